@@ -1,0 +1,14 @@
+//! Where the flow meets the grains: rigidity imposed on the grid, loads on the grains (Eq. 5).
+
+use serde::{Deserialize, Serialize};
+
+/// How rigidity is imposed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scheme {
+    /// Smoothed ghost-Dirichlet drag with aperture-corrected advection (the default).
+    #[default]
+    Aperture,
+    /// The paper's own: solve without the grain, blend by solid fraction, project again.
+    Paper,
+}

@@ -1,0 +1,53 @@
+//! A grain: a shared shape, a density, and its state of motion.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use grainwake_shape::Shape;
+use serde::{Deserialize, Serialize};
+
+use crate::math::Pose;
+
+/// Whether the three components of a velocity follow the dynamics or are given.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Dof {
+    /// Follows Newton's (Euler's) law.
+    Free,
+    /// Held at this velocity [m/s] or angular velocity [rad/s, space frame]; zero holds still.
+    Prescribed(DVec3),
+}
+
+/// One grain. Velocities are at integer times and in the space frame.
+#[derive(Clone, Debug)]
+pub struct Grain {
+    /// Shape, shared between equal grains.
+    pub shape: Arc<Shape>,
+    /// Density [kg/m^3].
+    pub density: f64,
+    /// Position and orientation.
+    pub pose: Pose,
+    /// Velocity of the centroid [m/s].
+    pub velocity: DVec3,
+    /// Angular velocity, space frame [rad/s].
+    pub angular_velocity: DVec3,
+    /// Law of the translation.
+    pub translation: Dof,
+    /// Law of the rotation.
+    pub rotation: Dof,
+}
+
+impl Grain {
+    /// Mass [kg].
+    pub fn mass(&self) -> f64 {
+        self.density * self.shape.volume()
+    }
+    /// Inertia tensor in the space frame [kg m^2].
+    pub fn inertia(&self) -> DMat3 {
+        let turn = DMat3::from_quat(self.pose.orientation);
+        turn * DMat3::from_diagonal(self.shape.inertia() * self.density) * turn.transpose()
+    }
+    /// Rigid velocity V + Omega x (x - X) at a point of the space frame [m/s].
+    pub fn velocity_at(&self, x: DVec3) -> DVec3 {
+        self.velocity + self.angular_velocity.cross(x - self.pose.position)
+    }
+}

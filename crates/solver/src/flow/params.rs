@@ -1,0 +1,28 @@
+//! Parameters of the fluid.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Advection scheme.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Advection {
+    /// Conservative second-order central differences: no numerical dissipation.
+    #[default]
+    Central,
+}
+
+/// The fluid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FluidParams {
+    /// Density [kg/m^3].
+    pub density: f64,
+    /// Kinematic viscosity [m^2/s].
+    pub kinematic_viscosity: f64,
+    /// Uniform acceleration that drives the flow (a mean pressure gradient over density) [m/s^2].
+    pub body_acceleration: DVec3,
+    /// Uniform velocity at the start [m/s].
+    pub initial_velocity: DVec3,
+    /// Advection scheme.
+    pub advection: Advection,
+}

@@ -1,0 +1,5 @@
+//! The uniform staggered (MAC) grid.
+
+mod mesh;
+
+pub use mesh::{Axis, Mesh};

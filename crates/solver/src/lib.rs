@@ -1,0 +1,14 @@
+//! CFD-iDEM: incompressible flow resolved around real grains, coupled to an image-based DEM.
+//!
+//! Layers, each importing only from those above it in this list:
+//! `math` -> `grid` -> `poisson`, `dem` -> `flow` -> `coupling` -> `sim` -> `case`, `output`.
+
+pub mod math;
+pub mod grid;
+pub mod poisson;
+pub mod dem;
+pub mod flow;
+pub mod coupling;
+pub mod sim;
+pub mod case;
+pub mod output;

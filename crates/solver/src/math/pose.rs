@@ -1,0 +1,51 @@
+//! Where a body is and how it is turned.
+
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// Position of the centroid and orientation (rotates body vectors into the space frame).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pose {
+    /// Centroid in the space frame [m].
+    pub position: DVec3,
+    /// Unit quaternion, body -> space.
+    pub orientation: DQuat,
+}
+
+impl Pose {
+    /// Space point -> body point.
+    pub fn to_body(&self, x: DVec3) -> DVec3 {
+        self.orientation.conjugate() * (x - self.position)
+    }
+    /// Body point -> space point.
+    pub fn to_space(&self, x: DVec3) -> DVec3 {
+        self.position + self.orientation * x
+    }
+}
+
+/// A force [N] and a torque about the centroid [N m], both in the space frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Load {
+    /// Force [N].
+    pub force: DVec3,
+    /// Torque about the centroid [N m].
+    pub torque: DVec3,
+}
+
+impl std::ops::Add for Load {
+    type Output = Load;
+    fn add(self, other: Load) -> Load {
+        Load { force: self.force + other.force, torque: self.torque + other.torque }
+    }
+}
+impl std::ops::AddAssign for Load {
+    fn add_assign(&mut self, other: Load) {
+        *self = *self + other;
+    }
+}
+impl std::ops::Mul<f64> for Load {
+    type Output = Load;
+    fn mul(self, factor: f64) -> Load {
+        Load { force: self.force * factor, torque: self.torque * factor }
+    }
+}
