@@ -1,5 +1,6 @@
 //! The coupled simulation: set-up, the time step, the clock and diagnostics.
 
+pub mod events;
 mod setup;
 
 use std::io::{self, Read, Write};
