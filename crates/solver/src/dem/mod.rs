@@ -70,12 +70,23 @@ impl Dynamics {
     /// Advances poses and velocities by `dt` [s] in sub-steps under constant `loads` plus contact;
     /// returns through `mean_contact` the time mean of the contact load on each grain.
     pub fn advance(&mut self, grains: &mut [Grain], loads: &[Load], dt: f64, mean_contact: &mut [Load]) -> usize {
-        let _ = (loads, self.params, self.enclosure);
+        let _ = (self.params, self.enclosure);
         mean_contact.fill(Load::default());
-        for grain in grains.iter_mut() {
-            grain.pose.position += grain.velocity * dt;
+        for (grain, load) in grains.iter_mut().zip(loads) {
+            if grain.translation == Dof::Free {
+                grain.pose.position += grain.velocity * dt + load.force * (0.5 * dt * dt / grain.mass());
+                grain.velocity += load.force * (dt / grain.mass());
+            }
         }
         1
+    }
+    /// save
+    pub fn save(&self, _: &mut dyn std::io::Write) -> std::io::Result<()> {
+        Ok(())
+    }
+    /// restore
+    pub fn restore(&mut self, _: &mut dyn std::io::Read) -> std::io::Result<()> {
+        Ok(())
     }
 }
 

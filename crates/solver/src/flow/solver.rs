@@ -225,6 +225,27 @@ impl Flow {
         }
     }
 
+    /// Projects the prediction in place: u* becomes the flow without grains, and the pressure takes
+    /// its increment (the first of the two projections of the paper's scheme).
+    pub fn project_prediction(&mut self, dt: f64) {
+        self.project(dt);
+        for axis in 0..3 {
+            self.predicted.component_mut(axis).copy_from_slice(self.velocity.component(axis));
+        }
+    }
+
+    /// Everything that a later step depends on.
+    pub fn state(&self) -> [&[f64]; 7] {
+        let (u, h) = (&self.velocity, &self.tendency);
+        [&u.x, &u.y, &u.z, &h.x, &h.y, &h.z, &self.pressure]
+    }
+    /// The same to be overwritten by a state whose last step was `last_step` [s] long.
+    pub fn state_mut(&mut self, last_step: f64) -> [&mut [f64]; 7] {
+        self.previous_step = (last_step > 0.0).then_some(last_step);
+        let (u, h) = (&mut self.velocity, &mut self.tendency);
+        [&mut u.x, &mut u.y, &mut u.z, &mut h.x, &mut h.y, &mut h.z, &mut self.pressure]
+    }
+
     /// The grid.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
