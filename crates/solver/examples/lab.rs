@@ -62,7 +62,7 @@ fn main() {
             let exact = 8.0 * std::f64::consts::PI * nu * 0.125 * om;
             while s.time() < num(4, 1.0) {
                 s.step(f64::INFINITY).unwrap();
-                if s.steps() % 200 == 0 { println!("t {:.3} T/T0 {:.5} F {:?}", s.time(), -s.loads()[0].torque.y / exact, s.loads()[0].force.length()); }
+                if s.steps() % 100 == 0 { println!("t {:.3} T/T0 {:.5} F {:?}", s.time(), -s.loads()[0].torque.y / exact, s.loads()[0].force.length()); }
             }
             println!("finite-size: (R/(L/2))^3 ~ {:.5}", (1.0 / l).powi(3));
         }
@@ -80,7 +80,7 @@ fn main() {
                 fluid: Some(fluid(1.0, nu)), scheme, gravity: DVec3::ZERO, grains: vec![g], contact: Default::default(), step: limits }).unwrap();
             while s.time() < num(4, 6.0) {
                 s.step(f64::INFINITY).unwrap();
-                if s.steps() % 1000 == 0 { println!("t {:.3} spin/gdot {:.5}", s.time(), s.grains()[0].angular_velocity.y / gdot); }
+                if s.steps() % 4000 == 0 { println!("t {:.3} spin/gdot {:.5}", s.time(), s.grains()[0].angular_velocity.y / gdot); }
             }
         }
         "tencate" => {
@@ -100,6 +100,23 @@ fn main() {
                 if s.time() >= next { println!("t {:.3} u {:.5} h/d {:.3} dt {:.5}", s.time(), g.velocity.z, (g.pose.position.z - 0.0075) / 0.015, s.time_step()); next += 0.1; }
             }
             println!("E{e} peak {peak:.5} ratio {:.4} at {tp:.3} wall {:.1}", peak / uinf, start.elapsed().as_secs_f64());
+        }
+        "bench" => {
+            let h = 0.25e-3;
+            let mesh = Mesh { cells: [num(2, 100.0) as usize, num(3, 100.0) as usize, num(4, 390.0) as usize], spacing: DVec3::splat(h), origin: DVec3::ZERO };
+            let e = mesh.extent();
+            let gr = vec![sphere(2e-3, 0.5 * e, 1500.0), sphere(2e-3, 0.5 * e + DVec3::new(0.0, 0.0, 5e-3), 1500.0)];
+            let mut s = Simulation::new(Setup { mesh, boundaries: Boundaries([[wall; 2]; 3]),
+                fluid: Some(fluid(1000.0, 1e-6)), scheme, gravity: DVec3::new(0.0, 0.0, -9.81), grains: gr, contact: Default::default(), step: StepRule::Fixed(2e-4) }).unwrap();
+            for _ in 0..2 { s.step(f64::INFINITY).unwrap(); }
+            let p0 = s.pass_times();
+            let t = std::time::Instant::now();
+            let n = num(5, 10.0) as usize;
+            for _ in 0..n { s.step(f64::INFINITY).unwrap(); }
+            let c = 1e9 / n as f64 / mesh.cell_count() as f64;
+            println!("ns/cell/step {:.1}", t.elapsed().as_secs_f64() * c);
+            for (a, b) in p0.iter().zip(s.pass_times()) { println!("{} {:.1}", a.0, (b.1 - a.1) * c); }
+            println!("bytes/cell {:.1}", s.bytes() as f64 / mesh.cell_count() as f64);
         }
         "carry" => {
             // sphere carried at constant speed through a periodic box, force noise

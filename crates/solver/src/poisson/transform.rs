@@ -11,8 +11,8 @@ use rustfft::{Fft, FftPlanner, num_complex::Complex64};
 
 use super::Ends;
 
-/// Pairs of lines transformed at a time: eight columns fill a cache line.
-const PAIRS: usize = 4;
+/// Lines transformed at a time: eight neighbouring columns fill a cache line.
+const LINES: usize = 8;
 
 /// Where the lines of a plane lie in memory.
 #[derive(Clone, Copy)]
@@ -37,11 +37,10 @@ impl LineScratch {
     pub fn new(transforms: [&Transform; 2]) -> LineScratch {
         let n = transforms.map(|t| t.n).into_iter().max().unwrap_or(1);
         let fft = transforms.map(Transform::scratch_len).into_iter().max().unwrap_or(0);
-        let zero = Complex64::new(0.0, 0.0);
-        LineScratch { lines: vec![zero; PAIRS * n], fft: vec![zero; fft] }
+        LineScratch { lines: vec![Complex64::ZERO; LINES / 2 * n], fft: vec![Complex64::ZERO; fft] }
     }
     pub fn bytes(&self) -> usize {
-        16 * (self.lines.len() + self.fft.len())
+        size_of::<Complex64>() * (self.lines.len() + self.fft.len())
     }
 }
 
@@ -91,115 +90,172 @@ impl Transform {
 
     /// Lines -> modes, in place.
     pub fn forward(&self, plane: &mut [f64], at: Lines, scratch: &mut LineScratch) {
-        self.for_groups(at, |pairs, group| {
-            let LineScratch { lines, fft } = &mut *scratch;
-            let n = self.n;
-            for m in 0..n {
-                for p in 0..pairs {
-                    let (a, b) = group.entries(p, m);
-                    let imaginary = b.map_or(0.0, |b| plane[b]);
-                    lines[p * n + self.order[m]] = Complex64::new(plane[a], imaginary);
-                }
+        let (n, LineScratch { lines, fft }) = (self.n, scratch);
+        for group in self.groups(at) {
+            let lines = &mut lines[..group.pairs() * n];
+            group.load(plane, lines, &self.order);
+            self.forward.process_with_scratch(lines, fft);
+            let half = |z: Complex64, w: Complex64| {
+                let (sum, difference) = (z + w.conj(), z - w.conj());
+                (sum * 0.5, Complex64::new(0.5 * difference.im, -0.5 * difference.re))
+            };
+            match self.ends {
+                Ends::Neumann => group.store(plane, n, |p, k| {
+                    let line = &lines[p * n..(p + 1) * n];
+                    let (va, vb) = half(line[k], line[if k == 0 { 0 } else { n - k }]);
+                    let t = self.turn[k];
+                    (t.re * va.re + t.im * va.im, t.re * vb.re + t.im * vb.im)
+                }),
+                // Index k <= n/2 holds the cosine part of mode k, index n - k its sine part.
+                Ends::Periodic => group.store(plane, n, |p, k| {
+                    let line = &lines[p * n..(p + 1) * n];
+                    let (va, vb) = half(line[k], line[if k == 0 { 0 } else { n - k }]);
+                    if 2 * k <= n { (va.re, vb.re) } else { (-va.im, -vb.im) }
+                }),
             }
-            self.forward.process_with_scratch(&mut lines[..pairs * n], fft);
-            for k in 0..n {
-                let mirror = if k == 0 { 0 } else { n - k };
-                for p in 0..pairs {
-                    let (z, w) = (lines[p * n + k], lines[p * n + mirror].conj());
-                    let (va, ib) = ((z + w) * 0.5, (z - w) * 0.5);
-                    let vb = Complex64::new(ib.im, -ib.re);
-                    let (a, b) = group.entries(p, k);
-                    plane[a] = self.mode(k, va);
-                    if let Some(b) = b {
-                        plane[b] = self.mode(k, vb);
-                    }
-                }
-            }
-        });
+        }
     }
 
     /// Modes -> lines, in place, unnormalised.
     pub fn inverse(&self, plane: &mut [f64], at: Lines, scratch: &mut LineScratch) {
-        self.for_groups(at, |pairs, group| {
-            let LineScratch { lines, fft } = &mut *scratch;
-            let n = self.n;
-            for k in 0..n {
-                let mirror = n - k;
-                for p in 0..pairs {
-                    let (a, b) = group.entries(p, k);
-                    let (am, bm) = group.entries(p, mirror % n);
-                    let pair = |at: usize, mirrored: usize| {
-                        let mirrored = if k == 0 { 0.0 } else { plane[mirrored] };
-                        self.spectrum(k, plane[at], mirrored)
-                    };
-                    let va = pair(a, am);
-                    let vb = match (b, bm) {
-                        (Some(b), Some(bm)) => pair(b, bm),
-                        _ => Complex64::new(0.0, 0.0),
-                    };
-                    lines[p * n + k] = Complex64::new(va.re - vb.im, va.im + vb.re);
-                }
-            }
-            self.inverse.process_with_scratch(&mut lines[..pairs * n], fft);
-            for m in 0..n {
-                for p in 0..pairs {
-                    let value = lines[p * n + self.order[m]];
-                    let (a, b) = group.entries(p, m);
-                    plane[a] = value.re;
-                    if let Some(b) = b {
-                        plane[b] = value.im;
+        let (n, LineScratch { lines, fft }) = (self.n, scratch);
+        for group in self.groups(at) {
+            let lines = &mut lines[..group.pairs() * n];
+            let combine = |va: Complex64, vb: Complex64| Complex64::new(va.re - vb.im, va.im + vb.re);
+            match self.ends {
+                Ends::Neumann => group.load_modes(plane, lines, n, |k, [a, b], [am, bm]| {
+                    let t = self.turn[k];
+                    combine(t * Complex64::new(a, -am), t * Complex64::new(b, -bm))
+                }),
+                Ends::Periodic => group.load_modes(plane, lines, n, |k, [a, b], [am, bm]| {
+                    if k == 0 || 2 * k == n {
+                        Complex64::new(a, b)
+                    } else if 2 * k < n {
+                        combine(Complex64::new(a, am), Complex64::new(b, bm))
+                    } else {
+                        combine(Complex64::new(am, -a), Complex64::new(bm, -b))
                     }
-                }
+                }),
             }
-        });
-    }
-
-    /// Real coefficient stored for the complex coefficient `k` of a real line.
-    #[inline(always)]
-    fn mode(&self, k: usize, v: Complex64) -> f64 {
-        match self.ends {
-            Ends::Neumann => self.turn[k].re * v.re + self.turn[k].im * v.im,
-            Ends::Periodic if 2 * k <= self.n => v.re,
-            // Index n - k holds the sine part of mode k; v here is the conjugate of that mode.
-            Ends::Periodic => -v.im,
+            self.inverse.process_with_scratch(lines, fft);
+            group.store(plane, n, |p, m| {
+                let value = lines[p * n + self.order[m]];
+                (value.re, value.im)
+            });
         }
     }
 
-    /// Complex coefficient `k` of a real line from its stored modes `k` and `n - k`.
-    #[inline(always)]
-    fn spectrum(&self, k: usize, here: f64, mirrored: f64) -> Complex64 {
-        match self.ends {
-            Ends::Neumann => self.turn[k] * Complex64::new(here, -mirrored),
-            Ends::Periodic if k == 0 || 2 * k == self.n => Complex64::new(here, 0.0),
-            Ends::Periodic if 2 * k < self.n => Complex64::new(here, mirrored),
-            Ends::Periodic => Complex64::new(mirrored, -here),
-        }
-    }
-
-    fn for_groups(&self, at: Lines, mut f: impl FnMut(usize, Group)) {
-        if self.n == 1 {
-            return;
-        }
-        for start in (0..at.count).step_by(2 * PAIRS) {
-            let lines = (at.count - start).min(2 * PAIRS);
-            f(lines.div_ceil(2), Group { at, start, lines });
-        }
+    fn groups(&self, at: Lines) -> impl Iterator<Item = Group> + use<> {
+        let count = if self.n == 1 { 0 } else { at.count };
+        (0..count).step_by(LINES).map(move |start| Group {
+            first: at.first + start * at.apart,
+            lines: (count - start).min(LINES),
+            apart: at.apart,
+            step: at.step,
+        })
     }
 }
 
-/// A few neighbouring lines.
+/// A few neighbouring lines; an odd count leaves the last one without a partner.
 #[derive(Clone, Copy)]
 struct Group {
-    at: Lines,
-    start: usize,
+    first: usize,
     lines: usize,
+    apart: usize,
+    step: usize,
 }
 
 impl Group {
-    /// Memory positions of entry `m` of both lines of pair `p`; an odd count leaves one alone.
-    #[inline(always)]
-    fn entries(&self, p: usize, m: usize) -> (usize, Option<usize>) {
-        let a = self.at.first + (self.start + 2 * p) * self.at.apart + m * self.at.step;
-        (a, (2 * p + 1 < self.lines).then_some(a + self.at.apart))
+    fn pairs(&self) -> usize {
+        self.lines.div_ceil(2)
+    }
+
+    /// Packs the lines in the order of the FFT's input.
+    #[inline]
+    fn load(&self, plane: &[f64], lines: &mut [Complex64], order: &[usize]) {
+        let n = order.len();
+        if self.step == 1 {
+            for p in 0..self.pairs() {
+                let [a, b] = self.rows(p);
+                let (a, b) = (&plane[a..a + n], &plane[b..b + n]);
+                let line = &mut lines[p * n..(p + 1) * n];
+                for m in 0..n {
+                    line[order[m]] = Complex64::new(a[m], b[m]);
+                }
+            }
+        } else {
+            for (m, &to) in order.iter().enumerate() {
+                let entries = &plane[self.first + m * self.step..][..self.lines];
+                for (p, pair) in entries.chunks(2).enumerate() {
+                    lines[p * n + to] = Complex64::new(pair[0], pair[pair.len() - 1]);
+                }
+            }
+        }
+    }
+
+    /// Packs spectra: `f(k, [a, b] at k, [a, b] at n - k)`, zero standing for the entry n.
+    #[inline]
+    fn load_modes(
+        &self,
+        plane: &[f64],
+        lines: &mut [Complex64],
+        n: usize,
+        f: impl Fn(usize, [f64; 2], [f64; 2]) -> Complex64,
+    ) {
+        if self.step == 1 {
+            for p in 0..self.pairs() {
+                let [a, b] = self.rows(p);
+                let (a, b) = (&plane[a..a + n], &plane[b..b + n]);
+                let line = &mut lines[p * n..(p + 1) * n];
+                line[0] = f(0, [a[0], b[0]], [0.0; 2]);
+                for k in 1..n {
+                    line[k] = f(k, [a[k], b[k]], [a[n - k], b[n - k]]);
+                }
+            }
+        } else {
+            for k in 0..n {
+                let entries = &plane[self.first + k * self.step..][..self.lines];
+                let mirrored = &plane[self.first + (n - k) % n * self.step..][..self.lines];
+                for (p, (pair, mirror)) in entries.chunks(2).zip(mirrored.chunks(2)).enumerate() {
+                    let last = pair.len() - 1;
+                    let mirror = if k == 0 { [0.0; 2] } else { [mirror[0], mirror[last]] };
+                    lines[p * n + k] = f(k, [pair[0], pair[last]], mirror);
+                }
+            }
+        }
+    }
+
+    /// Stores `f(pair, entry)` for both lines of each pair.
+    #[inline]
+    fn store(&self, plane: &mut [f64], n: usize, f: impl Fn(usize, usize) -> (f64, f64)) {
+        if self.step == 1 {
+            for p in 0..self.pairs() {
+                let [a, b] = self.rows(p);
+                for m in 0..n {
+                    // A line without a partner is its own: the second store repeats the first.
+                    let (first, second) = f(p, m);
+                    plane[b + m] = if a == b { first } else { second };
+                    plane[a + m] = first;
+                }
+            }
+        } else {
+            for m in 0..n {
+                let entries = &mut plane[self.first + m * self.step..][..self.lines];
+                for (p, pair) in entries.chunks_mut(2).enumerate() {
+                    let (first, second) = f(p, m);
+                    pair[0] = first;
+                    if let Some(entry) = pair.get_mut(1) {
+                        *entry = second;
+                    }
+                }
+            }
+        }
+    }
+
+    /// First entries of the two rows of pair `p`.
+    #[inline]
+    fn rows(&self, p: usize) -> [usize; 2] {
+        let a = self.first + 2 * p * self.apart;
+        [a, if 2 * p + 1 < self.lines { a + self.apart } else { a }]
     }
 }
