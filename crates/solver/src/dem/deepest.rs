@@ -30,7 +30,7 @@ impl Probe {
 }
 
 /// Newton's projection onto the zero level of the shape.
-fn project(surface: &Shape, mut x: DVec3) -> DVec3 {
+pub(super) fn project(surface: &Shape, mut x: DVec3) -> DVec3 {
     for _ in 0..2 {
         let (distance, gradient) = surface.distance_and_gradient(x);
         let square = gradient.length_squared();

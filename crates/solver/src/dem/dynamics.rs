@@ -12,7 +12,7 @@ use super::grain::{Dof, Grain};
 use super::history::{PairKey, Slot, renew};
 use super::law::{Law, Motion, Pair};
 use super::motion::{MidStep, kick, kick_and_drift};
-use super::narrow_phase::{Body, grain_grain, grain_wall};
+use super::narrow_phase::Body;
 use super::node_tree::NodeTree;
 use super::params::ContactParams;
 use super::{Contact, Partner};
@@ -379,17 +379,12 @@ fn look_at(
             pair.inverse_mass += actors[j].inverse_mass;
             pair.radius = radius * other / (radius + other);
             pair.wall = false;
-            grain_grain(&a, &b, law.reach(), &mut slot.touches)
+            slot.patch.of_grains(&a, &b, law.reach())
         }
         Partner::Wall { axis, side } => {
             let face = enclosure.plane(axis as usize, side as usize);
-            grain_wall(
-                &a,
-                face.inward,
-                face.distance(a.position),
-                law.reach(),
-                &mut slot.touches,
-            )
+            let offset = face.distance(a.position);
+            slot.patch.of_wall(&a, face.inward, offset, law.reach())
         }
     };
     law.apply(slot, closest, &pair, step);

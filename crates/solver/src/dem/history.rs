@@ -3,7 +3,7 @@
 use glam::{DVec3, IVec3};
 
 use super::Partner;
-use super::narrow_phase::Touch;
+use super::narrow_phase::Patch;
 use crate::math::Load;
 
 /// A pair: ordered by grain, then partner (grains before walls), then image.
@@ -69,6 +69,8 @@ pub(super) struct Slot {
     pub key: PairKey,
     /// Whether it touched when last looked at.
     pub touching: bool,
+    /// Part of the dashpot at work: less than one just after the contact began.
+    pub onset: f64,
     /// Share-weighted mean of the displacements then, and its normal: what a new node inherits.
     pub mean: Memory,
     /// Displacements by node.
@@ -76,7 +78,7 @@ pub(super) struct Slot {
     /// Displacements being written.
     pub next: Vec<Memory>,
     /// Penetrating nodes of the last look.
-    pub touches: Vec<Touch>,
+    pub patch: Patch,
     /// Result of the last look.
     pub outcome: Outcome,
 }
@@ -93,20 +95,22 @@ impl Slot {
         Slot {
             key,
             touching: false,
+            onset: 1.0,
             mean: NOTHING,
             memory: Vec::new(),
             next: Vec::new(),
-            touches: Vec::new(),
+            patch: Patch::default(),
             outcome: Outcome::default(),
         }
     }
     /// Forgets everything but the buffers.
     pub fn clear(&mut self) {
         self.touching = false;
+        self.onset = 1.0;
         self.mean = NOTHING;
         self.memory.clear();
         self.next.clear();
-        self.touches.clear();
+        self.patch.touches.clear();
         self.outcome = Outcome::default();
     }
 }

@@ -51,6 +51,58 @@ pub(super) struct Pair {
 pub(super) struct Law {
     pub params: ContactParams,
     damping_ratio: f64,
+    /// k_zeta [N/m].
+    tangential: f64,
+}
+
+/// What the points of a patch have in common.
+#[derive(Clone, Copy, Debug)]
+struct Mean {
+    /// Deepest overlap [m].
+    overlap: f64,
+    /// Sum of area times depth [m^3].
+    total: f64,
+    /// Mean of the normals: shorter than one where they differ.
+    normal: DVec3,
+    arm: DVec3,
+    /// Closing speed along the normals [m/s].
+    approach: f64,
+}
+
+impl Mean {
+    fn of(touches: &[Touch], pair: &Pair) -> Option<Mean> {
+        let overlap = touches.iter().map(|t| t.depth).fold(0.0, f64::max);
+        let total: f64 = touches.iter().map(|t| t.area * t.depth).sum();
+        if overlap <= 0.0 || total <= 0.0 {
+            return None;
+        }
+        let mut mean = Mean {
+            overlap,
+            total,
+            normal: DVec3::ZERO,
+            arm: DVec3::ZERO,
+            approach: 0.0,
+        };
+        for touch in touches {
+            let share = touch.area * touch.depth / total;
+            mean.normal += share * touch.normal;
+            mean.arm += share * touch.arm;
+            mean.approach += share * relative(&pair.now, touch, pair.apart).dot(touch.normal);
+        }
+        Some(mean)
+    }
+}
+
+/// What the friction of every point of a patch depends on.
+#[derive(Clone, Copy, Debug)]
+struct Rub {
+    /// Normal force of the pair [N].
+    press: f64,
+    /// Tangential dashpot [N s/m].
+    dashpot: f64,
+    /// Part of the sub-step in contact, and all of it [s].
+    since: f64,
+    step: f64,
 }
 
 /// Turns `v` by the smallest rotation that takes `from` to `to` (R of Eq. 14).
@@ -61,9 +113,11 @@ fn carry(v: DVec3, from: DVec3, to: DVec3) -> DVec3 {
 
 impl Law {
     pub fn new(params: ContactParams) -> Law {
+        let tangential = params.normal_stiffness * params.tangential_ratio;
         Law {
             params,
             damping_ratio: params.damping_ratio(),
+            tangential,
         }
     }
 
@@ -79,125 +133,130 @@ impl Law {
     /// Loads of the pair at the end of a sub-step of length `step` [s] (zero: the state as it is),
     /// into `slot.outcome`; moves the memory on.
     pub fn apply(&self, slot: &mut Slot, closest: Option<Closest>, pair: &Pair, step: f64) {
-        let overlap = slot.touches.iter().map(|t| t.depth).fold(0.0, f64::max);
-        if overlap <= 0.0 {
+        let Some(mean) = Mean::of(&slot.patch.touches, pair) else {
             slot.clear();
             if let Some(closest) = closest {
                 slot.outcome = self.lubrication(&closest, pair, step);
             }
             return;
-        }
-        let Slot {
-            touching,
-            mean,
-            memory,
-            next,
-            touches,
-            outcome,
-            ..
-        } = slot;
-        let total: f64 = touches.iter().map(|t| t.area * t.depth).sum();
-        let (mut normal, mut arm, mut approach) = (DVec3::ZERO, DVec3::ZERO, 0.0);
-        for touch in touches.iter() {
-            let share = touch.area * touch.depth / total;
-            normal += share * touch.normal;
-            arm += share * touch.arm;
-            approach += share * relative(&pair.now, touch, pair.apart).dot(touch.normal);
-        }
+        };
+        let k = self.params.normal_stiffness;
+        // A new contact began somewhere inside the sub-step: its dashpot, which does not start from
+        // zero, has acted for `since` of it.
+        let begins = !slot.touching && mean.approach * step > mean.overlap;
+        let since = if begins {
+            mean.overlap / mean.approach
+        } else {
+            step
+        };
+        slot.onset = match (begins, step > 0.0 && slot.touching) {
+            (true, _) => 0.5 + since / step,
+            (false, true) => 1.0,
+            // The same moment looked at again, or grains that overlap from the start.
+            (false, false) => slot.onset,
+        };
+        let dashpot = slot.onset * self.dashpot(pair);
+        let rub = Rub {
+            press: (k * mean.overlap + dashpot * mean.approach).max(0.0),
+            dashpot: dashpot * self.params.tangential_damping,
+            since,
+            step,
+        };
         // Normals of one patch hardly differ; those of opposite flanks may cancel, and then the
         // force is what the flanks leave over.
-        let scale = 1.0 / normal.length().max(0.9);
-        let k = self.params.normal_stiffness;
-        let dashpot = if pair.inverse_mass > 0.0 {
-            2.0 * self.damping_ratio * (k / pair.inverse_mass).sqrt()
-        } else {
-            0.0
-        };
-        let press = (k * overlap + dashpot * approach).max(0.0);
-        let friction = if pair.wall {
-            self.params.wall_friction
-        } else {
-            self.params.friction
-        };
-        let tangential = k * self.params.tangential_ratio;
-        let rub = dashpot * self.params.tangential_damping;
-        let sliding = friction > 0.0 && tangential > 0.0;
-        // A new contact began somewhere inside the sub-step.
-        let since = if *touching || approach * step <= overlap {
-            step
-        } else {
-            overlap / approach
-        };
+        let scale = 1.0 / mean.normal.length().max(0.9);
+        let center = mean.normal.normalize_or(slot.patch.touches[0].normal);
 
-        next.clear();
-        let mut load = [Load::default(); 2];
-        let (mut slips, mut stored) = (DVec3::ZERO, 0.0);
-        let mut known = memory.iter().peekable();
-        let center = normal.normalize_or(touches[0].normal);
-        for touch in touches.iter() {
-            let share = touch.area * touch.depth / total;
-            let mut force = -(press * share * scale) * touch.normal;
-            if sliding {
-                while known.next_if(|m| m.code < touch.code).is_some() {}
-                let old = known
-                    .next_if(|m| m.code == touch.code)
-                    .or(touching.then_some(&*mean));
-                let mut slip = match old {
-                    Some(old) => {
-                        let twist = 0.5
-                            * step
-                            * (pair.during[0].spin + pair.during[1].spin).dot(touch.normal);
-                        let carried = carry(old.slip, old.normal, touch.normal);
-                        if twist == 0.0 {
-                            carried
-                        } else {
-                            DQuat::from_axis_angle(touch.normal, twist) * carried
-                        }
-                    }
-                    None => DVec3::ZERO,
-                };
-                let across = |v: DVec3| v - v.dot(touch.normal) * touch.normal;
-                slip += since * across(relative(&pair.during, touch, pair.apart));
-                let drag = rub * across(relative(&pair.now, touch, pair.apart));
-                let mut pull = -(tangential * slip + drag);
-                let limit = friction * press;
-                if pull.length_squared() > limit * limit {
-                    pull *= limit / pull.length();
-                    slip = -(pull + drag) / tangential;
+        let mut outcome = Outcome {
+            overlap: mean.overlap,
+            arm: mean.arm,
+            normal: center,
+            elastic_energy: 0.5 * k * mean.overlap * mean.overlap,
+            ..Default::default()
+        };
+        let (mut slips, mut known) = (DVec3::ZERO, 0);
+        slot.next.clear();
+        for touch in &slot.patch.touches {
+            let share = touch.area * touch.depth / mean.total;
+            let mut force = -(rub.press * share * scale) * touch.normal;
+            if self.tangential > 0.0 && self.friction(pair) > 0.0 {
+                while slot.memory.get(known).is_some_and(|m| m.code < touch.code) {
+                    known += 1;
                 }
+                let own = slot.memory.get(known).filter(|m| m.code == touch.code);
+                let old = own.or(slot.touching.then_some(&slot.mean));
+                let (pull, slip) = self.friction_at(touch, old, pair, &rub);
                 force += share * pull;
                 slips += share * carry(slip, touch.normal, center);
-                stored += 0.5 * share * tangential * slip.length_squared();
-                next.push(Memory {
+                outcome.elastic_energy += 0.5 * share * self.tangential * slip.length_squared();
+                slot.next.push(Memory {
                     code: touch.code,
                     normal: touch.normal,
                     slip,
                 });
             }
-            load[0] += Load {
+            outcome.first += Load {
                 force,
                 torque: touch.arm.cross(force),
             };
-            load[1] += Load {
+            outcome.second += Load {
                 force: -force,
                 torque: -(touch.arm + pair.apart).cross(force),
             };
         }
-        std::mem::swap(memory, next);
-        *touching = true;
-        *mean = Memory {
+        std::mem::swap(&mut slot.memory, &mut slot.next);
+        slot.touching = true;
+        slot.mean = Memory {
             code: 0,
             normal: center,
             slip: slips,
         };
-        *outcome = Outcome {
-            overlap,
-            first: load[0],
-            second: load[1],
-            arm,
-            normal: center,
-            elastic_energy: 0.5 * k * overlap * overlap + stored,
-        };
+        slot.outcome = outcome;
+    }
+
+    /// Coefficient of the normal dashpot [N s/m].
+    fn dashpot(&self, pair: &Pair) -> f64 {
+        if pair.inverse_mass > 0.0 {
+            2.0 * self.damping_ratio * (self.params.normal_stiffness / pair.inverse_mass).sqrt()
+        } else {
+            0.0
+        }
+    }
+
+    fn friction(&self, pair: &Pair) -> f64 {
+        if pair.wall {
+            self.params.wall_friction
+        } else {
+            self.params.friction
+        }
+    }
+
+    /// Tangential force on the first grain as if this point carried the whole pair, and its
+    /// displacement (Eqs 13-15). Both Coulomb's bound and the stiffness scale with the share, so the
+    /// bound on the displacement does not depend on it.
+    fn friction_at(
+        &self,
+        touch: &Touch,
+        old: Option<&Memory>,
+        pair: &Pair,
+        rub: &Rub,
+    ) -> (DVec3, DVec3) {
+        let across = |v: DVec3| v - v.dot(touch.normal) * touch.normal;
+        let kept = old.map_or(DVec3::ZERO, |old| {
+            // The pair may turn as a whole about its normal, and the spring with it.
+            let twist =
+                0.5 * rub.step * (pair.during[0].spin + pair.during[1].spin).dot(touch.normal);
+            DQuat::from_axis_angle(touch.normal, twist) * carry(old.slip, old.normal, touch.normal)
+        });
+        let slip = kept + rub.since * across(relative(&pair.during, touch, pair.apart));
+        let drag = rub.dashpot * across(relative(&pair.now, touch, pair.apart));
+        let pull = -(self.tangential * slip + drag);
+        let limit = self.friction(pair) * rub.press;
+        if pull.length_squared() <= limit * limit {
+            return (pull, slip);
+        }
+        let pull = pull * (limit / pull.length());
+        (pull, -(pull + drag) / self.tangential)
     }
 
     /// Leading-order squeeze-film force between equal-volume spheres,

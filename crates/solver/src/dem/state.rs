@@ -94,6 +94,7 @@ impl Dynamics {
             }
             put_vector(w, slot.mean.normal)?;
             put_vector(w, slot.mean.slip)?;
+            put_real(w, slot.onset)?;
             put_real(w, slot.outcome.elastic_energy)?;
             put(w, slot.memory.len() as u64)?;
             for memory in &slot.memory {
@@ -187,6 +188,7 @@ fn read_slot(r: &mut dyn Read, grains: u64) -> io::Result<Slot> {
     slot.touching = true;
     slot.mean.normal = get_vector(r)?;
     slot.mean.slip = get_vector(r)?;
+    slot.onset = get_real(r)?;
     slot.outcome.elastic_energy = get_real(r)?;
     let nodes = get_count(r, u64::from(u32::MAX), "count of nodes")?;
     slot.memory = list(nodes);
