@@ -46,6 +46,33 @@ impl Grain {
         let turn = DMat3::from_quat(self.pose.orientation);
         turn * DMat3::from_diagonal(self.shape.inertia() * self.density) * turn.transpose()
     }
+    /// Principal moments of inertia [kg m^2].
+    pub fn principal_inertia(&self) -> DVec3 {
+        self.shape.inertia() * self.density
+    }
+    /// Mass that resists a contact force: infinite where the translation is prescribed [kg].
+    pub(super) fn inverse_mass(&self) -> f64 {
+        match self.translation {
+            Dof::Free => 1.0 / self.mass(),
+            Dof::Prescribed(_) => 0.0,
+        }
+    }
+    /// Kinetic energy of translation and rotation [J].
+    pub fn kinetic_energy(&self) -> f64 {
+        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
+        0.5 * self.mass() * self.velocity.length_squared()
+            + 0.5 * omega.dot(self.principal_inertia() * omega)
+    }
+    /// Linear momentum [kg m/s].
+    pub fn momentum(&self) -> DVec3 {
+        self.mass() * self.velocity
+    }
+    /// Angular momentum about the point `about` [kg m^2/s, space frame].
+    pub fn angular_momentum(&self, about: DVec3) -> DVec3 {
+        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
+        (self.pose.position - about).cross(self.momentum())
+            + self.pose.orientation * (self.principal_inertia() * omega)
+    }
     /// Rigid velocity V + Omega x (x - X) at a point of the space frame [m/s].
     pub fn velocity_at(&self, x: DVec3) -> DVec3 {
         self.velocity + self.angular_velocity.cross(x - self.pose.position)

@@ -1,27 +1,34 @@
 //! Image-based DEM: grains, contact (Eqs 7-18) and rigid motion (Eqs 19-37). Knows no grid.
+//!
+//! [`Dynamics::advance`] is the step: pairs that may touch (`broad_phase`), their penetrating nodes
+//! (`narrow_phase`), the forces (`law`, with the memory of `history`), and the motion (`motion`,
+//! `rotation`) in sub-steps of the contact time.
 
+mod broad_phase;
+mod deepest;
+mod dynamics;
+mod enclosure;
+mod gap;
 mod grain;
+mod history;
+mod law;
+mod motion;
+mod narrow_phase;
+mod node_tree;
 mod params;
+pub mod rotation;
+mod state;
+mod target;
 
 use glam::DVec3;
 
 use crate::math::Load;
 
+pub use dynamics::Dynamics;
+pub use enclosure::Enclosure;
+pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
 pub use grain::{Dof, Grain};
 pub use params::ContactParams;
-
-/// The box as the grains see it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Enclosure {
-    /// Lower corner [m].
-    pub lower: DVec3,
-    /// Upper corner [m].
-    pub upper: DVec3,
-    /// Axes along which images interact.
-    pub periodic: [bool; 3],
-    /// Faces `[axis][side]` that stop a grain.
-    pub solid: [[bool; 2]; 3],
-}
 
 /// What a grain touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -37,7 +44,8 @@ pub enum Partner {
     },
 }
 
-/// A touching pair at the end of a step; `grain` < partner when the partner is a grain.
+/// A touching pair at the end of a step; `grain` < partner when the partner is a grain, and equal
+/// where a grain touches its own periodic image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// First grain.
@@ -48,39 +56,8 @@ pub struct Contact {
     pub overlap: f64,
     /// Load on `grain` (the partner gets the opposite force).
     pub load: Load,
-}
-
-/// Contact law, history and integrator.
-#[derive(Clone, Debug)]
-pub struct Dynamics {
-    params: ContactParams,
-    enclosure: Enclosure,
-    contacts: Vec<Contact>,
-}
-
-impl Dynamics {
-    /// A system at rest without contact history.
-    pub fn new(params: ContactParams, enclosure: Enclosure) -> Dynamics {
-        Dynamics { params, enclosure, contacts: Vec::new() }
-    }
-    /// Contacts at the end of the last step.
-    pub fn contacts(&self) -> &[Contact] {
-        &self.contacts
-    }
-    /// Advances poses and velocities by `dt` [s] in sub-steps under constant `loads` plus contact;
-    /// returns through `mean_contact` the time mean of the contact load on each grain.
-    pub fn advance(&mut self, grains: &mut [Grain], loads: &[Load], dt: f64, mean_contact: &mut [Load]) -> usize {
-        let _ = (loads, self.params, self.enclosure);
-        mean_contact.fill(Load::default());
-        for grain in grains.iter_mut() {
-            grain.pose.position += grain.velocity * dt;
-        }
-        1
-    }
-}
-
-/// Smallest distance between the surfaces of two grains [m] (negative: overlap), nearest periodic image.
-pub fn surface_gap(a: &Grain, b: &Grain, enclosure: &Enclosure) -> f64 {
-    let _ = enclosure;
-    (a.pose.position - b.pose.position).length() - a.shape.bounding_radius() - b.shape.bounding_radius()
+    /// Mean point of contact, beside `grain` as it stands [m].
+    pub point: DVec3,
+    /// Mean unit normal, out of `grain`.
+    pub normal: DVec3,
 }

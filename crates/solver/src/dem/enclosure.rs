@@ -1,0 +1,140 @@
+//! The box as the grains see it: its faces, and its images along periodic axes.
+
+use glam::{DVec3, IVec3};
+
+/// The box as the grains see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Enclosure {
+    /// Lower corner [m].
+    pub lower: DVec3,
+    /// Upper corner [m].
+    pub upper: DVec3,
+    /// Axes along which images interact.
+    pub periodic: [bool; 3],
+    /// Faces `[axis][side]` that stop a grain; ignored along periodic axes.
+    pub solid: [[bool; 2]; 3],
+}
+
+/// A solid face as a half space: the grain is on the side of `inward`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Face {
+    /// Axis of the normal.
+    pub axis: usize,
+    /// 0 lower, 1 upper.
+    pub side: usize,
+    /// Unit normal that points into the box: the gradient of the wall's distance field.
+    pub inward: DVec3,
+    /// Coordinate of the face along its axis [m].
+    pub at: f64,
+}
+
+impl Face {
+    /// Signed distance of a point of the space frame, negative inside the wall [m].
+    pub fn distance(&self, x: DVec3) -> f64 {
+        self.inward[self.axis] * (x[self.axis] - self.at)
+    }
+}
+
+impl Enclosure {
+    /// Edge lengths [m].
+    pub fn size(&self) -> DVec3 {
+        self.upper - self.lower
+    }
+    /// Whether images along `axis` interact.
+    pub fn is_periodic(&self, axis: usize) -> bool {
+        self.periodic[axis] && self.size()[axis] > 0.0
+    }
+    /// Periods along the three axes [m], zero where not periodic.
+    pub(super) fn period(&self) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|axis| {
+            if self.is_periodic(axis) {
+                self.size()[axis]
+            } else {
+                0.0
+            }
+        }))
+    }
+    /// Face `side` of `axis`, if it stops grains.
+    pub(super) fn face(&self, axis: usize, side: usize) -> Option<Face> {
+        let solid = self.solid[axis][side] && !self.is_periodic(axis);
+        solid.then(|| self.plane(axis, side))
+    }
+    /// Face `side` of `axis` as a plane, solid or not.
+    pub(super) fn plane(&self, axis: usize, side: usize) -> Face {
+        let sign = if side == 0 { 1.0 } else { -1.0 };
+        let corner = if side == 0 { self.lower } else { self.upper };
+        Face {
+            axis,
+            side,
+            inward: sign * DVec3::AXES[axis],
+            at: corner[axis],
+        }
+    }
+    /// All faces that stop grains.
+    pub(super) fn faces(&self) -> impl Iterator<Item = Face> + '_ {
+        (0..6).filter_map(|k| self.face(k / 2, k % 2))
+    }
+    /// Number of periods by which `x` lies outside the box, zero along other axes (and at most a
+    /// million, so that a runaway grain cannot overflow the count).
+    pub(super) fn periods_outside(&self, x: DVec3) -> IVec3 {
+        let period = self.period();
+        IVec3::from_array([0, 1, 2].map(|axis| {
+            if period[axis] > 0.0 {
+                ((x[axis] - self.lower[axis]) / period[axis])
+                    .floor()
+                    .clamp(-1e6, 1e6) as i32
+            } else {
+                0
+            }
+        }))
+    }
+    /// The image of `x` inside the box along periodic axes [m].
+    pub fn wrap(&self, x: DVec3) -> DVec3 {
+        x - self.periods_outside(x).as_dvec3() * self.period()
+    }
+    /// The image of a separation that is shortest along every periodic axis [m].
+    pub fn nearest_image(&self, separation: DVec3) -> DVec3 {
+        let period = self.period();
+        DVec3::from_array([0, 1, 2].map(|axis| {
+            let (d, l) = (separation[axis], period[axis]);
+            if l > 0.0 { d - l * (d / l).round() } else { d }
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channel() -> Enclosure {
+        Enclosure {
+            lower: DVec3::new(-1.0, 0.0, 0.0),
+            upper: DVec3::new(1.0, 2.0, 3.0),
+            periodic: [true, false, false],
+            solid: [[true, true], [true, false], [false, false]],
+        }
+    }
+
+    #[test]
+    fn wraps_only_periodic_axes() {
+        let box_ = channel();
+        assert_eq!(
+            box_.wrap(DVec3::new(1.5, 5.0, -1.0)),
+            DVec3::new(-0.5, 5.0, -1.0)
+        );
+        assert_eq!(
+            box_.nearest_image(DVec3::new(1.5, 1.5, 0.0)),
+            DVec3::new(-0.5, 1.5, 0.0)
+        );
+    }
+
+    #[test]
+    fn solid_faces_are_half_spaces_and_periodic_axes_have_none() {
+        let box_ = channel();
+        let faces: Vec<_> = box_.faces().collect();
+        assert_eq!(faces.len(), 1);
+        assert_eq!((faces[0].axis, faces[0].side), (1, 0));
+        assert_eq!(faces[0].distance(DVec3::new(9.0, -0.25, 9.0)), -0.25);
+        assert_eq!(box_.plane(2, 1).distance(DVec3::new(0.0, 0.0, 2.0)), 1.0);
+    }
+}

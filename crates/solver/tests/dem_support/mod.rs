@@ -1,0 +1,142 @@
+//! Helpers of the contact tests.
+#![allow(dead_code)]
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+use grainwake_shape::Shape;
+use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain};
+use grainwake_solver::math::{Load, Pose};
+
+/// A sphere at rest.
+pub fn sphere(radius: f64, density: f64, nodes: usize, position: DVec3) -> Grain {
+    Grain {
+        shape: Arc::new(Shape::sphere(radius, nodes)),
+        density,
+        pose: Pose {
+            position,
+            // Turned so that no node points along an axis.
+            orientation: DQuat::from_scaled_axis(DVec3::new(0.4, -0.9, 0.3)),
+        },
+        velocity: DVec3::ZERO,
+        angular_velocity: DVec3::ZERO,
+        translation: Dof::Free,
+        rotation: Dof::Free,
+    }
+}
+
+/// A box of half width `half` about the origin without walls.
+pub fn open_box(half: f64) -> Enclosure {
+    Enclosure {
+        lower: DVec3::splat(-half),
+        upper: DVec3::splat(half),
+        periodic: [false; 3],
+        solid: [[false; 2]; 3],
+    }
+}
+
+/// A floor at z = 0 in an otherwise open box.
+pub fn floor() -> Enclosure {
+    Enclosure {
+        lower: DVec3::new(-10.0, -10.0, 0.0),
+        upper: DVec3::splat(10.0),
+        periodic: [false; 3],
+        solid: [[false; 2], [false; 2], [true, false]],
+    }
+}
+
+/// Frictionless and elastic, with this stiffness.
+pub fn smooth(stiffness: f64) -> ContactParams {
+    ContactParams {
+        normal_stiffness: stiffness,
+        friction: 0.0,
+        wall_friction: 0.0,
+        ..Default::default()
+    }
+}
+
+/// Weight of every grain.
+pub fn weights(grains: &[Grain], gravity: DVec3) -> Vec<Load> {
+    grains
+        .iter()
+        .map(|g| Load {
+            force: g.mass() * gravity,
+            torque: DVec3::ZERO,
+        })
+        .collect()
+}
+
+/// One step under gravity.
+pub fn step(dynamics: &mut Dynamics, grains: &mut [Grain], gravity: DVec3, dt: f64) -> usize {
+    let loads = weights(grains, gravity);
+    let mut mean = vec![Load::default(); grains.len()];
+    dynamics.advance(grains, &loads, dt, &mut mean)
+}
+
+/// Repeatable numbers in 0..1.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+    pub fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.next(), self.next(), self.next()) * 2.0 - 1.0
+    }
+}
+
+/// Every bit of a grain's state.
+pub fn bits(grains: &[Grain]) -> Vec<u64> {
+    let vector = |v: DVec3| v.to_array().map(f64::to_bits);
+    grains
+        .iter()
+        .flat_map(|g| {
+            let turn = g.pose.orientation.to_array().map(f64::to_bits);
+            let motion = [
+                vector(g.pose.position),
+                vector(g.velocity),
+                vector(g.angular_velocity),
+            ];
+            turn.into_iter()
+                .chain(motion.into_iter().flatten())
+                .collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+/// `count` spheres that do not touch in a cube of half width `half`, moving inwards at about `speed`.
+pub fn cloud(count: usize, half: f64, radius: f64, speed: f64, seed: u64) -> Vec<Grain> {
+    let mut random = Random(seed);
+    let shape = Arc::new(Shape::sphere(radius, 150));
+    let mut grains: Vec<Grain> = Vec::new();
+    while grains.len() < count {
+        let position = random.vector() * half;
+        if grains
+            .iter()
+            .all(|g| g.pose.position.distance(position) > 2.0 * radius)
+        {
+            grains.push(Grain {
+                shape: shape.clone(),
+                density: 1000.0 + 500.0 * random.next(),
+                pose: Pose {
+                    position,
+                    orientation: DQuat::from_scaled_axis(random.vector() * 3.0),
+                },
+                velocity: (random.vector() - position / half) * speed,
+                angular_velocity: random.vector() * speed / radius,
+                translation: Dof::Free,
+                rotation: Dof::Free,
+            });
+        }
+    }
+    grains
+}
+
+/// Kinetic energy [J].
+pub fn kinetic(grains: &[Grain]) -> f64 {
+    grains.iter().map(Grain::kinetic_energy).sum()
+}
