@@ -78,6 +78,8 @@ pub struct RawContact {
     pub wall_friction: Option<Loc<Quantity<Number>>>,
     /// Coefficient of restitution; 1 has no dashpot.
     pub restitution: Loc<Quantity<Number>>,
+    /// Tangential over normal dashpot, where `restitution` is below 1.
+    pub tangential_damping: Loc<Quantity<Number>>,
     /// Global damping xi [1/s] (Eqs 6, 22, 24).
     pub global_damping: Loc<Quantity<Rate>>,
     /// Lubrication correction below this gap [m]; 0 turns it off.
@@ -96,6 +98,7 @@ impl Default for RawContact {
             friction: Quantity::new(params.friction).into(),
             wall_friction: None,
             restitution: Quantity::new(params.restitution).into(),
+            tangential_damping: Quantity::new(params.tangential_damping).into(),
             global_damping: Quantity::new(params.global_damping).into(),
             lubrication_gap: Quantity::new(params.lubrication_gap).into(),
             substeps_per_contact: Quantity::new(params.substeps_per_contact).into(),
