@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use grainwake_shape::Shape;
+use grainwake_shape::{Shape, ShapeOptions, analytic};
 
+use super::loc::Loc;
+use super::quantity::{Length, Quantity};
 use super::raw::{RawShape, ShapeKind};
 
 /// Nodes of a closed form where none are asked for.
-const DEFAULT_NODES: usize = 2000;
+pub(super) const DEFAULT_NODES: usize = 2000;
 
 /// A `.grain` file that a case uses.
 #[derive(Clone, Debug)]
@@ -56,7 +58,10 @@ impl<'a> Library<'a> {
             ),
             _ => (format!("cannot read {}: {error}", path.display()), "check the file and its permissions".to_string()),
         })?;
-        let shape = load(&bytes, &path)?;
+        let shape = Shape::from_bytes(&bytes, &path).map_err(|error| {
+            let help = "a case takes .grain files; make one with `grainwake grain from-scan`, `from-mesh` or `make`";
+            (error.to_string(), help.to_string())
+        })?;
         let stem = path.file_stem().map_or_else(|| "grain".into(), |s| s.to_string_lossy().into_owned());
         let taken = |candidate: &str| self.files.values().any(|(f, _)| f.name == candidate);
         let mut name = format!("shapes/{stem}.grain");
@@ -89,7 +94,8 @@ impl<'a> Library<'a> {
         if let Some(shape) = self.built.get(&key) {
             return Ok(shape.clone());
         }
-        let scaled = Arc::new(rescale(shape, diameter)?);
+        let scaled = shape.scaled_to_equivalent_diameter(diameter);
+        let scaled = Arc::new(scaled.map_err(|error| (error.to_string(), "give a positive length".to_string()))?);
         self.built.insert(key, scaled.clone());
         Ok(scaled)
     }
@@ -121,4 +127,20 @@ fn build(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
         }
     }
     construct(raw, nodes)
+}
+
+fn construct(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
+    let options = ShapeOptions { nodes: Some(nodes), ..ShapeOptions::default() };
+    let length = |value: &Option<Loc<Quantity<Length>>>| value.as_ref().map_or(f64::NAN, |v| v.si);
+    let [a, b, c] = raw.size.as_ref().map_or([f64::NAN; 3], |v| v.si.to_array());
+    let exponents = raw.exponents.as_ref().map_or([f64::NAN; 2], |e| e.value);
+    let shape = match raw.kind.value {
+        ShapeKind::Sphere => analytic::sphere(0.5 * length(&raw.diameter), &options),
+        ShapeKind::Ellipsoid => analytic::ellipsoid(0.5 * a, 0.5 * b, 0.5 * c, &options),
+        ShapeKind::RoundedBox => analytic::rounded_box(a, b, c, length(&raw.radius), &options),
+        ShapeKind::Cylinder => analytic::cylinder(0.5 * length(&raw.diameter), length(&raw.height), &options),
+        ShapeKind::Capsule => analytic::capsule(0.5 * length(&raw.diameter), length(&raw.height), &options),
+        ShapeKind::Superquadric => analytic::superquadric([0.5 * a, 0.5 * b, 0.5 * c], exponents[0], exponents[1], &options),
+    };
+    shape.map_err(|error| (error.to_string(), "change the sizes of this shape".to_string()))
 }

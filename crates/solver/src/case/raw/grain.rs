@@ -24,7 +24,7 @@ pub struct RawGrain {
     /// Rescales the shape to this equal-volume diameter [m]; without it the shape keeps its size.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub equivalent_diameter: Option<Loc<Quantity<Length>>>,
-    /// Number of surface nodes; without it a file keeps its own and a closed form gets 2000.
+    /// Surface nodes of a closed form; 2000 if not given. A file brings its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nodes: Option<Loc<usize>>,
     /// Density [kg/m3].
@@ -55,7 +55,8 @@ pub struct RawGrain {
     pub motion: Loc<Motion>,
 }
 
-/// A closed form. Which sizes belong to it depends on `kind`.
+/// A closed form. Which sizes belong to it depends on `kind`. In the frame of the body the longest
+/// axis is x and the shortest z, whatever the order of `size`; `orientation` turns it from there.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawShape {
@@ -67,15 +68,15 @@ pub struct RawShape {
     /// Height of a cylinder; length between the cap centres of a capsule [m].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub height: Option<Loc<Quantity<Length>>>,
-    /// Full edge lengths of an ellipsoid, rounded box or superquadric along its axes [m].
+    /// Full edge lengths of an ellipsoid, rounded box or superquadric [m].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<Loc<Triple<Length>>>,
     /// Edge radius of a rounded box [m].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<Loc<Quantity<Length>>>,
-    /// Exponents of a superquadric: |x/a|^p + |y/b|^q + |z/c|^r = 1; 2 is an ellipsoid.
+    /// Exponents e1, e2 of a superquadric (Barr 1981), 0.1 to 2; 1, 1 is an ellipsoid.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub exponents: Option<Loc<[f64; 3]>>,
+    pub exponents: Option<Loc<[f64; 2]>>,
 }
 
 /// Closed forms that can be written in a case file.

@@ -176,3 +176,13 @@ impl Default for RawRun {
         RawRun { threads: 0.into(), precision: "f64".to_string().into() }
     }
 }
+
+impl From<&crate::output::Plane> for RawPlane {
+    fn from(plane: &crate::output::Plane) -> RawPlane {
+        let (at, grain) = match plane.place {
+            crate::output::Place::At(at) => (Some(Quantity::new(at).into()), None),
+            crate::output::Place::Grain(grain) => (None, Some(grain.into())),
+        };
+        RawPlane { normal: ["x", "y", "z"][plane.axis].to_string().into(), at, grain }
+    }
+}
