@@ -89,7 +89,10 @@ impl Estimate {
         let galileo = fastest.map(|(grain, f)| galileo(grain, f, g));
         let speed = fastest.map(|(grain, f)| terminal_speed(grain, f, g));
         let smallest = setup.grains.iter().map(|g| g.shape.equivalent_diameter()).fold(f64::INFINITY, f64::min);
-        let time_step_s = time_step(setup, speed.unwrap_or(0.0));
+        let plan = &case.plan;
+        let outputs = [plan.tables, plan.slices, plan.fields, plan.surfaces];
+        let allowed = time_step(setup, speed.unwrap_or(0.0));
+        let time_step_s = outputs.into_iter().filter(|interval| *interval > 0.0).fold(allowed, f64::min);
         let steps = (case.plan.end / time_step_s).ceil();
         let cells = setup.mesh.cell_count();
         let contact_time_s = contact_time(setup);
@@ -113,8 +116,20 @@ impl Estimate {
             warnings: Vec::new(),
         };
         estimate.warnings = warnings(setup, &estimate);
+        if time_step_s < 0.5 * allowed {
+            let message = format!("an output every {time_step_s:.3e} s makes the steps shorter than the {allowed:.3e} s they could have: make [output] intervals longer");
+            estimate.warnings.push(message);
+        }
         estimate
     }
+}
+
+/// The step that the rule allows once the grains settle [s].
+pub(super) fn settled_time_step(setup: &Setup) -> f64 {
+    let g = setup.gravity.length();
+    let speeds = setup.grains.iter().filter(|g| g.translation == crate::dem::Dof::Free);
+    let speed = setup.fluid.as_ref().map_or(0.0, |f| speeds.map(|grain| terminal_speed(grain, f, g)).fold(0.0, f64::max));
+    time_step(setup, speed)
 }
 
 /// The step that the rule allows at `speed` [s].

@@ -24,7 +24,7 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use crate::output::RunPlan;
+use crate::output::{Job, RunPlan};
 use crate::sim::Setup;
 
 pub use error::{CaseError, Problem};
@@ -81,6 +81,27 @@ impl Case {
         let validate::Validated { setup, plan, threads, expect, shapes, .. } = v;
         Ok(Case { title, setup, plan, threads, expect, resolved, shapes, digest })
     }
+}
+
+impl Case {
+    /// What the run loop needs of the case.
+    pub fn job(&self) -> Job {
+        Job {
+            setup: self.setup.clone(),
+            plan: self.plan.clone(),
+            resolved: self.resolved.clone(),
+            digest: self.digest.clone(),
+            files: self.shapes.iter().map(|file| (file.name.clone(), file.bytes.clone())).collect(),
+        }
+    }
+}
+
+/// Reads a length such as "2 mm" or "0.002" [m]; the error says what is accepted.
+///
+/// # Errors
+/// A message for the user.
+pub fn parse_length(text: &str) -> Result<f64, String> {
+    quantity::parse_quantity::<quantity::Length>(text)
 }
 
 fn digest(resolved: &RawCase, shapes: &[ShapeFile], write: &dyn Fn(&RawCase) -> Result<String, CaseError>) -> Result<String, CaseError> {

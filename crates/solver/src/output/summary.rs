@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::sim::events::Event;
+
 /// Results of a run. The JSON names are stable; those of a pair stand at the top level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
@@ -11,8 +13,8 @@ pub struct Summary {
     pub end_time_s: f64,
     /// Wall-clock time of all sessions [s].
     pub wall_s: f64,
-    /// Number of events.
-    pub events: usize,
+    /// What happened, in the order in which it became certain.
+    pub events: Vec<Event>,
     /// Largest |div u| after any step [1/s].
     pub max_divergence: f64,
     /// Largest CFL number of any step.

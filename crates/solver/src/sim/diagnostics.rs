@@ -26,6 +26,14 @@ pub struct Diagnostics {
 }
 
 impl Simulation {
+    /// Largest |div u| after the last projection [1/s]; zero without fluid.
+    pub fn max_divergence(&self) -> f64 {
+        self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures.max_divergence)
+    }
+    /// CFL number of the last step; zero without fluid.
+    pub fn cfl(&self) -> f64 {
+        self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures.max_rate * self.clock.last_step)
+    }
     /// Measures the present state.
     pub fn diagnostics(&self) -> Diagnostics {
         let grains = &self.setup.grains;

@@ -404,7 +404,7 @@ mod tests {
     }
 
     fn touch(grain: usize, partner: Partner) -> Contact {
-        Contact { grain, partner, overlap: 1e-3, load: Load::default() }
+        Contact { grain, partner, overlap: 1e-3, load: Load::default(), point: DVec3::ZERO, normal: DVec3::Z }
     }
 
     /// Runs positions (grain 0 at the origin, grain 1 at x, z) through a tracker; g = d = 1.

@@ -11,7 +11,7 @@ mod step;
 use std::time::Duration;
 
 use crate::coupling::Coupling;
-use crate::dem::{Contact, Dynamics, Enclosure, Grain};
+use crate::dem::{Contact, Dynamics, Grain};
 use crate::flow::{Flow, FlowMeasures};
 use crate::grid::Mesh;
 use crate::math::Load;
@@ -60,12 +60,7 @@ impl Simulation {
     /// Builds the simulation at t = 0; the fluid next to moving grains starts at their velocity.
     pub fn new(setup: Setup) -> Result<Simulation, SetupError> {
         setup.validate()?;
-        let enclosure = Enclosure {
-            lower: setup.mesh.origin,
-            upper: setup.mesh.upper(),
-            periodic: [0, 1, 2].map(|axis| setup.boundaries.is_periodic(axis)),
-            solid: setup.boundaries.0.map(|sides| sides.map(|boundary| boundary.is_solid())),
-        };
+        let enclosure = setup.enclosure();
         let fluid = setup.fluid.map(|params| {
             let mut flow = Flow::new(&setup.mesh, setup.boundaries, &params);
             let (density, nu) = (params.density, params.kinematic_viscosity);

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::coupling::Scheme;
-use crate::dem::{ContactParams, Grain};
+use crate::dem::{ContactParams, Enclosure, Grain};
 use crate::flow::{Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
 
@@ -53,6 +53,16 @@ pub enum SetupError {
 }
 
 impl Setup {
+    /// The box as the grains see it.
+    pub fn enclosure(&self) -> Enclosure {
+        Enclosure {
+            lower: self.mesh.origin,
+            upper: self.mesh.upper(),
+            periodic: [0, 1, 2].map(|axis| self.boundaries.is_periodic(axis)),
+            solid: self.boundaries.0.map(|sides| sides.map(|boundary| boundary.is_solid())),
+        }
+    }
+
     /// Checks what the parts cannot check alone.
     ///
     /// # Errors
@@ -67,7 +77,7 @@ impl Setup {
             if (*lower == Boundary::Periodic) != (*upper == Boundary::Periodic) {
                 return fail(format!("axis {name} is periodic on one side only"));
             }
-            if self.mesh.cells[axis] == 1 && *lower != Boundary::Periodic {
+            if self.fluid.is_some() && self.mesh.cells[axis] == 1 && *lower != Boundary::Periodic {
                 return fail(format!("axis {name} has one cell, so both its faces must be periodic"));
             }
         }

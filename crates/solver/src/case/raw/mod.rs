@@ -11,14 +11,14 @@ mod packing;
 mod plan;
 mod physics;
 
-pub use domain::{AxisFaces, CellSize, Face, FaceKind, RawBoundaries, RawDomain};
+pub use domain::{AxisFaces, CellSize, Face, FaceKind, RawDomain};
 pub use expect::{OneOrMany, RawExpect, RawExpected, Tolerance};
-pub use grain::{Position, RawGapAbove, RawGrain, RawShape, ShapeKind};
-pub use motion::{Law, Motion};
-pub use orientation::{Direction, Orientation, Turn, Turns};
-pub use packing::{Arrangement, DiameterRange, PackingOrientation, RawPacking, RawRegion};
+pub use grain::{Position, RawGrain, RawShape, ShapeKind};
+pub use motion::Law;
+pub use orientation::{Orientation, Turns};
+pub use packing::{Arrangement, PackingOrientation, RawPacking};
 pub use physics::{RawContact, RawCoupling, RawFluid};
-pub use plan::{RawOutput, RawPlane, RawRun, RawStop, RawTime};
+pub use plan::{RawOutput, RawRun, RawStop, RawTime};
 
 use glam::DVec3;
 use schemars::JsonSchema;

@@ -109,10 +109,11 @@ impl JsonSchema for RawStop {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawOutput {
-    /// Interval of the rows of `grains.csv` and `diagnostics.csv` [s]; end / 400 if not given.
+    /// Interval of the rows of `grains.csv` and `diagnostics.csv` [s]; end / 400 if not given, but
+    /// not shorter than the step expected at the settling speed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tables: Option<Loc<Quantity<Time>>>,
-    /// Interval of the slices [s]; end / 40 if not given.
+    /// Interval of the slices [s]; end / 40 if not given (dry: none).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slices: Option<Loc<Quantity<Time>>>,
     /// Interval of the full fields [s]; 0 writes none.

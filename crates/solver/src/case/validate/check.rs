@@ -43,3 +43,8 @@ impl<'a> Checker<'a> {
         None
     }
 }
+
+/// A number as people write it: six digits at most.
+pub(super) fn short(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
+}

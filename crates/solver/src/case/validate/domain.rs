@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::check::Checker;
+use super::check::{Checker, short};
 use crate::case::loc::Loc;
 use crate::case::raw::{AxisFaces, CellSize, Face, FaceKind, RawDomain};
 use crate::case::quantity::Triple;
@@ -81,7 +81,7 @@ fn divide(check: &mut Checker, size: &Loc<Triple<crate::case::quantity::Length>>
                 format!("{length} m along {} is not a whole number of cells of {h} m ({ratio:.4} cells)", AXES[axis]),
                 format!(
                     "take {} = {} m ({below} cells) or {} m ({above} cells), or keep the size with a cell of {} m",
-                    AXES[axis], below * h, above * h, length / whole
+                    AXES[axis], short(below * h), short(above * h), short(length / whole)
                 ),
             );
             return None;

@@ -91,13 +91,12 @@ pub(super) fn validate(source: &Source, mut raw: RawCase, folder: &Path) -> Resu
         None
     };
     let step = plan::step(&mut check, &mut raw.time, &mesh, &grains, gravity, dry);
-    let plan = plan::plan(&mut check, &raw.time, &mut raw.output, &grains, &mesh, vertical.0, dry);
-    let expect = expectations(&raw.expect, grains.len(), &mut |span, key, message, help| check.fail(span, key, message, help));
-    let (Some(contact), Some(step), Some(plan), true) = (contact, step, plan, check.problems.is_empty()) else {
-        return Err(CaseError::Invalid(check.problems));
-    };
+    let (Some(contact), Some(step)) = (contact, step) else { return Err(CaseError::Invalid(check.problems)) };
     let scheme = raw.coupling.scheme.value;
     let setup = Setup { mesh, boundaries, fluid: fluid_params.copied(), scheme, gravity, grains, contact, step };
+    let plan = plan::plan(&mut check, &raw.time, &mut raw.output, &setup, vertical.0);
+    let expect = expectations(&raw.expect, setup.grains.len(), &mut |span, key, message, help| check.fail(span, key, message, help));
+    let (Some(plan), true) = (plan, check.problems.is_empty()) else { return Err(CaseError::Invalid(check.problems)) };
     setup.validate().map_err(|error| CaseError::from(Problem::new(error.to_string())))?;
     raw.grain = resolved;
     raw.packing = Vec::new();

@@ -1,14 +1,14 @@
 //! `[time]`, `[output]` and `[run]` -> step rule and run plan.
 
 use super::check::Checker;
-use crate::case::estimate::default_max_step;
+use crate::case::estimate::{default_max_step, settled_time_step};
 use crate::case::loc::Loc;
 use crate::case::quantity::{Quantity, Time};
 use crate::case::raw::{RawOutput, RawRun, RawTime};
 use crate::dem::Grain;
 use crate::grid::Mesh;
 use crate::output::{Place, Plane, RunPlan, Stop};
-use crate::sim::StepRule;
+use crate::sim::{Setup, StepRule};
 use crate::sim::events::StopWhen;
 
 /// Limits where none are given.
@@ -39,9 +39,10 @@ pub(super) fn step(check: &mut Checker, raw: &mut RawTime, mesh: &Mesh, grains: 
 }
 
 /// The run plan; fills in the intervals that are not given.
-pub(super) fn plan(check: &mut Checker, time: &RawTime, raw: &mut RawOutput, grains: &[Grain], mesh: &Mesh, vertical: usize, dry: bool) -> Option<RunPlan> {
+pub(super) fn plan(check: &mut Checker, time: &RawTime, raw: &mut RawOutput, setup: &Setup, vertical: usize) -> Option<RunPlan> {
     let before = check.problems.len();
     let end = time.end.si;
+    let (grains, mesh, dry) = (&setup.grains, &setup.mesh, setup.fluid.is_none());
     let mut interval = |value: &mut Option<Loc<Quantity<Time>>>, default: f64, name: &str| {
         let value = value.get_or_insert_with(|| Quantity::new(default).into());
         let key = format!("output.{name}");
@@ -51,9 +52,11 @@ pub(super) fn plan(check: &mut Checker, time: &RawTime, raw: &mut RawOutput, gra
         }
         interval
     };
-    let tables = interval(&mut raw.tables, end / 400.0, "tables");
-    let slices = interval(&mut raw.slices, if dry { 0.0 } else { end / 40.0 }, "slices");
-    let surfaces = interval(&mut raw.surfaces, if slices > 0.0 { slices } else { end / 40.0 }, "surfaces");
+    // Outputs that nobody asked for do not shorten the steps.
+    let step = settled_time_step(setup).min(end);
+    let tables = interval(&mut raw.tables, (end / 400.0).max(step), "tables");
+    let slices = interval(&mut raw.slices, if dry { 0.0 } else { (end / 40.0).max(step) }, "slices");
+    let surfaces = interval(&mut raw.surfaces, if slices > 0.0 { slices } else { (end / 40.0).max(step) }, "surfaces");
     let mut fields = Some(raw.fields.clone());
     let fields = interval(&mut fields, 0.0, "fields");
     let checkpoint_interval = check.within(&raw.checkpoint_interval, "output.checkpoint_interval", 0.0, f64::INFINITY);
