@@ -36,7 +36,7 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
         (size, Some(cells), Some(cell)) => {
             let extent = as_vector(cells.value) * cell.0;
             if let Some(size) = size.as_ref().filter(|s| ((s.si - extent) / extent).abs().max_element() > 1e-9) {
-                check.fail(size.span.as_ref(), "domain.size", format!("size {:?} m is not cells times cell_size, {:?} m", size.si.to_array(), extent.to_array()), "give two of size, cells and cell_size");
+                check.fail(cells.span.as_ref(), "domain.cells", format!("size {:?} m is not cells times cell_size, {:?} m", size.si.to_array(), extent.to_array()), "give two of size, cells and cell_size");
                 return None;
             }
             (cells.value, cell.0)
