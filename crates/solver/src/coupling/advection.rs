@@ -25,9 +25,10 @@ const LEAST_APERTURE: f64 = 0.4;
 
 /// Corrects the tendency of the step just predicted; `bodies` are where `grains` were located.
 pub fn correct(locator: &Locator, flow: &mut Flow, grains: &[Grain], bodies: &[Body]) {
+    let cells = flow.mesh().cells;
     for (grain, body) in grains.iter().zip(bodies) {
         for component in 0..3 {
-            for along in (0..3).filter(|&axis| flow.mesh().cells[axis] > 1) {
+            for along in (0..3).filter(|&axis| cells[axis] > 1) {
                 correct_links(locator, flow, grain, body, component, along);
             }
         }
