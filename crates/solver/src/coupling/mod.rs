@@ -1,6 +1,18 @@
 //! Where the flow meets the grains: rigidity imposed on the grid, loads on the grains (Eq. 5).
 
+mod advection;
+mod aperture;
+mod locate;
+mod rigidity;
+
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
+
+use crate::dem::Grain;
+use crate::flow::{Flow, FlowMeasures};
+use crate::math::Load;
+
+use locate::{Body, Locator};
 
 /// How rigidity is imposed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -11,4 +23,79 @@ pub enum Scheme {
     Aperture,
     /// The paper's own: solve without the grain, blend by solid fraction, project again.
     Paper,
+}
+
+/// The grains on the grid.
+pub struct Coupling {
+    scheme: Scheme,
+    fluid_density: f64,
+    locator: Locator,
+    bodies: Vec<Body>,
+}
+
+impl Coupling {
+    /// For the grains of a simulation on the grid of `flow`.
+    pub fn new(flow: &Flow, scheme: Scheme, fluid_density: f64, kinematic_viscosity: f64, grains: &[Grain]) -> Coupling {
+        let locator = Locator::new(flow.mesh(), flow.boundaries(), scheme, kinematic_viscosity);
+        let mut coupling =
+            Coupling { scheme, fluid_density, locator, bodies: vec![Body::default(); grains.len()] };
+        coupling.locate(grains, 1.0);
+        coupling
+    }
+
+    /// Finds the faces near the grains at their present poses, for a step of length `dt` [s].
+    pub fn locate(&mut self, grains: &[Grain], dt: f64) {
+        self.locator.locate(grains, dt, &mut self.bodies);
+    }
+
+    /// Corrects the advection just predicted where grains close part of a link.
+    pub fn correct_advection(&self, flow: &mut Flow, grains: &[Grain]) {
+        if self.scheme == Scheme::Aperture {
+            advection::open_links(&self.locator, flow, grains, &self.bodies);
+        }
+    }
+
+    /// Imposes rigidity on the predicted velocity and advances the grains' velocities from
+    /// `before` (velocity, angular velocity) under the fluid's impulse and the `other` loads.
+    /// `loads` receives the hydrodynamic load on each grain.
+    pub fn impose_rigidity(
+        &mut self,
+        flow: &mut Flow,
+        grains: &mut [Grain],
+        before: &[[DVec3; 2]],
+        other: &[Load],
+        dt: f64,
+        loads: &mut [Load],
+    ) {
+        let relief = if self.scheme == Scheme::Aperture { dt } else { 0.0 };
+        for (index, body) in self.bodies.iter().enumerate() {
+            let grain = &mut grains[index];
+            let impulse = rigidity::gather(flow, self.fluid_density, body, relief);
+            loads[index] = rigidity::advance(grain, before[index], &impulse, self.fluid_density, other[index], dt);
+            rigidity::impose(flow, grain, body, relief);
+        }
+    }
+
+    /// Gives the fluid inside and next to the grains their rigid velocity, for initial states.
+    pub fn start(&mut self, flow: &mut Flow, grains: &[Grain]) -> FlowMeasures {
+        for axis in 0..3 {
+            let (from, to) = (flow.velocity.component(axis), flow.predicted.component_mut(axis));
+            to.copy_from_slice(from);
+        }
+        // A step this long closes every face of the band.
+        self.locate(grains, f64::MAX.sqrt());
+        for (grain, body) in grains.iter().zip(&self.bodies) {
+            rigidity::impose(flow, grain, body, 0.0);
+        }
+        for axis in 0..3 {
+            let (from, to) = (flow.predicted.component(axis), flow.velocity.component_mut(axis));
+            to.copy_from_slice(from);
+        }
+        flow.make_solenoidal()
+    }
+
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        self.bodies.iter().map(Body::bytes).sum()
+    }
 }

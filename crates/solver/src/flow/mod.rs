@@ -1,7 +1,13 @@
 //! Incompressible Navier-Stokes on the staggered grid (Eqs 1-4). Knows no grain.
+//!
+//! Adams-Bashforth for advection and diffusion, incremental pressure correction, one direct
+//! Poisson solve a step.
 
 mod boundary;
 mod params;
+mod solver;
+mod tendency;
 
 pub use boundary::{Boundaries, Boundary};
 pub use params::{Advection, FluidParams};
+pub use solver::{Flow, FlowMeasures};

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use super::Layout;
+
 /// One of the three space axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
@@ -40,5 +42,21 @@ impl Mesh {
     /// Upper corner of the box [m].
     pub fn upper(&self) -> DVec3 {
         self.origin + self.extent()
+    }
+    /// Memory layout of its fields.
+    pub fn layout(&self) -> Layout {
+        Layout { cells: self.cells }
+    }
+    /// Position [m] of the point `offset` (in spacings from the lower corner) of cell `index`,
+    /// counted from 1.
+    #[inline]
+    pub fn position(&self, offset: [f64; 3], index: [usize; 3]) -> DVec3 {
+        self.origin
+            + self.spacing
+                * DVec3::new(
+                    index[0] as f64 - 1.0 + offset[0],
+                    index[1] as f64 - 1.0 + offset[1],
+                    index[2] as f64 - 1.0 + offset[2],
+                )
     }
 }

@@ -1,5 +1,9 @@
-//! The uniform staggered (MAC) grid.
+//! The uniform staggered (MAC) grid: geometry, typed fields, loops in a fixed order.
 
+mod field;
+mod loops;
 mod mesh;
 
+pub use field::{Centre, FACE_OFFSET, FaceVector, FaceX, FaceY, FaceZ, Field, Layout, Location};
+pub use loops::{RowColumn, for_planes, for_planes_of, for_planes_with, for_row_columns, ordered_sum};
 pub use mesh::{Axis, Mesh};

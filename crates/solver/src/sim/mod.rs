@@ -1,88 +1,103 @@
 //! The coupled simulation: set-up, the time step, the clock and diagnostics.
 
+mod clock;
+mod diagnostics;
+mod probe;
 mod setup;
+mod state;
+mod step;
 
-use std::io::{self, Read, Write};
+use std::time::Duration;
 
-use glam::DVec3;
-
-use crate::dem::{Contact, Grain};
+use crate::coupling::Coupling;
+use crate::dem::{Contact, Dynamics, Enclosure, Grain};
+use crate::flow::{Flow, FlowMeasures};
 use crate::grid::Mesh;
 use crate::math::Load;
 
+pub use clock::Clock;
+pub use diagnostics::Diagnostics;
 pub use setup::{Setup, SetupError, StepRule};
+pub use step::StepError;
 
-/// What the method may break, measured after every step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Diagnostics {
-    /// Largest |div u| after projection [1/s].
-    pub max_divergence: f64,
-    /// Largest velocity magnitude on the grid [m/s].
-    pub max_velocity: f64,
-    /// CFL number dt * max(sum |u_a| / h_a).
-    pub cfl: f64,
-    /// Root mean square slip velocity at the surface nodes [m/s].
-    pub slip: f64,
-    /// Kinetic energy of the fluid in the box [J].
-    pub fluid_kinetic_energy: f64,
-    /// Kinetic energy of the grains [J].
-    pub grain_kinetic_energy: f64,
-    /// Momentum of the box (fluid + grains) [kg m/s].
-    pub momentum: DVec3,
-    /// Momentum balance of fluid + grains + walls in this step, relative to the largest term.
-    pub momentum_residual: f64,
-}
-
-/// Why a step could not be taken.
-#[derive(Debug, thiserror::Error)]
-pub enum StepError {
-    /// The numerics failed.
-    #[error("the run became unstable at t = {time:.6e} s (step {step}): {what}; try {remedy}")]
-    Unstable {
-        /// Time [s].
-        time: f64,
-        /// Step number.
-        step: u64,
-        /// What was seen.
-        what: String,
-        /// What to try.
-        remedy: String,
-    },
+/// The fluid side of a simulation.
+struct Fluid {
+    flow: Flow,
+    coupling: Coupling,
+    measures: FlowMeasures,
 }
 
 /// A running simulation.
 pub struct Simulation {
     setup: Setup,
-    time: f64,
-    steps: u64,
+    clock: Clock,
+    fluid: Option<Fluid>,
+    dynamics: Dynamics,
+    /// Hydrodynamic load on each grain over the last step.
     loads: Vec<Load>,
-    diagnostics: Diagnostics,
+    work: Work,
+    passes: Passes,
+}
+
+/// Per-grain scratch of a step.
+struct Work {
+    before: Vec<[glam::DVec3; 2]>,
+    driving: Vec<Load>,
+    contact: Vec<Load>,
+}
+
+/// Time spent in each stage since the start.
+#[derive(Clone, Copy, Debug, Default)]
+struct Passes {
+    predict: Duration,
+    contact: Duration,
+    coupling: Duration,
+    project: Duration,
 }
 
 impl Simulation {
-    /// Builds the simulation at t = 0.
+    /// Builds the simulation at t = 0; the fluid next to moving grains starts at their velocity.
     pub fn new(setup: Setup) -> Result<Simulation, SetupError> {
-        let loads = vec![Load::default(); setup.grains.len()];
-        Ok(Simulation { setup, time: 0.0, steps: 0, loads, diagnostics: Diagnostics::default() })
-    }
-    /// One time step; `limit` [s] caps the step so that output times are met exactly.
-    pub fn step(&mut self, limit: f64) -> Result<(), StepError> {
-        let dt = limit.min(1e-3);
-        for grain in &mut self.setup.grains {
-            grain.velocity += self.setup.gravity * dt;
-            grain.pose.position += grain.velocity * dt;
-        }
-        self.time += dt;
-        self.steps += 1;
-        Ok(())
+        setup.validate()?;
+        let enclosure = Enclosure {
+            lower: setup.mesh.origin,
+            upper: setup.mesh.upper(),
+            periodic: [0, 1, 2].map(|axis| setup.boundaries.is_periodic(axis)),
+            solid: setup.boundaries.0.map(|sides| sides.map(|boundary| boundary.is_solid())),
+        };
+        let fluid = setup.fluid.map(|params| {
+            let mut flow = Flow::new(&setup.mesh, setup.boundaries, &params);
+            let (density, nu) = (params.density, params.kinematic_viscosity);
+            let mut coupling = Coupling::new(&flow, setup.scheme, density, nu, &setup.grains);
+            let measures = coupling.start(&mut flow, &setup.grains);
+            Fluid { flow, coupling, measures }
+        });
+        let count = setup.grains.len();
+        Ok(Simulation {
+            dynamics: Dynamics::new(setup.contact, enclosure),
+            clock: Clock::new(&setup),
+            fluid,
+            loads: vec![Load::default(); count],
+            work: Work {
+                before: vec![Default::default(); count],
+                driving: vec![Load::default(); count],
+                contact: vec![Load::default(); count],
+            },
+            passes: Passes::default(),
+            setup,
+        })
     }
     /// Simulated time [s].
     pub fn time(&self) -> f64 {
-        self.time
+        self.clock.time
     }
     /// Steps taken.
     pub fn steps(&self) -> u64 {
-        self.steps
+        self.clock.steps
+    }
+    /// Length of the last step [s]; zero before the first.
+    pub fn time_step(&self) -> f64 {
+        self.clock.last_step
     }
     /// The grid.
     pub fn mesh(&self) -> &Mesh {
@@ -102,44 +117,17 @@ impl Simulation {
     }
     /// Touching pairs at the end of the last step.
     pub fn contacts(&self) -> &[Contact] {
-        &[]
+        self.dynamics.contacts()
     }
-    /// Diagnostics of the last step.
-    pub fn diagnostics(&self) -> &Diagnostics {
-        &self.diagnostics
+    /// Seconds spent since the start in each stage of the step.
+    pub fn pass_times(&self) -> Vec<(&'static str, f64)> {
+        let p = &self.passes;
+        [("predict", p.predict), ("contact", p.contact), ("coupling", p.coupling), ("project", p.project)]
+            .map(|(name, time)| (name, time.as_secs_f64()))
+            .to_vec()
     }
-    /// Cell-centred velocity [m/s] of cell (i, j, k); zero without fluid.
-    pub fn velocity_at(&self, cell: [usize; 3]) -> DVec3 {
-        let _ = cell;
-        DVec3::ZERO
-    }
-    /// Vorticity [1/s] at the centre of cell (i, j, k).
-    pub fn vorticity_at(&self, cell: [usize; 3]) -> DVec3 {
-        let _ = cell;
-        DVec3::ZERO
-    }
-    /// Dynamic pressure [Pa] of cell (i, j, k).
-    pub fn pressure_at(&self, cell: [usize; 3]) -> f64 {
-        let _ = cell;
-        0.0
-    }
-    /// Solid fraction of cell (i, j, k), 0 to 1.
-    pub fn solid_fraction_at(&self, cell: [usize; 3]) -> f64 {
-        let _ = cell;
-        0.0
-    }
-    /// Writes the full state, bit for bit; reading it back continues with the same bits.
-    pub fn save(&self, writer: &mut dyn Write) -> io::Result<()> {
-        writer.write_all(&self.time.to_le_bytes())?;
-        writer.write_all(&self.steps.to_le_bytes())
-    }
-    /// Restores a state written by `save` from the same set-up.
-    pub fn restore(&mut self, reader: &mut dyn Read) -> io::Result<()> {
-        let mut word = [0; 8];
-        reader.read_exact(&mut word)?;
-        self.time = f64::from_le_bytes(word);
-        reader.read_exact(&mut word)?;
-        self.steps = u64::from_le_bytes(word);
-        Ok(())
+    /// Memory held by fields, solver and grains on the grid [bytes].
+    pub fn bytes(&self) -> usize {
+        self.fluid.as_ref().map_or(0, |fluid| fluid.flow.bytes() + fluid.coupling.bytes())
     }
 }

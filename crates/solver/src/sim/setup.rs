@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::coupling::Scheme;
 use crate::dem::{ContactParams, Grain};
-use crate::flow::{Boundaries, FluidParams};
+use crate::flow::{Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
 
 /// How the time step is chosen.
@@ -50,4 +50,42 @@ pub enum SetupError {
     /// Some values contradict each other.
     #[error("{0}")]
     Inconsistent(String),
+}
+
+impl Setup {
+    /// Checks what the parts cannot check alone.
+    ///
+    /// # Errors
+    /// [`SetupError::Inconsistent`] with what contradicts what.
+    pub fn validate(&self) -> Result<(), SetupError> {
+        let fail = |message: String| Err(SetupError::Inconsistent(message));
+        let open = |side: &Boundary| matches!(side, Boundary::Outflow);
+        let flux = |side: &Boundary| matches!(side, Boundary::Inflow { .. });
+        let sides = || self.boundaries.0.iter().flatten();
+        for (axis, [lower, upper]) in self.boundaries.0.iter().enumerate() {
+            let name = ["x", "y", "z"][axis];
+            if (*lower == Boundary::Periodic) != (*upper == Boundary::Periodic) {
+                return fail(format!("axis {name} is periodic on one side only"));
+            }
+            if self.mesh.cells[axis] == 1 && *lower != Boundary::Periodic {
+                return fail(format!("axis {name} has one cell, so both its faces must be periodic"));
+            }
+        }
+        if sides().any(flux) && !sides().any(open) {
+            return fail("fluid enters the box but no face lets it out: make one face an outflow".into());
+        }
+        let bounded = |x: f64| x.is_finite() && x > 0.0;
+        if !self.mesh.spacing.to_array().into_iter().all(bounded) || self.mesh.cells.contains(&0) {
+            return fail("the grid needs at least one cell of positive size along each axis".into());
+        }
+        if let Some(fluid) = &self.fluid {
+            if !bounded(fluid.density) || !bounded(fluid.kinematic_viscosity) {
+                return fail("density and viscosity of the fluid must be positive".into());
+            }
+        }
+        if let Some(i) = self.grains.iter().position(|grain| !bounded(grain.density)) {
+            return fail(format!("the density of grain {i} must be positive"));
+        }
+        Ok(())
+    }
 }

@@ -1,0 +1,255 @@
+//! Where the grains lie on the grid: signed distances at the faces near each grain, and the list
+//! of faces that its rigidity acts on.
+
+use glam::{DVec3, IVec3};
+use rayon::prelude::*;
+
+use super::Scheme;
+use super::aperture::{aperture, drag};
+use crate::dem::Grain;
+use crate::flow::Boundaries;
+use crate::grid::{FACE_OFFSET, Mesh};
+
+/// A face that a grain's rigidity acts on.
+#[derive(Clone, Copy, Debug)]
+pub struct ForcedFace {
+    /// Component of the velocity.
+    pub axis: usize,
+    /// Position in memory.
+    pub at: usize,
+    /// From the grain's centroid to the face [m].
+    pub arm: DVec3,
+    /// Share by which the face takes the rigid velocity, 0 to 1.
+    pub share: f64,
+    /// Share of the pressure gradient that does not act there, 0 to 1.
+    pub relief: f64,
+}
+
+/// One grain on the grid.
+#[derive(Clone, Debug, Default)]
+pub struct Body {
+    /// Lower corner of the box of cells about the grain; counted from 1, may lie across a periodic edge.
+    pub first: IVec3,
+    /// Cells of the box.
+    pub size: IVec3,
+    /// Signed distance [m] at the faces of the box for each component; infinite where another
+    /// grain is nearer.
+    pub distance: [Vec<f64>; 3],
+    /// Faces under its rigidity.
+    pub forced: Vec<ForcedFace>,
+}
+
+impl Body {
+    /// Position of cell `(i, j, k)` of the box (from 0) in `distance`.
+    #[inline]
+    pub fn local(&self, i: i32, j: i32, k: i32) -> usize {
+        (i + self.size.x * (j + self.size.y * k)) as usize
+    }
+}
+
+impl Body {
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        let distances: usize = self.distance.iter().map(|values| size_of::<f64>() * values.capacity()).sum();
+        distances + size_of::<ForcedFace>() * self.forced.capacity()
+    }
+}
+
+/// Maps box indices to memory, across periodic edges; `None` where the face is no unknown.
+#[derive(Clone, Copy)]
+pub struct Unknowns {
+    cells: IVec3,
+    strides: [usize; 3],
+    periodic: [bool; 3],
+}
+
+impl Unknowns {
+    pub fn new(mesh: &Mesh, boundaries: &Boundaries) -> Unknowns {
+        let [x, y, z] = mesh.cells.map(|n| n as i32);
+        Unknowns {
+            cells: IVec3::new(x, y, z),
+            strides: mesh.layout().strides(),
+            periodic: [0, 1, 2].map(|axis| boundaries.is_periodic(axis)),
+        }
+    }
+    /// Memory position of face `cell` (counted from 1) of component `component`.
+    #[inline]
+    pub fn at(&self, component: usize, cell: IVec3) -> Option<usize> {
+        let mut at = 0;
+        for axis in 0..3 {
+            let (i, n) = (cell[axis], self.cells[axis]);
+            let i = if self.periodic[axis] {
+                (i - 1).rem_euclid(n) + 1
+            } else if i > i32::from(axis == component) && i <= n {
+                i
+            } else {
+                return None;
+            };
+            at += i as usize * self.strides[axis];
+        }
+        Some(at)
+    }
+}
+
+/// Where to look for grains and how.
+pub struct Locator {
+    mesh: Mesh,
+    unknowns: Unknowns,
+    scheme: Scheme,
+    kinematic_viscosity: f64,
+    /// Half-width of the band [m].
+    eps: f64,
+}
+
+impl Locator {
+    pub fn new(mesh: &Mesh, boundaries: &Boundaries, scheme: Scheme, kinematic_viscosity: f64) -> Locator {
+        let flat = mesh.cells.map(|n| n == 1);
+        let resolved: Vec<f64> = (0..3).filter(|&axis| !flat[axis]).map(|axis| mesh.spacing[axis]).collect();
+        let eps = resolved.iter().sum::<f64>() / resolved.len().max(1) as f64;
+        Locator { mesh: *mesh, unknowns: Unknowns::new(mesh, boundaries), scheme, kinematic_viscosity, eps }
+    }
+
+    /// Half-width of the band about the surface [m].
+    pub fn band(&self) -> f64 {
+        self.eps
+    }
+    pub fn unknowns(&self) -> &Unknowns {
+        &self.unknowns
+    }
+
+    /// Finds all grains for a step of length `dt` [s].
+    pub fn locate(&self, grains: &[Grain], dt: f64, bodies: &mut [Body]) {
+        bodies.par_iter_mut().enumerate().for_each(|(index, body)| {
+            self.measure(grains, index, body);
+            self.list(&grains[index], dt, body);
+        });
+    }
+
+    /// Distances in the box about grain `index`.
+    fn measure(&self, grains: &[Grain], index: usize, body: &mut Body) {
+        let (mesh, grain) = (&self.mesh, &grains[index]);
+        let centre = grain.pose.position;
+        let reach = 2.0 * self.eps + 0.5 * mesh.spacing.max_element();
+        let turn = glam::DMat3::from_quat(grain.pose.orientation);
+        let (lower, upper) = (grain.shape.lower(), grain.shape.upper());
+        let middle = centre + turn * (0.5 * (lower + upper));
+        let half = 0.5 * (upper - lower);
+        let span = turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
+        for axis in 0..3 {
+            let (h, n) = (mesh.spacing[axis], mesh.cells[axis] as i32);
+            if n == 1 {
+                (body.first[axis], body.size[axis]) = (1, 1);
+                continue;
+            }
+            let from = (middle[axis] - span[axis] - reach - mesh.origin[axis]) / h;
+            let to = (middle[axis] + span[axis] + reach - mesh.origin[axis]) / h;
+            body.first[axis] = from.floor() as i32 + 1;
+            body.size[axis] = to.floor() as i32 + 2 - body.first[axis];
+        }
+        let rivals = self.rivals(grains, index, reach);
+        let far = grain.shape.bounding_radius() + reach;
+        let count = (body.size.x * body.size.y * body.size.z) as usize;
+        for (component, offset) in FACE_OFFSET.iter().enumerate() {
+            let mut distance = std::mem::take(&mut body.distance[component]);
+            distance.clear();
+            distance.resize(count, f64::INFINITY);
+            for k in 0..body.size.z {
+                for j in 0..body.size.y {
+                    for i in 0..body.size.x {
+                        let x = self.position(offset, body.first + IVec3::new(i, j, k));
+                        if (x - centre).length_squared() > far * far {
+                            continue;
+                        }
+                        let d = grain.shape.distance(grain.pose.to_body(x));
+                        let nearer = |rival: &Rival| {
+                            let other = &grains[rival.index];
+                            let there = other.shape.distance(other.pose.to_body(x - rival.shift));
+                            there < d || (there == d && rival.index < index)
+                        };
+                        if d <= reach && !rivals.iter().any(nearer) {
+                            distance[body.local(i, j, k)] = d;
+                        }
+                    }
+                }
+            }
+            body.distance[component] = distance;
+        }
+    }
+
+    /// Grains (and periodic images of them) whose band may meet that of grain `index`.
+    fn rivals(&self, grains: &[Grain], index: usize, reach: f64) -> Vec<Rival> {
+        let grain = &grains[index];
+        let extent = self.mesh.extent();
+        let mut rivals = Vec::new();
+        for (other, rival) in grains.iter().enumerate().filter(|(other, _)| *other != index) {
+            let mut shift = grain.pose.position - rival.pose.position;
+            for axis in 0..3 {
+                let period = extent[axis];
+                shift[axis] =
+                    if self.unknowns.periodic[axis] { (shift[axis] / period).round() * period } else { 0.0 };
+            }
+            let apart = (grain.pose.position - rival.pose.position - shift).length();
+            if apart < grain.shape.bounding_radius() + rival.shape.bounding_radius() + 2.0 * reach {
+                rivals.push(Rival { index: other, shift });
+            }
+        }
+        rivals
+    }
+
+    /// Lists the faces under the rigidity of `grain`.
+    fn list(&self, grain: &Grain, dt: f64, body: &mut Body) {
+        let mut forced = std::mem::take(&mut body.forced);
+        forced.clear();
+        for (component, offset) in FACE_OFFSET.iter().enumerate() {
+            for k in 0..body.size.z {
+                for j in 0..body.size.y {
+                    for i in 0..body.size.x {
+                        let d = body.distance[component][body.local(i, j, k)];
+                        if d >= 2.0 * self.eps {
+                            continue;
+                        }
+                        let cell = body.first + IVec3::new(i, j, k);
+                        let Some(at) = self.unknowns.at(component, cell) else { continue };
+                        let x = self.position(offset, cell);
+                        let (share, relief) = self.share(grain, x, d, dt);
+                        if share > 0.0 || relief > 0.0 {
+                            forced.push(ForcedFace { axis: component, at, arm: x - grain.pose.position, share, relief });
+                        }
+                    }
+                }
+            }
+        }
+        body.forced = forced;
+    }
+
+    fn share(&self, grain: &Grain, x: DVec3, d: f64, dt: f64) -> (f64, f64) {
+        let normal = || {
+            let (_, gradient) = grain.shape.distance_and_gradient(grain.pose.to_body(x));
+            grain.pose.orientation * gradient.normalize_or_zero()
+        };
+        match self.scheme {
+            Scheme::Aperture if d <= -self.eps => (1.0, 1.0),
+            Scheme::Aperture => {
+                let strength = dt * self.kinematic_viscosity * drag(d, normal(), self.mesh.spacing, self.eps);
+                let share = if strength.is_finite() { strength / (1.0 + strength) } else { 1.0 };
+                (share, 1.0 - aperture(d, self.eps))
+            }
+            Scheme::Paper => {
+                let width = normal().abs().dot(self.mesh.spacing);
+                ((0.5 - d / width).clamp(0.0, 1.0), 0.0)
+            }
+        }
+    }
+
+    #[inline]
+    fn position(&self, offset: &[f64; 3], cell: IVec3) -> DVec3 {
+        let offset = DVec3::from_array(*offset);
+        self.mesh.origin + self.mesh.spacing * (cell.as_dvec3() - 1.0 + offset)
+    }
+}
+
+/// Another grain nearby; `shift` [m] moves it to its nearest image.
+struct Rival {
+    index: usize,
+    shift: DVec3,
+}

@@ -1,0 +1,111 @@
+//! Rigidity imposed on the grid and the load it leaves on the grain (Eqs 4b, 4c, 5).
+//!
+//! Every forced face takes a share of the rigid velocity V + Omega x r, which is affine in the six
+//! velocities of the grain; so is the impulse that this takes from the fluid. Newton's and Euler's
+//! laws with that impulse are one 6 x 6 system, stable at any density ratio. What the fluid gains
+//! the grain loses: momentum is conserved to round-off, and the load is Eq. 5 in the form that
+//! holds for the torque as well (the printed Eq. 5b can lose a third of it).
+//!
+//! Legend: w mass of a face's cell, J impulse on the fluid, M its derivative by the velocities,
+//! m_s and m_f masses of the grain and of the fluid it displaces.
+
+use glam::{DMat3, DVec3};
+
+use super::locate::Body;
+use crate::dem::{Dof, Grain};
+use crate::flow::Flow;
+use crate::math::{Load, Matrix6, Vector6, solve6};
+
+/// What a step of the fluid does to one grain.
+pub struct Impulse {
+    constant: Vector6,
+    slope: Matrix6,
+}
+
+/// Sums the impulse on the fluid as an affine function of the grain's velocities; `relief` is the
+/// time over which the pressure gradient is given back on faces that are closed to it.
+pub fn gather(flow: &Flow, fluid_density: f64, body: &Body, relief: f64) -> Impulse {
+    let w = fluid_density * flow.mesh().cell_volume();
+    let mut sum = Impulse { constant: [0.0; 6], slope: [[0.0; 6]; 6] };
+    for face in &body.forced {
+        let unit = DVec3::AXES[face.axis];
+        let lever = face.arm.cross(unit);
+        let weight = [unit.x, unit.y, unit.z, lever.x, lever.y, lever.z];
+        let back = relief * face.relief * pressure_gradient(flow, face.axis, face.at);
+        let free = flow.predicted.component(face.axis)[face.at] + back;
+        let push = w * (back - face.share * free);
+        for row in 0..6 {
+            sum.constant[row] += push * weight[row];
+            let pull = w * face.share * weight[row];
+            for column in 0..6 {
+                sum.slope[row][column] += pull * weight[column];
+            }
+        }
+    }
+    sum
+}
+
+/// New velocities of the grain from `before` under the impulse and the `other` loads (weight less
+/// buoyancy, contact) over `dt`; returns the hydrodynamic load on it.
+pub fn advance(grain: &mut Grain, before: [DVec3; 2], impulse: &Impulse, fluid_density: f64, other: Load, dt: f64) -> Load {
+    let ratio = 1.0 - fluid_density / grain.density;
+    let (mass, inertia) = (grain.mass() * ratio, grain.inertia() * ratio);
+    let [v, omega] = before;
+    let gyroscopic = omega.cross(inertia * omega);
+    let momentum = mass * v + dt * other.force;
+    let angular = inertia * omega + dt * (other.torque - gyroscopic);
+    let mut a = impulse.slope;
+    let mut b = [0.0; 6];
+    for row in 0..3 {
+        a[row][row] += mass;
+        b[row] = momentum[row] - impulse.constant[row];
+        b[3 + row] = angular[row] - impulse.constant[3 + row];
+        for column in 0..3 {
+            a[3 + row][3 + column] += inertia.col(column)[row];
+        }
+    }
+    prescribe(&mut a, &mut b, 0, grain.translation);
+    prescribe(&mut a, &mut b, 3, grain.rotation);
+    // Positive definite whenever a face is forced; a grain without faces moves on as it was.
+    let x = solve6(a, b).unwrap_or([v.x, v.y, v.z, omega.x, omega.y, omega.z]);
+    grain.velocity = DVec3::new(x[0], x[1], x[2]);
+    grain.angular_velocity = DVec3::new(x[3], x[4], x[5]);
+
+    let j: Vector6 = std::array::from_fn(|row| {
+        impulse.constant[row] + impulse.slope[row].iter().zip(x).map(|(m, x)| m * x).sum::<f64>()
+    });
+    let displaced = fluid_density / grain.density;
+    let fluid_inertia: DMat3 = grain.inertia() * displaced;
+    Load {
+        force: (displaced * grain.mass() * (grain.velocity - v) - DVec3::new(j[0], j[1], j[2])) / dt,
+        torque: (fluid_inertia * (grain.angular_velocity - omega) - DVec3::new(j[3], j[4], j[5])) / dt
+            + omega.cross(fluid_inertia * omega),
+    }
+}
+
+/// Gives the forced faces their share of the rigid velocity.
+pub fn impose(flow: &mut Flow, grain: &Grain, body: &Body, relief: f64) {
+    for face in &body.forced {
+        let back = relief * face.relief * pressure_gradient(flow, face.axis, face.at);
+        let rigid = (grain.velocity + grain.angular_velocity.cross(face.arm))[face.axis];
+        let q = &mut flow.predicted.component_mut(face.axis)[face.at];
+        let free = *q + back;
+        *q = free + face.share * (rigid - free);
+    }
+}
+
+fn pressure_gradient(flow: &Flow, axis: usize, at: usize) -> f64 {
+    let stride = flow.mesh().layout().strides()[axis];
+    (flow.pressure[at] - flow.pressure[at - stride]) / flow.mesh().spacing[axis]
+}
+
+/// Replaces three equations by given velocities.
+fn prescribe(a: &mut Matrix6, b: &mut Vector6, first: usize, law: Dof) {
+    if let Dof::Prescribed(given) = law {
+        for i in 0..3 {
+            a[first + i] = [0.0; 6];
+            a[first + i][first + i] = 1.0;
+            b[first + i] = given[i];
+        }
+    }
+}

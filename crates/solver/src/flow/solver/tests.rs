@@ -1,0 +1,184 @@
+//! Discrete identities and observed orders of the fluid alone.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use super::super::{Advection, Boundary};
+use super::*;
+
+const PERIODIC: Boundaries = Boundaries([[Boundary::Periodic; 2]; 3]);
+
+fn params(nu: f64) -> FluidParams {
+    FluidParams {
+        density: 1.0,
+        kinematic_viscosity: nu,
+        body_acceleration: DVec3::ZERO,
+        initial_velocity: DVec3::ZERO,
+        advection: Advection::Central,
+    }
+}
+
+fn noise(state: &mut u64) -> f64 {
+    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// A random divergence-free velocity.
+fn random_flow(mesh: &Mesh, boundaries: Boundaries, nu: f64) -> Flow {
+    let mut flow = Flow::new(mesh, boundaries, &params(nu));
+    let mut state = 11;
+    for axis in 0..3 {
+        flow.velocity.component_mut(axis).iter_mut().for_each(|value| *value = noise(&mut state));
+    }
+    flow.make_solenoidal();
+    flow
+}
+
+fn interior(mesh: &Mesh) -> impl Iterator<Item = [usize; 3]> + use<> {
+    let [nx, ny, nz] = mesh.cells;
+    (1..=nz).flat_map(move |k| (1..=ny).flat_map(move |j| (1..=nx).map(move |i| [i, j, k])))
+}
+
+/// Advection and diffusion of the present velocity, per component.
+fn tendencies(flow: &Flow) -> FaceVector {
+    let mesh = flow.mesh();
+    let mut out = FaceVector::zeros(mesh);
+    let row = mesh.layout().row();
+    for k in 1..=mesh.cells[2] {
+        for j in 1..=mesh.cells[1] {
+            let at = mesh.layout().index(0, j, k);
+            let FaceVector { x, y, z } = &mut out;
+            let rows = [&mut x[at..at + row], &mut y[at..at + row], &mut z[at..at + row]];
+            tendency::row(&flow.coefficients, &flow.velocity, j, k, rows);
+        }
+    }
+    out
+}
+
+#[test]
+fn divergence_is_minus_the_transposed_gradient() {
+    let mesh = Mesh { cells: [7, 6, 5], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
+    let flow = random_flow(&mesh, Boundaries([[Boundary::Periodic; 2], [Boundary::WALL; 2], [Boundary::WALL; 2]]), 0.0);
+    let mut state = 5;
+    let mut p = Field::<Centre>::zeros(&mesh);
+    p.iter_mut().for_each(|value| *value = noise(&mut state));
+    flow.boundaries.fill_pressure(&mut p);
+    let mut u = flow.velocity.clone();
+    for axis in 0..3 {
+        u.component_mut(axis).iter_mut().for_each(|value| *value = noise(&mut state));
+    }
+    flow.boundaries.set_normal(&mut u);
+    let h = mesh.spacing;
+    let (mut left, mut right, mut size) = (0.0, 0.0, 0.0);
+    for [i, j, k] in interior(&mesh) {
+        let div = (u.x.at(i + 1, j, k) - u.x.at(i, j, k)) / h.x
+            + (u.y.at(i, j + 1, k) - u.y.at(i, j, k)) / h.y
+            + (u.z.at(i, j, k + 1) - u.z.at(i, j, k)) / h.z;
+        left += p.at(i, j, k) * div;
+        size += (p.at(i, j, k) * div).abs();
+        let c = p.at(i, j, k);
+        right -= u.x.at(i, j, k) * (c - p.at(i - 1, j, k)) / h.x
+            + u.y.at(i, j, k) * (c - p.at(i, j - 1, k)) / h.y
+            + u.z.at(i, j, k) * (c - p.at(i, j, k - 1)) / h.z;
+    }
+    assert!((left - right).abs() <= 1e-14 * size, "p.Du = {left:e}, -Gp.u = {right:e}");
+}
+
+#[test]
+fn projection_leaves_round_off_divergence() {
+    for boundaries in [PERIODIC, Boundaries([[Boundary::WALL; 2]; 3])] {
+        let mesh = Mesh { cells: [19, 14, 11], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
+        let mut flow = random_flow(&mesh, boundaries, 0.01);
+        for _ in 0..5 {
+            flow.predict(0.01);
+            let m = flow.project(0.01);
+            assert!(m.max_divergence <= 1e-10 * m.max_rate, "{m:?}");
+            let h = mesh.spacing;
+            let worst = interior(&mesh)
+                .map(|[i, j, k]| {
+                    let u = &flow.velocity;
+                    ((u.x.at(i + 1, j, k) - u.x.at(i, j, k)) / h.x
+                        + (u.y.at(i, j + 1, k) - u.y.at(i, j, k)) / h.y
+                        + (u.z.at(i, j, k + 1) - u.z.at(i, j, k)) / h.z)
+                        .abs()
+                })
+                .fold(0.0, f64::max);
+            assert!(worst <= 1e-10 * m.max_rate, "measured apart from the sweep: {worst:e}");
+        }
+    }
+}
+
+#[test]
+fn advection_conserves_momentum_and_kinetic_energy() {
+    let mesh = Mesh { cells: [9, 8, 7], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
+    let flow = random_flow(&mesh, PERIODIC, 0.0);
+    let h = tendencies(&flow);
+    for axis in 0..3 {
+        let (mut momentum, mut size) = (0.0, 0.0);
+        for [i, j, k] in interior(&mesh) {
+            let value = h.component(axis)[mesh.layout().index(i, j, k)];
+            momentum += value;
+            size += value.abs();
+        }
+        assert!(momentum.abs() <= 1e-13 * size, "momentum {axis}: {momentum:e} of {size:e}");
+    }
+    let (mut power, mut size) = (0.0, 0.0);
+    for [i, j, k] in interior(&mesh) {
+        let at = mesh.layout().index(i, j, k);
+        for axis in 0..3 {
+            let p = h.component(axis)[at] * flow.velocity.component(axis)[at];
+            power += p;
+            size += p.abs();
+        }
+    }
+    assert!(power.abs() <= 1e-13 * size, "energy rate {power:e} of {size:e}");
+}
+
+/// Decaying Taylor-Green vortex in the plane of two axes; returns the largest velocity error.
+fn taylor_green(n: usize, dt: f64, steps: usize, nu: f64, plane: [usize; 2]) -> f64 {
+    let mut cells = [1; 3];
+    cells[plane[0]] = n;
+    cells[plane[1]] = n;
+    let mesh = Mesh { cells, spacing: DVec3::splat(2.0 * PI / n as f64), origin: DVec3::ZERO };
+    let mut flow = Flow::new(&mesh, PERIODIC, &params(nu));
+    let exact = |axis: usize, x: DVec3, t: f64| {
+        let (a, b) = (x[plane[0]], x[plane[1]]);
+        let decay = (-2.0 * nu * t).exp();
+        if axis == plane[0] {
+            a.sin() * b.cos() * decay
+        } else if axis == plane[1] {
+            -a.cos() * b.sin() * decay
+        } else {
+            0.0
+        }
+    };
+    flow.velocity.x.fill_with(&mesh, |x| exact(0, x, 0.0));
+    flow.velocity.y.fill_with(&mesh, |x| exact(1, x, 0.0));
+    flow.velocity.z.fill_with(&mesh, |x| exact(2, x, 0.0));
+    flow.boundaries.fill_ghosts(&mut flow.velocity);
+    for _ in 0..steps {
+        flow.predict(dt);
+        flow.project(dt);
+    }
+    let t = dt * steps as f64;
+    let mut worst: f64 = 0.0;
+    for [i, j, k] in interior(&mesh) {
+        for axis in 0..3 {
+            let x = mesh.position(crate::grid::FACE_OFFSET[axis], [i, j, k]);
+            let u = flow.velocity.component(axis)[mesh.layout().index(i, j, k)];
+            worst = worst.max((u - exact(axis, x, t)).abs());
+        }
+    }
+    worst
+}
+
+#[test]
+fn taylor_green_is_second_order_in_space() {
+    for plane in [[0, 1], [1, 2], [0, 2]] {
+        let coarse = taylor_green(16, 2e-3, 250, 0.1, plane);
+        let fine = taylor_green(32, 2e-3, 250, 0.1, plane);
+        let order = (coarse / fine).log2();
+        assert!((order - 2.0).abs() <= 0.1, "{plane:?}: errors {coarse:e} {fine:e}, order {order}");
+    }
+}

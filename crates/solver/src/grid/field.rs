@@ -1,0 +1,217 @@
+//! Fields on the staggered grid. The location is part of the type, so that a face field cannot be
+//! passed for a centre field.
+//!
+//! Every field has one ghost layer on each side and the same shape (nx+2, ny+2, nz+2), x fastest.
+//! Cell (i, j, k) of the interior has 1 <= i <= nx and so on. A face field stores the *lower* face
+//! of each cell: face i of `FaceX` lies between cells i-1 and i, so a box with walls has its upper
+//! boundary face at index nx+1.
+
+use std::marker::PhantomData;
+use std::ops::{Deref, DerefMut};
+
+use glam::DVec3;
+
+use super::Mesh;
+
+/// A place on the staggered cell.
+pub trait Location: Copy + Send + Sync + 'static {
+    /// Offset from the cell's lower corner in units of the spacing.
+    const OFFSET: [f64; 3];
+}
+
+/// Cell centres.
+#[derive(Clone, Copy, Debug)]
+pub struct Centre;
+/// Faces normal to x (lower face of each cell).
+#[derive(Clone, Copy, Debug)]
+pub struct FaceX;
+/// Faces normal to y.
+#[derive(Clone, Copy, Debug)]
+pub struct FaceY;
+/// Faces normal to z.
+#[derive(Clone, Copy, Debug)]
+pub struct FaceZ;
+
+impl Location for Centre {
+    const OFFSET: [f64; 3] = [0.5, 0.5, 0.5];
+}
+impl Location for FaceX {
+    const OFFSET: [f64; 3] = [0.0, 0.5, 0.5];
+}
+impl Location for FaceY {
+    const OFFSET: [f64; 3] = [0.5, 0.0, 0.5];
+}
+impl Location for FaceZ {
+    const OFFSET: [f64; 3] = [0.5, 0.5, 0.0];
+}
+
+/// Offsets of the three face locations, indexed by axis.
+pub const FACE_OFFSET: [[f64; 3]; 3] = [FaceX::OFFSET, FaceY::OFFSET, FaceZ::OFFSET];
+
+/// Memory layout shared by all fields of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Interior cells along x, y, z.
+    pub cells: [usize; 3],
+}
+
+impl Layout {
+    /// Entries of a row, ghosts included.
+    #[inline]
+    pub fn row(&self) -> usize {
+        self.cells[0] + 2
+    }
+    /// Entries of a plane, ghosts included.
+    #[inline]
+    pub fn plane(&self) -> usize {
+        self.row() * (self.cells[1] + 2)
+    }
+    /// Entries of a field, ghosts included.
+    #[inline]
+    pub fn len(&self) -> usize {
+        self.plane() * (self.cells[2] + 2)
+    }
+    /// A layout always has ghosts, so it is never empty.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+    /// Position of (i, j, k) in memory.
+    #[inline]
+    pub fn index(&self, i: usize, j: usize, k: usize) -> usize {
+        i + self.row() * (j + (self.cells[1] + 2) * k)
+    }
+    /// Distance in memory between neighbours along each axis.
+    #[inline]
+    pub fn strides(&self) -> [usize; 3] {
+        [1, self.row(), self.plane()]
+    }
+    /// Copies both outermost interior layers of a periodic axis onto the ghosts across the box.
+    pub fn wrap(&self, values: &mut [f64], axis: usize) {
+        let n = self.cells[axis];
+        self.map_layer(values, axis, n, 0, |value| value);
+        self.map_layer(values, axis, 1, n + 1, |value| value);
+    }
+    /// Calls `f` with the memory position of every entry of a layer, ghosts included.
+    pub fn each_of_layer(&self, axis: usize, layer: usize, mut f: impl FnMut(usize)) {
+        let (row, plane) = (self.row(), self.plane());
+        let (outer, middle) = (self.len() / plane, plane / row);
+        match axis {
+            0 => (0..outer * middle).for_each(|line| f(line * row + layer)),
+            1 => (0..outer).for_each(|k| (0..row).for_each(|i| f(k * plane + layer * row + i))),
+            _ => (0..plane).for_each(|at| f(layer * plane + at)),
+        }
+    }
+    /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.
+    pub fn map_layer(&self, values: &mut [f64], axis: usize, from: usize, to: usize, f: impl Fn(f64) -> f64) {
+        let stride = self.strides()[axis];
+        let shift = (from as isize - to as isize) * stride as isize;
+        self.each_of_layer(axis, to, |at| values[at] = f(values[at.wrapping_add_signed(shift)]));
+    }
+}
+
+/// Values at one location of every cell.
+#[derive(Clone, Debug)]
+pub struct Field<L> {
+    layout: Layout,
+    values: Vec<f64>,
+    location: PhantomData<L>,
+}
+
+impl<L: Location> Field<L> {
+    /// A field of zeros on `mesh`.
+    pub fn zeros(mesh: &Mesh) -> Self {
+        let layout = mesh.layout();
+        Field { layout, values: vec![0.0; layout.len()], location: PhantomData }
+    }
+    /// Its layout.
+    #[inline]
+    pub fn layout(&self) -> Layout {
+        self.layout
+    }
+    /// Value at (i, j, k); ghosts at 0 and n+1.
+    #[inline]
+    pub fn at(&self, i: usize, j: usize, k: usize) -> f64 {
+        self.values[self.layout.index(i, j, k)]
+    }
+    /// Sets the value at (i, j, k).
+    #[inline]
+    pub fn set(&mut self, i: usize, j: usize, k: usize, value: f64) {
+        let at = self.layout.index(i, j, k);
+        self.values[at] = value;
+    }
+    /// One row, ghosts included.
+    #[inline]
+    pub fn row(&self, j: usize, k: usize) -> &[f64] {
+        let start = self.layout.index(0, j, k);
+        &self.values[start..start + self.layout.row()]
+    }
+    /// Sets every interior value from its position [m].
+    pub fn fill_with(&mut self, mesh: &Mesh, f: impl Fn(DVec3) -> f64) {
+        let [nx, ny, nz] = self.layout.cells;
+        for k in 1..=nz + 1 {
+            for j in 1..=ny + 1 {
+                for i in 1..=nx + 1 {
+                    self.set(i, j, k, f(mesh.position(L::OFFSET, [i, j, k])));
+                }
+            }
+        }
+    }
+    /// Copies the interior across the box on a periodic axis (the upper boundary face included).
+    pub fn wrap(&mut self, axis: usize) {
+        self.layout.wrap(&mut self.values, axis);
+    }
+    /// Copies the layer `from` of an axis onto the layer `to`.
+    pub fn copy_layer(&mut self, axis: usize, from: usize, to: usize) {
+        self.layout.map_layer(&mut self.values, axis, from, to, |value| value);
+    }
+}
+
+impl<L> Deref for Field<L> {
+    type Target = [f64];
+    #[inline]
+    fn deref(&self) -> &[f64] {
+        &self.values
+    }
+}
+impl<L> DerefMut for Field<L> {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+}
+
+/// The three components of a vector field, each on its own faces.
+#[derive(Clone, Debug)]
+pub struct FaceVector {
+    /// x component on x faces.
+    pub x: Field<FaceX>,
+    /// y component on y faces.
+    pub y: Field<FaceY>,
+    /// z component on z faces.
+    pub z: Field<FaceZ>,
+}
+
+impl FaceVector {
+    /// A vector field of zeros.
+    pub fn zeros(mesh: &Mesh) -> Self {
+        FaceVector { x: Field::zeros(mesh), y: Field::zeros(mesh), z: Field::zeros(mesh) }
+    }
+    /// Raw values of one component.
+    #[inline]
+    pub fn component(&self, axis: usize) -> &[f64] {
+        match axis {
+            0 => &self.x,
+            1 => &self.y,
+            _ => &self.z,
+        }
+    }
+    /// Raw values of one component, to write.
+    #[inline]
+    pub fn component_mut(&mut self, axis: usize) -> &mut [f64] {
+        match axis {
+            0 => &mut self.x,
+            1 => &mut self.y,
+            _ => &mut self.z,
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! The solver against its definition: the residual of the seven-point Laplacian.
+
+use super::*;
+use glam::DVec3;
+
+/// Small deterministic generator of values in (-1, 1).
+fn noise(state: &mut u64) -> f64 {
+    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+fn residual(cells: [usize; 3], ends: [Ends; 3]) -> f64 {
+    let mesh = Mesh { cells, spacing: DVec3::new(0.5, 0.7, 0.6), origin: DVec3::ZERO };
+    let [nx, ny, nz] = cells;
+    let mut f = Field::<Centre>::zeros(&mesh);
+    let mut state = 7;
+    let mut sum = 0.0;
+    for k in 1..=nz {
+        for j in 1..=ny {
+            for i in 1..=nx {
+                let value = noise(&mut state);
+                sum += value;
+                f.set(i, j, k, value);
+            }
+        }
+    }
+    let mean = sum / mesh.cell_count() as f64;
+    for k in 1..=nz {
+        for j in 1..=ny {
+            for i in 1..=nx {
+                let value = f.at(i, j, k) - mean;
+                f.set(i, j, k, value);
+            }
+        }
+    }
+    let rhs = f.clone();
+    Poisson::new(&mesh, ends).solve(&mut f);
+    for axis in 0..3 {
+        match ends[axis] {
+            Ends::Periodic => f.wrap(axis),
+            Ends::Neumann => {
+                f.copy_layer(axis, 1, 0);
+                f.copy_layer(axis, cells[axis], cells[axis] + 1);
+            }
+        }
+    }
+    let (mut worst, mut scale) = (0.0f64, 0.0f64);
+    for k in 1..=nz {
+        for j in 1..=ny {
+            for i in 1..=nx {
+                let c = f.at(i, j, k);
+                let lap = (f.at(i - 1, j, k) - 2.0 * c + f.at(i + 1, j, k)) / mesh.spacing.x.powi(2)
+                    + (f.at(i, j - 1, k) - 2.0 * c + f.at(i, j + 1, k)) / mesh.spacing.y.powi(2)
+                    + (f.at(i, j, k - 1) - 2.0 * c + f.at(i, j, k + 1)) / mesh.spacing.z.powi(2);
+                worst = worst.max((lap - rhs.at(i, j, k)).abs());
+                scale = scale.max(rhs.at(i, j, k).abs());
+            }
+        }
+    }
+    worst / scale
+}
+
+#[test]
+fn residual_is_round_off_for_every_pairing_and_awkward_sizes() {
+    use Ends::{Neumann as N, Periodic as P};
+    let pairings = [[N, N, N], [P, N, N], [N, P, N], [P, P, N], [N, N, P], [P, N, P], [N, P, P], [P, P, P]];
+    let sizes = [
+        [67, 31, 12],
+        [12, 97, 31],
+        [9, 10, 131],
+        [16, 20, 24],
+        [1, 15, 30],
+        [14, 1, 9],
+        [8, 11, 1],
+        [2, 3, 2],
+        [1, 1, 5],
+    ];
+    for ends in pairings {
+        for cells in sizes {
+            let r = residual(cells, ends);
+            assert!(r <= 1e-12, "{cells:?} {ends:?}: relative residual {r:e}");
+        }
+    }
+}
+
+#[test]
+fn bits_do_not_depend_on_the_number_of_threads() {
+    let mesh = Mesh { cells: [30, 21, 17], spacing: DVec3::ONE, origin: DVec3::ZERO };
+    let solve = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut state = 3;
+            let mut f = Field::<Centre>::zeros(&mesh);
+            f.iter_mut().for_each(|value| *value = noise(&mut state));
+            Poisson::new(&mesh, [Ends::Neumann, Ends::Periodic, Ends::Neumann]).solve(&mut f);
+            f.iter().map(|value| value.to_bits()).collect::<Vec<_>>()
+        })
+    };
+    let one = solve(1);
+    assert_eq!(one, solve(2));
+    assert_eq!(one, solve(3));
+}

@@ -1,0 +1,63 @@
+//! What the method may break, measured.
+
+use glam::DVec3;
+
+use super::Simulation;
+
+/// Measures of the present state.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Diagnostics {
+    /// Largest |div u| after projection [1/s].
+    pub max_divergence: f64,
+    /// Largest velocity magnitude on the grid [m/s].
+    pub max_velocity: f64,
+    /// CFL number dt * max(sum |u_a| / h_a) of the last step.
+    pub cfl: f64,
+    /// Root mean square slip velocity at the surface nodes [m/s].
+    pub slip: f64,
+    /// Kinetic energy of the fluid in the box [J], the fluid inside grains included.
+    pub fluid_kinetic_energy: f64,
+    /// Kinetic energy of the grains [J].
+    pub grain_kinetic_energy: f64,
+    /// Momentum of the box (fluid + grains) [kg m/s].
+    pub momentum: DVec3,
+    /// Momentum balance of fluid + grains + walls in this step, relative to the largest term.
+    pub momentum_residual: f64,
+}
+
+impl Simulation {
+    /// Measures the present state.
+    pub fn diagnostics(&self) -> Diagnostics {
+        let grains = &self.setup.grains;
+        let mut d = Diagnostics::default();
+        for grain in grains {
+            let spin = grain.angular_velocity;
+            d.grain_kinetic_energy +=
+                0.5 * (grain.mass() * grain.velocity.length_squared() + spin.dot(grain.inertia() * spin));
+            d.momentum += grain.mass() * grain.velocity;
+        }
+        if let (Some(fluid), Some(params)) = (&self.fluid, &self.setup.fluid) {
+            d.max_divergence = fluid.measures.max_divergence;
+            d.max_velocity = fluid.measures.max_velocity;
+            d.cfl = fluid.measures.max_rate * self.clock.last_step;
+            d.fluid_kinetic_energy = params.density * fluid.measures.kinetic_energy;
+            d.slip = self.slip();
+        }
+        d
+    }
+
+    /// Root mean square, over all surface nodes in the box, of the fluid's velocity against the grain's.
+    fn slip(&self) -> f64 {
+        let (mut sum, mut area) = (0.0, 0.0);
+        for grain in &self.setup.grains {
+            for node in grain.shape.nodes() {
+                let x = grain.pose.to_space(node.position);
+                if let Some(u) = self.interpolate_velocity(x) {
+                    sum += node.area * (u - grain.velocity_at(x)).length_squared();
+                    area += node.area;
+                }
+            }
+        }
+        if area > 0.0 { (sum / area).sqrt() } else { 0.0 }
+    }
+}

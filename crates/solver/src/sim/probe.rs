@@ -1,0 +1,130 @@
+//! Reading the fields: values at cells and points.
+
+use glam::DVec3;
+
+use super::Simulation;
+use crate::flow::Flow;
+use crate::grid::{FACE_OFFSET, FaceVector};
+
+impl Simulation {
+    fn flow(&self) -> Option<&Flow> {
+        self.fluid.as_ref().map(|fluid| &fluid.flow)
+    }
+    /// Face velocities [m/s], if there is a fluid.
+    pub fn velocity(&self) -> Option<&FaceVector> {
+        self.flow().map(|flow| &flow.velocity)
+    }
+    /// Cell-centred velocity [m/s] of cell (i, j, k), counted from 0; zero without fluid.
+    pub fn velocity_at(&self, cell: [usize; 3]) -> DVec3 {
+        let Some(flow) = self.flow() else { return DVec3::ZERO };
+        let [i, j, k] = cell.map(|i| i + 1);
+        let FaceVector { x, y, z } = &flow.velocity;
+        0.5 * DVec3::new(
+            x.at(i, j, k) + x.at(i + 1, j, k),
+            y.at(i, j, k) + y.at(i, j + 1, k),
+            z.at(i, j, k) + z.at(i, j, k + 1),
+        )
+    }
+    /// Vorticity [1/s] at the centre of cell (i, j, k), counted from 0: mean of the four edges.
+    pub fn vorticity_at(&self, cell: [usize; 3]) -> DVec3 {
+        let Some(flow) = self.flow() else { return DVec3::ZERO };
+        let h = self.setup.mesh.spacing;
+        let layout = self.setup.mesh.layout();
+        let strides = layout.strides();
+        let [i, j, k] = cell.map(|i| i + 1);
+        let at = layout.index(i, j, k);
+        // Edge (b, c) at the lower corner of a cell: d u_c / d b - d u_b / d c.
+        let edge = |b: usize, c: usize, at: usize| {
+            let (ub, uc) = (flow.velocity.component(b), flow.velocity.component(c));
+            (uc[at] - uc[at - strides[b]]) / h[b] - (ub[at] - ub[at - strides[c]]) / h[c]
+        };
+        let mean = |b: usize, c: usize| {
+            let (up, across) = (strides[b], strides[c]);
+            0.25 * (edge(b, c, at) + edge(b, c, at + up) + edge(b, c, at + across) + edge(b, c, at + up + across))
+        };
+        DVec3::new(mean(1, 2), mean(2, 0), mean(0, 1))
+    }
+    /// Dynamic pressure [Pa] of cell (i, j, k), counted from 0.
+    pub fn pressure_at(&self, cell: [usize; 3]) -> f64 {
+        let [i, j, k] = cell.map(|i| i + 1);
+        let density = self.setup.fluid.map_or(0.0, |fluid| fluid.density);
+        self.flow().map_or(0.0, |flow| density * flow.pressure.at(i, j, k))
+    }
+    /// Solid fraction of cell (i, j, k), counted from 0, by the plane through the nearest surface.
+    pub fn solid_fraction_at(&self, cell: [usize; 3]) -> f64 {
+        let mesh = &self.setup.mesh;
+        let x = mesh.position([0.5; 3], cell.map(|i| i + 1));
+        let extent = mesh.extent();
+        let mut fraction: f64 = 0.0;
+        for grain in &self.setup.grains {
+            let mut arm = x - grain.pose.position;
+            for axis in 0..3 {
+                if self.setup.boundaries.is_periodic(axis) && mesh.cells[axis] > 1 {
+                    arm[axis] -= (arm[axis] / extent[axis]).round() * extent[axis];
+                }
+            }
+            let reach = grain.shape.bounding_radius() + mesh.spacing.length();
+            if arm.length_squared() > reach * reach {
+                continue;
+            }
+            let (d, gradient) = grain.shape.distance_and_gradient(grain.pose.orientation.conjugate() * arm);
+            let normal = grain.pose.orientation * gradient.normalize_or_zero();
+            let width = normal.abs().dot(mesh.spacing).max(mesh.spacing.min_element());
+            fraction = fraction.max((0.5 - d / width).clamp(0.0, 1.0));
+        }
+        fraction
+    }
+
+    /// Velocity [m/s] at a point by trilinear interpolation of each component; `None` outside the
+    /// box or without fluid.
+    pub fn interpolate_velocity(&self, x: DVec3) -> Option<DVec3> {
+        let flow = self.flow()?;
+        let mesh = &self.setup.mesh;
+        let layout = mesh.layout();
+        let strides = layout.strides();
+        let mut velocity = DVec3::ZERO;
+        for (component, offset) in FACE_OFFSET.iter().enumerate() {
+            let mut at = 0;
+            let mut weight = [0.0; 3];
+            let mut flat = [false; 3];
+            for axis in 0..3 {
+                let n = mesh.cells[axis];
+                if n == 1 {
+                    at += strides[axis];
+                    flat[axis] = true;
+                    continue;
+                }
+                let mut s = (x[axis] - mesh.origin[axis]) / mesh.spacing[axis];
+                if self.setup.boundaries.is_periodic(axis) {
+                    s = s.rem_euclid(n as f64);
+                }
+                if !(0.0..=n as f64).contains(&s) {
+                    return None;
+                }
+                let s = s - offset[axis] + 1.0;
+                let i = (s.floor() as usize).min(n);
+                at += i * strides[axis];
+                weight[axis] = s - i as f64;
+            }
+            let q = flow.velocity.component(component);
+            for corner in 0..8usize {
+                let (mut share, mut here) = (1.0, at);
+                for axis in 0..3 {
+                    let upper = corner >> axis & 1 == 1;
+                    if flat[axis] && upper {
+                        share = 0.0;
+                    } else if upper {
+                        share *= weight[axis];
+                        here += strides[axis];
+                    } else {
+                        share *= 1.0 - weight[axis];
+                    }
+                }
+                if share != 0.0 {
+                    velocity[component] += share * q[here];
+                }
+            }
+        }
+        Some(velocity)
+    }
+}

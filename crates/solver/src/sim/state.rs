@@ -1,0 +1,114 @@
+//! The full state, written and read bit for bit.
+
+use std::io::{self, Read, Write};
+
+use glam::{DQuat, DVec3};
+
+use super::Simulation;
+use crate::math::Load;
+
+impl Simulation {
+    /// Writes the full state; reading it back continues with the same bits.
+    pub fn save(&self, writer: &mut dyn Write) -> io::Result<()> {
+        let mut out = Writer(writer);
+        out.count(self.clock.steps)?;
+        out.numbers(&[self.clock.time, self.clock.last_step])?;
+        out.count(self.setup.grains.len() as u64)?;
+        for (grain, load) in self.setup.grains.iter().zip(&self.loads) {
+            out.numbers(&grain.pose.position.to_array())?;
+            out.numbers(&grain.pose.orientation.to_array())?;
+            for v in [grain.velocity, grain.angular_velocity, load.force, load.torque] {
+                out.numbers(&v.to_array())?;
+            }
+        }
+        if let Some(fluid) = &self.fluid {
+            let m = &fluid.measures;
+            out.numbers(&[m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy])?;
+            for values in fluid.flow.state() {
+                out.count(values.len() as u64)?;
+                out.numbers(values)?;
+            }
+        }
+        self.dynamics.save(out.0)
+    }
+
+    /// Restores a state written by [`Simulation::save`] from the same set-up.
+    ///
+    /// # Errors
+    /// `InvalidData` where the data do not fit this set-up; the simulation is then not to be used.
+    pub fn restore(&mut self, reader: &mut dyn Read) -> io::Result<()> {
+        let mut input = Reader(reader);
+        self.clock.steps = input.count()?;
+        [self.clock.time, self.clock.last_step] = input.numbers()?;
+        input.expect(self.setup.grains.len(), "grains")?;
+        for (grain, load) in self.setup.grains.iter_mut().zip(&mut self.loads) {
+            grain.pose.position = DVec3::from_array(input.numbers()?);
+            grain.pose.orientation = DQuat::from_array(input.numbers()?);
+            grain.velocity = DVec3::from_array(input.numbers()?);
+            grain.angular_velocity = DVec3::from_array(input.numbers()?);
+            *load = Load { force: DVec3::from_array(input.numbers()?), torque: DVec3::from_array(input.numbers()?) };
+        }
+        if let Some(fluid) = &mut self.fluid {
+            let m = &mut fluid.measures;
+            [m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy] = input.numbers()?;
+            for values in fluid.flow.state_mut(self.clock.last_step) {
+                input.expect(values.len(), "field entries")?;
+                input.fill(values)?;
+            }
+            fluid.coupling.locate(&self.setup.grains, self.clock.last_step);
+        }
+        self.dynamics.restore(input.0)
+    }
+}
+
+struct Writer<'a>(&'a mut dyn Write);
+
+impl Writer<'_> {
+    fn count(&mut self, value: u64) -> io::Result<()> {
+        self.0.write_all(&value.to_le_bytes())
+    }
+    fn numbers(&mut self, values: &[f64]) -> io::Result<()> {
+        let mut bytes = [0; 8 * 512];
+        for chunk in values.chunks(512) {
+            for (out, value) in bytes.chunks_exact_mut(8).zip(chunk) {
+                out.copy_from_slice(&value.to_le_bytes());
+            }
+            self.0.write_all(&bytes[..8 * chunk.len()])?;
+        }
+        Ok(())
+    }
+}
+
+struct Reader<'a>(&'a mut dyn Read);
+
+impl Reader<'_> {
+    fn count(&mut self) -> io::Result<u64> {
+        let mut bytes = [0; 8];
+        self.0.read_exact(&mut bytes)?;
+        Ok(u64::from_le_bytes(bytes))
+    }
+    fn numbers<const N: usize>(&mut self) -> io::Result<[f64; N]> {
+        let mut values = [0.0; N];
+        self.fill(&mut values)?;
+        Ok(values)
+    }
+    fn fill(&mut self, values: &mut [f64]) -> io::Result<()> {
+        let mut bytes = [0; 8 * 512];
+        for chunk in values.chunks_mut(512) {
+            let bytes = &mut bytes[..8 * chunk.len()];
+            self.0.read_exact(bytes)?;
+            for (value, bytes) in chunk.iter_mut().zip(bytes.chunks_exact(8)) {
+                *value = f64::from_le_bytes(bytes.try_into().expect("chunks of eight"));
+            }
+        }
+        Ok(())
+    }
+    fn expect(&mut self, count: usize, what: &str) -> io::Result<()> {
+        let found = self.count()?;
+        if found == count as u64 {
+            return Ok(());
+        }
+        let message = format!("the checkpoint has {found} {what}, this case has {count}");
+        Err(io::Error::new(io::ErrorKind::InvalidData, message))
+    }
+}

@@ -1,0 +1,104 @@
+//! The time step. It reads like the paper: predict, move the grains (contact sub-steps), locate
+//! the solid, impose rigidity, project.
+
+use std::time::{Duration, Instant};
+
+use super::{Fluid, Simulation};
+use crate::coupling::Scheme;
+use crate::math::Load;
+
+/// Why a step could not be taken.
+#[derive(Debug, thiserror::Error)]
+pub enum StepError {
+    /// The numerics failed.
+    #[error("the run became unstable at t = {time:.6e} s (step {step}): {what}; try {remedy}")]
+    Unstable {
+        /// Time [s].
+        time: f64,
+        /// Step number.
+        step: u64,
+        /// What was seen.
+        what: String,
+        /// What to try.
+        remedy: String,
+    },
+}
+
+impl Simulation {
+    /// One time step; `limit` [s] caps it so that output times are met exactly.
+    pub fn step(&mut self, limit: f64) -> Result<(), StepError> {
+        let rate = self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures.max_rate);
+        let dt = self.clock.choose(rate, limit);
+        let Simulation { setup, fluid, dynamics, loads, work, passes, .. } = self;
+        let grains = &mut setup.grains;
+        let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
+        for (i, grain) in grains.iter().enumerate() {
+            work.before[i] = [grain.velocity, grain.angular_velocity];
+            let weight = setup.gravity * (grain.density - fluid_density) * grain.shape.volume();
+            work.driving[i] = Load { force: weight, torque: glam::DVec3::ZERO } + loads[i];
+        }
+        match fluid {
+            None => timed(&mut passes.contact, || {
+                dynamics.advance(grains, &work.driving, dt, &mut work.contact);
+            }),
+            Some(Fluid { flow, coupling, measures }) => {
+                timed(&mut passes.predict, || flow.predict(dt));
+                timed(&mut passes.coupling, || coupling.correct_advection(flow, grains));
+                timed(&mut passes.contact, || dynamics.advance(grains, &work.driving, dt, &mut work.contact));
+                timed(&mut passes.coupling, || coupling.locate(grains, dt));
+                if setup.scheme == Scheme::Paper {
+                    timed(&mut passes.project, || flow.project_prediction(dt));
+                }
+                for i in 0..grains.len() {
+                    work.driving[i] = work.driving[i] + loads[i] * -1.0 + work.contact[i];
+                }
+                timed(&mut passes.coupling, || {
+                    coupling.impose_rigidity(flow, grains, &work.before, &work.driving, dt, loads);
+                });
+                timed(&mut passes.project, || *measures = flow.project(dt));
+            }
+        }
+        self.clock.advance(dt);
+        self.check()
+    }
+
+    /// Stops a run whose state is no longer finite or whose speed has left all reason.
+    fn check(&self) -> Result<(), StepError> {
+        let unstable = |what: String, remedy: &str| {
+            Err(StepError::Unstable { time: self.clock.time, step: self.clock.steps, what, remedy: remedy.into() })
+        };
+        for (i, grain) in self.setup.grains.iter().enumerate() {
+            let finite = grain.pose.position.is_finite()
+                && grain.velocity.is_finite()
+                && grain.angular_velocity.is_finite()
+                && grain.pose.orientation.is_finite();
+            if !finite {
+                return unstable(
+                    format!("the motion of grain {i} is not finite"),
+                    "a smaller time step or a softer contact",
+                );
+            }
+        }
+        if let Some(fluid) = &self.fluid {
+            let m = &fluid.measures;
+            if !(m.kinetic_energy.is_finite() && m.max_divergence.is_finite()) {
+                return unstable("the velocity is not finite".into(), "a smaller [time] cfl or a finer grid");
+            }
+            let cfl = m.max_rate * self.clock.last_step;
+            if cfl > 10.0 {
+                return unstable(
+                    format!("the CFL number jumped to {cfl:.1}"),
+                    "a smaller [time] cfl, a smaller fixed step or a finer grid",
+                );
+            }
+        }
+        Ok(())
+    }
+}
+
+fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = work();
+    *total += start.elapsed();
+    result
+}
