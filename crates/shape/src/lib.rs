@@ -1,9 +1,35 @@
 //! Grain shapes: a signed distance field in the body's principal frame, its surface nodes,
 //! mass properties and morphology record. A shape is immutable, shared, and knows no pose.
 //!
-//! Frame: origin at the centroid, axes along the principal axes of inertia, lengths in metres.
-//! Sign: distance is negative inside. Inertia is per unit density [m^5].
+//! Frame: origin at the centroid, axes along the principal axes of inertia (smallest moment
+//! about x, largest about z), lengths in metres. Sign: distance is negative inside. Inertia is
+//! per unit density [m^5].
+//!
+//! Shapes come from closed forms ([`analytic`]), closed surface meshes ([`mesh`]) and 3-D images
+//! ([`scan`]); [`Shape::save`] and [`Shape::load`] keep them in `.grain` files.
 
+pub mod analytic;
+mod assemble;
+mod error;
+mod field;
+mod grain_file;
+mod hull;
+mod limits;
+mod mass;
+pub mod mesh;
+mod morphology;
+mod nodes;
+mod principal;
+mod provenance;
+mod quality;
 mod shape;
+mod surface;
 
+pub use assemble::ShapeOptions;
+pub use error::{Result, ShapeError};
+pub use field::SampledField;
+pub use limits::{ReadLimits, SourceFile};
+pub use morphology::{Morphology, Record};
+pub use provenance::Provenance;
+pub use quality::{Quality, QualityBounds};
 pub use shape::{Field, Shape, SurfaceNode};

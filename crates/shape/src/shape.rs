@@ -1,5 +1,12 @@
 //! The shape itself.
 
+use crate::error::{Result, positive};
+use crate::field::SampledField;
+use crate::mesh::cube_sphere;
+use crate::morphology::{Morphology, Record};
+use crate::provenance::Provenance;
+use crate::quality::Quality;
+use crate::{assemble, grain_file};
 use glam::DVec3;
 
 /// A point of the surface with the area it stands for.
@@ -12,36 +19,50 @@ pub struct SurfaceNode {
 }
 
 /// How the distance is represented.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Field {
     /// Exact sphere of this radius [m].
     Sphere(f64),
+    /// Samples on a grid.
+    Sampled(SampledField),
 }
 
 /// An immutable grain shape.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
-    field: Field,
-    nodes: Vec<SurfaceNode>,
-    volume: f64,
-    inertia: DVec3,
-    lower: DVec3,
-    upper: DVec3,
-    bounding_radius: f64,
+    pub(crate) field: Field,
+    pub(crate) nodes: Vec<SurfaceNode>,
+    pub(crate) volume: f64,
+    pub(crate) inertia: DVec3,
+    pub(crate) lower: DVec3,
+    pub(crate) upper: DVec3,
+    pub(crate) bounding_radius: f64,
+    pub(crate) morphology: Morphology,
+    pub(crate) quality: Option<Quality>,
+    pub(crate) provenance: Provenance,
 }
 
 impl Shape {
-    /// Sphere of `radius` [m] with about `nodes` evenly spread surface nodes.
+    /// Sphere of `radius` [m] with about `nodes` evenly spread surface nodes; its distance is
+    /// exact. [`analytic::sphere`](crate::analytic::sphere) refuses bad arguments.
     pub fn sphere(radius: f64, nodes: usize) -> Shape {
         let volume = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
+        let area = 4.0 * std::f64::consts::PI * radius * radius;
         let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-        let share = 4.0 * std::f64::consts::PI * radius * radius / nodes as f64;
+        let share = area / nodes as f64;
+        let provenance = Provenance::new("analytic")
+            .with("body", "sphere")
+            .with("radius_m", radius);
         let nodes = (0..nodes)
             .map(|i| {
                 let z = 1.0 - (2.0 * i as f64 + 1.0) / nodes as f64;
                 let rho = (1.0 - z * z).sqrt();
                 let (s, c) = (golden * i as f64).sin_cos();
-                SurfaceNode { position: radius * DVec3::new(rho * c, rho * s, z), area: share }
+                SurfaceNode {
+                    position: radius * DVec3::new(rho * c, rho * s, z),
+                    area: share,
+                }
             })
             .collect();
         Shape {
@@ -52,23 +73,44 @@ impl Shape {
             lower: DVec3::splat(-radius),
             upper: DVec3::splat(radius),
             bounding_radius: radius,
+            morphology: Morphology::new(DVec3::splat(2.0 * radius), area, volume, Some(1.0)),
+            quality: None,
+            provenance,
         }
     }
 
     /// Signed distance [m] at `x` (principal frame), negative inside.
+    #[inline]
     pub fn distance(&self, x: DVec3) -> f64 {
-        match self.field {
+        match &self.field {
             Field::Sphere(radius) => x.length() - radius,
+            Field::Sampled(field) => field.distance(x),
         }
     }
 
-    /// Signed distance [m] and its gradient (outward normal where |gradient| = 1) at `x`.
+    /// Signed distance [m] and its gradient (outward normal where |gradient| = 1) at `x`. On the
+    /// grid of a sampled field the gradient is that of the trilinear value, so its length is 1
+    /// only to the field's accuracy; off the grid it is a unit vector.
+    #[inline]
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
-        match self.field {
-            Field::Sphere(radius) => (x.length() - radius, x.normalize_or_zero()),
+        match &self.field {
+            Field::Sphere(radius) => {
+                let length = x.length();
+                let normal = if length > 0.0 {
+                    x / length
+                } else {
+                    DVec3::ZERO
+                };
+                (length - radius, normal)
+            }
+            Field::Sampled(field) => field.distance_and_gradient(x),
         }
     }
 
+    /// How the distance is represented.
+    pub fn field(&self) -> &Field {
+        &self.field
+    }
     /// Surface nodes, evenly spread.
     pub fn nodes(&self) -> &[SurfaceNode] {
         &self.nodes
@@ -96,5 +138,104 @@ impl Shape {
     /// Diameter of the sphere of equal volume [m].
     pub fn equivalent_diameter(&self) -> f64 {
         (6.0 * self.volume / std::f64::consts::PI).cbrt()
+    }
+    /// Surface area [m^2].
+    pub fn surface_area(&self) -> f64 {
+        self.morphology.area
+    }
+    /// Measured form.
+    pub fn morphology(&self) -> &Morphology {
+        &self.morphology
+    }
+    /// What the quality gate measured; none for the exact sphere.
+    pub fn quality(&self) -> Option<&Quality> {
+        self.quality.as_ref()
+    }
+    /// Where the shape comes from.
+    pub fn provenance(&self) -> &Provenance {
+        &self.provenance
+    }
+
+    /// The surface as a closed mesh in the principal frame [m]: positions and outward-facing
+    /// triangles.
+    pub fn surface_mesh(&self) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+        let mesh = match &self.field {
+            Field::Sphere(radius) => cube_sphere(24, |u| *radius * u),
+            Field::Sampled(field) => assemble::surface_of(field),
+        };
+        (mesh.vertices, mesh.triangles)
+    }
+
+    /// The shape enlarged by `factor`.
+    pub fn scaled(&self, factor: f64) -> Result<Shape> {
+        positive("factor", factor)?;
+        let field = match &self.field {
+            Field::Sphere(radius) => Field::Sphere(radius * factor),
+            Field::Sampled(field) => Field::Sampled(field.scaled(factor)),
+        };
+        let node = |n: &SurfaceNode| SurfaceNode {
+            position: n.position * factor,
+            area: n.area * factor * factor,
+        };
+        let mut provenance = self.provenance.clone();
+        provenance.scale *= factor;
+        Ok(Shape {
+            field,
+            nodes: self.nodes.iter().map(node).collect(),
+            volume: self.volume * factor.powi(3),
+            inertia: self.inertia * factor.powi(5),
+            lower: self.lower * factor,
+            upper: self.upper * factor,
+            bounding_radius: self.bounding_radius * factor,
+            morphology: self.morphology.scaled(factor),
+            quality: self.quality,
+            provenance,
+        })
+    }
+
+    /// The shape enlarged so that its equivalent diameter is `diameter` [m].
+    pub fn scaled_to_equivalent_diameter(&self, diameter: f64) -> Result<Shape> {
+        positive("equivalent diameter", diameter)?;
+        self.scaled(diameter / self.equivalent_diameter())
+    }
+
+    /// Hash of the geometry (field, nodes, mass properties) in hexadecimal: equal for equal
+    /// shapes, whatever their provenance.
+    pub fn digest(&self) -> String {
+        grain_file::digest(self)
+    }
+
+    /// The record that the command line prints.
+    pub fn record(&self) -> Record {
+        let m = &self.morphology;
+        let field = match &self.field {
+            Field::Sphere(_) => None,
+            Field::Sampled(field) => Some(field),
+        };
+        Record {
+            volume_m3: self.volume,
+            equivalent_diameter_m: self.equivalent_diameter(),
+            a_m: m.a,
+            b_m: m.b,
+            c_m: m.c,
+            elongation: m.elongation(),
+            flatness: m.flatness(),
+            krumbein_sphericity: m.krumbein_sphericity,
+            wadell_sphericity: m.wadell_sphericity,
+            wadell_roundness: m.wadell_roundness,
+            convexity: m.convexity,
+            surface_area_m2: m.area,
+            inertia_m5: self.inertia.to_array(),
+            bounding_radius_m: self.bounding_radius,
+            surface_nodes: self.nodes.len(),
+            field_samples: field.map(SampledField::dims),
+            field_spacing_m: field.map(SampledField::spacing),
+            gradient_error: self.quality.map(|q| q.gradient_error),
+            volume_error: self.quality.and_then(|q| q.volume_error),
+            method: self.provenance.method.clone(),
+            source: self.provenance.source.clone(),
+            source_sha256: self.provenance.source_sha256.clone(),
+            digest: self.digest(),
+        }
     }
 }

@@ -1,0 +1,221 @@
+//! Box, cylinder, capsule and superquadric.
+
+use super::sorted;
+use crate::assemble::{Body, assemble};
+use crate::error::{Result, ShapeError, positive};
+use crate::mesh::{self, cube_sphere};
+use crate::provenance::Provenance;
+use crate::{Shape, ShapeOptions};
+use glam::{DVec2, DVec3, Vec3Swizzles};
+use std::f64::consts::PI;
+
+/// Box with the given full edge lengths [m], in any order, its edges and corners rounded to
+/// `radius` [m] (0 for a sharp box); the outer dimensions are the lengths given.
+pub fn rounded_box(
+    length: f64,
+    width: f64,
+    height: f64,
+    radius: f64,
+    options: &ShapeOptions,
+) -> Result<Shape> {
+    let lengths = sorted(["length", "width", "height"], [length, width, height])?;
+    if !(radius.is_finite() && (0.0..=0.5 * lengths[2]).contains(&radius)) {
+        let reason = "must lie between 0 and half the shortest edge";
+        return Err(ShapeError::BadParameter {
+            name: "radius",
+            value: radius,
+            reason,
+        });
+    }
+    let half = 0.5 * DVec3::from_array(lengths);
+    let core = half - DVec3::splat(radius);
+    let edges = 2.0 * core;
+    // Steiner's formula for the box grown by a ball.
+    let faces = 2.0 * (edges.x * edges.y + edges.y * edges.z + edges.z * edges.x);
+    let volume = edges.element_product()
+        + radius * faces
+        + PI * radius * radius * edges.element_sum()
+        + 4.0 / 3.0 * PI * radius.powi(3);
+    let provenance = Provenance::new("analytic")
+        .with("body", "rounded_box")
+        .with("length_m", lengths[0])
+        .with("width_m", lengths[1])
+        .with("height_m", lengths[2])
+        .with("radius_m", radius);
+    let body = Body {
+        distance: |x: DVec3| {
+            let q = x.abs() - core;
+            q.max(DVec3::ZERO).length() + q.max_element().min(0.0) - radius
+        },
+        lower: -half,
+        upper: half,
+        volume: Some(volume),
+    };
+    assemble(&body, provenance, options)
+}
+
+/// Circular cylinder of `radius` and `length` [m]; its axis is x where it is long, z where it is
+/// a disc (length under sqrt(3) radii), as the order of the principal moments demands.
+pub fn cylinder(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shape> {
+    positive("radius", radius)?;
+    positive("length", length)?;
+    let long = length >= 3f64.sqrt() * radius;
+    let half = 0.5 * length;
+    let provenance = Provenance::new("analytic")
+        .with("body", "cylinder")
+        .with("radius_m", radius)
+        .with("length_m", length);
+    let extent = if long {
+        DVec3::new(half, radius, radius)
+    } else {
+        DVec3::new(radius, radius, half)
+    };
+    let body = Body {
+        distance: |x: DVec3| {
+            let (along, across) = if long { (x.x, x.yz()) } else { (x.z, x.xy()) };
+            let q = DVec2::new(across.length() - radius, along.abs() - half);
+            q.max(DVec2::ZERO).length() + q.max_element().min(0.0)
+        },
+        lower: -extent,
+        upper: extent,
+        volume: Some(PI * radius * radius * length),
+    };
+    assemble(&body, provenance, options)
+}
+
+/// Cylinder of `radius` and `length` [m] with a hemisphere on either end (total length
+/// `length` + 2 `radius`), along x.
+pub fn capsule(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shape> {
+    positive("radius", radius)?;
+    positive("length", length)?;
+    let half = 0.5 * length;
+    let extent = DVec3::new(half + radius, radius, radius);
+    let provenance = Provenance::new("analytic")
+        .with("body", "capsule")
+        .with("radius_m", radius)
+        .with("length_m", length);
+    let body = Body {
+        distance: |x: DVec3| DVec3::new((x.x.abs() - half).max(0.0), x.y, x.z).length() - radius,
+        lower: -extent,
+        upper: extent,
+        volume: Some(PI * radius * radius * (length + 4.0 / 3.0 * radius)),
+    };
+    assemble(&body, provenance, options)
+}
+
+/// Quadrilaterals along each edge of the cube from which a superquadric is meshed.
+const FACETS: usize = 72;
+
+/// Superquadric (Barr 1981)
+/// ((|x/a|^(2/e2) + |y/b|^(2/e2))^(e2/e1) + |z/c|^(2/e1) = 1 with semi-axes a, b, c [m]:
+/// e1 = e2 = 1 is the ellipsoid, small exponents approach a box, 2 an octahedron. Distances are
+/// those to a fine mesh of it, whose corners are exact.
+pub fn superquadric(
+    semi_axes: [f64; 3],
+    e1: f64,
+    e2: f64,
+    options: &ShapeOptions,
+) -> Result<Shape> {
+    for (name, length) in ["a", "b", "c"].into_iter().zip(semi_axes) {
+        positive(name, length)?;
+    }
+    for (name, value) in [("e1", e1), ("e2", e2)] {
+        if !(0.1..=2.0).contains(&value) {
+            let reason = "must lie between 0.1 and 2 (convex, and not too sharp to mesh)";
+            return Err(ShapeError::BadParameter {
+                name,
+                value,
+                reason,
+            });
+        }
+    }
+    let axes = DVec3::from_array(semi_axes);
+    let mesh = cube_sphere(FACETS, |u| {
+        let v = u.abs();
+        let ring = (v.x.powf(2.0 / e2) + v.y.powf(2.0 / e2)).powf(e2 / e1);
+        axes * u / (ring + v.z.powf(2.0 / e1)).powf(0.5 * e1)
+    });
+    let provenance = Provenance::new("analytic")
+        .with("body", "superquadric")
+        .with("a_m", semi_axes[0])
+        .with("b_m", semi_axes[1])
+        .with("c_m", semi_axes[2])
+        .with("e1", e1)
+        .with("e2", e2);
+    mesh::from_closed(&mesh, provenance, options)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Field;
+
+    fn options() -> ShapeOptions {
+        ShapeOptions {
+            cells: 40,
+            nodes: Some(300),
+            ..Default::default()
+        }
+    }
+
+    #[track_caller]
+    fn close(found: f64, exact: f64, relative: f64) {
+        assert!(
+            (found / exact - 1.0).abs() < relative,
+            "{found} for {exact}"
+        );
+    }
+
+    #[test]
+    fn a_rounded_box_has_its_volume_moments_and_extents() {
+        let shape = rounded_box(1e-3, 3e-3, 2e-3, 0.2e-3, &options()).unwrap();
+        let extent = shape.upper() - shape.lower();
+        close(extent.x, 3e-3, 4e-3);
+        close(extent.y, 2e-3, 4e-3);
+        close(extent.z, 1e-3, 4e-3);
+        assert!(shape.quality().unwrap().volume_error.unwrap().abs() < 2e-3);
+        assert!(shape.inertia().x < shape.inertia().y && shape.inertia().y < shape.inertia().z);
+    }
+
+    #[test]
+    fn cylinders_long_and_flat_are_ordered_by_their_moments() {
+        let rod = cylinder(1.0, 6.0, &options()).unwrap();
+        close(rod.volume(), 6.0 * PI, 3e-3);
+        close(rod.inertia().x, 6.0 * PI / 2.0, 8e-3);
+        close(rod.inertia().y, 6.0 * PI * (3.0 + 36.0) / 12.0, 6e-3);
+        let disc = cylinder(1.0, 0.5, &options()).unwrap();
+        close(disc.upper().z - disc.lower().z, 0.5, 6e-3);
+        close(disc.inertia().z, 0.5 * PI / 2.0, 8e-3);
+    }
+
+    #[test]
+    fn a_capsule_and_a_superquadric() {
+        let pill = capsule(1.0, 2.0, &options()).unwrap();
+        close(pill.volume(), PI * (2.0 + 4.0 / 3.0), 3e-3);
+        assert!((pill.distance(DVec3::new(2.5, 0.0, 0.0)) - 0.5).abs() < 5e-3);
+        let ball = superquadric([1.0, 1.0, 1.0], 1.0, 1.0, &options()).unwrap();
+        close(ball.volume(), 4.0 / 3.0 * PI, 4e-3);
+        // Exponents of 0.1 come close to the cube; b is the longest axis and becomes x.
+        let brick = superquadric([1.0, 2.0, 0.9], 0.1, 0.1, &options()).unwrap();
+        assert!(brick.volume() > 0.97 * 8.0 * 1.8 && brick.volume() < 8.0 * 1.8);
+        close(brick.upper().x, 2.0, 3e-3);
+        assert!(matches!(brick.field(), Field::Sampled(_)));
+    }
+
+    #[test]
+    fn bad_parameters_are_refused() {
+        let o = options();
+        assert!(cylinder(0.0, 1.0, &o).is_err());
+        assert!(cylinder(1.0, f64::NAN, &o).is_err());
+        assert!(capsule(-1.0, 1.0, &o).is_err());
+        assert!(rounded_box(1.0, 1.0, 1.0, 0.6, &o).is_err());
+        assert!(rounded_box(1.0, 1.0, 1.0, f64::NAN, &o).is_err());
+        assert!(superquadric([1.0; 3], 0.01, 1.0, &o).is_err());
+        assert!(rounded_box(1.0, 1.0, 1e-9, 0.0, &o).is_err());
+        let few = ShapeOptions {
+            cells: 2,
+            ..Default::default()
+        };
+        assert!(cylinder(1.0, 1.0, &few).is_err());
+    }
+}

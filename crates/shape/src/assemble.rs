@@ -1,0 +1,167 @@
+//! From a distance function in the principal frame to a finished shape.
+
+use crate::error::{Result, ShapeError, positive};
+use crate::field::SampledField;
+use crate::mesh::TriangleMesh;
+use crate::morphology::Morphology;
+use crate::provenance::Provenance;
+use crate::quality::{self, Quality, QualityBounds};
+use crate::shape::{Field, Shape};
+use crate::surface::{self, Samples};
+use crate::{mass, nodes};
+use glam::DVec3;
+
+/// Resolution, surface nodes and bounds of a sampled shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShapeOptions {
+    /// Grid cells across the longest extent.
+    pub cells: usize,
+    /// Grid cells across the shortest extent, at least; refines the grid of flat grains.
+    pub least_cells: usize,
+    /// Surface nodes; none for about one in every (equivalent diameter / 20)^2 of surface.
+    pub nodes: Option<usize>,
+    /// Quality gate.
+    pub bounds: QualityBounds,
+}
+
+impl Default for ShapeOptions {
+    fn default() -> ShapeOptions {
+        ShapeOptions {
+            cells: 48,
+            least_cells: 16,
+            nodes: None,
+            bounds: QualityBounds::default(),
+        }
+    }
+}
+
+/// Share of the longest extent by which the grid reaches beyond the surface, at least.
+const MARGIN: f64 = 0.125;
+/// The same in cells.
+const MARGIN_CELLS: f64 = 4.0;
+
+/// A body in (nearly) its principal frame.
+pub(crate) struct Body<F> {
+    /// Signed distance [m].
+    pub distance: F,
+    /// Bounding box [m].
+    pub lower: DVec3,
+    /// Bounding box [m].
+    pub upper: DVec3,
+    /// Exact volume [m^3] where known.
+    pub volume: Option<f64>,
+}
+
+impl ShapeOptions {
+    fn spacing(&self, extent: DVec3) -> Result<f64> {
+        for (name, value) in [("cells", self.cells), ("least_cells", self.least_cells)] {
+            if !(8..=1024).contains(&value) {
+                let value = value as f64;
+                return Err(ShapeError::BadParameter {
+                    name,
+                    value,
+                    reason: "must be 8 to 1024",
+                });
+            }
+        }
+        if let Some(nodes @ (0..16 | 1_000_001..)) = self.nodes {
+            let value = nodes as f64;
+            let reason = "must be 16 to 1000000";
+            return Err(ShapeError::BadParameter {
+                name: "nodes",
+                value,
+                reason,
+            });
+        }
+        positive("shortest extent of the body", extent.min_element())?;
+        Ok((extent.max_element() / self.cells as f64)
+            .min(extent.min_element() / self.least_cells as f64))
+    }
+}
+
+/// Samples the body, centres the field on its own centroid, measures it, spreads the nodes and
+/// passes the quality gate.
+pub(crate) fn assemble<F: Fn(DVec3) -> f64 + Sync>(
+    body: &Body<F>,
+    mut provenance: Provenance,
+    options: &ShapeOptions,
+) -> Result<Shape> {
+    let extent = body.upper - body.lower;
+    let spacing = options.spacing(extent)?;
+    let margin = (MARGIN * extent.max_element()).max(MARGIN_CELLS * spacing);
+    let field = SampledField::sample(&body.distance, body.lower, body.upper, spacing, margin)?;
+    let off = mass::of_field(&field).centroid;
+    if !off.is_finite() {
+        return Err(ShapeError::Quality {
+            reason: "the sampled body is empty".into(),
+        });
+    }
+    provenance.centroid += provenance.rotation * off;
+    let field = field.shifted(-off);
+    let mass = mass::of_field(&field);
+    quality::check_axes(&mass.second)?;
+
+    let mesh = surface_of(&field);
+    mesh.check_closed().map_err(|e| ShapeError::Quality {
+        reason: format!("the surface of the sampled body is not one closed surface ({e}); ask for more cells across the grain"),
+    })?;
+    let diameter = (6.0 * mass.volume / std::f64::consts::PI).cbrt();
+    let count = options.nodes.unwrap_or_else(|| {
+        ((mesh.area() / (diameter / 20.0).powi(2)).round() as usize).clamp(16, 1_000_000)
+    });
+    let nodes = nodes::spread(&field, &mesh, count);
+    let quality = Quality {
+        gradient_error: quality::gradient_error(&field, &nodes),
+        volume_error: body.volume.map(|v| mass.volume / v - 1.0),
+    };
+    options.bounds.check(&quality)?;
+
+    let (lower, upper, radius) = bounds(&field, &mesh);
+    let second = DVec3::new(
+        mass.second.x_axis.x,
+        mass.second.y_axis.y,
+        mass.second.z_axis.z,
+    );
+    Ok(Shape {
+        nodes,
+        volume: mass.volume,
+        inertia: DVec3::splat(second.element_sum()) - second,
+        lower,
+        upper,
+        bounding_radius: radius,
+        morphology: Morphology::measure(&mesh, upper - lower, mass.volume),
+        quality: Some(quality),
+        provenance,
+        field: Field::Sampled(field),
+    })
+}
+
+/// Closed surface of a field.
+pub(crate) fn surface_of(field: &SampledField) -> TriangleMesh {
+    surface::extract(&Samples {
+        dims: field.dims(),
+        lower: field.lower(),
+        spacing: field.spacing(),
+        values: field.levels(),
+    })
+}
+
+/// Bounding box and bounding radius of the surface. Its vertices lie on the grid lines; the
+/// middles of its faces, brought onto the surface, catch the bulge between them.
+fn bounds(field: &SampledField, mesh: &TriangleMesh) -> (DVec3, DVec3, f64) {
+    let middles = (0..mesh.triangles.len()).map(|f| {
+        let middle = mesh.corners(f).iter().sum::<DVec3>() / 3.0;
+        nodes::project(field, middle)
+    });
+    let start = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0.0f64);
+    let (lower, upper, squared) = mesh
+        .vertices
+        .iter()
+        .copied()
+        .chain(middles)
+        .fold(start, |(lower, upper, squared), x| {
+            (lower.min(x), upper.max(x), squared.max(x.length_squared()))
+        });
+    // What the sampling of the bulge may miss, a fraction of a percent of a cell.
+    (lower, upper, squared.sqrt() + 2e-3 * field.spacing())
+}

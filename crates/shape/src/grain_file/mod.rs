@@ -1,0 +1,394 @@
+//! `.grain` files: one shape with its provenance, versioned and checksummed.
+//!
+//! Layout, little-endian: 8 bytes signature, u32 version, u64 length of the body, the body, and
+//! the SHA-256 of everything before it. The body holds provenance, mass properties, morphology,
+//! quality, nodes and the field; the field's levels are differences against a predictor,
+//! deflated. No date is kept: equal shapes give equal files.
+
+mod bytes;
+mod levels;
+
+use crate::error::{Result, ShapeError};
+use crate::field::SampledField;
+use crate::limits::hex;
+use crate::morphology::Morphology;
+use crate::provenance::Provenance;
+use crate::quality::Quality;
+use crate::shape::{Field, Shape, SurfaceNode};
+use bytes::{Decoder, Encoder};
+use glam::DQuat;
+use sha2::{Digest, Sha256};
+use std::io::Write;
+use std::path::Path;
+
+/// Not text (first byte), with both line ends, so that a transfer in text mode shows.
+const SIGNATURE: &[u8; 8] = b"\x8fGRAIN\r\n";
+/// Version written; files of this version and older are read.
+const VERSION: u32 = 1;
+const HEAD: usize = 8 + 4 + 8;
+const CHECKSUM: usize = 32;
+/// Largest file that is read [bytes].
+const LARGEST: u64 = 1 << 30;
+
+impl Shape {
+    /// Writes the shape to `path`: first to a temporary name beside it, then renamed, so that a
+    /// file is whole or absent.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let io = |e| ShapeError::io(path, e);
+        let mut name = path.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".{}.tmp", std::process::id()));
+        let temporary = path.with_file_name(name);
+        let write = || {
+            let mut file = std::fs::File::create(&temporary)?;
+            file.write_all(&self.to_bytes())?;
+            file.sync_all()?;
+            std::fs::rename(&temporary, path)
+        };
+        write().map_err(|e| {
+            // Best effort: the error that matters is the first one.
+            let _ = std::fs::remove_file(&temporary);
+            io(e)
+        })
+    }
+
+    /// Reads a shape back, bit for bit.
+    pub fn load(path: &Path) -> Result<Shape> {
+        let limits = crate::ReadLimits {
+            file_bytes: LARGEST,
+            ..Default::default()
+        };
+        let (bytes, _) = crate::limits::read_bytes(path, &limits)?;
+        Shape::from_bytes(&bytes, path)
+    }
+
+    /// The content of a `.grain` file.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut body = Encoder::default();
+        encode_provenance(&mut body, &self.provenance);
+        encode_measures(&mut body, self);
+        match &self.field {
+            Field::Sphere(radius) => {
+                body.u8(0);
+                body.f64(*radius);
+            }
+            Field::Sampled(field) => {
+                body.u8(1);
+                encode_grid(&mut body, field);
+                body.bytes(&levels::pack(field.levels(), field.dims()));
+            }
+        }
+        let body = body.finish();
+        let mut out = Vec::with_capacity(HEAD + body.len() + CHECKSUM);
+        out.extend_from_slice(SIGNATURE);
+        out.extend_from_slice(&VERSION.to_le_bytes());
+        out.extend_from_slice(&(body.len() as u64).to_le_bytes());
+        out.extend_from_slice(&body);
+        let checksum = Sha256::digest(&out);
+        out.extend_from_slice(&checksum);
+        out
+    }
+
+    /// A shape from the content of a `.grain` file; `path` is for messages only.
+    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Shape> {
+        if !bytes.starts_with(SIGNATURE) {
+            return Err(ShapeError::NotAGrainFile {
+                path: path.to_owned(),
+            });
+        }
+        let early = || ShapeError::malformed(path, "the grain file ends early");
+        let mut head = Decoder::new(bytes.get(8..HEAD).ok_or_else(early)?);
+        let version = head.u32().ok_or_else(early)?;
+        // Before the checksum: a newer version may place it elsewhere.
+        if version > VERSION {
+            let path = path.to_owned();
+            return Err(ShapeError::FutureVersion {
+                path,
+                found: version,
+                supported: VERSION,
+            });
+        }
+        let length = head.u64().ok_or_else(early)?;
+        if (bytes.len() as u64) < length.saturating_add((HEAD + CHECKSUM) as u64) {
+            return Err(early());
+        }
+        let (content, checksum) = bytes.split_at(bytes.len() - CHECKSUM);
+        if Sha256::digest(content).as_slice() != checksum {
+            return Err(ShapeError::Checksum {
+                path: path.to_owned(),
+            });
+        }
+        decode(&content[HEAD..])
+            .ok_or_else(|| ShapeError::malformed(path, "the content of the grain file is invalid"))
+    }
+}
+
+/// Hash of the geometry in hexadecimal.
+pub(crate) fn digest(shape: &Shape) -> String {
+    let mut content = Encoder::default();
+    encode_mass(&mut content, shape);
+    match &shape.field {
+        Field::Sphere(radius) => content.f64(*radius),
+        Field::Sampled(field) => {
+            encode_grid(&mut content, field);
+            for level in field.levels() {
+                content.u32(level.to_bits());
+            }
+        }
+    }
+    hex(&Sha256::digest(content.finish()))
+}
+
+fn encode_provenance(out: &mut Encoder, p: &Provenance) {
+    for text in [&p.method, &p.source, &p.source_sha256, &p.program_version] {
+        out.text(text);
+    }
+    out.u32(p.parameters.len() as u32);
+    for (name, value) in &p.parameters {
+        out.text(name);
+        out.text(value);
+    }
+    out.vec(p.centroid);
+    for part in p.rotation.to_array() {
+        out.f64(part);
+    }
+    out.f64(p.scale);
+}
+
+fn decode_provenance(from: &mut Decoder) -> Option<Provenance> {
+    let (method, source) = (from.text()?, from.text()?);
+    let (source_sha256, program_version) = (from.text()?, from.text()?);
+    let count = from.u32()?;
+    let parameters = (0..count)
+        .map(|_| Some((from.text()?, from.text()?)))
+        .collect::<Option<_>>()?;
+    let centroid = from.vec()?;
+    let rotation = DQuat::from_xyzw(from.f64()?, from.f64()?, from.f64()?, from.f64()?);
+    Some(Provenance {
+        method,
+        source,
+        source_sha256,
+        parameters,
+        program_version,
+        centroid,
+        rotation,
+        scale: from.f64()?,
+    })
+}
+
+/// Volume, inertia, bounds and nodes.
+fn encode_mass(out: &mut Encoder, shape: &Shape) {
+    out.f64(shape.volume);
+    for v in [shape.inertia, shape.lower, shape.upper] {
+        out.vec(v);
+    }
+    out.f64(shape.bounding_radius);
+    out.u32(shape.nodes.len() as u32);
+    for node in &shape.nodes {
+        out.vec(node.position);
+        out.f64(node.area);
+    }
+}
+
+fn encode_measures(out: &mut Encoder, shape: &Shape) {
+    encode_mass(out, shape);
+    let m = &shape.morphology;
+    for value in [
+        m.a,
+        m.b,
+        m.c,
+        m.area,
+        m.krumbein_sphericity,
+        m.wadell_sphericity,
+    ] {
+        out.f64(value);
+    }
+    out.option(m.wadell_roundness);
+    out.option(m.convexity);
+    out.option(shape.quality.map(|q| q.gradient_error));
+    out.option(shape.quality.and_then(|q| q.volume_error));
+}
+
+fn decode(body: &[u8]) -> Option<Shape> {
+    let mut from = Decoder::new(body);
+    let provenance = decode_provenance(&mut from)?;
+    let volume = from.f64()?;
+    let (inertia, lower, upper) = (from.vec()?, from.vec()?, from.vec()?);
+    let bounding_radius = from.f64()?;
+    let count = from.u32()?;
+    let nodes = (0..count)
+        .map(|_| {
+            Some(SurfaceNode {
+                position: from.vec()?,
+                area: from.f64()?,
+            })
+        })
+        .collect::<Option<Vec<_>>>()?;
+    let morphology = Morphology {
+        a: from.f64()?,
+        b: from.f64()?,
+        c: from.f64()?,
+        area: from.f64()?,
+        krumbein_sphericity: from.f64()?,
+        wadell_sphericity: from.f64()?,
+        wadell_roundness: from.option()?,
+        convexity: from.option()?,
+    };
+    let gradient_error = from.option()?;
+    let volume_error = from.option()?;
+    let field = match from.u8()? {
+        0 => Field::Sphere(from.f64()?),
+        1 => Field::Sampled(decode_grid(&mut from)?),
+        _ => return None,
+    };
+    let finite = inertia.is_finite() && lower.is_finite() && upper.is_finite();
+    let positive = [volume, bounding_radius, morphology.a, inertia.min_element()];
+    (from.is_empty() && finite && positive.iter().all(|v| v.is_finite() && *v > 0.0)).then(|| {
+        Shape {
+            field,
+            nodes,
+            volume,
+            inertia,
+            lower,
+            upper,
+            bounding_radius,
+            morphology,
+            quality: gradient_error.map(|gradient_error| Quality {
+                gradient_error,
+                volume_error,
+            }),
+            provenance,
+        }
+    })
+}
+
+fn encode_grid(out: &mut Encoder, field: &SampledField) {
+    out.vec(field.lower());
+    out.f64(field.spacing());
+    out.f64(field.quantum());
+    for n in field.dims() {
+        out.u32(n as u32);
+    }
+}
+
+fn decode_grid(from: &mut Decoder) -> Option<SampledField> {
+    let lower = from.vec()?;
+    let (spacing, quantum) = (from.f64()?, from.f64()?);
+    let dims = [
+        from.u32()? as usize,
+        from.u32()? as usize,
+        from.u32()? as usize,
+    ];
+    let samples = dims
+        .iter()
+        .try_fold(1u64, |n, d| n.checked_mul(*d as u64))?;
+    let sound = lower.is_finite()
+        && [spacing, quantum].iter().all(|v| v.is_finite() && *v > 0.0)
+        && dims.iter().all(|n| *n >= 2)
+        && samples <= crate::field::MAX_SAMPLES;
+    if !sound {
+        return None;
+    }
+    let levels = levels::unpack(from.bytes()?, dims)?;
+    Some(SampledField::from_levels(
+        lower, spacing, dims, quantum, levels,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ShapeOptions, analytic};
+
+    fn egg() -> Shape {
+        let options = ShapeOptions {
+            cells: 16,
+            nodes: Some(100),
+            ..Default::default()
+        };
+        analytic::ellipsoid(2e-3, 1.5e-3, 1e-3, &options).unwrap()
+    }
+
+    #[test]
+    fn files_round_trip_bit_for_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        for shape in [egg(), Shape::sphere(1e-3, 50), egg().scaled(1.7).unwrap()] {
+            let path = folder.path().join("egg.grain");
+            shape.save(&path).unwrap();
+            let back = Shape::load(&path).unwrap();
+            assert_eq!(back, shape);
+            assert_eq!(back.to_bytes(), shape.to_bytes());
+            assert_eq!(back.digest(), shape.digest());
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn every_flipped_byte_is_noticed() {
+        let path = Path::new("egg.grain");
+        let good = egg().to_bytes();
+        for at in (0..good.len())
+            .step_by(97)
+            .chain(0..40)
+            .chain(good.len() - 40..good.len())
+        {
+            let mut bad = good.clone();
+            bad[at] ^= 0x10;
+            assert!(Shape::from_bytes(&bad, path).is_err(), "byte {at}");
+        }
+        for length in (0..good.len()).step_by(101).chain([good.len() - 1]) {
+            assert!(
+                Shape::from_bytes(&good[..length], path).is_err(),
+                "length {length}"
+            );
+        }
+    }
+
+    #[test]
+    fn errors_tell_damage_from_age() {
+        let path = Path::new("egg.grain");
+        let good = egg().to_bytes();
+        let mut newer = good.clone();
+        newer[8] = 200;
+        let error = Shape::from_bytes(&newer, path).unwrap_err();
+        assert!(
+            matches!(error, ShapeError::FutureVersion { found: 200, .. }),
+            "{error}"
+        );
+        let mut damaged = good.clone();
+        let middle = damaged.len() / 2;
+        damaged[middle] ^= 1;
+        let error = Shape::from_bytes(&damaged, path).unwrap_err();
+        assert!(matches!(error, ShapeError::Checksum { .. }), "{error}");
+        let error = Shape::from_bytes(b"solid cube", path).unwrap_err();
+        assert!(matches!(error, ShapeError::NotAGrainFile { .. }), "{error}");
+        let missing = Shape::load(Path::new("/nonexistent/egg.grain")).unwrap_err();
+        assert!(matches!(missing, ShapeError::Io { .. }), "{missing}");
+    }
+
+    /// Content that a valid checksum covers but that makes no sense must not panic.
+    #[test]
+    fn forged_content_is_refused() {
+        let good = egg().to_bytes();
+        let mut refused = 0;
+        for at in (HEAD..good.len() - CHECKSUM).step_by(61) {
+            for value in [0u8, 0xff, 0x7f] {
+                let mut forged = good[..good.len() - CHECKSUM].to_vec();
+                forged[at] = value;
+                let checksum = Sha256::digest(&forged);
+                forged.extend_from_slice(&checksum);
+                refused += usize::from(Shape::from_bytes(&forged, Path::new("x")).is_err());
+            }
+        }
+        assert!(refused > 0);
+    }
+
+    #[test]
+    fn the_digest_is_of_the_geometry() {
+        let shape = egg();
+        let mut renamed = shape.clone();
+        renamed.provenance.source = "elsewhere".into();
+        assert_eq!(shape.digest(), renamed.digest());
+        assert_ne!(shape.digest(), shape.scaled(1.0 + 1e-12).unwrap().digest());
+        assert_eq!(shape.digest().len(), 64);
+    }
+}

@@ -1,0 +1,38 @@
+//! Wavefront OBJ: positions and faces; polygons are cut into fans, materials ignored.
+
+use super::TriangleMesh;
+use crate::error::{Result, ShapeError};
+use crate::limits::ReadLimits;
+use glam::DVec3;
+use std::io::Cursor;
+use std::path::Path;
+
+pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<TriangleMesh> {
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
+    let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
+    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
+        .map_err(|e| ShapeError::malformed(path, e.to_string()))?;
+    let mut mesh = TriangleMesh::default();
+    for model in models {
+        let first = mesh.vertices.len() as u32;
+        let positions = model.mesh.positions.chunks_exact(3);
+        mesh.vertices
+            .extend(positions.map(|p| DVec3::new(p[0], p[1], p[2])));
+        let faces = model.mesh.indices.chunks_exact(3);
+        mesh.triangles
+            .extend(faces.map(|t| [first + t[0], first + t[1], first + t[2]]));
+        if mesh.vertices.len().max(mesh.triangles.len()) as u64 > limits.mesh_elements {
+            return Err(super::read::too_many(
+                path,
+                "more faces or vertices",
+                limits,
+            ));
+        }
+    }
+    Ok(mesh)
+}

@@ -1,0 +1,173 @@
+//! PLY, text and binary, both byte orders.
+
+use super::TriangleMesh;
+use crate::error::{Result, ShapeError};
+use crate::limits::ReadLimits;
+use glam::DVec3;
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{
+    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
+    ScalarType,
+};
+use std::io::Cursor;
+use std::path::Path;
+
+/// What is kept of a vertex or a face; other properties are read over.
+#[derive(Default)]
+struct Element {
+    position: DVec3,
+    corners: Vec<i64>,
+}
+
+impl PropertyAccess for Element {
+    fn new() -> Element {
+        Element::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let axis = match name {
+            "x" => 0,
+            "y" => 1,
+            "z" => 2,
+            "vertex_indices" | "vertex_index" => {
+                self.corners = match property {
+                    Property::ListChar(v) => v.into_iter().map(i64::from).collect(),
+                    Property::ListUChar(v) => v.into_iter().map(i64::from).collect(),
+                    Property::ListShort(v) => v.into_iter().map(i64::from).collect(),
+                    Property::ListUShort(v) => v.into_iter().map(i64::from).collect(),
+                    Property::ListInt(v) => v.into_iter().map(i64::from).collect(),
+                    Property::ListUInt(v) => v.into_iter().map(i64::from).collect(),
+                    _ => return PropertyAccessResult::Ignored,
+                };
+                return PropertyAccessResult::Set;
+            }
+            _ => return PropertyAccessResult::Ignored,
+        };
+        self.position[axis] = match property {
+            Property::Float(v) => f64::from(v),
+            Property::Double(v) => v,
+            Property::Char(v) => f64::from(v),
+            Property::UChar(v) => f64::from(v),
+            Property::Short(v) => f64::from(v),
+            Property::UShort(v) => f64::from(v),
+            Property::Int(v) => f64::from(v),
+            Property::UInt(v) => f64::from(v),
+            _ => return PropertyAccessResult::Ignored,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<TriangleMesh> {
+    let malformed = |e: &dyn std::fmt::Display| ShapeError::malformed(path, e.to_string());
+    let size = bytes.len() as u64;
+    let mut reader = Reader::new(Cursor::new(bytes));
+    let parser = Parser::<Element>::new();
+    let header = parser.read_header(&mut reader).map_err(|e| malformed(&e))?;
+    check_header(path, &header, size, limits)?;
+    let payload = parser
+        .read_payload(&mut reader, &header)
+        .map_err(|e| malformed(&e))?;
+    let mut mesh = TriangleMesh::default();
+    for (name, elements) in payload {
+        match name.as_str() {
+            "vertex" => mesh.vertices = elements.iter().map(|e| e.position).collect(),
+            "face" => {
+                for (face, element) in elements.iter().enumerate() {
+                    push_fan(path, &mut mesh.triangles, face, &element.corners)?;
+                }
+            }
+            _ => {}
+        }
+    }
+    if mesh.triangles.len() as u64 > limits.mesh_elements {
+        return Err(super::read::too_many(path, "more faces", limits));
+    }
+    Ok(mesh)
+}
+
+fn push_fan(path: &Path, out: &mut Vec<[u32; 3]>, face: usize, corners: &[i64]) -> Result<()> {
+    let number = |c: i64| {
+        u32::try_from(c)
+            .map_err(|_| ShapeError::malformed(path, format!("face {face} has corner number {c}")))
+    };
+    if corners.len() < 3 {
+        return Err(ShapeError::malformed(
+            path,
+            format!("face {face} has {} corners", corners.len()),
+        ));
+    }
+    for pair in corners[1..].windows(2) {
+        out.push([number(corners[0])?, number(pair[0])?, number(pair[1])?]);
+    }
+    Ok(())
+}
+
+/// The header must name vertices and faces, and claim no more than the file can hold.
+fn check_header(path: &Path, header: &Header, size: u64, limits: &ReadLimits) -> Result<()> {
+    for needed in ["vertex", "face"] {
+        if !header.elements.contains_key(needed) {
+            return Err(ShapeError::malformed(
+                path,
+                format!("no element named {needed:?}"),
+            ));
+        }
+    }
+    for axis in ["x", "y", "z"] {
+        if !header.elements["vertex"].properties.contains_key(axis) {
+            return Err(ShapeError::malformed(
+                path,
+                format!("vertices have no property {axis:?}"),
+            ));
+        }
+    }
+    let faces = &header.elements["face"].properties;
+    if !faces.contains_key("vertex_indices") && !faces.contains_key("vertex_index") {
+        return Err(ShapeError::malformed(
+            path,
+            "faces have no property \"vertex_indices\"",
+        ));
+    }
+    for element in header.elements.values() {
+        let count = element.count as u64;
+        let claimed = || format!("{count} elements {:?}", element.name);
+        if count > limits.mesh_elements {
+            return Err(super::read::too_many(path, &claimed(), limits));
+        }
+        if count.saturating_mul(least_bytes(element, header)) > size {
+            return Err(ShapeError::malformed(
+                path,
+                format!(
+                    "the header claims {}, the file has only {size} bytes",
+                    claimed()
+                ),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Fewest bytes that one such element can take.
+fn least_bytes(element: &ElementDef, header: &Header) -> u64 {
+    let text = matches!(header.encoding, Encoding::Ascii);
+    let width = |scalar: &ScalarType| match scalar {
+        _ if text => 2,
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    };
+    let sum: u64 = element
+        .properties
+        .values()
+        .map(|p| match &p.data_type {
+            PropertyType::Scalar(scalar) | PropertyType::List(scalar, _) => width(scalar),
+        })
+        .sum();
+    // The last line of a text file may lack its line end.
+    if text {
+        sum.saturating_sub(1).max(1)
+    } else {
+        sum.max(1)
+    }
+}

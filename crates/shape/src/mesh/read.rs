@@ -1,0 +1,46 @@
+//! Reading a mesh file by its extension.
+
+use super::{TriangleMesh, obj, ply, stl, weld};
+use crate::error::{Result, ShapeError, positive};
+use crate::limits::{ReadLimits, SourceFile, extension, read_bytes};
+use std::path::Path;
+
+/// Reads STL, OBJ or PLY, joins coincident vertices and checks that the surface is closed and
+/// coherently wound. `unit` is the length [m] of the file's unit: 1e-3 for millimetres.
+/// Errors name places in the file's own units.
+pub fn read_mesh(
+    path: &Path,
+    unit: f64,
+    limits: &ReadLimits,
+) -> Result<(TriangleMesh, SourceFile)> {
+    positive("unit", unit)?;
+    let reader = match extension(path).as_str() {
+        "stl" => stl::read,
+        "obj" => obj::read,
+        "ply" => ply::read,
+        _ => {
+            return Err(ShapeError::UnknownFormat {
+                path: path.to_owned(),
+                known: ".stl, .obj, .ply",
+            });
+        }
+    };
+    let (bytes, source) = read_bytes(path, limits)?;
+    let raw = reader(path, bytes, limits)?;
+    raw.check_faces()?;
+    let (mesh, _) = weld::weld(&raw);
+    // An inside-out mesh is left to the builder, which can turn it on request.
+    match mesh.check_closed() {
+        Err(ShapeError::InsideOut { .. }) | Ok(()) => Ok((mesh.scaled(unit), source)),
+        Err(error) => Err(error),
+    }
+}
+
+pub(super) fn too_many(path: &Path, claimed: &str, limits: &ReadLimits) -> ShapeError {
+    ShapeError::TooLarge {
+        path: path.to_owned(),
+        claimed: claimed.to_owned(),
+        limit: limits.mesh_elements,
+        unit: "faces or vertices",
+    }
+}

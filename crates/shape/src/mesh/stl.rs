@@ -1,0 +1,54 @@
+//! STL, binary and text.
+
+use super::TriangleMesh;
+use crate::error::{Result, ShapeError};
+use crate::limits::ReadLimits;
+use glam::DVec3;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Bytes before the first triangle of a binary file, and bytes of a triangle.
+const HEADER: usize = 84;
+const TRIANGLE: usize = 50;
+
+pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Result<TriangleMesh> {
+    let binary = bytes.len() >= HEADER && {
+        let count = u32::from_le_bytes([bytes[80], bytes[81], bytes[82], bytes[83]]);
+        let fits = HEADER as u64 + TRIANGLE as u64 * u64::from(count) == bytes.len() as u64;
+        if !fits && !bytes.starts_with(b"solid") {
+            return Err(ShapeError::malformed(
+                path,
+                format!(
+                    "the header counts {count} triangles, which take {} bytes, but the file has {}",
+                    HEADER as u64 + TRIANGLE as u64 * u64::from(count),
+                    bytes.len()
+                ),
+            ));
+        }
+        fits
+    };
+    if binary {
+        // Many programs begin binary files with the word by which text files are known.
+        bytes[0] = b' ';
+    } else if !bytes.starts_with(b"solid") {
+        return Err(ShapeError::malformed(path, "too short for an STL file"));
+    }
+    let mut cursor = Cursor::new(bytes);
+    let triangles = stl_io::create_stl_reader(&mut cursor)
+        .map_err(|e| ShapeError::malformed(path, e.to_string()))?;
+    let mut mesh = TriangleMesh::default();
+    for triangle in triangles {
+        let triangle = triangle.map_err(|e| ShapeError::malformed(path, e.to_string()))?;
+        if mesh.triangles.len() as u64 >= limits.mesh_elements {
+            return Err(super::read::too_many(path, "more faces", limits));
+        }
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend(
+            triangle
+                .vertices
+                .map(|v| DVec3::from_array(v.0.map(f64::from))),
+        );
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    Ok(mesh)
+}

@@ -1,0 +1,127 @@
+//! The measured form of a grain.
+
+use crate::hull;
+use crate::mesh::TriangleMesh;
+use glam::DVec3;
+use serde::Serialize;
+use std::f64::consts::PI;
+
+/// Morphology, all from the shape's own surface.
+///
+/// Reading used: a, b and c are the full extents of the body along its principal axes of
+/// inertia, sorted so that a >= b >= c. (Feret readings differ by up to a few percent, most for
+/// near-equant grains, whose inertia axes are ill-defined.)
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Morphology {
+    /// Longest extent [m].
+    pub a: f64,
+    /// Intermediate extent [m].
+    pub b: f64,
+    /// Shortest extent [m].
+    pub c: f64,
+    /// Surface area [m^2].
+    pub area: f64,
+    /// Krumbein sphericity, the cube root of b c / a^2 (Eq. 38).
+    pub krumbein_sphericity: f64,
+    /// Wadell's true sphericity: area of the sphere of equal volume over the area.
+    pub wadell_sphericity: f64,
+    /// Wadell roundness (Eq. 39); none until it is measured.
+    pub wadell_roundness: Option<f64>,
+    /// Volume over that of the convex hull.
+    pub convexity: Option<f64>,
+}
+
+impl Morphology {
+    pub(crate) fn measure(mesh: &TriangleMesh, extents: DVec3, volume: f64) -> Morphology {
+        // The mesh is inscribed where the surface is convex: compare like with like.
+        let own = mesh.signed_volume();
+        let convexity = hull::volume(&mesh.vertices).map(|hull| (own / hull).min(1.0));
+        Self::new(extents, mesh.area(), volume, convexity)
+    }
+
+    pub(crate) fn new(extents: DVec3, area: f64, volume: f64, convexity: Option<f64>) -> Self {
+        let mut sorted = extents.to_array();
+        sorted.sort_by(|p, q| q.total_cmp(p));
+        let [a, b, c] = sorted;
+        Morphology {
+            a,
+            b,
+            c,
+            area,
+            krumbein_sphericity: (b * c / (a * a)).cbrt(),
+            wadell_sphericity: PI.cbrt() * (6.0 * volume).powf(2.0 / 3.0) / area,
+            wadell_roundness: None,
+            convexity,
+        }
+    }
+
+    /// Elongation b / a.
+    pub fn elongation(&self) -> f64 {
+        self.b / self.a
+    }
+    /// Flatness c / b.
+    pub fn flatness(&self) -> f64 {
+        self.c / self.b
+    }
+
+    pub(crate) fn scaled(&self, factor: f64) -> Morphology {
+        Morphology {
+            a: self.a * factor,
+            b: self.b * factor,
+            c: self.c * factor,
+            area: self.area * factor * factor,
+            ..*self
+        }
+    }
+}
+
+/// The record that `grain info --json` prints.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Record {
+    /// Volume [m^3].
+    pub volume_m3: f64,
+    /// Diameter of the sphere of equal volume [m].
+    pub equivalent_diameter_m: f64,
+    /// Longest extent [m].
+    pub a_m: f64,
+    /// Intermediate extent [m].
+    pub b_m: f64,
+    /// Shortest extent [m].
+    pub c_m: f64,
+    /// Elongation b / a.
+    pub elongation: f64,
+    /// Flatness c / b.
+    pub flatness: f64,
+    /// Krumbein sphericity (Eq. 38).
+    pub krumbein_sphericity: f64,
+    /// Wadell's true sphericity.
+    pub wadell_sphericity: f64,
+    /// Wadell roundness (Eq. 39), null where not measured.
+    pub wadell_roundness: Option<f64>,
+    /// Volume over that of the convex hull, null where not measured.
+    pub convexity: Option<f64>,
+    /// Surface area [m^2].
+    pub surface_area_m2: f64,
+    /// Principal second moments per unit density [m^5].
+    pub inertia_m5: [f64; 3],
+    /// Radius of the smallest sphere about the centroid that holds the grain [m].
+    pub bounding_radius_m: f64,
+    /// Number of surface nodes.
+    pub surface_nodes: usize,
+    /// Samples of the distance field along x, y and z; null for an exact sphere.
+    pub field_samples: Option<[usize; 3]>,
+    /// Spacing of the samples [m]; null for an exact sphere.
+    pub field_spacing_m: Option<f64>,
+    /// 0.9 quantile of | |grad phi| - 1 | at the surface; null for an exact sphere.
+    pub gradient_error: Option<f64>,
+    /// Relative difference of volume from the source; null where there is none.
+    pub volume_error: Option<f64>,
+    /// How the shape was made.
+    pub method: String,
+    /// Source file.
+    pub source: String,
+    /// SHA-256 of the source file.
+    pub source_sha256: String,
+    /// Content hash of the shape.
+    pub digest: String,
+}

@@ -1,0 +1,254 @@
+//! Surface nodes: evenly spread, with the area that each stands for.
+//!
+//! The surface is cut into many small samples. A Poisson-disc choice among them starts the
+//! nodes, a few rounds of Lloyd's relaxation (each node to the centroid of the samples nearest
+//! to it, then back onto the surface) even them out. A node's area is that of its samples.
+
+use crate::field::SampledField;
+use crate::mesh::TriangleMesh;
+use crate::shape::SurfaceNode;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Samples per node, about.
+const SAMPLES_PER_NODE: f64 = 24.0;
+/// Rounds of relaxation.
+const ROUNDS: usize = 12;
+
+/// A small piece of the surface.
+struct Sample {
+    position: DVec3,
+    normal: DVec3,
+    area: f64,
+}
+
+/// About `count` nodes on the zero set of `field`, whose triangulation is `mesh`.
+pub(crate) fn spread(field: &SampledField, mesh: &TriangleMesh, count: usize) -> Vec<SurfaceNode> {
+    let samples = samples(mesh, mesh.area() / (SAMPLES_PER_NODE * count as f64));
+    let area: f64 = samples.iter().map(|s| s.area).sum();
+    let spacing = (area / count as f64).sqrt();
+    let (lower, upper) = mesh.bounds();
+    // The nodes lie on the field's surface, which bulges a little beyond the mesh.
+    let slack = DVec3::splat(field.spacing());
+    let bounds = (lower - slack, upper + slack);
+    let chosen = choose(&samples, bounds, spacing, count);
+    let mut positions: Vec<DVec3> = chosen
+        .iter()
+        .map(|s| project(field, samples[*s as usize].position))
+        .collect();
+    for _ in 0..ROUNDS {
+        let owner = assign(field, &samples, &positions, bounds, spacing);
+        let mut sums = vec![(DVec3::ZERO, 0.0); positions.len()];
+        for (sample, owner) in samples.iter().zip(&owner) {
+            let sum = &mut sums[*owner as usize];
+            sum.0 += sample.area * sample.position;
+            sum.1 += sample.area;
+        }
+        for (position, (sum, area)) in positions.iter_mut().zip(&sums) {
+            if *area > 0.0 {
+                *position = project(field, *sum / *area);
+            }
+        }
+    }
+    let owner = assign(field, &samples, &positions, bounds, spacing);
+    let mut areas = vec![0.0; positions.len()];
+    for (sample, owner) in samples.iter().zip(&owner) {
+        areas[*owner as usize] += sample.area;
+    }
+    let nodes = positions.into_iter().zip(areas);
+    nodes
+        .map(|(position, area)| SurfaceNode { position, area })
+        .filter(|n| n.area > 0.0)
+        .collect()
+}
+
+/// The point brought onto the zero set along the gradient.
+pub(crate) fn project(field: &SampledField, mut x: DVec3) -> DVec3 {
+    for _ in 0..30 {
+        let (value, gradient) = field.distance_and_gradient(x);
+        let slope = gradient.length();
+        if value.abs() <= 1e-9 * field.spacing() || slope == 0.0 {
+            break;
+        }
+        // A step no longer than a cell: the gradient is only good nearby.
+        let step = (value / slope).clamp(-field.spacing(), field.spacing());
+        x -= step / slope * gradient;
+    }
+    x
+}
+
+/// The triangles, cut in four until none is larger than `largest`.
+fn samples(mesh: &TriangleMesh, largest: f64) -> Vec<Sample> {
+    let mut samples = Vec::new();
+    for face in 0..mesh.triangles.len() {
+        let corners = mesh.corners(face);
+        let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let normal = cross.normalize_or_zero();
+        let area = 0.5 * cross.length();
+        let levels = if area > largest {
+            (area / largest).log(4.0).ceil() as u32
+        } else {
+            0
+        };
+        let n = 1usize << levels.min(12);
+        let share = area / (n * n) as f64;
+        let at = |i: usize, j: usize, third: f64| {
+            let (u, v) = ((i as f64 + third) / n as f64, (j as f64 + third) / n as f64);
+            corners[0] + u * (corners[1] - corners[0]) + v * (corners[2] - corners[0])
+        };
+        for i in 0..n {
+            for j in 0..n - i {
+                samples.push(Sample {
+                    position: at(i, j, 1.0 / 3.0),
+                    normal,
+                    area: share,
+                });
+                if i + j + 1 < n {
+                    samples.push(Sample {
+                        position: at(i, j, 2.0 / 3.0),
+                        normal,
+                        area: share,
+                    });
+                }
+            }
+        }
+    }
+    samples
+}
+
+/// Poisson-disc choice of about `count` samples: the disc is adjusted until the number fits.
+fn choose(samples: &[Sample], bounds: (DVec3, DVec3), spacing: f64, count: usize) -> Vec<u32> {
+    let order = shuffled(samples.len());
+    let (mut low, mut high) = (0.4 * spacing, 1.2 * spacing);
+    let mut best: Option<Vec<u32>> = None;
+    for _ in 0..10 {
+        let radius = 0.5 * (low + high);
+        let chosen = discs(samples, &order, bounds, radius);
+        if chosen.len() > count {
+            low = radius;
+        } else {
+            high = radius;
+        }
+        let off = |c: &Vec<u32>| c.len().abs_diff(count);
+        if best.as_ref().is_none_or(|b| off(&chosen) < off(b)) {
+            best = Some(chosen);
+        }
+    }
+    best.unwrap_or_default()
+}
+
+/// Samples in shuffled order, each kept if none kept before is nearer than `radius`.
+fn discs(samples: &[Sample], order: &[u32], bounds: (DVec3, DVec3), radius: f64) -> Vec<u32> {
+    let mut grid = Buckets::new(bounds, radius);
+    let mut kept = Vec::new();
+    for &s in order {
+        let sample = &samples[s as usize];
+        let crowded = grid.around(sample.position).any(|k: u32| {
+            let other = &samples[k as usize];
+            other.position.distance_squared(sample.position) < radius * radius
+                && other.normal.dot(sample.normal) > -0.2
+        });
+        if !crowded {
+            grid.insert(sample.position, s);
+            kept.push(s);
+        }
+    }
+    kept
+}
+
+/// 0..n in an arbitrary but fixed order.
+fn shuffled(n: usize) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..n as u32).collect();
+    let mut state = 0x2545_f491_4f6c_dd1d_u64;
+    for i in (1..n).rev() {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let other = ((u128::from(state) * (i as u128 + 1)) >> 64) as usize;
+        order.swap(i, other);
+    }
+    order
+}
+
+/// The node nearest to each sample, of those on the same side of the body.
+fn assign(
+    field: &SampledField,
+    samples: &[Sample],
+    positions: &[DVec3],
+    bounds: (DVec3, DVec3),
+    spacing: f64,
+) -> Vec<u32> {
+    let mut grid = Buckets::new(bounds, 1.2 * spacing);
+    let normals: Vec<DVec3> = positions
+        .iter()
+        .map(|x| field.distance_and_gradient(*x).1)
+        .collect();
+    for (n, x) in positions.iter().enumerate() {
+        grid.insert(*x, n as u32);
+    }
+    samples
+        .par_iter()
+        .map(|sample| {
+            let score = |n: u32| {
+                let squared = positions[n as usize].distance_squared(sample.position);
+                // A node behind the sample, on the far side of a thin plate, comes last.
+                let behind = normals[n as usize].dot(sample.normal) < -0.2;
+                (behind, squared)
+            };
+            let better = |a: &u32, b: &u32| {
+                let (p, q) = (score(*a), score(*b));
+                p.0.cmp(&q.0).then(p.1.total_cmp(&q.1)).then(a.cmp(b))
+            };
+            grid.around(sample.position)
+                .min_by(better)
+                .or_else(|| (0..positions.len() as u32).min_by(better))
+                .unwrap_or(0)
+        })
+        .collect()
+}
+
+/// Points by cubic bucket, over a box that holds the body.
+struct Buckets {
+    lower: DVec3,
+    size: f64,
+    dims: [usize; 3],
+    items: Vec<Vec<u32>>,
+}
+
+impl Buckets {
+    fn new(bounds: (DVec3, DVec3), size: f64) -> Buckets {
+        let lower = bounds.0 - DVec3::splat(size);
+        let cells = (bounds.1 - lower) / size;
+        let dims = cells.to_array().map(|n| n as usize + 2);
+        Buckets {
+            lower,
+            size,
+            dims,
+            items: vec![Vec::new(); dims.iter().product()],
+        }
+    }
+
+    fn key(&self, x: DVec3) -> [usize; 3] {
+        let s = ((x - self.lower) / self.size).to_array();
+        // Kept off the outermost layer, so that every bucket has all its neighbours.
+        std::array::from_fn(|axis| (s[axis] as usize).clamp(1, self.dims[axis] - 2))
+    }
+
+    fn index(&self, [i, j, k]: [usize; 3]) -> usize {
+        i + self.dims[0] * (j + self.dims[1] * k)
+    }
+
+    fn insert(&mut self, x: DVec3, item: u32) {
+        let index = self.index(self.key(x));
+        self.items[index].push(item);
+    }
+
+    /// Items in the bucket of `x` and its 26 neighbours, in a fixed order.
+    fn around(&self, x: DVec3) -> impl Iterator<Item = u32> {
+        let [i, j, k] = self.key(x);
+        (0..9).flat_map(move |n| {
+            let first = self.index([i - 1, j + n % 3 - 1, k + n / 3 - 1]);
+            self.items[first..first + 3].iter().flatten().copied()
+        })
+    }
+}

@@ -1,0 +1,44 @@
+//! Where a shape comes from.
+
+use glam::{DQuat, DVec3};
+
+/// How a shape came to be. Holds no date, so that equal sources give equal files.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Provenance {
+    /// `analytic`, `mesh` or `scan`.
+    pub method: String,
+    /// Name of the source file, empty for analytic shapes.
+    pub source: String,
+    /// SHA-256 of the source file in hexadecimal, empty for analytic shapes.
+    pub source_sha256: String,
+    /// Parameters by name, in the order they were applied.
+    pub parameters: Vec<(String, String)>,
+    /// Version of the program that built the shape.
+    pub program_version: String,
+    /// Place of the shape's centroid in the source's frame [m].
+    pub centroid: DVec3,
+    /// Rotation from the principal frame to the source's frame.
+    pub rotation: DQuat,
+    /// Enlargement since it was built: x_source = centroid + rotation * x / scale.
+    pub scale: f64,
+}
+
+impl Provenance {
+    pub(crate) fn new(method: &str) -> Provenance {
+        Provenance {
+            method: method.to_owned(),
+            source: String::new(),
+            source_sha256: String::new(),
+            parameters: Vec::new(),
+            program_version: env!("CARGO_PKG_VERSION").to_owned(),
+            centroid: DVec3::ZERO,
+            rotation: DQuat::IDENTITY,
+            scale: 1.0,
+        }
+    }
+
+    pub(crate) fn with(mut self, name: &str, value: impl ToString) -> Provenance {
+        self.parameters.push((name.to_owned(), value.to_string()));
+        self
+    }
+}

@@ -1,0 +1,228 @@
+//! The zero set of sampled values as a closed triangle mesh (marching cubes).
+//!
+//! The polygons of a cell are found by walking its faces rather than from a table: on every face
+//! the inside corners are kept apart, a rule that depends on the face alone, so that neighbours
+//! agree and the surface is a closed manifold wherever the border of the grid is outside.
+
+use crate::mesh::TriangleMesh;
+use glam::DVec3;
+use std::collections::HashMap;
+
+/// Regular samples: `dims` values, x fastest, the first at `lower`, `spacing` apart.
+pub(crate) struct Samples<'a> {
+    pub dims: [usize; 3],
+    pub lower: DVec3,
+    pub spacing: f64,
+    pub values: &'a [f32],
+}
+
+/// Corner numbers of the six faces, anticlockwise seen from outside the cell; bit 0 of a corner
+/// is its x, bit 1 its y, bit 2 its z.
+const FACES: [[u8; 4]; 6] = [
+    [0, 4, 6, 2],
+    [1, 3, 7, 5],
+    [0, 1, 5, 4],
+    [2, 6, 7, 3],
+    [0, 2, 3, 1],
+    [4, 5, 7, 6],
+];
+
+/// Number of the cell edge between two neighbouring corners: axis * 4 + place.
+fn edge(a: u8, b: u8) -> usize {
+    let (low, axis) = (a.min(b), (a ^ b).trailing_zeros() as u8);
+    let place = match axis {
+        0 => low >> 1,
+        1 => (low & 1) | (low >> 1 & 2),
+        _ => low & 3,
+    };
+    usize::from(axis * 4 + place)
+}
+
+/// Lower corner and axis of a cell edge.
+fn edge_ends(edge: usize) -> (u8, usize) {
+    let (axis, place) = (edge / 4, (edge % 4) as u8);
+    let low = match axis {
+        0 => place << 1,
+        1 => (place & 1) | (place & 2) << 1,
+        _ => place,
+    };
+    (low, axis)
+}
+
+/// Follows the crossings round the cell: after which edge comes which. `mask` has the bit of
+/// every inside corner set.
+fn walk(mask: u8) -> [Option<u8>; 12] {
+    let mut next = [None; 12];
+    let inside = |corner: u8| mask >> corner & 1 == 1;
+    for face in FACES {
+        for i in 0..4 {
+            let (here, after) = (face[i], face[(i + 1) % 4]);
+            if inside(here) || !inside(after) {
+                continue;
+            }
+            let mut j = (i + 1) % 4;
+            while inside(face[(j + 1) % 4]) {
+                j = (j + 1) % 4;
+            }
+            next[edge(here, after)] = Some(edge(face[j], face[(j + 1) % 4]) as u8);
+        }
+    }
+    next
+}
+
+/// Closed surface where the values change sign; normals point to positive values.
+pub(crate) fn extract(samples: &Samples) -> TriangleMesh {
+    let [nx, ny, nz] = samples.dims;
+    let strides = [1, nx, nx * ny];
+    let mut mesh = TriangleMesh::default();
+    let mut on_edge: HashMap<usize, u32> = HashMap::new();
+    let offset = |corner: u8| {
+        (0..3)
+            .map(|axis| usize::from(corner >> axis & 1) * strides[axis])
+            .sum::<usize>()
+    };
+    let offsets: [usize; 8] = std::array::from_fn(|c| offset(c as u8));
+    for k in 0..nz.saturating_sub(1) {
+        for j in 0..ny.saturating_sub(1) {
+            for i in 0..nx.saturating_sub(1) {
+                let base = i + nx * (j + ny * k);
+                let mut mask = 0u8;
+                for (c, offset) in offsets.iter().enumerate() {
+                    mask |= u8::from(samples.values[base + offset] < 0.0) << c;
+                }
+                if mask == 0 || mask == 255 {
+                    continue;
+                }
+                let mut vertex = |edge: usize| {
+                    let (corner, axis) = edge_ends(edge);
+                    let low = base + offsets[usize::from(corner)];
+                    *on_edge.entry(3 * low + axis).or_insert_with(|| {
+                        mesh.vertices.push(crossing(samples, low, axis, strides));
+                        (mesh.vertices.len() - 1) as u32
+                    })
+                };
+                let mut polygons: Vec<Vec<u32>> = Vec::new();
+                let mut next = walk(mask);
+                for start in 0..12 {
+                    let mut polygon = Vec::new();
+                    let mut at = start;
+                    while let Some(after) = next[at].take() {
+                        polygon.push(vertex(at));
+                        at = usize::from(after);
+                    }
+                    if !polygon.is_empty() {
+                        polygons.push(polygon);
+                    }
+                }
+                for polygon in polygons {
+                    fill(&mut mesh, &polygon);
+                }
+            }
+        }
+    }
+    mesh
+}
+
+/// Where the value crosses zero between a sample and the next along `axis`. Kept a hair off the
+/// samples, so that no triangle loses its area.
+fn crossing(samples: &Samples, low: usize, axis: usize, strides: [usize; 3]) -> DVec3 {
+    let a = f64::from(samples.values[low]);
+    let b = f64::from(samples.values[low + strides[axis]]);
+    let t = (a / (a - b)).clamp(1e-4, 1.0 - 1e-4);
+    let mut s = DVec3::new(
+        (low % samples.dims[0]) as f64,
+        (low / strides[1] % samples.dims[1]) as f64,
+        (low / strides[2]) as f64,
+    );
+    s[axis] += t;
+    samples.lower + samples.spacing * s
+}
+
+/// Triangles and quadrilaterals as they are, larger polygons from their centre: a diagonal of
+/// those could lie in a cell face and coincide with the neighbour's.
+fn fill(mesh: &mut TriangleMesh, polygon: &[u32]) {
+    match *polygon {
+        [a, b, c] => mesh.triangles.push([a, b, c]),
+        [a, b, c, d] => {
+            let at = |i: u32| mesh.vertices[i as usize];
+            if at(a).distance_squared(at(c)) <= at(b).distance_squared(at(d)) {
+                mesh.triangles.extend([[a, b, c], [a, c, d]]);
+            } else {
+                mesh.triangles.extend([[b, c, d], [b, d, a]]);
+            }
+        }
+        _ => {
+            let sum: DVec3 = polygon.iter().map(|&i| mesh.vertices[i as usize]).sum();
+            mesh.vertices.push(sum / polygon.len() as f64);
+            let centre = (mesh.vertices.len() - 1) as u32;
+            for (n, &a) in polygon.iter().enumerate() {
+                mesh.triangles
+                    .push([a, polygon[(n + 1) % polygon.len()], centre]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ball(n: usize) -> (Vec<f32>, f64) {
+        let spacing = 2.5 / (n - 1) as f64;
+        let mut values = Vec::new();
+        for k in 0..n {
+            for j in 0..n {
+                for i in 0..n {
+                    let x = DVec3::new(i as f64, j as f64, k as f64) * spacing - DVec3::splat(1.25);
+                    values.push((x.length() - 1.0) as f32);
+                }
+            }
+        }
+        (values, spacing)
+    }
+
+    #[test]
+    fn the_surface_of_a_ball_is_closed_and_faces_outwards() {
+        let (values, spacing) = ball(40);
+        let samples = Samples {
+            dims: [40; 3],
+            lower: DVec3::splat(-1.25),
+            spacing,
+            values: &values,
+        };
+        let mesh = extract(&samples);
+        mesh.check_closed().unwrap();
+        let volume = mesh.signed_volume();
+        assert!(
+            (volume / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 0.01,
+            "{volume}"
+        );
+    }
+
+    /// Every pattern of signs, ambiguous ones included.
+    #[test]
+    fn noise_gives_a_closed_manifold() {
+        let n = 14;
+        let mut state = 1u64;
+        let mut values = vec![1.0f32; n * n * n];
+        for k in 1..n - 1 {
+            for j in 1..n - 1 {
+                for i in 1..n - 1 {
+                    state = state
+                        .wrapping_mul(6364136223846793005)
+                        .wrapping_add(1442695040888963407);
+                    values[i + n * (j + n * k)] = (state >> 40) as f32 / (1 << 23) as f32 - 1.0;
+                }
+            }
+        }
+        let samples = Samples {
+            dims: [n; 3],
+            lower: DVec3::ZERO,
+            spacing: 1.0,
+            values: &values,
+        };
+        let mesh = extract(&samples);
+        assert!(mesh.triangles.len() > 1000);
+        mesh.check_edges().unwrap();
+    }
+}
