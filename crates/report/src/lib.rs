@@ -1,1 +1,2 @@
-//! x
+//! Figures and pages from run folders.
+mod figure;

@@ -1,0 +1,7 @@
+//! Figures.
+mod axis;
+mod colormap;
+mod lines;
+mod style;
+mod svg;
+mod text;
