@@ -245,7 +245,7 @@ fn draw_marks(
             );
         }
     }
-    for (row, at, name) in names {
+    for (row, at, _) in names {
         let y = frame.y - 3.0 - ROW * *row as f64;
         if *row > 0 {
             drawing.line(

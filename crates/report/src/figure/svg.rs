@@ -110,14 +110,6 @@ impl Drawing {
         ));
     }
 
-    /// A circle; `style` are SVG attributes.
-    pub fn circle(&mut self, x: f64, y: f64, radius: f64, style: &str) {
-        let [x, y, radius] = [x, y, radius].map(number);
-        self.vectors.push_str(&format!(
-            "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" {style}/>\n"
-        ));
-    }
-
     /// A label with its baseline at (x, y); `turned` runs upwards.
     pub fn label(
         &mut self,

@@ -116,6 +116,23 @@ pub fn spans(label: &str, size: f64) -> String {
     out
 }
 
+/// The label as HTML.
+pub fn html(label: &str) -> String {
+    let mut out = String::new();
+    for piece in pieces(label) {
+        let mut text = escape(&piece.text);
+        if piece.italic {
+            text = format!("<i>{text}</i>");
+        }
+        out.push_str(&match piece.level {
+            -1 => format!("<sub>{text}</sub>"),
+            1 => format!("<sup>{text}</sup>"),
+            _ => text,
+        });
+    }
+    out
+}
+
 /// Width [pt] of a label set at `size` [pt].
 pub fn width(label: &str, size: f64) -> f64 {
     static FONT: OnceLock<Option<FontRef<'static>>> = OnceLock::new();
@@ -166,6 +183,14 @@ mod tests {
             "the line comes back up after a subscript: {svg}"
         );
         assert_eq!(plain("*v*_{z} / √(*d* *g*)"), "vz / √(d g)");
+    }
+
+    #[test]
+    fn labels_become_html() {
+        assert_eq!(
+            html("*v*_{z} < 10^{3}"),
+            "<i>v</i><sub>z</sub> &lt; 10<sup>3</sup>"
+        );
     }
 
     #[test]

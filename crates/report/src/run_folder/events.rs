@@ -11,6 +11,8 @@ use crate::error::ReportError;
 pub enum Kind {
     /// Two grains touch after having been apart.
     Kiss,
+    /// Two touching grains begin to turn about each other.
+    Tumble,
     /// The grain behind comes to lie ahead.
     RoleChange,
     /// Two grains that touched have parted.
@@ -23,8 +25,9 @@ pub enum Kind {
 
 impl Kind {
     fn from_name(name: &str) -> Kind {
-        match name {
+        match name.replace('-', "_").as_str() {
             "kiss" => Kind::Kiss,
+            "tumble" | "tumbling" => Kind::Tumble,
             "role_change" => Kind::RoleChange,
             "separation" => Kind::Separation,
             "landing" | "floor" => Kind::Landing,
@@ -36,6 +39,7 @@ impl Kind {
     pub fn name(&self) -> &str {
         match self {
             Kind::Kiss => "kiss",
+            Kind::Tumble => "tumbling",
             Kind::RoleChange => "role change",
             Kind::Separation => "separation",
             Kind::Landing => "landing",

@@ -15,6 +15,8 @@ use crate::error::ReportError;
 pub use events::{Event, Kind};
 pub use facts::Facts;
 pub use tables::{History, Table};
+#[cfg(test)]
+pub use vtk::Array;
 pub use vtk::{Image, Surface};
 
 /// A picture file of the run: a slice of the fields or the surface of grains.
@@ -133,6 +135,21 @@ impl RunFolder {
     /// Reads a surface.
     pub fn surface(&self, frame: &FrameFile) -> Result<Surface, String> {
         vtk::read_surface(&frame.file)
+    }
+
+    /// A file's path inside the folder.
+    pub fn short_name(&self, file: &Path) -> String {
+        file.strip_prefix(&self.path)
+            .unwrap_or(file)
+            .display()
+            .to_string()
+    }
+
+    /// Edge of the box along a periodic axis [m].
+    pub fn period(&self, axis: usize) -> Option<f64> {
+        let faces = self.facts.boundaries.as_ref()?;
+        let size = self.facts.size?;
+        (faces[axis][0] == "periodic").then_some(size[axis])
     }
 
     fn collection(&mut self) -> BTreeMap<String, f64> {
