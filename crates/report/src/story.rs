@@ -124,9 +124,9 @@ impl Story {
     pub fn grain_name(&self, grain: usize) -> String {
         match self.pair {
             Some([behind, _]) if grain == behind => {
-                format!("trailing at the start (grain {grain})")
+                format!("grain {grain} (trailing at the start)")
             }
-            Some([_, ahead]) if grain == ahead => format!("leading at the start (grain {grain})"),
+            Some([_, ahead]) if grain == ahead => format!("grain {grain} (leading at the start)"),
             _ => format!("grain {grain}"),
         }
     }
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn numbers_have_three_digits() {
-        let texts = [0.0, 18.234, -0.002_345, 123_456.0, 1.0e-9, -4.2e7, f64::NAN].map(short);
+        let texts = [0.0, 18.234, -0.002_346, 123_456.0, 1.0e-9, -4.2e7, f64::NAN].map(short);
         assert_eq!(
             texts,
             [

@@ -28,8 +28,20 @@ impl Axis {
         let (mut low, mut high) = sane(low, high);
         let step = round_step((high - low) / count.max(1) as f64);
         if !tight {
-            low = (low / step + 1e-6).floor() * step;
-            high = (high / step - 1e-6).ceil() * step;
+            // A value just beyond a round one does not cost a whole step.
+            let grow = |value: f64, out: f64| {
+                let inner = (value / step * out + 1e-6).floor() * out * step;
+                let beyond = (value - inner).abs() / step;
+                if beyond < 2e-6 {
+                    inner
+                } else if beyond < 0.15 {
+                    inner + 0.2 * out * step
+                } else {
+                    inner + out * step
+                }
+            };
+            low = grow(low, -1.0);
+            high = grow(high, 1.0);
         }
         let power = common_power(low.abs().max(high.abs()));
         let unit = 10f64.powi(power);
@@ -142,15 +154,15 @@ fn sane(low: f64, high: f64) -> (f64, f64) {
     }
 }
 
-/// The next of 1, 2, 5 times a power of ten that is at least `step`.
+/// The next of 1, 2, 5 times a power of ten that is at least about `step`.
 fn round_step(step: f64) -> f64 {
     let power = 10f64.powf(step.log10().floor());
     let lead = step / power;
-    let round = if lead <= 1.0 + 1e-9 {
+    let round = if lead <= 1.02 {
         1.0
-    } else if lead <= 2.0 + 1e-9 {
+    } else if lead <= 2.04 {
         2.0
-    } else if lead <= 5.0 + 1e-9 {
+    } else if lead <= 5.1 {
         5.0
     } else {
         10.0
@@ -195,7 +207,7 @@ mod tests {
 
     #[test]
     fn ticks_are_round() {
-        let axis = Axis::linear("t [s]", -0.13, 0.41, 6, false);
+        let axis = Axis::linear("t [s]", -0.13, 0.43, 6, false);
         assert_eq!(
             texts(&axis),
             ["−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]
@@ -207,10 +219,22 @@ mod tests {
     }
 
     #[test]
+    fn a_little_beyond_a_round_value_costs_a_little() {
+        let axis = Axis::linear("gap", -0.0004, 2.0, 4, false);
+        assert!(
+            (axis.low() + 0.1).abs() < 1e-12 && axis.high() == 2.0,
+            "{} {}",
+            axis.low(),
+            axis.high()
+        );
+        assert_eq!(texts(&axis), ["0.0", "0.5", "1.0", "1.5", "2.0"]);
+    }
+
+    #[test]
     fn a_power_of_ten_goes_to_the_unit() {
         let axis = Axis::linear("*E* [J]", 0.0, 4.2e-7, 4, false);
         assert_eq!(axis.label, "*E* [10^{−9} J]");
-        assert_eq!(texts(&axis), ["0", "200", "400", "600"]);
+        assert_eq!(texts(&axis), ["0", "200", "400"]);
         assert_eq!(
             Axis::linear("*D*_{r}/*d*", 0.0, 5e4, 4, false).label,
             "*D*_{r}/*d* [10^{3}]"

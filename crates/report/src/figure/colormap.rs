@@ -56,17 +56,27 @@ pub fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// sRGB from Oklab lightness, chroma and hue [deg]; chroma is lowered until the colour can be shown.
+/// sRGB from Oklab lightness, chroma and hue [deg]; chroma is lowered to what can be shown.
 fn from_oklch(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
-    let mut chroma = chroma;
-    for _ in 0..40 {
-        let rgb = linear_from_oklch(lightness, chroma, hue);
-        if rgb.iter().all(|v| (-1e-4..=1.0001).contains(v)) {
-            return rgb.map(gamma);
+    let shown = |chroma: f64| {
+        linear_from_oklch(lightness, chroma, hue)
+            .iter()
+            .all(|v| (-1e-4..=1.0001).contains(v))
+    };
+    let (mut low, mut high) = if shown(chroma) {
+        (chroma, chroma)
+    } else {
+        (0.0, chroma)
+    };
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if shown(middle) {
+            low = middle;
+        } else {
+            high = middle;
         }
-        chroma *= 0.94;
     }
-    linear_from_oklch(lightness, 0.0, hue).map(gamma)
+    linear_from_oklch(lightness, low, hue).map(gamma)
 }
 
 fn linear_from_oklch(lightness: f64, chroma: f64, hue: f64) -> [f64; 3] {

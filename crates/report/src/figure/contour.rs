@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn saddles_and_broken_values_do_not_break_loops() {
-        let checker = |i: usize, j: usize| if (i + j) % 2 == 0 { 1.0 } else { 0.0 };
+        let checker = |i: usize, j: usize| if (i + j).is_multiple_of(2) { 1.0 } else { 0.0 };
         assert!(loops(6, 6, checker, 0.5).iter().all(|ring| ring.len() > 2));
         assert!(loops(6, 6, |_, _| f64::NAN, 0.5).is_empty());
         assert!(loops(0, 0, |_, _| 1.0, 0.5).is_empty());

@@ -1,4 +1,4 @@
-//! Curves against time: gap, velocities, orientation, diagnostics.
+//! Curves of the motion against time: gap, velocities, orientation.
 
 use glam::DVec3;
 
@@ -9,9 +9,11 @@ use super::{Figure, Scene};
 use crate::run_folder::{History, Kind};
 use crate::story::{galileo, short};
 
-type Points = Vec<(f64, f64)>;
+/// Points of a curve.
+pub type Points = Vec<(f64, f64)>;
 
-fn series(name: Option<String>, points: Points, colour: &'static str) -> Series {
+/// A curve.
+pub fn series(name: Option<String>, points: Points, colour: &'static str) -> Series {
     Series {
         name,
         points,
@@ -21,7 +23,7 @@ fn series(name: Option<String>, points: Points, colour: &'static str) -> Series 
 }
 
 /// A panel whose axis covers its series and `also`.
-fn panel(label: &str, series: Vec<Series>, also: &[f64], height: f64) -> Panel {
+pub fn panel(label: &str, series: Vec<Series>, also: &[f64], height: f64) -> Panel {
     let values = series.iter().flat_map(|s| s.points.iter().map(|p| p.1));
     let (low, high) = extent(values.chain(also.iter().copied())).unwrap_or((0.0, 1.0));
     Panel {
@@ -32,7 +34,8 @@ fn panel(label: &str, series: Vec<Series>, also: &[f64], height: f64) -> Panel {
     }
 }
 
-fn log_panel(label: &str, series: Vec<Series>, height: f64) -> Option<Panel> {
+/// A panel with decades; none without positive values.
+pub fn log_panel(label: &str, series: Vec<Series>, height: f64) -> Option<Panel> {
     let positive = |v: &f64| *v > 0.0 && v.is_finite();
     let values = series
         .iter()
@@ -48,7 +51,8 @@ fn log_panel(label: &str, series: Vec<Series>, height: f64) -> Option<Panel> {
 }
 
 impl Scene<'_> {
-    fn time(&self) -> Axis {
+    /// The time axis of all curves.
+    pub fn time(&self) -> Axis {
         let (label, factor) = self.story.time_axis();
         Axis::linear(label, 0.0, self.story.end * factor, 6, true)
     }
@@ -77,7 +81,7 @@ impl Scene<'_> {
     }
 
     /// The grains with a history; of a pair, the one behind first.
-    fn moving(&self) -> Vec<usize> {
+    pub fn moving(&self) -> Vec<usize> {
         match self.story.pair {
             Some(pair) => pair.to_vec(),
             None => (0..self.run.grains.len())
@@ -381,152 +385,5 @@ pub fn orientation(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
         .to_owned(),
         caption,
         drawing: stack(&scene.time(), &panels, &scene.marks()),
-    })
-}
-
-/// Mean height, speed and contacts of many grains.
-pub fn heap_history(scene: &Scene) -> Option<Figure> {
-    let moving = scene.moving();
-    let first = &scene.run.grains[*moving.first()?];
-    let (_, factor) = scene.story.time_axis();
-    let up = scene.story.up;
-    let over = |value: &dyn Fn(&History, usize) -> f64| -> Points {
-        (0..first.len())
-            .map(|row| {
-                let present: Vec<&History> = moving
-                    .iter()
-                    .map(|g| &scene.run.grains[*g])
-                    .filter(|h| h.len() > row)
-                    .collect();
-                let sum: f64 = present.iter().map(|h| value(h, row)).sum();
-                (first.time[row] * factor, sum / present.len() as f64)
-            })
-            .collect()
-    };
-    let speed = over(&|h, row| h.velocity[row].length_squared());
-    let speed: Points = speed.into_iter().map(|(t, v)| (t, v.sqrt())).collect();
-    let contacts = over(&|h, row| h.contacts[row]);
-    let height = over(&|h, row| 1e3 * h.position[row].dot(up));
-    let (last_speed, last_contacts) = (speed.last()?.1, contacts.last()?.1);
-    let mut panels = vec![panel(
-        "mean height  [mm]",
-        vec![series(None, height, style::BLUE)],
-        &[],
-        70.0,
-    )];
-    panels.extend(log_panel(
-        "rms speed  [m/s]",
-        vec![series(None, speed, style::VERMILION)],
-        80.0,
-    ));
-    let mut caption = format!(
-        "(a) Mean height of the {} grains. (b) Root mean square of their speeds, {} m/s at the end.",
-        moving.len(),
-        short(last_speed)
-    );
-    if last_contacts.is_finite() {
-        panels.push(panel(
-            "contacts per grain  [–]",
-            vec![series(None, contacts, style::GREEN)],
-            &[0.0],
-            70.0,
-        ));
-        caption.push_str(&format!(
-            " (c) Mean number of contacts of a grain, {} at the end.",
-            short(last_contacts)
-        ));
-    }
-    Some(Figure {
-        name: "history",
-        title: "Coming to rest".to_owned(),
-        caption,
-        drawing: stack(&scene.time(), &panels, &[]),
-    })
-}
-
-/// What the method may break, against time.
-pub fn diagnostics(scene: &Scene) -> Option<Figure> {
-    let table = scene.run.diagnostics.as_ref()?;
-    let time = table.column("time")?;
-    let (_, factor) = scene.story.time_axis();
-    let points = |names: &[&str]| -> Option<Points> {
-        let column = names.iter().find_map(|name| table.column(name))?;
-        let points: Points = time
-            .iter()
-            .zip(column)
-            .map(|(t, v)| (t * factor, *v))
-            .collect();
-        points
-            .iter()
-            .any(|p| p.1.is_finite() && p.1 != 0.0)
-            .then_some(points)
-    };
-    let peak = |points: &Points| {
-        points
-            .iter()
-            .map(|p| p.1.abs())
-            .filter(|v| v.is_finite())
-            .fold(0.0, f64::max)
-    };
-    let mut panels = Vec::new();
-    let mut parts = Vec::new();
-    if let Some(divergence) = points(&["max_divergence", "divergence"]) {
-        parts.push(format!(
-            "largest divergence after projection, {} 1/s at most",
-            short(peak(&divergence))
-        ));
-        panels.extend(log_panel(
-            "max |div *u*|  [1/s]",
-            vec![series(None, divergence, style::BLUE)],
-            65.0,
-        ));
-    }
-    if let Some(cfl) = points(&["cfl"]) {
-        parts.push(format!("Courant number, {} at most", short(peak(&cfl))));
-        panels.push(panel(
-            "CFL  [–]",
-            vec![series(None, cfl, style::INK)],
-            &[0.0],
-            60.0,
-        ));
-    }
-    if let Some(residual) = points(&["momentum_residual"]) {
-        let residual: Points = residual.into_iter().map(|(t, v)| (t, v.abs())).collect();
-        parts.push(format!("momentum of fluid, grains and walls that is not accounted for, relative to the largest term, {} at most", short(peak(&residual))));
-        panels.extend(log_panel(
-            "momentum residual  [–]",
-            vec![series(None, residual, style::PURPLE)],
-            65.0,
-        ));
-    }
-    let energies: Vec<Series> = [
-        ("fluid", "fluid_kinetic_energy", style::BLUE),
-        ("grains", "grain_kinetic_energy", style::VERMILION),
-    ]
-    .into_iter()
-    .filter_map(|(name, column, colour)| {
-        Some(series(Some(name.to_owned()), points(&[column])?, colour))
-    })
-    .collect();
-    if !energies.is_empty() {
-        parts.push("kinetic energy".to_owned());
-        panels.push(panel("kinetic energy  [J]", energies, &[0.0], 80.0));
-    }
-    if panels.is_empty() {
-        return None;
-    }
-    let letters = parts
-        .iter()
-        .enumerate()
-        .map(|(i, part)| format!("({}) {part}", char::from(b'a' + i as u8)));
-    let caption = format!(
-        "What the method may break, step by step: {}.",
-        letters.collect::<Vec<_>>().join("; ")
-    );
-    Some(Figure {
-        name: "diagnostics",
-        title: "Diagnostics".to_owned(),
-        caption,
-        drawing: stack(&scene.time(), &panels, &[]),
     })
 }

@@ -58,24 +58,48 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
         low: (x.0, y.0),
         high: (x.1, y.1),
     };
-    let room = PAGE - LEFT - MIDDLE - 10.0;
-    let scale = (0.5 * room / side.width()).min(230.0 / top.height().max(side.height()));
-    let frame = scale * top.height().max(side.height());
-    let bottom = |window: &Window| 8.0 + frame - scale * window.height();
-    let start = LEFT + 0.5 * (room - 2.0 * scale * side.width());
+    // A low heap is shown below its side view, a tall column beside it.
+    let tall = side.height() > 1.2 * side.width();
+    let (across_room, up_room) = if tall {
+        (0.5 * (PAGE - 2.0 * LEFT - MIDDLE), 330.0)
+    } else {
+        (300.0, 420.0)
+    };
+    let stacked = if tall {
+        side.height()
+    } else {
+        side.height() + top.height()
+    };
+    let scale = (across_room / side.width()).min(up_room / stacked);
+    let (width, height) = (scale * side.width(), scale * side.height());
+    let (total, frame, second) = if tall {
+        let low = height - scale * top.height();
+        (
+            LEFT + 2.0 * width + MIDDLE + 10.0,
+            height.max(scale * top.height()),
+            (LEFT + width + MIDDLE, low.max(0.0)),
+        )
+    } else {
+        (
+            LEFT + width + 10.0,
+            height + 16.0 + scale * top.height(),
+            (LEFT, height + 16.0),
+        )
+    };
+    let total = total.max(240.0);
     let plans = [
         Plan {
             window: side,
-            corner: (start, bottom(&side)),
+            corner: (LEFT, 8.0),
             scale,
         },
         Plan {
             window: top,
-            corner: (start + scale * side.width() + MIDDLE, bottom(&top)),
+            corner: (second.0, 8.0 + second.1),
             scale,
         },
     ];
-    let mut drawing = Drawing::new(PAGE, 8.0 + frame + 26.0 + 36.0);
+    let mut drawing = Drawing::new(total, 8.0 + frame + 26.0 + 36.0);
     let (unit, factor) = length_unit(side.width().max(side.height()).max(top.height()));
     let views = [(across, up, depth, -1.0), (across, depth, up, 1.0)];
     for (i, (plan, (h, v, hidden, towards))) in plans.iter().zip(views).enumerate() {
@@ -99,7 +123,8 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
         }
         drawing.end_clip();
         let names = [h, v].map(|axis| format!("*{}*  [{unit}]", AXES[axis]));
-        plan.frame(&mut drawing, (Some(&names[0]), Some(&names[1])));
+        let below = (tall || i == 1).then_some(names[0].as_str());
+        plan.frame(&mut drawing, (below, Some(&names[1])));
     }
     let palette: Vec<[u8; 3]> = (0..256).map(|i| ordered(f64::from(i) / 255.0)).collect();
     let axis = Axis::linear(
@@ -111,7 +136,7 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
     );
     colour_bar(
         &mut drawing,
-        (0.5 * PAGE - 90.0, 8.0 + frame + 30.0),
+        (0.5 * total - 90.0, 8.0 + frame + 30.0),
         180.0,
         &palette,
         &axis,

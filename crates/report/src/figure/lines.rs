@@ -64,12 +64,15 @@ pub fn stack(x: &Axis, panels: &[Panel], marks: &[Mark]) -> Drawing {
     }
     let top = |i: usize| {
         let marks = if i == 0 { ROW * rows as f64 } else { 0.0 };
-        7.0 + ROW * legends[i].len() as f64 + marks
+        let letter = if panels.len() > 1 { 5.0 } else { 0.0 };
+        7.0 + letter + ROW * legends[i].len() as f64 + marks
     };
+    // A long label makes its panel taller.
+    let height = |panel: &Panel| panel.height.max(text::width(&panel.y.label, TEXT) + 4.0);
     let heights: f64 = panels
         .iter()
         .enumerate()
-        .map(|(i, panel)| top(i) + panel.height)
+        .map(|(i, panel)| top(i) + height(panel))
         .sum();
     let mut drawing = Drawing::new(COLUMN, heights + 26.0);
     let mut y = 0.0;
@@ -80,7 +83,7 @@ pub fn stack(x: &Axis, panels: &[Panel], marks: &[Mark]) -> Drawing {
             x: LEFT,
             y,
             width,
-            height: panel.height,
+            height: height(panel),
         };
         draw_marks(
             &mut drawing,
@@ -90,12 +93,12 @@ pub fn stack(x: &Axis, panels: &[Panel], marks: &[Mark]) -> Drawing {
             if i == 0 { &names } else { &[] },
         );
         draw_panel(&mut drawing, &frame, x, panel, i);
-        y += panel.height;
+        y += frame.height;
         let last = i + 1 == panels.len();
         draw_x_axis(&mut drawing, &frame, x, last);
         if panels.len() > 1 {
             let letter = format!("({})", char::from(b'a' + (i % 26) as u8));
-            drawing.label(2.0, frame.y + 4.0, Anchor::Start, TEXT, INK, &letter, false);
+            drawing.label(2.0, frame.y - 4.0, Anchor::Start, TEXT, INK, &letter, false);
         }
     }
     drawing

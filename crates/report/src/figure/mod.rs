@@ -5,9 +5,12 @@ mod colormap;
 mod contour;
 mod curves;
 mod heap;
+mod history;
 mod lines;
 mod plan;
+mod raster;
 mod section;
+mod sheet;
 mod silhouette;
 mod slices;
 mod style;
@@ -84,12 +87,12 @@ pub fn all(run: &RunFolder, story: &Story, notes: &mut Vec<String>) -> Vec<Figur
         }
         Subject::Many => {
             out.extend(heap::positions(&scene));
-            out.extend(curves::heap_history(&scene));
+            out.extend(history::many(&scene));
         }
         Subject::Flow => {}
     }
     out.extend(slices::figures(&scene, notes));
-    out.extend(curves::diagnostics(&scene));
+    out.extend(history::diagnostics(&scene));
     out
 }
 

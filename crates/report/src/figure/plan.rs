@@ -183,7 +183,7 @@ pub fn colour_bar(
 ) {
     const HEIGHT: f64 = 6.0;
     let (x, y) = corner;
-    let raster = super::svg::Raster {
+    let raster = super::raster::Raster {
         width: palette.len(),
         height: 1,
         pixels: (0..palette.len()).map(|i| i.min(255) as u8).collect(),

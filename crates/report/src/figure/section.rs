@@ -2,7 +2,7 @@
 
 use super::contour;
 use super::plan::Window;
-use super::svg::Raster;
+use super::raster::Raster;
 use crate::run_folder::Image;
 
 /// A slice one cell thick in y.

@@ -38,6 +38,14 @@ impl Scene<'_> {
             })
     }
 
+    /// Diameter of a grain that is a sphere [m].
+    pub fn sphere_diameter(&self, grain: usize) -> Option<f64> {
+        let facts = self.run.facts.grains.get(grain)?;
+        facts
+            .diameter
+            .filter(|_| facts.shape.as_deref() == Some("sphere"))
+    }
+
     /// The axis nearest to the vertical, and the two others.
     pub fn vertical(&self) -> (usize, [usize; 2]) {
         let up = self.story.up.abs();

@@ -238,7 +238,7 @@ fn phase_bar(story: &Story) -> String {
 }
 
 fn figure_block(number: usize, figure: &Figure) -> String {
-    let class = if figure.drawing.width() <= figure::COLUMN {
+    let class = if figure.drawing.width() <= figure::COLUMN + 30.0 {
         " class=\"column\""
     } else {
         ""

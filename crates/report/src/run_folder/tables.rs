@@ -117,6 +117,25 @@ impl History {
         }
     }
 
+    /// Position and orientation at a time, between rows in proportion; none outside the history.
+    pub fn pose(&self, time: f64) -> Option<(DVec3, DQuat)> {
+        let row = self.nearest(time)?;
+        if self.time[row] == time {
+            return Some((self.position[row], self.orientation[row]));
+        }
+        let after = self.time.partition_point(|t| *t < time);
+        if after == 0 || after >= self.len() {
+            return None;
+        }
+        let before = after - 1;
+        let part = (time - self.time[before]) / (self.time[after] - self.time[before]);
+        let position = self.position[before].lerp(self.position[after], part);
+        Some((
+            position,
+            self.orientation[before].slerp(self.orientation[after], part),
+        ))
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.time.len()
@@ -254,6 +273,8 @@ mod tests {
         assert_eq!(out[1].position[1].z, 0.9);
         assert_eq!(out[0].nearest(0.04), Some(0));
         assert_eq!(out[0].nearest(7.0), Some(1));
+        assert!((out[0].pose(0.05).unwrap().0.z - 2.95).abs() < 1e-12);
+        assert!(out[0].pose(7.0).is_none() && out[0].pose(0.1).is_some());
         assert!(notes.is_empty(), "{notes:?}");
     }
 
