@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde_json::Value;
 
 use crate::phases::{self, Instant, Phase};
-use crate::run_folder::RunFolder;
+use crate::run_folder::{History, RunFolder};
 
 /// What was run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +54,8 @@ pub struct Story {
     pub phases: Vec<Phase>,
     /// Instants that the pictures show.
     pub instants: Vec<Instant>,
+    /// Whether any grain travels by a tenth of its diameter or more.
+    pub travels: bool,
     /// Last time [s].
     pub end: f64,
 }
@@ -101,7 +103,19 @@ impl Story {
         } else {
             Vec::new()
         };
+        let step = 0.1 * run.facts.diameter().unwrap_or(0.0);
+        let far = |history: &History| {
+            history
+                .position
+                .iter()
+                .any(|p| p.distance(history.position[0]) > step)
+        };
+        let travels = run.grains.iter().any(far);
         let instants = match subject {
+            Subject::Single if !travels => vec![Instant {
+                time: end,
+                name: "",
+            }],
             Subject::Pair => phases::pair_instants(&phases, &run.events, end),
             Subject::Flow => vec![Instant {
                 time: end,
@@ -116,6 +130,7 @@ impl Story {
             pair,
             phases,
             instants,
+            travels,
             end,
         }
     }
@@ -173,7 +188,12 @@ pub fn short(value: f64) -> String {
     if !value.is_finite() {
         return "not known".to_owned();
     }
-    let power = value.abs().log10().floor() as i32;
+    // The power of the rounded number: 0.9999 reads 1.00.
+    let rounded = format!("{value:.2e}");
+    let power: i32 = rounded
+        .split_once('e')
+        .and_then(|(_, power)| power.parse().ok())
+        .unwrap_or(0);
     if !(-3..=5).contains(&power) {
         let mantissa = value / 10f64.powi(power);
         return format!(
@@ -189,16 +209,26 @@ pub fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run_folder::History;
 
     #[test]
     fn numbers_have_three_digits() {
-        let texts = [0.0, 18.234, -0.002_346, 123_456.0, 1.0e-9, -4.2e7, f64::NAN].map(short);
+        let texts = [
+            0.0,
+            18.234,
+            0.99999,
+            -0.002_346,
+            123_456.0,
+            1.0e-9,
+            -4.2e7,
+            f64::NAN,
+        ]
+        .map(short);
         assert_eq!(
             texts,
             [
                 "0",
                 "18.2",
+                "1.00",
                 "−0.00235",
                 "123456",
                 "1.00×10^{−9}",

@@ -57,7 +57,8 @@ impl Scene<'_> {
         Axis::linear(label, 0.0, self.story.end * factor, 6, true)
     }
 
-    fn marks(&self) -> Vec<Mark> {
+    /// The events as marks on the time axis.
+    pub fn marks(&self) -> Vec<Mark> {
         let (_, factor) = self.story.time_axis();
         let shown = |kind: &Kind| !matches!(kind, Kind::Other(_));
         let events = self.run.events.iter().filter(|event| shown(&event.kind));

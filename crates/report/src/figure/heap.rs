@@ -5,10 +5,8 @@ use super::colormap::{hex, ordered};
 use super::plan::{Plan, Window, colour_bar, length_unit};
 use super::style::PAGE;
 use super::svg::Drawing;
-use super::{Figure, Scene};
+use super::{AXES, Figure, Scene};
 use crate::story::short;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The grains at the end of the run, coloured by height.
 pub fn positions(scene: &Scene) -> Option<Figure> {

@@ -3,7 +3,7 @@
 use super::curves::{Points, log_panel, panel, series};
 use super::lines::{Series, stack};
 use super::style;
-use super::{Figure, Scene};
+use super::{AXES, Figure, Scene};
 use crate::run_folder::History;
 use crate::story::short;
 
@@ -67,6 +67,42 @@ pub fn many(scene: &Scene) -> Option<Figure> {
     })
 }
 
+/// Force of the fluid on a grain that is held or driven.
+pub fn force(scene: &Scene) -> Option<Figure> {
+    let driven = !scene.story.travels || scene.story.scales.is_none();
+    let grain = scene.moving().first().copied().filter(|_| driven)?;
+    let history = &scene.run.grains[grain];
+    let (_, factor) = scene.story.time_axis();
+    let part = |axis: usize| -> Points {
+        let rows = 0..history.len();
+        rows.map(|row| (history.time[row] * factor, history.force[row][axis]))
+            .collect()
+    };
+    let curves: Vec<Series> = [style::BLUE, style::VERMILION, style::GREEN]
+        .into_iter()
+        .enumerate()
+        .map(|(axis, colour)| series(Some(format!("*F*_{{{}}}", AXES[axis])), part(axis), colour))
+        .collect();
+    let any = curves
+        .iter()
+        .flat_map(|s| &s.points)
+        .any(|p| p.1.is_finite() && p.1 != 0.0);
+    let last = history.force.last().filter(|_| any)?;
+    let caption = format!(
+        "Force of the fluid on grain {grain}: ({}, {}, {}) N at the end.",
+        short(last.x),
+        short(last.y),
+        short(last.z)
+    );
+    let panels = [panel("force  [N]", curves, &[0.0], 110.0)];
+    Some(Figure {
+        name: "force",
+        title: "Force of the fluid".to_owned(),
+        caption,
+        drawing: stack(&scene.time(), &panels, &scene.marks()),
+    })
+}
+
 /// What the method may break, against time.
 pub fn diagnostics(scene: &Scene) -> Option<Figure> {
     let table = scene.run.diagnostics.as_ref()?;
@@ -117,7 +153,7 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
         let residual: Points = residual.into_iter().map(|(t, v)| (t, v.abs())).collect();
         parts.push(format!("momentum of fluid, grains and walls that is not accounted for, relative to the largest term, {} at most", short(peak(&residual))));
         panels.extend(log_panel(
-            "momentum residual  [–]",
+            "residual  [–]",
             vec![series(None, residual, style::PURPLE)],
             65.0,
         ));
@@ -133,7 +169,7 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
     .collect();
     if !energies.is_empty() {
         parts.push("kinetic energy".to_owned());
-        panels.push(panel("kinetic energy  [J]", energies, &[0.0], 80.0));
+        panels.push(panel("energy  [J]", energies, &[0.0], 80.0));
     }
     if panels.is_empty() {
         return None;

@@ -30,6 +30,9 @@ pub use style::COLUMN;
 pub use svg::Drawing;
 pub use text::{escape, html, literal, plain};
 
+/// Names of the coordinate axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// A figure ready to be written.
 #[derive(Clone, Debug)]
 pub struct Figure {
@@ -81,8 +84,11 @@ pub fn all(run: &RunFolder, story: &Story, notes: &mut Vec<String>) -> Vec<Figur
             out.extend(curves::orientation(&scene, notes));
         }
         Subject::Single => {
-            out.extend(trajectory::figure(&scene));
-            out.extend(curves::single_velocity(&scene));
+            if story.travels {
+                out.extend(trajectory::figure(&scene));
+                out.extend(curves::single_velocity(&scene));
+            }
+            out.extend(history::force(&scene));
             out.extend(curves::orientation(&scene, notes));
         }
         Subject::Many => {

@@ -1,52 +1,114 @@
-//! A vertical slice of the fields, ready to be drawn: values between cells, grain outlines.
+//! A slice of the fields, ready to be drawn: values between cells, grain outlines.
+
+use glam::DVec3;
 
 use super::contour;
 use super::plan::Window;
 use super::raster::Raster;
 use crate::run_folder::Image;
 
-/// A slice one cell thick in y.
+/// How a plane is looked at: axes 0, 1, 2 are x, y, z.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct View {
+    /// Axis across the plane.
+    pub normal: usize,
+    /// Axis to the right.
+    pub across: usize,
+    /// Axis upwards.
+    pub up: usize,
+}
+
+impl View {
+    /// The view of a slice with this normal; `vertical` points up where it lies in the plane.
+    pub fn along(normal: usize, vertical: usize) -> View {
+        let up = if vertical != normal {
+            vertical
+        } else {
+            if normal == 2 { 1 } else { 2 }
+        };
+        View {
+            normal,
+            across: 3 - normal - up,
+            up,
+        }
+    }
+
+    /// The two coordinates that are seen.
+    pub fn seen(&self, x: DVec3) -> (f64, f64) {
+        (x[self.across], x[self.up])
+    }
+
+    /// Whether positive rotation about the normal turns clockwise to the eye.
+    pub fn clockwise(&self) -> bool {
+        DVec3::AXES[self.across].cross(DVec3::AXES[self.up])[self.normal] < 0.0
+    }
+}
+
+/// A slice one cell thick.
 #[derive(Clone, Debug)]
 pub struct Section {
+    /// How it is looked at.
+    pub view: View,
     nx: usize,
     nz: usize,
     lower: (f64, f64),
     step: (f64, f64),
-    /// Place of the plane along y [m].
-    pub y: f64,
-    /// Velocity in the plane (x, z) and its magnitude in space [m/s], by cell.
+    /// Place of the plane along its normal [m].
+    pub place: f64,
+    /// Velocity in the plane (right, up) and its magnitude in space [m/s], by cell.
     pub velocity: Option<Vec<[f64; 3]>>,
-    /// Vorticity along y [1/s], by cell.
+    /// Vorticity along the normal [1/s], by cell.
     pub vorticity: Option<Vec<f64>>,
     solid: Option<Vec<f64>>,
 }
 
 impl Section {
-    /// Takes what is drawn from an image file; refuses one that is thicker than a cell.
-    pub fn of(image: &Image) -> Result<Section, String> {
+    /// Takes what is drawn from an image file one cell thick in y, else x, else z.
+    pub fn of(image: &Image, vertical: usize) -> Result<Section, String> {
         let [nx, ny, nz] = image.cells;
-        if ny != 1 {
-            return Err(format!("it is {ny} cells thick in y; a slice has one"));
-        }
-        let vector = |name: &str| image.arrays.get(name).filter(|array| array.components == 3);
-        let scalar = |name: &str| image.arrays.get(name).filter(|array| array.components == 1);
-        let velocity = vector("velocity").map(|array| {
-            let cells = array.values.chunks_exact(3);
-            cells
-                .map(|v| [v[0], v[2], (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()])
+        let thin = [1, 0, 2].into_iter().find(|axis| image.cells[*axis] == 1);
+        let normal = thin.ok_or_else(|| {
+            format!("{nx} x {ny} x {nz} cells are no slice, which is one cell thick")
+        })?;
+        let view = View::along(normal, vertical);
+        let strides = [1, nx, nx * ny];
+        let (across, up) = (view.across, view.up);
+        let order = || {
+            let rows = (0..image.cells[up]).map(move |k| k * strides[up]);
+            rows.flat_map(move |row| {
+                (0..image.cells[across]).map(move |i| row + i * strides[across])
+            })
+        };
+        let array = |name: &str, components: usize| {
+            image
+                .arrays
+                .get(name)
+                .filter(|array| array.components == components)
+        };
+        let velocity = array("velocity", 3).map(|array| {
+            let value = |cell: usize| {
+                let v = DVec3::from_slice(&array.values[3 * cell..]);
+                [v[across], v[up], v.length()]
+            };
+            order().map(value).collect()
+        });
+        let vorticity = array("vorticity", 3).map(|array| {
+            order()
+                .map(|cell| array.values[3 * cell + normal])
                 .collect()
         });
-        let vorticity =
-            vector("vorticity").map(|array| array.values.chunks_exact(3).map(|v| v[1]).collect());
+        let solid = array("solid_fraction", 1)
+            .map(|array| order().map(|cell| array.values[cell]).collect());
         Ok(Section {
-            nx,
-            nz,
-            lower: (image.lower.x, image.lower.z),
-            step: (image.spacing.x, image.spacing.z),
-            y: image.lower.y + 0.5 * image.spacing.y,
+            view,
+            nx: image.cells[across],
+            nz: image.cells[up],
+            lower: view.seen(image.lower),
+            step: view.seen(image.spacing),
+            place: image.lower[normal] + 0.5 * image.spacing[normal],
             velocity,
             vorticity,
-            solid: scalar("solid_fraction").map(|array| array.values.clone()),
+            solid,
         })
     }
 
@@ -159,7 +221,6 @@ fn cubic([a, b, c, d]: [f64; 4], t: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::run_folder::Array;
-    use glam::DVec3;
 
     fn image(ny: usize) -> Image {
         let scalar = |values: Vec<f64>| Array {
@@ -195,7 +256,7 @@ mod tests {
 
     #[test]
     fn values_between_cells() {
-        let section = Section::of(&image(1)).unwrap();
+        let section = Section::of(&image(1), 2).unwrap();
         let velocity = section.velocity.clone().unwrap();
         assert!(
             (section.sample(|i| velocity[i][0], (3.3, 2.9)) - 2.9).abs() < 1e-12,
@@ -206,7 +267,7 @@ mod tests {
             1.0,
             "held at the edge"
         );
-        assert_eq!(section.y, 0.5);
+        assert_eq!(section.place, 0.5);
         assert!(section.vorticity.is_none());
         let step = section.sample(|i| if i % 8 < 4 { 0.0 } else { 1.0 }, (4.9, 2.0));
         assert!((0.0..=1.0).contains(&step));
@@ -214,7 +275,7 @@ mod tests {
 
     #[test]
     fn the_solid_is_outlined() {
-        let section = Section::of(&image(1)).unwrap();
+        let section = Section::of(&image(1), 2).unwrap();
         let rings = section.outlines();
         assert_eq!(rings.len(), 1);
         let middle = rings[0]
@@ -232,9 +293,49 @@ mod tests {
     }
 
     #[test]
+    fn every_normal_has_its_view() {
+        assert_eq!(
+            View::along(1, 2),
+            View {
+                normal: 1,
+                across: 0,
+                up: 2
+            }
+        );
+        assert_eq!(
+            View::along(0, 1),
+            View {
+                normal: 0,
+                across: 2,
+                up: 1
+            }
+        );
+        assert_eq!(
+            View::along(2, 2),
+            View {
+                normal: 2,
+                across: 0,
+                up: 1
+            }
+        );
+        assert!(View::along(1, 2).clockwise() && !View::along(0, 2).clockwise());
+        let mut turned = image(1);
+        turned.cells = [1, 8, 6];
+        let section = Section::of(&turned, 1).unwrap();
+        assert_eq!((section.view.across, section.view.up), (2, 1));
+        assert_eq!(section.whole().high, (6.0, 8.0));
+        let inside = section.sample(|cell| section.solid(cell), (3.0, 4.0));
+        assert_eq!(inside, 1.0, "the solid follows the axes");
+    }
+
+    #[test]
     fn thick_images_are_no_slices() {
         let mut thick = image(1);
         thick.cells[1] = 2;
-        assert!(Section::of(&thick).unwrap_err().contains("2 cells thick"));
+        assert!(
+            Section::of(&thick, 2)
+                .unwrap_err()
+                .contains("8 x 2 x 6 cells are no slice")
+        );
     }
 }

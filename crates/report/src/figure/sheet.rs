@@ -1,13 +1,13 @@
 //! A sheet of slices: instants across, planes down, one colour scale.
 
-use super::Scene;
 use super::axis::Axis;
 use super::colormap::ColorMap;
 use super::plan::{Plan, Window, colour_bar, length_unit};
-use super::section::Section;
+use super::section::{Section, View};
 use super::silhouette::{self, Outline};
 use super::style::{self, HAIR, INK, PAGE, SMALL, TEXT, grain_colour};
 use super::svg::{Anchor, Drawing, path_data};
+use super::{AXES, Scene};
 
 /// Pixels of a slice for each point of the paper.
 const PIXELS: f64 = 3.0;
@@ -54,7 +54,8 @@ pub fn draw(
         .iter()
         .map(|c| c.window.height())
         .fold(0.0, f64::max);
-    let scale = (room.min(230.0) / widest).min(if rows > 1 { 200.0 } else { 260.0 } / tallest);
+    let scale = (room.min(if columns.len() == 1 { 430.0 } else { 230.0 }) / widest)
+        .min(if rows > 1 { 200.0 } else { 260.0 } / tallest);
     let (width, height) = (scale * widest, scale * tallest);
     let total = (left + n * width + (n - 1.0) * gap + right).max(220.0);
     let start = left + 0.5 * (total - left - right - n * width - (n - 1.0) * gap);
@@ -62,7 +63,9 @@ pub fn draw(
     let bottom = top + rows as f64 * height + (rows as f64 - 1.0) * 12.0;
     let mut drawing = Drawing::new(total, bottom + 26.0 + 32.0);
     let (unit, _) = length_unit(first.window.width().max(first.window.height()));
-    let (x_name, z_name) = (format!("*x*  [{unit}]"), format!("*z*  [{unit}]"));
+    let view = first.sections.iter().flatten().next()?.view;
+    let name = |axis: usize| format!("*{}*  [{unit}]", AXES[axis]);
+    let (x_name, z_name) = (name(view.across), name(view.up));
     for (c, column) in columns.iter().enumerate() {
         let x = start + c as f64 * (width + gap);
         drawing.label(
@@ -194,11 +197,12 @@ fn cuts(scene: &Scene, column: &Column, section: &Section) -> Vec<(Option<usize>
     let exact = |(grain, _): &(usize, (f64, f64))| {
         let (position, turn) = scene.run.grains[*grain].pose(column.at)?;
         let loops = match scene.bodies.get(grain) {
-            Some(body) => body.section(position, turn, section.y),
+            Some(body) => body.section(position, turn, section.view, section.place),
             None => {
                 let radius = 0.5 * scene.sphere_diameter(*grain)?;
-                let chord = radius * radius - (position.y - section.y).powi(2);
-                let ring = || silhouette::circle((position.x, position.z), chord.sqrt());
+                let chord =
+                    radius * radius - (position[section.view.normal] - section.place).powi(2);
+                let ring = || silhouette::circle(section.view.seen(position), chord.sqrt());
                 (chord > 0.0).then(ring).into_iter().collect()
             }
         };
@@ -210,7 +214,7 @@ fn cuts(scene: &Scene, column: &Column, section: &Section) -> Vec<(Option<usize>
         )
     };
     if let Some(loops) = column.centres.iter().map(exact).collect::<Option<Vec<_>>>() {
-        return with_images(scene, loops.concat());
+        return with_images(scene, section.view, loops.concat());
     }
     let nearest = |ring: Outline| {
         let n = ring.len() as f64;
@@ -236,6 +240,7 @@ fn cuts(scene: &Scene, column: &Column, section: &Section) -> Vec<(Option<usize>
 /// Adds the images through periodic faces.
 fn with_images(
     scene: &Scene,
+    view: View,
     loops: Vec<(Option<usize>, Outline)>,
 ) -> Vec<(Option<usize>, Outline)> {
     let shifts = |axis: usize| match scene.run.period(axis) {
@@ -243,8 +248,8 @@ fn with_images(
         None => vec![0.0],
     };
     let mut out = Vec::new();
-    for dx in shifts(0) {
-        for dz in shifts(2) {
+    for dx in shifts(view.across) {
+        for dz in shifts(view.up) {
             let moved = |ring: &Outline| ring.iter().map(|p| (p.0 + dx, p.1 + dz)).collect();
             out.extend(loops.iter().map(|(grain, ring)| (*grain, moved(ring))));
         }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use glam::{DQuat, DVec3};
 
 use super::contour;
+use super::section::View;
 use crate::run_folder::{History, RunFolder, Surface};
 
 /// A closed line in two of the three coordinates [m].
@@ -42,14 +43,14 @@ impl Body {
         )
     }
 
-    /// Loops in which the plane of this `y` cuts the body at a pose, in x and z.
-    pub fn section(&self, position: DVec3, turn: DQuat, y: f64) -> Vec<Outline> {
+    /// Loops in which a plane across the view's normal at `place` cuts the body at a pose.
+    pub fn section(&self, position: DVec3, turn: DQuat, view: View, place: f64) -> Vec<Outline> {
         let points: Vec<DVec3> = self.points.iter().map(|p| position + turn * *p).collect();
-        let above = |i: usize| points[i].y >= y;
+        let above = |i: usize| points[i][view.normal] >= place;
         let cross = |a: usize, b: usize| {
             let (p, q) = (points[a], points[b]);
-            let at = p.lerp(q, (y - p.y) / (q.y - p.y));
-            (at.x, at.z)
+            let (from, to) = (p[view.normal], q[view.normal]);
+            view.seen(p.lerp(q, (place - from) / (to - from)))
         };
         // Each cut triangle joins two of its edges; both are shared with the next cut triangle.
         let mut next: BTreeMap<(usize, usize), (usize, usize)> = BTreeMap::new();
@@ -295,10 +296,11 @@ mod tests {
     fn sections_are_loops_of_the_body() {
         let body = block(2e-3, 1e-3, 0.5e-3);
         let at = DVec3::new(0.1, 0.2, 0.3);
-        let cut = body.section(at, DQuat::IDENTITY, 0.2004);
+        let view = View::along(1, 2);
+        let cut = body.section(at, DQuat::IDENTITY, view, 0.2004);
         assert_eq!(cut.len(), 1);
         assert!((area(&cut[0]) - 4e-6).abs() < 1e-12, "{}", area(&cut[0]));
-        assert!(body.section(at, DQuat::IDENTITY, 0.2011).is_empty());
+        assert!(body.section(at, DQuat::IDENTITY, view, 0.2011).is_empty());
     }
 
     #[test]

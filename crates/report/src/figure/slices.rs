@@ -2,11 +2,11 @@
 
 use super::axis::Axis;
 use super::colormap::ColorMap;
-use super::plan::Window;
-use super::section::Section;
+use super::plan::{Window, length_unit};
+use super::section::{Section, View};
 use super::sheet::{self, Column, Look};
-use super::{Figure, Scene, letter};
-use crate::run_folder::FrameFile;
+use super::{AXES, Figure, Scene, letter};
+use crate::run_folder::{FrameFile, History};
 use crate::story::{Subject, short};
 
 /// Speed and vorticity slices; what cannot be read is added to `notes`.
@@ -30,23 +30,20 @@ pub fn figures(scene: &Scene, notes: &mut Vec<String>) -> Vec<Figure> {
 }
 
 fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
+    let vertical = scene.vertical().0;
     let mut read = |frame: Option<&FrameFile>| -> Option<Section> {
         let frame = frame?;
-        let section = scene.run.slice(frame).and_then(|image| Section::of(&image));
+        let section = scene
+            .run
+            .slice(frame)
+            .and_then(|image| Section::of(&image, vertical));
+        let name = scene.run.short_name(&frame.file);
         section
-            .map_err(|what| {
-                notes.push(format!(
-                    "{} was left out: {what}",
-                    scene.run.short_name(&frame.file)
-                ))
-            })
+            .map_err(|what| notes.push(format!("{name} was left out: {what}")))
             .ok()
     };
-    let apart = scene
-        .instants
-        .iter()
-        .any(|instant| scene.out_of_plane(instant.time));
-    let mut out = Vec::new();
+    let mut out: Vec<Column> = Vec::new();
+    let mut apart = false;
     for (i, instant) in scene.instants.iter().enumerate() {
         let frames: Vec<&FrameFile> = scene
             .run
@@ -61,39 +58,39 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
                 .copied()
         };
         let sections = match scene.story.pair {
-            Some([behind, ahead]) if apart => vec![read(of(behind)), read(of(ahead))],
-            Some([behind, ahead]) => {
-                vec![read(of(behind).or(of(ahead)).or(frames.first().copied()))]
-            }
-            None => vec![read(frames.first().copied())],
+            Some(pair) if of(pair[0]).is_some() => pair.map(|grain| read(of(grain))).to_vec(),
+            _ => vec![read(frames.first().copied())],
         };
-        if sections.iter().all(Option::is_none) {
+        let Some(first) = sections.iter().flatten().next() else {
             continue;
-        }
-        let title = format!("{} {}", letter(i), instant.name);
-        let centres = scene.centres(instant.time);
-        let whole = sections.iter().flatten().next().map(Section::whole);
-        let Some(whole) = whole else { continue };
+        };
+        let view = first.view;
+        apart |= scene.out_of_plane(instant.time, view);
         out.push(Column {
-            title,
+            title: format!("{} {}", letter(i), instant.name),
             time: scene.story.time_text(instant.time),
             at: instant.time,
-            window: whole,
+            window: first.whole(),
+            centres: scene.centres(instant.time, view),
             sections,
-            centres,
         });
+    }
+    // While both grains lie in one plane, one row shows both.
+    if !apart {
+        for column in &mut out {
+            let first = column.sections.drain(..).flatten().next();
+            column.sections.push(first);
+        }
     }
     crop(scene, &mut out);
     out
 }
 
 impl Scene<'_> {
-    /// Centres (x, z) of all grains at a time.
-    fn centres(&self, time: f64) -> Vec<(usize, (f64, f64))> {
-        let place = |(grain, history): (usize, &crate::run_folder::History)| {
-            let position = history.position[history.nearest(time)?];
-            Some((grain, (position.x, position.z)))
-        };
+    /// Centres of all grains at a time, as seen.
+    fn centres(&self, time: f64, view: View) -> Vec<(usize, (f64, f64))> {
+        let place =
+            |(grain, history): (usize, &History)| Some((grain, view.seen(history.pose(time)?.0)));
         self.run
             .grains
             .iter()
@@ -102,17 +99,15 @@ impl Scene<'_> {
             .collect()
     }
 
-    /// Whether one vertical plane cannot show both grains of a pair.
-    fn out_of_plane(&self, time: f64) -> bool {
+    /// Whether one plane cannot show both grains of a pair.
+    fn out_of_plane(&self, time: f64, view: View) -> bool {
         let Some([a, b]) = self.story.pair else {
             return false;
         };
-        let y = |grain: usize| {
-            let history = &self.run.grains[grain];
-            history.nearest(time).map(|row| history.position[row].y)
-        };
+        let place = |grain: usize| Some(self.run.grains[grain].pose(time)?.0[view.normal]);
         let diameter = self.run.facts.diameter().unwrap_or(0.0);
-        y(a).zip(y(b))
+        place(a)
+            .zip(place(b))
             .is_some_and(|(a, b)| (a - b).abs() > 0.25 * diameter)
     }
 }
@@ -122,7 +117,8 @@ fn crop(scene: &Scene, columns: &mut [Column]) {
     let Some(diameter) = scene.run.facts.diameter() else {
         return;
     };
-    if !matches!(scene.story.subject, Subject::Pair | Subject::Single) {
+    let settling = matches!(scene.story.subject, Subject::Pair | Subject::Single);
+    if !settling || !scene.story.travels {
         return;
     }
     let span = |column: &Column, pick: fn(&(f64, f64)) -> f64| {
@@ -185,7 +181,7 @@ fn speed(scene: &Scene, columns: &[Column], rows: usize) -> Option<Figure> {
     };
     let drawing = sheet::draw(scene, columns, rows, &look, value)?;
     let caption = format!(
-        "{} Colour is the speed of the fluid, at most {} m/s here; arrows show the velocity in the plane, their length in proportion.",
+        "{} Colour is the speed of the fluid, at most {} m/s; arrows show the velocity in the plane, their length in proportion.",
         planes(scene, columns, rows),
         short(highest)
     );
@@ -209,7 +205,19 @@ fn vorticity(scene: &Scene, columns: &[Column], rows: usize) -> Option<Figure> {
     if end <= 0.0 {
         return None;
     }
-    let axis = Axis::linear("vorticity *ω*_{y}  [1/s]", -end, end, 4, false);
+    let view = columns
+        .iter()
+        .flat_map(|c| c.sections.iter().flatten())
+        .next()?
+        .view;
+    let normal = AXES[view.normal];
+    let axis = Axis::linear(
+        &format!("vorticity *ω*_{{{normal}}}  [1/s]"),
+        -end,
+        end,
+        4,
+        false,
+    );
     let end = axis.high();
     let look = Look {
         map: ColorMap::Signed,
@@ -220,12 +228,22 @@ fn vorticity(scene: &Scene, columns: &[Column], rows: usize) -> Option<Figure> {
         beyond: (highest > end, highest > end),
     };
     let drawing = sheet::draw(scene, columns, rows, &look, value)?;
-    let caption = format!(
-        "{} Colour is the vorticity about y (positive, red, turns clockwise in this view), at most {} 1/s here; values beyond ±{} 1/s take the end colours.",
+    let mut caption = format!(
+        "{} Colour is the vorticity about {normal} (positive, red, turns {} in this view), at most {} 1/s.",
         planes(scene, columns, rows),
-        short(highest),
-        short(end)
+        if view.clockwise() {
+            "clockwise"
+        } else {
+            "anticlockwise"
+        },
+        short(highest)
     );
+    if highest > end {
+        caption.push_str(&format!(
+            " Values beyond ±{} 1/s take the end colours.",
+            short(end)
+        ));
+    }
     Some(Figure {
         name: "vorticity",
         title: "Vorticity of the fluid".to_owned(),
@@ -234,38 +252,47 @@ fn vorticity(scene: &Scene, columns: &[Column], rows: usize) -> Option<Figure> {
     })
 }
 
-/// Which planes are shown.
+/// Which planes are shown, and when.
 fn planes(scene: &Scene, columns: &[Column], rows: usize) -> String {
     let times: Vec<String> = columns
         .iter()
         .map(|column| format!("{}, {}", column.title.trim(), column.time))
         .collect();
-    let times = times.join("; ");
+    let times = if columns.len() == 1 {
+        columns[0].time.clone()
+    } else {
+        times.join("; ")
+    };
+    let Some(first) = columns
+        .iter()
+        .flat_map(|column| column.sections.iter().flatten())
+        .next()
+    else {
+        return String::new();
+    };
+    let normal = AXES[first.view.normal];
+    let follows = if scene.story.travels {
+        " The window follows the motion."
+    } else {
+        ""
+    };
     match (scene.story.subject, scene.story.pair) {
-        (Subject::Flow, _) => {
-            let y = columns
-                .iter()
-                .flat_map(|column| column.sections.iter().flatten())
-                .next()
-                .map_or(0.0, |s| s.y);
+        (_, Some([behind, ahead])) if rows == 2 => format!(
+            "Planes normal to {normal} through the centres of {} (upper row) and of {} (lower row): {times}.{follows}",
+            scene.story.grain_name(behind),
+            scene.story.grain_name(ahead)
+        ),
+        (_, Some(_)) => format!("Plane normal to {normal} through both grains: {times}.{follows}"),
+        (Subject::Single, _) => {
+            format!("Plane normal to {normal} through the grain: {times}.{follows}")
+        }
+        _ => {
+            let (unit, factor) = length_unit(first.whole().width().max(first.whole().height()));
             format!(
-                "The plane y = {} m at {}.",
-                short(y),
-                columns.last().map_or("", |column| column.time.as_str())
+                "The plane {normal} = {} {unit}: {times}.",
+                short(first.place * factor)
             )
         }
-        (_, Some(pair)) if rows == 2 => format!(
-            "Vertical planes through the centres of {} (upper row) and of {} (lower row): {times}. The window follows the grains.",
-            scene.story.grain_name(pair[0]),
-            scene.story.grain_name(pair[1])
-        ),
-        (_, Some(_)) => format!(
-            "Vertical plane through the centres of both grains: {times}. The window follows the grains."
-        ),
-        (Subject::Single, None) => format!(
-            "Vertical plane through the centre of the grain: {times}. The window follows the grain."
-        ),
-        (_, None) => format!("Vertical plane through the centre of a grain: {times}."),
     }
 }
 

@@ -4,10 +4,8 @@ use super::axis::extent;
 use super::plan::{Plan, Window, grain_style, length_unit};
 use super::style::{self, COLUMN, INK, SMALL, grain_colour};
 use super::svg::{Anchor, Drawing};
-use super::{Figure, Scene, letter, silhouette};
+use super::{AXES, Figure, Scene, letter, silhouette};
 use crate::story::short;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl Scene<'_> {
     /// Outline of a grain at a row of its history, seen along the axis that is neither.

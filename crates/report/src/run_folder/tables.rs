@@ -101,6 +101,8 @@ pub struct History {
     pub orientation: Vec<DQuat>,
     /// Angular velocity [rad/s].
     pub angular_velocity: Vec<DVec3>,
+    /// Hydrodynamic force [N].
+    pub force: Vec<DVec3>,
     /// Number of contacts.
     pub contacts: Vec<f64>,
 }
@@ -147,6 +149,7 @@ impl History {
         self.velocity.truncate(rows);
         self.orientation.truncate(rows);
         self.angular_velocity.truncate(rows);
+        self.force.truncate(rows);
         self.contacts.truncate(rows);
     }
 }
@@ -174,6 +177,7 @@ pub fn histories(file: &Path, notes: &mut Vec<String>) -> Result<Vec<History>, R
     );
     let q = [column("qw")?, column("qx")?, column("qy")?, column("qz")?];
     let contacts = table.column("contacts");
+    let force = three("fx", "fy", "fz").ok();
     let vector = |columns: [&[f64]; 3], row: usize| {
         DVec3::new(columns[0][row], columns[1][row], columns[2][row])
     };
@@ -219,6 +223,8 @@ pub fn histories(file: &Path, notes: &mut Vec<String>) -> Result<Vec<History>, R
         } else {
             DQuat::IDENTITY
         });
+        let force = force.map_or(DVec3::NAN, |columns| vector(columns, row));
+        history.force.push(force);
         history
             .contacts
             .push(contacts.map_or(f64::NAN, |column| column[row]));
