@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
 
+use figure::Figure;
 use run_folder::RunFolder;
 use story::Story;
 
@@ -55,17 +56,22 @@ pub fn render(run_dir: &Path) -> Result<Rendered, ReportError> {
         finished: run.finished(),
         ..Rendered::default()
     };
-    for figure in &figures {
-        let png = figure.drawing.to_png();
-        let png = png.map_err(|what| ReportError::Draw {
+    let with_svg = |figure: Figure| {
+        let svg = figure.svg();
+        (figure, svg)
+    };
+    let figures: Vec<(Figure, String)> = figures.into_iter().map(with_svg).collect();
+    for (figure, svg) in &figures {
+        let draw = |what| ReportError::Draw {
             figure: figure.name.to_owned(),
             what,
-        })?;
+        };
+        let png = figure.drawing.to_png().map_err(draw)?;
         out.png
             .push(write(folder.join(format!("{}.png", figure.name)), &png)?);
         out.svg.push(write(
             folder.join(format!("{}.svg", figure.name)),
-            figure.svg().as_bytes(),
+            svg.as_bytes(),
         )?);
     }
     let page = page::html(&run, &story, &figures, &notes);

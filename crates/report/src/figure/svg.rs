@@ -1,5 +1,7 @@
 //! A drawing: rasters below, vectors above; written as SVG and as PNG from the same description.
 
+use std::sync::{Arc, OnceLock};
+
 use base64::Engine;
 use resvg::{tiny_skia, usvg};
 
@@ -251,14 +253,19 @@ impl Drawing {
 
 /// Rendering options with the embedded font and no other.
 fn options() -> usvg::Options<'static> {
-    let mut options = usvg::Options {
-        font_family: "DejaVu Sans".to_owned(),
+    static FONTS: OnceLock<Arc<usvg::fontdb::Database>> = OnceLock::new();
+    let fonts = FONTS.get_or_init(|| {
+        let mut fonts = usvg::fontdb::Database::new();
+        fonts.load_font_data(dejavu::sans::regular().to_vec());
+        fonts.load_font_data(dejavu::sans::oblique().to_vec());
+        Arc::new(fonts)
+    });
+    let font_family = "DejaVu Sans".to_owned();
+    usvg::Options {
+        font_family,
+        fontdb: fonts.clone(),
         ..Default::default()
-    };
-    let fonts = options.fontdb_mut();
-    fonts.load_font_data(dejavu::sans::regular().to_vec());
-    fonts.load_font_data(dejavu::sans::oblique().to_vec());
-    options
+    }
 }
 
 #[cfg(test)]

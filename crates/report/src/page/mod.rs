@@ -9,8 +9,13 @@ use crate::story::{Story, Subject, short};
 
 const STYLE: &str = include_str!("style.css");
 
-/// The whole page.
-pub fn html(run: &RunFolder, story: &Story, figures: &[Figure], notes: &[String]) -> String {
+/// The whole page; `figures` come with their SVG documents.
+pub fn html(
+    run: &RunFolder,
+    story: &Story,
+    figures: &[(Figure, String)],
+    notes: &[String],
+) -> String {
     let title = title(run, story);
     let mut out = String::with_capacity(1 << 20);
     out.push_str("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
@@ -33,8 +38,8 @@ pub fn html(run: &RunFolder, story: &Story, figures: &[Figure], notes: &[String]
     }
     if !figures.is_empty() {
         out.push_str("<section>\n<h2>Figures</h2>\n<div class=\"figures\">\n");
-        for (i, figure) in figures.iter().enumerate() {
-            out.push_str(&figure_block(i + 1, figure));
+        for (i, (figure, svg)) in figures.iter().enumerate() {
+            out.push_str(&figure_block(i + 1, figure, svg));
         }
         out.push_str("</div>\n</section>\n");
     }
@@ -215,7 +220,7 @@ fn phase_bar(story: &Story) -> String {
             String::new()
         };
         rows.push_str(&format!(
-            "<tr><td><span class=\"swatch\" style=\"background:{colour}\"></span>{name}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>{scaled}</tr>\n",
+            "<tr><td class=\"name\"><span class=\"swatch\" style=\"background:{colour}\"></span>{name}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>{scaled}</tr>\n",
             figure::html(&short(phase.start)),
             figure::html(&short(phase.end))
         ));
@@ -237,13 +242,12 @@ fn phase_bar(story: &Story) -> String {
     )
 }
 
-fn figure_block(number: usize, figure: &Figure) -> String {
+fn figure_block(number: usize, figure: &Figure, svg: &str) -> String {
     let class = if figure.drawing.width() <= figure::COLUMN + 30.0 {
         " class=\"column\""
     } else {
         ""
     };
-    let svg = figure.svg();
     format!(
         "<figure{class} id=\"{name}\">\n<div class=\"paper\">{svg}</div>\n<figcaption><b>Figure {number}. {}.</b> {} <span>(<a href=\"figures/{name}.png\">PNG</a>, <a href=\"figures/{name}.svg\">SVG</a>)</span></figcaption>\n</figure>\n",
         figure::html(&figure.title),
