@@ -42,10 +42,16 @@ pub struct Rendered {
 
 /// Draws the figures and the page of a run folder.
 pub fn render(run_dir: &Path) -> Result<Rendered, ReportError> {
-    let run = RunFolder::open(run_dir)?;
+    let mut run = RunFolder::open(run_dir)?;
+    let mut notes = std::mem::take(&mut run.notes);
+    let bodies = figure::bodies(&run, &mut notes);
+    run.facts.add_diameters(
+        bodies
+            .iter()
+            .filter_map(|(grain, body)| Some((*grain, body.diameter()?))),
+    );
     let story = Story::of(&run);
-    let mut notes = run.notes.clone();
-    let figures = figure::all(&run, &story, &mut notes);
+    let figures = figure::all(&run, &story, bodies, &mut notes);
     let folder = run_dir.join("figures");
     std::fs::create_dir_all(&folder).map_err(|source| ReportError::Write {
         file: folder.clone(),

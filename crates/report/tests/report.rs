@@ -244,6 +244,10 @@ fn an_interrupted_run_still_gets_a_report() {
     assert!(!rendered.finished);
     let page = page(&rendered);
     assert!(page.contains("This run has not finished"));
+    assert!(
+        page.contains("Galileo number"),
+        "diameters are found from the surfaces"
+    );
     for text in [
         "grains.csv: the last line",
         "events.jsonl: the last line",

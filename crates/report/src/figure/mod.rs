@@ -25,7 +25,7 @@ use crate::run_folder::RunFolder;
 use crate::story::{Story, Subject};
 
 pub use axis::minus;
-pub use silhouette::Body;
+pub use silhouette::{Body, bodies};
 pub use style::COLUMN;
 pub use svg::Drawing;
 pub use text::{escape, html, literal, plain};
@@ -67,12 +67,17 @@ pub struct Scene<'a> {
 }
 
 /// Draws all figures that the run has data for; what had to be left out is added to `notes`.
-pub fn all(run: &RunFolder, story: &Story, notes: &mut Vec<String>) -> Vec<Figure> {
+pub fn all(
+    run: &RunFolder,
+    story: &Story,
+    bodies: BTreeMap<usize, Body>,
+    notes: &mut Vec<String>,
+) -> Vec<Figure> {
     let instants = phases::snap(&story.instants, &picture_times(run));
     let scene = Scene {
         run,
         story,
-        bodies: silhouette::bodies(run, notes),
+        bodies,
         instants,
     };
     let mut out = Vec::new();

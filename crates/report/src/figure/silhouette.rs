@@ -79,12 +79,25 @@ impl Body {
         loops
     }
 
+    /// Diameter of the sphere of equal volume [m].
+    pub fn diameter(&self) -> Option<f64> {
+        let volume = self
+            .corners()
+            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+            .sum::<f64>()
+            .abs();
+        Some((6.0 * volume / std::f64::consts::PI).cbrt()).filter(|d| d.is_finite() && *d > 0.0)
+    }
+
+    fn corners(&self) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+        self.triangles.iter().map(|t| t.map(|i| self.points[i]))
+    }
+
     /// Long and short axis from the second moments of the volume about the body axes; none for a
     /// body whose moments hardly differ (a sphere, a cube).
     pub fn axes(&self) -> Option<Axes> {
         let mut moments = DVec3::ZERO;
-        for [a, b, c] in &self.triangles {
-            let (a, b, c) = (self.points[*a], self.points[*b], self.points[*c]);
+        for [a, b, c] in self.corners() {
             let six_volumes = a.dot(b.cross(c));
             moments += six_volumes * (a * a + b * b + c * c + a * b + b * c + c * a) / 60.0;
         }
@@ -308,6 +321,8 @@ mod tests {
         let axes = block(1.0, 3.0, 2.0).axes().unwrap();
         assert_eq!((axes.long, axes.short), (DVec3::Y, DVec3::X));
         assert!(block(1.0, 1.0, 1.0).axes().is_none());
+        let diameter = block(1.0, 3.0, 2.0).diameter().unwrap();
+        assert!((diameter - (6.0 * 48.0 / std::f64::consts::PI).cbrt()).abs() < 1e-12);
     }
 
     #[test]

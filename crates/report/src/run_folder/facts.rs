@@ -60,6 +60,16 @@ impl Facts {
         (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
     }
 
+    /// Takes the diameters [m] of grains whose diameter is not known otherwise.
+    pub fn add_diameters(&mut self, known: impl Iterator<Item = (usize, f64)>) {
+        for (grain, diameter) in known {
+            if self.grains.len() <= grain {
+                self.grains.resize_with(grain + 1, GrainFacts::default);
+            }
+            self.grains[grain].diameter.get_or_insert(diameter);
+        }
+    }
+
     /// Mean density of the grains [kg/m^3].
     pub fn grain_density(&self) -> Option<f64> {
         let known: Vec<f64> = self

@@ -66,7 +66,10 @@ pub fn read_image(file: &Path) -> Result<Image, String> {
     if !(spacing.min_element() > 0.0 && spacing.is_finite() && origin.is_finite()) {
         return Err("Spacing or Origin is not usable".to_owned());
     }
-    let count = cells.iter().product::<usize>();
+    let count = cells
+        .iter()
+        .try_fold(1usize, |n, m| n.checked_mul(*m))
+        .ok_or("too many cells")?;
     let piece = child(grid, "Piece")?;
     let arrays = reader.arrays(child(piece, "CellData")?, Some(count))?;
     let lower = origin + spacing * DVec3::from_array(first.map(|i| i as f64));
@@ -233,7 +236,9 @@ impl<'a> Reader<'a> {
             let components = components.ok().filter(|n| (1..=16).contains(n));
             let components =
                 components.ok_or_else(|| format!("array '{name}': bad NumberOfComponents"))?;
-            if let Some(count) = count.filter(|count| count * components != values.len()) {
+            if let Some(count) =
+                count.filter(|count| count.checked_mul(components) != Some(values.len()))
+            {
                 return Err(format!(
                     "array '{name}': {} values for {count} cells of {components}",
                     values.len()
