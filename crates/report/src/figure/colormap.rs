@@ -17,12 +17,10 @@ impl ColorMap {
         match self {
             ColorMap::Magnitude => {
                 let lightness = 0.985 - 0.715 * s;
-                let chroma = 0.135
-                    * (std::f64::consts::PI * s.powf(0.8))
-                        .sin()
-                        .max(0.0)
-                        .powf(0.8)
-                    + 0.06 * s;
+                // Chosen to stay inside what a screen can show, so that the colours have no kinks.
+                let rise = 1.0 - (1.0 - (s / 0.3).min(1.0)).powi(2);
+                let fall = 1.0 - 0.45 * ((s - 0.35).max(0.0) / 0.65).powf(1.5);
+                let chroma = 0.104 * rise * fall;
                 let hue = 105.0 + 170.0 * s;
                 from_oklch(lightness, chroma, hue)
             }
@@ -30,7 +28,7 @@ impl ColorMap {
                 let u = 2.0 * s - 1.0;
                 let strength = u.abs();
                 let lightness = 0.985 - 0.585 * strength;
-                let chroma = 0.17 * (1.0 - (1.0 - strength).powf(1.6));
+                let chroma = 0.13 * (1.0 - (1.0 - strength).powf(1.6));
                 let hue = if u < 0.0 { 255.0 } else { 32.0 };
                 from_oklch(lightness, chroma, hue)
             }
@@ -48,7 +46,7 @@ impl ColorMap {
 /// A colour of viridis-like lightness for the fraction `s` (0 dark to 1 light), for lines and discs.
 pub fn ordered(s: f64) -> [u8; 3] {
     let s = s.clamp(0.0, 1.0);
-    from_oklch(0.36 + 0.5 * s, 0.12, 275.0 - 175.0 * s)
+    from_oklch(0.36 + 0.5 * s, 0.092, 275.0 - 175.0 * s)
 }
 
 /// The colour as `#rrggbb`.
@@ -135,6 +133,23 @@ mod tests {
                 "step {}",
                 pair[0] - pair[1]
             );
+        }
+    }
+
+    #[test]
+    fn no_map_has_kinks() {
+        let ordered: Vec<_> = (0..256).map(|i| ordered(f64::from(i) / 255.0)).collect();
+        for palette in [
+            ColorMap::Magnitude.palette(),
+            ColorMap::Signed.palette(),
+            ordered,
+        ] {
+            let step = |a: &[u8; 3], b: &[u8; 3]| (0..3).map(|c| a[c].abs_diff(b[c])).max();
+            let steps: Vec<_> = palette
+                .windows(2)
+                .map(|pair| step(&pair[0], &pair[1]))
+                .collect();
+            assert!(steps.iter().all(|s| *s <= Some(5)), "{steps:?}");
         }
     }
 

@@ -82,6 +82,13 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
             column.sections.push(first);
         }
     }
+    if let [only] = out.as_mut_slice() {
+        only.title = scene
+            .instants
+            .first()
+            .map_or("", |instant| instant.name)
+            .to_owned();
+    }
     crop(scene, &mut out);
     out
 }

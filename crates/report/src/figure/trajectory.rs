@@ -61,7 +61,7 @@ impl Scene<'_> {
 /// Paths seen along both horizontal axes.
 pub fn figure(scene: &Scene) -> Option<Figure> {
     const LEFT: f64 = 36.0;
-    const MIDDLE: f64 = 10.0;
+    const MIDDLE: f64 = 14.0;
     const RIGHT: f64 = 18.0;
     let grains: Vec<usize> = match scene.story.pair {
         Some(pair) => pair.to_vec(),
@@ -136,10 +136,11 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
             )
         })
         .collect();
-    let drawn = if scene.bodies.is_empty() {
-        "circles of equal volume"
-    } else {
+    let known = |g: &usize| scene.bodies.contains_key(g) || scene.sphere_diameter(*g).is_some();
+    let drawn = if grains.iter().all(known) {
         "true outlines"
+    } else {
+        "circles of equal volume"
     };
     let mut caption = format!(
         "Paths of the centres seen along {} and {}, at equal scale, with the grains as {drawn}",
