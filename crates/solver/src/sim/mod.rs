@@ -2,6 +2,7 @@
 
 mod clock;
 mod diagnostics;
+pub mod events;
 mod probe;
 mod setup;
 mod state;
