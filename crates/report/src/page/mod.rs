@@ -69,20 +69,7 @@ fn title(run: &RunFolder, story: &Story) -> String {
         Subject::Pair => "Settling pair",
         Subject::Many => "Many grains",
     };
-    let folder = run
-        .path
-        .file_name()
-        .map(|name| name.to_string_lossy().into_owned());
-    match run
-        .facts
-        .name
-        .clone()
-        .or(folder)
-        .filter(|name| !name.is_empty())
-    {
-        Some(name) => format!("{name}: {}", what.to_lowercase()),
-        None => what.to_owned(),
-    }
+    run.facts.title.clone().unwrap_or_else(|| what.to_owned())
 }
 
 /// One or two sentences with the result.
