@@ -237,6 +237,11 @@ fn an_interrupted_run_still_gets_a_report() {
     let slice = folder.join("slices/y-grain1_000179.vti");
     let bytes = std::fs::read(&slice).unwrap();
     std::fs::write(&slice, &bytes[..bytes.len() / 2]).unwrap();
+    let failure = "{\"time\": 0.4, \"what\": \"CFL <9\", \"remedy\": \"a smaller step\"}";
+    std::fs::write(folder.join("failure.json"), failure).unwrap();
+    let failed = page(&render(&folder).unwrap());
+    assert!(failed.contains("This run failed</b>: CFL &lt;9. To try: a smaller step."));
+    std::fs::remove_file(folder.join("failure.json")).unwrap();
     let rendered = render(&folder).unwrap();
     assert!(!rendered.finished);
     let page = page(&rendered);
