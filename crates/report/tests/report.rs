@@ -139,6 +139,12 @@ fn a_pair_gets_all_its_figures() {
             assert!(seen.contains(text), "{name} lacks '{text}': {seen}");
         }
     }
+    let images = svg(&rendered, "speed").matches("<image").count();
+    assert_eq!(
+        images,
+        8 + 1,
+        "a row for the plane of each grain, and the colour bar"
+    );
     remove(&folder);
 }
 
@@ -146,6 +152,12 @@ fn a_pair_gets_all_its_figures() {
 fn the_page_stands_alone_and_can_be_read_aloud() {
     let folder = small_pair(0.0);
     let rendered = render(&folder).unwrap();
+    let images = svg(&rendered, "speed").matches("<image").count();
+    assert_eq!(
+        images,
+        4 + 1,
+        "one row while the grains share a plane, and the colour bar"
+    );
     let page = page(&rendered);
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
     for forbidden in [
@@ -173,6 +185,7 @@ fn the_page_stands_alone_and_can_be_read_aloud() {
         "0123abc",
         "20 min 34 s",
         "role change",
+        "session 1, command",
         "prefers-color-scheme: dark",
         "@media print",
     ] {
@@ -206,22 +219,6 @@ fn the_same_folder_gives_the_same_bytes() {
 }
 
 #[test]
-fn one_row_while_the_grains_share_a_plane() {
-    let [flat, swinging] = [0.0, 0.9].map(|swing| {
-        let folder = small_pair(swing);
-        let rendered = render(&folder).unwrap();
-        let images = svg(&rendered, "speed").matches("<image").count();
-        remove(&folder);
-        images
-    });
-    assert_eq!(
-        (flat, swinging),
-        (4 + 1, 8 + 1),
-        "panels and the colour bar"
-    );
-}
-
-#[test]
 fn an_interrupted_run_still_gets_a_report() {
     let folder = small_pair(0.9);
     for name in [
@@ -237,9 +234,14 @@ fn an_interrupted_run_still_gets_a_report() {
     let log = std::fs::read_to_string(folder.join("events.jsonl")).unwrap();
     std::fs::write(folder.join("events.jsonl"), &log[..log.len() / 5 + 20]).unwrap();
     // The writer was stopped within a slice.
-    let slice = folder.join("slices/grain1_000179.vti");
+    let slice = folder.join("slices/y-grain1_000179.vti");
     let bytes = std::fs::read(&slice).unwrap();
     std::fs::write(&slice, &bytes[..bytes.len() / 2]).unwrap();
+    let failure = "{\"time\": 0.4, \"what\": \"CFL <9\", \"remedy\": \"a smaller step\"}";
+    std::fs::write(folder.join("failure.json"), failure).unwrap();
+    let failed = page(&render(&folder).unwrap());
+    assert!(failed.contains("This run failed</b>: CFL &lt;9. To try: a smaller step."));
+    std::fs::remove_file(folder.join("failure.json")).unwrap();
     let rendered = render(&folder).unwrap();
     assert!(!rendered.finished);
     let page = page(&rendered);
@@ -252,7 +254,7 @@ fn an_interrupted_run_still_gets_a_report() {
         "grains.csv: the last line",
         "events.jsonl: the last line",
         "diagnostics.csv is missing",
-        "slices/grain1_000179.vti was left out",
+        "slices/y-grain1_000179.vti was left out",
     ] {
         assert!(
             rendered.notes.iter().any(|note| note.contains(text)),
@@ -359,6 +361,7 @@ fn damage_to_any_file_is_an_error_or_a_note() {
 #[test]
 fn empty_tables_and_strange_numbers_do_not_panic() {
     let folder = small_pair(0.9);
+    std::fs::remove_dir_all(folder.join("slices")).unwrap();
     let header = std::fs::read_to_string(folder.join("grains.csv"))
         .unwrap()
         .lines()

@@ -17,13 +17,11 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
         .filter(|g| run.grains[*g].len() > 0)
         .collect();
     let last = |g: usize| run.grains[g].len() - 1;
+    let place = |g: usize| run.wrapped(run.grains[g].position[last(g)]);
     let (up, mut sides) = scene.vertical();
     sides.sort_unstable();
     let [across, depth] = sides;
-    let heights: Vec<f64> = grains
-        .iter()
-        .map(|g| run.grains[*g].position[last(*g)][up])
-        .collect();
+    let heights: Vec<f64> = grains.iter().map(|g| place(*g)[up]).collect();
     let (low, high) = extent(heights.iter().copied())?;
     let margin = run
         .facts
@@ -31,11 +29,7 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
         .unwrap_or(0.05 * (high - low))
         .max(1e-9);
     let span = |axis: usize| -> Option<(f64, f64)> {
-        let (a, b) = extent(
-            grains
-                .iter()
-                .map(|g| run.grains[*g].position[last(*g)][axis]),
-        )?;
+        let (a, b) = extent(grains.iter().map(|g| place(*g)[axis]))?;
         let (a, b) = (a - margin, b + margin);
         let Some(size) = run.facts.size else {
             return Some((a, b));
@@ -104,12 +98,12 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
         let mut order = grains.clone();
         // What is nearer to the eye is drawn later.
         order.sort_by(|a, b| {
-            let place = |g: usize| towards * run.grains[g].position[last(g)][hidden];
-            place(*a).total_cmp(&place(*b)).then(a.cmp(b))
+            let nearness = |g: usize| towards * place(g)[hidden];
+            nearness(*a).total_cmp(&nearness(*b)).then(a.cmp(b))
         });
         plan.clip(&mut drawing, &format!("clip-{i}"));
         for grain in order {
-            let height = run.grains[grain].position[last(grain)][up];
+            let height = place(grain)[up];
             let colour = hex(ordered((height - low) / (high - low).max(1e-12)));
             let style = format!(
                 "fill=\"{colour}\" stroke=\"#ffffff\" stroke-width=\"0.35\" stroke-linejoin=\"round\""

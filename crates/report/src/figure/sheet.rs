@@ -196,12 +196,17 @@ fn draw_section(
 fn cuts(scene: &Scene, column: &Column, section: &Section) -> Vec<(Option<usize>, Outline)> {
     let exact = |(grain, _): &(usize, (f64, f64))| {
         let (position, turn) = scene.run.grains[*grain].pose(column.at)?;
+        let mut position = scene.run.wrapped(position);
+        // The image nearest to the plane is the one that it cuts.
+        let normal = section.view.normal;
+        if let Some(period) = scene.run.period(normal) {
+            position[normal] += period * ((section.place - position[normal]) / period).round();
+        }
         let loops = match scene.bodies.get(grain) {
             Some(body) => body.section(position, turn, section.view, section.place),
             None => {
                 let radius = 0.5 * scene.sphere_diameter(*grain)?;
-                let chord =
-                    radius * radius - (position[section.view.normal] - section.place).powi(2);
+                let chord = radius * radius - (position[normal] - section.place).powi(2);
                 let ring = || silhouette::circle(section.view.seen(position), chord.sqrt());
                 (chord > 0.0).then(ring).into_iter().collect()
             }

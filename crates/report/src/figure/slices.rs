@@ -96,8 +96,9 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
 impl Scene<'_> {
     /// Centres of all grains at a time, as seen.
     fn centres(&self, time: f64, view: View) -> Vec<(usize, (f64, f64))> {
-        let place =
-            |(grain, history): (usize, &History)| Some((grain, view.seen(history.pose(time)?.0)));
+        let place = |(grain, history): (usize, &History)| {
+            Some((grain, view.seen(self.run.wrapped(history.pose(time)?.0))))
+        };
         self.run
             .grains
             .iter()
@@ -112,10 +113,14 @@ impl Scene<'_> {
             return false;
         };
         let place = |grain: usize| Some(self.run.grains[grain].pose(time)?.0[view.normal]);
+        let near = |distance: f64| match self.run.period(view.normal) {
+            Some(period) => distance - period * (distance / period).round(),
+            None => distance,
+        };
         let diameter = self.run.facts.diameter().unwrap_or(0.0);
         place(a)
             .zip(place(b))
-            .is_some_and(|(a, b)| (a - b).abs() > 0.25 * diameter)
+            .is_some_and(|(a, b)| near(a - b).abs() > 0.25 * diameter)
     }
 }
 

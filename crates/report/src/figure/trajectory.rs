@@ -17,7 +17,8 @@ impl Scene<'_> {
         up: usize,
     ) -> silhouette::Outline {
         let history = &self.run.grains[grain];
-        let (position, turn) = (history.position[row], history.orientation[row]);
+        let position = self.run.wrapped(history.position[row]);
+        let turn = history.orientation[row];
         let traced = self
             .bodies
             .get(&grain)
@@ -176,7 +177,8 @@ fn window(scene: &Scene, grains: &[usize], side: usize, up: usize) -> Option<Win
         extent(
             grains
                 .iter()
-                .flat_map(|g| scene.run.grains[*g].position.iter().map(move |p| p[axis])),
+                .flat_map(|g| scene.run.grains[*g].position.iter())
+                .map(|p| scene.run.wrapped(*p)[axis]),
         )
     };
     let ((x0, x1), (z0, z1)) = (over(side)?, over(up)?);
@@ -246,7 +248,10 @@ fn draw_paths(
             .iter()
             .enumerate()
             .filter(|(i, _)| i % every == 0 || i + 1 == history.len());
-        for point in kept.map(|(_, p)| (p[side], p[up])) {
+        for point in kept
+            .map(|(_, p)| scene.run.wrapped(*p))
+            .map(|p| (p[side], p[up]))
+        {
             if run
                 .last()
                 .is_some_and(|last| jump(side, last.0, point.0) || jump(up, last.1, point.1))
@@ -278,7 +283,7 @@ fn label_instants(scene: &Scene, grains: &[usize], plan: &Plan, up: usize, drawi
             .filter_map(|g| {
                 scene.run.grains[*g]
                     .nearest(instant.time)
-                    .map(|row| scene.run.grains[*g].position[row][up])
+                    .map(|row| scene.run.wrapped(scene.run.grains[*g].position[row])[up])
             })
             .collect();
         let mean = heights.iter().sum::<f64>() / heights.len().max(1) as f64;

@@ -69,20 +69,7 @@ fn title(run: &RunFolder, story: &Story) -> String {
         Subject::Pair => "Settling pair",
         Subject::Many => "Many grains",
     };
-    let folder = run
-        .path
-        .file_name()
-        .map(|name| name.to_string_lossy().into_owned());
-    match run
-        .facts
-        .name
-        .clone()
-        .or(folder)
-        .filter(|name| !name.is_empty())
-    {
-        Some(name) => format!("{name}: {}", what.to_lowercase()),
-        None => what.to_owned(),
-    }
+    run.facts.title.clone().unwrap_or_else(|| what.to_owned())
 }
 
 /// One or two sentences with the result.
@@ -105,7 +92,16 @@ fn lead(run: &RunFolder, story: &Story) -> String {
     let wall = wall.map_or(String::new(), |wall| {
         format!(" and took {}", tables::duration(wall))
     });
-    figure::html(&format!("{first}{end}{wall}."))
+    let ended = run
+        .summary
+        .as_ref()
+        .and_then(|s| s.get("ended_by"))
+        .and_then(serde_json::Value::as_str);
+    let ended = ended.filter(|reason| *reason != "end");
+    let ended = ended.map_or(String::new(), |reason| {
+        format!("; it ended by {}", figure::literal(reason))
+    });
+    figure::html(&format!("{first}{end}{wall}{ended}."))
 }
 
 fn pair_sentence(story: &Story) -> String {
@@ -156,10 +152,22 @@ fn single_sentence(run: &RunFolder, story: &Story) -> String {
 
 fn notices(run: &RunFolder, story: &Story, notes: &[String]) -> String {
     let mut out = String::new();
-    if !run.finished() {
+    let up_to = figure::html(&short(story.end));
+    if let Some(failure) = &run.failure {
+        let say = |name: &str| {
+            failure
+                .get(name)
+                .and_then(serde_json::Value::as_str)
+                .unwrap_or("not known")
+        };
         out.push_str(&format!(
-            "<div class=\"notice\" role=\"note\"><b>This run has not finished</b>: there is no <code>summary.json</code>. What follows goes up to <i>t</i> = {} s.</div>\n",
-            figure::html(&short(story.end))
+            "<div class=\"notice\" role=\"alert\"><b>This run failed</b>: {}. To try: {}. What follows goes up to <i>t</i> = {up_to} s.</div>\n",
+            figure::escape(say("what")),
+            figure::escape(say("remedy"))
+        ));
+    } else if !run.finished() {
+        out.push_str(&format!(
+            "<div class=\"notice\" role=\"note\"><b>This run has not finished</b>: there is no <code>summary.json</code>. What follows goes up to <i>t</i> = {up_to} s.</div>\n",
         ));
     }
     if !notes.is_empty() {

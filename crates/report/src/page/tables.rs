@@ -8,6 +8,8 @@ use crate::story::{Story, galileo, short};
 
 /// Most events that are listed.
 const EVENTS: usize = 100;
+/// Most entries of a list in the provenance that are listed.
+const SESSIONS: usize = 8;
 
 fn row(out: &mut String, name: &str, value: &str) {
     out.push_str(&format!(
@@ -229,20 +231,16 @@ pub fn events(run: &RunFolder, story: &Story) -> String {
             ));
         }
         let grains: Vec<String> = event.grains.iter().map(usize::to_string).collect();
-        let details: Vec<String> = event
+        let details = event
             .details
             .iter()
-            .map(|(name, value)| format!("{} {}", name.replace('_', " "), rounded(value)))
-            .collect();
+            .map(|(name, value)| detail(name, value));
+        let details: Vec<String> = details.map(|text| html(&text)).collect();
         out.push_str(&format!(
             "<td>{}</td><td>{}</td><td>{}</td></tr>\n",
             escape(event.kind.name()),
             grains.join(", "),
-            details
-                .iter()
-                .map(|text| html(text))
-                .collect::<Vec<_>>()
-                .join("; ")
+            details.join("; ")
         ));
     }
     out.push_str("</tbody></table></div>\n");
@@ -264,11 +262,17 @@ fn precise(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// A detail of an event: numbers shortened, texts as they are.
-fn rounded(value: &str) -> String {
-    match value.parse::<f64>() {
-        Ok(number) if value.contains(['.', 'e']) => short(number),
-        _ => literal(value),
+/// A detail of an event with its unit, where that is known; else as it stands.
+fn detail(name: &str, value: &str) -> String {
+    let number = value.parse::<f64>().ok();
+    match (name, number) {
+        ("gap", Some(gap)) => format!("gap {} mm", short(1e3 * gap)),
+        ("tilt", Some(tilt)) => format!("pair {}° from the vertical", short(tilt.to_degrees())),
+        ("confirmed", Some(time)) => format!("certain at {} s", precise(time)),
+        (_, Some(number)) if value.contains(['.', 'e']) => {
+            format!("{} {}", literal(name), short(number))
+        }
+        _ => format!("{} {}", literal(name), literal(value)),
     }
 }
 
@@ -292,13 +296,26 @@ fn flatten(out: &mut String, name: &str, value: &Value, depth: usize) {
             format!("{name}, {key}")
         }
     };
+    let plain = |value: &Value| !value.is_object() && !value.is_array();
     match value {
-        Value::Object(map) if depth < 4 => map
-            .iter()
-            .for_each(|(key, value)| flatten(out, &nested(key), value, depth + 1)),
-        Value::Array(list) if list.iter().all(|v| !v.is_object() && !v.is_array()) => {
+        Value::Null => code_row(out, name, "not known"),
+        Value::Object(map) if depth < 4 => {
+            map.iter()
+                .for_each(|(key, value)| flatten(out, &nested(key), value, depth + 1));
+        }
+        Value::Array(list) if list.iter().all(plain) => {
             let texts: Vec<String> = list.iter().map(text).collect();
             code_row(out, name, &texts.join(" "));
+        }
+        Value::Array(list) if depth < 4 => {
+            let (first, rest) = list.split_at(list.len().min(SESSIONS));
+            for (i, value) in first.iter().enumerate() {
+                let name = format!("{} {}", name.trim_end_matches('s'), i + 1);
+                flatten(out, &name, value, depth + 1);
+            }
+            if !rest.is_empty() {
+                code_row(out, name, &format!("and {} more", rest.len()));
+            }
         }
         other => code_row(out, name, &text(other)),
     }
@@ -349,18 +366,25 @@ mod tests {
             [0.0, 0.123_456_7, 12.345_678].map(precise),
             ["0", "0.12346", "12.346"]
         );
-        assert_eq!(rounded("0.000123456"), "1.23×10^{−4}");
-        assert_eq!(rounded("7"), "7");
+        assert_eq!(detail("gap", "1.25e-5"), "gap 0.0125 mm");
+        assert_eq!(
+            detail("tilt", "0.7853981633974483"),
+            "pair 45.0° from the vertical"
+        );
+        assert_eq!(detail("confirmed", "0.25"), "certain at 0.25000 s");
+        assert_eq!(detail("my_key", "7"), "my\\_key 7");
     }
 
     #[test]
     fn provenance_cannot_bring_markup_in() {
-        let value = serde_json::json!({"command": ["grainwake", "run", "<script>"], "machine": {"cores": 2}});
+        let value = serde_json::json!({"command": ["grainwake", "run", "<script>"], "commit": null, "sessions": [{"threads": 2}]});
         let run = RunFolder {
             provenance: Some(value),
             ..RunFolder::default()
         };
         let html = provenance(&run);
-        assert!(html.contains("grainwake run &lt;script&gt;") && html.contains("machine, cores"));
+        assert!(
+            html.contains("grainwake run &lt;script&gt;") && html.contains("session 1, threads")
+        );
     }
 }

@@ -22,8 +22,8 @@ pub struct GrainFacts {
 /// The set-up of a run; what the folder does not tell is none.
 #[derive(Clone, Debug, Default)]
 pub struct Facts {
-    /// Name of the case.
-    pub name: Option<String>,
+    /// One line that says what the case is.
+    pub title: Option<String>,
     /// Lower corner of the box [m].
     pub lower: DVec3,
     /// Edge lengths of the box [m].
@@ -104,38 +104,18 @@ fn facts_of(table: &Table) -> Facts {
     let faces = domain.get("boundaries").and_then(Value::as_table);
     let boundaries = faces.map(|faces| ["x", "y", "z"].map(|axis| faces_of(faces.get(axis))));
     let density = number(fluid, "density");
-    let dynamic = ["viscosity", "dynamic_viscosity"]
-        .iter()
-        .find_map(|name| number(fluid, name));
+    let dynamic = number(fluid, "viscosity");
     let kinematic = number(fluid, "kinematic_viscosity");
-    let named = [
-        table.get("name"),
-        section("case").get("name"),
-        table.get("title"),
-    ];
-    let gravity = [table, domain, fluid, section("time"), section("physics")];
     Facts {
-        name: named
-            .into_iter()
-            .flatten()
-            .find_map(Value::as_str)
-            .map(str::to_owned),
+        title: word(table, "title"),
         lower: vector(domain, "origin").unwrap_or(DVec3::ZERO),
         size: vector(domain, "size").filter(|size| size.min_element() > 0.0),
         cells: cells_of(domain),
         boundaries,
-        gravity: gravity
-            .into_iter()
-            .find_map(|table| vector(table, "gravity")),
+        gravity: vector(table, "gravity"),
         fluid_density: density,
         viscosity: kinematic.or_else(|| Some(dynamic? / density?)),
-        scheme: [section("coupling"), fluid].into_iter().find_map(|table| {
-            table
-                .get("scheme")
-                .or_else(|| table.get("coupling"))?
-                .as_str()
-                .map(str::to_owned)
-        }),
+        scheme: word(section("coupling"), "scheme"),
         grains: table
             .get("grain")
             .and_then(Value::as_array)
@@ -144,6 +124,14 @@ fn facts_of(table: &Table) -> Facts {
             .map(grain_of)
             .collect(),
     }
+}
+
+fn word(table: &Table, name: &str) -> Option<String> {
+    table
+        .get(name)?
+        .as_str()
+        .map(str::to_owned)
+        .filter(|word| !word.is_empty())
 }
 
 fn number(table: &Table, name: &str) -> Option<f64> {

@@ -8,6 +8,7 @@ mod vtk;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use serde_json::Value;
 
 use crate::error::ReportError;
@@ -45,6 +46,8 @@ pub struct RunFolder {
     pub events: Vec<Event>,
     /// The summary, written when the run ended.
     pub summary: Option<Value>,
+    /// Why the run broke off, if it says so.
+    pub failure: Option<Value>,
     /// Where the run comes from.
     pub provenance: Option<Value>,
     /// Slices in order of time.
@@ -82,6 +85,9 @@ impl RunFolder {
             let summary = facts::read_json(&file)?;
             facts::add_summary(&mut run.facts, &summary);
             run.summary = Some(summary);
+        }
+        if let Some(file) = present("failure.json") {
+            run.failure = Some(facts::read_json(&file)?);
         }
         if let Some(file) = present("provenance.json") {
             run.provenance = Some(facts::read_json(&file)?);
@@ -150,6 +156,17 @@ impl RunFolder {
         let faces = self.facts.boundaries.as_ref()?;
         let size = self.facts.size?;
         (faces[axis][0] == "periodic").then_some(size[axis])
+    }
+
+    /// The image of a point that lies in the box.
+    pub fn wrapped(&self, x: DVec3) -> DVec3 {
+        let inside = |axis: usize| match self.period(axis) {
+            Some(period) => {
+                x[axis] - period * ((x[axis] - self.facts.lower[axis]) / period).floor()
+            }
+            None => x[axis],
+        };
+        DVec3::new(inside(0), inside(1), inside(2))
     }
 
     fn collection(&mut self) -> BTreeMap<String, f64> {
@@ -256,6 +273,20 @@ mod tests {
         assert_eq!(grain_of_name("slice_000040_grain_0.vti"), Some(0));
         assert_eq!(grain_of_name("centre_000040.vti"), None);
         assert_eq!(grain_of_name("grains_000040.vtp"), None);
+    }
+
+    #[test]
+    fn periodic_axes_wrap() {
+        let mut run = RunFolder::default();
+        run.facts.size = Some(DVec3::new(2.0, 3.0, 4.0));
+        run.facts.lower = DVec3::new(-1.0, 0.0, 0.0);
+        let faces = |word: &str| [word.to_owned(), word.to_owned()];
+        run.facts.boundaries = Some([faces("periodic"), faces("wall"), faces("periodic")]);
+        assert_eq!(
+            run.wrapped(DVec3::new(1.5, 3.5, -0.5)),
+            DVec3::new(-0.5, 3.5, 3.5)
+        );
+        assert_eq!((run.period(0), run.period(1)), (Some(2.0), None));
     }
 
     #[test]

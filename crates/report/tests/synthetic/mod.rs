@@ -276,7 +276,7 @@ fn write(folder: &Path, name: &str, content: &str) {
 
 fn diagnostics(end: f64, rows: usize, gap: impl Fn(f64) -> Option<f64>) -> String {
     let mut out = String::from(
-        "time,step,max_divergence,max_velocity,cfl,slip,fluid_kinetic_energy,grain_kinetic_energy,momentum_residual,surface_gap\n",
+        "time,step,max_divergence,max_velocity,cfl,slip,fluid_kinetic_energy,grain_kinetic_energy,momentum_residual,gap\n",
     );
     for i in 0..=rows {
         let t = end * i as f64 / rows as f64;
@@ -301,7 +301,7 @@ fn provenance(folder: &Path) {
     write(
         folder,
         "provenance.json",
-        "{\"program\":\"grainwake 0.1.0\",\"commit\":\"0123abc\",\"command\":[\"grainwake\",\"run\",\"cases/dkt-pair/case.toml\"],\"machine\":{\"cpu\":\"8 cores\",\"threads\":2},\"inputs\":{\"case.toml\":\"blake3:00ff\"}}",
+        "{\"program\":\"grainwake\",\"version\":\"0.1.0\",\"commit\":\"0123abc\",\"case_sha256\":\"00ff\",\"sessions\":[{\"started\":\"2026-11-21T04:30:00+00:00\",\"command\":[\"grainwake\",\"run\",\"cases/dkt-pair/case.toml\"],\"cpu\":\"some cpu\",\"system\":\"linux x86_64\",\"threads\":2,\"from_step\":0,\"wall_s\":1234.5}]}",
     );
 }
 
@@ -344,7 +344,7 @@ pub fn pair(folder: &Path, swing: f64, h: f64) {
         folder,
         "case.resolved.toml",
         &format!(
-            "name = \"dkt-pair\"\ngravity = [0.0, 0.0, -9.81]\n[domain]\nsize = [0.025, 0.025, 0.0975]\ncells = [{0}, {0}, {1}]\norigin = [0.0, 0.0, 0.0]\n[domain.boundaries]\nx = [\"wall\", \"wall\"]\ny = [\"wall\", \"wall\"]\nz = [\"wall\", \"wall\"]\n[fluid]\ndensity = 1000.0\nkinematic_viscosity = 1e-6\n[coupling]\nscheme = \"default\"\n[[grain]]\nfile = \"rock.grain\"\ndensity = 1500.0\n[[grain]]\nfile = \"rock.grain\"\ndensity = 1500.0\n",
+            "title = \"Two rocks drafting, kissing and tumbling\"\ngravity = [0.0, 0.0, -9.81]\n[domain]\nsize = [0.025, 0.025, 0.0975]\ncells = [{0}, {0}, {1}]\norigin = [0.0, 0.0, 0.0]\n[domain.boundaries]\nx = [\"wall\", \"wall\"]\ny = [\"wall\", \"wall\"]\nz = [\"wall\", \"wall\"]\n[fluid]\ndensity = 1000.0\nkinematic_viscosity = 1e-6\n[coupling]\nscheme = \"default\"\n[[grain]]\nfile = \"rock.grain\"\ndensity = 1500.0\n[[grain]]\nfile = \"rock.grain\"\ndensity = 1500.0\n",
             (0.025 / h).round() as usize,
             (0.0975 / h).round() as usize
         ),
@@ -361,7 +361,7 @@ pub fn pair(folder: &Path, swing: f64, h: f64) {
     let event = |s: f64, name: &str, grains: &str| {
         let t = s * unit;
         format!(
-            "{{\"time\":{t},\"event\":\"{name}\",\"grains\":{grains},\"confirmed\":{t},\"gap\":1.25e-5}}\n"
+            "{{\"time\":{t},\"event\":\"{name}\",\"grains\":{grains},\"confirmed\":{t},\"gap\":1.25e-5,\"tilt\":0.5}}\n"
         )
     };
     let log = [
@@ -403,7 +403,7 @@ pub fn pair(folder: &Path, swing: f64, h: f64) {
             )
         });
         for grain in 0..2 {
-            let name = format!("slices/grain{grain}_{row:06}.vti");
+            let name = format!("slices/y-grain{grain}_{row:06}.vti");
             let field = |x: DVec3| {
                 let (u, w) = wake(x, &moving);
                 let solid: f64 = poses
@@ -505,7 +505,7 @@ pub fn single(folder: &Path) {
             (stream, DVec3::Y * stream.z * 300.0 * r.x, 0.0, solid)
         };
         write_slice(
-            &folder.join(format!("slices/grain0_{n:06}.vti")),
+            &folder.join(format!("slices/y-grain0_{n:06}.vti")),
             [50, 80],
             2e-3,
             0.05,
@@ -542,7 +542,7 @@ pub fn cavity(folder: &Path) {
         (velocity, DVec3::Y * (6.0 * x.z - 2.0) * a, b, 0.0)
     };
     write_slice(
-        &folder.join("slices/centre_000030.vti"),
+        &folder.join("slices/y-plane0_000030.vti"),
         [64, 64],
         1.0 / 64.0,
         0.5,
