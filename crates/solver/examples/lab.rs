@@ -24,9 +24,9 @@ fn main() {
             let (re, n, tend) = (num(2, 100.0), num(3, 8.0), num(4, 30.0));
             let xs = num(5, 5.0);
             let h = 1.0 / n;
-            let mesh = Mesh { cells: [15, 6, 6].map(|c| c * n as usize), spacing: DVec3::splat(h), origin: DVec3::ZERO };
+            let mesh = Mesh { cells: [15, 3, 3].map(|c| c * n as usize), spacing: DVec3::splat(h), origin: DVec3::ZERO };
             let u = DVec3::X;
-            let mut g = sphere(1.0, DVec3::new(xs, 3.0, 3.0), 1.0);
+            let mut g = sphere(1.0, DVec3::new(xs, 0.0, 0.0), 1.0);
             g.translation = Dof::Prescribed(DVec3::ZERO);
             g.rotation = Dof::Prescribed(DVec3::ZERO);
             let mut f = fluid(1.0, 1.0 / re);
@@ -38,7 +38,7 @@ fn main() {
             while s.time() < tend {
                 s.step(f64::INFINITY).unwrap();
                 if s.time() >= next {
-                    let c = 8.0 / std::f64::consts::PI;
+                    let c = 32.0 / std::f64::consts::PI;
                     let F = s.loads()[0].force * c;
                     println!("t {:.2} dt {:.4} Cd {:.5} Cl {:.5} {:.5} slip {:.4} div {:.1e} wall {:.1}", s.time(), s.time_step(), F.x, F.y, F.z, s.diagnostics().slip, s.diagnostics().max_divergence, start.elapsed().as_secs_f64());
                     next += tend / 10.0;
@@ -118,16 +118,43 @@ fn main() {
             for (a, b) in p0.iter().zip(s.pass_times()) { println!("{} {:.1}", a.0, (b.1 - a.1) * c); }
             println!("bytes/cell {:.1}", s.bytes() as f64 / mesh.cell_count() as f64);
         }
+        "pair" => {
+            // FeatFloWer sphere pair: d = g = 1, nu 4.7e-3, ratio 1.14, box 6 x 6 x 24
+            let n = num(2, 8.0);
+            let h = 1.0 / n;
+            let mesh = Mesh { cells: [6, 6, 24].map(|c| c * n as usize), spacing: DVec3::splat(h), origin: DVec3::new(-3.0, -3.0, 0.0) };
+            let gr = vec![sphere(1.0, DVec3::new(0.0, 0.0, 20.0), 1.14), sphere(1.0, DVec3::new(0.05, 0.0, 21.5), 1.14)];
+            let mut gr = gr;
+            if std::env::var("SINGLE").is_ok() { gr[1].pose.position = DVec3::new(0.0, 0.0, 3.0); gr[1].translation = Dof::Prescribed(DVec3::ZERO); gr[0].pose.position.z = 21.5; }
+            let contact = ContactParams { normal_stiffness: 300.0, friction: num(4, 0.0), wall_friction: 0.0, restitution: 0.9, ..Default::default() };
+            let mut s = Simulation::new(Setup { mesh, boundaries: Boundaries([[wall; 2]; 3]),
+                fluid: Some(fluid(1.0, 4.7e-3)), scheme, gravity: DVec3::new(0.0, 0.0, -1.0), grains: gr, contact, step: limits }).unwrap();
+            let (mut next, mut kiss, mut peak) = (0.0, None, 0.0f64);
+            let start = std::time::Instant::now();
+            while s.time() < num(3, 36.0) {
+                if let Err(e) = s.step(f64::INFINITY) { println!("{e}"); break; }
+                let (a, b) = (&s.grains()[0], &s.grains()[1]);
+                let r = b.pose.position - a.pose.position;
+                if kiss.is_none() && r.length() < 1.005 { kiss = Some(s.time()); }
+                if s.time() < 18.8 { peak = peak.max(-b.velocity.z); }
+                if s.time() >= next { println!("t {:.2} sep {:.3} tilt {:.2} ul {:.4} ut {:.4} dt {:.4}", s.time(), r.length(), r.x.hypot(r.y).atan2(r.z).to_degrees(), -a.velocity.z, -b.velocity.z, s.time_step()); next += 1.25; }
+            }
+            println!("kiss {kiss:?} peak {peak:.4} steps {} wall {:.0}", s.steps(), start.elapsed().as_secs_f64());
+        }
         "carry" => {
             // sphere carried at constant speed through a periodic box, force noise
             let (n, re) = (num(2, 16.0), num(3, 50.0));
             let h = 1.0 / n;
             let mesh = Mesh { cells: [(8.0 * n) as usize, (4.0 * n) as usize, (4.0 * n) as usize], spacing: DVec3::splat(h), origin: DVec3::ZERO };
             let mut g = sphere(1.0, DVec3::new(2.0, 2.0 + 0.21 * h, 2.0 + 0.37 * h), 1.0);
-            g.translation = Dof::Prescribed(DVec3::X);
+            let frame = num(4, 0.0) * DVec3::X;
+            g.translation = Dof::Prescribed(DVec3::X - frame);
             g.rotation = Dof::Prescribed(DVec3::ZERO);
-            let mut s = Simulation::new(Setup { mesh, boundaries: Boundaries([per, [wall; 2], [wall; 2]]),
-                fluid: Some(fluid(1.0, 1.0 / re)), scheme, gravity: DVec3::ZERO, grains: vec![g], contact: Default::default(), step: StepRule::Fixed(cfl * h) }).unwrap();
+            let mut f = fluid(1.0, 1.0 / re);
+            f.initial_velocity = -frame;
+            let w = Boundary::Wall { velocity: -frame };
+            let mut s = Simulation::new(Setup { mesh, boundaries: Boundaries([per, [w; 2], [w; 2]]),
+                fluid: Some(f), scheme, gravity: DVec3::ZERO, grains: vec![g], contact: Default::default(), step: StepRule::Fixed(cfl * h) }).unwrap();
             let mut v = vec![];
             while s.time() < 6.0 { s.step(f64::INFINITY).unwrap(); if s.time() > 4.0 { v.push((s.time(), -s.loads()[0].force.x)); } }
             // remove quadratic trend

@@ -51,7 +51,7 @@ impl Coupling {
     /// Corrects the advection just predicted where grains close part of a link.
     pub fn correct_advection(&self, flow: &mut Flow, grains: &[Grain]) {
         if self.scheme == Scheme::Aperture {
-            advection::open_links(&self.locator, flow, grains, &self.bodies);
+            advection::correct(&self.locator, flow, grains, &self.bodies);
         }
     }
 

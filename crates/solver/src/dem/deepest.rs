@@ -47,7 +47,9 @@ pub(super) fn project(surface: &Shape, mut x: DVec3) -> DVec3 {
 /// Steepest descent in the tangent plane; the first step assumes the curvature of the bounding
 /// spheres (Newton's step where both are spheres), the next ones the curvature seen on the last step
 /// (Barzilai and Borwein). A step that does not come closer is shortened, never taken, so the
-/// answer is at least as deep as `start`. `stride` [m] limits a step, `tolerance` [m] ends the search.
+/// answer is at least as deep as `start`. Edges and the facets of a sampled field can stop it short;
+/// then points around are tried until none is better. `stride` [m] limits a step, `tolerance` [m]
+/// ends the search.
 pub(super) fn slide(
     surface: &Shape,
     target: &Target,
@@ -64,6 +66,7 @@ pub(super) fn slide(
     let mut here = start;
     let mut climb = tangential(&here);
     let mut length = 1.0 / (1.0 / surface.bounding_radius() + 1.0 / target.radius());
+    let mut stopped = false;
     for _ in 0..iterations {
         let slope = climb.length();
         if slope.is_nan() || length * slope <= tolerance {
@@ -75,6 +78,7 @@ pub(super) fn slide(
         };
         if next.distance >= here.distance {
             length = 0.25 * step;
+            stopped = true;
             continue;
         }
         let next_climb = tangential(&next);
@@ -87,6 +91,39 @@ pub(super) fn slide(
         };
         here = next;
         climb = next_climb;
+    }
+    if stopped {
+        look_around(surface, target, here, stride)
+    } else {
+        here
+    }
+}
+
+/// Compass search from `here`: six points around it in the tangent plane, at a distance that is
+/// halved when none of them is closer.
+fn look_around(surface: &Shape, target: &Target, mut here: Probe, stride: f64) -> Probe {
+    const DIRECTIONS: usize = 6;
+    const MOST_MOVES: usize = 40;
+    const FINEST: f64 = 0.1;
+    let (_, gradient) = surface.distance_and_gradient(here.x);
+    let (u, v) = gradient.normalize_or(DVec3::Z).any_orthonormal_pair();
+    let around: [DVec3; DIRECTIONS] = std::array::from_fn(|k| {
+        let (s, c) = (std::f64::consts::TAU * k as f64 / DIRECTIONS as f64).sin_cos();
+        c * u + s * v
+    });
+    let (mut radius, mut moves) = (stride, 0);
+    while radius > FINEST * stride && moves < MOST_MOVES {
+        let better = around.iter().find_map(|direction| {
+            let next = Probe::at(target, project(surface, here.x + radius * *direction))?;
+            (next.distance < here.distance).then_some(next)
+        });
+        match better {
+            Some(next) => {
+                here = next;
+                moves += 1;
+            }
+            None => radius *= 0.5,
+        }
     }
     here
 }

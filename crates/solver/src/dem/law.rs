@@ -96,8 +96,6 @@ impl Mean {
 /// What the friction of every point of a patch depends on.
 #[derive(Clone, Copy, Debug)]
 struct Rub {
-    /// Normal force of the pair [N].
-    press: f64,
     /// Tangential dashpot [N s/m].
     dashpot: f64,
     /// Part of the sub-step in contact, and all of it [s].
@@ -157,7 +155,6 @@ impl Law {
         };
         let dashpot = slot.onset * self.dashpot(pair);
         let rub = Rub {
-            press: (k * mean.overlap + dashpot * mean.approach).max(0.0),
             dashpot: dashpot * self.params.tangential_damping,
             since,
             step,
@@ -178,14 +175,17 @@ impl Law {
         slot.next.clear();
         for touch in &slot.patch.touches {
             let share = touch.area * touch.depth / mean.total;
-            let mut force = -(rub.press * share * scale) * touch.normal;
+            // The local approach speed, so that rocking on a face is damped as well.
+            let approach = relative(&pair.now, touch, pair.apart).dot(touch.normal);
+            let press = (k * mean.overlap + dashpot * approach).max(0.0);
+            let mut force = -(press * share * scale) * touch.normal;
             if self.tangential > 0.0 && self.friction(pair) > 0.0 {
                 while slot.memory.get(known).is_some_and(|m| m.code < touch.code) {
                     known += 1;
                 }
                 let own = slot.memory.get(known).filter(|m| m.code == touch.code);
                 let old = own.or(slot.touching.then_some(&slot.mean));
-                let (pull, slip) = self.friction_at(touch, old, pair, &rub);
+                let (pull, slip) = self.friction_at(touch, press, old, pair, &rub);
                 force += share * pull;
                 slips += share * carry(slip, touch.normal, center);
                 outcome.elastic_energy += 0.5 * share * self.tangential * slip.length_squared();
@@ -237,6 +237,7 @@ impl Law {
     fn friction_at(
         &self,
         touch: &Touch,
+        press: f64,
         old: Option<&Memory>,
         pair: &Pair,
         rub: &Rub,
@@ -251,7 +252,7 @@ impl Law {
         let slip = kept + rub.since * across(relative(&pair.during, touch, pair.apart));
         let drag = rub.dashpot * across(relative(&pair.now, touch, pair.apart));
         let pull = -(self.tangential * slip + drag);
-        let limit = self.friction(pair) * rub.press;
+        let limit = self.friction(pair) * press;
         if pull.length_squared() <= limit * limit {
             return (pull, slip);
         }

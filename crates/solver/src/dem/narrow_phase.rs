@@ -20,6 +20,8 @@ const DEEPEST_NODES: f64 = 1.0;
 const ITERATIONS: usize = 10;
 /// A mirror point counts if the surface is within this part of its distance from the deepest point.
 const MIRROR_MISS: f64 = 0.3;
+/// A patch with more nodes than this is resolved and goes without mirror points.
+const RESOLVED: usize = 128;
 
 /// A grain (or an image of it) as the contact law sees it.
 #[derive(Clone, Copy)]
@@ -112,7 +114,9 @@ fn scan(owner: &Body, target: &Target, reach: f64, found: &mut Vec<Found>) -> Op
         ITERATIONS,
     );
     if closest.distance < 0.0 {
-        mirror(owner.shape, target, closest.x, found);
+        if found.len() <= RESOLVED {
+            mirror(owner.shape, target, closest.x, found);
+        }
         let area = DEEPEST_NODES * tree.spacing * tree.spacing;
         found.push(Found {
             code: DEEPEST,

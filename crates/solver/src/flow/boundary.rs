@@ -49,6 +49,11 @@ impl Boundaries {
         self.0[axis][0] == Boundary::Periodic
     }
 
+    /// Axes whose lower boundary face is given, not an unknown.
+    pub fn walled(&self) -> [bool; 3] {
+        [0, 1, 2].map(|axis| !self.is_periodic(axis))
+    }
+
     /// Conditions on the pressure that go with the faces.
     pub fn pressure_ends(&self) -> [Ends; 3] {
         [0, 1, 2].map(|axis| if self.is_periodic(axis) { Ends::Periodic } else { Ends::Neumann })

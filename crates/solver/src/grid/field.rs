@@ -101,6 +101,16 @@ impl Layout {
             _ => (0..plane).for_each(|at| f(layer * plane + at)),
         }
     }
+    /// Calls `f` with the memory position of every entry of a layer, without ghosts.
+    pub fn each_inside_layer(&self, axis: usize, layer: usize, mut f: impl FnMut(usize)) {
+        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+        let strides = self.strides();
+        for second in 1..=self.cells[b] {
+            for first in 1..=self.cells[a] {
+                f(layer * strides[axis] + first * strides[a] + second * strides[b]);
+            }
+        }
+    }
     /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.
     pub fn map_layer(&self, values: &mut [f64], axis: usize, from: usize, to: usize, f: impl Fn(f64) -> f64) {
         let stride = self.strides()[axis];

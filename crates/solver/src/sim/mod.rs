@@ -36,6 +36,8 @@ pub struct Simulation {
     dynamics: Dynamics,
     /// Hydrodynamic load on each grain over the last step.
     loads: Vec<Load>,
+    /// Momentum of the fluid that the last step cannot account for [kg m/s].
+    momentum_residual: glam::DVec3,
     work: Work,
     passes: Passes,
 }
@@ -74,6 +76,7 @@ impl Simulation {
             clock: Clock::new(&setup),
             fluid,
             loads: vec![Load::default(); count],
+            momentum_residual: glam::DVec3::ZERO,
             work: Work {
                 before: vec![Default::default(); count],
                 driving: vec![Load::default(); count],

@@ -24,6 +24,8 @@ impl Simulation {
         if let Some(fluid) = &self.fluid {
             let m = &fluid.measures;
             out.numbers(&[m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy])?;
+            out.numbers(&m.momentum.to_array())?;
+            out.numbers(&self.momentum_residual.to_array())?;
             for values in fluid.flow.state() {
                 out.count(values.len() as u64)?;
                 out.numbers(values)?;
@@ -51,6 +53,8 @@ impl Simulation {
         if let Some(fluid) = &mut self.fluid {
             let m = &mut fluid.measures;
             [m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy] = input.numbers()?;
+            m.momentum = DVec3::from_array(input.numbers()?);
+            self.momentum_residual = DVec3::from_array(input.numbers()?);
             for values in fluid.flow.state_mut(self.clock.last_step) {
                 input.expect(values.len(), "field entries")?;
                 input.fill(values)?;

@@ -55,7 +55,15 @@ impl Simulation {
                 timed(&mut passes.coupling, || {
                     coupling.impose_rigidity(flow, grains, &work.before, &work.driving, dt, loads);
                 });
+                let momentum = measures.momentum;
                 timed(&mut passes.project, || *measures = flow.project(dt));
+                self.momentum_residual =
+                    fluid_density * (measures.momentum - momentum - flow.boundary_impulse(dt));
+                for (grain, (before, load)) in grains.iter().zip(work.before.iter().zip(&*loads)) {
+                    // What the fluid gave the grain, the fluid inside it included, it lost.
+                    let displaced = fluid_density * grain.shape.volume();
+                    self.momentum_residual -= displaced * (grain.velocity - before[0]) - dt * load.force;
+                }
             }
         }
         self.clock.advance(dt);

@@ -182,3 +182,121 @@ fn taylor_green_is_second_order_in_space() {
         assert!((order - 2.0).abs() <= 0.1, "{plane:?}: errors {coarse:e} {fine:e}, order {order}");
     }
 }
+
+#[test]
+fn taylor_green_is_second_order_in_time() {
+    // The same grid throughout: differences between steps leave the error in time alone.
+    let field = |steps: usize| {
+        let n = 24;
+        let mesh = Mesh { cells: [n, 1, n], spacing: DVec3::splat(2.0 * PI / n as f64), origin: DVec3::ZERO };
+        let mut flow = Flow::new(&mesh, PERIODIC, &params(0.05));
+        // Two superposed vortices interact, so that advection is not a gradient.
+        flow.velocity.x.fill_with(&mesh, |x| x.x.sin() * x.z.cos() + 0.5 * (2.0 * x.z).sin());
+        flow.velocity.z.fill_with(&mesh, |x| -x.x.cos() * x.z.sin());
+        flow.make_solenoidal();
+        for _ in 0..steps {
+            flow.predict(1.0 / steps as f64);
+            flow.project(1.0 / steps as f64);
+        }
+        flow.velocity.x.to_vec()
+    };
+    let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    let [one, two, four] = [40, 80, 160].map(field);
+    let order = (apart(&one, &two) / apart(&two, &four)).log2();
+    assert!((1.9..=2.2).contains(&order), "observed order in time {order}");
+}
+
+/// Arnold-Beltrami-Childress flow, an exact decaying solution in three dimensions.
+fn beltrami(n: usize) -> f64 {
+    let nu = 0.1;
+    let mesh = Mesh { cells: [n; 3], spacing: DVec3::splat(2.0 * PI / n as f64), origin: DVec3::ZERO };
+    let mut flow = Flow::new(&mesh, PERIODIC, &params(nu));
+    flow.velocity.x.fill_with(&mesh, |x| x.z.sin() + 0.7 * x.y.cos());
+    flow.velocity.y.fill_with(&mesh, |x| 0.8 * x.x.sin() + x.z.cos());
+    flow.velocity.z.fill_with(&mesh, |x| 0.7 * x.y.sin() + 0.8 * x.x.cos());
+    flow.boundaries.fill_ghosts(&mut flow.velocity);
+    let (dt, steps) = (4e-3, 100);
+    for _ in 0..steps {
+        flow.predict(dt);
+        flow.project(dt);
+    }
+    let decay = (-nu * dt * steps as f64).exp();
+    interior(&mesh)
+        .map(|[i, j, k]| {
+            let x = mesh.position(crate::grid::FACE_OFFSET[0], [i, j, k]);
+            (flow.velocity.x.at(i, j, k) - decay * (x.z.sin() + 0.7 * x.y.cos())).abs()
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn beltrami_flow_is_second_order_in_space() {
+    let (coarse, fine) = (beltrami(12), beltrami(24));
+    let order = (coarse / fine).log2();
+    assert!((order - 2.0).abs() <= 0.1, "errors {coarse:e} {fine:e}, order {order}");
+}
+
+/// Steady Couette-Poiseuille flow between a wall at rest and a moving lid, across `axis`.
+fn channel(n: usize, axis: usize) -> f64 {
+    let along = (axis + 1) % 3;
+    let mut cells = [1; 3];
+    cells[axis] = n;
+    let (nu, push, lid) = (1.0, 6.0, 0.7);
+    let mut p = params(nu);
+    p.body_acceleration[along] = push;
+    let mut velocity = DVec3::ZERO;
+    velocity[along] = lid;
+    let mut boundaries = PERIODIC;
+    boundaries.0[axis] = [Boundary::WALL, Boundary::Wall { velocity }];
+    let h = 1.0 / n as f64;
+    let mesh = Mesh { cells, spacing: DVec3::splat(h), origin: DVec3::ZERO };
+    let mut flow = Flow::new(&mesh, boundaries, &p);
+    let dt = 0.2 * h * h;
+    for _ in 0..(2.0 / dt) as usize {
+        flow.predict(dt);
+        flow.project(dt);
+    }
+    (1..=n)
+        .map(|m| {
+            let mut index = [1; 3];
+            index[axis] = m;
+            let s = (m as f64 - 0.5) * h;
+            let exact = lid * s + push / (2.0 * nu) * s * (1.0 - s);
+            (flow.velocity.component(along)[mesh.layout().index(index[0], index[1], index[2])] - exact).abs()
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn channel_with_a_moving_lid_is_second_order() {
+    for axis in 0..3 {
+        let (coarse, fine) = (channel(8, axis), channel(16, axis));
+        let order = (coarse / fine).log2();
+        assert!((order - 2.0).abs() <= 0.1, "axis {axis}: errors {coarse:e} {fine:e}, order {order}");
+    }
+}
+
+#[test]
+fn outflow_keeps_the_mass_of_the_box() {
+    let mesh = Mesh { cells: [20, 8, 8], spacing: DVec3::splat(0.1), origin: DVec3::ZERO };
+    let velocity = DVec3::X;
+    let boundaries = Boundaries([
+        [Boundary::Inflow { velocity }, Boundary::Outflow],
+        [Boundary::Slip; 2],
+        [Boundary::WALL, Boundary::FreeSurface],
+    ]);
+    let mut p = params(0.02);
+    p.initial_velocity = velocity;
+    let mut flow = Flow::new(&mesh, boundaries, &p);
+    for _ in 0..200 {
+        flow.predict(0.02);
+        let m = flow.project(0.02);
+        assert!(m.max_divergence <= 1e-10 * m.max_rate, "{m:?}");
+    }
+    let through = |i: usize| {
+        interior(&mesh).filter(|[x, ..]| *x == 1).map(|[_, j, k]| flow.velocity.x.at(i, j, k)).sum::<f64>()
+    };
+    assert!((through(1) - 64.0).abs() < 1e-12 && (through(21) - 64.0).abs() < 1e-10);
+    // The floor slows the fluid, the lid does not.
+    assert!(flow.velocity.x.at(18, 4, 1) < 0.8 * flow.velocity.x.at(18, 4, 8));
+}

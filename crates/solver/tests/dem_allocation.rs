@@ -1,0 +1,72 @@
+//! No allocation in a sub-step once the buffers have grown.
+
+mod dem_support;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use dem_support::{cloud, step};
+use glam::DVec3;
+use grainwake_solver::dem::{ContactParams, Dynamics, Enclosure};
+use grainwake_solver::math::Load;
+
+struct Counting;
+
+static COUNT: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: hands every call on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.fetch_add(1, Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(at, layout) }
+    }
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        COUNT.fetch_add(1, Ordering::Relaxed);
+        unsafe { System.realloc(at, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn a_heap_at_rest_steps_without_allocating() {
+    let tank = Enclosure {
+        lower: DVec3::splat(-0.05),
+        upper: DVec3::new(0.05, 0.05, 0.2),
+        periodic: [true, false, false],
+        solid: [[false; 2], [true; 2], [true, false]],
+    };
+    let params = ContactParams {
+        normal_stiffness: 500.0,
+        restitution: 0.3,
+        global_damping: 5.0,
+        ..Default::default()
+    };
+    let mut grains = cloud(80, 0.043, 0.007, 0.1, 3);
+    let mut dynamics = Dynamics::new(params, tank);
+    let gravity = DVec3::new(0.0, 0.0, -9.81);
+    for _ in 0..800 {
+        step(&mut dynamics, &mut grains, gravity, 1e-3);
+    }
+    let loads = dem_support::weights(&grains, gravity);
+    let mut mean = vec![Load::default(); grains.len()];
+    let before = COUNT.load(Ordering::Relaxed);
+    let mut substeps = 0;
+    for _ in 0..50 {
+        substeps += dynamics.advance(&mut grains, &loads, 1e-3, &mut mean);
+    }
+    let count = COUNT.load(Ordering::Relaxed) - before;
+    println!(
+        "{count} allocations in {substeps} sub-steps, {} contacts",
+        dynamics.contacts().len()
+    );
+    assert!(dynamics.contacts().len() > 80);
+    assert!(
+        count * 20 < substeps,
+        "{count} allocations in {substeps} sub-steps"
+    );
+}
