@@ -2,6 +2,7 @@
 
 mod make;
 mod mesh;
+mod scan;
 mod table;
 
 use std::path::Path;
@@ -16,7 +17,7 @@ use crate::print;
 /// Carries out one of the commands.
 pub fn grain(args: &GrainArgs) -> Result<(), Exit> {
     match &args.command {
-        GrainCommand::FromScan(_) => Err(Exit::new(BAD_INPUT, "not yet")),
+        GrainCommand::FromScan(args) => scan::from_scan(args),
         GrainCommand::FromMesh(args) => mesh::from_mesh(args),
         GrainCommand::Make(args) => make::make(&args.body),
         GrainCommand::Info(args) => info(args),
