@@ -59,9 +59,12 @@ impl From<CaseError> for Exit {
     fn from(error: CaseError) -> Exit {
         match error {
             CaseError::Unreadable { ref source, .. } => {
-                let missing = source.kind() == std::io::ErrorKind::NotFound;
-                let help = if missing { "give the path of a case file, for example cases/dkt-pair/quick.toml" } else { "check the file and its permissions" };
-                Exit::with_help(if missing { BAD_INPUT } else { IO }, error.to_string(), help)
+                let (code, help) = match source.kind() {
+                    std::io::ErrorKind::NotFound => (BAD_INPUT, "give the path of a case file, for example cases/dkt-pair/quick.toml"),
+                    std::io::ErrorKind::InvalidData => (BAD_INPUT, "a case file is text (UTF-8) in TOML"),
+                    _ => (IO, "check the file and its permissions"),
+                };
+                Exit::with_help(code, error.to_string(), help)
             }
             CaseError::Invalid(problems) => Exit::problems(BAD_INPUT, problems),
         }

@@ -32,7 +32,7 @@ fn a_wrong_key() {
 
 #[test]
 fn a_wrong_unit() {
-    refused("\"1 mPa s\"", "\"1 mPa\"", &["case.toml:5:13", "fluid.viscosity", "is a pressure", "\"1 mPa s\""]);
+    refused("\"5 mPa s\"", "\"5 mPa\"", &["case.toml:5:13", "fluid.viscosity", "is a pressure", "\"1 mPa s\""]);
 }
 
 #[test]

@@ -17,7 +17,7 @@ pub const WET: &str = r#"
 title = "small and wet"
 [fluid]
 density = 1000
-viscosity = "1 mPa s"
+viscosity = "5 mPa s"
 [domain]
 size = ["4 mm", "4 mm", "12 mm"]
 cell_size = "0.5 mm"

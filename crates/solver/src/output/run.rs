@@ -171,7 +171,8 @@ impl Running {
                 return self.finish(why);
             }
             let limit = self.recorder.until_next(self.sim.time());
-            if let Err(source) = self.sim.step(limit) {
+            let stepped = self.sim.step(limit).and_then(|()| self.collapsed(limit));
+            if let Err(source) = stepped {
                 return Err(self.failed(source, saved_time));
             }
             for event in self.recorder.after_step(&self.sim)? {
@@ -202,6 +203,20 @@ impl Running {
                 return Ok(Ending::Interrupted(saved_time));
             }
         }
+    }
+
+    /// An error if the step has become absurdly short, though an output is far away.
+    fn collapsed(&self, limit: f64) -> Result<(), StepError> {
+        let dt = self.sim.time_step();
+        if dt >= self.plan.smallest_step || 2.0 * dt > limit {
+            return Ok(());
+        }
+        Err(StepError::Unstable {
+            time: self.sim.time(),
+            step: self.sim.steps(),
+            what: format!("the time step has collapsed to {dt:.1e} s: somewhere the fluid is far faster than any grain should settle"),
+            remedy: "a finer grid, a smaller [time] cfl, or a look at the last slices".into(),
+        })
     }
 
     /// Why the run is at its end, if it is.

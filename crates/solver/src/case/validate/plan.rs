@@ -14,6 +14,8 @@ use crate::sim::events::StopWhen;
 /// Limits where none are given.
 const CFL: f64 = 0.3;
 const VISCOUS: f64 = 0.2;
+/// Steps this much shorter than those at the settling speed mean velocities as much above it.
+const SMALLEST_STEP: f64 = 1e-3;
 
 /// The step rule.
 pub(super) fn step(check: &mut Checker, raw: &mut RawTime, mesh: &Mesh, grains: &[Grain], gravity: glam::DVec3, dry: bool) -> Option<StepRule> {
@@ -52,6 +54,8 @@ pub(super) fn plan(check: &mut Checker, time: &RawTime, raw: &mut RawOutput, set
         }
         interval
     };
+    let by_limits = matches!(setup.step, StepRule::Limits { .. }) && !dry;
+    let smallest_step = if by_limits { SMALLEST_STEP * settled_time_step(setup) } else { 0.0 };
     // Outputs that nobody asked for do not shorten the steps.
     let step = settled_time_step(setup).min(end);
     let tables = interval(&mut raw.tables, (end / 400.0).max(step), "tables");
@@ -68,6 +72,7 @@ pub(super) fn plan(check: &mut Checker, time: &RawTime, raw: &mut RawOutput, set
     Some(RunPlan {
         end,
         stop,
+        smallest_step,
         tables,
         slices,
         fields,
