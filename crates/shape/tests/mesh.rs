@@ -190,8 +190,11 @@ fn a_sphere_mesh_agrees_with_the_analytic_sphere() {
         let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
         let x = 1.25e-3 * (2.0 * u.fract() - DVec3::ONE);
         let (d, n) = shape.distance_and_gradient(x);
-        assert!((d - exact.distance(x)).abs() < 2e-6, "at {x}: {d}");
-        if x.length() > 0.5e-3 {
+        // The tip of the cone at the centre is cut off by the interpolation.
+        let tip = x.length() < 0.2e-3;
+        let allowed = if tip { 1e-4 } else { 2e-6 };
+        assert!((d - exact.distance(x)).abs() < allowed, "at {x}: {d}");
+        if x.length() > 0.8e-3 {
             assert!(n.normalize().angle_between(x) < 0.05, "at {x}: {n}");
         }
     }
@@ -370,10 +373,10 @@ fn absurd_headers_are_refused() {
     ));
 }
 
-/// Every real mesh at hand: passes the gate, matches its exact volume and the independent
-/// morphology table, and its nodes lie on the surface and carry its area.
-#[test]
-fn real_grains_agree_with_the_table() {
+/// Real meshes pass the gate, match their exact volume and the independent morphology table, lie
+/// within a thousandth of the diameter of the mesh (but on the sharpest ridges), and their nodes
+/// lie on the surface.
+fn check_real_grains(wanted: &dyn Fn(&str) -> bool) {
     let (Some(folder), Some(table)) = (shared("grains/meshes"), shared("grains/table.csv")) else {
         return;
     };
@@ -389,12 +392,29 @@ fn real_grains_agree_with_the_table() {
         .filter(|p| p.extension().is_some_and(|e| e == "ply"))
     {
         let name = path.file_stem().unwrap().to_str().unwrap();
+        if !wanted(name) {
+            continue;
+        }
         let (mesh, source) = read_mesh(path, 1e-3, &ReadLimits::default()).unwrap();
         let shape = shape_from_mesh(&mesh, &source, &MeshOptions::default()).unwrap();
         let quality = shape.quality().unwrap();
         let m = shape.morphology();
+        let p = shape.provenance();
+        let mut loss: Vec<f64> = mesh
+            .vertices
+            .iter()
+            .map(|v| {
+                shape
+                    .distance(p.rotation.inverse() * (*v - p.centroid))
+                    .abs()
+            })
+            .map(|d| d / shape.equivalent_diameter())
+            .collect();
+        loss.sort_by(f64::total_cmp);
+        let rms = (loss.iter().map(|d| d * d).sum::<f64>() / loss.len() as f64).sqrt();
+        let most = loss[loss.len() * 98 / 100];
         println!(
-            "{name}: volume {:+.5} gradient {:.4} psi {:.4} convexity {:.4} S {:.4}, {} nodes, {} bytes",
+            "{name}: volume {:+.5} gradient {:.4} off rms {rms:.5} 0.98 quantile {most:.5} psi {:.4} convexity {:.4} S {:.4}, {} nodes, {} bytes",
             quality.volume_error.unwrap(),
             quality.gradient_error,
             m.wadell_sphericity,
@@ -403,7 +423,9 @@ fn real_grains_agree_with_the_table() {
             shape.nodes().len(),
             shape.to_bytes().len(),
         );
-        assert!(quality.volume_error.unwrap().abs() < 2e-3);
+        assert!(quality.volume_error.unwrap().abs() < 1e-3);
+        assert!(rms < 4e-4 && most < 1.2e-3, "{rms} {most}");
+        assert!(shape.to_bytes().len() < 400_000);
         check_nodes(&shape);
         let row = table
             .lines()
@@ -429,7 +451,18 @@ fn real_grains_agree_with_the_table() {
         close(m.convexity.unwrap(), convexity, 5e-3);
         seen += 1;
     }
-    assert!(seen >= 10, "only {seen} meshes");
+    assert!(seen >= 2, "only {seen} meshes");
+}
+
+#[test]
+fn real_grains_agree_with_the_table() {
+    check_real_grains(&|name| matches!(name, "fdot57_D-00002" | "ma165_05720"));
+}
+
+#[test]
+#[ignore = "twelve grains, some ten seconds: run with --ignored"]
+fn all_real_grains_agree_with_the_table() {
+    check_real_grains(&|_| true);
 }
 
 fn check_nodes(shape: &Shape) {

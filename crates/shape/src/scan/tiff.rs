@@ -28,11 +28,13 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
         let (width, height) = decoder.dimensions().map_err(|e| malformed(&e))?;
         let color = decoder.colortype().map_err(|e| malformed(&e))?;
         let bits = match color {
-            ColorType::Gray(bits) => bits,
+            ColorType::Gray(bits @ (8 | 16 | 32 | 64)) => bits,
             other => {
                 return Err(ShapeError::Unsupported {
                     path: path.to_owned(),
-                    reason: format!("page {pages} is {other:?}; convert it to greyscale"),
+                    reason: format!(
+                        "page {pages} is {other:?}; convert it to greyscale of 8, 16 or 32 bits"
+                    ),
                 });
             }
         };

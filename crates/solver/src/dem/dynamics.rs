@@ -114,6 +114,7 @@ impl Dynamics {
         let damping = self.law.params.global_damping;
         self.follow(grains);
         self.search(grains, loads, dt);
+        self.slots.iter_mut().for_each(|slot| slot.touched = false);
         self.touch(grains, 0.0);
         let (mut done, mut left) = (0, dt);
         let mut ahead = self.substeps(left);
@@ -311,7 +312,10 @@ impl Dynamics {
             };
         }
         let (actors, law, enclosure) = (&self.actors, &self.law, &self.enclosure);
-        let look = |slot: &mut Slot| look_at(slot, grains, actors, law, enclosure, step);
+        let look = |slot: &mut Slot| {
+            look_at(slot, grains, actors, law, enclosure, step);
+            slot.touched |= slot.outcome.overlap > 0.0;
+        };
         // Each pair writes its own slot, and the slots are summed in order: the same bits for any
         // number of threads.
         if self.slots.len() < WORTH_THREADS {
@@ -329,12 +333,12 @@ impl Dynamics {
 
     fn report(&mut self, grains: &[Grain]) {
         self.contacts.clear();
-        for slot in self.slots.iter().filter(|slot| slot.outcome.overlap > 0.0) {
+        for slot in self.slots.iter().filter(|slot| slot.touched) {
             let grain = slot.key.grain as usize;
             self.contacts.push(Contact {
                 grain,
                 partner: slot.key.partner,
-                overlap: slot.outcome.overlap,
+                overlap: slot.outcome.overlap.max(0.0),
                 load: slot.outcome.first,
                 point: grains[grain].pose.position + slot.outcome.arm,
                 normal: slot.outcome.normal,

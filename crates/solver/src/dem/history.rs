@@ -69,6 +69,8 @@ pub(super) struct Slot {
     pub key: PairKey,
     /// Whether it touched when last looked at.
     pub touching: bool,
+    /// Whether it touched at any sub-step of the present step: an impact may fit between two ends.
+    pub touched: bool,
     /// Part of the dashpot at work: less than one just after the contact began.
     pub onset: f64,
     /// Share-weighted mean of the displacements then, and its normal: what a new node inherits.
@@ -95,6 +97,7 @@ impl Slot {
         Slot {
             key,
             touching: false,
+            touched: false,
             onset: 1.0,
             mean: NOTHING,
             memory: Vec::new(),
@@ -105,6 +108,7 @@ impl Slot {
     }
     /// Forgets everything but the buffers.
     pub fn clear(&mut self) {
+        self.touched = false;
         self.touching = false;
         self.onset = 1.0;
         self.mean = NOTHING;

@@ -114,7 +114,7 @@ impl Simulation {
     pub fn loads(&self) -> &[Load] {
         &self.loads
     }
-    /// Touching pairs at the end of the last step.
+    /// Pairs that touched during the last step.
     pub fn contacts(&self) -> &[Contact] {
         self.dynamics.contacts()
     }
