@@ -48,20 +48,44 @@ struct Pass {
 
 /// Measures and prints.
 pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
-    let &[nx, ny, nz] = &args.size[..] else { return Err(Exit::new(BAD_INPUT, "--size takes three numbers")) };
+    let &[nx, ny, nz] = &args.size[..] else {
+        return Err(Exit::new(BAD_INPUT, "--size takes three numbers"));
+    };
     if [nx, ny, nz].iter().any(|n| !(16..=4096).contains(n)) || args.steps == 0 {
-        return Err(Exit::new(BAD_INPUT, "--size takes 16 to 4096 cells along each axis, --steps at least one step"));
+        return Err(Exit::new(
+            BAD_INPUT,
+            "--size takes 16 to 4096 cells along each axis, --steps at least one step",
+        ));
     }
     let threads = threads::resolve(args.threads);
-    let scheme = if args.scheme == "paper" { Scheme::Paper } else { Scheme::Aperture };
-    let measured = threads::on(threads, || measure([nx, ny, nz], scheme, args.steps, threads))??;
-    if args.json { print(&serde_json::to_string(&measured)?) } else { print(&table(&measured)) }
+    let scheme = if args.scheme == "paper" {
+        Scheme::Paper
+    } else {
+        Scheme::Aperture
+    };
+    let measured = threads::on(threads, || {
+        measure([nx, ny, nz], scheme, args.steps, threads)
+    })??;
+    if args.json {
+        print(&serde_json::to_string(&measured)?)
+    } else {
+        print(&table(&measured))
+    }
 }
 
-fn measure(cells: [usize; 3], scheme: Scheme, steps: u64, threads: usize) -> Result<Measured, Exit> {
+fn measure(
+    cells: [usize; 3],
+    scheme: Scheme,
+    steps: u64,
+    threads: usize,
+) -> Result<Measured, Exit> {
     let count = cells.iter().product::<usize>() as f64;
-    let mut sim = Simulation::new(setup(cells, scheme)).map_err(|e| Exit::new(BAD_INPUT, e.to_string()))?;
-    let advance = |sim: &mut Simulation| sim.step(f64::INFINITY).map_err(|e| Exit::new(3, e.to_string()));
+    let mut sim =
+        Simulation::new(setup(cells, scheme)).map_err(|e| Exit::new(BAD_INPUT, e.to_string()))?;
+    let advance = |sim: &mut Simulation| {
+        sim.step(f64::INFINITY)
+            .map_err(|e| Exit::new(3, e.to_string()))
+    };
     for _ in 0..2 {
         advance(&mut sim)?;
     }
@@ -72,11 +96,25 @@ fn measure(cells: [usize; 3], scheme: Scheme, steps: u64, threads: usize) -> Res
     }
     let per_cell_step = |seconds: f64| 1e9 * seconds / (count * steps as f64);
     let ns = per_cell_step(start.elapsed().as_secs_f64());
-    let earlier = |name: &str| before.iter().find(|(n, _)| *n == name).map_or(0.0, |(_, t)| *t);
-    let mut passes: Vec<Pass> =
-        sim.pass_times().iter().map(|(name, t)| Pass { name, ns_per_cell_step: per_cell_step(t - earlier(name)) }).collect();
+    let earlier = |name: &str| {
+        before
+            .iter()
+            .find(|(n, _)| *n == name)
+            .map_or(0.0, |(_, t)| *t)
+    };
+    let mut passes: Vec<Pass> = sim
+        .pass_times()
+        .iter()
+        .map(|(name, t)| Pass {
+            name,
+            ns_per_cell_step: per_cell_step(t - earlier(name)),
+        })
+        .collect();
     let named: f64 = passes.iter().map(|p| p.ns_per_cell_step).sum();
-    passes.push(Pass { name: "other", ns_per_cell_step: ns - named });
+    passes.push(Pass {
+        name: "other",
+        ns_per_cell_step: ns - named,
+    });
     let bytes_per_cell = sim.bytes() as f64 / count;
     drop(sim);
     let triad = triad_bandwidth();
@@ -97,13 +135,20 @@ fn measure(cells: [usize; 3], scheme: Scheme, steps: u64, threads: usize) -> Res
 /// Two spheres of eight cells' diameter in water, one above the other, as in the main case.
 fn setup(cells: [usize; 3], scheme: Scheme) -> Setup {
     let spacing = DVec3::splat(0.25e-3);
-    let mesh = Mesh { cells, spacing, origin: DVec3::ZERO };
+    let mesh = Mesh {
+        cells,
+        spacing,
+        origin: DVec3::ZERO,
+    };
     let radius = 4.0 * spacing.x;
     let shape = Arc::new(Shape::sphere(radius, 2000));
     let grain = |height: f64| Grain {
         shape: shape.clone(),
         density: 1500.0,
-        pose: Pose { position: mesh.extent() * DVec3::new(0.5, 0.5, height), orientation: DQuat::IDENTITY },
+        pose: Pose {
+            position: mesh.extent() * DVec3::new(0.5, 0.5, height),
+            orientation: DQuat::IDENTITY,
+        },
         velocity: DVec3::ZERO,
         angular_velocity: DVec3::ZERO,
         translation: Dof::Free,
@@ -123,7 +168,11 @@ fn setup(cells: [usize; 3], scheme: Scheme) -> Setup {
         gravity: DVec3::new(0.0, 0.0, -9.81),
         grains: vec![grain(0.75), grain(0.25)],
         contact: ContactParams::default(),
-        step: StepRule::Limits { cfl: 0.3, viscous: 0.2, max_step: 1e-3 },
+        step: StepRule::Limits {
+            cfl: 0.3,
+            viscous: 0.2,
+            max_step: 1e-3,
+        },
     }
 }
 
@@ -132,7 +181,9 @@ fn triad_bandwidth() -> f64 {
     const CHUNK: usize = 1 << 16;
     let make = |value: f64| {
         let mut array = vec![0.0; TRIAD_LENGTH];
-        array.par_chunks_mut(CHUNK).for_each(|chunk| chunk.fill(value));
+        array
+            .par_chunks_mut(CHUNK)
+            .for_each(|chunk| chunk.fill(value));
         array
     };
     let (mut a, b, c) = (make(0.0), make(1.0), make(2.0));
@@ -140,11 +191,14 @@ fn triad_bandwidth() -> f64 {
     for repeat in 0..TRIAD_REPEATS {
         let s = std::hint::black_box(repeat as f64);
         let start = Instant::now();
-        a.par_chunks_mut(CHUNK).zip(b.par_chunks(CHUNK)).zip(c.par_chunks(CHUNK)).for_each(|((a, b), c)| {
-            for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
-                *a = b + s * c;
-            }
-        });
+        a.par_chunks_mut(CHUNK)
+            .zip(b.par_chunks(CHUNK))
+            .zip(c.par_chunks(CHUNK))
+            .for_each(|((a, b), c)| {
+                for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
+                    *a = b + s * c;
+                }
+            });
         best = best.min(start.elapsed().as_secs_f64());
         std::hint::black_box(&a);
     }
@@ -153,13 +207,29 @@ fn triad_bandwidth() -> f64 {
 
 fn table(m: &Measured) -> String {
     let mut lines = vec![
-        format!("{} x {} x {} cells, two grains, {} threads, {} steps", m.cells[0], m.cells[1], m.cells[2], m.threads, m.steps),
-        format!("time        {:8.2} ns per cell per step", m.ns_per_cell_step),
+        format!(
+            "{} x {} x {} cells, two grains, {} threads, {} steps",
+            m.cells[0], m.cells[1], m.cells[2], m.threads, m.steps
+        ),
+        format!(
+            "time        {:8.2} ns per cell per step",
+            m.ns_per_cell_step
+        ),
     ];
-    lines.extend(m.passes.iter().map(|p| format!("  {:10}{:8.2}", p.name, p.ns_per_cell_step)));
-    lines.push(format!("memory      {:8.1} bytes per cell", m.bytes_per_cell));
+    lines.extend(
+        m.passes
+            .iter()
+            .map(|p| format!("  {:10}{:8.2}", p.name, p.ns_per_cell_step)),
+    );
+    lines.push(format!(
+        "memory      {:8.1} bytes per cell",
+        m.bytes_per_cell
+    ));
     lines.push(format!("triad       {:8.2} GB/s", m.triad_gb_per_s));
-    lines.push(format!("limit       {:8.2} ns per cell per step ({TRAFFIC} bytes per cell at that bandwidth)", m.limit_ns_per_cell_step));
+    lines.push(format!(
+        "limit       {:8.2} ns per cell per step ({TRAFFIC} bytes per cell at that bandwidth)",
+        m.limit_ns_per_cell_step
+    ));
     lines.push(format!("ratio       {:8.2}", m.ratio_to_limit));
     lines.join("\n")
 }

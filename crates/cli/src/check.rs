@@ -26,29 +26,60 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     if !case.title.is_empty() {
         rows.push(("case", case.title.clone()));
     }
-    rows.push(("box", format!("{:.4} x {:.4} x {:.4} mm", extent.x, extent.y, extent.z)));
+    rows.push((
+        "box",
+        format!("{:.4} x {:.4} x {:.4} mm", extent.x, extent.y, extent.z),
+    ));
     if case.setup.fluid.is_some() {
-        rows.push(("cells", format!("{} x {} x {} = {}", mesh.cells[0], mesh.cells[1], mesh.cells[2], e.cells)));
+        rows.push((
+            "cells",
+            format!(
+                "{} x {} x {} = {}",
+                mesh.cells[0], mesh.cells[1], mesh.cells[2], e.cells
+            ),
+        ));
     } else {
         rows.push(("fluid", "none (contact only)".into()));
     }
     rows.push(("grains", grains(case)));
-    let number = |name, value: Option<f64>, unit: &str| value.map(|v| (name, format!("{v:.4} {unit}").trim_end().to_string()));
+    let number = |name, value: Option<f64>, unit: &str| {
+        value.map(|v| (name, format!("{v:.4} {unit}").trim_end().to_string()))
+    };
     rows.extend(number("cells per diameter", e.cells_per_diameter, ""));
     rows.extend(number("Galileo number", e.galileo, ""));
-    rows.extend(number("expected Reynolds number", e.reynolds, "(equal-volume sphere)"));
-    rows.extend(number("expected settling speed", e.settling_speed_m_per_s.map(|v| 1e3 * v), "mm/s"));
+    rows.extend(number(
+        "expected Reynolds number",
+        e.reynolds,
+        "(equal-volume sphere)",
+    ));
+    rows.extend(number(
+        "expected settling speed",
+        e.settling_speed_m_per_s.map(|v| 1e3 * v),
+        "mm/s",
+    ));
     rows.extend(number("blockage", e.blockage.map(|b| 100.0 * b), "%"));
-    rows.push(("contact stiffness", format!("{:.4e} N/m", case.setup.contact.normal_stiffness)));
+    rows.push((
+        "contact stiffness",
+        format!("{:.4e} N/m", case.setup.contact.normal_stiffness),
+    ));
     if let (Some(time), Some(substeps)) = (e.contact_time_s, e.contact_substeps) {
-        rows.push(("contact time", format!("{time:.3e} s ({substeps:.0} sub-steps a step)")));
+        rows.push((
+            "contact time",
+            format!("{time:.3e} s ({substeps:.0} sub-steps a step)"),
+        ));
     }
     rows.push(("time step", format!("{:.4e} s", e.time_step_s)));
     rows.push(("steps", format!("{} to t = {} s", e.steps, case.plan.end)));
     rows.push(("memory", format!("{:.0} MB", e.memory_bytes as f64 / 1e6)));
-    rows.push(("wall time", format!("about {} on {threads} threads", clock(e.wall_s))));
+    rows.push((
+        "wall time",
+        format!("about {} on {threads} threads", clock(e.wall_s)),
+    ));
     let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    let mut lines: Vec<String> = rows.iter().map(|(name, value)| format!("{name:width$}  {value}")).collect();
+    let mut lines: Vec<String> = rows
+        .iter()
+        .map(|(name, value)| format!("{name:width$}  {value}"))
+        .collect();
     lines.extend(e.warnings.iter().map(|w| format!("warning: {w}")));
     if e.warnings.is_empty() {
         lines.push("no warnings".into());
@@ -57,7 +88,11 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
 }
 
 fn grains(case: &Case) -> String {
-    let diameters = case.setup.grains.iter().map(|g| 1e3 * g.shape.equivalent_diameter());
+    let diameters = case
+        .setup
+        .grains
+        .iter()
+        .map(|g| 1e3 * g.shape.equivalent_diameter());
     let (least, most) = diameters.fold((f64::INFINITY, 0.0_f64), |(a, b), d| (a.min(d), b.max(d)));
     match case.setup.grains.len() {
         0 => "none".into(),

@@ -26,11 +26,17 @@ pub struct Exit {
 impl Exit {
     /// With one message.
     pub fn new(code: u8, message: impl Into<String>) -> Exit {
-        Exit { code, problems: vec![Problem::new(message)] }
+        Exit {
+            code,
+            problems: vec![Problem::new(message)],
+        }
     }
     /// With one message and what to do about it.
     pub fn with_help(code: u8, message: impl Into<String>, help: impl Into<String>) -> Exit {
-        Exit { code, problems: vec![Problem::new(message).help(help)] }
+        Exit {
+            code,
+            problems: vec![Problem::new(message).help(help)],
+        }
     }
     /// With several problems.
     pub fn problems(code: u8, problems: Vec<Problem>) -> Exit {
@@ -39,11 +45,18 @@ impl Exit {
 
     /// Prints the messages and gives the exit code.
     pub fn report(&self) -> ExitCode {
-        let terminal = std::io::IsTerminal::is_terminal(&std::io::stderr()) && std::env::var_os("NO_COLOR").is_none();
-        let theme = if terminal { GraphicalTheme::unicode() } else { GraphicalTheme::none() };
+        let terminal = std::io::IsTerminal::is_terminal(&std::io::stderr())
+            && std::env::var_os("NO_COLOR").is_none();
+        let theme = if terminal {
+            GraphicalTheme::unicode()
+        } else {
+            GraphicalTheme::none()
+        };
         // A narrow report breaks paths and numbers; what is not a terminal has no width.
         let width = if terminal { 100 } else { 400 };
-        let handler = GraphicalReportHandler::new_themed(theme).with_width(width).with_context_lines(1);
+        let handler = GraphicalReportHandler::new_themed(theme)
+            .with_width(width)
+            .with_context_lines(1);
         for problem in &self.problems {
             let mut text = String::new();
             match handler.render_report(&mut text, problem) {
@@ -59,9 +72,17 @@ impl From<CaseError> for Exit {
     fn from(error: CaseError) -> Exit {
         match error {
             CaseError::Unreadable { ref source, .. } => {
-                let missing = source.kind() == std::io::ErrorKind::NotFound;
-                let help = if missing { "give the path of a case file, for example cases/dkt-pair/quick.toml" } else { "check the file and its permissions" };
-                Exit::with_help(if missing { BAD_INPUT } else { IO }, error.to_string(), help)
+                let (code, help) = match source.kind() {
+                    std::io::ErrorKind::NotFound => (
+                        BAD_INPUT,
+                        "give the path of a case file, for example cases/dkt-pair/quick.toml",
+                    ),
+                    std::io::ErrorKind::InvalidData => {
+                        (BAD_INPUT, "a case file is text (UTF-8) in TOML")
+                    }
+                    _ => (IO, "check the file and its permissions"),
+                };
+                Exit::with_help(code, error.to_string(), help)
             }
             CaseError::Invalid(problems) => Exit::problems(BAD_INPUT, problems),
         }
@@ -74,7 +95,9 @@ impl From<RunError> for Exit {
             RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => {
                 Some("the disk is full: free some space, then continue with --resume")
             }
-            RunError::Io { .. } => Some("check the folder and its permissions, then continue with --resume"),
+            RunError::Io { .. } => {
+                Some("check the folder and its permissions, then continue with --resume")
+            }
             _ => None,
         };
         match help {

@@ -28,12 +28,20 @@ impl Shown {
     pub fn new(quiet: bool, stop: Arc<AtomicBool>, diameter: Option<f64>) -> Shown {
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::new(TICKS);
-            if let Ok(style) = ProgressStyle::with_template("{bar:30.cyan/blue} {percent:>3} % {msg}") {
+            if let Ok(style) =
+                ProgressStyle::with_template("{bar:30.cyan/blue} {percent:>3} % {msg}")
+            {
                 bar.set_style(style.progress_chars("━╸─"));
             }
             bar
         });
-        Shown { bar, quiet, last_line: Instant::now(), stop, diameter }
+        Shown {
+            bar,
+            quiet,
+            last_line: Instant::now(),
+            stop,
+            diameter,
+        }
     }
 
     /// Takes the bar away.
@@ -53,9 +61,18 @@ impl Shown {
     fn describe(&self, p: &Progress) -> String {
         let rate = p.session_steps as f64 / p.wall_s.max(1e-9);
         let left = p.wall_s * (p.end - p.time) / (p.time - p.from).max(1e-300);
-        let mut text = format!("t {:.4} / {:.4} s  step {}  {}  ETA {}", p.time, p.end, p.steps, per_second(rate), clock(left));
+        let mut text = format!(
+            "t {:.4} / {:.4} s  step {}  {}  ETA {}",
+            p.time,
+            p.end,
+            p.steps,
+            per_second(rate),
+            clock(left)
+        );
         if let (Some(gap), Some(phase)) = (p.gap, p.phase) {
-            let gap = self.diameter.map_or(format!("{:.3} mm", 1e3 * gap), |d| format!("{:.2} d", gap / d));
+            let gap = self.diameter.map_or(format!("{:.3} mm", 1e3 * gap), |d| {
+                format!("{:.2} d", gap / d)
+            });
             text += &format!("  gap {gap}  {}", phase.name());
         } else if p.contacts > 0 {
             text += &format!("  {} contacts", p.contacts);
@@ -65,7 +82,11 @@ impl Shown {
 }
 
 fn per_second(rate: f64) -> String {
-    if rate >= 1.0 { format!("{rate:.1} steps/s") } else { format!("{:.1} s/step", 1.0 / rate.max(1e-9)) }
+    if rate >= 1.0 {
+        format!("{rate:.1} steps/s")
+    } else {
+        format!("{:.1} s/step", 1.0 / rate.max(1e-9))
+    }
 }
 
 /// Seconds as "1:02:03" or "2:03".
@@ -74,7 +95,11 @@ pub fn clock(seconds: f64) -> String {
         return "?".into();
     }
     let s = seconds.round() as u64;
-    if s >= 3600 { format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60) } else { format!("{}:{:02}", s / 60, s % 60) }
+    if s >= 3600 {
+        format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
+    } else {
+        format!("{}:{:02}", s / 60, s % 60)
+    }
 }
 
 impl Observer for Shown {
@@ -97,7 +122,12 @@ impl Observer for Shown {
     fn event(&mut self, event: &Event) {
         if !self.quiet {
             let grains: Vec<String> = event.grains.iter().map(usize::to_string).collect();
-            self.line(&format!("t {:.4} s  {} (grain {})", event.time, event.event.name(), grains.join(", ")));
+            self.line(&format!(
+                "t {:.4} s  {} (grain {})",
+                event.time,
+                event.event.name(),
+                grains.join(", ")
+            ));
         }
     }
     fn note(&mut self, text: &str) {

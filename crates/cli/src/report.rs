@@ -18,5 +18,9 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
     for note in &done.notes {
         eprintln!("note: {note}");
     }
-    print(&format!("{} ({} figures)", done.page.display(), done.png.len()))
+    print(&format!(
+        "{} ({} figures)",
+        done.page.display(),
+        done.png.len()
+    ))
 }

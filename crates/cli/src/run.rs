@@ -15,22 +15,42 @@ use crate::{print, threads};
 /// Runs a case.
 pub fn run(args: &RunArgs) -> Result<(), Exit> {
     let case = Case::load(&args.case, &args.set)?;
-    let out = args.output.clone().unwrap_or_else(|| default_folder(&args.case));
+    let out = args
+        .output
+        .clone()
+        .unwrap_or_else(|| default_folder(&args.case));
     let threads = threads::resolve(args.threads.unwrap_or(case.threads));
     let existing = match (args.resume, args.force) {
         (true, _) => Existing::Resume,
         (_, true) => Existing::Replace,
         _ => Existing::Refuse,
     };
-    let options = Options { existing, command: std::env::args().collect(), threads };
+    let options = Options {
+        existing,
+        command: std::env::args().collect(),
+        threads,
+    };
     let stop = Arc::new(AtomicBool::new(false));
     watch_for_interrupt(stop.clone());
     if !args.quiet {
         let cells = case.setup.mesh.cells;
-        let what = if case.setup.fluid.is_some() { format!("{} x {} x {} cells", cells[0], cells[1], cells[2]) } else { "dry".into() };
-        eprintln!("{}: {} grains, {what}, {threads} threads -> {}", args.case.display(), case.setup.grains.len(), out.display());
+        let what = if case.setup.fluid.is_some() {
+            format!("{} x {} x {} cells", cells[0], cells[1], cells[2])
+        } else {
+            "dry".into()
+        };
+        eprintln!(
+            "{}: {} grains, {what}, {threads} threads -> {}",
+            args.case.display(),
+            case.setup.grains.len(),
+            out.display()
+        );
     }
-    let diameter = case.setup.grains.first().map(|g| g.shape.equivalent_diameter());
+    let diameter = case
+        .setup
+        .grains
+        .first()
+        .map(|g| g.shape.equivalent_diameter());
     let mut shown = Shown::new(args.quiet, stop, diameter);
     let ending = threads::on(threads, || {
         let ending = output::run(case.job(), &out, &options, &mut shown);
@@ -40,7 +60,14 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
     match ending {
         Ending::Interrupted(time) => {
             let message = format!("interrupted at t = {time:.6e} s; a checkpoint was written");
-            Err(Exit::with_help(INTERRUPTED, message, format!("continue with: grainwake run {} --resume", out.join(RESOLVED).display())))
+            Err(Exit::with_help(
+                INTERRUPTED,
+                message,
+                format!(
+                    "continue with: grainwake run {} --resume",
+                    out.join(RESOLVED).display()
+                ),
+            ))
         }
         Ending::AlreadyFinished(summary) => {
             if !args.quiet {
@@ -64,8 +91,16 @@ fn conclude(args: &RunArgs, case: &Case, summary: &Summary, out: &Path) -> Resul
     } else if !args.quiet {
         print(&describe(summary, out))?;
     }
-    let missed: Vec<Problem> = verdicts.iter().filter(|v| !v.pass).map(Problem::from).collect();
-    if missed.is_empty() { Ok(()) } else { Err(Exit::problems(MISSED, missed)) }
+    let missed: Vec<Problem> = verdicts
+        .iter()
+        .filter(|v| !v.pass)
+        .map(Problem::from)
+        .collect();
+    if missed.is_empty() {
+        Ok(())
+    } else {
+        Err(Exit::problems(MISSED, missed))
+    }
 }
 
 fn describe(s: &Summary, out: &Path) -> String {
@@ -135,9 +170,18 @@ mod tests {
         let case = folder.path().join("dkt-pair");
         std::fs::create_dir(&case).unwrap();
         std::fs::write(case.join("case.toml"), "").unwrap();
-        assert_eq!(default_folder(&case.join("case.toml")), Path::new("runs/dkt-pair"));
-        assert_eq!(default_folder(&case.join("quick.toml")), Path::new("runs/dkt-pair-quick"));
-        assert_eq!(default_folder(&folder.path().join("mine.toml")), Path::new("runs/mine"));
+        assert_eq!(
+            default_folder(&case.join("case.toml")),
+            Path::new("runs/dkt-pair")
+        );
+        assert_eq!(
+            default_folder(&case.join("quick.toml")),
+            Path::new("runs/dkt-pair-quick")
+        );
+        assert_eq!(
+            default_folder(&folder.path().join("mine.toml")),
+            Path::new("runs/mine")
+        );
         assert_eq!(default_folder(&case.join(RESOLVED)), case);
         assert_eq!(default_folder(Path::new(RESOLVED)), Path::new("."));
     }

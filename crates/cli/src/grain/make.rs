@@ -29,7 +29,9 @@ fn build(body: &Body, options: &ShapeOptions) -> Result<Shape, Exit> {
         Ok(values)
     };
     Ok(match body {
-        Body::Sphere { diameter, .. } => analytic::sphere(0.5 * length("diameter", diameter)?, options)?,
+        Body::Sphere { diameter, .. } => {
+            analytic::sphere(0.5 * length("diameter", diameter)?, options)?
+        }
         Body::Ellipsoid { axes, .. } => {
             let [a, b, c] = three("axes", axes)?.map(|x| 0.5 * x);
             analytic::ellipsoid(a, b, c, options)?
@@ -38,13 +40,23 @@ fn build(body: &Body, options: &ShapeOptions) -> Result<Shape, Exit> {
             let [a, b, c] = three("edges", edges)?;
             analytic::rounded_box(a, b, c, length("--radius", radius)?, options)?
         }
-        Body::Cylinder { diameter, height, .. } => {
-            analytic::cylinder(0.5 * length("diameter", diameter)?, length("height", height)?, options)?
-        }
-        Body::Capsule { diameter, height, .. } => {
-            analytic::capsule(0.5 * length("diameter", diameter)?, length("height", height)?, options)?
-        }
-        Body::Superquadric { axes, exponents, .. } => {
+        Body::Cylinder {
+            diameter, height, ..
+        } => analytic::cylinder(
+            0.5 * length("diameter", diameter)?,
+            length("height", height)?,
+            options,
+        )?,
+        Body::Capsule {
+            diameter, height, ..
+        } => analytic::capsule(
+            0.5 * length("diameter", diameter)?,
+            length("height", height)?,
+            options,
+        )?,
+        Body::Superquadric {
+            axes, exponents, ..
+        } => {
             let semi_axes = three("axes", axes)?.map(|x| 0.5 * x);
             analytic::superquadric(semi_axes, exponents[0], exponents[1], options)?
         }

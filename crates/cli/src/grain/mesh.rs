@@ -12,6 +12,13 @@ pub fn from_mesh(args: &FromMeshArgs) -> Result<(), Exit> {
     may_write(&args.new.output, args.new.force)?;
     let unit = length("--unit", &args.unit)?;
     let (mesh, source) = read_mesh(&args.mesh, unit, &ReadLimits::default())?;
-    let shape = shape_from_mesh(&mesh, &source, &MeshOptions { shape: options(&args.new), flip: args.flip })?;
+    let shape = shape_from_mesh(
+        &mesh,
+        &source,
+        &MeshOptions {
+            shape: options(&args.new),
+            flip: args.flip,
+        },
+    )?;
     save(shape, &args.new)
 }

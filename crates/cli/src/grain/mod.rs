@@ -30,7 +30,10 @@ fn length(name: &str, text: &str) -> Result<f64, Exit> {
 }
 
 fn options(new: &NewGrain) -> ShapeOptions {
-    let mut options = ShapeOptions { nodes: new.nodes, ..ShapeOptions::default() };
+    let mut options = ShapeOptions {
+        nodes: new.nodes,
+        ..ShapeOptions::default()
+    };
     if let Some(cells) = new.cells {
         options.cells = cells;
     }
@@ -40,7 +43,11 @@ fn options(new: &NewGrain) -> ShapeOptions {
 /// Refuses to replace a file without `--force`; asked before any work is done.
 fn may_write(path: &Path, force: bool) -> Result<(), Exit> {
     if path.exists() && !force {
-        return Err(Exit::with_help(BAD_INPUT, format!("{} is there already", path.display()), "give another name with -o, or --force to replace it"));
+        return Err(Exit::with_help(
+            BAD_INPUT,
+            format!("{} is there already", path.display()),
+            "give another name with -o, or --force to replace it",
+        ));
     }
     Ok(())
 }
@@ -48,7 +55,9 @@ fn may_write(path: &Path, force: bool) -> Result<(), Exit> {
 /// Rescales as asked and saves.
 fn finish(shape: Shape, path: &Path, new: &NewGrain) -> Result<Shape, Exit> {
     let shape = match &new.equivalent_diameter {
-        Some(text) => shape.scaled_to_equivalent_diameter(length("--equivalent-diameter", text)?)?,
+        Some(text) => {
+            shape.scaled_to_equivalent_diameter(length("--equivalent-diameter", text)?)?
+        }
         None => shape,
     };
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
@@ -65,7 +74,11 @@ fn save(shape: Shape, new: &NewGrain) -> Result<(), Exit> {
 }
 
 fn show(shape: &Shape, path: &Path, json: bool) -> Result<(), Exit> {
-    if json { print(&serde_json::to_string(&shape.record())?) } else { print(&table::of(&shape.record(), path)) }
+    if json {
+        print(&serde_json::to_string(&shape.record())?)
+    } else {
+        print(&table::of(&shape.record(), path))
+    }
 }
 
 fn info(args: &InfoArgs) -> Result<(), Exit> {

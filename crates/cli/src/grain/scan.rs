@@ -31,9 +31,21 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
         return all(args, grains);
     }
     let Some(grain) = grains.pop().filter(|_| grains.is_empty()) else {
-        let labels: Vec<String> = grains.iter().take(10).map(|g| g.label.to_string()).collect();
-        let message = format!("the image holds {} grains, the first with labels {}", grains.len() + 1, labels.join(", "));
-        return Err(Exit::with_help(BAD_INPUT, message, "choose one with --label N, or give -o a folder to take them all"));
+        let labels: Vec<String> = grains
+            .iter()
+            .take(10)
+            .map(|g| g.label.to_string())
+            .collect();
+        let message = format!(
+            "the image holds {} grains, the first with labels {}",
+            grains.len() + 1,
+            labels.join(", ")
+        );
+        return Err(Exit::with_help(
+            BAD_INPUT,
+            message,
+            "choose one with --label N, or give -o a folder to take them all",
+        ));
     };
     save(grain.shape?, &args.new)
 }
@@ -56,16 +68,26 @@ fn all(args: &FromScanArgs, grains: Vec<ScannedGrain>) -> Result<(), Exit> {
                 } else {
                     print(&format!(
                         "{}  {} voxels, equivalent diameter {:.4} mm, Krumbein sphericity {:.3}",
-                        file.display(), grain.voxels, 1e3 * record.equivalent_diameter_m, record.krumbein_sphericity
+                        file.display(),
+                        grain.voxels,
+                        1e3 * record.equivalent_diameter_m,
+                        record.krumbein_sphericity
                     ))?;
                 }
             }
             Err(reason) => {
                 refused += 1;
-                eprintln!("label {} ({} voxels) left out: {reason}", grain.label, grain.voxels);
+                eprintln!(
+                    "label {} ({} voxels) left out: {reason}",
+                    grain.label, grain.voxels
+                );
             }
         }
     }
     eprintln!("{kept} grains written, {refused} left out");
-    if kept == 0 { Err(Exit::new(BAD_INPUT, "no grain of the image can be used")) } else { Ok(()) }
+    if kept == 0 {
+        Err(Exit::new(BAD_INPUT, "no grain of the image can be used"))
+    } else {
+        Ok(())
+    }
 }

@@ -17,7 +17,7 @@ pub const WET: &str = r#"
 title = "small and wet"
 [fluid]
 density = 1000
-viscosity = "1 mPa s"
+viscosity = "5 mPa s"
 [domain]
 size = ["4 mm", "4 mm", "12 mm"]
 cell_size = "0.5 mm"
@@ -91,7 +91,11 @@ pub fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
             if path.is_dir() {
                 collect(&path, root, found);
             } else {
-                let name = path.strip_prefix(root).unwrap().to_string_lossy().into_owned();
+                let name = path
+                    .strip_prefix(root)
+                    .unwrap()
+                    .to_string_lossy()
+                    .into_owned();
                 found.push((name, std::fs::read(&path).unwrap()));
             }
         }
@@ -119,7 +123,12 @@ pub fn assert_same_run(a: &Path, b: &Path) {
             .collect()
     };
     let (a, b) = (strip(contents(a)), strip(contents(b)));
-    let names = |files: &[(String, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    let names = |files: &[(String, Vec<u8>)]| {
+        files
+            .iter()
+            .map(|(name, _)| name.clone())
+            .collect::<Vec<_>>()
+    };
     assert_eq!(names(&a), names(&b));
     for ((name, a), (_, b)) in a.iter().zip(&b) {
         assert!(a == b, "{name} differs");

@@ -15,14 +15,26 @@ pub struct Problem {
     pub message: String,
     /// What to do.
     pub help: Option<String>,
-    source: Option<NamedSource<String>>,
-    label: Option<(String, Range<usize>)>,
+    place: Option<Box<Place>>,
+}
+
+/// A range of a named text, and a few words about it.
+#[derive(Clone, Debug)]
+struct Place {
+    source: NamedSource<String>,
+    label: String,
+    span: Range<usize>,
 }
 
 impl Problem {
     /// A problem without a place.
     pub fn new(message: impl Into<String>) -> Problem {
-        Problem { key: None, message: message.into(), help: None, source: None, label: None }
+        Problem {
+            key: None,
+            message: message.into(),
+            help: None,
+            place: None,
+        }
     }
     /// With the dotted key it concerns.
     #[must_use]
@@ -38,14 +50,24 @@ impl Problem {
     }
     /// With its place: a name and text, a range of its bytes, and a few words about that range.
     #[must_use]
-    pub fn at(mut self, name: &str, text: &str, span: Range<usize>, label: impl Into<String>) -> Problem {
-        self.source = Some(NamedSource::new(name, text.to_string()));
-        self.label = Some((label.into(), span));
+    pub fn at(
+        mut self,
+        name: &str,
+        text: &str,
+        span: Range<usize>,
+        label: impl Into<String>,
+    ) -> Problem {
+        let source = NamedSource::new(name, text.to_string());
+        self.place = Some(Box::new(Place {
+            source,
+            label: label.into(),
+            span,
+        }));
         self
     }
     /// File, line and column (both from 1) of the place.
     pub fn place(&self) -> Option<(&str, usize, usize)> {
-        let (source, (_, span)) = (self.source.as_ref()?, self.label.as_ref()?);
+        let Place { source, span, .. } = self.place.as_deref()?;
         let before = source.inner().get(..span.start)?;
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
@@ -66,15 +88,23 @@ impl std::error::Error for Problem {}
 
 impl Diagnostic for Problem {
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.help.as_ref().map(|h| Box::new(h) as Box<dyn fmt::Display>)
+        self.help
+            .as_ref()
+            .map(|h| Box::new(h) as Box<dyn fmt::Display>)
     }
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.source.as_ref().map(|s| s as &dyn SourceCode)
+        self.place
+            .as_deref()
+            .map(|place| &place.source as &dyn SourceCode)
     }
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let (label, span) = self.label.as_ref()?;
+        let Place { label, span, .. } = self.place.as_deref()?;
         let label = (!label.is_empty()).then(|| label.clone());
-        Some(Box::new(std::iter::once(LabeledSpan::new(label, span.start, span.len().max(1)))))
+        Some(Box::new(std::iter::once(LabeledSpan::new(
+            label,
+            span.start,
+            span.len().max(1),
+        ))))
     }
 }
 
@@ -95,7 +125,11 @@ pub enum CaseError {
 }
 
 fn list(problems: &[Problem]) -> String {
-    problems.iter().map(Problem::to_string).collect::<Vec<_>>().join("\n")
+    problems
+        .iter()
+        .map(Problem::to_string)
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 impl CaseError {

@@ -53,7 +53,9 @@ impl Expectation {
     pub fn judge(&self, summary: &Summary) -> Verdict {
         let value = self.value(summary);
         let pass = value.is_some_and(|v| (self.low..=self.high).contains(&v));
-        let quantity = self.grain.map_or(self.quantity.to_string(), |g| format!("{} of grain {g}", self.quantity));
+        let quantity = self.grain.map_or(self.quantity.to_string(), |g| {
+            format!("{} of grain {g}", self.quantity)
+        });
         let finite = |x: f64| x.is_finite().then_some(x);
         Verdict {
             quantity,
@@ -67,9 +69,18 @@ impl Expectation {
 
     fn value(&self, summary: &Summary) -> Option<f64> {
         let chosen = |i: &usize| self.grain.is_none_or(|g| g == *i);
-        let grains = || summary.grains.iter().enumerate().filter(|(i, _)| chosen(i)).map(|(_, g)| g);
+        let grains = || {
+            summary
+                .grains
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| chosen(i))
+                .map(|(_, g)| g)
+        };
         match self.measure {
-            Measure::PeakSettlingSpeed => grains().map(|g| g.peak_settling_speed_m_per_s).reduce(f64::max),
+            Measure::PeakSettlingSpeed => grains()
+                .map(|g| g.peak_settling_speed_m_per_s)
+                .reduce(f64::max),
             Measure::LandingTime => grains().filter_map(|g| g.landing_time_s).reduce(f64::min),
             Measure::KissTime => summary.pair.as_ref()?.kiss_time_s,
             Measure::TumbleTime => summary.pair.as_ref()?.tumble_time_s,
@@ -89,59 +100,163 @@ pub(super) fn expectations(raw: &RawExpect, grains: usize, fail: &mut Fail) -> V
     let mut all = Vec::new();
     let pair = |fail: &mut Fail, present: bool, name: &str| {
         if present && grains != 2 {
-            fail(None, &format!("expect.{name}"), format!("this is a result of a pair, but there are {grains} grains"), "leave it out, or use two grains");
+            fail(
+                None,
+                &format!("expect.{name}"),
+                format!("this is a result of a pair, but there are {grains} grains"),
+                "leave it out, or use two grains",
+            );
         }
     };
     pair(fail, raw.kiss_time.is_some(), "kiss_time");
     pair(fail, raw.tumble_time.is_some(), "tumble_time");
     pair(fail, raw.separation_time.is_some(), "separation_time");
     pair(fail, raw.role_changes.is_some(), "role_changes");
-    collect(&raw.peak_settling_speed, "peak_settling_speed", Measure::PeakSettlingSpeed, grains, &mut all, fail);
-    collect(&raw.kiss_time, "kiss_time", Measure::KissTime, grains, &mut all, fail);
-    collect(&raw.tumble_time, "tumble_time", Measure::TumbleTime, grains, &mut all, fail);
-    collect(&raw.separation_time, "separation_time", Measure::SeparationTime, grains, &mut all, fail);
-    collect(&raw.landing_time, "landing_time", Measure::LandingTime, grains, &mut all, fail);
-    collect(&raw.role_changes, "role_changes", Measure::RoleChanges, grains, &mut all, fail);
-    collect(&raw.end_time, "end_time", Measure::EndTime, grains, &mut all, fail);
-    collect(&raw.max_divergence, "max_divergence", Measure::MaxDivergence, grains, &mut all, fail);
+    collect(
+        &raw.peak_settling_speed,
+        "peak_settling_speed",
+        Measure::PeakSettlingSpeed,
+        grains,
+        &mut all,
+        fail,
+    );
+    collect(
+        &raw.kiss_time,
+        "kiss_time",
+        Measure::KissTime,
+        grains,
+        &mut all,
+        fail,
+    );
+    collect(
+        &raw.tumble_time,
+        "tumble_time",
+        Measure::TumbleTime,
+        grains,
+        &mut all,
+        fail,
+    );
+    collect(
+        &raw.separation_time,
+        "separation_time",
+        Measure::SeparationTime,
+        grains,
+        &mut all,
+        fail,
+    );
+    collect(
+        &raw.landing_time,
+        "landing_time",
+        Measure::LandingTime,
+        grains,
+        &mut all,
+        fail,
+    );
+    collect(
+        &raw.role_changes,
+        "role_changes",
+        Measure::RoleChanges,
+        grains,
+        &mut all,
+        fail,
+    );
+    collect(
+        &raw.end_time,
+        "end_time",
+        Measure::EndTime,
+        grains,
+        &mut all,
+        fail,
+    );
+    collect(
+        &raw.max_divergence,
+        "max_divergence",
+        Measure::MaxDivergence,
+        grains,
+        &mut all,
+        fail,
+    );
     all
 }
 
-fn collect<K: Kind>(raw: &Option<OneOrMany<RawExpected<K>>>, quantity: &'static str, measure: Measure, grains: usize, all: &mut Vec<Expectation>, fail: &mut Fail) {
+fn collect<K: Kind>(
+    raw: &Option<OneOrMany<RawExpected<K>>>,
+    quantity: &'static str,
+    measure: Measure,
+    grains: usize,
+    all: &mut Vec<Expectation>,
+    fail: &mut Fail,
+) {
     let key = format!("expect.{quantity}");
     for item in raw.iter().flat_map(|list| &list.0) {
         let (item, place) = (&item.value, &item.span);
         if let Some(grain) = item.grain.as_ref().filter(|g| g.value >= grains) {
-            fail(grain.span.as_ref(), &key, format!("there is no grain {}", grain.value), "grains count from 0");
+            fail(
+                grain.span.as_ref(),
+                &key,
+                format!("there is no grain {}", grain.value),
+                "grains count from 0",
+            );
             continue;
         }
-        let span = item.value.as_ref().and_then(|v| v.span.as_ref()).or(place.as_ref());
+        let span = item
+            .value
+            .as_ref()
+            .and_then(|v| v.span.as_ref())
+            .or(place.as_ref());
         let bounds = match (&item.value, &item.tolerance, &item.at_least, &item.at_most) {
             (Some(value), Some(tolerance), None, None) => {
                 let width = match tolerance.value {
                     Tolerance::Absolute(q) => q.si,
                     Tolerance::Relative(fraction) => fraction * value.si.abs(),
                 };
-                if width >= 0.0 { Some((value.si - width, value.si + width)) } else { None }
+                if width >= 0.0 {
+                    Some((value.si - width, value.si + width))
+                } else {
+                    None
+                }
             }
-            (None, None, low, high) if low.is_some() || high.is_some() => {
-                Some((low.as_ref().map_or(f64::NEG_INFINITY, |q| q.si), high.as_ref().map_or(f64::INFINITY, |q| q.si)))
-            }
+            (None, None, low, high) if low.is_some() || high.is_some() => Some((
+                low.as_ref().map_or(f64::NEG_INFINITY, |q| q.si),
+                high.as_ref().map_or(f64::INFINITY, |q| q.si),
+            )),
             _ => None,
         };
         let Some((low, high)) = bounds.filter(|(low, high)| low <= high) else {
-            fail(span, &key, "this does not say what is expected".into(), "write { value = ..., tolerance = \"2 %\" }, or { at_least = ..., at_most = ... }");
+            fail(
+                span,
+                &key,
+                "this does not say what is expected".into(),
+                "write { value = ..., tolerance = \"2 %\" }, or { at_least = ..., at_most = ... }",
+            );
             continue;
         };
-        let (reference, grain) = (item.value.as_ref().map(|v| v.si), item.grain.as_ref().map(|g| g.value));
-        all.push(Expectation { quantity, measure, grain, reference, low, high });
+        let (reference, grain) = (
+            item.value.as_ref().map(|v| v.si),
+            item.grain.as_ref().map(|g| g.value),
+        );
+        all.push(Expectation {
+            quantity,
+            measure,
+            grain,
+            reference,
+            low,
+            high,
+        });
     }
 }
 
 impl From<&Verdict> for Problem {
     fn from(verdict: &Verdict) -> Problem {
-        let value = verdict.value.map_or("did not happen".to_string(), |v| format!("is {v:.6e}"));
-        let [low, high] = verdict.bound.map(|b| b.map_or("any".to_string(), |b| format!("{b:.6e}")));
-        Problem::new(format!("expected {} between {low} and {high}, but it {value}", verdict.quantity))
+        let value = verdict
+            .value
+            .map_or("did not happen".to_string(), |v| format!("is {v:.6e}"));
+        let [low, high] = verdict
+            .bound
+            .map(|b| b.map_or("any".to_string(), |b| format!("{b:.6e}")));
+        Problem::new(format!(
+            "expected {} between {low} and {high}, but it {value}",
+            verdict.quantity
+        ))
     }
 }

@@ -54,7 +54,10 @@ impl<T: fmt::Debug> fmt::Debug for Loc<T> {
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Loc<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let spanned = Spanned::<T>::deserialize(deserializer)?;
-        Ok(Loc { span: Some(spanned.span()), value: spanned.into_inner() })
+        Ok(Loc {
+            span: Some(spanned.span()),
+            value: spanned.into_inner(),
+        })
     }
 }
 

@@ -62,7 +62,10 @@ impl Case {
     /// # Errors
     /// [`CaseError`] with every problem found and its place.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Case, CaseError> {
-        let text = std::fs::read_to_string(path).map_err(|source| CaseError::Unreadable { path: path.into(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| CaseError::Unreadable {
+            path: path.into(),
+            source,
+        })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Case::parse(&text, &path.display().to_string(), folder, overrides)
     }
@@ -71,15 +74,38 @@ impl Case {
     ///
     /// # Errors
     /// [`CaseError`] with every problem found and its place.
-    pub fn parse(text: &str, name: &str, folder: &Path, overrides: &[String]) -> Result<Case, CaseError> {
+    pub fn parse(
+        text: &str,
+        name: &str,
+        folder: &Path,
+        overrides: &[String],
+    ) -> Result<Case, CaseError> {
         let (source, raw) = source::Source::parse(name, text, overrides)?;
         let v = validate::validate(&source, raw, folder)?;
-        let write = |raw: &RawCase| toml::to_string(raw).map_err(|e| CaseError::from(Problem::new(e.to_string())));
+        let write = |raw: &RawCase| {
+            toml::to_string(raw).map_err(|e| CaseError::from(Problem::new(e.to_string())))
+        };
         let resolved = write(&v.resolved)?;
         let digest = digest(&v.resolved, &v.shapes, &write)?;
         let title = v.resolved.title;
-        let validate::Validated { setup, plan, threads, expect, shapes, .. } = v;
-        Ok(Case { title, setup, plan, threads, expect, resolved, shapes, digest })
+        let validate::Validated {
+            setup,
+            plan,
+            threads,
+            expect,
+            shapes,
+            ..
+        } = v;
+        Ok(Case {
+            title,
+            setup,
+            plan,
+            threads,
+            expect,
+            resolved,
+            shapes,
+            digest,
+        })
     }
 }
 
@@ -91,7 +117,11 @@ impl Case {
             plan: self.plan.clone(),
             resolved: self.resolved.clone(),
             digest: self.digest.clone(),
-            files: self.shapes.iter().map(|file| (file.name.clone(), file.bytes.clone())).collect(),
+            files: self
+                .shapes
+                .iter()
+                .map(|file| (file.name.clone(), file.bytes.clone()))
+                .collect(),
         }
     }
 }
@@ -104,7 +134,11 @@ pub fn parse_length(text: &str) -> Result<f64, String> {
     quantity::parse_quantity::<quantity::Length>(text)
 }
 
-fn digest(resolved: &RawCase, shapes: &[ShapeFile], write: &dyn Fn(&RawCase) -> Result<String, CaseError>) -> Result<String, CaseError> {
+fn digest(
+    resolved: &RawCase,
+    shapes: &[ShapeFile],
+    write: &dyn Fn(&RawCase) -> Result<String, CaseError>,
+) -> Result<String, CaseError> {
     let mut core = resolved.clone();
     core.title = String::new();
     core.run = RawRun::default();
@@ -119,5 +153,9 @@ fn digest(resolved: &RawCase, shapes: &[ShapeFile], write: &dyn Fn(&RawCase) -> 
         hash.update(shape.name.as_bytes());
         hash.update(shape.bytes.as_slice());
     }
-    Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(hash
+        .finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect())
 }

@@ -28,7 +28,11 @@ impl Random {
     }
     /// Evenly over all orientations (Shoemake 1992).
     pub fn orientation(&mut self) -> DQuat {
-        let (u, a, b) = (self.unit(), std::f64::consts::TAU * self.unit(), std::f64::consts::TAU * self.unit());
+        let (u, a, b) = (
+            self.unit(),
+            std::f64::consts::TAU * self.unit(),
+            std::f64::consts::TAU * self.unit(),
+        );
         let (low, high) = ((1.0 - u).sqrt(), u.sqrt());
         DQuat::from_xyzw(low * a.sin(), low * a.cos(), high * b.sin(), high * b.cos()).normalize()
     }
@@ -75,9 +79,16 @@ impl Space<'_> {
     /// where the region spans a periodic axis.
     fn margin(&self, radius: f64) -> DVec3 {
         let spans = |axis: usize| {
-            self.enclosure.periodic[axis] && (self.upper - self.lower)[axis] >= self.enclosure.size()[axis] * (1.0 - 1e-9)
+            self.enclosure.periodic[axis]
+                && (self.upper - self.lower)[axis] >= self.enclosure.size()[axis] * (1.0 - 1e-9)
         };
-        DVec3::from_array([0, 1, 2].map(|axis| if spans(axis) { 0.0 } else { radius + self.clearance }))
+        DVec3::from_array([0, 1, 2].map(|axis| {
+            if spans(axis) {
+                0.0
+            } else {
+                radius + self.clearance
+            }
+        }))
     }
 
     /// Random centres without overlap; the error says how many found a place.
@@ -90,7 +101,10 @@ impl Space<'_> {
                 return Err(placed.len());
             }
             let found = (0..20_000).find_map(|_| {
-                let ball = Ball { centre: self.lower + margin + room * random.point(), radius };
+                let ball = Ball {
+                    centre: self.lower + margin + room * random.point(),
+                    radius,
+                };
                 self.free(ball, &placed).then_some(ball)
             });
             placed.push(found.ok_or(placed.len())?);
@@ -100,7 +114,13 @@ impl Space<'_> {
 
     /// Centres on a cubic lattice filled layer by layer from below (along `up`), each shifted by
     /// up to `jitter` of its free space; the error says how many sites there are.
-    pub fn lattice(&self, radii: &[f64], jitter: f64, up: (usize, f64), random: &mut Random) -> Result<Vec<DVec3>, usize> {
+    pub fn lattice(
+        &self,
+        radii: &[f64],
+        jitter: f64,
+        up: (usize, f64),
+        random: &mut Random,
+    ) -> Result<Vec<DVec3>, usize> {
         let largest = radii.iter().copied().fold(0.0, f64::max);
         let margin = self.margin(largest);
         let smallest_pitch = 2.0 * largest + self.clearance;
@@ -112,7 +132,11 @@ impl Space<'_> {
         let sites: [usize; 3] = std::array::from_fn(|axis| {
             // A periodic axis has as many gaps as sites.
             let whole = (sites[axis] * (1.0 + 1e-12)).floor() as usize;
-            if margin[axis] == 0.0 { whole } else { whole + 1 }
+            if margin[axis] == 0.0 {
+                whole
+            } else {
+                whole + 1
+            }
         });
         let capacity: usize = sites.iter().product();
         if capacity < radii.len() {
@@ -128,19 +152,35 @@ impl Space<'_> {
         let layers = radii.len().div_ceil(layer);
         let mut pitch = DVec3::ZERO;
         for a in 0..3 {
-            let gaps = if margin[a] == 0.0 { sites[a] } else { sites[a] - 1 };
-            pitch[a] = if gaps == 0 { 0.0 } else { room[a] / gaps as f64 };
+            let gaps = if margin[a] == 0.0 {
+                sites[a]
+            } else {
+                sites[a] - 1
+            };
+            pitch[a] = if gaps == 0 {
+                0.0
+            } else {
+                room[a] / gaps as f64
+            };
         }
         // Stacked tightly along the vertical, spread evenly across.
-        pitch[axis] = if layers > 1 { pitch[axis].min(1.2 * smallest_pitch) } else { 0.0 };
+        pitch[axis] = if layers > 1 {
+            pitch[axis].min(1.2 * smallest_pitch)
+        } else {
+            0.0
+        };
         let mut centres = Vec::with_capacity(radii.len());
         for (n, &radius) in radii.iter().enumerate() {
             let (level, rest) = (n / layer, n % layer);
             let mut site = [0.0; 3];
-            (site[across], site[along], site[axis]) =
-                ((rest % sites[across]) as f64, (rest / sites[across]) as f64, level as f64);
+            (site[across], site[along], site[axis]) = (
+                (rest % sites[across]) as f64,
+                (rest / sites[across]) as f64,
+                level as f64,
+            );
             let free = (pitch - smallest_pitch).max(DVec3::ZERO) + 2.0 * (largest - radius);
-            let offset = pitch * DVec3::from_array(site) + jitter * 0.5 * free * (2.0 * random.point() - 1.0);
+            let offset = pitch * DVec3::from_array(site)
+                + jitter * 0.5 * free * (2.0 * random.point() - 1.0);
             let corner = self.lower + margin;
             let mut centre = corner + offset;
             if sign < 0.0 {
@@ -156,7 +196,10 @@ impl Space<'_> {
 
     /// Whether none of these balls meets another or one that stands there.
     pub fn clear(&self, balls: &[Ball]) -> bool {
-        balls.iter().enumerate().all(|(i, ball)| self.free(*ball, &balls[..i]))
+        balls
+            .iter()
+            .enumerate()
+            .all(|(i, ball)| self.free(*ball, &balls[..i]))
     }
 }
 
@@ -165,28 +208,60 @@ mod tests {
     use super::*;
 
     fn space<'a>(enclosure: &'a Enclosure, taken: &'a [Ball]) -> Space<'a> {
-        Space { lower: DVec3::ZERO, upper: DVec3::new(1.0, 1.0, 3.0), clearance: 0.01, enclosure, taken }
+        Space {
+            lower: DVec3::ZERO,
+            upper: DVec3::new(1.0, 1.0, 3.0),
+            clearance: 0.01,
+            enclosure,
+            taken,
+        }
     }
 
     fn closed() -> Enclosure {
-        Enclosure { lower: DVec3::ZERO, upper: DVec3::new(1.0, 1.0, 3.0), periodic: [false; 3], solid: [[true; 2]; 3] }
+        Enclosure {
+            lower: DVec3::ZERO,
+            upper: DVec3::new(1.0, 1.0, 3.0),
+            periodic: [false; 3],
+            solid: [[true; 2]; 3],
+        }
     }
 
     fn balls(centres: &[DVec3], radii: &[f64]) -> Vec<Ball> {
-        centres.iter().zip(radii).map(|(centre, radius)| Ball { centre: *centre, radius: *radius }).collect()
+        centres
+            .iter()
+            .zip(radii)
+            .map(|(centre, radius)| Ball {
+                centre: *centre,
+                radius: *radius,
+            })
+            .collect()
     }
 
     #[test]
     fn lattices_keep_clear_and_inside() {
         for periodic in [false, true] {
-            let enclosure = Enclosure { periodic: [periodic; 3], ..closed() };
+            let enclosure = Enclosure {
+                periodic: [periodic; 3],
+                ..closed()
+            };
             let space = space(&enclosure, &[]);
             let radii: Vec<f64> = (0..150).map(|i| 0.06 + 0.0002 * f64::from(i)).collect();
             for jitter in [0.0, 0.5, 1.0] {
-                let centres = space.lattice(&radii, jitter, (2, 1.0), &mut Random::new(7)).unwrap();
-                assert!(space.clear(&balls(&centres, &radii)), "periodic {periodic}, jitter {jitter}");
+                let centres = space
+                    .lattice(&radii, jitter, (2, 1.0), &mut Random::new(7))
+                    .unwrap();
+                assert!(
+                    space.clear(&balls(&centres, &radii)),
+                    "periodic {periodic}, jitter {jitter}"
+                );
                 if !periodic {
-                    assert!(centres.iter().zip(&radii).all(|(c, r)| (*c - r).min_element() >= 0.0 && (*c + *r).cmple(space.upper).all()));
+                    assert!(
+                        centres
+                            .iter()
+                            .zip(&radii)
+                            .all(|(c, r)| (*c - r).min_element() >= 0.0
+                                && (*c + *r).cmple(space.upper).all())
+                    );
                 }
             }
         }
@@ -194,7 +269,13 @@ mod tests {
 
     #[test]
     fn random_places_are_clear_and_repeat() {
-        let (enclosure, taken) = (closed(), [Ball { centre: DVec3::splat(0.5), radius: 0.3 }]);
+        let (enclosure, taken) = (
+            closed(),
+            [Ball {
+                centre: DVec3::splat(0.5),
+                radius: 0.3,
+            }],
+        );
         let space = space(&enclosure, &taken);
         let radii = [0.1; 60];
         let centres = space.random(&radii, &mut Random::new(3)).unwrap();
@@ -207,7 +288,10 @@ mod tests {
     fn too_many_are_refused_with_the_capacity() {
         let enclosure = closed();
         let space = space(&enclosure, &[]);
-        assert_eq!(space.lattice(&[0.4; 9], 0.0, (2, 1.0), &mut Random::new(0)), Err(3));
+        assert_eq!(
+            space.lattice(&[0.4; 9], 0.0, (2, 1.0), &mut Random::new(0)),
+            Err(3)
+        );
         let placed = space.random(&[0.4; 9], &mut Random::new(0)).unwrap_err();
         assert!((1..4).contains(&placed));
     }

@@ -16,28 +16,45 @@ pub(super) fn orientation(orientation: &Orientation, turns: &Turns) -> Result<DQ
         Orientation::Axes(axes) => from_axes(axes)?,
     };
     let turned = turns.0.iter().fold(start, |q, turn| turn.quaternion() * q);
-    Ok(if (turned.length_squared() - 1.0).abs() < 1e-14 { turned } else { turned.normalize() })
+    Ok(if (turned.length_squared() - 1.0).abs() < 1e-14 {
+        turned
+    } else {
+        turned.normalize()
+    })
 }
 
 /// Turns the principal axes (long, middle, short) into the given directions. A second direction
 /// is made perpendicular to the first; where there is none, the next principal axis points along
 /// the next axis of space (x -> y -> z -> x), made perpendicular.
 fn from_axes(axes: &[Option<DVec3>; 3]) -> Result<DQuat, String> {
-    let first = axes.iter().position(Option::is_some).ok_or("no direction is given")?;
-    let a = axes[first].and_then(DVec3::try_normalize).ok_or("a direction cannot be zero")?;
+    let first = axes
+        .iter()
+        .position(Option::is_some)
+        .ok_or("no direction is given")?;
+    let a = axes[first]
+        .and_then(DVec3::try_normalize)
+        .ok_or("a direction cannot be zero")?;
     let second = (0..3).find(|i| *i != first && axes[*i].is_some());
     let (other, toward) = match second {
         Some(i) => (i, axes[i].unwrap_or(DVec3::ZERO)),
         None => {
-            let largest = (0..3).max_by(|i, j| a[*i].abs().total_cmp(&a[*j].abs())).unwrap_or(0);
+            let largest = (0..3)
+                .max_by(|i, j| a[*i].abs().total_cmp(&a[*j].abs()))
+                .unwrap_or(0);
             ((first + 1) % 3, DVec3::AXES[(largest + 1) % 3])
         }
     };
-    let b = (toward - a * a.dot(toward)).try_normalize().filter(|_| a.cross(toward).length() > 1e-6 * toward.length());
+    let b = (toward - a * a.dot(toward))
+        .try_normalize()
+        .filter(|_| a.cross(toward).length() > 1e-6 * toward.length());
     let b = b.ok_or("the two directions are parallel; principal axes are perpendicular")?;
     let third = 3 - first - other;
     // Right-handed: axis i x axis i+1 = axis i+2.
-    let c = if other == (first + 1) % 3 { a.cross(b) } else { b.cross(a) };
+    let c = if other == (first + 1) % 3 {
+        a.cross(b)
+    } else {
+        b.cross(a)
+    };
     let mut columns = [DVec3::ZERO; 3];
     (columns[first], columns[other], columns[third]) = (a, b, c);
     Ok(DQuat::from_mat3(&DMat3::from_cols(columns[0], columns[1], columns[2])).normalize())
@@ -51,10 +68,18 @@ pub(super) fn reach(grain: &Grain, axis: usize) -> (f64, f64) {
     let side = |side: usize| {
         let mut solid = [[false; 2]; 3];
         solid[axis][side] = true;
-        let box_around = Enclosure { lower: centre - margin, upper: centre + margin, periodic: [false; 3], solid };
+        let box_around = Enclosure {
+            lower: centre - margin,
+            upper: centre + margin,
+            periodic: [false; 3],
+            solid,
+        };
         wall_gap(grain, &box_around).map_or(margin, |(gap, _)| gap)
     };
-    (centre[axis] - margin + side(0), centre[axis] + margin - side(1))
+    (
+        centre[axis] - margin + side(0),
+        centre[axis] + margin - side(1),
+    )
 }
 
 #[cfg(test)]
@@ -73,7 +98,9 @@ mod tests {
         assert!(turned(both, DVec3::X).distance(DVec3::Z) < 1e-12);
         assert!(turned(both, DVec3::Z).distance(DVec3::X) < 1e-12);
         let tilted = [None, Some(DVec3::new(1.0, 0.0, 1.0)), Some(DVec3::Y)];
-        assert!((turned(tilted, DVec3::Y) - DVec3::new(1.0, 0.0, 1.0).normalize()).length() < 1e-12);
+        assert!(
+            (turned(tilted, DVec3::Y) - DVec3::new(1.0, 0.0, 1.0).normalize()).length() < 1e-12
+        );
         for axes in [both, tilted, [Some(DVec3::NEG_Y), None, None]] {
             let q = from_axes(&axes).unwrap();
             assert!((q * DVec3::X).cross(q * DVec3::Y).distance(q * DVec3::Z) < 1e-12);

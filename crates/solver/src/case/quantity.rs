@@ -85,7 +85,10 @@ pub struct Quantity<K> {
 impl<K> Quantity<K> {
     /// A quantity from its value in SI units.
     pub const fn new(si: f64) -> Self {
-        Quantity { si, kind: PhantomData }
+        Quantity {
+            si,
+            kind: PhantomData,
+        }
     }
 }
 impl<K> Clone for Quantity<K> {
@@ -114,7 +117,12 @@ fn how_to_write<K: Kind>() -> String {
     if K::SI == "1" {
         format!("a plain number such as {}", K::EXAMPLE)
     } else {
-        format!("{} as a number in {} or a string such as \"{}\"", K::NAME, K::SI, K::EXAMPLE)
+        format!(
+            "{} as a number in {} or a string such as \"{}\"",
+            K::NAME,
+            K::SI,
+            K::EXAMPLE
+        )
     }
 }
 
@@ -122,8 +130,12 @@ fn how_to_write<K: Kind>() -> String {
 pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
     let trimmed = text.trim();
     let end = number_end(trimmed);
-    let value: f64 =
-        trimmed[..end].parse().map_err(|_| format!("\"{text}\" does not start with a number; write {}", how_to_write::<K>()))?;
+    let value: f64 = trimmed[..end].parse().map_err(|_| {
+        format!(
+            "\"{text}\" does not start with a number; write {}",
+            how_to_write::<K>()
+        )
+    })?;
     let unit = trimmed[end..].trim();
     if unit.is_empty() {
         return Ok(value);
@@ -131,14 +143,30 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
     let scale = parse_unit(unit).map_err(|error| match error {
         UnitError::Unknown(symbol) => {
             let symbols = known_symbols();
-            let hint = nearest(&symbol, symbols.iter().map(String::as_str)).map_or(String::new(), |s| format!(" (did you mean `{s}`?)"));
-            format!("unknown unit `{symbol}` in \"{text}\"{hint}; write {}", how_to_write::<K>())
+            let hint = nearest(&symbol, symbols.iter().map(String::as_str))
+                .map_or(String::new(), |s| format!(" (did you mean `{s}`?)"));
+            format!(
+                "unknown unit `{symbol}` in \"{text}\"{hint}; write {}",
+                how_to_write::<K>()
+            )
         }
-        UnitError::Malformed(unit) => format!("the unit `{unit}` in \"{text}\" cannot be read; write {}", how_to_write::<K>()),
+        UnitError::Malformed(unit) => format!(
+            "the unit `{unit}` in \"{text}\" cannot be read; write {}",
+            how_to_write::<K>()
+        ),
     })?;
-    let bare_angle = Dimension { angle: 0, ..K::DIMENSION };
-    if scale.dimension != K::DIMENSION && !(K::DIMENSION.angle != 0 && scale.dimension == bare_angle) {
-        return Err(format!("\"{text}\" is {}; expected {}", scale.dimension.describe(), how_to_write::<K>()));
+    let bare_angle = Dimension {
+        angle: 0,
+        ..K::DIMENSION
+    };
+    if scale.dimension != K::DIMENSION
+        && !(K::DIMENSION.angle != 0 && scale.dimension == bare_angle)
+    {
+        return Err(format!(
+            "\"{text}\" is {}; expected {}",
+            scale.dimension.describe(),
+            how_to_write::<K>()
+        ));
     }
     Ok(scale.to_si(value))
 }
@@ -170,7 +198,14 @@ impl<'de, K: Kind> Deserialize<'de> for Quantity<K> {
         struct QuantityVisitor<K>(PhantomData<K>);
         impl<K: Kind> QuantityVisitor<K> {
             fn finite<E: de::Error>(value: f64) -> Result<Quantity<K>, E> {
-                if value.is_finite() { Ok(Quantity::new(value)) } else { Err(E::custom(format!("found {value}; expected {}", how_to_write::<K>()))) }
+                if value.is_finite() {
+                    Ok(Quantity::new(value))
+                } else {
+                    Err(E::custom(format!(
+                        "found {value}; expected {}",
+                        how_to_write::<K>()
+                    )))
+                }
             }
         }
         impl<K: Kind> Visitor<'_> for QuantityVisitor<K> {
@@ -223,7 +258,10 @@ pub struct Triple<K> {
 impl<K> Triple<K> {
     /// A vector from its values in SI units.
     pub const fn new(si: DVec3) -> Self {
-        Triple { si, kind: PhantomData }
+        Triple {
+            si,
+            kind: PhantomData,
+        }
     }
 }
 impl<K> Clone for Triple<K> {
@@ -253,7 +291,11 @@ struct TripleVisitor<K>(PhantomData<K>);
 impl<'de, K: Kind> Visitor<'de> for TripleVisitor<K> {
     type Value = Triple<K>;
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "three components [x, y, z], each {}", how_to_write::<K>())
+        write!(
+            f,
+            "three components [x, y, z], each {}",
+            how_to_write::<K>()
+        )
     }
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self::Value, A::Error> {
         let mut values = Vec::new();
@@ -313,11 +355,19 @@ mod tests {
     #[test]
     fn wrong_dimension_names_the_expected_unit() {
         let message = parse_quantity::<Length>("2 kg").unwrap_err();
-        assert!(message.contains("is a mass") && message.contains("a length") && message.contains("2 mm"), "{message}");
+        assert!(
+            message.contains("is a mass")
+                && message.contains("a length")
+                && message.contains("2 mm"),
+            "{message}"
+        );
         let message = parse_quantity::<Length>("2 mmm").unwrap_err();
         assert!(message.contains("did you mean `mm`"), "{message}");
         let message = parse_quantity::<KinematicViscosity>("1 mPa s").unwrap_err();
-        assert!(message.contains("dynamic viscosity") && message.contains("1 cSt"), "{message}");
+        assert!(
+            message.contains("dynamic viscosity") && message.contains("1 cSt"),
+            "{message}"
+        );
         assert!(parse_quantity::<Number>("45 deg").is_err());
         assert!(parse_quantity::<Length>("mm").is_err());
     }

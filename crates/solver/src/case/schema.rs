@@ -14,11 +14,20 @@ mod tests {
         let schema = super::schema();
         let contact = &schema["$defs"]["RawContact"]["properties"];
         assert_eq!(contact["friction"]["default"], 0.5);
-        assert!(contact["friction"]["description"].as_str().is_some_and(|d| d.contains("Coulomb")));
+        assert!(
+            contact["friction"]["description"]
+                .as_str()
+                .is_some_and(|d| d.contains("Coulomb"))
+        );
         for (name, table) in schema["$defs"].as_object().unwrap() {
             for (key, value) in table["properties"].as_object().into_iter().flatten() {
-                let described = value["description"].is_string() || value["$ref"].is_string() || value["anyOf"].is_array();
-                assert!(described || value["type"].is_string() || value["allOf"].is_array(), "{name}.{key} says nothing: {value}");
+                let described = value["description"].is_string()
+                    || value["$ref"].is_string()
+                    || value["anyOf"].is_array();
+                assert!(
+                    described || value["type"].is_string() || value["allOf"].is_array(),
+                    "{name}.{key} says nothing: {value}"
+                );
             }
         }
     }

@@ -37,7 +37,11 @@ pub(super) struct Library<'a> {
 impl<'a> Library<'a> {
     /// Files are looked for relative to `folder`.
     pub fn new(folder: &'a Path) -> Library<'a> {
-        Library { folder, files: BTreeMap::new(), built: BTreeMap::new() }
+        Library {
+            folder,
+            files: BTreeMap::new(),
+            built: BTreeMap::new(),
+        }
     }
 
     /// The files that were read, by name.
@@ -62,7 +66,9 @@ impl<'a> Library<'a> {
             let help = "a case takes .grain files; make one with `grainwake grain from-scan`, `from-mesh` or `make`";
             (error.to_string(), help.to_string())
         })?;
-        let stem = path.file_stem().map_or_else(|| "grain".into(), |s| s.to_string_lossy().into_owned());
+        let stem = path
+            .file_stem()
+            .map_or_else(|| "grain".into(), |s| s.to_string_lossy().into_owned());
         let taken = |candidate: &str| self.files.values().any(|(f, _)| f.name == candidate);
         let mut name = format!("shapes/{stem}.grain");
         let mut count = 1;
@@ -71,13 +77,21 @@ impl<'a> Library<'a> {
             name = format!("shapes/{stem}-{count}.grain");
         }
         let shape = Arc::new(shape);
-        let file = ShapeFile { name: name.clone(), source: path.clone(), bytes: Arc::new(bytes) };
+        let file = ShapeFile {
+            name: name.clone(),
+            source: path.clone(),
+            bytes: Arc::new(bytes),
+        };
         self.files.insert(path, (file, shape.clone()));
         Ok((shape, name))
     }
 
     /// A closed form.
-    pub fn closed_form(&mut self, raw: &RawShape, nodes: Option<usize>) -> Result<Arc<Shape>, Refusal> {
+    pub fn closed_form(
+        &mut self,
+        raw: &RawShape,
+        nodes: Option<usize>,
+    ) -> Result<Arc<Shape>, Refusal> {
         let nodes = nodes.unwrap_or(DEFAULT_NODES);
         let key = format!("{raw:?} {nodes}");
         if let Some(shape) = self.built.get(&key) {
@@ -95,7 +109,9 @@ impl<'a> Library<'a> {
             return Ok(shape.clone());
         }
         let scaled = shape.scaled_to_equivalent_diameter(diameter);
-        let scaled = Arc::new(scaled.map_err(|error| (error.to_string(), "give a positive length".to_string()))?);
+        let scaled = Arc::new(
+            scaled.map_err(|error| (error.to_string(), "give a positive length".to_string()))?,
+        );
         self.built.insert(key, scaled.clone());
         Ok(scaled)
     }
@@ -116,13 +132,30 @@ const SIZES: [&str; 5] = ["diameter", "height", "size", "radius", "exponents"];
 
 /// Checks that exactly the sizes of this kind are given, and builds it.
 fn build(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
-    let given =
-        [raw.diameter.is_some(), raw.height.is_some(), raw.size.is_some(), raw.radius.is_some(), raw.exponents.is_some()];
+    let given = [
+        raw.diameter.is_some(),
+        raw.height.is_some(),
+        raw.size.is_some(),
+        raw.radius.is_some(),
+        raw.exponents.is_some(),
+    ];
     let wanted = wanted(raw.kind.value);
-    let list = |which: [bool; 5]| SIZES.iter().zip(which).filter(|(_, w)| *w).map(|(n, _)| *n).collect::<Vec<_>>().join(", ");
+    let list = |which: [bool; 5]| {
+        SIZES
+            .iter()
+            .zip(which)
+            .filter(|(_, w)| *w)
+            .map(|(n, _)| *n)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
     for i in 0..5 {
         if wanted[i] != given[i] {
-            let message = if wanted[i] { format!("`{}` is missing", SIZES[i]) } else { format!("`{}` does not belong to this shape", SIZES[i]) };
+            let message = if wanted[i] {
+                format!("`{}` is missing", SIZES[i])
+            } else {
+                format!("`{}` does not belong to this shape", SIZES[i])
+            };
             return Err((message, format!("this kind takes: {}", list(wanted))));
         }
     }
@@ -130,7 +163,10 @@ fn build(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
 }
 
 fn construct(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
-    let options = ShapeOptions { nodes: Some(nodes), ..ShapeOptions::default() };
+    let options = ShapeOptions {
+        nodes: Some(nodes),
+        ..ShapeOptions::default()
+    };
     let length = |value: &Option<Loc<Quantity<Length>>>| value.as_ref().map_or(f64::NAN, |v| v.si);
     let [a, b, c] = raw.size.as_ref().map_or([f64::NAN; 3], |v| v.si.to_array());
     let exponents = raw.exponents.as_ref().map_or([f64::NAN; 2], |e| e.value);
@@ -138,9 +174,23 @@ fn construct(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
         ShapeKind::Sphere => analytic::sphere(0.5 * length(&raw.diameter), &options),
         ShapeKind::Ellipsoid => analytic::ellipsoid(0.5 * a, 0.5 * b, 0.5 * c, &options),
         ShapeKind::RoundedBox => analytic::rounded_box(a, b, c, length(&raw.radius), &options),
-        ShapeKind::Cylinder => analytic::cylinder(0.5 * length(&raw.diameter), length(&raw.height), &options),
-        ShapeKind::Capsule => analytic::capsule(0.5 * length(&raw.diameter), length(&raw.height), &options),
-        ShapeKind::Superquadric => analytic::superquadric([0.5 * a, 0.5 * b, 0.5 * c], exponents[0], exponents[1], &options),
+        ShapeKind::Cylinder => {
+            analytic::cylinder(0.5 * length(&raw.diameter), length(&raw.height), &options)
+        }
+        ShapeKind::Capsule => {
+            analytic::capsule(0.5 * length(&raw.diameter), length(&raw.height), &options)
+        }
+        ShapeKind::Superquadric => analytic::superquadric(
+            [0.5 * a, 0.5 * b, 0.5 * c],
+            exponents[0],
+            exponents[1],
+            &options,
+        ),
     };
-    shape.map_err(|error| (error.to_string(), "change the sizes of this shape".to_string()))
+    shape.map_err(|error| {
+        (
+            error.to_string(),
+            "change the sizes of this shape".to_string(),
+        )
+    })
 }

@@ -25,8 +25,17 @@ struct Override {
 
 impl Source {
     /// Reads the text of a case file called `name` and applies overrides such as `time.end=0.5`.
-    pub fn parse(name: &str, text: &str, overrides: &[String]) -> Result<(Source, RawCase), Problem> {
-        let mut source = Source { name: name.into(), text: text.into(), overrides: Vec::new(), keys: Vec::new() };
+    pub fn parse(
+        name: &str,
+        text: &str,
+        overrides: &[String],
+    ) -> Result<(Source, RawCase), Problem> {
+        let mut source = Source {
+            name: name.into(),
+            text: text.into(),
+            overrides: Vec::new(),
+            keys: Vec::new(),
+        };
         let mut start = text.len() + 1;
         for item in overrides {
             let line = override_line(item)?;
@@ -36,13 +45,19 @@ impl Source {
         }
         let mut table = DeTable::parse(text).map_err(|e| source.located(&e))?;
         // Each override is parsed behind as many blanks as there is text before it: its spans are right as they come.
-        let padded: Vec<String> = source.overrides.iter().map(|o| format!("{}{}", " ".repeat(o.start), o.line)).collect();
+        let padded: Vec<String> = source
+            .overrides
+            .iter()
+            .map(|o| format!("{}{}", " ".repeat(o.start), o.line))
+            .collect();
         for (item, line) in padded.iter().zip(overrides) {
             let extra = DeTable::parse(item).map_err(|e| source.located(&e))?;
-            merge(table.get_mut(), extra.into_inner()).map_err(|m| Problem::new(format!("--set {line}: {m}")))?;
+            merge(table.get_mut(), extra.into_inner())
+                .map_err(|m| Problem::new(format!("--set {line}: {m}")))?;
         }
         collect_keys(table.get_ref(), "", &mut source.keys);
-        let case = RawCase::deserialize(Deserializer::from(table)).map_err(|e| source.located(&e))?;
+        let case =
+            RawCase::deserialize(Deserializer::from(table)).map_err(|e| source.located(&e))?;
         Ok((source, case))
     }
 
@@ -50,7 +65,9 @@ impl Source {
     pub fn key_at(&self, span: &Range<usize>) -> Option<&str> {
         self.keys
             .iter()
-            .filter(|(range, _)| range.start <= span.start && span.end <= range.end.max(range.start + 1))
+            .filter(|(range, _)| {
+                range.start <= span.start && span.end <= range.end.max(range.start + 1)
+            })
             .min_by_key(|(range, _)| range.len())
             .map(|(_, key)| key.as_str())
     }
@@ -63,7 +80,12 @@ impl Source {
             _ => problem,
         };
         match self.overrides.iter().rev().find(|o| o.start <= span.start) {
-            Some(o) => problem.at("--set", &o.line, span.start - o.start..span.end - o.start, label),
+            Some(o) => problem.at(
+                "--set",
+                &o.line,
+                span.start - o.start..span.end - o.start,
+                label,
+            ),
             None => problem.at(&self.name, &self.text, span.clone(), label),
         }
     }
@@ -73,24 +95,56 @@ impl Source {
         let message = error.message();
         let span = error.span();
         let words: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-        let owner = span.as_ref().and_then(|s| self.key_at(s)).unwrap_or_default().to_string();
+        let owner = span
+            .as_ref()
+            .and_then(|s| self.key_at(s))
+            .unwrap_or_default()
+            .to_string();
         let (text, label, help) = if message.starts_with("unknown field") && !words.is_empty() {
             let known = &words[1..];
-            let parent = owner.rsplit_once('.').map_or("the case file".to_string(), |(p, _)| format!("`{p}`"));
+            let parent = owner
+                .rsplit_once('.')
+                .map_or("the case file".to_string(), |(p, _)| format!("`{p}`"));
             let hint = nearest(words[0], known.iter().copied());
             let help = match hint {
-                Some(key) => format!("did you mean `{key}`? Keys of {parent}: {}", known.join(", ")),
+                Some(key) => format!(
+                    "did you mean `{key}`? Keys of {parent}: {}",
+                    known.join(", ")
+                ),
                 None => format!("keys of {parent}: {}", known.join(", ")),
             };
-            (format!("unknown key `{}`", words[0]), hint.map_or("not a key here".into(), |k| format!("did you mean `{k}`?")), Some(help))
+            (
+                format!("unknown key `{}`", words[0]),
+                hint.map_or("not a key here".into(), |k| format!("did you mean `{k}`?")),
+                Some(help),
+            )
         } else if message.starts_with("missing field") && !words.is_empty() {
-            (format!("the key `{}` is missing", words[0]), format!("`{}` is needed here", words[0]), Some(format!("add `{} = ...`; `grainwake schema` lists every key", words[0])))
+            (
+                format!("the key `{}` is missing", words[0]),
+                format!("`{}` is needed here", words[0]),
+                Some(format!(
+                    "add `{} = ...`; `grainwake schema` lists every key",
+                    words[0]
+                )),
+            )
         } else if message.starts_with("unknown variant") && !words.is_empty() {
             let known = &words[1..];
-            let hint = nearest(words[0], known.iter().copied()).map_or(String::new(), |w| format!("did you mean \"{w}\"? "));
-            (format!("unknown value \"{}\"", words[0]), "not accepted".into(), Some(format!("{hint}Accepted: {}", known.join(", "))))
-        } else if let Some(rest) = message.strip_prefix("invalid type: ").or_else(|| message.strip_prefix("invalid value: ")) {
-            (format!("wrong kind of value: found {rest}"), "here".into(), None)
+            let hint = nearest(words[0], known.iter().copied())
+                .map_or(String::new(), |w| format!("did you mean \"{w}\"? "));
+            (
+                format!("unknown value \"{}\"", words[0]),
+                "not accepted".into(),
+                Some(format!("{hint}Accepted: {}", known.join(", "))),
+            )
+        } else if let Some(rest) = message
+            .strip_prefix("invalid type: ")
+            .or_else(|| message.strip_prefix("invalid value: "))
+        {
+            (
+                format!("wrong kind of value: found {rest}"),
+                "here".into(),
+                None,
+            )
         } else {
             (message.trim_end().replace('\n', "; "), "here".into(), None)
         };
@@ -103,9 +157,16 @@ impl Source {
 /// "time.end=0.5" -> "time.end = 0.5"; a value that is not TOML is taken as a string.
 fn override_line(item: &str) -> Result<String, Problem> {
     let usage = "write key=value, for example --set time.end=0.5 or --set grain.0.density=2600";
-    let (key, value) = item.split_once('=').ok_or_else(|| Problem::new(format!("--set {item}: there is no `=`")).help(usage))?;
+    let (key, value) = item
+        .split_once('=')
+        .ok_or_else(|| Problem::new(format!("--set {item}: there is no `=`")).help(usage))?;
     let (key, value) = (key.trim(), value.trim());
-    let plain = |part: &str| !part.is_empty() && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+    let plain = |part: &str| {
+        !part.is_empty()
+            && part
+                .chars()
+                .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+    };
     if !key.split('.').all(plain) {
         return Err(Problem::new(format!("--set {item}: `{key}` is not a key")).help(usage));
     }
@@ -114,7 +175,14 @@ fn override_line(item: &str) -> Result<String, Problem> {
         return Ok(as_toml);
     }
     let escaped: String = value.chars().flat_map(char::escape_default).collect();
-    Ok(format!("{key} = \"{}\"", if value.is_ascii() { escaped } else { value.replace('\\', "\\\\").replace('"', "\\\"") }))
+    Ok(format!(
+        "{key} = \"{}\"",
+        if value.is_ascii() {
+            escaped
+        } else {
+            value.replace('\\', "\\\\").replace('"', "\\\"")
+        }
+    ))
 }
 
 fn merge<'i>(base: &mut DeTable<'i>, extra: DeTable<'i>) -> Result<(), String> {
@@ -123,19 +191,27 @@ fn merge<'i>(base: &mut DeTable<'i>, extra: DeTable<'i>) -> Result<(), String> {
         let old = base.get_mut(&key).map(|v| v.get_mut());
         match (old, value.get_ref()) {
             (Some(DeValue::Table(_)), DeValue::Table(_)) => {
-                if let (Some(DeValue::Table(old)), DeValue::Table(new)) = (base.get_mut(&key).map(|v| v.get_mut()), value.into_inner()) {
+                if let (Some(DeValue::Table(old)), DeValue::Table(new)) =
+                    (base.get_mut(&key).map(|v| v.get_mut()), value.into_inner())
+                {
                     merge(old, new)?;
                 }
             }
             (Some(DeValue::Array(items)), DeValue::Table(_)) => {
-                let DeValue::Table(new) = value.into_inner() else { continue };
+                let DeValue::Table(new) = value.into_inner() else {
+                    continue;
+                };
                 let count = items.len();
                 for (index, item) in new {
-                    let at: usize = index.get_ref().parse().map_err(|_| format!("`{name}` is a list: write {name}.0 for its first element"))?;
+                    let at: usize = index.get_ref().parse().map_err(|_| {
+                        format!("`{name}` is a list: write {name}.0 for its first element")
+                    })?;
                     let slot = items.get_mut(at).ok_or_else(|| format!("`{name}` has {count} elements, there is no number {at} (they count from 0)"))?;
                     match (slot.get_mut(), item.get_ref()) {
                         (DeValue::Table(_), DeValue::Table(_)) => {
-                            if let (DeValue::Table(old), DeValue::Table(new)) = (slot.get_mut(), item.into_inner()) {
+                            if let (DeValue::Table(old), DeValue::Table(new)) =
+                                (slot.get_mut(), item.into_inner())
+                            {
                                 merge(old, new)?;
                             }
                         }
@@ -155,13 +231,21 @@ fn merge<'i>(base: &mut DeTable<'i>, extra: DeTable<'i>) -> Result<(), String> {
 
 fn collect_keys(table: &DeTable<'_>, prefix: &str, keys: &mut Vec<(Range<usize>, String)>) {
     for (key, value) in table {
-        let path = if prefix.is_empty() { key.get_ref().to_string() } else { format!("{prefix}.{}", key.get_ref()) };
+        let path = if prefix.is_empty() {
+            key.get_ref().to_string()
+        } else {
+            format!("{prefix}.{}", key.get_ref())
+        };
         keys.push((key.span(), path.clone()));
         collect_value(value, &path, keys);
     }
 }
 
-fn collect_value(value: &serde_spanned::Spanned<DeValue<'_>>, path: &str, keys: &mut Vec<(Range<usize>, String)>) {
+fn collect_value(
+    value: &serde_spanned::Spanned<DeValue<'_>>,
+    path: &str,
+    keys: &mut Vec<(Range<usize>, String)>,
+) {
     keys.push((value.span(), path.to_string()));
     match value.get_ref() {
         DeValue::Table(table) => collect_keys(table, path, keys),
@@ -208,14 +292,22 @@ mod tests {
     fn a_wrong_unit_is_located() {
         let p = problem(&CASE.replace("1 mPa s", "1 mm"), &[]);
         assert_eq!(p.place(), Some(("case.toml", 3, 13)));
-        assert!(p.message.contains("is a length") && p.message.contains("1 mPa s"), "{p}");
+        assert!(
+            p.message.contains("is a length") && p.message.contains("1 mPa s"),
+            "{p}"
+        );
         let p = problem(&CASE.replace("diameter = 0.1", "diameter = \"1 s\""), &[]);
         assert_eq!(p.key.as_deref(), Some("grain.0.shape.diameter"));
     }
 
     #[test]
     fn overrides_reach_tables_and_lists() {
-        let sets = ["time.end=2".to_string(), "fluid.viscosity=2 mPa s".into(), "grain.0.density=\"2 g/cm3\"".into(), "contact.friction=0.1".into()];
+        let sets = [
+            "time.end=2".to_string(),
+            "fluid.viscosity=2 mPa s".into(),
+            "grain.0.density=\"2 g/cm3\"".into(),
+            "contact.friction=0.1".into(),
+        ];
         let (_, case) = Source::parse("case.toml", CASE, &sets).unwrap();
         assert_eq!(case.time.end.si, 2.0);
         assert_eq!(case.fluid.unwrap().viscosity.as_ref().unwrap().si, 2e-3);
@@ -231,7 +323,11 @@ mod tests {
         let p = problem(CASE, &["time.end=2 mm"]);
         assert_eq!(p.place().unwrap().0, "--set");
         assert!(problem(CASE, &["nonsense"]).message.contains("no `=`"));
-        assert!(problem(CASE, &["grain.3.density=1"]).message.contains("no number 3"));
+        assert!(
+            problem(CASE, &["grain.3.density=1"])
+                .message
+                .contains("no number 3")
+        );
     }
 
     #[test]

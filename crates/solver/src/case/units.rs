@@ -16,7 +16,12 @@ pub struct Dimension {
 impl Dimension {
     /// A dimension from its exponents of kg, m, s and rad.
     pub const fn new(mass: i8, length: i8, time: i8, angle: i8) -> Dimension {
-        Dimension { mass, length, time, angle }
+        Dimension {
+            mass,
+            length,
+            time,
+            angle,
+        }
     }
     fn plus(self, other: Dimension, times: i8) -> Option<Dimension> {
         let add = |a: i8, b: i8| b.checked_mul(times).and_then(|b| a.checked_add(b));
@@ -50,11 +55,22 @@ impl Dimension {
         ];
         known.iter().find(|(d, _)| *d == self).map_or_else(
             || {
-                let parts = [("kg", self.mass), ("m", self.length), ("s", self.time), ("rad", self.angle)];
+                let parts = [
+                    ("kg", self.mass),
+                    ("m", self.length),
+                    ("s", self.time),
+                    ("rad", self.angle),
+                ];
                 let text: Vec<String> = parts
                     .iter()
                     .filter(|(_, n)| *n != 0)
-                    .map(|(u, n)| if *n == 1 { (*u).to_string() } else { format!("{u}^{n}") })
+                    .map(|(u, n)| {
+                        if *n == 1 {
+                            (*u).to_string()
+                        } else {
+                            format!("{u}^{n}")
+                        }
+                    })
                     .collect();
                 format!("in {}", text.join(" "))
             },
@@ -71,7 +87,12 @@ struct Unit {
 }
 
 const fn unit(symbol: &'static str, factor: f64, d: (i8, i8, i8, i8), prefixes: bool) -> Unit {
-    Unit { symbol, factor, dimension: Dimension::new(d.0, d.1, d.2, d.3), prefixes }
+    Unit {
+        symbol,
+        factor,
+        dimension: Dimension::new(d.0, d.1, d.2, d.3),
+        prefixes,
+    }
 }
 
 const UNITS: &[Unit] = &[
@@ -96,8 +117,18 @@ const UNITS: &[Unit] = &[
 ];
 
 /// Decimal exponents, so that `prefixed` can divide by an exact power of ten.
-const PREFIXES: &[(&str, i32)] =
-    &[("n", -9), ("u", -6), ("µ", -6), ("μ", -6), ("m", -3), ("c", -2), ("d", -1), ("k", 3), ("M", 6), ("G", 9)];
+const PREFIXES: &[(&str, i32)] = &[
+    ("n", -9),
+    ("u", -6),
+    ("µ", -6),
+    ("μ", -6),
+    ("m", -3),
+    ("c", -2),
+    ("d", -1),
+    ("k", 3),
+    ("M", 6),
+    ("G", 9),
+];
 
 /// A parsed unit: multiply by `numerator`, divide by `denominator`. Both are kept so that
 /// "2 mm" is 2 / 1000, the double nearest to 0.002, and not 2 * 0.001 rounded twice.
@@ -112,7 +143,11 @@ pub struct Scale {
 }
 
 impl Scale {
-    const ONE: Scale = Scale { numerator: 1.0, denominator: 1.0, dimension: Dimension::new(0, 0, 0, 0) };
+    const ONE: Scale = Scale {
+        numerator: 1.0,
+        denominator: 1.0,
+        dimension: Dimension::new(0, 0, 0, 0),
+    };
 
     /// `value` of this unit in SI.
     pub fn to_si(self, value: f64) -> f64 {
@@ -122,18 +157,33 @@ impl Scale {
 
 /// Units by their plain symbols, for suggestions.
 pub fn known_symbols() -> Vec<String> {
-    let common = ["mm", "um", "cm", "km", "nm", "mg", "kg", "ms", "us", "mPa", "kPa", "MPa", "GPa", "kN", "mN", "cP", "cSt", "mL"];
-    UNITS.iter().map(|u| u.symbol.to_string()).chain(common.iter().map(|s| (*s).to_string())).collect()
+    let common = [
+        "mm", "um", "cm", "km", "nm", "mg", "kg", "ms", "us", "mPa", "kPa", "MPa", "GPa", "kN",
+        "mN", "cP", "cSt", "mL",
+    ];
+    UNITS
+        .iter()
+        .map(|u| u.symbol.to_string())
+        .chain(common.iter().map(|s| (*s).to_string()))
+        .collect()
 }
 
 fn split(factor: f64) -> (f64, f64) {
-    if factor < 1.0 && (1.0 / factor).fract() == 0.0 { (1.0, 1.0 / factor) } else { (factor, 1.0) }
+    if factor < 1.0 && (1.0 / factor).fract() == 0.0 {
+        (1.0, 1.0 / factor)
+    } else {
+        (factor, 1.0)
+    }
 }
 
 fn lookup(symbol: &str) -> Option<Scale> {
     if let Some(u) = UNITS.iter().find(|u| u.symbol == symbol) {
         let (numerator, denominator) = split(u.factor);
-        return Some(Scale { numerator, denominator, dimension: u.dimension });
+        return Some(Scale {
+            numerator,
+            denominator,
+            dimension: u.dimension,
+        });
     }
     PREFIXES.iter().find_map(|(prefix, power)| {
         let rest = symbol.strip_prefix(prefix)?;
@@ -149,7 +199,11 @@ fn lookup(symbol: &str) -> Option<Scale> {
             numerator /= common;
             denominator /= common;
         }
-        Some(Scale { numerator, denominator, dimension: u.dimension })
+        Some(Scale {
+            numerator,
+            denominator,
+            dimension: u.dimension,
+        })
     })
 }
 
@@ -175,15 +229,22 @@ pub fn parse_unit(text: &str) -> Result<Scale, UnitError> {
         if token == "1" {
             continue;
         }
-        let (symbol, power) = split_power(token).ok_or_else(|| UnitError::Malformed(text.to_string()))?;
+        let (symbol, power) =
+            split_power(token).ok_or_else(|| UnitError::Malformed(text.to_string()))?;
         let scale = lookup(symbol).ok_or_else(|| UnitError::Unknown(symbol.to_string()))?;
         // As in "kg/m s": everything after a slash divides.
         let power = if divide { -power } else { power };
-        let (up, down) = if power >= 0 { (scale.numerator, scale.denominator) } else { (scale.denominator, scale.numerator) };
+        let (up, down) = if power >= 0 {
+            (scale.numerator, scale.denominator)
+        } else {
+            (scale.denominator, scale.numerator)
+        };
         result.numerator *= up.powi(i32::from(power).abs());
         result.denominator *= down.powi(i32::from(power).abs());
-        result.dimension =
-            result.dimension.plus(scale.dimension, power).ok_or_else(|| UnitError::Malformed(text.to_string()))?;
+        result.dimension = result
+            .dimension
+            .plus(scale.dimension, power)
+            .ok_or_else(|| UnitError::Malformed(text.to_string()))?;
     }
     if divide && text.trim_end().ends_with('/') {
         return Err(UnitError::Malformed(text.to_string()));
@@ -199,10 +260,19 @@ fn split_power(token: &str) -> Option<(&str, i8)> {
             return (!symbol.is_empty()).then_some((symbol, power));
         }
     }
-    let end = token.find(|c: char| c.is_ascii_digit() || c == '^' || c == '-').unwrap_or(token.len());
+    let end = token
+        .find(|c: char| c.is_ascii_digit() || c == '^' || c == '-')
+        .unwrap_or(token.len());
     let (symbol, tail) = token.split_at(end);
     let digits = tail.strip_prefix('^').unwrap_or(tail);
-    let power = if tail.is_empty() { 1 } else { digits.parse::<i8>().ok().filter(|p| (1..=9).contains(&p.abs()))? };
+    let power = if tail.is_empty() {
+        1
+    } else {
+        digits
+            .parse::<i8>()
+            .ok()
+            .filter(|p| (1..=9).contains(&p.abs()))?
+    };
     (!symbol.is_empty()).then_some((symbol, power))
 }
 
@@ -233,16 +303,34 @@ mod tests {
 
     #[test]
     fn dimensions_add_up() {
-        assert_eq!(parse_unit("mPa s").unwrap().dimension, Dimension::new(1, -1, -1, 0));
-        assert_eq!(parse_unit("kg/m/s").unwrap().dimension, Dimension::new(1, -1, -1, 0));
-        assert_eq!(parse_unit("kg/m s").unwrap().dimension, Dimension::new(1, -1, -1, 0));
-        assert_eq!(parse_unit("deg/s").unwrap().dimension, Dimension::new(0, 0, -1, 1));
-        assert_eq!(parse_unit("N/m").unwrap().dimension, Dimension::new(1, 0, -2, 0));
+        assert_eq!(
+            parse_unit("mPa s").unwrap().dimension,
+            Dimension::new(1, -1, -1, 0)
+        );
+        assert_eq!(
+            parse_unit("kg/m/s").unwrap().dimension,
+            Dimension::new(1, -1, -1, 0)
+        );
+        assert_eq!(
+            parse_unit("kg/m s").unwrap().dimension,
+            Dimension::new(1, -1, -1, 0)
+        );
+        assert_eq!(
+            parse_unit("deg/s").unwrap().dimension,
+            Dimension::new(0, 0, -1, 1)
+        );
+        assert_eq!(
+            parse_unit("N/m").unwrap().dimension,
+            Dimension::new(1, 0, -2, 0)
+        );
     }
 
     #[test]
     fn nonsense_is_named() {
-        assert_eq!(parse_unit("mmm").unwrap_err(), UnitError::Unknown("mmm".into()));
+        assert_eq!(
+            parse_unit("mmm").unwrap_err(),
+            UnitError::Unknown("mmm".into())
+        );
         assert!(parse_unit("m99").is_err());
         assert!(parse_unit("m^").is_err());
         assert!(parse_unit("m/").is_err());

@@ -72,8 +72,14 @@ fn name(steps: u64) -> String {
 
 /// Checkpoints in a run folder, newest first.
 pub fn list(run: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(run.join(FOLDER)).into_iter().flatten().flatten();
-    let mut found: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "ckpt")).collect();
+    let entries = std::fs::read_dir(run.join(FOLDER))
+        .into_iter()
+        .flatten()
+        .flatten();
+    let mut found: Vec<PathBuf> = entries
+        .map(|e| e.path())
+        .filter(|p| p.extension().is_some_and(|e| e == "ckpt"))
+        .collect();
     found.sort_by(|a, b| b.cmp(a));
     found
 }
@@ -82,9 +88,14 @@ pub fn list(run: &Path) -> Vec<PathBuf> {
 pub(super) fn write(run: &Path, record: &Record, sim: &Simulation) -> Result<(), RunError> {
     let folder = run.join(FOLDER);
     let path = folder.join(name(record.steps));
-    let json = serde_json::to_vec(record).map_err(io::Error::from).context("write", &path)?;
+    let json = serde_json::to_vec(record)
+        .map_err(io::Error::from)
+        .context("write", &path)?;
     write_whole(&path, true, |out| {
-        let mut hashed = Hashed { out, hash: Sha256::new() };
+        let mut hashed = Hashed {
+            out,
+            hash: Sha256::new(),
+        };
         hashed.write_all(SIGNATURE)?;
         hashed.write_all(&VERSION.to_le_bytes())?;
         hashed.write_all(&(json.len() as u64).to_le_bytes())?;
@@ -111,7 +122,9 @@ fn read(path: &Path, digest: &str, sim: &mut Simulation) -> Result<Record, Strin
     let mut buffer = vec![0; 1 << 18];
     let mut left = body;
     while left > 0 {
-        let part = buffer.len().min(usize::try_from(left).unwrap_or(usize::MAX));
+        let part = buffer
+            .len()
+            .min(usize::try_from(left).unwrap_or(usize::MAX));
         file.read_exact(&mut buffer[..part]).map_err(text)?;
         hash.update(&buffer[..part]);
         left -= part as u64;
@@ -154,18 +167,33 @@ fn read(path: &Path, digest: &str, sim: &mut Simulation) -> Result<Record, Strin
 ///
 /// # Errors
 /// [`RunError::NoCheckpoint`] where there are some and none can be used.
-pub(super) fn restore(run: &Path, digest: &str, sim: &mut Simulation, note: &mut dyn FnMut(&str)) -> Result<Option<Record>, RunError> {
+pub(super) fn restore(
+    run: &Path,
+    digest: &str,
+    sim: &mut Simulation,
+    note: &mut dyn FnMut(&str),
+) -> Result<Option<Record>, RunError> {
     let mut reasons = Vec::new();
     for path in list(run) {
         match read(&path, digest, sim) {
             Ok(record) => {
                 for reason in &reasons {
-                    note(&format!("warning: {reason}; continuing from the checkpoint before it (t = {:.6e} s)", record.time));
+                    note(&format!(
+                        "warning: {reason}; continuing from the checkpoint before it (t = {:.6e} s)",
+                        record.time
+                    ));
                 }
                 return Ok(Some(record));
             }
             Err(reason) => reasons.push(format!("{}: {reason}", path.display())),
         }
     }
-    if reasons.is_empty() { Ok(None) } else { Err(RunError::NoCheckpoint { folder: run.join(FOLDER), reasons }) }
+    if reasons.is_empty() {
+        Ok(None)
+    } else {
+        Err(RunError::NoCheckpoint {
+            folder: run.join(FOLDER),
+            reasons,
+        })
+    }
 }

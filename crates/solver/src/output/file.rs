@@ -5,7 +5,11 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 /// Writes `path` through `fill`; on an error the old file, if any, is left as it was.
-pub(super) fn write_whole(path: &Path, sync: bool, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+pub(super) fn write_whole(
+    path: &Path,
+    sync: bool,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(".tmp");
     let temporary = path.with_file_name(name);
@@ -27,5 +31,9 @@ pub(super) fn write_whole(path: &Path, sync: bool, fill: impl FnOnce(&mut dyn Wr
 
 /// Makes a rename in `folder` last through a power cut, where the system can.
 pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
-    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
+    if cfg!(unix) {
+        File::open(folder)?.sync_all()
+    } else {
+        Ok(())
+    }
 }

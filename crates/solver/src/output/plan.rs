@@ -9,6 +9,8 @@ pub struct RunPlan {
     pub end: f64,
     /// Ends the run earlier.
     pub stop: Option<Stop>,
+    /// A run whose steps fall below this, though no output asks for it, has become unstable [s].
+    pub smallest_step: f64,
     /// Interval of the rows of the tables [s].
     pub tables: f64,
     /// Interval of the slices [s].

@@ -65,7 +65,9 @@ impl Provenance {
     /// Of an existing run folder; none where there is none or it cannot be read.
     pub fn read(run: &Path) -> Option<Provenance> {
         let text = std::fs::read_to_string(run.join(FILE)).ok()?;
-        serde_json::from_str(&text).ok().filter(|p: &Provenance| p.program == PROGRAM)
+        serde_json::from_str(&text)
+            .ok()
+            .filter(|p: &Provenance| p.program == PROGRAM)
     }
     /// Writes it.
     pub(super) fn write(&self, run: &Path) -> Result<(), RunError> {
@@ -86,7 +88,9 @@ impl Session {
     /// A session that starts now.
     pub fn now(command: &[String], threads: usize, from_step: u64) -> Session {
         Session {
-            started: jiff::Zoned::now().strftime("%Y-%m-%dT%H:%M:%S%:z").to_string(),
+            started: jiff::Zoned::now()
+                .strftime("%Y-%m-%dT%H:%M:%S%:z")
+                .to_string(),
             command: command.to_vec(),
             cpu: cpu(),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
@@ -99,6 +103,10 @@ impl Session {
 
 fn cpu() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let name = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, n)| n.trim().to_string()));
+    let name = text.lines().find_map(|line| {
+        line.strip_prefix("model name")?
+            .split_once(':')
+            .map(|(_, n)| n.trim().to_string())
+    });
     name.unwrap_or_else(|| "unknown".into())
 }

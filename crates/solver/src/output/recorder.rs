@@ -26,7 +26,12 @@ enum Series {
     Surfaces,
 }
 
-const SERIES: [Series; 4] = [Series::Tables, Series::Slices, Series::Fields, Series::Surfaces];
+const SERIES: [Series; 4] = [
+    Series::Tables,
+    Series::Slices,
+    Series::Fields,
+    Series::Surfaces,
+];
 
 /// The recording side of a run.
 pub(super) struct Recorder {
@@ -47,10 +52,17 @@ pub(super) struct Recorder {
 }
 
 impl Recorder {
-    fn build(run: &Path, digest: &str, plan: &RunPlan, sim: &Simulation, tables: Tables) -> Recorder {
+    fn build(
+        run: &Path,
+        digest: &str,
+        plan: &RunPlan,
+        sim: &Simulation,
+        tables: Tables,
+    ) -> Recorder {
         let setup = sim.setup();
         let enclosure = setup.enclosure();
-        let period = [0, 1, 2].map(|axis| enclosure.is_periodic(axis).then(|| enclosure.size()[axis]));
+        let period =
+            [0, 1, 2].map(|axis| enclosure.is_periodic(axis).then(|| enclosure.size()[axis]));
         let params = EventParams::for_grains(sim.grains(), setup.gravity, period);
         let gap = pair_gap(sim, &enclosure);
         Recorder {
@@ -72,7 +84,12 @@ impl Recorder {
     }
 
     /// Of a run that starts at t = 0; the first outputs are written.
-    pub fn start(run: &Path, digest: &str, plan: &RunPlan, sim: &Simulation) -> Result<Recorder, RunError> {
+    pub fn start(
+        run: &Path,
+        digest: &str,
+        plan: &RunPlan,
+        sim: &Simulation,
+    ) -> Result<Recorder, RunError> {
         let mut recorder = Recorder::build(run, digest, plan, sim, Tables::create(run)?);
         recorder.due(sim)?;
         recorder.checkpoint(sim)?;
@@ -80,8 +97,19 @@ impl Recorder {
     }
 
     /// Of a run that goes on from a checkpoint.
-    pub fn resume(run: &Path, record: Record, plan: &RunPlan, sim: &Simulation) -> Result<Recorder, RunError> {
-        let mut recorder = Recorder::build(run, &record.digest, plan, sim, Tables::reopen(run, record.lengths)?);
+    pub fn resume(
+        run: &Path,
+        record: Record,
+        plan: &RunPlan,
+        sim: &Simulation,
+    ) -> Result<Recorder, RunError> {
+        let mut recorder = Recorder::build(
+            run,
+            &record.digest,
+            plan,
+            sim,
+            Tables::reopen(run, record.lengths)?,
+        );
         recorder.tracker.restore(record.tracker);
         recorder.next = record.next;
         recorder.shown = record.pictures;
@@ -94,8 +122,15 @@ impl Recorder {
 
     /// Time from now to the next output or the end [s].
     pub fn until_next(&self, now: f64) -> f64 {
-        let times = self.intervals.iter().zip(&self.next).filter(|(interval, _)| **interval > 0.0);
-        times.map(|(interval, k)| *k as f64 * interval).fold(self.end, f64::min) - now
+        let times = self
+            .intervals
+            .iter()
+            .zip(&self.next)
+            .filter(|(interval, _)| **interval > 0.0);
+        times
+            .map(|(interval, k)| *k as f64 * interval)
+            .fold(self.end, f64::min)
+            - now
     }
 
     /// Takes in the state after a step and writes what is due; returns what has happened.
@@ -104,7 +139,9 @@ impl Recorder {
         self.max_cfl = self.max_cfl.max(sim.cfl());
         let gap = pair_gap(sim, &self.enclosure);
         let before = self.tracker.events().len();
-        let events = self.tracker.update(sim.time(), sim.grains(), sim.contacts(), gap);
+        let events = self
+            .tracker
+            .update(sim.time(), sim.grains(), sim.contacts(), gap);
         self.tables.events(&events)?;
         self.due(sim)?;
         if self.at_events {
@@ -115,8 +152,16 @@ impl Recorder {
         Ok(events)
     }
 
-    fn picture_event(&mut self, sim: &Simulation, kind: EventKind, index: usize) -> Result<(), RunError> {
-        let earlier = self.tracker.events()[..index].iter().filter(|e| e.event == kind).count();
+    fn picture_event(
+        &mut self,
+        sim: &Simulation,
+        kind: EventKind,
+        index: usize,
+    ) -> Result<(), RunError> {
+        let earlier = self.tracker.events()[..index]
+            .iter()
+            .filter(|e| e.event == kind)
+            .count();
         let tag = format!("{}-{}", kind.name(), earlier + 1);
         let slices = self.pictures.slices(&self.run, sim, &tag)?;
         let grains = self.pictures.grains(&self.run, sim, &tag)?;
@@ -143,7 +188,11 @@ impl Recorder {
             }
             self.next[index] += 1;
         }
-        if pictures.is_empty() { Ok(()) } else { self.show(pictures) }
+        if pictures.is_empty() {
+            Ok(())
+        } else {
+            self.show(pictures)
+        }
     }
 
     fn show(&mut self, pictures: impl IntoIterator<Item = Picture>) -> Result<(), RunError> {
@@ -193,13 +242,17 @@ impl Recorder {
     /// The results so far.
     pub fn summary(&self, sim: &Simulation, wall_s: f64, ended_by: &str) -> Summary {
         let tracker = &self.tracker;
-        let grains = sim.grains().iter().enumerate().map(|(i, grain)| GrainSummary {
-            equivalent_diameter_m: grain.shape.equivalent_diameter(),
-            density: grain.density,
-            peak_settling_speed_m_per_s: tracker.peak_settling_speeds()[i],
-            landing_time_s: tracker.landing_times()[i],
-            position_m: grain.pose.position.to_array(),
-        });
+        let grains = sim
+            .grains()
+            .iter()
+            .enumerate()
+            .map(|(i, grain)| GrainSummary {
+                equivalent_diameter_m: grain.shape.equivalent_diameter(),
+                density: grain.density,
+                peak_settling_speed_m_per_s: tracker.peak_settling_speeds()[i],
+                landing_time_s: tracker.landing_times()[i],
+                position_m: grain.pose.position.to_array(),
+            });
         Summary {
             steps: sim.steps(),
             end_time_s: sim.time(),

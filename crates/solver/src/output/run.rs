@@ -102,7 +102,12 @@ pub enum Ending {
 ///
 /// # Errors
 /// [`RunError`]; where the numerics or the disk fail, the last good checkpoint is kept.
-pub fn run(job: Job, out: &Path, options: &Options, observer: &mut dyn Observer) -> Result<Ending, RunError> {
+pub fn run(
+    job: Job,
+    out: &Path,
+    options: &Options,
+    observer: &mut dyn Observer,
+) -> Result<Ending, RunError> {
     let found = folder::admit(out, options.existing)?;
     let mut provenance = Provenance::new(&job.digest);
     let resuming = options.existing == Existing::Resume;
@@ -110,7 +115,10 @@ pub fn run(job: Job, out: &Path, options: &Options, observer: &mut dyn Observer)
         provenance = Provenance::read(out).unwrap_or(provenance);
         if provenance.case_sha256 != job.digest {
             let what = "its grains, fluid, box, contact, step or output times differ".into();
-            return Err(RunError::OtherCase { folder: out.into(), what });
+            return Err(RunError::OtherCase {
+                folder: out.into(),
+                what,
+            });
         }
     }
     if found == Found::Finished && resuming {
@@ -118,20 +126,34 @@ pub fn run(job: Job, out: &Path, options: &Options, observer: &mut dyn Observer)
         if summary.end_time_s >= job.plan.end * (1.0 - 1e-9) || summary.ended_by != "end" {
             return Ok(Ending::AlreadyFinished(summary));
         }
-        observer.note(&format!("the run had ended at t = {:.6e} s; going on to {:.6e} s", summary.end_time_s, job.plan.end));
+        observer.note(&format!(
+            "the run had ended at t = {:.6e} s; going on to {:.6e} s",
+            summary.end_time_s, job.plan.end
+        ));
     }
     let mut sim = Simulation::new(job.setup)?;
-    let record = if resuming { checkpoint::restore(out, &job.digest, &mut sim, &mut |text| observer.note(text))? } else { None };
+    let record = if resuming {
+        checkpoint::restore(out, &job.digest, &mut sim, &mut |text| observer.note(text))?
+    } else {
+        None
+    };
     match &record {
-        Some(record) => observer.note(&format!("resuming at t = {:.6e} s, step {}", record.time, record.steps)),
-        None if resuming => observer.note("no checkpoint had been written yet: starting from the beginning"),
+        Some(record) => observer.note(&format!(
+            "resuming at t = {:.6e} s, step {}",
+            record.time, record.steps
+        )),
+        None if resuming => {
+            observer.note("no checkpoint had been written yet: starting from the beginning")
+        }
         None => {}
     }
     if record.is_none() && found != Found::Empty {
         folder::clear(out)?;
     }
     folder::create(out)?;
-    provenance.sessions.push(Session::now(&options.command, options.threads, sim.steps()));
+    provenance
+        .sessions
+        .push(Session::now(&options.command, options.threads, sim.steps()));
     provenance.write(out)?;
     write(&out.join(RESOLVED), job.resolved.as_bytes())?;
     for (name, bytes) in &job.files {
@@ -145,7 +167,15 @@ pub fn run(job: Job, out: &Path, options: &Options, observer: &mut dyn Observer)
         Some(record) => Recorder::resume(out, record, &job.plan, &sim)?,
         None => Recorder::start(out, &job.digest, &job.plan, &sim)?,
     };
-    Running { out: out.into(), plan: job.plan, sim, recorder, provenance, started: Instant::now() }.to_the_end(observer)
+    Running {
+        out: out.into(),
+        plan: job.plan,
+        sim,
+        recorder,
+        provenance,
+        started: Instant::now(),
+    }
+    .drive(observer)
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
@@ -162,7 +192,7 @@ struct Running {
 }
 
 impl Running {
-    fn to_the_end(mut self, observer: &mut dyn Observer) -> Result<Ending, RunError> {
+    fn drive(mut self, observer: &mut dyn Observer) -> Result<Ending, RunError> {
         let (from, first_step) = (self.sim.time(), self.sim.steps());
         let mut saved = Instant::now();
         let mut saved_time = self.sim.time();
@@ -171,7 +201,8 @@ impl Running {
                 return self.finish(why);
             }
             let limit = self.recorder.until_next(self.sim.time());
-            if let Err(source) = self.sim.step(limit) {
+            let stepped = self.sim.step(limit).and_then(|()| self.collapsed(limit));
+            if let Err(source) = stepped {
                 return Err(self.failed(source, saved_time));
             }
             for event in self.recorder.after_step(&self.sim)? {
@@ -204,6 +235,22 @@ impl Running {
         }
     }
 
+    /// An error if the step has become absurdly short, though an output is far away.
+    fn collapsed(&self, limit: f64) -> Result<(), StepError> {
+        let dt = self.sim.time_step();
+        if dt >= self.plan.smallest_step || 2.0 * dt > limit {
+            return Ok(());
+        }
+        Err(StepError::Unstable {
+            time: self.sim.time(),
+            step: self.sim.steps(),
+            what: format!(
+                "the time step has collapsed to {dt:.1e} s: somewhere the fluid is far faster than any grain should settle"
+            ),
+            remedy: "a finer grid, a smaller [time] cfl, or a look at the last slices".into(),
+        })
+    }
+
     /// Why the run is at its end, if it is.
     fn ended(&self) -> Option<&'static str> {
         let time = self.sim.time();
@@ -211,7 +258,10 @@ impl Running {
             return Some("end");
         }
         let stop = self.plan.stop?;
-        let since = self.recorder.tracker().holds_since(stop.when, self.sim.grains())?;
+        let since = self
+            .recorder
+            .tracker()
+            .holds_since(stop.when, self.sim.grains())?;
         (time - since >= stop.hold).then_some(match stop.when {
             StopWhen::Landing => "landing",
             StopWhen::Rest => "rest",
@@ -234,7 +284,9 @@ impl Running {
     fn finish(mut self, why: &str) -> Result<Ending, RunError> {
         self.recorder.finish(&self.sim)?;
         self.checkpoint()?;
-        let summary = self.recorder.summary(&self.sim, self.provenance.wall_s(), why);
+        let summary = self
+            .recorder
+            .summary(&self.sim, self.provenance.wall_s(), why);
         let path = self.out.join(SUMMARY);
         write_whole(&path, true, |out| {
             serde_json::to_writer_pretty(&mut *out, &summary)?;
@@ -246,12 +298,22 @@ impl Running {
 
     /// Notes what was seen; the last good checkpoint stays as it is.
     fn failed(&mut self, source: StepError, time: f64) -> RunError {
-        let StepError::Unstable { time: at, step, what, remedy } = &source;
+        let StepError::Unstable {
+            time: at,
+            step,
+            what,
+            remedy,
+        } = &source;
         let failure = serde_json::json!({ "time": at, "step": step, "what": what, "remedy": remedy, "checkpoint_time": time });
         let path = self.out.join("failure.json");
-        let kept = write(&path, format!("{failure:#}\n").as_bytes()).and_then(|()| self.note_wall());
+        let kept =
+            write(&path, format!("{failure:#}\n").as_bytes()).and_then(|()| self.note_wall());
         match kept {
-            Ok(()) => RunError::Unstable { source, time, folder: self.out.join(checkpoint::FOLDER) },
+            Ok(()) => RunError::Unstable {
+                source,
+                time,
+                folder: self.out.join(checkpoint::FOLDER),
+            },
             Err(error) => error,
         }
     }

@@ -14,7 +14,8 @@ use crate::sim::Simulation;
 use crate::sim::events::{Event, Tracker};
 
 /// Header of `grains.csv`.
-pub const GRAINS_HEADER: &str = "time,grain,x,y,z,vx,vy,vz,qw,qx,qy,qz,wx,wy,wz,fx,fy,fz,tx,ty,tz,contacts";
+pub const GRAINS_HEADER: &str =
+    "time,grain,x,y,z,vx,vy,vz,qw,qx,qy,qz,wx,wy,wz,fx,fy,fz,tx,ty,tz,contacts";
 /// Header of `diagnostics.csv`.
 pub const DIAGNOSTICS_HEADER: &str = "time,step,dt,cfl,max_divergence,max_velocity,slip,fluid_kinetic_energy,grain_kinetic_energy,momentum_x,momentum_y,momentum_z,momentum_residual,contacts,gap";
 
@@ -38,7 +39,10 @@ impl Tables {
             let file = File::create(&path).context("create", &path)?;
             Ok::<_, RunError>((path, file))
         };
-        let mut tables = Tables { files: [open(NAMES[0])?, open(NAMES[1])?, open(NAMES[2])?], lengths: Lengths::default() };
+        let mut tables = Tables {
+            files: [open(NAMES[0])?, open(NAMES[1])?, open(NAMES[2])?],
+            lengths: Lengths::default(),
+        };
         tables.append(0, &format!("{GRAINS_HEADER}\n"))?;
         tables.append(1, &format!("{DIAGNOSTICS_HEADER}\n"))?;
         Ok(tables)
@@ -48,17 +52,27 @@ impl Tables {
     pub fn reopen(folder: &Path, lengths: Lengths) -> Result<Tables, RunError> {
         let open = |index: usize| {
             let path = folder.join(NAMES[index]);
-            let mut file = OpenOptions::new().write(true).open(&path).context("open", &path)?;
+            let mut file = OpenOptions::new()
+                .write(true)
+                .open(&path)
+                .context("open", &path)?;
             let found = file.metadata().context("read", &path)?.len();
             if found < lengths.0[index] {
-                let message = format!("it has {found} bytes, the checkpoint knows of {}", lengths.0[index]);
-                return Err(io::Error::new(io::ErrorKind::UnexpectedEof, message)).context("continue", &path);
+                let message = format!(
+                    "it has {found} bytes, the checkpoint knows of {}",
+                    lengths.0[index]
+                );
+                return Err(io::Error::new(io::ErrorKind::UnexpectedEof, message))
+                    .context("continue", &path);
             }
             file.set_len(lengths.0[index]).context("cut back", &path)?;
             file.seek(SeekFrom::End(0)).context("continue", &path)?;
             Ok((path, file))
         };
-        Ok(Tables { files: [open(0)?, open(1)?, open(2)?], lengths })
+        Ok(Tables {
+            files: [open(0)?, open(1)?, open(2)?],
+            lengths,
+        })
     }
 
     fn append(&mut self, index: usize, text: &str) -> Result<(), RunError> {
@@ -78,7 +92,9 @@ impl Tables {
     /// One line for each event.
     pub fn events(&mut self, events: &[Event]) -> Result<(), RunError> {
         for event in events {
-            let line = serde_json::to_string(event).map_err(io::Error::from).context("write", &self.files[2].0)?;
+            let line = serde_json::to_string(event)
+                .map_err(io::Error::from)
+                .context("write", &self.files[2].0)?;
             self.append(2, &format!("{line}\n"))?;
         }
         Ok(())
@@ -104,13 +120,37 @@ fn grain_rows(sim: &Simulation) -> String {
     }
     let mut text = String::new();
     for (i, (grain, load)) in sim.grains().iter().zip(sim.loads()).enumerate() {
-        let (x, v, w, q) = (grain.pose.position, grain.velocity, grain.angular_velocity, grain.pose.orientation);
+        let (x, v, w, q) = (
+            grain.pose.position,
+            grain.velocity,
+            grain.angular_velocity,
+            grain.pose.orientation,
+        );
         let (f, t) = (load.force, load.torque);
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
             "{time:?},{i},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{}",
-            x.x, x.y, x.z, v.x, v.y, v.z, q.w, q.x, q.y, q.z, w.x, w.y, w.z, f.x, f.y, f.z, t.x, t.y, t.z, contacts[i]
+            x.x,
+            x.y,
+            x.z,
+            v.x,
+            v.y,
+            v.z,
+            q.w,
+            q.x,
+            q.y,
+            q.z,
+            w.x,
+            w.y,
+            w.z,
+            f.x,
+            f.y,
+            f.z,
+            t.x,
+            t.y,
+            t.z,
+            contacts[i]
         );
     }
     text
@@ -118,7 +158,9 @@ fn grain_rows(sim: &Simulation) -> String {
 
 fn diagnostics_row(sim: &Simulation, tracker: &Tracker) -> String {
     let d = sim.diagnostics();
-    let gap = tracker.gap().map_or(String::new(), |gap| format!("{gap:?}"));
+    let gap = tracker
+        .gap()
+        .map_or(String::new(), |gap| format!("{gap:?}"));
     format!(
         "{:?},{},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{},{gap}\n",
         sim.time(),

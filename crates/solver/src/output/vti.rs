@@ -65,7 +65,12 @@ pub fn write(path: &Path, image: &Image) -> io::Result<()> {
     let count: usize = image.cells.iter().product();
     for array in &image.arrays {
         if !matches!(array.components, 1..=3) || array.data.len() != count * array.components {
-            let message = format!("array {} has {} numbers for {count} cells of {}", array.name, array.data.len(), array.components);
+            let message = format!(
+                "array {} has {} numbers for {count} cells of {}",
+                array.name,
+                array.data.len(),
+                array.components
+            );
             return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
         }
     }
@@ -81,10 +86,33 @@ pub fn write(path: &Path, image: &Image) -> io::Result<()> {
             }
         })
         .collect();
-    let sources: Vec<Source> =
-        image.arrays.iter().zip(&values).map(|(a, value)| Source { name: &a.name, components: a.components, value }).collect();
-    let Image { cells, spacing, origin, time, .. } = *image;
-    write_from(path, &Frame { cells, spacing, origin, time }, &sources)
+    let sources: Vec<Source> = image
+        .arrays
+        .iter()
+        .zip(&values)
+        .map(|(a, value)| Source {
+            name: &a.name,
+            components: a.components,
+            value,
+        })
+        .collect();
+    let Image {
+        cells,
+        spacing,
+        origin,
+        time,
+        ..
+    } = *image;
+    write_from(
+        path,
+        &Frame {
+            cells,
+            spacing,
+            origin,
+            time,
+        },
+        &sources,
+    )
 }
 
 /// Writes an image whose values are computed on the way, so that none is held in memory.
@@ -98,9 +126,20 @@ pub fn write_from(path: &Path, frame: &Frame, sources: &[Source]) -> io::Result<
         let (h, o) = (frame.spacing, frame.origin);
         let extent = format!("0 {nx} 0 {ny} 0 {nz}");
         writeln!(out, "<?xml version=\"1.0\"?>")?;
-        writeln!(out, "<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">")?;
-        writeln!(out, "<ImageData WholeExtent=\"{extent}\" Origin=\"{:?} {:?} {:?}\" Spacing=\"{:?} {:?} {:?}\">", o.x, o.y, o.z, h.x, h.y, h.z)?;
-        writeln!(out, "<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">{:?}</DataArray></FieldData>", frame.time)?;
+        writeln!(
+            out,
+            "<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">"
+        )?;
+        writeln!(
+            out,
+            "<ImageData WholeExtent=\"{extent}\" Origin=\"{:?} {:?} {:?}\" Spacing=\"{:?} {:?} {:?}\">",
+            o.x, o.y, o.z, h.x, h.y, h.z
+        )?;
+        writeln!(
+            out,
+            "<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">{:?}</DataArray></FieldData>",
+            frame.time
+        )?;
         writeln!(out, "<Piece Extent=\"{extent}\">")?;
         writeln!(out, "<CellData>")?;
         let mut offset = 0;
@@ -144,42 +183,86 @@ const LARGEST_HEAD: usize = 1 << 16;
 pub fn read(path: &Path) -> io::Result<Image> {
     let mut bytes = Vec::new();
     std::fs::File::open(path)?.read_to_end(&mut bytes)?;
-    parse(&bytes).map_err(|what| io::Error::new(io::ErrorKind::InvalidData, format!("{}: {what}", path.display())))
+    parse(&bytes).map_err(|what| {
+        io::Error::new(
+            io::ErrorKind::InvalidData,
+            format!("{}: {what}", path.display()),
+        )
+    })
 }
 
 fn parse(bytes: &[u8]) -> Result<Image, String> {
     let marker = b"<AppendedData encoding=\"raw\">\n_";
-    let head_end = bytes.windows(marker.len()).take(LARGEST_HEAD).position(|w| w == marker);
+    let head_end = bytes
+        .windows(marker.len())
+        .take(LARGEST_HEAD)
+        .position(|w| w == marker);
     let head_end = head_end.ok_or("no raw appended data; not an image of this program")?;
     let head = std::str::from_utf8(&bytes[..head_end]).map_err(|_| "the head is not text")?;
     let data = &bytes[head_end + marker.len()..];
-    if !head.contains("type=\"ImageData\"") || !head.contains("header_type=\"UInt64\"") || !head.contains("LittleEndian") {
+    if !head.contains("type=\"ImageData\"")
+        || !head.contains("header_type=\"UInt64\"")
+        || !head.contains("LittleEndian")
+    {
         return Err("not a little-endian image with 64-bit headers".into());
     }
     let image = element(head, "ImageData ").ok_or("no ImageData")?;
     let extent: [usize; 6] = numbers(image, "WholeExtent")?;
     let cells = [extent[1], extent[3], extent[5]];
-    let count = cells.iter().try_fold(1usize, |n, c| n.checked_mul(*c)).filter(|n| (1..=1 << 40).contains(n));
+    let count = cells
+        .iter()
+        .try_fold(1usize, |n, c| n.checked_mul(*c))
+        .filter(|n| (1..=1 << 40).contains(n));
     let count = count.ok_or_else(|| format!("extent {extent:?}"))?;
-    let time_text = head.split("Name=\"TimeValue\"").nth(1).and_then(|rest| rest.split(['>', '<']).nth(1));
-    let time = time_text.and_then(|t| t.trim().parse().ok()).ok_or("no TimeValue")?;
+    let time_text = head
+        .split("Name=\"TimeValue\"")
+        .nth(1)
+        .and_then(|rest| rest.split(['>', '<']).nth(1));
+    let time = time_text
+        .and_then(|t| t.trim().parse().ok())
+        .ok_or("no TimeValue")?;
     let mut arrays = Vec::new();
     let cell_data = head.split("<CellData>").nth(1).ok_or("no CellData")?;
     for text in cell_data.split("<DataArray ").skip(1) {
-        let name = attribute(text, "Name").ok_or("an array without a name")?.to_string();
+        let name = attribute(text, "Name")
+            .ok_or("an array without a name")?
+            .to_string();
         let [components]: [usize; 1] = numbers(text, "NumberOfComponents")?;
         let [offset]: [usize; 1] = numbers(text, "offset")?;
         let cut = || format!("array {name} is cut off");
-        let length = data.get(offset..).and_then(|d| d.first_chunk::<8>()).ok_or_else(cut)?;
+        let length = data
+            .get(offset..)
+            .and_then(|d| d.first_chunk::<8>())
+            .ok_or_else(cut)?;
         let length = u64::from_le_bytes(*length) as usize;
         if !(1..=3).contains(&components) || count.checked_mul(4 * components) != Some(length) {
-            return Err(format!("array {name} has {length} bytes for {count} cells of {components}"));
+            return Err(format!(
+                "array {name} has {length} bytes for {count} cells of {components}"
+            ));
         }
-        let values = data.get(offset + 8..).and_then(|d| d.get(..length)).ok_or_else(cut)?;
-        let values = values.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-        arrays.push(Array { name, components, data: values });
+        let values = data
+            .get(offset + 8..)
+            .and_then(|d| d.get(..length))
+            .ok_or_else(cut)?;
+        let values = values
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .map(|b| f32::from_le_bytes(*b))
+            .collect();
+        arrays.push(Array {
+            name,
+            components,
+            data: values,
+        });
     }
-    Ok(Image { cells, spacing: vector(image, "Spacing")?, origin: vector(image, "Origin")?, time, arrays })
+    Ok(Image {
+        cells,
+        spacing: vector(image, "Spacing")?,
+        origin: vector(image, "Origin")?,
+        time,
+        arrays,
+    })
 }
 
 fn element<'a>(text: &'a str, name: &str) -> Option<&'a str> {
@@ -195,7 +278,10 @@ fn attribute<'a>(text: &'a str, name: &str) -> Option<&'a str> {
 
 fn numbers<T: std::str::FromStr, const N: usize>(text: &str, name: &str) -> Result<[T; N], String> {
     let value = attribute(text, name).ok_or_else(|| format!("no {name}"))?;
-    let list: Vec<T> = value.split_whitespace().filter_map(|v| v.parse().ok()).collect();
+    let list: Vec<T> = value
+        .split_whitespace()
+        .filter_map(|v| v.parse().ok())
+        .collect();
     list.try_into().map_err(|_| format!("{name}=\"{value}\""))
 }
 
@@ -215,8 +301,16 @@ mod tests {
             origin: DVec3::new(-1.0, 0.0, 1.0 / 3.0),
             time: 0.1 + 0.2,
             arrays: vec![
-                Array { name: "pressure".into(), components: 1, data: (0..count).map(|i| i as f32 * 0.1).collect() },
-                Array { name: "velocity".into(), components: 3, data: (0..3 * count).map(|i| -(i as f32)).collect() },
+                Array {
+                    name: "pressure".into(),
+                    components: 1,
+                    data: (0..count).map(|i| i as f32 * 0.1).collect(),
+                },
+                Array {
+                    name: "velocity".into(),
+                    components: 3,
+                    data: (0..3 * count).map(|i| -(i as f32)).collect(),
+                },
             ],
         }
     }
@@ -227,7 +321,11 @@ mod tests {
         let path = folder.path().join("a.vti");
         write(&path, &sample()).unwrap();
         assert_eq!(read(&path).unwrap(), sample());
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
+        assert_eq!(
+            std::fs::read_dir(folder.path()).unwrap().count(),
+            1,
+            "no temporary file stays"
+        );
     }
 
     #[test]
@@ -238,9 +336,14 @@ mod tests {
         let good = std::fs::read(&path).unwrap();
         for length in [0, 10, 300, good.len() - 60] {
             std::fs::write(&path, &good[..length]).unwrap();
-            assert_eq!(read(&path).unwrap_err().kind(), io::ErrorKind::InvalidData, "{length} bytes");
+            assert_eq!(
+                read(&path).unwrap_err().kind(),
+                io::ErrorKind::InvalidData,
+                "{length} bytes"
+            );
         }
-        let huge = String::from_utf8_lossy(&good[..500]).replace("0 4 0 3 0 2", "0 999999999 0 999999999 0 999999999");
+        let huge = String::from_utf8_lossy(&good[..500])
+            .replace("0 4 0 3 0 2", "0 999999999 0 999999999 0 999999999");
         assert!(parse(&[huge.as_bytes(), &good[500..]].concat()).is_err());
     }
 
@@ -249,6 +352,11 @@ mod tests {
         let mut image = sample();
         image.arrays[0].data.pop();
         let folder = tempfile::tempdir().unwrap();
-        assert_eq!(write(&folder.path().join("a.vti"), &image).unwrap_err().kind(), io::ErrorKind::InvalidInput);
+        assert_eq!(
+            write(&folder.path().join("a.vti"), &image)
+                .unwrap_err()
+                .kind(),
+            io::ErrorKind::InvalidInput
+        );
     }
 }

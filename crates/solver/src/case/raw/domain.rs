@@ -69,7 +69,10 @@ impl JsonSchema for CellSize {
         "CellSize".into()
     }
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let (one, three) = (generator.subschema_for::<Quantity<Length>>(), generator.subschema_for::<Triple<Length>>());
+        let (one, three) = (
+            generator.subschema_for::<Quantity<Length>>(),
+            generator.subschema_for::<Triple<Length>>(),
+        );
         json_schema!({ "anyOf": [one, three] })
     }
 }
@@ -106,25 +109,44 @@ pub struct AxisTable {
 }
 
 impl Forms for AxisFaces {
-    const EXPECTED: &'static str =
-        "a condition for both faces (\"periodic\", \"wall\", ...), a pair [lower, upper], or { lower = ..., upper = ... }";
+    const EXPECTED: &'static str = "a condition for both faces (\"periodic\", \"wall\", ...), a pair [lower, upper], or { lower = ..., upper = ... }";
     type List = [Loc<Face>; 2];
     type Table = AxisTable;
     fn from_word(word: &str) -> Result<Self, String> {
         let face = Face::from_word(word)?;
-        Ok(AxisFaces { lower: Loc::none(face), upper: Loc::none(face) })
+        Ok(AxisFaces {
+            lower: Loc::none(face),
+            upper: Loc::none(face),
+        })
     }
     fn from_list([lower, upper]: Self::List) -> Result<Self, String> {
         Ok(AxisFaces { lower, upper })
     }
     fn from_table(table: AxisTable) -> Result<Self, String> {
         match table {
-            AxisTable { lower, upper, kind: None, velocity: None } => {
-                Ok(AxisFaces { lower: lower.unwrap_or_default(), upper: upper.unwrap_or_default() })
-            }
-            AxisTable { lower: None, upper: None, kind: Some(kind), velocity } => {
-                let face = Loc::none(Face { kind, velocity: velocity.map(|v| v.si) });
-                Ok(AxisFaces { lower: face.clone(), upper: face })
+            AxisTable {
+                lower,
+                upper,
+                kind: None,
+                velocity: None,
+            } => Ok(AxisFaces {
+                lower: lower.unwrap_or_default(),
+                upper: upper.unwrap_or_default(),
+            }),
+            AxisTable {
+                lower: None,
+                upper: None,
+                kind: Some(kind),
+                velocity,
+            } => {
+                let face = Loc::none(Face {
+                    kind,
+                    velocity: velocity.map(|v| v.si),
+                });
+                Ok(AxisFaces {
+                    lower: face.clone(),
+                    upper: face,
+                })
             }
             _ => Err("give either `kind` (for both faces) or `lower` and `upper`".into()),
         }
@@ -184,7 +206,10 @@ impl FaceKind {
     ];
     /// The word for this condition in a case file.
     pub fn name(self) -> &'static str {
-        FaceKind::NAMES.iter().find(|(_, kind)| *kind == self).map_or("wall", |(name, _)| name)
+        FaceKind::NAMES
+            .iter()
+            .find(|(_, kind)| *kind == self)
+            .map_or("wall", |(name, _)| name)
     }
 }
 
@@ -193,11 +218,18 @@ impl Forms for FaceKind {
     type List = Never;
     type Table = Never;
     fn from_word(word: &str) -> Result<Self, String> {
-        FaceKind::NAMES.iter().find(|(name, _)| *name == word).map(|(_, kind)| *kind).ok_or_else(|| {
-            let hint = nearest(word, FaceKind::NAMES.iter().map(|(name, _)| *name))
-                .map_or(String::new(), |name| format!(" (did you mean \"{name}\"?)"));
-            format!("unknown boundary \"{word}\"{hint}; accepted: {}", FaceKind::EXPECTED)
-        })
+        FaceKind::NAMES
+            .iter()
+            .find(|(name, _)| *name == word)
+            .map(|(_, kind)| *kind)
+            .ok_or_else(|| {
+                let hint = nearest(word, FaceKind::NAMES.iter().map(|(name, _)| *name))
+                    .map_or(String::new(), |name| format!(" (did you mean \"{name}\"?)"));
+                format!(
+                    "unknown boundary \"{word}\"{hint}; accepted: {}",
+                    FaceKind::EXPECTED
+                )
+            })
     }
 }
 
@@ -223,10 +255,16 @@ impl Forms for Face {
     type List = Never;
     type Table = FaceTable;
     fn from_word(word: &str) -> Result<Self, String> {
-        Ok(Face { kind: FaceKind::from_word(word)?, velocity: None })
+        Ok(Face {
+            kind: FaceKind::from_word(word)?,
+            velocity: None,
+        })
     }
     fn from_table(table: FaceTable) -> Result<Self, String> {
-        Ok(Face { kind: table.kind, velocity: table.velocity.map(|v| v.si) })
+        Ok(Face {
+            kind: table.kind,
+            velocity: table.velocity.map(|v| v.si),
+        })
     }
 }
 
@@ -241,7 +279,11 @@ impl Serialize for Face {
         }
         match self.velocity {
             None => self.kind.serialize(serializer),
-            Some(velocity) => Table { kind: self.kind, velocity: velocity.to_array() }.serialize(serializer),
+            Some(velocity) => Table {
+                kind: self.kind,
+                velocity: velocity.to_array(),
+            }
+            .serialize(serializer),
         }
     }
 }

@@ -85,7 +85,8 @@ pub enum Tolerance<K> {
 }
 
 impl<K: Kind> Forms for Tolerance<K> {
-    const EXPECTED: &'static str = "a difference in the unit of the value, or a percentage such as \"2 %\"";
+    const EXPECTED: &'static str =
+        "a difference in the unit of the value, or a percentage such as \"2 %\"";
     type List = Never;
     type Table = Never;
     fn from_word(word: &str) -> Result<Self, String> {
@@ -109,7 +110,9 @@ impl<K> Serialize for Tolerance<K> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Tolerance::Absolute(q) => q.serialize(serializer),
-            Tolerance::Relative(fraction) => serializer.serialize_str(&format!("{} %", fraction * 100.0)),
+            Tolerance::Relative(fraction) => {
+                serializer.serialize_str(&format!("{} %", fraction * 100.0))
+            }
         }
     }
 }
@@ -131,7 +134,8 @@ impl<K: Kind> JsonSchema for Tolerance<K> {
 pub struct OneOrMany<T>(pub Vec<Loc<T>>);
 
 impl<T: for<'de> Deserialize<'de>> Forms for OneOrMany<T> {
-    const EXPECTED: &'static str = "a table such as { value = ..., tolerance = \"2 %\" }, or a list of them";
+    const EXPECTED: &'static str =
+        "a table such as { value = ..., tolerance = \"2 %\" }, or a list of them";
     type List = Vec<Loc<T>>;
     type Table = T;
     fn from_list(list: Vec<Loc<T>>) -> Result<Self, String> {
@@ -166,4 +170,3 @@ impl<T: JsonSchema> JsonSchema for OneOrMany<T> {
         json_schema!({ "anyOf": [one, { "type": "array", "items": one }] })
     }
 }
-

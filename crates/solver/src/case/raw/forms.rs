@@ -64,10 +64,12 @@ impl<'de, T: Forms> Visitor<'de> for FormsVisitor<T> {
         T::from_number(number as f64).map_err(E::custom)
     }
     fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<T, A::Error> {
-        T::from_list(T::List::deserialize(SeqAccessDeserializer::new(seq))?).map_err(de::Error::custom)
+        T::from_list(T::List::deserialize(SeqAccessDeserializer::new(seq))?)
+            .map_err(de::Error::custom)
     }
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
-        T::from_table(T::Table::deserialize(MapAccessDeserializer::new(map))?).map_err(de::Error::custom)
+        T::from_table(T::Table::deserialize(MapAccessDeserializer::new(map))?)
+            .map_err(de::Error::custom)
     }
 }
 

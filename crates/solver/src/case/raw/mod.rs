@@ -8,8 +8,8 @@ mod grain;
 mod motion;
 mod orientation;
 mod packing;
-mod plan;
 mod physics;
+mod plan;
 
 pub use domain::{AxisFaces, CellSize, Face, FaceKind, RawDomain};
 pub use expect::{OneOrMany, RawExpect, RawExpected, Tolerance};

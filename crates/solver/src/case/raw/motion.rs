@@ -24,7 +24,9 @@ impl Law {
         match word {
             "free" => Ok(Law::Free),
             "fixed" => Ok(Law::Prescribed(DVec3::ZERO)),
-            _ => Err(format!("found \"{word}\"; expected \"free\", \"fixed\" or a vector")),
+            _ => Err(format!(
+                "found \"{word}\"; expected \"free\", \"fixed\" or a vector"
+            )),
         }
     }
     fn is_fixed(self) -> bool {
@@ -92,15 +94,23 @@ pub struct MotionTable {
 }
 
 impl Forms for Motion {
-    const EXPECTED: &'static str = "\"free\", \"fixed\", or { velocity = ..., angular_velocity = ... }";
+    const EXPECTED: &'static str =
+        "\"free\", \"fixed\", or { velocity = ..., angular_velocity = ... }";
     type List = Never;
     type Table = MotionTable;
     fn from_word(word: &str) -> Result<Self, String> {
-        let law = Law::word(word).map_err(|_| format!("found \"{word}\"; expected {}", Self::EXPECTED))?;
-        Ok(Motion { velocity: law, angular_velocity: law })
+        let law = Law::word(word)
+            .map_err(|_| format!("found \"{word}\"; expected {}", Self::EXPECTED))?;
+        Ok(Motion {
+            velocity: law,
+            angular_velocity: law,
+        })
     }
     fn from_table(table: MotionTable) -> Result<Self, String> {
-        Ok(Motion { velocity: table.velocity.0, angular_velocity: table.angular_velocity.0 })
+        Ok(Motion {
+            velocity: table.velocity.0,
+            angular_velocity: table.angular_velocity.0,
+        })
     }
 }
 
@@ -114,7 +124,11 @@ impl Serialize for Motion {
         match (self.velocity, self.angular_velocity) {
             (Law::Free, Law::Free) => serializer.serialize_str("free"),
             (v, w) if v.is_fixed() && w.is_fixed() => serializer.serialize_str("fixed"),
-            (velocity, angular_velocity) => Table { velocity, angular_velocity }.serialize(serializer),
+            (velocity, angular_velocity) => Table {
+                velocity,
+                angular_velocity,
+            }
+            .serialize(serializer),
         }
     }
 }
@@ -124,7 +138,10 @@ impl JsonSchema for Motion {
         "Motion".into()
     }
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let (v, w) = (generator.subschema_for::<Triple<Velocity>>(), generator.subschema_for::<Triple<AngularVelocity>>());
+        let (v, w) = (
+            generator.subschema_for::<Triple<Velocity>>(),
+            generator.subschema_for::<Triple<AngularVelocity>>(),
+        );
         let words = json_schema!({ "enum": ["free", "fixed"] });
         json_schema!({
             "description": Motion::EXPECTED,

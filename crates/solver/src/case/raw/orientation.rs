@@ -26,12 +26,20 @@ impl Forms for Direction {
             "x" => DVec3::X,
             "y" => DVec3::Y,
             "z" => DVec3::Z,
-            _ => return Err(format!("unknown direction \"{word}\"; expected {}", Self::EXPECTED)),
+            _ => {
+                return Err(format!(
+                    "unknown direction \"{word}\"; expected {}",
+                    Self::EXPECTED
+                ));
+            }
         };
         Ok(Direction(axis * sign))
     }
     fn from_list(list: [f64; 3]) -> Result<Self, String> {
-        DVec3::from_array(list).try_normalize().map(Direction).ok_or_else(|| "a direction cannot be zero".into())
+        DVec3::from_array(list)
+            .try_normalize()
+            .map(Direction)
+            .ok_or_else(|| "a direction cannot be zero".into())
     }
 }
 
@@ -137,7 +145,11 @@ impl Forms for Orientation {
     type Table = OrientationTable;
     fn from_list(list: Vec<f64>) -> Result<Self, String> {
         let [w, x, y, z] = list[..] else {
-            return Err(format!("found {} numbers; expected {}", list.len(), Self::EXPECTED));
+            return Err(format!(
+                "found {} numbers; expected {}",
+                list.len(),
+                Self::EXPECTED
+            ));
         };
         let q = DQuat::from_xyzw(x, y, z, w);
         let norm = q.length_squared();
@@ -145,14 +157,23 @@ impl Forms for Orientation {
             return Err("a quaternion cannot be zero".into());
         }
         // A quaternion that is already of unit length keeps its bits.
-        Ok(Orientation::Quaternion(if (norm - 1.0).abs() < 1e-14 { q } else { q.normalize() }))
+        Ok(Orientation::Quaternion(if (norm - 1.0).abs() < 1e-14 {
+            q
+        } else {
+            q.normalize()
+        }))
     }
     fn from_table(table: OrientationTable) -> Result<Self, String> {
         let axes = [table.long_axis, table.middle_axis, table.short_axis].map(|d| d.map(|d| d.0));
         match (table.axis, table.angle, axes.iter().flatten().count()) {
-            (Some(axis), Some(angle), 0) => Ok(Orientation::Quaternion(Turn { axis, angle }.quaternion())),
+            (Some(axis), Some(angle), 0) => {
+                Ok(Orientation::Quaternion(Turn { axis, angle }.quaternion()))
+            }
             (None, None, 1 | 2) => Ok(Orientation::Axes(axes)),
-            (None, None, 3) => Err("give at most two of long_axis, middle_axis and short_axis: they fix the third".into()),
+            (None, None, 3) => Err(
+                "give at most two of long_axis, middle_axis and short_axis: they fix the third"
+                    .into(),
+            ),
             _ => Err(format!("expected {}", Self::EXPECTED)),
         }
     }
@@ -164,7 +185,12 @@ impl Serialize for Orientation {
             Orientation::Quaternion(q) => [q.w, q.x, q.y, q.z].serialize(serializer),
             Orientation::Axes(axes) => {
                 let names = ["long_axis", "middle_axis", "short_axis"];
-                serializer.collect_map(names.iter().zip(axes).filter_map(|(n, a)| a.map(|a| (n, a.to_array()))))
+                serializer.collect_map(
+                    names
+                        .iter()
+                        .zip(axes)
+                        .filter_map(|(n, a)| a.map(|a| (n, a.to_array()))),
+                )
             }
         }
     }
@@ -175,7 +201,10 @@ impl JsonSchema for Orientation {
         "Orientation".into()
     }
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let (turn, direction) = (generator.subschema_for::<Turn>(), generator.subschema_for::<Direction>());
+        let (turn, direction) = (
+            generator.subschema_for::<Turn>(),
+            generator.subschema_for::<Direction>(),
+        );
         json_schema!({
             "description": Orientation::EXPECTED,
             "anyOf": [

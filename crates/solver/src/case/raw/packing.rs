@@ -112,7 +112,8 @@ pub struct RangeTable {
 }
 
 impl Forms for DiameterRange {
-    const EXPECTED: &'static str = "a length such as \"2 mm\", or { from = \"1 mm\", to = \"2 mm\" }";
+    const EXPECTED: &'static str =
+        "a length such as \"2 mm\", or { from = \"1 mm\", to = \"2 mm\" }";
     type List = Never;
     type Table = RangeTable;
     fn from_word(word: &str) -> Result<Self, String> {
@@ -122,7 +123,10 @@ impl Forms for DiameterRange {
         Ok(DiameterRange { from: d, to: d })
     }
     fn from_table(table: RangeTable) -> Result<Self, String> {
-        Ok(DiameterRange { from: table.from.si, to: table.to.si })
+        Ok(DiameterRange {
+            from: table.from.si,
+            to: table.to.si,
+        })
     }
 }
 

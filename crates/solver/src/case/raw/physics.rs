@@ -5,7 +5,10 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::case::loc::Loc;
-use crate::case::quantity::{Acceleration, Density, DynamicViscosity, KinematicViscosity, Length, Number, Quantity, Rate, Stiffness, Triple, Velocity};
+use crate::case::quantity::{
+    Acceleration, Density, DynamicViscosity, KinematicViscosity, Length, Number, Quantity, Rate,
+    Stiffness, Triple, Velocity,
+};
 use crate::coupling::Scheme;
 use crate::dem::ContactParams;
 use crate::flow::Advection;

@@ -50,8 +50,12 @@ fn stop_word(word: &str) -> Result<StopWhen, String> {
         "rest" => Ok(StopWhen::Rest),
         "separation" => Ok(StopWhen::Separation),
         _ => {
-            let hint = nearest(word, ["landing", "rest", "separation"]).map_or(String::new(), |w| format!(" (did you mean \"{w}\"?)"));
-            Err(format!("found \"{word}\"{hint}; expected {}", RawStop::EXPECTED))
+            let hint = nearest(word, ["landing", "rest", "separation"])
+                .map_or(String::new(), |w| format!(" (did you mean \"{w}\"?)"));
+            Err(format!(
+                "found \"{word}\"{hint}; expected {}",
+                RawStop::EXPECTED
+            ))
         }
     }
 }
@@ -70,14 +74,21 @@ fn no_time() -> Quantity<Time> {
 }
 
 impl Forms for RawStop {
-    const EXPECTED: &'static str = "\"landing\", \"rest\", \"separation\", or { when = \"landing\", hold = \"50 ms\" }";
+    const EXPECTED: &'static str =
+        "\"landing\", \"rest\", \"separation\", or { when = \"landing\", hold = \"50 ms\" }";
     type List = Never;
     type Table = StopTable;
     fn from_word(word: &str) -> Result<Self, String> {
-        Ok(RawStop { when: stop_word(word)?, hold: no_time() })
+        Ok(RawStop {
+            when: stop_word(word)?,
+            hold: no_time(),
+        })
     }
     fn from_table(table: StopTable) -> Result<Self, String> {
-        Ok(RawStop { when: table.when, hold: table.hold })
+        Ok(RawStop {
+            when: table.when,
+            hold: table.hold,
+        })
     }
 }
 
@@ -88,7 +99,8 @@ impl JsonSchema for RawStop {
         "Stop".into()
     }
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let words = json_schema!({ "enum": [StopWhen::Landing, StopWhen::Rest, StopWhen::Separation] });
+        let words =
+            json_schema!({ "enum": [StopWhen::Landing, StopWhen::Rest, StopWhen::Separation] });
         let hold = generator.subschema_for::<Quantity<Time>>();
         json_schema!({
             "description": RawStop::EXPECTED,
@@ -174,7 +186,10 @@ pub struct RawRun {
 
 impl Default for RawRun {
     fn default() -> Self {
-        RawRun { threads: 0.into(), precision: "f64".to_string().into() }
+        RawRun {
+            threads: 0.into(),
+            precision: "f64".to_string().into(),
+        }
     }
 }
 
@@ -184,6 +199,10 @@ impl From<&crate::output::Plane> for RawPlane {
             crate::output::Place::At(at) => (Some(Quantity::new(at).into()), None),
             crate::output::Place::Grain(grain) => (None, Some(grain.into())),
         };
-        RawPlane { normal: ["x", "y", "z"][plane.axis].to_string().into(), at, grain }
+        RawPlane {
+            normal: ["x", "y", "z"][plane.axis].to_string().into(),
+            at,
+            grain,
+        }
     }
 }

@@ -15,13 +15,23 @@ pub(super) struct Checker<'a> {
 
 impl<'a> Checker<'a> {
     pub fn new(source: &'a Source) -> Checker<'a> {
-        Checker { source, problems: Vec::new() }
+        Checker {
+            source,
+            problems: Vec::new(),
+        }
     }
 
     /// Notes a problem of `key`, written at `span` unless it is a default.
-    pub fn fail(&mut self, span: Option<&Range<usize>>, key: &str, message: impl Into<String>, help: impl Into<String>) {
+    pub fn fail(
+        &mut self,
+        span: Option<&Range<usize>>,
+        key: &str,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) {
         let problem = Problem::new(message).key(key).help(help);
-        self.problems.push(self.source.locate(problem, span, "here"));
+        self.problems
+            .push(self.source.locate(problem, span, "here"));
     }
 
     /// The value if it is above zero.
@@ -29,17 +39,37 @@ impl<'a> Checker<'a> {
         if value.si > 0.0 {
             return Some(value.si);
         }
-        self.fail(value.span.as_ref(), key, format!("{what} must be greater than zero, found {}", value.si), format!("give a positive `{key}`"));
+        self.fail(
+            value.span.as_ref(),
+            key,
+            format!("{what} must be greater than zero, found {}", value.si),
+            format!("give a positive `{key}`"),
+        );
         None
     }
 
     /// The value if it lies in `low..=high`.
-    pub fn within<K>(&mut self, value: &Loc<Quantity<K>>, key: &str, low: f64, high: f64) -> Option<f64> {
+    pub fn within<K>(
+        &mut self,
+        value: &Loc<Quantity<K>>,
+        key: &str,
+        low: f64,
+        high: f64,
+    ) -> Option<f64> {
         if (low..=high).contains(&value.si) {
             return Some(value.si);
         }
-        let range = if high.is_finite() { format!("between {low} and {high}") } else { format!("at least {low}") };
-        self.fail(value.span.as_ref(), key, format!("found {}, which is out of range", value.si), format!("`{key}` must be {range}"));
+        let range = if high.is_finite() {
+            format!("between {low} and {high}")
+        } else {
+            format!("at least {low}")
+        };
+        self.fail(
+            value.span.as_ref(),
+            key,
+            format!("found {}, which is out of range", value.si),
+            format!("`{key}` must be {range}"),
+        );
         None
     }
 }

@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::check::{Checker, short};
 use crate::case::loc::Loc;
-use crate::case::raw::{AxisFaces, CellSize, Face, FaceKind, RawDomain};
 use crate::case::quantity::Triple;
+use crate::case::raw::{AxisFaces, CellSize, Face, FaceKind, RawDomain};
 use crate::flow::{Boundaries, Boundary};
 use crate::grid::Mesh;
 
@@ -20,23 +20,57 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
     let origin = raw.origin.si;
     let positive = |v: DVec3| v.min_element() > 0.0;
     if let Some(size) = raw.size.as_ref().filter(|s| !positive(s.si)) {
-        check.fail(size.span.as_ref(), "domain.size", format!("the edges of the box must be longer than zero, found {:?}", size.si.to_array()), "give three positive lengths");
+        check.fail(
+            size.span.as_ref(),
+            "domain.size",
+            format!(
+                "the edges of the box must be longer than zero, found {:?}",
+                size.si.to_array()
+            ),
+            "give three positive lengths",
+        );
         return None;
     }
     if let Some(cell) = raw.cell_size.as_ref().filter(|c| !positive(c.0)) {
-        check.fail(cell.span.as_ref(), "domain.cell_size", "the cell size must be greater than zero", "give a positive length such as \"0.25 mm\"");
+        check.fail(
+            cell.span.as_ref(),
+            "domain.cell_size",
+            "the cell size must be greater than zero",
+            "give a positive length such as \"0.25 mm\"",
+        );
         return None;
     }
-    if let Some(cells) = raw.cells.as_ref().filter(|c| c.iter().any(|n| *n == 0 || *n > MOST_CELLS)) {
-        check.fail(cells.span.as_ref(), "domain.cells", format!("found {:?} cells", cells.value), format!("each axis needs 1 to {MOST_CELLS} cells"));
+    if let Some(cells) = raw
+        .cells
+        .as_ref()
+        .filter(|c| c.iter().any(|n| *n == 0 || *n > MOST_CELLS))
+    {
+        check.fail(
+            cells.span.as_ref(),
+            "domain.cells",
+            format!("found {:?} cells", cells.value),
+            format!("each axis needs 1 to {MOST_CELLS} cells"),
+        );
         return None;
     }
     let as_vector = |cells: [usize; 3]| DVec3::from_array(cells.map(|n| n as f64));
     let (cells, spacing) = match (&raw.size, &raw.cells, &raw.cell_size) {
         (size, Some(cells), Some(cell)) => {
             let extent = as_vector(cells.value) * cell.0;
-            if let Some(size) = size.as_ref().filter(|s| ((s.si - extent) / extent).abs().max_element() > 1e-9) {
-                check.fail(cells.span.as_ref(), "domain.cells", format!("size {:?} m is not cells times cell_size, {:?} m", size.si.to_array(), extent.to_array()), "give two of size, cells and cell_size");
+            if let Some(size) = size
+                .as_ref()
+                .filter(|s| ((s.si - extent) / extent).abs().max_element() > 1e-9)
+            {
+                check.fail(
+                    cells.span.as_ref(),
+                    "domain.cells",
+                    format!(
+                        "size {:?} m is not cells times cell_size, {:?} m",
+                        size.si.to_array(),
+                        extent.to_array()
+                    ),
+                    "give two of size, cells and cell_size",
+                );
                 return None;
             }
             (cells.value, cell.0)
@@ -51,11 +85,23 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
     };
     let count = cells.iter().try_fold(1usize, |n, c| n.checked_mul(*c));
     if count.is_none_or(|n| n > MOST_CELLS_IN_ALL) {
-        let span = raw.cell_size.as_ref().map_or_else(|| raw.cells.as_ref().and_then(|c| c.span.clone()), |c| c.span.clone());
-        check.fail(span.as_ref(), "domain", format!("{cells:?} cells are more than any machine holds"), "make the cells larger; was a unit forgotten?");
+        let span = raw.cell_size.as_ref().map_or_else(
+            || raw.cells.as_ref().and_then(|c| c.span.clone()),
+            |c| c.span.clone(),
+        );
+        check.fail(
+            span.as_ref(),
+            "domain",
+            format!("{cells:?} cells are more than any machine holds"),
+            "make the cells larger; was a unit forgotten?",
+        );
         return None;
     }
-    let mesh = Mesh { cells, spacing, origin };
+    let mesh = Mesh {
+        cells,
+        spacing,
+        origin,
+    };
     raw.size = Some(Triple::new(mesh.extent()).into());
     raw.cells = Some(cells.into());
     raw.cell_size = Some(CellSize(spacing).into());
@@ -63,13 +109,22 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
 }
 
 /// Whole cells in the box, or a problem that says which sizes would do.
-fn divide(check: &mut Checker, size: &Loc<Triple<crate::case::quantity::Length>>, cell: &Loc<CellSize>) -> Option<[usize; 3]> {
+fn divide(
+    check: &mut Checker,
+    size: &Loc<Triple<crate::case::quantity::Length>>,
+    cell: &Loc<CellSize>,
+) -> Option<[usize; 3]> {
     let mut cells = [0; 3];
     for axis in 0..3 {
         let (length, h) = (size.si[axis], cell.0[axis]);
         let ratio = length / h;
         if ratio > MOST_CELLS as f64 {
-            check.fail(cell.span.as_ref(), "domain.cell_size", format!("{ratio:.3e} cells along {}", AXES[axis]), "make the cells larger; was a unit forgotten?");
+            check.fail(
+                cell.span.as_ref(),
+                "domain.cell_size",
+                format!("{ratio:.3e} cells along {}", AXES[axis]),
+                "make the cells larger; was a unit forgotten?",
+            );
             return None;
         }
         let whole = ratio.round().max(1.0);
@@ -92,7 +147,12 @@ fn divide(check: &mut Checker, size: &Loc<Triple<crate::case::quantity::Length>>
 }
 
 /// Boundaries of the six faces.
-pub(super) fn boundaries(check: &mut Checker, raw: &RawDomain, mesh: &Mesh, dry: bool) -> Option<Boundaries> {
+pub(super) fn boundaries(
+    check: &mut Checker,
+    raw: &RawDomain,
+    mesh: &Mesh,
+    dry: bool,
+) -> Option<Boundaries> {
     let before = check.problems.len();
     let axes = [&raw.boundaries.x, &raw.boundaries.y, &raw.boundaries.z];
     let mut result = Boundaries([[Boundary::WALL; 2]; 3]);
@@ -115,21 +175,33 @@ pub(super) fn boundaries(check: &mut Checker, raw: &RawDomain, mesh: &Mesh, dry:
 fn boundary(face: &Face, axis: usize, side: usize) -> Result<Boundary, (String, String)> {
     let velocity = match (face.kind, face.velocity) {
         (FaceKind::Inflow, None) => {
-            return Err(("an inflow needs its velocity".into(), "write { kind = \"inflow\", velocity = [...] }".into()));
+            return Err((
+                "an inflow needs its velocity".into(),
+                "write { kind = \"inflow\", velocity = [...] }".into(),
+            ));
         }
         (FaceKind::Wall | FaceKind::Inflow, velocity) => velocity.unwrap_or(DVec3::ZERO),
         (kind, Some(_)) => {
-            return Err((format!("a {} face has no velocity of its own", kind.name()), "only wall and inflow take a velocity".into()));
+            return Err((
+                format!("a {} face has no velocity of its own", kind.name()),
+                "only wall and inflow take a velocity".into(),
+            ));
         }
         (_, None) => DVec3::ZERO,
     };
     match face.kind {
         FaceKind::Wall if velocity[axis] != 0.0 => Err((
-            format!("a wall moves in its own plane, but this one has {} m/s along {}", velocity[axis], AXES[axis]),
+            format!(
+                "a wall moves in its own plane, but this one has {} m/s along {}",
+                velocity[axis], AXES[axis]
+            ),
             format!("set the {} component of its velocity to zero", AXES[axis]),
         )),
         FaceKind::Inflow if velocity[axis] * [1.0, -1.0][side] < 0.0 => Err((
-            format!("this inflow leaves the box ({} m/s along {})", velocity[axis], AXES[axis]),
+            format!(
+                "this inflow leaves the box ({} m/s along {})",
+                velocity[axis], AXES[axis]
+            ),
             "turn the sign of its velocity, or make it an outflow".into(),
         )),
         FaceKind::Wall => Ok(Boundary::Wall { velocity }),
@@ -149,15 +221,25 @@ fn axis_rules(check: &mut Checker, faces: &Loc<AxisFaces>, axis: usize, cells: u
         check.fail(
             span,
             &key,
-            format!("periodic on one side only: lower is {}, upper is {}", lower.name(), upper.name()),
+            format!(
+                "periodic on one side only: lower is {}, upper is {}",
+                lower.name(),
+                upper.name()
+            ),
             format!("make both sides periodic: {} = \"periodic\"", AXES[axis]),
         );
     } else if cells == 1 && lower != FaceKind::Periodic && !dry {
         check.fail(
             span,
             &key,
-            format!("{} has one cell, so it is flat, and a flat axis has no walls", AXES[axis]),
-            format!("write {} = \"periodic\", or give the axis more cells", AXES[axis]),
+            format!(
+                "{} has one cell, so it is flat, and a flat axis has no walls",
+                AXES[axis]
+            ),
+            format!(
+                "write {} = \"periodic\", or give the axis more cells",
+                AXES[axis]
+            ),
         );
     }
 }
@@ -177,7 +259,8 @@ fn mass_balance(check: &mut Checker, raw: &RawDomain, boundaries: &Boundaries, m
                     largest = largest.max(flux.abs());
                     let faces = [&raw.boundaries.x, &raw.boundaries.y, &raw.boundaries.z][axis];
                     let face = [&faces.lower, &faces.upper][side];
-                    where_from = where_from.or(Some((axis, face.span.clone().or(faces.span.clone()))));
+                    where_from =
+                        where_from.or(Some((axis, face.span.clone().or(faces.span.clone()))));
                 }
                 _ => {}
             }
@@ -187,7 +270,9 @@ fn mass_balance(check: &mut Checker, raw: &RawDomain, boundaries: &Boundaries, m
         check.fail(
             span.as_ref(),
             &format!("domain.boundaries.{}", AXES[axis]),
-            format!("{entering:.4e} m3/s enter the box and nothing leaves it: no face is an outflow"),
+            format!(
+                "{entering:.4e} m3/s enter the box and nothing leaves it: no face is an outflow"
+            ),
             "make the opposite face an outflow",
         );
     }

@@ -1,8 +1,10 @@
 //! Raw case -> validated set-up and plan. Nothing downstream checks again.
 
+mod arrangement;
 mod check;
 mod domain;
 mod grains;
+mod packings;
 mod physics;
 mod plan;
 
@@ -32,10 +34,17 @@ pub(super) struct Validated {
 }
 
 /// Checks a case; files are looked for in `folder`.
-pub(super) fn validate(source: &Source, mut raw: RawCase, folder: &Path) -> Result<Validated, CaseError> {
+pub(super) fn validate(
+    source: &Source,
+    mut raw: RawCase,
+    folder: &Path,
+) -> Result<Validated, CaseError> {
     let mut check = Checker::new(source);
     let dry = raw.fluid.is_none();
-    let fluid = raw.fluid.as_mut().map(|fluid| physics::fluid(&mut check, fluid));
+    let fluid = raw
+        .fluid
+        .as_mut()
+        .map(|fluid| physics::fluid(&mut check, fluid));
     let mesh = domain::mesh(&mut check, &mut raw.domain.value, dry);
     let boundaries = mesh.and_then(|mesh| domain::boundaries(&mut check, &raw.domain, &mesh, dry));
     let gravity = raw.gravity.si;
@@ -48,7 +57,12 @@ pub(super) fn validate(source: &Source, mut raw: RawCase, folder: &Path) -> Resu
     let mut spans: Vec<Option<Range<usize>>> = Vec::new();
     let place = |grain: &Loc<RawGrain>| {
         let above = grain.gap_above.as_ref().and_then(|g| g.span.clone());
-        grain.position.as_ref().and_then(|p| p.span.clone()).or(above).or(grain.span.clone())
+        grain
+            .position
+            .as_ref()
+            .and_then(|p| p.span.clone())
+            .or(above)
+            .or(grain.span.clone())
     };
     for (index, grain) in raw.grain.iter().enumerate() {
         let built = grains::grain(&mut check, &mut library, grain, index, &standing, vertical);
@@ -57,7 +71,9 @@ pub(super) fn validate(source: &Source, mut raw: RawCase, folder: &Path) -> Resu
         standing.push(grain);
         resolved.extend(raw_grain.map(Loc::none));
     }
-    let (Some(mesh), Some(boundaries)) = (mesh, boundaries) else { return Err(CaseError::Invalid(check.problems)) };
+    let (Some(mesh), Some(boundaries)) = (mesh, boundaries) else {
+        return Err(CaseError::Invalid(check.problems));
+    };
     let enclosure = Enclosure {
         lower: mesh.origin,
         upper: mesh.upper(),
@@ -66,9 +82,27 @@ pub(super) fn validate(source: &Source, mut raw: RawCase, folder: &Path) -> Resu
     };
     for (index, packing) in raw.packing.iter().enumerate() {
         let there: Vec<Grain> = standing.iter().flatten().cloned().collect();
-        for grain in grains::packing(&mut check, &mut library, packing, index, &there, &enclosure, vertical) {
-            let located = Loc { value: grain, span: packing.span.clone() };
-            let built = grains::grain(&mut check, &mut library, &located, standing.len(), &standing, vertical);
+        for grain in packings::packing(
+            &mut check,
+            &mut library,
+            packing,
+            index,
+            &there,
+            &enclosure,
+            vertical,
+        ) {
+            let located = Loc {
+                value: grain,
+                span: packing.span.clone(),
+            };
+            let built = grains::grain(
+                &mut check,
+                &mut library,
+                &located,
+                standing.len(),
+                &standing,
+                vertical,
+            );
             spans.push(packing.span.clone());
             let (grain, raw_grain) = built.unzip();
             standing.push(grain);
@@ -79,28 +113,66 @@ pub(super) fn validate(source: &Source, mut raw: RawCase, folder: &Path) -> Resu
         return Err(CaseError::Invalid(check.problems));
     }
     let grains: Vec<Grain> = standing.into_iter().flatten().collect();
-    grains::arrangement(&mut check, &grains, &spans, &enclosure);
+    arrangement::check(&mut check, &grains, &spans, &enclosure);
     if dry && grains.is_empty() {
-        check.fail(None, "grain", "there is neither a fluid nor a grain", "add [fluid] or [[grain]]");
+        check.fail(
+            None,
+            "grain",
+            "there is neither a fluid nor a grain",
+            "add [fluid] or [[grain]]",
+        );
     }
 
     let fluid_params = fluid.as_ref().and_then(|f| f.as_ref());
     let contact = if fluid.is_some() == fluid_params.is_some() {
-        physics::contact(&mut check, &mut raw.contact, &grains, fluid_params, gravity, &mesh)
+        physics::contact(
+            &mut check,
+            &mut raw.contact,
+            &grains,
+            fluid_params,
+            gravity,
+            &mesh,
+        )
     } else {
         None
     };
     let step = plan::step(&mut check, &mut raw.time, &mesh, &grains, gravity, dry);
-    let (Some(contact), Some(step)) = (contact, step) else { return Err(CaseError::Invalid(check.problems)) };
+    let (Some(contact), Some(step)) = (contact, step) else {
+        return Err(CaseError::Invalid(check.problems));
+    };
     let scheme = raw.coupling.scheme.value;
-    let setup = Setup { mesh, boundaries, fluid: fluid_params.copied(), scheme, gravity, grains, contact, step };
+    let setup = Setup {
+        mesh,
+        boundaries,
+        fluid: fluid_params.copied(),
+        scheme,
+        gravity,
+        grains,
+        contact,
+        step,
+    };
     let plan = plan::plan(&mut check, &raw.time, &mut raw.output, &setup, vertical.0);
-    let expect = expectations(&raw.expect, setup.grains.len(), &mut |span, key, message, help| check.fail(span, key, message, help));
-    let (Some(plan), true) = (plan, check.problems.is_empty()) else { return Err(CaseError::Invalid(check.problems)) };
-    setup.validate().map_err(|error| CaseError::from(Problem::new(error.to_string())))?;
+    let expect = expectations(
+        &raw.expect,
+        setup.grains.len(),
+        &mut |span, key, message, help| check.fail(span, key, message, help),
+    );
+    let (Some(plan), true) = (plan, check.problems.is_empty()) else {
+        return Err(CaseError::Invalid(check.problems));
+    };
+    setup
+        .validate()
+        .map_err(|error| CaseError::from(Problem::new(error.to_string())))?;
     raw.grain = resolved;
     raw.packing = Vec::new();
     raw.output.planes = Some(plan.planes.iter().map(|p| Loc::none(p.into())).collect());
     raw.run.threads = threads.into();
-    Ok(Validated { setup, plan, threads, expect, shapes: library.into_files(), resolved: raw })
+    Ok(Validated {
+        setup,
+        plan,
+        threads,
+        expect,
+        shapes: library.into_files(),
+        resolved: raw,
+    })
 }

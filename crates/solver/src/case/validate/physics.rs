@@ -20,14 +20,27 @@ pub(super) fn fluid(check: &mut Checker, raw: &mut Loc<RawFluid>) -> Option<Flui
     let span = raw.span.clone();
     let fluid = &mut raw.value;
     let kinematic_viscosity = match (&fluid.viscosity, &fluid.kinematic_viscosity) {
-        (Some(mu), None) => check.positive(mu, "fluid.viscosity", "the viscosity").zip(density).map(|(mu, rho)| mu / rho),
+        (Some(mu), None) => check
+            .positive(mu, "fluid.viscosity", "the viscosity")
+            .zip(density)
+            .map(|(mu, rho)| mu / rho),
         (None, Some(nu)) => check.positive(nu, "fluid.kinematic_viscosity", "the viscosity"),
         (Some(mu), Some(_)) => {
-            check.fail(mu.span.as_ref(), "fluid.viscosity", "both viscosity and kinematic_viscosity are given", "keep one of them");
+            check.fail(
+                mu.span.as_ref(),
+                "fluid.viscosity",
+                "both viscosity and kinematic_viscosity are given",
+                "keep one of them",
+            );
             None
         }
         (None, None) => {
-            check.fail(span.as_ref(), "fluid", "the viscosity is missing", "add viscosity = \"1 mPa s\" or kinematic_viscosity = \"1 cSt\"");
+            check.fail(
+                span.as_ref(),
+                "fluid",
+                "the viscosity is missing",
+                "add viscosity = \"1 mPa s\" or kinematic_viscosity = \"1 cSt\"",
+            );
             None
         }
     };
@@ -44,27 +57,69 @@ pub(super) fn fluid(check: &mut Checker, raw: &mut Loc<RawFluid>) -> Option<Flui
 }
 
 /// The contact law; a stiffness that is not given follows from the largest overlap.
-pub(super) fn contact(check: &mut Checker, raw: &mut RawContact, grains: &[Grain], fluid: Option<&FluidParams>, gravity: DVec3, mesh: &Mesh) -> Option<ContactParams> {
+pub(super) fn contact(
+    check: &mut Checker,
+    raw: &mut RawContact,
+    grains: &[Grain],
+    fluid: Option<&FluidParams>,
+    gravity: DVec3,
+    mesh: &Mesh,
+) -> Option<ContactParams> {
     let before = check.problems.len();
     let infinite = f64::INFINITY;
-    let tangential_ratio = check.within(&raw.tangential_ratio, "contact.tangential_ratio", 0.0, infinite);
+    let tangential_ratio = check.within(
+        &raw.tangential_ratio,
+        "contact.tangential_ratio",
+        0.0,
+        infinite,
+    );
     let friction = check.within(&raw.friction, "contact.friction", 0.0, infinite);
     let wall_friction = match &raw.wall_friction {
         Some(wall) => check.within(wall, "contact.wall_friction", 0.0, infinite),
         None => friction,
     };
-    let restitution = check.within(&raw.restitution, "contact.restitution", ContactParams::SMALLEST_RESTITUTION, 1.0);
-    let tangential_damping = check.within(&raw.tangential_damping, "contact.tangential_damping", 0.0, infinite);
+    let restitution = check.within(
+        &raw.restitution,
+        "contact.restitution",
+        ContactParams::SMALLEST_RESTITUTION,
+        1.0,
+    );
+    let tangential_damping = check.within(
+        &raw.tangential_damping,
+        "contact.tangential_damping",
+        0.0,
+        infinite,
+    );
     let global_damping = check.within(&raw.global_damping, "contact.global_damping", 0.0, infinite);
-    let lubrication_gap = check.within(&raw.lubrication_gap, "contact.lubrication_gap", 0.0, infinite);
-    let substeps = check.within(&raw.substeps_per_contact, "contact.substeps_per_contact", 5.0, 1e6);
+    let lubrication_gap = check.within(
+        &raw.lubrication_gap,
+        "contact.lubrication_gap",
+        0.0,
+        infinite,
+    );
+    let substeps = check.within(
+        &raw.substeps_per_contact,
+        "contact.substeps_per_contact",
+        5.0,
+        1e6,
+    );
     let viscosity = fluid.map_or(0.0, |f| f.density * f.kinematic_viscosity);
     if let Some(gap) = lubrication_gap.filter(|gap| *gap > 0.0 && fluid.is_none()) {
-        check.fail(raw.lubrication_gap.span.as_ref(), "contact.lubrication_gap", format!("a lubrication gap of {gap} m needs a fluid"), "add [fluid] or set lubrication_gap = 0");
+        check.fail(
+            raw.lubrication_gap.span.as_ref(),
+            "contact.lubrication_gap",
+            format!("a lubrication gap of {gap} m needs a fluid"),
+            "add [fluid] or set lubrication_gap = 0",
+        );
     }
     let stiffness = match (&raw.stiffness, &raw.maximum_overlap) {
         (Some(k), Some(_)) => {
-            check.fail(k.span.as_ref(), "contact.stiffness", "both stiffness and maximum_overlap are given", "keep one of them");
+            check.fail(
+                k.span.as_ref(),
+                "contact.stiffness",
+                "both stiffness and maximum_overlap are given",
+                "keep one of them",
+            );
             None
         }
         (Some(k), None) => check.positive(k, "contact.stiffness", "the stiffness"),
@@ -97,8 +152,17 @@ pub(super) fn contact(check: &mut Checker, raw: &mut RawContact, grains: &[Grain
 /// Stiffness [N/m] for which no grain that meets a wall at 1.5 times its settling speed (dry: after
 /// falling through the box), or lies on it, overlaps by more than `fraction` of the smallest
 /// equal-volume diameter.
-fn stiffness_for(fraction: f64, grains: &[Grain], fluid: Option<&FluidParams>, gravity: DVec3, mesh: &Mesh) -> f64 {
-    let smallest = grains.iter().map(|g| g.shape.equivalent_diameter()).fold(f64::INFINITY, f64::min);
+fn stiffness_for(
+    fraction: f64,
+    grains: &[Grain],
+    fluid: Option<&FluidParams>,
+    gravity: DVec3,
+    mesh: &Mesh,
+) -> f64 {
+    let smallest = grains
+        .iter()
+        .map(|g| g.shape.equivalent_diameter())
+        .fold(f64::INFINITY, f64::min);
     let overlap = fraction * smallest;
     let g = gravity.length();
     let height = (mesh.extent() * gravity.normalize_or_zero()).length();
@@ -113,5 +177,9 @@ fn stiffness_for(fraction: f64, grains: &[Grain], fluid: Option<&FluidParams>, g
         ContactParams::stiffness_for_overlap(grain.mass(), speed, overlap).max(weight / overlap)
     };
     let stiffness = grains.iter().map(needed).fold(0.0, f64::max);
-    if stiffness > 0.0 { stiffness } else { ContactParams::default().normal_stiffness }
+    if stiffness > 0.0 {
+        stiffness
+    } else {
+        ContactParams::default().normal_stiffness
+    }
 }

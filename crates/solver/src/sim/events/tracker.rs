@@ -1,150 +1,10 @@
-//! What happens to the grains: kiss, tumbling, role change, separation, landing.
-//!
-//! Pure logic on positions, contacts and the gap of a pair; it neither moves nor writes anything.
-//! The states of a pair (exactly two grains) follow the paper: drafting until the first contact,
-//! kissing until the line of centres has turned far from the vertical, tumbling until the grains
-//! part for good, separated until they touch again.
+//! Follows the grains and notes what happens.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::{Event, EventKind, EventParams, Phase, StopWhen};
 use crate::dem::{Contact, Dof, Grain, Partner};
-
-/// What ends a run early.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum StopWhen {
-    /// Every free grain has touched the floor.
-    Landing,
-    /// Every free grain touches something and lies still.
-    Rest,
-    /// The pair has parted after kissing.
-    Separation,
-}
-
-/// State of a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Phase {
-    /// Not yet in contact.
-    Drafting,
-    /// In contact, one above the other.
-    Kissing,
-    /// Turning about each other.
-    Tumbling,
-    /// Parted.
-    Separated,
-}
-
-impl Phase {
-    /// Name as written in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Phase::Drafting => "drafting",
-            Phase::Kissing => "kissing",
-            Phase::Tumbling => "tumbling",
-            Phase::Separated => "separated",
-        }
-    }
-}
-
-/// Kind of event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum EventKind {
-    /// The pair comes into contact.
-    Kiss,
-    /// After a kiss, the line of centres has turned past `EventParams::tumble_angle`.
-    Tumble,
-    /// The upper grain has passed the lower one.
-    RoleChange,
-    /// The pair has parted.
-    Separation,
-    /// A grain touches the floor for the first time.
-    Landing,
-}
-
-impl EventKind {
-    /// Name as written in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            EventKind::Kiss => "kiss",
-            EventKind::Tumble => "tumble",
-            EventKind::RoleChange => "role-change",
-            EventKind::Separation => "separation",
-            EventKind::Landing => "landing",
-        }
-    }
-}
-
-/// Something that happened. One line of `events.jsonl`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Event {
-    /// When it happened [s]: for a separation the end of the contact, for a role change the
-    /// moment of equal height.
-    pub time: f64,
-    /// What happened.
-    pub event: EventKind,
-    /// To which grains.
-    pub grains: Vec<usize>,
-    /// When it was certain [s]; a separation and a role change need some distance first.
-    pub confirmed: f64,
-    /// Gap between the surfaces of the pair when confirmed [m].
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub gap: Option<f64>,
-    /// Angle of the line of centres from the vertical when confirmed [rad], 0 to pi/2.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub tilt: Option<f64>,
-}
-
-/// Thresholds. `for_grains` chooses them from the grains and gravity.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EventParams {
-    /// Unit vector along gravity; -z without gravity.
-    pub down: DVec3,
-    /// The face that grains land on: axis and side.
-    pub floor: (u8, u8),
-    /// Period of the box along periodic axes [m].
-    pub period: [Option<f64>; 3],
-    /// A pair has parted beyond this gap [m].
-    pub separation_gap: f64,
-    /// ... held without contact this long [s].
-    pub separation_hold: f64,
-    /// Tumbling begins at this angle of the line of centres from the vertical [rad].
-    pub tumble_angle: f64,
-    /// A role change counts beyond this difference in height [m].
-    pub role_margin: f64,
-    /// A grain lies still below this speed of its fastest point [m/s].
-    pub rest_speed: f64,
-}
-
-impl EventParams {
-    /// Separation beyond 0.05 d for sqrt(d/g), tumbling from 45 degrees, role change beyond
-    /// 0.02 d, rest below 0.001 sqrt(g d); d is the mean equal-volume diameter.
-    pub fn for_grains(grains: &[Grain], gravity: DVec3, period: [Option<f64>; 3]) -> EventParams {
-        let down = gravity.try_normalize().unwrap_or(DVec3::NEG_Z);
-        let magnitude = down.abs();
-        let axis = if magnitude.z >= magnitude.x && magnitude.z >= magnitude.y {
-            2
-        } else if magnitude.y >= magnitude.x {
-            1
-        } else {
-            0
-        };
-        let d = grains.iter().map(|g| g.shape.equivalent_diameter()).sum::<f64>() / grains.len().max(1) as f64;
-        let g = gravity.length();
-        EventParams {
-            down,
-            floor: (axis as u8, u8::from(down[axis] > 0.0)),
-            period,
-            separation_gap: 0.05 * d,
-            separation_hold: if g > 0.0 { (d / g).sqrt() } else { 0.0 },
-            tumble_angle: std::f64::consts::FRAC_PI_4,
-            role_margin: 0.02 * d,
-            rest_speed: 1e-3 * (g * d).sqrt(),
-        }
-    }
-}
 
 /// The pair's part of the tracker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -191,8 +51,14 @@ impl Tracker {
             let line = tracker.line(a, b);
             let leader = usize::from(line.dot(params.down) > 0.0);
             let tilt = tracker.tilt(line);
-            tracker.state.pair =
-                Some(Pair { phase: Phase::Drafting, leader, level_since: None, parted_since: None, gap, tilt });
+            tracker.state.pair = Some(Pair {
+                phase: Phase::Drafting,
+                leader,
+                level_since: None,
+                parted_since: None,
+                gap,
+                tilt,
+            });
         }
         tracker
     }
@@ -215,15 +81,25 @@ impl Tracker {
     }
 
     /// Takes in the state after a step and returns what has happened, oldest first.
-    pub fn update(&mut self, time: f64, grains: &[Grain], contacts: &[Contact], gap: Option<f64>) -> Vec<Event> {
+    pub fn update(
+        &mut self,
+        time: f64,
+        grains: &[Grain],
+        contacts: &[Contact],
+        gap: Option<f64>,
+    ) -> Vec<Event> {
         let first = self.state.events.len();
         for (peak, grain) in self.state.peak_settling_speed.iter_mut().zip(grains) {
             *peak = peak.max(grain.velocity.dot(self.params.down));
         }
         if let ([a, b], Some(gap)) = (grains, gap) {
             let line = self.line(a, b);
-            let touching =
-                contacts.iter().any(|c| matches!((c.grain, c.partner), (0, Partner::Grain(1)) | (1, Partner::Grain(0))));
+            let touching = contacts.iter().any(|c| {
+                matches!(
+                    (c.grain, c.partner),
+                    (0, Partner::Grain(1)) | (1, Partner::Grain(0))
+                )
+            });
             self.update_pair(time, line, touching || gap <= 0.0, gap);
         }
         self.update_landing(time, contacts);
@@ -233,7 +109,9 @@ impl Tracker {
 
     fn update_pair(&mut self, time: f64, line: DVec3, touching: bool, gap: f64) {
         let (params, tilt) = (self.params, self.tilt(line));
-        let Some(pair) = self.state.pair.as_mut() else { return };
+        let Some(pair) = self.state.pair.as_mut() else {
+            return;
+        };
         (pair.gap, pair.tilt) = (gap, tilt);
         let mut happened = Vec::new();
 
@@ -275,25 +153,39 @@ impl Tracker {
                 }
             }
         }
-        self.state.events.extend(happened.into_iter().map(|(event, at)| Event {
-            time: at,
-            event,
-            grains: vec![0, 1],
-            confirmed: time,
-            gap: Some(gap),
-            tilt: Some(tilt),
-        }));
+        self.state
+            .events
+            .extend(happened.into_iter().map(|(event, at)| Event {
+                time: at,
+                event,
+                grains: vec![0, 1],
+                confirmed: time,
+                gap: Some(gap),
+                tilt: Some(tilt),
+            }));
     }
 
     fn update_landing(&mut self, time: f64, contacts: &[Contact]) {
         let (axis, side) = self.params.floor;
         for contact in contacts {
             let on_floor = contact.partner == Partner::Wall { axis, side };
-            if let Some(landed) = self.state.landed.get_mut(contact.grain).filter(|l| on_floor && l.is_none()) {
+            if let Some(landed) = self
+                .state
+                .landed
+                .get_mut(contact.grain)
+                .filter(|l| on_floor && l.is_none())
+            {
                 *landed = Some(time);
                 let grains = vec![contact.grain];
                 let event = EventKind::Landing;
-                self.state.events.push(Event { time, event, grains, confirmed: time, gap: None, tilt: None });
+                self.state.events.push(Event {
+                    time,
+                    event,
+                    grains,
+                    confirmed: time,
+                    gap: None,
+                    tilt: None,
+                });
             }
         }
     }
@@ -306,23 +198,39 @@ impl Tracker {
                 supported[other] = true;
             }
         }
-        let still = grains.iter().zip(supported).filter(|(g, _)| g.translation == Dof::Free).all(|(g, supported)| {
-            let spin = g.angular_velocity.length() * g.shape.bounding_radius();
-            supported && g.velocity.length() + spin < self.params.rest_speed
-        });
-        self.state.still_since = if still { self.state.still_since.or(Some(time)) } else { None };
+        let still = grains
+            .iter()
+            .zip(supported)
+            .filter(|(g, _)| g.translation == Dof::Free)
+            .all(|(g, supported)| {
+                let spin = g.angular_velocity.length() * g.shape.bounding_radius();
+                supported && g.velocity.length() + spin < self.params.rest_speed
+            });
+        self.state.still_since = if still {
+            self.state.still_since.or(Some(time))
+        } else {
+            None
+        };
     }
 
     /// Time since which `when` holds, if it does [s].
     pub fn holds_since(&self, when: StopWhen, grains: &[Grain]) -> Option<f64> {
         match when {
             StopWhen::Landing => {
-                let mut free = self.state.landed.iter().zip(grains).filter(|(_, g)| g.translation == Dof::Free).peekable();
+                let mut free = self
+                    .state
+                    .landed
+                    .iter()
+                    .zip(grains)
+                    .filter(|(_, g)| g.translation == Dof::Free)
+                    .peekable();
                 free.peek()?;
                 free.try_fold(0.0_f64, |last, (landed, _)| landed.map(|t| last.max(t)))
             }
             StopWhen::Rest => self.state.still_since,
-            StopWhen::Separation => (self.phase() == Some(Phase::Separated)).then(|| self.separation_time()).flatten(),
+            StopWhen::Separation => (self.phase() == Some(Phase::Separated))
+                .then(|| self.separation_time())
+                .flatten(),
         }
     }
 
@@ -352,12 +260,21 @@ impl Tracker {
     }
     /// When the pair parted for the last time; none while it is in contact [s].
     pub fn separation_time(&self) -> Option<f64> {
-        let last = self.state.events.iter().rev().find(|e| matches!(e.event, EventKind::Separation | EventKind::Kiss))?;
+        let last = self
+            .state
+            .events
+            .iter()
+            .rev()
+            .find(|e| matches!(e.event, EventKind::Separation | EventKind::Kiss))?;
         (last.event == EventKind::Separation).then_some(last.time)
     }
     /// Number of role changes.
     pub fn role_changes(&self) -> usize {
-        self.state.events.iter().filter(|e| e.event == EventKind::RoleChange).count()
+        self.state
+            .events
+            .iter()
+            .filter(|e| e.event == EventKind::RoleChange)
+            .count()
     }
     /// First contact of each grain with the floor [s].
     pub fn landing_times(&self) -> &[Option<f64>] {
@@ -368,7 +285,11 @@ impl Tracker {
         &self.state.peak_settling_speed
     }
     fn first(&self, kind: EventKind) -> Option<f64> {
-        self.state.events.iter().find(|e| e.event == kind).map(|e| e.time)
+        self.state
+            .events
+            .iter()
+            .find(|e| e.event == kind)
+            .map(|e| e.time)
     }
 
     /// What a checkpoint keeps.
@@ -395,7 +316,10 @@ mod tests {
         Grain {
             shape: Arc::new(Shape::sphere(0.5, 50)),
             density: 2.0,
-            pose: Pose { position: DVec3::new(x, 0.0, z), orientation: DQuat::IDENTITY },
+            pose: Pose {
+                position: DVec3::new(x, 0.0, z),
+                orientation: DQuat::IDENTITY,
+            },
             velocity: DVec3::ZERO,
             angular_velocity: DVec3::ZERO,
             translation: Dof::Free,
@@ -404,7 +328,14 @@ mod tests {
     }
 
     fn touch(grain: usize, partner: Partner) -> Contact {
-        Contact { grain, partner, overlap: 1e-3, load: Load::default(), point: DVec3::ZERO, normal: DVec3::Z }
+        Contact {
+            grain,
+            partner,
+            overlap: 1e-3,
+            load: Load::default(),
+            point: DVec3::ZERO,
+            normal: DVec3::Z,
+        }
     }
 
     /// Runs positions (grain 0 at the origin, grain 1 at x, z) through a tracker; g = d = 1.
@@ -415,7 +346,11 @@ mod tests {
         let params = EventParams::for_grains(&start, DVec3::new(0.0, 0.0, -1.0), [None; 3]);
         let mut tracker = Tracker::new(params, &start, Some(gap(path[0].1, path[0].2)));
         for &(t, x, z) in path {
-            let contacts = if gap(x, z) <= 0.0 { vec![touch(0, Partner::Grain(1))] } else { vec![] };
+            let contacts = if gap(x, z) <= 0.0 {
+                vec![touch(0, Partner::Grain(1))]
+            } else {
+                vec![]
+            };
             tracker.update(t, &grains(x, z), &contacts, Some(gap(x, z)));
         }
         tracker
@@ -423,13 +358,25 @@ mod tests {
 
     /// Trailer comes down on the leader, rolls over it, and leads.
     fn dkt() -> Vec<(f64, f64, f64)> {
-        let mut path: Vec<(f64, f64, f64)> = (0..=10).map(|i| (0.1 * f64::from(i), 0.0, 2.0 - 0.1 * f64::from(i))).collect();
+        let mut path: Vec<(f64, f64, f64)> = (0..=10)
+            .map(|i| (0.1 * f64::from(i), 0.0, 2.0 - 0.1 * f64::from(i)))
+            .collect();
         path.extend((1..=24).map(|i| {
             let angle = f64::from(i) * 5f64.to_radians();
-            (1.0 + 0.1 * f64::from(i), 0.9999 * angle.sin(), 0.9999 * angle.cos())
+            (
+                1.0 + 0.1 * f64::from(i),
+                0.9999 * angle.sin(),
+                0.9999 * angle.cos(),
+            )
         }));
         let (t, x, z) = path[path.len() - 1];
-        path.extend((1..=30).map(|i| (t + 0.1 * f64::from(i), x + 0.02 * f64::from(i), z - 0.02 * f64::from(i))));
+        path.extend((1..=30).map(|i| {
+            (
+                t + 0.1 * f64::from(i),
+                x + 0.02 * f64::from(i),
+                z - 0.02 * f64::from(i),
+            )
+        }));
         path
     }
 
@@ -437,7 +384,15 @@ mod tests {
     fn phases_of_a_pair_come_in_order() {
         let tracker = follow(&dkt());
         let kinds: Vec<EventKind> = tracker.events().iter().map(|e| e.event).collect();
-        assert_eq!(kinds, [EventKind::Kiss, EventKind::Tumble, EventKind::RoleChange, EventKind::Separation]);
+        assert_eq!(
+            kinds,
+            [
+                EventKind::Kiss,
+                EventKind::Tumble,
+                EventKind::RoleChange,
+                EventKind::Separation
+            ]
+        );
         assert_eq!(tracker.phase(), Some(Phase::Separated));
         assert!((tracker.kiss_time().unwrap() - 1.0).abs() < 1e-12);
         assert!((tracker.tumble_time().unwrap() - 1.9).abs() < 1e-12);
@@ -449,27 +404,58 @@ mod tests {
 
     #[test]
     fn a_bounce_is_not_a_separation() {
-        let path = [(0.0, 0.0, 1.5), (1.0, 0.0, 0.999), (1.1, 0.0, 1.2), (1.2, 0.0, 0.999), (1.3, 0.0, 1.04), (9.0, 0.0, 1.04)];
+        let path = [
+            (0.0, 0.0, 1.5),
+            (1.0, 0.0, 0.999),
+            (1.1, 0.0, 1.2),
+            (1.2, 0.0, 0.999),
+            (1.3, 0.0, 1.04),
+            (9.0, 0.0, 1.04),
+        ];
         let tracker = follow(&path);
         assert_eq!(tracker.events().len(), 1);
-        assert_eq!((tracker.phase(), tracker.separation_time()), (Some(Phase::Kissing), None));
+        assert_eq!(
+            (tracker.phase(), tracker.separation_time()),
+            (Some(Phase::Kissing), None)
+        );
     }
 
     #[test]
     fn a_second_kiss_withdraws_the_separation() {
-        let path = [(0.0, 0.0, 1.5), (1.0, 0.0, 0.999), (2.0, 0.0, 1.2), (4.0, 0.0, 1.3), (5.0, 0.0, 0.999)];
+        let path = [
+            (0.0, 0.0, 1.5),
+            (1.0, 0.0, 0.999),
+            (2.0, 0.0, 1.2),
+            (4.0, 0.0, 1.3),
+            (5.0, 0.0, 0.999),
+        ];
         let tracker = follow(&path);
         let kinds: Vec<EventKind> = tracker.events().iter().map(|e| e.event).collect();
-        assert_eq!(kinds, [EventKind::Kiss, EventKind::Separation, EventKind::Kiss]);
-        assert_eq!((tracker.separation_time(), tracker.kiss_time()), (None, Some(1.0)));
+        assert_eq!(
+            kinds,
+            [EventKind::Kiss, EventKind::Separation, EventKind::Kiss]
+        );
+        assert_eq!(
+            (tracker.separation_time(), tracker.kiss_time()),
+            (None, Some(1.0))
+        );
     }
 
     #[test]
     fn level_grains_do_not_chatter() {
-        let path = [(0.0, 2.0, 0.01), (1.0, 2.0, -0.01), (2.0, 2.0, 0.01), (3.0, 2.0, -0.01), (4.0, 2.0, -0.03)];
+        let path = [
+            (0.0, 2.0, 0.01),
+            (1.0, 2.0, -0.01),
+            (2.0, 2.0, 0.01),
+            (3.0, 2.0, -0.01),
+            (4.0, 2.0, -0.03),
+        ];
         let tracker = follow(&path);
         assert_eq!(tracker.role_changes(), 1);
-        assert_eq!((tracker.events()[0].time, tracker.events()[0].confirmed), (3.0, 4.0));
+        assert_eq!(
+            (tracker.events()[0].time, tracker.events()[0].confirmed),
+            (3.0, 4.0)
+        );
     }
 
     #[test]
@@ -479,12 +465,28 @@ mod tests {
         let params = EventParams::for_grains(&grains, DVec3::new(0.0, 0.0, -1.0), [None; 3]);
         let mut tracker = Tracker::new(params, &grains, None);
         let floor = Partner::Wall { axis: 2, side: 0 };
-        let events = tracker.update(1.0, &grains, &[touch(0, floor), touch(1, Partner::Wall { axis: 0, side: 1 })], None);
-        assert_eq!((events.len(), events[0].event, events[0].grains.as_slice()), (1, EventKind::Landing, &[0][..]));
+        let events = tracker.update(
+            1.0,
+            &grains,
+            &[
+                touch(0, floor),
+                touch(1, Partner::Wall { axis: 0, side: 1 }),
+            ],
+            None,
+        );
+        assert_eq!(
+            (events.len(), events[0].event, events[0].grains.as_slice()),
+            (1, EventKind::Landing, &[0][..])
+        );
         assert_eq!(tracker.holds_since(StopWhen::Landing, &grains), None);
         assert_eq!(tracker.holds_since(StopWhen::Rest, &grains), Some(1.0));
         grains[0].velocity.z = -0.1;
-        assert_eq!(tracker.update(2.0, &grains, &[touch(0, floor), touch(1, floor)], None).len(), 1);
+        assert_eq!(
+            tracker
+                .update(2.0, &grains, &[touch(0, floor), touch(1, floor)], None)
+                .len(),
+            1
+        );
         assert_eq!(tracker.holds_since(StopWhen::Landing, &grains), Some(2.0));
         assert_eq!(tracker.holds_since(StopWhen::Rest, &grains), None);
         assert_eq!(tracker.peak_settling_speeds()[0], 0.1);
@@ -493,9 +495,15 @@ mod tests {
     #[test]
     fn the_nearest_image_counts() {
         let grains = [grain(0.1, 0.0), grain(9.9, 1.2)];
-        let params = EventParams::for_grains(&grains, DVec3::new(0.0, 0.0, -1.0), [Some(10.0), None, None]);
+        let params = EventParams::for_grains(
+            &grains,
+            DVec3::new(0.0, 0.0, -1.0),
+            [Some(10.0), None, None],
+        );
         let tracker = Tracker::new(params, &grains, Some(0.2));
-        assert!((tracker.line(&grains[0], &grains[1]) - DVec3::new(-0.2, 0.0, 1.2)).length() < 1e-12);
+        assert!(
+            (tracker.line(&grains[0], &grains[1]) - DVec3::new(-0.2, 0.0, 1.2)).length() < 1e-12
+        );
     }
 
     #[test]
@@ -509,7 +517,11 @@ mod tests {
         tracker.restore(serde_json::from_str(&text).unwrap());
         for &(t, x, z) in &path[20..] {
             let gap = x.hypot(z) - 1.0;
-            let contacts = if gap <= 0.0 { vec![touch(0, Partner::Grain(1))] } else { vec![] };
+            let contacts = if gap <= 0.0 {
+                vec![touch(0, Partner::Grain(1))]
+            } else {
+                vec![]
+            };
             tracker.update(t, &[grain(0.0, 0.0), grain(x, z)], &contacts, Some(gap));
         }
         assert_eq!(tracker.state(), whole.state());
