@@ -12,7 +12,11 @@ use grainwake_solver::grid::Mesh;
 use grainwake_solver::math::Pose;
 use grainwake_solver::sim::{Setup, Simulation, StepRule};
 
-const LIMITS: StepRule = StepRule::Limits { cfl: 0.3, viscous: 0.2, max_step: f64::INFINITY };
+const LIMITS: StepRule = StepRule::Limits {
+    cfl: 0.3,
+    viscous: 0.2,
+    max_step: f64::INFINITY,
+};
 const PERIODIC: [Boundary; 2] = [Boundary::Periodic; 2];
 const WALLS: [Boundary; 2] = [Boundary::WALL; 2];
 const HELD: Dof = Dof::Prescribed(DVec3::ZERO);
@@ -21,7 +25,10 @@ fn sphere(diameter: f64, position: DVec3, density: f64) -> Grain {
     Grain {
         shape: Arc::new(Shape::sphere(0.5 * diameter, 600)),
         density,
-        pose: Pose { position, orientation: DQuat::IDENTITY },
+        pose: Pose {
+            position,
+            orientation: DQuat::IDENTITY,
+        },
         velocity: DVec3::ZERO,
         angular_velocity: DVec3::ZERO,
         translation: Dof::Free,
@@ -39,15 +46,28 @@ fn water(kinematic_viscosity: f64) -> FluidParams {
     }
 }
 
-fn setup(cells: [usize; 3], h: f64, boundaries: [[Boundary; 2]; 3], nu: f64, grains: Vec<Grain>) -> Setup {
+fn setup(
+    cells: [usize; 3],
+    h: f64,
+    boundaries: [[Boundary; 2]; 3],
+    nu: f64,
+    grains: Vec<Grain>,
+) -> Setup {
     Setup {
-        mesh: Mesh { cells, spacing: DVec3::splat(h), origin: DVec3::ZERO },
+        mesh: Mesh {
+            cells,
+            spacing: DVec3::splat(h),
+            origin: DVec3::ZERO,
+        },
         boundaries: Boundaries(boundaries),
         fluid: Some(water(nu)),
         scheme: Scheme::Aperture,
         gravity: DVec3::ZERO,
         grains,
-        contact: ContactParams { normal_stiffness: 50.0, ..ContactParams::default() },
+        contact: ContactParams {
+            normal_stiffness: 50.0,
+            ..ContactParams::default()
+        },
         step: LIMITS,
     }
 }
@@ -77,13 +97,20 @@ fn momentum_of_fluid_and_grains_is_conserved_in_a_periodic_box() {
             sim.step(f64::INFINITY).unwrap();
             touched |= !sim.contacts().is_empty();
             let d = sim.diagnostics();
-            assert!(d.momentum_residual < 1e-13, "{scheme:?}: residual {:e}", d.momentum_residual);
+            assert!(
+                d.momentum_residual < 1e-13,
+                "{scheme:?}: residual {:e}",
+                d.momentum_residual
+            );
             assert!(d.max_divergence < 1e-10 * d.max_velocity / 0.125, "{d:?}");
         }
         let after = sim.diagnostics().momentum;
         assert!(touched, "the grains were to meet");
         let drift = (after - before).length();
-        assert!(drift < 1e-12 * before.length().max(1.0), "{scheme:?}: momentum drifted by {drift:e}");
+        assert!(
+            drift < 1e-12 * before.length().max(1.0),
+            "{scheme:?}: momentum drifted by {drift:e}"
+        );
     }
 }
 
@@ -91,20 +118,35 @@ fn momentum_of_fluid_and_grains_is_conserved_in_a_periodic_box() {
 fn momentum_balances_between_walls() {
     let mut grains = vec![sphere(1.0, DVec3::new(1.5, 1.4, 2.0), 1.5)];
     grains[0].velocity = DVec3::new(0.3, 0.0, -0.5);
-    let mut case = setup([24, 24, 32], 1.0 / 8.0, [WALLS, PERIODIC, WALLS], 0.02, grains);
+    let mut case = setup(
+        [24, 24, 32],
+        1.0 / 8.0,
+        [WALLS, PERIODIC, WALLS],
+        0.02,
+        grains,
+    );
     case.gravity = DVec3::new(0.0, 0.0, -1.0);
     let mut sim = Simulation::new(case).unwrap();
     for _ in 0..80 {
         sim.step(f64::INFINITY).unwrap();
-        assert!(sim.diagnostics().momentum_residual < 1e-13, "{:e}", sim.diagnostics().momentum_residual);
+        assert!(
+            sim.diagnostics().momentum_residual < 1e-13,
+            "{:e}",
+            sim.diagnostics().momentum_residual
+        );
     }
 }
 
 #[test]
 fn settling_is_stable_at_every_density_ratio() {
     for ratio in [1.01, 1.14, 1.5, 2.6, 7.8] {
-        let mut case =
-            setup([24, 24, 48], 1.0 / 8.0, [WALLS, WALLS, WALLS], 0.02, vec![sphere(1.0, DVec3::new(1.5, 1.5, 5.0), ratio)]);
+        let mut case = setup(
+            [24, 24, 48],
+            1.0 / 8.0,
+            [WALLS, WALLS, WALLS],
+            0.02,
+            vec![sphere(1.0, DVec3::new(1.5, 1.5, 5.0), ratio)],
+        );
         case.gravity = DVec3::new(0.0, 0.0, -1.0 / (ratio - 1.0));
         let mut sim = Simulation::new(case).unwrap();
         let mut speed = 0.0;
@@ -112,7 +154,11 @@ fn settling_is_stable_at_every_density_ratio() {
             sim.step(f64::INFINITY).unwrap();
             let grain = &sim.grains()[0];
             let change = (-grain.velocity.z - speed) / sim.time_step();
-            assert!(change.abs() < 1.2 / ratio, "ratio {ratio}: acceleration {change} at t = {}", sim.time());
+            assert!(
+                change.abs() < 1.2 / ratio,
+                "ratio {ratio}: acceleration {change} at t = {}",
+                sim.time()
+            );
             speed = -grain.velocity.z;
         }
         // The same submerged weight: the same speed in the end, whatever the inertia.
@@ -132,7 +178,10 @@ fn a_spinning_sphere_feels_the_stokes_torque() {
     let ratio = -sim.loads()[0].torque.y / free;
     // Inside a concentric sphere of the box's half-width (corners: 1.73 of it) the torque is
     // raised by 1 / (1 - (R/R_box)^3): 1.6 % (0.3 %).
-    assert!((0.985..1.035).contains(&ratio), "torque over 8 pi mu R^3 Omega: {ratio}");
+    assert!(
+        (0.985..1.035).contains(&ratio),
+        "torque over 8 pi mu R^3 Omega: {ratio}"
+    );
 }
 
 #[test]
@@ -140,8 +189,16 @@ fn a_free_sphere_in_shear_turns_at_half_the_shear_rate() {
     let shear = 0.05;
     let mut ball = sphere(1.0, DVec3::splat(1.5), 1.0);
     ball.translation = HELD;
-    let lid = |sign: f64| Boundary::Wall { velocity: DVec3::new(sign * 1.5 * shear, 0.0, 0.0) };
-    let case = setup([24; 3], 1.0 / 8.0, [PERIODIC, PERIODIC, [lid(-1.0), lid(1.0)]], 1.0, vec![ball]);
+    let lid = |sign: f64| Boundary::Wall {
+        velocity: DVec3::new(sign * 1.5 * shear, 0.0, 0.0),
+    };
+    let case = setup(
+        [24; 3],
+        1.0 / 8.0,
+        [PERIODIC, PERIODIC, [lid(-1.0), lid(1.0)]],
+        1.0,
+        vec![ball],
+    );
     let mut sim = Simulation::new(case).unwrap();
     run(&mut sim, 3.0);
     let spin = sim.grains()[0].angular_velocity.y / shear;
@@ -156,7 +213,13 @@ fn drag_of_a_fixed_sphere_at_re_100() {
     (ball.translation, ball.rotation) = (HELD, HELD);
     let sides = [Boundary::Slip; 2];
     let flow = [Boundary::Inflow { velocity: stream }, Boundary::Outflow];
-    let mut case = setup([120, 24, 24], 1.0 / 8.0, [flow, sides, sides], 0.01, vec![ball]);
+    let mut case = setup(
+        [120, 24, 24],
+        1.0 / 8.0,
+        [flow, sides, sides],
+        0.01,
+        vec![ball],
+    );
     case.fluid.as_mut().unwrap().initial_velocity = stream;
     let mut sim = Simulation::new(case).unwrap();
     run(&mut sim, 14.0);
@@ -170,7 +233,13 @@ fn force_on_a_carried_sphere_is_quiet() {
     let mut ball = sphere(1.0, DVec3::new(2.0, 2.026, 2.046), 1.0);
     ball.translation = Dof::Prescribed(DVec3::X);
     ball.rotation = HELD;
-    let mut case = setup([48, 32, 32], 1.0 / 8.0, [PERIODIC, WALLS, WALLS], 0.02, vec![ball]);
+    let mut case = setup(
+        [48, 32, 32],
+        1.0 / 8.0,
+        [PERIODIC, WALLS, WALLS],
+        0.02,
+        vec![ball],
+    );
     case.step = StepRule::Fixed(0.02);
     let mut sim = Simulation::new(case).unwrap();
     run(&mut sim, 3.0);
@@ -181,8 +250,15 @@ fn force_on_a_carried_sphere_is_quiet() {
     }
     let n = samples.len() as f64;
     let mean = samples.iter().map(|s| s.1).sum::<f64>() / n;
-    let slope = samples.iter().map(|s| s.0 * (s.1 - mean)).sum::<f64>() / samples.iter().map(|s| s.0 * s.0).sum::<f64>();
-    let noise = (samples.iter().map(|s| (s.1 - mean - slope * s.0).powi(2)).sum::<f64>() / n).sqrt() / mean;
+    let slope = samples.iter().map(|s| s.0 * (s.1 - mean)).sum::<f64>()
+        / samples.iter().map(|s| s.0 * s.0).sum::<f64>();
+    let noise = (samples
+        .iter()
+        .map(|s| (s.1 - mean - slope * s.0).powi(2))
+        .sum::<f64>()
+        / n)
+        .sqrt()
+        / mean;
     assert!(noise < 0.01, "force noise {noise}");
     assert!(mean > 0.0);
 }
@@ -190,10 +266,18 @@ fn force_on_a_carried_sphere_is_quiet() {
 #[test]
 fn ten_cate_e4_on_the_coarse_mesh() {
     let (nx, nz) = (37, 59);
-    let mesh =
-        Mesh { cells: [nx, nx, nz], spacing: DVec3::new(0.1 / 37.0, 0.1 / 37.0, 0.16 / 59.0), origin: DVec3::ZERO };
-    let mut case =
-        setup([nx, nx, nz], 1.0, [WALLS; 3], 0.058 / 960.0, vec![sphere(0.015, DVec3::new(0.05, 0.05, 0.1275), 1120.0)]);
+    let mesh = Mesh {
+        cells: [nx, nx, nz],
+        spacing: DVec3::new(0.1 / 37.0, 0.1 / 37.0, 0.16 / 59.0),
+        origin: DVec3::ZERO,
+    };
+    let mut case = setup(
+        [nx, nx, nz],
+        1.0,
+        [WALLS; 3],
+        0.058 / 960.0,
+        vec![sphere(0.015, DVec3::new(0.05, 0.05, 0.1275), 1120.0)],
+    );
     case.mesh = mesh;
     case.fluid.as_mut().unwrap().density = 960.0;
     case.gravity = DVec3::new(0.0, 0.0, -9.81);
@@ -203,13 +287,19 @@ fn ten_cate_e4_on_the_coarse_mesh() {
         sim.step(f64::INFINITY).unwrap();
         peak = peak.max(-sim.grains()[0].velocity.z);
     }
-    assert!((peak / 0.12224 - 1.0).abs() < 0.04, "peak speed {peak} m/s, experiment 0.12224");
+    assert!(
+        (peak / 0.12224 - 1.0).abs() < 0.04,
+        "peak speed {peak} m/s, experiment 0.12224"
+    );
 }
 
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
     let bits = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| {
             let grains = vec![
                 sphere(1.0, DVec3::new(1.5, 1.5, 1.2), 1.5),
@@ -254,12 +344,18 @@ fn a_restored_state_continues_with_the_same_bits() {
     for _ in 0..50 {
         straight.step(f64::INFINITY).unwrap();
     }
-    assert!(!straight.contacts().is_empty(), "the test is to cross a contact");
+    assert!(
+        !straight.contacts().is_empty(),
+        "the test is to cross a contact"
+    );
     let mut resumed = make();
     resumed.restore(&mut middle.as_slice()).unwrap();
     for _ in 0..50 {
         resumed.step(f64::INFINITY).unwrap();
     }
     assert!(state(&straight) == state(&resumed));
-    assert!(make().restore(&mut &middle[..middle.len() / 2]).is_err(), "a cut state must not pass");
+    assert!(
+        make().restore(&mut &middle[..middle.len() / 2]).is_err(),
+        "a cut state must not pass"
+    );
 }

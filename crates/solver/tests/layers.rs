@@ -11,13 +11,25 @@ const ALLOWED: [(&str, &[&str]); 9] = [
     ("dem", &["math"]),
     ("flow", &["math", "grid", "poisson"]),
     ("coupling", &["math", "grid", "dem", "flow"]),
-    ("sim", &["math", "grid", "poisson", "dem", "flow", "coupling"]),
-    ("case", &["math", "grid", "dem", "flow", "coupling", "sim", "output"]),
-    ("output", &["math", "grid", "dem", "flow", "coupling", "sim"]),
+    (
+        "sim",
+        &["math", "grid", "poisson", "dem", "flow", "coupling"],
+    ),
+    (
+        "case",
+        &["math", "grid", "dem", "flow", "coupling", "sim", "output"],
+    ),
+    (
+        "output",
+        &["math", "grid", "dem", "flow", "coupling", "sim"],
+    ),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).expect("a source folder").map(|entry| entry.expect("an entry").path()) {
+    for entry in fs::read_dir(folder)
+        .expect("a source folder")
+        .map(|entry| entry.expect("an entry").path())
+    {
         if entry.is_dir() {
             sources(&entry, found);
         } else if entry.extension().is_some_and(|extension| extension == "rs") {
@@ -32,7 +44,10 @@ fn named(line: &str) -> Vec<String> {
     code.match_indices("crate::")
         .filter(|(at, _)| !code[..*at].ends_with('_'))
         .map(|(at, word)| {
-            code[at + word.len()..].chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+            code[at + word.len()..]
+                .chars()
+                .take_while(|c| c.is_alphanumeric() || *c == '_')
+                .collect()
         })
         .collect()
 }
@@ -60,21 +75,32 @@ fn imports_point_downwards() {
             }
         }
     }
-    assert!(seen > 50, "the test found only {seen} imports: has the layout changed?");
+    assert!(
+        seen > 50,
+        "the test found only {seen} imports: has the layout changed?"
+    );
 }
 
 #[test]
 fn libraries_depend_downwards() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the folder of crates");
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("the folder of crates");
     for (name, barred) in [
-        ("shape", &["grainwake-solver", "grainwake-report", "grainwake ="][..]),
+        (
+            "shape",
+            &["grainwake-solver", "grainwake-report", "grainwake ="][..],
+        ),
         ("solver", &["grainwake-report", "grainwake ="][..]),
         ("report", &["grainwake ="][..]),
     ] {
         let text = fs::read_to_string(crates.join(name).join("Cargo.toml")).expect("a manifest");
         let dependencies = text.split("dependencies]").nth(1).unwrap_or("");
         for word in barred {
-            assert!(!dependencies.contains(word), "crates/{name} must not depend on {word}");
+            assert!(
+                !dependencies.contains(word),
+                "crates/{name} must not depend on {word}"
+            );
         }
     }
 }

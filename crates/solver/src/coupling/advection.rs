@@ -56,13 +56,17 @@ fn correct_links(
         for j in 0..last.y {
             for i in 0..last.x {
                 let there = IVec3::new(i, j, k) + step;
-                let d = 0.5 * (distance[body.local(i, j, k)] + distance[body.local(there.x, there.y, there.z)]);
+                let d = 0.5
+                    * (distance[body.local(i, j, k)]
+                        + distance[body.local(there.x, there.y, there.z)]);
                 if d >= 2.0 * band || d <= -band {
                     continue;
                 }
                 let cell = body.first + IVec3::new(i, j, k);
                 let face = |shift: i32| unknowns.at(component, cell + shift * step);
-                let (Some(from), Some(to)) = (face(0), face(1)) else { continue };
+                let (Some(from), Some(to)) = (face(0), face(1)) else {
+                    continue;
+                };
                 let q = flow.velocity.component(component);
                 let mean = 0.5 * (q[from] + q[to]);
                 let carrier = if along == component {
@@ -74,11 +78,13 @@ fn correct_links(
                 };
                 let mut flux = 0.0;
                 if d < band {
-                    let rigid = grain.velocity_at(mesh.origin + mesh.spacing * (cell.as_dvec3() + middle));
+                    let rigid =
+                        grain.velocity_at(mesh.origin + mesh.spacing * (cell.as_dvec3() + middle));
                     let relative = (carrier - rigid[along]) * (mean - rigid[component]);
                     flux += relative * (1.0 / aperture(d, band).max(LEAST_APERTURE) - 1.0);
                 }
-                if let (Some(a), Some(b), Some(y), Some(z)) = (face(-2), face(-1), face(2), face(3)) {
+                if let (Some(a), Some(b), Some(y), Some(z)) = (face(-2), face(-1), face(2), face(3))
+                {
                     let sixth = 7.0 * (q[from] + q[to]) - 8.0 * (q[b] + q[y]) + q[a] + q[z];
                     flux += carrier * sixth / 60.0;
                 }

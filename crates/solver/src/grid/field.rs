@@ -112,10 +112,19 @@ impl Layout {
         }
     }
     /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.
-    pub fn map_layer(&self, values: &mut [f64], axis: usize, from: usize, to: usize, f: impl Fn(f64) -> f64) {
+    pub fn map_layer(
+        &self,
+        values: &mut [f64],
+        axis: usize,
+        from: usize,
+        to: usize,
+        f: impl Fn(f64) -> f64,
+    ) {
         let stride = self.strides()[axis];
         let shift = (from as isize - to as isize) * stride as isize;
-        self.each_of_layer(axis, to, |at| values[at] = f(values[at.wrapping_add_signed(shift)]));
+        self.each_of_layer(axis, to, |at| {
+            values[at] = f(values[at.wrapping_add_signed(shift)])
+        });
     }
 }
 
@@ -131,7 +140,11 @@ impl<L: Location> Field<L> {
     /// A field of zeros on `mesh`.
     pub fn zeros(mesh: &Mesh) -> Self {
         let layout = mesh.layout();
-        Field { layout, values: vec![0.0; layout.len()], location: PhantomData }
+        Field {
+            layout,
+            values: vec![0.0; layout.len()],
+            location: PhantomData,
+        }
     }
     /// Its layout.
     #[inline]
@@ -172,7 +185,8 @@ impl<L: Location> Field<L> {
     }
     /// Copies the layer `from` of an axis onto the layer `to`.
     pub fn copy_layer(&mut self, axis: usize, from: usize, to: usize) {
-        self.layout.map_layer(&mut self.values, axis, from, to, |value| value);
+        self.layout
+            .map_layer(&mut self.values, axis, from, to, |value| value);
     }
 }
 
@@ -204,7 +218,11 @@ pub struct FaceVector {
 impl FaceVector {
     /// A vector field of zeros.
     pub fn zeros(mesh: &Mesh) -> Self {
-        FaceVector { x: Field::zeros(mesh), y: Field::zeros(mesh), z: Field::zeros(mesh) }
+        FaceVector {
+            x: Field::zeros(mesh),
+            y: Field::zeros(mesh),
+            z: Field::zeros(mesh),
+        }
     }
     /// Raw values of one component.
     #[inline]

@@ -30,11 +30,15 @@ pub struct Diagnostics {
 impl Simulation {
     /// Largest |div u| after the last projection [1/s]; zero without fluid.
     pub fn max_divergence(&self) -> f64 {
-        self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures.max_divergence)
+        self.fluid
+            .as_ref()
+            .map_or(0.0, |fluid| fluid.measures.max_divergence)
     }
     /// CFL number of the last step; zero without fluid.
     pub fn cfl(&self) -> f64 {
-        self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures.max_rate * self.clock.last_step)
+        self.fluid
+            .as_ref()
+            .map_or(0.0, |fluid| fluid.measures.max_rate * self.clock.last_step)
     }
     /// Measures the present state.
     pub fn diagnostics(&self) -> Diagnostics {
@@ -43,8 +47,9 @@ impl Simulation {
         let fluid_density = self.setup.fluid.map_or(0.0, |fluid| fluid.density);
         for grain in grains {
             let spin = grain.angular_velocity;
-            d.grain_kinetic_energy +=
-                0.5 * (grain.mass() * grain.velocity.length_squared() + spin.dot(grain.inertia() * spin));
+            d.grain_kinetic_energy += 0.5
+                * (grain.mass() * grain.velocity.length_squared()
+                    + spin.dot(grain.inertia() * spin));
             d.momentum += (grain.density - fluid_density) * grain.shape.volume() * grain.velocity;
         }
         if let (Some(fluid), Some(params)) = (&self.fluid, &self.setup.fluid) {
@@ -56,7 +61,11 @@ impl Simulation {
             d.momentum += params.density * fluid.measures.momentum;
             let volume = self.setup.mesh.cell_volume() * self.setup.mesh.cell_count() as f64;
             let scale = params.density * volume * d.max_velocity;
-            d.momentum_residual = if scale > 0.0 { self.momentum_residual.length() / scale } else { 0.0 };
+            d.momentum_residual = if scale > 0.0 {
+                self.momentum_residual.length() / scale
+            } else {
+                0.0
+            };
         }
         d
     }

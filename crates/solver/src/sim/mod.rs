@@ -68,7 +68,11 @@ impl Simulation {
             let (density, nu) = (params.density, params.kinematic_viscosity);
             let mut coupling = Coupling::new(&flow, setup.scheme, density, nu, &setup.grains);
             let measures = coupling.start(&mut flow, &setup.grains);
-            Fluid { flow, coupling, measures }
+            Fluid {
+                flow,
+                coupling,
+                measures,
+            }
         });
         let count = setup.grains.len();
         Ok(Simulation {
@@ -121,12 +125,19 @@ impl Simulation {
     /// Seconds spent since the start in each stage of the step.
     pub fn pass_times(&self) -> Vec<(&'static str, f64)> {
         let p = &self.passes;
-        [("predict", p.predict), ("contact", p.contact), ("coupling", p.coupling), ("project", p.project)]
-            .map(|(name, time)| (name, time.as_secs_f64()))
-            .to_vec()
+        [
+            ("predict", p.predict),
+            ("contact", p.contact),
+            ("coupling", p.coupling),
+            ("project", p.project),
+        ]
+        .map(|(name, time)| (name, time.as_secs_f64()))
+        .to_vec()
     }
     /// Memory held by fields, solver and grains on the grid [bytes].
     pub fn bytes(&self) -> usize {
-        self.fluid.as_ref().map_or(0, |fluid| fluid.flow.bytes() + fluid.coupling.bytes())
+        self.fluid
+            .as_ref()
+            .map_or(0, |fluid| fluid.flow.bytes() + fluid.coupling.bytes())
     }
 }

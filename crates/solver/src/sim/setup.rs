@@ -59,7 +59,10 @@ impl Setup {
             lower: self.mesh.origin,
             upper: self.mesh.upper(),
             periodic: [0, 1, 2].map(|axis| self.boundaries.is_periodic(axis)),
-            solid: self.boundaries.0.map(|sides| sides.map(|boundary| boundary.is_solid())),
+            solid: self
+                .boundaries
+                .0
+                .map(|sides| sides.map(|boundary| boundary.is_solid())),
         }
     }
 
@@ -78,15 +81,21 @@ impl Setup {
                 return fail(format!("axis {name} is periodic on one side only"));
             }
             if self.fluid.is_some() && self.mesh.cells[axis] == 1 && *lower != Boundary::Periodic {
-                return fail(format!("axis {name} has one cell, so both its faces must be periodic"));
+                return fail(format!(
+                    "axis {name} has one cell, so both its faces must be periodic"
+                ));
             }
         }
         if sides().any(flux) && !sides().any(open) {
-            return fail("fluid enters the box but no face lets it out: make one face an outflow".into());
+            return fail(
+                "fluid enters the box but no face lets it out: make one face an outflow".into(),
+            );
         }
         let bounded = |x: f64| x.is_finite() && x > 0.0;
         if !self.mesh.spacing.to_array().into_iter().all(bounded) || self.mesh.cells.contains(&0) {
-            return fail("the grid needs at least one cell of positive size along each axis".into());
+            return fail(
+                "the grid needs at least one cell of positive size along each axis".into(),
+            );
         }
         if let Some(fluid) = &self.fluid {
             if !bounded(fluid.density) || !bounded(fluid.kinematic_viscosity) {
