@@ -122,8 +122,8 @@ impl Tridiagonal {
             let pivots = &scratch.pivots[(k - 1) * nx..k * nx];
             let row = column.row(k);
             for i in 0..nx {
-                row[i] += pivots[i] * carry[i];
-                carry[i] = row[i];
+                carry[i] = row[i] + pivots[i] * carry[i];
+                row[i] = carry[i];
             }
         }
     }

@@ -97,10 +97,11 @@ impl Setup {
                 "the grid needs at least one cell of positive size along each axis".into(),
             );
         }
-        if let Some(fluid) = &self.fluid {
-            if !bounded(fluid.density) || !bounded(fluid.kinematic_viscosity) {
-                return fail("density and viscosity of the fluid must be positive".into());
-            }
+        if self
+            .fluid
+            .is_some_and(|fluid| !bounded(fluid.density) || !bounded(fluid.kinematic_viscosity))
+        {
+            return fail("density and viscosity of the fluid must be positive".into());
         }
         if let Some(i) = self.grains.iter().position(|grain| !bounded(grain.density)) {
             return fail(format!("the density of grain {i} must be positive"));

@@ -1,4 +1,16 @@
-//! Scratch experiments.
+//! The measurements behind `docs/decisions/` and the case pages, one word each:
+//!
+//! `cargo run --release -p grainwake-solver --example measure -- WORD [numbers]`
+//!
+//! - `fixed [Re] [cells/d] [t_end] [x]`: drag of a fixed sphere, a quarter of the paper's box
+//! - `spin [cells/d] [box/d] [t_end]`: torque of a spinning sphere between walls
+//! - `shear [cells/d] [box/d] [t_end]`: spin of a free sphere in shear
+//! - `tencate [1-4] [nx] [nz]`: peak speed of a settling sphere
+//! - `pair [cells/d] [t_end] [friction]`: two spheres, ratio 1.14 (SINGLE=1: one alone)
+//! - `carry [cells/d] [Re] [frame]`: force on a carried (frame 0) or held (frame 1) sphere
+//! - `bench [nx ny nz] [steps]`: time a step
+//!
+//! SCHEME=paper takes the paper's coupling, CFL=0.1 another time step.
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
 use grainwake_solver::{coupling::Scheme, dem::*, flow::*, grid::Mesh, math::Pose, sim::*};
@@ -83,7 +95,7 @@ fn main() {
                 s.step(f64::INFINITY).unwrap();
                 if s.time() >= next {
                     let c = 32.0 / std::f64::consts::PI;
-                    let F = s.loads()[0].force * c;
+                    let drag = s.loads()[0].force * c;
                     println!(
                         "t {:.2} dt {:.4} Cd {:.5} Cl {:.5} {:.5} slip {:.4} div {:.1e} wall {:.1}",
                         s.time(),
@@ -135,7 +147,7 @@ fn main() {
             let exact = 8.0 * std::f64::consts::PI * nu * 0.125 * om;
             while s.time() < num(4, 1.0) {
                 s.step(f64::INFINITY).unwrap();
-                if s.steps() % 100 == 0 {
+                if s.steps().is_multiple_of(100) {
                     println!(
                         "t {:.3} T/T0 {:.5} F {:?}",
                         s.time(),
@@ -181,7 +193,7 @@ fn main() {
             .unwrap();
             while s.time() < num(4, 6.0) {
                 s.step(f64::INFINITY).unwrap();
-                if s.steps() % 4000 == 0 {
+                if s.steps().is_multiple_of(4000) {
                     println!(
                         "t {:.3} spin/gdot {:.5}",
                         s.time(),
