@@ -100,9 +100,9 @@ fn main() {
                         "t {:.2} dt {:.4} Cd {:.5} Cl {:.5} {:.5} slip {:.4} div {:.1e} wall {:.1}",
                         s.time(),
                         s.time_step(),
-                        F.x,
-                        F.y,
-                        F.z,
+                        drag.x,
+                        drag.y,
+                        drag.z,
                         s.diagnostics().slip,
                         s.diagnostics().max_divergence,
                         start.elapsed().as_secs_f64()
