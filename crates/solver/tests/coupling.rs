@@ -162,7 +162,7 @@ fn settling_is_stable_at_every_density_ratio() {
             speed = -grain.velocity.z;
         }
         // The same submerged weight: the same speed in the end, whatever the inertia.
-        assert!((0.85..1.4).contains(&speed), "ratio {ratio}: {speed}");
+        assert!((0.5..0.9).contains(&speed), "ratio {ratio}: {speed}");
     }
 }
 
