@@ -316,3 +316,83 @@ fn a_run_can_be_reported() {
         .assert()
         .code(2);
 }
+
+/// Set `GRAINWAKE_PYTHON` to a Python that has PyVista; without one the test says so and passes.
+#[test]
+fn pictures_open_in_pyvista() {
+    let python = std::env::var("GRAINWAKE_PYTHON").unwrap_or_else(|_| "python3".into());
+    let has = std::process::Command::new(&python)
+        .args(["-c", "import pyvista"])
+        .output();
+    if !has.is_ok_and(|o| o.status.success()) {
+        eprintln!(
+            "SKIPPED pictures_open_in_pyvista: {python} has no pyvista (set GRAINWAKE_PYTHON)"
+        );
+        return;
+    }
+    let (folder, case) = folder_with(WET);
+    let out = folder.path().join("run");
+    let quick = [
+        "--quiet",
+        "--set",
+        "output.checkpoint_steps=0",
+        "--set",
+        "time.end=20 ms",
+    ];
+    grainwake()
+        .arg("run")
+        .arg(&case)
+        .arg("-o")
+        .arg(&out)
+        .args(quick)
+        .assert()
+        .success();
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/read_pictures.py");
+    let done = std::process::Command::new(&python)
+        .arg(script)
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let found = json(&done.stdout);
+    assert_eq!(found["fields"]["dimensions"], serde_json::json!([9, 9, 25]));
+    assert_eq!(
+        found["fields"]["arrays"]["velocity"],
+        serde_json::json!([1536, 3])
+    );
+    let ours = grainwake_solver::output::vti::read(&out.join("fields/fields_000001.vti")).unwrap();
+    let pressure = &ours
+        .arrays
+        .iter()
+        .find(|a| a.name == "pressure")
+        .unwrap()
+        .data;
+    assert_eq!(
+        found["fields"]["pressure_at_5_3_7"].as_f64(),
+        Some(f64::from(pressure[(7 * 8 + 3) * 8 + 5]))
+    );
+    assert_eq!(found["fields"]["time"].as_f64(), Some(ours.time));
+    assert_eq!(found["grains"]["closed"], true);
+    let volume = found["grains"]["volume_of_0"].as_f64().unwrap();
+    assert!(
+        (volume / (std::f64::consts::PI / 6.0 * 8e-9) - 1.0).abs() < 0.01,
+        "{volume}"
+    );
+    let grains = std::fs::read_to_string(out.join("grains.csv")).unwrap();
+    let last: Vec<f64> = grains
+        .lines()
+        .rev()
+        .nth(1)
+        .unwrap()
+        .split(',')
+        .map(|v| v.parse().unwrap())
+        .collect();
+    assert!((found["grains"]["centre_of_0"][2].as_f64().unwrap() - last[4]).abs() < 1e-6);
+    assert_eq!(found["times"], serde_json::json!([0.0, 0.01, 0.02]));
+    // The field, the grains and a slice through each of them.
+    assert_eq!(found["parts_at_the_end"], 4);
+}

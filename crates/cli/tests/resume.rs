@@ -336,3 +336,14 @@ fn a_folder_that_cannot_be_written_is_exit_code_4() {
     let done = run(&case, &file.join("run"), &[]).code(4);
     assert!(String::from_utf8_lossy(&done.get_output().stderr).contains("file"));
 }
+
+#[test]
+fn a_run_that_was_killed_in_its_first_moments_can_be_started_again() {
+    let (folder, case) = folder_with(DRY);
+    let out = folder.path().join("run");
+    std::fs::create_dir_all(out.join("slices")).unwrap();
+    std::fs::create_dir_all(out.join("checkpoint")).unwrap();
+    std::fs::write(out.join("provenance.json.tmp"), "{").unwrap();
+    run(&case, &out, &["--set", "time.end=2 ms"]).success();
+    assert!(!out.join("provenance.json.tmp").exists());
+}

@@ -111,7 +111,7 @@ pub fn assert_same_run(a: &Path, b: &Path) {
     let strip = |files: Vec<(String, Vec<u8>)>| -> Vec<(String, Vec<u8>)> {
         files
             .into_iter()
-            .filter(|(name, _)| name != "provenance.json" && !name.ends_with(".tmp"))
+            .filter(|(name, _)| name != "provenance.json")
             .map(|(name, bytes)| {
                 if name != "summary.json" {
                     return (name, bytes);

@@ -51,10 +51,11 @@ pub(super) fn look(folder: &Path) -> Result<Found, RunError> {
             Found::Unfinished
         });
     }
-    // A kill in the first moments leaves a temporary file at most.
-    let foreign = entries
-        .flatten()
-        .any(|e| !e.file_name().to_string_lossy().ends_with(".tmp"));
+    // A kill in the first moments leaves empty folders and temporary files at most.
+    let foreign = entries.flatten().any(|entry| {
+        let empty = std::fs::read_dir(entry.path()).is_ok_and(|mut inside| inside.next().is_none());
+        !empty && !is_temporary(&entry.path())
+    });
     Ok(if foreign {
         Found::Foreign
     } else {
@@ -127,7 +128,11 @@ fn remove(path: &Path, how: impl Fn(&Path) -> std::io::Result<()>) -> Result<(),
     }
 }
 
-/// Makes the folder and its subfolders.
+fn is_temporary(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "tmp")
+}
+
+/// Makes the folder and its subfolders, and removes what a kill left half written there.
 pub(super) fn create(folder: &Path) -> Result<(), RunError> {
     let inner = pictures::FOLDERS
         .iter()
@@ -135,6 +140,14 @@ pub(super) fn create(folder: &Path) -> Result<(), RunError> {
         .map(|name| folder.join(name));
     for path in std::iter::once(PathBuf::from(folder)).chain(inner) {
         std::fs::create_dir_all(&path).context("create", &path)?;
+        let entries = std::fs::read_dir(&path).context("read", &path)?;
+        for file in entries
+            .flatten()
+            .map(|e| e.path())
+            .filter(|p| is_temporary(p))
+        {
+            std::fs::remove_file(&file).context("remove", &file)?;
+        }
     }
     Ok(())
 }
