@@ -20,6 +20,8 @@ use crate::math::Load;
 
 /// Part of its bounding radius that a grain may always move before the pairs are searched again.
 const SKIN: f64 = 0.01;
+/// A pair that is known to be apart is looked at again when this many times its motion could close it.
+const MOVED_SLACK: f64 = 1.01;
 /// Fewer pairs than this are not worth a second thread.
 const WORTH_THREADS: usize = 16;
 /// More sub-steps than this in one step are a mistake in the input.
@@ -35,6 +37,8 @@ struct Actor {
     now: Motion,
     mid: MidStep,
     contact: Load,
+    /// No point of the surface has moved further than this since the last look [m].
+    moved: f64,
     inverse_mass: f64,
     /// Where it was when the pairs were searched [m], and how far it may go from there.
     searched: DVec3,
@@ -110,10 +114,32 @@ impl Dynamics {
         if dt.is_nan() || dt <= 0.0 {
             return 0;
         }
-        let load_of = |i: usize| loads.get(i).copied().unwrap_or_default();
-        let damping = self.law.params.global_damping;
         self.follow(grains);
         self.search(grains, loads, dt);
+        let done = if self.slots.len() < WORTH_THREADS {
+            self.run(grains, loads, dt, mean_contact)
+        } else {
+            // Into the pool once, not once for each sub-step: a caller outside it would have to wait
+            // for a worker to wake every time.
+            rayon::scope(|_| self.run(grains, loads, dt, mean_contact))
+        };
+        self.last.clear();
+        self.last
+            .extend(grains.iter().map(|grain| grain.pose.position));
+        self.report(grains);
+        done
+    }
+
+    /// The sub-steps of one step.
+    fn run(
+        &mut self,
+        grains: &mut [Grain],
+        loads: &[Load],
+        dt: f64,
+        mean_contact: &mut [Load],
+    ) -> usize {
+        let load_of = |i: usize| loads.get(i).copied().unwrap_or_default();
+        let damping = self.law.params.global_damping;
         self.touch(grains, 0.0);
         let (mut done, mut left) = (0, dt);
         let mut ahead = self.substeps(left);
@@ -147,15 +173,20 @@ impl Dynamics {
                 );
             }
         }
-        self.last.clear();
-        self.last
-            .extend(grains.iter().map(|grain| grain.pose.position));
-        self.report(grains);
         done
     }
 
-    /// Brings the actors in line with the grains: shapes, and jumps by whole periods.
-    fn follow(&mut self, grains: &[Grain]) {
+    /// Brings the actors in line with the grains: prescribed velocities, shapes, and jumps by whole
+    /// periods.
+    fn follow(&mut self, grains: &mut [Grain]) {
+        for grain in grains.iter_mut() {
+            if let Dof::Prescribed(velocity) = grain.translation {
+                grain.velocity = velocity;
+            }
+            if let Dof::Prescribed(omega) = grain.rotation {
+                grain.angular_velocity = omega;
+            }
+        }
         self.actors.truncate(grains.len());
         // Nothing of the last step may steer this one but what a checkpoint holds.
         self.actors
@@ -185,6 +216,7 @@ impl Dynamics {
                 now: Motion::default(),
                 mid: MidStep::default(),
                 contact: Load::default(),
+                moved: 0.0,
                 inverse_mass: 0.0,
                 searched: DVec3::ZERO,
                 margin: 0.0,
@@ -210,6 +242,7 @@ impl Dynamics {
         };
         let mut jumped = false;
         for slot in &mut self.slots {
+            slot.patch.forget();
             if let Partner::Grain(j) = slot.key.partner {
                 let jump = jumps(slot.key.grain as usize) - jumps(j);
                 slot.key.image = slot.key.image.wrapping_add(jump);
@@ -291,6 +324,8 @@ impl Dynamics {
         for (grain, actor) in grains.iter().zip(&mut self.actors) {
             actor.contact = Load::default();
             actor.rotation = DMat3::from_quat(grain.pose.orientation);
+            let radius = grain.shape.bounding_radius();
+            actor.moved = step * (actor.mid.velocity.length() + radius * actor.mid.spin.length());
             (actor.during, actor.now) = if step > 0.0 {
                 (
                     Motion {
@@ -359,6 +394,14 @@ fn look_at(
         position: grains[i].pose.position + shift,
     };
     let i = slot.key.grain as usize;
+    let other_moved = match slot.key.partner {
+        Partner::Grain(j) => actors[j].moved,
+        Partner::Wall { .. } => 0.0,
+    };
+    slot.patch.apart -= MOVED_SLACK * (actors[i].moved + other_moved);
+    if slot.patch.apart > 0.0 {
+        return;
+    }
     let a = body(i, DVec3::ZERO);
     let (own, radius) = (&actors[i], 0.5 * a.shape.equivalent_diameter());
     let mut pair = Pair {

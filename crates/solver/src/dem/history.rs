@@ -134,6 +134,7 @@ pub(super) fn renew(
         slots.push(kept.unwrap_or_else(|| match spare.pop() {
             Some(mut slot) => {
                 slot.key = key;
+                slot.patch.forget();
                 slot
             }
             None => Slot::new(key),
