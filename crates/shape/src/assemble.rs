@@ -6,7 +6,7 @@ use crate::mesh::TriangleMesh;
 use crate::morphology::Morphology;
 use crate::provenance::Provenance;
 use crate::quality::{self, Quality, QualityBounds};
-use crate::shape::{Field, Shape};
+use crate::shape::{Field, Shape, SurfaceNode};
 use crate::surface::{self, Samples};
 use crate::{mass, nodes};
 use glam::DVec3;
@@ -27,7 +27,7 @@ pub struct ShapeOptions {
 impl Default for ShapeOptions {
     fn default() -> ShapeOptions {
         ShapeOptions {
-            cells: 48,
+            cells: 56,
             least_cells: 16,
             nodes: None,
             bounds: QualityBounds::default(),
@@ -42,7 +42,7 @@ const MARGIN_CELLS: f64 = 4.0;
 
 /// A body in (nearly) its principal frame.
 pub(crate) struct Body<F> {
-    /// Signed distance [m].
+    /// Signed distance [m] at a point; the hint passes from one sample to the next.
     pub distance: F,
     /// Bounding box [m].
     pub lower: DVec3,
@@ -81,7 +81,7 @@ impl ShapeOptions {
 
 /// Samples the body, centres the field on its own centroid, measures it, spreads the nodes and
 /// passes the quality gate.
-pub(crate) fn assemble<F: Fn(DVec3) -> f64 + Sync>(
+pub(crate) fn assemble<F: Fn(DVec3, &mut u32) -> f64 + Sync>(
     body: &Body<F>,
     mut provenance: Provenance,
     options: &ShapeOptions,
@@ -116,7 +116,7 @@ pub(crate) fn assemble<F: Fn(DVec3) -> f64 + Sync>(
     };
     options.bounds.check(&quality)?;
 
-    let (lower, upper, radius) = bounds(&field, &mesh);
+    let (lower, upper, radius) = bounds(&field, &mesh, &nodes);
     let second = DVec3::new(
         mass.second.x_axis.x,
         mass.second.y_axis.y,
@@ -148,20 +148,21 @@ pub(crate) fn surface_of(field: &SampledField) -> TriangleMesh {
 
 /// Bounding box and bounding radius of the surface. Its vertices lie on the grid lines; the
 /// middles of its faces, brought onto the surface, catch the bulge between them.
-fn bounds(field: &SampledField, mesh: &TriangleMesh) -> (DVec3, DVec3, f64) {
+fn bounds(field: &SampledField, mesh: &TriangleMesh, nodes: &[SurfaceNode]) -> (DVec3, DVec3, f64) {
     let middles = (0..mesh.triangles.len()).map(|f| {
         let middle = mesh.corners(f).iter().sum::<DVec3>() / 3.0;
         nodes::project(field, middle)
     });
-    let start = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0.0f64);
-    let (lower, upper, squared) = mesh
+    let on_surface = mesh
         .vertices
         .iter()
         .copied()
         .chain(middles)
-        .fold(start, |(lower, upper, squared), x| {
-            (lower.min(x), upper.max(x), squared.max(x.length_squared()))
-        });
+        .chain(nodes.iter().map(|n| n.position));
+    let start = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0.0f64);
+    let (lower, upper, squared) = on_surface.fold(start, |(lower, upper, squared), x| {
+        (lower.min(x), upper.max(x), squared.max(x.length_squared()))
+    });
     // What the sampling of the bulge may miss, a fraction of a percent of a cell.
     (lower, upper, squared.sqrt() + 2e-3 * field.spacing())
 }

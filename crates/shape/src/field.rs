@@ -9,11 +9,11 @@ pub(crate) const MAX_SAMPLES: u64 = 1 << 26;
 
 /// Levels between zero and the largest magnitude; a power of two below f32's 2^24, so that every
 /// stored level is exact.
-const LEVELS: f64 = (1u32 << 20) as f64;
+const LEVELS: f64 = (1u32 << 17) as f64;
 
 /// Signed distance on a regular grid in the principal frame, read by trilinear interpolation.
 ///
-/// Values are integer levels times `quantum` (about a millionth of the shape's size), which makes
+/// Values are integer levels times `quantum` (a few millionths of the shape's size), which makes
 /// the file exact and lets a scaled copy share the levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampledField {
@@ -21,20 +21,24 @@ pub struct SampledField {
     spacing: f64,
     inverse_spacing: f64,
     dims: [usize; 3],
+    /// Number of the last sample along each axis.
+    last: DVec3,
     quantum: f64,
     levels: Vec<f32>,
 }
 
 /// The cell that holds a point, with the point's place in it.
 struct Place {
+    cell: [usize; 3],
     index: usize,
     fraction: DVec3,
 }
 
 impl SampledField {
-    /// Samples `distance` on a grid that covers the box with `margin` [m] to spare on every side.
+    /// Samples `distance(x, hint)` (the hint, left by the sample before, may speed a search) on a
+    /// grid that covers the box with `margin` [m] to spare on every side.
     pub(crate) fn sample(
-        distance: impl Fn(DVec3) -> f64 + Sync,
+        distance: impl Fn(DVec3, &mut u32) -> f64 + Sync,
         lower: DVec3,
         upper: DVec3,
         spacing: f64,
@@ -61,8 +65,10 @@ impl SampledField {
             .enumerate()
             .for_each(|(row, line)| {
                 let (j, k) = (row % wide[1], row / wide[1]);
+                let mut hint = 0;
                 for (i, value) in line.iter_mut().enumerate() {
-                    *value = distance(first + spacing * DVec3::new(i as f64, j as f64, k as f64));
+                    let x = first + spacing * DVec3::new(i as f64, j as f64, k as f64);
+                    *value = distance(x, &mut hint);
                 }
             });
         let values = unbiased(&values, wide, spacing);
@@ -103,6 +109,7 @@ impl SampledField {
             spacing,
             inverse_spacing: 1.0 / spacing,
             dims,
+            last: DVec3::from_array(dims.map(|n| n as f64 - 1.0)),
             quantum,
             levels,
         }
@@ -122,8 +129,7 @@ impl SampledField {
     }
     /// Position of the last sample [m].
     pub fn upper(&self) -> DVec3 {
-        let [nx, ny, nz] = self.dims;
-        self.lower + self.spacing * DVec3::new((nx - 1) as f64, (ny - 1) as f64, (nz - 1) as f64)
+        self.lower + self.spacing * self.last
     }
     /// Step of the stored values [m].
     pub fn quantum(&self) -> f64 {
@@ -179,23 +185,26 @@ impl SampledField {
     #[inline]
     fn locate(&self, x: DVec3) -> Option<Place> {
         let s = (x - self.lower) * self.inverse_spacing;
-        let [nx, ny, nz] = self.dims;
-        let last = DVec3::new((nx - 1) as f64, (ny - 1) as f64, (nz - 1) as f64);
-        if s.cmpge(DVec3::ZERO).all() && s.cmple(last).all() {
+        if s.cmpge(DVec3::ZERO).all() && s.cmple(self.last).all() {
             Some(self.place(s))
         } else {
             None
         }
     }
 
+    /// The cell at `s`, given in spacings from the first sample and on the grid.
     #[inline]
     fn place(&self, s: DVec3) -> Place {
-        let i = (s.x as usize).min(self.dims[0] - 2);
-        let j = (s.y as usize).min(self.dims[1] - 2);
-        let k = (s.z as usize).min(self.dims[2] - 2);
+        // Through i32, which converts in one instruction each way; a grid has no more samples
+        // along an axis than that holds.
+        let cell = |axis: usize| (s[axis] as i32).clamp(0, self.dims[axis] as i32 - 2);
+        let [i, j, k] = [cell(0), cell(1), cell(2)];
+        let fraction = s - DVec3::new(f64::from(i), f64::from(j), f64::from(k));
+        let cell = [i as usize, j as usize, k as usize];
         Place {
-            index: self.index(i, j, k),
-            fraction: s - DVec3::new(i as f64, j as f64, k as f64),
+            cell,
+            index: self.index(cell[0], cell[1], cell[2]),
+            fraction,
         }
     }
 
@@ -270,38 +279,25 @@ impl SampledField {
     /// Normal interpolated from central differences at the samples: continuous, unlike the
     /// gradient of the trilinear value.
     fn smooth_normal(&self, place: &Place) -> DVec3 {
+        let f = place.fraction;
+        let low = DVec3::ONE - f;
         let strides = [1, self.dims[0], self.dims[0] * self.dims[1]];
         let mut sum = DVec3::ZERO;
         for corner in 0..8usize {
-            let mut index = place.index;
-            let mut weight = 1.0;
-            for (axis, stride) in strides.iter().enumerate() {
-                let up = corner >> axis & 1;
-                index += up * stride;
-                let f = place.fraction[axis];
-                weight *= if up == 1 { f } else { 1.0 - f };
-            }
-            if weight > 0.0 {
-                sum += weight * self.difference(index, strides);
-            }
+            let up = [corner & 1, corner >> 1 & 1, corner >> 2];
+            let index = place.index + up[0] + up[1] * strides[1] + up[2] * strides[2];
+            let weight = [low.x, f.x][up[0]] * [low.y, f.y][up[1]] * [low.z, f.z][up[2]];
+            let slope = |axis: usize| {
+                let n = place.cell[axis] + up[axis];
+                let (below, above) = (n > 0, n + 1 < self.dims[axis]);
+                let a = self.levels[index - usize::from(below) * strides[axis]];
+                let b = self.levels[index + usize::from(above) * strides[axis]];
+                // One-sided on the border, where the step is half as long.
+                f64::from(b - a) * if below && above { 0.5 } else { 1.0 }
+            };
+            sum += weight * DVec3::new(slope(0), slope(1), slope(2));
         }
         sum.normalize_or_zero()
-    }
-
-    fn difference(&self, index: usize, strides: [usize; 3]) -> DVec3 {
-        let mut gradient = DVec3::ZERO;
-        for axis in 0..3 {
-            let n = index / strides[axis] % self.dims[axis];
-            let low = if n > 0 { index - strides[axis] } else { index };
-            let high = if n + 1 < self.dims[axis] {
-                index + strides[axis]
-            } else {
-                index
-            };
-            let steps = ((high - low) / strides[axis]) as f64;
-            gradient[axis] = f64::from(self.levels[high] - self.levels[low]) / steps;
-        }
-        gradient
     }
 }
 
@@ -351,7 +347,7 @@ mod tests {
 
     fn ball() -> SampledField {
         SampledField::sample(
-            |x| x.length() - 1.0,
+            |x, _| x.length() - 1.0,
             DVec3::splat(-1.0),
             DVec3::splat(1.0),
             2.0 / 48.0,
@@ -408,7 +404,7 @@ mod tests {
                 (reach.length() - radius, reach.normalize_or_zero())
             };
             let corner = DVec3::new(1.0, radius, radius);
-            let distance = |x| exact(x).0;
+            let distance = |x, _: &mut u32| exact(x).0;
             let field = SampledField::sample(distance, -corner, corner, 1.0 / 24.0, 0.25).unwrap();
             let off_grid = |x: &DVec3| x.cmplt(field.lower()).any() || x.cmpgt(field.upper()).any();
             for x in points(1.6, 4000).chain(points(8.0, 4000)).filter(off_grid) {
@@ -440,7 +436,7 @@ mod tests {
     #[test]
     fn an_absurd_resolution_is_refused() {
         let refused =
-            SampledField::sample(|x| x.x, DVec3::splat(-1.0), DVec3::splat(1.0), 1e-6, 0.0);
+            SampledField::sample(|x, _| x.x, DVec3::splat(-1.0), DVec3::splat(1.0), 1e-6, 0.0);
         assert!(matches!(refused, Err(ShapeError::BadParameter { .. })));
     }
 }

@@ -22,6 +22,7 @@ mod nodes;
 mod principal;
 mod provenance;
 mod quality;
+pub mod scan;
 mod shape;
 mod surface;
 

@@ -11,9 +11,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Samples per node, about.
-const SAMPLES_PER_NODE: f64 = 24.0;
+const SAMPLES_PER_NODE: f64 = 16.0;
 /// Rounds of relaxation.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 8;
 
 /// A small piece of the surface.
 struct Sample {
@@ -119,9 +119,9 @@ fn samples(mesh: &TriangleMesh, largest: f64) -> Vec<Sample> {
 /// Poisson-disc choice of about `count` samples: the disc is adjusted until the number fits.
 fn choose(samples: &[Sample], bounds: (DVec3, DVec3), spacing: f64, count: usize) -> Vec<u32> {
     let order = shuffled(samples.len());
-    let (mut low, mut high) = (0.4 * spacing, 1.2 * spacing);
+    let (mut low, mut high) = (0.55 * spacing, 0.95 * spacing);
     let mut best: Option<Vec<u32>> = None;
-    for _ in 0..10 {
+    for _ in 0..7 {
         let radius = 0.5 * (low + high);
         let chosen = discs(samples, &order, bounds, radius);
         if chosen.len() > count {

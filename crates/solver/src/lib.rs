@@ -3,12 +3,12 @@
 //! Layers, each importing only from those above it in this list:
 //! `math` -> `grid` -> `poisson`, `dem` -> `flow` -> `coupling` -> `sim` -> `case`, `output`.
 
-pub mod math;
-pub mod grid;
-pub mod poisson;
+pub mod case;
+pub mod coupling;
 pub mod dem;
 pub mod flow;
-pub mod coupling;
-pub mod sim;
-pub mod case;
+pub mod grid;
+pub mod math;
 pub mod output;
+pub mod poisson;
+pub mod sim;

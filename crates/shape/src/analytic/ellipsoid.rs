@@ -17,7 +17,7 @@ pub fn ellipsoid(a: f64, b: f64, c: f64, options: &ShapeOptions) -> Result<Shape
         .with("b_m", b)
         .with("c_m", c);
     let body = Body {
-        distance: |x| distance(axes, x),
+        distance: |x, _: &mut u32| distance(axes, x),
         lower: -axes,
         upper: axes,
         volume: Some(4.0 / 3.0 * std::f64::consts::PI * a * b * c),

@@ -43,7 +43,7 @@ pub fn rounded_box(
         .with("height_m", lengths[2])
         .with("radius_m", radius);
     let body = Body {
-        distance: |x: DVec3| {
+        distance: |x: DVec3, _: &mut u32| {
             let q = x.abs() - core;
             q.max(DVec3::ZERO).length() + q.max_element().min(0.0) - radius
         },
@@ -71,7 +71,7 @@ pub fn cylinder(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shap
         DVec3::new(radius, radius, half)
     };
     let body = Body {
-        distance: |x: DVec3| {
+        distance: |x: DVec3, _: &mut u32| {
             let (along, across) = if long { (x.x, x.yz()) } else { (x.z, x.xy()) };
             let q = DVec2::new(across.length() - radius, along.abs() - half);
             q.max(DVec2::ZERO).length() + q.max_element().min(0.0)
@@ -95,7 +95,9 @@ pub fn capsule(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shape
         .with("radius_m", radius)
         .with("length_m", length);
     let body = Body {
-        distance: |x: DVec3| DVec3::new((x.x.abs() - half).max(0.0), x.y, x.z).length() - radius,
+        distance: |x: DVec3, _: &mut u32| {
+            DVec3::new((x.x.abs() - half).max(0.0), x.y, x.z).length() - radius
+        },
         lower: -extent,
         upper: extent,
         volume: Some(PI * radius * radius * (length + 4.0 / 3.0 * radius)),

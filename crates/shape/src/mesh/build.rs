@@ -56,7 +56,7 @@ pub(crate) fn from_closed(
     provenance.centroid = mass.centroid;
     provenance.rotation = DQuat::from_mat3(&axes);
     let body = Body {
-        distance: |x| distance.distance(x),
+        distance: |x, hint: &mut u32| distance.near(x, hint),
         lower,
         upper,
         volume: Some(mass.volume),

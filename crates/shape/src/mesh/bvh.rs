@@ -57,14 +57,17 @@ impl Bvh {
         }
     }
 
-    /// Nearest point of the mesh to `x`.
-    pub(crate) fn nearest(&self, x: DVec3) -> Nearest {
+    /// Nearest point of the mesh to `x`. The search starts from triangle `hint` (in leaf order),
+    /// which is left at the nearest one: a good start for a query nearby.
+    pub(crate) fn nearest(&self, x: DVec3, hint: &mut u32) -> Nearest {
+        let start = *hint as usize;
+        let (point, feature) = nearest_on_triangle(x, &self.corners[start]);
         let mut best = Nearest {
-            point: self.corners[0][0],
-            face: self.faces[0],
-            feature: Feature::Corner(0),
+            point,
+            face: self.faces[start],
+            feature,
         };
-        let mut bound = f64::INFINITY;
+        let mut bound = point.distance_squared(x);
         // Depth is at most about log2 of the triangle count: the split halves the list.
         let mut stack = [(0u32, 0.0f64); 64];
         stack[0] = (0, self.nodes[0].squared_distance(x));
@@ -82,6 +85,7 @@ impl Bvh {
                     let distance = point.distance_squared(x);
                     if distance < bound {
                         bound = distance;
+                        *hint = n as u32;
                         best = Nearest {
                             point,
                             face: self.faces[n],
@@ -216,7 +220,7 @@ mod tests {
             let brute = (0..mesh.triangles.len())
                 .map(|f| nearest_on_triangle(x, &mesh.corners(f)).0.distance(x))
                 .fold(f64::INFINITY, f64::min);
-            assert!((bvh.nearest(x).point.distance(x) - brute).abs() < 1e-14);
+            assert!((bvh.nearest(x, &mut 0).point.distance(x) - brute).abs() < 1e-14);
         }
     }
 

@@ -123,29 +123,69 @@ impl TriangleMesh {
     }
 }
 
+impl TriangleMesh {
+    /// The piece with the most faces, or none where the others together have more than the share
+    /// `crumbs` of all faces, or the edges do not match.
+    pub(crate) fn largest_piece(self, crumbs: f64) -> Option<TriangleMesh> {
+        let neighbours = self.check_edges().ok()?;
+        let (number, sizes) = pieces(&neighbours);
+        let largest = (0..sizes.len()).max_by_key(|n| (sizes[*n], std::cmp::Reverse(*n)))?;
+        if sizes.len() == 1 {
+            return Some(self);
+        }
+        let others = self.triangles.len() - sizes[largest];
+        if others as f64 > crumbs * self.triangles.len() as f64 {
+            return None;
+        }
+        let mut renamed = vec![None; self.vertices.len()];
+        let mut mesh = TriangleMesh::default();
+        for (triangle, _) in self
+            .triangles
+            .iter()
+            .zip(number)
+            .filter(|(_, n)| *n == largest)
+        {
+            mesh.triangles.push(triangle.map(|v| {
+                *renamed[v as usize].get_or_insert_with(|| {
+                    mesh.vertices.push(self.vertices[v as usize]);
+                    (mesh.vertices.len() - 1) as u32
+                })
+            }));
+        }
+        Some(mesh)
+    }
+}
+
 /// Faces in each connected piece, largest first.
 fn piece_sizes(neighbours: &Neighbours) -> Vec<usize> {
-    let mut seen = vec![false; neighbours.len()];
+    let (_, mut sizes) = pieces(neighbours);
+    sizes.sort_unstable_by(|a, b| b.cmp(a));
+    sizes
+}
+
+/// Number of the connected piece that each face belongs to, and the faces in each piece.
+fn pieces(neighbours: &Neighbours) -> (Vec<usize>, Vec<usize>) {
+    let mut number = vec![usize::MAX; neighbours.len()];
     let mut sizes = Vec::new();
     for start in 0..neighbours.len() {
-        if seen[start] {
+        if number[start] != usize::MAX {
             continue;
         }
-        seen[start] = true;
+        number[start] = sizes.len();
         let mut stack = vec![start];
         let mut size = 0;
         while let Some(face) = stack.pop() {
             size += 1;
             for n in neighbours[face] {
-                if !std::mem::replace(&mut seen[n as usize], true) {
+                if number[n as usize] == usize::MAX {
+                    number[n as usize] = sizes.len();
                     stack.push(n as usize);
                 }
             }
         }
         sizes.push(size);
     }
-    sizes.sort_unstable_by(|a, b| b.cmp(a));
-    sizes
+    (number, sizes)
 }
 
 #[cfg(test)]

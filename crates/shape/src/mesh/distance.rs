@@ -51,9 +51,9 @@ impl MeshDistance {
         }
     }
 
-    /// Signed distance [m] at `x`, negative inside.
-    pub(crate) fn distance(&self, x: DVec3) -> f64 {
-        let nearest = self.bvh.nearest(x);
+    /// Signed distance [m] at `x`, negative inside; `hint` comes from a query nearby, or is 0.
+    pub(crate) fn near(&self, x: DVec3, hint: &mut u32) -> f64 {
+        let nearest = self.bvh.nearest(x, hint);
         let face = nearest.face as usize;
         let normal = match nearest.feature {
             Feature::Face => self.face_normals[face],
@@ -104,7 +104,7 @@ mod tests {
             let x = 5.0 * u.fract() - DVec3::splat(2.5);
             let q = x.abs() - DVec3::ONE;
             let exact = q.max(DVec3::ZERO).length() + q.max_element().min(0.0);
-            assert!((field.distance(x) - exact).abs() < 1e-12, "at {x}");
+            assert!((field.near(x, &mut 0) - exact).abs() < 1e-12, "at {x}");
         }
     }
 }

@@ -1,9 +1,16 @@
-//! Advection through partly closed links near a grain.
+//! Advection next to a grain, mended where central differences are at their worst.
 //!
-//! A face value near the surface stands for its open part only, q = A u, so a link's product of two
-//! such values carries A^2 u u where the flux is A u u: the part relative to the grain is divided
-//! by the aperture of the link. The correction is a flux between two faces, so it moves no
-//! momentum in or out.
+//! 1. A face value near the surface stands for its open part only, q = A u, so a link's product of
+//!    two such values carries A^2 u u where the flux is A u u: the part relative to the grain is
+//!    divided by the aperture of the link.
+//! 2. The boundary layer is about a cell thick and moves with the grain. Second-order central
+//!    differences carry such a profile at about two thirds of its speed; within two cells of the
+//!    surface the mean of two faces gives way to the sixth-order mean of six.
+//!
+//! Both are fluxes between two faces, so they move no momentum in or out
+//! (`docs/decisions/0003-advection-next-to-grains.md` has the measurements).
+//!
+//! Legend: q component carried, c velocity that carries it, d signed distance of a link.
 
 use glam::{DVec3, IVec3};
 
@@ -17,56 +24,72 @@ use crate::grid::FACE_OFFSET;
 const LEAST_APERTURE: f64 = 0.4;
 
 /// Corrects the tendency of the step just predicted; `bodies` are where `grains` were located.
-pub fn open_links(locator: &Locator, flow: &mut Flow, grains: &[Grain], bodies: &[Body]) {
+pub fn correct(locator: &Locator, flow: &mut Flow, grains: &[Grain], bodies: &[Body]) {
+    let cells = flow.mesh().cells;
     for (grain, body) in grains.iter().zip(bodies) {
-        open_links_of(locator, flow, grain, body);
+        for component in 0..3 {
+            for along in (0..3).filter(|&axis| cells[axis] > 1) {
+                correct_links(locator, flow, grain, body, component, along);
+            }
+        }
     }
 }
 
-fn open_links_of(locator: &Locator, flow: &mut Flow, grain: &Grain, body: &Body) {
-    let (eps, unknowns) = (locator.band(), locator.unknowns());
+/// Links of `component` along one axis.
+fn correct_links(
+    locator: &Locator,
+    flow: &mut Flow,
+    grain: &Grain,
+    body: &Body,
+    component: usize,
+    along: usize,
+) {
+    let (band, unknowns) = (locator.band(), locator.unknowns());
     let mesh = *flow.mesh();
-    let strides = mesh.layout().strides();
-    for component in 0..3 {
-        let distance = &body.distance[component];
-        for along in 0..3 {
-            if mesh.cells[along] == 1 {
-                continue;
-            }
-            let mut step = IVec3::ZERO;
-            step[along] = 1;
-            let inverse = 1.0 / mesh.spacing[along];
-            let last = body.size - step;
-            for k in 0..last.z {
-                for j in 0..last.y {
-                    for i in 0..last.x {
-                        let here = IVec3::new(i, j, k);
-                        let there = here + step;
-                        let d = 0.5
-                            * (distance[body.local(i, j, k)] + distance[body.local(there.x, there.y, there.z)]);
-                        if d >= eps || d <= -eps {
-                            continue;
-                        }
-                        let cell = body.first + here;
-                        let (from, to) = (unknowns.at(component, cell), unknowns.at(component, cell + step));
-                        let (Some(from), Some(to)) = (from, to) else { continue };
-                        let q = flow.velocity.component(component);
-                        let through = flow.velocity.component(along);
-                        let mean = 0.5 * (q[from] + q[to]);
-                        // Two faces of the advecting component share the link: the one of the
-                        // target cell and its neighbour across the component's own face.
-                        let carrier =
-                            if along == component { mean } else { 0.5 * (through[to] + through[to - strides[component]]) };
-                        let x = mesh.origin
-                            + mesh.spacing
-                                * (cell.as_dvec3() - 1.0 + DVec3::from_array(FACE_OFFSET[component]) + 0.5 * step.as_dvec3());
-                        let rigid = grain.velocity_at(x);
-                        let relative = (carrier - rigid[along]) * (mean - rigid[component]);
-                        let flux = relative * (1.0 / aperture(d, eps).max(LEAST_APERTURE) - 1.0) * inverse;
-                        flow.add_tendency(component, from, -flux);
-                        flow.add_tendency(component, to, flux);
-                    }
+    let across = mesh.layout().strides()[component];
+    let step = IVec3::AXES[along];
+    let inverse = 1.0 / mesh.spacing[along];
+    let middle = DVec3::from_array(FACE_OFFSET[component]) + 0.5 * step.as_dvec3() - 1.0;
+    let distance = &body.distance[component];
+    let last = body.size - step;
+    for k in 0..last.z {
+        for j in 0..last.y {
+            for i in 0..last.x {
+                let there = IVec3::new(i, j, k) + step;
+                let d = 0.5
+                    * (distance[body.local(i, j, k)]
+                        + distance[body.local(there.x, there.y, there.z)]);
+                if d >= 2.0 * band || d <= -band {
+                    continue;
                 }
+                let cell = body.first + IVec3::new(i, j, k);
+                let face = |shift: i32| unknowns.at(component, cell + shift * step);
+                let (Some(from), Some(to)) = (face(0), face(1)) else {
+                    continue;
+                };
+                let q = flow.velocity.component(component);
+                let mean = 0.5 * (q[from] + q[to]);
+                let carrier = if along == component {
+                    mean
+                } else {
+                    // Two faces of the carrying component share the link.
+                    let c = flow.velocity.component(along);
+                    0.5 * (c[to] + c[to - across])
+                };
+                let mut flux = 0.0;
+                if d < band {
+                    let rigid =
+                        grain.velocity_at(mesh.origin + mesh.spacing * (cell.as_dvec3() + middle));
+                    let relative = (carrier - rigid[along]) * (mean - rigid[component]);
+                    flux += relative * (1.0 / aperture(d, band).max(LEAST_APERTURE) - 1.0);
+                }
+                if let (Some(a), Some(b), Some(y), Some(z)) = (face(-2), face(-1), face(2), face(3))
+                {
+                    let sixth = 7.0 * (q[from] + q[to]) - 8.0 * (q[b] + q[y]) + q[a] + q[z];
+                    flux += carrier * sixth / 60.0;
+                }
+                flow.add_tendency(component, from, -flux * inverse);
+                flow.add_tendency(component, to, flux * inverse);
             }
         }
     }

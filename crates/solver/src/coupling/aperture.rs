@@ -37,7 +37,11 @@ pub fn drag(d: f64, n: DVec3, spacing: DVec3, eps: f64) -> f64 {
         let (step, h) = (spacing[axis] * n[axis], spacing[axis]);
         excess += (open_depth(d + step, eps) + open_depth(d - step, eps) - 2.0 * here) / (h * h);
     }
-    if here <= 1e-12 * eps { f64::INFINITY } else { excess.max(0.0) / here }
+    if here <= 1e-12 * eps {
+        f64::INFINITY
+    } else {
+        excess.max(0.0) / here
+    }
 }
 
 #[cfg(test)]

@@ -50,7 +50,11 @@ impl Body {
 impl Body {
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let distances: usize = self.distance.iter().map(|values| size_of::<f64>() * values.capacity()).sum();
+        let distances: usize = self
+            .distance
+            .iter()
+            .map(|values| size_of::<f64>() * values.capacity())
+            .sum();
         distances + size_of::<ForcedFace>() * self.forced.capacity()
     }
 }
@@ -102,11 +106,25 @@ pub struct Locator {
 }
 
 impl Locator {
-    pub fn new(mesh: &Mesh, boundaries: &Boundaries, scheme: Scheme, kinematic_viscosity: f64) -> Locator {
+    pub fn new(
+        mesh: &Mesh,
+        boundaries: &Boundaries,
+        scheme: Scheme,
+        kinematic_viscosity: f64,
+    ) -> Locator {
         let flat = mesh.cells.map(|n| n == 1);
-        let resolved: Vec<f64> = (0..3).filter(|&axis| !flat[axis]).map(|axis| mesh.spacing[axis]).collect();
+        let resolved: Vec<f64> = (0..3)
+            .filter(|&axis| !flat[axis])
+            .map(|axis| mesh.spacing[axis])
+            .collect();
         let eps = resolved.iter().sum::<f64>() / resolved.len().max(1) as f64;
-        Locator { mesh: *mesh, unknowns: Unknowns::new(mesh, boundaries), scheme, kinematic_viscosity, eps }
+        Locator {
+            mesh: *mesh,
+            unknowns: Unknowns::new(mesh, boundaries),
+            scheme,
+            kinematic_viscosity,
+            eps,
+        }
     }
 
     /// Half-width of the band about the surface [m].
@@ -134,7 +152,8 @@ impl Locator {
         let (lower, upper) = (grain.shape.lower(), grain.shape.upper());
         let middle = centre + turn * (0.5 * (lower + upper));
         let half = 0.5 * (upper - lower);
-        let span = turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
+        let span =
+            turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
         for axis in 0..3 {
             let (h, n) = (mesh.spacing[axis], mesh.cells[axis] as i32);
             if n == 1 {
@@ -181,16 +200,26 @@ impl Locator {
         let grain = &grains[index];
         let extent = self.mesh.extent();
         let mut rivals = Vec::new();
-        for (other, rival) in grains.iter().enumerate().filter(|(other, _)| *other != index) {
+        for (other, rival) in grains
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != index)
+        {
             let mut shift = grain.pose.position - rival.pose.position;
             for axis in 0..3 {
                 let period = extent[axis];
-                shift[axis] =
-                    if self.unknowns.periodic[axis] { (shift[axis] / period).round() * period } else { 0.0 };
+                shift[axis] = if self.unknowns.periodic[axis] {
+                    (shift[axis] / period).round() * period
+                } else {
+                    0.0
+                };
             }
             let apart = (grain.pose.position - rival.pose.position - shift).length();
             if apart < grain.shape.bounding_radius() + rival.shape.bounding_radius() + 2.0 * reach {
-                rivals.push(Rival { index: other, shift });
+                rivals.push(Rival {
+                    index: other,
+                    shift,
+                });
             }
         }
         rivals
@@ -209,11 +238,19 @@ impl Locator {
                             continue;
                         }
                         let cell = body.first + IVec3::new(i, j, k);
-                        let Some(at) = self.unknowns.at(component, cell) else { continue };
+                        let Some(at) = self.unknowns.at(component, cell) else {
+                            continue;
+                        };
                         let x = self.position(offset, cell);
                         let (share, relief) = self.share(grain, x, d, dt);
                         if share > 0.0 || relief > 0.0 {
-                            forced.push(ForcedFace { axis: component, at, arm: x - grain.pose.position, share, relief });
+                            forced.push(ForcedFace {
+                                axis: component,
+                                at,
+                                arm: x - grain.pose.position,
+                                share,
+                                relief,
+                            });
                         }
                     }
                 }
@@ -230,8 +267,13 @@ impl Locator {
         match self.scheme {
             Scheme::Aperture if d <= -self.eps => (1.0, 1.0),
             Scheme::Aperture => {
-                let strength = dt * self.kinematic_viscosity * drag(d, normal(), self.mesh.spacing, self.eps);
-                let share = if strength.is_finite() { strength / (1.0 + strength) } else { 1.0 };
+                let strength =
+                    dt * self.kinematic_viscosity * drag(d, normal(), self.mesh.spacing, self.eps);
+                let share = if strength.is_finite() {
+                    strength / (1.0 + strength)
+                } else {
+                    1.0
+                };
                 (share, 1.0 - aperture(d, self.eps))
             }
             Scheme::Paper => {

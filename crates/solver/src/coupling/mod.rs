@@ -35,10 +35,20 @@ pub struct Coupling {
 
 impl Coupling {
     /// For the grains of a simulation on the grid of `flow`.
-    pub fn new(flow: &Flow, scheme: Scheme, fluid_density: f64, kinematic_viscosity: f64, grains: &[Grain]) -> Coupling {
+    pub fn new(
+        flow: &Flow,
+        scheme: Scheme,
+        fluid_density: f64,
+        kinematic_viscosity: f64,
+        grains: &[Grain],
+    ) -> Coupling {
         let locator = Locator::new(flow.mesh(), flow.boundaries(), scheme, kinematic_viscosity);
-        let mut coupling =
-            Coupling { scheme, fluid_density, locator, bodies: vec![Body::default(); grains.len()] };
+        let mut coupling = Coupling {
+            scheme,
+            fluid_density,
+            locator,
+            bodies: vec![Body::default(); grains.len()],
+        };
         coupling.locate(grains, 1.0);
         coupling
     }
@@ -51,7 +61,7 @@ impl Coupling {
     /// Corrects the advection just predicted where grains close part of a link.
     pub fn correct_advection(&self, flow: &mut Flow, grains: &[Grain]) {
         if self.scheme == Scheme::Aperture {
-            advection::open_links(&self.locator, flow, grains, &self.bodies);
+            advection::correct(&self.locator, flow, grains, &self.bodies);
         }
     }
 
@@ -67,11 +77,22 @@ impl Coupling {
         dt: f64,
         loads: &mut [Load],
     ) {
-        let relief = if self.scheme == Scheme::Aperture { dt } else { 0.0 };
+        let relief = if self.scheme == Scheme::Aperture {
+            dt
+        } else {
+            0.0
+        };
         for (index, body) in self.bodies.iter().enumerate() {
             let grain = &mut grains[index];
             let impulse = rigidity::gather(flow, self.fluid_density, body, relief);
-            loads[index] = rigidity::advance(grain, before[index], &impulse, self.fluid_density, other[index], dt);
+            loads[index] = rigidity::advance(
+                grain,
+                before[index],
+                &impulse,
+                self.fluid_density,
+                other[index],
+                dt,
+            );
             rigidity::impose(flow, grain, body, relief);
         }
     }
@@ -79,7 +100,10 @@ impl Coupling {
     /// Gives the fluid inside and next to the grains their rigid velocity, for initial states.
     pub fn start(&mut self, flow: &mut Flow, grains: &[Grain]) -> FlowMeasures {
         for axis in 0..3 {
-            let (from, to) = (flow.velocity.component(axis), flow.predicted.component_mut(axis));
+            let (from, to) = (
+                flow.velocity.component(axis),
+                flow.predicted.component_mut(axis),
+            );
             to.copy_from_slice(from);
         }
         // A step this long closes every face of the band.
@@ -88,7 +112,10 @@ impl Coupling {
             rigidity::impose(flow, grain, body, 0.0);
         }
         for axis in 0..3 {
-            let (from, to) = (flow.predicted.component(axis), flow.velocity.component_mut(axis));
+            let (from, to) = (
+                flow.predicted.component(axis),
+                flow.velocity.component_mut(axis),
+            );
             to.copy_from_slice(from);
         }
         flow.make_solenoidal()

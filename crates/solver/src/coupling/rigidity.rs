@@ -26,7 +26,10 @@ pub struct Impulse {
 /// time over which the pressure gradient is given back on faces that are closed to it.
 pub fn gather(flow: &Flow, fluid_density: f64, body: &Body, relief: f64) -> Impulse {
     let w = fluid_density * flow.mesh().cell_volume();
-    let mut sum = Impulse { constant: [0.0; 6], slope: [[0.0; 6]; 6] };
+    let mut sum = Impulse {
+        constant: [0.0; 6],
+        slope: [[0.0; 6]; 6],
+    };
     for face in &body.forced {
         let unit = DVec3::AXES[face.axis];
         let lever = face.arm.cross(unit);
@@ -47,7 +50,14 @@ pub fn gather(flow: &Flow, fluid_density: f64, body: &Body, relief: f64) -> Impu
 
 /// New velocities of the grain from `before` under the impulse and the `other` loads (weight less
 /// buoyancy, contact) over `dt`; returns the hydrodynamic load on it.
-pub fn advance(grain: &mut Grain, before: [DVec3; 2], impulse: &Impulse, fluid_density: f64, other: Load, dt: f64) -> Load {
+pub fn advance(
+    grain: &mut Grain,
+    before: [DVec3; 2],
+    impulse: &Impulse,
+    fluid_density: f64,
+    other: Load,
+    dt: f64,
+) -> Load {
     let ratio = 1.0 - fluid_density / grain.density;
     let (mass, inertia) = (grain.mass() * ratio, grain.inertia() * ratio);
     let [v, omega] = before;
@@ -72,13 +82,20 @@ pub fn advance(grain: &mut Grain, before: [DVec3; 2], impulse: &Impulse, fluid_d
     grain.angular_velocity = DVec3::new(x[3], x[4], x[5]);
 
     let j: Vector6 = std::array::from_fn(|row| {
-        impulse.constant[row] + impulse.slope[row].iter().zip(x).map(|(m, x)| m * x).sum::<f64>()
+        impulse.constant[row]
+            + impulse.slope[row]
+                .iter()
+                .zip(x)
+                .map(|(m, x)| m * x)
+                .sum::<f64>()
     });
     let displaced = fluid_density / grain.density;
     let fluid_inertia: DMat3 = grain.inertia() * displaced;
     Load {
-        force: (displaced * grain.mass() * (grain.velocity - v) - DVec3::new(j[0], j[1], j[2])) / dt,
-        torque: (fluid_inertia * (grain.angular_velocity - omega) - DVec3::new(j[3], j[4], j[5])) / dt
+        force: (displaced * grain.mass() * (grain.velocity - v) - DVec3::new(j[0], j[1], j[2]))
+            / dt,
+        torque: (fluid_inertia * (grain.angular_velocity - omega) - DVec3::new(j[3], j[4], j[5]))
+            / dt
             + omega.cross(fluid_inertia * omega),
     }
 }

@@ -1,49 +1,25 @@
 //! Sub-steps of contact and motion.
 
-use std::sync::Arc;
-
-use glam::{DMat3, DVec3, IVec3};
-use grainwake_shape::Shape;
+use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
+use super::actor::{Actor, look_at};
 use super::broad_phase::{Ball, BroadPhase};
 use super::enclosure::Enclosure;
 use super::grain::{Dof, Grain};
 use super::history::{PairKey, Slot, renew};
-use super::law::{Law, Motion, Pair};
-use super::motion::{MidStep, kick, kick_and_drift};
-use super::narrow_phase::Body;
-use super::node_tree::NodeTree;
+use super::law::Law;
+use super::motion::{kick, kick_and_drift};
 use super::params::ContactParams;
 use super::{Contact, Partner};
 use crate::math::Load;
 
 /// Part of its bounding radius that a grain may always move before the pairs are searched again.
 const SKIN: f64 = 0.01;
-/// A pair that is known to be apart is looked at again when this many times its motion could close it.
-const MOVED_SLACK: f64 = 1.01;
 /// Fewer pairs than this are not worth a second thread.
 const WORTH_THREADS: usize = 16;
 /// More sub-steps than this in one step are a mistake in the input.
 const MOST_SUBSTEPS: f64 = 1e7;
-
-/// A grain's part in the contact search.
-#[derive(Clone, Debug)]
-struct Actor {
-    shape: Arc<Shape>,
-    tree: Arc<NodeTree>,
-    rotation: DMat3,
-    during: Motion,
-    now: Motion,
-    mid: MidStep,
-    contact: Load,
-    /// No point of the surface has moved further than this since the last look [m].
-    moved: f64,
-    inverse_mass: f64,
-    /// Where it was when the pairs were searched [m], and how far it may go from there.
-    searched: DVec3,
-    margin: f64,
-}
 
 /// Contact law, history and integrator.
 #[derive(Clone, Debug)]
@@ -187,45 +163,7 @@ impl Dynamics {
                 grain.angular_velocity = omega;
             }
         }
-        self.actors.truncate(grains.len());
-        // Nothing of the last step may steer this one but what a checkpoint holds.
-        self.actors
-            .iter_mut()
-            .for_each(|actor| actor.contact = Load::default());
-        for (i, grain) in grains.iter().enumerate() {
-            if self
-                .actors
-                .get(i)
-                .is_some_and(|actor| Arc::ptr_eq(&actor.shape, &grain.shape))
-            {
-                continue;
-            }
-            let known = self
-                .actors
-                .iter()
-                .find(|actor| Arc::ptr_eq(&actor.shape, &grain.shape));
-            let tree = known.map_or_else(
-                || Arc::new(NodeTree::new(&grain.shape)),
-                |actor| actor.tree.clone(),
-            );
-            let actor = Actor {
-                shape: grain.shape.clone(),
-                tree,
-                rotation: DMat3::IDENTITY,
-                during: Motion::default(),
-                now: Motion::default(),
-                mid: MidStep::default(),
-                contact: Load::default(),
-                moved: 0.0,
-                inverse_mass: 0.0,
-                searched: DVec3::ZERO,
-                margin: 0.0,
-            };
-            match self.actors.get_mut(i) {
-                Some(old) => *old = actor,
-                None => self.actors.push(actor),
-            }
-        }
+        Actor::cast(&mut self.actors, grains);
         let period = self.enclosure.period();
         let jumps = |i: usize| -> IVec3 {
             let (Some(last), Some(grain)) = (self.last.get(i), grains.get(i)) else {
@@ -242,7 +180,7 @@ impl Dynamics {
         };
         let mut jumped = false;
         for slot in &mut self.slots {
-            slot.patch.forget();
+            slot.begin_step();
             if let Partner::Grain(j) = slot.key.partner {
                 let jump = jumps(slot.key.grain as usize) - jumps(j);
                 slot.key.image = slot.key.image.wrapping_add(jump);
@@ -322,31 +260,13 @@ impl Dynamics {
     /// Contact loads for the poses as they are; `step` [s] is the time since the last look.
     fn touch(&mut self, grains: &[Grain], step: f64) {
         for (grain, actor) in grains.iter().zip(&mut self.actors) {
-            actor.contact = Load::default();
-            actor.rotation = DMat3::from_quat(grain.pose.orientation);
-            let radius = grain.shape.bounding_radius();
-            actor.moved = step * (actor.mid.velocity.length() + radius * actor.mid.spin.length());
-            (actor.during, actor.now) = if step > 0.0 {
-                (
-                    Motion {
-                        velocity: actor.mid.velocity,
-                        spin: actor.mid.spin,
-                    },
-                    Motion {
-                        velocity: actor.mid.predicted_velocity,
-                        spin: actor.mid.predicted_spin,
-                    },
-                )
-            } else {
-                let motion = Motion {
-                    velocity: grain.velocity,
-                    spin: grain.angular_velocity,
-                };
-                (motion, motion)
-            };
+            actor.observe(grain, step);
         }
         let (actors, law, enclosure) = (&self.actors, &self.law, &self.enclosure);
-        let look = |slot: &mut Slot| look_at(slot, grains, actors, law, enclosure, step);
+        let look = |slot: &mut Slot| {
+            look_at(slot, grains, actors, law, enclosure, step);
+            slot.touched |= slot.outcome.overlap > 0.0;
+        };
         // Each pair writes its own slot, and the slots are summed in order: the same bits for any
         // number of threads.
         if self.slots.len() < WORTH_THREADS {
@@ -364,71 +284,16 @@ impl Dynamics {
 
     fn report(&mut self, grains: &[Grain]) {
         self.contacts.clear();
-        for slot in self.slots.iter().filter(|slot| slot.outcome.overlap > 0.0) {
+        for slot in self.slots.iter().filter(|slot| slot.touched) {
             let grain = slot.key.grain as usize;
             self.contacts.push(Contact {
                 grain,
                 partner: slot.key.partner,
-                overlap: slot.outcome.overlap,
+                overlap: slot.outcome.overlap.max(0.0),
                 load: slot.outcome.first,
                 point: grains[grain].pose.position + slot.outcome.arm,
                 normal: slot.outcome.normal,
             });
         }
     }
-}
-
-/// Overlap and loads of one pair.
-fn look_at(
-    slot: &mut Slot,
-    grains: &[Grain],
-    actors: &[Actor],
-    law: &Law,
-    enclosure: &Enclosure,
-    step: f64,
-) {
-    let body = |i: usize, shift: DVec3| Body {
-        shape: &grains[i].shape,
-        tree: &actors[i].tree,
-        rotation: actors[i].rotation,
-        position: grains[i].pose.position + shift,
-    };
-    let i = slot.key.grain as usize;
-    let other_moved = match slot.key.partner {
-        Partner::Grain(j) => actors[j].moved,
-        Partner::Wall { .. } => 0.0,
-    };
-    slot.patch.apart -= MOVED_SLACK * (actors[i].moved + other_moved);
-    if slot.patch.apart > 0.0 {
-        return;
-    }
-    let a = body(i, DVec3::ZERO);
-    let (own, radius) = (&actors[i], 0.5 * a.shape.equivalent_diameter());
-    let mut pair = Pair {
-        apart: DVec3::ZERO,
-        during: [own.during, Motion::default()],
-        now: [own.now, Motion::default()],
-        inverse_mass: own.inverse_mass,
-        radius,
-        wall: true,
-    };
-    let closest = match slot.key.partner {
-        Partner::Grain(j) => {
-            let b = body(j, slot.key.image.as_dvec3() * enclosure.period());
-            let other = 0.5 * b.shape.equivalent_diameter();
-            pair.apart = a.position - b.position;
-            pair.during[1] = actors[j].during;
-            pair.now[1] = actors[j].now;
-            pair.inverse_mass += actors[j].inverse_mass;
-            pair.radius = radius * other / (radius + other);
-            pair.wall = false;
-            slot.patch.of_grains(&a, &b, law.reach())
-        }
-        Partner::Wall { axis, side } => {
-            let face = enclosure.plane(axis as usize, side as usize);
-            let offset = face.distance(a.position);
-            slot.patch.of_wall(&a, face.inward, offset, law.reach())
-        }
-    };
-    law.apply(slot, closest, &pair, step);
 }

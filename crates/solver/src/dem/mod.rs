@@ -4,6 +4,7 @@
 //! (`narrow_phase`), the forces (`law`, with the memory of `history`), and the motion (`motion`,
 //! `rotation`) in sub-steps of the contact time.
 
+mod actor;
 mod broad_phase;
 mod deepest;
 mod dynamics;
@@ -44,7 +45,7 @@ pub enum Partner {
     },
 }
 
-/// A touching pair at the end of a step; `grain` < partner when the partner is a grain, and equal
+/// A pair that touched during a step; `grain` < partner when the partner is a grain, and equal
 /// where a grain touches its own periodic image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
@@ -52,7 +53,8 @@ pub struct Contact {
     pub grain: usize,
     /// What it touches.
     pub partner: Partner,
-    /// Deepest overlap [m], positive.
+    /// Deepest overlap at the end of the step [m]; zero where the pair touched during the step and
+    /// has parted again.
     pub overlap: f64,
     /// Load on `grain` (the partner gets the opposite force).
     pub load: Load,

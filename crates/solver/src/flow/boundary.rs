@@ -31,7 +31,9 @@ pub enum Boundary {
 
 impl Boundary {
     /// A no-slip wall at rest.
-    pub const WALL: Boundary = Boundary::Wall { velocity: DVec3::ZERO };
+    pub const WALL: Boundary = Boundary::Wall {
+        velocity: DVec3::ZERO,
+    };
 
     /// Whether a grain is stopped by this face.
     pub fn is_solid(&self) -> bool {
@@ -49,9 +51,20 @@ impl Boundaries {
         self.0[axis][0] == Boundary::Periodic
     }
 
+    /// Axes whose lower boundary face is given, not an unknown.
+    pub fn walled(&self) -> [bool; 3] {
+        [0, 1, 2].map(|axis| !self.is_periodic(axis))
+    }
+
     /// Conditions on the pressure that go with the faces.
     pub fn pressure_ends(&self) -> [Ends; 3] {
-        [0, 1, 2].map(|axis| if self.is_periodic(axis) { Ends::Periodic } else { Ends::Neumann })
+        [0, 1, 2].map(|axis| {
+            if self.is_periodic(axis) {
+                Ends::Periodic
+            } else {
+                Ends::Neumann
+            }
+        })
     }
 
     /// Sets the normal velocity on every face where it is given; outflow faces keep theirs.
@@ -86,9 +99,13 @@ impl Boundaries {
                     // The boundary face itself is set; only the lower side has a ghost beyond it,
                     // and no interior face reads that.
                     _ if component == axis && side == 1 => {}
-                    _ if component == axis => layout.map_layer(q, axis, inner, ghost, |value| value),
+                    _ if component == axis => {
+                        layout.map_layer(q, axis, inner, ghost, |value| value)
+                    }
                     Boundary::Wall { velocity: given } | Boundary::Inflow { velocity: given } => {
-                        layout.map_layer(q, axis, inner, ghost, |value| 2.0 * given[component] - value);
+                        layout.map_layer(q, axis, inner, ghost, |value| {
+                            2.0 * given[component] - value
+                        });
                     }
                     Boundary::Slip | Boundary::FreeSurface | Boundary::Outflow => {
                         layout.map_layer(q, axis, inner, ghost, |value| value);
@@ -130,7 +147,8 @@ impl Boundaries {
                 open += faces.area();
             }
             if boundary != Boundary::Periodic {
-                net += outward * faces.sum(next.component(axis)) * faces.area() / faces.count as f64;
+                net +=
+                    outward * faces.sum(next.component(axis)) * faces.area() / faces.count as f64;
             }
         });
         if open > 0.0 {
@@ -140,7 +158,8 @@ impl Boundaries {
                     let face = if side == 0 { 1 } else { mesh.cells[axis] + 1 };
                     let outward = if side == 0 { -1.0 } else { 1.0 };
                     let new = next.component_mut(axis);
-                    BoundaryFaces::new(mesh, axis, face, face).each(|at, _| new[at] -= outward * shift);
+                    BoundaryFaces::new(mesh, axis, face, face)
+                        .each(|at, _| new[at] -= outward * shift);
                 }
             });
         }

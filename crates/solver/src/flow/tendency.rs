@@ -50,12 +50,27 @@ pub fn row(c: &Coefficients, velocity: &FaceVector, j: usize, k: usize, out: [&m
     let [out_x, out_y, out_z] = out.map(|row| &mut row[..n]);
     let g = c.acceleration;
 
-    let (u, um, up, ub, ut) =
-        (rows.x(j, k), rows.x(j - 1, k), rows.x(j + 1, k), rows.x(j, k - 1), rows.x(j, k + 1));
-    let (v, vm, vp, vb, vt) =
-        (rows.y(j, k), rows.y(j - 1, k), rows.y(j + 1, k), rows.y(j, k - 1), rows.y(j, k + 1));
-    let (w, wm, wp, wb, wt) =
-        (rows.z(j, k), rows.z(j - 1, k), rows.z(j + 1, k), rows.z(j, k - 1), rows.z(j, k + 1));
+    let (u, um, up, ub, ut) = (
+        rows.x(j, k),
+        rows.x(j - 1, k),
+        rows.x(j + 1, k),
+        rows.x(j, k - 1),
+        rows.x(j, k + 1),
+    );
+    let (v, vm, vp, vb, vt) = (
+        rows.y(j, k),
+        rows.y(j - 1, k),
+        rows.y(j + 1, k),
+        rows.y(j, k - 1),
+        rows.y(j, k + 1),
+    );
+    let (w, wm, wp, wb, wt) = (
+        rows.z(j, k),
+        rows.z(j - 1, k),
+        rows.z(j + 1, k),
+        rows.z(j, k - 1),
+        rows.z(j, k + 1),
+    );
     let (u_mt, v_pb, w_mt) = (rows.x(j - 1, k), rows.y(j + 1, k - 1), rows.z(j - 1, k + 1));
     let u_b = rows.x(j, k - 1);
 

@@ -101,11 +101,30 @@ impl Layout {
             _ => (0..plane).for_each(|at| f(layer * plane + at)),
         }
     }
+    /// Calls `f` with the memory position of every entry of a layer, without ghosts.
+    pub fn each_inside_layer(&self, axis: usize, layer: usize, mut f: impl FnMut(usize)) {
+        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+        let strides = self.strides();
+        for second in 1..=self.cells[b] {
+            for first in 1..=self.cells[a] {
+                f(layer * strides[axis] + first * strides[a] + second * strides[b]);
+            }
+        }
+    }
     /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.
-    pub fn map_layer(&self, values: &mut [f64], axis: usize, from: usize, to: usize, f: impl Fn(f64) -> f64) {
+    pub fn map_layer(
+        &self,
+        values: &mut [f64],
+        axis: usize,
+        from: usize,
+        to: usize,
+        f: impl Fn(f64) -> f64,
+    ) {
         let stride = self.strides()[axis];
         let shift = (from as isize - to as isize) * stride as isize;
-        self.each_of_layer(axis, to, |at| values[at] = f(values[at.wrapping_add_signed(shift)]));
+        self.each_of_layer(axis, to, |at| {
+            values[at] = f(values[at.wrapping_add_signed(shift)])
+        });
     }
 }
 
@@ -121,7 +140,11 @@ impl<L: Location> Field<L> {
     /// A field of zeros on `mesh`.
     pub fn zeros(mesh: &Mesh) -> Self {
         let layout = mesh.layout();
-        Field { layout, values: vec![0.0; layout.len()], location: PhantomData }
+        Field {
+            layout,
+            values: vec![0.0; layout.len()],
+            location: PhantomData,
+        }
     }
     /// Its layout.
     #[inline]
@@ -162,7 +185,8 @@ impl<L: Location> Field<L> {
     }
     /// Copies the layer `from` of an axis onto the layer `to`.
     pub fn copy_layer(&mut self, axis: usize, from: usize, to: usize) {
-        self.layout.map_layer(&mut self.values, axis, from, to, |value| value);
+        self.layout
+            .map_layer(&mut self.values, axis, from, to, |value| value);
     }
 }
 
@@ -194,7 +218,11 @@ pub struct FaceVector {
 impl FaceVector {
     /// A vector field of zeros.
     pub fn zeros(mesh: &Mesh) -> Self {
-        FaceVector { x: Field::zeros(mesh), y: Field::zeros(mesh), z: Field::zeros(mesh) }
+        FaceVector {
+            x: Field::zeros(mesh),
+            y: Field::zeros(mesh),
+            z: Field::zeros(mesh),
+        }
     }
     /// Raw values of one component.
     #[inline]

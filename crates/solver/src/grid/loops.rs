@@ -46,7 +46,11 @@ unsafe impl Sync for Planes {}
 
 impl Planes {
     fn new(values: &mut [f64], plane: usize) -> Planes {
-        Planes { start: values.as_mut_ptr(), plane, planes: values.len() / plane }
+        Planes {
+            start: values.as_mut_ptr(),
+            plane,
+            planes: values.len() / plane,
+        }
     }
     /// Plane `k`.
     ///
@@ -92,17 +96,28 @@ pub fn for_row_columns<S: Send>(
     f: impl Fn(usize, &mut RowColumn, &mut S) + Sync,
 ) {
     assert_eq!(values.len(), layout.len());
-    let whole = Planes { start: values.as_mut_ptr(), plane: layout.plane(), planes: 1 };
+    let whole = Planes {
+        start: values.as_mut_ptr(),
+        plane: layout.plane(),
+        planes: 1,
+    };
     let (rows, slots) = (layout.cells[1], scratch.len());
-    scratch.par_iter_mut().enumerate().for_each(|(slot, scratch)| {
-        let whole = &whole;
-        for j in rows * slot / slots..rows * (slot + 1) / slots {
-            // Every j belongs to one slot, so the rows of two columns never overlap.
-            let start = unsafe { whole.start.add(layout.index(1, j + 1, 0)) };
-            let mut column = RowColumn { start, layout, borrow: std::marker::PhantomData };
-            f(j + 1, &mut column, scratch);
-        }
-    });
+    scratch
+        .par_iter_mut()
+        .enumerate()
+        .for_each(|(slot, scratch)| {
+            let whole = &whole;
+            for j in rows * slot / slots..rows * (slot + 1) / slots {
+                // Every j belongs to one slot, so the rows of two columns never overlap.
+                let start = unsafe { whole.start.add(layout.index(1, j + 1, 0)) };
+                let mut column = RowColumn {
+                    start,
+                    layout,
+                    borrow: std::marker::PhantomData,
+                };
+                f(j + 1, &mut column, scratch);
+            }
+        });
 }
 
 /// Calls `f(k, plane, scratch)` for k = 1..=nz in parallel; each scratch slot serves a run of k.
@@ -114,11 +129,14 @@ pub fn for_planes_with<S: Send>(
 ) {
     let (plane, planes, slots) = (layout.plane(), layout.cells[2], scratch.len());
     let slabs = Planes::new(&mut values[plane..plane * (planes + 1)], plane);
-    scratch.par_iter_mut().enumerate().for_each(|(slot, scratch)| {
-        let slabs = &slabs;
-        for k in planes * slot / slots..planes * (slot + 1) / slots {
-            // Every k belongs to one slot.
-            f(k + 1, unsafe { slabs.get(k) }, scratch);
-        }
-    });
+    scratch
+        .par_iter_mut()
+        .enumerate()
+        .for_each(|(slot, scratch)| {
+            let slabs = &slabs;
+            for k in planes * slot / slots..planes * (slot + 1) / slots {
+                // Every k belongs to one slot.
+                f(k + 1, unsafe { slabs.get(k) }, scratch);
+            }
+        });
 }

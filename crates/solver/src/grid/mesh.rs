@@ -37,7 +37,12 @@ impl Mesh {
     }
     /// Edge lengths of the box [m].
     pub fn extent(&self) -> DVec3 {
-        self.spacing * DVec3::new(self.cells[0] as f64, self.cells[1] as f64, self.cells[2] as f64)
+        self.spacing
+            * DVec3::new(
+                self.cells[0] as f64,
+                self.cells[1] as f64,
+                self.cells[2] as f64,
+            )
     }
     /// Upper corner of the box [m].
     pub fn upper(&self) -> DVec3 {

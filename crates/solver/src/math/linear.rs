@@ -8,7 +8,8 @@ pub type Matrix6 = [[f64; 6]; 6];
 /// Solves `a x = b` by Gaussian elimination with partial pivoting; `None` if singular.
 pub fn solve6(mut a: Matrix6, mut b: Vector6) -> Option<Vector6> {
     for column in 0..6 {
-        let pivot = (column..6).max_by(|&i, &j| a[i][column].abs().total_cmp(&a[j][column].abs()))?;
+        let pivot =
+            (column..6).max_by(|&i, &j| a[i][column].abs().total_cmp(&a[j][column].abs()))?;
         if a[pivot][column] == 0.0 || !a[pivot][column].is_finite() {
             return None;
         }

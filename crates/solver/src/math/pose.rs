@@ -35,7 +35,10 @@ pub struct Load {
 impl std::ops::Add for Load {
     type Output = Load;
     fn add(self, other: Load) -> Load {
-        Load { force: self.force + other.force, torque: self.torque + other.torque }
+        Load {
+            force: self.force + other.force,
+            torque: self.torque + other.torque,
+        }
     }
 }
 impl std::ops::AddAssign for Load {
@@ -46,6 +49,9 @@ impl std::ops::AddAssign for Load {
 impl std::ops::Mul<f64> for Load {
     type Output = Load;
     fn mul(self, factor: f64) -> Load {
-        Load { force: self.force * factor, torque: self.torque * factor }
+        Load {
+            force: self.force * factor,
+            torque: self.torque * factor,
+        }
     }
 }

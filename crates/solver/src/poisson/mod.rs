@@ -39,10 +39,26 @@ impl Poisson {
         let [nx, ny, nz] = mesh.cells;
         let along_x = Transform::new(nx, ends[0], mesh.spacing.x);
         let along_y = Transform::new(ny, ends[1], mesh.spacing.y);
-        let along_z = Tridiagonal::new(nz, ends[2], mesh.spacing.z, 1.0 / (along_x.norm() * along_y.norm()));
-        let lines = (0..SLOTS.min(nz)).map(|_| LineScratch::new([&along_x, &along_y])).collect();
-        let columns = (0..SLOTS.min(ny)).map(|_| ColumnScratch::new(nx, nz)).collect();
-        Poisson { layout: mesh.layout(), along_x, along_y, along_z, lines, columns }
+        let along_z = Tridiagonal::new(
+            nz,
+            ends[2],
+            mesh.spacing.z,
+            1.0 / (along_x.norm() * along_y.norm()),
+        );
+        let lines = (0..SLOTS.min(nz))
+            .map(|_| LineScratch::new([&along_x, &along_y]))
+            .collect();
+        let columns = (0..SLOTS.min(ny))
+            .map(|_| ColumnScratch::new(nx, nz))
+            .collect();
+        Poisson {
+            layout: mesh.layout(),
+            along_x,
+            along_y,
+            along_z,
+            lines,
+            columns,
+        }
     }
 
     /// Replaces the right-hand side in the interior of `field` by the solution. Where the solution
@@ -52,15 +68,30 @@ impl Poisson {
         let layout = self.layout;
         let [nx, ny, _] = layout.cells;
         let first = layout.index(1, 1, 0);
-        let rows = Lines { first, count: ny, apart: layout.row(), step: 1 };
-        let cols = Lines { first, count: nx, apart: 1, step: layout.row() };
+        let rows = Lines {
+            first,
+            count: ny,
+            apart: layout.row(),
+            step: 1,
+        };
+        let cols = Lines {
+            first,
+            count: nx,
+            apart: 1,
+            step: layout.row(),
+        };
         let (along_x, along_y, along_z) = (&self.along_x, &self.along_y, &self.along_z);
         for_planes_with(layout, field, &mut self.lines, |_, plane, scratch| {
             along_x.forward(plane, rows, scratch);
             along_y.forward(plane, cols, scratch);
         });
         for_row_columns(layout, field, &mut self.columns, |j, column, scratch| {
-            along_z.solve(column, &along_x.eigenvalues, along_y.eigenvalues[j - 1], scratch);
+            along_z.solve(
+                column,
+                &along_x.eigenvalues,
+                along_y.eigenvalues[j - 1],
+                scratch,
+            );
         });
         for_planes_with(layout, field, &mut self.lines, |_, plane, scratch| {
             along_y.inverse(plane, cols, scratch);

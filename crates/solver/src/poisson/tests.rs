@@ -5,12 +5,18 @@ use glam::DVec3;
 
 /// Small deterministic generator of values in (-1, 1).
 fn noise(state: &mut u64) -> f64 {
-    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    *state = state
+        .wrapping_mul(6364136223846793005)
+        .wrapping_add(1442695040888963407);
     (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
 fn residual(cells: [usize; 3], ends: [Ends; 3]) -> f64 {
-    let mesh = Mesh { cells, spacing: DVec3::new(0.5, 0.7, 0.6), origin: DVec3::ZERO };
+    let mesh = Mesh {
+        cells,
+        spacing: DVec3::new(0.5, 0.7, 0.6),
+        origin: DVec3::ZERO,
+    };
     let [nx, ny, nz] = cells;
     let mut f = Field::<Centre>::zeros(&mesh);
     let mut state = 7;
@@ -49,7 +55,8 @@ fn residual(cells: [usize; 3], ends: [Ends; 3]) -> f64 {
         for j in 1..=ny {
             for i in 1..=nx {
                 let c = f.at(i, j, k);
-                let lap = (f.at(i - 1, j, k) - 2.0 * c + f.at(i + 1, j, k)) / mesh.spacing.x.powi(2)
+                let lap = (f.at(i - 1, j, k) - 2.0 * c + f.at(i + 1, j, k))
+                    / mesh.spacing.x.powi(2)
                     + (f.at(i, j - 1, k) - 2.0 * c + f.at(i, j + 1, k)) / mesh.spacing.y.powi(2)
                     + (f.at(i, j, k - 1) - 2.0 * c + f.at(i, j, k + 1)) / mesh.spacing.z.powi(2);
                 worst = worst.max((lap - rhs.at(i, j, k)).abs());
@@ -63,7 +70,16 @@ fn residual(cells: [usize; 3], ends: [Ends; 3]) -> f64 {
 #[test]
 fn residual_is_round_off_for_every_pairing_and_awkward_sizes() {
     use Ends::{Neumann as N, Periodic as P};
-    let pairings = [[N, N, N], [P, N, N], [N, P, N], [P, P, N], [N, N, P], [P, N, P], [N, P, P], [P, P, P]];
+    let pairings = [
+        [N, N, N],
+        [P, N, N],
+        [N, P, N],
+        [P, P, N],
+        [N, N, P],
+        [P, N, P],
+        [N, P, P],
+        [P, P, P],
+    ];
     let sizes = [
         [67, 31, 12],
         [12, 97, 31],
@@ -85,9 +101,16 @@ fn residual_is_round_off_for_every_pairing_and_awkward_sizes() {
 
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
-    let mesh = Mesh { cells: [30, 21, 17], spacing: DVec3::ONE, origin: DVec3::ZERO };
+    let mesh = Mesh {
+        cells: [30, 21, 17],
+        spacing: DVec3::ONE,
+        origin: DVec3::ZERO,
+    };
     let solve = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| {
             let mut state = 3;
             let mut f = Field::<Centre>::zeros(&mesh);

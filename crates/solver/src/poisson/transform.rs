@@ -36,8 +36,15 @@ pub struct LineScratch {
 impl LineScratch {
     pub fn new(transforms: [&Transform; 2]) -> LineScratch {
         let n = transforms.map(|t| t.n).into_iter().max().unwrap_or(1);
-        let fft = transforms.map(Transform::scratch_len).into_iter().max().unwrap_or(0);
-        LineScratch { lines: vec![Complex64::ZERO; LINES / 2 * n], fft: vec![Complex64::ZERO; fft] }
+        let fft = transforms
+            .map(Transform::scratch_len)
+            .into_iter()
+            .max()
+            .unwrap_or(0);
+        LineScratch {
+            lines: vec![Complex64::ZERO; LINES / 2 * n],
+            fft: vec![Complex64::ZERO; fft],
+        }
     }
     pub fn bytes(&self) -> usize {
         size_of::<Complex64>() * (self.lines.len() + self.fft.len())
@@ -63,9 +70,13 @@ impl Transform {
         let mut planner = FftPlanner::new();
         let order = match ends {
             Ends::Periodic => (0..n).collect(),
-            Ends::Neumann => (0..n).map(|m| if m % 2 == 0 { m / 2 } else { n - 1 - m / 2 }).collect(),
+            Ends::Neumann => (0..n)
+                .map(|m| if m % 2 == 0 { m / 2 } else { n - 1 - m / 2 })
+                .collect(),
         };
-        let turn = (0..n).map(|k| Complex64::from_polar(1.0, PI * k as f64 / (2 * n) as f64)).collect();
+        let turn = (0..n)
+            .map(|k| Complex64::from_polar(1.0, PI * k as f64 / (2 * n) as f64))
+            .collect();
         let eigenvalues = (0..n)
             .map(|m| {
                 let angle = match ends {
@@ -76,7 +87,15 @@ impl Transform {
             })
             .collect();
         let (forward, inverse) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
-        Transform { n, ends, forward, inverse, order, turn, eigenvalues }
+        Transform {
+            n,
+            ends,
+            forward,
+            inverse,
+            order,
+            turn,
+            eigenvalues,
+        }
     }
 
     /// What forward then inverse multiplies by.
@@ -85,7 +104,9 @@ impl Transform {
     }
 
     fn scratch_len(&self) -> usize {
-        self.forward.get_inplace_scratch_len().max(self.inverse.get_inplace_scratch_len())
+        self.forward
+            .get_inplace_scratch_len()
+            .max(self.inverse.get_inplace_scratch_len())
     }
 
     /// Lines -> modes, in place.
@@ -97,7 +118,10 @@ impl Transform {
             self.forward.process_with_scratch(lines, fft);
             let half = |z: Complex64, w: Complex64| {
                 let (sum, difference) = (z + w.conj(), z - w.conj());
-                (sum * 0.5, Complex64::new(0.5 * difference.im, -0.5 * difference.re))
+                (
+                    sum * 0.5,
+                    Complex64::new(0.5 * difference.im, -0.5 * difference.re),
+                )
             };
             match self.ends {
                 Ends::Neumann => group.store(plane, n, |p, k| {
@@ -110,7 +134,11 @@ impl Transform {
                 Ends::Periodic => group.store(plane, n, |p, k| {
                     let line = &lines[p * n..(p + 1) * n];
                     let (va, vb) = half(line[k], line[if k == 0 { 0 } else { n - k }]);
-                    if 2 * k <= n { (va.re, vb.re) } else { (-va.im, -vb.im) }
+                    if 2 * k <= n {
+                        (va.re, vb.re)
+                    } else {
+                        (-va.im, -vb.im)
+                    }
                 }),
             }
         }
@@ -121,7 +149,8 @@ impl Transform {
         let (n, LineScratch { lines, fft }) = (self.n, scratch);
         for group in self.groups(at) {
             let lines = &mut lines[..group.pairs() * n];
-            let combine = |va: Complex64, vb: Complex64| Complex64::new(va.re - vb.im, va.im + vb.re);
+            let combine =
+                |va: Complex64, vb: Complex64| Complex64::new(va.re - vb.im, va.im + vb.re);
             match self.ends {
                 Ends::Neumann => group.load_modes(plane, lines, n, |k, [a, b], [am, bm]| {
                     let t = self.turn[k];
@@ -218,7 +247,11 @@ impl Group {
                 let mirrored = &plane[self.first + (n - k) % n * self.step..][..self.lines];
                 for (p, (pair, mirror)) in entries.chunks(2).zip(mirrored.chunks(2)).enumerate() {
                     let last = pair.len() - 1;
-                    let mirror = if k == 0 { [0.0; 2] } else { [mirror[0], mirror[last]] };
+                    let mirror = if k == 0 {
+                        [0.0; 2]
+                    } else {
+                        [mirror[0], mirror[last]]
+                    };
                     lines[p * n + k] = f(k, [pair[0], pair[last]], mirror);
                 }
             }
@@ -256,6 +289,13 @@ impl Group {
     #[inline]
     fn rows(&self, p: usize) -> [usize; 2] {
         let a = self.first + 2 * p * self.apart;
-        [a, if 2 * p + 1 < self.lines { a + self.apart } else { a }]
+        [
+            a,
+            if 2 * p + 1 < self.lines {
+                a + self.apart
+            } else {
+                a
+            },
+        ]
     }
 }

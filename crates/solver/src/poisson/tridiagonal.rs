@@ -40,11 +40,22 @@ pub struct Tridiagonal {
 impl Tridiagonal {
     /// `scale` multiplies the right-hand side (the normalisation of the transforms).
     pub fn new(n: usize, ends: Ends, spacing: f64, scale: f64) -> Tridiagonal {
-        Tridiagonal { n, ends, square: spacing * spacing, scale }
+        Tridiagonal {
+            n,
+            ends,
+            square: spacing * spacing,
+            scale,
+        }
     }
 
     /// Solves all columns of a row: eigenvalues `lambda_x` along the row, `lambda_y` of the row.
-    pub fn solve(&self, column: &mut RowColumn, lambda_x: &[f64], lambda_y: f64, scratch: &mut ColumnScratch) {
+    pub fn solve(
+        &self,
+        column: &mut RowColumn,
+        lambda_x: &[f64],
+        lambda_y: f64,
+        scratch: &mut ColumnScratch,
+    ) {
         // Only the first mode of the first row can have a zero eigenvalue.
         let singular = lambda_y + lambda_x[0] == 0.0;
         match self.ends {
@@ -67,7 +78,11 @@ impl Tridiagonal {
     fn solve_flat(&self, column: &mut RowColumn, lambda_x: &[f64], lambda_y: f64) {
         for (value, lambda) in column.row(1).iter_mut().zip(lambda_x) {
             let lambda = lambda + lambda_y;
-            *value = if lambda == 0.0 { 0.0 } else { -self.scale * *value / lambda };
+            *value = if lambda == 0.0 {
+                0.0
+            } else {
+                -self.scale * *value / lambda
+            };
         }
     }
 
@@ -107,13 +122,19 @@ impl Tridiagonal {
             let pivots = &scratch.pivots[(k - 1) * nx..k * nx];
             let row = column.row(k);
             for i in 0..nx {
-                row[i] += pivots[i] * carry[i];
-                carry[i] = row[i];
+                carry[i] = row[i] + pivots[i] * carry[i];
+                row[i] = carry[i];
             }
         }
     }
 
-    fn solve_periodic(&self, column: &mut RowColumn, lambda_x: &[f64], lambda_y: f64, scratch: &mut ColumnScratch) {
+    fn solve_periodic(
+        &self,
+        column: &mut RowColumn,
+        lambda_x: &[f64],
+        lambda_y: f64,
+        scratch: &mut ColumnScratch,
+    ) {
         let (n, nx) = (self.n, lambda_x.len());
         let factor = -self.square * self.scale;
         let ColumnScratch { pivots, corner, .. } = scratch;

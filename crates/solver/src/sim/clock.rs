@@ -26,8 +26,13 @@ impl Clock {
     pub fn new(setup: &Setup) -> Clock {
         let mesh = &setup.mesh;
         let resolved = (0..3).filter(|&axis| mesh.cells[axis] > 1);
-        let inverse_squares: f64 = resolved.clone().map(|axis| mesh.spacing[axis].powi(-2)).sum();
-        let smallest = resolved.map(|axis| mesh.spacing[axis]).fold(f64::INFINITY, f64::min);
+        let inverse_squares: f64 = resolved
+            .clone()
+            .map(|axis| mesh.spacing[axis].powi(-2))
+            .sum();
+        let smallest = resolved
+            .map(|axis| mesh.spacing[axis])
+            .fold(f64::INFINITY, f64::min);
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
         let pull = setup
             .grains
@@ -44,7 +49,9 @@ impl Clock {
             steps: 0,
             last_step: 0.0,
             rule: setup.step,
-            viscous_rate: setup.fluid.map_or(0.0, |fluid| fluid.kinematic_viscosity * inverse_squares),
+            viscous_rate: setup
+                .fluid
+                .map_or(0.0, |fluid| fluid.kinematic_viscosity * inverse_squares),
             first_step,
         }
     }
@@ -54,12 +61,27 @@ impl Clock {
     pub fn choose(&self, rate: f64, limit: f64) -> f64 {
         let wanted = match self.rule {
             StepRule::Fixed(step) => step,
-            StepRule::Limits { cfl, viscous, max_step } => {
-                let growth = if self.steps == 0 { self.first_step } else { LARGEST_GROWTH * self.last_step };
-                (cfl / rate).min(viscous / self.viscous_rate).min(max_step).min(growth)
+            StepRule::Limits {
+                cfl,
+                viscous,
+                max_step,
+            } => {
+                let growth = if self.steps == 0 {
+                    self.first_step
+                } else {
+                    LARGEST_GROWTH * self.last_step
+                };
+                (cfl / rate)
+                    .min(viscous / self.viscous_rate)
+                    .min(max_step)
+                    .min(growth)
             }
         };
-        if limit.is_finite() { limit / (limit / wanted * (1.0 - 1e-12)).ceil().max(1.0) } else { wanted }
+        if limit.is_finite() {
+            limit / (limit / wanted * (1.0 - 1e-12)).ceil().max(1.0)
+        } else {
+            wanted
+        }
     }
 
     /// Moves on by `step` [s].

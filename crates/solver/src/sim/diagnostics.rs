@@ -19,22 +19,38 @@ pub struct Diagnostics {
     pub fluid_kinetic_energy: f64,
     /// Kinetic energy of the grains [J].
     pub grain_kinetic_energy: f64,
-    /// Momentum of the box (fluid + grains) [kg m/s].
+    /// Momentum of the box [kg m/s]: fluid in all cells plus what grains hold beyond the fluid they
+    /// displace.
     pub momentum: DVec3,
-    /// Momentum balance of fluid + grains + walls in this step, relative to the largest term.
+    /// Momentum of fluid + grains + walls unaccounted for in the last step, as a fraction of what
+    /// moves: fluid density times box volume times the largest velocity.
     pub momentum_residual: f64,
 }
 
 impl Simulation {
+    /// Largest |div u| after the last projection [1/s]; zero without fluid.
+    pub fn max_divergence(&self) -> f64 {
+        self.fluid
+            .as_ref()
+            .map_or(0.0, |fluid| fluid.measures.max_divergence)
+    }
+    /// CFL number of the last step; zero without fluid.
+    pub fn cfl(&self) -> f64 {
+        self.fluid
+            .as_ref()
+            .map_or(0.0, |fluid| fluid.measures.max_rate * self.clock.last_step)
+    }
     /// Measures the present state.
     pub fn diagnostics(&self) -> Diagnostics {
         let grains = &self.setup.grains;
         let mut d = Diagnostics::default();
+        let fluid_density = self.setup.fluid.map_or(0.0, |fluid| fluid.density);
         for grain in grains {
             let spin = grain.angular_velocity;
-            d.grain_kinetic_energy +=
-                0.5 * (grain.mass() * grain.velocity.length_squared() + spin.dot(grain.inertia() * spin));
-            d.momentum += grain.mass() * grain.velocity;
+            d.grain_kinetic_energy += 0.5
+                * (grain.mass() * grain.velocity.length_squared()
+                    + spin.dot(grain.inertia() * spin));
+            d.momentum += (grain.density - fluid_density) * grain.shape.volume() * grain.velocity;
         }
         if let (Some(fluid), Some(params)) = (&self.fluid, &self.setup.fluid) {
             d.max_divergence = fluid.measures.max_divergence;
@@ -42,6 +58,14 @@ impl Simulation {
             d.cfl = fluid.measures.max_rate * self.clock.last_step;
             d.fluid_kinetic_energy = params.density * fluid.measures.kinetic_energy;
             d.slip = self.slip();
+            d.momentum += params.density * fluid.measures.momentum;
+            let volume = self.setup.mesh.cell_volume() * self.setup.mesh.cell_count() as f64;
+            let scale = params.density * volume * d.max_velocity;
+            d.momentum_residual = if scale > 0.0 {
+                self.momentum_residual.length() / scale
+            } else {
+                0.0
+            };
         }
         d
     }

@@ -2,6 +2,7 @@
 
 mod clock;
 mod diagnostics;
+pub mod events;
 mod probe;
 mod setup;
 mod state;
@@ -10,7 +11,7 @@ mod step;
 use std::time::Duration;
 
 use crate::coupling::Coupling;
-use crate::dem::{Contact, Dynamics, Enclosure, Grain};
+use crate::dem::{Contact, Dynamics, Grain};
 use crate::flow::{Flow, FlowMeasures};
 use crate::grid::Mesh;
 use crate::math::Load;
@@ -35,6 +36,8 @@ pub struct Simulation {
     dynamics: Dynamics,
     /// Hydrodynamic load on each grain over the last step.
     loads: Vec<Load>,
+    /// Momentum of the fluid that the last step cannot account for [kg m/s].
+    momentum_residual: glam::DVec3,
     work: Work,
     passes: Passes,
 }
@@ -59,18 +62,17 @@ impl Simulation {
     /// Builds the simulation at t = 0; the fluid next to moving grains starts at their velocity.
     pub fn new(setup: Setup) -> Result<Simulation, SetupError> {
         setup.validate()?;
-        let enclosure = Enclosure {
-            lower: setup.mesh.origin,
-            upper: setup.mesh.upper(),
-            periodic: [0, 1, 2].map(|axis| setup.boundaries.is_periodic(axis)),
-            solid: setup.boundaries.0.map(|sides| sides.map(|boundary| boundary.is_solid())),
-        };
+        let enclosure = setup.enclosure();
         let fluid = setup.fluid.map(|params| {
             let mut flow = Flow::new(&setup.mesh, setup.boundaries, &params);
             let (density, nu) = (params.density, params.kinematic_viscosity);
             let mut coupling = Coupling::new(&flow, setup.scheme, density, nu, &setup.grains);
             let measures = coupling.start(&mut flow, &setup.grains);
-            Fluid { flow, coupling, measures }
+            Fluid {
+                flow,
+                coupling,
+                measures,
+            }
         });
         let count = setup.grains.len();
         Ok(Simulation {
@@ -78,6 +80,7 @@ impl Simulation {
             clock: Clock::new(&setup),
             fluid,
             loads: vec![Load::default(); count],
+            momentum_residual: glam::DVec3::ZERO,
             work: Work {
                 before: vec![Default::default(); count],
                 driving: vec![Load::default(); count],
@@ -115,19 +118,26 @@ impl Simulation {
     pub fn loads(&self) -> &[Load] {
         &self.loads
     }
-    /// Touching pairs at the end of the last step.
+    /// Pairs that touched during the last step.
     pub fn contacts(&self) -> &[Contact] {
         self.dynamics.contacts()
     }
     /// Seconds spent since the start in each stage of the step.
     pub fn pass_times(&self) -> Vec<(&'static str, f64)> {
         let p = &self.passes;
-        [("predict", p.predict), ("contact", p.contact), ("coupling", p.coupling), ("project", p.project)]
-            .map(|(name, time)| (name, time.as_secs_f64()))
-            .to_vec()
+        [
+            ("predict", p.predict),
+            ("contact", p.contact),
+            ("coupling", p.coupling),
+            ("project", p.project),
+        ]
+        .map(|(name, time)| (name, time.as_secs_f64()))
+        .to_vec()
     }
     /// Memory held by fields, solver and grains on the grid [bytes].
     pub fn bytes(&self) -> usize {
-        self.fluid.as_ref().map_or(0, |fluid| fluid.flow.bytes() + fluid.coupling.bytes())
+        self.fluid
+            .as_ref()
+            .map_or(0, |fluid| fluid.flow.bytes() + fluid.coupling.bytes())
     }
 }

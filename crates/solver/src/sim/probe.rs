@@ -16,7 +16,9 @@ impl Simulation {
     }
     /// Cell-centred velocity [m/s] of cell (i, j, k), counted from 0; zero without fluid.
     pub fn velocity_at(&self, cell: [usize; 3]) -> DVec3 {
-        let Some(flow) = self.flow() else { return DVec3::ZERO };
+        let Some(flow) = self.flow() else {
+            return DVec3::ZERO;
+        };
         let [i, j, k] = cell.map(|i| i + 1);
         let FaceVector { x, y, z } = &flow.velocity;
         0.5 * DVec3::new(
@@ -27,7 +29,9 @@ impl Simulation {
     }
     /// Vorticity [1/s] at the centre of cell (i, j, k), counted from 0: mean of the four edges.
     pub fn vorticity_at(&self, cell: [usize; 3]) -> DVec3 {
-        let Some(flow) = self.flow() else { return DVec3::ZERO };
+        let Some(flow) = self.flow() else {
+            return DVec3::ZERO;
+        };
         let h = self.setup.mesh.spacing;
         let layout = self.setup.mesh.layout();
         let strides = layout.strides();
@@ -40,7 +44,10 @@ impl Simulation {
         };
         let mean = |b: usize, c: usize| {
             let (up, across) = (strides[b], strides[c]);
-            0.25 * (edge(b, c, at) + edge(b, c, at + up) + edge(b, c, at + across) + edge(b, c, at + up + across))
+            0.25 * (edge(b, c, at)
+                + edge(b, c, at + up)
+                + edge(b, c, at + across)
+                + edge(b, c, at + up + across))
         };
         DVec3::new(mean(1, 2), mean(2, 0), mean(0, 1))
     }
@@ -48,7 +55,8 @@ impl Simulation {
     pub fn pressure_at(&self, cell: [usize; 3]) -> f64 {
         let [i, j, k] = cell.map(|i| i + 1);
         let density = self.setup.fluid.map_or(0.0, |fluid| fluid.density);
-        self.flow().map_or(0.0, |flow| density * flow.pressure.at(i, j, k))
+        self.flow()
+            .map_or(0.0, |flow| density * flow.pressure.at(i, j, k))
     }
     /// Solid fraction of cell (i, j, k), counted from 0, by the plane through the nearest surface.
     pub fn solid_fraction_at(&self, cell: [usize; 3]) -> f64 {
@@ -67,9 +75,14 @@ impl Simulation {
             if arm.length_squared() > reach * reach {
                 continue;
             }
-            let (d, gradient) = grain.shape.distance_and_gradient(grain.pose.orientation.conjugate() * arm);
+            let (d, gradient) = grain
+                .shape
+                .distance_and_gradient(grain.pose.orientation.conjugate() * arm);
             let normal = grain.pose.orientation * gradient.normalize_or_zero();
-            let width = normal.abs().dot(mesh.spacing).max(mesh.spacing.min_element());
+            let width = normal
+                .abs()
+                .dot(mesh.spacing)
+                .max(mesh.spacing.min_element());
             fraction = fraction.max((0.5 - d / width).clamp(0.0, 1.0));
         }
         fraction

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::coupling::Scheme;
-use crate::dem::{ContactParams, Grain};
+use crate::dem::{ContactParams, Enclosure, Grain};
 use crate::flow::{Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
 
@@ -53,6 +53,19 @@ pub enum SetupError {
 }
 
 impl Setup {
+    /// The box as the grains see it.
+    pub fn enclosure(&self) -> Enclosure {
+        Enclosure {
+            lower: self.mesh.origin,
+            upper: self.mesh.upper(),
+            periodic: [0, 1, 2].map(|axis| self.boundaries.is_periodic(axis)),
+            solid: self
+                .boundaries
+                .0
+                .map(|sides| sides.map(|boundary| boundary.is_solid())),
+        }
+    }
+
     /// Checks what the parts cannot check alone.
     ///
     /// # Errors
@@ -67,21 +80,28 @@ impl Setup {
             if (*lower == Boundary::Periodic) != (*upper == Boundary::Periodic) {
                 return fail(format!("axis {name} is periodic on one side only"));
             }
-            if self.mesh.cells[axis] == 1 && *lower != Boundary::Periodic {
-                return fail(format!("axis {name} has one cell, so both its faces must be periodic"));
+            if self.fluid.is_some() && self.mesh.cells[axis] == 1 && *lower != Boundary::Periodic {
+                return fail(format!(
+                    "axis {name} has one cell, so both its faces must be periodic"
+                ));
             }
         }
         if sides().any(flux) && !sides().any(open) {
-            return fail("fluid enters the box but no face lets it out: make one face an outflow".into());
+            return fail(
+                "fluid enters the box but no face lets it out: make one face an outflow".into(),
+            );
         }
         let bounded = |x: f64| x.is_finite() && x > 0.0;
         if !self.mesh.spacing.to_array().into_iter().all(bounded) || self.mesh.cells.contains(&0) {
-            return fail("the grid needs at least one cell of positive size along each axis".into());
+            return fail(
+                "the grid needs at least one cell of positive size along each axis".into(),
+            );
         }
-        if let Some(fluid) = &self.fluid {
-            if !bounded(fluid.density) || !bounded(fluid.kinematic_viscosity) {
-                return fail("density and viscosity of the fluid must be positive".into());
-            }
+        if self
+            .fluid
+            .is_some_and(|fluid| !bounded(fluid.density) || !bounded(fluid.kinematic_viscosity))
+        {
+            return fail("density and viscosity of the fluid must be positive".into());
         }
         if let Some(i) = self.grains.iter().position(|grain| !bounded(grain.density)) {
             return fail(format!("the density of grain {i} must be positive"));

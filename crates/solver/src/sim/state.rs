@@ -17,13 +17,25 @@ impl Simulation {
         for (grain, load) in self.setup.grains.iter().zip(&self.loads) {
             out.numbers(&grain.pose.position.to_array())?;
             out.numbers(&grain.pose.orientation.to_array())?;
-            for v in [grain.velocity, grain.angular_velocity, load.force, load.torque] {
+            for v in [
+                grain.velocity,
+                grain.angular_velocity,
+                load.force,
+                load.torque,
+            ] {
                 out.numbers(&v.to_array())?;
             }
         }
         if let Some(fluid) = &self.fluid {
             let m = &fluid.measures;
-            out.numbers(&[m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy])?;
+            out.numbers(&[
+                m.max_divergence,
+                m.max_rate,
+                m.max_velocity,
+                m.kinetic_energy,
+            ])?;
+            out.numbers(&m.momentum.to_array())?;
+            out.numbers(&self.momentum_residual.to_array())?;
             for values in fluid.flow.state() {
                 out.count(values.len() as u64)?;
                 out.numbers(values)?;
@@ -46,16 +58,28 @@ impl Simulation {
             grain.pose.orientation = DQuat::from_array(input.numbers()?);
             grain.velocity = DVec3::from_array(input.numbers()?);
             grain.angular_velocity = DVec3::from_array(input.numbers()?);
-            *load = Load { force: DVec3::from_array(input.numbers()?), torque: DVec3::from_array(input.numbers()?) };
+            *load = Load {
+                force: DVec3::from_array(input.numbers()?),
+                torque: DVec3::from_array(input.numbers()?),
+            };
         }
         if let Some(fluid) = &mut self.fluid {
             let m = &mut fluid.measures;
-            [m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy] = input.numbers()?;
+            [
+                m.max_divergence,
+                m.max_rate,
+                m.max_velocity,
+                m.kinetic_energy,
+            ] = input.numbers()?;
+            m.momentum = DVec3::from_array(input.numbers()?);
+            self.momentum_residual = DVec3::from_array(input.numbers()?);
             for values in fluid.flow.state_mut(self.clock.last_step) {
                 input.expect(values.len(), "field entries")?;
                 input.fill(values)?;
             }
-            fluid.coupling.locate(&self.setup.grains, self.clock.last_step);
+            fluid
+                .coupling
+                .locate(&self.setup.grains, self.clock.last_step);
         }
         self.dynamics.restore(input.0)
     }

@@ -27,24 +27,46 @@ pub enum StepError {
 impl Simulation {
     /// One time step; `limit` [s] caps it so that output times are met exactly.
     pub fn step(&mut self, limit: f64) -> Result<(), StepError> {
-        let rate = self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures.max_rate);
+        let rate = self
+            .fluid
+            .as_ref()
+            .map_or(0.0, |fluid| fluid.measures.max_rate);
         let dt = self.clock.choose(rate, limit);
-        let Simulation { setup, fluid, dynamics, loads, work, passes, .. } = self;
+        let Simulation {
+            setup,
+            fluid,
+            dynamics,
+            loads,
+            work,
+            passes,
+            ..
+        } = self;
         let grains = &mut setup.grains;
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
         for (i, grain) in grains.iter().enumerate() {
             work.before[i] = [grain.velocity, grain.angular_velocity];
             let weight = setup.gravity * (grain.density - fluid_density) * grain.shape.volume();
-            work.driving[i] = Load { force: weight, torque: glam::DVec3::ZERO } + loads[i];
+            work.driving[i] = Load {
+                force: weight,
+                torque: glam::DVec3::ZERO,
+            } + loads[i];
         }
         match fluid {
             None => timed(&mut passes.contact, || {
                 dynamics.advance(grains, &work.driving, dt, &mut work.contact);
             }),
-            Some(Fluid { flow, coupling, measures }) => {
+            Some(Fluid {
+                flow,
+                coupling,
+                measures,
+            }) => {
                 timed(&mut passes.predict, || flow.predict(dt));
-                timed(&mut passes.coupling, || coupling.correct_advection(flow, grains));
-                timed(&mut passes.contact, || dynamics.advance(grains, &work.driving, dt, &mut work.contact));
+                timed(&mut passes.coupling, || {
+                    coupling.correct_advection(flow, grains)
+                });
+                timed(&mut passes.contact, || {
+                    dynamics.advance(grains, &work.driving, dt, &mut work.contact)
+                });
                 timed(&mut passes.coupling, || coupling.locate(grains, dt));
                 if setup.scheme == Scheme::Paper {
                     timed(&mut passes.project, || flow.project_prediction(dt));
@@ -55,7 +77,16 @@ impl Simulation {
                 timed(&mut passes.coupling, || {
                     coupling.impose_rigidity(flow, grains, &work.before, &work.driving, dt, loads);
                 });
+                let momentum = measures.momentum;
                 timed(&mut passes.project, || *measures = flow.project(dt));
+                self.momentum_residual =
+                    fluid_density * (measures.momentum - momentum - flow.boundary_impulse(dt));
+                for (grain, (before, load)) in grains.iter().zip(work.before.iter().zip(&*loads)) {
+                    // What the fluid gave the grain, the fluid inside it included, it lost.
+                    let displaced = fluid_density * grain.shape.volume();
+                    self.momentum_residual -=
+                        displaced * (grain.velocity - before[0]) - dt * load.force;
+                }
             }
         }
         self.clock.advance(dt);
@@ -65,7 +96,12 @@ impl Simulation {
     /// Stops a run whose state is no longer finite or whose speed has left all reason.
     fn check(&self) -> Result<(), StepError> {
         let unstable = |what: String, remedy: &str| {
-            Err(StepError::Unstable { time: self.clock.time, step: self.clock.steps, what, remedy: remedy.into() })
+            Err(StepError::Unstable {
+                time: self.clock.time,
+                step: self.clock.steps,
+                what,
+                remedy: remedy.into(),
+            })
         };
         for (i, grain) in self.setup.grains.iter().enumerate() {
             let finite = grain.pose.position.is_finite()
@@ -82,7 +118,10 @@ impl Simulation {
         if let Some(fluid) = &self.fluid {
             let m = &fluid.measures;
             if !(m.kinetic_energy.is_finite() && m.max_divergence.is_finite()) {
-                return unstable("the velocity is not finite".into(), "a smaller [time] cfl or a finer grid");
+                return unstable(
+                    "the velocity is not finite".into(),
+                    "a smaller [time] cfl or a finer grid",
+                );
             }
             let cfl = m.max_rate * self.clock.last_step;
             if cfl > 10.0 {

@@ -20,7 +20,9 @@ fn params(nu: f64) -> FluidParams {
 }
 
 fn noise(state: &mut u64) -> f64 {
-    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    *state = state
+        .wrapping_mul(6364136223846793005)
+        .wrapping_add(1442695040888963407);
     (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
@@ -29,7 +31,10 @@ fn random_flow(mesh: &Mesh, boundaries: Boundaries, nu: f64) -> Flow {
     let mut flow = Flow::new(mesh, boundaries, &params(nu));
     let mut state = 11;
     for axis in 0..3 {
-        flow.velocity.component_mut(axis).iter_mut().for_each(|value| *value = noise(&mut state));
+        flow.velocity
+            .component_mut(axis)
+            .iter_mut()
+            .for_each(|value| *value = noise(&mut state));
     }
     flow.make_solenoidal();
     flow
@@ -49,7 +54,11 @@ fn tendencies(flow: &Flow) -> FaceVector {
         for j in 1..=mesh.cells[1] {
             let at = mesh.layout().index(0, j, k);
             let FaceVector { x, y, z } = &mut out;
-            let rows = [&mut x[at..at + row], &mut y[at..at + row], &mut z[at..at + row]];
+            let rows = [
+                &mut x[at..at + row],
+                &mut y[at..at + row],
+                &mut z[at..at + row],
+            ];
             tendency::row(&flow.coefficients, &flow.velocity, j, k, rows);
         }
     }
@@ -58,15 +67,29 @@ fn tendencies(flow: &Flow) -> FaceVector {
 
 #[test]
 fn divergence_is_minus_the_transposed_gradient() {
-    let mesh = Mesh { cells: [7, 6, 5], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
-    let flow = random_flow(&mesh, Boundaries([[Boundary::Periodic; 2], [Boundary::WALL; 2], [Boundary::WALL; 2]]), 0.0);
+    let mesh = Mesh {
+        cells: [7, 6, 5],
+        spacing: DVec3::new(0.3, 0.4, 0.5),
+        origin: DVec3::ZERO,
+    };
+    let flow = random_flow(
+        &mesh,
+        Boundaries([
+            [Boundary::Periodic; 2],
+            [Boundary::WALL; 2],
+            [Boundary::WALL; 2],
+        ]),
+        0.0,
+    );
     let mut state = 5;
     let mut p = Field::<Centre>::zeros(&mesh);
     p.iter_mut().for_each(|value| *value = noise(&mut state));
     flow.boundaries.fill_pressure(&mut p);
     let mut u = flow.velocity.clone();
     for axis in 0..3 {
-        u.component_mut(axis).iter_mut().for_each(|value| *value = noise(&mut state));
+        u.component_mut(axis)
+            .iter_mut()
+            .for_each(|value| *value = noise(&mut state));
     }
     flow.boundaries.set_normal(&mut u);
     let h = mesh.spacing;
@@ -82,13 +105,20 @@ fn divergence_is_minus_the_transposed_gradient() {
             + u.y.at(i, j, k) * (c - p.at(i, j - 1, k)) / h.y
             + u.z.at(i, j, k) * (c - p.at(i, j, k - 1)) / h.z;
     }
-    assert!((left - right).abs() <= 1e-14 * size, "p.Du = {left:e}, -Gp.u = {right:e}");
+    assert!(
+        (left - right).abs() <= 1e-14 * size,
+        "p.Du = {left:e}, -Gp.u = {right:e}"
+    );
 }
 
 #[test]
 fn projection_leaves_round_off_divergence() {
     for boundaries in [PERIODIC, Boundaries([[Boundary::WALL; 2]; 3])] {
-        let mesh = Mesh { cells: [19, 14, 11], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
+        let mesh = Mesh {
+            cells: [19, 14, 11],
+            spacing: DVec3::new(0.3, 0.4, 0.5),
+            origin: DVec3::ZERO,
+        };
         let mut flow = random_flow(&mesh, boundaries, 0.01);
         for _ in 0..5 {
             flow.predict(0.01);
@@ -104,14 +134,21 @@ fn projection_leaves_round_off_divergence() {
                         .abs()
                 })
                 .fold(0.0, f64::max);
-            assert!(worst <= 1e-10 * m.max_rate, "measured apart from the sweep: {worst:e}");
+            assert!(
+                worst <= 1e-10 * m.max_rate,
+                "measured apart from the sweep: {worst:e}"
+            );
         }
     }
 }
 
 #[test]
 fn advection_conserves_momentum_and_kinetic_energy() {
-    let mesh = Mesh { cells: [9, 8, 7], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
+    let mesh = Mesh {
+        cells: [9, 8, 7],
+        spacing: DVec3::new(0.3, 0.4, 0.5),
+        origin: DVec3::ZERO,
+    };
     let flow = random_flow(&mesh, PERIODIC, 0.0);
     let h = tendencies(&flow);
     for axis in 0..3 {
@@ -121,7 +158,10 @@ fn advection_conserves_momentum_and_kinetic_energy() {
             momentum += value;
             size += value.abs();
         }
-        assert!(momentum.abs() <= 1e-13 * size, "momentum {axis}: {momentum:e} of {size:e}");
+        assert!(
+            momentum.abs() <= 1e-13 * size,
+            "momentum {axis}: {momentum:e} of {size:e}"
+        );
     }
     let (mut power, mut size) = (0.0, 0.0);
     for [i, j, k] in interior(&mesh) {
@@ -132,7 +172,10 @@ fn advection_conserves_momentum_and_kinetic_energy() {
             size += p.abs();
         }
     }
-    assert!(power.abs() <= 1e-13 * size, "energy rate {power:e} of {size:e}");
+    assert!(
+        power.abs() <= 1e-13 * size,
+        "energy rate {power:e} of {size:e}"
+    );
 }
 
 /// Decaying Taylor-Green vortex in the plane of two axes; returns the largest velocity error.
@@ -140,7 +183,11 @@ fn taylor_green(n: usize, dt: f64, steps: usize, nu: f64, plane: [usize; 2]) -> 
     let mut cells = [1; 3];
     cells[plane[0]] = n;
     cells[plane[1]] = n;
-    let mesh = Mesh { cells, spacing: DVec3::splat(2.0 * PI / n as f64), origin: DVec3::ZERO };
+    let mesh = Mesh {
+        cells,
+        spacing: DVec3::splat(2.0 * PI / n as f64),
+        origin: DVec3::ZERO,
+    };
     let mut flow = Flow::new(&mesh, PERIODIC, &params(nu));
     let exact = |axis: usize, x: DVec3, t: f64| {
         let (a, b) = (x[plane[0]], x[plane[1]]);
@@ -179,6 +226,171 @@ fn taylor_green_is_second_order_in_space() {
         let coarse = taylor_green(16, 2e-3, 250, 0.1, plane);
         let fine = taylor_green(32, 2e-3, 250, 0.1, plane);
         let order = (coarse / fine).log2();
-        assert!((order - 2.0).abs() <= 0.1, "{plane:?}: errors {coarse:e} {fine:e}, order {order}");
+        assert!(
+            (order - 2.0).abs() <= 0.1,
+            "{plane:?}: errors {coarse:e} {fine:e}, order {order}"
+        );
     }
+}
+
+#[test]
+fn taylor_green_is_second_order_in_time() {
+    // The same grid throughout: differences between steps leave the error in time alone.
+    let field = |steps: usize| {
+        let n = 24;
+        let mesh = Mesh {
+            cells: [n, 1, n],
+            spacing: DVec3::splat(2.0 * PI / n as f64),
+            origin: DVec3::ZERO,
+        };
+        let mut flow = Flow::new(&mesh, PERIODIC, &params(0.05));
+        // Two superposed vortices interact, so that advection is not a gradient.
+        flow.velocity
+            .x
+            .fill_with(&mesh, |x| x.x.sin() * x.z.cos() + 0.5 * (2.0 * x.z).sin());
+        flow.velocity.z.fill_with(&mesh, |x| -x.x.cos() * x.z.sin());
+        flow.make_solenoidal();
+        for _ in 0..steps {
+            flow.predict(1.0 / steps as f64);
+            flow.project(1.0 / steps as f64);
+        }
+        flow.velocity.x.to_vec()
+    };
+    let apart = |a: &[f64], b: &[f64]| {
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| (a - b).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    };
+    let [one, two, four] = [40, 80, 160].map(field);
+    let order = (apart(&one, &two) / apart(&two, &four)).log2();
+    assert!(
+        (1.9..=2.2).contains(&order),
+        "observed order in time {order}"
+    );
+}
+
+/// Arnold-Beltrami-Childress flow, an exact decaying solution in three dimensions.
+fn beltrami(n: usize) -> f64 {
+    let nu = 0.1;
+    let mesh = Mesh {
+        cells: [n; 3],
+        spacing: DVec3::splat(2.0 * PI / n as f64),
+        origin: DVec3::ZERO,
+    };
+    let mut flow = Flow::new(&mesh, PERIODIC, &params(nu));
+    flow.velocity
+        .x
+        .fill_with(&mesh, |x| x.z.sin() + 0.7 * x.y.cos());
+    flow.velocity
+        .y
+        .fill_with(&mesh, |x| 0.8 * x.x.sin() + x.z.cos());
+    flow.velocity
+        .z
+        .fill_with(&mesh, |x| 0.7 * x.y.sin() + 0.8 * x.x.cos());
+    flow.boundaries.fill_ghosts(&mut flow.velocity);
+    let (dt, steps) = (4e-3, 100);
+    for _ in 0..steps {
+        flow.predict(dt);
+        flow.project(dt);
+    }
+    let decay = (-nu * dt * steps as f64).exp();
+    interior(&mesh)
+        .map(|[i, j, k]| {
+            let x = mesh.position(crate::grid::FACE_OFFSET[0], [i, j, k]);
+            (flow.velocity.x.at(i, j, k) - decay * (x.z.sin() + 0.7 * x.y.cos())).abs()
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn beltrami_flow_is_second_order_in_space() {
+    let (coarse, fine) = (beltrami(12), beltrami(24));
+    let order = (coarse / fine).log2();
+    assert!(
+        (order - 2.0).abs() <= 0.1,
+        "errors {coarse:e} {fine:e}, order {order}"
+    );
+}
+
+/// Steady Couette-Poiseuille flow between a wall at rest and a moving lid, across `axis`.
+fn channel(n: usize, axis: usize) -> f64 {
+    let along = (axis + 1) % 3;
+    let mut cells = [1; 3];
+    cells[axis] = n;
+    let (nu, push, lid) = (1.0, 6.0, 0.7);
+    let mut p = params(nu);
+    p.body_acceleration[along] = push;
+    let mut velocity = DVec3::ZERO;
+    velocity[along] = lid;
+    let mut boundaries = PERIODIC;
+    boundaries.0[axis] = [Boundary::WALL, Boundary::Wall { velocity }];
+    let h = 1.0 / n as f64;
+    let mesh = Mesh {
+        cells,
+        spacing: DVec3::splat(h),
+        origin: DVec3::ZERO,
+    };
+    let mut flow = Flow::new(&mesh, boundaries, &p);
+    let dt = 0.2 * h * h;
+    for _ in 0..(2.0 / dt) as usize {
+        flow.predict(dt);
+        flow.project(dt);
+    }
+    (1..=n)
+        .map(|m| {
+            let mut index = [1; 3];
+            index[axis] = m;
+            let s = (m as f64 - 0.5) * h;
+            let exact = lid * s + push / (2.0 * nu) * s * (1.0 - s);
+            (flow.velocity.component(along)[mesh.layout().index(index[0], index[1], index[2])]
+                - exact)
+                .abs()
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn channel_with_a_moving_lid_is_second_order() {
+    for axis in 0..3 {
+        let (coarse, fine) = (channel(8, axis), channel(16, axis));
+        let order = (coarse / fine).log2();
+        assert!(
+            (order - 2.0).abs() <= 0.1,
+            "axis {axis}: errors {coarse:e} {fine:e}, order {order}"
+        );
+    }
+}
+
+#[test]
+fn outflow_keeps_the_mass_of_the_box() {
+    let mesh = Mesh {
+        cells: [20, 8, 8],
+        spacing: DVec3::splat(0.1),
+        origin: DVec3::ZERO,
+    };
+    let velocity = DVec3::X;
+    let boundaries = Boundaries([
+        [Boundary::Inflow { velocity }, Boundary::Outflow],
+        [Boundary::Slip; 2],
+        [Boundary::WALL, Boundary::FreeSurface],
+    ]);
+    let mut p = params(0.02);
+    p.initial_velocity = velocity;
+    let mut flow = Flow::new(&mesh, boundaries, &p);
+    for _ in 0..200 {
+        flow.predict(0.02);
+        let m = flow.project(0.02);
+        assert!(m.max_divergence <= 1e-10 * m.max_rate, "{m:?}");
+    }
+    let through = |i: usize| {
+        interior(&mesh)
+            .filter(|[x, ..]| *x == 1)
+            .map(|[_, j, k]| flow.velocity.x.at(i, j, k))
+            .sum::<f64>()
+    };
+    assert!((through(1) - 64.0).abs() < 1e-12 && (through(21) - 64.0).abs() < 1e-10);
+    // The floor slows the fluid, the lid does not.
+    assert!(flow.velocity.x.at(18, 4, 1) < 0.8 * flow.velocity.x.at(18, 4, 8));
 }

@@ -1,0 +1,283 @@
+//! Arguments of the command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+/// Drops real grains into real fluid.
+#[derive(Debug, Parser)]
+#[command(name = "grainwake", version, about, propagate_version = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a case
+    Run(RunArgs),
+    /// Check a case without running it: derived numbers and warnings
+    Check(CheckArgs),
+    /// Make and look at grain shapes
+    Grain(GrainArgs),
+    /// Draw the figures and the page of a run folder
+    Report(ReportArgs),
+    /// Measure speed and memory of the solver on this machine
+    Bench(BenchArgs),
+    /// Print the JSON schema of the case file
+    Schema,
+    /// Print shell completions
+    Completions {
+        /// Shell
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// Case file
+    pub case: PathBuf,
+    /// Run folder [default: runs/NAME; for a case.resolved.toml its own folder]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Threads; 0 takes all cores [default: what the case says]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Continue from the last checkpoint
+    #[arg(long, conflicts_with = "force")]
+    pub resume: bool,
+    /// Replace a run that is already there
+    #[arg(long)]
+    pub force: bool,
+    /// Change a value of the case, for example time.end=0.5 or grain.0.density=2600
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// No progress, only problems
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the summary as one JSON object; everything else goes to standard error
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Case file
+    pub case: PathBuf,
+    /// Threads, for the estimated wall time; 0 takes all cores
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Change a value of the case
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Run folder
+    pub run: PathBuf,
+}
+
+/// Arguments of `bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Cells along x, y, z
+    #[arg(long, num_args = 3, value_names = ["NX", "NY", "NZ"], default_values_t = [100, 100, 390])]
+    pub size: Vec<usize>,
+    /// Steps that are timed, after two that are not
+    #[arg(long, default_value_t = 10)]
+    pub steps: u64,
+    /// Threads; 0 takes all cores
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub threads: usize,
+    /// Coupling scheme
+    #[arg(long, default_value = "aperture", value_parser = ["aperture", "paper"])]
+    pub scheme: String,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `grain`.
+#[derive(Debug, Args)]
+pub struct GrainArgs {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: GrainCommand,
+}
+
+/// Commands of `grain`.
+#[derive(Debug, Subcommand)]
+pub enum GrainCommand {
+    /// A grain from a 3-D image: one solid, or one label of a labelled volume
+    FromScan(FromScanArgs),
+    /// A grain from a closed surface mesh (STL, PLY, OBJ)
+    FromMesh(FromMeshArgs),
+    /// A grain of closed form
+    Make(MakeArgs),
+    /// Sizes and morphology of a grain file
+    Info(InfoArgs),
+}
+
+/// Where the new grain goes, and how fine it is.
+#[derive(Debug, Args)]
+pub struct NewGrain {
+    /// Grain file to write (from-scan: or a folder, for every grain of the image)
+    #[arg(short, long, value_name = "FILE.grain")]
+    pub output: PathBuf,
+    /// Rescale to this equal-volume diameter, for example "2 mm"
+    #[arg(long, value_name = "LENGTH")]
+    pub equivalent_diameter: Option<String>,
+    /// Surface nodes [default: one in every (diameter / 20)^2 of surface]
+    #[arg(long, value_name = "N")]
+    pub nodes: Option<usize>,
+    /// Cells of the distance field across the longest extent
+    #[arg(long, value_name = "N")]
+    pub cells: Option<usize>,
+    /// Replace the file if it is there
+    #[arg(long)]
+    pub force: bool,
+    /// Print the record as one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `grain from-mesh`.
+#[derive(Debug, Args)]
+pub struct FromMeshArgs {
+    /// Mesh file: .stl, .ply or .obj
+    pub mesh: PathBuf,
+    /// Length of one unit of the file, for example "1 mm"
+    #[arg(long, value_name = "LENGTH")]
+    pub unit: String,
+    /// Invert the faces of a mesh that is inside out
+    #[arg(long)]
+    pub flip: bool,
+    /// Where the grain goes.
+    #[command(flatten)]
+    pub new: NewGrain,
+}
+
+/// Arguments of `grain from-scan`.
+#[derive(Debug, Args)]
+pub struct FromScanArgs {
+    /// Image: multi-page .tif or .npy
+    pub image: PathBuf,
+    /// Edge of a voxel, for example "12 um"
+    #[arg(long, value_name = "LENGTH")]
+    pub voxel: String,
+    /// The one label that is wanted; without it every grain of the image
+    #[arg(long, value_name = "N")]
+    pub label: Option<u32>,
+    /// Grey value from which a voxel is solid
+    #[arg(long, value_name = "VALUE")]
+    pub threshold: Option<f64>,
+    /// Take each connected piece of solid as a grain
+    #[arg(long)]
+    pub split: bool,
+    /// Take grains that touch the border of the image, as cut there: for tight crops
+    #[arg(long)]
+    pub pad: bool,
+    /// Of a label with several pieces keep the largest
+    #[arg(long)]
+    pub largest_piece: bool,
+    /// Standard deviation of the smoothing, in voxels [default: 1.5]
+    #[arg(long, value_name = "VOXELS")]
+    pub smoothing: Option<f64>,
+    /// Where the grain goes; a folder for several grains.
+    #[command(flatten)]
+    pub new: NewGrain,
+}
+
+/// Arguments of `grain make`.
+#[derive(Debug, Args)]
+pub struct MakeArgs {
+    /// Which body
+    #[command(subcommand)]
+    pub body: Body,
+}
+
+/// Bodies of closed form.
+#[derive(Debug, Subcommand)]
+pub enum Body {
+    /// Sphere
+    Sphere {
+        /// Diameter
+        diameter: String,
+        /// Where the grain goes.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+    /// Ellipsoid
+    Ellipsoid {
+        /// Full axes, three lengths
+        #[arg(num_args = 3)]
+        axes: Vec<String>,
+        /// Where the grain goes.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+    /// Box with rounded edges
+    RoundedBox {
+        /// Full edges, three lengths
+        #[arg(num_args = 3)]
+        edges: Vec<String>,
+        /// Radius of the edges
+        #[arg(long)]
+        radius: String,
+        /// Where the grain goes.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+    /// Cylinder with sharp rims
+    Cylinder {
+        /// Diameter
+        diameter: String,
+        /// Height
+        height: String,
+        /// Where the grain goes.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+    /// Cylinder with half spheres on its ends
+    Capsule {
+        /// Diameter
+        diameter: String,
+        /// Distance of the centres of the caps
+        height: String,
+        /// Where the grain goes.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+    /// Superquadric
+    Superquadric {
+        /// Full axes, three lengths
+        #[arg(num_args = 3)]
+        axes: Vec<String>,
+        /// Exponents e1 and e2, 0.1 to 2
+        #[arg(long, num_args = 2, required = true)]
+        exponents: Vec<f64>,
+        /// Where the grain goes.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+}
+
+/// Arguments of `grain info`.
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// Grain files
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Print one JSON object for each file
+    #[arg(long)]
+    pub json: bool,
+}

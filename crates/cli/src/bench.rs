@@ -1,0 +1,235 @@
+//! `grainwake bench`: time and memory per cell, against the memory bandwidth of the same minute.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::{DQuat, DVec3};
+use grainwake_shape::Shape;
+use grainwake_solver::coupling::Scheme;
+use grainwake_solver::dem::{ContactParams, Dof, Grain};
+use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
+use grainwake_solver::grid::Mesh;
+use grainwake_solver::math::Pose;
+use grainwake_solver::sim::{Setup, Simulation, StepRule};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::args::BenchArgs;
+use crate::exit::{BAD_INPUT, Exit};
+use crate::{print, threads};
+
+/// Memory traffic that a step cannot do without [bytes per cell]: each state array is read and
+/// written once in each of the passes that the data dependencies of the step enforce.
+const TRAFFIC: f64 = 250.0;
+/// Doubles in each array of the triad: 64 MiB, more than any cache here.
+const TRIAD_LENGTH: usize = 1 << 23;
+const TRIAD_REPEATS: usize = 8;
+
+/// What was measured. The JSON names are stable.
+#[derive(Debug, Serialize)]
+struct Measured {
+    cells: [usize; 3],
+    threads: usize,
+    steps: u64,
+    ns_per_cell_step: f64,
+    bytes_per_cell: f64,
+    triad_gb_per_s: f64,
+    limit_ns_per_cell_step: f64,
+    ratio_to_limit: f64,
+    passes: Vec<Pass>,
+}
+
+/// Time of one pass.
+#[derive(Debug, Serialize)]
+struct Pass {
+    name: &'static str,
+    ns_per_cell_step: f64,
+}
+
+/// Measures and prints.
+pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
+    let &[nx, ny, nz] = &args.size[..] else {
+        return Err(Exit::new(BAD_INPUT, "--size takes three numbers"));
+    };
+    if [nx, ny, nz].iter().any(|n| !(16..=4096).contains(n)) || args.steps == 0 {
+        return Err(Exit::new(
+            BAD_INPUT,
+            "--size takes 16 to 4096 cells along each axis, --steps at least one step",
+        ));
+    }
+    let threads = threads::resolve(args.threads);
+    let scheme = if args.scheme == "paper" {
+        Scheme::Paper
+    } else {
+        Scheme::Aperture
+    };
+    let measured = threads::on(threads, || {
+        measure([nx, ny, nz], scheme, args.steps, threads)
+    })??;
+    if args.json {
+        print(&serde_json::to_string(&measured)?)
+    } else {
+        print(&table(&measured))
+    }
+}
+
+fn measure(
+    cells: [usize; 3],
+    scheme: Scheme,
+    steps: u64,
+    threads: usize,
+) -> Result<Measured, Exit> {
+    let count = cells.iter().product::<usize>() as f64;
+    let mut sim =
+        Simulation::new(setup(cells, scheme)).map_err(|e| Exit::new(BAD_INPUT, e.to_string()))?;
+    let advance = |sim: &mut Simulation| {
+        sim.step(f64::INFINITY)
+            .map_err(|e| Exit::new(3, e.to_string()))
+    };
+    for _ in 0..2 {
+        advance(&mut sim)?;
+    }
+    let before = sim.pass_times();
+    let start = Instant::now();
+    for _ in 0..steps {
+        advance(&mut sim)?;
+    }
+    let per_cell_step = |seconds: f64| 1e9 * seconds / (count * steps as f64);
+    let ns = per_cell_step(start.elapsed().as_secs_f64());
+    let earlier = |name: &str| {
+        before
+            .iter()
+            .find(|(n, _)| *n == name)
+            .map_or(0.0, |(_, t)| *t)
+    };
+    let mut passes: Vec<Pass> = sim
+        .pass_times()
+        .iter()
+        .map(|(name, t)| Pass {
+            name,
+            ns_per_cell_step: per_cell_step(t - earlier(name)),
+        })
+        .collect();
+    let named: f64 = passes.iter().map(|p| p.ns_per_cell_step).sum();
+    passes.push(Pass {
+        name: "other",
+        ns_per_cell_step: ns - named,
+    });
+    let bytes_per_cell = sim.bytes() as f64 / count;
+    drop(sim);
+    let triad = triad_bandwidth();
+    let limit = TRAFFIC / triad * 1e9;
+    Ok(Measured {
+        cells,
+        threads,
+        steps,
+        ns_per_cell_step: ns,
+        bytes_per_cell,
+        triad_gb_per_s: triad * 1e-9,
+        limit_ns_per_cell_step: limit,
+        ratio_to_limit: ns / limit,
+        passes,
+    })
+}
+
+/// Two spheres of eight cells' diameter in water, one above the other, as in the main case.
+fn setup(cells: [usize; 3], scheme: Scheme) -> Setup {
+    let spacing = DVec3::splat(0.25e-3);
+    let mesh = Mesh {
+        cells,
+        spacing,
+        origin: DVec3::ZERO,
+    };
+    let radius = 4.0 * spacing.x;
+    let shape = Arc::new(Shape::sphere(radius, 2000));
+    let grain = |height: f64| Grain {
+        shape: shape.clone(),
+        density: 1500.0,
+        pose: Pose {
+            position: mesh.extent() * DVec3::new(0.5, 0.5, height),
+            orientation: DQuat::IDENTITY,
+        },
+        velocity: DVec3::ZERO,
+        angular_velocity: DVec3::ZERO,
+        translation: Dof::Free,
+        rotation: Dof::Free,
+    };
+    Setup {
+        mesh,
+        boundaries: Boundaries([[Boundary::WALL; 2]; 3]),
+        fluid: Some(FluidParams {
+            density: 1000.0,
+            kinematic_viscosity: 1e-6,
+            body_acceleration: DVec3::ZERO,
+            initial_velocity: DVec3::ZERO,
+            advection: Advection::Central,
+        }),
+        scheme,
+        gravity: DVec3::new(0.0, 0.0, -9.81),
+        grains: vec![grain(0.75), grain(0.25)],
+        contact: ContactParams::default(),
+        step: StepRule::Limits {
+            cfl: 0.3,
+            viscous: 0.2,
+            max_step: 1e-3,
+        },
+    }
+}
+
+/// Bandwidth of a = b + s c over arrays larger than the caches, best of several [bytes/s].
+fn triad_bandwidth() -> f64 {
+    const CHUNK: usize = 1 << 16;
+    let make = |value: f64| {
+        let mut array = vec![0.0; TRIAD_LENGTH];
+        array
+            .par_chunks_mut(CHUNK)
+            .for_each(|chunk| chunk.fill(value));
+        array
+    };
+    let (mut a, b, c) = (make(0.0), make(1.0), make(2.0));
+    let mut best = f64::INFINITY;
+    for repeat in 0..TRIAD_REPEATS {
+        let s = std::hint::black_box(repeat as f64);
+        let start = Instant::now();
+        a.par_chunks_mut(CHUNK)
+            .zip(b.par_chunks(CHUNK))
+            .zip(c.par_chunks(CHUNK))
+            .for_each(|((a, b), c)| {
+                for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
+                    *a = b + s * c;
+                }
+            });
+        best = best.min(start.elapsed().as_secs_f64());
+        std::hint::black_box(&a);
+    }
+    (3 * 8 * TRIAD_LENGTH) as f64 / best
+}
+
+fn table(m: &Measured) -> String {
+    let mut lines = vec![
+        format!(
+            "{} x {} x {} cells, two grains, {} threads, {} steps",
+            m.cells[0], m.cells[1], m.cells[2], m.threads, m.steps
+        ),
+        format!(
+            "time        {:8.2} ns per cell per step",
+            m.ns_per_cell_step
+        ),
+    ];
+    lines.extend(
+        m.passes
+            .iter()
+            .map(|p| format!("  {:10}{:8.2}", p.name, p.ns_per_cell_step)),
+    );
+    lines.push(format!(
+        "memory      {:8.1} bytes per cell",
+        m.bytes_per_cell
+    ));
+    lines.push(format!("triad       {:8.2} GB/s", m.triad_gb_per_s));
+    lines.push(format!(
+        "limit       {:8.2} ns per cell per step ({TRAFFIC} bytes per cell at that bandwidth)",
+        m.limit_ns_per_cell_step
+    ));
+    lines.push(format!("ratio       {:8.2}", m.ratio_to_limit));
+    lines.join("\n")
+}

@@ -1,0 +1,130 @@
+//! How a command ends: messages on standard error, and the exit code.
+
+use std::process::ExitCode;
+
+use grainwake_shape::ShapeError;
+use grainwake_solver::case::{CaseError, Problem};
+use grainwake_solver::output::RunError;
+use miette::{GraphicalReportHandler, GraphicalTheme};
+
+/// The run did not give what `[expect]` says.
+pub const MISSED: u8 = 1;
+/// Bad input; nothing was written.
+pub const BAD_INPUT: u8 = 2;
+/// Input or output failed.
+pub const IO: u8 = 4;
+/// Interrupted after writing a checkpoint.
+pub const INTERRUPTED: u8 = 130;
+
+/// An ending other than success.
+#[derive(Debug)]
+pub struct Exit {
+    code: u8,
+    problems: Vec<Problem>,
+}
+
+impl Exit {
+    /// With one message.
+    pub fn new(code: u8, message: impl Into<String>) -> Exit {
+        Exit {
+            code,
+            problems: vec![Problem::new(message)],
+        }
+    }
+    /// With one message and what to do about it.
+    pub fn with_help(code: u8, message: impl Into<String>, help: impl Into<String>) -> Exit {
+        Exit {
+            code,
+            problems: vec![Problem::new(message).help(help)],
+        }
+    }
+    /// With several problems.
+    pub fn problems(code: u8, problems: Vec<Problem>) -> Exit {
+        Exit { code, problems }
+    }
+
+    /// Prints the messages and gives the exit code.
+    pub fn report(&self) -> ExitCode {
+        let terminal = std::io::IsTerminal::is_terminal(&std::io::stderr())
+            && std::env::var_os("NO_COLOR").is_none();
+        let theme = if terminal {
+            GraphicalTheme::unicode()
+        } else {
+            GraphicalTheme::none()
+        };
+        // A narrow report breaks paths and numbers; what is not a terminal has no width.
+        let width = if terminal { 100 } else { 400 };
+        let handler = GraphicalReportHandler::new_themed(theme)
+            .with_width(width)
+            .with_context_lines(1);
+        for problem in &self.problems {
+            let mut text = String::new();
+            match handler.render_report(&mut text, problem) {
+                Ok(()) => eprintln!("{}", text.trim_end_matches('\n')),
+                Err(_) => eprintln!("{problem}"),
+            }
+        }
+        ExitCode::from(self.code)
+    }
+}
+
+impl From<CaseError> for Exit {
+    fn from(error: CaseError) -> Exit {
+        match error {
+            CaseError::Unreadable { ref source, .. } => {
+                let (code, help) = match source.kind() {
+                    std::io::ErrorKind::NotFound => (
+                        BAD_INPUT,
+                        "give the path of a case file, for example cases/dkt-pair/quick.toml",
+                    ),
+                    std::io::ErrorKind::InvalidData => {
+                        (BAD_INPUT, "a case file is text (UTF-8) in TOML")
+                    }
+                    _ => (IO, "check the file and its permissions"),
+                };
+                Exit::with_help(code, error.to_string(), help)
+            }
+            CaseError::Invalid(problems) => Exit::problems(BAD_INPUT, problems),
+        }
+    }
+}
+
+impl From<RunError> for Exit {
+    fn from(error: RunError) -> Exit {
+        let help = match &error {
+            RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => {
+                Some("the disk is full: free some space, then continue with --resume")
+            }
+            RunError::Io { .. } => {
+                Some("check the folder and its permissions, then continue with --resume")
+            }
+            _ => None,
+        };
+        match help {
+            Some(help) => Exit::with_help(error.exit_code(), error.to_string(), help),
+            None => Exit::new(error.exit_code(), error.to_string()),
+        }
+    }
+}
+
+impl From<ShapeError> for Exit {
+    fn from(error: ShapeError) -> Exit {
+        let code = match &error {
+            ShapeError::Io { source, .. } if source.kind() != std::io::ErrorKind::NotFound => IO,
+            _ => BAD_INPUT,
+        };
+        Exit::new(code, error.to_string())
+    }
+}
+
+impl From<std::io::Error> for Exit {
+    fn from(error: std::io::Error) -> Exit {
+        Exit::new(IO, error.to_string())
+    }
+}
+
+impl From<serde_json::Error> for Exit {
+    fn from(error: serde_json::Error) -> Exit {
+        Exit::new(IO, error.to_string())
+    }
+}

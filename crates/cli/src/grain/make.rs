@@ -1,0 +1,64 @@
+//! `grain make`: shapes of closed form.
+
+use grainwake_shape::{Shape, ShapeOptions, analytic};
+
+use super::{length, may_write, options, save};
+use crate::args::Body;
+use crate::exit::Exit;
+
+/// A grain of closed form.
+pub fn make(body: &Body) -> Result<(), Exit> {
+    let new = match body {
+        Body::Sphere { new, .. }
+        | Body::Ellipsoid { new, .. }
+        | Body::RoundedBox { new, .. }
+        | Body::Cylinder { new, .. }
+        | Body::Capsule { new, .. }
+        | Body::Superquadric { new, .. } => new,
+    };
+    may_write(&new.output, new.force)?;
+    save(build(body, &options(new))?, new)
+}
+
+fn build(body: &Body, options: &ShapeOptions) -> Result<Shape, Exit> {
+    let three = |name: &str, texts: &[String]| -> Result<[f64; 3], Exit> {
+        let mut values = [f64::NAN; 3];
+        for (value, text) in values.iter_mut().zip(texts) {
+            *value = length(name, text)?;
+        }
+        Ok(values)
+    };
+    Ok(match body {
+        Body::Sphere { diameter, .. } => {
+            analytic::sphere(0.5 * length("diameter", diameter)?, options)?
+        }
+        Body::Ellipsoid { axes, .. } => {
+            let [a, b, c] = three("axes", axes)?.map(|x| 0.5 * x);
+            analytic::ellipsoid(a, b, c, options)?
+        }
+        Body::RoundedBox { edges, radius, .. } => {
+            let [a, b, c] = three("edges", edges)?;
+            analytic::rounded_box(a, b, c, length("--radius", radius)?, options)?
+        }
+        Body::Cylinder {
+            diameter, height, ..
+        } => analytic::cylinder(
+            0.5 * length("diameter", diameter)?,
+            length("height", height)?,
+            options,
+        )?,
+        Body::Capsule {
+            diameter, height, ..
+        } => analytic::capsule(
+            0.5 * length("diameter", diameter)?,
+            length("height", height)?,
+            options,
+        )?,
+        Body::Superquadric {
+            axes, exponents, ..
+        } => {
+            let semi_axes = three("axes", axes)?.map(|x| 0.5 * x);
+            analytic::superquadric(semi_axes, exponents[0], exponents[1], options)?
+        }
+    })
+}

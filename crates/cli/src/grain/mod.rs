@@ -1,0 +1,89 @@
+//! `grainwake grain`: shapes in, `.grain` files out.
+
+mod make;
+mod mesh;
+mod scan;
+mod table;
+
+use std::path::Path;
+
+use grainwake_shape::{Shape, ShapeOptions};
+use grainwake_solver::case::parse_length;
+
+use crate::args::{GrainArgs, GrainCommand, InfoArgs, NewGrain};
+use crate::exit::{BAD_INPUT, Exit};
+use crate::print;
+
+/// Carries out one of the commands.
+pub fn grain(args: &GrainArgs) -> Result<(), Exit> {
+    match &args.command {
+        GrainCommand::FromScan(args) => scan::from_scan(args),
+        GrainCommand::FromMesh(args) => mesh::from_mesh(args),
+        GrainCommand::Make(args) => make::make(&args.body),
+        GrainCommand::Info(args) => info(args),
+    }
+}
+
+/// A length given on the command line [m].
+fn length(name: &str, text: &str) -> Result<f64, Exit> {
+    parse_length(text).map_err(|message| Exit::new(BAD_INPUT, format!("{name}: {message}")))
+}
+
+fn options(new: &NewGrain) -> ShapeOptions {
+    let mut options = ShapeOptions {
+        nodes: new.nodes,
+        ..ShapeOptions::default()
+    };
+    if let Some(cells) = new.cells {
+        options.cells = cells;
+    }
+    options
+}
+
+/// Refuses to replace a file without `--force`; asked before any work is done.
+fn may_write(path: &Path, force: bool) -> Result<(), Exit> {
+    if path.exists() && !force {
+        return Err(Exit::with_help(
+            BAD_INPUT,
+            format!("{} is there already", path.display()),
+            "give another name with -o, or --force to replace it",
+        ));
+    }
+    Ok(())
+}
+
+/// Rescales as asked and saves.
+fn finish(shape: Shape, path: &Path, new: &NewGrain) -> Result<Shape, Exit> {
+    let shape = match &new.equivalent_diameter {
+        Some(text) => {
+            shape.scaled_to_equivalent_diameter(length("--equivalent-diameter", text)?)?
+        }
+        None => shape,
+    };
+    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder)?;
+    }
+    shape.save(path)?;
+    Ok(shape)
+}
+
+/// Saves and prints one shape.
+fn save(shape: Shape, new: &NewGrain) -> Result<(), Exit> {
+    let shape = finish(shape, &new.output, new)?;
+    show(&shape, &new.output, new.json)
+}
+
+fn show(shape: &Shape, path: &Path, json: bool) -> Result<(), Exit> {
+    if json {
+        print(&serde_json::to_string(&shape.record())?)
+    } else {
+        print(&table::of(&shape.record(), path))
+    }
+}
+
+fn info(args: &InfoArgs) -> Result<(), Exit> {
+    for path in &args.files {
+        show(&Shape::load(path)?, path, args.json)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,154 @@
+//! The progress of a run on standard error: a bar on a terminal, now and then a line elsewhere.
+
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use grainwake_solver::output::{Observer, Progress};
+use grainwake_solver::sim::events::Event;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Seconds between lines where there is no terminal.
+const LINE_INTERVAL: f64 = 10.0;
+const TICKS: u64 = 10_000;
+
+/// Shows a run.
+pub struct Shown {
+    bar: Option<ProgressBar>,
+    quiet: bool,
+    last_line: Instant,
+    stop: Arc<AtomicBool>,
+    /// Lengths are shown in parts of this [m].
+    diameter: Option<f64>,
+}
+
+impl Shown {
+    /// A display that stops the run when `stop` is set; `diameter` [m] scales the gap of a pair.
+    pub fn new(quiet: bool, stop: Arc<AtomicBool>, diameter: Option<f64>) -> Shown {
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
+            let bar = ProgressBar::new(TICKS);
+            if let Ok(style) =
+                ProgressStyle::with_template("{bar:30.cyan/blue} {percent:>3} % {msg}")
+            {
+                bar.set_style(style.progress_chars("━╸─"));
+            }
+            bar
+        });
+        Shown {
+            bar,
+            quiet,
+            last_line: Instant::now(),
+            stop,
+            diameter,
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn clear(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn line(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(text),
+            None => eprintln!("{text}"),
+        }
+    }
+
+    fn describe(&self, p: &Progress) -> String {
+        let rate = p.session_steps as f64 / p.wall_s.max(1e-9);
+        let left = p.wall_s * (p.end - p.time) / (p.time - p.from).max(1e-300);
+        let mut text = format!(
+            "t {:.4} / {:.4} s  step {}  {}  ETA {}",
+            p.time,
+            p.end,
+            p.steps,
+            per_second(rate),
+            clock(left)
+        );
+        if let (Some(gap), Some(phase)) = (p.gap, p.phase) {
+            let gap = self.diameter.map_or(format!("{:.3} mm", 1e3 * gap), |d| {
+                format!("{:.2} d", gap / d)
+            });
+            text += &format!("  gap {gap}  {}", phase.name());
+        } else if p.contacts > 0 {
+            text += &format!("  {} contacts", p.contacts);
+        }
+        text
+    }
+}
+
+fn per_second(rate: f64) -> String {
+    if rate >= 1.0 {
+        format!("{rate:.1} steps/s")
+    } else {
+        format!("{:.1} s/step", 1.0 / rate.max(1e-9))
+    }
+}
+
+/// Seconds as "1:02:03" or "2:03".
+pub fn clock(seconds: f64) -> String {
+    if !(seconds.is_finite() && seconds < 1e9) {
+        return "?".into();
+    }
+    let s = seconds.round() as u64;
+    if s >= 3600 {
+        format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
+    } else {
+        format!("{}:{:02}", s / 60, s % 60)
+    }
+}
+
+impl Observer for Shown {
+    fn progress(&mut self, p: &Progress) {
+        if self.quiet {
+            return;
+        }
+        match &self.bar {
+            Some(bar) => {
+                bar.set_position((p.time / p.end * TICKS as f64) as u64);
+                bar.set_message(self.describe(p));
+            }
+            None if self.last_line.elapsed().as_secs_f64() >= LINE_INTERVAL => {
+                self.last_line = Instant::now();
+                eprintln!("{:3.0} %  {}", 100.0 * p.time / p.end, self.describe(p));
+            }
+            None => {}
+        }
+    }
+    fn event(&mut self, event: &Event) {
+        if !self.quiet {
+            let grains: Vec<String> = event.grains.iter().map(usize::to_string).collect();
+            self.line(&format!(
+                "t {:.4} s  {} (grain {})",
+                event.time,
+                event.event.name(),
+                grains.join(", ")
+            ));
+        }
+    }
+    fn note(&mut self, text: &str) {
+        // A warning is a problem, and problems are shown even when quiet.
+        if !self.quiet || text.starts_with("warning") {
+            self.line(text);
+        }
+    }
+    fn interrupted(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::clock;
+
+    #[test]
+    fn durations_read_like_a_clock() {
+        assert_eq!(clock(61.2), "1:01");
+        assert_eq!(clock(3723.0), "1:02:03");
+        assert_eq!(clock(f64::INFINITY), "?");
+    }
+}

@@ -1,0 +1,188 @@
+//! `grainwake run`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use grainwake_solver::case::{Case, Problem, Verdict};
+use grainwake_solver::output::{self, Ending, Existing, Options, RESOLVED, Summary};
+
+use crate::args::RunArgs;
+use crate::exit::{Exit, INTERRUPTED, MISSED};
+use crate::progress::Shown;
+use crate::{print, threads};
+
+/// Runs a case.
+pub fn run(args: &RunArgs) -> Result<(), Exit> {
+    let case = Case::load(&args.case, &args.set)?;
+    let out = args
+        .output
+        .clone()
+        .unwrap_or_else(|| default_folder(&args.case));
+    let threads = threads::resolve(args.threads.unwrap_or(case.threads));
+    let existing = match (args.resume, args.force) {
+        (true, _) => Existing::Resume,
+        (_, true) => Existing::Replace,
+        _ => Existing::Refuse,
+    };
+    let options = Options {
+        existing,
+        command: std::env::args().collect(),
+        threads,
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    watch_for_interrupt(stop.clone());
+    if !args.quiet {
+        let cells = case.setup.mesh.cells;
+        let what = if case.setup.fluid.is_some() {
+            format!("{} x {} x {} cells", cells[0], cells[1], cells[2])
+        } else {
+            "dry".into()
+        };
+        eprintln!(
+            "{}: {} grains, {what}, {threads} threads -> {}",
+            args.case.display(),
+            case.setup.grains.len(),
+            out.display()
+        );
+    }
+    let diameter = case
+        .setup
+        .grains
+        .first()
+        .map(|g| g.shape.equivalent_diameter());
+    let mut shown = Shown::new(args.quiet, stop, diameter);
+    let ending = threads::on(threads, || {
+        let ending = output::run(case.job(), &out, &options, &mut shown);
+        shown.clear();
+        ending
+    })??;
+    match ending {
+        Ending::Interrupted(time) => {
+            let message = format!("interrupted at t = {time:.6e} s; a checkpoint was written");
+            Err(Exit::with_help(
+                INTERRUPTED,
+                message,
+                format!(
+                    "continue with: grainwake run {} --resume",
+                    out.join(RESOLVED).display()
+                ),
+            ))
+        }
+        Ending::AlreadyFinished(summary) => {
+            if !args.quiet {
+                eprintln!("the run had finished before");
+            }
+            conclude(args, &case, &summary, &out)
+        }
+        Ending::Finished(summary) => conclude(args, &case, &summary, &out),
+    }
+}
+
+/// Prints the summary and compares it with what was expected.
+fn conclude(args: &RunArgs, case: &Case, summary: &Summary, out: &Path) -> Result<(), Exit> {
+    let verdicts: Vec<Verdict> = case.expect.iter().map(|e| e.judge(summary)).collect();
+    if args.json {
+        let mut value = serde_json::to_value(summary)?;
+        if let Some(object) = value.as_object_mut().filter(|_| !verdicts.is_empty()) {
+            object.insert("expect".into(), serde_json::to_value(&verdicts)?);
+        }
+        print(&value.to_string())?;
+    } else if !args.quiet {
+        print(&describe(summary, out))?;
+    }
+    let missed: Vec<Problem> = verdicts
+        .iter()
+        .filter(|v| !v.pass)
+        .map(Problem::from)
+        .collect();
+    if missed.is_empty() {
+        Ok(())
+    } else {
+        Err(Exit::problems(MISSED, missed))
+    }
+}
+
+fn describe(s: &Summary, out: &Path) -> String {
+    let time = |t: Option<f64>| t.map_or("-".to_string(), |t| format!("{t:.4} s"));
+    let mut lines = vec![format!(
+        "done at t = {:.4} s ({}) after {} steps in {}; largest |div u| {:.1e} 1/s",
+        s.end_time_s,
+        s.ended_by,
+        s.steps,
+        crate::progress::clock(s.wall_s),
+        s.max_divergence
+    )];
+    if let Some(pair) = &s.pair {
+        lines.push(format!(
+            "kiss {}  tumbling {}  separation {}  role changes {}",
+            time(pair.kiss_time_s),
+            time(pair.tumble_time_s),
+            time(pair.separation_time_s),
+            pair.role_changes
+        ));
+    }
+    lines.push(format!("{}", out.display()));
+    lines.join("\n")
+}
+
+/// `runs/NAME`, where NAME is that of the case's folder, with the file's name where it is not
+/// the folder's main case; a resolved case runs in its own folder.
+fn default_folder(case: &Path) -> PathBuf {
+    if case.file_name().is_some_and(|name| name == RESOLVED) {
+        return match case.parent() {
+            Some(folder) if folder.as_os_str().is_empty() => PathBuf::from("."),
+            Some(folder) => folder.into(),
+            None => PathBuf::from("."),
+        };
+    }
+    let absolute = std::path::absolute(case).unwrap_or_else(|_| case.into());
+    let name = |part: Option<&std::ffi::OsStr>| part.map(|p| p.to_string_lossy().into_owned());
+    let stem = name(absolute.file_stem()).unwrap_or_else(|| "case".into());
+    let folder = absolute.parent();
+    let is_case_folder = folder.is_some_and(|f| f.join("case.toml").is_file());
+    let name = match name(folder.and_then(Path::file_name)).filter(|_| is_case_folder) {
+        Some(folder) if stem == "case" => folder,
+        Some(folder) => format!("{folder}-{stem}"),
+        None => stem,
+    };
+    Path::new("runs").join(name)
+}
+
+/// The first interrupt asks for a checkpoint, the second one ends the program at once.
+fn watch_for_interrupt(stop: Arc<AtomicBool>) {
+    // Without a handler an interrupt ends the program at once, which the checkpoints survive.
+    let _ = ctrlc::set_handler(move || {
+        if stop.swap(true, Ordering::Relaxed) {
+            std::process::exit(i32::from(INTERRUPTED));
+        }
+        eprintln!("interrupted: writing a checkpoint after this step (once more to stop at once)");
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn run_folders_are_named_after_their_case() {
+        let folder = tempfile::tempdir().unwrap();
+        let case = folder.path().join("dkt-pair");
+        std::fs::create_dir(&case).unwrap();
+        std::fs::write(case.join("case.toml"), "").unwrap();
+        assert_eq!(
+            default_folder(&case.join("case.toml")),
+            Path::new("runs/dkt-pair")
+        );
+        assert_eq!(
+            default_folder(&case.join("quick.toml")),
+            Path::new("runs/dkt-pair-quick")
+        );
+        assert_eq!(
+            default_folder(&folder.path().join("mine.toml")),
+            Path::new("runs/mine")
+        );
+        assert_eq!(default_folder(&case.join(RESOLVED)), case);
+        assert_eq!(default_folder(Path::new(RESOLVED)), Path::new("."));
+    }
+}

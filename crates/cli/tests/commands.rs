@@ -1,0 +1,318 @@
+//! What the commands print.
+
+mod common;
+
+use common::{DRY, WET, folder_with, grainwake};
+use serde_json::Value;
+
+fn json(stdout: &[u8]) -> Value {
+    serde_json::from_slice(stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(stdout)))
+}
+
+#[test]
+fn run_prints_one_json_object() {
+    let (folder, case) = folder_with(WET);
+    let out = folder.path().join("run");
+    let done = grainwake()
+        .arg("run")
+        .arg(&case)
+        .arg("-o")
+        .arg(&out)
+        .args(["--json", "--set", "time.end=10 ms"])
+        .assert()
+        .success();
+    let summary = json(&done.get_output().stdout);
+    for key in [
+        "steps",
+        "end_time_s",
+        "wall_s",
+        "events",
+        "max_divergence",
+        "kiss_time_s",
+        "tumble_time_s",
+        "separation_time_s",
+        "role_changes",
+    ] {
+        assert!(summary.get(key).is_some(), "{key} is missing in {summary}");
+    }
+    assert_eq!(summary["end_time_s"], 0.01);
+    let file = json(&std::fs::read(out.join("summary.json")).unwrap());
+    assert_eq!(file, summary);
+    let provenance = json(&std::fs::read(out.join("provenance.json")).unwrap());
+    assert_eq!(provenance["sessions"][0]["from_step"], 0);
+}
+
+#[test]
+fn a_run_folder_holds_what_the_reference_says() {
+    let (folder, case) = folder_with(WET);
+    let out = folder.path().join("run");
+    grainwake()
+        .arg("run")
+        .arg(&case)
+        .arg("-o")
+        .arg(&out)
+        .arg("--quiet")
+        .args(["--set", "output.checkpoint_steps=0"])
+        .assert()
+        .success()
+        .stdout("")
+        .stderr("");
+    let grains = std::fs::read_to_string(out.join("grains.csv")).unwrap();
+    let mut lines = grains.lines();
+    assert_eq!(
+        lines.next(),
+        Some("time,grain,x,y,z,vx,vy,vz,qw,qx,qy,qz,wx,wy,wz,fx,fy,fz,tx,ty,tz,contacts")
+    );
+    let rows: Vec<Vec<f64>> = lines
+        .map(|l| l.split(',').map(|v| v.parse().unwrap()).collect())
+        .collect();
+    assert_eq!(rows.len(), 2 * 31);
+    for (n, row) in rows.iter().enumerate() {
+        assert!(
+            (row[0] - 0.002 * (n / 2) as f64).abs() < 1e-12 && row[1] == (n % 2) as f64,
+            "{row:?}"
+        );
+    }
+    let field = grainwake_solver::output::vti::read(&out.join("fields/fields_000001.vti")).unwrap();
+    assert_eq!(field.cells, [8, 8, 24]);
+    let array = |name: &str| field.arrays.iter().find(|a| a.name == name).unwrap();
+    let solid: f64 = array("solid_fraction")
+        .data
+        .iter()
+        .map(|f| f64::from(*f))
+        .sum::<f64>()
+        * 0.125e-9;
+    let spheres = 2.0 * std::f64::consts::PI / 6.0 * 8e-9;
+    // Four cells across a sphere: planes in place of curved surfaces hold some ten percent more.
+    assert!((solid / spheres - 1.0).abs() < 0.15, "{solid} {spheres}");
+    assert!(array("velocity").data.iter().any(|v| *v < -1e-4));
+    let slice =
+        grainwake_solver::output::vti::read(&out.join("slices/y-grain0_000002.vti")).unwrap();
+    assert_eq!((slice.cells, slice.arrays.len()), ([8, 1, 24], 4));
+    assert!((slice.time - 0.02).abs() < 1e-12);
+    // The slice is a layer of the field.
+    let layer = (slice.origin.y / 0.5e-3).round() as usize;
+    let pressure = &slice
+        .arrays
+        .iter()
+        .find(|a| a.name == "pressure")
+        .unwrap()
+        .data;
+    for k in 0..24 {
+        for i in 0..8 {
+            assert_eq!(
+                pressure[k * 8 + i],
+                array("pressure").data[(k * 8 + layer) * 8 + i]
+            );
+        }
+    }
+    let collection = std::fs::read_to_string(out.join("run.pvd")).unwrap();
+    for file in collection
+        .split("file=\"")
+        .skip(1)
+        .map(|rest| rest.split('"').next().unwrap())
+    {
+        assert!(out.join(file).is_file(), "{file}");
+    }
+    let events = std::fs::read_to_string(out.join("events.jsonl")).unwrap();
+    let kinds: Vec<Value> = events
+        .lines()
+        .map(|l| json(l.as_bytes())["event"].clone())
+        .collect();
+    assert!(kinds.contains(&"landing".into()), "{events}");
+    assert!(collection.contains("landing-1"), "a picture of the landing");
+}
+
+#[test]
+fn check_gives_the_derived_numbers() {
+    let (_folder, case) = folder_with(WET);
+    let done = grainwake()
+        .arg("check")
+        .arg(&case)
+        .arg("--json")
+        .assert()
+        .success();
+    let numbers = json(&done.get_output().stdout);
+    for key in [
+        "cells",
+        "steps",
+        "time_step_s",
+        "memory_bytes",
+        "galileo",
+        "cells_per_diameter",
+        "warnings",
+    ] {
+        assert!(numbers.get(key).is_some(), "{key}");
+    }
+    assert_eq!(
+        (
+            numbers["cells"].as_u64(),
+            numbers["cells_per_diameter"].as_f64()
+        ),
+        (Some(1536), Some(4.0))
+    );
+    assert!(numbers["warnings"].to_string().contains("cells across"));
+    let text = grainwake().arg("check").arg(&case).assert().success();
+    assert!(String::from_utf8_lossy(&text.get_output().stdout).contains("Galileo number"));
+}
+
+#[test]
+fn an_expectation_makes_a_case_a_test() {
+    let (folder, case) = folder_with(&format!(
+        "{DRY}\n[expect]\nlanding_time = {{ value = 0.0286, tolerance = \"1 %\", grain = 0 }}\n"
+    ));
+    grainwake()
+        .arg("run")
+        .arg(&case)
+        .arg("-o")
+        .arg(folder.path().join("a"))
+        .arg("--quiet")
+        .assert()
+        .success();
+    let wrong = std::fs::read_to_string(&case)
+        .unwrap()
+        .replace("0.0286", "0.05");
+    std::fs::write(&case, wrong).unwrap();
+    let done = grainwake()
+        .arg("run")
+        .arg(&case)
+        .arg("-o")
+        .arg(folder.path().join("b"))
+        .args(["--quiet", "--json"])
+        .assert()
+        .code(1);
+    assert!(
+        String::from_utf8_lossy(&done.get_output().stderr)
+            .contains("expected landing_time of grain 0")
+    );
+    assert_eq!(json(&done.get_output().stdout)["expect"][0]["pass"], false);
+}
+
+#[test]
+fn a_stop_rule_ends_a_run() {
+    let (folder, case) = folder_with(
+        &DRY.replace(
+            "step = \"0.1 ms\"",
+            "step = \"0.1 ms\"\nstop = { when = \"landing\", hold = \"1 ms\" }",
+        )
+        .replace("end = \"120 ms\"", "end = \"1 s\""),
+    );
+    let out = folder.path().join("run");
+    let done = grainwake()
+        .arg("run")
+        .arg(&case)
+        .arg("-o")
+        .arg(&out)
+        .args(["--json", "--quiet"])
+        .assert();
+    let summary = json(&done.success().get_output().stdout);
+    assert_eq!(summary["ended_by"], "landing");
+    let last = summary["grains"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|g| g["landing_time_s"].as_f64().unwrap())
+        .fold(0.0, f64::max);
+    let end = summary["end_time_s"].as_f64().unwrap();
+    assert!(end >= last + 1e-3 && end < last + 1.5e-3, "{last} {end}");
+}
+
+#[test]
+fn schema_and_completions_are_printed() {
+    let schema = grainwake().arg("schema").assert().success();
+    assert_eq!(
+        json(&schema.get_output().stdout)["title"],
+        "Grainwake case file"
+    );
+    let script = grainwake().args(["completions", "bash"]).assert().success();
+    assert!(String::from_utf8_lossy(&script.get_output().stdout).contains("grainwake"));
+}
+
+#[test]
+fn bench_measures_time_memory_and_the_limit() {
+    let done = grainwake()
+        .args([
+            "bench", "--size", "24", "24", "48", "--steps", "2", "--json",
+        ])
+        .assert()
+        .success();
+    let measured = json(&done.get_output().stdout);
+    for key in [
+        "ns_per_cell_step",
+        "bytes_per_cell",
+        "triad_gb_per_s",
+        "limit_ns_per_cell_step",
+    ] {
+        assert!(
+            measured[key].as_f64().is_some_and(|v| v > 0.0),
+            "{key} in {measured}"
+        );
+    }
+    assert!(measured["passes"].as_array().is_some_and(|p| p.len() >= 3));
+}
+
+#[test]
+fn grains_are_made_and_described() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("new/ball.grain");
+    grainwake()
+        .args(["grain", "make", "sphere", "2 mm", "--nodes", "500", "-o"])
+        .arg(&path)
+        .assert()
+        .success();
+    let done = grainwake()
+        .args(["grain", "info", "--json"])
+        .arg(&path)
+        .assert()
+        .success();
+    let record = json(&done.get_output().stdout);
+    for key in [
+        "volume_m3",
+        "equivalent_diameter_m",
+        "a_m",
+        "b_m",
+        "c_m",
+        "krumbein_sphericity",
+        "wadell_sphericity",
+        "wadell_roundness",
+        "convexity",
+        "surface_nodes",
+    ] {
+        assert!(record.get(key).is_some(), "{key}");
+    }
+    assert!((record["equivalent_diameter_m"].as_f64().unwrap() - 2e-3).abs() < 1e-9);
+    let again = grainwake()
+        .args(["grain", "make", "sphere", "2 mm", "-o"])
+        .arg(&path)
+        .assert()
+        .code(2);
+    assert!(String::from_utf8_lossy(&again.get_output().stderr).contains("--force"));
+    let bad = grainwake()
+        .args(["grain", "make", "sphere", "2 kg", "-o"])
+        .arg(folder.path().join("x.grain"))
+        .assert()
+        .code(2);
+    assert!(String::from_utf8_lossy(&bad.get_output().stderr).contains("is a mass"));
+}
+
+#[test]
+fn a_run_can_be_reported() {
+    let (folder, case) = folder_with(WET);
+    let out = folder.path().join("run");
+    grainwake()
+        .arg("run")
+        .arg(&case)
+        .arg("-o")
+        .arg(&out)
+        .args(["--quiet", "--set", "time.end=20 ms"])
+        .assert()
+        .success();
+    grainwake().arg("report").arg(&out).assert().success();
+    assert!(out.join("report.html").is_file());
+    grainwake()
+        .arg("report")
+        .arg(folder.path())
+        .assert()
+        .code(2);
+}

@@ -1,0 +1,338 @@
+//! A run that is killed and resumed gives the bits of one that is not; damaged checkpoints.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use common::{DRY, WET, assert_same_run, folder_with, grainwake};
+
+fn run(case: &Path, out: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
+    grainwake()
+        .arg("run")
+        .arg(case)
+        .arg("-o")
+        .arg(out)
+        .arg("--quiet")
+        .args(more)
+        .assert()
+}
+
+fn checkpoints(run: &Path) -> Vec<PathBuf> {
+    let mut found: Vec<PathBuf> = std::fs::read_dir(run.join("checkpoint"))
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
+    found.sort();
+    found
+}
+
+/// Small and the same on every machine.
+struct Random(u64);
+impl Random {
+    fn below(&mut self, n: u64) -> u64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 33) % n
+    }
+}
+
+/// Kills the run at random moments until it comes through, and compares with an unharmed one.
+fn survives_kills(case_text: &str, seed: u64) {
+    let (folder, case) = folder_with(case_text);
+    let (whole, killed) = (folder.path().join("whole"), folder.path().join("killed"));
+    let start = std::time::Instant::now();
+    run(&case, &whole, &["--threads", "2"]).success();
+    let length = start.elapsed().as_millis() as u64;
+    let mut random = Random(seed);
+    let mut kills = 0;
+    for attempt in 0..200 {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin("grainwake"));
+        command
+            .arg("run")
+            .arg(&case)
+            .arg("-o")
+            .arg(&killed)
+            .args(["--quiet", "--threads", "1"]);
+        // Before its first file is written there is nothing to resume.
+        if killed.join("provenance.json").is_file() {
+            command.arg("--resume");
+        }
+        let mut child = command
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        if attempt < 10 {
+            std::thread::sleep(Duration::from_millis(random.below(length.max(20) * 2 / 3)));
+            // The run may have come to its end just before.
+            if child.kill().is_ok() {
+                kills += 1;
+            }
+        }
+        let output = child.wait_with_output().unwrap();
+        if output.status.success() && attempt >= 10 {
+            break;
+        }
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            output.status.success() || output.status.code().is_none(),
+            "attempt {attempt}: {:?} {said}",
+            output.status
+        );
+    }
+    assert!(kills > 0);
+    assert_same_run(&whole, &killed);
+}
+
+#[test]
+fn a_killed_dry_run_resumes_to_the_same_bits() {
+    survives_kills(DRY, 1);
+}
+
+#[test]
+fn a_killed_wet_run_resumes_to_the_same_bits() {
+    survives_kills(WET, 2);
+}
+
+#[test]
+fn checkpoints_and_threads_do_not_change_the_results() {
+    let (folder, case) = folder_with(WET);
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    run(
+        &case,
+        &a,
+        &[
+            "--threads",
+            "1",
+            "--set",
+            "output.checkpoint_steps=0",
+            "--set",
+            "run.threads=3",
+        ],
+    )
+    .success();
+    run(
+        &case,
+        &b,
+        &["--threads", "3", "--set", "output.checkpoint_steps=1"],
+    )
+    .success();
+    for file in [
+        "grains.csv",
+        "diagnostics.csv",
+        "events.jsonl",
+        "fields/fields_000003.vti",
+        "slices/y-grain1_000004.vti",
+        "grains/grains_000006.vtp",
+        "run.pvd",
+    ] {
+        assert!(
+            std::fs::read(a.join(file)).unwrap() == std::fs::read(b.join(file)).unwrap(),
+            "{file} differs"
+        );
+    }
+    let last = |run: &Path| std::fs::read(checkpoints(run).pop().unwrap()).unwrap();
+    assert!(last(&a) == last(&b), "the last checkpoints differ");
+}
+
+#[test]
+fn the_resolved_case_gives_the_same_bits() {
+    let (folder, case) = folder_with(WET);
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    run(&case, &a, &["--set", "time.end=20 ms"]).success();
+    run(&a.join("case.resolved.toml"), &b, &[]).success();
+    assert_same_run(&a, &b);
+}
+
+/// A run that has not finished, with two checkpoints.
+fn unfinished(folder: &Path, case: &Path) -> PathBuf {
+    let out = folder.join("run");
+    run(case, &out, &["--set", "time.end=30 ms"]).success();
+    std::fs::remove_file(out.join("summary.json")).unwrap();
+    assert_eq!(checkpoints(&out).len(), 2);
+    out
+}
+
+fn damage(path: &Path) {
+    let mut bytes = std::fs::read(path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn a_damaged_checkpoint_gives_way_to_the_one_before() {
+    let (folder, case) = folder_with(WET);
+    let whole = folder.path().join("whole");
+    run(&case, &whole, &["--set", "time.end=30 ms"]).success();
+    for harm in [damage as fn(&Path), |p| {
+        std::fs::write(p, b"short").unwrap()
+    }] {
+        let out = unfinished(folder.path(), &case);
+        harm(&checkpoints(&out)[1]);
+        let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).success();
+        let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        assert!(
+            said.contains("warning") && said.contains("checkpoint before it"),
+            "{said}"
+        );
+        assert_same_run(&whole, &out);
+        std::fs::remove_dir_all(out).unwrap();
+    }
+}
+
+#[test]
+fn two_damaged_checkpoints_end_with_exit_code_4() {
+    let (folder, case) = folder_with(WET);
+    let out = unfinished(folder.path(), &case);
+    for path in checkpoints(&out) {
+        damage(&path);
+    }
+    let before = common::contents(&out);
+    let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).code(4);
+    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    assert!(
+        said.contains("no checkpoint") && said.contains("checksum") && said.contains("--force"),
+        "{said}"
+    );
+    assert_eq!(before, common::contents(&out), "nothing may change");
+}
+
+#[test]
+fn a_finished_run_is_not_overwritten() {
+    let (folder, case) = folder_with(DRY);
+    let out = folder.path().join("run");
+    run(&case, &out, &["--set", "time.end=2 ms"]).success();
+    let before = common::contents(&out);
+    let refused = run(&case, &out, &["--set", "time.end=2 ms"]).code(2);
+    let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(
+        said.contains("finished run") && said.contains("--force") && said.contains("-o"),
+        "{said}"
+    );
+    run(&case, &out, &["--set", "time.end=2 ms", "--resume"]).success();
+    assert_eq!(before, common::contents(&out));
+    run(&case, &out, &["--set", "time.end=2 ms", "--force"]).success();
+    let other = run(
+        &case,
+        &out,
+        &[
+            "--set",
+            "time.end=2 ms",
+            "--set",
+            "grain.0.density=2000",
+            "--resume",
+        ],
+    )
+    .code(2);
+    assert!(String::from_utf8_lossy(&other.get_output().stderr).contains("another case"));
+}
+
+#[test]
+fn a_finished_run_can_be_continued_to_a_later_end() {
+    let (folder, case) = folder_with(DRY);
+    let (out, whole) = (folder.path().join("run"), folder.path().join("whole"));
+    run(&case, &out, &["--set", "time.end=20 ms"]).success();
+    run(&case, &out, &["--set", "time.end=40 ms", "--resume"]).success();
+    run(&case, &whole, &["--set", "time.end=40 ms"]).success();
+    assert_same_run(&whole, &out);
+}
+
+#[test]
+fn a_folder_of_something_else_is_never_touched() {
+    let (folder, case) = folder_with(DRY);
+    for more in [&[][..], &["--force"], &["--resume"]] {
+        let refused = run(&case, folder.path(), more).code(2);
+        assert!(
+            String::from_utf8_lossy(&refused.get_output().stderr)
+                .contains("holds no run of this program")
+        );
+    }
+    assert_eq!(common::contents(folder.path()).len(), 1);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_writes_a_checkpoint_and_exits_with_130() {
+    let (folder, case) = folder_with(WET);
+    let (out, whole) = (folder.path().join("run"), folder.path().join("whole"));
+    let long = ["--set", "output.checkpoint_steps=0"];
+    run(&case, &whole, &long).success();
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("grainwake"));
+    command
+        .arg("run")
+        .arg(&case)
+        .arg("-o")
+        .arg(&out)
+        .arg("--quiet")
+        .args(long);
+    let child = command
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while !out.join("slices/y-grain0_000000.vti").is_file() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    if output.status.success() {
+        // The run was faster than the signal.
+        return;
+    }
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(said.contains("--resume"), "{said}");
+    run(&case, &out, &[&long[..], &["--resume"]].concat()).success();
+    let tables = |run: &Path| std::fs::read(run.join("grains.csv")).unwrap();
+    assert!(tables(&whole) == tables(&out));
+}
+
+#[test]
+fn a_run_that_blows_up_keeps_its_last_checkpoint() {
+    let (folder, case) = folder_with(WET);
+    let out = folder.path().join("run");
+    let unstable = [
+        "--set",
+        "time.step=20 ms",
+        "--set",
+        "output.tables=1 s",
+        "--set",
+        "output.slices=0",
+        "--set",
+        "output.fields=0",
+        "--set",
+        "output.surfaces=0",
+        "--set",
+        "time.end=10 s",
+        "--set",
+        "output.checkpoint_steps=1",
+    ];
+    let done = run(&case, &out, &unstable).code(3);
+    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    assert!(
+        said.contains("unstable") && said.contains("try") && said.contains("checkpoint"),
+        "{said}"
+    );
+    assert!(
+        !checkpoints(&out).is_empty()
+            && out.join("failure.json").is_file()
+            && !out.join("summary.json").exists()
+    );
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_exit_code_4() {
+    let (folder, case) = folder_with(DRY);
+    let file = folder.path().join("file");
+    std::fs::write(&file, "x").unwrap();
+    let done = run(&case, &file.join("run"), &[]).code(4);
+    assert!(String::from_utf8_lossy(&done.get_output().stderr).contains("file"));
+}

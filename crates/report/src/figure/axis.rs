@@ -1,0 +1,268 @@
+//! Axes: range, ticks and their labels.
+
+/// How values are spread along an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// Evenly.
+    Linear,
+    /// By decades.
+    Log,
+}
+
+/// One axis of a plot.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// Quantity and unit, in label markup.
+    pub label: String,
+    scale: Scale,
+    low: f64,
+    high: f64,
+    /// Values with a tick and the text beside it (empty: a minor tick).
+    pub ticks: Vec<(f64, String)>,
+}
+
+impl Axis {
+    /// An axis that covers `low` to `high` with about `count` round steps; the range grows to whole
+    /// steps unless `tight`.
+    pub fn linear(label: &str, low: f64, high: f64, count: usize, tight: bool) -> Axis {
+        let (mut low, mut high) = sane(low, high);
+        let step = round_step((high - low) / count.max(1) as f64);
+        if !tight {
+            // A value just beyond a round one does not cost a whole step.
+            let grow = |value: f64, out: f64| {
+                let inner = (value / step * out + 1e-6).floor() * out * step;
+                let beyond = (value - inner).abs() / step;
+                if beyond < 2e-6 {
+                    inner
+                } else if beyond < 0.15 {
+                    inner + 0.2 * out * step
+                } else {
+                    inner + out * step
+                }
+            };
+            low = grow(low, -1.0);
+            high = grow(high, 1.0);
+        }
+        let power = common_power(low.abs().max(high.abs()));
+        let unit = 10f64.powi(power);
+        let decimals = decimals(step / unit);
+        let first = (low / step - 1e-6).ceil() as i64;
+        let last = (high / step + 1e-6).floor() as i64;
+        let ticks = (first..=last)
+            .map(|i| {
+                let value = i as f64 * step;
+                (
+                    value,
+                    minus(&format!(
+                        "{:.decimals$}",
+                        if i == 0 { 0.0 } else { value / unit }
+                    )),
+                )
+            })
+            .collect();
+        let label = if power == 0 {
+            label.to_owned()
+        } else {
+            scaled_label(label, power)
+        };
+        Axis {
+            label,
+            scale: Scale::Linear,
+            low,
+            high,
+            ticks,
+        }
+    }
+
+    /// A logarithmic axis that covers the positive values `low` to `high` in whole decades.
+    pub fn log(label: &str, low: f64, high: f64) -> Axis {
+        let positive = |v: f64| if v.is_finite() && v > 0.0 { v } else { 1.0 };
+        let (low, high) = (
+            positive(low).min(positive(high)),
+            positive(low).max(positive(high)),
+        );
+        let first = (low.log10() + 1e-9).floor() as i32;
+        let last = ((high.log10() - 1e-9).ceil() as i32).max(first + 1);
+        let every = ((last - first) / 5 + 1).max(1);
+        let ticks = (first..=last)
+            .map(|power| {
+                let shown = (power - first) % every == 0;
+                let text = if shown {
+                    format!("10^{{{}}}", minus(&power.to_string()))
+                } else {
+                    String::new()
+                };
+                (10f64.powi(power), text)
+            })
+            .collect();
+        Axis {
+            label: label.to_owned(),
+            scale: Scale::Log,
+            low: 10f64.powi(first),
+            high: 10f64.powi(last),
+            ticks,
+        }
+    }
+
+    /// Lower end.
+    pub fn low(&self) -> f64 {
+        self.low
+    }
+
+    /// Upper end.
+    pub fn high(&self) -> f64 {
+        self.high
+    }
+
+    /// Place of `value` along the axis: 0 at the lower end, 1 at the upper; none where it has no place.
+    pub fn place(&self, value: f64) -> Option<f64> {
+        let place = match self.scale {
+            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Log if value > 0.0 => {
+                (value / self.low).log10() / (self.high / self.low).log10()
+            }
+            Scale::Log => return None,
+        };
+        place.is_finite().then_some(place)
+    }
+}
+
+/// Smallest and largest finite value.
+pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    values
+        .into_iter()
+        .filter(|v| v.is_finite())
+        .fold(None, |range, v| match range {
+            None => Some((v, v)),
+            Some((low, high)) => Some((low.min(v), high.max(v))),
+        })
+}
+
+/// A range that can be drawn: finite, ordered and not empty.
+fn sane(low: f64, high: f64) -> (f64, f64) {
+    if !low.is_finite() || !high.is_finite() {
+        return (0.0, 1.0);
+    }
+    let (low, high) = (low.min(high), low.max(high));
+    let size = low.abs().max(high.abs());
+    if high - low > 1e-9 * size {
+        (low, high)
+    } else if size == 0.0 {
+        (-1.0, 1.0)
+    } else {
+        (low - 0.1 * size, high + 0.1 * size)
+    }
+}
+
+/// The next of 1, 2, 5 times a power of ten that is at least about `step`.
+fn round_step(step: f64) -> f64 {
+    let power = 10f64.powf(step.log10().floor());
+    let lead = step / power;
+    let round = if lead <= 1.02 {
+        1.0
+    } else if lead <= 2.04 {
+        2.0
+    } else if lead <= 5.1 {
+        5.0
+    } else {
+        10.0
+    };
+    round * power
+}
+
+/// Power of ten to take out of very large or small values.
+fn common_power(size: f64) -> i32 {
+    if size > 0.0 && !(9e-3..2e4).contains(&size) {
+        3 * (size.log10() / 3.0).floor() as i32
+    } else {
+        0
+    }
+}
+
+fn decimals(step: f64) -> usize {
+    (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize
+}
+
+/// A label with a power of ten before its unit: "p [Pa]" becomes "p [10³ Pa]".
+fn scaled_label(label: &str, power: i32) -> String {
+    let factor = format!("10^{{{}}}", minus(&power.to_string()));
+    match label.split_once('[') {
+        Some((name, unit)) => format!("{name}[{factor} {unit}"),
+        None => format!("{label} [{factor}]"),
+    }
+}
+
+/// The typographic minus.
+pub fn minus(text: &str) -> String {
+    text.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(axis: &Axis) -> Vec<&str> {
+        axis.ticks.iter().map(|(_, text)| text.as_str()).collect()
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        let axis = Axis::linear("t [s]", -0.13, 0.43, 6, false);
+        assert_eq!(
+            texts(&axis),
+            ["−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]
+        );
+        assert_eq!((axis.low(), axis.high()), (-0.2, 0.5));
+        let tight = Axis::linear("t [s]", 0.0, 0.97, 5, true);
+        assert_eq!(texts(&tight), ["0.0", "0.2", "0.4", "0.6", "0.8"]);
+        assert_eq!(tight.high(), 0.97);
+    }
+
+    #[test]
+    fn a_little_beyond_a_round_value_costs_a_little() {
+        let axis = Axis::linear("gap", -0.0004, 2.0, 4, false);
+        assert!(
+            (axis.low() + 0.1).abs() < 1e-12 && axis.high() == 2.0,
+            "{} {}",
+            axis.low(),
+            axis.high()
+        );
+        assert_eq!(texts(&axis), ["0.0", "0.5", "1.0", "1.5", "2.0"]);
+    }
+
+    #[test]
+    fn a_power_of_ten_goes_to_the_unit() {
+        let axis = Axis::linear("*E* [J]", 0.0, 4.2e-7, 4, false);
+        assert_eq!(axis.label, "*E* [10^{−9} J]");
+        assert_eq!(texts(&axis), ["0", "200", "400"]);
+        assert_eq!(
+            Axis::linear("*D*_{r}/*d*", 0.0, 5e4, 4, false).label,
+            "*D*_{r}/*d* [10^{3}]"
+        );
+    }
+
+    #[test]
+    fn log_axes_take_whole_decades() {
+        let axis = Axis::log("div [1/s]", 3e-14, 2e-12);
+        assert_eq!((axis.low(), axis.high()), (1e-14, 1e-11));
+        assert_eq!(axis.place(1e-14), Some(0.0));
+        assert!(axis.place(0.0).is_none());
+        assert!(texts(&axis).contains(&"10^{−14}"));
+    }
+
+    #[test]
+    fn empty_or_broken_ranges_can_be_drawn() {
+        for (low, high) in [(1.0, 1.0), (0.0, 0.0), (f64::NAN, 2.0), (5.0, -5.0)] {
+            let axis = Axis::linear("x", low, high, 5, false);
+            assert!(
+                axis.high() > axis.low() && axis.ticks.len() >= 2,
+                "{low} {high}"
+            );
+        }
+        assert_eq!(
+            extent([f64::NAN, 2.0, -1.0, f64::INFINITY]),
+            Some((-1.0, 2.0))
+        );
+        assert_eq!(extent([f64::NAN]), None);
+    }
+}

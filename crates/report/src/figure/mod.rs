@@ -1,0 +1,128 @@
+//! Figures of a run: each a drawing with its caption, written as SVG and PNG.
+
+mod axis;
+mod colormap;
+mod contour;
+mod curves;
+mod heap;
+mod history;
+mod lines;
+mod plan;
+mod raster;
+mod section;
+mod sheet;
+mod silhouette;
+mod slices;
+mod style;
+mod svg;
+mod text;
+mod trajectory;
+
+use std::collections::BTreeMap;
+
+use crate::phases::{self, Instant};
+use crate::run_folder::RunFolder;
+use crate::story::{Story, Subject};
+
+pub use axis::minus;
+pub use silhouette::{Body, bodies};
+pub use style::COLUMN;
+pub use svg::Drawing;
+pub use text::{escape, html, literal, plain};
+
+/// Names of the coordinate axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// A figure ready to be written.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// File name without its extension.
+    pub name: &'static str,
+    /// Title.
+    pub title: String,
+    /// What is to be seen, in plain words with the numbers, in label markup.
+    pub caption: String,
+    /// The drawing.
+    pub drawing: Drawing,
+}
+
+impl Figure {
+    /// The figure as an SVG document that can also stand inside a page.
+    pub fn svg(&self) -> String {
+        self.drawing
+            .to_svg(self.name, &plain(&self.title), &plain(&self.caption))
+    }
+}
+
+/// What the figures are drawn from.
+pub struct Scene<'a> {
+    /// The run folder.
+    pub run: &'a RunFolder,
+    /// What it tells.
+    pub story: &'a Story,
+    /// Surfaces of the grains in their own frames, as far as known.
+    pub bodies: BTreeMap<usize, Body>,
+    /// Instants that the pictures show, at times that the folder has pictures of.
+    pub instants: Vec<Instant>,
+}
+
+/// Draws all figures that the run has data for; what had to be left out is added to `notes`.
+pub fn all(
+    run: &RunFolder,
+    story: &Story,
+    bodies: BTreeMap<usize, Body>,
+    notes: &mut Vec<String>,
+) -> Vec<Figure> {
+    let instants = phases::snap(&story.instants, &picture_times(run));
+    let scene = Scene {
+        run,
+        story,
+        bodies,
+        instants,
+    };
+    let mut out = Vec::new();
+    match story.subject {
+        Subject::Pair => {
+            out.extend(trajectory::figure(&scene));
+            out.extend(curves::gap(&scene));
+            out.extend(curves::pair_velocity(&scene));
+            out.extend(curves::orientation(&scene, notes));
+        }
+        Subject::Single => {
+            if story.travels {
+                out.extend(trajectory::figure(&scene));
+                out.extend(curves::single_velocity(&scene));
+            }
+            out.extend(history::force(&scene));
+            out.extend(curves::orientation(&scene, notes));
+        }
+        Subject::Many => {
+            out.extend(heap::positions(&scene));
+            out.extend(history::many(&scene));
+        }
+        Subject::Flow => {}
+    }
+    out.extend(slices::figures(&scene, notes));
+    out.extend(history::diagnostics(&scene));
+    out
+}
+
+/// Times of the slices; without slices, of the table.
+fn picture_times(run: &RunFolder) -> Vec<f64> {
+    let mut times: Vec<f64> = run.slices.iter().map(|frame| frame.time).collect();
+    if times.is_empty() {
+        times = run
+            .grains
+            .iter()
+            .find(|history| history.len() > 0)
+            .map(|h| h.time.clone())
+            .unwrap_or_default();
+    }
+    times.dedup();
+    times
+}
+
+/// The letter of the i-th instant: (a), (b), ...
+pub fn letter(i: usize) -> String {
+    format!("({})", char::from(b'a' + (i % 26) as u8))
+}

@@ -1,0 +1,341 @@
+//! A slice of the fields, ready to be drawn: values between cells, grain outlines.
+
+use glam::DVec3;
+
+use super::contour;
+use super::plan::Window;
+use super::raster::Raster;
+use crate::run_folder::Image;
+
+/// How a plane is looked at: axes 0, 1, 2 are x, y, z.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct View {
+    /// Axis across the plane.
+    pub normal: usize,
+    /// Axis to the right.
+    pub across: usize,
+    /// Axis upwards.
+    pub up: usize,
+}
+
+impl View {
+    /// The view of a slice with this normal; `vertical` points up where it lies in the plane.
+    pub fn along(normal: usize, vertical: usize) -> View {
+        let up = if vertical != normal {
+            vertical
+        } else {
+            if normal == 2 { 1 } else { 2 }
+        };
+        View {
+            normal,
+            across: 3 - normal - up,
+            up,
+        }
+    }
+
+    /// The two coordinates that are seen.
+    pub fn seen(&self, x: DVec3) -> (f64, f64) {
+        (x[self.across], x[self.up])
+    }
+
+    /// Whether positive rotation about the normal turns clockwise to the eye.
+    pub fn clockwise(&self) -> bool {
+        DVec3::AXES[self.across].cross(DVec3::AXES[self.up])[self.normal] < 0.0
+    }
+}
+
+/// A slice one cell thick.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// How it is looked at.
+    pub view: View,
+    nx: usize,
+    nz: usize,
+    lower: (f64, f64),
+    step: (f64, f64),
+    /// Place of the plane along its normal [m].
+    pub place: f64,
+    /// Velocity in the plane (right, up) and its magnitude in space [m/s], by cell.
+    pub velocity: Option<Vec<[f64; 3]>>,
+    /// Vorticity along the normal [1/s], by cell.
+    pub vorticity: Option<Vec<f64>>,
+    solid: Option<Vec<f64>>,
+}
+
+impl Section {
+    /// Takes what is drawn from an image file one cell thick in y, else x, else z.
+    pub fn of(image: &Image, vertical: usize) -> Result<Section, String> {
+        let [nx, ny, nz] = image.cells;
+        let thin = [1, 0, 2].into_iter().find(|axis| image.cells[*axis] == 1);
+        let normal = thin.ok_or_else(|| {
+            format!("{nx} x {ny} x {nz} cells are no slice, which is one cell thick")
+        })?;
+        let view = View::along(normal, vertical);
+        let strides = [1, nx, nx * ny];
+        let (across, up) = (view.across, view.up);
+        let order = || {
+            let rows = (0..image.cells[up]).map(move |k| k * strides[up]);
+            rows.flat_map(move |row| {
+                (0..image.cells[across]).map(move |i| row + i * strides[across])
+            })
+        };
+        let array = |name: &str, components: usize| {
+            image
+                .arrays
+                .get(name)
+                .filter(|array| array.components == components)
+        };
+        let velocity = array("velocity", 3).map(|array| {
+            let value = |cell: usize| {
+                let v = DVec3::from_slice(&array.values[3 * cell..]);
+                [v[across], v[up], v.length()]
+            };
+            order().map(value).collect()
+        });
+        let vorticity = array("vorticity", 3).map(|array| {
+            order()
+                .map(|cell| array.values[3 * cell + normal])
+                .collect()
+        });
+        let solid = array("solid_fraction", 1)
+            .map(|array| order().map(|cell| array.values[cell]).collect());
+        Ok(Section {
+            view,
+            nx: image.cells[across],
+            nz: image.cells[up],
+            lower: view.seen(image.lower),
+            step: view.seen(image.spacing),
+            place: image.lower[normal] + 0.5 * image.spacing[normal],
+            velocity,
+            vorticity,
+            solid,
+        })
+    }
+
+    /// All of the slice.
+    pub fn whole(&self) -> Window {
+        let (x, z) = self.lower;
+        Window {
+            low: (x, z),
+            high: (
+                x + self.step.0 * self.nx as f64,
+                z + self.step.1 * self.nz as f64,
+            ),
+        }
+    }
+
+    /// Value at a point by cubic interpolation that does not overshoot its neighbours.
+    pub fn sample(&self, value: impl Fn(usize) -> f64, (x, z): (f64, f64)) -> f64 {
+        let place = |at: f64, low: f64, step: f64, n: usize| {
+            ((at - low) / step - 0.5).clamp(0.0, (n - 1) as f64)
+        };
+        let (px, pz) = (
+            place(x, self.lower.0, self.step.0, self.nx),
+            place(z, self.lower.1, self.step.1, self.nz),
+        );
+        let (i, k) = (px.floor() as isize, pz.floor() as isize);
+        let at = |i: isize, k: isize| {
+            let (i, k) = (
+                i.clamp(0, self.nx as isize - 1),
+                k.clamp(0, self.nz as isize - 1),
+            );
+            value(i as usize + self.nx * k as usize)
+        };
+        let (u, w) = (px - i as f64, pz - k as f64);
+        let row = |k: isize| cubic([at(i - 1, k), at(i, k), at(i + 1, k), at(i + 2, k)], u);
+        let out = cubic([row(k - 1), row(k), row(k + 1), row(k + 2)], w);
+        let near = [at(i, k), at(i + 1, k), at(i, k + 1), at(i + 1, k + 1)];
+        out.clamp(
+            near.iter().copied().fold(f64::INFINITY, f64::min),
+            near.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        )
+    }
+
+    /// Solid fraction of a cell; zero where the file has none.
+    pub fn solid(&self, cell: usize) -> f64 {
+        self.solid.as_ref().map_or(0.0, |solid| solid[cell])
+    }
+
+    /// Cells whose centre lies in the window.
+    pub fn cells_in(&self, window: Window) -> impl Iterator<Item = usize> + '_ {
+        let inside = move |cell: usize| {
+            let x = self.lower.0 + (0.5 + (cell % self.nx) as f64) * self.step.0;
+            let z = self.lower.1 + (0.5 + (cell / self.nx) as f64) * self.step.1;
+            x >= window.low.0 && x <= window.high.0 && z >= window.low.1 && z <= window.high.1
+        };
+        (0..self.nx * self.nz).filter(move |cell| inside(*cell))
+    }
+
+    /// Outlines of the solid [m].
+    pub fn outlines(&self) -> Vec<Vec<(f64, f64)>> {
+        let Some(solid) = &self.solid else {
+            return Vec::new();
+        };
+        let loops = contour::loops(self.nx, self.nz, |i, k| solid[i + self.nx * k], 0.5);
+        let place = |(i, k): (f64, f64)| {
+            (
+                self.lower.0 + (i + 0.5) * self.step.0,
+                self.lower.1 + (k + 0.5) * self.step.1,
+            )
+        };
+        loops
+            .into_iter()
+            .map(|ring| ring.into_iter().map(place).collect())
+            .collect()
+    }
+
+    /// The window in colours: `position` turns a value into a place in the palette, 0 to 1.
+    pub fn raster(
+        &self,
+        window: Window,
+        width: usize,
+        height: usize,
+        palette: Vec<[u8; 3]>,
+        value: impl Fn(usize) -> f64,
+        position: impl Fn(f64) -> f64,
+    ) -> Raster {
+        let mut pixels = Vec::with_capacity(width * height);
+        for row in 0..height {
+            let z = window.high.1 - window.height() * (row as f64 + 0.5) / height as f64;
+            for column in 0..width {
+                let x = window.low.0 + window.width() * (column as f64 + 0.5) / width as f64;
+                let place = position(self.sample(&value, (x, z)));
+                pixels.push((255.0 * place.clamp(0.0, 1.0)).round() as u8);
+            }
+        }
+        Raster {
+            width,
+            height,
+            pixels,
+            palette,
+        }
+    }
+}
+
+/// Catmull-Rom interpolation between the middle two of four values.
+fn cubic([a, b, c, d]: [f64; 4], t: f64) -> f64 {
+    b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run_folder::Array;
+
+    fn image(ny: usize) -> Image {
+        let scalar = |values: Vec<f64>| Array {
+            components: 1,
+            values,
+        };
+        let centre = |i: usize| (i % 8) as f64 + 0.5;
+        let height = |i: usize| (i / 8) as f64 + 0.5;
+        let solid = (0..48)
+            .map(|i| f64::from((centre(i) - 4.0).hypot(height(i) - 3.0) < 1.6))
+            .collect();
+        let velocity = (0..48)
+            .flat_map(|i| [height(i), 0.0, 2.0 * centre(i)])
+            .collect();
+        let arrays = [
+            ("solid_fraction".to_owned(), scalar(solid)),
+            (
+                "velocity".to_owned(),
+                Array {
+                    components: 3,
+                    values: velocity,
+                },
+            ),
+        ];
+        Image {
+            cells: [8, ny, 6],
+            spacing: DVec3::ONE,
+            lower: DVec3::ZERO,
+            arrays: arrays.into(),
+            fields: Default::default(),
+        }
+    }
+
+    #[test]
+    fn values_between_cells() {
+        let section = Section::of(&image(1), 2).unwrap();
+        let velocity = section.velocity.clone().unwrap();
+        assert!(
+            (section.sample(|i| velocity[i][0], (3.3, 2.9)) - 2.9).abs() < 1e-12,
+            "linear fields are exact"
+        );
+        assert_eq!(
+            section.sample(|i| velocity[i][1], (-9.0, 3.0)),
+            1.0,
+            "held at the edge"
+        );
+        assert_eq!(section.place, 0.5);
+        assert!(section.vorticity.is_none());
+        let step = section.sample(|i| if i % 8 < 4 { 0.0 } else { 1.0 }, (4.9, 2.0));
+        assert!((0.0..=1.0).contains(&step));
+    }
+
+    #[test]
+    fn the_solid_is_outlined() {
+        let section = Section::of(&image(1), 2).unwrap();
+        let rings = section.outlines();
+        assert_eq!(rings.len(), 1);
+        let middle = rings[0]
+            .iter()
+            .fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
+        let n = rings[0].len() as f64;
+        assert!((middle.0 / n - 4.0).abs() < 0.1 && (middle.1 / n - 3.0).abs() < 0.1);
+        let window = Window {
+            low: (0.0, 0.0),
+            high: (4.0, 6.0),
+        };
+        assert_eq!(section.cells_in(window).count(), 24);
+        let raster = section.raster(window, 4, 6, vec![[0; 3]; 256], |i| section.solid(i), |v| v);
+        assert_eq!((raster.pixels.len(), raster.pixels[3 + 4 * 3]), (24, 255));
+    }
+
+    #[test]
+    fn every_normal_has_its_view() {
+        assert_eq!(
+            View::along(1, 2),
+            View {
+                normal: 1,
+                across: 0,
+                up: 2
+            }
+        );
+        assert_eq!(
+            View::along(0, 1),
+            View {
+                normal: 0,
+                across: 2,
+                up: 1
+            }
+        );
+        assert_eq!(
+            View::along(2, 2),
+            View {
+                normal: 2,
+                across: 0,
+                up: 1
+            }
+        );
+        assert!(View::along(1, 2).clockwise() && !View::along(0, 2).clockwise());
+        let mut turned = image(1);
+        turned.cells = [1, 8, 6];
+        let section = Section::of(&turned, 1).unwrap();
+        assert_eq!((section.view.across, section.view.up), (2, 1));
+        assert_eq!(section.whole().high, (6.0, 8.0));
+        let inside = section.sample(|cell| section.solid(cell), (3.0, 4.0));
+        assert_eq!(inside, 1.0, "the solid follows the axes");
+    }
+
+    #[test]
+    fn thick_images_are_no_slices() {
+        let mut thick = image(1);
+        thick.cells[1] = 2;
+        assert!(
+            Section::of(&thick, 2)
+                .unwrap_err()
+                .contains("8 x 2 x 6 cells are no slice")
+        );
+    }
+}

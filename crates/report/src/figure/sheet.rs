@@ -1,0 +1,318 @@
+//! A sheet of slices: instants across, planes down, one colour scale.
+
+use super::axis::Axis;
+use super::colormap::ColorMap;
+use super::plan::{Plan, Window, colour_bar, length_unit};
+use super::section::{Section, View};
+use super::silhouette::{self, Outline};
+use super::style::{self, HAIR, INK, PAGE, SMALL, TEXT, grain_colour};
+use super::svg::{Anchor, Drawing, path_data};
+use super::{AXES, Scene};
+
+/// Pixels of a slice for each point of the paper.
+const PIXELS: f64 = 3.0;
+/// Distance of the arrows [pt].
+const ARROWS: f64 = 8.5;
+
+/// One column of the figure: an instant, and the plane of each row.
+pub struct Column {
+    pub title: String,
+    pub time: String,
+    /// The instant [s].
+    pub at: f64,
+    pub window: Window,
+    pub sections: Vec<Option<Section>>,
+    /// Centres of the grains at that instant, for the colour of their outlines.
+    pub centres: Vec<(usize, (f64, f64))>,
+}
+
+/// How a quantity is shown.
+pub struct Look {
+    pub map: ColorMap,
+    pub low: f64,
+    pub high: f64,
+    /// Largest speed, if arrows are drawn.
+    pub arrows: Option<f64>,
+    pub axis: Axis,
+    pub beyond: (bool, bool),
+}
+
+/// Panels of all instants (columns) and planes (rows) on one colour scale.
+pub fn draw(
+    scene: &Scene,
+    columns: &[Column],
+    rows: usize,
+    look: &Look,
+    value: impl Fn(&Section) -> Option<Vec<f64>>,
+) -> Option<Drawing> {
+    let first = columns.first()?;
+    let (left, gap, right) = (36.0 + if rows > 1 { 12.0 } else { 0.0 }, 25.0, 9.0);
+    let n = columns.len() as f64;
+    let room = (PAGE - left - right - gap * (n - 1.0)) / n;
+    let widest = columns.iter().map(|c| c.window.width()).fold(0.0, f64::max);
+    let tallest = columns
+        .iter()
+        .map(|c| c.window.height())
+        .fold(0.0, f64::max);
+    let scale = (room.min(if columns.len() == 1 { 430.0 } else { 230.0 }) / widest)
+        .min(if rows > 1 { 200.0 } else { 260.0 } / tallest);
+    let (width, height) = (scale * widest, scale * tallest);
+    let total = (left + n * width + (n - 1.0) * gap + right).max(220.0);
+    let start = left + 0.5 * (total - left - right - n * width - (n - 1.0) * gap);
+    let top = 22.0;
+    let bottom = top + rows as f64 * height + (rows as f64 - 1.0) * 12.0;
+    let mut drawing = Drawing::new(total, bottom + 26.0 + 32.0);
+    let (unit, _) = length_unit(first.window.width().max(first.window.height()));
+    let view = first.sections.iter().flatten().next()?.view;
+    let name = |axis: usize| format!("*{}*  [{unit}]", AXES[axis]);
+    let (x_name, z_name) = (name(view.across), name(view.up));
+    for (c, column) in columns.iter().enumerate() {
+        let x = start + c as f64 * (width + gap);
+        drawing.label(
+            x + 0.5 * width,
+            8.5,
+            Anchor::Middle,
+            TEXT,
+            INK,
+            column.title.trim(),
+            false,
+        );
+        drawing.label(
+            x + 0.5 * width,
+            18.0,
+            Anchor::Middle,
+            SMALL,
+            INK,
+            &column.time,
+            false,
+        );
+        for (r, section) in column.sections.iter().enumerate() {
+            let y = top + r as f64 * (height + 12.0);
+            let plan = Plan {
+                window: column.window,
+                corner: (x, y),
+                scale,
+            };
+            match section {
+                Some(section) => {
+                    draw_section(
+                        &mut drawing,
+                        scene,
+                        column,
+                        section,
+                        &plan,
+                        look,
+                        &value,
+                        &format!("clip-{c}-{r}"),
+                    );
+                }
+                None => drawing.label(
+                    x + 0.5 * width,
+                    y + 0.5 * height,
+                    Anchor::Middle,
+                    SMALL,
+                    style::FAINT,
+                    "no slice",
+                    false,
+                ),
+            }
+            let across = if r + 1 == rows {
+                Some(x_name.as_str())
+            } else {
+                None
+            };
+            plan.frame(
+                &mut drawing,
+                (across, Some(if c == 0 { z_name.as_str() } else { "" })),
+            );
+        }
+    }
+    if let (Some(pair), true) = (scene.story.pair, rows > 1) {
+        for (r, grain) in pair.iter().enumerate() {
+            let y = top + (r as f64 + 0.5) * height + 12.0 * r as f64;
+            let colour = grain_colour(scene.story.grain_rank(*grain));
+            drawing.label(
+                9.0,
+                y,
+                Anchor::Middle,
+                SMALL,
+                colour,
+                &format!("plane of grain {grain}"),
+                true,
+            );
+        }
+    }
+    let bar = 180.0_f64.min(total - 40.0);
+    colour_bar(
+        &mut drawing,
+        (0.5 * (total - bar), bottom + 28.0),
+        bar,
+        &look.map.palette(),
+        &look.axis,
+        look.beyond,
+    );
+    Some(drawing)
+}
+
+fn draw_section(
+    drawing: &mut Drawing,
+    scene: &Scene,
+    column: &Column,
+    section: &Section,
+    plan: &Plan,
+    look: &Look,
+    value: impl Fn(&Section) -> Option<Vec<f64>>,
+    clip: &str,
+) {
+    let Some(values) = value(section) else { return };
+    let (width, height) = (plan.width(), plan.height());
+    let pixels = |size: f64| ((PIXELS * size).round() as usize).clamp(1, 2000);
+    let position = |v: f64| (v - look.low) / (look.high - look.low);
+    let raster = section.raster(
+        plan.window,
+        pixels(width),
+        pixels(height),
+        look.map.palette(),
+        |cell| values[cell],
+        position,
+    );
+    drawing.raster(plan.corner.0, plan.corner.1, width, height, raster);
+    plan.clip(drawing, clip);
+    if let (Some(highest), Some(velocity)) = (look.arrows, &section.velocity) {
+        draw_arrows(drawing, section, velocity, plan, highest);
+    }
+    for (grain, ring) in cuts(scene, column, section) {
+        let colour = grain.map_or(INK, |grain| grain_colour(scene.story.grain_rank(grain)));
+        let style = format!(
+            "fill=\"#d9d9d9\" stroke=\"{colour}\" stroke-width=\"1.1\" stroke-linejoin=\"round\""
+        );
+        drawing.path(&plan.path(&ring, true), &style);
+    }
+    drawing.end_clip();
+}
+
+/// Where the plane of a slice cuts the grains: exactly where their surfaces are known, for spheres
+/// too; else along half solid fraction, where touching grains run together.
+fn cuts(scene: &Scene, column: &Column, section: &Section) -> Vec<(Option<usize>, Outline)> {
+    let exact = |(grain, _): &(usize, (f64, f64))| {
+        let (position, turn) = scene.run.grains[*grain].pose(column.at)?;
+        let mut position = scene.run.wrapped(position);
+        // The image nearest to the plane is the one that it cuts.
+        let normal = section.view.normal;
+        if let Some(period) = scene.run.period(normal) {
+            position[normal] += period * ((section.place - position[normal]) / period).round();
+        }
+        let loops = match scene.bodies.get(grain) {
+            Some(body) => body.section(position, turn, section.view, section.place),
+            None => {
+                let radius = 0.5 * scene.sphere_diameter(*grain)?;
+                let chord = radius * radius - (position[normal] - section.place).powi(2);
+                let ring = || silhouette::circle(section.view.seen(position), chord.sqrt());
+                (chord > 0.0).then(ring).into_iter().collect()
+            }
+        };
+        Some(
+            loops
+                .into_iter()
+                .map(|ring| (Some(*grain), ring))
+                .collect::<Vec<_>>(),
+        )
+    };
+    if let Some(loops) = column.centres.iter().map(exact).collect::<Option<Vec<_>>>() {
+        return with_images(scene, section.view, loops.concat());
+    }
+    let nearest = |ring: Outline| {
+        let n = ring.len() as f64;
+        let middle = ring
+            .iter()
+            .fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / n, sum.1 + p.1 / n));
+        let distance = |p: &(f64, f64)| (p.0 - middle.0).hypot(p.1 - middle.1);
+        let by_distance = |a: &&(usize, (f64, f64)), b: &&(usize, (f64, f64))| {
+            distance(&a.1).total_cmp(&distance(&b.1))
+        };
+        (
+            column
+                .centres
+                .iter()
+                .min_by(by_distance)
+                .map(|(grain, _)| *grain),
+            ring,
+        )
+    };
+    section.outlines().into_iter().map(nearest).collect()
+}
+
+/// Adds the images through periodic faces.
+fn with_images(
+    scene: &Scene,
+    view: View,
+    loops: Vec<(Option<usize>, Outline)>,
+) -> Vec<(Option<usize>, Outline)> {
+    let shifts = |axis: usize| match scene.run.period(axis) {
+        Some(period) => vec![0.0, -period, period],
+        None => vec![0.0],
+    };
+    let mut out = Vec::new();
+    for dx in shifts(view.across) {
+        for dz in shifts(view.up) {
+            let moved = |ring: &Outline| ring.iter().map(|p| (p.0 + dx, p.1 + dz)).collect();
+            out.extend(loops.iter().map(|(grain, ring)| (*grain, moved(ring))));
+        }
+    }
+    out
+}
+
+fn draw_arrows(
+    drawing: &mut Drawing,
+    section: &Section,
+    velocity: &[[f64; 3]],
+    plan: &Plan,
+    highest: f64,
+) {
+    let (columns, rows) = (
+        (plan.width() / ARROWS) as usize,
+        (plan.height() / ARROWS) as usize,
+    );
+    let mut data = String::new();
+    for row in 0..rows {
+        for column in 0..columns {
+            let x = plan.corner.0 + plan.width() * (column as f64 + 0.5) / columns as f64;
+            let y = plan.corner.1 + plan.height() * (row as f64 + 0.5) / rows as f64;
+            let at = (
+                plan.window.low.0 + (x - plan.corner.0) / plan.scale,
+                plan.window.high.1 - (y - plan.corner.1) / plan.scale,
+            );
+            if section.sample(|cell| section.solid(cell), at) > 0.1 {
+                continue;
+            }
+            let u = section.sample(|cell| velocity[cell][0], at) / highest;
+            let w = section.sample(|cell| velocity[cell][1], at) / highest;
+            let size = u.hypot(w);
+            if size.is_nan() || size < 0.06 {
+                continue;
+            }
+            let length = 1.7 * ARROWS * size.min(1.0);
+            let (dx, dy) = (u / size, -w / size);
+            let tip = (x + 0.5 * length * dx, y + 0.5 * length * dy);
+            let head = 0.35 * length.min(5.0);
+            let barb = |side: f64| {
+                (
+                    tip.0 - head * (dx - 0.5 * side * dy),
+                    tip.1 - head * (dy + 0.5 * side * dx),
+                )
+            };
+            data.push_str(&path_data(
+                &[(x - 0.5 * length * dx, y - 0.5 * length * dy), tip],
+                false,
+            ));
+            data.push_str(&path_data(&[barb(1.0), tip, barb(-1.0)], false));
+        }
+    }
+    if !data.is_empty() {
+        let style = format!(
+            "fill=\"none\" stroke=\"{INK}\" stroke-opacity=\"0.75\" stroke-width=\"{}\"",
+            HAIR - 0.1
+        );
+        drawing.path(&data, &style);
+    }
+}

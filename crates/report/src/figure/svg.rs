@@ -1,0 +1,335 @@
+//! A drawing: rasters below, vectors above; written as SVG and as PNG from the same description.
+
+use std::sync::{Arc, OnceLock};
+
+use base64::Engine;
+use resvg::{tiny_skia, usvg};
+
+use super::raster::{Raster, encode};
+use super::style;
+use super::text;
+
+/// Where a text is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anchor {
+    /// At its left end.
+    Start,
+    /// At its middle.
+    Middle,
+    /// At its right end.
+    End,
+}
+
+/// A drawing of fixed size [pt], y downwards.
+#[derive(Clone, Debug)]
+pub struct Drawing {
+    width: f64,
+    height: f64,
+    rasters: Vec<(f64, f64, f64, f64, Raster)>,
+    vectors: String,
+}
+
+/// A number for SVG, at most two decimals.
+pub fn number(value: f64) -> String {
+    let mut text = format!("{value:.2}");
+    if text.contains('.') {
+        text.truncate(text.trim_end_matches('0').trim_end_matches('.').len());
+    }
+    if text == "-0" { "0".to_owned() } else { text }
+}
+
+/// Path data through `points`, closed if asked.
+pub fn path_data(points: &[(f64, f64)], closed: bool) -> String {
+    let mut data = String::with_capacity(12 * points.len());
+    for (i, (x, y)) in points.iter().enumerate() {
+        data.push(if i == 0 { 'M' } else { 'L' });
+        data.push_str(&number(*x));
+        data.push(' ');
+        data.push_str(&number(*y));
+    }
+    if closed {
+        data.push('Z');
+    }
+    data
+}
+
+impl Drawing {
+    /// An empty drawing.
+    pub fn new(width: f64, height: f64) -> Drawing {
+        Drawing {
+            width,
+            height,
+            rasters: Vec::new(),
+            vectors: String::new(),
+        }
+    }
+
+    /// Width [pt].
+    pub fn width(&self) -> f64 {
+        self.width
+    }
+
+    /// Adds a raster that fills the rectangle; it lies below all vectors.
+    pub fn raster(&mut self, x: f64, y: f64, width: f64, height: f64, raster: Raster) {
+        self.rasters.push((x, y, width, height, raster));
+    }
+
+    /// Adds a path; `style` are SVG attributes.
+    pub fn path(&mut self, data: &str, style: &str) {
+        self.vectors
+            .push_str(&format!("<path d=\"{data}\" {style}/>\n"));
+    }
+
+    /// A stroked line through `points`.
+    pub fn line(&mut self, points: &[(f64, f64)], colour: &str, width: f64, dash: Option<&str>) {
+        let dash = dash
+            .map(|dash| format!(" stroke-dasharray=\"{dash}\""))
+            .unwrap_or_default();
+        let style = format!(
+            "fill=\"none\" stroke=\"{colour}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}",
+            number(width)
+        );
+        self.path(&path_data(points, false), &style);
+    }
+
+    /// A rectangle; `style` are SVG attributes.
+    pub fn rectangle(&mut self, x: f64, y: f64, width: f64, height: f64, style: &str) {
+        let [x, y, width, height] = [x, y, width, height].map(number);
+        self.vectors.push_str(&format!(
+            "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" {style}/>\n"
+        ));
+    }
+
+    /// A label with its baseline at (x, y); `turned` runs upwards.
+    pub fn label(
+        &mut self,
+        x: f64,
+        y: f64,
+        anchor: Anchor,
+        size: f64,
+        colour: &str,
+        label: &str,
+        turned: bool,
+    ) {
+        self.styled_label(
+            x,
+            y,
+            anchor,
+            size,
+            &format!("fill=\"{colour}\""),
+            label,
+            turned,
+        );
+    }
+
+    /// A label with a white rim, for use over colours.
+    pub fn rimmed_label(
+        &mut self,
+        x: f64,
+        y: f64,
+        anchor: Anchor,
+        size: f64,
+        colour: &str,
+        label: &str,
+    ) {
+        let rim = "fill=\"none\" stroke=\"#ffffff\" stroke-width=\"1.8\" stroke-linejoin=\"round\" stroke-opacity=\"0.85\"";
+        self.styled_label(x, y, anchor, size, rim, label, false);
+        self.label(x, y, anchor, size, colour, label, false);
+    }
+
+    fn styled_label(
+        &mut self,
+        x: f64,
+        y: f64,
+        anchor: Anchor,
+        size: f64,
+        style: &str,
+        label: &str,
+        turned: bool,
+    ) {
+        let anchor = match anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        let turn = if turned {
+            format!(" transform=\"rotate(-90 {} {})\"", number(x), number(y))
+        } else {
+            String::new()
+        };
+        self.vectors.push_str(&format!(
+            "<text x=\"{}\" y=\"{}\" font-size=\"{}\" text-anchor=\"{anchor}\" {style}{turn}>{}</text>\n",
+            number(x),
+            number(y),
+            number(size),
+            text::spans(label, size)
+        ));
+    }
+
+    /// Opens a clip to a rectangle; close it with `end_clip`. `name` must be unique in the drawing.
+    pub fn begin_clip(&mut self, name: &str, x: f64, y: f64, width: f64, height: f64) {
+        let [x, y, width, height] = [x, y, width, height].map(number);
+        self.vectors.push_str(&format!(
+            "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>\n<g clip-path=\"url(#{name})\">\n"
+        ));
+    }
+
+    /// Closes the last clip.
+    pub fn end_clip(&mut self) {
+        self.vectors.push_str("</g>\n");
+    }
+
+    /// The drawing as an SVG document; `name` prefixes its ids, so that several can share a page.
+    pub fn to_svg(&self, name: &str, title: &str, description: &str) -> String {
+        let (width, height) = (number(self.width), number(self.height));
+        let mut out = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\" viewBox=\"0 0 {width} {height}\" \
+             role=\"img\" aria-labelledby=\"{name}-title {name}-description\" font-family=\"{}\">\n\
+             <title id=\"{name}-title\">{}</title>\n<desc id=\"{name}-description\">{}</desc>\n\
+             <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n",
+            style::FONT,
+            text::escape(title),
+            text::escape(description)
+        );
+        for (x, y, width, height, raster) in &self.rasters {
+            let data = base64::engine::general_purpose::STANDARD.encode(raster.to_png());
+            let [x, y, width, height] = [*x, *y, *width, *height].map(number);
+            out.push_str(&format!(
+                "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" preserveAspectRatio=\"none\" \
+                 href=\"data:image/png;base64,{data}\"/>\n"
+            ));
+        }
+        out.push_str(
+            &self
+                .vectors
+                .replace("#clip-", &format!("#{name}-clip-"))
+                .replace("id=\"clip-", &format!("id=\"{name}-clip-")),
+        );
+        out.push_str("</svg>\n");
+        out
+    }
+
+    /// The drawing as a PNG file at 300 dots per inch, set in the embedded font.
+    pub fn to_png(&self) -> Result<Vec<u8>, String> {
+        let scale = style::PIXELS_PER_POINT;
+        let (width, height) = (
+            (self.width * scale).round() as u32,
+            (self.height * scale).round() as u32,
+        );
+        let mut pixmap = tiny_skia::Pixmap::new(width, height).ok_or("a picture without pixels")?;
+        pixmap.fill(tiny_skia::Color::WHITE);
+        for (x, y, width, height, raster) in &self.rasters {
+            let picture = raster.to_pixmap().ok_or("a raster without pixels")?;
+            let transform = tiny_skia::Transform::from_row(
+                (scale * width / raster.width as f64) as f32,
+                0.0,
+                0.0,
+                (scale * height / raster.height as f64) as f32,
+                (scale * x) as f32,
+                (scale * y) as f32,
+            );
+            let paint = tiny_skia::PixmapPaint {
+                quality: tiny_skia::FilterQuality::Bilinear,
+                ..Default::default()
+            };
+            pixmap.draw_pixmap(0, 0, picture.as_ref(), &paint, transform, None);
+        }
+        let document = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" font-family=\"DejaVu Sans\">{}</svg>",
+            self.vectors,
+            w = number(self.width),
+            h = number(self.height)
+        );
+        let tree =
+            usvg::Tree::from_str(&document, &options()).map_err(|error| error.to_string())?;
+        resvg::render(
+            &tree,
+            tiny_skia::Transform::from_scale(scale as f32, scale as f32),
+            &mut pixmap.as_mut(),
+        );
+        encode(width, height, &pixmap)
+    }
+}
+
+/// Rendering options with the embedded font and no other.
+fn options() -> usvg::Options<'static> {
+    static FONTS: OnceLock<Arc<usvg::fontdb::Database>> = OnceLock::new();
+    let fonts = FONTS.get_or_init(|| {
+        let mut fonts = usvg::fontdb::Database::new();
+        fonts.load_font_data(dejavu::sans::regular().to_vec());
+        fonts.load_font_data(dejavu::sans::oblique().to_vec());
+        Arc::new(fonts)
+    });
+    let font_family = "DejaVu Sans".to_owned();
+    usvg::Options {
+        font_family,
+        fontdb: fonts.clone(),
+        ..Default::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!(number(1.0), "1");
+        assert_eq!(number(-0.001), "0");
+        assert_eq!(number(2.505), "2.5");
+        assert_eq!(number(100.0), "100");
+        assert_eq!(path_data(&[(0.0, 1.0), (2.0, 3.5)], true), "M0 1L2 3.5Z");
+    }
+
+    #[test]
+    fn text_is_set_without_system_fonts() {
+        let mut drawing = Drawing::new(60.0, 20.0);
+        let blank = drawing.to_png().unwrap();
+        drawing.label(
+            5.0,
+            14.0,
+            Anchor::Start,
+            10.0,
+            "#000000",
+            "√*x*_{2} kiss",
+            false,
+        );
+        let png = drawing.to_png().unwrap();
+        let ink = |png: &[u8]| {
+            let mut reader = png::Decoder::new(std::io::Cursor::new(png))
+                .read_info()
+                .unwrap();
+            let mut data = vec![0; reader.output_buffer_size().unwrap()];
+            reader.next_frame(&mut data).unwrap();
+            data.iter().filter(|&&v| v < 128).count()
+        };
+        assert_eq!(ink(&blank), 0);
+        assert!(ink(&png) > 500, "{} dark samples", ink(&png));
+    }
+
+    #[test]
+    fn rasters_fill_their_place() {
+        let mut drawing = Drawing::new(20.0, 10.0);
+        let raster = Raster {
+            width: 2,
+            height: 1,
+            pixels: vec![0, 1],
+            palette: vec![[255, 0, 0], [0, 0, 255]],
+        };
+        drawing.raster(0.0, 0.0, 20.0, 10.0, raster);
+        let png = drawing.to_png().unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&png))
+            .read_info()
+            .unwrap();
+        let mut data = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut data).unwrap();
+        let row = &data[3 * (info.width * (info.height / 2)) as usize..][..3 * info.width as usize];
+        assert_eq!(&row[3 * 4..][..3], &[255, 0, 0]);
+        assert_eq!(&row[row.len() - 3 * 4..][..3], &[0, 0, 255]);
+        assert!(
+            drawing
+                .to_svg("f", "t", "d")
+                .contains("data:image/png;base64,iVBOR")
+        );
+    }
+}

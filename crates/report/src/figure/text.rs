@@ -1,0 +1,210 @@
+//! Labels: a small markup (`*italic*`, `_{sub}`, `^{sup}`), measured with the embedded font.
+
+use std::sync::OnceLock;
+
+use skrifa::instance::{LocationRef, Size};
+use skrifa::metrics::GlyphMetrics;
+use skrifa::{FontRef, MetadataProvider};
+
+/// Size of a sub- or superscript relative to the text.
+const SMALL: f64 = 0.72;
+
+/// A stretch of text in one style.
+#[derive(Clone, Debug, PartialEq)]
+struct Piece {
+    text: String,
+    italic: bool,
+    /// -1 subscript, 0 on the line, +1 superscript.
+    level: i8,
+}
+
+/// Splits a label into pieces; `\` makes the next character plain.
+fn pieces(label: &str) -> Vec<Piece> {
+    let mut out: Vec<Piece> = Vec::new();
+    let mut italic = false;
+    let mut level = 0;
+    let mut chars = label.chars().peekable();
+    let mut push = |c: char, italic: bool, level: i8| match out.last_mut() {
+        Some(last) if last.italic == italic && last.level == level => last.text.push(c),
+        _ => out.push(Piece {
+            text: c.to_string(),
+            italic,
+            level,
+        }),
+    };
+    while let Some(c) = chars.next() {
+        match c {
+            '\\' => {
+                if let Some(next) = chars.next() {
+                    push(next, italic, level);
+                }
+            }
+            '*' => italic = !italic,
+            '_' | '^' if level == 0 && chars.peek() == Some(&'{') => {
+                chars.next();
+                level = if c == '_' { -1 } else { 1 };
+            }
+            '}' if level != 0 => level = 0,
+            _ => push(c, italic, level),
+        }
+    }
+    out
+}
+
+/// The label as plain text, for titles and alternative texts.
+pub fn plain(label: &str) -> String {
+    pieces(label).into_iter().map(|piece| piece.text).collect()
+}
+
+/// Makes text that comes from a file safe to use as a label.
+pub fn literal(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if matches!(c, '\\' | '*' | '_' | '^' | '}') {
+            out.push('\\');
+        }
+        out.push(c);
+    }
+    out
+}
+
+/// Escapes the five characters that XML and HTML reserve, and drops control characters.
+pub fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            c if c.is_control() && c != '\n' && c != '\t' => {}
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// The label as SVG `tspan` elements for text of `size` [pt].
+pub fn spans(label: &str, size: f64) -> String {
+    let mut out = String::new();
+    let mut shift = 0.0;
+    for piece in pieces(label) {
+        let wanted = match piece.level {
+            -1 => 0.22 * size,
+            1 => -0.36 * size,
+            _ => 0.0,
+        };
+        let mut attributes = String::new();
+        if wanted != shift {
+            attributes.push_str(&format!(" dy=\"{:.2}\"", wanted - shift));
+            shift = wanted;
+        }
+        if piece.level != 0 {
+            attributes.push_str(&format!(" font-size=\"{:.2}\"", SMALL * size));
+        }
+        if piece.italic {
+            attributes.push_str(" font-style=\"italic\"");
+        }
+        let text = escape(&piece.text);
+        if attributes.is_empty() {
+            out.push_str(&text);
+        } else {
+            out.push_str(&format!("<tspan{attributes}>{text}</tspan>"));
+        }
+    }
+    out
+}
+
+/// The label as HTML.
+pub fn html(label: &str) -> String {
+    let mut out = String::new();
+    for piece in pieces(label) {
+        let mut text = escape(&piece.text);
+        if piece.italic {
+            text = format!("<i>{text}</i>");
+        }
+        out.push_str(&match piece.level {
+            -1 => format!("<sub>{text}</sub>"),
+            1 => format!("<sup>{text}</sup>"),
+            _ => text,
+        });
+    }
+    out
+}
+
+/// Width [pt] of a label set at `size` [pt].
+pub fn width(label: &str, size: f64) -> f64 {
+    static FONT: OnceLock<Option<FontRef<'static>>> = OnceLock::new();
+    let font = FONT.get_or_init(|| FontRef::new(dejavu::sans::regular()).ok());
+    let fallback = |pieces: Vec<Piece>| {
+        0.6 * size
+            * pieces
+                .iter()
+                .map(|p| p.text.chars().count() as f64)
+                .sum::<f64>()
+    };
+    let Some(font) = font else {
+        return fallback(pieces(label));
+    };
+    let map = font.charmap();
+    let metrics = GlyphMetrics::new(font, Size::new(1000.0), LocationRef::default());
+    pieces(label)
+        .iter()
+        .map(|piece| {
+            let scale = size / 1000.0 * if piece.level == 0 { 1.0 } else { SMALL };
+            let advance = |c| {
+                map.map(c)
+                    .and_then(|glyph| metrics.advance_width(glyph))
+                    .unwrap_or(600.0)
+            };
+            scale
+                * piece
+                    .text
+                    .chars()
+                    .map(|c| f64::from(advance(c)))
+                    .sum::<f64>()
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn markup_gives_scripts_and_italics() {
+        let svg = spans("*v*_{z} / √(*d* *g*)", 10.0);
+        assert!(svg.starts_with(
+            "<tspan font-style=\"italic\">v</tspan><tspan dy=\"2.20\" font-size=\"7.20\">z</tspan>"
+        ));
+        assert!(
+            svg.contains("dy=\"-2.20\""),
+            "the line comes back up after a subscript: {svg}"
+        );
+        assert_eq!(plain("*v*_{z} / √(*d* *g*)"), "vz / √(d g)");
+    }
+
+    #[test]
+    fn labels_become_html() {
+        assert_eq!(
+            html("*v*_{z} < 10^{3}"),
+            "<i>v</i><sub>z</sub> &lt; 10<sup>3</sup>"
+        );
+    }
+
+    #[test]
+    fn names_from_files_stay_as_they_are() {
+        assert_eq!(plain(&literal("max_{x}^{2} *a* \\")), "max_{x}^{2} *a* \\");
+        assert_eq!(escape("<a & 'b'>\u{1}"), "&lt;a &amp; &#39;b&#39;&gt;");
+    }
+
+    #[test]
+    fn widths_follow_the_font() {
+        let narrow = width("iiii", 10.0);
+        let wide = width("MMMM", 10.0);
+        assert!(narrow < 0.4 * wide, "{narrow} against {wide}");
+        assert!((width("MM", 20.0) - wide).abs() < 1e-9);
+        assert!(width("a_{bcd}", 10.0) < width("abcd", 10.0));
+    }
+}

@@ -1,0 +1,291 @@
+//! The phases of a settling pair (drafting, kissing, tumbling, separated) and the instants at which
+//! the figures show it.
+
+use crate::run_folder::{Event, Kind};
+
+/// What a pair is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PhaseKind {
+    /// Apart, the one behind catching up (also between two kisses).
+    Drafting,
+    /// In touch, in the order of the start.
+    Kissing,
+    /// In touch, turning about each other.
+    Tumbling,
+    /// Apart after having touched.
+    Separated,
+    /// One or both have reached the floor.
+    Landed,
+}
+
+impl PhaseKind {
+    /// Name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            PhaseKind::Drafting => "drafting",
+            PhaseKind::Kissing => "kissing",
+            PhaseKind::Tumbling => "tumbling",
+            PhaseKind::Separated => "separated",
+            PhaseKind::Landed => "landed",
+        }
+    }
+}
+
+/// A stretch of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Phase {
+    /// What the pair does.
+    pub kind: PhaseKind,
+    /// From [s].
+    pub start: f64,
+    /// To [s].
+    pub end: f64,
+}
+
+/// Phases from the log. `tumble` [s] is when the summary says that the tumbling begins; without it,
+/// the first role change in touch begins it. `end` [s] is the last time of the run.
+pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
+    use PhaseKind::{Drafting, Kissing, Landed, Separated, Tumbling};
+    let mut turns: Vec<(f64, Option<&Kind>)> = events
+        .iter()
+        .map(|event| (event.time, Some(&event.kind)))
+        .collect();
+    if let Some(tumble) = tumble {
+        turns.push((tumble, None));
+    }
+    turns.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut out: Vec<Phase> = Vec::new();
+    let (mut state, mut since) = (Drafting, 0.0);
+    for (time, kind) in turns {
+        let next = match (kind, state) {
+            (_, Landed) => Landed,
+            (Some(Kind::Kiss), Drafting | Separated) => Kissing,
+            (Some(Kind::RoleChange | Kind::Tumble) | None, Kissing) => Tumbling,
+            (Some(Kind::Separation), Kissing | Tumbling) => Separated,
+            (Some(Kind::Landing), _) => Landed,
+            (_, same) => same,
+        };
+        if next != state {
+            let caught_again = state == Separated && next == Kissing;
+            out.push(Phase {
+                kind: if caught_again { Drafting } else { state },
+                start: since,
+                end: time,
+            });
+            (state, since) = (next, time);
+        }
+    }
+    out.push(Phase {
+        kind: state,
+        start: since,
+        end: end.max(since),
+    });
+    out.retain(|phase| phase.end > phase.start);
+    out
+}
+
+/// A named instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instant {
+    /// Time [s].
+    pub time: f64,
+    /// What it shows; empty for an instant that is only a time.
+    pub name: &'static str,
+}
+
+/// The four instants at which a pair is shown: before the kiss, at it, tumbling, and after it has
+/// separated (or at the end). Without a kiss: four even times.
+pub fn pair_instants(phases: &[Phase], events: &[Event], end: f64) -> Vec<Instant> {
+    let of = |kind| phases.iter().find(|phase| phase.kind == kind);
+    let Some(kiss) = of(PhaseKind::Kissing).map(|phase| phase.start) else {
+        return even_instants(end);
+    };
+    let middle = |phase: &Phase| 0.5 * (phase.start + phase.end);
+    let mut out = vec![
+        Instant {
+            time: 0.6 * kiss,
+            name: "drafting",
+        },
+        Instant {
+            time: kiss,
+            name: "kiss",
+        },
+    ];
+    let parted = of(PhaseKind::Separated);
+    let limit = parted.map_or(end, |phase| phase.start);
+    let role = events
+        .iter()
+        .find(|event| event.kind == Kind::RoleChange && event.time > kiss && event.time < limit);
+    if let Some(role) = role {
+        out.push(Instant {
+            time: role.time,
+            name: "role change",
+        });
+    } else if let Some(tumbling) = of(PhaseKind::Tumbling) {
+        out.push(Instant {
+            time: middle(tumbling),
+            name: "tumbling",
+        });
+    } else {
+        out.push(Instant {
+            time: 0.5 * (kiss + limit),
+            name: "in contact",
+        });
+    }
+    let landing = of(PhaseKind::Landed).map_or(end, |phase| phase.start);
+    out.push(match parted {
+        Some(phase) => Instant {
+            time: middle(phase),
+            name: "separated",
+        },
+        None => Instant {
+            time: landing,
+            name: if landing < end { "landing" } else { "end" },
+        },
+    });
+    out
+}
+
+/// Four even times up to `end` [s].
+pub fn even_instants(end: f64) -> Vec<Instant> {
+    (1..=4)
+        .map(|i| Instant {
+            time: end * f64::from(i) / 4.0,
+            name: "",
+        })
+        .collect()
+}
+
+/// Moves each instant to the nearest of the `available` times; what falls on the same time is shown once.
+pub fn snap(instants: &[Instant], available: &[f64]) -> Vec<Instant> {
+    let mut out: Vec<Instant> = Vec::new();
+    for instant in instants {
+        let nearest = available.iter().min_by(|a, b| {
+            (*a - instant.time)
+                .abs()
+                .total_cmp(&(*b - instant.time).abs())
+        });
+        if let Some(time) = nearest.filter(|time| out.iter().all(|other| other.time != **time)) {
+            out.push(Instant {
+                time: *time,
+                name: instant.name,
+            });
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use PhaseKind::*;
+
+    fn log(events: &[(f64, Kind)]) -> Vec<Event> {
+        let event = |(time, kind): &(f64, Kind)| Event {
+            time: *time,
+            kind: kind.clone(),
+            grains: vec![0, 1],
+            details: Vec::new(),
+        };
+        events.iter().map(event).collect()
+    }
+
+    fn kinds(phases: &[Phase]) -> Vec<(PhaseKind, f64, f64)> {
+        phases.iter().map(|p| (p.kind, p.start, p.end)).collect()
+    }
+
+    #[test]
+    fn a_plain_pair() {
+        let events = log(&[
+            (1.0, Kind::Kiss),
+            (2.0, Kind::RoleChange),
+            (3.0, Kind::Separation),
+            (5.0, Kind::Landing),
+        ]);
+        let got = phases(&events, Some(1.5), 6.0);
+        assert_eq!(
+            kinds(&got),
+            [
+                (Drafting, 0.0, 1.0),
+                (Kissing, 1.0, 1.5),
+                (Tumbling, 1.5, 3.0),
+                (Separated, 3.0, 5.0),
+                (Landed, 5.0, 6.0)
+            ]
+        );
+        let names: Vec<_> = pair_instants(&got, &events, 6.0)
+            .iter()
+            .map(|i| (i.name, i.time))
+            .collect();
+        assert_eq!(
+            names,
+            [
+                ("drafting", 0.6),
+                ("kiss", 1.0),
+                ("role change", 2.0),
+                ("separated", 4.0)
+            ]
+        );
+        let got = phases(&events, None, 6.0);
+        assert_eq!(
+            got[2],
+            Phase {
+                kind: Tumbling,
+                start: 2.0,
+                end: 3.0
+            },
+            "a role change begins the tumbling"
+        );
+    }
+
+    #[test]
+    fn a_second_catching_up_is_drafting_again() {
+        let events = log(&[
+            (1.0, Kind::Kiss),
+            (2.0, Kind::Separation),
+            (3.0, Kind::Kiss),
+            (4.0, Kind::Separation),
+        ]);
+        let got: Vec<_> = phases(&events, None, 5.0).iter().map(|p| p.kind).collect();
+        assert_eq!(got, [Drafting, Kissing, Drafting, Kissing, Separated]);
+    }
+
+    #[test]
+    fn no_kiss_and_interrupted_runs() {
+        assert_eq!(kinds(&phases(&[], None, 2.0)), [(Drafting, 0.0, 2.0)]);
+        let early = log(&[(1.0, Kind::RoleChange), (1.5, Kind::Separation)]);
+        assert_eq!(
+            kinds(&phases(&early, None, 2.0)),
+            [(Drafting, 0.0, 2.0)],
+            "nothing to tumble or part without a kiss"
+        );
+        let events = log(&[(1.0, Kind::Kiss)]);
+        let got = phases(&events, None, 2.0);
+        assert_eq!(kinds(&got), [(Drafting, 0.0, 1.0), (Kissing, 1.0, 2.0)]);
+        let names: Vec<_> = pair_instants(&got, &events, 2.0)
+            .iter()
+            .map(|i| (i.name, i.time))
+            .collect();
+        assert_eq!(
+            names,
+            [
+                ("drafting", 0.6),
+                ("kiss", 1.0),
+                ("in contact", 1.5),
+                ("end", 2.0)
+            ]
+        );
+        assert!(phases(&[], None, 0.0).is_empty());
+    }
+
+    #[test]
+    fn instants_move_to_what_was_written() {
+        let instants = even_instants(4.0);
+        let got: Vec<f64> = snap(&instants, &[0.0, 1.1, 3.8])
+            .iter()
+            .map(|i| i.time)
+            .collect();
+        assert_eq!(got, [1.1, 3.8], "two instants on one file are shown once");
+        assert!(snap(&instants, &[]).is_empty());
+    }
+}

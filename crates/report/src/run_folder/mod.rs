@@ -1,0 +1,305 @@
+//! A run folder as it lies on disk: everything a report is made of.
+
+mod events;
+mod facts;
+mod tables;
+mod vtk;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use serde_json::Value;
+
+use crate::error::ReportError;
+
+pub use events::{Event, Kind};
+pub use facts::Facts;
+pub use tables::{History, Table};
+#[cfg(test)]
+pub use vtk::Array;
+pub use vtk::{Image, Surface};
+
+/// A picture file of the run: a slice of the fields or the surface of grains.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameFile {
+    /// The file.
+    pub file: PathBuf,
+    /// Time [s].
+    pub time: f64,
+    /// The grain it belongs to, where its name or content says so.
+    pub grain: Option<usize>,
+}
+
+/// What a run left behind.
+#[derive(Clone, Debug, Default)]
+pub struct RunFolder {
+    /// The folder.
+    pub path: PathBuf,
+    /// The set-up.
+    pub facts: Facts,
+    /// Motion of each grain.
+    pub grains: Vec<History>,
+    /// Diagnostics against time.
+    pub diagnostics: Option<Table>,
+    /// What happened, in order of time.
+    pub events: Vec<Event>,
+    /// The summary, written when the run ended.
+    pub summary: Option<Value>,
+    /// Why the run broke off, if it says so.
+    pub failure: Option<Value>,
+    /// Where the run comes from.
+    pub provenance: Option<Value>,
+    /// Slices in order of time.
+    pub slices: Vec<FrameFile>,
+    /// Surfaces in order of time.
+    pub surfaces: Vec<FrameFile>,
+    /// What was missing or had to be left out.
+    pub notes: Vec<String>,
+}
+
+impl RunFolder {
+    /// Reads the folder. Missing files are noted; damaged tables and logs are errors.
+    pub fn open(path: &Path) -> Result<RunFolder, ReportError> {
+        let mut run = RunFolder {
+            path: path.to_owned(),
+            ..RunFolder::default()
+        };
+        let present = |name: &str| Some(path.join(name)).filter(|file| file.is_file());
+        let known = [
+            "case.resolved.toml",
+            "grains.csv",
+            "diagnostics.csv",
+            "summary.json",
+        ];
+        if !known.iter().any(|name| present(name).is_some()) {
+            return Err(ReportError::NotARun(path.to_owned()));
+        }
+        match present("case.resolved.toml") {
+            Some(file) => run.facts = facts::read_case(&file)?,
+            None => run
+                .notes
+                .push("case.resolved.toml is missing: the set-up is not known".to_owned()),
+        }
+        if let Some(file) = present("summary.json") {
+            let summary = facts::read_json(&file)?;
+            facts::add_summary(&mut run.facts, &summary);
+            run.summary = Some(summary);
+        }
+        if let Some(file) = present("failure.json") {
+            run.failure = Some(facts::read_json(&file)?);
+        }
+        if let Some(file) = present("provenance.json") {
+            run.provenance = Some(facts::read_json(&file)?);
+        }
+        match present("grains.csv") {
+            Some(file) => run.grains = tables::histories(&file, &mut run.notes)?,
+            None if run.facts.grains.is_empty() => {}
+            None => run
+                .notes
+                .push("grains.csv is missing: the motion of the grains is not known".to_owned()),
+        }
+        match present("diagnostics.csv") {
+            Some(file) => run.diagnostics = Some(Table::read(&file, &mut run.notes)?),
+            None => run.notes.push("diagnostics.csv is missing".to_owned()),
+        }
+        if let Some(file) = present("events.jsonl") {
+            run.events = events::read(&file, &mut run.notes)?;
+        }
+        let times = run.collection();
+        run.slices = run.frames("slices", "vti", &times);
+        run.surfaces = run.frames("grains", "vtp", &times);
+        Ok(run)
+    }
+
+    /// Whether the run came to its end: the summary is written last.
+    pub fn finished(&self) -> bool {
+        self.summary.is_some()
+    }
+
+    /// Last time of any table [s].
+    pub fn end(&self) -> f64 {
+        let of_grains = self
+            .grains
+            .iter()
+            .filter_map(|history| history.time.last().copied());
+        let of_diagnostics = self
+            .diagnostics
+            .as_ref()
+            .and_then(|table| table.column("time")?.last().copied());
+        of_grains
+            .chain(of_diagnostics)
+            .filter(|t| t.is_finite())
+            .fold(0.0, f64::max)
+    }
+
+    /// Reads a slice.
+    pub fn slice(&self, frame: &FrameFile) -> Result<Image, String> {
+        vtk::read_image(&frame.file)
+    }
+
+    /// Reads a surface.
+    pub fn surface(&self, frame: &FrameFile) -> Result<Surface, String> {
+        vtk::read_surface(&frame.file)
+    }
+
+    /// A file's path inside the folder.
+    pub fn short_name(&self, file: &Path) -> String {
+        file.strip_prefix(&self.path)
+            .unwrap_or(file)
+            .display()
+            .to_string()
+    }
+
+    /// Edge of the box along a periodic axis [m].
+    pub fn period(&self, axis: usize) -> Option<f64> {
+        let faces = self.facts.boundaries.as_ref()?;
+        let size = self.facts.size?;
+        (faces[axis][0] == "periodic").then_some(size[axis])
+    }
+
+    /// The image of a point that lies in the box.
+    pub fn wrapped(&self, x: DVec3) -> DVec3 {
+        let inside = |axis: usize| match self.period(axis) {
+            Some(period) => {
+                x[axis] - period * ((x[axis] - self.facts.lower[axis]) / period).floor()
+            }
+            None => x[axis],
+        };
+        DVec3::new(inside(0), inside(1), inside(2))
+    }
+
+    fn collection(&mut self) -> BTreeMap<String, f64> {
+        let file = self.path.join("run.pvd");
+        if !file.is_file() {
+            return BTreeMap::new();
+        }
+        vtk::read_collection(&file)
+            .map(BTreeMap::from_iter)
+            .unwrap_or_else(|what| {
+                self.notes
+                    .push(format!("run.pvd could not be read ({what})"));
+                BTreeMap::new()
+            })
+    }
+
+    /// Files of a kind below `folder` with their times: from the collection, else from inside them.
+    fn frames(
+        &mut self,
+        folder: &str,
+        extension: &str,
+        times: &BTreeMap<String, f64>,
+    ) -> Vec<FrameFile> {
+        let Ok(entries) = std::fs::read_dir(self.path.join(folder)) else {
+            return Vec::new();
+        };
+        let mut files: Vec<PathBuf> = entries
+            .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+            .collect();
+        files.retain(|file| file.extension().is_some_and(|e| e == extension));
+        files.sort();
+        let mut out = Vec::new();
+        for file in files {
+            let name = file
+                .file_name()
+                .map(|name| name.to_string_lossy().into_owned())
+                .unwrap_or_default();
+            let listed = times.get(&format!("{folder}/{name}")).copied();
+            let time = listed
+                .map(Ok)
+                .unwrap_or_else(|| time_inside(&file, extension));
+            match time {
+                Ok(time) => out.push(FrameFile {
+                    grain: grain_of_name(&name),
+                    file,
+                    time,
+                }),
+                Err(what) => self
+                    .notes
+                    .push(format!("{folder}/{name} was left out: {what}")),
+            }
+        }
+        out.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.grain.cmp(&b.grain)));
+        out
+    }
+}
+
+fn time_inside(file: &Path, extension: &str) -> Result<f64, String> {
+    let fields = if extension == "vti" {
+        vtk::read_image(file)?.fields
+    } else {
+        vtk::read_surface(file)?.fields
+    };
+    fields
+        .get("TimeValue")
+        .copied()
+        .filter(|t| t.is_finite())
+        .ok_or_else(|| "it does not tell its time".to_owned())
+}
+
+/// The number after "grain" in a file name such as `grain1_000040.vti`.
+fn grain_of_name(name: &str) -> Option<usize> {
+    let rest = name
+        .split("grain")
+        .nth(1)?
+        .trim_start_matches(['_', '-', '.']);
+    let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
+    digits.parse().ok()
+}
+
+fn read_text(file: &Path) -> Result<String, ReportError> {
+    let bytes = std::fs::read(file).map_err(|source| ReportError::Read {
+        file: file.to_owned(),
+        source,
+    })?;
+    String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        ReportError::Line {
+            file: file.to_owned(),
+            line,
+            what: "not text (UTF-8)".to_owned(),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_the_grain() {
+        assert_eq!(grain_of_name("grain1_000040.vti"), Some(1));
+        assert_eq!(grain_of_name("slice_000040_grain_0.vti"), Some(0));
+        assert_eq!(grain_of_name("centre_000040.vti"), None);
+        assert_eq!(grain_of_name("grains_000040.vtp"), None);
+    }
+
+    #[test]
+    fn periodic_axes_wrap() {
+        let mut run = RunFolder::default();
+        run.facts.size = Some(DVec3::new(2.0, 3.0, 4.0));
+        run.facts.lower = DVec3::new(-1.0, 0.0, 0.0);
+        let faces = |word: &str| [word.to_owned(), word.to_owned()];
+        run.facts.boundaries = Some([faces("periodic"), faces("wall"), faces("periodic")]);
+        assert_eq!(
+            run.wrapped(DVec3::new(1.5, 3.5, -0.5)),
+            DVec3::new(-0.5, 3.5, 3.5)
+        );
+        assert_eq!((run.period(0), run.period(1)), (Some(2.0), None));
+    }
+
+    #[test]
+    fn a_folder_without_a_run_is_refused() {
+        let folder = crate::testing::folder();
+        let error = RunFolder::open(&folder).unwrap_err();
+        assert!(matches!(error, ReportError::NotARun(_)), "{error}");
+        std::fs::write(folder.join("summary.json"), "{\n\"steps\": }").unwrap();
+        let error = RunFolder::open(&folder).unwrap_err().to_string();
+        assert!(error.contains("summary.json, line 2"), "{error}");
+        std::fs::write(folder.join("summary.json"), b"{}\n\n\xff").unwrap();
+        let error = RunFolder::open(&folder).unwrap_err().to_string();
+        assert!(error.contains("line 3: not text"), "{error}");
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}

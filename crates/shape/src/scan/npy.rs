@@ -1,0 +1,263 @@
+//! NPY arrays of numbers (numpy.save), indexed [z][y][x].
+//!
+//! Read here rather than by a crate: the header is one line of text, and the crate at hand
+//! multiplies the claimed dimensions without a check and parses them recursively, so that a
+//! hostile header can bring the program down.
+
+use super::volume::{Volume, Voxels, count};
+use crate::error::{Result, ShapeError};
+use crate::limits::ReadLimits;
+use std::path::Path;
+
+/// Longest header that is read [bytes].
+const LONGEST_HEADER: usize = 1 << 16;
+
+pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
+    let malformed = |reason: &str| ShapeError::malformed(path, reason);
+    if !bytes.starts_with(b"\x93NUMPY") {
+        return Err(malformed("it does not begin with the NPY signature"));
+    }
+    let early = || malformed("the NPY header ends early");
+    let version = *bytes.get(6).ok_or_else(early)?;
+    let (length, start) = match (version, bytes.get(8..12)) {
+        (1, Some(b)) => (usize::from(u16::from_le_bytes([b[0], b[1]])), 10),
+        (2 | 3, Some(b)) => (u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize, 12),
+        (_, None) => return Err(early()),
+        _ => return Err(malformed("unknown NPY version")),
+    };
+    if length > LONGEST_HEADER {
+        return Err(malformed("the NPY header is longer than 64 KiB"));
+    }
+    let header = bytes.get(start..start + length).ok_or_else(early)?;
+    let header = std::str::from_utf8(header).map_err(|_| malformed("the header is not text"))?;
+    let header = Header::parse(header)
+        .ok_or_else(|| malformed("the header lacks a readable descr, fortran_order or shape"))?;
+    let [nz, ny, nx] = header.shape[..] else {
+        return Err(ShapeError::Unsupported {
+            path: path.to_owned(),
+            reason: format!(
+                "the array has {} dimensions {:?}; a volume has 3, indexed [z][y][x]",
+                header.shape.len(),
+                header.shape
+            ),
+        });
+    };
+    let voxels = count(path, [nx, ny, nz], limits)?;
+    let dims = [nx as usize, ny as usize, nz as usize];
+    let number = Number::parse(&header.descr).ok_or_else(|| ShapeError::Unsupported {
+        path: path.to_owned(),
+        reason: format!(
+            "values of type {:?}; save whole or floating numbers",
+            header.descr
+        ),
+    })?;
+    let data = &bytes[start + length..];
+    let needed = voxels as u64 * number.width as u64;
+    if (data.len() as u64) < needed {
+        return Err(malformed(&format!(
+            "the header claims {needed} bytes of data, the file has {}",
+            data.len()
+        )));
+    }
+    let data = &data[..needed as usize];
+    // Where voxel n (x fastest) lies in the file.
+    let place = |n: usize| {
+        let (i, j, k) = (n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]);
+        if header.fortran {
+            k + dims[2] * (j + dims[1] * i)
+        } else {
+            n
+        }
+    };
+    let values = (0..voxels).map(|n| number.value(&data[number.width * place(n)..]));
+    if number.kind != b'f' {
+        let labels: Option<Vec<u32>> = values
+            .clone()
+            .map(|v| (v >= 0.0 && v <= f64::from(u32::MAX)).then_some(v as u32))
+            .collect();
+        if let Some(labels) = labels {
+            return Ok(Volume {
+                dims,
+                voxels: Voxels::Labels(labels),
+            });
+        }
+    }
+    Volume::from_numbers(dims, values.map(|v| v as f32).collect())
+}
+
+struct Header {
+    descr: String,
+    fortran: bool,
+    shape: Vec<u64>,
+}
+
+impl Header {
+    /// A line such as {'descr': '<u2', 'fortran_order': False, 'shape': (4, 3, 2), }.
+    fn parse(text: &str) -> Option<Header> {
+        let after = |key: &str| {
+            let at = text
+                .find(&format!("'{key}'"))
+                .or_else(|| text.find(&format!("\"{key}\"")))?;
+            let rest = text[at + key.len() + 2..].trim_start();
+            Some(rest.strip_prefix(':')?.trim_start())
+        };
+        let descr = after("descr")?;
+        let quote = descr.chars().next().filter(|c| matches!(c, '\'' | '"'))?;
+        let descr = descr[1..].split(quote).next()?.to_owned();
+        let fortran = match after("fortran_order")? {
+            rest if rest.starts_with("True") => true,
+            rest if rest.starts_with("False") => false,
+            _ => return None,
+        };
+        let shape = after("shape")?.strip_prefix('(')?.split(')').next()?;
+        let shape = shape
+            .split(',')
+            .map(str::trim)
+            .filter(|n| !n.is_empty())
+            .map(|n| n.trim_end_matches('L').parse().ok())
+            .collect::<Option<Vec<u64>>>()?;
+        Some(Header {
+            descr,
+            fortran,
+            shape,
+        })
+    }
+}
+
+/// A numeric type: byte order, kind (b, i, u, f) and width in bytes.
+struct Number {
+    big: bool,
+    kind: u8,
+    width: usize,
+}
+
+impl Number {
+    fn parse(descr: &str) -> Option<Number> {
+        let [order, kind, width] = *descr.as_bytes() else {
+            return None;
+        };
+        let number = Number {
+            big: match order {
+                b'<' | b'|' | b'=' => false,
+                b'>' => true,
+                _ => return None,
+            },
+            kind,
+            width: usize::from(width.wrapping_sub(b'0')),
+        };
+        match (kind, number.width) {
+            (b'b', 1) | (b'i' | b'u', 1 | 2 | 4 | 8) | (b'f', 4 | 8) => Some(number),
+            _ => None,
+        }
+    }
+
+    /// The number at the head of `bytes`, which hold at least its width.
+    fn value(&self, bytes: &[u8]) -> f64 {
+        let mut raw = [0u8; 8];
+        for (n, byte) in bytes[..self.width].iter().enumerate() {
+            raw[if self.big { self.width - 1 - n } else { n }] = *byte;
+        }
+        let bits = u64::from_le_bytes(raw);
+        match (self.kind, self.width) {
+            (b'f', 4) => f64::from(f32::from_bits(bits as u32)),
+            (b'f', _) => f64::from_bits(bits),
+            (b'i', width) => {
+                let unused = 64 - 8 * width as u32;
+                ((bits << unused) as i64 >> unused) as f64
+            }
+            _ => bits as f64,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(header: &str, data: &[u8]) -> Vec<u8> {
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend_from_slice(&(header.len() as u16).to_le_bytes());
+        bytes.extend_from_slice(header.as_bytes());
+        bytes.extend_from_slice(data);
+        bytes
+    }
+
+    fn open(bytes: &[u8]) -> Result<Volume> {
+        read(Path::new("a.npy"), bytes, &ReadLimits::default())
+    }
+
+    #[test]
+    fn every_type_and_both_orders_are_read() {
+        let header = |descr: &str, fortran: &str| {
+            format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': (1, 2, 3), }}\n")
+        };
+        let expect = Volume::from_labels([3, 2, 1], vec![0, 1, 2, 3, 4, 5]).unwrap();
+        assert_eq!(
+            open(&file(&header("|u1", "False"), &[0, 1, 2, 3, 4, 5])).unwrap(),
+            expect
+        );
+        assert_eq!(
+            open(&file(&header("|u1", "True"), &[0, 3, 1, 4, 2, 5])).unwrap(),
+            expect
+        );
+        let big: Vec<u8> = (0..6u16).flat_map(u16::to_be_bytes).collect();
+        assert_eq!(open(&file(&header(">u2", "False"), &big)).unwrap(), expect);
+        let signed: Vec<u8> = (0..6i64).flat_map(i64::to_le_bytes).collect();
+        assert_eq!(
+            open(&file(&header("<i8", "False"), &signed)).unwrap(),
+            expect
+        );
+        let whole: Vec<u8> = (0..6).flat_map(|v| (v as f32).to_le_bytes()).collect();
+        assert_eq!(
+            open(&file(&header("<f4", "False"), &whole)).unwrap(),
+            expect
+        );
+        let grey: Vec<u8> = (0..6)
+            .flat_map(|v| (f64::from(v) - 0.5).to_le_bytes())
+            .collect();
+        let read = open(&file(&header("<f8", "False"), &grey)).unwrap();
+        assert_eq!(
+            read.voxels,
+            Voxels::Grey(vec![-0.5, 0.5, 1.5, 2.5, 3.5, 4.5])
+        );
+        let negative: Vec<u8> = (-3..3i16).flat_map(i16::to_le_bytes).collect();
+        let read = open(&file(&header("<i2", "False"), &negative)).unwrap();
+        assert_eq!(
+            read.voxels,
+            Voxels::Grey(vec![-3.0, -2.0, -1.0, 0.0, 1.0, 2.0])
+        );
+    }
+
+    #[test]
+    fn damaged_and_absurd_files_are_refused() {
+        let header =
+            |shape: &str| format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+        let huge = open(&file(&header("(1000000, 1000000, 1000000)"), &[]));
+        assert!(matches!(huge, Err(ShapeError::TooLarge { .. })), "{huge:?}");
+        let overflow = open(&file(&header("(4294967296, 4294967296, 4294967296)"), &[]));
+        assert!(matches!(overflow, Err(ShapeError::TooLarge { .. })));
+        let short = open(&file(&header("(2, 2, 2)"), &[0; 31]));
+        assert!(
+            matches!(short, Err(ShapeError::Malformed { .. })),
+            "{short:?}"
+        );
+        let empty = open(&file(&header("(2, 0, 2)"), &[]));
+        assert!(matches!(empty, Err(ShapeError::Malformed { .. })));
+        let flat = open(&file(&header("(2, 2)"), &[0; 16]));
+        assert!(matches!(flat, Err(ShapeError::Unsupported { .. })));
+        let nan: Vec<u8> = [f32::NAN; 8].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let nan = open(&file(&header("(2, 2, 2)"), &nan));
+        assert!(matches!(nan, Err(ShapeError::NotFinite { .. })));
+        let nested = "(".repeat(60_000);
+        assert!(open(&file(&header(&nested), &[])).is_err());
+        let good = file(&header("(2, 2, 2)"), &[0; 32]);
+        for length in 0..good.len() {
+            assert!(open(&good[..length]).is_err());
+        }
+        for at in 0..good.len() - 32 {
+            let mut bad = good.clone();
+            bad[at] = 0xff;
+            let _ = open(&bad);
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! Multi-page TIFF: one page a slice along z, greyscale.
+
+use super::volume::{Volume, Voxels, count};
+use crate::error::{Result, ShapeError};
+use crate::limits::ReadLimits;
+use std::io::Cursor;
+use std::path::Path;
+use tiff::ColorType;
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::tags::Tag;
+
+/// More than any compression that TIFF knows can gain; a page that claims more is a forgery.
+const BEST_RATIO: u64 = 5000;
+
+/// Values gathered over the pages.
+enum Values {
+    Labels(Vec<u32>),
+    Numbers(Vec<f32>),
+}
+
+pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
+    let malformed = |e: &dyn std::fmt::Display| ShapeError::malformed(path, e.to_string());
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| malformed(&e))?;
+    let mut first: Option<(u32, u32, ColorType)> = None;
+    let mut values = Values::Labels(Vec::new());
+    let mut pages = 0u64;
+    loop {
+        let (width, height) = decoder.dimensions().map_err(|e| malformed(&e))?;
+        let color = decoder.colortype().map_err(|e| malformed(&e))?;
+        let bits = match color {
+            ColorType::Gray(bits @ (8 | 16 | 32 | 64)) => bits,
+            other => {
+                return Err(ShapeError::Unsupported {
+                    path: path.to_owned(),
+                    reason: format!(
+                        "page {pages} is {other:?}; convert it to greyscale of 8, 16 or 32 bits"
+                    ),
+                });
+            }
+        };
+        let page = (width, height, color);
+        if *first.get_or_insert(page) != page {
+            return Err(malformed(&format!(
+                "page {pages} is {width} x {height} {color:?}, unlike the first page"
+            )));
+        }
+        count(path, [width.into(), height.into(), pages + 1], limits)?;
+        let size = u64::from(width) * u64::from(height) * u64::from(bits).div_ceil(8);
+        if size > BEST_RATIO.saturating_mul(bytes.len() as u64) {
+            return Err(malformed(&format!(
+                "page {pages} claims {width} x {height} voxels, the file has only {} bytes",
+                bytes.len()
+            )));
+        }
+        let mut own = Limits::default();
+        own.decoding_buffer_size = size as usize;
+        own.intermediate_buffer_size = 1 << 30;
+        own.ifd_value_size = bytes.len();
+        decoder = decoder.with_limits(own);
+        let decoded = decoder
+            .read_image()
+            .map_err(|e| malformed(&format!("page {pages}: {e}")))?;
+        let before = pages * u64::from(width) * u64::from(height);
+        values = append(values, decoded);
+        pages += 1;
+        let after = values.len() as u64;
+        if after != before + u64::from(width) * u64::from(height) {
+            return Err(malformed(&format!("page {} is incomplete", pages - 1)));
+        }
+        if !decoder.more_images() {
+            break;
+        }
+        decoder.next_image().map_err(|e| malformed(&e))?;
+    }
+    check_claimed_slices(path, &mut decoder, pages)?;
+    let (width, height, _) = first.unwrap_or((0, 0, ColorType::Gray(8)));
+    let dims = [width as usize, height as usize, pages as usize];
+    match values {
+        Values::Labels(labels) => Ok(Volume {
+            dims,
+            voxels: Voxels::Labels(labels),
+        }),
+        Values::Numbers(numbers) => Volume::from_numbers(dims, numbers),
+    }
+}
+
+/// ImageJ writes stacks over 4 GiB as one page and the number of slices in the description.
+fn check_claimed_slices(
+    path: &Path,
+    decoder: &mut Decoder<Cursor<&[u8]>>,
+    pages: u64,
+) -> Result<()> {
+    if pages > 1 {
+        return Ok(());
+    }
+    let description = decoder
+        .get_tag_ascii_string(Tag::ImageDescription)
+        .unwrap_or_default();
+    let claimed = description
+        .lines()
+        .find_map(|line| line.trim().strip_prefix("images="))
+        .and_then(|n| n.parse::<u64>().ok());
+    match claimed {
+        Some(claimed) if claimed > 1 => Err(ShapeError::Unsupported {
+            path: path.to_owned(),
+            reason: format!(
+                "the description tells of {claimed} slices but the file has one page \
+                 (ImageJ does so with large stacks); save it as NPY or as a true multi-page TIFF"
+            ),
+        }),
+        _ => Ok(()),
+    }
+}
+
+impl Values {
+    fn len(&self) -> usize {
+        match self {
+            Values::Labels(v) => v.len(),
+            Values::Numbers(v) => v.len(),
+        }
+    }
+}
+
+/// Adds a page; labels give way to plain numbers where a value is no label.
+fn append(values: Values, page: DecodingResult) -> Values {
+    use DecodingResult as Page;
+    fn whole<T: Copy + TryInto<u32>>(values: Values, page: &[T], f: fn(T) -> f32) -> Values {
+        match values {
+            Values::Labels(mut labels) => {
+                let before = labels.len();
+                for v in page {
+                    match (*v).try_into() {
+                        Ok(label) => labels.push(label),
+                        Err(_) => {
+                            labels.truncate(before);
+                            let mut numbers: Vec<f32> = labels.iter().map(|v| *v as f32).collect();
+                            numbers.extend(page.iter().map(|v| f(*v)));
+                            return Values::Numbers(numbers);
+                        }
+                    }
+                }
+                Values::Labels(labels)
+            }
+            Values::Numbers(mut numbers) => {
+                numbers.extend(page.iter().map(|v| f(*v)));
+                Values::Numbers(numbers)
+            }
+        }
+    }
+    fn floats(values: Values, page: impl Iterator<Item = f32>) -> Values {
+        let mut numbers = match values {
+            Values::Labels(labels) => labels.iter().map(|v| *v as f32).collect(),
+            Values::Numbers(numbers) => numbers,
+        };
+        numbers.extend(page);
+        Values::Numbers(numbers)
+    }
+    match page {
+        Page::U8(v) => whole(values, &v, f32::from),
+        Page::U16(v) => whole(values, &v, f32::from),
+        Page::U32(v) => whole(values, &v, |v| v as f32),
+        Page::U64(v) => whole(values, &v, |v| v as f32),
+        Page::I8(v) => whole(values, &v, f32::from),
+        Page::I16(v) => whole(values, &v, f32::from),
+        Page::I32(v) => whole(values, &v, |v| v as f32),
+        Page::I64(v) => whole(values, &v, |v| v as f32),
+        Page::F16(v) => floats(values, v.iter().map(|v| v.to_f32())),
+        Page::F32(v) => floats(values, v.iter().copied()),
+        Page::F64(v) => floats(values, v.iter().map(|v| *v as f32)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tiff::encoder::colortype::{
+        ColorType as Written, Gray8, Gray16, Gray32, Gray32Float, RGB8,
+    };
+    use tiff::encoder::{TiffEncoder, TiffValue};
+
+    fn write<C: Written>(pages: &[&[C::Inner]], width: u32, height: u32) -> Vec<u8>
+    where
+        [C::Inner]: TiffValue,
+    {
+        let mut bytes = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+        for page in pages {
+            encoder.write_image::<C>(width, height, page).unwrap();
+        }
+        bytes.into_inner()
+    }
+
+    fn open(bytes: &[u8]) -> Result<Volume> {
+        read(Path::new("a.tif"), bytes, &ReadLimits::default())
+    }
+
+    #[test]
+    fn all_depths_are_read_page_by_page() {
+        let expect = Volume::from_labels([3, 1, 2], vec![0, 1, 2, 3, 4, 5]).unwrap();
+        assert_eq!(
+            open(&write::<Gray8>(&[&[0, 1, 2], &[3, 4, 5]], 3, 1)).unwrap(),
+            expect
+        );
+        assert_eq!(
+            open(&write::<Gray16>(&[&[0, 1, 2], &[3, 4, 5]], 3, 1)).unwrap(),
+            expect
+        );
+        assert_eq!(
+            open(&write::<Gray32>(&[&[0, 1, 2], &[3, 4, 5]], 3, 1)).unwrap(),
+            expect
+        );
+        let whole: [&[f32]; 2] = [&[0.0, 1.0, 2.0], &[3.0, 4.0, 5.0]];
+        assert_eq!(open(&write::<Gray32Float>(&whole, 3, 1)).unwrap(), expect);
+        let grey = open(&write::<Gray32Float>(&[&[0.5, 1.0]], 2, 1)).unwrap();
+        assert_eq!(grey.voxels, Voxels::Grey(vec![0.5, 1.0]));
+    }
+
+    #[test]
+    fn damaged_and_absurd_files_are_refused() {
+        let colour = open(&write::<RGB8>(&[&[1, 2, 3]], 1, 1));
+        assert!(
+            matches!(colour, Err(ShapeError::Unsupported { .. })),
+            "{colour:?}"
+        );
+        let nan = open(&write::<Gray32Float>(&[&[f32::NAN, 1.0]], 2, 1));
+        assert!(matches!(nan, Err(ShapeError::NotFinite { .. })), "{nan:?}");
+        let good = write::<Gray8>(&[&[7; 64], &[9; 64]], 8, 8);
+        for length in 0..good.len() {
+            assert!(open(&good[..length]).is_err(), "{length} bytes");
+        }
+        // Width and height of 10^6 in the directory of the last page, and everywhere else any
+        // byte at all: refused or read, never a panic.
+        let mut state = 3u64;
+        for at in 0..good.len() {
+            for _ in 0..4 {
+                state = state
+                    .wrapping_mul(6364136223846793005)
+                    .wrapping_add(1442695040888963407);
+                let mut bad = good.clone();
+                bad[at] = (state >> 56) as u8;
+                let _ = open(&bad);
+            }
+        }
+    }
+
+    /// A header that claims a million voxels along every axis.
+    #[test]
+    fn a_million_cubed_is_refused_before_memory_is_asked_for() {
+        for edge in [1_000_000u32, 20_000] {
+            let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+            let entries: [(u16, u32); 8] = [
+                (256, edge),
+                (257, edge),
+                (258, 8),
+                (259, 1),
+                (262, 1),
+                (273, 8),
+                (278, edge),
+                (279, edge),
+            ];
+            bytes.extend_from_slice(&(entries.len() as u16).to_le_bytes());
+            for (tag, value) in entries {
+                bytes.extend_from_slice(&tag.to_le_bytes());
+                bytes.extend_from_slice(&4u16.to_le_bytes());
+                bytes.extend_from_slice(&1u32.to_le_bytes());
+                bytes.extend_from_slice(&value.to_le_bytes());
+            }
+            bytes.extend_from_slice(&0u32.to_le_bytes());
+            let error = open(&bytes).unwrap_err();
+            let expected = if edge > 100_000 {
+                matches!(error, ShapeError::TooLarge { .. })
+            } else {
+                matches!(error, ShapeError::Malformed { .. })
+            };
+            assert!(expected, "{error}");
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! Directions, turns and orientations.
+
+use std::borrow::Cow;
+
+use glam::{DQuat, DVec3};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize, Serializer};
+
+use super::forms::{Forms, Never, deserialize_forms};
+use crate::case::quantity::{Angle, Quantity};
+
+/// A direction of space: "x", "-z", or a vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction(pub DVec3);
+
+impl Forms for Direction {
+    const EXPECTED: &'static str = "x, y, z, -x, -y, -z or a vector such as [1, 0, 1]";
+    type List = [f64; 3];
+    type Table = Never;
+    fn from_word(word: &str) -> Result<Self, String> {
+        let (sign, letter) = match word.strip_prefix('-') {
+            Some(rest) => (-1.0, rest),
+            None => (1.0, word.strip_prefix('+').unwrap_or(word)),
+        };
+        let axis = match letter {
+            "x" => DVec3::X,
+            "y" => DVec3::Y,
+            "z" => DVec3::Z,
+            _ => {
+                return Err(format!(
+                    "unknown direction \"{word}\"; expected {}",
+                    Self::EXPECTED
+                ));
+            }
+        };
+        Ok(Direction(axis * sign))
+    }
+    fn from_list(list: [f64; 3]) -> Result<Self, String> {
+        DVec3::from_array(list)
+            .try_normalize()
+            .map(Direction)
+            .ok_or_else(|| "a direction cannot be zero".into())
+    }
+}
+
+impl Serialize for Direction {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.to_array().serialize(serializer)
+    }
+}
+
+impl JsonSchema for Direction {
+    fn schema_name() -> Cow<'static, str> {
+        "Direction".into()
+    }
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "anyOf": [
+                { "enum": ["x", "y", "z", "-x", "-y", "-z"] },
+                { "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 },
+            ],
+        })
+    }
+}
+
+/// A turn about an axis of space.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Turn {
+    /// Axis.
+    pub axis: Direction,
+    /// Angle, right-handed [rad].
+    pub angle: Quantity<Angle>,
+}
+
+impl Turn {
+    /// As a quaternion.
+    pub fn quaternion(&self) -> DQuat {
+        DQuat::from_axis_angle(self.axis.0, self.angle.si)
+    }
+}
+
+/// Turns in the order in which they are applied.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Turns(pub Vec<Turn>);
+
+impl Turns {
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl Forms for Turns {
+    const EXPECTED: &'static str = "{ axis = \"y\", angle = \"45 deg\" } or a list of such turns";
+    type List = Vec<Turn>;
+    type Table = Turn;
+    fn from_list(list: Vec<Turn>) -> Result<Self, String> {
+        Ok(Turns(list))
+    }
+    fn from_table(turn: Turn) -> Result<Self, String> {
+        Ok(Turns(vec![turn]))
+    }
+}
+
+impl JsonSchema for Turns {
+    fn schema_name() -> Cow<'static, str> {
+        "Turns".into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let turn = generator.subschema_for::<Turn>();
+        json_schema!({ "anyOf": [turn, { "type": "array", "items": turn }] })
+    }
+}
+
+/// Orientation of a grain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Orientation {
+    /// Unit quaternion, body to space.
+    Quaternion(DQuat),
+    /// Directions of the longest, middle and shortest principal axis, one or two of them given.
+    Axes([Option<DVec3>; 3]),
+}
+
+impl Default for Orientation {
+    fn default() -> Self {
+        Orientation::Quaternion(DQuat::IDENTITY)
+    }
+}
+
+/// Table form of `Orientation`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OrientationTable {
+    axis: Option<Direction>,
+    angle: Option<Quantity<Angle>>,
+    long_axis: Option<Direction>,
+    middle_axis: Option<Direction>,
+    short_axis: Option<Direction>,
+}
+
+impl Forms for Orientation {
+    const EXPECTED: &'static str = "a quaternion [w, x, y, z], { axis = \"y\", angle = \"45 deg\" }, or one or two of { long_axis, middle_axis, short_axis }";
+    type List = Vec<f64>;
+    type Table = OrientationTable;
+    fn from_list(list: Vec<f64>) -> Result<Self, String> {
+        let [w, x, y, z] = list[..] else {
+            return Err(format!(
+                "found {} numbers; expected {}",
+                list.len(),
+                Self::EXPECTED
+            ));
+        };
+        let q = DQuat::from_xyzw(x, y, z, w);
+        let norm = q.length_squared();
+        if !(norm.is_finite() && norm > 1e-12) {
+            return Err("a quaternion cannot be zero".into());
+        }
+        // A quaternion that is already of unit length keeps its bits.
+        Ok(Orientation::Quaternion(if (norm - 1.0).abs() < 1e-14 {
+            q
+        } else {
+            q.normalize()
+        }))
+    }
+    fn from_table(table: OrientationTable) -> Result<Self, String> {
+        let axes = [table.long_axis, table.middle_axis, table.short_axis].map(|d| d.map(|d| d.0));
+        match (table.axis, table.angle, axes.iter().flatten().count()) {
+            (Some(axis), Some(angle), 0) => {
+                Ok(Orientation::Quaternion(Turn { axis, angle }.quaternion()))
+            }
+            (None, None, 1 | 2) => Ok(Orientation::Axes(axes)),
+            (None, None, 3) => Err(
+                "give at most two of long_axis, middle_axis and short_axis: they fix the third"
+                    .into(),
+            ),
+            _ => Err(format!("expected {}", Self::EXPECTED)),
+        }
+    }
+}
+
+impl Serialize for Orientation {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Orientation::Quaternion(q) => [q.w, q.x, q.y, q.z].serialize(serializer),
+            Orientation::Axes(axes) => {
+                let names = ["long_axis", "middle_axis", "short_axis"];
+                serializer.collect_map(
+                    names
+                        .iter()
+                        .zip(axes)
+                        .filter_map(|(n, a)| a.map(|a| (n, a.to_array()))),
+                )
+            }
+        }
+    }
+}
+
+impl JsonSchema for Orientation {
+    fn schema_name() -> Cow<'static, str> {
+        "Orientation".into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let (turn, direction) = (
+            generator.subschema_for::<Turn>(),
+            generator.subschema_for::<Direction>(),
+        );
+        json_schema!({
+            "description": Orientation::EXPECTED,
+            "anyOf": [
+                { "type": "array", "items": { "type": "number" }, "minItems": 4, "maxItems": 4 },
+                turn,
+                {
+                    "type": "object",
+                    "properties": { "long_axis": direction, "middle_axis": direction, "short_axis": direction },
+                    "additionalProperties": false,
+                },
+            ],
+        })
+    }
+}
+
+deserialize_forms!(Direction, Turns, Orientation);

@@ -1,0 +1,185 @@
+//! `[fluid]`, `[contact]` and gravity.
+
+use glam::DVec3;
+
+use super::check::Checker;
+use crate::case::estimate::terminal_speed;
+use crate::case::loc::Loc;
+use crate::case::quantity::Quantity;
+use crate::case::raw::{RawContact, RawFluid};
+use crate::dem::{ContactParams, Grain};
+use crate::flow::FluidParams;
+use crate::grid::Mesh;
+
+/// Largest overlap at impact where neither stiffness nor overlap is given [diameters].
+const MAXIMUM_OVERLAP: f64 = 0.01;
+
+/// The fluid; the viscosity is kept as a kinematic one.
+pub(super) fn fluid(check: &mut Checker, raw: &mut Loc<RawFluid>) -> Option<FluidParams> {
+    let density = check.positive(&raw.density, "fluid.density", "the density of the fluid");
+    let span = raw.span.clone();
+    let fluid = &mut raw.value;
+    let kinematic_viscosity = match (&fluid.viscosity, &fluid.kinematic_viscosity) {
+        (Some(mu), None) => check
+            .positive(mu, "fluid.viscosity", "the viscosity")
+            .zip(density)
+            .map(|(mu, rho)| mu / rho),
+        (None, Some(nu)) => check.positive(nu, "fluid.kinematic_viscosity", "the viscosity"),
+        (Some(mu), Some(_)) => {
+            check.fail(
+                mu.span.as_ref(),
+                "fluid.viscosity",
+                "both viscosity and kinematic_viscosity are given",
+                "keep one of them",
+            );
+            None
+        }
+        (None, None) => {
+            check.fail(
+                span.as_ref(),
+                "fluid",
+                "the viscosity is missing",
+                "add viscosity = \"1 mPa s\" or kinematic_viscosity = \"1 cSt\"",
+            );
+            None
+        }
+    };
+    let params = FluidParams {
+        density: density?,
+        kinematic_viscosity: kinematic_viscosity?,
+        body_acceleration: fluid.body_acceleration.si,
+        initial_velocity: fluid.initial_velocity.si,
+        advection: fluid.advection.value,
+    };
+    fluid.viscosity = None;
+    fluid.kinematic_viscosity = Some(Quantity::new(params.kinematic_viscosity).into());
+    Some(params)
+}
+
+/// The contact law; a stiffness that is not given follows from the largest overlap.
+pub(super) fn contact(
+    check: &mut Checker,
+    raw: &mut RawContact,
+    grains: &[Grain],
+    fluid: Option<&FluidParams>,
+    gravity: DVec3,
+    mesh: &Mesh,
+) -> Option<ContactParams> {
+    let before = check.problems.len();
+    let infinite = f64::INFINITY;
+    let tangential_ratio = check.within(
+        &raw.tangential_ratio,
+        "contact.tangential_ratio",
+        0.0,
+        infinite,
+    );
+    let friction = check.within(&raw.friction, "contact.friction", 0.0, infinite);
+    let wall_friction = match &raw.wall_friction {
+        Some(wall) => check.within(wall, "contact.wall_friction", 0.0, infinite),
+        None => friction,
+    };
+    let restitution = check.within(
+        &raw.restitution,
+        "contact.restitution",
+        ContactParams::SMALLEST_RESTITUTION,
+        1.0,
+    );
+    let tangential_damping = check.within(
+        &raw.tangential_damping,
+        "contact.tangential_damping",
+        0.0,
+        infinite,
+    );
+    let global_damping = check.within(&raw.global_damping, "contact.global_damping", 0.0, infinite);
+    let lubrication_gap = check.within(
+        &raw.lubrication_gap,
+        "contact.lubrication_gap",
+        0.0,
+        infinite,
+    );
+    let substeps = check.within(
+        &raw.substeps_per_contact,
+        "contact.substeps_per_contact",
+        5.0,
+        1e6,
+    );
+    let viscosity = fluid.map_or(0.0, |f| f.density * f.kinematic_viscosity);
+    if let Some(gap) = lubrication_gap.filter(|gap| *gap > 0.0 && fluid.is_none()) {
+        check.fail(
+            raw.lubrication_gap.span.as_ref(),
+            "contact.lubrication_gap",
+            format!("a lubrication gap of {gap} m needs a fluid"),
+            "add [fluid] or set lubrication_gap = 0",
+        );
+    }
+    let stiffness = match (&raw.stiffness, &raw.maximum_overlap) {
+        (Some(k), Some(_)) => {
+            check.fail(
+                k.span.as_ref(),
+                "contact.stiffness",
+                "both stiffness and maximum_overlap are given",
+                "keep one of them",
+            );
+            None
+        }
+        (Some(k), None) => check.positive(k, "contact.stiffness", "the stiffness"),
+        (None, Some(overlap)) => check
+            .within(overlap, "contact.maximum_overlap", 1e-6, 0.2)
+            .map(|overlap| stiffness_for(overlap, grains, fluid, gravity, mesh)),
+        (None, None) => Some(stiffness_for(MAXIMUM_OVERLAP, grains, fluid, gravity, mesh)),
+    };
+    if check.problems.len() > before {
+        return None;
+    }
+    let params = ContactParams {
+        normal_stiffness: stiffness?,
+        tangential_ratio: tangential_ratio?,
+        friction: friction?,
+        wall_friction: wall_friction?,
+        restitution: restitution?,
+        tangential_damping: tangential_damping?,
+        global_damping: global_damping?,
+        lubrication_gap: lubrication_gap?,
+        lubrication_viscosity: viscosity,
+        substeps_per_contact: substeps?,
+    };
+    raw.maximum_overlap = None;
+    raw.stiffness = Some(Quantity::new(params.normal_stiffness).into());
+    raw.wall_friction = Some(Quantity::new(params.wall_friction).into());
+    Some(params)
+}
+
+/// Stiffness [N/m] for which no grain that meets a wall at 1.5 times its settling speed (dry: after
+/// falling through the box), or lies on it, overlaps by more than `fraction` of the smallest
+/// equal-volume diameter.
+fn stiffness_for(
+    fraction: f64,
+    grains: &[Grain],
+    fluid: Option<&FluidParams>,
+    gravity: DVec3,
+    mesh: &Mesh,
+) -> f64 {
+    let smallest = grains
+        .iter()
+        .map(|g| g.shape.equivalent_diameter())
+        .fold(f64::INFINITY, f64::min);
+    let overlap = fraction * smallest;
+    let g = gravity.length();
+    let height = (mesh.extent() * gravity.normalize_or_zero()).length();
+    let needed = |grain: &Grain| {
+        let falling = match fluid {
+            Some(fluid) => 1.5 * terminal_speed(grain, fluid, g),
+            None => (2.0 * g * height).sqrt(),
+        };
+        let speed = falling.max(grain.velocity.length());
+        let buoyant = fluid.map_or(0.0, |f| f.density);
+        let weight = (grain.density - buoyant).abs() * grain.shape.volume() * g;
+        ContactParams::stiffness_for_overlap(grain.mass(), speed, overlap).max(weight / overlap)
+    };
+    let stiffness = grains.iter().map(needed).fold(0.0, f64::max);
+    if stiffness > 0.0 {
+        stiffness
+    } else {
+        ContactParams::default().normal_stiffness
+    }
+}

@@ -1,0 +1,199 @@
+//! Checkpoints: the whole state in one file, checksummed, synced, renamed; two are kept.
+//!
+//! Layout: signature, version, length of the record, the record (JSON), the state of the
+//! simulation, SHA-256 of all before it.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::error::{Context, RunError};
+use super::file::{sync_folder, write_whole};
+use super::pvd::Picture;
+use super::tables::Lengths;
+use crate::sim::Simulation;
+use crate::sim::events::TrackerState;
+
+const SIGNATURE: &[u8; 8] = b"GWCKPT\r\n";
+const VERSION: u32 = 1;
+const CHECKSUM: u64 = 32;
+const LARGEST_RECORD: u64 = 1 << 30;
+/// Folder of the checkpoints in a run folder.
+pub const FOLDER: &str = "checkpoint";
+
+/// Everything but the simulation that a run continues from. No wall-clock time stands here, so
+/// that two runs of a case write the same bits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Hash of the case.
+    pub digest: String,
+    /// Simulated time [s].
+    pub time: f64,
+    /// Steps taken.
+    pub steps: u64,
+    /// Lengths of the tables.
+    pub lengths: Lengths,
+    /// Index of the next output of each series.
+    pub next: [u64; 4],
+    /// Pictures written.
+    pub pictures: Vec<Picture>,
+    /// Largest |div u| so far [1/s].
+    pub max_divergence: f64,
+    /// Largest CFL number so far.
+    pub max_cfl: f64,
+    /// Time of the last row of the tables [s].
+    pub last_row: Option<f64>,
+    /// What has happened.
+    pub tracker: TrackerState,
+}
+
+struct Hashed<'a> {
+    out: &'a mut dyn Write,
+    hash: Sha256,
+}
+
+impl Write for Hashed<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write_all(bytes)?;
+        self.hash.update(bytes);
+        Ok(bytes.len())
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+fn name(steps: u64) -> String {
+    format!("step-{steps:010}.ckpt")
+}
+
+/// Checkpoints in a run folder, newest first.
+pub fn list(run: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(run.join(FOLDER))
+        .into_iter()
+        .flatten()
+        .flatten();
+    let mut found: Vec<PathBuf> = entries
+        .map(|e| e.path())
+        .filter(|p| p.extension().is_some_and(|e| e == "ckpt"))
+        .collect();
+    found.sort_by(|a, b| b.cmp(a));
+    found
+}
+
+/// Writes a checkpoint and removes all but the one before it.
+pub(super) fn write(run: &Path, record: &Record, sim: &Simulation) -> Result<(), RunError> {
+    let folder = run.join(FOLDER);
+    let path = folder.join(name(record.steps));
+    let json = serde_json::to_vec(record)
+        .map_err(io::Error::from)
+        .context("write", &path)?;
+    write_whole(&path, true, |out| {
+        let mut hashed = Hashed {
+            out,
+            hash: Sha256::new(),
+        };
+        hashed.write_all(SIGNATURE)?;
+        hashed.write_all(&VERSION.to_le_bytes())?;
+        hashed.write_all(&(json.len() as u64).to_le_bytes())?;
+        hashed.write_all(&json)?;
+        sim.save(&mut hashed)?;
+        let Hashed { out, hash } = hashed;
+        out.write_all(&hash.finalize())
+    })
+    .and_then(|()| sync_folder(&folder))
+    .context("write", &path)?;
+    for old in list(run).into_iter().skip(2) {
+        std::fs::remove_file(&old).context("remove", &old)?;
+    }
+    Ok(())
+}
+
+/// Reads a checkpoint into `sim`, after its checksum has been found right.
+fn read(path: &Path, digest: &str, sim: &mut Simulation) -> Result<Record, String> {
+    let text = |e: io::Error| e.to_string();
+    let mut file = File::open(path).map_err(text)?;
+    let length = file.metadata().map_err(text)?.len();
+    let body = length.checked_sub(CHECKSUM).ok_or("it is cut off")?;
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; 1 << 18];
+    let mut left = body;
+    while left > 0 {
+        let part = buffer
+            .len()
+            .min(usize::try_from(left).unwrap_or(usize::MAX));
+        file.read_exact(&mut buffer[..part]).map_err(text)?;
+        hash.update(&buffer[..part]);
+        left -= part as u64;
+    }
+    let mut checksum = [0; CHECKSUM as usize];
+    file.read_exact(&mut checksum).map_err(text)?;
+    if hash.finalize().as_slice() != checksum {
+        return Err("its checksum does not match: it is damaged or cut off".into());
+    }
+    file.seek(SeekFrom::Start(0)).map_err(text)?;
+    let mut input = BufReader::with_capacity(1 << 18, file);
+    let mut signature = [0; 8];
+    input.read_exact(&mut signature).map_err(text)?;
+    let mut version = [0; 4];
+    input.read_exact(&mut version).map_err(text)?;
+    if &signature != SIGNATURE || u32::from_le_bytes(version) != VERSION {
+        return Err(format!("it is not a checkpoint of version {VERSION}"));
+    }
+    let mut size = [0; 8];
+    input.read_exact(&mut size).map_err(text)?;
+    let size = u64::from_le_bytes(size);
+    if size > LARGEST_RECORD.min(body) {
+        return Err("its record is too long".into());
+    }
+    let mut json = vec![0; size as usize];
+    input.read_exact(&mut json).map_err(text)?;
+    let record: Record = serde_json::from_slice(&json).map_err(|e| e.to_string())?;
+    if record.digest != digest {
+        return Err("it belongs to another case".into());
+    }
+    sim.restore(&mut input).map_err(text)?;
+    if sim.time().to_bits() != record.time.to_bits() || sim.steps() != record.steps {
+        return Err("its record and its state differ".into());
+    }
+    Ok(record)
+}
+
+/// Restores the newest checkpoint that is sound; `note` is told of those that are not. None if
+/// the run has no checkpoint at all.
+///
+/// # Errors
+/// [`RunError::NoCheckpoint`] where there are some and none can be used.
+pub(super) fn restore(
+    run: &Path,
+    digest: &str,
+    sim: &mut Simulation,
+    note: &mut dyn FnMut(&str),
+) -> Result<Option<Record>, RunError> {
+    let mut reasons = Vec::new();
+    for path in list(run) {
+        match read(&path, digest, sim) {
+            Ok(record) => {
+                for reason in &reasons {
+                    note(&format!(
+                        "warning: {reason}; continuing from the checkpoint before it (t = {:.6e} s)",
+                        record.time
+                    ));
+                }
+                return Ok(Some(record));
+            }
+            Err(reason) => reasons.push(format!("{}: {reason}", path.display())),
+        }
+    }
+    if reasons.is_empty() {
+        Ok(None)
+    } else {
+        Err(RunError::NoCheckpoint {
+            folder: run.join(FOLDER),
+            reasons,
+        })
+    }
+}

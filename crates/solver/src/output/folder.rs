@@ -1,0 +1,149 @@
+//! The run folder: what may be started where.
+
+use std::path::{Path, PathBuf};
+
+use super::checkpoint;
+use super::error::{Context, RunError};
+use super::pictures;
+use super::provenance::{self, Provenance};
+use super::summary::Summary;
+
+/// Name of the summary; it is written last.
+pub const SUMMARY: &str = "summary.json";
+/// Name of the case with everything spelled out.
+pub const RESOLVED: &str = "case.resolved.toml";
+
+/// What to do with a run that is already there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Existing {
+    /// Leave it alone and stop.
+    #[default]
+    Refuse,
+    /// Remove it and start over.
+    Replace,
+    /// Go on from its last checkpoint.
+    Resume,
+}
+
+/// What is in a folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Found {
+    /// Nothing.
+    Empty,
+    /// A run that came to its end.
+    Finished,
+    /// A run that did not.
+    Unfinished,
+    /// Something else.
+    Foreign,
+}
+
+pub(super) fn look(folder: &Path) -> Result<Found, RunError> {
+    let entries = match std::fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Found::Empty),
+        Err(error) => return Err(error).context("read", folder),
+    };
+    if Provenance::read(folder).is_some() {
+        return Ok(if folder.join(SUMMARY).is_file() {
+            Found::Finished
+        } else {
+            Found::Unfinished
+        });
+    }
+    // A kill in the first moments leaves a temporary file at most.
+    let foreign = entries
+        .flatten()
+        .any(|e| !e.file_name().to_string_lossy().ends_with(".tmp"));
+    Ok(if foreign {
+        Found::Foreign
+    } else {
+        Found::Empty
+    })
+}
+
+/// Whether a run may go into the folder; nothing is written.
+pub(super) fn admit(folder: &Path, existing: Existing) -> Result<Found, RunError> {
+    let found = look(folder)?;
+    let occupied = |what: &str, remedy: &str| {
+        Err(RunError::Occupied {
+            what: format!("{} {what}", folder.display()),
+            remedy: remedy.into(),
+        })
+    };
+    match (found, existing) {
+        (Found::Foreign, _) => occupied(
+            "is not empty and holds no run of this program",
+            "give another folder with -o",
+        ),
+        (Found::Finished, Existing::Refuse) => occupied(
+            "holds a finished run",
+            "give another folder with -o, or --force to replace it",
+        ),
+        (Found::Unfinished, Existing::Refuse) => occupied(
+            "holds a run that has not finished",
+            "continue it with --resume, give another folder with -o, or --force to start over",
+        ),
+        (Found::Empty, Existing::Resume) => occupied(
+            "holds no run to resume",
+            "leave out --resume, or give the run folder with -o",
+        ),
+        _ => Ok(found),
+    }
+}
+
+/// Removes what a run leaves in its folder, and nothing else.
+pub(super) fn clear(folder: &Path) -> Result<(), RunError> {
+    // The mark of a run folder goes last: a clearing that is cut short can be repeated.
+    let files = [
+        SUMMARY,
+        "failure.json",
+        "run.pvd",
+        "report.html",
+        "grains.csv",
+        "diagnostics.csv",
+        "events.jsonl",
+        RESOLVED,
+        provenance::FILE,
+    ];
+    for name in pictures::FOLDERS
+        .iter()
+        .chain(&[checkpoint::FOLDER, "shapes", "figures"])
+    {
+        remove(&folder.join(name), |p| std::fs::remove_dir_all(p))?;
+    }
+    for name in files {
+        remove(&folder.join(name), |p| std::fs::remove_file(p))?;
+    }
+    Ok(())
+}
+
+fn remove(path: &Path, how: impl Fn(&Path) -> std::io::Result<()>) -> Result<(), RunError> {
+    match how(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).context("remove", path)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Makes the folder and its subfolders.
+pub(super) fn create(folder: &Path) -> Result<(), RunError> {
+    let inner = pictures::FOLDERS
+        .iter()
+        .chain(&[checkpoint::FOLDER, "shapes"])
+        .map(|name| folder.join(name));
+    for path in std::iter::once(PathBuf::from(folder)).chain(inner) {
+        std::fs::create_dir_all(&path).context("create", &path)?;
+    }
+    Ok(())
+}
+
+/// The summary of a finished run.
+pub fn read_summary(folder: &Path) -> Result<Summary, RunError> {
+    let path = folder.join(SUMMARY);
+    let text = std::fs::read_to_string(&path).context("read", &path)?;
+    serde_json::from_str(&text)
+        .map_err(std::io::Error::from)
+        .context("read", &path)
+}
