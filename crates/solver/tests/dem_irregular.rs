@@ -412,3 +412,47 @@ fn irregular_contact_across_a_periodic_face_is_the_same() {
         );
     }
 }
+
+#[test]
+fn pairs_that_are_not_looked_at_do_not_miss_a_contact() {
+    // One long step skips pairs known to be apart and starts its search from the last nearest node;
+    // a hundred short ones look at everything anew.
+    let turn = DQuat::from_scaled_axis(DVec3::new(0.4, -0.2, 0.9));
+    let start = {
+        let mut a = grain(&PEBBLE, DVec3::ZERO, turn);
+        let mut b = grain(&BLOCK, DVec3::new(0.05, 0.01, 0.0), turn.inverse());
+        a.velocity.x = 2.0;
+        a.angular_velocity = DVec3::new(5.0, -20.0, 10.0);
+        b.angular_velocity.y = 30.0;
+        [a, b]
+    };
+    let mass = 1.0 / start.iter().map(|g| 1.0 / g.mass()).sum::<f64>();
+    let mut params = ContactParams {
+        normal_stiffness: 1e5,
+        friction: 0.3,
+        ..Default::default()
+    };
+    // A hundredth of the step is just one sub-step.
+    params.substeps_per_contact = 100.0 * params.contact_time(mass) / 1e-2 * 0.9999;
+    let run = |steps: u32| {
+        let mut grains = start.clone();
+        let mut dynamics = Dynamics::new(params, open_box(1.0));
+        for _ in 0..2 * steps {
+            step(
+                &mut dynamics,
+                &mut grains,
+                DVec3::ZERO,
+                1e-2 / f64::from(steps),
+            );
+        }
+        grains.map(|g| (g.velocity, g.angular_velocity))
+    };
+    let (long, short) = (run(1), run(100));
+    assert!(long[1].0.length() > 0.1, "they met: {}", long[1].0);
+    for (a, b) in long.iter().zip(&short) {
+        assert!(
+            (a.0 - b.0).length() < 1e-9 && (a.1 - b.1).length() < 1e-6,
+            "{a:?} {b:?}"
+        );
+    }
+}

@@ -374,3 +374,52 @@ fn mean_contact_is_the_impulse_of_the_step() {
     }
     assert!(most > 1);
 }
+
+#[test]
+fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
+    // Two equal spheres: F = 6 pi mu R_eq^2 v (1/h - 1/h0), R_eq = R/2, from a prescribed approach.
+    let (radius, viscosity, range) = (1e-3, 0.1, 1e-4);
+    let params = ContactParams {
+        lubrication_gap: range,
+        lubrication_viscosity: viscosity,
+        ..smooth(1e3)
+    };
+    let force = |gap: f64, speed: f64| {
+        let mut grains = [
+            sphere(radius, 2500.0, 1000, DVec3::ZERO),
+            sphere(
+                radius,
+                2500.0,
+                1000,
+                DVec3::new(0.0, 0.0, 2.0 * radius + gap),
+            ),
+        ];
+        grains[0].rotation = Dof::Prescribed(DVec3::ZERO);
+        grains[0].translation = Dof::Prescribed(DVec3::ZERO);
+        grains[1].rotation = Dof::Prescribed(DVec3::ZERO);
+        grains[1].translation = Dof::Prescribed(DVec3::new(0.01, 0.0, -speed));
+        let mut mean = [Load::default(); 2];
+        Dynamics::new(params, open_box(1.0)).advance(&mut grains, &[], 1e-9, &mut mean);
+        assert!((mean[0].force + mean[1].force).length() <= 1e-12 * mean[1].force.length());
+        mean[1].force
+    };
+    let expected = |gap: f64, speed: f64| {
+        let r = 0.5 * radius;
+        6.0 * std::f64::consts::PI * viscosity * r * r * speed * (1.0 / gap - 1.0 / range)
+    };
+    for gap in [5e-6, 2e-5, 8e-5] {
+        for speed in [0.01, -0.02] {
+            let f = force(gap, speed);
+            assert!(
+                (f.z / expected(gap, speed) - 1.0).abs() < 1e-3,
+                "{gap} {speed}: {f}"
+            );
+            assert!(f.truncate().length() < 1e-3 * f.z.abs());
+        }
+    }
+    // Saturated below a hundredth of the range, and gone beyond the range.
+    assert!((force(1e-8, 0.01).z / expected(1e-6, 0.01) - 1.0).abs() < 1e-3);
+    assert_eq!(force(1.1e-4, 0.01), DVec3::ZERO);
+    // An overlap is the spring alone.
+    assert!((force(-1e-5, 0.0).z / (1e3 * 1e-5) - 1.0).abs() < 1e-3);
+}

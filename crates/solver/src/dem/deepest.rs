@@ -104,7 +104,7 @@ pub(super) fn slide(
 fn look_around(surface: &Shape, target: &Target, mut here: Probe, stride: f64) -> Probe {
     const DIRECTIONS: usize = 6;
     const MOST_MOVES: usize = 40;
-    const FINEST: f64 = 0.1;
+    const FINEST: f64 = 0.2;
     let (_, gradient) = surface.distance_and_gradient(here.x);
     let (u, v) = gradient.normalize_or(DVec3::Z).any_orthonormal_pair();
     let around: [DVec3; DIRECTIONS] = std::array::from_fn(|k| {
@@ -152,11 +152,7 @@ mod tests {
         );
         assert!((found.distance + 0.01).abs() < 1e-12, "{}", found.distance);
         let other = Shape::sphere(1.0, 100);
-        let target = Target::Shape {
-            shape: &other,
-            turn: DMat3::IDENTITY,
-            shift: 2.98 * away,
-        };
+        let target = Target::grain(&other, DMat3::IDENTITY, 2.98 * away);
         let start = -2.0 * (away + DVec3::new(0.2, 0.1, -0.1)).normalize();
         let found = slide(
             &ball,

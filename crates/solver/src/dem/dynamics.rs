@@ -1,19 +1,15 @@
 //! Sub-steps of contact and motion.
 
-use std::sync::Arc;
-
-use glam::{DMat3, DVec3, IVec3};
-use grainwake_shape::Shape;
+use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
+use super::actor::{Actor, look_at};
 use super::broad_phase::{Ball, BroadPhase};
 use super::enclosure::Enclosure;
 use super::grain::{Dof, Grain};
 use super::history::{PairKey, Slot, renew};
-use super::law::{Law, Motion, Pair};
-use super::motion::{MidStep, kick, kick_and_drift};
-use super::narrow_phase::Body;
-use super::node_tree::NodeTree;
+use super::law::Law;
+use super::motion::{kick, kick_and_drift};
 use super::params::ContactParams;
 use super::{Contact, Partner};
 use crate::math::Load;
@@ -24,22 +20,6 @@ const SKIN: f64 = 0.01;
 const WORTH_THREADS: usize = 16;
 /// More sub-steps than this in one step are a mistake in the input.
 const MOST_SUBSTEPS: f64 = 1e7;
-
-/// A grain's part in the contact search.
-#[derive(Clone, Debug)]
-struct Actor {
-    shape: Arc<Shape>,
-    tree: Arc<NodeTree>,
-    rotation: DMat3,
-    during: Motion,
-    now: Motion,
-    mid: MidStep,
-    contact: Load,
-    inverse_mass: f64,
-    /// Where it was when the pairs were searched [m], and how far it may go from there.
-    searched: DVec3,
-    margin: f64,
-}
 
 /// Contact law, history and integrator.
 #[derive(Clone, Debug)]
@@ -110,11 +90,32 @@ impl Dynamics {
         if dt.is_nan() || dt <= 0.0 {
             return 0;
         }
-        let load_of = |i: usize| loads.get(i).copied().unwrap_or_default();
-        let damping = self.law.params.global_damping;
         self.follow(grains);
         self.search(grains, loads, dt);
-        self.slots.iter_mut().for_each(|slot| slot.touched = false);
+        let done = if self.slots.len() < WORTH_THREADS {
+            self.run(grains, loads, dt, mean_contact)
+        } else {
+            // Into the pool once, not once for each sub-step: a caller outside it would have to wait
+            // for a worker to wake every time.
+            rayon::scope(|_| self.run(grains, loads, dt, mean_contact))
+        };
+        self.last.clear();
+        self.last
+            .extend(grains.iter().map(|grain| grain.pose.position));
+        self.report(grains);
+        done
+    }
+
+    /// The sub-steps of one step.
+    fn run(
+        &mut self,
+        grains: &mut [Grain],
+        loads: &[Load],
+        dt: f64,
+        mean_contact: &mut [Load],
+    ) -> usize {
+        let load_of = |i: usize| loads.get(i).copied().unwrap_or_default();
+        let damping = self.law.params.global_damping;
         self.touch(grains, 0.0);
         let (mut done, mut left) = (0, dt);
         let mut ahead = self.substeps(left);
@@ -148,53 +149,21 @@ impl Dynamics {
                 );
             }
         }
-        self.last.clear();
-        self.last
-            .extend(grains.iter().map(|grain| grain.pose.position));
-        self.report(grains);
         done
     }
 
-    /// Brings the actors in line with the grains: shapes, and jumps by whole periods.
-    fn follow(&mut self, grains: &[Grain]) {
-        self.actors.truncate(grains.len());
-        // Nothing of the last step may steer this one but what a checkpoint holds.
-        self.actors
-            .iter_mut()
-            .for_each(|actor| actor.contact = Load::default());
-        for (i, grain) in grains.iter().enumerate() {
-            if self
-                .actors
-                .get(i)
-                .is_some_and(|actor| Arc::ptr_eq(&actor.shape, &grain.shape))
-            {
-                continue;
+    /// Brings the actors in line with the grains: prescribed velocities, shapes, and jumps by whole
+    /// periods.
+    fn follow(&mut self, grains: &mut [Grain]) {
+        for grain in grains.iter_mut() {
+            if let Dof::Prescribed(velocity) = grain.translation {
+                grain.velocity = velocity;
             }
-            let known = self
-                .actors
-                .iter()
-                .find(|actor| Arc::ptr_eq(&actor.shape, &grain.shape));
-            let tree = known.map_or_else(
-                || Arc::new(NodeTree::new(&grain.shape)),
-                |actor| actor.tree.clone(),
-            );
-            let actor = Actor {
-                shape: grain.shape.clone(),
-                tree,
-                rotation: DMat3::IDENTITY,
-                during: Motion::default(),
-                now: Motion::default(),
-                mid: MidStep::default(),
-                contact: Load::default(),
-                inverse_mass: 0.0,
-                searched: DVec3::ZERO,
-                margin: 0.0,
-            };
-            match self.actors.get_mut(i) {
-                Some(old) => *old = actor,
-                None => self.actors.push(actor),
+            if let Dof::Prescribed(omega) = grain.rotation {
+                grain.angular_velocity = omega;
             }
         }
+        Actor::cast(&mut self.actors, grains);
         let period = self.enclosure.period();
         let jumps = |i: usize| -> IVec3 {
             let (Some(last), Some(grain)) = (self.last.get(i), grains.get(i)) else {
@@ -211,6 +180,7 @@ impl Dynamics {
         };
         let mut jumped = false;
         for slot in &mut self.slots {
+            slot.begin_step();
             if let Partner::Grain(j) = slot.key.partner {
                 let jump = jumps(slot.key.grain as usize) - jumps(j);
                 slot.key.image = slot.key.image.wrapping_add(jump);
@@ -290,26 +260,7 @@ impl Dynamics {
     /// Contact loads for the poses as they are; `step` [s] is the time since the last look.
     fn touch(&mut self, grains: &[Grain], step: f64) {
         for (grain, actor) in grains.iter().zip(&mut self.actors) {
-            actor.contact = Load::default();
-            actor.rotation = DMat3::from_quat(grain.pose.orientation);
-            (actor.during, actor.now) = if step > 0.0 {
-                (
-                    Motion {
-                        velocity: actor.mid.velocity,
-                        spin: actor.mid.spin,
-                    },
-                    Motion {
-                        velocity: actor.mid.predicted_velocity,
-                        spin: actor.mid.predicted_spin,
-                    },
-                )
-            } else {
-                let motion = Motion {
-                    velocity: grain.velocity,
-                    spin: grain.angular_velocity,
-                };
-                (motion, motion)
-            };
+            actor.observe(grain, step);
         }
         let (actors, law, enclosure) = (&self.actors, &self.law, &self.enclosure);
         let look = |slot: &mut Slot| {
@@ -345,51 +296,4 @@ impl Dynamics {
             });
         }
     }
-}
-
-/// Overlap and loads of one pair.
-fn look_at(
-    slot: &mut Slot,
-    grains: &[Grain],
-    actors: &[Actor],
-    law: &Law,
-    enclosure: &Enclosure,
-    step: f64,
-) {
-    let body = |i: usize, shift: DVec3| Body {
-        shape: &grains[i].shape,
-        tree: &actors[i].tree,
-        rotation: actors[i].rotation,
-        position: grains[i].pose.position + shift,
-    };
-    let i = slot.key.grain as usize;
-    let a = body(i, DVec3::ZERO);
-    let (own, radius) = (&actors[i], 0.5 * a.shape.equivalent_diameter());
-    let mut pair = Pair {
-        apart: DVec3::ZERO,
-        during: [own.during, Motion::default()],
-        now: [own.now, Motion::default()],
-        inverse_mass: own.inverse_mass,
-        radius,
-        wall: true,
-    };
-    let closest = match slot.key.partner {
-        Partner::Grain(j) => {
-            let b = body(j, slot.key.image.as_dvec3() * enclosure.period());
-            let other = 0.5 * b.shape.equivalent_diameter();
-            pair.apart = a.position - b.position;
-            pair.during[1] = actors[j].during;
-            pair.now[1] = actors[j].now;
-            pair.inverse_mass += actors[j].inverse_mass;
-            pair.radius = radius * other / (radius + other);
-            pair.wall = false;
-            slot.patch.of_grains(&a, &b, law.reach())
-        }
-        Partner::Wall { axis, side } => {
-            let face = enclosure.plane(axis as usize, side as usize);
-            let offset = face.distance(a.position);
-            slot.patch.of_wall(&a, face.inward, offset, law.reach())
-        }
-    };
-    law.apply(slot, closest, &pair, step);
 }

@@ -65,11 +65,7 @@ fn closest(owner: &Grain, target: &Target) -> Option<Probe> {
 fn one_way(owner: &Grain, other: &Grain, apart: DVec3) -> f64 {
     let to_other = DMat3::from_quat(other.pose.orientation.conjugate());
     let turn = to_other * DMat3::from_quat(owner.pose.orientation);
-    let target = Target::Shape {
-        shape: &other.shape,
-        turn,
-        shift: to_other * -apart,
-    };
+    let target = Target::grain(&other.shape, turn, to_other * -apart);
     closest(owner, &target).map_or(f64::INFINITY, |probe| probe.distance)
 }
 

@@ -106,16 +106,29 @@ impl Slot {
             outcome: Outcome::default(),
         }
     }
-    /// Forgets everything but the buffers.
-    pub fn clear(&mut self) {
-        self.touched = false;
+    /// Ends the contact and its memory; where it was stays known.
+    pub fn part(&mut self) {
         self.touching = false;
         self.onset = 1.0;
         self.mean = NOTHING;
         self.memory.clear();
-        self.next.clear();
-        self.patch.touches.clear();
+        self.outcome = Outcome {
+            arm: self.outcome.arm,
+            normal: self.outcome.normal,
+            ..Default::default()
+        };
+    }
+    /// Makes ready for another step: nothing but what a checkpoint holds may steer it.
+    pub fn begin_step(&mut self) {
+        self.touched = false;
+        self.patch.forget();
+    }
+    /// Makes ready for another pair; only the buffers stay.
+    fn reuse(&mut self, key: PairKey) {
+        self.part();
+        self.begin_step();
         self.outcome = Outcome::default();
+        self.key = key;
     }
 }
 
@@ -130,23 +143,19 @@ pub(super) fn renew(
     std::mem::swap(slots, old);
     let mut left = old.drain(..).peekable();
     for &key in keys {
-        while let Some(mut gone) = left.next_if(|slot| slot.key < key) {
-            gone.clear();
+        while let Some(gone) = left.next_if(|slot| slot.key < key) {
             spare.push(gone);
         }
         let kept = left.next_if(|slot| slot.key == key);
         slots.push(kept.unwrap_or_else(|| match spare.pop() {
             Some(mut slot) => {
-                slot.key = key;
+                slot.reuse(key);
                 slot
             }
             None => Slot::new(key),
         }));
     }
-    for mut gone in left {
-        gone.clear();
-        spare.push(gone);
-    }
+    spare.extend(left);
 }
 
 #[cfg(test)]

@@ -132,7 +132,7 @@ impl Law {
     /// into `slot.outcome`; moves the memory on.
     pub fn apply(&self, slot: &mut Slot, closest: Option<Closest>, pair: &Pair, step: f64) {
         let Some(mean) = Mean::of(&slot.patch.touches, pair) else {
-            slot.clear();
+            slot.part();
             if let Some(closest) = closest {
                 slot.outcome = self.lubrication(&closest, pair, step);
             }

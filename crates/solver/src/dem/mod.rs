@@ -4,6 +4,7 @@
 //! (`narrow_phase`), the forces (`law`, with the memory of `history`), and the motion (`motion`,
 //! `rotation`) in sub-steps of the contact time.
 
+mod actor;
 mod broad_phase;
 mod deepest;
 mod dynamics;

@@ -22,6 +22,10 @@ const ITERATIONS: usize = 10;
 const MIRROR_MISS: f64 = 0.3;
 /// A patch with more nodes than this is resolved and goes without mirror points.
 const RESOLVED: usize = 128;
+/// Nodes are looked for up to this many spacings, to know how long a pair stays apart.
+const LOOK_AHEAD: f64 = 3.0;
+/// No point of a surface is further than this many spacings from a node.
+const BETWEEN_NODES: f64 = 1.2;
 
 /// A grain (or an image of it) as the contact law sees it.
 #[derive(Clone, Copy)]
@@ -70,26 +74,68 @@ pub(super) struct Found {
     probe: Probe,
 }
 
+/// What the nodes of one grain see of a target.
+struct Scan {
+    /// No point of the surface is nearer than this [m].
+    bound: f64,
+    /// The closest point, if it is nearer than asked.
+    closest: Option<Probe>,
+}
+
+/// The nearest node so far; of equally near ones the first.
+struct Nearest {
+    distance: f64,
+    node: Option<u32>,
+}
+
+impl Nearest {
+    fn offer(&mut self, distance: f64, number: u32) {
+        let tied = distance == self.distance && self.node.is_some_and(|node| number < node);
+        if distance < self.distance || tied {
+            *self = Nearest {
+                distance,
+                node: Some(number),
+            };
+        }
+    }
+}
+
 /// Tests the nodes of `owner` against `target`: penetrating ones go to `found`, in ascending code;
-/// returns the closest point of the surface if it is nearer than `reach` [m].
-fn scan(owner: &Body, target: &Target, reach: f64, found: &mut Vec<Found>) -> Option<Probe> {
+/// looks for the closest point of the surface where it may be nearer than `reach` [m].
+///
+/// `seed` is the nearest node of the last look, if any: it only saves work.
+fn scan(
+    owner: &Body,
+    target: &Target,
+    reach: f64,
+    seed: &mut Option<u32>,
+    found: &mut Vec<Found>,
+) -> Scan {
     found.clear();
     let tree = owner.tree;
     let near = tree.spacing.max(reach);
-    let mut best = (near, None);
+    let mut best = Nearest {
+        distance: LOOK_AHEAD * near,
+        node: None,
+    };
+    if let Some((number, node)) = seed.and_then(|n| Some((n, tree.nodes.get(n as usize)?))) {
+        best.offer(target.distance(node.position), number);
+    }
     let mut index = 0;
     while let Some(blob) = tree.blobs.get(index) {
-        if target.is_beyond(blob.center, blob.radius, near) {
+        // Only penetrating nodes and those nearer than the nearest so far matter.
+        if target.is_beyond(blob.center, blob.radius, best.distance.max(0.0)) {
             index = blob.skip as usize;
             continue;
         }
         if blob.is_leaf(index) {
             for number in blob.nodes.0..blob.nodes.1 {
                 let node = &tree.nodes[number as usize];
-                let distance = target.distance(node.position);
-                if distance < best.0 {
-                    best = (distance, Some(node.position));
-                }
+                let limit = best.distance.max(0.0);
+                let Some(distance) = target.distance_within(node.position, limit) else {
+                    continue;
+                };
+                best.offer(distance, number);
                 if distance < 0.0
                     && let Some(probe) = Probe::at(target, node.position)
                 {
@@ -103,7 +149,18 @@ fn scan(owner: &Body, target: &Target, reach: f64, found: &mut Vec<Found>) -> Op
         }
         index += 1;
     }
-    let start = Probe::at(target, best.1?)?;
+    *seed = best.node;
+    let bound = best.distance - BETWEEN_NODES * tree.spacing;
+    let start = best
+        .node
+        .filter(|_| best.distance < near)
+        .and_then(|number| Probe::at(target, tree.nodes[number as usize].position));
+    let Some(start) = start else {
+        return Scan {
+            bound,
+            closest: None,
+        };
+    };
     let tolerance = 1e-5 * tree.spacing;
     let closest = slide(
         owner.shape,
@@ -124,7 +181,10 @@ fn scan(owner: &Body, target: &Target, reach: f64, found: &mut Vec<Found>) -> Op
             probe: closest,
         });
     }
-    (closest.distance < reach).then_some(closest)
+    Scan {
+        bound,
+        closest: (closest.distance < reach).then_some(closest),
+    }
 }
 
 /// Shares the area of each node with its mirror image in the deepest point, where the surface goes
@@ -171,10 +231,20 @@ fn nearer(a: Option<Closest>, b: Option<Closest>) -> Option<Closest> {
 pub(super) struct Patch {
     /// Penetrating points of the pair, in ascending code.
     pub touches: Vec<Touch>,
+    /// The surfaces are at least this far apart [m]; not positive where that is unknown.
+    pub apart: f64,
+    /// Nearest node of either grain at the last look.
+    seeds: [Option<u32>; 2],
     found: Vec<Found>,
 }
 
 impl Patch {
+    /// Forgets what earlier looks found out about where the pair is near.
+    pub fn forget(&mut self) {
+        self.apart = 0.0;
+        self.seeds = [None; 2];
+    }
+
     fn take(&mut self, second: u32, place: impl Fn(&Probe) -> (DVec3, DVec3)) {
         self.touches.extend(self.found.iter().map(|point| {
             let (arm, normal) = place(&point.probe);
@@ -194,46 +264,51 @@ impl Patch {
     pub fn of_grains(&mut self, a: &Body, b: &Body, reach: f64) -> Option<Closest> {
         self.touches.clear();
         let apart = a.position - b.position;
-        let limit = a.shape.bounding_radius() + b.shape.bounding_radius() + reach;
-        if apart.length_squared() > limit * limit {
+        self.apart = apart.length() - a.shape.bounding_radius() - b.shape.bounding_radius() - reach;
+        if self.apart > 0.0 {
             return None;
         }
         let to_b = b.rotation.transpose();
         let turn = to_b * a.rotation;
-        let in_b = Target::Shape {
-            shape: b.shape,
-            turn,
-            shift: to_b * apart,
-        };
+        let in_b = Target::grain(b.shape, turn, to_b * apart);
+        let first = scan(a, &in_b, reach, &mut self.seeds[0], &mut self.found);
         let place = |p: &Probe| (a.rotation * p.x, -(a.rotation * p.normal));
-        let first = scan(a, &in_b, reach, &mut self.found).map(|p| closest(&p, place(&p)));
+        let nearest = first.closest.map(|p| closest(&p, place(&p)));
         self.take(0, place);
         let shift = -(a.rotation.transpose() * apart);
-        let in_a = Target::Shape {
-            shape: a.shape,
-            turn: turn.transpose(),
-            shift,
-        };
+        let in_a = Target::grain(a.shape, turn.transpose(), shift);
+        let second = scan(b, &in_a, reach, &mut self.seeds[1], &mut self.found);
         let place = |p: &Probe| (b.rotation * p.x - apart, b.rotation * p.normal);
-        let second = scan(b, &in_a, reach, &mut self.found).map(|p| closest(&p, place(&p)));
+        let other = second.closest.map(|p| closest(&p, place(&p)));
         self.take(SECOND, place);
-        nearer(first, second)
+        self.apart = if self.touches.is_empty() {
+            first.bound.max(second.bound) - reach
+        } else {
+            0.0
+        };
+        nearer(nearest, other)
     }
 
     /// The same for a wall with normal `inward` at the distance `offset` [m] from the centroid.
     pub fn of_wall(&mut self, a: &Body, inward: DVec3, offset: f64, reach: f64) -> Option<Closest> {
         self.touches.clear();
-        if offset > a.shape.bounding_radius() + reach {
+        self.apart = offset - a.shape.bounding_radius() - reach;
+        if self.apart > 0.0 {
             return None;
         }
         let target = Target::HalfSpace {
             normal: a.rotation.transpose() * inward,
             offset,
         };
+        let result = scan(a, &target, reach, &mut self.seeds[0], &mut self.found);
         let place = |p: &Probe| (a.rotation * p.x, -inward);
-        let nearest = scan(a, &target, reach, &mut self.found).map(|p| closest(&p, place(&p)));
         self.take(0, place);
-        nearest
+        self.apart = if self.touches.is_empty() {
+            result.bound - reach
+        } else {
+            0.0
+        };
+        result.closest.map(|p| closest(&p, place(&p)))
     }
 }
 

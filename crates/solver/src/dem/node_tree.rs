@@ -4,7 +4,7 @@ use glam::DVec3;
 use grainwake_shape::{Shape, SurfaceNode};
 
 /// Nodes of a blob that is not split further.
-const LEAF: usize = 16;
+const LEAF: usize = 8;
 
 /// A ball that holds a run of nodes, stored in depth-first order.
 #[derive(Clone, Copy, Debug)]
