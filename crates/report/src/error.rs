@@ -34,14 +34,6 @@ pub enum ReportError {
         /// What is wrong.
         what: String,
     },
-    /// A file is damaged as a whole.
-    #[error("{}: {what}", .file.display())]
-    File {
-        /// The file.
-        file: PathBuf,
-        /// What is wrong.
-        what: String,
-    },
     /// A figure could not be turned into pixels.
     #[error("figure {figure} cannot be drawn: {what}")]
     Draw {

@@ -93,57 +93,48 @@ pub struct Instant {
     pub name: &'static str,
 }
 
-/// The four instants at which a pair is shown: before the kiss, at it, tumbling, and after it has
-/// separated (or at the end). Without a kiss: four even times.
-pub fn pair_instants(phases: &[Phase], events: &[Event], end: f64) -> Vec<Instant> {
+/// The four instants at which a pair is shown: before the kiss, at it, at the role change that
+/// follows (else while tumbling), and after both have happened (or at the end). Without a kiss:
+/// before, at the role change and when they were `closest` [s], and afterwards.
+pub fn pair_instants(phases: &[Phase], events: &[Event], closest: f64, end: f64) -> Vec<Instant> {
     let of = |kind| phases.iter().find(|phase| phase.kind == kind);
+    let instant = |time, name| Instant { time, name };
+    let landing = of(PhaseKind::Landed).map_or(end, |phase| phase.start);
+    let role_after = |start: f64| {
+        let mut roles = events.iter().filter(|event| event.kind == Kind::RoleChange);
+        roles
+            .find(|event| event.time >= start && event.time < landing)
+            .map(|event| event.time)
+    };
     let Some(kiss) = of(PhaseKind::Kissing).map(|phase| phase.start) else {
-        return even_instants(end);
+        let mut out = vec![instant(closest, "closest")];
+        out.extend(role_after(0.0).map(|time| instant(time, "role change")));
+        out.sort_by(|a, b| a.time.total_cmp(&b.time));
+        let (first, last) = (out[0].time, out[out.len() - 1].time);
+        out.insert(0, instant(0.6 * first, "drafting"));
+        out.push(instant(0.5 * (last + landing.max(last)), "apart"));
+        return out;
     };
     let middle = |phase: &Phase| 0.5 * (phase.start + phase.end);
-    let mut out = vec![
-        Instant {
-            time: 0.6 * kiss,
-            name: "drafting",
-        },
-        Instant {
-            time: kiss,
-            name: "kiss",
-        },
-    ];
     let parted = of(PhaseKind::Separated);
-    let limit = parted.map_or(end, |phase| phase.start);
-    let role = events
-        .iter()
-        .find(|event| event.kind == Kind::RoleChange && event.time > kiss && event.time < limit);
-    if let Some(role) = role {
-        out.push(Instant {
-            time: role.time,
-            name: "role change",
-        });
-    } else if let Some(tumbling) = of(PhaseKind::Tumbling) {
-        out.push(Instant {
-            time: middle(tumbling),
-            name: "tumbling",
-        });
-    } else {
-        out.push(Instant {
-            time: 0.5 * (kiss + limit),
-            name: "in contact",
-        });
-    }
-    let landing = of(PhaseKind::Landed).map_or(end, |phase| phase.start);
-    out.push(match parted {
-        Some(phase) => Instant {
-            time: middle(phase),
-            name: "separated",
-        },
-        None => Instant {
-            time: landing,
-            name: if landing < end { "landing" } else { "end" },
-        },
-    });
-    out
+    let third = match (role_after(kiss), of(PhaseKind::Tumbling)) {
+        (Some(time), _) => instant(time, "role change"),
+        (None, Some(tumbling)) => instant(middle(tumbling), "tumbling"),
+        (None, None) => instant(
+            0.5 * (kiss + parted.map_or(end, |phase| phase.start)),
+            "in contact",
+        ),
+    };
+    let fourth = match parted {
+        Some(phase) => instant(0.5 * (phase.start.max(third.time) + phase.end), "separated"),
+        None => instant(landing, if landing < end { "landing" } else { "end" }),
+    };
+    vec![
+        instant(0.6 * kiss, "drafting"),
+        instant(kiss, "kiss"),
+        third,
+        fourth,
+    ]
 }
 
 /// Four even times up to `end` [s].
@@ -213,7 +204,7 @@ mod tests {
                 (Landed, 5.0, 6.0)
             ]
         );
-        let names: Vec<_> = pair_instants(&got, &events, 6.0)
+        let names: Vec<_> = pair_instants(&got, &events, 1.2, 6.0)
             .iter()
             .map(|i| (i.name, i.time))
             .collect();
@@ -262,7 +253,7 @@ mod tests {
         let events = log(&[(1.0, Kind::Kiss)]);
         let got = phases(&events, None, 2.0);
         assert_eq!(kinds(&got), [(Drafting, 0.0, 1.0), (Kissing, 1.0, 2.0)]);
-        let names: Vec<_> = pair_instants(&got, &events, 2.0)
+        let names: Vec<_> = pair_instants(&got, &events, 1.2, 2.0)
             .iter()
             .map(|i| (i.name, i.time))
             .collect();
@@ -276,6 +267,46 @@ mod tests {
             ]
         );
         assert!(phases(&[], None, 0.0).is_empty());
+    }
+
+    #[test]
+    fn instants_follow_what_happened() {
+        let names = |events: &[Event], closest: f64, end: f64| -> Vec<(&str, f64)> {
+            let instants = pair_instants(&phases(events, None, end), events, closest, end);
+            instants.iter().map(|i| (i.name, i.time)).collect()
+        };
+        // Passing without a touch.
+        let events = log(&[(2.0, Kind::RoleChange), (8.0, Kind::Landing)]);
+        assert_eq!(
+            names(&events, 4.0, 9.0),
+            [
+                ("drafting", 1.2),
+                ("role change", 2.0),
+                ("closest", 4.0),
+                ("apart", 6.0)
+            ]
+        );
+        assert_eq!(
+            names(&[], 5.0, 9.0),
+            [("drafting", 3.0), ("closest", 5.0), ("apart", 7.0)]
+        );
+        // Roles that change after the grains have parted.
+        let events = log(&[
+            (1.0, Kind::Kiss),
+            (1.1, Kind::Tumble),
+            (1.5, Kind::Separation),
+            (2.0, Kind::RoleChange),
+            (4.0, Kind::Landing),
+        ]);
+        assert_eq!(
+            names(&events, 1.0, 5.0),
+            [
+                ("drafting", 0.6),
+                ("kiss", 1.0),
+                ("role change", 2.0),
+                ("separated", 3.0)
+            ]
+        );
     }
 
     #[test]

@@ -116,7 +116,7 @@ impl Story {
                 time: end,
                 name: "",
             }],
-            Subject::Pair => phases::pair_instants(&phases, &run.events, end),
+            Subject::Pair => phases::pair_instants(&phases, &run.events, closest(run, pair), end),
             Subject::Flow => vec![Instant {
                 time: end,
                 name: "",
@@ -173,6 +173,31 @@ impl Story {
             _ => format!("*t* = {} s", short(time)),
         }
     }
+}
+
+/// When the two grains were closest [s]: their surfaces, or their centres if nothing is known of
+/// the surfaces.
+fn closest(run: &RunFolder, pair: Option<[usize; 2]>) -> f64 {
+    let least = |points: &mut dyn Iterator<Item = (f64, f64)>| {
+        points
+            .filter(|(time, gap)| time.is_finite() && gap.is_finite())
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(time, _)| time)
+    };
+    let surfaces = run.diagnostics.as_ref().and_then(|table| {
+        let (time, gap) = (table.column("time")?, table.column("gap")?);
+        least(&mut time.iter().copied().zip(gap.iter().copied()))
+    });
+    let centres = || {
+        let [a, b] = pair.map(|pair| pair.map(|grain| &run.grains[grain]))?;
+        let line = a
+            .position
+            .iter()
+            .zip(&b.position)
+            .map(|(a, b)| run.nearest(*a - *b).length());
+        least(&mut a.time.iter().copied().zip(line))
+    };
+    surfaces.or_else(centres).unwrap_or(0.0)
 }
 
 /// The Galileo number sqrt(|s - 1| g d^3) / nu of density ratio s.

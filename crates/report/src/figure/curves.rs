@@ -96,15 +96,7 @@ impl Scene<'_> {
         let (a, b) = (&self.run.grains[behind], &self.run.grains[ahead]);
         let (_, factor) = self.story.time_axis();
         let rows = (0..a.len().min(b.len())).filter(|row| a.time[*row] == b.time[*row]);
-        let nearest = |line: DVec3| {
-            let image = |axis: usize| {
-                self.run
-                    .period(axis)
-                    .map_or(0.0, |p| p * (line[axis] / p).round())
-            };
-            line - DVec3::new(image(0), image(1), image(2))
-        };
-        let line = |row: usize| nearest(a.position[row] - b.position[row]);
+        let line = |row: usize| self.run.nearest(a.position[row] - b.position[row]);
         Some(
             rows.map(|row| (a.time[row] * factor, value(line(row))))
                 .collect(),

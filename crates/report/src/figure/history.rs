@@ -151,7 +151,7 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
     }
     if let Some(residual) = points(&["momentum_residual"]) {
         let residual: Points = residual.into_iter().map(|(t, v)| (t, v.abs())).collect();
-        parts.push(format!("momentum of fluid, grains and walls that is not accounted for, relative to the largest term, {} at most", short(peak(&residual))));
+        parts.push(format!("momentum of fluid, grains and walls that a step leaves unaccounted for, as a fraction of the mass of the fluid times its largest velocity, {} at most", short(peak(&residual))));
         panels.extend(log_panel(
             "residual  [–]",
             vec![series(None, residual, style::PURPLE)],

@@ -43,7 +43,7 @@ pub struct Mark {
 const LEFT: f64 = 38.0;
 const RIGHT: f64 = 8.0;
 const ROW: f64 = 9.5;
-const LABEL_ROWS: usize = 3;
+const LABEL_ROWS: usize = 5;
 
 /// Draws the panels over one horizontal axis in a column-wide drawing.
 pub fn stack(x: &Axis, panels: &[Panel], marks: &[Mark]) -> Drawing {
@@ -173,14 +173,8 @@ fn draw_panel(drawing: &mut Drawing, frame: &Frame, x: &Axis, panel: &Panel, ind
     drawing.end_clip();
     for (value, note) in &panel.levels {
         if let Some((_, y)) = frame.at(x, &panel.y, (x.low(), *value)) {
-            drawing.rimmed_label(
-                frame.x + frame.width - 3.0,
-                y - 2.5,
-                Anchor::End,
-                SMALL,
-                style::FAINT,
-                note,
-            );
+            let (left, base) = place_note(frame, x, panel, y, text::width(note, SMALL));
+            drawing.rimmed_label(left, base, Anchor::Start, SMALL, style::FAINT, note);
         }
     }
     let outline = format!("fill=\"none\" stroke=\"{INK}\" stroke-width=\"{HAIR}\"");
@@ -194,6 +188,29 @@ fn draw_panel(drawing: &mut Drawing, frame: &Frame, x: &Axis, panel: &Panel, ind
         &panel.y.label,
         true,
     );
+}
+
+/// Where the note of a level line covers the least of the curves: left end and baseline [pt].
+fn place_note(frame: &Frame, x: &Axis, panel: &Panel, y: f64, width: f64) -> (f64, f64) {
+    let points = panel.series.iter().flat_map(|series| &series.points);
+    let points: Vec<_> = points.filter_map(|p| frame.at(x, &panel.y, *p)).collect();
+    let covered = |left: f64, base: f64| {
+        let inside = |p: &&(f64, f64)| {
+            (left - 2.0..left + width + 2.0).contains(&p.0)
+                && (base - SMALL - 1.0..base + 3.0).contains(&p.1)
+        };
+        points.iter().filter(inside).count()
+    };
+    let room = frame.width - width - 6.0;
+    let ends = [1.0, 0.0, 0.75, 0.25, 0.5].map(|part| frame.x + 3.0 + part * room);
+    let bases = [y - 2.5, y + SMALL + 1.5];
+    let places = ends.iter().flat_map(|left| bases.map(|base| (*left, base)));
+    let inside =
+        |(_, base): &(f64, f64)| *base > frame.y + SMALL && *base < frame.y + frame.height - 1.0;
+    let best = places
+        .filter(inside)
+        .min_by_key(|(left, base)| covered(*left, *base));
+    best.unwrap_or((ends[0], bases[0]))
 }
 
 fn draw_x_axis(drawing: &mut Drawing, frame: &Frame, x: &Axis, labelled: bool) {
@@ -267,12 +284,17 @@ fn draw_marks(
     }
 }
 
-/// Rows for the names of marks such that none overlap: (row, place [pt], name). Names that find no
-/// room are left out; their lines stay.
+/// Rows for the names of marks such that none overlap: (row, place [pt], name). Of marks of one
+/// name in a row only the first is named. Names that find no room are left out; their lines stay.
 fn place_names<'a>(x: &Axis, marks: &'a [Mark], width: f64) -> Vec<(usize, f64, &'a str)> {
     let mut ends = [f64::NEG_INFINITY; LABEL_ROWS];
     let mut out = Vec::new();
+    let mut before = "";
     for mark in marks.iter().filter(|mark| !mark.name.is_empty()) {
+        let repeated = std::mem::replace(&mut before, mark.name.as_str()) == mark.name;
+        if repeated {
+            continue;
+        }
         let Some(place) = x.place(mark.at).filter(|place| (0.0..=1.0).contains(place)) else {
             continue;
         };
@@ -409,7 +431,10 @@ mod tests {
             mark(5.0, "kiss"),
             mark(5.1, "role change"),
             mark(5.2, "separation"),
-            mark(5.3, "one too many"),
+            mark(5.21, "separation"),
+            mark(5.3, "landing"),
+            mark(5.4, "rest"),
+            mark(5.5, "one too many"),
             mark(99.0, "outside"),
         ];
         let placed = place_names(&x, &marks, 200.0);
@@ -418,7 +443,45 @@ mod tests {
                 .iter()
                 .map(|(row, _, name)| (*row, *name))
                 .collect::<Vec<_>>(),
-            [(0, "kiss"), (1, "role change"), (2, "separation")]
+            [
+                (0, "kiss"),
+                (1, "role change"),
+                (2, "separation"),
+                (3, "landing"),
+                (4, "rest")
+            ]
+        );
+    }
+
+    #[test]
+    fn notes_keep_off_the_curves() {
+        let x = Axis::linear("t", 0.0, 10.0, 5, true);
+        let points = (0..=100)
+            .map(|i| (0.1 * f64::from(i), if i < 60 { 1.0 } else { 5.5 }))
+            .collect();
+        let series = Series {
+            name: None,
+            points,
+            colour: INK,
+            dash: None,
+        };
+        let y = Axis::linear("y", 0.0, 10.0, 5, true);
+        let panel = Panel {
+            y,
+            series: vec![series],
+            levels: Vec::new(),
+            height: 100.0,
+        };
+        let frame = Frame {
+            x: 40.0,
+            y: 10.0,
+            width: 200.0,
+            height: 100.0,
+        };
+        let (left, base) = place_note(&frame, &x, &panel, 60.0, 30.0);
+        assert!(
+            left > 200.0 && base > 60.0,
+            "to the right, below the line: {left} {base}"
         );
     }
 

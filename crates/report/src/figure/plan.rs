@@ -95,7 +95,7 @@ impl Plan {
                 true,
             )
         };
-        let across = axis(self.window.low.0, self.window.high.0, width, 24.0);
+        let across = axis(self.window.low.0, self.window.high.0, width, 18.0);
         for (value, name) in &across.ticks {
             let Some(place) = across.place(*value) else {
                 continue;

@@ -1,11 +1,11 @@
 //! A slice of the fields, ready to be drawn: values between cells, grain outlines.
 
 use glam::DVec3;
+use grainwake_solver::output::vti::Image;
 
 use super::contour;
 use super::plan::Window;
 use super::raster::Raster;
-use crate::run_folder::Image;
 
 /// How a plane is looked at: axes 0, 1, 2 are x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,33 +79,40 @@ impl Section {
                 (0..image.cells[across]).map(move |i| row + i * strides[across])
             })
         };
+        if !(image.spacing.min_element() > 0.0
+            && image.spacing.is_finite()
+            && image.origin.is_finite())
+        {
+            return Err("its spacing or origin cannot be used".to_owned());
+        }
         let array = |name: &str, components: usize| {
-            image
+            let found = image
                 .arrays
-                .get(name)
-                .filter(|array| array.components == components)
+                .iter()
+                .find(|a| a.name == name && a.components == components)?;
+            Some(&found.data)
         };
-        let velocity = array("velocity", 3).map(|array| {
+        let velocity = array("velocity", 3).map(|data| {
             let value = |cell: usize| {
-                let v = DVec3::from_slice(&array.values[3 * cell..]);
-                [v[across], v[up], v.length()]
+                let v = [0, 1, 2].map(|axis| f64::from(data[3 * cell + axis]));
+                [v[across], v[up], DVec3::from_array(v).length()]
             };
             order().map(value).collect()
         });
-        let vorticity = array("vorticity", 3).map(|array| {
+        let vorticity = array("vorticity", 3).map(|data| {
             order()
-                .map(|cell| array.values[3 * cell + normal])
+                .map(|cell| f64::from(data[3 * cell + normal]))
                 .collect()
         });
         let solid = array("solid_fraction", 1)
-            .map(|array| order().map(|cell| array.values[cell]).collect());
+            .map(|data| order().map(|cell| f64::from(data[cell])).collect());
         Ok(Section {
             view,
             nx: image.cells[across],
             nz: image.cells[up],
-            lower: view.seen(image.lower),
+            lower: view.seen(image.origin),
             step: view.seen(image.spacing),
-            place: image.lower[normal] + 0.5 * image.spacing[normal],
+            place: image.origin[normal] + 0.5 * image.spacing[normal],
             velocity,
             vorticity,
             solid,
@@ -220,37 +227,36 @@ fn cubic([a, b, c, d]: [f64; 4], t: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run_folder::Array;
+    use grainwake_solver::output::vti::Array;
 
     fn image(ny: usize) -> Image {
-        let scalar = |values: Vec<f64>| Array {
-            components: 1,
-            values,
+        let centre = |i: usize| (i % 8) as f32 + 0.5;
+        let height = |i: usize| (i / 8) as f32 + 0.5;
+        let inside = |i: usize| (centre(i) - 4.0).hypot(height(i) - 3.0) < 1.6;
+        let array = |name: &str, components, data| Array {
+            name: name.to_owned(),
+            components,
+            data,
         };
-        let centre = |i: usize| (i % 8) as f64 + 0.5;
-        let height = |i: usize| (i / 8) as f64 + 0.5;
-        let solid = (0..48)
-            .map(|i| f64::from((centre(i) - 4.0).hypot(height(i) - 3.0) < 1.6))
-            .collect();
-        let velocity = (0..48)
-            .flat_map(|i| [height(i), 0.0, 2.0 * centre(i)])
-            .collect();
-        let arrays = [
-            ("solid_fraction".to_owned(), scalar(solid)),
-            (
-                "velocity".to_owned(),
-                Array {
-                    components: 3,
-                    values: velocity,
-                },
-            ),
-        ];
         Image {
             cells: [8, ny, 6],
             spacing: DVec3::ONE,
-            lower: DVec3::ZERO,
-            arrays: arrays.into(),
-            fields: Default::default(),
+            origin: DVec3::ZERO,
+            time: 0.0,
+            arrays: vec![
+                array(
+                    "solid_fraction",
+                    1,
+                    (0..48).map(|i| f32::from(u8::from(inside(i)))).collect(),
+                ),
+                array(
+                    "velocity",
+                    3,
+                    (0..48)
+                        .flat_map(|i| [height(i), 0.0, 2.0 * centre(i)])
+                        .collect(),
+                ),
+            ],
         }
     }
 

@@ -112,15 +112,11 @@ impl Scene<'_> {
         let Some([a, b]) = self.story.pair else {
             return false;
         };
-        let place = |grain: usize| Some(self.run.grains[grain].pose(time)?.0[view.normal]);
-        let near = |distance: f64| match self.run.period(view.normal) {
-            Some(period) => distance - period * (distance / period).round(),
-            None => distance,
-        };
+        let place = |grain: usize| Some(self.run.grains[grain].pose(time)?.0);
         let diameter = self.run.facts.diameter().unwrap_or(0.0);
         place(a)
             .zip(place(b))
-            .is_some_and(|(a, b)| near(a - b).abs() > 0.25 * diameter)
+            .is_some_and(|(a, b)| self.run.nearest(a - b)[view.normal].abs() > 0.25 * diameter)
     }
 }
 
@@ -143,7 +139,13 @@ fn crop(scene: &Scene, columns: &mut [Column]) {
             .map(|(low, high)| high - low)
             .fold(0.0, f64::max)
     };
-    let width = (8.0 * diameter).max(widest(|p| p.0) + 4.0 * diameter);
+    let box_width = columns
+        .iter()
+        .map(|c| c.window.width())
+        .fold(f64::INFINITY, f64::min);
+    let width = (8.0 * diameter)
+        .max(widest(|p| p.0) + 4.0 * diameter)
+        .min(box_width);
     let height = (1.9 * width).max(widest(|p| p.1) + 5.0 * diameter);
     for column in columns {
         let whole = column.window;

@@ -2,8 +2,9 @@
 
 mod events;
 mod facts;
+mod pvd;
+mod surface;
 mod tables;
-mod vtk;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,14 +12,14 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use serde_json::Value;
 
+use grainwake_solver::output::vti::{self, Image};
+
 use crate::error::ReportError;
 
 pub use events::{Event, Kind};
 pub use facts::Facts;
+pub use surface::Surface;
 pub use tables::{History, Table};
-#[cfg(test)]
-pub use vtk::Array;
-pub use vtk::{Image, Surface};
 
 /// A picture file of the run: a slice of the fields or the surface of grains.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,12 +136,12 @@ impl RunFolder {
 
     /// Reads a slice.
     pub fn slice(&self, frame: &FrameFile) -> Result<Image, String> {
-        vtk::read_image(&frame.file)
+        read_image(&frame.file)
     }
 
     /// Reads a surface.
     pub fn surface(&self, frame: &FrameFile) -> Result<Surface, String> {
-        vtk::read_surface(&frame.file)
+        surface::read(&frame.file)
     }
 
     /// A file's path inside the folder.
@@ -156,6 +157,15 @@ impl RunFolder {
         let faces = self.facts.boundaries.as_ref()?;
         let size = self.facts.size?;
         (faces[axis][0] == "periodic").then_some(size[axis])
+    }
+
+    /// The shortest of a line and its periodic images.
+    pub fn nearest(&self, line: DVec3) -> DVec3 {
+        let part = |axis: usize| match self.period(axis) {
+            Some(period) => line[axis] - period * (line[axis] / period).round(),
+            None => line[axis],
+        };
+        DVec3::new(part(0), part(1), part(2))
     }
 
     /// The image of a point that lies in the box.
@@ -174,7 +184,7 @@ impl RunFolder {
         if !file.is_file() {
             return BTreeMap::new();
         }
-        vtk::read_collection(&file)
+        pvd::read(&file)
             .map(BTreeMap::from_iter)
             .unwrap_or_else(|what| {
                 self.notes
@@ -225,16 +235,16 @@ impl RunFolder {
 }
 
 fn time_inside(file: &Path, extension: &str) -> Result<f64, String> {
-    let fields = if extension == "vti" {
-        vtk::read_image(file)?.fields
-    } else {
-        vtk::read_surface(file)?.fields
+    let time = match extension {
+        "vti" => Some(read_image(file)?.time),
+        _ => surface::read(file)?.time,
     };
-    fields
-        .get("TimeValue")
-        .copied()
-        .filter(|t| t.is_finite())
+    time.filter(|t| t.is_finite())
         .ok_or_else(|| "it does not tell its time".to_owned())
+}
+
+fn read_image(file: &Path) -> Result<Image, String> {
+    vti::read(file).map_err(|error| error.to_string())
 }
 
 /// The number after "grain" in a file name such as `grain1_000040.vti`.
@@ -285,6 +295,10 @@ mod tests {
         assert_eq!(
             run.wrapped(DVec3::new(1.5, 3.5, -0.5)),
             DVec3::new(-0.5, 3.5, 3.5)
+        );
+        assert_eq!(
+            run.nearest(DVec3::new(1.5, 3.5, -0.5)),
+            DVec3::new(-0.5, 3.5, -0.5)
         );
         assert_eq!((run.period(0), run.period(1)), (Some(2.0), None));
     }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DQuat, DVec3};
+use grainwake_solver::output::vti;
 
 pub const D: f64 = 2e-3;
 pub const G: f64 = 9.81;
@@ -167,30 +168,34 @@ fn write_slice(
     value: impl Fn(DVec3) -> Cell,
 ) {
     let [nx, nz] = cells;
-    let (mut u, mut w, mut p, mut s) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut arrays = [
+        ("velocity", 3),
+        ("vorticity", 3),
+        ("pressure", 1),
+        ("solid_fraction", 1),
+    ]
+    .map(|(name, components)| vti::Array {
+        name: name.to_owned(),
+        components,
+        data: Vec::new(),
+    });
     for k in 0..nz {
         for i in 0..nx {
-            let (velocity, vorticity, pressure, solid) =
-                value(DVec3::new((i as f64 + 0.5) * h, y, (k as f64 + 0.5) * h));
-            u.extend(velocity.to_array());
-            w.extend(vorticity.to_array());
-            p.push(pressure);
-            s.push(solid);
+            let (u, w, p, s) = value(DVec3::new((i as f64 + 0.5) * h, y, (k as f64 + 0.5) * h));
+            arrays[0].data.extend(u.as_vec3().to_array());
+            arrays[1].data.extend(w.as_vec3().to_array());
+            arrays[2].data.push(p as f32);
+            arrays[3].data.push(s as f32);
         }
     }
-    let mut out = Appended::new();
-    let arrays = [
-        out.reals("velocity", 3, &u),
-        out.reals("vorticity", 3, &w),
-        out.reals("pressure", 1, &p),
-        out.reals("solid_fraction", 1, &s),
-    ];
-    let origin = y - 0.5 * h;
-    let body = format!(
-        "<ImageData WholeExtent=\"0 {nx} 0 1 0 {nz}\" Origin=\"0 {origin} 0\" Spacing=\"{h} {h} {h}\">\n<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">{time:?}</DataArray></FieldData>\n<Piece Extent=\"0 {nx} 0 1 0 {nz}\"><CellData>\n{}</CellData></Piece></ImageData>",
-        arrays.concat()
-    );
-    std::fs::write(file, out.file("ImageData", &body)).unwrap();
+    let image = vti::Image {
+        cells: [nx, 1, nz],
+        spacing: DVec3::splat(h),
+        origin: DVec3::new(0.0, y - 0.5 * h, 0.0),
+        time,
+        arrays: arrays.to_vec(),
+    };
+    vti::write(file, &image).unwrap();
 }
 
 fn write_surfaces(file: &Path, grains: &[(DVec3, DQuat)], time: f64) {

@@ -1,4 +1,4 @@
-//! VTK XML files with raw appended data: images (`.vti`) and surfaces (`.vtp`).
+//! Surfaces of grains (`.vtp`): VTK XML with ascii or raw appended data.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,26 +8,11 @@ use roxmltree::{Document, Node};
 
 /// Values of one array, component fastest.
 #[derive(Clone, Debug)]
-pub struct Array {
+struct Array {
     /// Numbers for each cell or point.
-    pub components: usize,
+    components: usize,
     /// All numbers.
-    pub values: Vec<f64>,
-}
-
-/// A uniform grid with values at its cells.
-#[derive(Clone, Debug)]
-pub struct Image {
-    /// Cells along x, y, z.
-    pub cells: [usize; 3],
-    /// Cell edges [m].
-    pub spacing: DVec3,
-    /// Lower corner [m].
-    pub lower: DVec3,
-    /// Arrays over the cells, x fastest.
-    pub arrays: BTreeMap<String, Array>,
-    /// Values that belong to the whole file.
-    pub fields: BTreeMap<String, f64>,
+    values: Vec<f64>,
 }
 
 /// A triangulated surface.
@@ -39,59 +24,20 @@ pub struct Surface {
     pub triangles: Vec<[usize; 3]>,
     /// Index of the grain each triangle belongs to, where the file says so.
     pub grains: Option<Vec<usize>>,
-    /// Values that belong to the whole file.
-    pub fields: BTreeMap<String, f64>,
-}
-
-/// Reads an image.
-pub fn read_image(file: &Path) -> Result<Image, String> {
-    let bytes = std::fs::read(file).map_err(|error| error.to_string())?;
-    let (xml, data) = split(&bytes)?;
-    let document = Document::parse(&xml).map_err(|error| format!("not XML: {error}"))?;
-    let reader = Reader::new(&document, "ImageData", data)?;
-    let grid = child(document.root_element(), "ImageData")?;
-    let extent: Vec<i64> = numbers(grid, "WholeExtent")?;
-    let spacing = vector(grid, "Spacing")?;
-    let origin = vector(grid, "Origin")?;
-    let [x0, x1, y0, y1, z0, z1] = extent[..] else {
-        return Err("WholeExtent does not have six numbers".to_owned());
-    };
-    let first = [x0, y0, z0];
-    let mut cells = [0; 3];
-    for (cells, (low, high)) in cells.iter_mut().zip([(x0, x1), (y0, y1), (z0, z1)]) {
-        let size = high.checked_sub(low).filter(|n| (1..=1 << 20).contains(n));
-        *cells = size.ok_or_else(|| format!("WholeExtent '{extent:?}' has no cells or too many"))?
-            as usize;
-    }
-    if !(spacing.min_element() > 0.0 && spacing.is_finite() && origin.is_finite()) {
-        return Err("Spacing or Origin is not usable".to_owned());
-    }
-    let count = cells
-        .iter()
-        .try_fold(1usize, |n, m| n.checked_mul(*m))
-        .ok_or("too many cells")?;
-    let piece = child(grid, "Piece")?;
-    let arrays = reader.arrays(child(piece, "CellData")?, Some(count))?;
-    let lower = origin + spacing * DVec3::from_array(first.map(|i| i as f64));
-    Ok(Image {
-        cells,
-        spacing,
-        lower,
-        arrays,
-        fields: reader.fields(grid)?,
-    })
+    /// Time [s], where the file says so.
+    pub time: Option<f64>,
 }
 
 /// Reads a surface of polygons; polygons of more than three corners are cut into triangles.
-pub fn read_surface(file: &Path) -> Result<Surface, String> {
+pub fn read(file: &Path) -> Result<Surface, String> {
     let bytes = std::fs::read(file).map_err(|error| error.to_string())?;
     let (xml, data) = split(&bytes)?;
     let document = Document::parse(&xml).map_err(|error| format!("not XML: {error}"))?;
-    let reader = Reader::new(&document, "PolyData", data)?;
+    let reader = Reader::new(&document, data)?;
     let grid = child(document.root_element(), "PolyData")?;
     let piece = child(grid, "Piece")?;
     let points = reader
-        .arrays(child(piece, "Points")?, None)?
+        .arrays(child(piece, "Points")?)?
         .into_values()
         .next()
         .ok_or("no points")?;
@@ -106,7 +52,7 @@ pub fn read_surface(file: &Path) -> Result<Surface, String> {
     if points.iter().any(|p| !p.is_finite()) {
         return Err("a point is not finite".to_owned());
     }
-    let polygons = reader.arrays(child(piece, "Polys")?, None)?;
+    let polygons = reader.arrays(child(piece, "Polys")?)?;
     let list = |name: &str| {
         polygons
             .get(name)
@@ -134,11 +80,7 @@ pub fn read_surface(file: &Path) -> Result<Surface, String> {
     }
     let of_cells = child(piece, "CellData")
         .ok()
-        .map(|node| reader.arrays(node, None))
-        .transpose()?;
-    let of_points = child(piece, "PointData")
-        .ok()
-        .map(|node| reader.arrays(node, None))
+        .map(|node| reader.arrays(node))
         .transpose()?;
     let by_cell = of_cells
         .as_ref()
@@ -149,20 +91,11 @@ pub fn read_surface(file: &Path) -> Result<Surface, String> {
                 .map(|polygon| grain.values.get(*polygon).map(|g| *g as usize))
                 .collect::<Option<Vec<_>>>()
         });
-    let by_point = of_points
-        .as_ref()
-        .and_then(|arrays| arrays.get("grain"))
-        .map(|grain| {
-            triangles
-                .iter()
-                .map(|t| grain.values.get(t[0]).map(|g| *g as usize))
-                .collect::<Option<Vec<_>>>()
-        });
     Ok(Surface {
         points,
         triangles,
-        grains: by_cell.or(by_point).flatten(),
-        fields: reader.fields(grid)?,
+        grains: by_cell.flatten(),
+        time: reader.time(grid)?,
     })
 }
 
@@ -199,10 +132,10 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn new(document: &Document, kind: &str, data: &'a [u8]) -> Result<Reader<'a>, String> {
+    fn new(document: &Document, data: &'a [u8]) -> Result<Reader<'a>, String> {
         let root = document.root_element();
-        if root.tag_name().name() != "VTKFile" || root.attribute("type") != Some(kind) {
-            return Err(format!("not a VTK file of type {kind}"));
+        if root.tag_name().name() != "VTKFile" || root.attribute("type") != Some("PolyData") {
+            return Err("not a VTK file of type PolyData".to_owned());
         }
         if root
             .attribute("byte_order")
@@ -219,8 +152,8 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// All arrays below `node`; each must have `count` tuples, if given.
-    fn arrays(&self, node: Node, count: Option<usize>) -> Result<BTreeMap<String, Array>, String> {
+    /// All arrays below `node`.
+    fn arrays(&self, node: Node) -> Result<BTreeMap<String, Array>, String> {
         let mut out = BTreeMap::new();
         for array in node
             .children()
@@ -236,29 +169,20 @@ impl<'a> Reader<'a> {
             let components = components.ok().filter(|n| (1..=16).contains(n));
             let components =
                 components.ok_or_else(|| format!("array '{name}': bad NumberOfComponents"))?;
-            if let Some(count) =
-                count.filter(|count| count.checked_mul(components) != Some(values.len()))
-            {
-                return Err(format!(
-                    "array '{name}': {} values for {count} cells of {components}",
-                    values.len()
-                ));
-            }
             out.insert(name, Array { components, values });
         }
         Ok(out)
     }
 
-    /// First value of every array in the file's FieldData.
-    fn fields(&self, grid: Node) -> Result<BTreeMap<String, f64>, String> {
+    fn time(&self, grid: Node) -> Result<Option<f64>, String> {
         let Ok(node) = child(grid, "FieldData") else {
-            return Ok(BTreeMap::new());
+            return Ok(None);
         };
-        let arrays = self.arrays(node, None)?;
-        Ok(arrays
-            .into_iter()
-            .filter_map(|(name, array)| Some((name, *array.values.first()?)))
-            .collect())
+        let arrays = self.arrays(node)?;
+        let time = arrays
+            .get("TimeValue")
+            .and_then(|array| array.values.first());
+        Ok(time.copied().filter(|time| time.is_finite()))
     }
 
     fn values(&self, array: Node) -> Result<Vec<f64>, String> {
@@ -319,52 +243,18 @@ fn child<'a, 'b>(node: Node<'a, 'b>, name: &str) -> Result<Node<'a, 'b>, String>
         .ok_or_else(|| format!("no <{name}>"))
 }
 
-fn numbers<T: std::str::FromStr>(node: Node, name: &str) -> Result<Vec<T>, String> {
-    let text = node
-        .attribute(name)
-        .ok_or_else(|| format!("no attribute {name}"))?;
-    text.split_whitespace()
-        .map(|v| {
-            v.parse()
-                .map_err(|_| format!("{name}: '{v}' is not a number"))
-        })
-        .collect()
-}
-
-fn vector(node: Node, name: &str) -> Result<DVec3, String> {
-    match numbers(node, name)?[..] {
-        [x, y, z] => Ok(DVec3::new(x, y, z)),
-        _ => Err(format!("{name} does not have three numbers")),
-    }
-}
-
-/// Time of every file that a collection (`run.pvd`) lists, by its path as written there.
-pub fn read_collection(file: &Path) -> Result<Vec<(String, f64)>, String> {
-    let text = std::fs::read_to_string(file).map_err(|error| error.to_string())?;
-    let document = Document::parse(&text).map_err(|error| format!("not XML: {error}"))?;
-    let sets = document
-        .descendants()
-        .filter(|node| node.has_tag_name("DataSet"));
-    Ok(sets
-        .filter_map(|node| {
-            Some((
-                node.attribute("file")?.to_owned(),
-                node.attribute("timestep")?.parse().ok()?,
-            ))
-        })
-        .collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn image_bytes() -> Vec<u8> {
-        let mut out = b"<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<ImageData WholeExtent=\"0 2 3 4 0 2\" Origin=\"0 0 0\" Spacing=\"0.5 0.25 1\">\n<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">0.75</DataArray></FieldData>\n<Piece Extent=\"0 2 3 4 0 2\"><CellData><DataArray type=\"Float32\" Name=\"pressure\" format=\"appended\" offset=\"0\"/></CellData></Piece></ImageData>\n<AppendedData encoding=\"raw\">\n_".to_vec();
-        out.extend(16u64.to_le_bytes());
-        for value in [1.0f32, 2.0, 3.0, 4.0] {
-            out.extend(value.to_le_bytes());
-        }
+    fn appended() -> Vec<u8> {
+        let mut out = b"<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData>\n<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">0.75</DataArray></FieldData>\n<Piece><Points><DataArray type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/></Points>\n<Polys><DataArray type=\"Int32\" Name=\"connectivity\" format=\"appended\" offset=\"44\"/><DataArray type=\"Int32\" Name=\"offsets\" format=\"appended\" offset=\"64\"/></Polys></Piece></PolyData>\n<AppendedData encoding=\"raw\">\n_".to_vec();
+        out.extend(36u64.to_le_bytes());
+        out.extend((0..9).flat_map(|i| (i as f32).to_le_bytes()));
+        out.extend(12u64.to_le_bytes());
+        out.extend([0i32, 1, 2].into_iter().flat_map(i32::to_le_bytes));
+        out.extend(4u64.to_le_bytes());
+        out.extend(3i32.to_le_bytes());
         out.extend(b"\n</AppendedData></VTKFile>\n");
         out
     }
@@ -379,31 +269,27 @@ mod tests {
     }
 
     #[test]
-    fn an_image_is_read_back() {
-        let image = with_file(&image_bytes(), read_image).unwrap();
-        assert_eq!(image.cells, [2, 1, 2]);
-        assert_eq!(image.lower, DVec3::new(0.0, 0.75, 0.0));
-        assert_eq!(image.arrays["pressure"].values, [1.0, 2.0, 3.0, 4.0]);
-        assert_eq!(image.fields["TimeValue"], 0.75);
+    fn a_surface_is_read_back() {
+        let surface = with_file(&appended(), read).unwrap();
+        assert_eq!(surface.points[1], DVec3::new(3.0, 4.0, 5.0));
+        assert_eq!(
+            (surface.triangles.as_slice(), surface.time),
+            (&[[0, 1, 2]][..], Some(0.75))
+        );
+        assert!(surface.grains.is_none());
     }
 
     #[test]
     fn no_damage_brings_the_reader_down() {
-        let whole = image_bytes();
-        for cut in 0..whole.len() - 40 {
-            assert!(
-                with_file(&whole[..cut], read_image).is_err(),
-                "cut at {cut}"
-            );
+        let whole = appended();
+        for cut in 0..whole.len() - 30 {
+            assert!(with_file(&whole[..cut], read).is_err(), "cut at {cut}");
         }
         let text = String::from_utf8_lossy(&whole).into_owned();
-        let refused = |from: &str, to: &str| {
-            with_file(text.replace(from, to).as_bytes(), read_image).unwrap_err()
-        };
-        assert!(refused("0 2 3 4 0 2", "0 999999999999 3 4 0 2").contains("too many"));
-        assert!(refused("Spacing=\"0.5", "Spacing=\"-1").contains("not usable"));
+        let refused =
+            |from: &str, to: &str| with_file(text.replace(from, to).as_bytes(), read).unwrap_err();
         assert!(refused("Float32", "Float16").contains("'Float16' is not read"));
-        assert!(refused("ImageData", "PolyData").contains("not a VTK file of type ImageData"));
+        assert!(refused("PolyData", "ImageData").contains("not a VTK file of type PolyData"));
         assert!(refused("offset=\"0\"", "offset=\"99\"").contains("cut off"));
     }
 
@@ -414,12 +300,12 @@ mod tests {
             <Points><DataArray type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 1 1 0 0 1 0</DataArray></Points>\
             <Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 3 0 1 3</DataArray>\
             <DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4 7</DataArray></Polys></Piece></PolyData></VTKFile>";
-        let surface = with_file(text.as_bytes(), read_surface).unwrap();
+        let surface = with_file(text.as_bytes(), read).unwrap();
         assert_eq!(surface.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 3]]);
         assert_eq!(surface.grains, Some(vec![5, 5, 6]));
         let outside = text.replace("0 1 2 3 0 1 3", "0 1 2 9 0 1 3");
         assert!(
-            with_file(outside.as_bytes(), read_surface)
+            with_file(outside.as_bytes(), read)
                 .unwrap_err()
                 .contains("not there")
         );
