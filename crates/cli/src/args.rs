@@ -22,6 +22,8 @@ pub enum Command {
     Check(CheckArgs),
     /// Make and look at grain shapes
     Grain(GrainArgs),
+    /// Compare with experiments, closed forms and published computations
+    Validate(ValidateArgs),
     /// Draw the figures and the page of a run folder
     Report(ReportArgs),
     /// Measure speed and memory of the solver on this machine
@@ -75,6 +77,37 @@ pub struct CheckArgs {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `validate`.
+#[derive(Debug, Args)]
+pub struct ValidateArgs {
+    /// Validations, by name; all if none is given
+    pub names: Vec<String>,
+    /// How much: small runs, or all at the published resolutions
+    #[arg(long, default_value = "ci", value_parser = ["ci", "full"])]
+    pub level: String,
+    /// Folder of the validations
+    #[arg(long, value_name = "DIR", default_value = "validation")]
+    pub suites: PathBuf,
+    /// Folder of the runs
+    #[arg(short, long, value_name = "DIR", default_value = "runs/validation")]
+    pub output: PathBuf,
+    /// Keep what is already there of the same cases and program
+    #[arg(long)]
+    pub resume: bool,
+    /// List the validations and their runs, and run nothing
+    #[arg(long)]
+    pub list: bool,
+    /// Threads; 0 takes all cores
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// No progress, only the table and problems
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print a JSON list of the results; everything else goes to standard error
     #[arg(long)]
     pub json: bool,
 }

@@ -9,6 +9,7 @@ mod progress;
 mod report;
 mod run;
 mod threads;
+mod validate;
 
 use std::io::Write;
 
@@ -23,6 +24,7 @@ fn main() -> std::process::ExitCode {
         Command::Run(args) => run::run(args),
         Command::Check(args) => check::check(args),
         Command::Grain(args) => grain::grain(args),
+        Command::Validate(args) => validate::validate(args),
         Command::Report(args) => report::report(args),
         Command::Bench(args) => bench::bench(args),
         Command::Schema => print(&format!("{:#}", grainwake_solver::case::schema())),

@@ -20,6 +20,7 @@ mod testing;
 use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
+pub use run_folder::Table;
 
 use figure::Figure;
 use run_folder::RunFolder;

@@ -103,9 +103,16 @@ impl Boundaries {
                         layout.map_layer(q, axis, inner, ghost, |value| value)
                     }
                     Boundary::Wall { velocity: given } | Boundary::Inflow { velocity: given } => {
-                        layout.map_layer(q, axis, inner, ghost, |value| {
-                            2.0 * given[component] - value
-                        });
+                        // A parabola through the wall: the shear at the wall is of second order.
+                        let wall = given[component];
+                        if n == 1 {
+                            layout.map_layer(q, axis, inner, ghost, |near| 2.0 * wall - near);
+                        } else {
+                            let next = if side == 0 { 2 } else { n - 1 };
+                            layout.map_layers(q, axis, [inner, next], ghost, |[near, next]| {
+                                (8.0 * wall - 6.0 * near + next) / 3.0
+                            });
+                        }
                     }
                     Boundary::Slip | Boundary::FreeSurface | Boundary::Outflow => {
                         layout.map_layer(q, axis, inner, ghost, |value| value);
