@@ -156,6 +156,8 @@ pub enum GrainCommand {
     FromMesh(FromMeshArgs),
     /// A grain of closed form
     Make(MakeArgs),
+    /// Grains of given sphericity and roundness, one for each pair
+    Family(FamilyArgs),
     /// Sizes and morphology of a grain file
     Info(InfoArgs),
 }
@@ -228,6 +230,41 @@ pub struct FromScanArgs {
     /// Where the grain goes; a folder for several grains.
     #[command(flatten)]
     pub new: NewGrain,
+}
+
+/// Arguments of `grain family`.
+#[derive(Debug, Args)]
+pub struct FamilyArgs {
+    /// Krumbein sphericities, 0.3 to 0.97: the rows
+    #[arg(long, value_delimiter = ',', required = true, value_name = "S,...")]
+    pub sphericity: Vec<f64>,
+    /// Wadell roundnesses, 0.05 to 0.95: the columns
+    #[arg(long, value_delimiter = ',', required = true, value_name = "R,...")]
+    pub roundness: Vec<f64>,
+    /// Flatness c/b, 0.2 to 1
+    #[arg(long, default_value_t = 0.8, value_name = "RATIO")]
+    pub flatness: f64,
+    /// The same seed gives the same grains
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// Diameter of the sphere of equal volume, the same for all
+    #[arg(long, default_value = "2 mm", value_name = "LENGTH")]
+    pub equivalent_diameter: String,
+    /// Folder for 01.grain, 02.grain, ... (row by row), table.csv and sheet.png
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Surface nodes [default: one in every (diameter / 20)^2 of surface]
+    #[arg(long, value_name = "N")]
+    pub nodes: Option<usize>,
+    /// Cells of the distance field across the longest extent, at least
+    #[arg(long, value_name = "N")]
+    pub cells: Option<usize>,
+    /// Replace files that are there
+    #[arg(long)]
+    pub force: bool,
+    /// Print one JSON object for each grain
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `grain make`.
