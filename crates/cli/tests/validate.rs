@@ -121,6 +121,21 @@ fn what_holds_is_said_and_json_has_the_stable_names() {
 }
 
 #[test]
+fn saved_results_are_replaced_run_by_run() {
+    let (folder, _) = suites(SUITE);
+    let save = ["--save", "kept"];
+    validate(folder.path(), &save).success();
+    validate(folder.path(), &save).success();
+    let text = std::fs::read_to_string(folder.path().join("kept/ci.json")).unwrap();
+    let saved: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(saved["results"].as_array().unwrap().len(), 4);
+    assert_eq!(saved["runs"].as_array().unwrap().len(), 1);
+    let steps = saved["runs"][0]["steps"].as_u64().unwrap();
+    let page = std::fs::read_to_string(folder.path().join("kept/ci.md")).unwrap();
+    assert!(page.contains(&format!("| fall/fall | {steps} |")), "{page}");
+}
+
+#[test]
 fn what_falls_short_is_exit_code_1_and_another_run_can_be_the_reference() {
     let (folder, _) = suites(SUITE);
     validate(folder.path(), &["--level", "full"])
