@@ -5,17 +5,21 @@ use crate::error::{Result, ShapeError};
 use std::path::Path;
 
 /// Columns after the name of the grain.
-const COLUMNS: [&str; 15] = [
+const COLUMNS: [&str; 19] = [
     "volume_m3",
     "equivalent_diameter_m",
     "a_m",
     "b_m",
     "c_m",
+    "feret_long_m",
+    "feret_middle_m",
+    "feret_short_m",
     "elongation",
     "flatness",
     "krumbein_sphericity",
     "wadell_sphericity",
     "wadell_roundness",
+    "inscribed_radius_m",
     "convexity",
     "surface_area_m2",
     "inertia_x_m5",
@@ -37,11 +41,15 @@ pub fn write_table(path: &Path, rows: &[(String, Record)]) -> Result<()> {
             Some(r.a_m),
             Some(r.b_m),
             Some(r.c_m),
+            r.feret_m.map(|l| l[0]),
+            r.feret_m.map(|l| l[1]),
+            r.feret_m.map(|l| l[2]),
             Some(r.elongation),
             Some(r.flatness),
             Some(r.krumbein_sphericity),
             Some(r.wadell_sphericity),
             r.wadell_roundness,
+            r.inscribed_radius_m,
             r.convexity,
             Some(r.surface_area_m2),
             Some(r.inertia_m5[0]),

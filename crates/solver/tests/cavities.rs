@@ -13,7 +13,7 @@ use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::{Setup, Simulation, StepRule};
 
-/// Runs a cavity until the kinetic energy changes by less than 1e-6 of itself in a unit of time.
+/// Runs a cavity until the kinetic energy changes by less than 1e-5 of itself in a unit of time.
 fn steady(reynolds: f64, cells: [usize; 3], y: [Boundary; 2]) -> Simulation {
     let wall = [Boundary::WALL; 2];
     let lid = Boundary::Wall { velocity: DVec3::X };
@@ -50,7 +50,7 @@ fn steady(reynolds: f64, cells: [usize; 3], y: [Boundary; 2]) -> Simulation {
         }
         next += 1.0;
         let energy = simulation.diagnostics().fluid_kinetic_energy;
-        if (energy - before).abs() < 1e-6 * energy {
+        if (energy - before).abs() < 1e-5 * energy {
             return simulation;
         }
         before = energy;

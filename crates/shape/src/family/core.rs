@@ -4,6 +4,7 @@
 //! or the point where three meet, so its distance is exact. Eroding the body by r takes r off
 //! every radius; growing it by a ball of radius r puts r between the distance and the surface.
 
+use crate::inscribed::deepest;
 use glam::DVec3;
 
 /// Points that violate a ball by less than this share of the largest radius still count as in it.
@@ -191,10 +192,8 @@ impl Core {
     }
 }
 
-/// Centre and radius of the largest ball in an intersection of balls, by the ellipsoid method
-/// (Shor; Yudin and Nemirovski 1976) from a ball that holds the answer: the depth is concave.
+/// Centre and radius of the largest ball in an intersection of balls.
 pub(super) fn inscribed(balls: &[Ball], start: DVec3, reach: f64) -> (DVec3, f64) {
-    const ROUNDS: usize = 700;
     let depth = |x: DVec3| {
         balls
             .iter()
@@ -206,26 +205,7 @@ pub(super) fn inscribed(balls: &[Ball], start: DVec3, reach: f64) -> (DVec3, f64
             .min_by(|p, q| p.0.total_cmp(&q.0))
             .unwrap_or((f64::NEG_INFINITY, DVec3::X))
     };
-    let mut x = start;
-    let mut shape = glam::DMat3::IDENTITY * (reach * reach);
-    let mut best = (x, depth(x).0);
-    for _ in 0..ROUNDS {
-        let (value, uphill) = depth(x);
-        if value > best.1 {
-            best = (x, value);
-        }
-        let stretched = shape * uphill;
-        let squared = uphill.dot(stretched);
-        if squared <= 0.0 {
-            break;
-        }
-        let step = stretched / squared.sqrt();
-        // The centre of the smallest ellipsoid around the half that may hold the maximum.
-        x += step / 4.0;
-        let outer = glam::DMat3::from_cols(step * step.x, step * step.y, step * step.z);
-        shape = (shape - outer * 0.5) * (9.0 / 8.0);
-    }
-    best
+    deepest(depth, start, reach, 700)
 }
 
 #[cfg(test)]
