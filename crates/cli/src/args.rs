@@ -24,7 +24,9 @@ pub enum Command {
     Grain(GrainArgs),
     /// Compare with experiments, closed forms and published computations
     Validate(ValidateArgs),
-    /// Draw the figures and the page of a run folder
+    /// Run all models of a study: what is missing, from where it stopped
+    Study(StudyArgs),
+    /// Draw the figures and the page of a run folder or a study folder
     Report(ReportArgs),
     /// Measure speed and memory of the solver on this machine
     Bench(BenchArgs),
@@ -115,10 +117,50 @@ pub struct ValidateArgs {
     pub json: bool,
 }
 
+/// Arguments of `study`.
+#[derive(Debug, Args)]
+pub struct StudyArgs {
+    /// Study file
+    pub study: PathBuf,
+    /// Study folder [default: runs/NAME]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Runs at once
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub jobs: usize,
+    /// Threads of each run; 0 shares all cores among the jobs
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// Only these runs: names with * and ?, separated by commas, or a share i/N of all
+    #[arg(long, value_name = "PATTERN|i/N")]
+    pub only: Option<String>,
+    /// List the runs and how far they are, and run nothing
+    #[arg(long)]
+    pub list: bool,
+    /// Say what would be done, how long it takes and what it needs, and do nothing
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Change a value of every case, for example domain.cell_size="0.5 mm"
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Start failed runs over
+    #[arg(long)]
+    pub retry: bool,
+    /// Keep the checkpoints of finished runs
+    #[arg(long)]
+    pub keep_checkpoints: bool,
+    /// No progress, only the table and problems
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the table (or the list) as JSON; everything else goes to standard error
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Arguments of `report`.
 #[derive(Debug, Args)]
 pub struct ReportArgs {
-    /// Run folder
+    /// Run folder or study folder
     pub run: PathBuf,
 }
 

@@ -8,6 +8,8 @@ mod grain;
 mod progress;
 mod report;
 mod run;
+mod study;
+mod study_board;
 mod threads;
 mod validate;
 
@@ -25,6 +27,7 @@ fn main() -> std::process::ExitCode {
         Command::Check(args) => check::check(args),
         Command::Grain(args) => grain::grain(args),
         Command::Validate(args) => validate::validate(args),
+        Command::Study(args) => study::study(args),
         Command::Report(args) => report::report(args),
         Command::Bench(args) => bench::bench(args),
         Command::Schema => print(&format!("{:#}", grainwake_solver::case::schema())),

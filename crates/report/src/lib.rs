@@ -9,11 +9,11 @@
 //! read are left out and listed on the page.
 
 mod error;
-mod figure;
+pub mod figure;
 mod page;
-mod phases;
-mod run_folder;
-mod story;
+pub mod phases;
+pub mod run_folder;
+pub mod story;
 #[cfg(test)]
 mod testing;
 
