@@ -22,7 +22,11 @@ pub enum Command {
     Check(CheckArgs),
     /// Make and look at grain shapes
     Grain(GrainArgs),
-    /// Draw the figures and the page of a run folder
+    /// Compare with experiments, closed forms and published computations
+    Validate(ValidateArgs),
+    /// Run all models of a study: what is missing, from where it stopped
+    Study(StudyArgs),
+    /// Draw the figures and the page of a run folder or a study folder
     Report(ReportArgs),
     /// Measure speed and memory of the solver on this machine
     Bench(BenchArgs),
@@ -79,10 +83,84 @@ pub struct CheckArgs {
     pub json: bool,
 }
 
+/// Arguments of `validate`.
+#[derive(Debug, Args)]
+pub struct ValidateArgs {
+    /// Validations, by name; all if none is given
+    pub names: Vec<String>,
+    /// How much: small runs, or all at the published resolutions
+    #[arg(long, default_value = "ci", value_parser = ["ci", "full"])]
+    pub level: String,
+    /// Folder of the validations
+    #[arg(long, value_name = "DIR", default_value = "validation")]
+    pub suites: PathBuf,
+    /// Folder of the runs
+    #[arg(short, long, value_name = "DIR", default_value = "runs/validation")]
+    pub output: PathBuf,
+    /// Add the results to LEVEL.json and LEVEL.md in this folder, with their provenance
+    #[arg(long, value_name = "DIR")]
+    pub save: Option<PathBuf>,
+    /// Keep what is already there of the same cases and program
+    #[arg(long)]
+    pub resume: bool,
+    /// List the validations and their runs, and run nothing
+    #[arg(long)]
+    pub list: bool,
+    /// Threads; 0 takes all cores
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// No progress, only the table and problems
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print a JSON list of the results; everything else goes to standard error
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `study`.
+#[derive(Debug, Args)]
+pub struct StudyArgs {
+    /// Study file
+    pub study: PathBuf,
+    /// Study folder [default: runs/NAME]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Runs at once
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub jobs: usize,
+    /// Threads of each run; 0 shares all cores among the jobs
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// Only these runs: names with * and ?, separated by commas, or a share i/N of all
+    #[arg(long, value_name = "PATTERN|i/N")]
+    pub only: Option<String>,
+    /// List the runs and how far they are, and run nothing
+    #[arg(long)]
+    pub list: bool,
+    /// Say what would be done, how long it takes and what it needs, and do nothing
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Change a value of every case, for example domain.cell_size="0.5 mm"
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Start failed runs over
+    #[arg(long)]
+    pub retry: bool,
+    /// Keep the checkpoints of finished runs
+    #[arg(long)]
+    pub keep_checkpoints: bool,
+    /// No progress, only the table and problems
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the table (or the list) as JSON; everything else goes to standard error
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Arguments of `report`.
 #[derive(Debug, Args)]
 pub struct ReportArgs {
-    /// Run folder
+    /// Run folder or study folder
     pub run: PathBuf,
 }
 
@@ -123,6 +201,8 @@ pub enum GrainCommand {
     FromMesh(FromMeshArgs),
     /// A grain of closed form
     Make(MakeArgs),
+    /// Grains of given sphericity and roundness, one for each pair
+    Family(FamilyArgs),
     /// Sizes and morphology of a grain file
     Info(InfoArgs),
 }
@@ -195,6 +275,41 @@ pub struct FromScanArgs {
     /// Where the grain goes; a folder for several grains.
     #[command(flatten)]
     pub new: NewGrain,
+}
+
+/// Arguments of `grain family`.
+#[derive(Debug, Args)]
+pub struct FamilyArgs {
+    /// Krumbein sphericities, 0.3 to 0.97: the rows
+    #[arg(long, value_delimiter = ',', required = true, value_name = "S,...")]
+    pub sphericity: Vec<f64>,
+    /// Wadell roundnesses, 0.05 to 0.95: the columns
+    #[arg(long, value_delimiter = ',', required = true, value_name = "R,...")]
+    pub roundness: Vec<f64>,
+    /// Flatness c/b, 0.2 to 1
+    #[arg(long, default_value_t = 0.8, value_name = "RATIO")]
+    pub flatness: f64,
+    /// The same seed gives the same grains
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// Diameter of the sphere of equal volume, the same for all
+    #[arg(long, default_value = "2 mm", value_name = "LENGTH")]
+    pub equivalent_diameter: String,
+    /// Folder for 01.grain, 02.grain, ... (row by row), table.csv and sheet.png
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Surface nodes [default: one in every (diameter / 20)^2 of surface]
+    #[arg(long, value_name = "N")]
+    pub nodes: Option<usize>,
+    /// Cells of the distance field across the longest extent, at least
+    #[arg(long, value_name = "N")]
+    pub cells: Option<usize>,
+    /// Replace files that are there
+    #[arg(long)]
+    pub force: bool,
+    /// Print one JSON object for each grain
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `grain make`.

@@ -8,7 +8,10 @@ mod grain;
 mod progress;
 mod report;
 mod run;
+mod study;
+mod study_board;
 mod threads;
+mod validate;
 
 use std::io::Write;
 
@@ -23,6 +26,8 @@ fn main() -> std::process::ExitCode {
         Command::Run(args) => run::run(args),
         Command::Check(args) => check::check(args),
         Command::Grain(args) => grain::grain(args),
+        Command::Validate(args) => validate::validate(args),
+        Command::Study(args) => study::study(args),
         Command::Report(args) => report::report(args),
         Command::Bench(args) => bench::bench(args),
         Command::Schema => print(&format!("{:#}", grainwake_solver::case::schema())),

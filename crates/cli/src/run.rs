@@ -150,7 +150,7 @@ fn default_folder(case: &Path) -> PathBuf {
 }
 
 /// The first interrupt asks for a checkpoint, the second one ends the program at once.
-fn watch_for_interrupt(stop: Arc<AtomicBool>) {
+pub(crate) fn watch_for_interrupt(stop: Arc<AtomicBool>) {
     // Without a handler an interrupt ends the program at once, which the checkpoints survive.
     let _ = ctrlc::set_handler(move || {
         if stop.swap(true, Ordering::Relaxed) {

@@ -9,17 +9,18 @@
 //! read are left out and listed on the page.
 
 mod error;
-mod figure;
+pub mod figure;
 mod page;
-mod phases;
-mod run_folder;
-mod story;
+pub mod phases;
+pub mod run_folder;
+pub mod story;
 #[cfg(test)]
 mod testing;
 
 use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
+pub use run_folder::Table;
 
 use figure::Figure;
 use run_folder::RunFolder;

@@ -8,7 +8,7 @@ use crate::provenance::Provenance;
 use crate::quality::{self, Quality, QualityBounds};
 use crate::shape::{Field, Shape, SurfaceNode};
 use crate::surface::{self, Samples};
-use crate::{mass, nodes};
+use crate::{inscribed, mass, nodes, roundness};
 use glam::DVec3;
 
 /// Resolution, surface nodes and bounds of a sampled shape.
@@ -20,6 +20,8 @@ pub struct ShapeOptions {
     pub least_cells: usize,
     /// Surface nodes; none for about one in every (equivalent diameter / 20)^2 of surface.
     pub nodes: Option<usize>,
+    /// Measure the inscribed sphere and the roundness, which takes about as long as all the rest.
+    pub roundness: bool,
     /// Quality gate.
     pub bounds: QualityBounds,
 }
@@ -30,6 +32,7 @@ impl Default for ShapeOptions {
             cells: 56,
             least_cells: 16,
             nodes: None,
+            roundness: true,
             bounds: QualityBounds::default(),
         }
     }
@@ -117,6 +120,13 @@ pub(crate) fn assemble<F: Fn(DVec3, &mut u32) -> f64 + Sync>(
     options.bounds.check(&quality)?;
 
     let (lower, upper, radius) = bounds(&field, &mesh, &nodes);
+    let mut morphology = Morphology::measure(&mesh, upper - lower, mass.volume);
+    if options.roundness {
+        let (_, inscribed) = inscribed::sphere(&body.distance, body.lower, body.upper);
+        morphology.inscribed_radius = Some(inscribed);
+        morphology.wadell_roundness =
+            roundness::measure(&body.distance, body.lower, body.upper, inscribed);
+    }
     let second = DVec3::new(
         mass.second.x_axis.x,
         mass.second.y_axis.y,
@@ -129,7 +139,7 @@ pub(crate) fn assemble<F: Fn(DVec3, &mut u32) -> f64 + Sync>(
         lower,
         upper,
         bounding_radius: radius,
-        morphology: Morphology::measure(&mesh, upper - lower, mass.volume),
+        morphology,
         quality: Some(quality),
         provenance,
         field: Field::Sampled(field),

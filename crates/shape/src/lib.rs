@@ -5,26 +5,33 @@
 //! about x, largest about z), lengths in metres. Sign: distance is negative inside. Inertia is
 //! per unit density [m^5].
 //!
-//! Shapes come from closed forms ([`analytic`]), closed surface meshes ([`mesh`]) and 3-D images
-//! ([`scan`]); [`Shape::save`] and [`Shape::load`] keep them in `.grain` files.
+//! Shapes come from closed forms ([`analytic`]), closed surface meshes ([`mesh`]), 3-D images
+//! ([`scan`]) and a generator ([`family`]); [`Shape::save`] and [`Shape::load`] keep them in `.grain` files.
 
 pub mod analytic;
 mod assemble;
 mod error;
+pub mod family;
+mod feret;
 mod field;
 mod grain_file;
 mod hull;
+mod inscribed;
 mod limits;
 mod mass;
 pub mod mesh;
 mod morphology;
 mod nodes;
+pub mod picture;
 mod principal;
 mod provenance;
 mod quality;
+mod random;
+mod roundness;
 pub mod scan;
 mod shape;
 mod surface;
+mod table;
 
 pub use assemble::ShapeOptions;
 pub use error::{Result, ShapeError};
@@ -34,3 +41,4 @@ pub use morphology::{Morphology, Record};
 pub use provenance::Provenance;
 pub use quality::{Quality, QualityBounds};
 pub use shape::{Field, Shape, SurfaceNode};
+pub use table::write_table;

@@ -1,7 +1,7 @@
 //! The measured form of a grain.
 
-use crate::hull;
 use crate::mesh::TriangleMesh;
+use crate::{feret, hull};
 use glam::DVec3;
 use serde::Serialize;
 use std::f64::consts::PI;
@@ -9,8 +9,8 @@ use std::f64::consts::PI;
 /// Morphology, all from the shape's own surface.
 ///
 /// Reading used: a, b and c are the full extents of the body along its principal axes of
-/// inertia, sorted so that a >= b >= c. (Feret readings differ by up to a few percent, most for
-/// near-equant grains, whose inertia axes are ill-defined.)
+/// inertia, sorted so that a >= b >= c. (Calipers read [`feret`](Self::feret), which differs by up
+/// to a few percent, most for near-equant grains, whose inertia axes are ill-defined.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Morphology {
     /// Longest extent [m].
@@ -25,8 +25,14 @@ pub struct Morphology {
     pub krumbein_sphericity: f64,
     /// Wadell's true sphericity: area of the sphere of equal volume over the area.
     pub wadell_sphericity: f64,
-    /// Wadell roundness (Eq. 39); none until it is measured.
+    /// Wadell roundness (Eq. 39); none where the body is too slender to measure it, and in files
+    /// of version 1.
     pub wadell_roundness: Option<f64>,
+    /// Radius of the largest inscribed sphere [m]; none in files of version 1.
+    pub inscribed_radius: Option<f64>,
+    /// Caliper lengths [m]: the longest, the longest across it, and the one across both; none in
+    /// files of version 1.
+    pub feret: Option<[f64; 3]>,
     /// Volume over that of the convex hull.
     pub convexity: Option<f64>,
 }
@@ -36,7 +42,9 @@ impl Morphology {
         // The mesh is inscribed where the surface is convex: compare like with like.
         let own = mesh.signed_volume();
         let convexity = hull::volume(&mesh.vertices).map(|hull| (own / hull).min(1.0));
-        Self::new(extents, mesh.area(), volume, convexity)
+        let mut morphology = Self::new(extents, mesh.area(), volume, convexity);
+        morphology.feret = Some(feret::lengths(&mesh.vertices));
+        morphology
     }
 
     pub(crate) fn new(extents: DVec3, area: f64, volume: f64, convexity: Option<f64>) -> Self {
@@ -51,6 +59,8 @@ impl Morphology {
             krumbein_sphericity: (b * c / (a * a)).cbrt(),
             wadell_sphericity: PI.cbrt() * (6.0 * volume).powf(2.0 / 3.0) / area,
             wadell_roundness: None,
+            inscribed_radius: None,
+            feret: None,
             convexity,
         }
     }
@@ -70,6 +80,8 @@ impl Morphology {
             b: self.b * factor,
             c: self.c * factor,
             area: self.area * factor * factor,
+            inscribed_radius: self.inscribed_radius.map(|r| r * factor),
+            feret: self.feret.map(|lengths| lengths.map(|l| l * factor)),
             ..*self
         }
     }
@@ -92,12 +104,20 @@ pub struct Record {
     pub elongation: f64,
     /// Flatness c / b.
     pub flatness: f64,
+    /// Caliper lengths [m]: the longest, the longest across it, the one across both.
+    pub feret_m: Option<[f64; 3]>,
     /// Krumbein sphericity (Eq. 38).
     pub krumbein_sphericity: f64,
+    /// The same from the caliper lengths.
+    pub krumbein_sphericity_feret: Option<f64>,
     /// Wadell's true sphericity.
     pub wadell_sphericity: f64,
     /// Wadell roundness (Eq. 39), null where not measured.
     pub wadell_roundness: Option<f64>,
+    /// Detail finer than this is not seen by the roundness [m].
+    pub roundness_cutoff_m: Option<f64>,
+    /// Radius of the largest inscribed sphere [m].
+    pub inscribed_radius_m: Option<f64>,
     /// Volume over that of the convex hull, null where not measured.
     pub convexity: Option<f64>,
     /// Surface area [m^2].

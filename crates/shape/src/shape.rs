@@ -6,7 +6,7 @@ use crate::mesh::cube_sphere;
 use crate::morphology::{Morphology, Record};
 use crate::provenance::Provenance;
 use crate::quality::Quality;
-use crate::{assemble, grain_file};
+use crate::{assemble, grain_file, roundness};
 use glam::DVec3;
 
 /// A point of the surface with the area it stands for.
@@ -65,6 +65,10 @@ impl Shape {
                 }
             })
             .collect();
+        let mut morphology = Morphology::new(DVec3::splat(2.0 * radius), area, volume, Some(1.0));
+        morphology.wadell_roundness = Some(1.0);
+        morphology.inscribed_radius = Some(radius);
+        morphology.feret = Some([2.0 * radius; 3]);
         Shape {
             field: Field::Sphere(radius),
             nodes,
@@ -73,7 +77,7 @@ impl Shape {
             lower: DVec3::splat(-radius),
             upper: DVec3::splat(radius),
             bounding_radius: radius,
-            morphology: Morphology::new(DVec3::splat(2.0 * radius), area, volume, Some(1.0)),
+            morphology,
             quality: None,
             provenance,
         }
@@ -220,9 +224,13 @@ impl Shape {
             c_m: m.c,
             elongation: m.elongation(),
             flatness: m.flatness(),
+            feret_m: m.feret,
+            krumbein_sphericity_feret: m.feret.map(|[l, w, t]| (w * t / (l * l)).cbrt()),
             krumbein_sphericity: m.krumbein_sphericity,
             wadell_sphericity: m.wadell_sphericity,
             wadell_roundness: m.wadell_roundness,
+            roundness_cutoff_m: m.inscribed_radius.map(|r| roundness::CUTOFF * r),
+            inscribed_radius_m: m.inscribed_radius,
             convexity: m.convexity,
             surface_area_m2: m.area,
             inertia_m5: self.inertia.to_array(),

@@ -1,5 +1,6 @@
 //! `grainwake grain`: shapes in, `.grain` files out.
 
+mod family;
 mod make;
 mod mesh;
 mod scan;
@@ -20,6 +21,7 @@ pub fn grain(args: &GrainArgs) -> Result<(), Exit> {
         GrainCommand::FromScan(args) => scan::from_scan(args),
         GrainCommand::FromMesh(args) => mesh::from_mesh(args),
         GrainCommand::Make(args) => make::make(&args.body),
+        GrainCommand::Family(args) => family::family(args),
         GrainCommand::Info(args) => info(args),
     }
 }

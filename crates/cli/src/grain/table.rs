@@ -24,6 +24,12 @@ pub fn of(r: &Record, path: &Path) -> String {
             "a, b, c",
             format!("{}, {}, {}", mm(r.a_m), mm(r.b_m), mm(r.c_m)),
         ),
+        (
+            "caliper lengths",
+            r.feret_m.map_or("not measured".to_string(), |[l, w, t]| {
+                format!("{}, {}, {}", mm(l), mm(w), mm(t))
+            }),
+        ),
         ("elongation b/a", format!("{:.4}", r.elongation)),
         ("flatness c/b", format!("{:.4}", r.flatness)),
         (
@@ -31,7 +37,13 @@ pub fn of(r: &Record, path: &Path) -> String {
             format!("{:.4}", r.krumbein_sphericity),
         ),
         ("Wadell sphericity", format!("{:.4}", r.wadell_sphericity)),
-        ("Wadell roundness", optional(r.wadell_roundness)),
+        ("Wadell roundness", {
+            let cutoff = r
+                .roundness_cutoff_m
+                .filter(|_| r.wadell_roundness.is_some());
+            let cutoff = cutoff.map_or(String::new(), |c| format!(" (cut-off {})", mm(c)));
+            optional(r.wadell_roundness) + &cutoff
+        }),
         ("convexity", optional(r.convexity)),
         ("surface area", format!("{:.6e} m2", r.surface_area_m2)),
         ("surface nodes", r.surface_nodes.to_string()),

@@ -4,6 +4,8 @@
 mod ellipsoid;
 mod solids;
 
+#[cfg(test)]
+pub(crate) use ellipsoid::distance as ellipsoid_distance;
 pub use ellipsoid::ellipsoid;
 pub use solids::{capsule, cylinder, rounded_box, superquadric};
 

@@ -23,8 +23,9 @@ use std::path::Path;
 
 /// Not text (first byte), with both line ends, so that a transfer in text mode shows.
 const SIGNATURE: &[u8; 8] = b"\x8fGRAIN\r\n";
-/// Version written; files of this version and older are read.
-const VERSION: u32 = 1;
+/// Version written; files of this version and older are read. Version 2 added the inscribed sphere
+/// and the caliper lengths.
+const VERSION: u32 = 2;
 const HEAD: usize = 8 + 4 + 8;
 const CHECKSUM: usize = 32;
 /// Largest file that is read [bytes].
@@ -117,7 +118,7 @@ impl Shape {
                 path: path.to_owned(),
             });
         }
-        decode(&content[HEAD..])
+        decode(&content[HEAD..], version)
             .ok_or_else(|| ShapeError::malformed(path, "the content of the grain file is invalid"))
     }
 }
@@ -204,11 +205,15 @@ fn encode_measures(out: &mut Encoder, shape: &Shape) {
     }
     out.option(m.wadell_roundness);
     out.option(m.convexity);
+    out.option(m.inscribed_radius);
+    for n in 0..3 {
+        out.option(m.feret.map(|lengths| lengths[n]));
+    }
     out.option(shape.quality.map(|q| q.gradient_error));
     out.option(shape.quality.and_then(|q| q.volume_error));
 }
 
-fn decode(body: &[u8]) -> Option<Shape> {
+fn decode(body: &[u8], version: u32) -> Option<Shape> {
     let mut from = Decoder::new(body);
     let provenance = decode_provenance(&mut from)?;
     let volume = from.f64()?;
@@ -223,7 +228,7 @@ fn decode(body: &[u8]) -> Option<Shape> {
             })
         })
         .collect::<Option<Vec<_>>>()?;
-    let morphology = Morphology {
+    let mut morphology = Morphology {
         a: from.f64()?,
         b: from.f64()?,
         c: from.f64()?,
@@ -231,8 +236,16 @@ fn decode(body: &[u8]) -> Option<Shape> {
         krumbein_sphericity: from.f64()?,
         wadell_sphericity: from.f64()?,
         wadell_roundness: from.option()?,
+        inscribed_radius: None,
+        feret: None,
         convexity: from.option()?,
     };
+    if version >= 2 {
+        morphology.inscribed_radius = from.option()?;
+        if let (Some(l), Some(w), Some(t)) = (from.option()?, from.option()?, from.option()?) {
+            morphology.feret = Some([l, w, t]);
+        }
+    }
     let gradient_error = from.option()?;
     let volume_error = from.option()?;
     let field = match from.u8()? {

@@ -29,8 +29,11 @@ use crate::sim::Setup;
 
 pub use error::{CaseError, Problem};
 pub use expect::{Expectation, Verdict};
+pub use loc::Loc;
 pub use schema::schema;
 pub use shapes::ShapeFile;
+pub use source::Source;
+pub use suggest::nearest;
 
 use raw::{RawCase, RawExpect, RawRun};
 

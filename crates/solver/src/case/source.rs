@@ -1,15 +1,14 @@
-//! The text of a case file with its overrides, its keys and their places.
+//! The text of a TOML file with its overrides, its keys and their places.
 
 use std::ops::Range;
 
-use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
 use super::error::Problem;
-use super::raw::RawCase;
 use super::suggest::nearest;
 
-/// A case file and the `key=value` overrides that follow it. Spans count on through the
+/// A TOML file and the `key=value` overrides that follow it. Spans count on through the
 /// overrides as if they stood below the file, so that one range says where a value came from.
 pub struct Source {
     name: String,
@@ -24,12 +23,15 @@ struct Override {
 }
 
 impl Source {
-    /// Reads the text of a case file called `name` and applies overrides such as `time.end=0.5`.
-    pub fn parse(
+    /// Reads the text of a file called `name` and applies overrides such as `time.end=0.5`.
+    ///
+    /// # Errors
+    /// What is wrong, with its place.
+    pub fn parse<T: DeserializeOwned>(
         name: &str,
         text: &str,
         overrides: &[String],
-    ) -> Result<(Source, RawCase), Problem> {
+    ) -> Result<(Source, T), Problem> {
         let mut source = Source {
             name: name.into(),
             text: text.into(),
@@ -56,9 +58,8 @@ impl Source {
                 .map_err(|m| Problem::new(format!("--set {line}: {m}")))?;
         }
         collect_keys(table.get_ref(), "", &mut source.keys);
-        let case =
-            RawCase::deserialize(Deserializer::from(table)).map_err(|e| source.located(&e))?;
-        Ok((source, case))
+        let value = T::deserialize(Deserializer::from(table)).map_err(|e| source.located(&e))?;
+        Ok((source, value))
     }
 
     /// Dotted key of the innermost key or value that holds `span`.
@@ -90,7 +91,7 @@ impl Source {
         }
     }
 
-    /// Rewords an error of the TOML reader in the terms of the case file.
+    /// Rewords an error of the TOML reader in the terms of the file.
     fn located(&self, error: &toml::de::Error) -> Problem {
         let message = error.message();
         let span = error.span();
@@ -104,7 +105,7 @@ impl Source {
             let known = &words[1..];
             let parent = owner
                 .rsplit_once('.')
-                .map_or("the case file".to_string(), |(p, _)| format!("`{p}`"));
+                .map_or("the file".to_string(), |(p, _)| format!("`{p}`"));
             let hint = nearest(words[0], known.iter().copied());
             let help = match hint {
                 Some(key) => format!(
@@ -264,9 +265,11 @@ mod tests {
 
     const CASE: &str = "[fluid]\ndensity = 1000\nviscosity = \"1 mPa s\"\n\n[domain]\nsize = [1, 1, 1]\ncells = [4, 4, 4]\n\n[time]\nend = 1\n\n[[grain]]\ndensity = 2000\nshape = { kind = \"sphere\", diameter = 0.1 }\n";
 
+    use super::super::raw::RawCase;
+
     fn problem(text: &str, sets: &[&str]) -> Problem {
         let sets: Vec<String> = sets.iter().map(|s| (*s).to_string()).collect();
-        match Source::parse("case.toml", text, &sets) {
+        match Source::parse::<RawCase>("case.toml", text, &sets) {
             Ok(_) => panic!("accepted"),
             Err(problem) => problem,
         }
@@ -274,7 +277,7 @@ mod tests {
 
     #[test]
     fn a_good_case_is_read() {
-        let (_, case) = Source::parse("case.toml", CASE, &[]).unwrap();
+        let (_, case): (_, RawCase) = Source::parse("case.toml", CASE, &[]).unwrap();
         assert_eq!(case.fluid.unwrap().viscosity.as_ref().unwrap().si, 1e-3);
         assert_eq!(case.time.end.si, 1.0);
         assert_eq!(case.grain.len(), 1);
@@ -308,7 +311,7 @@ mod tests {
             "grain.0.density=\"2 g/cm3\"".into(),
             "contact.friction=0.1".into(),
         ];
-        let (_, case) = Source::parse("case.toml", CASE, &sets).unwrap();
+        let (_, case): (_, RawCase) = Source::parse("case.toml", CASE, &sets).unwrap();
         assert_eq!(case.time.end.si, 2.0);
         assert_eq!(case.fluid.unwrap().viscosity.as_ref().unwrap().si, 2e-3);
         assert_eq!(case.grain[0].density.si, 2000.0);

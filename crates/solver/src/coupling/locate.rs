@@ -10,6 +10,10 @@ use crate::dem::Grain;
 use crate::flow::Boundaries;
 use crate::grid::{FACE_OFFSET, Mesh};
 
+/// Distances that differ by less than this part of the band are equal: of two copies of a face
+/// across a periodic edge just one must count.
+const TIE: f64 = 1e-9;
+
 /// A face that a grain's rigidity acts on.
 #[derive(Clone, Copy, Debug)]
 pub struct ForcedFace {
@@ -183,7 +187,8 @@ impl Locator {
                         let nearer = |rival: &Rival| {
                             let other = &grains[rival.index];
                             let there = other.shape.distance(other.pose.to_body(x - rival.shift));
-                            there < d || (there == d && rival.index < index)
+                            let tie = (there - d).abs() <= TIE * self.eps;
+                            if tie { rival.wins_ties } else { there < d }
                         };
                         if d <= reach && !rivals.iter().any(nearer) {
                             distance[body.local(i, j, k)] = d;
@@ -195,31 +200,46 @@ impl Locator {
         }
     }
 
-    /// Grains (and periodic images of them) whose band may meet that of grain `index`.
+    /// Grains, and periodic images of them and of the grain itself, whose band may meet that of
+    /// grain `index`.
     fn rivals(&self, grains: &[Grain], index: usize, reach: f64) -> Vec<Rival> {
-        let grain = &grains[index];
-        let extent = self.mesh.extent();
+        let (grain, extent) = (&grains[index], self.mesh.extent());
         let mut rivals = Vec::new();
-        for (other, rival) in grains
-            .iter()
-            .enumerate()
-            .filter(|(other, _)| *other != index)
-        {
-            let mut shift = grain.pose.position - rival.pose.position;
-            for axis in 0..3 {
-                let period = extent[axis];
-                shift[axis] = if self.unknowns.periodic[axis] {
-                    (shift[axis] / period).round() * period
-                } else {
-                    0.0
-                };
-            }
-            let apart = (grain.pose.position - rival.pose.position - shift).length();
-            if apart < grain.shape.bounding_radius() + rival.shape.bounding_radius() + 2.0 * reach {
-                rivals.push(Rival {
-                    index: other,
-                    shift,
-                });
+        for (other, rival) in grains.iter().enumerate() {
+            let radii = grain.shape.bounding_radius() + rival.shape.bounding_radius();
+            let limit = radii + 2.0 * reach;
+            let apart = grain.pose.position - rival.pose.position;
+            // Images along each axis that may be near enough: first, last.
+            let range = |axis: usize| match self.unknowns.periodic[axis] {
+                true if self.mesh.cells[axis] > 1 => (
+                    ((apart[axis] - limit) / extent[axis]).ceil() as i32,
+                    ((apart[axis] + limit) / extent[axis]).floor() as i32,
+                ),
+                _ => (0, 0),
+            };
+            let [(ax, bx), (ay, by), (az, bz)] = [range(0), range(1), range(2)];
+            for z in az..=bz {
+                for y in ay..=by {
+                    for x in ax..=bx {
+                        let image = IVec3::new(x, y, z);
+                        let shift = image.as_dvec3() * extent;
+                        let own = other == index;
+                        if own && image == IVec3::ZERO
+                            || (apart - shift).length_squared() > limit * limit
+                        {
+                            continue;
+                        }
+                        rivals.push(Rival {
+                            index: other,
+                            shift,
+                            wins_ties: if own {
+                                image.to_array() > [0; 3]
+                            } else {
+                                other < index
+                            },
+                        });
+                    }
+                }
             }
         }
         rivals
@@ -290,8 +310,11 @@ impl Locator {
     }
 }
 
-/// Another grain nearby; `shift` [m] moves it to its nearest image.
+/// Another grain nearby, or an image of the grain itself.
 struct Rival {
     index: usize,
+    /// From the grain to the image in question [m].
     shift: DVec3,
+    /// Whether it has the faces that are as far from both.
+    wins_ties: bool,
 }

@@ -133,9 +133,12 @@ impl Boundaries {
                 Mirror::Copy => plane
                     .chunks_exact_mut(row)
                     .for_each(|row| row[ghost] = row[inner]),
-                Mirror::About(value) => plane
-                    .chunks_exact_mut(row)
-                    .for_each(|row| row[ghost] = 2.0 * value - row[inner]),
+                Mirror::About(wall) => {
+                    let next = second(inner, nx);
+                    plane
+                        .chunks_exact_mut(row)
+                        .for_each(|row| row[ghost] = beyond_wall(wall, row[inner], row[next], nx));
+                }
             }
         }
         for side in 0..2 {
@@ -287,19 +290,37 @@ enum Mirror {
     About(f64),
 }
 
+/// The layer behind `inner`, seen from the nearer end of 1..=n.
+fn second(inner: usize, n: usize) -> usize {
+    if inner == 1 { 2.min(n) } else { inner - 1 }
+}
+
+/// Value beyond a wall that moves at `wall`, on the parabola through it and the two nearest values:
+/// the shear at the wall is then of second order.
+fn beyond_wall(wall: f64, near: f64, next: f64, n: usize) -> f64 {
+    if n == 1 {
+        2.0 * wall - near
+    } else {
+        (8.0 * wall - 6.0 * near + next) / 3.0
+    }
+}
+
 /// Fills the layer `ghost` of `layer` entries; `inner` is next to it and 1..=n are inside.
 fn reflect(values: &mut [f64], layer: usize, mirror: Mirror, ghost: usize, inner: usize, n: usize) {
     let from = match mirror {
         Mirror::None => return,
         Mirror::Wrap => n + 1 - inner,
-        Mirror::Copy | Mirror::About(_) => inner,
+        Mirror::Copy => inner,
+        Mirror::About(wall) => {
+            let next = second(inner, n);
+            for i in 0..layer {
+                let [near, next] = [inner, next].map(|from| values[from * layer + i]);
+                values[ghost * layer + i] = beyond_wall(wall, near, next, n);
+            }
+            return;
+        }
     };
     values.copy_within(from * layer..(from + 1) * layer, ghost * layer);
-    if let Mirror::About(value) = mirror {
-        for q in &mut values[ghost * layer..(ghost + 1) * layer] {
-            *q = 2.0 * value - *q;
-        }
-    }
 }
 
 /// The faces of one side of the box and their inner neighbours in memory.

@@ -120,10 +120,21 @@ impl Layout {
         to: usize,
         f: impl Fn(f64) -> f64,
     ) {
-        let stride = self.strides()[axis];
-        let shift = (from as isize - to as isize) * stride as isize;
+        self.map_layers(values, axis, [from; 2], to, |[value, _]| f(value));
+    }
+    /// The same of two layers.
+    pub fn map_layers(
+        &self,
+        values: &mut [f64],
+        axis: usize,
+        from: [usize; 2],
+        to: usize,
+        f: impl Fn([f64; 2]) -> f64,
+    ) {
+        let stride = self.strides()[axis] as isize;
+        let shift = from.map(|layer| (layer as isize - to as isize) * stride);
         self.each_of_layer(axis, to, |at| {
-            values[at] = f(values[at.wrapping_add_signed(shift)])
+            values[at] = f(shift.map(|s| values[at.wrapping_add_signed(s)]));
         });
     }
 }

@@ -23,6 +23,27 @@ pub enum Existing {
     Replace,
     /// Go on from its last checkpoint.
     Resume,
+    /// Take it as it is or go on with it if it is of the same case and program; else start over.
+    Reuse,
+}
+
+impl Existing {
+    /// What [`Existing::Reuse`] means in this folder; the others mean themselves.
+    pub(super) fn settle(self, folder: &Path, digest: &str) -> Existing {
+        if self != Existing::Reuse {
+            return self;
+        }
+        let own = Provenance::new(digest);
+        let same = |there: &Provenance| {
+            (&there.case_sha256, &there.version, &there.commit)
+                == (&own.case_sha256, &own.version, &own.commit)
+        };
+        match Provenance::read(folder) {
+            None => Existing::Refuse,
+            Some(there) if same(&there) => Existing::Resume,
+            Some(_) => Existing::Replace,
+        }
+    }
 }
 
 /// What is in a folder.

@@ -108,9 +108,10 @@ pub fn run(
     options: &Options,
     observer: &mut dyn Observer,
 ) -> Result<Ending, RunError> {
-    let found = folder::admit(out, options.existing)?;
+    let existing = options.existing.settle(out, &job.digest);
+    let found = folder::admit(out, existing)?;
     let mut provenance = Provenance::new(&job.digest);
-    let resuming = options.existing == Existing::Resume;
+    let resuming = existing == Existing::Resume;
     if resuming {
         provenance = Provenance::read(out).unwrap_or(provenance);
         if provenance.case_sha256 != job.digest {

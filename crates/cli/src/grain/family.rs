@@ -1,0 +1,52 @@
+//! `grain family`.
+
+use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
+use grainwake_shape::picture::Picture;
+use grainwake_shape::write_table;
+
+use super::{length, may_write, show};
+use crate::args::FamilyArgs;
+use crate::exit::{BAD_INPUT, Exit};
+
+/// Pixels of one view in the contact sheet.
+const PIXELS: usize = 130;
+
+/// One grain for each pair of sphericity and roundness, numbered row by row.
+pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
+    let diameter = length("--equivalent-diameter", &args.equivalent_diameter)?;
+    let mut options = family_options();
+    options.nodes = args.nodes;
+    options.cells = args.cells.unwrap_or(options.cells);
+    let count = args.sphericity.len() * args.roundness.len();
+    if count > 999 {
+        return Err(Exit::new(BAD_INPUT, format!("{count} grains; at most 999")));
+    }
+    let file = |n: usize| args.output.join(format!("{n:02}.grain"));
+    let (table, sheet) = (args.output.join("table.csv"), args.output.join("sheet.png"));
+    for path in (1..=count).map(file).chain([table.clone(), sheet.clone()]) {
+        may_write(&path, args.force)?;
+    }
+    // All of them before any is written: bad input writes nothing.
+    let mut shapes = Vec::with_capacity(count);
+    for &sphericity in &args.sphericity {
+        for &roundness in &args.roundness {
+            let target = FamilyTarget {
+                flatness: args.flatness,
+                ..FamilyTarget::new(sphericity, roundness, diameter)
+            };
+            shapes.push(family_grain(&target, args.seed, &options)?);
+        }
+    }
+    std::fs::create_dir_all(&args.output)?;
+    let (mut rows, mut pictures) = (Vec::new(), Vec::new());
+    for (n, shape) in shapes.iter().enumerate() {
+        let path = file(n + 1);
+        shape.save(&path)?;
+        show(shape, &path, args.json)?;
+        rows.push((format!("{:02}", n + 1), shape.record()));
+        pictures.push(Picture::three_sides(shape, PIXELS, false));
+    }
+    write_table(&table, &rows)?;
+    Picture::sheet(&pictures, args.roundness.len()).save(&sheet)?;
+    Ok(())
+}

@@ -1,0 +1,269 @@
+//! `grainwake study`.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use comfy_table::{CellAlignment, Table, presets};
+use grainwake_study::{
+    Options, Outcome, Plan, Row, Run, Selection, State, Study, StudyError, carry_out, state, table,
+    write_table,
+};
+
+use crate::args::StudyArgs;
+use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO};
+use crate::progress::clock;
+use crate::study_board::Board;
+use crate::{print, run, threads};
+
+impl From<StudyError> for Exit {
+    fn from(error: StudyError) -> Exit {
+        match error {
+            StudyError::Invalid(problems) => Exit::problems(BAD_INPUT, problems),
+            StudyError::Case(error) => error.into(),
+            StudyError::Occupied { .. } => {
+                Exit::with_help(BAD_INPUT, error.to_string(), "give another folder with -o")
+            }
+            StudyError::Damaged { .. } => Exit::with_help(
+                BAD_INPUT,
+                error.to_string(),
+                "start the study again: it writes the file anew and keeps what is finished",
+            ),
+            StudyError::Io {
+                action, ref source, ..
+            } => {
+                use std::io::ErrorKind::{InvalidData, NotFound};
+                let bad = action == "read" && matches!(source.kind(), NotFound | InvalidData);
+                let help = if bad {
+                    "give the path of a study file, for example studies/dkt-morphology/study.toml"
+                } else {
+                    "check the folder, its permissions and the room on the disk"
+                };
+                Exit::with_help(if bad { BAD_INPUT } else { IO }, error.to_string(), help)
+            }
+        }
+    }
+}
+
+/// Runs a study.
+pub fn study(args: &StudyArgs) -> Result<(), Exit> {
+    let study = Study::read(&args.study)?;
+    let selection = args
+        .only
+        .as_deref()
+        .map_or(Ok(Selection::All), Selection::parse);
+    let selection = selection.map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
+    let plan = Plan::of(&study, &args.set)?;
+    let runs = &plan.manifest.runs;
+    let chosen = selection
+        .choose(runs)
+        .map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
+    let folder = args
+        .output
+        .clone()
+        .unwrap_or_else(|| study.default_folder());
+    let jobs = args.jobs.clamp(1, chosen.len().max(1));
+    let all = threads::resolve(0);
+    let each = if args.threads > 0 {
+        args.threads
+    } else {
+        (all / jobs).max(1)
+    };
+    if args.list || args.dry_run {
+        plan.admit(&folder)?;
+        let states: Vec<(usize, State)> = chosen
+            .iter()
+            .map(|i| (*i, state(&runs[*i], &folder)))
+            .collect();
+        if args.json {
+            return print(&serde_json::to_string_pretty(&listed(runs, &states))?);
+        }
+        if args.list {
+            return print(&list(runs, &states));
+        }
+        return print(&intent(args, runs, &states, jobs, each));
+    }
+    plan.settle(&folder)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    run::watch_for_interrupt(stop.clone());
+    if !args.quiet {
+        eprintln!(
+            "{}: {} of {} runs, {jobs} at once with {each} threads each -> {}",
+            args.study.display(),
+            chosen.len(),
+            runs.len(),
+            folder.display()
+        );
+    }
+    let options = Options {
+        jobs,
+        threads: each,
+        retry: args.retry,
+        keep_checkpoints: args.keep_checkpoints,
+        command: std::env::args().collect(),
+    };
+    let board = Board::new(runs, &chosen, jobs, args.quiet, stop.clone());
+    let ended = carry_out(runs, &chosen, &folder, &options, &board)?;
+    board.clear();
+    let rows = table(&plan.manifest, &folder);
+    write_table(&rows, &folder)?;
+    let shown: Vec<&Row> = chosen.iter().map(|i| &rows[*i]).collect();
+    if args.json {
+        print(&serde_json::to_string_pretty(&shown)?)?;
+    } else {
+        print(&pretty(&shown).to_string())?;
+    }
+    if !args.quiet {
+        eprintln!("{}", folder.join("table.csv").display());
+    }
+    conclude(runs, &ended, stop.load(Ordering::Relaxed))
+}
+
+fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(), Exit> {
+    let failed: Vec<(&str, &str, u8)> = ended
+        .iter()
+        .filter_map(|(i, outcome)| match outcome {
+            Outcome::Failed(why, code) => Some((runs[*i].name.as_str(), why.as_str(), *code)),
+            _ => None,
+        })
+        .collect();
+    let open = ended
+        .iter()
+        .filter(|(_, o)| *o == Outcome::Interrupted)
+        .count();
+    if stopped {
+        return Err(Exit::with_help(
+            INTERRUPTED,
+            format!("interrupted with {open} runs to go; checkpoints were written"),
+            "go on with the same command",
+        ));
+    }
+    for (_, outcome) in ended
+        .iter()
+        .filter(|(_, o)| *o == Outcome::Elsewhere)
+        .take(1)
+    {
+        debug_assert_eq!(*outcome, Outcome::Elsewhere);
+        eprintln!("note: some runs are in the hands of another program, see the table");
+    }
+    let Some(code) = failed.iter().map(|(.., code)| *code).max() else {
+        return Ok(());
+    };
+    let lines: Vec<String> = failed
+        .iter()
+        .map(|(name, why, _)| format!("{name}: {why}"))
+        .collect();
+    Err(Exit::with_help(
+        code,
+        format!(
+            "{} of {} runs failed:\n{}",
+            failed.len(),
+            ended.len(),
+            lines.join("\n")
+        ),
+        "the others are done; --retry starts failed runs over",
+    ))
+}
+
+fn list(runs: &[Run], states: &[(usize, State)]) -> String {
+    let width = runs.iter().map(|r| r.name.len()).max().unwrap_or(0);
+    let line = |(i, state): &(usize, State)| {
+        let run = &runs[*i];
+        format!(
+            "{:>4}  {:width$}  {:10}  {}",
+            i + 1,
+            run.name,
+            state.word(),
+            run.id
+        )
+    };
+    states.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+fn listed(runs: &[Run], states: &[(usize, State)]) -> serde_json::Value {
+    let entry = |(i, state): &(usize, State)| {
+        let run = &runs[*i];
+        serde_json::json!({
+            "number": i + 1, "name": run.name, "model": run.model, "member": run.member,
+            "state": state.word(), "id": run.id, "set": run.set, "base": run.base,
+            "memory_bytes": run.memory_bytes, "wall_s": run.wall_s,
+        })
+    };
+    states.iter().map(entry).collect()
+}
+
+/// What would be done, and what it would cost at most.
+fn intent(
+    args: &StudyArgs,
+    runs: &[Run],
+    states: &[(usize, State)],
+    jobs: usize,
+    threads: usize,
+) -> String {
+    let mut lines = Vec::new();
+    let (mut wall, mut to_do) = (0.0, 0);
+    for (i, state) in states {
+        let doing = match state {
+            State::Missing => "run".to_owned(),
+            State::Unfinished => "go on".to_owned(),
+            State::Finished => continue,
+            State::Failed(why) if args.retry => format!("start over, failed before: {why}"),
+            State::Failed(why) => {
+                lines.push(format!("{}: left alone, failed: {why}", runs[*i].name));
+                continue;
+            }
+            State::Stale(why) => format!("start over: {why}"),
+        };
+        wall += runs[*i].wall_s;
+        to_do += 1;
+        lines.push(format!("{}: {doing}", runs[*i].name));
+    }
+    let largest = states
+        .iter()
+        .map(|(i, _)| runs[*i].memory_bytes)
+        .max()
+        .unwrap_or(0);
+    lines.push(format!(
+        "{to_do} of {} to do; at most {} with {jobs} at once, {threads} threads each (an estimate; runs that stop early take less), {:.1} GB of memory",
+        states.len(),
+        clock(wall / (jobs * threads) as f64),
+        jobs as f64 * largest as f64 / 1e9
+    ));
+    lines.join("\n")
+}
+
+fn pretty(rows: &[&Row]) -> Table {
+    let columns: [(&str, &str); 8] = [
+        ("kiss", "kiss_time"),
+        ("contact", "contact_stage"),
+        ("tumble", "tumble_time"),
+        ("parted", "separation_time"),
+        ("landed", "landing_time"),
+        ("kisses", "kisses"),
+        ("passes", "role_changes"),
+        ("mean v", "mean_speed_leading"),
+    ];
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    let header = ["run", "state"]
+        .into_iter()
+        .chain(columns.iter().map(|c| c.0));
+    table.set_header(header.chain(["wall"]));
+    for row in rows {
+        let mut cells = vec![row.name.clone(), row.state.clone()];
+        cells.extend(columns.iter().map(|(_, name)| {
+            match row.pair.as_ref().and_then(|p| p.get(name)) {
+                Some(v) if v.fract() == 0.0 => format!("{v:.0}"),
+                Some(v) => format!("{v:.3}"),
+                None => "-".into(),
+            }
+        }));
+        cells.push(row.wall_s.map_or("-".into(), clock));
+        table.add_row(cells);
+    }
+    for column in 2..11 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}

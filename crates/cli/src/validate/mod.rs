@@ -1,0 +1,190 @@
+//! `grainwake validate`.
+
+mod saved;
+mod table;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use grainwake_solver::case::{Case, nearest};
+use grainwake_solver::output::{self, Ending, Existing, Options, RunError};
+use grainwake_validation::{Level, Run, Suite, SuiteError};
+use table::{line, table};
+
+use crate::args::ValidateArgs;
+use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, MISSED};
+use crate::progress::{Shown, clock};
+use crate::{print, run, threads};
+
+impl From<SuiteError> for Exit {
+    fn from(error: SuiteError) -> Exit {
+        match error {
+            SuiteError::Invalid(problem) => Exit::problems(BAD_INPUT, vec![*problem]),
+            SuiteError::Unreadable { ref source, .. } => {
+                let missing = source.kind() == std::io::ErrorKind::NotFound;
+                Exit::with_help(
+                    if missing { BAD_INPUT } else { IO },
+                    error.to_string(),
+                    "the validations lie in the folder `validation` of the source tree: run from \
+                     its top, or give the folder with --suites",
+                )
+            }
+        }
+    }
+}
+
+/// Runs validations and prints how far each number is from its reference.
+pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
+    let suites = chosen(Suite::all(&args.suites)?, &args.names)?;
+    let level = match args.level.as_str() {
+        "full" => Level::Full,
+        _ => Level::Ci,
+    };
+    if args.list {
+        return print(&listing(&suites));
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    run::watch_for_interrupt(stop.clone());
+    let started = std::time::Instant::now();
+    let mut verdicts = Vec::new();
+    for suite in &suites {
+        let mut known = BTreeMap::new();
+        for run in suite.runs.iter().filter(|run| run.level <= level) {
+            let folder = args.output.join(&suite.name).join(&run.name);
+            let ending = one(args, suite, run, &folder, stop.clone())?;
+            let found = match ending {
+                Ok(()) => suite.judge(run, &folder, &mut known),
+                Err(why) => suite.failed(run, &why),
+            };
+            if !args.quiet {
+                found.iter().for_each(|v| eprintln!("  {}", line(v)));
+            }
+            verdicts.extend(found);
+        }
+    }
+    if args.json {
+        print(&serde_json::to_string_pretty(&verdicts)?)?;
+    } else {
+        print(&table(&verdicts).to_string())?;
+    }
+    if let Some(folder) = &args.save {
+        saved::add(folder, &args.level, &verdicts, &args.output)?;
+    }
+    let short = verdicts.iter().filter(|v| !v.pass).count();
+    if !args.quiet {
+        eprintln!(
+            "{} of {} hold, in {}",
+            verdicts.len() - short,
+            verdicts.len(),
+            clock(started.elapsed().as_secs_f64())
+        );
+    }
+    if short == 0 {
+        return Ok(());
+    }
+    let missed: Vec<String> = verdicts.iter().filter(|v| !v.pass).map(line).collect();
+    Err(Exit::new(
+        MISSED,
+        format!(
+            "{short} of {} fall short:\n{}",
+            verdicts.len(),
+            missed.join("\n")
+        ),
+    ))
+}
+
+/// The suites that were asked for.
+fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
+    let known: Vec<String> = all.iter().map(|s| s.name.clone()).collect();
+    if all.is_empty() {
+        return Err(Exit::with_help(
+            BAD_INPUT,
+            "there is no validation in the folder",
+            "each is a folder with a validation.toml; give their parent with --suites",
+        ));
+    }
+    for name in names {
+        if !known.contains(name) {
+            let hint = nearest(name, known.iter().map(String::as_str))
+                .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
+            return Err(Exit::with_help(
+                BAD_INPUT,
+                format!("there is no validation \"{name}\""),
+                format!("{hint}There are: {}", known.join(", ")),
+            ));
+        }
+    }
+    let wanted = |suite: &Suite| names.is_empty() || names.contains(&suite.name);
+    Ok(all.into_iter().filter(wanted).collect())
+}
+
+/// Carries out one run. The outer error ends the command, the inner one only this run.
+fn one(
+    args: &ValidateArgs,
+    suite: &Suite,
+    run: &Run,
+    folder: &Path,
+    stop: Arc<AtomicBool>,
+) -> Result<Result<(), String>, Exit> {
+    let case = Case::load(&run.case, &run.set)?;
+    let threads = threads::resolve(args.threads);
+    if !args.quiet {
+        let cells = case.setup.mesh.cells;
+        eprintln!(
+            "{}/{}: {} x {} x {} cells",
+            suite.name, run.name, cells[0], cells[1], cells[2]
+        );
+    }
+    let options = Options {
+        existing: if args.resume {
+            Existing::Reuse
+        } else {
+            Existing::Replace
+        },
+        command: std::env::args().collect(),
+        threads,
+    };
+    let diameter = case
+        .setup
+        .grains
+        .first()
+        .map(|g| g.shape.equivalent_diameter());
+    let mut shown = Shown::new(args.quiet, stop.clone(), diameter);
+    let ending = threads::on(threads, || {
+        let ending = output::run(case.job(), folder, &options, &mut shown);
+        shown.clear();
+        ending
+    })?;
+    match ending {
+        Ok(Ending::Interrupted(_)) => Err(Exit::with_help(
+            INTERRUPTED,
+            "interrupted; a checkpoint was written",
+            "go on with the same command and --resume",
+        )),
+        Ok(_) if stop.load(Ordering::Relaxed) => {
+            Err(Exit::new(INTERRUPTED, "interrupted between two runs"))
+        }
+        Ok(_) => Ok(Ok(())),
+        Err(error @ RunError::Unstable { .. }) => Ok(Err(error.to_string())),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn listing(suites: &[Suite]) -> String {
+    let mut lines = Vec::new();
+    for suite in suites {
+        lines.push(format!("{}: {}", suite.name, suite.title));
+        for run in &suite.runs {
+            let level = if run.level == Level::Full {
+                " (full)"
+            } else {
+                ""
+            };
+            let checks: Vec<&str> = run.checks.iter().map(|c| c.quantity.as_str()).collect();
+            lines.push(format!("  {}{level}: {}", run.name, checks.join(", ")));
+        }
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,101 @@
+//! Results that are kept: `LEVEL.json` and `LEVEL.md`.
+
+use std::path::Path;
+
+use grainwake_solver::output::provenance::{Provenance, commit};
+use grainwake_solver::output::read_summary;
+use grainwake_validation::Verdict;
+use serde::{Deserialize, Serialize};
+
+use super::table::table;
+use crate::exit::{Exit, IO};
+
+/// Contents of `LEVEL.json`.
+#[derive(Default, Serialize, Deserialize)]
+struct Saved {
+    results: Vec<Verdict>,
+    runs: Vec<Source>,
+}
+
+/// Where the numbers of a run come from.
+#[derive(Serialize, Deserialize)]
+struct Source {
+    name: String,
+    run: String,
+    commit: Option<String>,
+    cpu: String,
+    threads: usize,
+    steps: u64,
+    wall_s: f64,
+}
+
+/// Adds `verdicts` of runs below `output` to the results in `folder`, in place of earlier ones of
+/// the same runs.
+pub fn add(folder: &Path, level: &str, verdicts: &[Verdict], output: &Path) -> Result<(), Exit> {
+    let failed = |path: &Path, what: &dyn std::fmt::Display| {
+        Exit::new(IO, format!("{}: {what}", path.display()))
+    };
+    let json = folder.join(format!("{level}.json"));
+    let mut saved = match std::fs::read_to_string(&json) {
+        Ok(text) => serde_json::from_str(&text).map_err(|e| failed(&json, &e))?,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Saved::default(),
+        Err(error) => return Err(failed(&json, &error)),
+    };
+    let key = |v: &Verdict| (v.name.clone(), v.run.clone());
+    let new: Vec<_> = verdicts.iter().map(key).collect();
+    saved.results.retain(|v| !new.contains(&key(v)));
+    saved.results.extend(verdicts.iter().cloned());
+    saved.results.sort_by_key(|v| v.name.clone());
+    saved
+        .runs
+        .retain(|r| !new.contains(&(r.name.clone(), r.run.clone())));
+    let mut seen = Vec::new();
+    for (name, run) in new {
+        if seen.contains(&(name.clone(), run.clone())) {
+            continue;
+        }
+        seen.push((name.clone(), run.clone()));
+        let path = output.join(&name).join(&run);
+        let (Some(provenance), Ok(summary)) = (Provenance::read(&path), read_summary(&path)) else {
+            continue;
+        };
+        let session = provenance.sessions.last();
+        saved.runs.push(Source {
+            commit: commit().map(str::to_owned),
+            cpu: session.map_or_else(String::new, |s| s.cpu.clone()),
+            threads: session.map_or(0, |s| s.threads),
+            steps: summary.steps,
+            wall_s: summary.wall_s,
+            name,
+            run,
+        });
+    }
+    saved.runs.sort_by_key(|r| r.name.clone());
+    std::fs::create_dir_all(folder).map_err(|e| failed(folder, &e))?;
+    std::fs::write(&json, serde_json::to_string_pretty(&saved)? + "\n")
+        .map_err(|e| failed(&json, &e))?;
+    let page = folder.join(format!("{level}.md"));
+    std::fs::write(&page, markdown(level, &saved)).map_err(|e| failed(&page, &e))
+}
+
+fn markdown(level: &str, saved: &Saved) -> String {
+    let mut text = format!(
+        "# Results of the validations, level {level}\n\nMade by `grainwake validate --level {level} \
+         --save`. A row without a bound is context.\n\n{}\n\n## Runs\n\n| run | steps | wall time [s] | threads \
+         | commit | processor |\n|---|---|---|---|---|---|\n",
+        table(&saved.results)
+    );
+    for run in &saved.runs {
+        text += &format!(
+            "| {}/{} | {} | {:.0} | {} | {} | {} |\n",
+            run.name,
+            run.run,
+            run.steps,
+            run.wall_s,
+            run.threads,
+            run.commit.as_deref().unwrap_or("unknown"),
+            run.cpu
+        );
+    }
+    text
+}

@@ -1,0 +1,80 @@
+//! Verdicts for people to read.
+
+use comfy_table::{CellAlignment, Table, presets};
+use grainwake_validation::Verdict;
+
+fn number(value: Option<f64>) -> String {
+    match value {
+        None => "-".into(),
+        Some(v) if v == 0.0 || (1e-3..1e5).contains(&v.abs()) => {
+            let digits = (4 - v.abs().max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
+            format!("{v:.digits$}")
+        }
+        Some(v) => format!("{v:.3e}"),
+    }
+}
+
+fn error(v: &Verdict) -> String {
+    match v.error {
+        Some(e) if v.bound.contains('%') || v.bound.is_empty() => format!("{:+.2} %", 100.0 * e),
+        e => number(e),
+    }
+}
+
+fn verdict(v: &Verdict) -> &'static str {
+    match (v.pass, v.bound.is_empty()) {
+        (false, _) => "SHORT",
+        (true, true) => "context",
+        (true, false) => "holds",
+    }
+}
+
+/// A verdict in a line.
+pub fn line(v: &Verdict) -> String {
+    let mut text = format!("{}/{} {}: {}", v.name, v.run, v.quantity, number(v.value));
+    if v.reference.is_some() {
+        text += &format!(", reference {}, error {}", number(v.reference), error(v));
+    }
+    if !v.bound.is_empty() {
+        text += &format!(", bound {}", v.bound);
+    }
+    text += &format!(": {}", verdict(v));
+    match &v.problem {
+        Some(problem) => format!("{text} ({problem})"),
+        None => text,
+    }
+}
+
+/// Verdicts as a table in Markdown.
+pub fn table(verdicts: &[Verdict]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    table.set_header([
+        "validation",
+        "run",
+        "quantity",
+        "value",
+        "reference",
+        "error",
+        "bound",
+        "",
+    ]);
+    for v in verdicts {
+        table.add_row([
+            v.name.clone(),
+            v.run.clone(),
+            v.quantity.clone(),
+            number(v.value),
+            number(v.reference),
+            error(v),
+            v.bound.clone(),
+            verdict(v).to_string(),
+        ]);
+    }
+    for column in 3..6 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}

@@ -1,0 +1,274 @@
+//! A random stone of given proportions and roundness.
+
+use super::core::{Ball, Core, inscribed};
+use crate::mass::Mass;
+use crate::principal;
+use crate::random::Random;
+use glam::{DMat3, DVec3};
+
+/// Faces of a stone, fewest and most.
+const FACES: (u64, u64) = (13, 20);
+/// Rounds of repulsion that spread the faces: few, so that large and small ones remain.
+const ROUNDS: usize = 4;
+/// Offsets of the faces vary by this share.
+const UNEVEN: f64 = 0.16;
+/// Radius of a face over its own reach: the higher, the flatter.
+const FLATNESS: f64 = 4.0;
+/// Twice the height of a face's bulge over the depth of the stone, at most.
+const BULGE: f64 = 0.6;
+/// Least radius of a face over the reach of the stone: its ball must hold the far end too. So
+/// no face counts as a corner either, for its radius is well above the inscribed sphere's.
+const LEAST: f64 = 2.0;
+/// Relative error of the proportions at which the search ends.
+const CLOSE: f64 = 2e-4;
+/// Power of the correction: less than 1, for the faces' bulges follow their size.
+const CAUTION: f64 = 0.7;
+/// Rounds of the search.
+const SEARCH: usize = 60;
+
+/// Half-space n . x <= h.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    normal: DVec3,
+    offset: f64,
+}
+
+/// A finished stone in its principal frame, of arbitrary size.
+pub(super) struct Stone {
+    pub core: Core,
+    /// Radius of edges and corners.
+    pub radius: f64,
+    /// Radius of the largest inscribed sphere.
+    pub inscribed: f64,
+    pub lower: DVec3,
+    pub upper: DVec3,
+    pub volume: f64,
+    pub faces: usize,
+}
+
+/// A stone whose extents along its principal axes have the ratios `shape` = (1, b/a, c/a), or
+/// none where the search does not settle.
+pub(super) fn stone(shape: DVec3, roundness: f64, random: &mut Random) -> Option<Stone> {
+    let mut planes = faces(random);
+    for plane in &mut planes {
+        *plane = plane.mapped(DVec3::ZERO, DMat3::IDENTITY, shape);
+    }
+    for round in 0..SEARCH {
+        let built = Built::new(&planes, roundness)?;
+        let fine = round > 0 && round % 4 == 0;
+        let mass = built.mass(if fine { 24_000 } else { 6_000 });
+        let axes = principal::axes(mass.second, mass.volume, |axes| {
+            built.third_moments(mass.centroid, axes)
+        });
+        let reach = |u: DVec3| built.core.support(u) + built.radius;
+        let middle = axes.transpose() * mass.centroid;
+        let columns = [axes.x_axis, axes.y_axis, axes.z_axis];
+        let upper = DVec3::from_array(columns.map(reach)) - middle;
+        let lower = -DVec3::from_array(columns.map(|u| reach(-u))) - middle;
+        let extent = upper - lower;
+        let wrong = extent.x * shape / extent;
+        if fine && (wrong - DVec3::ONE).abs().max_element() < CLOSE {
+            // The frame of the planes is the principal one to this accuracy: move there.
+            let planes: Vec<Plane> = planes
+                .iter()
+                .map(|p| p.mapped(mass.centroid, axes, DVec3::ONE))
+                .collect();
+            let built = Built::new(&planes, roundness)?;
+            return Some(Stone {
+                faces: built.faces,
+                radius: built.radius,
+                inscribed: built.inscribed,
+                core: built.core,
+                lower,
+                upper,
+                volume: mass.volume,
+            });
+        }
+        for plane in &mut planes {
+            *plane = plane.mapped(mass.centroid, axes, wrong.powf(CAUTION));
+        }
+    }
+    None
+}
+
+/// Planes around the origin: directions at random, pushed apart a little, at uneven distances.
+fn faces(random: &mut Random) -> Vec<Plane> {
+    let count = FACES.0 + random.next() % (FACES.1 - FACES.0 + 1);
+    let mut normals: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
+    for _ in 0..ROUNDS {
+        let old = normals.clone();
+        for (n, normal) in normals.iter_mut().enumerate() {
+            let others = old.iter().enumerate().filter(|(m, _)| *m != n);
+            let push: DVec3 = others
+                .map(|(_, other)| (old[n] - *other) / old[n].distance(*other).max(1e-3).powi(3))
+                .sum();
+            let push = push - old[n] * push.dot(old[n]);
+            *normal = (old[n] + push.clamp_length_max(4.0) * 0.03).normalize();
+        }
+    }
+    let plane = |normal: DVec3| Plane {
+        normal,
+        offset: 1.0 + UNEVEN * (2.0 * random.unit() - 1.0),
+    };
+    normals.into_iter().map(plane).collect()
+}
+
+impl Plane {
+    /// The plane in the frame with this origin and axes, then stretched along its axes.
+    fn mapped(self, origin: DVec3, axes: DMat3, stretch: DVec3) -> Plane {
+        let normal = (axes.transpose() * self.normal) / stretch;
+        let length = normal.length();
+        Plane {
+            normal: normal / length,
+            offset: (self.offset - self.normal.dot(origin)) / length,
+        }
+    }
+}
+
+struct Built {
+    core: Core,
+    radius: f64,
+    inscribed: f64,
+    centre: DVec3,
+    reach: f64,
+    faces: usize,
+}
+
+impl Built {
+    /// Bulges the faces of the polytope, finds its inscribed sphere, and rounds it.
+    fn new(planes: &[Plane], roundness: f64) -> Option<Built> {
+        let corners = corners(planes);
+        let mut bulged = Vec::new();
+        let start = corners.iter().map(|c| c.0).sum::<DVec3>() / corners.len().max(1) as f64;
+        let reach = corners
+            .iter()
+            .fold(0.0f64, |m, c| m.max(c.0.distance(start)));
+        let shallow = planes
+            .iter()
+            .fold(f64::INFINITY, |m, p| m.min(p.offset - p.normal.dot(start)));
+        if shallow <= 0.0 {
+            return None;
+        }
+        for (n, plane) in planes.iter().enumerate() {
+            let own: Vec<DVec3> = corners
+                .iter()
+                .filter(|c| c.1.contains(&n))
+                .map(|c| c.0)
+                .collect();
+            if own.len() < 3 {
+                continue;
+            }
+            let middle = own.iter().sum::<DVec3>() / own.len() as f64;
+            let width = own.iter().fold(0.0f64, |m, c| m.max(c.distance(middle)));
+            let radius = (FLATNESS * width)
+                .max(width * width / (BULGE * shallow))
+                .max(LEAST * reach);
+            bulged.push(Ball {
+                centre: middle - radius * plane.normal,
+                radius,
+            });
+        }
+        if bulged.len() < 4 {
+            return None;
+        }
+        let (centre, inscribed) = inscribed(&bulged, start, 2.0 * reach);
+        let radius = roundness * inscribed;
+        if inscribed <= 0.0 {
+            return None;
+        }
+        let faces = bulged.len();
+        for ball in &mut bulged {
+            ball.radius -= radius;
+        }
+        Some(Built {
+            core: Core::new(bulged),
+            radius,
+            inscribed,
+            centre,
+            reach: 2.0 * reach,
+            faces,
+        })
+    }
+
+    /// Distances of the surface from the inscribed sphere's centre along `count` directions
+    /// spread evenly over the sphere (a golden spiral).
+    fn radii(&self, count: usize) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+        let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+        (0..count).map(move |n| {
+            let z = 1.0 - (2.0 * n as f64 + 1.0) / count as f64;
+            let (s, c) = (golden * n as f64).sin_cos();
+            let ring = (1.0 - z * z).sqrt();
+            let u = DVec3::new(ring * c, ring * s, z);
+            // Newton from outside: the distance is convex, so it never passes the surface.
+            let mut t = self.reach;
+            for _ in 0..40 {
+                let (distance, outward) = self.core.distance(self.centre + t * u);
+                let step = (distance - self.radius) / outward.dot(u);
+                t -= step;
+                if step.abs() < 1e-12 * self.reach {
+                    break;
+                }
+            }
+            (u, t)
+        })
+    }
+
+    fn mass(&self, count: usize) -> Mass {
+        let share = 4.0 * std::f64::consts::PI / count as f64;
+        let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
+        for (u, t) in self.radii(count) {
+            volume += share * t.powi(3) / 3.0;
+            first += share * t.powi(4) / 4.0 * u;
+            second += DMat3::from_cols(u * u.x, u * u.y, u * u.z) * (share * t.powi(5) / 5.0);
+        }
+        let off = first / volume;
+        let outer = DMat3::from_cols(off * off.x, off * off.y, off * off.z);
+        Mass {
+            volume,
+            centroid: self.centre + off,
+            second: second - outer * volume,
+        }
+    }
+
+    /// Integrals of (x . axis)^3 about `origin`; coarse, for they only tell two ends apart.
+    fn third_moments(&self, origin: DVec3, axes: DMat3) -> DVec3 {
+        let count = 2_000;
+        let share = 4.0 * std::f64::consts::PI / count as f64;
+        let off = axes.transpose() * (self.centre - origin);
+        let mut sum = DVec3::ZERO;
+        for (u, t) in self.radii(count) {
+            let v = axes.transpose() * u;
+            let power = |n: i32| t.powi(n + 3) / f64::from(n + 3);
+            sum += share
+                * (off.powf(3.0) * power(0)
+                    + 3.0 * off * off * v * power(1)
+                    + 3.0 * off * v * v * power(2)
+                    + v * v * v * power(3));
+        }
+        sum
+    }
+}
+
+/// Corners of the polytope, each with the three planes that meet in it.
+fn corners(planes: &[Plane]) -> Vec<(DVec3, [usize; 3])> {
+    let mut found = Vec::new();
+    for i in 0..planes.len() {
+        for j in i + 1..planes.len() {
+            for k in j + 1..planes.len() {
+                let [p, q, r] = [i, j, k].map(|n| planes[n]);
+                let rows = DMat3::from_cols(p.normal, q.normal, r.normal).transpose();
+                if rows.determinant().abs() < 1e-9 {
+                    continue;
+                }
+                let x = rows.inverse() * DVec3::new(p.offset, q.offset, r.offset);
+                let holds = |n: usize| {
+                    [i, j, k].contains(&n) || planes[n].normal.dot(x) <= planes[n].offset
+                };
+                if (0..planes.len()).all(holds) {
+                    found.push((x, [i, j, k]));
+                }
+            }
+        }
+    }
+    found
+}

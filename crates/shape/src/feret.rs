@@ -1,0 +1,116 @@
+//! Caliper lengths of a body, from points of its surface.
+
+use glam::DVec3;
+
+/// Directions tried for the longest length.
+const DIRECTIONS: usize = 400;
+/// Directions tried across it.
+const ACROSS: usize = 90;
+
+/// The longest caliper length, the longest at right angles to it, and the one at right angles to
+/// both, in the unit of the points.
+pub(crate) fn lengths(points: &[DVec3]) -> [f64; 3] {
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let spiral = (0..DIRECTIONS).map(|n| {
+        let z = (n as f64 + 0.5) / DIRECTIONS as f64;
+        let (s, c) = (golden * n as f64).sin_cos();
+        DVec3::new((1.0 - z * z).sqrt() * c, (1.0 - z * z).sqrt() * s, z)
+    });
+    let long = longest(points, spiral, |u| u);
+    let e = long.any_orthonormal_vector();
+    let f = long.cross(e);
+    let fan = (0..ACROSS).map(|n| {
+        let (s, c) = (std::f64::consts::PI * n as f64 / ACROSS as f64).sin_cos();
+        c * e + s * f
+    });
+    let middle = longest(points, fan, |u| u - long * long.dot(u));
+    [long, middle, long.cross(middle)].map(|u| {
+        let (low, high) = ends(points, u);
+        (high - low).dot(u)
+    })
+}
+
+/// First and last of the points along `u`.
+fn ends(points: &[DVec3], u: DVec3) -> (DVec3, DVec3) {
+    let start = (f64::INFINITY, DVec3::ZERO, f64::NEG_INFINITY, DVec3::ZERO);
+    let (_, low, _, high) = points.iter().fold(start, |mut best, p| {
+        let along = u.dot(*p);
+        if along < best.0 {
+            (best.0, best.1) = (along, *p);
+        }
+        if along > best.2 {
+            (best.2, best.3) = (along, *p);
+        }
+        best
+    });
+    (low, high)
+}
+
+/// The direction of the longest length: the best of those given, then that of the line between
+/// the two points which it touches, as long as that is longer.
+fn longest(
+    points: &[DVec3],
+    directions: impl Iterator<Item = DVec3>,
+    allowed: impl Fn(DVec3) -> DVec3,
+) -> DVec3 {
+    let span = |u: DVec3| {
+        let (low, high) = ends(points, u);
+        ((high - low).dot(u), high - low)
+    };
+    let mut best = (0.0, DVec3::X, DVec3::X);
+    for u in directions {
+        let (length, line) = span(u);
+        if length > best.0 {
+            best = (length, u, line);
+        }
+    }
+    for _ in 0..20 {
+        let Some(u) = allowed(best.2).try_normalize() else {
+            break;
+        };
+        let (length, line) = span(u);
+        if length <= best.0 {
+            break;
+        }
+        best = (length, u, line);
+    }
+    best.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DQuat;
+
+    #[test]
+    fn a_turned_box_is_read_along_its_diagonal() {
+        let turn = DQuat::from_scaled_axis(DVec3::new(0.4, -1.3, 0.8));
+        let corners: Vec<DVec3> = (0..8)
+            .map(|c| {
+                let sign = |bit: i32| f64::from(c >> bit & 1) - 0.5;
+                turn * DVec3::new(4.0 * sign(0), 2.0 * sign(1), sign(2))
+            })
+            .collect();
+        let [long, middle, short] = lengths(&corners);
+        assert!((long - 21f64.sqrt()).abs() < 1e-12);
+        // Across the diagonal d, the longest width is that of the best of all directions in its
+        // plane, here found by brute force.
+        let d = turn * DVec3::new(4.0, 2.0, 1.0).normalize();
+        let (e, f) = (
+            d.any_orthonormal_vector(),
+            d.cross(d.any_orthonormal_vector()),
+        );
+        let width = |u: DVec3| {
+            let (low, high) = ends(&corners, u);
+            (high - low).dot(u)
+        };
+        // The diagonal is one of four: any of them may have been taken.
+        let brute = (0..20_000).map(|n| {
+            let (s, c) = (std::f64::consts::PI * f64::from(n) / 20_000.0).sin_cos();
+            width(c * e + s * f)
+        });
+        let best = brute.fold(0.0, f64::max);
+        assert!((middle - best).abs() < 1e-6, "{middle} {best}");
+        assert!(short < middle && middle < long);
+    }
+}

@@ -1,0 +1,190 @@
+//! Pictures of grains.
+
+use crate::Shape;
+use crate::error::{Result, ShapeError};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::path::Path;
+
+/// An RGB picture, rows from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Pixels along a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Red, green and blue of every pixel.
+    pub pixels: Vec<[u8; 3]>,
+}
+
+/// Background.
+const PAPER: [u8; 3] = [255, 255, 255];
+/// Colour of a grain in full light.
+const STONE: DVec3 = DVec3::new(222.0, 200.0, 165.0);
+/// Colour of a surface node.
+const NODE: [u8; 3] = [150, 30, 30];
+/// Rays along the edge of a pixel.
+const RAYS: usize = 2;
+
+/// A direction of view: what points right and up in the picture, in the grain's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Points right in the picture.
+    pub right: DVec3,
+    /// Points up in the picture.
+    pub up: DVec3,
+}
+
+impl View {
+    /// Down the short axis: the broadest side, long axis to the right.
+    pub const BROAD: View = View {
+        right: DVec3::X,
+        up: DVec3::Y,
+    };
+    /// Along the intermediate axis: long axis to the right, short axis up.
+    pub const SIDE: View = View {
+        right: DVec3::X,
+        up: DVec3::Z,
+    };
+    /// Along the long axis.
+    pub const END: View = View {
+        right: DVec3::Y,
+        up: DVec3::Z,
+    };
+}
+
+impl Picture {
+    /// An empty picture.
+    pub fn blank(width: usize, height: usize) -> Picture {
+        Picture {
+            width,
+            height,
+            pixels: vec![PAPER; width * height],
+        }
+    }
+
+    /// Puts another picture on this one, its upper left corner at column `x`, row `y`.
+    pub fn paste(&mut self, other: &Picture, x: usize, y: usize) {
+        let width = other.width.min(self.width.saturating_sub(x));
+        for row in 0..other.height.min(self.height.saturating_sub(y)) {
+            let to = x + self.width * (y + row);
+            let from = other.width * row;
+            self.pixels[to..to + width].copy_from_slice(&other.pixels[from..from + width]);
+        }
+    }
+
+    /// Writes a PNG file.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let io = |e| ShapeError::io(path, e);
+        let file = std::io::BufWriter::new(std::fs::File::create(path).map_err(io)?);
+        let mut encoder = png::Encoder::new(file, self.width as u32, self.height as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let bytes: Vec<u8> = self.pixels.iter().flatten().copied().collect();
+        let written = encoder
+            .write_header()
+            .and_then(|mut writer| writer.write_image_data(&bytes));
+        written.map_err(|e| io(std::io::Error::other(e)))
+    }
+
+    /// A grain seen along a direction, without perspective, lit from the upper left. The picture
+    /// is `pixels` wide and high and shows `width` [m]; with `nodes` the surface nodes are dots.
+    pub fn of(shape: &Shape, view: View, pixels: usize, width: f64, nodes: bool) -> Picture {
+        let towards_eye = view.right.cross(view.up);
+        let light = (0.55 * towards_eye + 0.6 * view.up - 0.5 * view.right).normalize();
+        let start = shape.bounding_radius() * 1.01;
+        let step = width / (pixels * RAYS) as f64;
+        let place = |n: usize| (n as f64 + 0.5 - 0.5 * (pixels * RAYS) as f64) * step;
+        let mut picture = Picture::blank(pixels, pixels);
+        let rows = picture.pixels.par_chunks_mut(pixels).enumerate();
+        rows.for_each(|(row, line)| {
+            for (column, pixel) in line.iter_mut().enumerate() {
+                let mut sum = DVec3::ZERO;
+                for ray in 0..RAYS * RAYS {
+                    let (i, j) = (RAYS * column + ray % RAYS, RAYS * row + ray / RAYS);
+                    let from = place(i) * view.right - place(j) * view.up + start * towards_eye;
+                    sum += trace(shape, from, -towards_eye, 2.0 * start)
+                        .map_or(DVec3::from_array(PAPER.map(f64::from)), |normal| {
+                            shade(normal, light, towards_eye)
+                        });
+                }
+                let mean = sum / (RAYS * RAYS) as f64;
+                *pixel = mean.to_array().map(|v| v.round() as u8);
+            }
+        });
+        if nodes {
+            picture.mark_nodes(shape, view, width);
+        }
+        picture
+    }
+
+    /// The three sides of a grain in a row: broad side, long side, end.
+    pub fn three_sides(shape: &Shape, pixels: usize, nodes: bool) -> Picture {
+        let width = 2.1 * shape.bounding_radius();
+        let mut picture = Picture::blank(3 * pixels, pixels);
+        for (n, view) in [View::BROAD, View::SIDE, View::END].into_iter().enumerate() {
+            let side = Picture::of(shape, view, pixels, width, nodes);
+            picture.paste(&side, n * pixels, 0);
+        }
+        picture
+    }
+
+    /// Pictures of equal size in rows of `columns`.
+    pub fn sheet(pictures: &[Picture], columns: usize) -> Picture {
+        let columns = columns.clamp(1, pictures.len().max(1));
+        let (width, height) = pictures.first().map_or((1, 1), |p| (p.width, p.height));
+        let rows = pictures.len().div_ceil(columns).max(1);
+        let mut sheet = Picture::blank(width * columns, height * rows);
+        for (n, picture) in pictures.iter().enumerate() {
+            sheet.paste(picture, n % columns * width, n / columns * height);
+        }
+        sheet
+    }
+
+    fn mark_nodes(&mut self, shape: &Shape, view: View, width: f64) {
+        let towards_eye = view.right.cross(view.up);
+        let scale = self.width as f64 / width;
+        let clearance = 1e-2 * shape.equivalent_diameter();
+        for node in shape.nodes() {
+            let normal = shape.distance_and_gradient(node.position).1;
+            let from = node.position + clearance * normal.normalize_or_zero();
+            let away = 2.1 * shape.bounding_radius();
+            let hidden =
+                normal.dot(towards_eye) <= 0.0 || trace(shape, from, towards_eye, away).is_some();
+            if hidden {
+                continue;
+            }
+            let x = 0.5 * self.width as f64 + scale * node.position.dot(view.right);
+            let y = 0.5 * self.height as f64 - scale * node.position.dot(view.up);
+            let (x, y) = (x as usize, y as usize);
+            if x < self.width && y < self.height {
+                self.pixels[x + self.width * y] = NODE;
+            }
+        }
+    }
+}
+
+/// Normal where a ray meets the surface.
+fn trace(shape: &Shape, from: DVec3, along: DVec3, reach: f64) -> Option<DVec3> {
+    let close = 1e-4 * shape.bounding_radius();
+    let mut t = 0.0;
+    for _ in 0..400 {
+        let (distance, gradient) = shape.distance_and_gradient(from + t * along);
+        if distance < close {
+            return Some(gradient.normalize_or_zero());
+        }
+        // A little less than the distance, which trilinear values may overestimate.
+        t += 0.9 * distance;
+        if t > reach {
+            return None;
+        }
+    }
+    None
+}
+
+/// Diffuse light with a dark rim, so that light faces stand out against the paper.
+fn shade(normal: DVec3, light: DVec3, towards_eye: DVec3) -> DVec3 {
+    let lit = normal.dot(light).max(0.0);
+    let rim = normal.dot(towards_eye).clamp(0.0, 1.0);
+    STONE * ((0.25 + 0.75 * lit) * (0.45 + 0.55 * rim.sqrt())).min(1.0)
+}

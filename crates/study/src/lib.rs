@@ -1,0 +1,33 @@
+//! Studies: many runs of one case, and what they say together.
+//!
+//! A study file expands a base case along axes into [`Model`]s ([`Study::read`]); [`Plan::of`]
+//! resolves each into a [`Run`] with a stable name and a hash of its case and of the program;
+//! [`carry_out`] runs what is missing, several at once, each from its last checkpoint. A study
+//! folder holds `study.json` (the plan), `runs/NAME/` (ordinary run folders), and what is made of
+//! them.
+
+mod error;
+mod file;
+mod measure;
+mod model;
+mod plan;
+mod raw;
+mod runner;
+mod select;
+mod state;
+mod table;
+
+pub use error::StudyError;
+pub use file::{Ensemble, Study};
+pub use measure::{Measures, Pair, QUANTITIES};
+pub use model::{Model, Setting};
+pub use plan::{Manifest, Plan, Run};
+pub use runner::{Options, Outcome, Watcher, carry_out};
+pub use select::Selection;
+pub use state::{State, state};
+pub use table::{Row, csv_of, table, write_table};
+
+/// Subfolder of a study folder that holds the run folders.
+pub const RUNS: &str = "runs";
+/// The plan of a study, in its folder.
+pub const MANIFEST: &str = "study.json";

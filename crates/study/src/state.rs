@@ -1,0 +1,69 @@
+//! How far a run of a study is.
+
+use std::path::Path;
+
+use grainwake_solver::output::provenance::Provenance;
+use grainwake_solver::output::{RESOLVED, SUMMARY};
+
+use crate::plan::{Run, ending};
+
+/// How far a run is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Nothing is there.
+    Missing,
+    /// It was begun, and can go on.
+    Unfinished,
+    /// It came to its end.
+    Finished,
+    /// It became unstable; the same case and program would again.
+    Failed(String),
+    /// What is there is of another case or program, as said.
+    Stale(&'static str),
+}
+
+impl State {
+    /// One word.
+    pub fn word(&self) -> &'static str {
+        match self {
+            State::Missing => "missing",
+            State::Unfinished => "unfinished",
+            State::Finished => "finished",
+            State::Failed(_) => "failed",
+            State::Stale(_) => "stale",
+        }
+    }
+}
+
+/// Looks into the run folder of a run.
+pub fn state(run: &Run, study: &Path) -> State {
+    let folder = run.folder(study);
+    let Some(there) = Provenance::read(&folder) else {
+        return State::Missing;
+    };
+    let own = Provenance::new(&run.case_sha256);
+    if there.case_sha256 != own.case_sha256 {
+        return State::Stale("its case is another one now");
+    }
+    if (&there.version, &there.commit) != (&own.version, &own.commit) {
+        return State::Stale("it was made by another version of the program");
+    }
+    if folder.join(SUMMARY).is_file() {
+        let resolved = std::fs::read_to_string(folder.join(RESOLVED)).unwrap_or_default();
+        return if ending(&resolved) == run.ending {
+            State::Finished
+        } else {
+            State::Stale("it ends at another time now")
+        };
+    }
+    match std::fs::read_to_string(folder.join("failure.json")) {
+        Ok(text) => State::Failed(why(&text)),
+        Err(_) => State::Unfinished,
+    }
+}
+
+fn why(failure: &str) -> String {
+    let value: serde_json::Value = serde_json::from_str(failure).unwrap_or_default();
+    let what = value.get("what").and_then(serde_json::Value::as_str);
+    what.unwrap_or("the numerics failed").to_owned()
+}

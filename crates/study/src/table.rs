@@ -1,0 +1,231 @@
+//! The table of a study: one row for each run.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use grainwake_report::run_folder::RunFolder;
+use grainwake_solver::output::provenance::Provenance;
+use grainwake_solver::output::read_summary;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{StudyError, write_whole};
+use crate::measure::{Measures, QUANTITIES};
+use crate::plan::{Manifest, Run};
+use crate::state::{State, state};
+
+/// A run and what came out of it. The JSON names are stable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Name of the run.
+    pub name: String,
+    /// Name of its model.
+    pub model: String,
+    /// Number in the ensemble.
+    pub member: usize,
+    /// Name of its value on each axis.
+    pub levels: BTreeMap<String, String>,
+    /// Numbers that belong to it.
+    pub factors: BTreeMap<String, f64>,
+    /// "finished", "unfinished", "missing", "failed" or "stale".
+    pub state: String,
+    /// Why it failed or is stale.
+    pub remark: Option<String>,
+    /// Hash of its case, its end and the program.
+    pub id: String,
+    /// Equal-volume diameter d [m].
+    pub diameter_m: Option<f64>,
+    /// First contact [s].
+    pub kiss_time_s: Option<f64>,
+    /// Steps taken.
+    pub steps: Option<u64>,
+    /// Simulated time [s].
+    pub end_time_s: Option<f64>,
+    /// Wall-clock time [s].
+    pub wall_s: Option<f64>,
+    /// Threads of its last session.
+    pub threads: Option<usize>,
+    /// Largest |div u| after any step [1/s].
+    pub max_divergence: Option<f64>,
+    /// What was measured on the pair; only of a finished run.
+    pub pair: Option<Measures>,
+}
+
+impl Row {
+    /// Looks at a run in a study folder.
+    pub fn of(run: &Run, study: &Path) -> Row {
+        let found = state(run, study);
+        let folder = run.folder(study);
+        let mut row = Row {
+            name: run.name.clone(),
+            model: run.model.clone(),
+            member: run.member,
+            levels: run.levels.clone(),
+            factors: run.factors.clone(),
+            state: found.word().into(),
+            remark: None,
+            id: run.id.clone(),
+            diameter_m: None,
+            kiss_time_s: None,
+            steps: None,
+            end_time_s: None,
+            wall_s: None,
+            threads: None,
+            max_divergence: None,
+            pair: None,
+        };
+        match &found {
+            State::Failed(why) => row.remark = Some(why.clone()),
+            State::Stale(why) => row.remark = Some((*why).into()),
+            _ => {}
+        }
+        if found != State::Finished {
+            return row;
+        }
+        if let Ok(summary) = read_summary(&folder) {
+            let mean = summary
+                .grains
+                .iter()
+                .map(|g| g.equivalent_diameter_m)
+                .sum::<f64>();
+            row.diameter_m =
+                (!summary.grains.is_empty()).then(|| mean / summary.grains.len() as f64);
+            row.kiss_time_s = summary.pair.as_ref().and_then(|p| p.kiss_time_s);
+            row.steps = Some(summary.steps);
+            row.end_time_s = Some(summary.end_time_s);
+            row.wall_s = Some(summary.wall_s);
+            row.max_divergence = Some(summary.max_divergence);
+        }
+        row.threads = Provenance::read(&folder).and_then(|p| Some(p.sessions.last()?.threads));
+        match RunFolder::open(&folder) {
+            Ok(run) => row.pair = Measures::of(&run),
+            Err(error) => row.remark = Some(error.to_string()),
+        }
+        row
+    }
+
+    /// Whether the run came to its end.
+    pub fn finished(&self) -> bool {
+        self.state == State::Finished.word()
+    }
+
+    /// A quantity, a factor or a number of the run by name.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        let measured = self.pair.as_ref().and_then(|pair| pair.get(name));
+        measured.or_else(|| self.factors.get(name).copied())
+    }
+}
+
+/// The table of all runs.
+pub fn table(manifest: &Manifest, study: &Path) -> Vec<Row> {
+    use rayon::prelude::*;
+    let rows: Vec<Row> = manifest
+        .runs
+        .par_iter()
+        .map(|run| Row::of(run, study))
+        .collect();
+    let kept: BTreeMap<String, Row> = kept(study)
+        .into_iter()
+        .map(|r| (r.name.clone(), r))
+        .collect();
+    // A study folder that was thinned out keeps its results in the table.
+    let known = |row: Row| match kept.get(&row.name) {
+        Some(old) if row.state == State::Missing.word() && old.id == row.id && old.finished() => {
+            old.clone()
+        }
+        _ => row,
+    };
+    rows.into_iter().map(known).collect()
+}
+
+fn kept(study: &Path) -> Vec<Row> {
+    let text = std::fs::read_to_string(study.join("table.json")).unwrap_or_default();
+    serde_json::from_str(&text).unwrap_or_default()
+}
+
+/// Writes `table.json` and `table.csv` into a study folder.
+///
+/// # Errors
+/// If they cannot be written.
+pub fn write_table(rows: &[Row], study: &Path) -> Result<(), StudyError> {
+    let json = study.join("table.json");
+    let text = serde_json::to_string_pretty(rows).map_err(|error| StudyError::Io {
+        action: "write",
+        path: json.clone(),
+        source: error.into(),
+    })?;
+    write_whole(&json, text.as_bytes())?;
+    write_whole(&study.join("table.csv"), csv_of(rows).as_bytes())
+}
+
+/// The table as comma-separated text; what is not known is empty.
+pub fn csv_of(rows: &[Row]) -> String {
+    let union = |names: fn(&Row) -> Vec<String>| -> BTreeSet<String> {
+        rows.iter().flat_map(names).collect()
+    };
+    let axes = union(|r| r.levels.keys().cloned().collect());
+    let factors = union(|r| r.factors.keys().cloned().collect());
+    let plain = [
+        "diameter_m",
+        "kiss_time_s",
+        "steps",
+        "end_time_s",
+        "wall_s",
+        "threads",
+        "max_divergence",
+        "id",
+        "remark",
+    ];
+    let mut out = csv::Writer::from_writer(Vec::new());
+    // Writing to memory does not fail; a row of another length cannot come about.
+    let header = ["run", "model", "member", "state"]
+        .map(str::to_owned)
+        .into_iter();
+    let header = header
+        .chain(axes.iter().cloned())
+        .chain(factors.iter().cloned());
+    let header = header
+        .chain(QUANTITIES.map(str::to_owned))
+        .chain(plain.map(str::to_owned));
+    let _ = out.write_record(header);
+    for row in rows {
+        let mut cells = vec![
+            row.name.clone(),
+            row.model.clone(),
+            row.member.to_string(),
+            row.state.clone(),
+        ];
+        cells.extend(
+            axes.iter()
+                .map(|a| row.levels.get(a).cloned().unwrap_or_default()),
+        );
+        cells.extend(factors.iter().map(|f| number(row.factors.get(f).copied())));
+        cells.extend(
+            QUANTITIES
+                .iter()
+                .map(|q| number(row.pair.as_ref().and_then(|p| p.get(q)))),
+        );
+        cells.extend([
+            row.diameter_m.map_or(String::new(), |v| format!("{v:e}")),
+            number(row.kiss_time_s),
+            row.steps.map_or(String::new(), |v| v.to_string()),
+            number(row.end_time_s),
+            row.wall_s.map_or(String::new(), |v| format!("{v:.1}")),
+            row.threads.map_or(String::new(), |v| v.to_string()),
+            row.max_divergence
+                .map_or(String::new(), |v| format!("{v:.1e}")),
+            row.id.clone(),
+            row.remark.clone().unwrap_or_default(),
+        ]);
+        let _ = out.write_record(&cells);
+    }
+    String::from_utf8(out.into_inner().unwrap_or_default()).unwrap_or_default()
+}
+
+/// Six significant digits, without trailing zeros.
+fn number(value: Option<f64>) -> String {
+    let Some(value) = value else {
+        return String::new();
+    };
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    rounded.to_string()
+}

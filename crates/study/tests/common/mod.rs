@@ -1,0 +1,83 @@
+//! Help for the tests: a small dry pair and studies of it.
+#![allow(dead_code)]
+
+use std::path::{Path, PathBuf};
+
+use grainwake_study::{Plan, Study, StudyError};
+
+/// Two spheres that fall on a floor, the upper one on the lower one; no fluid, a moment to run.
+pub const DRY: &str = r#"
+title = "dry pair"
+[domain]
+size = ["10 mm", "10 mm", "30 mm"]
+[contact]
+stiffness = 200
+restitution = 0.8
+[time]
+end = "60 ms"
+step = "0.1 ms"
+[output]
+tables = "1 ms"
+checkpoint_steps = 40
+[[grain]]
+shape = { kind = "sphere", diameter = "2 mm" }
+nodes = 200
+density = 2500
+position = ["5 mm", "5 mm", "5 mm"]
+[[grain]]
+shape = { kind = "sphere", diameter = "2 mm" }
+nodes = 200
+density = 2500
+position = ["5.2 mm", "5 mm"]
+velocity = [0, 0, "-0.2 m/s"]
+gap_above = { grain = 0, gap = "1 mm" }
+"#;
+
+/// Two axes and a model of its own.
+pub const STUDY: &str = r#"
+title = "test"
+base = "case.toml"
+[[axis]]
+name = "weight"
+key = ["grain.0.density", "grain.1.density"]
+values = [
+  { name = "light", value = 2000, factors = { density = 2000 } },
+  { name = "heavy", value = "4 g/cm3", factors = { density = 4000 } },
+]
+[[axis]]
+name = "grip"
+values = [
+  { name = "smooth", set = { "contact.friction" = 0 } },
+  { name = "rough", set = { contact = { friction = 0.6, wall_friction = 0.1 } } },
+]
+[[model]]
+name = "alone"
+set = { "grain.1.velocity" = [0, 0, 0] }
+[[adjust]]
+models = ["heavy-*"]
+set = { "time.end" = "50 ms" }
+"#;
+
+/// A folder with `case.toml` and `study.toml`.
+pub fn folder(study: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("case.toml"), DRY).unwrap();
+    let path = folder.path().join("study.toml");
+    std::fs::write(&path, study).unwrap();
+    (folder, path)
+}
+
+/// The plan of a study file.
+pub fn plan(path: &Path) -> Result<Plan, StudyError> {
+    Plan::of(&Study::read(path)?, &[])
+}
+
+/// The problems of a study that is wrong.
+pub fn problems(study: &str) -> Vec<grainwake_solver::case::Problem> {
+    let (_folder, path) = folder(study);
+    match plan(&path) {
+        Err(StudyError::Invalid(problems)) => problems,
+        Err(other) => panic!("another error: {other}"),
+        Ok(_) => panic!("accepted"),
+    }
+}

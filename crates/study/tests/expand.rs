@@ -1,0 +1,235 @@
+//! What a study file expands to, and what is said about a wrong one.
+
+mod common;
+
+use common::{STUDY, folder, plan, problems};
+use grainwake_study::{Selection, Study};
+
+fn names(study: &str) -> Vec<String> {
+    let (_folder, path) = folder(study);
+    plan(&path)
+        .unwrap()
+        .manifest
+        .runs
+        .into_iter()
+        .map(|r| r.name)
+        .collect()
+}
+
+#[test]
+fn axes_multiply_and_models_follow() {
+    let expected = [
+        "light-smooth",
+        "light-rough",
+        "heavy-smooth",
+        "heavy-rough",
+        "alone",
+    ];
+    assert_eq!(names(STUDY), expected);
+    let (_folder, path) = folder(STUDY);
+    let runs = plan(&path).unwrap().manifest.runs;
+    let case = |i: usize| runs[i].case().unwrap();
+    let heavy = case(3);
+    assert_eq!(
+        heavy
+            .setup
+            .grains
+            .iter()
+            .map(|g| g.density)
+            .collect::<Vec<_>>(),
+        [4000.0, 4000.0]
+    );
+    assert_eq!(heavy.plan.end, 0.05, "adjusted");
+    assert_eq!(case(1).plan.end, 0.06, "not adjusted");
+    assert_eq!(case(0).setup.grains[0].density, 2000.0);
+    assert!(
+        case(3).resolved.contains("friction = 0.6")
+            && case(3).resolved.contains("wall_friction = 0.1")
+    );
+    assert_eq!(case(4).setup.grains[1].velocity.z, 0.0);
+    assert_eq!(runs[3].factors["density"], 4000.0);
+    assert_eq!(
+        (
+            runs[3].levels["weight"].as_str(),
+            runs[3].levels["grip"].as_str()
+        ),
+        ("heavy", "rough")
+    );
+    assert!(runs[4].levels.is_empty());
+}
+
+#[test]
+fn a_model_may_replace_all_grains() {
+    let text = STUDY.replace(
+        "set = { \"grain.1.velocity\" = [0, 0, 0] }",
+        "set.grain = [\n { shape = { kind = \"ellipsoid\", size = [\"3 mm\", \"2 mm\", \"1 mm\"] }, nodes = 300, density = 2500, position = [\"5 mm\", \"5 mm\", \"9 mm\"] },\n]",
+    );
+    let (_folder, path) = folder(&text);
+    let runs = plan(&path).unwrap().manifest.runs;
+    let case = runs[4].case().unwrap();
+    assert_eq!(case.setup.grains.len(), 1);
+    assert!((case.setup.grains[0].shape.equivalent_diameter() - 6e-9_f64.cbrt()).abs() < 1e-5);
+}
+
+#[test]
+fn hashes_follow_what_decides_the_results() {
+    let ids = |study: &str, sets: &[&str]| {
+        let (_folder, path) = folder(study);
+        let sets: Vec<String> = sets.iter().map(|s| (*s).to_string()).collect();
+        let runs = grainwake_study::Plan::of(&Study::read(&path).unwrap(), &sets)
+            .unwrap()
+            .manifest
+            .runs;
+        runs.into_iter().map(|r| r.id).collect::<Vec<_>>()
+    };
+    let first = ids(STUDY, &[]);
+    let mut distinct = first.clone();
+    distinct.sort();
+    distinct.dedup();
+    assert_eq!(distinct.len(), 5);
+    assert_eq!(
+        first,
+        ids(
+            STUDY,
+            &["title=other", "run.threads=3", "output.checkpoint_steps=11"]
+        )
+    );
+    let later = ids(STUDY, &["time.end=0.07"]);
+    let softer = ids(STUDY, &["contact.stiffness=100"]);
+    assert!(
+        first
+            .iter()
+            .zip(&later)
+            .zip(&softer)
+            .all(|((a, b), c)| a != b && a != c)
+    );
+}
+
+#[test]
+fn an_ensemble_offsets_all_but_the_first_member() {
+    let text = format!(
+        "{STUDY}\n[ensemble]\nmembers = 4\noffset = \"0.05 mm\"\nmodels = [\"light-*\"]\nseed = 7\n"
+    );
+    let (_folder, path) = folder(&text);
+    let runs = plan(&path).unwrap().manifest.runs;
+    let named: Vec<&str> = runs.iter().map(|r| r.name.as_str()).collect();
+    assert_eq!(
+        named[..5],
+        [
+            "light-smooth",
+            "light-smooth-m1",
+            "light-smooth-m2",
+            "light-smooth-m3",
+            "light-rough"
+        ]
+    );
+    assert_eq!(runs.len(), 2 * 4 + 3);
+    let place = |i: usize| runs[i].case().unwrap().setup.grains[1].pose.position;
+    let start = place(0);
+    let offsets: Vec<_> = (1..4).map(|i| place(i) - start).collect();
+    for offset in &offsets {
+        assert!(
+            offset.z.abs() < 1e-9
+                && offset.length() > 1e-9
+                && offset.length() <= 0.05e-3 * (1.0 + 1e-9),
+            "{offset}"
+        );
+    }
+    assert!(offsets[0].distance(offsets[1]) > 1e-7);
+    assert_eq!(
+        plan(&path).unwrap().manifest.runs,
+        runs,
+        "the same every time"
+    );
+    // A grain that has a height of its own keeps it.
+    let first = text.replace("[ensemble]", "[ensemble]\ngrain = 0");
+    let (_folder, path) = folder(&first);
+    let runs = plan(&path).unwrap().manifest.runs;
+    let moved = runs[1].case().unwrap().setup.grains[0].pose.position;
+    assert!(moved.z == 5e-3 && moved.x != 5e-3);
+}
+
+#[test]
+fn wrong_studies_are_located() {
+    let one = |study: &str| {
+        let found = problems(study);
+        let p = found.first().unwrap().clone();
+        let place = p
+            .place()
+            .map(|(name, line, _)| (name.ends_with("study.toml"), line));
+        (p.to_string(), p.help.clone().unwrap_or_default(), place)
+    };
+    let (message, help, place) =
+        one(&STUDY.replace("key = [\"grain.0.density\"", "keys = [\"grain.0.density\""));
+    assert!(
+        message.contains("unknown key `keys`") && help.contains("`key`"),
+        "{message} {help}"
+    );
+    assert_eq!(place, Some((true, 6)));
+    let (message, _, place) = one(&STUDY.replace("case.toml", "cases.toml"));
+    assert!(message.contains("no case file"), "{message}");
+    assert_eq!(place, Some((true, 3)));
+    let (message, ..) = one(&STUDY
+        .replace("\"heavy\"", "\"light\"")
+        .replace("heavy-*", "light-*"));
+    assert!(
+        message.contains("two models called \"light-smooth\""),
+        "{message}"
+    );
+    let (message, help, _) = one(&STUDY.replace("heavy-*", "haevy-rough"));
+    assert!(
+        message.contains("no model is called") && help.contains("heavy-rough"),
+        "{message} {help}"
+    );
+    let (message, ..) = one(&STUDY.replace("\"heavy\"", "\"../heavy\""));
+    assert!(message.contains("cannot be a name"), "{message}");
+    let (message, ..) = one(&STUDY.replace("name = \"grip\"", "name = \"weight\""));
+    assert!(message.contains("two axes"), "{message}");
+    let (message, ..) = one(&format!("{STUDY}[ensemble]\nmembers = 0\noffset = 1\n"));
+    assert!(message.contains("1 to 1000"), "{message}");
+    let (message, ..) = one(&format!(
+        "{STUDY}[ensemble]\nmembers = 2\noffset = \"1 s\"\n"
+    ));
+    assert!(
+        message.contains("length") || message.contains("time"),
+        "{message}"
+    );
+    let (message, ..) = one("title = \"empty\"\n");
+    assert!(message.contains("no models"), "{message}");
+}
+
+#[test]
+fn a_wrong_case_is_placed_where_the_study_set_it() {
+    let found = problems(&STUDY.replace("\"contact.friction\" = 0 ", "\"contact.fricton\" = 0 "));
+    let p = &found[0];
+    assert!(
+        p.to_string().contains("light-smooth") && p.help.as_deref().unwrap().contains("friction"),
+        "{p}"
+    );
+    let (name, line, _) = p.place().unwrap();
+    assert!(name.ends_with("study.toml") && line == 14, "{name} {line}");
+    let found = problems(&STUDY.replace("\"4 g/cm3\"", "\"4 mm\""));
+    assert_eq!(found[0].place().unwrap().1, 9);
+    assert!(found[0].to_string().contains("heavy-smooth"));
+}
+
+#[test]
+fn only_takes_patterns_and_shares() {
+    let (_folder, path) = folder(STUDY);
+    let runs = plan(&path).unwrap().manifest.runs;
+    let chosen = |text: &str| Selection::parse(text).unwrap().choose(&runs);
+    assert_eq!(chosen("light-*,alone").unwrap(), [0, 1, 4]);
+    assert_eq!(chosen("*-rough").unwrap(), [1, 3]);
+    assert_eq!(chosen("1/2").unwrap(), [0, 2, 4]);
+    let mut all: Vec<usize> = (1..=3)
+        .flat_map(|i| chosen(&format!("{i}/3")).unwrap())
+        .collect();
+    all.sort_unstable();
+    assert_eq!(all, [0, 1, 2, 3, 4]);
+    assert!(chosen("7/9").unwrap().is_empty());
+    let help = chosen("alnoe").unwrap_err().help.unwrap();
+    assert!(help.contains("\"alone\""), "{help}");
+    for bad in ["0/3", "4/3", "a/3", "", "[", ","] {
+        assert!(Selection::parse(bad).is_err(), "{bad}");
+    }
+}

@@ -1,0 +1,325 @@
+//! Runs of a study: nothing is repeated, what is stale is, and kills and failures stay small.
+
+mod common;
+
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use common::{STUDY, folder, plan};
+use grainwake_solver::output::Progress;
+use grainwake_study::{
+    Manifest, Options, Outcome, Plan, State, Study, Watcher, carry_out, csv_of, state, table,
+    write_table,
+};
+
+struct Quiet;
+impl Watcher for Quiet {}
+
+/// Interrupts after so many steps of all runs together.
+struct After(AtomicU64, u64);
+impl Watcher for After {
+    fn progress(&self, _: usize, _: &Progress) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+    fn interrupted(&self) -> bool {
+        self.0.load(Ordering::Relaxed) >= self.1
+    }
+}
+
+fn options(jobs: usize) -> Options {
+    Options {
+        jobs,
+        threads: 1,
+        retry: false,
+        keep_checkpoints: false,
+        command: vec!["test".into()],
+    }
+}
+
+fn run(plan: &Plan, study: &Path, watcher: &dyn Watcher, options: &Options) -> Vec<Outcome> {
+    plan.settle(study).unwrap();
+    let runs = &plan.manifest.runs;
+    let all: Vec<usize> = (0..runs.len()).collect();
+    carry_out(runs, &all, study, options, watcher)
+        .unwrap()
+        .into_iter()
+        .map(|(_, o)| o)
+        .collect()
+}
+
+fn states(plan: &Plan, study: &Path) -> Vec<State> {
+    plan.manifest.runs.iter().map(|r| state(r, study)).collect()
+}
+
+fn results(plan: &Plan, study: &Path) -> Vec<Vec<u8>> {
+    let file = |name: &str| {
+        plan.manifest
+            .runs
+            .iter()
+            .map(|r| std::fs::read(r.folder(study).join(name)).unwrap())
+            .collect::<Vec<_>>()
+    };
+    [
+        file("grains.csv"),
+        file("events.jsonl"),
+        file("case.resolved.toml"),
+    ]
+    .concat()
+}
+
+#[test]
+fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
+    let (folder, path) = folder(STUDY);
+    let study = folder.path().join("out");
+    let first = plan(&path).unwrap();
+    assert!(states(&first, &study).iter().all(|s| *s == State::Missing));
+    let ended = run(&first, &study, &Quiet, &options(2));
+    assert!(
+        ended.iter().all(|o| matches!(o, Outcome::Finished(_))),
+        "{ended:?}"
+    );
+    assert!(
+        !study.join("runs/alone/checkpoint").exists(),
+        "checkpoints of finished runs go"
+    );
+    assert_eq!(Manifest::read(&study).unwrap(), first.manifest);
+    let kept = std::fs::read(study.join("runs/alone/provenance.json")).unwrap();
+    assert!(
+        run(&first, &study, &Quiet, &options(1))
+            .iter()
+            .all(|o| *o == Outcome::Before)
+    );
+    assert_eq!(
+        std::fs::read(study.join("runs/alone/provenance.json")).unwrap(),
+        kept,
+        "untouched"
+    );
+    // One model changes: it alone is stale, and is run again.
+    std::fs::write(&path, STUDY.replace("friction = 0.6", "friction = 0.3")).unwrap();
+    let second = plan(&path).unwrap();
+    let stale: Vec<&str> = states(&second, &study).iter().map(State::word).collect();
+    assert_eq!(
+        stale,
+        ["finished", "stale", "finished", "stale", "finished"]
+    );
+    let ended = run(&second, &study, &Quiet, &options(1));
+    let again: Vec<bool> = ended
+        .iter()
+        .map(|o| matches!(o, Outcome::Finished(_)))
+        .collect();
+    assert_eq!(again, [false, true, false, true, false]);
+    // Another end is stale too, though the case hash of a run folder does not know it.
+    let longer = Plan::of(&Study::read(&path).unwrap(), &["time.end=0.07".into()]).unwrap();
+    assert!(
+        states(&longer, &study)
+            .iter()
+            .all(|s| matches!(s, State::Stale(_)))
+    );
+    // Another version of the program.
+    let file = study.join("runs/alone/provenance.json");
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(
+        &file,
+        text.replace("\"version\": \"", "\"version\": \"0.0."),
+    )
+    .unwrap();
+    assert!(matches!(states(&second, &study)[4], State::Stale(why) if why.contains("version")));
+}
+
+#[test]
+fn interrupted_studies_go_on_and_give_the_same_bits() {
+    let (folder, path) = folder(STUDY);
+    let plan = plan(&path).unwrap();
+    let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
+    run(&plan, &whole, &Quiet, &options(1));
+    let mut rounds = 0;
+    loop {
+        let ended = run(&plan, &broken, &After(AtomicU64::new(0), 333), &options(2));
+        rounds += 1;
+        if ended
+            .iter()
+            .all(|o| matches!(o, Outcome::Finished(_) | Outcome::Before))
+        {
+            break;
+        }
+        assert!(
+            ended.contains(&Outcome::Interrupted) && rounds < 50,
+            "{ended:?}"
+        );
+        assert!(states(&plan, &broken).contains(&State::Unfinished) || rounds > 1);
+    }
+    assert!(rounds > 3, "it was interrupted {rounds} times");
+    assert_eq!(results(&plan, &whole), results(&plan, &broken));
+    let (a, b) = (
+        table(&plan.manifest, &whole),
+        table(&plan.manifest, &broken),
+    );
+    let measured = |rows: &[grainwake_study::Row]| {
+        rows.iter()
+            .map(|r| (r.pair.clone(), r.steps))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(measured(&a), measured(&b));
+    assert!(
+        a.iter()
+            .all(|r| r.pair.as_ref().unwrap().kiss_time.is_some() || r.name == "alone"),
+        "they do collide"
+    );
+}
+
+#[test]
+fn a_run_without_a_usable_checkpoint_starts_over() {
+    let (folder, path) = folder(STUDY);
+    let plan = plan(&path).unwrap();
+    let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
+    run(&plan, &whole, &Quiet, &options(1));
+    run(&plan, &broken, &After(AtomicU64::new(0), 200), &options(1));
+    let checkpoints = broken.join("runs/light-smooth/checkpoint");
+    for file in std::fs::read_dir(&checkpoints).unwrap().flatten() {
+        std::fs::write(file.path(), b"nonsense").unwrap();
+    }
+    let ended = run(&plan, &broken, &Quiet, &options(1));
+    assert!(
+        ended.iter().all(|o| matches!(o, Outcome::Finished(_))),
+        "{ended:?}"
+    );
+    assert_eq!(results(&plan, &whole), results(&plan, &broken));
+}
+
+#[test]
+fn a_failure_stays_alone() {
+    let (folder, path) = folder(STUDY);
+    let plan = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    std::fs::create_dir_all(study.join("runs/light-rough")).unwrap();
+    std::fs::write(study.join("runs/light-rough/mine.txt"), "not a run").unwrap();
+    let ended = run(&plan, &study, &Quiet, &options(2));
+    for (i, outcome) in ended.iter().enumerate() {
+        match outcome {
+            Outcome::Failed(why, code) => assert!(
+                i == 1 && why.contains("is not empty") && *code == 2,
+                "{why}"
+            ),
+            other => assert!(i != 1 && matches!(other, Outcome::Finished(_))),
+        }
+    }
+    assert_eq!(
+        std::fs::read_to_string(study.join("runs/light-rough/mine.txt")).unwrap(),
+        "not a run"
+    );
+    // A run that became unstable is left alone until it is asked for.
+    let alone = study.join("runs/alone");
+    std::fs::remove_file(alone.join("summary.json")).unwrap();
+    std::fs::write(
+        alone.join("failure.json"),
+        "{\"time\":0.1,\"what\":\"it blew up\"}",
+    )
+    .unwrap();
+    assert_eq!(states(&plan, &study)[4], State::Failed("it blew up".into()));
+    let ended = run(&plan, &study, &Quiet, &options(1));
+    assert!(matches!(&ended[4], Outcome::Failed(why, 3) if why.contains("it blew up")));
+    assert_eq!(
+        table(&plan.manifest, &study)[4].remark.as_deref(),
+        Some("it blew up")
+    );
+    let ended = run(
+        &plan,
+        &study,
+        &Quiet,
+        &Options {
+            retry: true,
+            ..options(1)
+        },
+    );
+    assert!(matches!(ended[4], Outcome::Finished(_)));
+}
+
+#[test]
+fn a_run_in_other_hands_is_left_alone() {
+    let (folder, path) = folder(STUDY);
+    let plan = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    std::fs::create_dir_all(study.join("runs")).unwrap();
+    plan.settle(&study).unwrap();
+    std::fs::create_dir_all(study.join("locks")).unwrap();
+    let lock = std::fs::File::create(study.join("locks/alone.lock")).unwrap();
+    lock.lock().unwrap();
+    let ended = run(&plan, &study, &Quiet, &options(1));
+    assert_eq!(ended[4], Outcome::Elsewhere);
+    assert!(matches!(ended[0], Outcome::Finished(_)));
+    drop(lock);
+    assert!(matches!(
+        run(&plan, &study, &Quiet, &options(1))[4],
+        Outcome::Finished(_)
+    ));
+}
+
+#[test]
+fn folders_of_others_are_refused() {
+    let (folder, path) = folder(STUDY);
+    let first = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    first.settle(&study).unwrap();
+    let other = folder.path().join("other.toml");
+    std::fs::write(
+        &other,
+        STUDY.replace("title = \"test\"", "title = \"another\""),
+    )
+    .unwrap();
+    let second = plan(&other).unwrap();
+    let error = second.settle(&study).unwrap_err().to_string();
+    assert!(error.contains("holds another study, \"test\""), "{error}");
+    let foreign = folder.path().join("foreign");
+    std::fs::create_dir_all(&foreign).unwrap();
+    std::fs::write(foreign.join("thesis.tex"), "").unwrap();
+    assert!(
+        first
+            .settle(&foreign)
+            .unwrap_err()
+            .to_string()
+            .contains("holds no study")
+    );
+}
+
+#[test]
+fn the_table_holds_every_run_and_outlives_the_run_folders() {
+    let (folder, path) = folder(STUDY);
+    let plan = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    plan.settle(&study).unwrap();
+    carry_out(&plan.manifest.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
+    let rows = table(&plan.manifest, &study);
+    write_table(&rows, &study).unwrap();
+    let words: Vec<&str> = rows.iter().map(|r| r.state.as_str()).collect();
+    assert_eq!(
+        words,
+        ["finished", "missing", "missing", "missing", "finished"]
+    );
+    let mut csv = csv::Reader::from_path(study.join("table.csv")).unwrap();
+    let header = csv.headers().unwrap().clone();
+    let column = |name: &str| {
+        header
+            .iter()
+            .position(|h| h == name)
+            .unwrap_or_else(|| panic!("{name}"))
+    };
+    let records: Vec<_> = csv.records().map(Result::unwrap).collect();
+    assert_eq!(records.len(), 5);
+    assert_eq!(
+        (
+            &records[0][column("weight")],
+            &records[0][column("density")]
+        ),
+        ("light", "2000")
+    );
+    let kiss: f64 = records[0][column("kiss_time")].parse().unwrap();
+    let seconds: f64 = records[0][column("kiss_time_s")].parse().unwrap();
+    assert!(
+        (kiss - seconds / (2e-3_f64 / 9.81).sqrt()).abs() < 1e-4 * kiss,
+        "{kiss} {seconds}"
+    );
+    assert_eq!(&records[1][column("kiss_time")], "");
+    assert_eq!(csv_of(&rows).lines().count(), 6);
+    std::fs::remove_dir_all(study.join("runs")).unwrap();
+    assert_eq!(table(&plan.manifest, &study), rows, "the table is kept");
+}

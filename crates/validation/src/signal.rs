@@ -1,0 +1,113 @@
+//! Numbers from a sampled function of one variable.
+
+/// Mean over the interval, by trapezoids; of a single sample its value.
+pub fn mean(x: &[f64], y: &[f64]) -> Option<f64> {
+    match (x.first(), x.last()) {
+        (Some(a), Some(b)) if b > a => Some(integral(x, y) / (b - a)),
+        _ => y.first().copied(),
+    }
+}
+
+/// Integral by trapezoids.
+pub fn integral(x: &[f64], y: &[f64]) -> f64 {
+    let pairs = x.windows(2).zip(y.windows(2));
+    pairs
+        .map(|(x, y)| 0.5 * (x[1] - x[0]) * (y[0] + y[1]))
+        .sum()
+}
+
+/// Value at `at` between the samples; none outside them.
+pub fn interpolate(x: &[f64], y: &[f64], at: f64) -> Option<f64> {
+    let after = x.partition_point(|v| *v < at);
+    if x.get(after) == Some(&at) {
+        return y.get(after).copied();
+    }
+    let before = after.checked_sub(1)?;
+    let (x1, y1) = (*x.get(after)?, *y.get(after)?);
+    let (x0, y0) = (x[before], y[before]);
+    Some(y0 + (y1 - y0) * (at - x0) / (x1 - x0))
+}
+
+/// Places where the function goes through zero, upwards and downwards.
+pub fn crossings(x: &[f64], y: &[f64]) -> Vec<(f64, bool)> {
+    let mut found = Vec::new();
+    for i in 1..x.len().min(y.len()) {
+        let (a, b) = (y[i - 1], y[i]);
+        if (a < 0.0) != (b < 0.0) {
+            found.push((x[i - 1] + (x[i] - x[i - 1]) * a / (a - b), b >= 0.0));
+        }
+    }
+    found
+}
+
+/// Oscillations about the mean in a unit of x, from upward crossings; none below two of them.
+pub fn frequency(x: &[f64], y: &[f64]) -> Option<f64> {
+    let middle = mean(x, y)?;
+    let shifted: Vec<f64> = y.iter().map(|v| v - middle).collect();
+    let ups: Vec<f64> = crossings(x, &shifted)
+        .into_iter()
+        .filter_map(|(at, up)| up.then_some(at))
+        .collect();
+    let span = ups.last()? - ups.first()?;
+    (ups.len() > 1).then(|| (ups.len() - 1) as f64 / span)
+}
+
+/// Slope of the straight line through the samples, least squares, and the rms distance from it.
+pub fn line_fit(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
+    let n = x.len().min(y.len()) as f64;
+    if n < 2.0 {
+        return None;
+    }
+    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
+    let sxx: f64 = x.iter().map(|v| (v - mx).powi(2)).sum();
+    let sxy: f64 = x.iter().zip(y).map(|(a, b)| (a - mx) * (b - my)).sum();
+    let slope = sxy / sxx;
+    let rest: f64 = x
+        .iter()
+        .zip(y)
+        .map(|(a, b)| (b - my - slope * (a - mx)).powi(2))
+        .sum();
+    sxx.gt(&0.0).then(|| (slope, (rest / n).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sine() -> (Vec<f64>, Vec<f64>) {
+        let x: Vec<f64> = (0..2001).map(|i| 0.005 * f64::from(i)).collect();
+        let y = x.iter().map(|x| 3.0 + (1.7 * x + 0.3).sin()).collect();
+        (x, y)
+    }
+
+    #[test]
+    fn a_sine_is_measured() {
+        let (x, y) = sine();
+        let f = frequency(&x, &y).unwrap();
+        assert!((f * std::f64::consts::TAU / 1.7 - 1.0).abs() < 2e-3, "{f}");
+        assert!((mean(&x, &y).unwrap() - 3.0).abs() < 0.12);
+        let (slope, rms) = line_fit(&x, &y).unwrap();
+        assert!(
+            slope.abs() < 0.03 && (rms - 0.5f64.sqrt()).abs() < 0.02,
+            "{slope} {rms}"
+        );
+    }
+
+    #[test]
+    fn uneven_samples_weigh_by_their_interval() {
+        assert_eq!(
+            mean(&[0.0, 1.0, 4.0], &[2.0, 2.0, 4.0]),
+            Some((2.0 + 9.0) / 4.0)
+        );
+        assert_eq!(
+            interpolate(&[0.0, 1.0, 4.0], &[2.0, 2.0, 4.0], 2.5),
+            Some(3.0)
+        );
+        assert_eq!(interpolate(&[0.0, 1.0], &[2.0, 2.0], 1.5), None);
+        assert_eq!(
+            crossings(&[0.0, 1.0, 2.0], &[-1.0, 1.0, -3.0]),
+            [(0.5, true), (1.25, false)]
+        );
+        assert_eq!(frequency(&[0.0, 1.0], &[1.0, 1.0]), None);
+    }
+}
