@@ -8,7 +8,7 @@ use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of};
 use crate::math::lanes::dispatch;
 use crate::poisson::{Plane, Poisson, Stages};
 
-use super::project::{Correct, Divergence, Largest, PlaneMeasures, measure_below};
+use super::project::{Correct, Divergence, PlaneMeasures};
 use super::tendency::{Coefficients, PredictPlane, Weights};
 use super::{Boundaries, FluidParams};
 
@@ -168,11 +168,12 @@ impl Flow {
         let [nx, ny, nz] = layout.cells;
         let inverse = self.mesh.spacing.to_array().map(|h| 1.0 / h);
         let walled = self.boundaries.walled();
+        let periodic = walled.map(|walled| !walled);
         let (predicted, boundaries) = (&self.predicted, &self.boundaries);
         let divergence = |k: usize, out: &mut Plane| {
             dispatch(Divergence {
                 layout,
-                periodic: walled.map(|walled| !walled),
+                periodic,
                 predicted,
                 k,
                 inverse,
@@ -190,7 +191,7 @@ impl Flow {
                     layout,
                     predicted,
                     solution,
-                    walled,
+                    periodic,
                     k,
                     inverse,
                     pull: inverse.map(|inverse| dt * inverse),
@@ -213,7 +214,6 @@ impl Flow {
                     boundaries.fill_ghosts_of_plane(layout, component, q);
                 }
                 boundaries.fill_pressure_of_plane(layout, p);
-                measure_below(layout, inverse, k, run);
             });
         debug_assert_eq!(row, nx + 2);
         if walled[2] {
@@ -222,29 +222,7 @@ impl Flow {
         }
         boundaries.fill_pressure_planes(&mut self.pressure);
         boundaries.fill_ghost_planes(&mut self.velocity);
-        self.measure_open_planes(inverse);
         self.total()
-    }
-
-    /// Measures the divergence of the planes whose upper neighbour belonged to another run.
-    fn measure_open_planes(&mut self, inverse: [f64; 3]) {
-        let (layout, velocity) = (self.mesh.layout(), &self.velocity);
-        let plane = layout.plane();
-        for_planes_of(layout, [], &mut self.partial, |k, [], measures| {
-            if measures.open {
-                dispatch(Largest {
-                    layout,
-                    inverse,
-                    x: &velocity.x[k * plane..][..plane],
-                    y: &velocity.y[k * plane..][..plane],
-                    z: [
-                        &velocity.z[k * plane..][..plane],
-                        &velocity.z[(k + 1) * plane..][..plane],
-                    ],
-                    found: &mut measures.flow.max_divergence,
-                });
-            }
-        });
     }
 
     /// What all planes measured, in their order.

@@ -16,7 +16,8 @@ use crate::math::lanes::{Kernel, Partial, RowWork, Vector, along_row};
 /// Constants of the tendency.
 #[derive(Clone, Copy)]
 pub struct Coefficients {
-    half_inverse: [f64; 3],
+    /// 1/4h: a quarter, as both the carried value and the velocity that carries it are means.
+    quarter_inverse: [f64; 3],
     nu_inverse_square: [f64; 3],
     acceleration: DVec3,
 }
@@ -26,7 +27,7 @@ impl Coefficients {
     pub fn new(mesh: &Mesh, kinematic_viscosity: f64, acceleration: DVec3) -> Coefficients {
         let h = mesh.spacing.to_array();
         Coefficients {
-            half_inverse: h.map(|h| 0.5 / h),
+            quarter_inverse: h.map(|h| 0.25 / h),
             nu_inverse_square: h.map(|h| kinematic_viscosity / (h * h)),
             acceleration,
         }
@@ -42,14 +43,13 @@ impl Coefficients {
         neighbour: [[V; 2]; 3],
         link: [[V; 2]; 3],
     ) -> V {
-        let (half, two) = (V::splat(0.5), V::splat(2.0));
+        let twice = q + q;
         let mut sum = V::splat(self.acceleration.to_array()[component]);
         for axis in 0..3 {
             let ([qm, qp], [cm, cp]) = (neighbour[axis], link[axis]);
-            let (cm, cp) = (half * cm, half * cp);
-            let diffusion = V::splat(self.nu_inverse_square[axis]) * (qm + qp - two * q);
+            let diffusion = V::splat(self.nu_inverse_square[axis]) * (qm + qp - twice);
             let carried = cp * (q + qp) - cm * (qm + q);
-            sum = sum + (diffusion - V::splat(self.half_inverse[axis]) * carried);
+            sum = sum + (diffusion - V::splat(self.quarter_inverse[axis]) * carried);
         }
         sum
     }

@@ -49,17 +49,6 @@ impl<const N: usize, T> Run<'_, N, T> {
             (fields, &mut self.partial.get(k - 1)[0])
         }
     }
-    /// Planes k - 1 and k of each field, and the partial result of plane k - 1.
-    #[inline]
-    pub fn two_planes(&mut self, k: usize) -> ([[&mut [f64]; 2]; N], &mut T) {
-        assert!(self.range.contains(&(k - 1)) && self.range.contains(&k));
-        // SAFETY: as above, and the two planes are disjoint.
-        unsafe {
-            let fields = self.fields.each_ref();
-            let fields = fields.map(|field| [field.get(k - 2), field.get(k - 1)]);
-            (fields, &mut self.partial.get(k - 2)[0])
-        }
-    }
 }
 
 /// Calls `f(run, scratch)` for one run of consecutive interior planes a scratch slot, in parallel.

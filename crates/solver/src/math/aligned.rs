@@ -5,7 +5,8 @@ use std::ops::{Deref, DerefMut};
 /// Doubles of a cache line.
 const LINE: usize = 8;
 
-/// A fixed number of doubles whose first lies at the start of a cache line.
+/// A fixed number of doubles whose first lies at the start of a cache line. Nothing is touched
+/// when it is made: a page belongs to the thread that first writes to it.
 #[derive(Debug)]
 pub struct Aligned {
     values: Vec<f64>,

@@ -48,12 +48,15 @@ pub struct Stages {
     pub inverse: Duration,
 }
 
-/// One plane of the solution, the plane below it, ghosts included in both.
+/// One plane of the solution and its neighbours, ghosts included. Beyond the ends of the box lie
+/// the plane across it on a periodic axis, else the plane itself.
 pub struct Solution<'a> {
     /// Plane k.
     pub here: &'a Plane,
-    /// Plane k - 1: across the box under the first plane of a periodic axis, else `here`.
+    /// Plane k - 1.
     pub below: &'a Plane,
+    /// Plane k + 1.
+    pub above: &'a Plane,
 }
 
 /// Solver for lap(phi) = f. Planned once for a mesh; solving allocates nothing.
@@ -73,14 +76,14 @@ pub struct Poisson {
 
 /// Scratch of one run of planes.
 struct Slot {
-    planes: [Plane; 2],
+    planes: [Plane; 3],
     buffers: Buffers,
 }
 
 /// Runs of planes or blocks of columns: enough to keep many threads busy, whatever their number.
 const SLOTS: usize = 32;
-/// Planes of a run at least: the plane below each run is transformed twice.
-const LEAST_RUN: usize = 8;
+/// Planes of a run at least: the planes below and above each run are transformed twice.
+const LEAST_RUN: usize = 16;
 
 impl Poisson {
     /// Plans the solver for `mesh` with the given ends along x, y, z.
@@ -94,7 +97,7 @@ impl Poisson {
             eigenvalues[at] = axes[0].eigenvalues[i] + axes[1].eigenvalues[j];
         });
         let slot = || Slot {
-            planes: [(); 2].map(|()| Plane::new(shape)),
+            planes: [(); 3].map(|()| Plane::new(shape)),
             buffers: Buffers::new([&axes[0], &axes[1]]),
         };
         let width = block_width(nz).min(shape.modes());
@@ -136,7 +139,7 @@ impl Poisson {
             &mut self.slots,
             |k, modes, slot| {
                 let Slot {
-                    planes: [plane, _],
+                    planes: [plane, ..],
                     buffers,
                 } = slot;
                 source(k + 1, plane);
@@ -188,19 +191,31 @@ impl Poisson {
             &mut self.slots,
             |run, slot| {
                 let Slot { planes, buffers } = slot;
+                // Plane k on the other side of the box; none beyond an end that is not periodic.
+                let across = |k: usize| match k {
+                    0 => periodic[2].then_some(nz),
+                    k if k > nz => periodic[2].then_some(1),
+                    k => Some(k),
+                };
+                let start = run.range().start;
+                let [below, here, _] = planes;
+                if let Some(k) = across(start - 1) {
+                    invert(k, below, buffers);
+                }
+                invert(start, here, buffers);
                 for k in run.range() {
-                    let [here, below] = planes;
-                    if k == run.range().start && (k > 1 || periodic[2]) {
-                        invert(if k > 1 { k - 1 } else { nz }, below, buffers);
+                    let [below, here, above] = planes;
+                    if let Some(k) = across(k + 1) {
+                        invert(k, above, buffers);
                     }
-                    invert(k, here, buffers);
-                    let below = if k > 1 || periodic[2] {
-                        &*below
-                    } else {
-                        &*here
+                    let (here, end) = (&*here, |k: usize| across(k).is_none());
+                    let solution = Solution {
+                        here,
+                        below: if end(k - 1) { here } else { below },
+                        above: if end(k + 1) { here } else { above },
                     };
-                    sink(k, Solution { here, below }, run);
-                    planes.swap(0, 1);
+                    sink(k, solution, run);
+                    planes.rotate_left(1);
                 }
             },
         );
