@@ -82,6 +82,7 @@ fn residual_is_round_off_for_every_pairing_and_awkward_sizes() {
         [P, P, P],
     ];
     let sizes = [
+        [67, 97, 131],
         [67, 31, 12],
         [12, 97, 31],
         [9, 10, 131],
