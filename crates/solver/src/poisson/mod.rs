@@ -93,8 +93,12 @@ impl Poisson {
         let scale = 1.0 / (axes[0].norm() * axes[1].norm());
         let shape = Shape::new(nx, ny);
         let mut eigenvalues = vec![0.0; shape.modes()];
+        // Lines that only fill up a block must not be singular: what they hold, round-off of their
+        // partners, would become infinite and come back to them.
+        let filler = mesh.spacing.y.powi(-2);
         shape.each_mode(|at, i, j| {
-            eigenvalues[at] = axes[0].eigenvalues[i] + axes[1].eigenvalues[j];
+            let along_y = axes[1].eigenvalues.get(j).unwrap_or(&filler);
+            eigenvalues[at] = axes[0].eigenvalues[i] + along_y;
         });
         let slot = || Slot {
             planes: [(); 3].map(|()| Plane::new(shape)),

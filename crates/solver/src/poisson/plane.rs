@@ -43,14 +43,14 @@ impl Shape {
     pub fn stride(&self) -> usize {
         8 * ((self.modes() / 8) | 1)
     }
-    /// Calls `f` with the place of each mode in its plane, its index along x and its line along x
-    /// (counted from 0, at most `ny - 1`).
+    /// Calls `f` with the place of each mode in its plane, its index along x and its line along x,
+    /// both from 0; lines from `ny` on fill up the last block.
     pub fn each_mode(&self, mut f: impl FnMut(usize, usize, usize)) {
         for (first, width) in blocks(self.lines()) {
             for m in 0..self.nx {
                 for line in 0..width {
                     let at = first * self.nx + m * width + line;
-                    f(at, m, (first + line).min(self.ny - 1));
+                    f(at, m, first + line);
                 }
             }
         }
