@@ -4,7 +4,9 @@ mod common;
 
 use common::{close, shared};
 use glam::{DQuat, DVec3};
-use grainwake_shape::scan::{ScanOptions, Volume, Voxels, read_volume, shapes_from_volume};
+use grainwake_shape::scan::{
+    ScanOptions, Threshold, Volume, Voxels, read_volume, shapes_from_volume,
+};
 use grainwake_shape::{ReadLimits, Shape, ShapeError, ShapeOptions, SourceFile};
 use std::f64::consts::PI;
 
@@ -162,7 +164,7 @@ fn a_labelled_volume_gives_one_shape_each_and_skips_what_the_border_cuts() {
         .unwrap();
     // The same volume as one binary image, split into its pieces.
     let binary = ScanOptions {
-        threshold: Some(1.0),
+        threshold: Some(Threshold::Value(1.0)),
         split: true,
         ..options()
     };
@@ -172,7 +174,7 @@ fn a_labelled_volume_gives_one_shape_each_and_skips_what_the_border_cuts() {
     );
     // Without splitting, three pieces under one label, one of them cut.
     let lumped = ScanOptions {
-        threshold: Some(1.0),
+        threshold: Some(Threshold::Value(1.0)),
         pad: true,
         ..options()
     };
@@ -243,7 +245,7 @@ fn hopeless_volumes_are_refused() {
         ));
     }
     let bad = ScanOptions {
-        smoothing: f64::NAN,
+        smoothing: Some(f64::NAN),
         ..options()
     };
     assert!(matches!(

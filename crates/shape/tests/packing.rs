@@ -1,0 +1,217 @@
+//! A rendered scan of touching grains with known labels: every grain is found again.
+
+mod common;
+#[path = "common/render.rs"]
+mod render;
+
+use glam::{DQuat, DVec3};
+use grainwake_shape::family::{FamilyTarget, family_grain};
+use grainwake_shape::scan::{Denoise, ScanOptions, Threshold, Volume, Voxels, scan_volume};
+use grainwake_shape::{Shape, ShapeOptions, SourceFile};
+use render::{Noise, Placed, blurred, greys, shares};
+use std::collections::HashMap;
+
+/// Irregular grains of equal volume, from rods to balls, sharp to round.
+fn grains() -> Vec<Shape> {
+    let options = ShapeOptions {
+        cells: 24,
+        least_cells: 12,
+        nodes: Some(250),
+        roundness: false,
+        ..Default::default()
+    };
+    let targets = [
+        (0.6, 0.4),
+        (0.65, 0.7),
+        (0.7, 0.3),
+        (0.75, 0.6),
+        (0.8, 0.2),
+        (0.8, 0.5),
+        (0.85, 0.4),
+        (0.9, 0.6),
+    ];
+    let grain = |(s, r)| family_grain(&FamilyTarget::new(s, r, 1.0), 5, &options).unwrap();
+    targets.into_iter().map(grain).collect()
+}
+
+fn turn(random: &mut Noise) -> DQuat {
+    let q = [
+        random.normal(),
+        random.normal(),
+        random.normal(),
+        random.normal(),
+    ];
+    DQuat::from_array(q).normalize()
+}
+
+/// How deep two grains reach into each other [voxels]; negative for a gap.
+fn overlap(a: &Placed, b: &Placed) -> f64 {
+    let deepest = |a: &Placed, b: &Placed| {
+        let nodes = a
+            .shape
+            .nodes()
+            .iter()
+            .map(|n| a.centre + a.turn * (a.scale * n.position));
+        nodes
+            .map(|x| -b.distance(x))
+            .fold(f64::NEG_INFINITY, f64::max)
+    };
+    deepest(a, b).max(deepest(b, a))
+}
+
+/// Grains let down one by one, each at the lowest of several places, until it touches.
+fn heap(shapes: &[Shape], count: usize, width: f64, diameter: f64) -> Vec<Placed<'_>> {
+    let mut random = Noise::new(11);
+    let mut placed: Vec<Placed> = Vec::new();
+    for n in 0..count {
+        let scale = diameter * (0.85 + 0.3 * random.unit());
+        let mut best: Option<Placed> = None;
+        for _ in 0..6 {
+            let shape = &shapes[n % shapes.len()];
+            let mut grain = Placed {
+                shape,
+                centre: DVec3::ZERO,
+                turn: turn(&mut random),
+                scale,
+            };
+            let room = width - 2.0 * grain.reach() - 4.0;
+            let place = DVec3::new(random.unit(), random.unit(), 0.0) * room;
+            grain.centre = place + DVec3::splat(grain.reach() + 2.0);
+            let floor = grain.reach() + 2.0;
+            let near: Vec<&Placed> = placed
+                .iter()
+                .filter(|p| {
+                    let across = (p.centre - grain.centre).truncate().length();
+                    across < p.reach() + grain.reach()
+                })
+                .collect();
+            // The highest height at which it touches: down from above in steps, then halved.
+            let top = near
+                .iter()
+                .map(|p| p.centre.z + p.reach() + grain.reach())
+                .fold(floor, f64::max);
+            let touches = |grain: &Placed| {
+                near.iter().any(|p| {
+                    p.centre.distance(grain.centre) < p.reach() + grain.reach()
+                        && overlap(p, grain) > 0.15
+                })
+            };
+            grain.centre.z = top;
+            let mut step = 1.0;
+            while step > 0.05 {
+                grain.centre.z -= step;
+                if grain.centre.z < floor || touches(&grain) {
+                    grain.centre.z += step;
+                    step *= 0.5;
+                }
+            }
+            if best.as_ref().is_none_or(|b| grain.centre.z < b.centre.z) {
+                best = Some(grain);
+            }
+        }
+        placed.extend(best);
+    }
+    placed
+}
+
+#[test]
+fn two_hundred_touching_grains_are_found_one_to_one() {
+    let shapes = grains();
+    let placed = heap(&shapes, 200, 120.0, 21.0);
+    let highest = placed
+        .iter()
+        .map(|p| p.centre.z + p.reach())
+        .fold(0.0, f64::max);
+    let dims = [120, 120, highest.ceil() as usize + 4];
+    let touching = placed
+        .iter()
+        .enumerate()
+        .map(|(n, a)| {
+            placed[..n]
+                .iter()
+                .filter(|b| {
+                    a.centre.distance(b.centre) < a.reach() + b.reach() && overlap(a, b) > -0.5
+                })
+                .count()
+        })
+        .sum::<usize>();
+    let bodies: Vec<_> = placed
+        .iter()
+        .map(|p| move |x: DVec3| p.distance(x))
+        .collect();
+    let bodies: Vec<&dyn Fn(DVec3) -> f64> = bodies.iter().map(|b| b as _).collect();
+    let boxes: Vec<(DVec3, f64)> = placed.iter().map(|p| (p.centre, p.reach())).collect();
+    let exact = shares(dims, &bodies, &boxes);
+    let solid = exact.iter().map(|v| f64::from(*v)).sum::<f64>() / exact.len() as f64;
+    println!("{dims:?}, {touching} contacts, solid fraction {solid:.3}");
+    assert!(touching > 250);
+    let image = greys(&blurred(&exact, dims, 1.0), 0.05, 3);
+    let volume = Volume::from_labels(dims, image).unwrap();
+    let neck: f64 = std::env::var("NECK").map_or(0.8, |v| v.parse().unwrap());
+    let options = ScanOptions {
+        threshold: Some(Threshold::Otsu),
+        denoise: Denoise::Median,
+        separate: Some(neck),
+        shape: ShapeOptions {
+            cells: 24,
+            nodes: Some(100),
+            roundness: false,
+            ..Default::default()
+        },
+        ..ScanOptions::new(1.0)
+    };
+    let start = std::time::Instant::now();
+    let scan = scan_volume(&volume, &SourceFile::default(), &options, &|_, _, _| {}).unwrap();
+    println!("{} regions in {:.1?}", scan.grains.len(), start.elapsed());
+    let Voxels::Labels(labels) = &scan.labels.voxels else {
+        panic!()
+    };
+    // One to one: the label in which most of a grain's voxels lie, and the grain of most of a
+    // label's voxels, are each other's; and they share most of their voxels.
+    let mut shared: HashMap<(usize, u32), usize> = HashMap::new();
+    let mut own = vec![0usize; placed.len()];
+    for (n, label) in labels.iter().enumerate() {
+        let x = DVec3::new(
+            (n % dims[0]) as f64,
+            (n / dims[0] % dims[1]) as f64,
+            (n / dims[0] / dims[1]) as f64,
+        ) + 0.5;
+        for (g, p) in placed.iter().enumerate() {
+            if p.centre.distance_squared(x) < p.reach() * p.reach() && p.distance(x) < 0.0 {
+                own[g] += 1;
+                *shared.entry((g, *label)).or_default() += 1;
+            }
+        }
+    }
+    let best = |g: usize| {
+        shared
+            .iter()
+            .filter(|((h, l), _)| *h == g && *l != 0)
+            .max_by_key(|(_, n)| **n)
+            .map(|((_, l), n)| (*l, *n))
+    };
+    let (mut found, mut errors) = (0, Vec::new());
+    for (g, placed) in placed.iter().enumerate() {
+        let Some((label, common)) = best(g) else {
+            continue;
+        };
+        let grain = scan.grains.iter().find(|s| s.label == label).unwrap();
+        let union = own[g] + grain.voxels as usize - common;
+        if common as f64 / union as f64 > 0.8 {
+            found += 1;
+            let exact = placed.shape.volume() * placed.scale.powi(3);
+            match &grain.shape {
+                Ok(shape) => errors.push((shape.volume() / exact - 1.0).abs()),
+                Err(reason) => println!("grain {g}: {reason}"),
+            }
+        }
+    }
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    println!(
+        "{found} found, {} shapes, mean volume error {mean:.4}",
+        errors.len()
+    );
+    assert!(found >= 194);
+    assert!(errors.len() >= 190);
+    assert!(mean <= 0.02, "{mean}");
+}
