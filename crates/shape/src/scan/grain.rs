@@ -13,8 +13,9 @@ use glam::DVec3;
 
 /// Fewest voxels of a grain: a ball of five voxels across.
 const FEWEST: u64 = 64;
-/// Cells across a grain below which the smoothed field is refined before its surface is taken.
-const FINE: usize = 64;
+/// Cells across a grain below which the smoothed field is refined before its surface is taken,
+/// from grey values and from a mask.
+const FINE: [usize; 2] = [40, 64];
 /// Share of the surface that pieces broken off by smoothing may have.
 const CRUMBS: f64 = 0.02;
 /// Cells of the finished field over the voxels across a grain, and the fewest.
@@ -49,7 +50,8 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
     let smoothing = options.smoothing.unwrap_or(smoothing);
     let margin = (4.0 * smoothing).ceil() as usize + 4;
     let mut mask = crop(dims, labels, label, region, margin);
-    let voxels = one_piece(&mut mask, label, options.largest_piece)?;
+    let largest = options.largest_piece || options.separate.is_some();
+    let voxels = one_piece(&mut mask, label, largest)?;
     if voxels < FEWEST {
         return Err(ShapeError::TooFewVoxels {
             label,
@@ -62,7 +64,9 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
         .map(|a| region.upper[a] - region.lower[a] + 1)
         .max()
         .unwrap_or(1);
-    let factor = FINE.div_ceil(longest).clamp(1, 4);
+    let factor = FINE[usize::from(context.grey.is_none())]
+        .div_ceil(longest)
+        .clamp(1, 4);
     let mut provenance = Provenance::new("scan")
         .with("voxel_m", options.voxel)
         .with("label", label)

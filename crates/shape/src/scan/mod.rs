@@ -17,8 +17,11 @@
 mod build;
 mod grain;
 mod grey;
+mod header;
 mod npy;
+mod npz;
 mod regions;
+mod slices;
 mod smooth;
 mod threshold;
 mod tiff;

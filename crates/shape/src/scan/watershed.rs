@@ -42,6 +42,22 @@ impl Hills {
         }
         n
     }
+
+    /// Joins two hills that meet at this height if the saddle is no neck.
+    fn join(&mut self, p: u32, q: u32, height: f32, neck: f64) {
+        if p == q {
+            return;
+        }
+        let (high, low) = if self.top[p as usize] >= self.top[q as usize] {
+            (p, q)
+        } else {
+            (q, p)
+        };
+        let top = self.top[low as usize];
+        if f64::from(height) >= neck * f64::from(top) || top - height < 1.0 {
+            self.parent[low as usize] = high;
+        }
+    }
 }
 
 /// Labels from 1 of the solid voxels (squared distance from the void above 0), numbered by their
@@ -58,32 +74,30 @@ pub(crate) fn separate(squared: &[f32], dims: [usize; 3], neck: f64) -> Vec<u32>
         let at = at as usize;
         let (i, j, k) = (at % nx, at / nx % ny, at / nx / ny);
         let height = squared[at].sqrt();
-        let mut own = 0u32;
+        // The hills around, and the highest voxel among them: uphill is where this one belongs.
+        let mut around = [0u32; 26];
+        let mut count = 0;
+        let mut uphill = (0.0f32, 0u32);
         for c in k.saturating_sub(1)..=(k + 1).min(nz - 1) {
             for b in j.saturating_sub(1)..=(j + 1).min(ny - 1) {
                 for a in i.saturating_sub(1)..=(i + 1).min(nx - 1) {
-                    let label = labels[a + nx * (b + ny * c)];
-                    if label == 0 {
-                        continue;
-                    }
-                    let other = hills.root(label);
-                    if own == 0 {
-                        own = other;
-                    } else if other != own {
-                        let (p, q) = (hills.top[own as usize], hills.top[other as usize]);
-                        let lower = p.min(q);
-                        if f64::from(height) >= neck * f64::from(lower) || lower - height < 1.0 {
-                            let (high, low) = if p >= q { (own, other) } else { (other, own) };
-                            hills.parent[low as usize] = high;
-                            own = high;
-                        } else if q > p {
-                            // The voxel goes to the higher hill.
-                            own = other;
+                    let n = a + nx * (b + ny * c);
+                    let label = labels[n];
+                    if label != 0 {
+                        around[count] = label;
+                        count += 1;
+                        if squared[n] > uphill.0 {
+                            uphill = (squared[n], label);
                         }
                     }
                 }
             }
         }
+        for n in 1..count {
+            let (p, q) = (hills.root(around[n - 1]), hills.root(around[n]));
+            hills.join(p, q, height, neck);
+        }
+        let mut own = uphill.1;
         if own == 0 {
             own = hills.parent.len() as u32;
             hills.parent.push(own);

@@ -1,5 +1,7 @@
 //! Grey volumes of bodies with known places: partial volumes, blur, noise.
 
+#![allow(dead_code)]
+
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
 
