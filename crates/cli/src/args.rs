@@ -155,7 +155,7 @@ pub struct NewGrain {
 /// Arguments of `grain from-mesh`.
 #[derive(Debug, Args)]
 pub struct FromMeshArgs {
-    /// Mesh file: .stl, .ply or .obj
+    /// Mesh file: .stl, .ply or .obj, or spherical-harmonic coefficients: .anm
     pub mesh: PathBuf,
     /// Length of one unit of the file, for example "1 mm"
     #[arg(long, value_name = "LENGTH")]

@@ -177,22 +177,23 @@ fn two_hundred_touching_grains_are_found_one_to_one() {
         },
         ..ScanOptions::new(1.0)
     };
-    let start = std::time::Instant::now();
-    let scan = scan_volume(&volume, &SourceFile::default(), &options, &|_, _, _| {}).unwrap();
-    println!("{} regions in {:.1?}", scan.grains.len(), start.elapsed());
+    // All labels, the shape of one grain only: shapes take longest.
+    let one = ScanOptions {
+        label: Some(1),
+        ..options.clone()
+    };
+    let scan = scan_volume(&volume, &SourceFile::default(), &one, &|_, _, _| {}).unwrap();
     let Voxels::Labels(labels) = &scan.labels.voxels else {
         panic!()
     };
-    // One to one: the label in which most of a grain's voxels lie, and the grain of most of a
-    // label's voxels, are each other's; and they share most of their voxels.
+    // One to one: a grain and a label share four fifths of the voxels that either has.
     let mut shared: HashMap<(usize, u32), usize> = HashMap::new();
     let mut own = vec![0usize; placed.len()];
+    let mut sizes: HashMap<u32, usize> = HashMap::new();
     for (n, label) in labels.iter().enumerate() {
-        let x = DVec3::new(
-            (n % dims[0]) as f64,
-            (n / dims[0] % dims[1]) as f64,
-            (n / dims[0] / dims[1]) as f64,
-        ) + 0.5;
+        *sizes.entry(*label).or_default() += 1;
+        let place = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
+        let x = DVec3::from_array(place.map(|i| i as f64 + 0.5));
         for (g, p) in placed.iter().enumerate() {
             if p.centre.distance_squared(x) < p.reach() * p.reach() && p.distance(x) < 0.0 {
                 own[g] += 1;
@@ -200,35 +201,41 @@ fn two_hundred_touching_grains_are_found_one_to_one() {
             }
         }
     }
-    let best = |g: usize| {
-        shared
-            .iter()
-            .filter(|((h, l), _)| *h == g && *l != 0)
-            .max_by_key(|(_, n)| **n)
-            .map(|((_, l), n)| (*l, *n))
+    let same = |(g, label): &(usize, u32), common: usize| {
+        *label != 0 && 5 * common > 4 * (own[*g] + sizes[label] - common)
     };
-    let (mut found, mut errors) = (0, Vec::new());
-    for (g, placed) in placed.iter().enumerate() {
-        let Some((label, common)) = best(g) else {
-            continue;
-        };
-        let grain = scan.grains.iter().find(|s| s.label == label).unwrap();
-        let union = own[g] + grain.voxels as usize - common;
-        if common as f64 / union as f64 > 0.8 {
-            found += 1;
-            let exact = placed.shape.volume() * placed.scale.powi(3);
-            match &grain.shape {
-                Ok(shape) => errors.push((shape.volume() / exact - 1.0).abs()),
-                Err(reason) => println!("grain {g}: {reason}"),
-            }
-        }
+    let found = shared
+        .iter()
+        .filter(|(pair, common)| same(pair, **common))
+        .count();
+    println!("{found} of 200 found in {} labels", sizes.len() - 1);
+    assert!(found >= 194);
+
+    // Shapes of the lower part of the heap.
+    let height = 75;
+    let Voxels::Labels(image) = &volume.voxels else {
+        panic!()
+    };
+    let lower = image[..dims[0] * dims[1] * height].to_vec();
+    let volume = Volume::from_labels([dims[0], dims[1], height], lower).unwrap();
+    let scan = scan_volume(&volume, &SourceFile::default(), &options, &|_, _, _| {}).unwrap();
+    let mut errors = Vec::new();
+    for shape in scan.grains.iter().filter_map(|g| g.shape.as_ref().ok()) {
+        let centre = shape.provenance().centroid;
+        let truth = placed.iter().find(|p| p.centre.distance(centre) < 1.5);
+        errors.extend(
+            truth.map(|p| (shape.volume() / (p.shape.volume() * p.scale.powi(3)) - 1.0).abs()),
+        );
     }
+    let whole = placed
+        .iter()
+        .filter(|p| p.centre.z + p.reach() < height as f64)
+        .count();
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     println!(
-        "{found} found, {} shapes, mean volume error {mean:.4}",
+        "{} of about {whole} shapes, mean volume error {mean:.4}",
         errors.len()
     );
-    assert!(found >= 194);
-    assert!(errors.len() >= 190);
+    assert!(errors.len() * 10 >= whole * 9 && whole > 25);
     assert!(mean <= 0.02, "{mean}");
 }

@@ -206,14 +206,14 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
         Packed::Raw => data,
         Packed::Gzip => {
             MultiGzDecoder::new(data)
-                .take(needed)
+                .take(needed + 1)
                 .read_to_end(&mut plain)
                 .map_err(failed)?;
             &plain
         }
         Packed::Zlib => {
             ZlibDecoder::new(data)
-                .take(needed)
+                .take(needed + 1)
                 .read_to_end(&mut plain)
                 .map_err(failed)?;
             &plain
