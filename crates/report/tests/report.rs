@@ -148,6 +148,14 @@ fn a_pair_gets_all_its_figures() {
     remove(&folder);
 }
 
+/// Whether this place of the page lies inside base64 data.
+fn in_picture(page: &str, at: usize) -> bool {
+    let plain = |c: char| !(c.is_ascii_alphanumeric() || "+/=".contains(c));
+    page[..at]
+        .rfind(plain)
+        .is_some_and(|start| page[..start].ends_with(";base64"))
+}
+
 #[test]
 fn the_page_stands_alone_and_can_be_read_aloud() {
     let folder = small_pair(0.0);
@@ -163,7 +171,13 @@ fn the_page_stands_alone_and_can_be_read_aloud() {
     for forbidden in [
         "<script", "<link", "@import", "src=", "url(http", "NaN", "inf ",
     ] {
-        assert!(!page.contains(forbidden), "the page holds '{forbidden}'");
+        // Letters of an embedded picture spell anything.
+        let around = page
+            .match_indices(forbidden)
+            .find(|(at, _)| !in_picture(&page, *at));
+        let around =
+            around.map(|(at, _)| page.get(at.saturating_sub(60)..at + 20).unwrap_or("here"));
+        assert_eq!(around, None, "the page holds '{forbidden}'");
     }
     let outside = page
         .match_indices("http")

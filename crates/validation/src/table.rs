@@ -86,27 +86,32 @@ impl Columns {
     /// Reads reference data: comma-separated, names in the first line, comments behind `#`.
     pub fn of_data(file: &Path) -> Result<Columns, String> {
         let problem = |what: String| format!("{}: {what}", file.display());
-        let mut reader = csv::ReaderBuilder::new()
-            .comment(Some(b'#'))
-            .trim(csv::Trim::All)
-            .from_path(file)
-            .map_err(|e| problem(e.to_string()))?;
-        let names = reader
-            .headers()
-            .map_err(|e| problem(e.to_string()))?
-            .clone();
+        let text = std::fs::read_to_string(file).map_err(|e| problem(e.to_string()))?;
+        let mut lines = text
+            .lines()
+            .zip(1..)
+            .map(|(line, number)| (line.trim(), number))
+            .filter(|(line, _)| !line.is_empty() && !line.starts_with('#'));
         let mut columns = Columns::default();
-        for name in &names {
-            columns.push(name, Vec::new());
+        let (header, _) = lines.next().ok_or_else(|| problem("no header".into()))?;
+        for name in header.split(',') {
+            columns.push(name.trim(), Vec::new());
         }
-        for record in reader.records() {
-            let record = record.map_err(|e| problem(e.to_string()))?;
-            let line = record.position().map_or(0, csv::Position::line);
-            for (field, column) in record.iter().zip(&mut columns.values) {
-                let number = field
+        for (line, number) in lines {
+            let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+            if fields.len() != columns.names.len() {
+                let found = format!(
+                    "{} values under {} names",
+                    fields.len(),
+                    columns.names.len()
+                );
+                return Err(problem(format!("line {number}: {found}")));
+            }
+            for (field, column) in fields.iter().zip(&mut columns.values) {
+                let value = field
                     .parse()
-                    .map_err(|_| problem(format!("line {line}: '{field}' is not a number")))?;
-                column.push(number);
+                    .map_err(|_| problem(format!("line {number}: '{field}' is not a number")))?;
+                column.push(value);
             }
         }
         Ok(columns)
