@@ -179,6 +179,9 @@ pub struct BenchArgs {
     /// Coupling scheme
     #[arg(long, default_value = "aperture", value_parser = ["aperture", "paper"])]
     pub scheme: String,
+    /// Measure cubes of 32 to 256 cells along each edge instead, awkward sizes among them
+    #[arg(long, conflicts_with = "size")]
+    pub scaling: bool,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,

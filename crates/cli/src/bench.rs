@@ -18,9 +18,26 @@ use crate::args::BenchArgs;
 use crate::exit::{BAD_INPUT, Exit};
 use crate::{print, threads};
 
-/// Memory traffic that a step cannot do without [bytes per cell]: each state array is read and
-/// written once in each of the passes that the data dependencies of the step enforce.
-const TRAFFIC: f64 = 250.0;
+/// Bytes per cell that each pass must move through memory, counting a read and a write of a double
+/// as eight each (what a store fetches before it writes is left out, as in the triad):
+///
+/// - predict: reads u (3), the old tendency (3), p; writes the tendency (3) and u* (3);
+/// - divergence: reads u* (3), writes the modes;
+/// - columns: reads and writes the modes;
+/// - correct: reads the modes, u* (3) and p; writes u (3) and p.
+///
+/// The passes cannot be merged: rigidity changes u* between the first two, every column needs all
+/// planes of modes, and every plane needs all columns.
+const TRAFFIC: [(&str, f64); 4] = [
+    ("predict", 8.0 * 13.0),
+    ("divergence", 8.0 * 4.0),
+    ("columns", 8.0 * 2.0),
+    ("correct", 8.0 * 9.0),
+];
+/// Cells along each edge of the cubes of `--scaling`: powers of two, round numbers, and primes.
+const CUBES: [usize; 14] = [
+    32, 48, 64, 67, 80, 96, 97, 100, 128, 131, 160, 192, 200, 256,
+];
 /// Doubles in each array of the triad: 64 MiB, more than any cache here.
 const TRIAD_LENGTH: usize = 1 << 23;
 const TRIAD_REPEATS: usize = 8;
@@ -31,8 +48,10 @@ struct Measured {
     cells: [usize; 3],
     threads: usize,
     steps: u64,
+    /// Median over the steps.
     ns_per_cell_step: f64,
     bytes_per_cell: f64,
+    traffic_bytes_per_cell: f64,
     triad_gb_per_s: f64,
     limit_ns_per_cell_step: f64,
     ratio_to_limit: f64,
@@ -44,6 +63,8 @@ struct Measured {
 struct Pass {
     name: &'static str,
     ns_per_cell_step: f64,
+    /// What memory bandwidth alone would take; none for passes that depend on the grains alone.
+    limit_ns_per_cell_step: Option<f64>,
 }
 
 /// Measures and prints.
@@ -63,13 +84,21 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     } else {
         Scheme::Aperture
     };
-    let measured = threads::on(threads, || {
-        measure([nx, ny, nz], scheme, args.steps, threads)
-    })??;
-    if args.json {
-        print(&serde_json::to_string(&measured)?)
+    let sizes = if args.scaling {
+        CUBES.map(|n| [n; 3]).to_vec()
     } else {
-        print(&table(&measured))
+        vec![[nx, ny, nz]]
+    };
+    let measured: Vec<Measured> = threads::on(threads, || {
+        let each = sizes.into_iter();
+        each.map(|size| measure(size, scheme, args.steps, threads))
+            .collect::<Result<_, Exit>>()
+    })??;
+    match (args.json, &measured[..]) {
+        (true, [one]) => print(&serde_json::to_string(one)?),
+        (true, all) => print(&serde_json::to_string(all)?),
+        (false, [one]) => print(&table(one)),
+        (false, all) => print(&scaling(all)),
     }
 }
 
@@ -89,47 +118,63 @@ fn measure(
     for _ in 0..2 {
         advance(&mut sim)?;
     }
-    let before = sim.pass_times();
-    let start = Instant::now();
+    let per_cell = 1e9 / count;
+    let mut totals = Vec::new();
+    let mut times = Vec::new();
     for _ in 0..steps {
+        let (before, start) = (sim.pass_times(), Instant::now());
         advance(&mut sim)?;
+        totals.push(per_cell * start.elapsed().as_secs_f64());
+        let after = sim.pass_times();
+        times.push(std::array::from_fn::<_, 7, _>(|pass| {
+            per_cell * (after[pass].1 - before[pass].1)
+        }));
     }
-    let per_cell_step = |seconds: f64| 1e9 * seconds / (count * steps as f64);
-    let ns = per_cell_step(start.elapsed().as_secs_f64());
-    let earlier = |name: &str| {
-        before
-            .iter()
-            .find(|(n, _)| *n == name)
-            .map_or(0.0, |(_, t)| *t)
+    let ns = median(totals);
+    let bytes_per_cell = sim.bytes() as f64 / count;
+    let names = sim.pass_times().map(|(name, _)| name);
+    drop(sim);
+    let triad = triad_bandwidth();
+    let limit = |name: &str| {
+        let bytes = TRAFFIC.iter().find(|(pass, _)| *pass == name);
+        bytes.map(|(_, bytes)| 1e9 * bytes / triad)
     };
-    let mut passes: Vec<Pass> = sim
-        .pass_times()
-        .iter()
-        .map(|(name, t)| Pass {
+    let mut passes: Vec<Pass> = names
+        .into_iter()
+        .enumerate()
+        .map(|(pass, name)| Pass {
             name,
-            ns_per_cell_step: per_cell_step(t - earlier(name)),
+            ns_per_cell_step: median(times.iter().map(|step| step[pass]).collect()),
+            limit_ns_per_cell_step: limit(name),
         })
         .collect();
     let named: f64 = passes.iter().map(|p| p.ns_per_cell_step).sum();
     passes.push(Pass {
         name: "other",
-        ns_per_cell_step: ns - named,
+        ns_per_cell_step: (ns - named).max(0.0),
+        limit_ns_per_cell_step: None,
     });
-    let bytes_per_cell = sim.bytes() as f64 / count;
-    drop(sim);
-    let triad = triad_bandwidth();
-    let limit = TRAFFIC / triad * 1e9;
+    let traffic: f64 = TRAFFIC.iter().map(|(_, bytes)| bytes).sum();
+    let limit = 1e9 * traffic / triad;
     Ok(Measured {
         cells,
         threads,
         steps,
         ns_per_cell_step: ns,
         bytes_per_cell,
+        traffic_bytes_per_cell: traffic,
         triad_gb_per_s: triad * 1e-9,
         limit_ns_per_cell_step: limit,
         ratio_to_limit: ns / limit,
         passes,
     })
+}
+
+/// The middle one; of an even number the mean of the middle two.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    0.5 * (values[(n - 1) / 2] + values[n / 2])
 }
 
 /// Two spheres of eight cells' diameter in water, one above the other, as in the main case.
@@ -216,20 +261,43 @@ fn table(m: &Measured) -> String {
             m.ns_per_cell_step
         ),
     ];
-    lines.extend(
-        m.passes
-            .iter()
-            .map(|p| format!("  {:10}{:8.2}", p.name, p.ns_per_cell_step)),
-    );
+    for p in &m.passes {
+        let limit = p.limit_ns_per_cell_step;
+        let limit = limit.map_or(String::new(), |ns| format!("   limit {ns:6.2}"));
+        lines.push(format!("  {:10}{:8.2}{limit}", p.name, p.ns_per_cell_step));
+    }
     lines.push(format!(
         "memory      {:8.1} bytes per cell",
         m.bytes_per_cell
     ));
     lines.push(format!("triad       {:8.2} GB/s", m.triad_gb_per_s));
     lines.push(format!(
-        "limit       {:8.2} ns per cell per step ({TRAFFIC} bytes per cell at that bandwidth)",
-        m.limit_ns_per_cell_step
+        "limit       {:8.2} ns per cell per step ({:.0} bytes per cell at that bandwidth)",
+        m.limit_ns_per_cell_step, m.traffic_bytes_per_cell
     ));
     lines.push(format!("ratio       {:8.2}", m.ratio_to_limit));
+    lines.join("\n")
+}
+
+/// One line a size; the last column compares with the cube before, the first with itself.
+fn scaling(all: &[Measured]) -> String {
+    let mut lines = vec![format!(
+        "{:>5} {:>10} {:>9} {:>7} {:>7} {:>9}",
+        "edge", "ns/cell", "columns", "bytes", "ratio", "to before"
+    )];
+    let mut before = all[0].ns_per_cell_step;
+    for m in all {
+        let columns = m.passes.iter().find(|p| p.name == "columns");
+        lines.push(format!(
+            "{:5} {:10.2} {:9.2} {:7.1} {:7.2} {:9.2}",
+            m.cells[0],
+            m.ns_per_cell_step,
+            columns.map_or(0.0, |p| p.ns_per_cell_step),
+            m.bytes_per_cell,
+            m.ratio_to_limit,
+            m.ns_per_cell_step / before
+        ));
+        before = m.ns_per_cell_step;
+    }
     lines.join("\n")
 }

@@ -15,6 +15,7 @@ use crate::dem::{Contact, Dynamics, Grain};
 use crate::flow::{Flow, FlowMeasures};
 use crate::grid::Mesh;
 use crate::math::Load;
+use crate::poisson::Stages;
 
 pub use clock::Clock;
 pub use diagnostics::Diagnostics;
@@ -56,6 +57,8 @@ struct Passes {
     contact: Duration,
     coupling: Duration,
     project: Duration,
+    /// What the Poisson solver had spent before the first step.
+    initial: Stages,
 }
 
 impl Simulation {
@@ -78,7 +81,6 @@ impl Simulation {
         Ok(Simulation {
             dynamics: Dynamics::new(setup.contact, enclosure),
             clock: Clock::new(&setup),
-            fluid,
             loads: vec![Load::default(); count],
             momentum_residual: glam::DVec3::ZERO,
             work: Work {
@@ -86,7 +88,13 @@ impl Simulation {
                 driving: vec![Load::default(); count],
                 contact: vec![Load::default(); count],
             },
-            passes: Passes::default(),
+            passes: Passes {
+                initial: fluid.as_ref().map_or(Stages::default(), |fluid: &Fluid| {
+                    fluid.flow.poisson_stages()
+                }),
+                ..Passes::default()
+            },
+            fluid,
             setup,
         })
     }
@@ -122,17 +130,33 @@ impl Simulation {
     pub fn contacts(&self) -> &[Contact] {
         self.dynamics.contacts()
     }
-    /// Seconds spent since the start in each stage of the step.
-    pub fn pass_times(&self) -> Vec<(&'static str, f64)> {
+    /// Seconds spent since the start in each pass of the step. The projection is split into the
+    /// right-hand side with its transforms, the tridiagonal columns, the transforms back with the
+    /// correction, and the ghosts and sums that remain.
+    pub fn pass_times(&self) -> [(&'static str, f64); 7] {
         let p = &self.passes;
+        let stages = self
+            .fluid
+            .as_ref()
+            .map_or(p.initial, |fluid| fluid.flow.poisson_stages());
+        let [forward, columns, inverse] = [
+            stages.forward - p.initial.forward,
+            stages.columns - p.initial.columns,
+            stages.inverse - p.initial.inverse,
+        ];
         [
             ("predict", p.predict),
             ("contact", p.contact),
             ("coupling", p.coupling),
-            ("project", p.project),
+            ("divergence", forward),
+            ("columns", columns),
+            ("correct", inverse),
+            (
+                "ghosts",
+                p.project.saturating_sub(forward + columns + inverse),
+            ),
         ]
         .map(|(name, time)| (name, time.as_secs_f64()))
-        .to_vec()
     }
     /// Memory held by fields, solver and grains on the grid [bytes].
     pub fn bytes(&self) -> usize {
