@@ -195,7 +195,7 @@ pub struct GrainArgs {
 /// Commands of `grain`.
 #[derive(Debug, Subcommand)]
 pub enum GrainCommand {
-    /// A grain from a 3-D image: one solid, or one label of a labelled volume
+    /// Grains from a 3-D image: grey, binary or labelled
     FromScan(FromScanArgs),
     /// A grain from a closed surface mesh (STL, PLY, OBJ)
     FromMesh(FromMeshArgs),
@@ -233,7 +233,7 @@ pub struct NewGrain {
 /// Arguments of `grain from-mesh`.
 #[derive(Debug, Args)]
 pub struct FromMeshArgs {
-    /// Mesh file: .stl, .ply or .obj
+    /// Mesh file: .stl, .ply or .obj, or spherical-harmonic coefficients: .anm
     pub mesh: PathBuf,
     /// Length of one unit of the file, for example "1 mm"
     #[arg(long, value_name = "LENGTH")]
@@ -249,7 +249,7 @@ pub struct FromMeshArgs {
 /// Arguments of `grain from-scan`.
 #[derive(Debug, Args)]
 pub struct FromScanArgs {
-    /// Image: multi-page .tif or .npy
+    /// Image: multi-page .tif, .npy, .npz, .nrrd, .mha, or a folder of .tif slices
     pub image: PathBuf,
     /// Edge of a voxel, for example "12 um"
     #[arg(long, value_name = "LENGTH")]
@@ -257,9 +257,22 @@ pub struct FromScanArgs {
     /// The one label that is wanted; without it every grain of the image
     #[arg(long, value_name = "N")]
     pub label: Option<u32>,
-    /// Grey value from which a voxel is solid
-    #[arg(long, value_name = "VALUE")]
-    pub threshold: Option<f64>,
+    /// How solid is told from void in a grey image: a grey value, "otsu", or "otsu3" (the upper of
+    /// two thresholds)
+    #[arg(long, value_name = "VALUE|otsu|otsu3")]
+    pub threshold: Option<String>,
+    /// Take a median of 27 voxels before the threshold
+    #[arg(long)]
+    pub median: bool,
+    /// Separate grains that touch: two where the neck is thinner than this share of the smaller
+    #[arg(long, value_name = "NECK", num_args = 0..=1, default_missing_value = "0.87")]
+    pub separate: Option<f64>,
+    /// Take surfaces from the mask although there are grey values
+    #[arg(long)]
+    pub from_mask: bool,
+    /// Do not measure roundness, which takes long
+    #[arg(long)]
+    pub no_roundness: bool,
     /// Take each connected piece of solid as a grain
     #[arg(long)]
     pub split: bool,
@@ -269,7 +282,7 @@ pub struct FromScanArgs {
     /// Of a label with several pieces keep the largest
     #[arg(long)]
     pub largest_piece: bool,
-    /// Standard deviation of the smoothing, in voxels [default: 1.5]
+    /// Standard deviation of the smoothing, in voxels [default: 1.1 from grey values, 1.5 from a mask]
     #[arg(long, value_name = "VOXELS")]
     pub smoothing: Option<f64>,
     /// Where the grain goes; a folder for several grains.
@@ -395,4 +408,7 @@ pub struct InfoArgs {
     /// Print one JSON object for each file
     #[arg(long)]
     pub json: bool,
+    /// Draw the three sides of each grain with its surface nodes into this PNG, one row a grain
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
 }

@@ -64,7 +64,7 @@ impl Story {
     /// Makes out what the run folder tells.
     pub fn of(run: &RunFolder) -> Story {
         let moving: Vec<usize> = (0..run.grains.len())
-            .filter(|i| run.grains[*i].len() > 0)
+            .filter(|i| !run.grains[*i].is_empty())
             .collect();
         let subject = match moving.len() {
             0 => Subject::Flow,

@@ -574,3 +574,23 @@ fn threads_do_not_matter_and_scaling_is_exact() {
     assert!(one.scaled(0.0).is_err() && one.scaled(f64::NAN).is_err());
     assert!(one.scaled_to_equivalent_diameter(-1.0).is_err());
 }
+
+/// Coefficients and the mesh made from them elsewhere describe the same grain.
+#[test]
+fn harmonic_coefficients_give_the_grain_of_their_mesh() {
+    for name in ["fdot57_D-00002", "ma160_01520", "sika-cement07_00418"] {
+        let (Some(series), Some(mesh)) = (
+            shared(&format!("grains/sh/{name}.anm")),
+            shared(&format!("grains/meshes/{name}.ply")),
+        ) else {
+            return;
+        };
+        let read = |path: &Path| read_mesh(path, 1e-3, &ReadLimits::default()).unwrap().0;
+        let (series, mesh) = (read(&series), read(&mesh));
+        close(series.signed_volume(), mesh.signed_volume(), 2e-3);
+        close(series.area(), mesh.area(), 5e-3);
+        let (a, b) = (series.bounds(), mesh.bounds());
+        let size = (b.1 - b.0).length();
+        assert!(a.0.distance(b.0) < 0.01 * size && a.1.distance(b.1) < 0.01 * size);
+    }
+}

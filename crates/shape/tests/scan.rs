@@ -4,7 +4,9 @@ mod common;
 
 use common::{close, shared};
 use glam::{DQuat, DVec3};
-use grainwake_shape::scan::{ScanOptions, Volume, Voxels, read_volume, shapes_from_volume};
+use grainwake_shape::scan::{
+    ScanOptions, Threshold, Volume, Voxels, read_volume, scan_volume, shapes_from_volume,
+};
 use grainwake_shape::{ReadLimits, Shape, ShapeError, ShapeOptions, SourceFile};
 use std::f64::consts::PI;
 
@@ -162,7 +164,7 @@ fn a_labelled_volume_gives_one_shape_each_and_skips_what_the_border_cuts() {
         .unwrap();
     // The same volume as one binary image, split into its pieces.
     let binary = ScanOptions {
-        threshold: Some(1.0),
+        threshold: Some(Threshold::Value(1.0)),
         split: true,
         ..options()
     };
@@ -172,7 +174,7 @@ fn a_labelled_volume_gives_one_shape_each_and_skips_what_the_border_cuts() {
     );
     // Without splitting, three pieces under one label, one of them cut.
     let lumped = ScanOptions {
-        threshold: Some(1.0),
+        threshold: Some(Threshold::Value(1.0)),
         pad: true,
         ..options()
     };
@@ -243,7 +245,7 @@ fn hopeless_volumes_are_refused() {
         ));
     }
     let bad = ScanOptions {
-        smoothing: f64::NAN,
+        smoothing: Some(f64::NAN),
         ..options()
     };
     assert!(matches!(
@@ -300,5 +302,53 @@ fn a_real_labelled_ct_grain_becomes_a_shape() {
     for grain in shapes_from_volume(&volume, &source, &options).unwrap() {
         let shape = grain.shape.unwrap();
         close(shape.volume(), grain.voxels as f64 * 1e-18, 0.02);
+    }
+}
+
+/// A real packing of touching powder grains: as many interior grains, of the same size, as an
+/// independent watershed found (1058, median diameter 21.6 voxels).
+#[test]
+fn a_real_packing_is_separated_as_others_do() {
+    let Some(path) = shared("grains/scans/nrel_nmc/nmc-1-cal_generatedCBD_bridge.tif") else {
+        return;
+    };
+    let (mut volume, source) = read_volume(&path, &ReadLimits::default()).unwrap();
+    let Voxels::Labels(labels) = &mut volume.voxels else {
+        panic!("not labels")
+    };
+    // Label 2 is a phase that was made up.
+    labels.iter_mut().filter(|l| **l == 2).for_each(|l| *l = 0);
+    for neck in [0.8, 0.87] {
+        // One shape only: the labels are what is looked at.
+        let options = ScanOptions {
+            threshold: Some(Threshold::Value(1.0)),
+            separate: Some(neck),
+            label: Some(1),
+            ..options()
+        };
+        let scan = scan_volume(&volume, &source, &options, &|_, _, _| {}).unwrap();
+        let Voxels::Labels(labels) = &scan.labels.voxels else {
+            panic!()
+        };
+        let dims = volume.dims;
+        let most = *labels.iter().max().unwrap() as usize;
+        let (mut sizes, mut cut) = (vec![0usize; most + 1], vec![false; most + 1]);
+        for (n, label) in labels.iter().enumerate() {
+            let place = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
+            sizes[*label as usize] += 1;
+            cut[*label as usize] |= (0..3).any(|a| place[a] == 0 || place[a] + 1 == dims[a]);
+        }
+        let inner = (1..=most).filter(|l| !cut[*l] && sizes[*l] >= 64);
+        let mut diameters: Vec<f64> = inner.map(|l| (6.0 * sizes[l] as f64 / PI).cbrt()).collect();
+        diameters.sort_by(f64::total_cmp);
+        let median = diameters[diameters.len() / 2];
+        println!(
+            "neck {neck}: {} interior grains, median diameter {median:.1} voxels",
+            diameters.len()
+        );
+        if neck == 0.87 {
+            close(diameters.len() as f64, 1058.0, 0.1);
+            close(median, 21.6, 0.1);
+        }
     }
 }

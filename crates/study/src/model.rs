@@ -339,10 +339,10 @@ fn unique(source: &Source, raw: &RawStudy, models: &[Model], problems: &mut Vec<
                 .flat_map(|a| a.values.value.iter().map(|v| &v.name));
             let names = values.chain(raw.model.iter().map(|m| &m.name));
             let place = names
-                .filter(|n| {
+                .rev()
+                .find(|n| {
                     model.name.split('-').any(|part| part == n.value) || model.name == n.value
                 })
-                .last()
                 .and_then(|n| n.span.clone());
             let problem = Problem::new(format!("there are two models called \"{}\"", model.name))
                 .help("give every value of an axis and every model a name of its own");

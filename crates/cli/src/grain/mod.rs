@@ -8,6 +8,7 @@ mod table;
 
 use std::path::Path;
 
+use grainwake_shape::picture::Picture;
 use grainwake_shape::{Shape, ShapeOptions};
 use grainwake_solver::case::parse_length;
 
@@ -84,8 +85,16 @@ fn show(shape: &Shape, path: &Path, json: bool) -> Result<(), Exit> {
 }
 
 fn info(args: &InfoArgs) -> Result<(), Exit> {
+    let mut pictures = Vec::new();
     for path in &args.files {
-        show(&Shape::load(path)?, path, args.json)?;
+        let shape = Shape::load(path)?;
+        show(&shape, path, args.json)?;
+        if args.picture.is_some() {
+            pictures.push(Picture::three_sides(&shape, 320, true));
+        }
+    }
+    if let Some(path) = &args.picture {
+        Picture::sheet(&pictures, 1).save(path)?;
     }
     Ok(())
 }

@@ -2,8 +2,12 @@
 
 use std::path::PathBuf;
 
-use grainwake_shape::ReadLimits;
-use grainwake_shape::scan::{ScanOptions, ScannedGrain, read_volume, shapes_from_volume};
+use grainwake_shape::picture::{Picture, View};
+use grainwake_shape::scan::{
+    Denoise, Scan, ScanOptions, ScannedGrain, Threshold, read_volume, scan_volume,
+};
+use grainwake_shape::{ReadLimits, write_table};
+use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 use super::{finish, length, may_write, options, save};
@@ -11,25 +15,36 @@ use crate::args::FromScanArgs;
 use crate::exit::{BAD_INPUT, Exit};
 use crate::print;
 
+/// Pixels of one grain in the contact sheet, grains in a row, and the most it shows.
+const SHEET: (usize, usize, usize) = (110, 12, 600);
+
 /// One grain, or all grains of an image.
 pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     let one_file = args.new.output.extension().is_some_and(|e| e == "grain");
     if one_file {
         may_write(&args.new.output, args.new.force)?;
     }
-    let mut how = ScanOptions::new(length("--voxel", &args.voxel)?);
-    how.label = args.label;
-    how.threshold = args.threshold;
-    how.split = args.split;
-    how.pad = args.pad;
-    how.largest_piece = args.largest_piece;
-    how.smoothing = args.smoothing.unwrap_or(how.smoothing);
-    how.shape = options(&args.new);
+    let how = how(args)?;
     let (volume, source) = read_volume(&args.image, &ReadLimits::default())?;
-    let mut grains = shapes_from_volume(&volume, &source, &how)?;
-    if !one_file {
-        return all(args, grains);
+    let bar = ProgressBar::new(0);
+    if let Ok(style) = ProgressStyle::with_template("{msg:10} {bar:40} {pos}/{len} {eta}") {
+        bar.set_style(style);
     }
+    let scan = scan_volume(&volume, &source, &how, &|what, done, total| {
+        bar.set_message(what.to_owned());
+        bar.set_length(total);
+        bar.set_position(done);
+    });
+    bar.finish_and_clear();
+    let scan = scan?;
+    drop(volume);
+    if let Some(threshold) = scan.threshold {
+        eprintln!("threshold {threshold}");
+    }
+    if !one_file {
+        return all(args, scan);
+    }
+    let mut grains = scan.grains;
     let Some(grain) = grains.pop().filter(|_| grains.is_empty()) else {
         let labels: Vec<String> = grains
             .iter()
@@ -50,44 +65,93 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     save(grain.shape?, &args.new)
 }
 
-/// Every grain into a folder; those that are refused are listed with the reason.
-fn all(args: &FromScanArgs, grains: Vec<ScannedGrain>) -> Result<(), Exit> {
-    let path = |label: u32| -> PathBuf { args.new.output.join(format!("label-{label:05}.grain")) };
+fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
+    let mut how = ScanOptions::new(length("--voxel", &args.voxel)?);
+    how.label = args.label;
+    how.threshold = match args.threshold.as_deref() {
+        None => None,
+        Some("otsu") => Some(Threshold::Otsu),
+        Some("otsu3") => Some(Threshold::Otsu3),
+        Some(text) => Some(Threshold::Value(text.parse().map_err(|_| {
+            Exit::with_help(
+                BAD_INPUT,
+                format!("--threshold: {text:?} is no number"),
+                "give a grey value, otsu or otsu3",
+            )
+        })?)),
+    };
+    if args.median {
+        how.denoise = Denoise::Median;
+    }
+    how.split = args.split;
+    how.separate = args.separate;
+    how.sub_voxel = !args.from_mask;
+    how.pad = args.pad;
+    how.largest_piece = args.largest_piece;
+    how.smoothing = args.smoothing;
+    how.shape = options(&args.new);
+    how.shape.roundness = !args.no_roundness;
+    Ok(how)
+}
+
+/// Every grain into a folder, with table, contact sheet and label image; those that are refused
+/// are listed with the reason.
+fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
+    let Scan { grains, labels, .. } = scan;
+    let folder = &args.new.output;
+    let path = |label: u32| -> PathBuf { folder.join(format!("label-{label:05}.grain")) };
+    let (table, sheet, image) = (
+        folder.join("table.csv"),
+        folder.join("sheet.png"),
+        folder.join("labels.tif"),
+    );
     for grain in grains.iter().filter(|g| g.shape.is_ok()) {
         may_write(&path(grain.label), args.new.force)?;
     }
-    let (mut kept, mut refused) = (0, 0);
-    for grain in grains {
-        match grain.shape {
+    for file in [&table, &sheet, &image] {
+        may_write(file, args.new.force)?;
+    }
+    let (mut rows, mut pictures, mut refused) = (Vec::new(), Vec::new(), 0);
+    for ScannedGrain {
+        label,
+        voxels,
+        shape,
+    } in grains
+    {
+        match shape {
             Ok(shape) => {
-                kept += 1;
-                let file = path(grain.label);
-                let record = finish(shape, &file, &args.new)?.record();
+                let file = path(label);
+                let shape = finish(shape, &file, &args.new)?;
+                let record = shape.record();
+                if pictures.len() < SHEET.2 {
+                    let width = 2.1 * shape.bounding_radius();
+                    pictures.push(Picture::of(&shape, View::BROAD, SHEET.0, width, false));
+                }
                 if args.new.json {
-                    print(&json!({ "label": grain.label, "voxels": grain.voxels, "file": file, "record": record }).to_string())?;
+                    print(&json!({ "label": label, "voxels": voxels, "file": file, "record": record }).to_string())?;
                 } else {
                     print(&format!(
                         "{}  {} voxels, equivalent diameter {:.4} mm, Krumbein sphericity {:.3}",
                         file.display(),
-                        grain.voxels,
+                        voxels,
                         1e3 * record.equivalent_diameter_m,
                         record.krumbein_sphericity
                     ))?;
                 }
+                rows.push((format!("label-{label:05}"), record));
             }
             Err(reason) => {
                 refused += 1;
-                eprintln!(
-                    "label {} ({} voxels) left out: {reason}",
-                    grain.label, grain.voxels
-                );
+                eprintln!("label {label} ({voxels} voxels) left out: {reason}");
             }
         }
     }
-    eprintln!("{kept} grains written, {refused} left out");
-    if kept == 0 {
-        Err(Exit::new(BAD_INPUT, "no grain of the image can be used"))
-    } else {
-        Ok(())
+    eprintln!("{} grains written, {refused} left out", rows.len());
+    if rows.is_empty() {
+        return Err(Exit::new(BAD_INPUT, "no grain of the image can be used"));
     }
+    write_table(&table, &rows)?;
+    Picture::sheet(&pictures, SHEET.1).save(&sheet)?;
+    labels.save_labels(&image)?;
+    Ok(())
 }

@@ -86,7 +86,7 @@ impl Scene<'_> {
         match self.story.pair {
             Some(pair) => pair.to_vec(),
             None => (0..self.run.grains.len())
-                .filter(|i| self.run.grains[*i].len() > 0)
+                .filter(|i| !self.run.grains[*i].is_empty())
                 .collect(),
         }
     }

@@ -14,7 +14,7 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
     const MIDDLE: f64 = 44.0;
     let run = scene.run;
     let grains: Vec<usize> = (0..run.grains.len())
-        .filter(|g| run.grains[*g].len() > 0)
+        .filter(|g| !run.grains[*g].is_empty())
         .collect();
     let last = |g: usize| run.grains[g].len() - 1;
     let place = |g: usize| run.wrapped(run.grains[g].position[last(g)]);

@@ -114,7 +114,7 @@ fn picture_times(run: &RunFolder) -> Vec<f64> {
         times = run
             .grains
             .iter()
-            .find(|history| history.len() > 0)
+            .find(|history| !history.is_empty())
             .map(|h| h.time.clone())
             .unwrap_or_default();
     }

@@ -67,7 +67,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     let grains: Vec<usize> = match scene.story.pair {
         Some(pair) => pair.to_vec(),
         None => (0..scene.run.grains.len())
-            .filter(|g| scene.run.grains[*g].len() > 0)
+            .filter(|g| !scene.run.grains[*g].is_empty())
             .collect(),
     };
     let (up, mut sides) = scene.vertical();

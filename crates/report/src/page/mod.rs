@@ -81,7 +81,7 @@ fn lead(run: &RunFolder, story: &Story) -> String {
         Subject::Single => single_sentence(run, story),
         Subject::Many => format!(
             "{} grains. ",
-            run.grains.iter().filter(|h| h.len() > 0).count()
+            run.grains.iter().filter(|h| !h.is_empty()).count()
         ),
         Subject::Flow => String::new(),
     };

@@ -143,6 +143,11 @@ impl History {
         self.time.len()
     }
 
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     fn truncate(&mut self, rows: usize) {
         self.time.truncate(rows);
         self.position.truncate(rows);

@@ -5,6 +5,7 @@ mod bvh;
 mod check;
 mod cube_sphere;
 mod distance;
+mod harmonics;
 mod obj;
 mod ply;
 mod read;

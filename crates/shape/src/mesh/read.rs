@@ -1,11 +1,11 @@
 //! Reading a mesh file by its extension.
 
-use super::{TriangleMesh, obj, ply, stl, weld};
+use super::{TriangleMesh, harmonics, obj, ply, stl, weld};
 use crate::error::{Result, ShapeError, positive};
 use crate::limits::{ReadLimits, SourceFile, extension, read_bytes};
 use std::path::Path;
 
-/// Reads STL, OBJ or PLY, joins coincident vertices and checks that the surface is closed and
+/// Reads STL, OBJ, PLY or spherical-harmonic coefficients (.anm), joins coincident vertices and checks that the surface is closed and
 /// coherently wound. `unit` is the length [m] of the file's unit: 1e-3 for millimetres.
 /// Errors name places in the file's own units.
 pub fn read_mesh(
@@ -18,10 +18,11 @@ pub fn read_mesh(
         "stl" => stl::read,
         "obj" => obj::read,
         "ply" => ply::read,
+        "anm" => harmonics::read,
         _ => {
             return Err(ShapeError::UnknownFormat {
                 path: path.to_owned(),
-                known: ".stl, .obj, .ply",
+                known: ".stl, .obj, .ply, .anm",
             });
         }
     };

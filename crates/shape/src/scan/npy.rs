@@ -42,7 +42,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
             ),
         });
     };
-    let voxels = count(path, [nx, ny, nz], limits)?;
+    count(path, [nx, ny, nz], limits)?;
     let dims = [nx as usize, ny as usize, nz as usize];
     let number = Number::parse(&header.descr).ok_or_else(|| ShapeError::Unsupported {
         path: path.to_owned(),
@@ -51,38 +51,54 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
             header.descr
         ),
     })?;
-    let data = &bytes[start + length..];
-    let needed = voxels as u64 * number.width as u64;
-    if (data.len() as u64) < needed {
-        return Err(malformed(&format!(
-            "the header claims {needed} bytes of data, the file has {}",
-            data.len()
-        )));
-    }
-    let data = &data[..needed as usize];
-    // Where voxel n (x fastest) lies in the file.
-    let place = |n: usize| {
-        let (i, j, k) = (n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]);
-        if header.fortran {
-            k + dims[2] * (j + dims[1] * i)
-        } else {
-            n
+    number.volume(path, dims, header.fortran, &bytes[start + length..])
+}
+
+impl Number {
+    /// The volume whose voxels lie in `data`, x fastest, or z fastest in Fortran's order.
+    pub(super) fn volume(
+        &self,
+        path: &Path,
+        dims: [usize; 3],
+        fortran: bool,
+        data: &[u8],
+    ) -> Result<Volume> {
+        let voxels: usize = dims.iter().product();
+        let needed = voxels as u64 * self.width as u64;
+        if (data.len() as u64) < needed {
+            return Err(ShapeError::malformed(
+                path,
+                format!(
+                    "the header claims {needed} bytes of data, the file has {}",
+                    data.len()
+                ),
+            ));
         }
-    };
-    let values = (0..voxels).map(|n| number.value(&data[number.width * place(n)..]));
-    if number.kind != b'f' {
-        let labels: Option<Vec<u32>> = values
-            .clone()
-            .map(|v| (v >= 0.0 && v <= f64::from(u32::MAX)).then_some(v as u32))
-            .collect();
-        if let Some(labels) = labels {
-            return Ok(Volume {
-                dims,
-                voxels: Voxels::Labels(labels),
-            });
+        let data = &data[..needed as usize];
+        // Where voxel n (x fastest) lies in the file.
+        let place = |n: usize| {
+            let (i, j, k) = (n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]);
+            if fortran {
+                k + dims[2] * (j + dims[1] * i)
+            } else {
+                n
+            }
+        };
+        let values = (0..voxels).map(|n| self.value(&data[self.width * place(n)..]));
+        if self.kind != b'f' {
+            let labels: Option<Vec<u32>> = values
+                .clone()
+                .map(|v| (v >= 0.0 && v <= f64::from(u32::MAX)).then_some(v as u32))
+                .collect();
+            if let Some(labels) = labels {
+                return Ok(Volume {
+                    dims,
+                    voxels: Voxels::Labels(labels),
+                });
+            }
         }
+        Volume::from_numbers(dims, values.map(|v| v as f32).collect())
     }
-    Volume::from_numbers(dims, values.map(|v| v as f32).collect())
 }
 
 struct Header {
@@ -125,10 +141,10 @@ impl Header {
 }
 
 /// A numeric type: byte order, kind (b, i, u, f) and width in bytes.
-struct Number {
-    big: bool,
-    kind: u8,
-    width: usize,
+pub(super) struct Number {
+    pub big: bool,
+    pub kind: u8,
+    pub width: usize,
 }
 
 impl Number {

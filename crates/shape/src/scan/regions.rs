@@ -1,7 +1,6 @@
 //! Regions of a labelled volume: where they lie, whether they are whole.
 
 use super::Mask;
-use super::volume::Volume;
 use std::collections::BTreeMap;
 
 /// Extent of one label.
@@ -125,9 +124,18 @@ fn neighbours(dims: [usize; 3], at: usize) -> impl Iterator<Item = usize> {
 pub(crate) fn fill_cavities(mask: &mut Mask) -> u64 {
     let [nx, ny, nz] = mask.dims;
     let mut open = vec![false; mask.solid.len()];
-    // The border is background by construction, so that one corner reaches all of it.
-    let mut stack = vec![0usize];
-    open[0] = true;
+    // All of the border is outside.
+    let mut stack = Vec::new();
+    for row in 0..ny * nz {
+        let inner = row % ny > 0 && row % ny < ny - 1 && row / ny > 0 && row / ny < nz - 1;
+        for i in (0..nx).step_by(if inner { (nx - 1).max(1) } else { 1 }) {
+            let at = i + nx * row;
+            if !mask.solid[at] {
+                open[at] = true;
+                stack.push(at);
+            }
+        }
+    }
     while let Some(at) = stack.pop() {
         let (i, j, k) = (at % nx, at / nx % ny, at / nx / ny);
         for c in k.saturating_sub(1)..=(k + 1).min(nz - 1) {
@@ -150,22 +158,6 @@ pub(crate) fn fill_cavities(mask: &mut Mask) -> u64 {
         }
     }
     filled
-}
-
-/// Labels of the volume after thresholding and splitting as asked.
-pub(crate) fn labels_of(volume: &Volume, threshold: Option<f64>, split: bool) -> Option<Vec<u32>> {
-    use super::Voxels::{Grey, Labels};
-    let labels: Vec<u32> = match (&volume.voxels, threshold) {
-        (Labels(v), None) => v.clone(),
-        (Labels(v), Some(t)) => v.iter().map(|v| u32::from(f64::from(*v) >= t)).collect(),
-        (Grey(v), Some(t)) => v.iter().map(|v| u32::from(f64::from(*v) >= t)).collect(),
-        (Grey(_), None) => return None,
-    };
-    Some(if split {
-        pieces(volume.dims, |n| labels[n] != 0).0
-    } else {
-        labels
-    })
 }
 
 #[cfg(test)]
@@ -205,8 +197,5 @@ mod tests {
         let (number, sizes) = pieces(dims, |n| labels[n] != 0);
         assert_eq!(sizes, [26, 1]);
         assert_eq!(number[at(5, 0, 4)], 2);
-        let volume = Volume::from_labels(dims, labels).unwrap();
-        let split = labels_of(&volume, Some(8.0), true).unwrap();
-        assert_eq!(split.iter().filter(|l| **l == 1).count(), 1);
     }
 }

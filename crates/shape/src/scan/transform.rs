@@ -22,6 +22,11 @@ pub(crate) fn signed(mask: &Mask) -> Vec<f32> {
     outside.par_iter().zip(&inside).map(distance).collect()
 }
 
+/// Squared distance [voxels^2] of every voxel centre to the nearest void voxel's, 0 in the void.
+pub(crate) fn to_void(mask: &Mask) -> Vec<f32> {
+    squared(mask, false)
+}
+
 /// Squared distance of every voxel to the nearest voxel whose mask value is `target`.
 fn squared(mask: &Mask, target: bool) -> Vec<f32> {
     let [nx, ny, nz] = mask.dims;

@@ -2,6 +2,8 @@
 
 use crate::error::{Result, ShapeError};
 use crate::limits::{ReadLimits, SourceFile, extension, read_bytes};
+use ::tiff::encoder::colortype::{Gray16, Gray32};
+use ::tiff::encoder::{Compression, DeflateLevel, TiffEncoder};
 use std::path::Path;
 
 /// Voxel values.
@@ -59,22 +61,61 @@ impl Volume {
     }
 }
 
-/// Reads a 3-D image: a multi-page TIFF (8, 16 or 32 bits, whole or floating) or an NPY array
-/// indexed [z][y][x].
+/// Reads a 3-D image: a multi-page TIFF (8, 16 or 32 bits, whole or floating, BigTIFF too), a
+/// folder of TIFF slices, an NPY array indexed [z][y][x] or an NPZ archive of one, NRRD or
+/// MetaImage (with the voxels inside, or raw beside the header).
 pub fn read_volume(path: &Path, limits: &ReadLimits) -> Result<(Volume, SourceFile)> {
+    if path.is_dir() {
+        return super::slices::read(path, limits);
+    }
     let reader = match extension(path).as_str() {
         "tif" | "tiff" => super::tiff::read,
         "npy" => super::npy::read,
+        "npz" => super::npz::read,
+        "nrrd" | "nhdr" => super::header::read_nrrd,
+        "mha" | "mhd" => super::header::read_meta,
         _ => {
             return Err(ShapeError::UnknownFormat {
                 path: path.to_owned(),
-                known: ".tif, .tiff, .npy",
+                known: ".tif, .tiff, .npy, .npz, .nrrd, .nhdr, .mha, .mhd, or a folder of .tif slices",
             });
         }
     };
     let (bytes, source) = read_bytes(path, limits)?;
     let volume = reader(path, &bytes, limits)?;
     Ok((volume, source))
+}
+
+impl Volume {
+    /// Writes labels as a multi-page TIFF of 16 bits (32 where labels need them).
+    pub fn save_labels(&self, path: &Path) -> Result<()> {
+        let Voxels::Labels(labels) = &self.voxels else {
+            return Err(ShapeError::Unsupported {
+                path: path.to_owned(),
+                reason: "grey values are not labels".into(),
+            });
+        };
+        let failed = |e: ::tiff::TiffError| ShapeError::io(path, std::io::Error::other(e));
+        let file = std::fs::File::create(path).map_err(|e| ShapeError::io(path, e))?;
+        let mut encoder = TiffEncoder::new_big(std::io::BufWriter::new(file))
+            .map_err(failed)?
+            .with_compression(Compression::Deflate(DeflateLevel::Fast));
+        let small = labels.iter().all(|l| *l <= u32::from(u16::MAX));
+        let [width, height, _] = self.dims.map(|n| n as u32);
+        for page in labels.chunks(self.dims[0] * self.dims[1]) {
+            if small {
+                let page: Vec<u16> = page.iter().map(|l| *l as u16).collect();
+                encoder
+                    .write_image::<Gray16>(width, height, &page)
+                    .map_err(failed)?;
+            } else {
+                encoder
+                    .write_image::<Gray32>(width, height, page)
+                    .map_err(failed)?;
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Refuses dimensions that are empty or over the limit; returns the number of voxels.
@@ -89,5 +130,25 @@ pub(super) fn count(path: &Path, dims: [u64; 3], limits: &ReadLimits) -> Result<
             limit: limits.voxels,
             unit: "voxels",
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_are_written_and_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        for largest in [7, 70_000, 4_000_000_000] {
+            let labels = vec![0, 1, 2, 3, 4, largest, 0, 0, 9, 9, 1, 0];
+            let volume = Volume::from_labels([3, 2, 2], labels).unwrap();
+            let path = folder.path().join("labels.tif");
+            volume.save_labels(&path).unwrap();
+            assert_eq!(
+                read_volume(&path, &ReadLimits::default()).unwrap().0,
+                volume
+            );
+        }
     }
 }

@@ -254,7 +254,9 @@ fn warnings(setup: &Setup, e: &Estimate) -> Vec<String> {
         };
         found.push(format!("a grain blocks {:.0} % of the cross-section: {what}; widen the box for an unbounded fluid", 100.0 * blockage));
     }
-    if let Some(substeps) = e.contact_substeps.filter(|n| *n > 200.0) {
+    // A dry run has nothing but contact to compute.
+    let wet = setup.fluid.is_some();
+    if let Some(substeps) = e.contact_substeps.filter(|n| wet && *n > 200.0) {
         found.push(format!("contacts need {substeps:.0} sub-steps a step: a lower [contact] stiffness or a larger maximum_overlap is cheaper"));
     }
     if let Some(overlap) = expected_overlap(setup).filter(|overlap| *overlap > 0.05) {
@@ -264,7 +266,7 @@ fn warnings(setup: &Setup, e: &Estimate) -> Vec<String> {
         let limits = Setup {
             step: StepRule::Limits {
                 cfl: 0.6,
-                viscous: 0.25,
+                viscous: 0.216,
                 max_step: f64::INFINITY,
             },
             ..setup.clone()

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::grid::{Centre, FaceVector, Field, Mesh};
+use crate::grid::{Centre, FaceVector, Field, Layout, Mesh};
 use crate::poisson::Ends;
 
 /// Condition on one face of the box.
@@ -67,78 +67,174 @@ impl Boundaries {
         })
     }
 
-    /// Sets the normal velocity on every face where it is given; outflow faces keep theirs.
+    /// Sets the normal velocity on every face where it is given, and the upper faces of periodic
+    /// axes; outflow faces keep theirs.
     pub fn set_normal(&self, velocity: &mut FaceVector) {
         let layout = velocity.x.layout();
-        self.for_sides(|axis, side, boundary| {
-            let face = if side == 0 { 1 } else { layout.cells[axis] + 1 };
+        for axis in 0..3 {
             let normal = velocity.component_mut(axis);
-            match boundary {
-                Boundary::Periodic => layout.wrap(normal, axis),
-                Boundary::Outflow => {}
-                Boundary::Wall { .. } | Boundary::Slip | Boundary::FreeSurface => {
-                    layout.map_layer(normal, axis, face, face, |_| 0.0);
-                }
-                Boundary::Inflow { velocity: given } => {
-                    layout.map_layer(normal, axis, face, face, |_| given[axis]);
-                }
+            if self.is_periodic(axis) {
+                layout.wrap(normal, axis);
             }
-        });
+            for (face, value) in self.given_faces(axis, layout.cells[axis]) {
+                layout.map_layer(normal, axis, face, face, |_| value);
+            }
+        }
+    }
+
+    /// Layers of faces across `axis` whose normal velocity is given, and that velocity.
+    pub fn given_faces(&self, axis: usize, n: usize) -> impl Iterator<Item = (usize, f64)> {
+        let sides = self.0[axis];
+        [1, n + 1]
+            .into_iter()
+            .zip(sides)
+            .filter_map(move |(face, boundary)| match boundary {
+                Boundary::Periodic | Boundary::Outflow => None,
+                Boundary::Wall { .. } | Boundary::Slip | Boundary::FreeSurface => Some((face, 0.0)),
+                Boundary::Inflow { velocity } => Some((face, velocity[axis])),
+            })
+    }
+
+    /// Sets the given x and y faces of one plane.
+    pub fn set_normal_of_plane(&self, layout: Layout, [x, y]: [&mut [f64]; 2]) {
+        let row = layout.row();
+        for (face, value) in self.given_faces(0, layout.cells[0]) {
+            x.chunks_exact_mut(row).for_each(|row| row[face] = value);
+        }
+        for (face, value) in self.given_faces(1, layout.cells[1]) {
+            y[face * row..(face + 1) * row].fill(value);
+        }
     }
 
     /// Fills the ghost layers of a velocity whose interior and boundary faces are set.
     pub fn fill_ghosts(&self, velocity: &mut FaceVector) {
         let layout = velocity.x.layout();
-        self.for_sides(|axis, side, boundary| {
-            let n = layout.cells[axis];
-            let (ghost, inner) = if side == 0 { (0, 1) } else { (n + 1, n) };
-            for component in 0..3 {
-                let q = velocity.component_mut(component);
-                match boundary {
-                    Boundary::Periodic => layout.wrap(q, axis),
-                    // The boundary face itself is set; only the lower side has a ghost beyond it,
-                    // and no interior face reads that.
-                    _ if component == axis && side == 1 => {}
-                    _ if component == axis => {
-                        layout.map_layer(q, axis, inner, ghost, |value| value)
-                    }
-                    Boundary::Wall { velocity: given } | Boundary::Inflow { velocity: given } => {
-                        // A parabola through the wall: the shear at the wall is of second order.
-                        let wall = given[component];
-                        if n == 1 {
-                            layout.map_layer(q, axis, inner, ghost, |near| 2.0 * wall - near);
-                        } else {
-                            let next = if side == 0 { 2 } else { n - 1 };
-                            layout.map_layers(q, axis, [inner, next], ghost, |[near, next]| {
-                                (8.0 * wall - 6.0 * near + next) / 3.0
-                            });
-                        }
-                    }
-                    Boundary::Slip | Boundary::FreeSurface | Boundary::Outflow => {
-                        layout.map_layer(q, axis, inner, ghost, |value| value);
-                    }
-                }
-            }
-        });
-    }
-
-    /// Fills the ghost layers of the pressure or its increment: zero normal gradient or periodic.
-    pub fn fill_pressure(&self, pressure: &mut Field<Centre>) {
-        for axis in 0..3 {
-            let n = pressure.layout().cells[axis];
-            if self.is_periodic(axis) {
-                pressure.wrap(axis);
-            } else {
-                pressure.copy_layer(axis, 1, 0);
-                pressure.copy_layer(axis, n, n + 1);
+        for component in 0..3 {
+            for plane in velocity
+                .component_mut(component)
+                .chunks_exact_mut(layout.plane())
+            {
+                self.fill_ghosts_of_plane(layout, component, plane);
             }
         }
+        self.fill_ghost_planes(velocity);
+    }
+
+    /// Fills the ghosts along x and y of one plane of a velocity component.
+    pub fn fill_ghosts_of_plane(&self, layout: Layout, component: usize, plane: &mut [f64]) {
+        let (row, [nx, ny, _]) = (layout.row(), layout.cells);
+        for side in 0..2 {
+            let (ghost, inner) = if side == 0 { (0, 1) } else { (nx + 1, nx) };
+            match self.mirror(0, side, component) {
+                Mirror::None => {}
+                Mirror::Wrap => plane.chunks_exact_mut(row).for_each(|row| {
+                    (row[0], row[nx + 1]) = (row[nx], row[1]);
+                }),
+                Mirror::Copy => plane
+                    .chunks_exact_mut(row)
+                    .for_each(|row| row[ghost] = row[inner]),
+                Mirror::About(wall) => {
+                    let next = second(inner, nx);
+                    plane
+                        .chunks_exact_mut(row)
+                        .for_each(|row| row[ghost] = beyond_wall(wall, row[inner], row[next], nx));
+                }
+            }
+        }
+        for side in 0..2 {
+            let (ghost, inner) = if side == 0 { (0, 1) } else { (ny + 1, ny) };
+            reflect(
+                plane,
+                row,
+                self.mirror(1, side, component),
+                ghost,
+                inner,
+                ny,
+            );
+        }
+    }
+
+    /// Fills the ghost planes below and above, and the ghosts of the upper boundary faces.
+    pub fn fill_ghost_planes(&self, velocity: &mut FaceVector) {
+        let layout = velocity.x.layout();
+        let (plane, nz) = (layout.plane(), layout.cells[2]);
+        if !self.is_periodic(2) {
+            self.fill_ghosts_of_plane(layout, 2, &mut velocity.z[(nz + 1) * plane..]);
+        }
+        for component in 0..3 {
+            for side in 0..2 {
+                let (ghost, inner) = if side == 0 { (0, 1) } else { (nz + 1, nz) };
+                let mirror = self.mirror(2, side, component);
+                let q = velocity.component_mut(component);
+                reflect(q, plane, mirror, ghost, inner, nz);
+            }
+        }
+    }
+
+    /// How the ghosts of a component on one side follow from the inside.
+    fn mirror(&self, axis: usize, side: usize, component: usize) -> Mirror {
+        match self.0[axis][side] {
+            Boundary::Periodic => Mirror::Wrap,
+            // The boundary face itself is set; only the lower side has a ghost beyond it, and no
+            // interior face reads that.
+            _ if component == axis && side == 1 => Mirror::None,
+            _ if component == axis => Mirror::Copy,
+            Boundary::Wall { velocity } | Boundary::Inflow { velocity } => {
+                Mirror::About(velocity[component])
+            }
+            Boundary::Slip | Boundary::FreeSurface | Boundary::Outflow => Mirror::Copy,
+        }
+    }
+
+    /// Fills the ghosts along x and y of one plane of the pressure: zero normal gradient or periodic.
+    pub fn fill_pressure_of_plane(&self, layout: Layout, plane: &mut [f64]) {
+        let (row, [nx, ny, _]) = (layout.row(), layout.cells);
+        let periodic = self.is_periodic(0);
+        for row in plane.chunks_exact_mut(row) {
+            let ends = [row[1], row[nx]];
+            [row[0], row[nx + 1]] = if periodic { [ends[1], ends[0]] } else { ends };
+        }
+        self.fill_pressure_ends(plane, row, 1, ny);
+    }
+
+    /// Fills the ghost planes of the pressure.
+    pub fn fill_pressure_planes(&self, pressure: &mut Field<Centre>) {
+        let layout = pressure.layout();
+        self.fill_pressure_ends(pressure, layout.plane(), 2, layout.cells[2]);
+    }
+
+    fn fill_pressure_ends(&self, values: &mut [f64], layer: usize, axis: usize, n: usize) {
+        for (ghost, inner) in [(0, 1), (n + 1, n)] {
+            let mirror = if self.is_periodic(axis) {
+                Mirror::Wrap
+            } else {
+                Mirror::Copy
+            };
+            reflect(values, layer, mirror, ghost, inner, n);
+        }
+    }
+
+    /// Fills all ghosts of the pressure.
+    pub fn fill_pressure(&self, pressure: &mut Field<Centre>) {
+        let layout = pressure.layout();
+        for plane in pressure.chunks_exact_mut(layout.plane()) {
+            self.fill_pressure_of_plane(layout, plane);
+        }
+        self.fill_pressure_planes(pressure);
     }
 
     /// Moves the outflow faces of `next` by convection, d q / dt + C d q / d n = 0 with C the mean
     /// speed through the face, then shifts them all by one speed so that inflow equals outflow.
     /// `next` has its other boundary faces set. Without an outflow nothing is done.
     pub fn convect_outflow(&self, mesh: &Mesh, now: &FaceVector, next: &mut FaceVector, dt: f64) {
+        if !self
+            .0
+            .iter()
+            .flatten()
+            .any(|side| *side == Boundary::Outflow)
+        {
+            return;
+        }
         let (mut net, mut open) = (0.0, 0.0);
         self.for_sides(|axis, side, boundary| {
             let n = mesh.cells[axis];
@@ -179,6 +275,52 @@ impl Boundaries {
             }
         }
     }
+}
+
+/// How a ghost layer follows from the inside.
+#[derive(Clone, Copy)]
+enum Mirror {
+    /// It is not read.
+    None,
+    /// It is the layer across the box.
+    Wrap,
+    /// It is the inner layer.
+    Copy,
+    /// The mean of both is this value.
+    About(f64),
+}
+
+/// The layer behind `inner`, seen from the nearer end of 1..=n.
+fn second(inner: usize, n: usize) -> usize {
+    if inner == 1 { 2.min(n) } else { inner - 1 }
+}
+
+/// Value beyond a wall that moves at `wall`, on the parabola through it and the two nearest values:
+/// the shear at the wall is then of second order.
+fn beyond_wall(wall: f64, near: f64, next: f64, n: usize) -> f64 {
+    if n == 1 {
+        2.0 * wall - near
+    } else {
+        (8.0 * wall - 6.0 * near + next) / 3.0
+    }
+}
+
+/// Fills the layer `ghost` of `layer` entries; `inner` is next to it and 1..=n are inside.
+fn reflect(values: &mut [f64], layer: usize, mirror: Mirror, ghost: usize, inner: usize, n: usize) {
+    let from = match mirror {
+        Mirror::None => return,
+        Mirror::Wrap => n + 1 - inner,
+        Mirror::Copy => inner,
+        Mirror::About(wall) => {
+            let next = second(inner, n);
+            for i in 0..layer {
+                let [near, next] = [inner, next].map(|from| values[from * layer + i]);
+                values[ghost * layer + i] = beyond_wall(wall, near, next, n);
+            }
+            return;
+        }
+    };
+    values.copy_within(from * layer..(from + 1) * layer, ghost * layer);
 }
 
 /// The faces of one side of the box and their inner neighbours in memory.

@@ -5,6 +5,7 @@
 
 mod boundary;
 mod params;
+mod project;
 mod solver;
 mod tendency;
 

@@ -4,10 +4,12 @@
 
 use glam::DVec3;
 
-use crate::grid::{Centre, FaceVector, Field, Layout, Mesh, for_planes_of};
-use crate::poisson::Poisson;
+use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of};
+use crate::math::lanes::dispatch;
+use crate::poisson::{Plane, Poisson, Stages};
 
-use super::tendency::{self, Coefficients};
+use super::project::{Correct, Divergence, PlaneMeasures};
+use super::tendency::{Coefficients, PredictPlane, Weights};
 use super::{Boundaries, FluidParams};
 
 /// What a projection measures on the way, over the whole grid.
@@ -37,14 +39,15 @@ pub struct Flow {
     /// Dynamic pressure over density p^n [m^2/s^2].
     pub pressure: Field<Centre>,
     tendency: FaceVector,
-    increment: Field<Centre>,
     poisson: Poisson,
-    partial: Vec<FlowMeasures>,
+    partial: Vec<PlaneMeasures>,
     previous_step: Option<f64>,
     weight: f64,
     /// Sums of H over the unknown faces, of the last step and of the one before, three each.
     tendency_sums: [f64; 6],
     impulse: DVec3,
+    /// Pressure at the upper end less that at the lower end, summed over the lines along each axis.
+    pressure_rise: DVec3,
 }
 
 impl Flow {
@@ -62,13 +65,13 @@ impl Flow {
             predicted: FaceVector::zeros(mesh),
             pressure: Field::zeros(mesh),
             tendency: FaceVector::zeros(mesh),
-            increment: Field::zeros(mesh),
             poisson: Poisson::new(mesh, boundaries.pressure_ends()),
-            partial: vec![FlowMeasures::default(); mesh.cells[2]],
+            partial: vec![PlaneMeasures::default(); mesh.cells[2]],
             previous_step: None,
             weight: 0.0,
             tendency_sums: [0.0; 6],
             impulse: DVec3::ZERO,
+            pressure_rise: DVec3::ZERO,
         };
         flow.velocity.x.fill(params.initial_velocity.x);
         flow.velocity.y.fill(params.initial_velocity.y);
@@ -99,17 +102,15 @@ impl Flow {
     pub fn predict(&mut self, dt: f64) {
         let ratio = self.previous_step.map_or(0.0, |previous| dt / previous);
         let (now, before) = (dt * (1.0 + 0.5 * ratio), -dt * 0.5 * ratio);
-        let (velocity, pressure, coefficients) =
-            (&self.velocity, &self.pressure, &self.coefficients);
-        let layout = self.mesh.layout();
-        let walled = self.boundaries.walled();
-        let push = self.mesh.spacing.to_array().map(|h| dt / h);
-        let (row, plane) = (layout.row(), layout.plane());
-        let FaceVector {
-            x: tx,
-            y: ty,
-            z: tz,
-        } = &mut self.tendency;
+        let weights = Weights {
+            now,
+            before,
+            push: self.mesh.spacing.to_array().map(|h| dt / h),
+        };
+        let (layout, walled) = (self.mesh.layout(), self.boundaries.walled());
+        let (velocity, pressure, boundaries) = (&self.velocity, &self.pressure, &self.boundaries);
+        let coefficients = &self.coefficients;
+        let FaceVector { x, y, z } = &mut self.tendency;
         let FaceVector {
             x: px,
             y: py,
@@ -117,66 +118,35 @@ impl Flow {
         } = &mut self.predicted;
         for_planes_of(
             layout,
-            [tx, ty, tz, px, py, pz],
+            [x, y, z, px, py, pz],
             &mut self.partial,
-            |k, [tx, ty, tz, px, py, pz], partial| {
-                partial.momentum = DVec3::ZERO;
-                for j in 1..=layout.cells[1] {
-                    let (first, at) = (j * row, layout.index(0, j, k));
-                    let cut = first..first + row;
-                    // The old tendency is spent before the new one takes its place.
-                    for (axis, (old, new)) in [
-                        (&mut *tx, &mut *px),
-                        (&mut *ty, &mut *py),
-                        (&mut *tz, &mut *pz),
-                    ]
-                    .into_iter()
-                    .enumerate()
-                    {
-                        let u = &velocity.component(axis)[at..at + row];
-                        let p = &pressure[at..at + row];
-                        let stride = [1, row, plane][axis];
-                        let lower = &pressure[at + 1 - stride..at + row - stride];
-                        let (old, new) = (&old[cut.clone()], &mut new[cut.clone()]);
-                        for i in 1..row - 1 {
-                            new[i] = u[i] + before * old[i] - push[axis] * (p[i] - lower[i - 1]);
-                        }
-                    }
-                    tendency::row(
-                        coefficients,
-                        velocity,
-                        j,
-                        k,
-                        [
-                            &mut tx[cut.clone()],
-                            &mut ty[cut.clone()],
-                            &mut tz[cut.clone()],
-                        ],
-                    );
-                    for (axis, (tendency, new)) in
-                        [(&*tx, &mut *px), (&*ty, &mut *py), (&*tz, &mut *pz)]
-                            .into_iter()
-                            .enumerate()
-                    {
-                        let (tendency, new) = (&tendency[cut.clone()], &mut new[cut.clone()]);
-                        for i in 1..row - 1 {
-                            new[i] += now * tendency[i];
-                        }
-                        if let Some(from) = first_unknown(walled, axis, j, k) {
-                            partial.momentum[axis] += tendency[from..row - 1].iter().sum::<f64>();
-                        }
-                    }
-                }
+            |k, [x, y, z, px, py, pz], partial| {
+                dispatch(PredictPlane {
+                    layout,
+                    coefficients,
+                    weights,
+                    velocity,
+                    pressure,
+                    walled,
+                    k,
+                    tendency: [x, y, z],
+                    predicted: [&mut *px, &mut *py, pz],
+                    sum: &mut partial.tendency,
+                });
+                boundaries.set_normal_of_plane(layout, [px, py]);
             },
         );
+        for (face, value) in boundaries.given_faces(2, layout.cells[2]) {
+            let plane = layout.plane();
+            pz[face * plane..(face + 1) * plane].fill(value);
+        }
         let sum = self
             .partial
             .iter()
-            .fold(DVec3::ZERO, |sum, m| sum + m.momentum);
+            .fold(DVec3::ZERO, |sum, plane| sum + plane.tendency);
         let [_, _, _, x, y, z] = self.tendency_sums;
         self.tendency_sums = [x, y, z, sum.x, sum.y, sum.z];
         self.impulse = now * sum + before * DVec3::new(x, y, z);
-        self.boundaries.set_normal(&mut self.predicted);
         self.boundaries
             .convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, dt);
         self.previous_step = Some(dt);
@@ -195,168 +165,108 @@ impl Flow {
     pub fn project(&mut self, dt: f64) -> FlowMeasures {
         let layout = self.mesh.layout();
         let [row, plane] = [layout.row(), layout.plane()];
+        let [nx, ny, nz] = layout.cells;
         let inverse = self.mesh.spacing.to_array().map(|h| 1.0 / h);
-        for axis in 0..3 {
-            if self.boundaries.is_periodic(axis) {
-                layout.wrap(self.predicted.component_mut(axis), axis);
-            }
-        }
-        let predicted = &self.predicted;
-        for_planes_of(
-            layout,
-            [&mut self.increment],
-            &mut self.partial,
-            |k, [f], _| {
-                for j in 1..=layout.cells[1] {
-                    let (at, out) = (layout.index(0, j, k), &mut f[j * row..(j + 1) * row]);
-                    let (u, v, w) = (
-                        &predicted.x[at..at + row],
-                        &predicted.y[at..at + row],
-                        &predicted.z[at..at + row],
-                    );
-                    let (vp, wp) = (
-                        &predicted.y[at + row..at + 2 * row],
-                        &predicted.z[at + plane..at + plane + row],
-                    );
-                    for i in 1..row - 1 {
-                        out[i] = ((u[i + 1] - u[i]) * inverse[0]
-                            + (vp[i] - v[i]) * inverse[1]
-                            + (wp[i] - w[i]) * inverse[2])
-                            / dt;
+        let walled = self.boundaries.walled();
+        let periodic = walled.map(|walled| !walled);
+        let (predicted, boundaries) = (&self.predicted, &self.boundaries);
+        let divergence = |k: usize, out: &mut Plane| {
+            dispatch(Divergence {
+                layout,
+                periodic,
+                predicted,
+                k,
+                inverse,
+                dt,
+                out,
+            });
+        };
+        let FaceVector { x, y, z } = &mut self.velocity;
+        let fields = [&mut **x, &mut **y, &mut **z, &mut *self.pressure];
+        let partial = &mut self.partial;
+        self.poisson
+            .solve(divergence, fields, partial, |k, solution, run| {
+                let ([x, y, z, p], measures) = run.plane(k);
+                dispatch(Correct {
+                    layout,
+                    predicted,
+                    solution,
+                    periodic,
+                    k,
+                    inverse,
+                    pull: inverse.map(|inverse| dt * inverse),
+                    velocity: [&mut *x, &mut *y, &mut *z],
+                    pressure: &mut *p,
+                    measures,
+                });
+                // The upper boundary faces are left as predicted.
+                if walled[0] {
+                    for j in 1..=ny {
+                        let at = (j + 1) * row - 1;
+                        x[at] = predicted.x[k * plane + at];
                     }
                 }
-            },
-        );
-        self.poisson.solve(&mut self.increment);
-        self.boundaries.fill_pressure(&mut self.increment);
-        let measures = self.correct(dt, layout);
-        self.boundaries.fill_pressure(&mut self.pressure);
-        self.copy_upper_faces();
-        self.boundaries.fill_ghosts(&mut self.velocity);
-        measures
+                if walled[1] {
+                    let upper = (ny + 1) * row..(ny + 2) * row;
+                    y[upper.clone()].copy_from_slice(&predicted.y[k * plane..][upper]);
+                }
+                for (component, q) in [x, y, z].into_iter().enumerate() {
+                    boundaries.fill_ghosts_of_plane(layout, component, q);
+                }
+                boundaries.fill_pressure_of_plane(layout, p);
+            });
+        debug_assert_eq!(row, nx + 2);
+        if walled[2] {
+            let upper = (nz + 1) * plane..;
+            z[upper.clone()].copy_from_slice(&predicted.z[upper]);
+        }
+        boundaries.fill_pressure_planes(&mut self.pressure);
+        boundaries.fill_ghost_planes(&mut self.velocity);
+        self.total()
     }
 
-    /// The last stage of the projection, one sweep over the grid.
-    fn correct(&mut self, dt: f64, layout: Layout) -> FlowMeasures {
-        let [row, plane] = [layout.row(), layout.plane()];
-        let inverse = self.mesh.spacing.to_array().map(|h| 1.0 / h);
-        let pull = inverse.map(|inverse| dt * inverse);
-        let walled = self.boundaries.walled();
-        let (predicted, phi) = (&self.predicted, &self.increment);
-        let FaceVector { x, y, z } = &mut self.velocity;
-        for_planes_of(
-            layout,
-            [x, y, z, &mut self.pressure],
-            &mut self.partial,
-            |k, [x, y, z, p], partial| {
-                let mut m = FlowMeasures::default();
-                let mut kinetic = 0.0;
-                let mut momentum = DVec3::ZERO;
-                for j in 1..=layout.cells[1] {
-                    let (at, cut) = (layout.index(0, j, k), j * row..(j + 1) * row);
-                    let (x, y, z, p) = (
-                        &mut x[cut.clone()],
-                        &mut y[cut.clone()],
-                        &mut z[cut.clone()],
-                        &mut p[cut],
-                    );
-                    let (u, v, w) = (
-                        &predicted.x[at..at + row],
-                        &predicted.y[at..at + row],
-                        &predicted.z[at..at + row],
-                    );
-                    let (vp, wp) = (
-                        &predicted.y[at + row..at + 2 * row],
-                        &predicted.z[at + plane..at + plane + row],
-                    );
-                    let f = &phi[at..at + row];
-                    let (fym, fyp) = (&phi[at - row..at], &phi[at + row..at + 2 * row]);
-                    let (fzm, fzp) = (
-                        &phi[at - plane..at - plane + row],
-                        &phi[at + plane..at + plane + row],
-                    );
-                    for i in 1..row - 1 {
-                        let lower = [
-                            u[i] - pull[0] * (f[i] - f[i - 1]),
-                            v[i] - pull[1] * (f[i] - fym[i]),
-                            w[i] - pull[2] * (f[i] - fzm[i]),
-                        ];
-                        let upper = [
-                            u[i + 1] - pull[0] * (f[i + 1] - f[i]),
-                            vp[i] - pull[1] * (fyp[i] - f[i]),
-                            wp[i] - pull[2] * (fzp[i] - f[i]),
-                        ];
-                        let divergence = (upper[0] - lower[0]) * inverse[0]
-                            + (upper[1] - lower[1]) * inverse[1]
-                            + (upper[2] - lower[2]) * inverse[2];
-                        let square =
-                            lower[0] * lower[0] + lower[1] * lower[1] + lower[2] * lower[2];
-                        let rate = lower[0].abs() * inverse[0]
-                            + lower[1].abs() * inverse[1]
-                            + lower[2].abs() * inverse[2];
-                        m.max_divergence = larger(m.max_divergence, divergence.abs());
-                        m.max_rate = larger(m.max_rate, rate);
-                        m.max_velocity = larger(m.max_velocity, square);
-                        kinetic += square;
-                        x[i] = lower[0];
-                        y[i] = lower[1];
-                        z[i] = lower[2];
-                        p[i] += f[i];
-                    }
-                    for (axis, component) in [&*x, &*y, &*z].into_iter().enumerate() {
-                        if let Some(from) = first_unknown(walled, axis, j, k) {
-                            momentum[axis] += component[from..row - 1].iter().sum::<f64>();
-                        }
-                    }
-                }
-                m.momentum = momentum;
-                m.kinetic_energy = 0.5 * kinetic;
-                *partial = m;
-            },
-        );
+    /// What all planes measured, in their order.
+    fn total(&mut self) -> FlowMeasures {
         let mut total = FlowMeasures::default();
-        for m in &self.partial {
-            total.max_divergence = larger(total.max_divergence, m.max_divergence);
-            total.max_rate = larger(total.max_rate, m.max_rate);
-            total.max_velocity = larger(total.max_velocity, m.max_velocity);
+        let mut rise = DVec3::ZERO;
+        for plane in &self.partial {
+            let m = &plane.flow;
+            total.max_divergence = total.max_divergence.max(m.max_divergence);
+            total.max_rate = total.max_rate.max(m.max_rate);
+            total.max_velocity = total.max_velocity.max(m.max_velocity);
             total.kinetic_energy += m.kinetic_energy;
             total.momentum += m.momentum;
+            rise += DVec3::new(plane.pressure_rise[0], plane.pressure_rise[1], 0.0);
         }
+        let layout = self.mesh.layout();
+        let (plane, nz) = (layout.plane(), layout.cells[2]);
+        for j in 1..=layout.cells[1] {
+            for at in layout.index(1, j, 0)..=layout.index(layout.cells[0], j, 0) {
+                rise.z += self.pressure[nz * plane + at] - self.pressure[plane + at];
+            }
+        }
+        self.pressure_rise = rise;
         total.max_velocity = total.max_velocity.sqrt();
         total.kinetic_energy *= self.mesh.cell_volume();
         total.momentum *= self.mesh.cell_volume();
+        if total.kinetic_energy.is_nan() {
+            // A maximum passes over what is not a number; a sum does not.
+            total.max_divergence = f64::NAN;
+            total.max_rate = f64::NAN;
+            total.max_velocity = f64::NAN;
+        }
         total
     }
 
     /// What walls, open faces and body force have given the box in the step just projected, per
     /// density [m^4/s]: its momentum changes by this and by the impulse of grains.
     pub fn boundary_impulse(&self, dt: f64) -> DVec3 {
-        let layout = self.mesh.layout();
         let mut sum = self.impulse;
         for axis in (0..3).filter(|&axis| !self.boundaries.is_periodic(axis)) {
             // The sum of a gradient over the inner faces leaves the two outermost cells.
-            let n = layout.cells[axis];
-            let mut difference = 0.0;
-            let stride = layout.strides()[axis] as isize;
-            layout.each_inside_layer(axis, n, |at| {
-                difference += self.pressure[at]
-                    - self.pressure[at.wrapping_add_signed((1 - n as isize) * stride)];
-            });
-            sum[axis] -= dt * difference / self.mesh.spacing[axis];
+            sum[axis] -= dt * self.pressure_rise[axis] / self.mesh.spacing[axis];
         }
         sum * self.mesh.cell_volume()
-    }
-
-    /// The upper boundary faces lie outside the sweep; the projection leaves them as predicted.
-    fn copy_upper_faces(&mut self) {
-        let layout = self.mesh.layout();
-        for axis in 0..3 {
-            let (from, to) = (
-                self.predicted.component(axis),
-                self.velocity.component_mut(axis),
-            );
-            layout.each_of_layer(axis, layout.cells[axis] + 1, |at| to[at] = from[at]);
-        }
     }
 
     /// Projects the prediction in place: u* becomes the flow without grains, and the pressure takes
@@ -410,25 +320,12 @@ impl Flow {
     }
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        8 * 11 * self.mesh.layout().len() + self.poisson.bytes()
+        8 * 10 * self.mesh.layout().len() + self.poisson.bytes()
     }
-}
-
-/// First unknown entry of row (j, k) of a component, if the row has any: the lower boundary face of
-/// an axis that is not periodic is given.
-#[inline(always)]
-fn first_unknown(walled: [bool; 3], axis: usize, j: usize, k: usize) -> Option<usize> {
-    match axis {
-        0 => Some(1 + usize::from(walled[0])),
-        1 => (j > 1 || !walled[1]).then_some(1),
-        _ => (k > 1 || !walled[2]).then_some(1),
+    /// Time spent in each stage of the Poisson solves, divergence and correction included.
+    pub fn poisson_stages(&self) -> Stages {
+        self.poisson.stages()
     }
-}
-
-/// Maximum that keeps a NaN, so that a broken field cannot pass for a quiet one.
-#[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if b > a || b.is_nan() { b } else { a }
 }
 
 #[cfg(test)]

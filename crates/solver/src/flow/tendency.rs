@@ -1,19 +1,23 @@
-//! Advection and diffusion at one face (the right side of Eq. 1b without the pressure).
+//! Advection and diffusion (the right side of Eq. 1b without the pressure) and the explicit step,
+//! a row at a time.
 //!
 //! Both are differences of fluxes through the six links to the neighbouring faces of the same
 //! component. A link carries the mean of its two ends times the velocity through it: with a
 //! divergence-free velocity this conserves momentum and kinetic energy.
 //!
-//! Legend: q velocity component, c velocity through a link, m/p minus/plus neighbour.
+//! Legend: q velocity component, c velocity through a link; u, v, w components along x, y, z; the
+//! letters after them: m/p one row down/up in y, b/t one down/up in z.
 
 use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout, Mesh};
+use crate::math::lanes::{Kernel, Partial, RowWork, Vector, along_row};
 
 /// Constants of the tendency.
 #[derive(Clone, Copy)]
 pub struct Coefficients {
-    half_inverse: [f64; 3],
+    /// 1/4h: a quarter, as both the carried value and the velocity that carries it are means.
+    quarter_inverse: [f64; 3],
     nu_inverse_square: [f64; 3],
     acceleration: DVec3,
 }
@@ -23,107 +27,198 @@ impl Coefficients {
     pub fn new(mesh: &Mesh, kinematic_viscosity: f64, acceleration: DVec3) -> Coefficients {
         let h = mesh.spacing.to_array();
         Coefficients {
-            half_inverse: h.map(|h| 0.5 / h),
+            quarter_inverse: h.map(|h| 0.25 / h),
             nu_inverse_square: h.map(|h| kinematic_viscosity / (h * h)),
             acceleration,
         }
     }
 
-    /// -div(c q) + nu lap(q) at a face with value `q`, neighbours and link velocities `[axis][minus, plus]`.
+    /// -div(c q) + nu lap(q) + g of `component` at a face with value `q`, neighbours and link
+    /// velocities (twice the mean) `[axis][minus, plus]`.
     #[inline(always)]
-    fn at_face(&self, q: f64, neighbour: [[f64; 2]; 3], link: [[f64; 2]; 3]) -> f64 {
-        let mut sum = 0.0;
+    fn at_face<V: Vector>(
+        &self,
+        component: usize,
+        q: V,
+        neighbour: [[V; 2]; 3],
+        link: [[V; 2]; 3],
+    ) -> V {
+        let twice = q + q;
+        let mut sum = V::splat(self.acceleration.to_array()[component]);
         for axis in 0..3 {
             let ([qm, qp], [cm, cp]) = (neighbour[axis], link[axis]);
-            sum += self.nu_inverse_square[axis] * (qm + qp - 2.0 * q)
-                - self.half_inverse[axis] * (cp * (q + qp) - cm * (qm + q));
+            let diffusion = V::splat(self.nu_inverse_square[axis]) * (qm + qp - twice);
+            let carried = cp * (q + qp) - cm * (qm + q);
+            sum = sum + (diffusion - V::splat(self.quarter_inverse[axis]) * carried);
         }
         sum
     }
 }
 
-/// Tendencies [m/s^2] of row (j, k): writes `out[component][i]` for i = 1..=nx.
-pub fn row(c: &Coefficients, velocity: &FaceVector, j: usize, k: usize, out: [&mut [f64]; 3]) {
-    let layout = velocity.x.layout();
-    let n = layout.row();
-    let rows = Rows { layout, velocity };
-    let [out_x, out_y, out_z] = out.map(|row| &mut row[..n]);
-    let g = c.acceleration;
+/// What a step multiplies by.
+#[derive(Clone, Copy)]
+pub struct Weights {
+    /// Of the new tendency [s].
+    pub now: f64,
+    /// Of the old one [s].
+    pub before: f64,
+    /// Of the pressure difference along each axis [s/m].
+    pub push: [f64; 3],
+}
 
-    let (u, um, up, ub, ut) = (
-        rows.x(j, k),
-        rows.x(j - 1, k),
-        rows.x(j + 1, k),
-        rows.x(j, k - 1),
-        rows.x(j, k + 1),
-    );
-    let (v, vm, vp, vb, vt) = (
-        rows.y(j, k),
-        rows.y(j - 1, k),
-        rows.y(j + 1, k),
-        rows.y(j, k - 1),
-        rows.y(j, k + 1),
-    );
-    let (w, wm, wp, wb, wt) = (
-        rows.z(j, k),
-        rows.z(j - 1, k),
-        rows.z(j + 1, k),
-        rows.z(j, k - 1),
-        rows.z(j, k + 1),
-    );
-    let (u_mt, v_pb, w_mt) = (rows.x(j - 1, k), rows.y(j + 1, k - 1), rows.z(j - 1, k + 1));
-    let u_b = rows.x(j, k - 1);
+/// One plane of the prediction u* = u + now H + before H_old - dt grad p.
+pub struct PredictPlane<'a> {
+    pub layout: Layout,
+    pub coefficients: &'a Coefficients,
+    pub weights: Weights,
+    pub velocity: &'a FaceVector,
+    pub pressure: &'a [f64],
+    /// Axes whose lower boundary face is given.
+    pub walled: [bool; 3],
+    pub k: usize,
+    /// H_old, to be replaced by H.
+    pub tendency: [&'a mut [f64]; 3],
+    pub predicted: [&'a mut [f64]; 3],
+    /// Receives the sum of H over the unknown faces of the plane.
+    pub sum: &'a mut DVec3,
+}
 
-    for i in 1..n - 1 {
-        let neighbour = [[u[i - 1], u[i + 1]], [um[i], up[i]], [ub[i], ut[i]]];
-        let link = [
-            [0.5 * (u[i - 1] + u[i]), 0.5 * (u[i] + u[i + 1])],
-            [0.5 * (v[i - 1] + v[i]), 0.5 * (vp[i - 1] + vp[i])],
-            [0.5 * (w[i - 1] + w[i]), 0.5 * (wt[i - 1] + wt[i])],
-        ];
-        out_x[i] = c.at_face(u[i], neighbour, link) + g.x;
-    }
-    for i in 1..n - 1 {
-        let neighbour = [[v[i - 1], v[i + 1]], [vm[i], vp[i]], [vb[i], vt[i]]];
-        let link = [
-            [0.5 * (u_mt[i] + u[i]), 0.5 * (u_mt[i + 1] + u[i + 1])],
-            [0.5 * (vm[i] + v[i]), 0.5 * (v[i] + vp[i])],
-            [0.5 * (wm[i] + w[i]), 0.5 * (w_mt[i] + wt[i])],
-        ];
-        out_y[i] = c.at_face(v[i], neighbour, link) + g.y;
-    }
-    for i in 1..n - 1 {
-        let neighbour = [[w[i - 1], w[i + 1]], [wm[i], wp[i]], [wb[i], wt[i]]];
-        let link = [
-            [0.5 * (u_b[i] + u[i]), 0.5 * (u_b[i + 1] + u[i + 1])],
-            [0.5 * (vb[i] + v[i]), 0.5 * (v_pb[i] + vp[i])],
-            [0.5 * (wb[i] + w[i]), 0.5 * (w[i] + wt[i])],
-        ];
-        out_z[i] = c.at_face(w[i], neighbour, link) + g.z;
+impl Kernel for PredictPlane<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let (layout, k) = (self.layout, self.k);
+        let (row, plane, n) = (layout.row(), layout.plane(), layout.cells[0]);
+        let FaceVector { x, y, z } = self.velocity;
+        let [tx, ty, tz] = self.tendency;
+        let [px, py, pz] = self.predicted;
+        let mut sums = [Partial::default(); 3];
+        for j in 1..=layout.cells[1] {
+            let (at, here) = (layout.index(0, j, k), j * row..(j + 1) * row);
+            let mut work = PredictRow {
+                coefficients: self.coefficients,
+                weights: self.weights,
+                u: around(x, at, row, plane),
+                v: around(y, at, row, plane),
+                w: around(z, at, row, plane),
+                vpb: &y[at + row - plane..][..row],
+                wmt: &z[at + plane - row..][..row],
+                p: &self.pressure[at..][..row],
+                pm: &self.pressure[at - row..][..row],
+                pb: &self.pressure[at - plane..][..row],
+                tendency: [
+                    &mut tx[here.clone()],
+                    &mut ty[here.clone()],
+                    &mut tz[here.clone()],
+                ],
+                predicted: [&mut px[here.clone()], &mut py[here.clone()], &mut pz[here]],
+                sums: &mut sums,
+                given: [false, self.walled[1] && j == 1, self.walled[2] && k == 1],
+            };
+            along_row::<V>(n, &mut work);
+            if self.walled[0] {
+                // The lower boundary face was summed with the others.
+                sums[0].add(1, crate::math::lanes::Single::splat(-tx[j * row + 1]));
+            }
+        }
+        *self.sum = DVec3::from_array(sums.map(|sum| sum.sum()));
     }
 }
 
-struct Rows<'a> {
-    layout: Layout,
-    velocity: &'a FaceVector,
+/// A row and its four neighbours: here, one row down and up in y, one down and up in z.
+type Around<'a> = [&'a [f64]; 5];
+
+#[inline(always)]
+fn around(values: &[f64], at: usize, row: usize, plane: usize) -> Around<'_> {
+    [
+        &values[at..][..row],
+        &values[at - row..][..row],
+        &values[at + row..][..row],
+        &values[at - plane..][..row],
+        &values[at + plane..][..row],
+    ]
 }
 
-impl<'a> Rows<'a> {
+struct PredictRow<'a> {
+    coefficients: &'a Coefficients,
+    weights: Weights,
+    u: Around<'a>,
+    v: Around<'a>,
+    w: Around<'a>,
+    vpb: &'a [f64],
+    wmt: &'a [f64],
+    p: &'a [f64],
+    pm: &'a [f64],
+    pb: &'a [f64],
+    tendency: [&'a mut [f64]; 3],
+    predicted: [&'a mut [f64]; 3],
+    sums: &'a mut [Partial; 3],
+    /// Components that are given on the whole row.
+    given: [bool; 3],
+}
+
+impl RowWork for PredictRow<'_> {
     #[inline(always)]
-    fn cut(&self, values: &'a [f64], j: usize, k: usize) -> &'a [f64] {
-        let start = self.layout.index(0, j, k);
-        &values[start..start + self.layout.row()]
-    }
-    #[inline(always)]
-    fn x(&self, j: usize, k: usize) -> &'a [f64] {
-        self.cut(&self.velocity.x, j, k)
-    }
-    #[inline(always)]
-    fn y(&self, j: usize, k: usize) -> &'a [f64] {
-        self.cut(&self.velocity.y, j, k)
-    }
-    #[inline(always)]
-    fn z(&self, j: usize, k: usize) -> &'a [f64] {
-        self.cut(&self.velocity.z, j, k)
+    fn at<V: Vector>(&mut self, i: usize) {
+        // Entries i - 1, i, i + 1 of a row.
+        macro_rules! three {
+            ($row:expr) => {{
+                let cut = &$row[i - 1..i + V::WIDTH + 1];
+                [V::load(cut), V::load(&cut[1..]), V::load(&cut[2..])]
+            }};
+        }
+        macro_rules! two {
+            ($row:expr) => {{
+                let cut = &$row[i - 1..i + V::WIDTH];
+                [V::load(cut), V::load(&cut[1..])]
+            }};
+        }
+        let c = self.coefficients;
+        let [ul, uc, ur] = three!(self.u[0]);
+        let [_, um, umr] = three!(self.u[1]);
+        let up = V::load(&self.u[2][i..]);
+        let [_, ub, ubr] = three!(self.u[3]);
+        let ut = V::load(&self.u[4][i..]);
+        let [vl, vc, vr] = three!(self.v[0]);
+        let vm = V::load(&self.v[1][i..]);
+        let [vpl, vp] = two!(self.v[2]);
+        let vb = V::load(&self.v[3][i..]);
+        let vt = V::load(&self.v[4][i..]);
+        let [wl, wc, wr] = three!(self.w[0]);
+        let wm = V::load(&self.w[1][i..]);
+        let wp = V::load(&self.w[2][i..]);
+        let wb = V::load(&self.w[3][i..]);
+        let [wtl, wt] = two!(self.w[4]);
+        let (vpb, wmt) = (V::load(&self.vpb[i..]), V::load(&self.wmt[i..]));
+
+        let hx = c.at_face(
+            0,
+            uc,
+            [[ul, ur], [um, up], [ub, ut]],
+            [[ul + uc, uc + ur], [vl + vc, vpl + vp], [wl + wc, wtl + wt]],
+        );
+        let hy = c.at_face(
+            1,
+            vc,
+            [[vl, vr], [vm, vp], [vb, vt]],
+            [[um + uc, umr + ur], [vm + vc, vc + vp], [wm + wc, wmt + wt]],
+        );
+        let hz = c.at_face(
+            2,
+            wc,
+            [[wl, wr], [wm, wp], [wb, wt]],
+            [[ub + uc, ubr + ur], [vb + vc, vpb + vp], [wb + wc, wc + wt]],
+        );
+        let [pl, pc] = two!(self.p);
+        let lower = [pl, V::load(&self.pm[i..]), V::load(&self.pb[i..])];
+        let (now, before) = (V::splat(self.weights.now), V::splat(self.weights.before));
+        for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
+            let old = &mut self.tendency[axis][i..];
+            let push = V::splat(self.weights.push[axis]) * (pc - lower[axis]);
+            (q + before * V::load(old) - push + now * h).store(&mut self.predicted[axis][i..]);
+            h.store(old);
+            if !self.given[axis] {
+                self.sums[axis].add(i, h);
+            }
+        }
     }
 }

@@ -1,66 +1,156 @@
-//! Parallel loops over the planes of a field and reductions in a fixed order.
+//! Parallel loops over planes and columns, and reductions in a fixed order.
 //!
-//! Work is split by z plane, and every plane's result depends on nothing but its inputs, so the
-//! bits do not depend on the number of threads.
+//! Every plane's result depends on nothing but its inputs, so the bits do not depend on the number
+//! of threads.
+
+use std::marker::PhantomData;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::Layout;
 
-/// Calls `f(k, plane)` for the interior planes k = 1..=nz of `values` in parallel.
-pub fn for_planes(layout: Layout, values: &mut [f64], f: impl Fn(usize, &mut [f64]) + Sync) {
-    let plane = layout.plane();
-    values[plane..plane * (layout.cells[2] + 1)]
-        .par_chunks_exact_mut(plane)
-        .enumerate()
-        .for_each(|(k, slab)| f(k + 1, slab));
-}
-
-/// Like [`for_planes`] for several fields at once, with one partial result a plane.
+/// Calls `f(k, plane, partial)` for the interior planes k = 1..=nz of several fields in parallel,
+/// with one partial result a plane.
 pub fn for_planes_of<const N: usize, T: Send>(
     layout: Layout,
     fields: [&mut [f64]; N],
     partial: &mut [T],
     f: impl Fn(usize, [&mut [f64]; N], &mut T) + Sync,
 ) {
-    let (plane, planes) = (layout.plane(), layout.cells[2]);
-    debug_assert_eq!(partial.len(), planes);
-    let interior = plane..plane * (planes + 1);
-    let fields = fields.map(|field| Planes::new(&mut field[interior.clone()], plane));
+    let fields = fields.map(|field| Pieces::interior(layout, field));
+    assert_eq!(partial.len(), layout.cells[2]);
     partial.par_iter_mut().enumerate().for_each(|(k, partial)| {
-        // Each k is visited once, so no two threads hold the same plane.
+        // SAFETY: each k is visited once, so no two threads hold the same plane.
         let slabs = fields.each_ref().map(|field| unsafe { field.get(k) });
         f(k + 1, slabs, partial);
     });
 }
 
-/// A field cut into planes that threads may hold one at a time.
-struct Planes {
-    start: *mut f64,
-    plane: usize,
-    planes: usize,
+/// Consecutive planes of several fields that one thread holds during [`for_runs`].
+pub struct Run<'a, const N: usize, T> {
+    range: Range<usize>,
+    fields: &'a [Pieces<f64>; N],
+    partial: &'a Pieces<T>,
 }
 
-unsafe impl Send for Planes {}
-unsafe impl Sync for Planes {}
-
-impl Planes {
-    fn new(values: &mut [f64], plane: usize) -> Planes {
-        Planes {
-            start: values.as_mut_ptr(),
-            plane,
-            planes: values.len() / plane,
+impl<const N: usize, T> Run<'_, N, T> {
+    /// Its planes k.
+    pub fn range(&self) -> Range<usize> {
+        self.range.clone()
+    }
+    /// Plane k of each field and its partial result.
+    #[inline]
+    pub fn plane(&mut self, k: usize) -> ([&mut [f64]; N], &mut T) {
+        assert!(self.range.contains(&k));
+        // SAFETY: runs are disjoint, and the result borrows this one as a whole.
+        unsafe {
+            let fields = self.fields.each_ref().map(|field| field.get(k - 1));
+            (fields, &mut self.partial.get(k - 1)[0])
         }
     }
-    /// Plane `k`.
-    ///
-    /// # Safety
-    /// No two live borrows may have the same `k`, and the field must outlive them.
-    #[allow(clippy::mut_from_ref)]
-    unsafe fn get(&self, k: usize) -> &mut [f64] {
-        assert!(k < self.planes);
-        unsafe { std::slice::from_raw_parts_mut(self.start.add(k * self.plane), self.plane) }
+}
+
+/// Calls `f(run, scratch)` for one run of consecutive interior planes a scratch slot, in parallel.
+pub fn for_runs<const N: usize, T: Send, S: Send>(
+    layout: Layout,
+    fields: [&mut [f64]; N],
+    partial: &mut [T],
+    scratch: &mut [S],
+    f: impl Fn(&mut Run<N, T>, &mut S) + Sync,
+) {
+    let fields = fields.map(|field| Pieces::interior(layout, field));
+    let (planes, slots) = (layout.cells[2], scratch.len());
+    assert_eq!(partial.len(), planes);
+    let partial = Pieces::new(partial, 1);
+    let slots_with_ends = scratch.par_iter_mut().enumerate();
+    slots_with_ends.for_each(|(slot, scratch)| {
+        let mut run = Run {
+            range: 1 + planes * slot / slots..1 + planes * (slot + 1) / slots,
+            fields: &fields,
+            partial: &partial,
+        };
+        f(&mut run, scratch);
+    });
+}
+
+/// Calls `f(k, chunk, scratch)` for the chunks k = 0.. of `values` in parallel; each scratch slot
+/// serves a run of k.
+pub fn for_chunks<S: Send>(
+    values: &mut [f64],
+    chunk: usize,
+    scratch: &mut [S],
+    f: impl Fn(usize, &mut [f64], &mut S) + Sync,
+) {
+    let slots = scratch.len();
+    let chunks = Pieces::new(values, chunk);
+    scratch
+        .par_iter_mut()
+        .enumerate()
+        .for_each(|(slot, scratch)| {
+            let chunks = &chunks;
+            for k in chunks.count * slot / slots..chunks.count * (slot + 1) / slots {
+                // SAFETY: every k belongs to one slot.
+                f(k, unsafe { chunks.get(k) }, scratch);
+            }
+        });
+}
+
+/// Neighbouring columns through all planes that one thread holds during [`for_columns`].
+pub struct Columns<'a> {
+    start: *mut f64,
+    stride: usize,
+    planes: usize,
+    width: usize,
+    borrow: PhantomData<&'a mut [f64]>,
+}
+
+impl Columns<'_> {
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.width
     }
+    /// Their entries in plane `k`, counted from 0.
+    #[inline(always)]
+    pub fn row(&mut self, k: usize) -> &mut [f64] {
+        assert!(k < self.planes);
+        // SAFETY: disjoint from all other columns, and borrowed from `self` as a whole.
+        unsafe { std::slice::from_raw_parts_mut(self.start.add(k * self.stride), self.width) }
+    }
+}
+
+/// Cuts the first `len` entries of the planes of `values`, `stride` apart, into blocks of `width`
+/// columns and calls `f(first column, block, scratch)` in parallel; each scratch slot serves a run
+/// of blocks.
+pub fn for_columns<S: Send>(
+    values: &mut [f64],
+    stride: usize,
+    len: usize,
+    width: usize,
+    scratch: &mut [S],
+    f: impl Fn(usize, &mut Columns, &mut S) + Sync,
+) {
+    assert!(len <= stride);
+    let (slots, blocks, planes) = (scratch.len(), len.div_ceil(width), values.len() / stride);
+    let whole = Pieces::new(values, stride);
+    scratch
+        .par_iter_mut()
+        .enumerate()
+        .for_each(|(slot, scratch)| {
+            let whole = &whole;
+            for block in blocks * slot / slots..blocks * (slot + 1) / slots {
+                let at = block * width;
+                let mut columns = Columns {
+                    // SAFETY: inside the first plane; every block belongs to one slot.
+                    start: unsafe { whole.start.add(at) },
+                    stride,
+                    planes,
+                    width: width.min(len - at),
+                    borrow: PhantomData,
+                };
+                f(at, &mut columns, scratch);
+            }
+        });
 }
 
 /// Sum of partial results in the order of the planes.
@@ -68,75 +158,41 @@ pub fn ordered_sum(partial: &[f64]) -> f64 {
     partial.iter().sum()
 }
 
-/// The rows (j fixed, k = 1..=nz) of a field that one thread holds during [`for_row_columns`].
-pub struct RowColumn<'a> {
-    start: *mut f64,
-    layout: Layout,
-    borrow: std::marker::PhantomData<&'a mut [f64]>,
+/// A slice cut into equal pieces that threads may hold one at a time.
+struct Pieces<T> {
+    start: *mut T,
+    size: usize,
+    count: usize,
 }
 
-impl RowColumn<'_> {
-    /// The interior of row `k`, entries i = 1..=nx.
-    #[inline]
-    pub fn row(&mut self, k: usize) -> &mut [f64] {
-        assert!((1..=self.layout.cells[2]).contains(&k));
-        // Disjoint from all other columns, and borrowed from `self` as a whole.
-        unsafe {
-            let first = self.start.add(k * self.layout.plane());
-            std::slice::from_raw_parts_mut(first, self.layout.cells[0])
+// SAFETY: whoever takes a piece promises that nobody else holds it.
+unsafe impl<T: Send> Send for Pieces<T> {}
+unsafe impl<T: Send> Sync for Pieces<T> {}
+
+impl<T> Pieces<T> {
+    fn new(values: &mut [T], size: usize) -> Pieces<T> {
+        Pieces {
+            start: values.as_mut_ptr(),
+            size,
+            count: values.len() / size,
         }
+    }
+    /// Piece `k`.
+    ///
+    /// # Safety
+    /// No two live borrows may have the same `k`, and the slice must outlive them.
+    #[allow(clippy::mut_from_ref)]
+    unsafe fn get(&self, k: usize) -> &mut [T] {
+        assert!(k < self.count);
+        unsafe { std::slice::from_raw_parts_mut(self.start.add(k * self.size), self.size) }
     }
 }
 
-/// Calls `f(j, column, scratch)` for j = 1..=ny in parallel; each scratch slot serves a run of j.
-pub fn for_row_columns<S: Send>(
-    layout: Layout,
-    values: &mut [f64],
-    scratch: &mut [S],
-    f: impl Fn(usize, &mut RowColumn, &mut S) + Sync,
-) {
-    assert_eq!(values.len(), layout.len());
-    let whole = Planes {
-        start: values.as_mut_ptr(),
-        plane: layout.plane(),
-        planes: 1,
-    };
-    let (rows, slots) = (layout.cells[1], scratch.len());
-    scratch
-        .par_iter_mut()
-        .enumerate()
-        .for_each(|(slot, scratch)| {
-            let whole = &whole;
-            for j in rows * slot / slots..rows * (slot + 1) / slots {
-                // Every j belongs to one slot, so the rows of two columns never overlap.
-                let start = unsafe { whole.start.add(layout.index(1, j + 1, 0)) };
-                let mut column = RowColumn {
-                    start,
-                    layout,
-                    borrow: std::marker::PhantomData,
-                };
-                f(j + 1, &mut column, scratch);
-            }
-        });
-}
-
-/// Calls `f(k, plane, scratch)` for k = 1..=nz in parallel; each scratch slot serves a run of k.
-pub fn for_planes_with<S: Send>(
-    layout: Layout,
-    values: &mut [f64],
-    scratch: &mut [S],
-    f: impl Fn(usize, &mut [f64], &mut S) + Sync,
-) {
-    let (plane, planes, slots) = (layout.plane(), layout.cells[2], scratch.len());
-    let slabs = Planes::new(&mut values[plane..plane * (planes + 1)], plane);
-    scratch
-        .par_iter_mut()
-        .enumerate()
-        .for_each(|(slot, scratch)| {
-            let slabs = &slabs;
-            for k in planes * slot / slots..planes * (slot + 1) / slots {
-                // Every k belongs to one slot.
-                f(k + 1, unsafe { slabs.get(k) }, scratch);
-            }
-        });
+impl Pieces<f64> {
+    /// The interior planes of a field.
+    fn interior(layout: Layout, field: &mut [f64]) -> Pieces<f64> {
+        assert_eq!(field.len(), layout.len());
+        let plane = layout.plane();
+        Pieces::new(&mut field[plane..plane * (layout.cells[2] + 1)], plane)
+    }
 }

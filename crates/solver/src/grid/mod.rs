@@ -5,7 +5,5 @@ mod loops;
 mod mesh;
 
 pub use field::{Centre, FACE_OFFSET, FaceVector, FaceX, FaceY, FaceZ, Field, Layout, Location};
-pub use loops::{
-    RowColumn, for_planes, for_planes_of, for_planes_with, for_row_columns, ordered_sum,
-};
+pub use loops::{Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, ordered_sum};
 pub use mesh::{Axis, Mesh};

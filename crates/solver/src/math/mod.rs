@@ -1,7 +1,10 @@
-//! Small mathematics shared by every layer: poses and dense 6 x 6 systems.
+//! Small mathematics shared by every layer: poses, dense 6 x 6 systems, vector registers.
 
+mod aligned;
+pub mod lanes;
 mod linear;
 mod pose;
 
+pub use aligned::Aligned;
 pub use linear::{Matrix6, Vector6, solve6};
 pub use pose::{Load, Pose};

@@ -3,13 +3,30 @@
 //! Along x and y the second difference is diagonalised (cosine modes between impermeable faces,
 //! Fourier modes on a periodic axis); along z a tridiagonal system is left for each pair of modes.
 //! Every scaling of the transforms is hidden in here.
+//!
+//! Memory is the bottleneck, so the solver holds nothing but the modes: the right-hand side of a
+//! plane is made by the caller when its transform begins, and the solution of a plane is used by
+//! the caller while it is in cache, together with the plane below, and then forgotten.
 
-mod transform;
+mod axis;
+mod butterfly;
+mod chirp;
+mod fft;
+mod lines;
+mod plane;
 mod tridiagonal;
 
-use crate::grid::{Centre, Field, Layout, Mesh, for_planes_with, for_row_columns};
-use transform::{LineScratch, Lines, Transform};
-use tridiagonal::{ColumnScratch, Tridiagonal};
+use std::time::{Duration, Instant};
+
+use crate::grid::{Centre, Field, Mesh, Run, for_chunks, for_columns, for_runs};
+use crate::math::Aligned;
+use crate::math::lanes::dispatch;
+use axis::Axis;
+use lines::Buffers;
+use plane::{Forward, Inverse, Shape};
+use tridiagonal::{ColumnScratch, Solve, Tridiagonal, block_width};
+
+pub use plane::Plane;
 
 /// The pair of conditions at the two ends of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,90 +37,231 @@ pub enum Ends {
     Neumann,
 }
 
-/// Solver for lap(phi) = f. Planned once for a mesh; solving allocates nothing.
-pub struct Poisson {
-    layout: Layout,
-    along_x: Transform,
-    along_y: Transform,
-    along_z: Tridiagonal,
-    lines: Vec<LineScratch>,
-    columns: Vec<ColumnScratch>,
+/// Time spent in each stage since the start.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Stages {
+    /// Right-hand side and its transforms.
+    pub forward: Duration,
+    /// Tridiagonal systems.
+    pub columns: Duration,
+    /// Transforms back and what the caller does with the solution.
+    pub inverse: Duration,
 }
 
-/// Slots of scratch memory: enough to keep many threads busy, independent of their number.
+/// One plane of the solution and its neighbours, ghosts included. Beyond the ends of the box lie
+/// the plane across it on a periodic axis, else the plane itself.
+pub struct Solution<'a> {
+    /// Plane k.
+    pub here: &'a Plane,
+    /// Plane k - 1.
+    pub below: &'a Plane,
+    /// Plane k + 1.
+    pub above: &'a Plane,
+}
+
+/// Solver for lap(phi) = f. Planned once for a mesh; solving allocates nothing.
+pub struct Poisson {
+    mesh: Mesh,
+    ends: [Ends; 3],
+    axes: [Axis; 2],
+    along_z: Tridiagonal,
+    shape: Shape,
+    modes: Aligned,
+    /// Eigenvalue along x and y of each mode of a plane.
+    eigenvalues: Vec<f64>,
+    slots: Vec<Slot>,
+    columns: Vec<ColumnScratch>,
+    stages: Stages,
+}
+
+/// Scratch of one run of planes.
+struct Slot {
+    planes: [Plane; 3],
+    buffers: Buffers,
+}
+
+/// Runs of planes or blocks of columns: enough to keep many threads busy, whatever their number.
 const SLOTS: usize = 32;
+/// Planes of a run at least: the planes below and above each run are transformed twice.
+const LEAST_RUN: usize = 16;
 
 impl Poisson {
     /// Plans the solver for `mesh` with the given ends along x, y, z.
     pub fn new(mesh: &Mesh, ends: [Ends; 3]) -> Poisson {
         let [nx, ny, nz] = mesh.cells;
-        let along_x = Transform::new(nx, ends[0], mesh.spacing.x);
-        let along_y = Transform::new(ny, ends[1], mesh.spacing.y);
-        let along_z = Tridiagonal::new(
-            nz,
-            ends[2],
-            mesh.spacing.z,
-            1.0 / (along_x.norm() * along_y.norm()),
-        );
-        let lines = (0..SLOTS.min(nz))
-            .map(|_| LineScratch::new([&along_x, &along_y]))
-            .collect();
-        let columns = (0..SLOTS.min(ny))
-            .map(|_| ColumnScratch::new(nx, nz))
-            .collect();
+        let axes = [0, 1].map(|a| Axis::new(mesh.cells[a], ends[a], mesh.spacing[a]));
+        let scale = 1.0 / (axes[0].norm() * axes[1].norm());
+        let shape = Shape::new(nx, ny);
+        let mut eigenvalues = vec![0.0; shape.modes()];
+        // Lines that only fill up a block must not be singular: what they hold, round-off of their
+        // partners, would become infinite and come back to them.
+        let filler = mesh.spacing.y.powi(-2);
+        shape.each_mode(|at, i, j| {
+            let along_y = axes[1].eigenvalues.get(j).unwrap_or(&filler);
+            eigenvalues[at] = axes[0].eigenvalues[i] + along_y;
+        });
+        let slot = || Slot {
+            planes: [(); 3].map(|()| Plane::new(shape)),
+            buffers: Buffers::new([&axes[0], &axes[1]]),
+        };
+        let width = block_width(nz).min(shape.modes());
+        let blocks = shape.modes().div_ceil(width);
         Poisson {
-            layout: mesh.layout(),
-            along_x,
-            along_y,
-            along_z,
-            lines,
-            columns,
+            mesh: *mesh,
+            ends,
+            along_z: Tridiagonal::new(nz, ends[2], mesh.spacing.z, scale),
+            shape,
+            modes: Aligned::zeros(shape.stride() * nz),
+            eigenvalues,
+            slots: (0..(nz / LEAST_RUN).clamp(1, SLOTS))
+                .map(|_| slot())
+                .collect(),
+            columns: (0..SLOTS.min(blocks))
+                .map(|_| ColumnScratch::new(width, nz, ends[2]))
+                .collect(),
+            axes,
+            stages: Stages::default(),
         }
     }
 
-    /// Replaces the right-hand side in the interior of `field` by the solution. Where the solution
-    /// is defined up to a constant, the mean of the right-hand side is taken to be zero and one
-    /// value of the mean mode is pinned. Ghosts are not touched.
-    pub fn solve(&mut self, field: &mut Field<Centre>) {
-        let layout = self.layout;
-        let [nx, ny, _] = layout.cells;
-        let first = layout.index(1, 1, 0);
-        let rows = Lines {
-            first,
-            count: ny,
-            apart: layout.row(),
-            step: 1,
+    /// Solves for the right-hand side whose plane k = 1..=nz `source` writes (rows 1..=ny, entries
+    /// 1..=nx), and hands each plane of the solution to `sink` with the same plane of `fields` and
+    /// its `partial` result. Where the solution is defined up to a constant, the mean of the
+    /// right-hand side is taken to be zero and one value of the mean mode is pinned.
+    pub fn solve<const N: usize, T: Send>(
+        &mut self,
+        source: impl Fn(usize, &mut Plane) + Sync,
+        fields: [&mut [f64]; N],
+        partial: &mut [T],
+        sink: impl Fn(usize, Solution, &mut Run<N, T>) + Sync,
+    ) {
+        let start = Instant::now();
+        let (axes, stride) = ([&self.axes[0], &self.axes[1]], self.shape.stride());
+        for_chunks(
+            &mut self.modes,
+            stride,
+            &mut self.slots,
+            |k, modes, slot| {
+                let Slot {
+                    planes: [plane, ..],
+                    buffers,
+                } = slot;
+                source(k + 1, plane);
+                dispatch(Forward {
+                    axes,
+                    plane,
+                    modes,
+                    buffers,
+                });
+            },
+        );
+        let forward = Instant::now();
+        let (system, eigenvalues) = (self.along_z, &self.eigenvalues);
+        let nz = self.mesh.cells[2];
+        for_columns(
+            &mut self.modes,
+            stride,
+            eigenvalues.len(),
+            block_width(nz),
+            &mut self.columns,
+            |at, columns, scratch| {
+                let lambda = &eigenvalues[at..at + columns.width()];
+                let singular = at == 0 && lambda[0] == 0.0;
+                dispatch(Solve {
+                    system,
+                    columns,
+                    lambda,
+                    singular,
+                    scratch,
+                });
+            },
+        );
+        let columns = Instant::now();
+        let periodic = self.ends.map(|ends| ends == Ends::Periodic);
+        let modes = &self.modes;
+        let invert = |k: usize, plane: &mut Plane, buffers: &mut Buffers| {
+            dispatch(Inverse {
+                axes,
+                periodic: [periodic[0], periodic[1]],
+                plane,
+                modes: &modes[(k - 1) * stride..][..self.shape.modes()],
+                buffers,
+            });
         };
-        let cols = Lines {
-            first,
-            count: nx,
-            apart: 1,
-            step: layout.row(),
+        for_runs(
+            self.mesh.layout(),
+            fields,
+            partial,
+            &mut self.slots,
+            |run, slot| {
+                let Slot { planes, buffers } = slot;
+                // Plane k on the other side of the box; none beyond an end that is not periodic.
+                let across = |k: usize| match k {
+                    0 => periodic[2].then_some(nz),
+                    k if k > nz => periodic[2].then_some(1),
+                    k => Some(k),
+                };
+                let start = run.range().start;
+                let [below, here, _] = planes;
+                if let Some(k) = across(start - 1) {
+                    invert(k, below, buffers);
+                }
+                invert(start, here, buffers);
+                for k in run.range() {
+                    let [below, here, above] = planes;
+                    if let Some(k) = across(k + 1) {
+                        invert(k, above, buffers);
+                    }
+                    let (here, end) = (&*here, |k: usize| across(k).is_none());
+                    let solution = Solution {
+                        here,
+                        below: if end(k - 1) { here } else { below },
+                        above: if end(k + 1) { here } else { above },
+                    };
+                    sink(k, solution, run);
+                    planes.rotate_left(1);
+                }
+            },
+        );
+        self.stages.forward += forward - start;
+        self.stages.columns += columns - forward;
+        self.stages.inverse += columns.elapsed();
+    }
+
+    /// Replaces the right-hand side in the interior of `field` by the solution; ghosts are not
+    /// touched.
+    pub fn solve_field(&mut self, field: &mut Field<Centre>) {
+        let layout = self.mesh.layout();
+        let [nx, ny, nz] = layout.cells;
+        let given = field.clone();
+        let source = |k: usize, plane: &mut Plane| {
+            for j in 1..=ny {
+                plane.row_mut(j)[1..=nx].copy_from_slice(&given.row(j, k)[1..=nx]);
+            }
         };
-        let (along_x, along_y, along_z) = (&self.along_x, &self.along_y, &self.along_z);
-        for_planes_with(layout, field, &mut self.lines, |_, plane, scratch| {
-            along_x.forward(plane, rows, scratch);
-            along_y.forward(plane, cols, scratch);
-        });
-        for_row_columns(layout, field, &mut self.columns, |j, column, scratch| {
-            along_z.solve(
-                column,
-                &along_x.eigenvalues,
-                along_y.eigenvalues[j - 1],
-                scratch,
-            );
-        });
-        for_planes_with(layout, field, &mut self.lines, |_, plane, scratch| {
-            along_y.inverse(plane, cols, scratch);
-            along_x.inverse(plane, rows, scratch);
+        self.solve(source, [field], &mut vec![(); nz], |k, solution, run| {
+            let ([plane], ()) = run.plane(k);
+            for j in 1..=ny {
+                let at = layout.row() * j;
+                plane[at + 1..=at + nx].copy_from_slice(&solution.here.row(j)[1..=nx]);
+            }
         });
     }
 
-    /// Memory held besides the field [bytes].
+    /// Time spent in each stage.
+    pub fn stages(&self) -> Stages {
+        self.stages
+    }
+
+    /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let lines: usize = self.lines.iter().map(LineScratch::bytes).sum();
+        let slots: usize = self
+            .slots
+            .iter()
+            .map(|slot| slot.buffers.bytes() + slot.planes.iter().map(Plane::bytes).sum::<usize>())
+            .sum();
         let columns: usize = self.columns.iter().map(ColumnScratch::bytes).sum();
-        lines + columns
+        8 * (self.modes.len() + self.eigenvalues.len()) + slots + columns
     }
 }
 

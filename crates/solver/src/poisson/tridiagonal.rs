@@ -2,34 +2,57 @@
 //!
 //! With lambda = lambda_x + lambda_y and b = 2 + lambda dz^2 each reads
 //! -x[k-1] + b x[k] - x[k+1] = -dz^2 f[k], with b lowered by one next to a Neumann end and the
-//! corners closed by Sherman-Morrison on a periodic axis. A whole row of x modes is eliminated at
-//! a time, so that the arithmetic runs along contiguous memory.
+//! corners closed by Sherman-Morrison on a periodic axis. A block of columns is eliminated at a
+//! time: as many as the cache holds, so that memory sees each mode once in and once out.
+//!
+//! Legend: y solution of the open system, q its answer to the corner, g = -b, v values in cache.
 
 use super::Ends;
-use crate::grid::RowColumn;
+use crate::grid::Columns;
+use crate::math::Aligned;
+use crate::math::lanes::{Kernel, Vector};
 
-/// Pivots (and the corner vector of a periodic axis) of one row of columns.
+/// Doubles of cache that a block of columns may take.
+const CACHE: usize = 1 << 16;
+
+/// Columns of a block: a multiple of eight.
+pub fn block_width(nz: usize) -> usize {
+    (CACHE / 2 / nz / 16 * 16).max(16)
+}
+
+/// One block of columns in cache.
 pub struct ColumnScratch {
-    pivots: Vec<f64>,
-    corner: Vec<f64>,
-    carry: Vec<f64>,
+    values: Aligned,
+    pivots: Aligned,
+    corner: Aligned,
+    carry: Aligned,
     mean: Vec<f64>,
 }
 
 impl ColumnScratch {
-    pub fn new(nx: usize, nz: usize) -> ColumnScratch {
+    pub fn new(width: usize, nz: usize, ends: Ends) -> ColumnScratch {
+        let periodic = ends == Ends::Periodic && nz > 1;
         ColumnScratch {
-            pivots: vec![0.0; nx * nz],
-            corner: vec![0.0; nx * nz],
-            carry: vec![0.0; nx],
+            values: Aligned::zeros(width * nz),
+            pivots: Aligned::zeros(width * nz),
+            corner: Aligned::zeros(if periodic { width * nz } else { 0 }),
+            carry: Aligned::zeros(2 * width),
             mean: vec![0.0; nz],
         }
     }
     pub fn bytes(&self) -> usize {
-        8 * (self.pivots.len() + self.corner.len() + self.carry.len() + self.mean.len())
+        let Self {
+            values,
+            pivots,
+            corner,
+            carry,
+            mean,
+        } = self;
+        8 * (values.len() + pivots.len() + corner.len() + carry.len() + mean.len())
     }
 }
 
+#[derive(Clone, Copy)]
 pub struct Tridiagonal {
     n: usize,
     ends: Ends,
@@ -47,38 +70,51 @@ impl Tridiagonal {
             scale,
         }
     }
+}
 
-    /// Solves all columns of a row: eigenvalues `lambda_x` along the row, `lambda_y` of the row.
-    pub fn solve(
-        &self,
-        column: &mut RowColumn,
-        lambda_x: &[f64],
-        lambda_y: f64,
-        scratch: &mut ColumnScratch,
-    ) {
-        // Only the first mode of the first row can have a zero eigenvalue.
-        let singular = lambda_y + lambda_x[0] == 0.0;
-        match self.ends {
-            _ if self.n == 1 => self.solve_flat(column, lambda_x, lambda_y),
-            Ends::Neumann => self.solve_neumann(column, lambda_x, lambda_y, singular, scratch),
+/// Solves all columns of a block with the eigenvalues `lambda`; `singular` if the first of them is
+/// the mean mode, which is defined up to a constant.
+pub struct Solve<'a, 'b> {
+    pub system: Tridiagonal,
+    pub columns: &'a mut Columns<'b>,
+    pub lambda: &'a [f64],
+    pub singular: bool,
+    pub scratch: &'a mut ColumnScratch,
+}
+
+impl Kernel for Solve<'_, '_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Solve {
+            system,
+            columns,
+            lambda,
+            singular,
+            scratch,
+        } = self;
+        match system.ends {
+            _ if system.n == 1 => system.solve_flat(columns, lambda),
+            Ends::Neumann => system.solve_neumann::<V>(columns, lambda, singular, scratch),
             Ends::Periodic => {
                 if singular {
-                    for k in 1..=self.n {
-                        scratch.mean[k - 1] = column.row(k)[0];
+                    for k in 0..system.n {
+                        scratch.mean[k] = columns.row(k)[0];
                     }
                 }
-                self.solve_periodic(column, lambda_x, lambda_y, scratch);
+                system.solve_periodic::<V>(columns, lambda, scratch);
                 if singular {
-                    self.solve_mean(column, &mut scratch.mean, &mut scratch.pivots);
+                    system.solve_mean(columns, &mut scratch.mean, &mut scratch.pivots);
                 }
             }
         }
     }
+}
 
-    fn solve_flat(&self, column: &mut RowColumn, lambda_x: &[f64], lambda_y: f64) {
-        for (value, lambda) in column.row(1).iter_mut().zip(lambda_x) {
-            let lambda = lambda + lambda_y;
-            *value = if lambda == 0.0 {
+impl Tridiagonal {
+    #[inline(always)]
+    fn solve_flat(&self, columns: &mut Columns, lambda: &[f64]) {
+        for (value, lambda) in columns.row(0).iter_mut().zip(lambda) {
+            *value = if *lambda == 0.0 {
                 0.0
             } else {
                 -self.scale * *value / lambda
@@ -86,99 +122,138 @@ impl Tridiagonal {
         }
     }
 
-    fn solve_neumann(
+    #[inline(always)]
+    fn solve_neumann<V: Vector>(
         &self,
-        column: &mut RowColumn,
-        lambda_x: &[f64],
-        lambda_y: f64,
+        columns: &mut Columns,
+        lambda: &[f64],
         singular: bool,
         scratch: &mut ColumnScratch,
     ) {
-        let (n, nx) = (self.n, lambda_x.len());
-        let factor = -self.square * self.scale;
-        let carry = &mut scratch.carry[..nx];
-        carry.fill(0.0);
-        let mut before: &mut [f64] = &mut vec_of_zeros(&mut scratch.corner)[..nx];
-        for (k, pivots) in (1..=n).zip(scratch.pivots.chunks_exact_mut(nx)) {
-            let open = 2.0 - f64::from(u8::from(k == 1)) - f64::from(u8::from(k == n));
-            let row = column.row(k);
-            for i in 0..nx {
-                let b = open + (lambda_x[i] + lambda_y) * self.square;
-                let pivot = 1.0 / (b - before[i]);
-                let value = (factor * row[i] + carry[i]) * pivot;
-                pivots[i] = pivot;
-                carry[i] = value;
-                row[i] = value;
+        let (n, width) = (self.n, lambda.len());
+        let (one, square) = (V::splat(1.0), V::splat(self.square));
+        let factor = V::splat(-self.square * self.scale);
+        let (values, pivots) = (
+            &mut scratch.values[..n * width],
+            &mut scratch.pivots[..n * width],
+        );
+        for k in 0..n {
+            let open =
+                V::splat(2.0 - f64::from(u8::from(k == 0)) - f64::from(u8::from(k + 1 == n)));
+            let row = &columns.row(k)[..width];
+            let (before, here) = pivots[..(k + 1) * width].split_at_mut(k * width);
+            let (values_before, values_here) = values[..(k + 1) * width].split_at_mut(k * width);
+            for i in (0..width).step_by(V::WIDTH) {
+                let b = open + V::load(&lambda[i..]) * square;
+                let f = factor * V::load(&row[i..]);
+                let (pivot, value) = if k == 0 {
+                    let pivot = one.over(b);
+                    (pivot, f * pivot)
+                } else {
+                    let at = (k - 1) * width + i;
+                    let pivot = one.over(b - V::load(&before[at..]));
+                    (pivot, (f + V::load(&values_before[at..])) * pivot)
+                };
+                pivot.store(&mut here[i..]);
+                value.store(&mut values_here[i..]);
             }
-            if singular && k == n {
-                // The mean mode: its last pivot vanishes; the value there is pinned to zero.
-                pivots[0] = 0.0;
-                carry[0] = 0.0;
-                row[0] = 0.0;
-            }
-            before = pivots;
         }
-        for k in (1..n).rev() {
-            let pivots = &scratch.pivots[(k - 1) * nx..k * nx];
-            let row = column.row(k);
-            for i in 0..nx {
-                carry[i] = row[i] + pivots[i] * carry[i];
-                row[i] = carry[i];
+        if singular {
+            // The last pivot of the mean mode vanishes; the value there is pinned to zero.
+            values[(n - 1) * width] = 0.0;
+        }
+        let carry = &mut scratch.carry[..width];
+        carry.copy_from_slice(&values[(n - 1) * width..]);
+        columns.row(n - 1).copy_from_slice(carry);
+        for k in (0..n - 1).rev() {
+            let row = columns.row(k);
+            let (values, pivots) = (&values[k * width..][..width], &pivots[k * width..][..width]);
+            for i in (0..width).step_by(V::WIDTH) {
+                let x = V::load(&values[i..]) + V::load(&pivots[i..]) * V::load(&carry[i..]);
+                x.store(&mut carry[i..]);
+                x.store(&mut row[i..]);
             }
         }
     }
 
-    fn solve_periodic(
+    #[inline(always)]
+    fn solve_periodic<V: Vector>(
         &self,
-        column: &mut RowColumn,
-        lambda_x: &[f64],
-        lambda_y: f64,
+        columns: &mut Columns,
+        lambda: &[f64],
         scratch: &mut ColumnScratch,
     ) {
-        let (n, nx) = (self.n, lambda_x.len());
-        let factor = -self.square * self.scale;
-        let ColumnScratch { pivots, corner, .. } = scratch;
-        for i in 0..nx {
-            // A = T + u v^T with u = (g, 0.., -1), v = (1, 0.., -1/g), g = -b.
-            let b = 2.0 + (lambda_x[i] + lambda_y) * self.square;
-            let g = -b;
-            let (mut pivot, mut y, mut q) = (0.0, 0.0, 0.0);
-            for k in 1..=n {
-                let mut diagonal = b;
-                let mut u = 0.0;
-                if k == 1 {
-                    diagonal -= g;
-                    u += g;
+        let (n, width) = (self.n, lambda.len());
+        let (one, two, zero) = (V::splat(1.0), V::splat(2.0), V::splat(0.0));
+        let (square, factor) = (V::splat(self.square), V::splat(-self.square * self.scale));
+        let ColumnScratch {
+            values,
+            pivots,
+            corner,
+            carry,
+            ..
+        } = scratch;
+        // A = T + u v^T with u = (g, 0.., -1), v = (1, 0.., -1/g), g = -b.
+        for k in 0..n {
+            let row = &columns.row(k)[..width];
+            for i in (0..width).step_by(V::WIDTH) {
+                let b = two + V::load(&lambda[i..]) * square;
+                let g = zero - b;
+                let (mut diagonal, mut u) = (b, zero);
+                if k == 0 {
+                    (diagonal, u) = (diagonal - g, u + g);
                 }
-                if k == n {
-                    diagonal -= 1.0 / g;
-                    u -= 1.0;
+                if k + 1 == n {
+                    (diagonal, u) = (diagonal - one.over(g), u - one);
                 }
-                let value = &mut column.row(k)[i];
-                pivot = 1.0 / (diagonal - pivot);
-                y = (factor * *value + y) * pivot;
-                q = (u + q) * pivot;
-                *value = y;
-                pivots[(k - 1) * nx + i] = pivot;
-                corner[(k - 1) * nx + i] = q;
+                let (before, y, q) = if k == 0 {
+                    (zero, zero, zero)
+                } else {
+                    let at = (k - 1) * width + i;
+                    (
+                        V::load(&pivots[at..]),
+                        V::load(&values[at..]),
+                        V::load(&corner[at..]),
+                    )
+                };
+                let pivot = one.over(diagonal - before);
+                let at = k * width + i;
+                pivot.store(&mut pivots[at..]);
+                ((factor * V::load(&row[i..]) + y) * pivot).store(&mut values[at..]);
+                ((u + q) * pivot).store(&mut corner[at..]);
             }
-            for k in (1..n).rev() {
-                let at = (k - 1) * nx + i;
-                y = column.row(k)[i] + pivots[at] * y;
-                q = corner[at] + pivots[at] * q;
-                column.row(k)[i] = y;
-                corner[at] = q;
+        }
+        for k in (0..n - 1).rev() {
+            for i in (0..width).step_by(V::WIDTH) {
+                let (at, after) = (k * width + i, (k + 1) * width + i);
+                let pivot = V::load(&pivots[at..]);
+                (V::load(&values[at..]) + pivot * V::load(&values[after..]))
+                    .store(&mut values[at..]);
+                (V::load(&corner[at..]) + pivot * V::load(&corner[after..]))
+                    .store(&mut corner[at..]);
             }
-            let (y_last, q_last) = (column.row(n)[i], corner[(n - 1) * nx + i]);
-            let share = (y - y_last / g) / (1.0 + q - q_last / g);
-            for k in 1..=n {
-                column.row(k)[i] -= share * corner[(k - 1) * nx + i];
+        }
+        let share = &mut carry[..width];
+        let last = (n - 1) * width;
+        for i in (0..width).step_by(V::WIDTH) {
+            let g = zero - (two + V::load(&lambda[i..]) * square);
+            let y = V::load(&values[i..]) - V::load(&values[last + i..]).over(g);
+            let q = one + V::load(&corner[i..]) - V::load(&corner[last + i..]).over(g);
+            y.over(q).store(&mut share[i..]);
+        }
+        for k in 0..n {
+            let row = columns.row(k);
+            for i in (0..width).step_by(V::WIDTH) {
+                let at = k * width + i;
+                let x = V::load(&values[at..]) - V::load(&share[i..]) * V::load(&corner[at..]);
+                x.store(&mut row[i..]);
             }
         }
     }
 
     /// The mean mode of a periodic axis: its first value is pinned to zero.
-    fn solve_mean(&self, column: &mut RowColumn, f: &mut [f64], pivots: &mut [f64]) {
+    #[inline(always)]
+    fn solve_mean(&self, columns: &mut Columns, f: &mut [f64], pivots: &mut [f64]) {
         let (n, factor) = (self.n, -self.square * self.scale);
         let (mut pivot, mut y) = (0.0, 0.0);
         for k in 1..n {
@@ -187,16 +262,11 @@ impl Tridiagonal {
             pivots[k] = pivot;
             f[k] = y;
         }
-        column.row(1)[0] = 0.0;
+        columns.row(0)[0] = 0.0;
         y = 0.0;
         for k in (1..n).rev() {
             y = f[k] + pivots[k] * y;
-            column.row(k + 1)[0] = y;
+            columns.row(k)[0] = y;
         }
     }
-}
-
-fn vec_of_zeros(values: &mut [f64]) -> &mut [f64] {
-    values.fill(0.0);
-    values
 }

@@ -20,7 +20,7 @@ pub struct RawTime {
     /// The same step always [s]. Without it the step follows `cfl`, `viscous` and `max_step`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<Loc<Quantity<Time>>>,
-    /// Limit of dt max(sum |u_a| / h_a); 0.3 where no limit or step is given.
+    /// Limit of dt max(sum |u_a| / h_a); 0.4 where no limit or step is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cfl: Option<Loc<Quantity<Number>>>,
     /// Limit of nu dt sum 1 / h_a^2; 0.2 where it is not given.

@@ -12,7 +12,7 @@ use crate::sim::events::StopWhen;
 use crate::sim::{Setup, StepRule};
 
 /// Limits where none are given.
-const CFL: f64 = 0.3;
+const CFL: f64 = 0.4;
 const VISCOUS: f64 = 0.2;
 /// Steps this much shorter than those at the settling speed mean velocities as much above it.
 const SMALLEST_STEP: f64 = 1e-3;

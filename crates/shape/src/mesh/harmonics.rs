@@ -1,0 +1,174 @@
+//! Spherical-harmonic coefficients of a grain: lines "n m Re Im" of a_nm in
+//! r(theta, phi) = sum of a_nm Y_nm, with orthonormal Y_nm and the Condon-Shortley phase, as the
+//! collections of the National Institute of Standards and Technology keep them. Only grains that
+//! every ray from the origin leaves once can be written so.
+//!
+//! The terms are weighted by Lanczos factors, sin(x) / x at x = pi n / (N + 1), against ringing.
+
+use super::{TriangleMesh, cube_sphere};
+use crate::error::{Result, ShapeError};
+use crate::limits::ReadLimits;
+use glam::DVec3;
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// Quadrilaterals along an edge of the cube from which the grain is meshed.
+const FACETS: usize = 56;
+/// Highest degree that is read.
+const HIGHEST: usize = 100;
+
+/// Coefficients of m >= 0, by degree, then order; those of m < 0 follow for a real radius.
+struct Series {
+    coefficients: Vec<Vec<(f64, f64)>>,
+}
+
+pub(super) fn read(path: &Path, bytes: Vec<u8>, _: &ReadLimits) -> Result<TriangleMesh> {
+    let series = Series::parse(path, &String::from_utf8_lossy(&bytes))?;
+    let mut lowest = f64::INFINITY;
+    let radius = |u: DVec3| series.radius(u);
+    let mesh = cube_sphere(FACETS, |u| radius(u) * u);
+    for v in &mesh.vertices {
+        lowest = lowest.min(v.length());
+    }
+    // A negative radius turns its vertex to the other side.
+    let turned = |v: &DVec3| radius(v.normalize_or_zero()) <= 0.0;
+    if lowest.is_nan() || lowest <= 0.0 || mesh.vertices.iter().any(turned) {
+        let reason = "the radius is not positive in every direction";
+        return Err(ShapeError::malformed(path, reason));
+    }
+    Ok(mesh)
+}
+
+impl Series {
+    fn parse(path: &Path, text: &str) -> Result<Series> {
+        let mut coefficients: Vec<Vec<(f64, f64)>> = Vec::new();
+        for (number, line) in text.lines().enumerate() {
+            let line = line.trim();
+            if line.is_empty() || line.starts_with('#') {
+                continue;
+            }
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let parsed = || {
+                let [n, m, re, im] = words[..] else {
+                    return None;
+                };
+                let (n, m): (usize, i64) = (n.parse().ok()?, m.parse().ok()?);
+                let (re, im): (f64, f64) = (re.parse().ok()?, im.parse().ok()?);
+                let sound = n <= HIGHEST && m.unsigned_abs() <= n as u64;
+                (sound && re.is_finite() && im.is_finite()).then_some((n, m, re, im))
+            };
+            let Some((n, m, re, im)) = parsed() else {
+                let reason = format!(
+                    "line {}: expected four numbers n m Re Im with |m| <= n <= {HIGHEST}, found {:?}",
+                    number + 1,
+                    line.chars().take(60).collect::<String>()
+                );
+                return Err(ShapeError::malformed(path, reason));
+            };
+            while coefficients.len() <= n {
+                coefficients.push(vec![(0.0, 0.0); coefficients.len() + 1]);
+            }
+            if m >= 0 {
+                coefficients[n][m as usize] = (re, im);
+            }
+        }
+        if coefficients.is_empty() {
+            return Err(ShapeError::malformed(path, "it holds no coefficients"));
+        }
+        let top = coefficients.len() as f64;
+        for (n, terms) in coefficients.iter_mut().enumerate().skip(1) {
+            let x = PI * n as f64 / top;
+            for term in terms {
+                term.0 *= x.sin() / x;
+                term.1 *= x.sin() / x;
+            }
+        }
+        Ok(Series { coefficients })
+    }
+
+    /// Radius along the unit vector `u`.
+    fn radius(&self, u: DVec3) -> f64 {
+        let (cos, sin) = (u.z, u.truncate().length());
+        let (c1, s1) = if sin > 0.0 {
+            (u.x / sin, u.y / sin)
+        } else {
+            (1.0, 0.0)
+        };
+        let top = self.coefficients.len();
+        let mut sum = 0.0;
+        // Normalised Legendre functions by their stable recurrence in n, one m after another.
+        let mut diagonal = (0.25 / PI).sqrt();
+        let (mut cm, mut sm) = (1.0, 0.0);
+        for m in 0..top {
+            if m > 0 {
+                let m = m as f64;
+                diagonal *= -sin * ((2.0 * m + 1.0) / (2.0 * m)).sqrt();
+                (cm, sm) = (cm * c1 - sm * s1, sm * c1 + cm * s1);
+            }
+            let (mut before, mut here) = (0.0, diagonal);
+            for n in m..top {
+                if n > m {
+                    let (nf, mf) = (n as f64, m as f64);
+                    let a = ((4.0 * nf * nf - 1.0) / (nf * nf - mf * mf)).sqrt();
+                    let lower = nf - 1.0;
+                    let b = ((lower * lower - mf * mf) / (4.0 * lower * lower - 1.0)).max(0.0);
+                    (before, here) = (here, a * (cos * here - b.sqrt() * before));
+                }
+                let (re, im) = self.coefficients[n][m];
+                let twice = if m > 0 { 2.0 } else { 1.0 };
+                sum += twice * here * (re * cm - im * sm);
+            }
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn open(text: &str) -> Result<TriangleMesh> {
+        read(Path::new("a.anm"), text.into(), &ReadLimits::default())
+    }
+
+    #[test]
+    fn low_degrees_are_the_textbook_functions() {
+        let text = "# first\n0 0 3.0 0\n1 0 0.3 0\n1 1 0.2 -0.1\n1 -1 -0.2 -0.1\n2 1 0.05 0.02\n";
+        let series = Series::parse(Path::new("a.anm"), text).unwrap();
+        let weight = |n: f64| (PI * n / 3.0).sin() / (PI * n / 3.0);
+        for u in [
+            DVec3::Z,
+            DVec3::new(0.6, 0.0, 0.8),
+            DVec3::new(-0.3, 0.5, 0.4).normalize(),
+        ] {
+            let y00 = (0.25 / PI).sqrt();
+            let y10 = (0.75 / PI).sqrt() * u.z;
+            let along = -(0.375 / PI).sqrt();
+            let first = 2.0 * along * (0.2 * u.x + 0.1 * u.y);
+            let second = 2.0 * -(1.875 / PI).sqrt() * u.z * (0.05 * u.x - 0.02 * u.y);
+            let exact = 3.0 * y00 + weight(1.0) * (0.3 * y10 + first) + weight(2.0) * second;
+            assert!((series.radius(u) - exact).abs() < 1e-12, "{u}");
+        }
+    }
+
+    #[test]
+    fn a_ball_is_meshed_and_nonsense_is_refused_with_its_line() {
+        let mesh = open("0 0 3.5449077018 0\n").unwrap();
+        assert!((mesh.signed_volume() / (4.0 / 3.0 * PI) - 1.0).abs() < 2e-3);
+        mesh.check_closed().unwrap();
+        for bad in [
+            "",
+            "0 0 3.5",
+            "0 1 1 1",
+            "5000 0 1 1",
+            "0 0 NaN 0",
+            "a b c d",
+            "0 0 -1 0",
+            "0 0 0 0",
+        ] {
+            assert!(open(bad).is_err(), "{bad:?}");
+        }
+        let error = open("0 0 3 0\n1 0 x 0\n").unwrap_err();
+        assert!(error.to_string().contains("line 2"), "{error}");
+    }
+}

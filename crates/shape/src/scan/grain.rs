@@ -1,0 +1,170 @@
+//! The shape of one grain of a volume.
+
+use super::grey::Grey;
+use super::regions::{Region, crop, fill_cavities, pieces};
+use super::{Mask, ScanOptions, smooth, transform};
+use crate::Shape;
+use crate::error::{Result, ShapeError};
+use crate::limits::SourceFile;
+use crate::mesh::{TriangleMesh, from_closed};
+use crate::provenance::Provenance;
+use crate::surface::{Samples, extract};
+use glam::DVec3;
+
+/// Fewest voxels of a grain: a ball of five voxels across.
+const FEWEST: u64 = 64;
+/// Cells across a grain below which the smoothed field is refined before its surface is taken,
+/// from grey values and from a mask.
+const FINE: [usize; 2] = [40, 64];
+/// Share of the surface that pieces broken off by smoothing may have.
+const CRUMBS: f64 = 0.02;
+/// Cells of the finished field over the voxels across a grain, and the fewest.
+const CELLS: (f64, usize) = (1.25, 24);
+/// Smoothing from grey values and from a mask [voxels].
+const SMOOTHING: [f64; 2] = [1.1, 1.5];
+
+/// The segmented volume.
+pub(super) struct Context<'a> {
+    pub dims: [usize; 3],
+    pub labels: &'a [u32],
+    pub grey: Option<&'a Grey>,
+    pub threshold: Option<f64>,
+    pub source: &'a SourceFile,
+    pub options: &'a ScanOptions,
+}
+
+/// Shape of the grain `label`, which lies in `region`.
+pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Shape> {
+    let Context {
+        dims,
+        labels,
+        source,
+        options,
+        ..
+    } = *context;
+    let faces = region.faces(dims);
+    if !faces.is_empty() && !options.pad {
+        return Err(ShapeError::CutByBorder { label, faces });
+    }
+    let smoothing = SMOOTHING[usize::from(context.grey.is_none())];
+    let smoothing = options.smoothing.unwrap_or(smoothing);
+    let margin = (4.0 * smoothing).ceil() as usize + 4;
+    let mut mask = crop(dims, labels, label, region, margin);
+    let largest = options.largest_piece || options.separate.is_some();
+    let voxels = one_piece(&mut mask, label, largest)?;
+    if voxels < FEWEST {
+        return Err(ShapeError::TooFewVoxels {
+            label,
+            voxels,
+            needed: FEWEST,
+        });
+    }
+    let filled = fill_cavities(&mut mask);
+    let longest = (0..3)
+        .map(|a| region.upper[a] - region.lower[a] + 1)
+        .max()
+        .unwrap_or(1);
+    let factor = FINE[usize::from(context.grey.is_none())]
+        .div_ceil(longest)
+        .clamp(1, 4);
+    let mut provenance = Provenance::new("scan")
+        .with("voxel_m", options.voxel)
+        .with("label", label)
+        .with("voxels", voxels)
+        .with("cavity_voxels_filled", filled)
+        .with("smoothing_voxels", smoothing)
+        .with("split", options.split)
+        .with("pad", options.pad);
+    if let Some(threshold) = context.threshold {
+        provenance = provenance.with("threshold", threshold);
+    }
+    if let Some(neck) = options.separate {
+        provenance = provenance.with("separate", neck);
+    }
+    let (field, volume) = match context.grey {
+        Some(grey) => {
+            let low = region.lower.map(|n| n as isize - margin as isize);
+            let cut = grey.cut(&mask, low, label, smoothing);
+            provenance = provenance
+                .with("surface", "grey")
+                .with("blur_voxels", format!("{:.3}", cut.blur));
+            (cut.field, cut.volume)
+        }
+        None => {
+            let distance = transform::signed(&mask);
+            let field = smooth::unshrinking(&distance, mask.dims, smoothing);
+            (field, (voxels + filled) as f64)
+        }
+    };
+    let mut mesh = surface(&field, mask.dims, volume, factor)?;
+    // Voxel i spans i to i + 1 edges from the image's corner, its centre is at i + 1/2.
+    let shift = DVec3::from_array(region.lower.map(|low| low as f64 - margin as f64 + 0.5));
+    for v in &mut mesh.vertices {
+        *v = options.voxel * (*v + shift);
+    }
+    provenance.source.clone_from(&source.name);
+    provenance.source_sha256.clone_from(&source.sha256);
+    let mut finish = options.shape.clone();
+    let enough = ((CELLS.0 * longest as f64).ceil() as usize).max(CELLS.1);
+    finish.cells = finish.cells.min(enough);
+    from_closed(&mesh, provenance, &finish)
+}
+
+/// Refuses, or on request drops, all but the largest piece; returns the voxels kept.
+fn one_piece(mask: &mut Mask, label: u32, largest: bool) -> Result<u64> {
+    let (number, sizes) = pieces(mask.dims, |n| mask.solid[n]);
+    let mut order: Vec<usize> = (0..sizes.len()).collect();
+    order.sort_by_key(|n| std::cmp::Reverse(sizes[*n]));
+    if sizes.len() > 1 && !largest {
+        let shown: Vec<String> = order
+            .iter()
+            .take(5)
+            .map(|n| sizes[*n].to_string())
+            .collect();
+        let more = if sizes.len() > 5 { ", ..." } else { "" };
+        let sizes = format!("{}{more}", shown.join(", "));
+        return Err(ShapeError::SeveralPieces {
+            label,
+            count: order.len(),
+            sizes,
+        });
+    }
+    let kept = order[0];
+    for (solid, number) in mask.solid.iter_mut().zip(number) {
+        *solid = number == kept as u32 + 1;
+    }
+    Ok(sizes[kept])
+}
+
+/// Closed smooth surface in voxel units (voxel centres at whole numbers), enclosing `volume`
+/// voxels: a field that is about the signed distance, at the level that gives that volume, taken
+/// on a grid `factor` times as fine.
+fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Result<TriangleMesh> {
+    let (mut fine, dims) = smooth::refine(field, dims, factor);
+    let spacing = 1.0 / factor as f64;
+    let mut mesh = TriangleMesh::default();
+    // Newton's method: the volume changes by the area for every unit of level.
+    for _ in 0..5 {
+        let samples = Samples {
+            dims,
+            lower: DVec3::ZERO,
+            spacing,
+            values: &fine,
+        };
+        mesh = extract(&samples)
+            .largest_piece(CRUMBS)
+            .ok_or_else(|| ShapeError::Quality {
+                reason: "smoothing leaves no single surface (a neck of a voxel or two breaks); \
+                     reduce the smoothing"
+                    .into(),
+            })?;
+        let missing = (volume - mesh.signed_volume()) / mesh.area();
+        if missing.abs() < 1e-4 {
+            break;
+        }
+        for value in &mut fine {
+            *value -= missing as f32;
+        }
+    }
+    Ok(mesh)
+}

@@ -1,0 +1,200 @@
+//! The surface of one grain from grey values: finer than the voxels.
+//!
+//! With the grey of void and solid known, a voxel's value tells how much of it is solid. The sum of
+//! these shares is the volume of the grain, whatever the blur of the scanner, which moves grey
+//! about but makes none. The surface is where the smoothed share is one half; smoothing and blur
+//! together would draw it in where it is curved, by their variance times the mean curvature, so
+//! the smoothing kernel is given the negative of the blur's second moment. What is left is taken
+//! out by setting the level so that the volume is that of the sum.
+
+use super::Mask;
+use super::smooth::gaussian;
+use super::transform;
+use super::watershed::HALO;
+
+/// Grey values with the owner of each voxel: the label of its grain, with [`HALO`] the void
+/// around it, 0 elsewhere.
+pub(crate) struct Grey {
+    pub dims: [usize; 3],
+    pub values: Vec<f32>,
+    pub owner: Vec<u32>,
+    /// Mean grey of void and of solid, far from surfaces.
+    pub void: f64,
+    pub solid: f64,
+}
+
+/// Distance from the surface beyond which a voxel is wholly solid or void [voxels].
+const BAND: f32 = 2.7;
+/// Layers of void that belong to a grain [voxels].
+pub(crate) const LAYERS: usize = 4;
+/// Deep voxels from which a grain's own grey is taken; with fewer, that of all grains.
+const DEEP: usize = 300;
+
+/// A grain's share of each voxel of a crop, ready to be cut at zero.
+pub(crate) struct Cut {
+    /// About the signed distance near the surface [voxels].
+    pub field: Vec<f32>,
+    /// Volume [voxels].
+    pub volume: f64,
+    /// Standard deviation of the scanner's blur [voxels].
+    pub blur: f64,
+}
+
+impl Grey {
+    /// Mean grey of the phases from voxels that have none of the other within `reach` along the
+    /// axes; from all voxels of the phase where there are hardly any such.
+    pub(crate) fn new(dims: [usize; 3], values: Vec<f32>, owner: Vec<u32>) -> Grey {
+        let is_solid = |n: usize| owner[n] != 0 && owner[n] & HALO == 0;
+        let mut grey = [0.0; 2];
+        for (phase, mean) in [false, true].into_iter().zip(&mut grey) {
+            let mut deep = (0.0, 0u64);
+            let mut all = (0.0, 0u64);
+            for n in 0..values.len() {
+                if is_solid(n) != phase {
+                    continue;
+                }
+                all = (all.0 + f64::from(values[n]), all.1 + 1);
+                if far_from(dims, n, 4, |m| is_solid(m) != phase) {
+                    deep = (deep.0 + f64::from(values[n]), deep.1 + 1);
+                }
+            }
+            let (sum, count) = if deep.1 >= 200 { deep } else { all };
+            *mean = sum / count.max(1) as f64;
+        }
+        Grey {
+            dims,
+            values,
+            owner,
+            void: grey[0],
+            solid: grey[1],
+        }
+    }
+
+    /// The grain `label`, whose mask (with `low` the image's coordinate of its first voxel, which
+    /// may lie outside) holds its solid voxels, cavities filled.
+    pub(crate) fn cut(&self, mask: &Mask, low: [isize; 3], label: u32, sigma: f64) -> Cut {
+        let dims = mask.dims;
+        let distance = transform::signed(mask);
+        let place = |n: usize| -> Option<usize> {
+            let at = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
+            let mut index = 0;
+            for axis in (0..3).rev() {
+                let i = usize::try_from(low[axis] + at[axis] as isize).ok()?;
+                if i >= self.dims[axis] {
+                    return None;
+                }
+                index = index * self.dims[axis] + i;
+            }
+            Some(index)
+        };
+        let solid = self.own_grey(&distance, &place);
+        let share = |n: usize| -> f64 {
+            if distance[n] < -BAND {
+                return 1.0;
+            }
+            match place(n) {
+                Some(m) if distance[n] <= BAND && self.owner[m] & !HALO == label => {
+                    (f64::from(self.values[m]) - self.void) / (solid - self.void)
+                }
+                // A filled cavity is the grain's whatever its grey.
+                Some(m) if mask.solid[n] && self.owner[m] == 0 => 1.0,
+                _ => 0.0,
+            }
+        };
+        let shares: Vec<f32> = (0..distance.len()).map(|n| share(n) as f32).collect();
+        let volume = shares.iter().map(|s| f64::from(*s)).sum();
+        let once = gaussian(&shares, dims, sigma);
+        let steep = steepness(&once, dims);
+        let blur = blur(steep, sigma);
+        // Second moment of a G + (1 - a) G G: s^2 (2 - a) = -blur^2.
+        let a = (2.0 + (blur / sigma).powi(2)) as f32;
+        let twice = gaussian(&once, dims, sigma);
+        let field: Vec<f32> = once
+            .iter()
+            .zip(&twice)
+            .map(|(g, gg)| 0.5 - (a * g + (1.0 - a) * gg))
+            .collect();
+        let slope = steepness(&field, dims).max(0.05) as f32;
+        Cut {
+            field: field.iter().map(|v| v / slope).collect(),
+            volume,
+            blur,
+        }
+    }
+
+    /// Mean grey of the grain's own deep voxels: grains differ.
+    fn own_grey(&self, distance: &[f32], place: &impl Fn(usize) -> Option<usize>) -> f64 {
+        let deep: Vec<f64> = (0..distance.len())
+            .filter(|n| distance[*n] < -BAND - 0.5)
+            .filter_map(place)
+            .map(|m| f64::from(self.values[m]))
+            .collect();
+        if deep.len() < DEEP {
+            return self.solid;
+        }
+        deep.iter().sum::<f64>() / deep.len() as f64
+    }
+}
+
+/// Is no voxel up to `reach` along the axes of the kind `other`?
+fn far_from(dims: [usize; 3], n: usize, reach: usize, other: impl Fn(usize) -> bool) -> bool {
+    let strides = [1, dims[0], dims[0] * dims[1]];
+    (0..3).all(|axis| {
+        let i = n / strides[axis] % dims[axis];
+        let below = (1..=reach.min(i)).all(|s| !other(n - s * strides[axis]));
+        below && (1..=reach.min(dims[axis] - 1 - i)).all(|s| !other(n + s * strides[axis]))
+    })
+}
+
+/// Median length of the gradient by central differences [per voxel] where a field of shares or its
+/// half minus it is close to its crossing.
+fn steepness(field: &[f32], dims: [usize; 3]) -> f64 {
+    let [nx, ny, nz] = dims;
+    let strides = [1, nx, nx * ny];
+    // A field of shares crosses at one half, the other at zero: told by the far corner.
+    let crossing = if field[0].abs() < 0.25 { 0.5 } else { 0.0 };
+    let mut slopes = Vec::new();
+    for k in 1..nz - 1 {
+        for j in 1..ny - 1 {
+            for i in 1..nx - 1 {
+                let at = i + nx * (j + ny * k);
+                if (field[at] - crossing).abs() < 0.12 {
+                    let squared: f64 = strides
+                        .iter()
+                        .map(|s| f64::from(0.5 * (field[at + s] - field[at - s])).powi(2))
+                        .sum();
+                    slopes.push(squared.sqrt());
+                }
+            }
+        }
+    }
+    let middle = slopes.len() / 2;
+    if slopes.is_empty() {
+        return 0.0;
+    }
+    *slopes.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Blur [voxels] of an edge that, smoothed by `sigma` more, has this central difference.
+fn blur(steepness: f64, sigma: f64) -> f64 {
+    // Half the rise of the error function of total width w over two voxels; falls with w.
+    let rise = |w: f64| {
+        let n = 64;
+        let density =
+            |x: f64| (-0.5 * (x / w).powi(2)).exp() / (w * (2.0 * std::f64::consts::PI).sqrt());
+        (0..n)
+            .map(|i| density((f64::from(i) + 0.5) / f64::from(n)))
+            .sum::<f64>()
+            / f64::from(n)
+    };
+    let (mut low, mut high) = (sigma, sigma + 4.0);
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if rise(middle) > steepness {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    (low * low - sigma * sigma).max(0.0).sqrt().min(2.0)
+}

@@ -1,0 +1,305 @@
+//! Volumes with a header of text: NRRD (`.nrrd`, `.nhdr`) and MetaImage (`.mha`, `.mhd`), the usual
+//! ways to describe raw files. Voxels raw or gzipped, in the header's file or one beside it.
+
+use super::npy::Number;
+use super::volume::{Volume, count};
+use crate::error::{Result, ShapeError};
+use crate::limits::{ReadLimits, read_bytes};
+use flate2::read::{MultiGzDecoder, ZlibDecoder};
+use std::io::Read;
+use std::path::Path;
+
+/// Longest header [bytes].
+const LONGEST: usize = 1 << 16;
+
+/// What a header says.
+#[derive(Default)]
+struct Fields {
+    sizes: Vec<u64>,
+    number: Option<Number>,
+    big: bool,
+    packed: Packed,
+    /// File of the voxels, or none for the header's own.
+    beside: Option<String>,
+    skip: u64,
+}
+
+#[derive(Default, PartialEq)]
+enum Packed {
+    #[default]
+    Raw,
+    Gzip,
+    Zlib,
+    Other,
+}
+
+pub(super) fn read_nrrd(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
+    let malformed = |reason: &str| ShapeError::malformed(path, reason);
+    if !bytes.starts_with(b"NRRD000") {
+        return Err(malformed("it does not begin with the NRRD signature"));
+    }
+    // The header ends at the first empty line; a detached one at its end.
+    let head = &bytes[..bytes.len().min(LONGEST)];
+    let end = head
+        .windows(2)
+        .position(|w| w == b"\n\n")
+        .map(|n| (n, n + 2));
+    let end = end.or_else(|| {
+        head.windows(4)
+            .position(|w| w == b"\r\n\r\n")
+            .map(|n| (n, n + 4))
+    });
+    let (text_end, start) = end.unwrap_or((head.len(), head.len()));
+    let text = String::from_utf8_lossy(&bytes[..text_end]);
+    let mut fields = Fields::default();
+    for line in text.lines().skip(1).filter(|l| !l.starts_with('#')) {
+        let Some((key, value)) = line.split_once(": ") else {
+            continue;
+        };
+        let value = value.trim();
+        match key.trim().to_ascii_lowercase().as_str() {
+            "sizes" => fields.sizes = sizes(value),
+            "type" => fields.number = nrrd_type(value),
+            "endian" => fields.big = value.eq_ignore_ascii_case("big"),
+            "encoding" => {
+                fields.packed = match value.to_ascii_lowercase().as_str() {
+                    "raw" => Packed::Raw,
+                    "gzip" | "gz" => Packed::Gzip,
+                    _ => Packed::Other,
+                }
+            }
+            "data file" | "datafile" => fields.beside = Some(value.to_owned()),
+            "byte skip" | "byteskip" => {
+                fields.skip = value
+                    .parse()
+                    .map_err(|_| malformed("byte skip is no whole number"))?;
+            }
+            _ => {}
+        }
+    }
+    if end.is_none() && fields.beside.is_none() {
+        return Err(malformed("the NRRD header does not end"));
+    }
+    voxels(path, fields, &bytes[start..], limits)
+}
+
+pub(super) fn read_meta(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
+    let malformed = |reason: &str| ShapeError::malformed(path, reason);
+    let mut fields = Fields::default();
+    let mut at = 0;
+    // The name of the data file is the last line of the header.
+    while fields.beside.is_none() {
+        let rest = &bytes[at..bytes.len().min(LONGEST).max(at)];
+        let Some(end) = rest.iter().position(|b| *b == b'\n') else {
+            return Err(malformed("the MetaImage header names no ElementDataFile"));
+        };
+        let line = String::from_utf8_lossy(&rest[..end]).into_owned();
+        at += end + 1;
+        let Some((key, value)) = line.split_once('=') else {
+            continue;
+        };
+        let value = value.trim();
+        let yes = value.eq_ignore_ascii_case("true");
+        match key.trim() {
+            "DimSize" => fields.sizes = sizes(value),
+            "ElementType" => fields.number = meta_type(value),
+            "BinaryDataByteOrderMSB" | "ElementByteOrderMSB" => fields.big = yes,
+            "CompressedData" if yes => fields.packed = Packed::Zlib,
+            "HeaderSize" => {
+                fields.skip = value
+                    .parse()
+                    .map_err(|_| malformed("HeaderSize is no whole number"))?;
+            }
+            "ElementDataFile" => fields.beside = Some(value.to_owned()),
+            _ => {}
+        }
+    }
+    if fields.beside.as_deref() == Some("LOCAL") {
+        fields.beside = None;
+    }
+    voxels(path, fields, &bytes[at..], limits)
+}
+
+fn sizes(value: &str) -> Vec<u64> {
+    // What is no number becomes 0 and is refused as an empty axis.
+    value
+        .split_whitespace()
+        .map(|n| n.parse().unwrap_or(0))
+        .collect()
+}
+
+fn nrrd_type(value: &str) -> Option<Number> {
+    let (kind, width) = match value.to_ascii_lowercase().as_str() {
+        "signed char" | "int8" | "int8_t" => (b'i', 1),
+        "uchar" | "unsigned char" | "uint8" | "uint8_t" => (b'u', 1),
+        "short" | "short int" | "signed short" | "int16" | "int16_t" => (b'i', 2),
+        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => (b'u', 2),
+        "int" | "signed int" | "int32" | "int32_t" => (b'i', 4),
+        "uint" | "unsigned int" | "uint32" | "uint32_t" => (b'u', 4),
+        "float" => (b'f', 4),
+        "double" => (b'f', 8),
+        _ => return None,
+    };
+    Some(Number {
+        big: false,
+        kind,
+        width,
+    })
+}
+
+fn meta_type(value: &str) -> Option<Number> {
+    let (kind, width) = match value {
+        "MET_CHAR" => (b'i', 1),
+        "MET_UCHAR" => (b'u', 1),
+        "MET_SHORT" => (b'i', 2),
+        "MET_USHORT" => (b'u', 2),
+        "MET_INT" => (b'i', 4),
+        "MET_UINT" => (b'u', 4),
+        "MET_FLOAT" => (b'f', 4),
+        "MET_DOUBLE" => (b'f', 8),
+        _ => return None,
+    };
+    Some(Number {
+        big: false,
+        kind,
+        width,
+    })
+}
+
+fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Result<Volume> {
+    let unsupported = |reason: String| ShapeError::Unsupported {
+        path: path.to_owned(),
+        reason,
+    };
+    let [nx, ny, nz] = fields.sizes[..] else {
+        return Err(unsupported(format!(
+            "the image has sizes {:?}; a volume has 3",
+            fields.sizes
+        )));
+    };
+    let voxels = count(path, [nx, ny, nz], limits)?;
+    let Some(mut number) = fields.number else {
+        return Err(unsupported(
+            "the type of the voxels is missing or unknown; save whole or floating numbers".into(),
+        ));
+    };
+    number.big = fields.big;
+    let apart;
+    let data = match &fields.beside {
+        None => own,
+        Some(name) if name.contains(['/', '\\', ' ']) || name == "LIST" || name.contains('%') => {
+            return Err(unsupported(format!(
+                "its voxels lie in {name:?}; they must lie in one file in the same folder"
+            )));
+        }
+        Some(name) => {
+            apart = read_bytes(&path.with_file_name(name), limits)?.0;
+            &apart
+        }
+    };
+    let skip = usize::try_from(fields.skip).unwrap_or(usize::MAX);
+    let data = data.get(skip..).unwrap_or(&[]);
+    let needed = voxels as u64 * number.width as u64;
+    let mut plain = Vec::new();
+    let failed = |e: std::io::Error| ShapeError::malformed(path, format!("packed voxels: {e}"));
+    let data = match fields.packed {
+        Packed::Raw => data,
+        Packed::Gzip => {
+            MultiGzDecoder::new(data)
+                .take(needed + 1)
+                .read_to_end(&mut plain)
+                .map_err(failed)?;
+            &plain
+        }
+        Packed::Zlib => {
+            ZlibDecoder::new(data)
+                .take(needed + 1)
+                .read_to_end(&mut plain)
+                .map_err(failed)?;
+            &plain
+        }
+        Packed::Other => {
+            return Err(unsupported(
+                "the voxels are neither raw nor gzipped; save them so".into(),
+            ));
+        }
+    };
+    number.volume(path, [nx, ny, nz].map(|n| n as usize), false, data)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn limits() -> ReadLimits {
+        ReadLimits {
+            voxels: 1 << 20,
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn both_kinds_attached_and_apart_raw_and_packed() {
+        let folder = tempfile::tempdir().unwrap();
+        let expect = Volume::from_labels([3, 2, 1], vec![0, 1, 2, 3, 4, 500]).unwrap();
+        let values: Vec<u16> = vec![0, 1, 2, 3, 4, 500];
+        let little: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let big: Vec<u8> = values.iter().flat_map(|v| v.to_be_bytes()).collect();
+        let mut packer = flate2::write::GzEncoder::new(Vec::new(), Default::default());
+        packer.write_all(&little).unwrap();
+        let gzip = packer.finish().unwrap();
+        let nrrd = |more: &str| {
+            format!("NRRD0004\n# made by hand\ntype: ushort\ndimension: 3\nsizes: 3 2 1\n{more}")
+        };
+        let path = folder.path().join("a.nrrd");
+        for (more, data) in [
+            ("endian: little\nencoding: raw\n\n", &little),
+            ("endian: big\nencoding: raw\n\n", &big),
+            ("endian: little\nencoding: gzip\n\n", &gzip),
+        ] {
+            let mut bytes = nrrd(more).into_bytes();
+            bytes.extend_from_slice(data);
+            assert_eq!(
+                read_nrrd(&path, &bytes, &limits()).unwrap(),
+                expect,
+                "{more}"
+            );
+            for cut in 0..bytes.len() {
+                assert!(
+                    read_nrrd(&path, &bytes[..cut], &limits()).is_err(),
+                    "{more} {cut}"
+                );
+            }
+        }
+        std::fs::write(folder.path().join("a.raw"), [&[9; 5], &little[..]].concat()).unwrap();
+        let apart = nrrd("endian: little\nencoding: raw\nbyte skip: 5\ndata file: a.raw\n");
+        assert_eq!(
+            read_nrrd(&path, apart.as_bytes(), &limits()).unwrap(),
+            expect
+        );
+        let meta = "ObjectType = Image\nNDims = 3\nDimSize = 3 2 1\nElementType = MET_USHORT\n\
+                    HeaderSize = 5\nElementDataFile = a.raw\n";
+        assert_eq!(
+            read_meta(&path, meta.as_bytes(), &limits()).unwrap(),
+            expect
+        );
+        let mut local = meta
+            .replace("HeaderSize = 5\n", "")
+            .replace("a.raw", "LOCAL")
+            .into_bytes();
+        local.extend_from_slice(&little);
+        assert_eq!(read_meta(&path, &local, &limits()).unwrap(), expect);
+        // A file elsewhere is not fetched.
+        let away = apart.replace("a.raw", "../a.raw");
+        assert!(matches!(
+            read_nrrd(&path, away.as_bytes(), &limits()),
+            Err(ShapeError::Unsupported { .. })
+        ));
+        let huge = apart.replace("3 2 1", "300000 200000 100000");
+        assert!(matches!(
+            read_nrrd(&path, huge.as_bytes(), &limits()),
+            Err(ShapeError::TooLarge { .. })
+        ));
+    }
+}

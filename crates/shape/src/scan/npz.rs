@@ -1,0 +1,80 @@
+//! NPZ archives (numpy.savez) that hold one array.
+
+use super::npy;
+use super::volume::Volume;
+use crate::error::{Result, ShapeError};
+use crate::limits::ReadLimits;
+use std::io::{Cursor, Read};
+use std::path::Path;
+
+pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
+    let malformed = |e: &dyn std::fmt::Display| ShapeError::malformed(path, e.to_string());
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| malformed(&e))?;
+    let names: Vec<String> = archive.file_names().map(str::to_owned).collect();
+    let [name] = &names[..] else {
+        return Err(ShapeError::Unsupported {
+            path: path.to_owned(),
+            reason: format!(
+                "it holds {} arrays ({}); save the one volume alone",
+                names.len(),
+                names.iter().take(5).cloned().collect::<Vec<_>>().join(", ")
+            ),
+        });
+    };
+    let file = archive.by_name(name).map_err(|e| malformed(&e))?;
+    let mut plain = Vec::new();
+    // What it claims is not trusted: no more is unpacked than a file may have.
+    file.take(limits.file_bytes + 1)
+        .read_to_end(&mut plain)
+        .map_err(|e| malformed(&e))?;
+    if plain.len() as u64 > limits.file_bytes {
+        return Err(ShapeError::TooLarge {
+            path: path.to_owned(),
+            claimed: format!("at least {} bytes unpacked", plain.len()),
+            limit: limits.file_bytes,
+            unit: "bytes",
+        });
+    }
+    npy::read(path, &plain, limits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn archive(names: &[&str]) -> Vec<u8> {
+        let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        for name in names {
+            let options = zip::write::SimpleFileOptions::default();
+            writer.start_file(*name, options).unwrap();
+            let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (1, 2, 3), }\n";
+            writer.write_all(b"\x93NUMPY\x01\x00").unwrap();
+            writer
+                .write_all(&(header.len() as u16).to_le_bytes())
+                .unwrap();
+            writer.write_all(header.as_bytes()).unwrap();
+            writer.write_all(&[0, 1, 2, 3, 4, 5]).unwrap();
+        }
+        writer.finish().unwrap().into_inner()
+    }
+
+    #[test]
+    fn one_array_is_read_several_are_refused_and_damage_is_no_panic() {
+        let limits = ReadLimits::default();
+        let path = Path::new("a.npz");
+        let good = archive(&["volume.npy"]);
+        let expect = Volume::from_labels([3, 2, 1], vec![0, 1, 2, 3, 4, 5]).unwrap();
+        assert_eq!(read(path, &good, &limits).unwrap(), expect);
+        let several = read(path, &archive(&["a.npy", "b.npy"]), &limits);
+        assert!(matches!(several, Err(ShapeError::Unsupported { .. })));
+        for cut in 0..good.len() {
+            assert!(read(path, &good[..cut], &limits).is_err());
+        }
+        for at in 0..good.len() {
+            let mut bad = good.clone();
+            bad[at] ^= 0x55;
+            let _ = read(path, &bad, &limits);
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Complex numbers, one a lane.
+
+use std::ops::{Add, Sub};
+
+use super::Vector;
+
+/// `WIDTH` complex numbers.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct Complex<V> {
+    /// Real parts.
+    pub re: V,
+    /// Imaginary parts.
+    pub im: V,
+}
+
+impl<V: Vector> Complex<V> {
+    /// Zero in every lane.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        Complex {
+            re: V::splat(0.0),
+            im: V::splat(0.0),
+        }
+    }
+    /// Product with one complex number.
+    #[inline(always)]
+    pub fn times(self, [re, im]: [f64; 2]) -> Self {
+        let (re, im) = (V::splat(re), V::splat(im));
+        Complex {
+            re: self.re * re - self.im * im,
+            im: self.re * im + self.im * re,
+        }
+    }
+    /// Real and imaginary parts exchanged.
+    #[inline(always)]
+    pub fn exchanged(self) -> Self {
+        Complex {
+            re: self.im,
+            im: self.re,
+        }
+    }
+    /// Product with one real number.
+    #[inline(always)]
+    pub fn scale(self, factor: f64) -> Self {
+        let factor = V::splat(factor);
+        Complex {
+            re: self.re * factor,
+            im: self.im * factor,
+        }
+    }
+}
+
+impl<V: Vector> Add for Complex<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Complex {
+            re: self.re + other.re,
+            im: self.im + other.im,
+        }
+    }
+}
+impl<V: Vector> Sub for Complex<V> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Complex {
+            re: self.re - other.re,
+            im: self.im - other.im,
+        }
+    }
+}
+
+/// a - i b and a + i b.
+#[inline(always)]
+pub fn turned<V: Vector>(a: Complex<V>, b: Complex<V>) -> [Complex<V>; 2] {
+    [
+        Complex {
+            re: a.re + b.im,
+            im: a.im - b.re,
+        },
+        Complex {
+            re: a.re - b.im,
+            im: a.im + b.re,
+        },
+    ]
+}

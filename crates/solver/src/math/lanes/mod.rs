@@ -1,0 +1,194 @@
+//! Vector registers and the choice among instruction sets, made once when the program runs.
+//!
+//! A [`Kernel`] is written once over [`Vector`] and compiled for each instruction set; [`dispatch`]
+//! calls the widest that the machine has. All of them round alike: no kernel fuses a product with
+//! a sum, and no result depends on the number of lanes, so the bits are the same everywhere.
+//!
+//! Everything that a kernel calls must be inlined into it, hence the many `inline(always)`: what is
+//! left outside would be compiled for the oldest machine.
+
+mod complex;
+#[cfg(any(test, not(target_arch = "x86_64")))]
+mod plain;
+mod single;
+#[cfg(test)]
+mod tests;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use std::ops::{Add, Mul, Sub};
+use std::sync::atomic::{AtomicU8, Ordering};
+
+pub use complex::{Complex, turned};
+#[cfg(not(target_arch = "x86_64"))]
+use plain::Plain as Common;
+pub use single::Single;
+#[cfg(target_arch = "x86_64")]
+use x86::Pairs as Common;
+
+/// A register of `WIDTH` numbers.
+pub trait Vector:
+    Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// Numbers held: 8, 4 or 1.
+    const WIDTH: usize;
+    /// The vector of four lanes of the same instruction set.
+    type Four: Vector;
+    /// The same number in every lane.
+    fn splat(value: f64) -> Self;
+    /// The first `WIDTH` numbers of `from`.
+    fn load(from: &[f64]) -> Self;
+    /// Overwrites the first `WIDTH` numbers of `to`.
+    fn store(self, to: &mut [f64]);
+    /// Lane-wise quotient.
+    fn over(self, divisor: Self) -> Self;
+    /// Lane-wise `self` where it is greater, else `other`.
+    fn larger(self, other: Self) -> Self;
+    /// Lane-wise absolute value.
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        self.larger(Self::splat(0.0) - self)
+    }
+    /// Swaps rows and columns of `WIDTH` vectors.
+    fn transpose(block: &mut [Self]);
+}
+
+/// Work on the neighbouring entries of a row.
+pub trait RowWork {
+    /// Treats the `V::WIDTH` entries from `i` on.
+    fn at<V: Vector>(&mut self, i: usize);
+}
+
+/// Treats the entries 1..=n of a row, as many at a time as possible. Entry i always falls on lane
+/// (i - 1) % 8 of a sum kept in eight lanes, whatever the width.
+#[inline(always)]
+pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork) {
+    let mut i = 1;
+    while i + V::WIDTH <= n + 1 {
+        work.at::<V>(i);
+        i += V::WIDTH;
+    }
+    if i + 4 <= n + 1 {
+        work.at::<V::Four>(i);
+        i += 4;
+    }
+    while i <= n {
+        work.at::<Single>(i);
+        i += 1;
+    }
+}
+
+/// Eight partial results of a row: a sum or a maximum in an order that no width changes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Partial([f64; 8]);
+
+impl Partial {
+    /// Adds to the lanes of entry `i` and its neighbours.
+    #[inline(always)]
+    pub fn add<V: Vector>(&mut self, i: usize, value: V) {
+        let lanes = &mut self.0[(i - 1) % 8..];
+        (V::load(lanes) + value).store(lanes);
+    }
+    /// Keeps the larger in the lanes of entry `i` and its neighbours.
+    #[inline(always)]
+    pub fn keep_larger<V: Vector>(&mut self, i: usize, value: V) {
+        let lanes = &mut self.0[(i - 1) % 8..];
+        V::load(lanes).larger(value).store(lanes);
+    }
+    /// Sum of the lanes.
+    pub fn sum(&self) -> f64 {
+        let [a, b, c, d, e, f, g, h] = self.0;
+        ((a + e) + (c + g)) + ((b + f) + (d + h))
+    }
+    /// Largest of the lanes.
+    pub fn largest(&self) -> f64 {
+        self.0.into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// Work compiled for every instruction set.
+pub trait Kernel {
+    /// The work, with the widest vectors of the instruction set; mark it `inline(always)`.
+    fn run<V: Vector>(self);
+}
+
+/// An instruction set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Level {
+    /// What every machine has: pairs of doubles on x86-64.
+    Common = 1,
+    /// AVX2: registers of four doubles.
+    Four = 2,
+    /// AVX-512: registers of eight doubles.
+    Eight = 3,
+}
+
+/// Level in use; 0 before the first question.
+static LEVEL: AtomicU8 = AtomicU8::new(0);
+
+/// The level in use.
+pub fn level() -> Level {
+    match LEVEL.load(Ordering::Relaxed) {
+        3 => Level::Eight,
+        2 => Level::Four,
+        1 => Level::Common,
+        _ => limit_level(Level::Eight),
+    }
+}
+
+/// Uses the widest level of this machine up to `highest` from now on, in the whole program (to
+/// compare levels); returns it.
+pub fn limit_level(highest: Level) -> Level {
+    let level = widest().min(highest);
+    LEVEL.store(level as u8, Ordering::Relaxed);
+    level
+}
+
+#[cfg(target_arch = "x86_64")]
+fn widest() -> Level {
+    if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
+        Level::Eight
+    } else if is_x86_feature_detected!("avx2") {
+        Level::Four
+    } else {
+        Level::Common
+    }
+}
+#[cfg(not(target_arch = "x86_64"))]
+fn widest() -> Level {
+    Level::Common
+}
+
+/// Runs `kernel` with the instruction set of [`level`].
+#[inline]
+pub fn dispatch<K: Kernel>(kernel: K) {
+    match level() {
+        // SAFETY: `level` never exceeds what was detected on this machine.
+        #[cfg(target_arch = "x86_64")]
+        Level::Eight => unsafe { with_eight(kernel) },
+        #[cfg(target_arch = "x86_64")]
+        Level::Four => unsafe { with_four(kernel) },
+        _ => kernel.run::<Common>(),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,avx512f,avx512vl")]
+fn with_eight<K: Kernel>(kernel: K) {
+    kernel.run::<x86::Eight>();
+}
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn with_four<K: Kernel>(kernel: K) {
+    kernel.run::<x86::Four>();
+}
+
+/// The numbers of `values` as complex lanes; `values` must be aligned as [`super::Aligned`] is.
+#[inline(always)]
+pub fn as_complex<V: Vector>(values: &mut [f64]) -> &mut [Complex<V>] {
+    // SAFETY: every `Vector` here is `WIDTH` doubles without padding, for which any bits are valid.
+    let (head, lanes, _) = unsafe { values.align_to_mut::<Complex<V>>() };
+    assert!(head.is_empty(), "lanes start on a cache line");
+    lanes
+}

@@ -1,0 +1,170 @@
+//! The modes of the second difference along one axis.
+//!
+//! Two real lines travel as the real and imaginary part of one complex Fourier transform. The
+//! cosine transform (type II and its inverse) uses Makhoul's even-odd reordering (1980), so its
+//! Fourier transform has the length of the line; any length works, primes included.
+//!
+//! Legend: z_k spectrum of a pair of lines a + i b; m = n - k the mirror of k.
+
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+use super::Ends;
+use super::chirp::Fourier;
+use crate::math::lanes::{Complex, Kernel, Vector, as_complex};
+
+/// Transforms of one axis and the eigenvalues of minus the second difference.
+pub struct Axis {
+    /// Cells.
+    pub n: usize,
+    /// Place of cell i in the transform's input.
+    pub order: Vec<usize>,
+    /// Eigenvalue of mode k [1/m^2], in the order in which modes are stored. On a periodic axis
+    /// index k <= n/2 holds the cosine part of mode k, its mirror the sine part.
+    pub eigenvalues: Vec<f64>,
+    fourier: Fourier,
+    /// cos and sin of pi k / 2n for cosine modes; 1 and 0 on a periodic axis.
+    turn: Vec<[f64; 2]>,
+    /// Factors of the mode k = n/2, its own mirror, there and back.
+    middle: [f64; 2],
+}
+
+impl Axis {
+    pub fn new(n: usize, ends: Ends, spacing: f64) -> Axis {
+        let neumann = ends == Ends::Neumann;
+        let order = |i: usize| match i {
+            _ if !neumann => i,
+            _ if i.is_multiple_of(2) => i / 2,
+            _ => n - 1 - i / 2,
+        };
+        let turn = |k: usize| {
+            let angle = PI * k as f64 / (2 * n) as f64;
+            if neumann {
+                [angle.cos(), angle.sin()]
+            } else {
+                [1.0, 0.0]
+            }
+        };
+        let eigenvalue = |k: usize| {
+            let angle = match ends {
+                Ends::Periodic => PI * k.min(n - k) as f64 / n as f64,
+                Ends::Neumann => PI * k as f64 / (2 * n) as f64,
+            };
+            (2.0 * angle.sin() / spacing).powi(2)
+        };
+        Axis {
+            n,
+            order: (0..n).map(order).collect(),
+            eigenvalues: (0..n).map(eigenvalue).collect(),
+            fourier: Fourier::new(n),
+            turn: (0..n).map(turn).collect(),
+            middle: if neumann {
+                [FRAC_1_SQRT_2, 2.0 * FRAC_1_SQRT_2]
+            } else {
+                [1.0; 2]
+            },
+        }
+    }
+
+    /// What forward then inverse multiplies by.
+    pub fn norm(&self) -> f64 {
+        self.n as f64
+    }
+
+    /// Entries of each of the two buffers.
+    pub fn buffer_len(&self) -> usize {
+        self.fourier.buffer_len(self.n)
+    }
+
+    /// Spectra of pairs of lines -> modes: real parts of the first lines, imaginary of the second.
+    #[inline(always)]
+    fn split<V: Vector>(&self, modes: &mut [Complex<V>]) {
+        let (n, half) = (self.n, V::splat(0.5));
+        for k in 1..n.div_ceil(2) {
+            let (z, w) = (modes[k], modes[n - k]);
+            let [cos, sin] = self.turn[k];
+            let (cos, sin) = (V::splat(cos) * half, V::splat(sin) * half);
+            let (p, q, r, t) = (z.re + w.re, z.im - w.im, z.im + w.im, w.re - z.re);
+            modes[k] = Complex {
+                re: cos * p + sin * q,
+                im: cos * r + sin * t,
+            };
+            modes[n - k] = Complex {
+                re: sin * p - cos * q,
+                im: sin * r - cos * t,
+            };
+        }
+        if n.is_multiple_of(2) {
+            modes[n / 2] = modes[n / 2].scale(self.middle[0]);
+        }
+    }
+
+    /// The way back. Real and imaginary parts are exchanged on the way into the transform, and so
+    /// on the way out, which turns it into its inverse.
+    #[inline(always)]
+    fn join<V: Vector>(&self, modes: &mut [Complex<V>]) {
+        let n = self.n;
+        modes[0] = modes[0].exchanged();
+        for k in 1..n.div_ceil(2) {
+            let (x, y) = (modes[k], modes[n - k]);
+            let [cos, sin] = self.turn[k];
+            let (cos, sin) = (V::splat(cos), V::splat(sin));
+            let (p, q) = (cos * x.re + sin * y.re, sin * x.re - cos * y.re);
+            let (r, t) = (cos * x.im + sin * y.im, sin * x.im - cos * y.im);
+            modes[k] = Complex {
+                re: q + r,
+                im: p - t,
+            };
+            modes[n - k] = Complex {
+                re: r - q,
+                im: p + t,
+            };
+        }
+        if n.is_multiple_of(2) {
+            modes[n / 2] = modes[n / 2].scale(self.middle[1]).exchanged();
+        }
+    }
+}
+
+/// The transform of a block of lines. It is dispatched on its own, so that its many loops are
+/// compiled once for each instruction set and not once for each place that needs them.
+pub struct Lines<'a> {
+    pub axis: &'a Axis,
+    /// Both buffers, one after the other; the first holds the lines.
+    ///
+    /// Forward: entry i at `order[i]` -> modes. Inverse: modes -> entry i at `order[i]`, with real
+    /// and imaginary parts exchanged, unnormalised.
+    pub buffers: &'a mut [f64],
+    pub inverse: bool,
+    /// Whether the block has four lanes.
+    pub four: bool,
+    /// Set to which of the buffers holds the result.
+    pub second: &'a mut bool,
+}
+
+impl Kernel for Lines<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        if self.four && V::WIDTH > 4 {
+            self.transform::<V::Four>();
+        } else {
+            self.transform::<V>();
+        }
+    }
+}
+
+impl Lines<'_> {
+    #[inline(always)]
+    fn transform<V: Vector>(self) {
+        let axis = self.axis;
+        let (a, b) = as_complex::<V>(self.buffers).split_at_mut(axis.buffer_len());
+        let first = a.as_ptr();
+        if self.inverse {
+            axis.join(&mut a[..axis.n]);
+        }
+        let [found, _] = axis.fourier.run(a, b);
+        if !self.inverse {
+            axis.split(&mut found[..axis.n]);
+        }
+        *self.second = first != found.as_ptr();
+    }
+}

@@ -1,0 +1,93 @@
+//! Short Fourier transforms, the building blocks of the long ones.
+//!
+//! Outputs come in pairs k, r - k: with e_k the cosine sum over x_t + x_{r-t} and o_k the sine sum
+//! over x_t - x_{r-t} they are e_k - i o_k and e_k + i o_k.
+
+use crate::math::lanes::{Complex, Vector, turned};
+
+/// A transform of fixed length `R`.
+pub trait Butterfly<const R: usize> {
+    /// X_k = sum over t of x_t exp(-2 pi i k t / R).
+    fn apply<V: Vector>(x: [Complex<V>; R]) -> [Complex<V>; R];
+}
+
+pub struct Two;
+pub struct Three;
+pub struct Four;
+pub struct Five;
+pub struct Seven;
+
+impl Butterfly<2> for Two {
+    #[inline(always)]
+    fn apply<V: Vector>([a, b]: [Complex<V>; 2]) -> [Complex<V>; 2] {
+        [a + b, a - b]
+    }
+}
+
+impl Butterfly<3> for Three {
+    #[inline(always)]
+    fn apply<V: Vector>([a, b, c]: [Complex<V>; 3]) -> [Complex<V>; 3] {
+        const SIN: f64 = 0.866_025_403_784_438_6;
+        let sum = b + c;
+        let [y, z] = turned(a - sum.scale(0.5), (b - c).scale(SIN));
+        [a + sum, y, z]
+    }
+}
+
+impl Butterfly<4> for Four {
+    #[inline(always)]
+    fn apply<V: Vector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
+        let (s, t, u) = (a + c, a - c, b + d);
+        let [y, z] = turned(t, b - d);
+        [s + u, y, s - u, z]
+    }
+}
+
+impl Butterfly<5> for Five {
+    #[inline(always)]
+    fn apply<V: Vector>([a, b, c, d, e]: [Complex<V>; 5]) -> [Complex<V>; 5] {
+        const COS: [f64; 2] = [0.309_016_994_374_947_45, -0.809_016_994_374_947_5];
+        const SIN: [f64; 2] = [0.951_056_516_295_153_5, 0.587_785_252_292_473_1];
+        let (p, q, r, s) = (b + e, c + d, b - e, c - d);
+        let [y1, y4] = turned(
+            a + p.scale(COS[0]) + q.scale(COS[1]),
+            r.scale(SIN[0]) + s.scale(SIN[1]),
+        );
+        let [y2, y3] = turned(
+            a + p.scale(COS[1]) + q.scale(COS[0]),
+            r.scale(SIN[1]) - s.scale(SIN[0]),
+        );
+        [a + p + q, y1, y2, y3, y4]
+    }
+}
+
+impl Butterfly<7> for Seven {
+    #[inline(always)]
+    fn apply<V: Vector>([a, b, c, d, e, f, g]: [Complex<V>; 7]) -> [Complex<V>; 7] {
+        const COS: [f64; 3] = [
+            0.623_489_801_858_733_6,
+            -0.222_520_933_956_314_34,
+            -0.900_968_867_902_419_1,
+        ];
+        const SIN: [f64; 3] = [
+            0.781_831_482_468_029_8,
+            0.974_927_912_181_823_6,
+            0.433_883_739_117_558_1,
+        ];
+        let (p, q, r) = (b + g, c + f, d + e);
+        let (u, v, w) = (b - g, c - f, d - e);
+        let [y1, y6] = turned(
+            a + p.scale(COS[0]) + q.scale(COS[1]) + r.scale(COS[2]),
+            u.scale(SIN[0]) + v.scale(SIN[1]) + w.scale(SIN[2]),
+        );
+        let [y2, y5] = turned(
+            a + p.scale(COS[1]) + q.scale(COS[2]) + r.scale(COS[0]),
+            u.scale(SIN[1]) - v.scale(SIN[2]) - w.scale(SIN[0]),
+        );
+        let [y3, y4] = turned(
+            a + p.scale(COS[2]) + q.scale(COS[0]) + r.scale(COS[1]),
+            u.scale(SIN[2]) - v.scale(SIN[0]) + w.scale(SIN[1]),
+        );
+        [a + p + q + r, y1, y2, y3, y4, y5, y6]
+    }
+}

@@ -1,0 +1,265 @@
+//! Complex Fourier transforms of any length, as many at once as a register has lanes.
+//!
+//! Stockham's self-sorting scheme: one pass over the data a factor, from one buffer to the other,
+//! no bit reversal. Factors 2, 3, 4, 5 and 7 have butterflies of their own, other primes a loop
+//! over pairs of outputs; beyond `LARGEST_PRIME` the length is padded instead (`chirp.rs`).
+//!
+//! Legend: r radix, blocks twiddled groups of a pass, stride distance of what a pass has merged.
+
+use std::f64::consts::PI;
+
+use super::butterfly::{Butterfly, Five, Four, Seven, Three, Two};
+use crate::math::lanes::{Complex, Vector, turned};
+
+/// Largest prime factor that is transformed by its definition; measured, decision 0005.
+pub const LARGEST_PRIME: usize = 113;
+/// Outputs (and their mirrors) of a prime radix that are summed in one sweep over its inputs.
+const TOGETHER: usize = 4;
+
+/// exp(-2 pi i numerator / denominator).
+pub fn root(numerator: usize, denominator: usize) -> [f64; 2] {
+    let angle = -2.0 * PI * (numerator % denominator) as f64 / denominator as f64;
+    [angle.cos(), angle.sin()]
+}
+
+/// Factors in the order of the passes.
+pub fn factors(mut n: usize) -> Vec<usize> {
+    let mut found = Vec::new();
+    for radix in [4, 2, 3, 5, 7] {
+        while n.is_multiple_of(radix) {
+            found.push(radix);
+            n /= radix;
+        }
+    }
+    let mut radix = 11;
+    while n > 1 {
+        if radix * radix > n {
+            radix = n;
+        }
+        if n.is_multiple_of(radix) {
+            found.push(radix);
+            n /= radix;
+        } else {
+            radix += 2;
+        }
+    }
+    found
+}
+
+/// One pass.
+struct Pass {
+    radix: usize,
+    blocks: usize,
+    stride: usize,
+    /// Twiddles: `radix - 1` for each block.
+    turn: Vec<[f64; 2]>,
+    /// Cosines and sines of a prime radix without a butterfly, in the order in which `modes` reads.
+    circle: Vec<[f64; 2]>,
+}
+
+/// A planned transform.
+pub struct Fft {
+    passes: Vec<Pass>,
+}
+
+impl Fft {
+    /// Plans for `n` points.
+    pub fn new(n: usize) -> Fft {
+        let (mut left, mut stride) = (n, 1);
+        let pass = |radix: usize| {
+            let blocks = left / radix;
+            let turn = (0..blocks)
+                .flat_map(|p| (1..radix).map(move |t| root(p * t, left)))
+                .collect();
+            let pass = Pass {
+                radix,
+                blocks,
+                stride,
+                turn,
+                circle: if radix > 7 { circle(radix) } else { Vec::new() },
+            };
+            left = blocks;
+            stride *= radix;
+            pass
+        };
+        Fft {
+            passes: factors(n).into_iter().map(pass).collect(),
+        }
+    }
+
+    /// Transforms `a`, using both buffers; returns the one with the result, then the other.
+    #[inline(always)]
+    pub fn run<'a, V: Vector>(
+        &self,
+        mut a: &'a mut [Complex<V>],
+        mut b: &'a mut [Complex<V>],
+    ) -> [&'a mut [Complex<V>]; 2] {
+        for pass in &self.passes {
+            match pass.radix {
+                2 => step::<V, Two, 2>(pass, a, b),
+                3 => step::<V, Three, 3>(pass, a, b),
+                4 => step::<V, Four, 4>(pass, a, b),
+                5 => step::<V, Five, 5>(pass, a, b),
+                7 => step::<V, Seven, 7>(pass, a, b),
+                _ => prime_step(pass, a, b),
+            }
+            std::mem::swap(&mut a, &mut b);
+        }
+        [a, b]
+    }
+}
+
+/// A pass with a butterfly.
+#[inline(always)]
+fn step<V: Vector, B: Butterfly<R>, const R: usize>(
+    pass: &Pass,
+    source: &[Complex<V>],
+    target: &mut [Complex<V>],
+) {
+    let (stride, span) = (pass.stride, pass.blocks * pass.stride);
+    let mut from: [&[Complex<V>]; R] = [&[]; R];
+    for t in 0..R {
+        from[t] = &source[t * span..][..span];
+    }
+    let target = &mut target[..R * span];
+    if pass.blocks == 1 {
+        let mut rest = target;
+        let to: [_; R] = std::array::from_fn(|_| cut(&mut rest, span));
+        for q in 0..span {
+            let mut x = [Complex::zero(); R];
+            for t in 0..R {
+                x[t] = from[t][q];
+            }
+            let y = B::apply(x);
+            for t in 0..R {
+                to[t][q] = y[t];
+            }
+        }
+    } else if stride == 1 {
+        let (to, _) = target.as_chunks_mut::<R>();
+        for ((p, turn), to) in pass.turn.chunks_exact(R - 1).enumerate().zip(to) {
+            let mut x = [Complex::zero(); R];
+            for t in 0..R {
+                x[t] = from[t][p];
+            }
+            let y = B::apply(x);
+            to[0] = y[0];
+            for t in 1..R {
+                to[t] = y[t].times(turn[t - 1]);
+            }
+        }
+    } else {
+        let blocks = target.chunks_exact_mut(R * stride);
+        for ((p, turn), mut rest) in pass.turn.chunks_exact(R - 1).enumerate().zip(blocks) {
+            let mut here: [&[Complex<V>]; R] = [&[]; R];
+            for t in 0..R {
+                here[t] = &from[t][p * stride..][..stride];
+            }
+            let to: [_; R] = std::array::from_fn(|_| cut(&mut rest, stride));
+            for q in 0..stride {
+                let mut x = [Complex::zero(); R];
+                for t in 0..R {
+                    x[t] = here[t][q];
+                }
+                let y = B::apply(x);
+                to[0][q] = y[0];
+                for t in 1..R {
+                    to[t][q] = y[t].times(turn[t - 1]);
+                }
+            }
+        }
+    }
+}
+
+/// Cuts the first `len` entries off.
+#[inline(always)]
+fn cut<'a, T>(rest: &mut &'a mut [T], len: usize) -> &'a mut [T] {
+    let (first, others) = std::mem::take(rest).split_at_mut(len);
+    *rest = others;
+    first
+}
+
+/// A pass of any odd prime radix; uses up `source`.
+#[inline(always)]
+fn prime_step<V: Vector>(pass: &Pass, source: &mut [Complex<V>], target: &mut [Complex<V>]) {
+    let (r, stride, span) = (pass.radix, pass.stride, pass.blocks * pass.stride);
+    let half = r / 2;
+    for at in 0..span {
+        let mut sum = source[at];
+        for t in 1..=half {
+            let (b, e) = (source[at + t * span], source[at + (r - t) * span]);
+            sum = sum + (b + e);
+            source[at + t * span] = b + e;
+            source[at + (r - t) * span] = b - e;
+        }
+        let (p, q) = (at / stride, at % stride);
+        let to = stride * r * p + q;
+        target[to] = sum;
+        let mut k = 1;
+        while k <= half {
+            if k + TOGETHER <= half + 1 {
+                modes::<V, TOGETHER>(pass, source, target, at, to, k);
+                k += TOGETHER;
+            } else {
+                modes::<V, 1>(pass, source, target, at, to, k);
+                k += 1;
+            }
+        }
+    }
+}
+
+/// Outputs k..k + K of a prime radix and their mirrors.
+#[inline(always)]
+fn modes<V: Vector, const K: usize>(
+    pass: &Pass,
+    source: &[Complex<V>],
+    target: &mut [Complex<V>],
+    at: usize,
+    to: usize,
+    k: usize,
+) {
+    let (r, stride, span) = (pass.radix, pass.stride, pass.blocks * pass.stride);
+    let half = r / 2;
+    let (mut even, mut odd) = ([source[at]; K], [Complex::zero(); K]);
+    let (circle, _) = pass.circle[(k - 1) * half..(k - 1 + K) * half].as_chunks::<K>();
+    let (mut sum, mut difference) = (at + span, at + (r - 1) * span);
+    for circle in circle {
+        let (b, e) = (source[sum], source[difference]);
+        for m in 0..K {
+            let [cos, sin] = circle[m];
+            even[m] = even[m] + b.scale(cos);
+            odd[m] = odd[m] + e.scale(sin);
+        }
+        sum += span;
+        difference -= span;
+    }
+    let turn = &pass.turn[at / stride * (r - 1)..][..r - 1];
+    for m in 0..K {
+        let k = k + m;
+        let [y, z] = turned(even[m], odd[m]);
+        target[to + stride * k] = y.times(turn[k - 1]);
+        target[to + stride * (r - k)] = z.times(turn[r - k - 1]);
+    }
+}
+
+/// Cosine and sine of 2 pi k t / r, grouped as `prime_step` sums them.
+fn circle(r: usize) -> Vec<[f64; 2]> {
+    let half = r / 2;
+    let mut found = Vec::with_capacity(half * half);
+    let mut k = 1;
+    while k <= half {
+        let together = if k + TOGETHER <= half + 1 {
+            TOGETHER
+        } else {
+            1
+        };
+        for t in 1..=half {
+            for m in 0..together {
+                let [cos, sin] = root((k + m) * t, r);
+                found.push([cos, -sin]);
+            }
+        }
+        k += together;
+    }
+    found
+}

@@ -1,0 +1,132 @@
+//! Blocks of lines on their way into the transforms and out of them.
+
+use super::axis::{self, Axis};
+use crate::math::Aligned;
+use crate::math::lanes::{Complex, Vector, as_complex, dispatch};
+
+/// Both buffers of the transforms of one thread.
+pub struct Buffers(Aligned);
+
+impl Buffers {
+    pub fn new(axes: [&Axis; 2]) -> Buffers {
+        let longest = axes[0].buffer_len().max(axes[1].buffer_len());
+        Buffers(Aligned::zeros(2 * 16 * longest))
+    }
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.0)
+    }
+    /// Where the lines of `axis` are put.
+    #[inline(always)]
+    pub fn lines<V: Vector>(&mut self, axis: &Axis) -> &mut [Complex<V>] {
+        &mut as_complex::<V>(&mut self.0)[..axis.n]
+    }
+    /// Transforms them.
+    #[inline(always)]
+    pub fn transform<V: Vector>(&mut self, axis: &Axis, inverse: bool) -> &[Complex<V>] {
+        let len = axis.buffer_len();
+        let buffers = &mut self.0[..4 * V::WIDTH * len];
+        let mut second = false;
+        dispatch(axis::Lines {
+            axis,
+            buffers,
+            inverse,
+            four: V::WIDTH == 4,
+            second: &mut second,
+        });
+        &as_complex::<V>(buffers)[if second { len } else { 0 }..][..axis.n]
+    }
+}
+
+/// Lines side by side: entry i of the first ones at `at + i step`, of the second ones `second` on.
+#[derive(Clone, Copy)]
+pub struct Lines {
+    pub at: usize,
+    pub step: usize,
+    pub second: usize,
+}
+
+impl Lines {
+    #[inline(always)]
+    fn entry<V: Vector>(&self, values: &[f64], i: usize) -> Complex<V> {
+        let at = self.at + i * self.step;
+        Complex {
+            re: V::load(&values[at..]),
+            im: V::load(&values[at + self.second..]),
+        }
+    }
+    #[inline(always)]
+    pub fn load<V: Vector>(&self, values: &[f64], a: &mut [Complex<V>]) {
+        for (i, x) in a.iter_mut().enumerate() {
+            *x = self.entry(values, i);
+        }
+    }
+    #[inline(always)]
+    pub fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [f64]) {
+        for (i, x) in a.iter().enumerate() {
+            let at = self.at + i * self.step;
+            x.re.store(&mut values[at..]);
+            x.im.store(&mut values[at + self.second..]);
+        }
+    }
+    #[inline(always)]
+    pub fn forward<V: Vector>(&self, axis: &Axis, values: &mut [f64], buffers: &mut Buffers) {
+        let lines = buffers.lines::<V>(axis);
+        for (i, &to) in axis.order.iter().enumerate() {
+            lines[to] = self.entry(values, i);
+        }
+        self.store(buffers.transform::<V>(axis, false), values);
+    }
+    #[inline(always)]
+    pub fn inverse<V: Vector>(&self, axis: &Axis, values: &mut [f64], buffers: &mut Buffers) {
+        self.load(values, buffers.lines::<V>(axis));
+        let lines = buffers.transform::<V>(axis, true);
+        for (i, &from) in axis.order.iter().enumerate() {
+            let at = self.at + i * self.step;
+            lines[from].im.store(&mut values[at..]);
+            lines[from].re.store(&mut values[at + self.second..]);
+        }
+    }
+}
+
+/// Rows of a plane: the first of the first ones starts at `at`, the second ones `second` rows on.
+#[derive(Clone, Copy)]
+pub struct Rows {
+    pub at: usize,
+    pub pitch: usize,
+    pub second: usize,
+}
+
+impl Rows {
+    #[inline(always)]
+    pub fn load<V: Vector>(&self, order: &[usize], values: &[f64], a: &mut [Complex<V>]) {
+        for (group, order) in order.chunks(V::WIDTH).enumerate() {
+            let at = self.at + group * V::WIDTH;
+            let (mut re, mut im) = ([V::splat(0.0); 8], [V::splat(0.0); 8]);
+            for row in 0..V::WIDTH {
+                re[row] = V::load(&values[at + row * self.pitch..]);
+                im[row] = V::load(&values[at + (row + self.second) * self.pitch..]);
+            }
+            V::transpose(&mut re);
+            V::transpose(&mut im);
+            for ((re, im), &to) in re.into_iter().zip(im).zip(order) {
+                a[to] = Complex { re, im };
+            }
+        }
+    }
+    #[inline(always)]
+    pub fn store<V: Vector>(&self, order: &[usize], a: &[Complex<V>], values: &mut [f64]) {
+        for (group, order) in order.chunks(V::WIDTH).enumerate() {
+            let at = self.at + group * V::WIDTH;
+            let (mut re, mut im) = ([V::splat(0.0); 8], [V::splat(0.0); 8]);
+            for ((re, im), &from) in re.iter_mut().zip(&mut im).zip(order) {
+                (*re, *im) = (a[from].im, a[from].re);
+            }
+            V::transpose(&mut re);
+            V::transpose(&mut im);
+            for row in 0..V::WIDTH {
+                re[row].store(&mut values[at + row * self.pitch..]);
+                im[row].store(&mut values[at + (row + self.second) * self.pitch..]);
+            }
+        }
+    }
+}
