@@ -209,11 +209,18 @@ pub fn by_model(data: &Data) -> Option<Drawn> {
     f.outline(&mut drawing, (true, true));
     let members = data.rows.iter().map(|r| r.member).max().unwrap_or(0);
     let mut caption = format!(
-        "First contact of {} models, by grain and initial orientation; a block holds the grains of one sphericity, roundness grows to the right in it.",
+        "First contact of {} models, by grain and initial orientation.",
         layout.all.len()
     );
-    if layout.reference.is_some() {
-        caption += " The dashed line is the sphere.";
+    if let Some(rows) = &plan.rows {
+        caption += &format!(" A block holds the grains of one {rows}.");
+    }
+    if let Some(name) = plan
+        .reference
+        .as_ref()
+        .filter(|_| layout.reference.is_some())
+    {
+        caption += &format!(" The dashed line is {}.", text::literal(name));
     }
     caption += &if members > 0 {
         format!(
