@@ -1,13 +1,26 @@
 //! `grainwake report`.
 
 use grainwake_report::{ReportError, render};
+use grainwake_study::Manifest;
 
 use crate::args::ReportArgs;
 use crate::exit::{BAD_INPUT, Exit, IO};
 use crate::print;
 
-/// Draws the figures and the page of a run folder.
+/// Draws the figures and the page of a run folder, or of a study folder.
 pub fn report(args: &ReportArgs) -> Result<(), Exit> {
+    if Manifest::is_in(&args.run) {
+        let done = grainwake_study::render(&args.run)?;
+        for note in &done.notes {
+            eprintln!("note: {note}");
+        }
+        let (finished, all) = done.runs;
+        return print(&format!(
+            "{} ({} figures, {finished} of {all} runs finished)",
+            done.page.display(),
+            done.png.len()
+        ));
+    }
     let done = render(&args.run).map_err(|error| {
         let code = match &error {
             ReportError::NotARun(_) | ReportError::Line { .. } => BAD_INPUT,

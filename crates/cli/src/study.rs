@@ -137,20 +137,15 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
             "go on with the same command",
         ));
     }
-    for (_, outcome) in ended
-        .iter()
-        .filter(|(_, o)| *o == Outcome::Elsewhere)
-        .take(1)
-    {
-        debug_assert_eq!(*outcome, Outcome::Elsewhere);
-        eprintln!("note: some runs are in the hands of another program, see the table");
+    if ended.iter().any(|(_, o)| *o == Outcome::Elsewhere) {
+        eprintln!("note: some runs are in the hands of another program");
     }
     let Some(code) = failed.iter().map(|(.., code)| *code).max() else {
         return Ok(());
     };
     let lines: Vec<String> = failed
         .iter()
-        .map(|(name, why, _)| format!("{name}: {why}"))
+        .map(|(name, why, _)| format!("{name}: {}", first_line(why)))
         .collect();
     Err(Exit::with_help(
         code,
@@ -162,6 +157,11 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
         ),
         "the others are done; --retry starts failed runs over",
     ))
+}
+
+/// The first line of a message: what went wrong.
+pub fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or_default()
 }
 
 fn list(runs: &[Run], states: &[(usize, State)]) -> String {

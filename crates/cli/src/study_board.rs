@@ -268,7 +268,7 @@ impl Watcher for Board<'_> {
                 clock(s.wall_s)
             ),
             Outcome::Before => "had finished before".into(),
-            Outcome::Failed(why, _) => format!("FAILED: {why}"),
+            Outcome::Failed(why, _) => format!("FAILED: {}", crate::study::first_line(why)),
             Outcome::Interrupted => "interrupted".into(),
             Outcome::Elsewhere => "in the hands of another program".into(),
         };

@@ -20,6 +20,7 @@ mod testing;
 use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
+pub use page::STYLE;
 pub use run_folder::Table;
 
 use figure::Figure;
@@ -41,8 +42,20 @@ pub struct Rendered {
     pub finished: bool,
 }
 
-/// Draws the figures and the page of a run folder.
-pub fn render(run_dir: &Path) -> Result<Rendered, ReportError> {
+/// A run folder with what it tells and its figures; nothing is written.
+pub struct Told {
+    /// The run folder.
+    pub run: RunFolder,
+    /// What it tells.
+    pub story: Story,
+    /// Its figures, in the order of the page.
+    pub figures: Vec<Figure>,
+    /// What was missing or had to be left out.
+    pub notes: Vec<String>,
+}
+
+/// Reads a run folder and draws its figures.
+pub fn tell(run_dir: &Path) -> Result<Told, ReportError> {
     let mut run = RunFolder::open(run_dir)?;
     let mut notes = std::mem::take(&mut run.notes);
     let bodies = figure::bodies(&run, &mut notes);
@@ -53,6 +66,22 @@ pub fn render(run_dir: &Path) -> Result<Rendered, ReportError> {
     );
     let story = Story::of(&run);
     let figures = figure::all(&run, &story, bodies, &mut notes);
+    Ok(Told {
+        run,
+        story,
+        figures,
+        notes,
+    })
+}
+
+/// Draws the figures and the page of a run folder.
+pub fn render(run_dir: &Path) -> Result<Rendered, ReportError> {
+    let Told {
+        run,
+        story,
+        figures,
+        notes,
+    } = tell(run_dir)?;
     let folder = run_dir.join("figures");
     std::fs::create_dir_all(&folder).map_err(|source| ReportError::Write {
         file: folder.clone(),
@@ -88,7 +117,7 @@ pub fn render(run_dir: &Path) -> Result<Rendered, ReportError> {
 }
 
 /// Writes a file under a temporary name first, so that a reader never finds half of it.
-fn write(file: PathBuf, bytes: &[u8]) -> Result<PathBuf, ReportError> {
+pub fn write(file: PathBuf, bytes: &[u8]) -> Result<PathBuf, ReportError> {
     let mut name = file.clone().into_os_string();
     name.push(".tmp");
     let temporary = PathBuf::from(name);

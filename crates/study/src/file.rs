@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use grainwake_solver::case::{Loc, Problem, Source, parse_length};
 
+use crate::claims::Analysis;
 use crate::error::{At, StudyError};
 use crate::model::{self, Model};
 use crate::raw::{Length, RawEnsemble, RawStudy};
@@ -19,6 +20,8 @@ pub struct Study {
     pub models: Vec<Model>,
     /// Repetitions with small random offsets.
     pub ensemble: Option<Ensemble>,
+    /// What is asked of the results.
+    pub analysis: Analysis,
     source: Source,
 }
 
@@ -60,11 +63,16 @@ impl Study {
             Some(given) => Some(ensemble(&source, given, &models)?),
             None => None,
         };
+        let analysis = match &raw.analysis {
+            Some(given) => analysis(&source, given, folder, &models)?,
+            None => Analysis::default(),
+        };
         Ok(Study {
             path: path.into(),
             title: raw.title,
             models,
             ensemble,
+            analysis,
             source,
         })
     }
@@ -92,6 +100,21 @@ impl Study {
     ) -> Problem {
         self.source.locate(problem, span, label)
     }
+}
+
+fn analysis(
+    source: &Source,
+    given: &Loc<PathBuf>,
+    folder: &Path,
+    models: &[Model],
+) -> Result<Analysis, StudyError> {
+    let path = folder.join(&given.value);
+    let text = std::fs::read_to_string(&path).map_err(|error| {
+        let problem = Problem::new(format!("cannot read {}: {error}", path.display()))
+            .help("paths are relative to the study file");
+        source.locate(problem, given.span.as_ref(), "this file")
+    })?;
+    Analysis::parse(&path.display().to_string(), &text, models).map_err(StudyError::Invalid)
 }
 
 fn ensemble(source: &Source, raw: &RawEnsemble, models: &[Model]) -> Result<Ensemble, Problem> {

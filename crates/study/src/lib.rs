@@ -6,22 +6,35 @@
 //! folder holds `study.json` (the plan), `runs/NAME/` (ordinary run folders), and what is made of
 //! them.
 
+mod claims;
+pub mod correlation;
 mod error;
+pub mod figure;
 mod file;
+pub mod judge;
 mod measure;
 mod model;
+mod motion;
+mod offset;
+mod page;
 mod plan;
 mod raw;
+mod report;
 mod runner;
 mod select;
 mod state;
+pub mod stats;
 mod table;
+pub mod words;
 
+pub use claims::{Analysis, Claim, Condition, Correlations, FigurePlan, Sign, Test};
 pub use error::StudyError;
 pub use file::{Ensemble, Study};
 pub use measure::{Measures, Pair, QUANTITIES};
 pub use model::{Model, Setting};
-pub use plan::{Manifest, Plan, Run};
+pub use motion::{HISTORIES, Motion};
+pub use plan::{MEASURED, Manifest, Plan, Run};
+pub use report::{Rendered, render};
 pub use runner::{Options, Outcome, Watcher, carry_out};
 pub use select::Selection;
 pub use state::{State, state};

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
 use grainwake_solver::case::estimate::Estimate;
 use grainwake_solver::case::{Case, CaseError, Problem};
 use grainwake_solver::output::provenance::Provenance;
@@ -11,10 +10,15 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::claims::Analysis;
 use crate::error::{At, StudyError, write_whole};
-use crate::file::{Ensemble, Study};
+use crate::file::Study;
 use crate::model::Model;
+use crate::offset::offset;
 use crate::{MANIFEST, RUNS};
+
+/// Factors that every run has: Krumbein sphericity and, if known, Wadell roundness of its first grain.
+pub const MEASURED: [&str; 2] = ["krumbein_sphericity", "wadell_roundness"];
 
 /// One run of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,6 +79,9 @@ pub struct Manifest {
     pub version: String,
     /// Its commit, where known.
     pub commit: Option<String>,
+    /// What is asked of the results.
+    #[serde(default)]
+    pub analysis: Analysis,
     /// All runs.
     pub runs: Vec<Run>,
 }
@@ -109,6 +116,7 @@ impl Plan {
                 title: study.title.clone(),
                 version: own.version,
                 commit: own.commit,
+                analysis: study.analysis.clone(),
                 runs,
             },
         })
@@ -236,7 +244,7 @@ fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
         model: model.name.clone(),
         member,
         levels: model.levels.clone(),
-        factors: model.factors.clone(),
+        factors: factors(model, case),
         base: std::path::absolute(&model.base).unwrap_or_else(|_| model.base.clone()),
         set,
         id,
@@ -248,6 +256,18 @@ fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
     }
 }
 
+/// The numbers of a model, and what is measured on its first grain.
+fn factors(model: &Model, case: &Case) -> BTreeMap<String, f64> {
+    let mut factors = BTreeMap::new();
+    if let Some(grain) = case.setup.grains.first() {
+        let form = grain.shape.morphology();
+        factors.insert(MEASURED[0].to_owned(), form.krumbein_sphericity);
+        factors.extend(form.wadell_roundness.map(|r| (MEASURED[1].to_owned(), r)));
+    }
+    factors.extend(model.factors.clone());
+    factors
+}
+
 /// The end of a resolved case and what stops it before, in one line.
 pub(crate) fn ending(resolved: &str) -> String {
     let table: toml::Table = resolved.parse().unwrap_or_default();
@@ -257,89 +277,6 @@ pub(crate) fn ending(resolved: &str) -> String {
             .map_or("-".into(), toml::Value::to_string)
     };
     format!("end {}, stop {}", part("end"), part("stop"))
-}
-
-/// The override that offsets a member of an ensemble in the plane normal to gravity.
-fn offset(
-    study: &Study,
-    model: &Model,
-    ensemble: &Ensemble,
-    member: usize,
-    case: &Case,
-    set: &[String],
-) -> Result<String, StudyError> {
-    let grains = &case.setup.grains;
-    let index = ensemble.grain.unwrap_or(grains.len().saturating_sub(1));
-    let Some(grain) = grains.get(index) else {
-        let problem = Problem::new(format!(
-            "the ensemble offsets grain {index}, but \"{}\" has {} grains",
-            model.name,
-            grains.len()
-        ));
-        return Err(study
-            .locate(problem.help("grains count from 0"), None, "")
-            .into());
-    };
-    let up = case.setup.gravity.abs();
-    let axis = if up.max_element() == 0.0 {
-        2
-    } else {
-        (0..3).max_by(|i, j| up[*i].total_cmp(&up[*j])).unwrap_or(2)
-    };
-    let flat: Vec<usize> = (0..3).filter(|a| *a != axis).collect();
-    let (radius, angle) = disc(ensemble.seed, &model.name, member);
-    let mut at: DVec3 = grain.pose.position;
-    at[flat[0]] += ensemble.offset * radius * angle.cos();
-    at[flat[1]] += ensemble.offset * radius * angle.sin();
-    Ok(if stands_on_a_gap(model, set, index) {
-        format!(
-            "grain.{index}.position=[{:e}, {:e}]",
-            at[flat[0]], at[flat[1]]
-        )
-    } else {
-        format!(
-            "grain.{index}.position=[{:e}, {:e}, {:e}]",
-            at.x, at.y, at.z
-        )
-    })
-}
-
-/// An even draw from the unit disc, the same for the same arguments everywhere.
-fn disc(seed: u64, model: &str, member: usize) -> (f64, f64) {
-    let mut hash = Sha256::new();
-    hash.update(seed.to_le_bytes());
-    hash.update((member as u64).to_le_bytes());
-    hash.update(model);
-    let bytes = hash.finalize();
-    let unit = |from: usize| {
-        let mut eight = [0; 8];
-        eight.copy_from_slice(&bytes[from..from + 8]);
-        (u64::from_le_bytes(eight) >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (unit(0).sqrt(), std::f64::consts::TAU * unit(8))
-}
-
-/// Whether the height of a grain follows from `gap_above`.
-fn stands_on_a_gap(model: &Model, set: &[String], grain: usize) -> bool {
-    let text = std::fs::read_to_string(&model.base).unwrap_or_default();
-    let table: toml::Table = text.parse().unwrap_or_default();
-    let of = |table: &toml::Table| {
-        let list = table.get("grain")?.as_array()?;
-        Some(list.get(grain)?.get("gap_above").is_some())
-    };
-    let mut gap = of(&table).unwrap_or(false);
-    for item in set {
-        let Some((key, value)) = item.split_once('=') else {
-            continue;
-        };
-        if key.trim().starts_with(&format!("grain.{grain}.gap_above")) {
-            gap = true;
-        } else if key.trim() == "grain" {
-            let whole: Option<toml::Table> = format!("grain = {value}").parse().ok();
-            gap = whole.as_ref().and_then(of).unwrap_or(gap);
-        }
-    }
-    gap
 }
 
 /// Problems of a model's case, placed in the study file where it set the key.

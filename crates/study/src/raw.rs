@@ -24,6 +24,7 @@ pub(crate) struct RawStudy {
     #[serde(default)]
     pub adjust: Vec<RawAdjust>,
     pub ensemble: Option<RawEnsemble>,
+    pub analysis: Option<Loc<PathBuf>>,
 }
 
 #[derive(Deserialize)]

@@ -35,17 +35,22 @@ impl State {
     }
 }
 
-/// Looks into the run folder of a run.
+/// Looks into the run folder of a run, for this program.
 pub fn state(run: &Run, study: &Path) -> State {
+    let own = Provenance::new("");
+    state_for(run, study, &own.version, own.commit.as_deref())
+}
+
+/// The same for a version and commit of the program.
+pub(crate) fn state_for(run: &Run, study: &Path, version: &str, commit: Option<&str>) -> State {
     let folder = run.folder(study);
     let Some(there) = Provenance::read(&folder) else {
         return State::Missing;
     };
-    let own = Provenance::new(&run.case_sha256);
-    if there.case_sha256 != own.case_sha256 {
+    if there.case_sha256 != run.case_sha256 {
         return State::Stale("its case is another one now");
     }
-    if (&there.version, &there.commit) != (&own.version, &own.commit) {
+    if (there.version.as_str(), there.commit.as_deref()) != (version, commit) {
         return State::Stale("it was made by another version of the program");
     }
     if folder.join(SUMMARY).is_file() {

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use glam::DVec3;
 use grainwake_report::run_folder::RunFolder;
 use grainwake_solver::output::provenance::Provenance;
 use grainwake_solver::output::read_summary;
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{StudyError, write_whole};
 use crate::measure::{Measures, QUANTITIES};
 use crate::plan::{Manifest, Run};
-use crate::state::{State, state};
+use crate::state::{State, state_for};
 
 /// A run and what came out of it. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,6 +35,9 @@ pub struct Row {
     pub id: String,
     /// Equal-volume diameter d [m].
     pub diameter_m: Option<f64>,
+    /// Gravity [m/s2].
+    #[serde(default)]
+    pub gravity_m_per_s2: Option<[f64; 3]>,
     /// First contact [s].
     pub kiss_time_s: Option<f64>,
     /// Steps taken.
@@ -51,9 +55,9 @@ pub struct Row {
 }
 
 impl Row {
-    /// Looks at a run in a study folder.
-    pub fn of(run: &Run, study: &Path) -> Row {
-        let found = state(run, study);
+    /// Looks at a run in a study folder, as its plan has it.
+    pub fn of(run: &Run, manifest: &Manifest, study: &Path) -> Row {
+        let found = state_for(run, study, &manifest.version, manifest.commit.as_deref());
         let folder = run.folder(study);
         let mut row = Row {
             name: run.name.clone(),
@@ -65,6 +69,7 @@ impl Row {
             remark: None,
             id: run.id.clone(),
             diameter_m: None,
+            gravity_m_per_s2: None,
             kiss_time_s: None,
             steps: None,
             end_time_s: None,
@@ -97,10 +102,21 @@ impl Row {
         }
         row.threads = Provenance::read(&folder).and_then(|p| Some(p.sessions.last()?.threads));
         match RunFolder::open(&folder) {
-            Ok(run) => row.pair = Measures::of(&run),
+            Ok(run) => {
+                row.gravity_m_per_s2 = run.facts.gravity.map(|g| g.to_array());
+                row.pair = Measures::of(&run);
+            }
             Err(error) => row.remark = Some(error.to_string()),
         }
         row
+    }
+
+    /// Against gravity, and sqrt(d/g) [s].
+    pub fn up_and_time(&self) -> Option<(DVec3, f64)> {
+        let gravity = DVec3::from_array(self.gravity_m_per_s2?);
+        let size = gravity.length();
+        let diameter = self.diameter_m.filter(|d| *d > 0.0)?;
+        (size > 0.0).then(|| (-gravity / size, (diameter / size).sqrt()))
     }
 
     /// Whether the run came to its end.
@@ -121,7 +137,7 @@ pub fn table(manifest: &Manifest, study: &Path) -> Vec<Row> {
     let rows: Vec<Row> = manifest
         .runs
         .par_iter()
-        .map(|run| Row::of(run, study))
+        .map(|run| Row::of(run, manifest, study))
         .collect();
     let kept: BTreeMap<String, Row> = kept(study)
         .into_iter()

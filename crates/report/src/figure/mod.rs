@@ -1,21 +1,21 @@
 //! Figures of a run: each a drawing with its caption, written as SVG and PNG.
 
-mod axis;
-mod colormap;
+pub mod axis;
+pub mod colormap;
 mod contour;
 mod curves;
 mod heap;
 mod history;
-mod lines;
-mod plan;
-mod raster;
-mod section;
+pub mod lines;
+pub mod plan;
+pub mod raster;
+pub mod section;
 mod sheet;
-mod silhouette;
+pub mod silhouette;
 mod slices;
-mod style;
-mod svg;
-mod text;
+pub mod style;
+pub mod svg;
+pub mod text;
 mod trajectory;
 
 use std::collections::BTreeMap;

@@ -31,6 +31,11 @@ pub struct Axes {
 }
 
 impl Body {
+    /// A body from its closed surface, positions in its own frame [m].
+    pub fn new(points: Vec<DVec3>, triangles: Vec<[usize; 3]>) -> Body {
+        Body { points, triangles }
+    }
+
     /// Outline of the body at a pose, seen along the axis that is neither `across` nor `up`.
     pub fn outline(&self, position: DVec3, turn: DQuat, across: usize, up: usize) -> Outline {
         let place = |p: &DVec3| {

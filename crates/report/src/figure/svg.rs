@@ -69,6 +69,29 @@ impl Drawing {
         self.width
     }
 
+    /// Height [pt].
+    pub fn height(&self) -> f64 {
+        self.height
+    }
+
+    /// Places another drawing with its upper left corner at (x, y); `tag` keeps the names of its
+    /// clips apart from those of others.
+    pub fn inset(&mut self, other: &Drawing, x: f64, y: f64, tag: &str) {
+        for (left, top, width, height, raster) in &other.rasters {
+            let place = (x + left, y + top, *width, *height, raster.clone());
+            self.rasters.push(place);
+        }
+        let vectors = other
+            .vectors
+            .replace("#clip-", &format!("#clip-{tag}-"))
+            .replace("id=\"clip-", &format!("id=\"clip-{tag}-"));
+        self.vectors.push_str(&format!(
+            "<g transform=\"translate({} {})\">\n{vectors}</g>\n",
+            number(x),
+            number(y)
+        ));
+    }
+
     /// Adds a raster that fills the rectangle; it lies below all vectors.
     pub fn raster(&mut self, x: f64, y: f64, width: f64, height: f64, raster: Raster) {
         self.rasters.push((x, y, width, height, raster));

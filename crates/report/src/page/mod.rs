@@ -7,7 +7,8 @@ use crate::phases::PhaseKind;
 use crate::run_folder::RunFolder;
 use crate::story::{Story, Subject, short};
 
-const STYLE: &str = include_str!("style.css");
+/// Style sheet of all pages.
+pub const STYLE: &str = include_str!("style.css");
 
 /// The whole page; `figures` come with their SVG documents.
 pub fn html(

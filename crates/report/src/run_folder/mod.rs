@@ -19,7 +19,7 @@ use crate::error::ReportError;
 pub use events::{Event, Kind};
 pub use facts::Facts;
 pub use surface::Surface;
-pub use tables::{History, Table};
+pub use tables::{History, Table, histories};
 
 /// A picture file of the run: a slice of the fields or the surface of grains.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,0 +1,129 @@
+//! Figures of a study, each a drawing with its caption.
+
+mod compare;
+mod frame;
+mod grains;
+mod kiss;
+mod setup;
+mod stories;
+mod trends;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use grainwake_report::figure::svg::Drawing;
+use grainwake_report::figure::text;
+use grainwake_solver::case::Case;
+use grainwake_solver::output::RESOLVED;
+
+use crate::correlation::Correlation;
+use crate::motion::Motion;
+use crate::plan::{Manifest, Run};
+use crate::table::Row;
+
+/// A figure ready to be written.
+pub struct Drawn {
+    /// File name without its extension.
+    pub name: String,
+    /// Number of its counterpart in the paper, if it has one.
+    pub number: String,
+    /// Title.
+    pub title: String,
+    /// What is to be seen, in label markup.
+    pub caption: String,
+    /// The drawing.
+    pub drawing: Drawing,
+}
+
+impl Drawn {
+    /// As an SVG document that can also stand inside a page.
+    pub fn svg(&self) -> String {
+        self.drawing.to_svg(
+            &self.name,
+            &text::plain(&self.title),
+            &text::plain(&self.caption),
+        )
+    }
+}
+
+/// What the figures are drawn from.
+pub struct Data<'a> {
+    /// The plan.
+    pub manifest: &'a Manifest,
+    /// The table.
+    pub rows: &'a [Row],
+    /// The study folder.
+    pub folder: &'a Path,
+    /// Correlations to be drawn.
+    pub correlations: &'a [Correlation],
+    /// Motions of the finished runs that are compared, by run.
+    pub motions: BTreeMap<String, Motion>,
+}
+
+impl Data<'_> {
+    /// The first run of a model.
+    pub fn run(&self, model: &str) -> Option<&Run> {
+        self.manifest.runs.iter().find(|run| run.model == model)
+    }
+
+    /// The case of a run: as it was run, else as it is planned.
+    pub fn case(&self, run: &Run) -> Option<Case> {
+        let resolved = run.folder(self.folder).join(RESOLVED);
+        Case::load(&resolved, &[]).or_else(|_| run.case()).ok()
+    }
+
+    /// Names of the values of an axis, in the order of the runs.
+    pub fn levels(&self, axis: &str) -> Vec<String> {
+        let mut out: Vec<String> = Vec::new();
+        for level in self.manifest.runs.iter().filter_map(|r| r.levels.get(axis)) {
+            if !out.contains(level) {
+                out.push(level.clone());
+            }
+        }
+        out
+    }
+
+    /// The different values of a factor among the models on the axes, in order.
+    pub fn factor_values(&self, factor: &str) -> Vec<f64> {
+        let on_axes = self.manifest.runs.iter().filter(|r| !r.levels.is_empty());
+        let mut out: Vec<f64> = on_axes
+            .filter_map(|r| r.factors.get(factor).copied())
+            .collect();
+        out.sort_by(f64::total_cmp);
+        out.dedup();
+        out
+    }
+}
+
+/// Draws all figures that the study has data for; what had to be left out is added to `notes`.
+pub fn all(data: &Data, notes: &mut Vec<String>) -> Vec<Drawn> {
+    let mut out = Vec::new();
+    out.extend(grains::family(data, notes));
+    out.extend(grains::orientations(data, notes));
+    out.extend(setup::figure(data, notes));
+    out.extend(stories::figures(data, notes));
+    out.extend(kiss::by_model(data));
+    out.extend(kiss::boxes(data));
+    out.extend(compare::figures(data, notes));
+    out.extend(trends::figure(data));
+    out
+}
+
+/// A factor as axis labels have it: its first letter in italics.
+pub fn symbol(factor: &str) -> String {
+    match factor.chars().next() {
+        Some(first) => format!("*{}*", first.to_uppercase()),
+        None => String::new(),
+    }
+}
+
+/// A factor's value, short.
+pub fn value_text(value: f64) -> String {
+    let text = format!("{value:.3}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text.contains('.') && text.len() == 3 {
+        format!("{text}0")
+    } else {
+        text.to_owned()
+    }
+}

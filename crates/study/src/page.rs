@@ -1,0 +1,333 @@
+//! The page of a study: one HTML file without scripts or outside resources.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use grainwake_report::STYLE;
+use grainwake_report::figure::text::{escape, html};
+
+use crate::correlation::Correlation;
+use crate::figure::Drawn;
+use crate::judge::{Finding, Sample, samples};
+use crate::plan::Manifest;
+use crate::stats::median;
+use crate::table::Row;
+use crate::words::{p_text, plain, short};
+
+/// What is on the page.
+pub(crate) struct Content<'a> {
+    pub manifest: &'a Manifest,
+    pub rows: &'a [Row],
+    pub findings: &'a [Finding],
+    pub correlations: &'a [Correlation],
+    /// Figures with their SVG documents.
+    pub figures: &'a [(Drawn, String)],
+    pub notes: &'a [String],
+}
+
+/// Columns of the table: heading and quantity.
+const COLUMNS: [(&str, &str); 9] = [
+    ("kiss", "kiss_time"),
+    ("kissing", "kissing_stage"),
+    ("contact", "contact_stage"),
+    ("45°", "tumble_time"),
+    ("passed", "pass_time"),
+    ("kisses", "kisses"),
+    ("role changes", "role_changes"),
+    ("v leading", "mean_speed_leading"),
+    ("v trailing", "mean_speed_trailing"),
+];
+
+impl Content<'_> {
+    /// The whole page.
+    pub fn html(&self) -> String {
+        let title = escape(&self.manifest.title);
+        let mut out = format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n<style>\n{STYLE}.holds {{ color: #00785a; }} .contradicted {{ color: #b34700; }} .open {{ color: var(--soft); }} td.verdict {{ font-weight: 600; white-space: nowrap; }}\n</style>\n</head>\n<body>\n<main>\n<header>\n<h1>{title}</h1>\n<p class=\"lead\">{}</p>\n</header>\n",
+            self.lead()
+        );
+        out += &self.notices();
+        section(
+            &mut out,
+            "Which kiss first, which part first, and how sure",
+            &self.answers(),
+        );
+        if !self.findings.is_empty() {
+            section(&mut out, "The claims and what the runs say", &self.claims());
+        }
+        if !self.figures.is_empty() {
+            let blocks: String = self
+                .figures
+                .iter()
+                .map(|(figure, svg)| block(figure, svg))
+                .collect();
+            section(
+                &mut out,
+                "Figures",
+                &format!("<div class=\"figures\">\n{blocks}</div>\n"),
+            );
+        }
+        section(&mut out, "All runs", &self.table());
+        if !self.correlations.is_empty() {
+            section(&mut out, "Rank correlations", &self.correlation_table());
+        }
+        section(&mut out, "Where it comes from", &self.provenance());
+        out += "<footer>Made by Grainwake from the run folders of this study; the figures are in <code>figures/</code>, the numbers in <code>table.csv</code>, <code>table.json</code> and <code>analysis.json</code>.</footer>\n</main>\n</body>\n</html>\n";
+        out
+    }
+
+    fn lead(&self) -> String {
+        let (done, all) = (self.done(), self.rows.len());
+        let mut text = format!("{done} of {all} runs are finished");
+        let kissed = self
+            .rows
+            .iter()
+            .filter(|r| r.pair.as_ref().is_some_and(|p| p.kiss_time.is_some()))
+            .count();
+        let parted = self
+            .rows
+            .iter()
+            .filter(|r| r.pair.as_ref().is_some_and(|p| p.parted == Some(true)))
+            .count();
+        let again = self
+            .rows
+            .iter()
+            .filter(|r| r.pair.as_ref().is_some_and(|p| p.repeated == Some(true)))
+            .count();
+        if done > 0 {
+            let _ = write!(
+                text,
+                "; {kissed} pairs kissed before they landed, {parted} of them parted, {again} kissed more than once"
+            );
+        }
+        let count = |verdict: &str| {
+            self.findings
+                .iter()
+                .filter(|f| f.verdict == verdict)
+                .count()
+        };
+        if !self.findings.is_empty() {
+            let _ = write!(
+                text,
+                ". Of {} claims {} hold, {} are contradicted and {} stay open",
+                self.findings.len(),
+                count("holds"),
+                count("contradicted"),
+                count("open")
+            );
+        }
+        text + ". Times are in √(d/g), lengths in the equal-volume diameter d, speeds in √(d g)."
+    }
+
+    fn notices(&self) -> String {
+        let mut items: Vec<String> = Vec::new();
+        for word in ["missing", "unfinished", "failed", "stale"] {
+            let names: Vec<String> = self
+                .rows
+                .iter()
+                .filter(|r| r.state == word)
+                .map(|r| escape(&r.name))
+                .collect();
+            if !names.is_empty() {
+                items.push(format!("{word}: {}", names.join(", ")));
+            }
+        }
+        items.extend(
+            self.rows
+                .iter()
+                .filter(|r| r.state == "failed")
+                .filter_map(|r| {
+                    Some(format!(
+                        "{}: {}",
+                        escape(&r.name),
+                        escape(r.remark.as_ref()?)
+                    ))
+                }),
+        );
+        items.extend(self.notes.iter().map(|note| escape(note)));
+        if items.is_empty() {
+            return String::new();
+        }
+        let items: String = items
+            .iter()
+            .map(|item| format!("<li>{item}</li>"))
+            .collect();
+        format!(
+            "<div class=\"notice\" role=\"note\"><b>Missing or left out</b><ul>{items}</ul></div>\n"
+        )
+    }
+
+    /// First and last kisses and partings, and what is known about their certainty.
+    fn answers(&self) -> String {
+        let all = BTreeMap::new();
+        let kiss = samples(self.rows, "kiss_time", &all);
+        let part = samples(self.rows, "contact_stage", &all);
+        let mut out = String::new();
+        for (what, list) in [
+            ("first contact", &kiss),
+            ("time in contact until the pair parts", &part),
+        ] {
+            let mut sorted: Vec<&Sample> = list.iter().filter(|s| !s.bound).collect();
+            sorted.sort_by(|a, b| a.value.total_cmp(&b.value));
+            if sorted.is_empty() {
+                let _ = writeln!(out, "<p>No finished run gives a {what}.</p>");
+                continue;
+            }
+            let name = |s: &&Sample| format!("{} ({})", escape(&s.model), short(s.value));
+            let few: Vec<String> = sorted.iter().take(5).map(name).collect();
+            let last: Vec<String> = sorted.iter().rev().take(3).map(name).collect();
+            let bounds = list.len() - sorted.len();
+            let more = if bounds > 0 {
+                format!(" {bounds} landed before.")
+            } else {
+                String::new()
+            };
+            let _ = writeln!(
+                out,
+                "<p><b>Shortest {what}</b>: {}. <b>Longest</b>: {}.{more}</p>",
+                few.join(", "),
+                last.join(", ")
+            );
+        }
+        out + &self.certainty(&kiss, &part)
+    }
+
+    fn certainty(&self, kiss: &[Sample], part: &[Sample]) -> String {
+        if self.rows.iter().all(|r| r.member == 0) {
+            return "<p><b>How sure</b>: every model was run once. Up to the first contact the motion follows from the start; after it the motion is sensitive to the smallest disturbance, and an <code>[ensemble]</code> of repetitions tells how much. The tests below go by ranks over all grains, so that no single run decides.</p>\n".into();
+        }
+        let spread = |list: &[Sample]| {
+            let several: Vec<f64> = list
+                .iter()
+                .filter(|s| s.range.1 > s.range.0)
+                .map(|s| (s.range.1 - s.range.0) / s.value)
+                .collect();
+            median(&several).map_or("not known".into(), |m| format!("{:.1} %", 100.0 * m))
+        };
+        format!(
+            "<p><b>How sure</b>: models were repeated with small random offsets of the start. The range of the repetitions, relative to their median, is {} for the first contact and {} for the time in contact (medians over the models). Differences of single grains below that say nothing.</p>\n",
+            spread(kiss),
+            spread(part)
+        )
+    }
+
+    fn claims(&self) -> String {
+        let mut out = String::from(
+            "<p>A claim holds, or is contradicted, if the 95 % interval says so; else it stays open. Each claim is tested by itself: of twenty claims that are not true, one would seem to hold by chance.</p>\n<div class=\"scroll\"><table><thead><tr><th>part</th><th>claim</th><th>verdict</th><th>measured</th></tr></thead><tbody>\n",
+        );
+        for f in self.findings {
+            let _ = writeln!(
+                out,
+                "<tr><td>{}</td><td>{}</td><td class=\"verdict {v}\">{v}</td><td>{}</td></tr>",
+                escape(&f.part),
+                escape(&f.claim),
+                escape(&f.says),
+                v = f.verdict
+            );
+        }
+        out + "</tbody></table></div>\n"
+    }
+
+    fn table(&self) -> String {
+        let head: String = COLUMNS
+            .iter()
+            .map(|(name, _)| format!("<th class=\"number\">{name}</th>"))
+            .collect();
+        let mut out = format!(
+            "<p>Dimensionless; v is the mean speed until the first landing, ≥ a lower bound. All quantities are in <code>table.csv</code>.</p>\n<div class=\"scroll\"><table><thead><tr><th>run</th><th>state</th>{head}<th class=\"number\">wall [min]</th></tr></thead><tbody>\n"
+        );
+        for row in self.rows {
+            let cell = |name: &str| {
+                let value = row
+                    .pair
+                    .as_ref()
+                    .and_then(|p| p.get(name))
+                    .map_or("–".into(), short);
+                let bound = name == "contact_stage"
+                    && row.pair.as_ref().is_some_and(|p| p.parted == Some(false));
+                format!(
+                    "<td class=\"number\">{}{value}</td>",
+                    if bound { "≥ " } else { "" }
+                )
+            };
+            let cells: String = COLUMNS.iter().map(|(_, name)| cell(name)).collect();
+            let wall = row
+                .wall_s
+                .map_or("–".into(), |s| format!("{:.1}", s / 60.0));
+            let _ = writeln!(
+                out,
+                "<tr><td class=\"name\">{}</td><td>{}</td>{cells}<td class=\"number\">{wall}</td></tr>",
+                escape(&row.name),
+                row.state
+            );
+        }
+        out + "</tbody></table></div>\n"
+    }
+
+    fn correlation_table(&self) -> String {
+        let mut out = String::from(
+            "<div class=\"scroll\"><table><thead><tr><th>quantity</th><th>factor</th><th></th><th class=\"number\">n</th><th class=\"number\">rank correlation</th><th class=\"number\">95 % interval</th><th class=\"number\">p</th></tr></thead><tbody>\n",
+        );
+        for c in self.correlations {
+            let value = |v: Option<f64>| v.map_or("–".into(), short);
+            let interval = c.interval.map_or("–".into(), |[a, b]| {
+                format!("{} to {}", short(a), short(b))
+            });
+            let _ = writeln!(
+                out,
+                "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">{interval}</td><td class=\"number\">{}</td></tr>",
+                escape(&plain(&c.quantity)),
+                escape(&c.factor),
+                escape(&c.level),
+                c.n,
+                value(c.rho),
+                c.p.map_or("–".into(), p_text)
+            );
+        }
+        out + "</tbody></table></div>\n"
+    }
+
+    fn provenance(&self) -> String {
+        let m = self.manifest;
+        let wall: f64 = self.rows.iter().filter_map(|r| r.wall_s).sum();
+        let steps: u64 = self.rows.iter().filter_map(|r| r.steps).sum();
+        let divergence = self
+            .rows
+            .iter()
+            .filter_map(|r| r.max_divergence)
+            .fold(0.0, f64::max);
+        let commit = m
+            .commit
+            .as_deref()
+            .map_or(String::new(), |c| format!(", commit {}", escape(c)));
+        format!(
+            "<table><tbody>\n<tr><th>study file</th><td><code>{}</code></td></tr>\n<tr><th>program</th><td>Grainwake {}{commit}</td></tr>\n<tr><th>steps of all runs</th><td>{steps}</td></tr>\n<tr><th>wall-clock time of all runs</th><td>{:.2} h</td></tr>\n<tr><th>largest |div u| of all runs</th><td>{divergence:.1e} 1/s</td></tr>\n</tbody></table>\n<p>Each run folder in <code>runs/</code> has its case with all defaults (<code>case.resolved.toml</code>), which runs as it is, and its own <code>provenance.json</code>.</p>\n",
+            escape(&m.study.display().to_string()),
+            escape(&m.version),
+            wall / 3600.0
+        )
+    }
+}
+
+fn section(out: &mut String, title: &str, body: &str) {
+    let _ = writeln!(out, "<section>\n<h2>{title}</h2>\n{body}</section>");
+}
+
+fn block(figure: &Drawn, svg: &str) -> String {
+    let class = if figure.drawing.width() <= 280.0 {
+        " class=\"column\""
+    } else {
+        ""
+    };
+    let number = if figure.number.is_empty() {
+        String::new()
+    } else {
+        format!("Figure {}. ", figure.number)
+    };
+    format!(
+        "<figure{class} id=\"{name}\">\n<div class=\"paper\">{svg}</div>\n<figcaption><b>{number}{}.</b> {} <span>(<a href=\"figures/{name}.png\">PNG</a>, <a href=\"figures/{name}.svg\">SVG</a>)</span></figcaption>\n</figure>\n",
+        html(&figure.title),
+        html(&figure.caption),
+        name = figure.name,
+    )
+}

@@ -1,0 +1,126 @@
+//! The report of a study: figures, analysis, table, and one page.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use crate::correlation::correlations;
+use crate::error::{At, StudyError, write_whole};
+use crate::figure::{self, Data, Drawn};
+use crate::judge::judge;
+use crate::motion::{Motion, thin};
+use crate::page::{self, Content};
+use crate::plan::{Manifest, Run};
+use crate::table::{Row, table, write_table};
+
+/// What was written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Rendered {
+    /// The page.
+    pub page: PathBuf,
+    /// The figures as PNG, in the order of the page; an SVG of the same name lies beside each.
+    pub png: Vec<PathBuf>,
+    /// What was missing or had to be left out; also on the page.
+    pub notes: Vec<String>,
+    /// Finished runs, and all runs.
+    pub runs: (usize, usize),
+}
+
+/// Draws the figures, tests the claims and writes the page of a study folder, whatever part of its
+/// runs is finished.
+///
+/// # Errors
+/// If the folder holds no study, or a file cannot be written.
+pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
+    let manifest = Manifest::read(folder)?;
+    let rows = table(&manifest, folder);
+    write_table(&rows, folder)?;
+    let done: Vec<(&Run, &Row)> = manifest
+        .runs
+        .iter()
+        .zip(&rows)
+        .filter(|(_, row)| row.finished())
+        .collect();
+    done.par_iter()
+        .try_for_each(|(run, row)| thin(run, row, folder).map(|_| ()))?;
+    let plan = &manifest.analysis.figures;
+    let compared = |run: &Run| {
+        let here = plan
+            .orientations
+            .as_ref()
+            .zip(plan.compare.as_ref())
+            .is_some_and(|(axis, level)| run.levels.get(axis) == Some(level));
+        run.member == 0 && (here || plan.reference.as_ref() == Some(&run.model))
+    };
+    let motions = done
+        .par_iter()
+        .filter(|(run, _)| compared(run))
+        .filter_map(|(run, row)| Some((run.name.clone(), Motion::read(run, row, folder)?)))
+        .collect();
+    let findings = judge(&manifest.analysis, &rows);
+    let correlations = correlations(&manifest.analysis, &rows);
+    let text = serde_json::to_string_pretty(
+        &serde_json::json!({ "claims": findings, "correlations": correlations }),
+    );
+    let file = folder.join("analysis.json");
+    write_whole(
+        &file,
+        text.map_err(std::io::Error::from)
+            .at("write", &file)?
+            .as_bytes(),
+    )?;
+    let mut notes: Vec<String> = Vec::new();
+    let data = Data {
+        manifest: &manifest,
+        rows: &rows,
+        folder,
+        correlations: &correlations,
+        motions,
+    };
+    let figures = figure::all(&data, &mut notes);
+    let (png, figures) = write_figures(folder, figures)?;
+    let out = Rendered {
+        page: folder.join("report.html"),
+        png,
+        runs: (done.len(), rows.len()),
+        notes,
+    };
+    let content = Content {
+        manifest: &manifest,
+        rows: &rows,
+        findings: &findings,
+        correlations: &correlations,
+        figures: &figures,
+        notes: &out.notes,
+    };
+    write_whole(&out.page, content.html().as_bytes())?;
+    Ok(out)
+}
+
+type Written = (Vec<PathBuf>, Vec<(Drawn, String)>);
+
+fn write_figures(folder: &Path, figures: Vec<Drawn>) -> Result<Written, StudyError> {
+    let place = folder.join("figures");
+    std::fs::create_dir_all(&place).at("create", &place)?;
+    let one = |figure: Drawn| -> Result<(PathBuf, (Drawn, String)), StudyError> {
+        let file = place.join(format!("{}.png", figure.name));
+        let png = figure
+            .drawing
+            .to_png()
+            .map_err(std::io::Error::other)
+            .at("draw", &file)?;
+        write_whole(&file, &png)?;
+        let svg = figure.svg();
+        write_whole(&place.join(format!("{}.svg", figure.name)), svg.as_bytes())?;
+        Ok((file, (figure, svg)))
+    };
+    let written: Vec<_> = figures.into_par_iter().map(one).collect::<Result<_, _>>()?;
+    Ok(written.into_iter().unzip())
+}
+
+impl page::Content<'_> {
+    /// Finished runs.
+    pub(crate) fn done(&self) -> usize {
+        self.rows.iter().filter(|row| row.finished()).count()
+    }
+}

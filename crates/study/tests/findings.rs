@@ -1,0 +1,295 @@
+//! Claims tested on made-up tables whose answers are known.
+
+use std::collections::BTreeMap;
+
+use grainwake_study::correlation::correlations;
+use grainwake_study::judge::{judge, samples};
+use grainwake_study::{Analysis, Measures, Model, Row};
+
+/// 16 grains in four orientations and a sphere; `fill` gives what is measured.
+fn rows(fill: impl Fn(f64, f64, usize) -> Measures) -> Vec<Row> {
+    let mut out = Vec::new();
+    for grain in 0..16 {
+        let (s, r) = (
+            0.45 + 0.15 * (grain / 4) as f64,
+            0.2 + 0.2 * (grain % 4) as f64,
+        );
+        for o in 1..=4 {
+            let levels = BTreeMap::from([
+                ("grain".into(), format!("g{grain:02}")),
+                ("orientation".into(), format!("o{o}")),
+            ]);
+            let factors = BTreeMap::from([("sphericity".into(), s), ("roundness".into(), r)]);
+            out.push(row(
+                &format!("g{grain:02}-o{o}"),
+                levels,
+                factors,
+                fill(s, r, o),
+            ));
+        }
+    }
+    out.push(row(
+        "sphere",
+        BTreeMap::new(),
+        BTreeMap::new(),
+        fill(1.0, 1.0, 3),
+    ));
+    out
+}
+
+fn row(
+    name: &str,
+    levels: BTreeMap<String, String>,
+    factors: BTreeMap<String, f64>,
+    pair: Measures,
+) -> Row {
+    Row {
+        name: name.into(),
+        model: name.into(),
+        member: 0,
+        levels,
+        factors,
+        state: "finished".into(),
+        remark: None,
+        id: String::new(),
+        diameter_m: Some(2e-3),
+        gravity_m_per_s2: Some([0.0, 0.0, -9.81]),
+        kiss_time_s: None,
+        steps: None,
+        end_time_s: None,
+        wall_s: None,
+        threads: None,
+        max_divergence: None,
+        pair: Some(pair),
+    }
+}
+
+/// Something that looks random and is the same every time.
+fn noise(s: f64, r: f64, o: usize) -> f64 {
+    (1e3 * s + 3.7e3 * r + 17.0 * o as f64).sin()
+}
+
+fn kiss(time: f64) -> Measures {
+    Measures {
+        kiss_time: Some(time),
+        landing_time: Some(60.0),
+        ..Measures::default()
+    }
+}
+
+/// The paper's own picture: order 1 > 2 = 4 > 3, form matters in orientation 1 alone.
+fn as_in_the_paper(s: f64, r: f64, o: usize) -> Measures {
+    let base = [0.0, 20.0 - 6.0 * s - 2.0 * r, 14.0, 10.0, 14.0][o];
+    kiss(base + 0.05 * noise(s, r, o))
+}
+
+fn models(rows: &[Row]) -> Vec<Model> {
+    let model = |row: &Row| Model {
+        name: row.model.clone(),
+        base: "case.toml".into(),
+        settings: Vec::new(),
+        levels: row.levels.clone(),
+        factors: row.factors.clone(),
+    };
+    rows.iter().map(model).collect()
+}
+
+fn verdict(rows: &[Row], claim: &str) -> (String, String) {
+    let text = format!("[[claim]]\nsays = \"a claim\"\n{claim}\n");
+    let analysis = Analysis::parse("analysis.toml", &text, &models(rows)).unwrap();
+    let found = judge(&analysis, rows).remove(0);
+    (found.verdict.to_owned(), found.says)
+}
+
+const ORDER: &str = "quantity = \"kiss_time\"\ntest.order = { axis = \"orientation\", more = \"o1\", less = \"o3\" }";
+
+#[test]
+fn orders_hold_are_contradicted_or_stay_open() {
+    let paper = rows(as_in_the_paper);
+    let (found, says) = verdict(&paper, ORDER);
+    assert_eq!(found, "holds");
+    assert!(
+        says.contains("for 16 of 16 grains") && says.contains("below 0.0001"),
+        "{says}"
+    );
+    let reversed = ORDER
+        .replace("\"o1\"", "\"x\"")
+        .replace("\"o3\"", "\"o1\"")
+        .replace("\"x\"", "\"o3\"");
+    assert_eq!(verdict(&paper, &reversed).0, "contradicted");
+    let chance = rows(|s, r, o| kiss(10.0 + noise(s, r, o)));
+    assert_eq!(verdict(&chance, ORDER).0, "open");
+    let equal = "quantity = \"kiss_time\"\ntest.equal = { axis = \"orientation\", values = [\"o2\", \"o4\"], within = 0.05 }";
+    assert_eq!(verdict(&paper, equal).0, "holds");
+    assert_eq!(
+        verdict(&paper, &equal.replace("\"o4\"", "\"o3\"")).0,
+        "contradicted"
+    );
+    let few: Vec<Row> = paper
+        .iter()
+        .filter(|r| r.levels.get("grain").is_none_or(|g| g == "g03"))
+        .cloned()
+        .collect();
+    let (found, says) = verdict(&few, ORDER);
+    assert!(found == "open" && says.contains("too few"), "{says}");
+}
+
+#[test]
+fn trends_and_ranges_follow_the_factors() {
+    let paper = rows(as_in_the_paper);
+    let trend = |factor: &str, sign: &str, o: &str| {
+        format!(
+            "quantity = \"kiss_time\"\ntest.trend = {{ with = \"{factor}\", sign = \"{sign}\" }}\nwhere = {{ orientation = \"{o}\" }}"
+        )
+    };
+    assert_eq!(
+        verdict(&paper, &trend("sphericity", "falls", "o1")).0,
+        "holds"
+    );
+    assert_eq!(
+        verdict(&paper, &trend("sphericity", "rises", "o1")).0,
+        "contradicted"
+    );
+    assert_eq!(
+        verdict(&paper, &trend("sphericity", "none", "o1")).0,
+        "contradicted"
+    );
+    assert_eq!(
+        verdict(&paper, &trend("sphericity", "falls", "o3")).0,
+        "open"
+    );
+    assert_eq!(
+        verdict(&paper, &trend("sphericity", "none", "o3")).0,
+        "open",
+        "no trend seen is no proof of none"
+    );
+    let low = trend("sphericity", "falls", "o1").replace(
+        "orientation = \"o1\"",
+        "orientation = \"o1\", sphericity = { at_most = 0.7 }",
+    );
+    let (found, says) = verdict(&paper, &low);
+    assert!(found == "holds" && says.contains("n = 8"), "{found} {says}");
+    let range = "quantity = \"kiss_time\"\ntest.range = { over = \"orientation\", with = \"sphericity\", sign = \"falls\" }";
+    assert_eq!(verdict(&paper, range).0, "holds");
+    let spread = "quantity = \"kiss_time\"\ntest.spread = { axis = \"orientation\", more = \"o1\", less = \"o3\" }";
+    assert_eq!(verdict(&paper, spread).0, "holds");
+    let near = "quantity = \"kiss_time\"\ntest.near = { model = \"sphere\", within = 0.05 }\nwhere = { orientation = \"o3\" }";
+    assert_eq!(verdict(&paper, near).0, "holds");
+    assert_eq!(
+        verdict(&paper, &near.replace("\"o3\"", "\"o1\"")).0,
+        "contradicted"
+    );
+}
+
+#[test]
+fn what_did_not_happen_before_the_landing_is_a_bound() {
+    let late = rows(|s, r, o| {
+        let mut m = as_in_the_paper(s, r, o);
+        if o == 1 && s < 0.5 {
+            m.kiss_time = None;
+            m.landing_time = Some(40.0);
+        }
+        m
+    });
+    let (found, says) = verdict(&late, ORDER);
+    assert!(
+        found == "holds"
+            && says.contains("for 16 of 16")
+            && says.contains("4 of them are lower bounds"),
+        "{says}"
+    );
+    let parts = rows(|s, r, o| Measures {
+        contact_stage: Some(5.0 * r),
+        parted: Some(r < 0.7),
+        ..as_in_the_paper(s, r, o)
+    });
+    let bounds = samples(&parts, "contact_stage", &BTreeMap::new())
+        .iter()
+        .filter(|s| s.bound)
+        .count();
+    assert_eq!(
+        bounds,
+        16 + 1,
+        "the roundest column and the sphere have not parted"
+    );
+    let mut unfinished = parts.clone();
+    unfinished[0].state = "unfinished".into();
+    assert_eq!(
+        samples(&unfinished, "kiss_time", &BTreeMap::new()).len(),
+        64
+    );
+}
+
+#[test]
+fn members_count_as_one_model() {
+    let mut all = rows(as_in_the_paper);
+    let first = all[0].clone();
+    let time = first.pair.as_ref().unwrap().kiss_time.unwrap();
+    for (member, shift) in [(1, 0.4), (2, -0.2)] {
+        let mut row = first.clone();
+        (row.member, row.name) = (member, format!("{}-m{member}", row.name));
+        row.pair = Some(kiss(time + shift));
+        all.push(row);
+    }
+    let found = samples(&all, "kiss_time", &BTreeMap::new());
+    assert_eq!(found.len(), 65);
+    assert_eq!(
+        (found[0].value, found[0].range),
+        (time, (time - 0.2, time + 0.4))
+    );
+}
+
+#[test]
+fn correlations_are_listed_by_level() {
+    let paper = rows(as_in_the_paper);
+    let text = "[correlations]\nquantities = [\"kiss_time\"]\nfactors = [\"sphericity\", \"roundness\"]\nby = \"orientation\"\n";
+    let analysis = Analysis::parse("analysis.toml", text, &models(&paper)).unwrap();
+    let found = correlations(&analysis, &paper);
+    assert_eq!(found.len(), 8);
+    assert!(found.iter().all(|c| c.n == 16));
+    let first = &found[0];
+    assert_eq!(
+        (first.factor.as_str(), first.level.as_str()),
+        ("sphericity", "o1")
+    );
+    assert!(
+        first.rho.unwrap() < -0.8 && first.interval.unwrap()[1] < -0.5 && first.p.unwrap() < 1e-3
+    );
+}
+
+#[test]
+fn wrong_names_are_located() {
+    let paper = rows(as_in_the_paper);
+    let problem = |text: &str| {
+        Analysis::parse("analysis.toml", text, &models(&paper))
+            .unwrap_err()
+            .remove(0)
+    };
+    let p = problem(&format!(
+        "[[claim]]\nsays = \"a\"\n{}",
+        ORDER.replace("kiss_time", "kis_time")
+    ));
+    assert!(
+        p.to_string().contains("no quantity \"kis_time\"")
+            && p.help.as_deref().unwrap().contains("\"kiss_time\""),
+        "{p}"
+    );
+    assert_eq!(p.place().unwrap().1, 3);
+    let p = problem(&format!(
+        "[[claim]]\nsays = \"a\"\n{}",
+        ORDER.replace("\"o3\"", "\"o5\"")
+    ));
+    assert!(
+        p.to_string()
+            .contains("value of \"orientation\" called \"o5\""),
+        "{p}"
+    );
+    let p = problem(&format!(
+        "[[claim]]\nsays = \"a\"\n{ORDER}\nwhere = {{ sphericty = {{ at_most = 1 }} }}"
+    ));
+    assert!(p.help.as_deref().unwrap().contains("\"sphericity\""), "{p}");
+    let p = problem("[figures]\nstories = [\"g99-o1\"]\n");
+    assert!(p.to_string().contains("no model \"g99-o1\""), "{p}");
+    let p = problem("[figures]\nstory = 1\n");
+    assert!(p.to_string().contains("unknown key `story`"), "{p}");
+}

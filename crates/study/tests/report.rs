@@ -1,0 +1,269 @@
+//! The report of a study on made-up run folders: all figures, a part of the runs, damage.
+
+#[path = "../../report/tests/synthetic/mod.rs"]
+mod synthetic;
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use grainwake_study::{Manifest, Plan, RUNS, Rendered, Run, Study, render};
+
+/// The 65 models of the repository, planned as if the made-up folders were theirs.
+fn manifest() -> Manifest {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/dkt-morphology/study.toml");
+    let mut manifest = Plan::of(&Study::read(&path).unwrap(), &[])
+        .unwrap()
+        .manifest;
+    (manifest.version, manifest.commit) = ("0.1.0".into(), Some("0123abc".into()));
+    for run in &mut manifest.runs {
+        (run.case_sha256, run.ending) = ("00ff".into(), "end -, stop -".into());
+    }
+    manifest
+}
+
+/// How long things take in a run, relative to the made-up pair: as the paper has it.
+fn pace(run: &Run) -> f64 {
+    let (s, r) = (run.factors["sphericity"], run.factors["roundness"]);
+    match run.levels.get("orientation").map(String::as_str) {
+        Some("o1") => 1.0 + 0.5 * (1.0 - s) + 0.2 * (1.0 - r),
+        Some("o2" | "o4") => 0.9 + 0.2 * (1.0 - s),
+        _ => 0.7 + 0.05 * (1.0 - s) + 0.03 * (1.0 - r),
+    }
+}
+
+/// Stretches the times of the made-up pair in `from` into `to`.
+fn stretch(from: &Path, to: &Path, factor: f64) {
+    std::fs::create_dir_all(to).unwrap();
+    let read = |name: &str| std::fs::read_to_string(from.join(name)).unwrap();
+    let mut table = String::new();
+    for (i, line) in read("grains.csv").lines().enumerate() {
+        if i == 0 {
+            table += line;
+            table.push('\n');
+            continue;
+        }
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        let scale = |cell: &str, by: f64| (cell.parse::<f64>().unwrap() * by).to_string();
+        cells[0] = scale(&cells[0], factor);
+        for cell in &mut cells[5..8] {
+            *cell = scale(cell, 1.0 / factor);
+        }
+        writeln!(table, "{}", cells.join(",")).unwrap();
+    }
+    std::fs::write(to.join("grains.csv"), table).unwrap();
+    let mut log = String::new();
+    for line in read("events.jsonl").lines() {
+        let mut event: serde_json::Value = serde_json::from_str(line).unwrap();
+        event["time"] = (event["time"].as_f64().unwrap() * factor).into();
+        writeln!(log, "{event}").unwrap();
+    }
+    std::fs::write(to.join("events.jsonl"), log).unwrap();
+    for name in ["case.resolved.toml", "provenance.json"] {
+        std::fs::copy(from.join(name), to.join(name)).unwrap();
+    }
+    let mut summary: serde_json::Value = serde_json::from_str(&read("summary.json")).unwrap();
+    summary["max_cfl"] = 0.3.into();
+    summary["ended_by"] = "landing".into();
+    summary["phase"] = "separated".into();
+    for grain in summary["grains"].as_array_mut().unwrap() {
+        grain["peak_settling_speed_m_per_s"] = 0.1.into();
+        grain["position_m"] = serde_json::json!([0.0, 0.0, 0.0]);
+    }
+    std::fs::write(to.join("summary.json"), summary.to_string()).unwrap();
+}
+
+/// A study folder in which the runs that `wanted` names are finished, and the stories have slices.
+fn study(root: &Path, wanted: impl Fn(&Run) -> bool) -> PathBuf {
+    let folder = root.join("study");
+    let manifest = manifest();
+    let original = root.join("pair");
+    std::fs::create_dir_all(&original).unwrap();
+    synthetic::pair(&original, 0.9, 0.5e-3);
+    for run in manifest.runs.iter().filter(|r| wanted(r)) {
+        let to = run.folder(&folder);
+        let story = manifest.analysis.figures.stories.contains(&run.name);
+        stretch(&original, &to, if story { 1.0 } else { pace(run) });
+        if story {
+            for part in ["slices", "grains"] {
+                std::fs::create_dir_all(to.join(part)).unwrap();
+                for file in std::fs::read_dir(original.join(part)).unwrap().flatten() {
+                    std::fs::copy(file.path(), to.join(part).join(file.file_name())).unwrap();
+                }
+            }
+            std::fs::copy(original.join("run.pvd"), to.join("run.pvd")).unwrap();
+        }
+    }
+    std::fs::create_dir_all(folder.join(RUNS)).unwrap();
+    std::fs::write(
+        folder.join("study.json"),
+        serde_json::to_string(&manifest).unwrap(),
+    )
+    .unwrap();
+    folder
+}
+
+fn names(rendered: &Rendered) -> Vec<String> {
+    let stem = |file: &PathBuf| file.file_stem().unwrap().to_string_lossy().into_owned();
+    rendered.png.iter().map(stem).collect()
+}
+
+fn findings(folder: &Path) -> Vec<(String, String)> {
+    let text = std::fs::read_to_string(folder.join("analysis.json")).unwrap();
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let text = |v: &serde_json::Value| v.as_str().unwrap().to_owned();
+    value["claims"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| (text(&c["claim"]), text(&c["verdict"])))
+        .collect()
+}
+
+#[test]
+fn a_whole_study_gets_all_figures() {
+    let root = tempfile::tempdir().unwrap();
+    let root = std::env::var("GRAINWAKE_GALLERY").map_or(root.path().to_owned(), PathBuf::from);
+    let folder = study(&root, |_| true);
+    let rendered = render(&folder).unwrap();
+    let expected = [
+        "fig04-grains",
+        "fig05-orientations",
+        "fig07-setup",
+        "fig08-g04-o1",
+        "fig09-g04-o3",
+        "fig10-sphere",
+        "fig11-vorticity-g04-o1",
+        "fig12-vorticity-g04-o3",
+        "fig13-vorticity-sphere",
+        "fig14a-kissing-time",
+        "fig14b-kissing-time-spread",
+        "fig15-gap-by-row",
+        "fig16-gap-by-column",
+        "fig17-velocity-by-row",
+        "fig18-velocity-by-column",
+        "correlations",
+    ];
+    assert_eq!(names(&rendered), expected);
+    assert_eq!(rendered.runs, (65, 65));
+    assert!(rendered.notes.is_empty(), "{:?}", rendered.notes);
+    for png in &rendered.png {
+        assert!(
+            std::fs::metadata(png).unwrap().len() > 5000,
+            "{}",
+            png.display()
+        );
+        let svg = std::fs::read_to_string(png.with_extension("svg")).unwrap();
+        let drawn: Vec<&str> = svg.lines().filter(|l| !l.contains("base64")).collect();
+        for wrong in ["NaN", "Minf", "Linf", "\"inf"] {
+            assert!(
+                !drawn.iter().any(|l| l.contains(wrong)),
+                "{}: {wrong}",
+                png.display()
+            );
+        }
+    }
+    let page = std::fs::read_to_string(&rendered.page).unwrap();
+    assert!(page.contains("65 of 65 runs are finished") && !page.contains("Missing or left out"));
+    assert_eq!(page.matches("<figure").count(), 16);
+    assert!(
+        page.contains("<b>Shortest first contact</b>: g16-o3"),
+        "the roundest, most spherical, broad side down"
+    );
+    let found = findings(&folder);
+    let verdict = |claim: &str| {
+        found
+            .iter()
+            .find(|(c, _)| c.contains(claim))
+            .map(|(_, v)| v.as_str())
+            .unwrap()
+    };
+    assert_eq!(
+        verdict("longer in orientation 1 than in orientation 2"),
+        "holds"
+    );
+    assert_eq!(verdict("same in orientations 2 and 4"), "holds");
+    assert_eq!(
+        verdict("Lower sphericity prolongs the drafting in orientation 1"),
+        "holds"
+    );
+    assert_eq!(
+        verdict("orientation 3 sphericity does not change the drafting"),
+        "contradicted"
+    );
+    // What is thinned out is small, and enough to draw the curves again without the run folders.
+    let size: u64 = std::fs::read_dir(folder.join("histories"))
+        .unwrap()
+        .flatten()
+        .map(|f| f.metadata().unwrap().len())
+        .sum();
+    assert!(size < 30_000_000, "{size}");
+    let kept = |name: &str| std::fs::read(folder.join(name)).unwrap();
+    let (table, analysis) = (kept("table.csv"), kept("analysis.json"));
+    std::fs::rename(folder.join(RUNS), root.join("elsewhere")).unwrap();
+    let again = render(&folder).unwrap();
+    std::fs::rename(root.join("elsewhere"), folder.join(RUNS)).unwrap();
+    assert_eq!(
+        (table, analysis),
+        (kept("table.csv"), kept("analysis.json"))
+    );
+    let drawn = names(&again);
+    assert!(drawn.contains(&"fig15-gap-by-row".into()) && !drawn.contains(&"fig08-g04-o1".into()));
+}
+
+#[test]
+fn a_part_of_a_study_is_drawn_and_what_is_missing_is_said() {
+    let root = tempfile::tempdir().unwrap();
+    let some = |run: &Run| {
+        ["g01", "g06"]
+            .iter()
+            .any(|g| run.levels.get("grain").is_some_and(|l| l == g))
+    };
+    let folder = study(root.path(), some);
+    // One of them has failed, one has lost its end.
+    let place = |name: &str| folder.join(RUNS).join(name);
+    std::fs::remove_file(place("g06-o3").join("summary.json")).unwrap();
+    std::fs::remove_file(place("g01-o1").join("summary.json")).unwrap();
+    std::fs::write(
+        place("g01-o1").join("failure.json"),
+        "{\"what\":\"it blew up\"}",
+    )
+    .unwrap();
+    let rendered = render(&folder).unwrap();
+    assert_eq!(rendered.runs, (6, 65));
+    let drawn = names(&rendered);
+    assert!(
+        drawn.contains(&"fig14a-kissing-time".into()) && drawn.contains(&"fig04-grains".into())
+    );
+    assert!(!drawn.iter().any(|n| n.contains("vorticity")));
+    let page = std::fs::read_to_string(&rendered.page).unwrap();
+    for part in [
+        "6 of 65 runs are finished",
+        "unfinished: g06-o3",
+        "g01-o1: it blew up",
+        "there is no run sphere",
+        "too few to say anything",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+}
+
+#[test]
+fn an_empty_study_has_a_page_and_a_damaged_one_an_error() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = study(root.path(), |_| false);
+    let rendered = render(&folder).unwrap();
+    assert_eq!(rendered.runs, (0, 65));
+    assert!(
+        std::fs::read_to_string(&rendered.page)
+            .unwrap()
+            .contains("0 of 65 runs are finished")
+    );
+    std::fs::write(folder.join("study.json"), "{").unwrap();
+    assert!(
+        render(&folder)
+            .unwrap_err()
+            .to_string()
+            .contains("study.json is damaged")
+    );
+}

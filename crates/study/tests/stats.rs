@@ -1,0 +1,112 @@
+//! Rank statistics against textbooks and tables.
+
+use grainwake_study::stats::{
+    median, quartile, ranks, relative_spread, signed_rank, spearman, wider,
+};
+
+#[test]
+fn ties_share_their_ranks() {
+    assert_eq!(ranks(&[3.0, 1.0, 3.0, 2.0]), [3.5, 1.0, 3.5, 2.0]);
+    assert!(ranks(&[]).is_empty());
+}
+
+#[test]
+fn spearman_of_known_samples() {
+    // The textbook example of intelligence and hours of television: rho = -29/165.
+    let iq = [
+        106.0, 100.0, 86.0, 101.0, 99.0, 103.0, 97.0, 113.0, 112.0, 110.0,
+    ];
+    let hours = [7.0, 27.0, 2.0, 50.0, 28.0, 29.0, 20.0, 12.0, 6.0, 17.0];
+    let found = spearman(&iq, &hours).unwrap();
+    assert!((found.value + 29.0 / 165.0).abs() < 1e-12);
+    assert!((found.p - 0.627_188).abs() < 1e-5, "{}", found.p);
+    // Fisher: atanh(-.17576) -+ 1.96 sqrt((1 + .0154) / 7)
+    assert!(
+        (found.low + 0.729).abs() < 2e-3 && (found.high - 0.513).abs() < 2e-3,
+        "{found:?}"
+    );
+    let rising: Vec<f64> = (0..16).map(f64::from).collect();
+    let cubes: Vec<f64> = rising.iter().map(|x| x.powi(3)).collect();
+    let perfect = spearman(&rising, &cubes).unwrap();
+    assert!(perfect.value == 1.0 && perfect.p == 0.0 && perfect.low > 0.9 && perfect.high < 1.0);
+    assert!(spearman(&rising, &[1.0; 16]).is_none());
+    assert!(spearman(&[1.0, 2.0, 3.0], &[1.0, 2.0, 3.0]).is_none());
+}
+
+#[test]
+fn signed_ranks_of_known_samples() {
+    // Exact tables: for n = 8 the sum 3 has a two-sided p of 2 * 5/256, and the 95 % interval
+    // leaves out three means of two at each end.
+    let d = [1.1, 2.2, 3.3, 4.4, 5.5, 6.6, -0.4, 7.7];
+    let found = signed_rank(&d).unwrap();
+    assert!(
+        (found.p - 2.0 * 2.0 / 256.0).abs() < 1e-12,
+        "only the smallest is negative: {}",
+        found.p
+    );
+    let d = [1.1, -2.2, 3.3, 4.4, 5.5, 6.6, 7.7, 8.8];
+    assert!((signed_rank(&d).unwrap().p - 2.0 * 3.0 / 256.0).abs() < 1e-12);
+    let mut means: Vec<f64> = Vec::new();
+    for i in 0..8 {
+        means.extend((i..8).map(|j| 0.5 * (d[i] + d[j])));
+    }
+    means.sort_by(f64::total_cmp);
+    let found = signed_rank(&d).unwrap();
+    assert_eq!(
+        (found.low, found.high),
+        (means[3], means[32]),
+        "the tables' fourth from each end"
+    );
+    // Sixteen differences: the tables' critical value is 29.
+    let d: Vec<f64> = (1..=16).map(|i| 3.0f64.powi(i)).collect();
+    let mut means: Vec<f64> = Vec::new();
+    for i in 0..16 {
+        means.extend((i..16).map(|j| 0.5 * (d[i] + d[j])));
+    }
+    means.sort_by(f64::total_cmp);
+    let found = signed_rank(&d).unwrap();
+    assert_eq!((found.low, found.high), (means[29], means[136 - 30]));
+    assert!(signed_rank(&[0.0; 8]).unwrap().p == 1.0);
+    assert!(signed_rank(&[1.0, 2.0]).is_none());
+}
+
+#[test]
+fn intervals_cover_what_they_should() {
+    // Differences spread evenly about 0.3: about 95 of 100 intervals hold it.
+    let mut state = 1u64;
+    let mut random = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let (mut held, mut correlated) = (0, 0);
+    for _ in 0..1000 {
+        let d: Vec<f64> = (0..16).map(|_| 0.3 + random() + random() - 1.0).collect();
+        let found = signed_rank(&d).unwrap();
+        held += usize::from(found.low <= 0.3 && 0.3 <= found.high);
+        let (x, y): (Vec<f64>, Vec<f64>) = (0..16).map(|_| (random(), random())).unzip();
+        let found = spearman(&x, &y).unwrap();
+        correlated += usize::from(found.low > 0.0 || found.high < 0.0);
+    }
+    assert!((930..=975).contains(&held), "{held}");
+    assert!((25..=75).contains(&correlated), "{correlated}");
+}
+
+#[test]
+fn quartiles_and_spreads() {
+    let v = [4.0, 1.0, 3.0, 2.0];
+    assert_eq!(
+        (quartile(&v, 0.0), median(&v), quartile(&v, 1.0)),
+        (Some(1.0), Some(2.5), Some(4.0))
+    );
+    assert_eq!(quartile(&v, 0.25), Some(1.75));
+    assert_eq!(median(&[]), None);
+    assert!((relative_spread(&[9.0, 11.0]).unwrap() - 2f64.sqrt() / 10.0).abs() < 1e-12);
+    let narrow: Vec<f64> = (0..12)
+        .map(|i| 10.0 + 0.1 * f64::from(i * 5 % 12))
+        .collect();
+    let wide: Vec<f64> = (0..12).map(|i| 10.0 + f64::from(i * 7 % 12)).collect();
+    assert!(wider(&wide, &narrow).unwrap().low > 0.0);
+    assert!(wider(&narrow, &wide).unwrap().high < 0.0);
+}
