@@ -86,7 +86,7 @@ pub struct CheckArgs {
 /// Arguments of `validate`.
 #[derive(Debug, Args)]
 pub struct ValidateArgs {
-    /// Validations, by name; all if none is given
+    /// Validations, NAME or NAME/RUN; all if none is given
     pub names: Vec<String>,
     /// How much: small runs, or all at the published resolutions
     #[arg(long, default_value = "ci", value_parser = ["ci", "full"])]

@@ -200,6 +200,7 @@ fn setup(cells: [usize; 3], scheme: Scheme) -> Setup {
         rotation: Dof::Free,
     };
     Setup {
+        prescription: Default::default(),
         mesh,
         boundaries: Boundaries([[Boundary::WALL; 2]; 3]),
         fluid: Some(FluidParams {

@@ -75,6 +75,7 @@ fn main() {
             let mut f = fluid(1.0, 1.0 / re);
             f.initial_velocity = u;
             let mut s = Simulation::new(Setup {
+                prescription: Default::default(),
                 mesh,
                 boundaries: Boundaries([
                     [Boundary::Inflow { velocity: u }, Boundary::Outflow],
@@ -134,6 +135,7 @@ fn main() {
             g.translation = Dof::Prescribed(DVec3::ZERO);
             g.rotation = Dof::Prescribed(DVec3::new(0.0, om, 0.0));
             let mut s = Simulation::new(Setup {
+                prescription: Default::default(),
                 mesh,
                 boundaries: Boundaries([[wall; 2]; 3]),
                 fluid: Some(fluid(1.0, nu)),
@@ -181,6 +183,7 @@ fn main() {
                 },
             ];
             let mut s = Simulation::new(Setup {
+                prescription: Default::default(),
                 mesh,
                 boundaries: Boundaries([per, per, b]),
                 fluid: Some(fluid(1.0, nu)),
@@ -219,6 +222,7 @@ fn main() {
             };
             let g = sphere(0.015, DVec3::new(0.05, 0.05, 0.1275), 1120.0);
             let mut s = Simulation::new(Setup {
+                prescription: Default::default(),
                 mesh,
                 boundaries: Boundaries([[wall; 2]; 3]),
                 fluid: Some(fluid(rho, mu / rho)),
@@ -274,6 +278,7 @@ fn main() {
                 sphere(2e-3, 0.5 * e + DVec3::new(0.0, 0.0, 5e-3), 1500.0),
             ];
             let mut s = Simulation::new(Setup {
+                prescription: Default::default(),
                 mesh,
                 boundaries: Boundaries([[wall; 2]; 3]),
                 fluid: Some(fluid(1000.0, 1e-6)),
@@ -330,6 +335,7 @@ fn main() {
                 ..Default::default()
             };
             let mut s = Simulation::new(Setup {
+                prescription: Default::default(),
                 mesh,
                 boundaries: Boundaries([[wall; 2]; 3]),
                 fluid: Some(fluid(1.0, 4.7e-3)),
@@ -391,6 +397,7 @@ fn main() {
             f.initial_velocity = -frame;
             let w = Boundary::Wall { velocity: -frame };
             let mut s = Simulation::new(Setup {
+                prescription: Default::default(),
                 mesh,
                 boundaries: Boundaries([per, [w; 2], [w; 2]]),
                 fluid: Some(f),

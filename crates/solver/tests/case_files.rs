@@ -483,6 +483,58 @@ fn motion_and_orientation_have_several_forms() {
 }
 
 #[test]
+fn vectors_may_be_formulas() {
+    let text = PAIR
+        .replacen(
+            "density = \"1500 kg/m3\"",
+            "density = \"1500 kg/m3\"\nmotion = { velocity = { formula = [0, \"0.1*t\", \"cos(3*t)\"] }, angular_velocity = \"fixed\" }",
+            1,
+        )
+        .replacen(
+            "[fluid]",
+            "[fluid]\ninitial_velocity = { formula = [\"z\", 0, \"2*x - y\"] }\nbody_acceleration = { formula = [\"exp(-t)\", 0, 0] }",
+            1,
+        );
+    let case = good(&text);
+    let setup = &case.setup;
+    assert_eq!(
+        setup.grains[0].translation,
+        Dof::Prescribed(DVec3::new(0.0, 0.0, 1.0))
+    );
+    assert_eq!(setup.grains[0].velocity, DVec3::new(0.0, 0.0, 1.0));
+    let start = setup.prescription.initial_velocity.as_ref().unwrap();
+    assert_eq!(start.at(&[1.0, 2.0, 3.0]), DVec3::new(3.0, 0.0, 0.0));
+    assert_eq!(
+        setup.prescription.body_acceleration(0.0),
+        Some(DVec3::new(1.0, 0.0, 0.0))
+    );
+    let again = good(&case.resolved);
+    assert_eq!(case.resolved, again.resolved);
+    let fluid = |to: &str, words: &[&str]| {
+        refused("[fluid]", &format!("[fluid]\n{to}"), "fluid", words);
+    };
+    fluid(
+        "initial_velocity = { formula = [\"t\", 0, 0] }",
+        &["unknown name \"t\"", "x, y, z"],
+    );
+    fluid(
+        "initial_velocity = { formula = [\"1/(x - 0.0125)\", 0, 0] }",
+        &["finite number"],
+    );
+    fluid("body_acceleration = { formula = [\"t\", 0] }", &["three"]);
+    fluid(
+        "body_acceleration = { formula = [\"sqrt(t - 1)\", 0, 0] }",
+        &["finite number"],
+    );
+    refused(
+        "density = \"1500 kg/m3\"",
+        "density = \"1500 kg/m3\"\nmotion = { velocity = { formula = [0, 0, \"x\"] } }",
+        "grain",
+        &["unknown name \"x\""],
+    );
+}
+
+#[test]
 fn packings_become_grains() {
     let text = r#"
         [domain]
@@ -557,6 +609,10 @@ fn overrides_are_located_too() {
     );
     let case = case.unwrap_or_else(|e| panic!("{e}"));
     assert_eq!((case.plan.end, case.setup.grains[1].density), (2.0, 2000.0));
+    let set = |item: &str| Case::parse(PAIR, "case.toml", Path::new("."), &[item.into()]);
+    let formula = set("domain.origin={ formula = [0, 0, 0] }");
+    assert!(formula.is_err_and(|e| e.to_string().contains("three components")));
+    assert!(set("domain.origin.0=1").is_ok_and(|c| c.setup.mesh.origin.x == 1.0));
     let Err(error) = Case::parse(
         PAIR,
         "case.toml",

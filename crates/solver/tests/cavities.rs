@@ -18,6 +18,7 @@ fn steady(reynolds: f64, cells: [usize; 3], y: [Boundary; 2]) -> Simulation {
     let wall = [Boundary::WALL; 2];
     let lid = Boundary::Wall { velocity: DVec3::X };
     let mut simulation = Simulation::new(Setup {
+        prescription: Default::default(),
         mesh: Mesh {
             cells,
             spacing: DVec3::splat(1.0 / cells[0] as f64),

@@ -91,7 +91,9 @@ fn study(root: &Path, wanted: impl Fn(&Run) -> bool) -> PathBuf {
                     std::fs::copy(file.path(), to.join(part).join(file.file_name())).unwrap();
                 }
             }
-            std::fs::copy(original.join("run.pvd"), to.join("run.pvd")).unwrap();
+            for file in ["run.pvd", "diagnostics.csv"] {
+                std::fs::copy(original.join(file), to.join(file)).unwrap();
+            }
         }
     }
     std::fs::create_dir_all(folder.join(RUNS)).unwrap();

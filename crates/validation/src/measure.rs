@@ -151,6 +151,9 @@ impl Check {
             evaluate(&along, &columns, &self.constants)?,
             evaluate(&w.of, &columns, &self.constants)?,
         );
+        if matches!(self.take, Take::CurveMax | Take::CurveRms) {
+            return self.distance_from_curve(&x, &y);
+        }
         let (low, high) = (
             w.from.unwrap_or(f64::NEG_INFINITY),
             w.to.unwrap_or(f64::INFINITY),
@@ -182,8 +185,7 @@ impl Check {
             Take::Value => w.at.and_then(|at| signal::interpolate(&x, &y, at)),
             Take::FirstZero => signal::crossings(&x, &y).first().map(|c| c.0),
             Take::LastZero => signal::crossings(&x, &y).last().map(|c| c.0),
-            Take::CurveMax | Take::CurveRms => Some(self.distance_from_curve(&x, &y)?),
-            Take::Summary => None,
+            Take::CurveMax | Take::CurveRms | Take::Summary => None,
         };
         found.ok_or_else(|| format!("'{}' has no such value in this run", w.of))
     }
@@ -193,12 +195,17 @@ impl Check {
         let data = Columns::of_data(w.data.as_deref().unwrap_or(Path::new("")))?;
         let at = evaluate(&w.x, &data, &self.constants)?;
         let expected = evaluate(&w.y, &data, &self.constants)?;
+        // A profile is smooth on its grid; a history may hold an impact.
+        let interpolate = match w.table {
+            From::Slice(_) => signal::interpolate_smooth,
+            _ => signal::interpolate,
+        };
         let mut distances = Vec::new();
         for (at, expected) in at.iter().zip(&expected) {
             if w.from.is_some_and(|low| *at < low) || w.to.is_some_and(|high| *at > high) {
                 continue;
             }
-            let Some(value) = signal::interpolate(x, y, *at) else {
+            let Some(value) = interpolate(x, y, *at) else {
                 return Err(format!(
                     "the run has no value at {at}, where the reference has"
                 ));

@@ -28,6 +28,22 @@ pub fn interpolate(x: &[f64], y: &[f64], at: f64) -> Option<f64> {
     Some(y0 + (y1 - y0) * (at - x0) / (x1 - x0))
 }
 
+/// Value at `at` of the cubic through the four samples about it; none outside the samples.
+pub fn interpolate_smooth(x: &[f64], y: &[f64], at: f64) -> Option<f64> {
+    let straight = interpolate(x, y, at)?;
+    if x.len() < 4 {
+        return Some(straight);
+    }
+    let after = x.partition_point(|v| *v < at);
+    let first = after.saturating_sub(2).min(x.len() - 4);
+    let near = first..first + 4;
+    let weight = |j: usize| -> f64 {
+        let others = near.clone().filter(|k| *k != j);
+        others.map(|k| (at - x[k]) / (x[j] - x[k])).product()
+    };
+    Some(near.clone().map(|j| weight(j) * y[j]).sum())
+}
+
 /// Places where the function goes through zero, upwards and downwards.
 pub fn crossings(x: &[f64], y: &[f64]) -> Vec<(f64, bool)> {
     let mut found = Vec::new();
@@ -86,6 +102,18 @@ mod tests {
         let f = frequency(&x, &y).unwrap();
         assert!((f * std::f64::consts::TAU / 1.7 - 1.0).abs() < 2e-3, "{f}");
         assert!((mean(&x, &y).unwrap() - 3.0).abs() < 0.12);
+    }
+
+    #[test]
+    fn a_cubic_is_met_between_its_samples() {
+        let x: Vec<f64> = [0.0, 0.7, 1.1, 2.0, 2.5, 3.6].to_vec();
+        let f = |x: f64| 2.0 - x + 0.5 * x * x - 0.3 * x * x * x;
+        let y: Vec<f64> = x.iter().map(|x| f(*x)).collect();
+        for at in [0.0, 0.1, 1.05, 1.9, 2.7, 3.6] {
+            let found = interpolate_smooth(&x, &y, at).unwrap();
+            assert!((found - f(at)).abs() < 1e-13, "{at}: {found}");
+        }
+        assert_eq!(interpolate_smooth(&x, &y, 3.7), None);
     }
 
     #[test]

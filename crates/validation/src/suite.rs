@@ -182,6 +182,23 @@ impl Suite {
         build(&source, raw, folder, name).map_err(|p| SuiteError::Invalid(Box::new(p)))
     }
 
+    /// The suite with the runs whose names are `wanted`, and those that their checks compare with.
+    pub fn only(mut self, wanted: impl Fn(&str) -> bool) -> Suite {
+        let needed: Vec<String> = self
+            .runs
+            .iter()
+            .filter(|run| wanted(&run.name))
+            .flat_map(|run| &run.checks)
+            .filter_map(|check| match &check.reference {
+                Some(Reference::Run(name)) => Some(name.clone()),
+                _ => None,
+            })
+            .collect();
+        self.runs
+            .retain(|run| wanted(&run.name) || needed.contains(&run.name));
+        self
+    }
+
     /// The validations below `root`, in order of name.
     ///
     /// # Errors

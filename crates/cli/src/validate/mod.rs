@@ -106,7 +106,19 @@ fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
         ));
     }
     for name in names {
-        if !known.contains(name) {
+        let (suite, run) = name.split_once('/').unwrap_or((name, ""));
+        if let Some(suite) = all.iter().find(|s| s.name == suite && !run.is_empty()) {
+            let runs: Vec<&str> = suite.runs.iter().map(|r| r.name.as_str()).collect();
+            if !runs.contains(&run) {
+                let hint = nearest(run, runs.iter().copied())
+                    .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
+                return Err(Exit::with_help(
+                    BAD_INPUT,
+                    format!("the validation \"{}\" has no run \"{run}\"", suite.name),
+                    format!("{hint}It has: {}", runs.join(", ")),
+                ));
+            }
+        } else if !known.iter().any(|known| known == name) {
             let hint = nearest(name, known.iter().map(String::as_str))
                 .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
             return Err(Exit::with_help(
@@ -116,8 +128,17 @@ fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
             ));
         }
     }
-    let wanted = |suite: &Suite| names.is_empty() || names.contains(&suite.name);
-    Ok(all.into_iter().filter(wanted).collect())
+    let mut chosen = Vec::new();
+    for mut suite in all {
+        if !names.is_empty() && !names.contains(&suite.name) {
+            let name = suite.name.clone();
+            suite = suite.only(|run| names.contains(&format!("{name}/{run}")));
+        }
+        if !suite.runs.is_empty() {
+            chosen.push(suite);
+        }
+    }
+    Ok(chosen)
 }
 
 /// Carries out one run. The outer error ends the command, the inner one only this run.

@@ -194,7 +194,10 @@ fn time_step(setup: &Setup, speed: f64) -> f64 {
                 }
                 _ => 0.0,
             });
-            let given = fluid.initial_velocity.abs().element_sum();
+            let given = setup
+                .prescription
+                .initial_speed(&setup.mesh)
+                .unwrap_or(fluid.initial_velocity.abs().element_sum());
             // Next to a settling grain the fluid is somewhat faster than the grain.
             let speed = lids.fold((1.4 * speed).max(given), f64::max);
             let smallest = h.iter().copied().fold(f64::INFINITY, f64::min);

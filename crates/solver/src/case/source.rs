@@ -198,6 +198,14 @@ fn merge<'i>(base: &mut DeTable<'i>, extra: DeTable<'i>) -> Result<(), String> {
                     merge(old, new)?;
                 }
             }
+            // `{ formula = ... }` in place of `[x, y, z]`, not `vector.0 = ...`.
+            (Some(DeValue::Array(items)), DeValue::Table(new))
+                if items.iter().all(|item| !item.get_ref().is_table())
+                    && new.keys().all(|key| key.get_ref().parse::<usize>().is_err()) =>
+            {
+                base.remove(&key);
+                base.insert(key, value);
+            }
             (Some(DeValue::Array(items)), DeValue::Table(_)) => {
                 let DeValue::Table(new) = value.into_inner() else {
                     continue;

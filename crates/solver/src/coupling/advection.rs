@@ -50,15 +50,14 @@ fn correct_links(
     let step = IVec3::AXES[along];
     let inverse = 1.0 / mesh.spacing[along];
     let middle = DVec3::from_array(FACE_OFFSET[component]) + 0.5 * step.as_dvec3() - 1.0;
-    let distance = &body.distance[component];
     let last = body.size - step;
     for k in 0..last.z {
         for j in 0..last.y {
             for i in 0..last.x {
                 let there = IVec3::new(i, j, k) + step;
                 let d = 0.5
-                    * (distance[body.local(i, j, k)]
-                        + distance[body.local(there.x, there.y, there.z)]);
+                    * (body.own_distance(component, body.local(i, j, k))
+                        + body.own_distance(component, body.local(there.x, there.y, there.z)));
                 if d >= 2.0 * band || d <= -band {
                     continue;
                 }

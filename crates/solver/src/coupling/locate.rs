@@ -10,7 +10,7 @@ use crate::dem::Grain;
 use crate::flow::Boundaries;
 use crate::grid::{FACE_OFFSET, Mesh};
 
-/// Distances that differ by less than this part of the band are equal: of two copies of a face
+/// Distances that differ by less than this part of the band are equal: of two copies of a link
 /// across a periodic edge just one must count.
 const TIE: f64 = 1e-9;
 
@@ -25,8 +25,12 @@ pub struct ForcedFace {
     pub arm: DVec3,
     /// Share by which the face takes the rigid velocity, 0 to 1.
     pub share: f64,
-    /// Share of the pressure gradient that does not act there, 0 to 1.
-    pub relief: f64,
+    /// Part of the face that the grain closes to the pressure gradient, 0 to 1.
+    pub closed: f64,
+    /// Part that all grains together close.
+    pub closed_by_all: f64,
+    /// Velocity there without the drag of the grains [m/s]; known once the impulse is.
+    pub free: f64,
 }
 
 /// One grain on the grid.
@@ -36,9 +40,11 @@ pub struct Body {
     pub first: IVec3,
     /// Cells of the box.
     pub size: IVec3,
-    /// Signed distance [m] at the faces of the box for each component; infinite where another
-    /// grain is nearer.
+    /// Signed distance [m] at the faces of the box for each component; infinite where it does not
+    /// matter.
     pub distance: [Vec<f64>; 3],
+    /// Smallest distance from another grain there [m]; infinite where none is near.
+    rival_distance: [Vec<f64>; 3],
     /// Faces under its rigidity.
     pub forced: Vec<ForcedFace>,
 }
@@ -49,14 +55,24 @@ impl Body {
     pub fn local(&self, i: i32, j: i32, k: i32) -> usize {
         (i + self.size.x * (j + self.size.y * k)) as usize
     }
-}
 
-impl Body {
+    /// Distance from the grain at position `at`, where no other grain is nearer.
+    #[inline]
+    pub fn own_distance(&self, component: usize, at: usize) -> f64 {
+        let d = self.distance[component][at];
+        if d <= self.rival_distance[component][at] {
+            d
+        } else {
+            f64::INFINITY
+        }
+    }
+
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
         let distances: usize = self
             .distance
             .iter()
+            .chain(&self.rival_distance)
             .map(|values| size_of::<f64>() * values.capacity())
             .sum();
         distances + size_of::<ForcedFace>() * self.forced.capacity()
@@ -142,16 +158,22 @@ impl Locator {
     /// Finds all grains for a step of length `dt` [s].
     pub fn locate(&self, grains: &[Grain], dt: f64, bodies: &mut [Body]) {
         bodies.par_iter_mut().enumerate().for_each(|(index, body)| {
-            self.measure(grains, index, body);
-            self.list(&grains[index], dt, body);
+            let rivals = self.rivals(grains, index);
+            self.measure(grains, index, &rivals, body);
+            self.list(grains, index, &rivals, dt, body);
         });
     }
 
+    /// How far from its surface a grain matters [m].
+    fn reach(&self) -> f64 {
+        2.0 * self.eps + 0.5 * self.mesh.spacing.max_element()
+    }
+
     /// Distances in the box about grain `index`.
-    fn measure(&self, grains: &[Grain], index: usize, body: &mut Body) {
+    fn measure(&self, grains: &[Grain], index: usize, rivals: &[Rival], body: &mut Body) {
         let (mesh, grain) = (&self.mesh, &grains[index]);
         let centre = grain.pose.position;
-        let reach = 2.0 * self.eps + 0.5 * mesh.spacing.max_element();
+        let reach = self.reach();
         let turn = glam::DMat3::from_quat(grain.pose.orientation);
         let (lower, upper) = (grain.shape.lower(), grain.shape.upper());
         let middle = centre + turn * (0.5 * (lower + upper));
@@ -169,13 +191,15 @@ impl Locator {
             body.first[axis] = from.floor() as i32 + 1;
             body.size[axis] = to.floor() as i32 + 2 - body.first[axis];
         }
-        let rivals = self.rivals(grains, index, reach);
         let far = grain.shape.bounding_radius() + reach;
         let count = (body.size.x * body.size.y * body.size.z) as usize;
         for (component, offset) in FACE_OFFSET.iter().enumerate() {
             let mut distance = std::mem::take(&mut body.distance[component]);
-            distance.clear();
-            distance.resize(count, f64::INFINITY);
+            let mut rival_distance = std::mem::take(&mut body.rival_distance[component]);
+            for values in [&mut distance, &mut rival_distance] {
+                values.clear();
+                values.resize(count, f64::INFINITY);
+            }
             for k in 0..body.size.z {
                 for j in 0..body.size.y {
                     for i in 0..body.size.x {
@@ -184,26 +208,27 @@ impl Locator {
                             continue;
                         }
                         let d = grain.shape.distance(grain.pose.to_body(x));
-                        let nearer = |rival: &Rival| {
-                            let other = &grains[rival.index];
-                            let there = other.shape.distance(other.pose.to_body(x - rival.shift));
-                            let tie = (there - d).abs() <= TIE * self.eps;
-                            if tie { rival.wins_ties } else { there < d }
-                        };
-                        if d <= reach && !rivals.iter().any(nearer) {
-                            distance[body.local(i, j, k)] = d;
+                        if d > reach {
+                            continue;
                         }
+                        let at = body.local(i, j, k);
+                        distance[at] = d;
+                        rival_distance[at] = rivals
+                            .iter()
+                            .map(|rival| rival.distance(grains, x) + rival.handicap * self.eps)
+                            .fold(f64::INFINITY, f64::min);
                     }
                 }
             }
             body.distance[component] = distance;
+            body.rival_distance[component] = rival_distance;
         }
     }
 
     /// Grains, and periodic images of them and of the grain itself, whose band may meet that of
     /// grain `index`.
-    fn rivals(&self, grains: &[Grain], index: usize, reach: f64) -> Vec<Rival> {
-        let (grain, extent) = (&grains[index], self.mesh.extent());
+    fn rivals(&self, grains: &[Grain], index: usize) -> Vec<Rival> {
+        let (grain, extent, reach) = (&grains[index], self.mesh.extent(), self.reach());
         let mut rivals = Vec::new();
         for (other, rival) in grains.iter().enumerate() {
             let radii = grain.shape.bounding_radius() + rival.shape.bounding_radius();
@@ -232,10 +257,10 @@ impl Locator {
                         rivals.push(Rival {
                             index: other,
                             shift,
-                            wins_ties: if own {
-                                image.to_array() > [0; 3]
-                            } else {
-                                other < index
+                            handicap: match own {
+                                true if image.to_array() > [0; 3] => -TIE,
+                                false if other < index => -TIE,
+                                _ => TIE,
                             },
                         });
                     }
@@ -245,31 +270,56 @@ impl Locator {
         rivals
     }
 
-    /// Lists the faces under the rigidity of `grain`.
-    fn list(&self, grain: &Grain, dt: f64, body: &mut Body) {
+    /// Lists the faces under the rigidity of grain `index`.
+    fn list(&self, grains: &[Grain], index: usize, rivals: &[Rival], dt: f64, body: &mut Body) {
+        let grain = &grains[index];
         let mut forced = std::mem::take(&mut body.forced);
         forced.clear();
         for (component, offset) in FACE_OFFSET.iter().enumerate() {
             for k in 0..body.size.z {
                 for j in 0..body.size.y {
                     for i in 0..body.size.x {
-                        let d = body.distance[component][body.local(i, j, k)];
+                        let local = body.local(i, j, k);
+                        let d = body.distance[component][local];
                         if d >= 2.0 * self.eps {
                             continue;
                         }
+                        let rival = body.rival_distance[component][local];
+                        let inside_rival = rival <= -self.eps && rival < d;
                         let cell = body.first + IVec3::new(i, j, k);
                         let Some(at) = self.unknowns.at(component, cell) else {
                             continue;
                         };
+                        if inside_rival {
+                            continue;
+                        }
                         let x = self.position(offset, cell);
-                        let (share, relief) = self.share(grain, x, d, dt);
-                        if share > 0.0 || relief > 0.0 {
+                        let own = self.hold(grain, x, d, dt);
+                        let mut all = own;
+                        if rival < 2.0 * self.eps && d > -self.eps {
+                            for rival in rivals {
+                                let there = rival.distance(grains, x);
+                                if there < 2.0 * self.eps {
+                                    let other = &grains[rival.index];
+                                    all = all + self.hold(other, x - rival.shift, there, dt);
+                                }
+                            }
+                        }
+                        let closed_by_all = all.closed.min(1.0);
+                        let share = if own.strength.is_finite() {
+                            own.strength / (1.0 + all.strength)
+                        } else {
+                            1.0
+                        };
+                        if share > 0.0 || own.closed > 0.0 {
                             forced.push(ForcedFace {
                                 axis: component,
                                 at,
                                 arm: x - grain.pose.position,
                                 share,
-                                relief,
+                                closed: own.closed / all.closed.max(1.0),
+                                closed_by_all,
+                                free: 0.0,
                             });
                         }
                     }
@@ -279,26 +329,30 @@ impl Locator {
         body.forced = forced;
     }
 
-    fn share(&self, grain: &Grain, x: DVec3, d: f64, dt: f64) -> (f64, f64) {
+    /// How a surface at distance `d` holds the face at `x` for a step of `dt`.
+    fn hold(&self, grain: &Grain, x: DVec3, d: f64, dt: f64) -> Hold {
         let normal = || {
             let (_, gradient) = grain.shape.distance_and_gradient(grain.pose.to_body(x));
             grain.pose.orientation * gradient.normalize_or_zero()
         };
         match self.scheme {
-            Scheme::Aperture if d <= -self.eps => (1.0, 1.0),
-            Scheme::Aperture => {
-                let strength =
-                    dt * self.kinematic_viscosity * drag(d, normal(), self.mesh.spacing, self.eps);
-                let share = if strength.is_finite() {
-                    strength / (1.0 + strength)
-                } else {
-                    1.0
-                };
-                (share, 1.0 - aperture(d, self.eps))
-            }
+            Scheme::Aperture if d <= -self.eps => Hold {
+                strength: f64::INFINITY,
+                closed: 1.0,
+            },
+            Scheme::Aperture => Hold {
+                strength: dt
+                    * self.kinematic_viscosity
+                    * drag(d, normal(), self.mesh.spacing, self.eps),
+                closed: 1.0 - aperture(d, self.eps),
+            },
             Scheme::Paper => {
                 let width = normal().abs().dot(self.mesh.spacing);
-                ((0.5 - d / width).clamp(0.0, 1.0), 0.0)
+                let share = (0.5 - d / width).clamp(0.0, 1.0);
+                Hold {
+                    strength: share / (1.0 - share),
+                    closed: 0.0,
+                }
             }
         }
     }
@@ -315,6 +369,34 @@ struct Rival {
     index: usize,
     /// From the grain to the image in question [m].
     shift: DVec3,
-    /// Whether it has the faces that are as far from both.
-    wins_ties: bool,
+    /// Added to its distance, as a part of the band, so that it has the faces as far from both or
+    /// has not.
+    handicap: f64,
+}
+
+impl Rival {
+    /// Distance of `x` from its surface [m].
+    fn distance(&self, grains: &[Grain], x: DVec3) -> f64 {
+        let grain = &grains[self.index];
+        grain.shape.distance(grain.pose.to_body(x - self.shift))
+    }
+}
+
+/// How surfaces hold a face.
+#[derive(Clone, Copy)]
+struct Hold {
+    /// Drag times the step: the face takes strength / (1 + strength) of the rigid velocity.
+    strength: f64,
+    /// Part closed to the pressure gradient.
+    closed: f64,
+}
+
+impl std::ops::Add for Hold {
+    type Output = Hold;
+    fn add(self, other: Hold) -> Hold {
+        Hold {
+            strength: self.strength + other.strength,
+            closed: self.closed + other.closed,
+        }
+    }
 }

@@ -82,18 +82,19 @@ impl Coupling {
         } else {
             0.0
         };
-        for (index, body) in self.bodies.iter().enumerate() {
-            let grain = &mut grains[index];
-            let impulse = rigidity::gather(flow, self.fluid_density, body, relief);
+        for (index, body) in self.bodies.iter_mut().enumerate() {
+            let impulse = rigidity::gather(flow, self.fluid_density, body, before[index], relief);
             loads[index] = rigidity::advance(
-                grain,
+                &mut grains[index],
                 before[index],
                 &impulse,
                 self.fluid_density,
                 other[index],
                 dt,
             );
-            rigidity::impose(flow, grain, body, relief);
+        }
+        for (index, body) in self.bodies.iter().enumerate() {
+            rigidity::impose(flow, &grains[index], body, before[index], relief);
         }
     }
 
@@ -108,8 +109,12 @@ impl Coupling {
         }
         // A step this long closes every face of the band.
         self.locate(grains, f64::MAX.sqrt());
+        let still = [DVec3::ZERO; 2];
+        for body in &mut self.bodies {
+            rigidity::gather(flow, self.fluid_density, body, still, 0.0);
+        }
         for (grain, body) in grains.iter().zip(&self.bodies) {
-            rigidity::impose(flow, grain, body, 0.0);
+            rigidity::impose(flow, grain, body, still, 0.0);
         }
         for axis in 0..3 {
             let (from, to) = (

@@ -11,7 +11,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::locate::Body;
+use super::locate::{Body, ForcedFace};
 use crate::dem::{Dof, Grain};
 use crate::flow::Flow;
 use crate::math::{Load, Matrix6, Vector6, solve6};
@@ -22,24 +22,36 @@ pub struct Impulse {
     slope: Matrix6,
 }
 
-/// Sums the impulse on the fluid as an affine function of the grain's velocities; `relief` is the
-/// time over which the pressure gradient is given back on faces that are closed to it.
-pub fn gather(flow: &Flow, fluid_density: f64, body: &Body, relief: f64) -> Impulse {
+/// Sums the impulse on the fluid as an affine function of the grain's new velocities; its old ones
+/// are `before`. `relief` is the time over which the closed part of a face takes the acceleration
+/// of the grains instead of the pressure gradient; zero turns both off. Faces that several grains
+/// hold take a part from each, and what one takes does not depend on the others' new velocities.
+pub fn gather(
+    flow: &Flow,
+    fluid_density: f64,
+    body: &mut Body,
+    before: [DVec3; 2],
+    relief: f64,
+) -> Impulse {
     let w = fluid_density * flow.mesh().cell_volume();
     let mut sum = Impulse {
         constant: [0.0; 6],
         slope: [[0.0; 6]; 6],
     };
-    for face in &body.forced {
+    for face in &mut body.forced {
         let unit = DVec3::AXES[face.axis];
         let lever = face.arm.cross(unit);
         let weight = [unit.x, unit.y, unit.z, lever.x, lever.y, lever.z];
-        let back = relief * face.relief * pressure_gradient(flow, face.axis, face.at);
-        let free = flow.predicted.component(face.axis)[face.at] + back;
-        let push = w * (back - face.share * free);
+        let predicted = flow.predicted.component(face.axis)[face.at];
+        let back = relief * pressure_gradient(flow, face.axis, face.at);
+        face.free = predicted + face.closed_by_all * back;
+        let follow = follow(face, relief);
+        let push = face.closed * back
+            - face.share * face.free
+            - follow * rigid_velocity(before, face);
         for row in 0..6 {
-            sum.constant[row] += push * weight[row];
-            let pull = w * face.share * weight[row];
+            sum.constant[row] += w * push * weight[row];
+            let pull = w * (face.share + follow) * weight[row];
             for column in 0..6 {
                 sum.slope[row][column] += pull * weight[column];
             }
@@ -100,15 +112,30 @@ pub fn advance(
     }
 }
 
-/// Gives the forced faces their share of the rigid velocity.
-pub fn impose(flow: &mut Flow, grain: &Grain, body: &Body, relief: f64) {
+/// Gives the forced faces what the grain gives them; arguments as of [`gather`], which came before.
+pub fn impose(flow: &mut Flow, grain: &Grain, body: &Body, before: [DVec3; 2], relief: f64) {
     for face in &body.forced {
-        let back = relief * face.relief * pressure_gradient(flow, face.axis, face.at);
-        let rigid = (grain.velocity + grain.angular_velocity.cross(face.arm))[face.axis];
-        let q = &mut flow.predicted.component_mut(face.axis)[face.at];
-        let free = *q + back;
-        *q = free + face.share * (rigid - free);
+        let back = relief * pressure_gradient(flow, face.axis, face.at);
+        let rigid = rigid_velocity([grain.velocity, grain.angular_velocity], face);
+        let change = rigid - rigid_velocity(before, face);
+        flow.predicted.component_mut(face.axis)[face.at] += face.closed * back
+            + face.share * (rigid - face.free)
+            + follow(face, relief) * change;
     }
+}
+
+/// Part of the grain's change of velocity that a face takes beside its share of the velocity.
+fn follow(face: &ForcedFace, relief: f64) -> f64 {
+    if relief > 0.0 {
+        (1.0 - face.share) * face.closed
+    } else {
+        0.0
+    }
+}
+
+/// Velocity along a face's axis of a body that moves at `[velocity, angular velocity]`.
+fn rigid_velocity([velocity, omega]: [DVec3; 2], face: &ForcedFace) -> f64 {
+    (velocity + omega.cross(face.arm))[face.axis]
 }
 
 fn pressure_gradient(flow: &Flow, axis: usize, at: usize) -> f64 {

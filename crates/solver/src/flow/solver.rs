@@ -80,6 +80,20 @@ impl Flow {
         flow
     }
 
+    /// Starts from the velocity `component(axis, position)` [m/s, m], made free of divergence.
+    pub fn start_from(&mut self, component: impl Fn(usize, DVec3) -> f64) {
+        let mesh = self.mesh;
+        self.velocity.x.fill_with(&mesh, |at| component(0, at));
+        self.velocity.y.fill_with(&mesh, |at| component(1, at));
+        self.velocity.z.fill_with(&mesh, |at| component(2, at));
+        self.make_solenoidal();
+    }
+
+    /// Uniform acceleration that drives the flow from now on [m/s^2].
+    pub fn set_body_acceleration(&mut self, acceleration: DVec3) {
+        self.coefficients.acceleration = acceleration;
+    }
+
     /// Projects the present velocity onto the divergence-free fields with the given boundaries;
     /// the pressure is left alone. For initial states.
     pub fn make_solenoidal(&mut self) -> FlowMeasures {

@@ -19,7 +19,7 @@ pub struct Coefficients {
     /// 1/4h: a quarter, as both the carried value and the velocity that carries it are means.
     quarter_inverse: [f64; 3],
     nu_inverse_square: [f64; 3],
-    acceleration: DVec3,
+    pub(super) acceleration: DVec3,
 }
 
 impl Coefficients {

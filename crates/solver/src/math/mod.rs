@@ -1,10 +1,12 @@
-//! Small mathematics shared by every layer: poses, dense 6 x 6 systems, vector registers.
+//! Small mathematics shared by every layer: poses, dense 6 x 6 systems, vector registers, formulas.
 
 mod aligned;
+mod formula;
 pub mod lanes;
 mod linear;
 mod pose;
 
 pub use aligned::Aligned;
+pub use formula::Formula;
 pub use linear::{Matrix6, Vector6, solve6};
 pub use pose::{Load, Pose};

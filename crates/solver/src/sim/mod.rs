@@ -3,6 +3,7 @@
 mod clock;
 mod diagnostics;
 pub mod events;
+mod prescription;
 mod probe;
 mod setup;
 mod state;
@@ -19,6 +20,7 @@ use crate::poisson::Stages;
 
 pub use clock::Clock;
 pub use diagnostics::Diagnostics;
+pub use prescription::{Drive, Prescription};
 pub use setup::{Setup, SetupError, StepRule};
 pub use step::StepError;
 
@@ -68,6 +70,9 @@ impl Simulation {
         let enclosure = setup.enclosure();
         let fluid = setup.fluid.map(|params| {
             let mut flow = Flow::new(&setup.mesh, setup.boundaries, &params);
+            if let Some(velocity) = &setup.prescription.initial_velocity {
+                flow.start_from(|axis, at| velocity.component(axis, &at.to_array()));
+            }
             let (density, nu) = (params.density, params.kinematic_viscosity);
             let mut coupling = Coupling::new(&flow, setup.scheme, density, nu, &setup.grains);
             let measures = coupling.start(&mut flow, &setup.grains);

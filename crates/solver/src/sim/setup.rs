@@ -7,6 +7,8 @@ use crate::dem::{ContactParams, Enclosure, Grain};
 use crate::flow::{Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
 
+use super::Prescription;
+
 /// How the time step is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepRule {
@@ -42,6 +44,8 @@ pub struct Setup {
     pub contact: ContactParams,
     /// Time step.
     pub step: StepRule,
+    /// What formulas give.
+    pub prescription: Prescription,
 }
 
 /// A set-up that cannot be simulated.

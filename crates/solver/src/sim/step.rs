@@ -41,7 +41,8 @@ impl Simulation {
             passes,
             ..
         } = self;
-        let grains = &mut setup.grains;
+        let (grains, prescription) = (&mut setup.grains, &setup.prescription);
+        let (now, end) = (self.clock.time, self.clock.time + dt);
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
         for (i, grain) in grains.iter().enumerate() {
             work.before[i] = [grain.velocity, grain.angular_velocity];
@@ -51,15 +52,20 @@ impl Simulation {
                 torque: glam::DVec3::ZERO,
             } + loads[i];
         }
+        prescription.drive(grains, now + 0.5 * dt);
         match fluid {
             None => timed(&mut passes.contact, || {
                 dynamics.advance(grains, &work.driving, dt, &mut work.contact);
+                prescription.drive(grains, end);
             }),
             Some(Fluid {
                 flow,
                 coupling,
                 measures,
             }) => {
+                if let Some(acceleration) = prescription.body_acceleration(now) {
+                    flow.set_body_acceleration(acceleration);
+                }
                 timed(&mut passes.predict, || flow.predict(dt));
                 timed(&mut passes.coupling, || {
                     coupling.correct_advection(flow, grains)
@@ -67,6 +73,7 @@ impl Simulation {
                 timed(&mut passes.contact, || {
                     dynamics.advance(grains, &work.driving, dt, &mut work.contact)
                 });
+                prescription.drive(grains, end);
                 timed(&mut passes.coupling, || coupling.locate(grains, dt));
                 if setup.scheme == Scheme::Paper {
                     timed(&mut passes.project, || flow.project_prediction(dt));

@@ -4,6 +4,7 @@
 mod domain;
 mod expect;
 pub(crate) mod forms;
+mod given;
 mod grain;
 mod motion;
 mod orientation;

@@ -7,16 +7,20 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::forms::{Forms, Never, deserialize_forms};
+use super::given::{FormulaTable, OfTime, formula_schema, write_formula};
 use crate::case::quantity::{AngularVelocity, Quantity, Triple, Velocity};
+use crate::math::Formula;
 
 /// Law of a velocity: free, or prescribed.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Law {
     /// Follows the dynamics.
     #[default]
     Free,
     /// Held at this value [SI].
     Prescribed(DVec3),
+    /// A formula in t.
+    Formula(Formula),
 }
 
 impl Law {
@@ -25,12 +29,12 @@ impl Law {
             "free" => Ok(Law::Free),
             "fixed" => Ok(Law::Prescribed(DVec3::ZERO)),
             _ => Err(format!(
-                "found \"{word}\"; expected \"free\", \"fixed\" or a vector"
+                "found \"{word}\"; expected \"free\", \"fixed\", a vector or a formula"
             )),
         }
     }
-    fn is_fixed(self) -> bool {
-        self == Law::Prescribed(DVec3::ZERO)
+    fn is_fixed(&self) -> bool {
+        *self == Law::Prescribed(DVec3::ZERO)
     }
 }
 
@@ -39,6 +43,7 @@ impl Serialize for Law {
         match self {
             Law::Free => serializer.serialize_str("free"),
             Law::Prescribed(v) => v.to_array().serialize(serializer),
+            Law::Formula(formula) => write_formula(formula, serializer),
         }
     }
 }
@@ -46,12 +51,15 @@ impl Serialize for Law {
 macro_rules! law {
     ($(#[$doc:meta])* $name:ident, $kind:ty) => {
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        #[derive(Clone, Debug, Default, PartialEq)]
         pub struct $name(pub Law);
         impl Forms for $name {
-            const EXPECTED: &'static str = "\"free\", \"fixed\" or a vector [x, y, z]";
+            const EXPECTED: &'static str = "\"free\", \"fixed\", a vector [x, y, z] or { formula = [x, y, z] }";
             type List = Vec<Quantity<$kind>>;
-            type Table = Never;
+            type Table = FormulaTable;
+            fn from_table(table: FormulaTable) -> Result<Self, String> {
+                Ok($name(Law::Formula(table.read::<OfTime>()?)))
+            }
             fn from_word(word: &str) -> Result<Self, String> {
                 Law::word(word).map($name)
             }
@@ -75,7 +83,7 @@ law!(
 );
 
 /// Laws of translation and rotation.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
     /// Law of the translation [m/s].
     pub velocity: Law,
@@ -102,7 +110,7 @@ impl Forms for Motion {
         let law = Law::word(word)
             .map_err(|_| format!("found \"{word}\"; expected {}", Self::EXPECTED))?;
         Ok(Motion {
-            velocity: law,
+            velocity: law.clone(),
             angular_velocity: law,
         })
     }
@@ -117,11 +125,11 @@ impl Forms for Motion {
 impl Serialize for Motion {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
-        struct Table {
-            velocity: Law,
-            angular_velocity: Law,
+        struct Table<'a> {
+            velocity: &'a Law,
+            angular_velocity: &'a Law,
         }
-        match (self.velocity, self.angular_velocity) {
+        match (&self.velocity, &self.angular_velocity) {
             (Law::Free, Law::Free) => serializer.serialize_str("free"),
             (v, w) if v.is_fixed() && w.is_fixed() => serializer.serialize_str("fixed"),
             (velocity, angular_velocity) => Table {
@@ -150,8 +158,8 @@ impl JsonSchema for Motion {
                 {
                     "type": "object",
                     "properties": {
-                        "velocity": { "anyOf": [words, v] },
-                        "angular_velocity": { "anyOf": [words, w] },
+                        "velocity": { "anyOf": [words, v, formula_schema()] },
+                        "angular_velocity": { "anyOf": [words, w, formula_schema()] },
                     },
                     "additionalProperties": false,
                 },

@@ -1,13 +1,13 @@
 //! `[fluid]`, `[coupling]` and `[contact]`. Defaults come from the modules that own the parameters.
 
-use glam::DVec3;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
+use super::given::{Given, OfPlace, OfTime};
 use crate::case::loc::Loc;
 use crate::case::quantity::{
     Acceleration, Density, DynamicViscosity, KinematicViscosity, Length, Number, Quantity, Rate,
-    Stiffness, Triple, Velocity,
+    Stiffness, Velocity,
 };
 use crate::coupling::Scheme;
 use crate::dem::ContactParams;
@@ -26,22 +26,15 @@ pub struct RawFluid {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kinematic_viscosity: Option<Loc<Quantity<KinematicViscosity>>>,
     /// Uniform acceleration that drives the flow, a mean pressure gradient over density [m/s2].
-    #[serde(default = "no_acceleration")]
-    pub body_acceleration: Loc<Triple<Acceleration>>,
-    /// Uniform velocity at the start [m/s].
-    #[serde(default = "at_rest")]
-    pub initial_velocity: Loc<Triple<Velocity>>,
+    #[serde(default)]
+    pub body_acceleration: Loc<Given<Acceleration, OfTime>>,
+    /// Velocity at the start [m/s]; it is made free of divergence.
+    #[serde(default)]
+    pub initial_velocity: Loc<Given<Velocity, OfPlace>>,
     /// Advection scheme.
     #[serde(default)]
     #[schemars(schema_with = "advection_schema")]
     pub advection: Loc<Advection>,
-}
-
-fn no_acceleration() -> Loc<Triple<Acceleration>> {
-    Loc::none(Triple::new(DVec3::ZERO))
-}
-fn at_rest() -> Loc<Triple<Velocity>> {
-    Loc::none(Triple::new(DVec3::ZERO))
 }
 
 fn advection_schema(_: &mut SchemaGenerator) -> Schema {

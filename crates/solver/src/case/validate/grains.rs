@@ -13,6 +13,7 @@ use crate::case::raw::{Law, Orientation, Position, RawGrain, Turns};
 use crate::case::shapes::Library;
 use crate::dem::{Dof, Grain};
 use crate::math::Pose;
+use crate::sim::Drive;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -51,9 +52,10 @@ pub(super) fn grain(
     }
     let [velocity, angular_velocity] = velocities(check, raw, &key);
     let (shape, density, orientation) = (shape?, density?, turn.ok()?);
-    let law = |law: Law| match law {
+    let law = |law: &Law| match law {
         Law::Free => Dof::Free,
-        Law::Prescribed(v) => Dof::Prescribed(v),
+        Law::Prescribed(v) => Dof::Prescribed(*v),
+        Law::Formula(formula) => Dof::Prescribed(formula.at(&[0.0])),
     };
     let mut grain = Grain {
         shape,
@@ -64,8 +66,8 @@ pub(super) fn grain(
         },
         velocity,
         angular_velocity,
-        translation: law(raw.motion.velocity),
-        rotation: law(raw.motion.angular_velocity),
+        translation: law(&raw.motion.velocity),
+        rotation: law(&raw.motion.angular_velocity),
     };
     grain.pose.position = position(check, raw, index, &grain, earlier, vertical)?;
     resolved.position = Some(Position(grain.pose.position.to_array().to_vec()).into());
@@ -155,12 +157,35 @@ pub(super) fn shape(
         .ok()
 }
 
+/// Motions given by formulas.
+pub(super) fn drives(grains: &[Loc<RawGrain>]) -> Vec<Drive> {
+    let formula = |law: &Law| match law {
+        Law::Formula(formula) => Some(formula.clone()),
+        _ => None,
+    };
+    let drive = |(grain, raw): (usize, &Loc<RawGrain>)| {
+        let drive = Drive {
+            grain,
+            velocity: formula(&raw.motion.velocity),
+            angular_velocity: formula(&raw.motion.angular_velocity),
+        };
+        (drive.velocity.is_some() || drive.angular_velocity.is_some()).then_some(drive)
+    };
+    grains.iter().enumerate().filter_map(drive).collect()
+}
+
 /// Velocities at the start: the prescribed ones, else the given ones, else zero.
 fn velocities(check: &mut Checker, raw: &RawGrain, key: &dyn Fn(&str) -> String) -> [DVec3; 2] {
-    let mut start = |law: Law,
+    let mut start = |law: &Law,
                      given: Option<(DVec3, &Option<std::ops::Range<usize>>)>,
-                     name: &str| match (law, given) {
-        (Law::Prescribed(v), Some((u, span))) if u != v => {
+                     name: &str| {
+        let prescribed = match law {
+            Law::Free => None,
+            Law::Prescribed(v) => Some(*v),
+            Law::Formula(formula) => Some(formula.at(&[0.0])),
+        };
+        match (prescribed, given) {
+        (Some(v), Some((u, span))) if u != v => {
             check.fail(
                 span.as_ref(),
                 &key(name),
@@ -173,14 +198,14 @@ fn velocities(check: &mut Checker, raw: &RawGrain, key: &dyn Fn(&str) -> String)
             );
             v
         }
-        (Law::Prescribed(v), _) => v,
-        (Law::Free, given) => given.map_or(DVec3::ZERO, |(u, _)| u),
-    };
+        (Some(v), _) => v,
+        (None, given) => given.map_or(DVec3::ZERO, |(u, _)| u),
+    }};
     let velocity = raw.velocity.as_ref().map(|v| (v.si, &v.span));
     let spin = raw.angular_velocity.as_ref().map(|v| (v.si, &v.span));
     [
-        start(raw.motion.velocity, velocity, "velocity"),
-        start(raw.motion.angular_velocity, spin, "angular_velocity"),
+        start(&raw.motion.velocity, velocity, "velocity"),
+        start(&raw.motion.angular_velocity, spin, "angular_velocity"),
     ]
 }
 

@@ -20,7 +20,7 @@ use super::shapes::{Library, ShapeFile};
 use super::source::Source;
 use crate::dem::{Enclosure, Grain};
 use crate::output::RunPlan;
-use crate::sim::Setup;
+use crate::sim::{Prescription, Setup};
 
 /// What a good case gives.
 pub(super) struct Validated {
@@ -41,10 +41,11 @@ pub(super) fn validate(
 ) -> Result<Validated, CaseError> {
     let mut check = Checker::new(source);
     let dry = raw.fluid.is_none();
+    let mut prescription = Prescription::default();
     let fluid = raw
         .fluid
         .as_mut()
-        .map(|fluid| physics::fluid(&mut check, fluid));
+        .map(|fluid| physics::fluid(&mut check, fluid, &mut prescription));
     let mesh = domain::mesh(&mut check, &mut raw.domain.value, dry);
     let boundaries = mesh.and_then(|mesh| domain::boundaries(&mut check, &raw.domain, &mesh, dry));
     let gravity = raw.gravity.si;
@@ -74,6 +75,9 @@ pub(super) fn validate(
     let (Some(mesh), Some(boundaries)) = (mesh, boundaries) else {
         return Err(CaseError::Invalid(check.problems));
     };
+    if let Some(fluid) = &raw.fluid {
+        physics::defined(&mut check, fluid, &prescription, &mesh);
+    }
     let enclosure = Enclosure {
         lower: mesh.origin,
         upper: mesh.upper(),
@@ -112,7 +116,9 @@ pub(super) fn validate(
     if standing.iter().any(Option::is_none) {
         return Err(CaseError::Invalid(check.problems));
     }
-    let grains: Vec<Grain> = standing.into_iter().flatten().collect();
+    let mut grains: Vec<Grain> = standing.into_iter().flatten().collect();
+    prescription.motions = grains::drives(&resolved);
+    prescription.drive(&mut grains, 0.0);
     arrangement::check(&mut check, &grains, &spans, &enclosure);
     if dry && grains.is_empty() {
         check.fail(
@@ -150,6 +156,7 @@ pub(super) fn validate(
         grains,
         contact,
         step,
+        prescription,
     };
     let plan = plan::plan(&mut check, &raw.time, &mut raw.output, &setup, vertical.0);
     let expect = expectations(

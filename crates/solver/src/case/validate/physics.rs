@@ -10,12 +10,17 @@ use crate::case::raw::{RawContact, RawFluid};
 use crate::dem::{ContactParams, Grain};
 use crate::flow::FluidParams;
 use crate::grid::Mesh;
+use crate::sim::Prescription;
 
 /// Largest overlap at impact where neither stiffness nor overlap is given [diameters].
 const MAXIMUM_OVERLAP: f64 = 0.01;
 
 /// The fluid; the viscosity is kept as a kinematic one.
-pub(super) fn fluid(check: &mut Checker, raw: &mut Loc<RawFluid>) -> Option<FluidParams> {
+pub(super) fn fluid(
+    check: &mut Checker,
+    raw: &mut Loc<RawFluid>,
+    given: &mut Prescription,
+) -> Option<FluidParams> {
     let density = check.positive(&raw.density, "fluid.density", "the density of the fluid");
     let span = raw.span.clone();
     let fluid = &mut raw.value;
@@ -44,16 +49,40 @@ pub(super) fn fluid(check: &mut Checker, raw: &mut Loc<RawFluid>) -> Option<Flui
             None
         }
     };
+    let (body_acceleration, formula) = fluid.body_acceleration.parts();
+    given.body_acceleration = formula;
+    let (initial_velocity, formula) = fluid.initial_velocity.parts();
+    given.initial_velocity = formula;
     let params = FluidParams {
         density: density?,
         kinematic_viscosity: kinematic_viscosity?,
-        body_acceleration: fluid.body_acceleration.si,
-        initial_velocity: fluid.initial_velocity.si,
+        body_acceleration,
+        initial_velocity,
         advection: fluid.advection.value,
     };
     fluid.viscosity = None;
     fluid.kinematic_viscosity = Some(Quantity::new(params.kinematic_viscosity).into());
     Some(params)
+}
+
+/// Refuses formulas of the fluid that give no number.
+pub(super) fn defined(check: &mut Checker, raw: &RawFluid, given: &Prescription, mesh: &Mesh) {
+    let nowhere = given.initial_speed(mesh).is_some_and(f64::is_nan);
+    let never = given.body_acceleration(0.0).is_some_and(DVec3::is_nan);
+    let found = [
+        (nowhere, &raw.initial_velocity.span, "initial_velocity", "everywhere in the box"),
+        (never, &raw.body_acceleration.span, "body_acceleration", "at t = 0"),
+    ];
+    for (undefined, span, name, place) in found {
+        if undefined {
+            check.fail(
+                span.as_ref(),
+                &format!("fluid.{name}"),
+                format!("the formula does not give a finite number {place}"),
+                "avoid divisions by zero and roots or logarithms of negative numbers",
+            );
+        }
+    }
 }
 
 /// The contact law; a stiffness that is not given follows from the largest overlap.

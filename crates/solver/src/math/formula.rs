@@ -1,0 +1,107 @@
+//! Vectors given by formulas, such as an initial velocity in x, y, z or a motion in t.
+
+use exmex::prelude::*;
+use glam::DVec3;
+
+/// Three formulas in the same variables.
+#[derive(Clone, Debug)]
+pub struct Formula {
+    text: [String; 3],
+    parts: [Part; 3],
+}
+
+#[derive(Clone, Debug)]
+struct Part {
+    expression: exmex::FlatEx<f64>,
+    /// Which of the variables it takes, in the order in which it takes them.
+    takes: Vec<usize>,
+}
+
+impl Formula {
+    /// Reads three formulas whose names may be `variables` (and PI, E, TAU).
+    ///
+    /// # Errors
+    /// What is wrong with which component.
+    pub fn parse(text: [String; 3], variables: &[&str]) -> Result<Formula, String> {
+        let part = |axis: usize| -> Result<Part, String> {
+            let component = &text[axis];
+            let wrong = |what: String| {
+                let names = variables.join(", ");
+                format!(
+                    "the {} component \"{component}\": {what}; a formula may use {names}, PI, + - * / ^ and functions such as sin, cos, exp, sqrt, tanh",
+                    ["x", "y", "z"][axis]
+                )
+            };
+            let expression =
+                exmex::parse::<f64>(component).map_err(|error| wrong(error.msg().to_string()))?;
+            let takes = expression
+                .var_names()
+                .iter()
+                .map(|name| {
+                    variables
+                        .iter()
+                        .position(|known| known == name)
+                        .ok_or_else(|| wrong(format!("unknown name \"{name}\"")))
+                })
+                .collect::<Result<Vec<usize>, String>>()?;
+            Ok(Part { expression, takes })
+        };
+        let parts = [part(0)?, part(1)?, part(2)?];
+        Ok(Formula { text, parts })
+    }
+
+    /// The formulas as written.
+    pub fn text(&self) -> &[String; 3] {
+        &self.text
+    }
+
+    /// One component at the given values of the variables; NaN where it is not defined.
+    pub fn component(&self, axis: usize, values: &[f64]) -> f64 {
+        let Part { expression, takes } = &self.parts[axis];
+        let mut taken = [0.0; 4];
+        for (slot, &which) in taken.iter_mut().zip(takes) {
+            *slot = values[which];
+        }
+        expression
+            .eval(&taken[..takes.len()])
+            .unwrap_or(f64::NAN)
+    }
+
+    /// The vector at the given values of the variables.
+    pub fn at(&self, values: &[f64]) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|axis| self.component(axis, values)))
+    }
+}
+
+impl PartialEq for Formula {
+    fn eq(&self, other: &Formula) -> bool {
+        self.text == other.text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: [&str; 3], variables: &[&str]) -> Result<Formula, String> {
+        Formula::parse(text.map(str::to_owned), variables)
+    }
+
+    #[test]
+    fn components_take_their_own_variables() {
+        let formula = parse(["z - 2*x", "sin(PI*y)", "0.5"], &["x", "y", "z"]).unwrap();
+        let v = formula.at(&[1.0, 0.5, 10.0]);
+        assert!((v - DVec3::new(8.0, 1.0, 0.5)).length() < 1e-15, "{v}");
+    }
+
+    #[test]
+    fn mistakes_name_the_component_and_what_is_known() {
+        let error = parse(["0", "0", "sin(w*t)"], &["t"]).unwrap_err();
+        assert!(
+            error.contains("z component") && error.contains("\"w\"") && error.contains("use t,"),
+            "{error}"
+        );
+        let error = parse(["2*(t", "0", "0"], &["t"]).unwrap_err();
+        assert!(error.contains("x component"), "{error}");
+    }
+}
