@@ -610,9 +610,9 @@ fn overrides_are_located_too() {
     let case = case.unwrap_or_else(|e| panic!("{e}"));
     assert_eq!((case.plan.end, case.setup.grains[1].density), (2.0, 2000.0));
     let set = |item: &str| Case::parse(PAIR, "case.toml", Path::new("."), &[item.into()]);
-    let formula = set("domain.origin={ formula = [0, 0, 0] }");
+    let formula = set("domain.size={ formula = [0, 0, 0] }");
     assert!(formula.is_err_and(|e| e.to_string().contains("three components")));
-    assert!(set("domain.origin.0=1").is_ok_and(|c| c.setup.mesh.origin.x == 1.0));
+    assert!(set("domain.size.0=30 mm").is_ok_and(|c| c.setup.mesh.cells[0] == 120));
     let Err(error) = Case::parse(
         PAIR,
         "case.toml",

@@ -186,8 +186,8 @@ fn a_squeezed_pair_is_stable_on_coarse_grids() {
         pair.gravity = DVec3::new(0.0, 0.0, -1.0);
         let fastest = (density - 1.0).sqrt();
         let mut sim = Simulation::new(pair).unwrap();
-        while sim.time() < 15.0 {
-            run(&mut sim, sim.time() + 0.1);
+        for tenth in 1..=150 {
+            run(&mut sim, 0.1 * f64::from(tenth));
             let speed = sim.diagnostics().max_velocity;
             assert!(
                 speed < 4.0 * fastest,
@@ -218,7 +218,11 @@ fn a_shaken_sphere_moves_as_its_formula_says() {
     let (t, grain) = (sim.time(), &sim.grains()[0]);
     let rise = 2.0 + 0.4 / 3.0 * (1.0 - (3.0 * t).cos());
     assert!((grain.velocity.z - 0.4 * (3.0 * t).sin()).abs() < 1e-14);
-    assert!((grain.pose.position.z - rise).abs() < 2e-4, "{}", grain.pose.position.z - rise);
+    assert!(
+        (grain.pose.position.z - rise).abs() < 2e-4,
+        "{}",
+        grain.pose.position.z - rise
+    );
     assert!((grain.angular_velocity.z - 0.2 * (3.0 * t).cos()).abs() < 1e-14);
 }
 

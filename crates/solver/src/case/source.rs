@@ -201,7 +201,9 @@ fn merge<'i>(base: &mut DeTable<'i>, extra: DeTable<'i>) -> Result<(), String> {
             // `{ formula = ... }` in place of `[x, y, z]`, not `vector.0 = ...`.
             (Some(DeValue::Array(items)), DeValue::Table(new))
                 if items.iter().all(|item| !item.get_ref().is_table())
-                    && new.keys().all(|key| key.get_ref().parse::<usize>().is_err()) =>
+                    && new
+                        .keys()
+                        .all(|key| key.get_ref().parse::<usize>().is_err()) =>
             {
                 base.remove(&key);
                 base.insert(key, value);

@@ -46,9 +46,8 @@ pub fn gather(
         let back = relief * pressure_gradient(flow, face.axis, face.at);
         face.free = predicted + face.closed_by_all * back;
         let follow = follow(face, relief);
-        let push = face.closed * back
-            - face.share * face.free
-            - follow * rigid_velocity(before, face);
+        let push =
+            face.closed * back - face.share * face.free - follow * rigid_velocity(before, face);
         for row in 0..6 {
             sum.constant[row] += w * push * weight[row];
             let pull = w * (face.share + follow) * weight[row];
@@ -118,9 +117,8 @@ pub fn impose(flow: &mut Flow, grain: &Grain, body: &Body, before: [DVec3; 2], r
         let back = relief * pressure_gradient(flow, face.axis, face.at);
         let rigid = rigid_velocity([grain.velocity, grain.angular_velocity], face);
         let change = rigid - rigid_velocity(before, face);
-        flow.predicted.component_mut(face.axis)[face.at] += face.closed * back
-            + face.share * (rigid - face.free)
-            + follow(face, relief) * change;
+        flow.predicted.component_mut(face.axis)[face.at] +=
+            face.closed * back + face.share * (rigid - face.free) + follow(face, relief) * change;
     }
 }
 

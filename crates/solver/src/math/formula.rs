@@ -1,5 +1,7 @@
 //! Vectors given by formulas, such as an initial velocity in x, y, z or a motion in t.
 
+use std::sync::Arc;
+
 use exmex::prelude::*;
 use glam::DVec3;
 
@@ -7,12 +9,13 @@ use glam::DVec3;
 #[derive(Clone, Debug)]
 pub struct Formula {
     text: [String; 3],
-    parts: [Part; 3],
+    /// Kept apart: an expression takes tens of kilobytes.
+    parts: Arc<[Part]>,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Part {
-    expression: exmex::FlatEx<f64>,
+    expression: Box<exmex::FlatEx<f64>>,
     /// Which of the variables it takes, in the order in which it takes them.
     takes: Vec<usize>,
 }
@@ -44,9 +47,10 @@ impl Formula {
                         .ok_or_else(|| wrong(format!("unknown name \"{name}\"")))
                 })
                 .collect::<Result<Vec<usize>, String>>()?;
+            let expression = Box::new(expression);
             Ok(Part { expression, takes })
         };
-        let parts = [part(0)?, part(1)?, part(2)?];
+        let parts = (0..3).map(part).collect::<Result<_, String>>()?;
         Ok(Formula { text, parts })
     }
 
@@ -62,9 +66,7 @@ impl Formula {
         for (slot, &which) in taken.iter_mut().zip(takes) {
             *slot = values[which];
         }
-        expression
-            .eval(&taken[..takes.len()])
-            .unwrap_or(f64::NAN)
+        expression.eval(&taken[..takes.len()]).unwrap_or(f64::NAN)
     }
 
     /// The vector at the given values of the variables.

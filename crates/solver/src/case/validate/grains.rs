@@ -176,31 +176,31 @@ pub(super) fn drives(grains: &[Loc<RawGrain>]) -> Vec<Drive> {
 
 /// Velocities at the start: the prescribed ones, else the given ones, else zero.
 fn velocities(check: &mut Checker, raw: &RawGrain, key: &dyn Fn(&str) -> String) -> [DVec3; 2] {
-    let mut start = |law: &Law,
-                     given: Option<(DVec3, &Option<std::ops::Range<usize>>)>,
-                     name: &str| {
-        let prescribed = match law {
-            Law::Free => None,
-            Law::Prescribed(v) => Some(*v),
-            Law::Formula(formula) => Some(formula.at(&[0.0])),
+    let mut start =
+        |law: &Law, given: Option<(DVec3, &Option<std::ops::Range<usize>>)>, name: &str| {
+            let prescribed = match law {
+                Law::Free => None,
+                Law::Prescribed(v) => Some(*v),
+                Law::Formula(formula) => Some(formula.at(&[0.0])),
+            };
+            match (prescribed, given) {
+                (Some(v), Some((u, span))) if u != v => {
+                    check.fail(
+                        span.as_ref(),
+                        &key(name),
+                        format!(
+                            "the motion prescribes {:?}, but this is {:?}",
+                            v.to_array(),
+                            u.to_array()
+                        ),
+                        format!("leave out `{name}`: a prescribed motion sets it"),
+                    );
+                    v
+                }
+                (Some(v), _) => v,
+                (None, given) => given.map_or(DVec3::ZERO, |(u, _)| u),
+            }
         };
-        match (prescribed, given) {
-        (Some(v), Some((u, span))) if u != v => {
-            check.fail(
-                span.as_ref(),
-                &key(name),
-                format!(
-                    "the motion prescribes {:?}, but this is {:?}",
-                    v.to_array(),
-                    u.to_array()
-                ),
-                format!("leave out `{name}`: a prescribed motion sets it"),
-            );
-            v
-        }
-        (Some(v), _) => v,
-        (None, given) => given.map_or(DVec3::ZERO, |(u, _)| u),
-    }};
     let velocity = raw.velocity.as_ref().map(|v| (v.si, &v.span));
     let spin = raw.angular_velocity.as_ref().map(|v| (v.si, &v.span));
     [

@@ -70,8 +70,18 @@ pub(super) fn defined(check: &mut Checker, raw: &RawFluid, given: &Prescription,
     let nowhere = given.initial_speed(mesh).is_some_and(f64::is_nan);
     let never = given.body_acceleration(0.0).is_some_and(DVec3::is_nan);
     let found = [
-        (nowhere, &raw.initial_velocity.span, "initial_velocity", "everywhere in the box"),
-        (never, &raw.body_acceleration.span, "body_acceleration", "at t = 0"),
+        (
+            nowhere,
+            &raw.initial_velocity.span,
+            "initial_velocity",
+            "everywhere in the box",
+        ),
+        (
+            never,
+            &raw.body_acceleration.span,
+            "body_acceleration",
+            "at t = 0",
+        ),
     ];
     for (undefined, span, name, place) in found {
         if undefined {
