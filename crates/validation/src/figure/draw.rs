@@ -1,0 +1,238 @@
+//! From the description of a figure to its drawing.
+
+use std::path::{Path, PathBuf};
+
+use grainwake_report::figure::field::{self, Panel};
+use grainwake_report::figure::style::FAINT;
+use grainwake_report::figure::svg::Drawing;
+use grainwake_report::figure::{minus, plain};
+
+use grainwake_solver::output::SUMMARY;
+use grainwake_solver::output::vti::Image;
+
+use super::plot::{self, Shown};
+use super::{Content, Data, Figure, Picture, Point, Series};
+use crate::measure;
+use crate::signal;
+use crate::table::{Columns, last_slice};
+
+/// What came of a figure.
+#[derive(Debug)]
+pub struct Drawn {
+    /// The drawing; none if no run has data for it.
+    pub drawing: Option<Drawing>,
+    /// What was left out, and why.
+    pub notes: Vec<String>,
+}
+
+impl Figure {
+    /// Draws what there are data for; `runs` holds the run folders of the suite.
+    pub fn draw(&self, runs: &Path) -> Drawn {
+        let mut notes = Vec::new();
+        let drawing = match &self.content {
+            Content::Plot { across, up, series } => {
+                let mut shown = Vec::new();
+                let mut measured = false;
+                for one in series {
+                    match one.shown(runs, &mut notes) {
+                        Ok(found) => {
+                            measured |= !matches!(one.data, Data::Reference { .. });
+                            shown.extend(found);
+                        }
+                        Err(why) => notes.push(format!("\"{}\": {why}", plain(&one.label))),
+                    }
+                }
+                measured.then(|| plot::draw(across, up, &shown))
+            }
+            Content::Pictures {
+                quantity,
+                style,
+                pictures,
+            } => {
+                let mut images = Vec::new();
+                for picture in pictures {
+                    match picture.image(runs) {
+                        Ok(image) => images.push((picture, image)),
+                        Err(why) => notes.push(why),
+                    }
+                }
+                let panels: Vec<Panel> = images
+                    .iter()
+                    .map(|(picture, image)| Panel {
+                        title: picture.title.clone(),
+                        image,
+                        window: picture.window,
+                    })
+                    .collect();
+                if panels.is_empty() {
+                    None
+                } else {
+                    field::draw(&panels, *quantity, style)
+                        .map_err(|why| notes.push(why))
+                        .ok()
+                }
+            }
+        };
+        Drawn { drawing, notes }
+    }
+
+    /// Title, caption and sources of the reference data, in label markup.
+    pub fn description(&self) -> String {
+        let mut text = self.caption.clone();
+        if !self.sources.is_empty() {
+            text += &format!(" Reference data: {}.", self.sources.join("; "));
+        }
+        text.trim().to_owned()
+    }
+}
+
+/// The folder of a run that came to its end.
+fn finished(runs: &Path, name: &str) -> Result<PathBuf, String> {
+    let folder = runs.join(name);
+    if folder.join(SUMMARY).is_file() {
+        Ok(folder)
+    } else {
+        Err(format!("there is no finished run {name}"))
+    }
+}
+
+impl Picture {
+    fn image(&self, runs: &Path) -> Result<Image, String> {
+        let folder = finished(runs, &self.run)?;
+        last_slice(&folder, &self.plane).map_err(|why| format!("{}: {why}", self.run))
+    }
+}
+
+impl Series {
+    /// The points, and what else is drawn with them.
+    fn shown(&self, runs: &Path, notes: &mut Vec<String>) -> Result<Vec<Shown>, String> {
+        let mut shown = Shown {
+            label: self.label.clone(),
+            colour: self.colour,
+            sign: Some(self.sign),
+            hollow: false,
+            line: self.line,
+            points: Vec::new(),
+        };
+        match &self.data {
+            Data::Reference {
+                file,
+                x,
+                y,
+                constants,
+            } => {
+                let columns = Columns::of_data(file)?;
+                let x = measure::evaluate(x, &columns, constants)?;
+                let y = measure::evaluate(y, &columns, constants)?;
+                shown.points = x.into_iter().zip(y).collect();
+                shown.sign = self.line.is_none().then_some(self.sign);
+                shown.hollow = true;
+            }
+            Data::History {
+                run,
+                window,
+                constants,
+                derivative,
+            } => {
+                let (x, mut y) = window.samples(&finished(runs, run)?, constants)?;
+                if *derivative {
+                    y = signal::derivative(&x, &y).ok_or("one row has no derivative")?;
+                }
+                shown.points = x.into_iter().zip(y).collect();
+                shown.sign = None;
+            }
+            Data::Results {
+                points,
+                error,
+                slope,
+            } => {
+                for point in points {
+                    match point.value(runs, *error) {
+                        Ok(y) => shown.points.push((point.x, y)),
+                        Err(why) => notes.push(format!("\"{}\": {why}", plain(&self.label))),
+                    }
+                }
+                shown.points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                if shown.points.is_empty() {
+                    return Err("none of its runs can be drawn".into());
+                }
+                if let Some(slope) = slope {
+                    let guide = guide(&shown.points, *slope);
+                    if let Some(order) = observed_order(&shown.points, *slope) {
+                        shown.label += &minus(&format!(" (order {order:.2})"));
+                    }
+                    return Ok(guide.into_iter().chain([shown]).collect());
+                }
+            }
+        }
+        Ok(vec![shown])
+    }
+}
+
+impl Point {
+    fn value(&self, runs: &Path, error: bool) -> Result<f64, String> {
+        let value = self.check.measure(&finished(runs, &self.run)?)?;
+        Ok(match self.reference {
+            Some(reference) if error => ((value - reference) / reference).abs(),
+            _ => value,
+        })
+    }
+}
+
+/// The two points of the finest runs, the finest last: largest x where the error falls with x.
+fn finest(points: &[(f64, f64)], slope: f64) -> Option<[(f64, f64); 2]> {
+    let n = points.len();
+    match (n >= 2, slope < 0.0) {
+        (false, _) => None,
+        (true, true) => Some([points[n - 2], points[n - 1]]),
+        (true, false) => Some([points[1], points[0]]),
+    }
+}
+
+/// Power with which the error falls between the two finest of `points`, which are sorted by x;
+/// positive where it falls as `slope` does.
+fn observed_order(points: &[(f64, f64)], slope: f64) -> Option<f64> {
+    let [coarse, fine] = finest(points, slope)?;
+    let order = (fine.1 / coarse.1).ln() / (fine.0 / coarse.0).ln() * slope.signum();
+    order.is_finite().then_some(order)
+}
+
+/// A line of the given power through the point of the finest run.
+fn guide(points: &[(f64, f64)], slope: f64) -> Option<Shown> {
+    let [_, (x0, y0)] = finest(points, slope)?;
+    let along = |x: f64| (x, y0 * (x / x0).powf(slope));
+    Some(Shown {
+        label: minus(&format!("slope {slope}")),
+        colour: FAINT,
+        sign: None,
+        hollow: false,
+        line: Some("4.5 2"),
+        points: points.iter().map(|(x, _)| along(*x)).collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_is_that_of_the_two_finest() {
+        // Error 0.3 h^2 with h = 1/n, spoiled on the coarsest.
+        let error = |n: f64| 0.3 / (n * n);
+        let points = [(8.0, 0.5), (16.0, error(16.0)), (24.0, error(24.0))];
+        assert!((observed_order(&points, -2.0).unwrap() - 2.0).abs() < 1e-12);
+        let by_h = [
+            (1.0 / 24.0, error(24.0)),
+            (1.0 / 16.0, error(16.0)),
+            (0.125, 0.5),
+        ];
+        assert!((observed_order(&by_h, 2.0).unwrap() - 2.0).abs() < 1e-12);
+        let growing = [(8.0, 0.1), (16.0, 0.2)];
+        assert!((observed_order(&growing, -2.0).unwrap() + 1.0).abs() < 1e-12);
+        assert_eq!(observed_order(&points[..1], -2.0), None);
+        let line = guide(&points, -2.0).unwrap();
+        assert_eq!(line.points[2], points[2]);
+        assert!((line.points[0].1 - error(8.0)).abs() < 1e-12);
+        assert_eq!(line.label, "slope −2");
+    }
+}
