@@ -1,20 +1,25 @@
-//! Slices side by side on one colour scale, from image files alone.
+//! Slices side by side on one colour scale, of one run or of several.
+
+use std::path::Path;
 
 use grainwake_solver::output::vti::Image;
 
-use super::AXES;
 use super::axis::Axis;
 use super::colormap::ColorMap;
 use super::plan::Window;
 use super::section::Section;
 use super::sheet::{self, Cells, Column, Look};
+use super::silhouette::Outline;
 use super::style::INK;
 use super::svg::Drawing;
+use super::{AXES, Scene, cuts};
+use crate::run_folder::RunFolder;
+use crate::story::Story;
 
 /// What is shown of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Magnitude of the velocity, with arrows for its part in the plane.
+    /// Magnitude of the velocity.
     Speed,
     /// Vorticity along the normal of the plane.
     Vorticity,
@@ -30,6 +35,9 @@ pub struct Panel<'a> {
     pub image: &'a Image,
     /// The part that is shown; none for all of it.
     pub window: Option<Window>,
+    /// The run folder, whose tables say where the grains are; without it they are outlined along
+    /// half solid fraction.
+    pub run: Option<&'a Path>,
 }
 
 /// How the slices are shown.
@@ -41,6 +49,8 @@ pub struct Style {
     pub limit: Option<f64>,
     /// What lengths are in, such as "d"; none for metres and parts of them.
     pub length: Option<String>,
+    /// Whether arrows show the velocity in the plane, over the speed.
+    pub arrows: bool,
 }
 
 /// Draws the slices, z or else y upwards.
@@ -73,7 +83,7 @@ pub fn draw(panels: &[Panel], quantity: Quantity, style: &Style) -> Result<Drawi
             let highest = sheet::shown_values(&columns, value).fold(0.0, f64::max);
             let end = style.limit.unwrap_or(highest);
             let axis = scale(style, "speed |*u*|  [m/s]", 0.0, end);
-            let arrows = (highest > 0.0).then_some(highest);
+            let arrows = (style.arrows && highest > 0.0).then_some(highest);
             let beyond = (false, highest > axis.high());
             look(ColorMap::Magnitude, axis, arrows, beyond, Cells::Smooth)
         }
@@ -121,7 +131,7 @@ fn column(panel: &Panel) -> Result<Column, String> {
         return Err("the part that is asked for lies outside the slice".to_owned());
     }
     let rings = section.outlines();
-    Ok(Column {
+    let mut column = Column {
         title: panel.title.clone(),
         time: String::new(),
         at: panel.image.time,
@@ -129,7 +139,46 @@ fn column(panel: &Panel) -> Result<Column, String> {
         cuts: vec![rings.into_iter().map(|ring| (INK, ring)).collect()],
         centres: Vec::new(),
         sections: vec![Some(section)],
-    })
+    };
+    if let Some(cuts) = panel.run.and_then(|run| exact(run, &column)) {
+        column.cuts = cuts;
+    }
+    Ok(column)
+}
+
+/// Outlines of the grains from the tables of the run, all dark; none where they do not say enough.
+fn exact(run: &Path, column: &Column) -> Option<Vec<Vec<(&'static str, Outline)>>> {
+    let run = RunFolder::open(run).ok()?;
+    let story = Story::of(&run);
+    let bodies = super::bodies(&run, &mut Vec::new());
+    let scene = Scene {
+        run: &run,
+        story: &story,
+        bodies,
+        instants: Vec::new(),
+    };
+    let view = column.sections.iter().flatten().next()?.view;
+    let placed = Column {
+        title: String::new(),
+        time: String::new(),
+        at: column.at,
+        window: column.window,
+        centres: scene.centres(column.at, view),
+        cuts: Vec::new(),
+        sections: column.sections.clone(),
+    };
+    if placed.centres.is_empty() {
+        return None;
+    }
+    let dark = |rings: Vec<(&'static str, Outline)>| {
+        rings.into_iter().map(|(_, ring)| (INK, ring)).collect()
+    };
+    Some(
+        cuts::of_column(&scene, &placed)
+            .into_iter()
+            .map(dark)
+            .collect(),
+    )
 }
 
 fn scale(style: &Style, label: &str, low: f64, high: f64) -> Axis {
@@ -197,6 +246,7 @@ mod tests {
             title: title.to_owned(),
             image: &image,
             window,
+            run: None,
         };
         let window = Window {
             low: (5.0, -1.0),

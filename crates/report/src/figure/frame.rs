@@ -31,9 +31,9 @@ impl Frame {
         self.y + self.height * (1.0 - self.up.place(value).unwrap_or(0.0))
     }
 
-    /// Grid lines of the vertical axis, below the data.
+    /// Grid lines at the labelled ticks of the vertical axis, below the data.
     pub fn grid(&self, drawing: &mut Drawing) {
-        for (value, _) in &self.up.ticks {
+        for (value, _) in self.up.ticks.iter().filter(|(_, name)| !name.is_empty()) {
             let y = self.py(*value);
             if y > self.y + 1.0 && y < self.y + self.height - 1.0 {
                 drawing.line(&[(self.x, y), (self.x + self.width, y)], GRID, 0.5, None);
@@ -214,7 +214,7 @@ impl Sign {
                 .map(|(a, b)| (x + s * a, y + s * b))
                 .collect(),
         };
-        let fill = if hollow { "#ffffff" } else { colour };
+        let fill = if hollow { "none" } else { colour };
         let style = format!(
             "fill=\"{fill}\" stroke=\"{}\" stroke-width=\"0.9\"",
             if hollow { colour } else { "#ffffff" }

@@ -110,7 +110,7 @@ fn row_names(scene: &Scene, rows: usize) -> Vec<(String, &'static str)> {
 
 impl Scene<'_> {
     /// Centres of all grains at a time, as seen.
-    fn centres(&self, time: f64, view: View) -> Vec<(usize, (f64, f64))> {
+    pub(super) fn centres(&self, time: f64, view: View) -> Vec<(usize, (f64, f64))> {
         let place = |(grain, history): (usize, &History)| {
             Some((grain, view.seen(self.run.wrapped(history.pose(time)?.0))))
         };

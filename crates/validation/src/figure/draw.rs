@@ -16,6 +16,9 @@ use crate::measure;
 use crate::signal;
 use crate::table::{Columns, last_slice};
 
+/// Part of the finest error at which a guide line passes, so that the data do not hide it.
+const BESIDE: f64 = 0.7;
+
 /// What came of a figure.
 #[derive(Debug)]
 pub struct Drawn {
@@ -25,21 +28,52 @@ pub struct Drawn {
     pub notes: Vec<String>,
 }
 
+/// Why something is left out.
+enum Gap {
+    /// The run is not there or has not come to its end.
+    Run(String),
+    /// Anything else, in words.
+    Other(String),
+}
+
+impl From<String> for Gap {
+    fn from(what: String) -> Gap {
+        Gap::Other(what)
+    }
+}
+
+/// The gaps in words, all runs together.
+fn notes(gaps: Vec<Gap>) -> Vec<String> {
+    let (mut runs, mut notes): (Vec<String>, Vec<String>) = Default::default();
+    for gap in gaps {
+        match gap {
+            Gap::Run(name) if runs.contains(&name) => {}
+            Gap::Run(name) => runs.push(name),
+            Gap::Other(what) => notes.push(what),
+        }
+    }
+    if !runs.is_empty() {
+        notes.push(format!("no finished run {}", runs.join(", ")));
+    }
+    notes
+}
+
 impl Figure {
     /// Draws what there are data for; `runs` holds the run folders of the suite.
     pub fn draw(&self, runs: &Path) -> Drawn {
-        let mut notes = Vec::new();
+        let mut gaps = Vec::new();
         let drawing = match &self.content {
             Content::Plot { across, up, series } => {
                 let mut shown = Vec::new();
                 let mut measured = false;
                 for one in series {
-                    match one.shown(runs, &mut notes) {
+                    match one.shown(runs, &mut gaps) {
                         Ok(found) => {
-                            measured |= !matches!(one.data, Data::Reference { .. });
+                            let reference = matches!(one.data, Data::Reference { .. });
+                            measured |= !reference && !found.is_empty();
                             shown.extend(found);
                         }
-                        Err(why) => notes.push(format!("\"{}\": {why}", plain(&one.label))),
+                        Err(gap) => gaps.push(one.named(gap)),
                     }
                 }
                 measured.then(|| plot::draw(across, up, &shown))
@@ -52,28 +86,32 @@ impl Figure {
                 let mut images = Vec::new();
                 for picture in pictures {
                     match picture.image(runs) {
-                        Ok(image) => images.push((picture, image)),
-                        Err(why) => notes.push(why),
+                        Ok((folder, image)) => images.push((picture, folder, image)),
+                        Err(gap) => gaps.push(gap),
                     }
                 }
                 let panels: Vec<Panel> = images
                     .iter()
-                    .map(|(picture, image)| Panel {
+                    .map(|(picture, folder, image)| Panel {
                         title: picture.title.clone(),
                         image,
                         window: picture.window,
+                        run: Some(folder.as_path()),
                     })
                     .collect();
                 if panels.is_empty() {
                     None
                 } else {
                     field::draw(&panels, *quantity, style)
-                        .map_err(|why| notes.push(why))
+                        .map_err(|why| gaps.push(Gap::Other(why)))
                         .ok()
                 }
             }
         };
-        Drawn { drawing, notes }
+        Drawn {
+            drawing,
+            notes: notes(gaps),
+        }
     }
 
     /// Title, caption and sources of the reference data, in label markup.
@@ -87,25 +125,37 @@ impl Figure {
 }
 
 /// The folder of a run that came to its end.
-fn finished(runs: &Path, name: &str) -> Result<PathBuf, String> {
+fn finished(runs: &Path, name: &str) -> Result<PathBuf, Gap> {
     let folder = runs.join(name);
     if folder.join(SUMMARY).is_file() {
         Ok(folder)
     } else {
-        Err(format!("there is no finished run {name}"))
+        Err(Gap::Run(name.to_owned()))
     }
 }
 
 impl Picture {
-    fn image(&self, runs: &Path) -> Result<Image, String> {
+    fn image(&self, runs: &Path) -> Result<(PathBuf, Image), Gap> {
         let folder = finished(runs, &self.run)?;
-        last_slice(&folder, &self.plane).map_err(|why| format!("{}: {why}", self.run))
+        let image = last_slice(&folder, &self.plane);
+        let image = image.map_err(|why| Gap::Other(format!("{}: {why}", self.run)))?;
+        Ok((folder, image))
     }
 }
 
 impl Series {
+    /// What happened to this series.
+    fn named(&self, gap: Gap) -> Gap {
+        match gap {
+            Gap::Other(what) if !self.label.is_empty() => {
+                Gap::Other(format!("\"{}\": {what}", plain(&self.label)))
+            }
+            gap => gap,
+        }
+    }
+
     /// The points, and what else is drawn with them.
-    fn shown(&self, runs: &Path, notes: &mut Vec<String>) -> Result<Vec<Shown>, String> {
+    fn shown(&self, runs: &Path, gaps: &mut Vec<Gap>) -> Result<Vec<Shown>, Gap> {
         let mut shown = Shown {
             label: self.label.clone(),
             colour: self.colour,
@@ -136,7 +186,8 @@ impl Series {
             } => {
                 let (x, mut y) = window.samples(&finished(runs, run)?, constants)?;
                 if *derivative {
-                    y = signal::derivative(&x, &y).ok_or("one row has no derivative")?;
+                    y = signal::derivative(&x, &y)
+                        .ok_or_else(|| "one row has no derivative".to_owned())?;
                 }
                 shown.points = x.into_iter().zip(y).collect();
                 shown.sign = None;
@@ -149,12 +200,12 @@ impl Series {
                 for point in points {
                     match point.value(runs, *error) {
                         Ok(y) => shown.points.push((point.x, y)),
-                        Err(why) => notes.push(format!("\"{}\": {why}", plain(&self.label))),
+                        Err(gap) => gaps.push(self.named(gap)),
                     }
                 }
                 shown.points.sort_by(|a, b| a.0.total_cmp(&b.0));
                 if shown.points.is_empty() {
-                    return Err("none of its runs can be drawn".into());
+                    return Ok(Vec::new());
                 }
                 if let Some(slope) = slope {
                     let guide = guide(&shown.points, *slope);
@@ -170,7 +221,7 @@ impl Series {
 }
 
 impl Point {
-    fn value(&self, runs: &Path, error: bool) -> Result<f64, String> {
+    fn value(&self, runs: &Path, error: bool) -> Result<f64, Gap> {
         let value = self.check.measure(&finished(runs, &self.run)?)?;
         Ok(match self.reference {
             Some(reference) if error => ((value - reference) / reference).abs(),
@@ -197,10 +248,10 @@ fn observed_order(points: &[(f64, f64)], slope: f64) -> Option<f64> {
     order.is_finite().then_some(order)
 }
 
-/// A line of the given power through the point of the finest run.
+/// A line of the given power, a little below the point of the finest run.
 fn guide(points: &[(f64, f64)], slope: f64) -> Option<Shown> {
     let [_, (x0, y0)] = finest(points, slope)?;
-    let along = |x: f64| (x, y0 * (x / x0).powf(slope));
+    let along = |x: f64| (x, BESIDE * y0 * (x / x0).powf(slope));
     Some(Shown {
         label: minus(&format!("slope {slope}")),
         colour: FAINT,
@@ -231,8 +282,9 @@ mod tests {
         assert!((observed_order(&growing, -2.0).unwrap() + 1.0).abs() < 1e-12);
         assert_eq!(observed_order(&points[..1], -2.0), None);
         let line = guide(&points, -2.0).unwrap();
-        assert_eq!(line.points[2], points[2]);
-        assert!((line.points[0].1 - error(8.0)).abs() < 1e-12);
+        for (point, n) in line.points.iter().zip([8.0, 16.0, 24.0]) {
+            assert!((point.1 - BESIDE * error(n)).abs() < 1e-12);
+        }
         assert_eq!(line.label, "slope −2");
     }
 }

@@ -9,8 +9,8 @@ use grainwake_report::figure::{plan, style};
 use grainwake_solver::case::{Loc, Problem, Source, nearest};
 
 use super::raw::{
-    Colour, FieldQuantity, Line, Places, RawAxis, RawFigure, RawHistory, RawPicture, RawReference,
-    RawResults, Scale,
+    Colour, FieldQuantity, Line, Mark, Places, RawAxis, RawFigure, RawHistory, RawPicture,
+    RawReference, RawResults, Scale,
 };
 use super::{AxisPlan, Content, Data, Figure, Picture, Point, Series};
 use crate::measure::{self, Window};
@@ -87,6 +87,7 @@ impl Context<'_> {
                         label: field.label,
                         limit: field.limit,
                         length: field.length,
+                        arrows: field.arrows,
                     },
                     pictures: pictures.collect::<Result<_, _>>()?,
                 }
@@ -137,28 +138,29 @@ impl Context<'_> {
         results: Vec<RawResults>,
     ) -> Result<Vec<Series>, Problem> {
         let mut out: Vec<Series> = Vec::new();
-        let mut push = |label, colour: Option<Colour>, line: Option<Line>, data| {
-            let number = out.len();
-            out.push(Series {
-                label,
-                colour: colour.map_or(style::grain_colour(number), Colour::hex),
-                sign: number,
-                line: line.map(Line::dash),
-                data,
-            });
-        };
+        let mut push =
+            |label, colour: Option<Colour>, sign: Option<Mark>, line: Option<Line>, data| {
+                let number = out.len();
+                out.push(Series {
+                    label,
+                    colour: colour.map_or(style::grain_colour(number), Colour::hex),
+                    sign: sign.map_or(number, |sign| sign as usize),
+                    line: line.map(Line::dash),
+                    data,
+                });
+            };
         for raw in references {
             let data = self.reference(&raw)?;
-            push(raw.label, raw.colour, raw.line, data);
+            push(raw.label, raw.colour, raw.sign, raw.line, data);
         }
         for raw in histories {
             let (label, colour) = (raw.label.clone(), raw.colour);
             let line = raw.line.unwrap_or(Line::Full);
-            push(label, colour, Some(line), self.history(raw)?);
+            push(label, colour, None, Some(line), self.history(raw)?);
         }
         for raw in results {
             let data = self.results(&raw)?;
-            push(raw.label, raw.colour, raw.line, data);
+            push(raw.label, raw.colour, raw.sign, raw.line, data);
         }
         Ok(out)
     }

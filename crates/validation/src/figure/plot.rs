@@ -13,7 +13,7 @@ const LEFT: f64 = 42.0;
 const RIGHT: f64 = 9.0;
 const HEIGHT: f64 = 150.0;
 const ROW: f64 = 10.0;
-/// Width of the sample before a name [pt].
+/// Width of the sample of a line in the legend [pt].
 const SAMPLE: f64 = 16.0;
 /// Half the size of a sign [pt].
 const SIGN: f64 = 2.4;
@@ -46,8 +46,13 @@ impl Shown {
         }
     }
 
+    /// Width of the sample before its name [pt].
+    fn sample(&self) -> f64 {
+        if self.line.is_some() { SAMPLE } else { 6.0 }
+    }
+
     fn entry(&self) -> f64 {
-        SAMPLE + 4.0 + text::width(&self.label, SMALL) + 9.0
+        self.sample() + 4.0 + text::width(&self.label, SMALL) + 9.0
     }
 }
 
@@ -76,8 +81,8 @@ pub fn draw(across: &AxisPlan, up: &AxisPlan, shown: &[Shown]) -> Drawing {
             if one.line.is_some() {
                 drawing.line(&[(x, y), (x + SAMPLE, y)], one.colour, LINE, one.dash());
             }
-            one.mark(&mut drawing, (x + 0.5 * SAMPLE, y));
-            let left = x + SAMPLE + 4.0;
+            one.mark(&mut drawing, (x + 0.5 * one.sample(), y));
+            let left = x + one.sample() + 4.0;
             let base = y + 0.36 * SMALL;
             drawing.label(left, base, Anchor::Start, SMALL, INK, &one.label, false);
             x += one.entry();

@@ -60,6 +60,18 @@ pub enum Colour {
     Grey,
 }
 
+/// A sign at the points, in the order of `frame::Sign::number`.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mark {
+    Circle,
+    Square,
+    Triangle,
+    Diamond,
+    Down,
+    Pentagon,
+}
+
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Line {
@@ -77,6 +89,7 @@ pub struct RawReference {
     pub y: Loc<String>,
     pub source: Option<String>,
     pub colour: Option<Colour>,
+    pub sign: Option<Mark>,
     pub line: Option<Line>,
 }
 
@@ -111,6 +124,7 @@ pub struct RawResults {
     pub reference: Option<f64>,
     pub slope: Option<f64>,
     pub colour: Option<Colour>,
+    pub sign: Option<Mark>,
     pub line: Option<Line>,
 }
 
@@ -128,6 +142,8 @@ pub struct RawField {
     pub label: Option<String>,
     pub limit: Option<f64>,
     pub length: Option<String>,
+    #[serde(default)]
+    pub arrows: bool,
 }
 
 #[derive(Clone, Copy, Deserialize)]
