@@ -210,6 +210,8 @@ impl Series {
                 if let Some(slope) = slope {
                     let guide = guide(&shown.points, *slope);
                     if let Some(order) = observed_order(&shown.points, *slope) {
+                        // Not "-0.00".
+                        let order = (100.0 * order).round() / 100.0 + 0.0;
                         shown.label += &minus(&format!(" (order {order:.2})"));
                     }
                     return Ok(guide.into_iter().chain([shown]).collect());
