@@ -205,13 +205,13 @@ impl Context<'_> {
     }
 
     fn results(&self, raw: &RawResults) -> Result<Data, Problem> {
-        if let Places::List(places) = &raw.x.value {
-            if places.len() != raw.runs.len() {
-                let found = format!("{} numbers for {} runs", places.len(), raw.runs.len());
-                let problem = Problem::new(found)
-                    .help("give one number for each run, or an expression of their constants");
-                return Err(self.at(problem, raw.x.span.as_ref(), "as many as `runs`"));
-            }
+        if let Places::List(places) = &raw.x.value
+            && places.len() != raw.runs.len()
+        {
+            let found = format!("{} numbers for {} runs", places.len(), raw.runs.len());
+            let problem = Problem::new(found)
+                .help("give one number for each run, or an expression of their constants");
+            return Err(self.at(problem, raw.x.span.as_ref(), "as many as `runs`"));
         }
         let mut points = Vec::new();
         for (i, name) in raw.runs.iter().enumerate() {
