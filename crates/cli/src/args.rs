@@ -97,7 +97,7 @@ pub struct ValidateArgs {
     /// Folder of the runs
     #[arg(short, long, value_name = "DIR", default_value = "runs/validation")]
     pub output: PathBuf,
-    /// Add the results to LEVEL.json and LEVEL.md in this folder, with their provenance
+    /// Add the results to LEVEL.json and LEVEL.md in this folder, with their provenance, and draw the figures
     #[arg(long, value_name = "DIR")]
     pub save: Option<PathBuf>,
     /// Keep what is already there of the same cases and program

@@ -136,6 +136,56 @@ fn saved_results_are_replaced_run_by_run() {
 }
 
 #[test]
+fn figures_are_drawn_with_the_saved_results() {
+    let figure = r#"
+[[figure]]
+name = "height"
+title = "Height of the ball"
+x = { label = "*t*  [s]" }
+y = { label = "*z*  [m]" }
+
+[[figure.reference]]
+label = "closed form"
+data = "height.csv"
+x = "t"
+y = "z"
+source = "Galilei"
+
+[[figure.history]]
+label = "on the earth"
+run = "fall"
+of = "z"
+
+[[figure.history]]
+label = "on the moon"
+run = "slow"
+of = "z"
+"#;
+    let (folder, _) = suites(&format!("{SUITE}{figure}"));
+    validate(folder.path(), &["--save", "kept"])
+        .success()
+        .stderr(contains("left out: no finished run slow"));
+    let figures = folder.path().join("kept/figures");
+    let png = std::fs::read(figures.join("fall-height.png")).unwrap();
+    assert!(png.starts_with(b"\x89PNG"));
+    let svg = std::fs::read_to_string(figures.join("fall-height.svg")).unwrap();
+    assert!(
+        svg.contains(">on the earth<") && svg.contains("Galilei"),
+        "{svg}"
+    );
+    assert!(!svg.contains("moon"), "a run that is not there is left out");
+    let page = std::fs::read_to_string(figures.join("README.md")).unwrap();
+    assert!(
+        page.contains("![Height of the ball](fall-height.png)"),
+        "{page}"
+    );
+    // Without --save nothing is drawn.
+    std::fs::remove_dir_all(folder.path().join("kept")).unwrap();
+    validate(folder.path(), &["--resume"]).success();
+    assert!(!folder.path().join("kept").exists());
+}
+
+#[test]
 fn what_falls_short_is_exit_code_1_and_another_run_can_be_the_reference() {
     let (folder, _) = suites(SUITE);
     validate(folder.path(), &["--level", "full"])

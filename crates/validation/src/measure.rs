@@ -101,7 +101,7 @@ impl Window {
 }
 
 /// An expression row by row; its names are columns or constants.
-fn evaluate(
+pub(crate) fn evaluate(
     text: &str,
     columns: &Columns,
     constants: &BTreeMap<String, f64>,
@@ -134,6 +134,59 @@ fn evaluate(
         .collect()
 }
 
+/// An expression of constants alone.
+pub(crate) fn constant(text: &str, constants: &BTreeMap<String, f64>) -> Result<f64, String> {
+    let mut columns = Columns::default();
+    columns.names.push(String::new());
+    columns.values.push(vec![0.0]);
+    evaluate(text, &columns, constants).map(|values| values[0])
+}
+
+impl Window {
+    /// What takes the part of time, and the expression, row by row; the whole table.
+    fn rows(
+        &self,
+        folder: &Path,
+        constants: &BTreeMap<String, f64>,
+    ) -> Result<(Vec<f64>, Vec<f64>, String), String> {
+        let columns = Columns::of_run(folder, &self.table, self.grain)?;
+        let along = match (&self.against, &self.table) {
+            (Some(text), _) => text.clone(),
+            (None, From::Slice(_)) => columns.names[0].clone(),
+            (None, _) => "time".to_string(),
+        };
+        let x = evaluate(&along, &columns, constants)?;
+        let y = evaluate(&self.of, &columns, constants)?;
+        Ok((x, y, along))
+    }
+
+    /// The same rows inside the window.
+    pub(crate) fn samples(
+        &self,
+        folder: &Path,
+        constants: &BTreeMap<String, f64>,
+    ) -> Result<(Vec<f64>, Vec<f64>), String> {
+        let (x, y, along) = self.rows(folder, constants)?;
+        self.inside(x, y, &along)
+    }
+
+    fn inside(
+        &self,
+        x: Vec<f64>,
+        y: Vec<f64>,
+        along: &str,
+    ) -> Result<(Vec<f64>, Vec<f64>), String> {
+        let low = self.from.unwrap_or(f64::NEG_INFINITY);
+        let high = self.to.unwrap_or(f64::INFINITY);
+        let rows = x.into_iter().zip(y);
+        let (x, y): (Vec<f64>, Vec<f64>) = rows.filter(|(x, _)| (low..=high).contains(x)).unzip();
+        if x.is_empty() {
+            return Err(format!("no rows with {low} <= {along} <= {high}"));
+        }
+        Ok((x, y))
+    }
+}
+
 impl Check {
     /// The number, from the run in `folder`.
     pub(crate) fn measure(&self, folder: &Path) -> Result<f64, String> {
@@ -141,31 +194,11 @@ impl Check {
         if self.take == Take::Summary {
             return summary(folder, &w.of);
         }
-        let columns = Columns::of_run(folder, &w.table, w.grain)?;
-        let along = match (&w.against, &w.table) {
-            (Some(text), _) => text.clone(),
-            (None, From::Slice(_)) => columns.names[0].clone(),
-            (None, _) => "time".to_string(),
-        };
-        let (mut x, mut y) = (
-            evaluate(&along, &columns, &self.constants)?,
-            evaluate(&w.of, &columns, &self.constants)?,
-        );
+        let (x, y, along) = w.rows(folder, &self.constants)?;
         if matches!(self.take, Take::CurveMax | Take::CurveRms) {
             return self.distance_from_curve(&x, &y);
         }
-        let (low, high) = (
-            w.from.unwrap_or(f64::NEG_INFINITY),
-            w.to.unwrap_or(f64::INFINITY),
-        );
-        let inside: Vec<bool> = x.iter().map(|x| (low..=high).contains(x)).collect();
-        let mut keep = inside.iter();
-        x.retain(|_| keep.next() == Some(&true));
-        let mut keep = inside.iter();
-        y.retain(|_| keep.next() == Some(&true));
-        if x.is_empty() {
-            return Err(format!("no rows with {low} <= {along} <= {high}"));
-        }
+        let (x, y) = w.inside(x, y, &along)?;
         let most = y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let least = y.iter().copied().fold(f64::INFINITY, f64::min);
         let mean = signal::mean(&x, &y).unwrap_or(f64::NAN);

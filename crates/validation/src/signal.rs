@@ -16,6 +16,26 @@ pub fn integral(x: &[f64], y: &[f64]) -> f64 {
         .sum()
 }
 
+/// Derivative dy/dx at the samples: of the parabola through each and its neighbours, one-sided at
+/// the ends; none below two of them.
+pub fn derivative(x: &[f64], y: &[f64]) -> Option<Vec<f64>> {
+    let n = x.len().min(y.len());
+    if n < 2 {
+        return None;
+    }
+    let rise = |i: usize| (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
+    let inner = |i: usize| {
+        let (before, after) = (x[i] - x[i - 1], x[i + 1] - x[i]);
+        (rise(i - 1) * after + rise(i) * before) / (before + after)
+    };
+    let at = |i: usize| match i {
+        0 => rise(0),
+        i if i + 1 == n => rise(n - 2),
+        i => inner(i),
+    };
+    Some((0..n).map(at).collect())
+}
+
 /// Value at `at` between the samples; none outside them.
 pub fn interpolate(x: &[f64], y: &[f64], at: f64) -> Option<f64> {
     let after = x.partition_point(|v| *v < at);
@@ -94,6 +114,15 @@ mod tests {
         let x: Vec<f64> = (0..2001).map(|i| 0.005 * f64::from(i)).collect();
         let y = x.iter().map(|x| 3.0 + (1.7 * x + 0.3).sin()).collect();
         (x, y)
+    }
+
+    #[test]
+    fn the_derivative_of_a_parabola_is_exact_inside() {
+        let x = [0.0, 0.1, 0.4, 0.5];
+        let y = x.map(|x| 3.0 * x * x - x);
+        let slope = derivative(&x, &y).unwrap();
+        assert!((slope[1] + 0.4).abs() < 1e-12 && (slope[2] - 1.4).abs() < 1e-12);
+        assert!(derivative(&x[..1], &y[..1]).is_none());
     }
 
     #[test]

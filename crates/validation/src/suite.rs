@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use grainwake_solver::case::{Loc, Problem, Source, nearest};
 use serde::Deserialize;
 
+use crate::figure::{self, Figure, RawFigure};
 use crate::measure::{Take, Window};
 use crate::table::From;
 
@@ -31,6 +32,8 @@ pub struct Suite {
     pub title: String,
     /// What is run.
     pub runs: Vec<Run>,
+    /// What is drawn from the runs.
+    pub figures: Vec<Figure>,
 }
 
 /// A run of a case.
@@ -46,6 +49,8 @@ pub struct Run {
     pub level: Level,
     /// What is measured.
     pub checks: Vec<Check>,
+    /// Named numbers of the expressions.
+    pub constants: BTreeMap<String, f64>,
 }
 
 /// A number and what it should be.
@@ -101,6 +106,8 @@ struct RawSuite {
     #[serde(default)]
     constants: BTreeMap<String, f64>,
     run: Vec<RawRun>,
+    #[serde(default)]
+    figure: Vec<RawFigure>,
 }
 
 #[derive(Deserialize)]
@@ -245,13 +252,16 @@ fn build(source: &Source, raw: RawSuite, folder: &Path, name: String) -> Result<
             set: run.set,
             level: run.level,
             checks,
+            constants,
         });
     }
+    let figures = figure::build(source, raw.figure, &runs, folder, &raw.constants)?;
     let suite = Suite {
         name,
         folder: folder.into(),
         title: raw.title,
         runs,
+        figures,
     };
     for (i, run) in suite.runs.iter().enumerate() {
         for check in &run.checks {

@@ -153,7 +153,7 @@ fn by_grain(table: &Table, chosen: usize) -> Result<Columns, String> {
 }
 
 /// The last slice of a plane: the frame at the end, else the one with the highest number.
-fn last_slice(folder: &Path, plane: &str) -> Result<Image, String> {
+pub(crate) fn last_slice(folder: &Path, plane: &str) -> Result<Image, String> {
     let slices = folder.join("slices");
     let entries = std::fs::read_dir(&slices).map_err(|e| format!("{}: {e}", slices.display()))?;
     let mut latest: Option<Image> = None;

@@ -1,5 +1,6 @@
 //! `grainwake validate`.
 
+mod pictures;
 mod saved;
 mod table;
 
@@ -71,6 +72,11 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     }
     if let Some(folder) = &args.save {
         saved::add(folder, &args.level, &verdicts, &args.output)?;
+        let drawn = pictures::add(folder, &suites, &args.output)?;
+        pictures::list(folder, &Suite::all(&args.suites)?)?;
+        if !args.quiet {
+            eprintln!("{drawn} figures in {}", folder.join("figures").display());
+        }
     }
     let short = verdicts.iter().filter(|v| !v.pass).count();
     if !args.quiet {

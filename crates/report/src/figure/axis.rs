@@ -104,6 +104,68 @@ impl Axis {
         }
     }
 
+    /// A logarithmic axis that covers the positive values `low` to `high` out to the next of 1, 2, 5
+    /// times a power of ten, or no further if `tight`; these are labelled where there are few.
+    pub fn log_close(label: &str, low: f64, high: f64, tight: bool) -> Axis {
+        let whole = Axis::log(label, low, high);
+        let leads = [1.0, 2.0, 5.0];
+        let marks = |leads: &[f64]| -> Vec<f64> {
+            let (first, last) = (whole.low.log10().round(), whole.high.log10().round());
+            let powers = (first as i32 - 1)..=(last as i32 + 1);
+            powers
+                .flat_map(|power| leads.iter().map(move |lead| lead * 10f64.powi(power)))
+                .collect()
+        };
+        let (low, high) = match (low.is_finite(), high.is_finite()) {
+            (true, true) if low > 0.0 && high > low * (1.0 + 1e-9) => (low, high),
+            _ => (whole.low, whole.high),
+        };
+        let ends = marks(&leads);
+        let below = ends.iter().copied().rfind(|v| *v <= low * (1.0 + 1e-9));
+        let above = ends.iter().copied().find(|v| *v >= high * (1.0 - 1e-9));
+        let (low, high) = match (tight, below, above) {
+            (false, Some(below), Some(above)) => (below, above),
+            _ => (low, high),
+        };
+        let inside = |v: &f64| *v >= low * (1.0 - 1e-9) && *v <= high * (1.0 + 1e-9);
+        let few = (high / low).log10() < 2.2 && low >= 9e-5 && high <= 2e5;
+        if !few {
+            let ticks = whole.ticks.into_iter().filter(|(v, _)| inside(v)).collect();
+            return Axis {
+                low,
+                high,
+                ticks,
+                ..whole
+            };
+        }
+        let all: Vec<f64> = (1..10).map(f64::from).collect();
+        let text = |value: f64| {
+            let lead = value / 10f64.powf((value.log10() + 1e-9).floor());
+            let shown = leads.iter().any(|l| (lead - l).abs() < 1e-6);
+            let digits = decimals(value);
+            if shown {
+                format!("{value:.digits$}")
+            } else {
+                String::new()
+            }
+        };
+        let inner = marks(&all).into_iter().filter(inside);
+        Axis {
+            label: label.to_owned(),
+            scale: Scale::Log,
+            low,
+            high,
+            ticks: inner.map(|value| (value, text(value))).collect(),
+        }
+    }
+
+    /// Puts ticks at `values` and nowhere else.
+    #[must_use]
+    pub fn with_ticks(mut self, values: &[f64]) -> Axis {
+        self.ticks = values.iter().map(|v| (*v, minus(&v.to_string()))).collect();
+        self
+    }
+
     /// Lower end.
     pub fn low(&self) -> f64 {
         self.low
@@ -248,6 +310,27 @@ mod tests {
         assert_eq!(axis.place(1e-14), Some(0.0));
         assert!(axis.place(0.0).is_none());
         assert!(texts(&axis).contains(&"10^{−14}"));
+    }
+
+    #[test]
+    fn close_log_axes_end_and_are_labelled_between_decades() {
+        let axis = Axis::log_close("*Re*", 20.0, 350.0, false);
+        assert!((axis.low() - 20.0).abs() < 1e-9 && (axis.high() - 500.0).abs() < 1e-9);
+        let named: Vec<&str> = texts(&axis).into_iter().filter(|t| !t.is_empty()).collect();
+        assert_eq!(named, ["20", "50", "100", "200", "500"]);
+        let fine = Axis::log_close("error", 0.0031, 0.04, true);
+        assert_eq!((fine.low(), fine.high()), (0.0031, 0.04));
+        let named: Vec<&str> = texts(&fine).into_iter().filter(|t| !t.is_empty()).collect();
+        assert_eq!(named, ["0.005", "0.01", "0.02"]);
+        let wide = Axis::log_close("error", 3e-8, 0.4, false);
+        assert!(texts(&wide).contains(&"10^{−4}"));
+        assert!((wide.low() / 2e-8 - 1.0).abs() < 1e-9);
+        for (low, high) in [(0.0, 1.0), (f64::NAN, 2.0), (3.0, 3.0)] {
+            let axis = Axis::log_close("x", low, high, false);
+            assert!(axis.high() > axis.low() && axis.low() > 0.0, "{low} {high}");
+        }
+        let cells = axis.with_ticks(&[8.0, 16.0]);
+        assert_eq!(texts(&cells), ["8", "16"]);
     }
 
     #[test]

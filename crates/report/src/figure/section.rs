@@ -6,6 +6,7 @@ use grainwake_solver::output::vti::Image;
 use super::contour;
 use super::plan::Window;
 use super::raster::Raster;
+use super::sheet::Cells;
 
 /// How a plane is looked at: axes 0, 1, 2 are x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -158,9 +159,23 @@ impl Section {
         )
     }
 
+    /// The cell that holds a point, or the one nearest to it.
+    pub fn cell(&self, (x, z): (f64, f64)) -> usize {
+        let place = |at: f64, low: f64, step: f64, n: usize| {
+            (((at - low) / step).floor() as isize).clamp(0, n as isize - 1) as usize
+        };
+        place(x, self.lower.0, self.step.0, self.nx)
+            + self.nx * place(z, self.lower.1, self.step.1, self.nz)
+    }
+
     /// Solid fraction of a cell; zero where the file has none.
     pub fn solid(&self, cell: usize) -> f64 {
         self.solid.as_ref().map_or(0.0, |solid| solid[cell])
+    }
+
+    /// Solid fractions by cell, if the file has them.
+    pub fn solid_fraction(&self) -> Option<&[f64]> {
+        self.solid.as_deref()
     }
 
     /// Cells whose centre lies in the window.
@@ -200,13 +215,17 @@ impl Section {
         palette: Vec<[u8; 3]>,
         value: impl Fn(usize) -> f64,
         position: impl Fn(f64) -> f64,
+        cells: Cells,
     ) -> Raster {
         let mut pixels = Vec::with_capacity(width * height);
         for row in 0..height {
             let z = window.high.1 - window.height() * (row as f64 + 0.5) / height as f64;
             for column in 0..width {
                 let x = window.low.0 + window.width() * (column as f64 + 0.5) / width as f64;
-                let place = position(self.sample(&value, (x, z)));
+                let place = position(match cells {
+                    Cells::Smooth => self.sample(&value, (x, z)),
+                    Cells::Flat => value(self.cell((x, z))),
+                });
                 pixels.push((255.0 * place.clamp(0.0, 1.0)).round() as u8);
             }
         }
@@ -294,7 +313,28 @@ mod tests {
             high: (4.0, 6.0),
         };
         assert_eq!(section.cells_in(window).count(), 24);
-        let raster = section.raster(window, 4, 6, vec![[0; 3]; 256], |i| section.solid(i), |v| v);
+        let raster = section.raster(
+            window,
+            4,
+            6,
+            vec![[0; 3]; 256],
+            |i| section.solid(i),
+            |v| v,
+            Cells::Smooth,
+        );
+        let flat = section.raster(
+            window,
+            8,
+            12,
+            vec![[0; 3]; 256],
+            |i| section.solid(i),
+            |v| v,
+            Cells::Flat,
+        );
+        assert!(
+            flat.pixels.iter().all(|v| [0, 255].contains(v)),
+            "cells are not blended"
+        );
         assert_eq!((raster.pixels.len(), raster.pixels[3 + 4 * 3]), (24, 255));
     }
 

@@ -3,11 +3,11 @@
 use super::axis::Axis;
 use super::colormap::ColorMap;
 use super::plan::{Plan, Window, colour_bar, length_unit};
-use super::section::{Section, View};
-use super::silhouette::{self, Outline};
-use super::style::{self, HAIR, INK, PAGE, SMALL, TEXT, grain_colour};
+use super::section::Section;
+use super::silhouette::Outline;
+use super::style::{self, HAIR, INK, PAGE, SMALL, TEXT};
 use super::svg::{Anchor, Drawing, path_data};
-use super::{AXES, Scene};
+use super::{AXES, text};
 
 /// Pixels of a slice for each point of the paper.
 const PIXELS: f64 = 3.0;
@@ -24,6 +24,8 @@ pub struct Column {
     pub sections: Vec<Option<Section>>,
     /// Centres of the grains at that instant, for the colour of their outlines.
     pub centres: Vec<(usize, (f64, f64))>,
+    /// Outlines of the grains in the plane of each row, with their colours.
+    pub cuts: Vec<Vec<(&'static str, Outline)>>,
 }
 
 /// How a quantity is shown.
@@ -35,11 +37,25 @@ pub struct Look {
     pub arrows: Option<f64>,
     pub axis: Axis,
     pub beyond: (bool, bool),
+    /// Names of the rows with their colours, where there are several.
+    pub rows: Vec<(String, &'static str)>,
+    /// What lengths are in; none for metres and parts of them.
+    pub unit: Option<String>,
+    /// How the cells are shown.
+    pub cells: Cells,
+}
+
+/// How the cells of a slice are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cells {
+    /// Interpolated between their centres, the grains covered.
+    Smooth,
+    /// Each in its one colour, the grains outlined.
+    Flat,
 }
 
 /// Panels of all instants (columns) and planes (rows) on one colour scale.
 pub fn draw(
-    scene: &Scene,
     columns: &[Column],
     rows: usize,
     look: &Look,
@@ -59,12 +75,23 @@ pub fn draw(
     let (width, height) = (scale * widest, scale * tallest);
     let total = (left + n * width + (n - 1.0) * gap + right).max(220.0);
     let start = left + 0.5 * (total - left - right - n * width - (n - 1.0) * gap);
-    let top = 22.0;
+    let timed = columns.iter().any(|c| !c.time.is_empty());
+    let titled = timed || columns.iter().any(|c| !c.title.trim().is_empty());
+    let top = if timed {
+        22.0
+    } else if titled {
+        12.0
+    } else {
+        5.0
+    };
     let bottom = top + rows as f64 * height + (rows as f64 - 1.0) * 12.0;
     let mut drawing = Drawing::new(total, bottom + 26.0 + 32.0);
     let (unit, _) = length_unit(first.window.width().max(first.window.height()));
     let view = first.sections.iter().flatten().next()?.view;
-    let name = |axis: usize| format!("*{}*  [{unit}]", AXES[axis]);
+    let name = |axis: usize| match &look.unit {
+        Some(unit) => format!("*{}*/*{}*", AXES[axis], text::literal(unit)),
+        None => format!("*{}*  [{unit}]", AXES[axis]),
+    };
     let (x_name, z_name) = (name(view.across), name(view.up));
     for (c, column) in columns.iter().enumerate() {
         let x = start + c as f64 * (width + gap);
@@ -97,9 +124,8 @@ pub fn draw(
                 Some(section) => {
                     draw_section(
                         &mut drawing,
-                        scene,
-                        column,
                         section,
+                        column.cuts.get(r).map_or(&[], Vec::as_slice),
                         &plan,
                         look,
                         &value,
@@ -127,20 +153,9 @@ pub fn draw(
             );
         }
     }
-    if let (Some(pair), true) = (scene.story.pair, rows > 1) {
-        for (r, grain) in pair.iter().enumerate() {
-            let y = top + (r as f64 + 0.5) * height + 12.0 * r as f64;
-            let colour = grain_colour(scene.story.grain_rank(*grain));
-            drawing.label(
-                9.0,
-                y,
-                Anchor::Middle,
-                SMALL,
-                colour,
-                &format!("plane of grain {grain}"),
-                true,
-            );
-        }
+    for (r, (name, colour)) in look.rows.iter().enumerate() {
+        let y = top + (r as f64 + 0.5) * height + 12.0 * r as f64;
+        drawing.label(9.0, y, Anchor::Middle, SMALL, colour, name, true);
     }
     let bar = 180.0_f64.min(total - 40.0);
     colour_bar(
@@ -156,9 +171,8 @@ pub fn draw(
 
 fn draw_section(
     drawing: &mut Drawing,
-    scene: &Scene,
-    column: &Column,
     section: &Section,
+    cuts: &[(&'static str, Outline)],
     plan: &Plan,
     look: &Look,
     value: impl Fn(&Section) -> Option<Vec<f64>>,
@@ -175,91 +189,24 @@ fn draw_section(
         look.map.palette(),
         |cell| values[cell],
         position,
+        look.cells,
     );
     drawing.raster(plan.corner.0, plan.corner.1, width, height, raster);
     plan.clip(drawing, clip);
     if let (Some(highest), Some(velocity)) = (look.arrows, &section.velocity) {
         draw_arrows(drawing, section, velocity, plan, highest);
     }
-    for (grain, ring) in cuts(scene, column, section) {
-        let colour = grain.map_or(INK, |grain| grain_colour(scene.story.grain_rank(grain)));
+    let fill = match look.cells {
+        Cells::Smooth => "#d9d9d9",
+        Cells::Flat => "none",
+    };
+    for (colour, ring) in cuts {
         let style = format!(
-            "fill=\"#d9d9d9\" stroke=\"{colour}\" stroke-width=\"1.1\" stroke-linejoin=\"round\""
+            "fill=\"{fill}\" stroke=\"{colour}\" stroke-width=\"1.1\" stroke-linejoin=\"round\""
         );
-        drawing.path(&plan.path(&ring, true), &style);
+        drawing.path(&plan.path(ring, true), &style);
     }
     drawing.end_clip();
-}
-
-/// Where the plane of a slice cuts the grains: exactly where their surfaces are known, for spheres
-/// too; else along half solid fraction, where touching grains run together.
-fn cuts(scene: &Scene, column: &Column, section: &Section) -> Vec<(Option<usize>, Outline)> {
-    let exact = |(grain, _): &(usize, (f64, f64))| {
-        let (position, turn) = scene.run.grains[*grain].pose(column.at)?;
-        let mut position = scene.run.wrapped(position);
-        // The image nearest to the plane is the one that it cuts.
-        let normal = section.view.normal;
-        if let Some(period) = scene.run.period(normal) {
-            position[normal] += period * ((section.place - position[normal]) / period).round();
-        }
-        let loops = match scene.bodies.get(grain) {
-            Some(body) => body.section(position, turn, section.view, section.place),
-            None => {
-                let radius = 0.5 * scene.sphere_diameter(*grain)?;
-                let chord = radius * radius - (position[normal] - section.place).powi(2);
-                let ring = || silhouette::circle(section.view.seen(position), chord.sqrt());
-                (chord > 0.0).then(ring).into_iter().collect()
-            }
-        };
-        Some(
-            loops
-                .into_iter()
-                .map(|ring| (Some(*grain), ring))
-                .collect::<Vec<_>>(),
-        )
-    };
-    if let Some(loops) = column.centres.iter().map(exact).collect::<Option<Vec<_>>>() {
-        return with_images(scene, section.view, loops.concat());
-    }
-    let nearest = |ring: Outline| {
-        let n = ring.len() as f64;
-        let middle = ring
-            .iter()
-            .fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / n, sum.1 + p.1 / n));
-        let distance = |p: &(f64, f64)| (p.0 - middle.0).hypot(p.1 - middle.1);
-        let by_distance = |a: &&(usize, (f64, f64)), b: &&(usize, (f64, f64))| {
-            distance(&a.1).total_cmp(&distance(&b.1))
-        };
-        (
-            column
-                .centres
-                .iter()
-                .min_by(by_distance)
-                .map(|(grain, _)| *grain),
-            ring,
-        )
-    };
-    section.outlines().into_iter().map(nearest).collect()
-}
-
-/// Adds the images through periodic faces.
-fn with_images(
-    scene: &Scene,
-    view: View,
-    loops: Vec<(Option<usize>, Outline)>,
-) -> Vec<(Option<usize>, Outline)> {
-    let shifts = |axis: usize| match scene.run.period(axis) {
-        Some(period) => vec![0.0, -period, period],
-        None => vec![0.0],
-    };
-    let mut out = Vec::new();
-    for dx in shifts(view.across) {
-        for dz in shifts(view.up) {
-            let moved = |ring: &Outline| ring.iter().map(|p| (p.0 + dx, p.1 + dz)).collect();
-            out.extend(loops.iter().map(|(grain, ring)| (*grain, moved(ring))));
-        }
-    }
-    out
 }
 
 fn draw_arrows(
@@ -315,4 +262,36 @@ fn draw_arrows(
         );
         drawing.path(&data, &style);
     }
+}
+
+/// Values of all cells that the windows show, grains left out.
+pub fn shown_values<'a>(
+    columns: &'a [Column],
+    value: impl Fn(&Section) -> Option<Vec<f64>> + 'a,
+) -> impl Iterator<Item = f64> + 'a {
+    columns.iter().flat_map(move |column| {
+        let mut out = Vec::new();
+        for section in column.sections.iter().flatten() {
+            if let Some(values) = value(section) {
+                out.extend(
+                    section
+                        .cells_in(column.window)
+                        .filter(|c| section.solid(*c) < 0.5)
+                        .map(|c| values[c]),
+                );
+            }
+        }
+        out.into_iter().filter(|v| v.is_finite())
+    })
+}
+
+/// Where a scale of signed values ends, and the largest magnitude. Thin layers at the grains would
+/// hide the wakes: the scale ends where one cell in fifty of those with visible values lies beyond.
+pub fn signed_end(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let mut sizes: Vec<f64> = values.map(f64::abs).collect();
+    sizes.sort_by(f64::total_cmp);
+    let highest = *sizes.last()?;
+    let visible = &sizes[sizes.partition_point(|v| *v < 0.02 * highest)..];
+    let end = *visible.get(visible.len().saturating_sub(1) * 49 / 50)?;
+    (end > 0.0).then_some((end, highest))
 }

@@ -4,8 +4,9 @@ use super::axis::Axis;
 use super::colormap::ColorMap;
 use super::plan::{Window, length_unit};
 use super::section::{Section, View};
-use super::sheet::{self, Column, Look};
-use super::{AXES, Figure, Scene, letter};
+use super::sheet::{self, Cells, Column, Look};
+use super::style::grain_colour;
+use super::{AXES, Figure, Scene, cuts, letter};
 use crate::run_folder::{FrameFile, History};
 use crate::story::{Subject, short};
 
@@ -72,6 +73,7 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
             at: instant.time,
             window: first.whole(),
             centres: scene.centres(instant.time, view),
+            cuts: Vec::new(),
             sections,
         });
     }
@@ -90,12 +92,25 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
             .to_owned();
     }
     crop(scene, &mut out);
+    for column in &mut out {
+        column.cuts = cuts::of_column(scene, column);
+    }
     out
+}
+
+/// The planes of a pair, by name and colour, where each has its row.
+fn row_names(scene: &Scene, rows: usize) -> Vec<(String, &'static str)> {
+    let name = |grain: usize| {
+        let colour = grain_colour(scene.story.grain_rank(grain));
+        (format!("plane of grain {grain}"), colour)
+    };
+    let pair = scene.story.pair.filter(|_| rows > 1);
+    pair.map_or(Vec::new(), |pair| pair.map(name).to_vec())
 }
 
 impl Scene<'_> {
     /// Centres of all grains at a time, as seen.
-    fn centres(&self, time: f64, view: View) -> Vec<(usize, (f64, f64))> {
+    pub(super) fn centres(&self, time: f64, view: View) -> Vec<(usize, (f64, f64))> {
         let place = |(grain, history): (usize, &History)| {
             Some((grain, view.seen(self.run.wrapped(history.pose(time)?.0))))
         };
@@ -179,7 +194,7 @@ fn speed(scene: &Scene, columns: &[Column], rows: usize) -> Option<Figure> {
             .as_ref()
             .map(|v| v.iter().map(|v| v[2]).collect::<Vec<_>>())
     };
-    let highest = shown_values(columns, value).fold(0.0, f64::max);
+    let highest = sheet::shown_values(columns, value).fold(0.0, f64::max);
     if highest <= 0.0 {
         return None;
     }
@@ -192,8 +207,11 @@ fn speed(scene: &Scene, columns: &[Column], rows: usize) -> Option<Figure> {
         arrows: Some(highest),
         axis,
         beyond: (false, false),
+        rows: row_names(scene, rows),
+        unit: None,
+        cells: Cells::Smooth,
     };
-    let drawing = sheet::draw(scene, columns, rows, &look, value)?;
+    let drawing = sheet::draw(columns, rows, &look, value)?;
     let caption = format!(
         "{} Colour is the speed of the fluid, at most {} m/s; arrows show the velocity in the plane, their length in proportion.",
         planes(scene, columns, rows),
@@ -209,16 +227,7 @@ fn speed(scene: &Scene, columns: &[Column], rows: usize) -> Option<Figure> {
 
 fn vorticity(scene: &Scene, columns: &[Column], rows: usize) -> Option<Figure> {
     let value = |section: &Section| section.vorticity.clone();
-    let mut sizes: Vec<f64> = shown_values(columns, value).map(f64::abs).collect();
-    sizes.sort_by(f64::total_cmp);
-    let highest = *sizes.last()?;
-    // Thin layers at the grains would hide the wakes: the scale ends where one cell in fifty of
-    // those with visible vorticity lies beyond.
-    let visible = &sizes[sizes.partition_point(|v| *v < 0.02 * highest)..];
-    let end = *visible.get(visible.len().saturating_sub(1) * 49 / 50)?;
-    if end <= 0.0 {
-        return None;
-    }
+    let (end, highest) = sheet::signed_end(sheet::shown_values(columns, value))?;
     let view = columns
         .iter()
         .flat_map(|c| c.sections.iter().flatten())
@@ -240,8 +249,11 @@ fn vorticity(scene: &Scene, columns: &[Column], rows: usize) -> Option<Figure> {
         arrows: None,
         axis,
         beyond: (highest > end, highest > end),
+        rows: row_names(scene, rows),
+        unit: None,
+        cells: Cells::Smooth,
     };
-    let drawing = sheet::draw(scene, columns, rows, &look, value)?;
+    let drawing = sheet::draw(columns, rows, &look, value)?;
     let mut caption = format!(
         "{} Colour is the vorticity about {normal} (positive, red, turns {} in this view), at most {} 1/s.",
         planes(scene, columns, rows),
@@ -308,25 +320,4 @@ fn planes(scene: &Scene, columns: &[Column], rows: usize) -> String {
             )
         }
     }
-}
-
-/// Values of all cells that the windows show, grains left out.
-fn shown_values<'a>(
-    columns: &'a [Column],
-    value: impl Fn(&Section) -> Option<Vec<f64>> + 'a,
-) -> impl Iterator<Item = f64> + 'a {
-    columns.iter().flat_map(move |column| {
-        let mut out = Vec::new();
-        for section in column.sections.iter().flatten() {
-            if let Some(values) = value(section) {
-                out.extend(
-                    section
-                        .cells_in(column.window)
-                        .filter(|c| section.solid(*c) < 0.5)
-                        .map(|c| values[c]),
-                );
-            }
-        }
-        out.into_iter().filter(|v| v.is_finite())
-    })
 }

@@ -1,13 +1,13 @@
 //! Figs 15 to 18: gap and vertical velocity in one orientation, by row and by column.
 
 use grainwake_report::figure::axis::{Axis, extent};
+use grainwake_report::figure::frame::Frame;
 use grainwake_report::figure::style::{
     BLUE, GREEN, INK, LINE, ORANGE, PAGE, SMALL, TEXT, VERMILION,
 };
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::frame::Frame;
 use super::{Data, Drawn, symbol, value_text};
 use crate::motion::Motion;
 use crate::plan::Run;

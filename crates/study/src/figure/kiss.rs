@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use grainwake_report::figure::axis::{Axis, extent};
+use grainwake_report::figure::frame::{Frame, Sign};
 use grainwake_report::figure::style::{
     BLUE, GREEN, HAIR, INK, ORANGE, PAGE, SMALL, TEXT, VERMILION,
 };
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::frame::{Frame, Sign};
 use super::{Data, Drawn, symbol, value_text};
 use crate::judge::{Sample, samples};
 use crate::stats::quartile;

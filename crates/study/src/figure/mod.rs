@@ -1,7 +1,6 @@
 //! Figures of a study, each a drawing with its caption.
 
 mod compare;
-mod frame;
 mod grains;
 mod kiss;
 mod setup;

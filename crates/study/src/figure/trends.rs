@@ -1,11 +1,11 @@
 //! Rank correlations with their intervals.
 
 use grainwake_report::figure::axis::Axis;
+use grainwake_report::figure::frame::{Frame, Sign};
 use grainwake_report::figure::style::{BLUE, GREEN, INK, ORANGE, PAGE, SMALL, TEXT, VERMILION};
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::frame::{Frame, Sign};
 use super::{Data, Drawn};
 use crate::correlation::Correlation;
 use crate::words::plain;

@@ -1,9 +1,9 @@
 //! A frame with axes for points, boxes and curves.
 
-use grainwake_report::figure::axis::Axis;
-use grainwake_report::figure::style::{FAINT, GRID, HAIR, INK, LINE, SMALL, TEXT, TICK};
-use grainwake_report::figure::svg::{Anchor, Drawing, path_data};
-use grainwake_report::figure::text;
+use super::axis::Axis;
+use super::style::{FAINT, GRID, HAIR, INK, LINE, SMALL, TEXT, TICK};
+use super::svg::{Anchor, Drawing, path_data};
+use super::text;
 
 /// A frame on the paper with its axes.
 pub struct Frame {
@@ -31,9 +31,9 @@ impl Frame {
         self.y + self.height * (1.0 - self.up.place(value).unwrap_or(0.0))
     }
 
-    /// Grid lines of the vertical axis, below the data.
+    /// Grid lines at the labelled ticks of the vertical axis, below the data.
     pub fn grid(&self, drawing: &mut Drawing) {
-        for (value, _) in &self.up.ticks {
+        for (value, _) in self.up.ticks.iter().filter(|(_, name)| !name.is_empty()) {
             let y = self.py(*value);
             if y > self.y + 1.0 && y < self.y + self.height - 1.0 {
                 drawing.line(&[(self.x, y), (self.x + self.width, y)], GRID, 0.5, None);
@@ -159,12 +159,23 @@ pub enum Sign {
     Triangle,
     /// Diamond.
     Diamond,
+    /// Triangle on its tip.
+    Down,
+    /// Pentagon.
+    Pentagon,
 }
 
 impl Sign {
     /// The n-th sign.
     pub fn number(n: usize) -> Sign {
-        [Sign::Circle, Sign::Square, Sign::Triangle, Sign::Diamond][n % 4]
+        [
+            Sign::Circle,
+            Sign::Square,
+            Sign::Triangle,
+            Sign::Diamond,
+            Sign::Down,
+            Sign::Pentagon,
+        ][n % 6]
     }
 
     /// Draws it; hollow for a bound.
@@ -177,10 +188,18 @@ impl Sign {
         hollow: bool,
     ) {
         let s = size;
+        let ring = |n: i32, s0: f64| -> Vec<(f64, f64)> {
+            (0..n)
+                .map(|i| (std::f64::consts::TAU * f64::from(i) / f64::from(n)).sin_cos())
+                .map(|(sin, cos)| (x + s * s0 * sin, y - s * s0 * cos))
+                .collect()
+        };
         let corners: Vec<(f64, f64)> = match self {
-            Sign::Circle => (0..24)
-                .map(|i| (std::f64::consts::TAU * f64::from(i) / 24.0).sin_cos())
-                .map(|(sin, cos)| (x + s * cos, y + s * sin))
+            Sign::Circle => ring(24, 1.0),
+            Sign::Pentagon => ring(5, 1.1),
+            Sign::Down => [(-1.1, -0.8), (1.1, -0.8), (0.0, 1.2)]
+                .iter()
+                .map(|(a, b)| (x + s * a, y + s * b))
                 .collect(),
             Sign::Square => [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
                 .iter()
@@ -195,7 +214,7 @@ impl Sign {
                 .map(|(a, b)| (x + s * a, y + s * b))
                 .collect(),
         };
-        let fill = if hollow { "#ffffff" } else { colour };
+        let fill = if hollow { "none" } else { colour };
         let style = format!(
             "fill=\"{fill}\" stroke=\"{}\" stroke-width=\"0.9\"",
             if hollow { colour } else { "#ffffff" }

@@ -1,0 +1,57 @@
+//! Figures that are kept: `figures/SUITE-NAME.png` and `.svg`, and a page that lists them.
+
+use std::path::Path;
+
+use grainwake_report::figure::plain;
+use grainwake_validation::Suite;
+
+use crate::exit::{Exit, IO};
+
+/// Draws the figures of `suites` that have data below `output` into `folder/figures`, and says on
+/// stderr what had to be left out; gives their number.
+pub fn add(folder: &Path, suites: &[Suite], output: &Path) -> Result<usize, Exit> {
+    let place = folder.join("figures");
+    std::fs::create_dir_all(&place)
+        .map_err(|e| Exit::new(IO, format!("{}: {e}", place.display())))?;
+    let mut count = 0;
+    for suite in suites {
+        for figure in &suite.figures {
+            let name = format!("{}-{}", suite.name, figure.name);
+            let drawn = figure.draw(&output.join(&suite.name));
+            if !drawn.notes.is_empty() {
+                eprintln!("figure {name}: left out: {}", drawn.notes.join("; "));
+            }
+            let Some(drawing) = drawn.drawing else {
+                eprintln!("figure {name}: not drawn, no run has data for it");
+                continue;
+            };
+            let failed = |what| Exit::new(IO, format!("figure {name}: {what}"));
+            let png = drawing.to_png().map_err(failed)?;
+            let svg = drawing.to_svg(&name, &plain(&figure.title), &plain(&figure.description()));
+            let written = |e: grainwake_report::ReportError| Exit::new(IO, e.to_string());
+            grainwake_report::write(place.join(format!("{name}.png")), &png).map_err(written)?;
+            grainwake_report::write(place.join(format!("{name}.svg")), svg.as_bytes())
+                .map_err(written)?;
+            count += 1;
+        }
+    }
+    Ok(count)
+}
+
+/// Writes `folder/figures/README.md` with the figures of `suites` that are there.
+pub fn list(folder: &Path, suites: &[Suite]) -> Result<(), Exit> {
+    let place = folder.join("figures");
+    let mut text = String::from("# Figures of the validations\n");
+    for suite in suites {
+        let there = |name: &str| place.join(name).is_file();
+        for figure in &suite.figures {
+            let file = format!("{}-{}.png", suite.name, figure.name);
+            if there(&file) {
+                let (title, caption) = (plain(&figure.title), plain(&figure.description()));
+                text += &format!("\n## {title}\n\n![{title}]({file})\n\n{caption}\n");
+            }
+        }
+    }
+    let page = place.join("README.md");
+    std::fs::write(&page, text).map_err(|e| Exit::new(IO, format!("{}: {e}", page.display())))
+}
