@@ -59,6 +59,9 @@ pub struct RunArgs {
     /// Change a value of the case, for example time.end=0.5 or grain.0.density=2600
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+    /// Do not draw the figures and the page when the run has ended
+    #[arg(long)]
+    pub no_report: bool,
     /// No progress, only problems
     #[arg(long)]
     pub quiet: bool,

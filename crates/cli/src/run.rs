@@ -75,7 +75,24 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
             }
             conclude(args, &case, &summary, &out)
         }
-        Ending::Finished(summary) => conclude(args, &case, &summary, &out),
+        Ending::Finished(summary) => {
+            if !args.no_report {
+                draw(args, &out);
+            }
+            conclude(args, &case, &summary, &out)
+        }
+    }
+}
+
+/// Draws the report. The run is good without it, so trouble is told and no more.
+fn draw(args: &RunArgs, out: &Path) {
+    match grainwake_report::render(out) {
+        Ok(done) if !args.quiet => eprintln!("report: {}", done.page.display()),
+        Ok(_) => {}
+        Err(error) => eprintln!(
+            "note: no report: {error}; `grainwake report {}` tries again",
+            out.display()
+        ),
     }
 }
 

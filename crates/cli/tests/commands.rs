@@ -300,14 +300,17 @@ fn grains_are_made_and_described() {
 fn a_run_can_be_reported() {
     let (folder, case) = folder_with(WET);
     let out = folder.path().join("run");
-    grainwake()
-        .arg("run")
-        .arg(&case)
-        .arg("-o")
-        .arg(&out)
-        .args(["--quiet", "--set", "time.end=20 ms"])
-        .assert()
-        .success();
+    let run = |more: &str| {
+        let mut command = grainwake();
+        command.arg("run").arg(&case).arg("-o").arg(&out);
+        command.args(["--quiet", "--set", "time.end=20 ms", more]);
+        command.assert().success().stderr("");
+    };
+    run("--force");
+    assert!(out.join("report.html").is_file() && out.join("figures").is_dir());
+    std::fs::remove_dir_all(&out).unwrap();
+    run("--no-report");
+    assert!(!out.join("report.html").exists());
     grainwake().arg("report").arg(&out).assert().success();
     assert!(out.join("report.html").is_file());
     grainwake()
