@@ -73,6 +73,9 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
             if !args.quiet {
                 eprintln!("the run had finished before");
             }
+            if !args.no_report && !out.join("report.html").exists() {
+                draw(args, &out);
+            }
             conclude(args, &case, &summary, &out)
         }
         Ending::Finished(summary) => {
