@@ -106,6 +106,9 @@ pub struct ValidateArgs {
     /// Keep what is already there of the same cases and program
     #[arg(long)]
     pub resume: bool,
+    /// Run nothing, judge the finished runs that are there, of whatever program
+    #[arg(long, conflicts_with = "resume")]
+    pub judge: bool,
     /// List the validations and their runs, and run nothing
     #[arg(long)]
     pub list: bool,

@@ -217,6 +217,34 @@ fn finished_runs_are_kept_only_if_asked() {
 }
 
 #[test]
+fn runs_of_another_program_can_be_judged_but_not_those_of_another_case() {
+    let (folder, suite) = suites(SUITE);
+    let kept = folder.path().join("kept");
+    let judge = ["--judge", "--save", kept.to_str().unwrap()];
+    validate(folder.path(), &judge)
+        .code(2)
+        .stderr(contains("no finished run"));
+    validate(folder.path(), &[]).success();
+    let file = folder.path().join("runs/validation/fall/fall/provenance.json");
+    let mut provenance: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
+    provenance["commit"] = "elsewhere".into();
+    std::fs::write(&file, provenance.to_string()).unwrap();
+    validate(folder.path(), &judge).success();
+    assert_eq!(
+        std::fs::read_to_string(&file).unwrap(),
+        provenance.to_string()
+    );
+    let page = std::fs::read_to_string(kept.join("ci.md")).unwrap();
+    assert!(page.contains("| elsewhere |"), "{page}");
+    let heavier = CASE.replace("density = 1000", "density = 1100");
+    std::fs::write(suite.join("case.toml"), heavier).unwrap();
+    validate(folder.path(), &judge)
+        .code(2)
+        .stderr(contains("a run of another case"));
+}
+
+#[test]
 fn wrong_names_and_keys_are_exit_code_2() {
     let (folder, suite) = suites(SUITE);
     validate(folder.path(), &["fal"])

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use grainwake_solver::case::{Case, nearest};
+use grainwake_solver::output::provenance::Provenance;
 use grainwake_solver::output::{self, Ending, Existing, Options, RunError};
 use grainwake_validation::{Level, Run, Suite, SuiteError};
 use table::{line, table};
@@ -54,7 +55,14 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         let mut known = BTreeMap::new();
         for run in suite.runs.iter().filter(|run| run.level <= level) {
             let folder = args.output.join(&suite.name).join(&run.name);
-            let ending = one(args, suite, run, &folder, stop.clone())?;
+            if args.judge && !there(run, &folder)? {
+                continue;
+            }
+            let ending = if args.judge {
+                Ok(())
+            } else {
+                one(args, suite, run, &folder, stop.clone())?
+            };
             let found = match ending {
                 Ok(()) => suite.judge(run, &folder, &mut known),
                 Err(why) => suite.failed(run, &why),
@@ -64,6 +72,16 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
             }
             verdicts.extend(found);
         }
+    }
+    if args.judge && verdicts.is_empty() {
+        return Err(Exit::with_help(
+            BAD_INPUT,
+            format!(
+                "{}: no finished run of these validations",
+                args.output.display()
+            ),
+            "leave out --judge to carry them out, or give their folder with -o",
+        ));
     }
     if args.json {
         print(&serde_json::to_string_pretty(&verdicts)?)?;
@@ -145,6 +163,20 @@ fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
         }
     }
     Ok(chosen)
+}
+
+/// Whether `folder` holds a finished run of this very case.
+fn there(run: &Run, folder: &Path) -> Result<bool, Exit> {
+    let Some(provenance) =
+        Provenance::read(folder).filter(|_| output::read_summary(folder).is_ok())
+    else {
+        return Ok(false);
+    };
+    if provenance.case_sha256 != Case::load(&run.case, &run.set)?.digest {
+        eprintln!("{}: left out: a run of another case", folder.display());
+        return Ok(false);
+    }
+    Ok(true)
 }
 
 /// Carries out one run. The outer error ends the command, the inner one only this run.

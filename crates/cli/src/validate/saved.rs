@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use grainwake_solver::output::provenance::{Provenance, commit};
+use grainwake_solver::output::provenance::Provenance;
 use grainwake_solver::output::read_summary;
 use grainwake_validation::Verdict;
 use serde::{Deserialize, Serialize};
@@ -61,7 +61,7 @@ pub fn add(folder: &Path, level: &str, verdicts: &[Verdict], output: &Path) -> R
         };
         let session = provenance.sessions.last();
         saved.runs.push(Source {
-            commit: commit().map(str::to_owned),
+            commit: provenance.commit.clone(),
             cpu: session.map_or_else(String::new, |s| s.cpu.clone()),
             threads: session.map_or(0, |s| s.threads),
             steps: summary.steps,
