@@ -225,7 +225,9 @@ fn runs_of_another_program_can_be_judged_but_not_those_of_another_case() {
         .code(2)
         .stderr(contains("no finished run"));
     validate(folder.path(), &[]).success();
-    let file = folder.path().join("runs/validation/fall/fall/provenance.json");
+    let file = folder
+        .path()
+        .join("runs/validation/fall/fall/provenance.json");
     let mut provenance: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
     provenance["commit"] = "elsewhere".into();

@@ -380,6 +380,7 @@ fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
     let params = ContactParams {
         lubrication_gap: range,
         lubrication_viscosity: viscosity,
+        roughness: 1e-6,
         ..smooth(1e3)
     };
     let force = |gap: f64, speed: f64| {
@@ -415,9 +416,70 @@ fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
             assert!(f.truncate().length() < 1e-3 * f.z.abs());
         }
     }
-    // Saturated below a hundredth of the range, and gone beyond the range.
+    // No thinner than the asperities, and gone beyond the range.
     assert!((force(1e-8, 0.01).z / expected(1e-6, 0.01) - 1.0).abs() < 1e-3);
     assert_eq!(force(1.1e-4, 0.01), DVec3::ZERO);
     // An overlap is the spring alone.
     assert!((force(-1e-5, 0.0).z / (1e3 * 1e-5) - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn a_contact_turns_the_added_mass_as_well() {
+    let mut impulses = [0.0; 2];
+    for (impulse, added_density) in impulses.iter_mut().zip([0.0, 900.0]) {
+        let params = ContactParams {
+            added_density,
+            ..smooth(1e5)
+        };
+        let mut grains = [sphere(0.1, 2600.0, 400, DVec3::new(0.0, 0.0, 0.1001))];
+        grains[0].velocity = DVec3::new(0.0, 0.0, -1.0);
+        let mut dynamics = Dynamics::new(params, floor());
+        let mut mean = [Load::default()];
+        let dt = 1e-3;
+        for _ in 0..200 {
+            dynamics.advance(&mut grains, &[], dt, &mut mean);
+            *impulse += mean[0].force.z * dt;
+        }
+        assert!((grains[0].velocity.z - 1.0).abs() < 1e-3);
+        let moved = grains[0].mass() + added_density * grains[0].shape.volume();
+        assert!((*impulse / (2.0 * moved) - 1.0).abs() < 1e-3, "{impulse}");
+    }
+    assert!((impulses[1] / impulses[0] - 3500.0 / 2600.0).abs() < 1e-3);
+}
+
+#[test]
+fn a_film_takes_its_speed_whatever_the_step() {
+    // m dv = -6 pi mu R^2 (1/h - 1/h0) dh down to the asperities, the last film from there on.
+    let (radius, viscosity, range, roughness) = (3e-3, 0.1, 7.5e-4, 9e-6);
+    let params = ContactParams {
+        lubrication_gap: range,
+        lubrication_viscosity: viscosity,
+        roughness,
+        ..smooth(1e4)
+    };
+    for dt in [2e-5, 1e-3] {
+        let mut grains = [sphere(
+            radius,
+            7800.0,
+            1000,
+            DVec3::new(0.0, 0.0, radius + 1.2 * range),
+        )];
+        grains[0].velocity = DVec3::new(0.0, 0.0, -0.5);
+        let mass = grains[0].mass();
+        let mut dynamics = Dynamics::new(params, floor());
+        let mut mean = [Load::default()];
+        let mut time = 0.0;
+        while time < 8e-3 {
+            dynamics.advance(&mut grains, &[], dt, &mut mean);
+            time += dt;
+        }
+        let once = 6.0 * std::f64::consts::PI * viscosity * radius * radius / mass
+            * ((range / roughness).ln() - 1.0 + roughness / range + 1.0 - roughness / range);
+        let expected = 0.5 - 2.0 * once;
+        let rebound = grains[0].velocity.z;
+        assert!(
+            (rebound / expected - 1.0).abs() < 0.02,
+            "dt {dt}: {rebound} against {expected}"
+        );
+    }
 }

@@ -32,8 +32,10 @@ pub(super) struct Actor {
     pub mid: MidStep,
     /// Contact load at the last look.
     pub contact: Load,
-    /// One over the mass that resists a force [1/kg].
+    /// One over the mass that resists a contact, added mass included [1/kg].
     pub inverse_mass: f64,
+    /// The same of the grain alone [1/kg].
+    pub own_inverse_mass: f64,
     /// Where it was when the pairs were searched [m].
     pub searched: DVec3,
     /// How far it may go from there before they are searched again [m].
@@ -76,9 +78,31 @@ impl Actor {
             mid: MidStep::default(),
             contact: Load::default(),
             inverse_mass: 0.0,
+            own_inverse_mass: 0.0,
             searched: DVec3::ZERO,
             margin: 0.0,
         }
+    }
+
+    /// One over the mass that resists the present loads [1/kg].
+    pub fn resisting(&self) -> f64 {
+        if self.contact.force == DVec3::ZERO {
+            self.own_inverse_mass
+        } else {
+            self.inverse_mass
+        }
+    }
+
+    /// No point of the surface is faster [m/s].
+    pub fn speed(&self) -> f64 {
+        self.now.velocity.length() + self.now.spin.length() * self.shape.bounding_radius()
+    }
+
+    /// No two points of the surfaces part or meet faster [m/s].
+    pub fn speed_relative_to(&self, other: &Actor) -> f64 {
+        (self.now.velocity - other.now.velocity).length()
+            + self.now.spin.length() * self.shape.bounding_radius()
+            + other.now.spin.length() * other.shape.bounding_radius()
     }
 
     /// Takes over the grain's pose and motion; `step` [s] is the time since the last look.

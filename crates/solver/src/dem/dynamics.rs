@@ -126,7 +126,8 @@ impl Dynamics {
                 if let Some(mean) = mean_contact.get_mut(i) {
                     *mean += actor.contact * half_mean;
                 }
-                actor.mid = kick_and_drift(grain, &(load_of(i) + actor.contact), damping, step);
+                let load = load_of(i) + actor.contact;
+                actor.mid = kick_and_drift(grain, &load, actor.resisting(), damping, step);
             }
             ahead -= 1;
             done += 1;
@@ -144,6 +145,7 @@ impl Dynamics {
                     grain,
                     &actor.mid,
                     &(load_of(i) + actor.contact),
+                    actor.resisting(),
                     damping,
                     step,
                 );
@@ -198,10 +200,12 @@ impl Dynamics {
         let reach = 0.5 * self.law.reach();
         for (i, (grain, actor)) in grains.iter().zip(&mut self.actors).enumerate() {
             let load = loads.get(i).copied().unwrap_or_default() + actor.contact;
-            actor.inverse_mass = grain.inverse_mass();
+            actor.inverse_mass = grain.inverse_mass(self.law.params.added_density);
+            actor.own_inverse_mass = grain.inverse_mass(0.0);
             let speed = match grain.translation {
                 Dof::Free => {
-                    grain.velocity.length() + 0.5 * dt * load.force.length() * actor.inverse_mass
+                    grain.velocity.length()
+                        + 0.5 * dt * load.force.length() * actor.own_inverse_mass
                 }
                 Dof::Prescribed(velocity) => velocity.length(),
             };
@@ -241,12 +245,30 @@ impl Dynamics {
         }
         let longest =
             self.law.params.contact_time(1.0 / largest) / self.law.params.substeps_per_contact;
-        let count = (dt / longest).ceil();
+        let count = (dt / longest.min(self.film_time())).ceil();
         if count.is_finite() {
             count.clamp(1.0, MOST_SUBSTEPS) as usize
         } else {
             1
         }
+    }
+
+    /// Time in which no listed pair closes its lubrication film by more than half the asperities [s].
+    fn film_time(&self) -> f64 {
+        if self.law.reach() <= 0.0 {
+            return f64::INFINITY;
+        }
+        let fastest = self
+            .slots
+            .iter()
+            .map(|slot| match slot.key.partner {
+                Partner::Grain(j) => {
+                    self.actors[slot.key.grain as usize].speed_relative_to(&self.actors[j])
+                }
+                Partner::Wall { .. } => self.actors[slot.key.grain as usize].speed(),
+            })
+            .fold(0.0, f64::max);
+        0.5 * self.law.params.roughness / fastest
     }
 
     fn inverse_mass(&self, key: &PairKey) -> f64 {

@@ -50,10 +50,11 @@ impl Grain {
     pub fn principal_inertia(&self) -> DVec3 {
         self.shape.inertia() * self.density
     }
-    /// Mass that resists a contact force: infinite where the translation is prescribed [kg].
-    pub(super) fn inverse_mass(&self) -> f64 {
+    /// One over the mass that resists a force, with fluid of `added_density` [kg/m^3] dragged along;
+    /// zero where the translation is prescribed [1/kg].
+    pub(super) fn inverse_mass(&self, added_density: f64) -> f64 {
         match self.translation {
-            Dof::Free => 1.0 / self.mass(),
+            Dof::Free => 1.0 / (self.mass() + added_density * self.shape.volume()),
             Dof::Prescribed(_) => 0.0,
         }
     }

@@ -12,7 +12,6 @@ use super::params::ContactParams;
 use crate::math::Load;
 
 /// Lubrication saturates at this part of its range.
-const SATURATION: f64 = 0.01;
 
 /// Motion of a body at the contact.
 #[derive(Clone, Copy, Debug, Default)]
@@ -261,16 +260,16 @@ impl Law {
     }
 
     /// Leading-order squeeze-film force between equal-volume spheres,
-    /// 6 pi mu R^2 v_n (1/h - 1/h_0), saturated at a hundredth of the range h_0.
+    /// 6 pi mu R^2 v_n (1/h - 1/h_0), where asperities keep the surfaces `roughness` apart.
     fn lubrication(&self, closest: &Closest, pair: &Pair, step: f64) -> Outcome {
         let range = self.reach();
         if closest.gap >= range {
             return Outcome::default();
         }
-        let gap = closest.gap.max(SATURATION * range);
         let strength =
             6.0 * std::f64::consts::PI * self.params.lubrication_viscosity * pair.radius.powi(2);
-        let mut resistance = strength * (1.0 / gap - 1.0 / range);
+        let film = closest.gap.max(self.params.roughness).min(range);
+        let mut resistance = strength * (1.0 / film - 1.0 / range);
         // An explicit dashpot must not reverse the approach within a sub-step.
         if step * pair.inverse_mass > 0.0 {
             resistance = resistance.min(0.5 / (step * pair.inverse_mass));

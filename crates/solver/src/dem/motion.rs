@@ -23,13 +23,19 @@ pub(super) struct MidStep {
     pub predicted_spin: DVec3,
 }
 
-/// First half kick and drift: moves the pose to n+1.
-pub(super) fn kick_and_drift(grain: &mut Grain, load: &Load, damping: f64, step: f64) -> MidStep {
+/// First half kick and drift: moves the pose to n+1. `inverse_mass` [1/kg] is what resists the load.
+pub(super) fn kick_and_drift(
+    grain: &mut Grain,
+    load: &Load,
+    inverse_mass: f64,
+    damping: f64,
+    step: f64,
+) -> MidStep {
     let half = 0.5 * step;
     let mut mid = MidStep::default();
     match grain.translation {
         Dof::Free => {
-            let change = half * (load.force / grain.mass() - damping * grain.velocity);
+            let change = half * (load.force * inverse_mass - damping * grain.velocity);
             mid.velocity = grain.velocity + change;
             mid.predicted_velocity = mid.velocity + change;
         }
@@ -63,10 +69,17 @@ pub(super) fn kick_and_drift(grain: &mut Grain, load: &Load, damping: f64, step:
 }
 
 /// Second half kick, with the load at n+1: brings the velocities to n+1.
-pub(super) fn kick(grain: &mut Grain, mid: &MidStep, load: &Load, damping: f64, step: f64) {
+pub(super) fn kick(
+    grain: &mut Grain,
+    mid: &MidStep,
+    load: &Load,
+    inverse_mass: f64,
+    damping: f64,
+    step: f64,
+) {
     let half = 0.5 * step;
     if grain.translation == Dof::Free {
-        grain.velocity = (mid.velocity + half * load.force / grain.mass()) / (1.0 + damping * half);
+        grain.velocity = (mid.velocity + half * load.force * inverse_mass) / (1.0 + damping * half);
     }
     if grain.rotation == Dof::Free {
         let to_body = grain.pose.orientation.conjugate();

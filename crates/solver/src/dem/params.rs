@@ -22,6 +22,12 @@ pub struct ContactParams {
     pub lubrication_gap: f64,
     /// Dynamic viscosity of the fluid in the lubrication correction [Pa s].
     pub lubrication_viscosity: f64,
+    /// Height of the asperities [m]: the lubrication film is never thinner.
+    pub roughness: f64,
+    /// Added mass of a touching grain over its volume [kg/m^3]. A contact that is over within a step
+    /// has to turn this fluid as well; without it the grain loses what the fluid takes afterwards
+    /// (decision 0009).
+    pub added_density: f64,
     /// Sub-steps per contact time (half period of the stiffest pair).
     pub substeps_per_contact: f64,
 }
@@ -38,6 +44,8 @@ impl Default for ContactParams {
             global_damping: 0.0,
             lubrication_gap: 0.0,
             lubrication_viscosity: 0.0,
+            roughness: 0.0,
+            added_density: 0.0,
             substeps_per_contact: 25.0,
         }
     }

@@ -80,6 +80,10 @@ pub struct RawContact {
     pub global_damping: Loc<Quantity<Rate>>,
     /// Lubrication correction below this gap [m]; 0 turns it off.
     pub lubrication_gap: Loc<Quantity<Length>>,
+    /// Height of the asperities: the lubrication film is never thinner [m]; three thousandths of
+    /// the smallest equal-volume radius where it is not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roughness: Option<Loc<Quantity<Length>>>,
     /// Sub-steps per contact time.
     pub substeps_per_contact: Loc<Quantity<Number>>,
 }
@@ -97,6 +101,7 @@ impl Default for RawContact {
             tangential_damping: Quantity::new(params.tangential_damping).into(),
             global_damping: Quantity::new(params.global_damping).into(),
             lubrication_gap: Quantity::new(params.lubrication_gap).into(),
+            roughness: None,
             substeps_per_contact: Quantity::new(params.substeps_per_contact).into(),
         }
     }

@@ -14,6 +14,11 @@ use crate::sim::Prescription;
 
 /// Largest overlap at impact where neither stiffness nor overlap is given [diameters].
 const MAXIMUM_OVERLAP: f64 = 0.01;
+/// Roughness over the smallest equal-volume radius, where none is given.
+const ROUGHNESS: f64 = 3e-3;
+/// Added mass of a sphere that touches a wall or its like, over the mass of the fluid that it
+/// displaces (potential flow: Hicks 1879).
+const ADDED_MASS: f64 = 0.803;
 
 /// The fluid; the viscosity is kept as a kinematic one.
 pub(super) fn fluid(
@@ -136,6 +141,10 @@ pub(super) fn contact(
         0.0,
         infinite,
     );
+    let roughness = match &raw.roughness {
+        Some(given) => check.positive(given, "contact.roughness", "the roughness"),
+        None => Some(ROUGHNESS * 0.5 * smallest_diameter(grains)),
+    };
     let substeps = check.within(
         &raw.substeps_per_contact,
         "contact.substeps_per_contact",
@@ -180,12 +189,25 @@ pub(super) fn contact(
         global_damping: global_damping?,
         lubrication_gap: lubrication_gap?,
         lubrication_viscosity: viscosity,
+        roughness: roughness?,
+        added_density: fluid.map_or(0.0, |f| ADDED_MASS * f.density),
         substeps_per_contact: substeps?,
     };
     raw.maximum_overlap = None;
+    if params.lubrication_gap > 0.0 {
+        raw.roughness = Some(Quantity::new(params.roughness).into());
+    }
     raw.stiffness = Some(Quantity::new(params.normal_stiffness).into());
     raw.wall_friction = Some(Quantity::new(params.wall_friction).into());
     Some(params)
+}
+
+/// Smallest equal-volume diameter [m]; infinite without grains.
+fn smallest_diameter(grains: &[Grain]) -> f64 {
+    grains
+        .iter()
+        .map(|g| g.shape.equivalent_diameter())
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// Stiffness [N/m] for which no grain that meets a wall at 1.5 times its settling speed (dry: after
@@ -198,11 +220,7 @@ fn stiffness_for(
     gravity: DVec3,
     mesh: &Mesh,
 ) -> f64 {
-    let smallest = grains
-        .iter()
-        .map(|g| g.shape.equivalent_diameter())
-        .fold(f64::INFINITY, f64::min);
-    let overlap = fraction * smallest;
+    let overlap = fraction * smallest_diameter(grains);
     let g = gravity.length();
     let height = (mesh.extent() * gravity.normalize_or_zero()).length();
     let needed = |grain: &Grain| {
