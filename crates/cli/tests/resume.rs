@@ -347,3 +347,16 @@ fn a_run_that_was_killed_in_its_first_moments_can_be_started_again() {
     run(&case, &out, &["--set", "time.end=2 ms"]).success();
     assert!(!out.join("provenance.json.tmp").exists());
 }
+
+#[test]
+fn outputs_that_nearly_coincide_do_not_end_a_run() {
+    let (folder, case) = folder_with(WET);
+    let out = folder.path().join("out");
+    let more = [
+        "time.end=20 ms",
+        "output.tables=5 ms",
+        "output.slices=5.000001 ms",
+    ];
+    let more: Vec<&str> = more.iter().flat_map(|set| ["--set", set]).collect();
+    run(&case, &out, &more).success();
+}

@@ -11,8 +11,6 @@ use super::narrow_phase::{Closest, Touch};
 use super::params::ContactParams;
 use crate::math::Load;
 
-/// Lubrication saturates at this part of its range.
-
 /// Motion of a body at the contact.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Motion {

@@ -14,6 +14,8 @@ use crate::dem::{Enclosure, surface_gap};
 use crate::sim::Simulation;
 use crate::sim::events::{Event, EventKind, EventParams, Tracker};
 
+/// Two outputs less than this part of a step apart are written together.
+const SHORTEST_STEP: f64 = 0.1;
 /// Two times count as one when they differ by less than this part of the interval.
 const SAME_TIME: f64 = 1e-9;
 
@@ -120,16 +122,22 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// Time from now to the next output or the end [s].
-    pub fn until_next(&self, now: f64) -> f64 {
-        let times = self
-            .intervals
-            .iter()
-            .zip(&self.next)
-            .filter(|(interval, _)| **interval > 0.0);
-        times
-            .map(|(interval, k)| *k as f64 * interval)
-            .fold(self.end, f64::min)
+    /// Time from `now` to the next output or the end [s]. Outputs that are nearly due at the same time, the
+    /// end among them, wait for the last of them: the steps are about `step` [s] long, and a far
+    /// shorter one between them would do the pressure no good.
+    pub fn until_next(&self, now: f64, step: f64) -> f64 {
+        let times = || {
+            let due = self.intervals.iter().zip(&self.next);
+            due.filter(|(interval, _)| **interval > 0.0)
+                .map(|(interval, k)| *k as f64 * interval)
+                .filter(|time| *time < self.end)
+                .chain([self.end])
+        };
+        let first = times().fold(f64::INFINITY, f64::min);
+        let together = first + SHORTEST_STEP * step;
+        times()
+            .filter(|time| *time <= together)
+            .fold(first, f64::max)
             - now
     }
 

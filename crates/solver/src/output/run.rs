@@ -201,7 +201,9 @@ impl Running {
             if let Some(why) = self.ended() {
                 return self.finish(why);
             }
-            let limit = self.recorder.until_next(self.sim.time());
+            let limit = self
+                .recorder
+                .until_next(self.sim.time(), self.sim.time_step());
             let stepped = self.sim.step(limit).and_then(|()| self.collapsed(limit));
             if let Err(source) = stepped {
                 return Err(self.failed(source, saved_time));
