@@ -109,6 +109,7 @@ impl Tracker {
 
     fn update_pair(&mut self, time: f64, line: DVec3, touching: bool, gap: f64) {
         let (params, tilt) = (self.params, self.tilt(line));
+        let both_settle = self.state.landed.iter().all(Option::is_none);
         let Some(pair) = self.state.pair.as_mut() else {
             return;
         };
@@ -117,7 +118,7 @@ impl Tracker {
 
         let ahead = line.dot(params.down);
         let leader = usize::from(ahead > 0.0);
-        if leader == pair.leader {
+        if leader == pair.leader || !both_settle {
             pair.level_since = None;
         } else {
             let crossed = *pair.level_since.get_or_insert(time);
@@ -400,6 +401,23 @@ mod tests {
         assert_eq!((tracker.role_changes(), tracker.leader()), (1, Some(1)));
         let separation = &tracker.events()[3];
         assert!(separation.confirmed >= separation.time + 1.0 && separation.gap.unwrap() > 0.05);
+    }
+
+    #[test]
+    fn a_grain_that_lands_beside_one_on_the_floor_does_not_change_roles() {
+        let grains = |z: f64| [grain(0.0, 0.0), grain(3.0, z)];
+        let params = EventParams::for_grains(&grains(1.0), DVec3::new(0.0, 0.0, -1.0), [None; 3]);
+        let (axis, side) = params.floor;
+        for (contacts, changes) in [
+            (vec![touch(0, Partner::Wall { axis, side })], 0),
+            (vec![], 1),
+        ] {
+            let mut tracker = Tracker::new(params, &grains(1.0), Some(2.0));
+            for (t, z) in [(1.0, 0.5), (2.0, -0.5), (3.0, -0.5)] {
+                tracker.update(t, &grains(z), &contacts, Some(2.0));
+            }
+            assert_eq!(tracker.role_changes(), changes);
+        }
     }
 
     #[test]
