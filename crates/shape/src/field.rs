@@ -172,6 +172,33 @@ impl SampledField {
         }
     }
 
+    /// Signed distance [m] at `x` where that is at most `limit`, else infinity or the distance: what
+    /// is clearly farther costs little off the grid.
+    #[inline]
+    pub fn distance_within(&self, x: DVec3, limit: f64) -> f64 {
+        match self.locate(x) {
+            Some(place) => self.interpolate(&place),
+            None if self.is_farther(x, limit) => f64::INFINITY,
+            None => self.beyond(x).0,
+        }
+    }
+
+    /// Whether `x`, off the grid, is farther than `limit` by the distance at the nearest point of the
+    /// border: the body lies on the other side of the plane through that point, normal to the
+    /// line to `x`. May miss some.
+    fn is_farther(&self, x: DVec3, limit: f64) -> bool {
+        let border = x.clamp(self.lower, self.upper());
+        let away = (x - border).length_squared();
+        let limit = limit * limit;
+        if away > limit {
+            return true;
+        }
+        let place = self.place((border - self.lower) * self.inverse_spacing);
+        // A spacing less, for the error of the interpolation.
+        let from_border = (self.interpolate(&place) - self.spacing).max(0.0);
+        away + from_border * from_border > limit
+    }
+
     /// Signed distance [m] and its gradient at `x`.
     #[inline]
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
@@ -415,6 +442,26 @@ mod tests {
                 assert!(gradient.dot(n) > 0.99, "at {x}: {gradient} for {n}");
             }
         }
+    }
+
+    #[test]
+    fn a_limited_distance_is_the_distance_up_to_the_limit() {
+        let corner = DVec3::new(1.0, 0.125, 0.125);
+        let rod =
+            |x: DVec3, _: &mut u32| (x - DVec3::X * x.x.clamp(-0.875, 0.875)).length() - 0.125;
+        let field = SampledField::sample(rod, -corner, corner, 1.0 / 24.0, 0.25).unwrap();
+        let (mut spared, mut far) = (0, 0);
+        for x in points(1.6, 8000) {
+            let (full, limited) = (field.distance(x), field.distance_within(x, 0.4));
+            if full <= 0.4 {
+                assert_eq!(limited, full, "at {x}");
+            } else {
+                assert!(limited > 0.4, "at {x}");
+                far += 1;
+                spared += i32::from(limited.is_infinite());
+            }
+        }
+        assert!(spared > 9 * far / 10, "{spared} of {far}");
     }
 
     #[test]

@@ -92,6 +92,15 @@ impl Shape {
         }
     }
 
+    /// Signed distance [m] at `x` where that is at most `limit`; a larger one may be infinite.
+    #[inline]
+    pub fn distance_within(&self, x: DVec3, limit: f64) -> f64 {
+        match &self.field {
+            Field::Sphere(radius) => x.length() - radius,
+            Field::Sampled(field) => field.distance_within(x, limit),
+        }
+    }
+
     /// Signed distance [m] and its gradient (outward normal where |gradient| = 1) at `x`. On the
     /// grid of a sampled field the gradient is that of the trilinear value, so its length is 1
     /// only to the field's accuracy; off the grid it is a unit vector.

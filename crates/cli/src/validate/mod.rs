@@ -89,9 +89,10 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         print(&table(&verdicts).to_string())?;
     }
     if let Some(folder) = &args.save {
-        saved::add(folder, &args.level, &verdicts, &args.output)?;
+        let all = Suite::all(&args.suites)?;
+        saved::add(folder, &args.level, &verdicts, &args.output, &all)?;
         let drawn = pictures::add(folder, &suites, &args.output)?;
-        pictures::list(folder, &Suite::all(&args.suites)?)?;
+        pictures::list(folder, &all)?;
         if !args.quiet {
             eprintln!("{drawn} figures in {}", folder.join("figures").display());
         }

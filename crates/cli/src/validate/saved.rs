@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use grainwake_solver::case::Case;
 use grainwake_solver::output::provenance::Provenance;
 use grainwake_solver::output::read_summary;
-use grainwake_validation::Verdict;
+use grainwake_validation::{Suite, Verdict};
 use serde::{Deserialize, Serialize};
 
 use super::table::table;
@@ -25,13 +26,30 @@ struct Source {
     commit: Option<String>,
     cpu: String,
     threads: usize,
+    /// Cells of the grid; not in results kept by earlier versions.
+    #[serde(default)]
+    cells: Option<u64>,
     steps: u64,
     wall_s: f64,
 }
 
+impl Source {
+    /// Wall time [ns] for each cell and step.
+    fn cost(&self) -> Option<f64> {
+        let updates = self.cells? * self.steps;
+        (updates > 0).then(|| 1e9 * self.wall_s / updates as f64)
+    }
+}
+
 /// Adds `verdicts` of runs below `output` to the results in `folder`, in place of earlier ones of
-/// the same runs.
-pub fn add(folder: &Path, level: &str, verdicts: &[Verdict], output: &Path) -> Result<(), Exit> {
+/// the same runs; all are listed in the order of the `suites`.
+pub fn add(
+    folder: &Path,
+    level: &str,
+    verdicts: &[Verdict],
+    output: &Path,
+    suites: &[Suite],
+) -> Result<(), Exit> {
     let failed = |path: &Path, what: &dyn std::fmt::Display| {
         Exit::new(IO, format!("{}: {what}", path.display()))
     };
@@ -45,7 +63,9 @@ pub fn add(folder: &Path, level: &str, verdicts: &[Verdict], output: &Path) -> R
     let new: Vec<_> = verdicts.iter().map(key).collect();
     saved.results.retain(|v| !new.contains(&key(v)));
     saved.results.extend(verdicts.iter().cloned());
-    saved.results.sort_by_key(|v| v.name.clone());
+    saved
+        .results
+        .sort_by_key(|v| place(suites, &v.name, &v.run));
     saved
         .runs
         .retain(|r| !new.contains(&(r.name.clone(), r.run.clone())));
@@ -64,13 +84,19 @@ pub fn add(folder: &Path, level: &str, verdicts: &[Verdict], output: &Path) -> R
             commit: provenance.commit.clone(),
             cpu: session.map_or_else(String::new, |s| s.cpu.clone()),
             threads: session.map_or(0, |s| s.threads),
+            cells: None,
             steps: summary.steps,
             wall_s: summary.wall_s,
             name,
             run,
         });
     }
-    saved.runs.sort_by_key(|r| r.name.clone());
+    for run in &mut saved.runs {
+        if run.cells.is_none() {
+            run.cells = cells(suites, &run.name, &run.run);
+        }
+    }
+    saved.runs.sort_by_key(|r| place(suites, &r.name, &r.run));
     std::fs::create_dir_all(folder).map_err(|e| failed(folder, &e))?;
     std::fs::write(&json, serde_json::to_string_pretty(&saved)? + "\n")
         .map_err(|e| failed(&json, &e))?;
@@ -78,20 +104,38 @@ pub fn add(folder: &Path, level: &str, verdicts: &[Verdict], output: &Path) -> R
     std::fs::write(&page, markdown(level, &saved)).map_err(|e| failed(&page, &e))
 }
 
+/// Where a run stands in the suites: by name of the suite, then in its order.
+fn place(suites: &[Suite], name: &str, run: &str) -> (String, usize) {
+    let suite = suites.iter().find(|s| s.name == name);
+    let at = suite.and_then(|s| s.runs.iter().position(|r| r.name == run));
+    (name.to_string(), at.unwrap_or(usize::MAX))
+}
+
+/// Cells of a run's grid.
+fn cells(suites: &[Suite], name: &str, run: &str) -> Option<u64> {
+    let suite = suites.iter().find(|s| s.name == name)?;
+    let run = suite.runs.iter().find(|r| r.name == run)?;
+    let case = Case::load(&run.case, &run.set).ok()?;
+    Some(case.setup.mesh.cells.iter().map(|&n| n as u64).product())
+}
+
 fn markdown(level: &str, saved: &Saved) -> String {
     let mut text = format!(
         "# Results of the validations, level {level}\n\nMade by `grainwake validate --level {level} \
-         --save`. A row without a bound is context.\n\n{}\n\n## Runs\n\n| run | steps | wall time [s] | threads \
-         | commit | processor |\n|---|---|---|---|---|---|\n",
+         --save`. A row without a bound is context.\n\n{}\n\n## Runs\n\n| run | cells | steps | wall time [s] \
+         | ns per cell and step | threads | commit | processor |\n|---|---|---|---|---|---|---|---|\n",
         table(&saved.results)
     );
     for run in &saved.runs {
         text += &format!(
-            "| {}/{} | {} | {:.0} | {} | {} | {} |\n",
+            "| {}/{} | {} | {} | {:.0} | {} | {} | {} | {} |\n",
             run.name,
             run.run,
+            run.cells.map_or_else(|| "-".into(), |n| n.to_string()),
             run.steps,
             run.wall_s,
+            run.cost()
+                .map_or_else(|| "-".into(), |ns| format!("{ns:.0}")),
             run.threads,
             run.commit.as_deref().unwrap_or("unknown"),
             run.cpu

@@ -43,7 +43,7 @@ pub struct Body {
     /// Signed distance [m] at the faces of the box for each component; infinite where it does not
     /// matter.
     pub distance: [Vec<f64>; 3],
-    /// Smallest distance from another grain there [m]; infinite where none is near.
+    /// Smallest distance from another grain there [m]; infinite where it does not matter.
     rival_distance: [Vec<f64>; 3],
     /// Faces under its rigidity.
     pub forced: Vec<ForcedFace>,
@@ -207,7 +207,7 @@ impl Locator {
                         if (x - centre).length_squared() > far * far {
                             continue;
                         }
-                        let d = grain.shape.distance(grain.pose.to_body(x));
+                        let d = grain.shape.distance_within(grain.pose.to_body(x), reach);
                         if d > reach {
                             continue;
                         }
@@ -215,7 +215,9 @@ impl Locator {
                         distance[at] = d;
                         rival_distance[at] = rivals
                             .iter()
-                            .map(|rival| rival.distance(grains, x) + rival.handicap * self.eps)
+                            .map(|rival| {
+                                rival.distance_within(grains, x, reach) + rival.handicap * self.eps
+                            })
                             .fold(f64::INFINITY, f64::min);
                     }
                 }
@@ -298,7 +300,7 @@ impl Locator {
                         let mut all = own;
                         if rival < 2.0 * self.eps && d > -self.eps {
                             for rival in rivals {
-                                let there = rival.distance(grains, x);
+                                let there = rival.distance_within(grains, x, 2.0 * self.eps);
                                 if there < 2.0 * self.eps {
                                     let other = &grains[rival.index];
                                     all = all + self.hold(other, x - rival.shift, there, dt);
@@ -375,10 +377,11 @@ struct Rival {
 }
 
 impl Rival {
-    /// Distance of `x` from its surface [m].
-    fn distance(&self, grains: &[Grain], x: DVec3) -> f64 {
+    /// Distance of `x` from its surface [m] where that is at most `limit`.
+    fn distance_within(&self, grains: &[Grain], x: DVec3, limit: f64) -> f64 {
         let grain = &grains[self.index];
-        grain.shape.distance(grain.pose.to_body(x - self.shift))
+        let y = grain.pose.to_body(x - self.shift);
+        grain.shape.distance_within(y, limit)
     }
 }
 
