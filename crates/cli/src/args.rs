@@ -214,6 +214,8 @@ pub enum GrainCommand {
     Family(FamilyArgs),
     /// Sizes and morphology of a grain file
     Info(InfoArgs),
+    /// How far two grains are from each other, in measures and in surface
+    Compare(CompareArgs),
 }
 
 /// Where the new grain goes, and how fine it is.
@@ -418,6 +420,24 @@ pub struct InfoArgs {
     #[arg(long)]
     pub json: bool,
     /// Draw the three sides of each grain with its surface nodes into this PNG, one row a grain
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+}
+
+/// Arguments of `grain compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// Grain file
+    pub first: PathBuf,
+    /// Another
+    pub second: PathBuf,
+    /// Scale the second to the volume of the first: compare form alone
+    #[arg(long)]
+    pub same_size: bool,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+    /// Draw the three sides of both, as they were laid upon each other, into this PNG
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
 }

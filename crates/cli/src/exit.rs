@@ -113,7 +113,24 @@ impl From<ShapeError> for Exit {
             ShapeError::Io { source, .. } if source.kind() != std::io::ErrorKind::NotFound => IO,
             _ => BAD_INPUT,
         };
-        Exit::new(code, error.to_string())
+        let help = match &error {
+            ShapeError::EmptyVolume | ShapeError::SolidVolume => {
+                "look at the image and its grey values; a grey image needs --threshold VALUE, otsu or otsu3"
+            }
+            ShapeError::CutByBorder { .. } => {
+                "scan a larger region; where the crop is merely tight, --pad takes the grain as cut there"
+            }
+            ShapeError::SeveralPieces { .. } => {
+                "--largest-piece keeps the largest, --split takes each piece as a grain"
+            }
+            ShapeError::InsideOut { .. } => "--flip inverts its faces",
+            ShapeError::TooFewVoxels { .. } => "scan it finer, or leave it out",
+            ShapeError::Malformed { .. } => {
+                "copy or export the file again; where it opens elsewhere, save it uncompressed"
+            }
+            _ => return Exit::new(code, error.to_string()),
+        };
+        Exit::with_help(code, error.to_string(), help)
     }
 }
 

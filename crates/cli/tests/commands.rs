@@ -297,6 +297,56 @@ fn grains_are_made_and_described() {
 }
 
 #[test]
+fn grains_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    for (name, axes) in [
+        ("long", ["3 mm", "2 mm", "1 mm"]),
+        ("flat", ["4 mm", "4 mm", "2 mm"]),
+    ] {
+        let mut make = grainwake();
+        make.args(["grain", "make", "ellipsoid"])
+            .args(axes)
+            .arg("-o")
+            .arg(path(name))
+            .args(["--cells", "32"]);
+        make.assert().success();
+    }
+    let compare = |more: &[&str]| {
+        let mut program = grainwake();
+        program
+            .args(["grain", "compare"])
+            .arg(path("long"))
+            .arg(path("flat"))
+            .args(more);
+        program.assert().success().get_output().stdout.clone()
+    };
+    let found = json(&compare(&["--json"]));
+    // The ends of the middle axis are 1 mm apart, which is more than those of the others.
+    let largest = found["comparison"]["largest_distance_m"].as_f64().unwrap();
+    assert!((largest - 1e-3).abs() < 5e-5, "{largest}");
+    assert!(found["comparison"]["mean_distance_m"].as_f64().unwrap() < -3e-4);
+    let same = json(&compare(&["--json", "--same-size"]));
+    let diameter = |which: &str| same[which]["equivalent_diameter_m"].as_f64().unwrap();
+    assert!((diameter("first") / diameter("second") - 1.0).abs() < 1e-9);
+    assert!(
+        same["comparison"]["mean_distance_m"]
+            .as_f64()
+            .unwrap()
+            .abs()
+            < 1e-4
+    );
+    let picture = path("both.png");
+    let text = compare(&["--picture", picture.to_str().unwrap()]);
+    let text = String::from_utf8_lossy(&text);
+    assert!(
+        text.contains("Krumbein sphericity") && text.contains("root mean square"),
+        "{text}"
+    );
+    assert!(picture.exists());
+}
+
+#[test]
 fn a_run_can_be_reported() {
     let (folder, case) = folder_with(WET);
     let out = folder.path().join("run");

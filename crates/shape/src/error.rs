@@ -25,9 +25,7 @@ pub enum ShapeError {
         known: &'static str,
     },
     /// The file claims more than the reader is allowed to hold.
-    #[error(
-        "{path}: claims {claimed}, the limit is {limit} {unit}; crop or coarsen the data, or raise the limit"
-    )]
+    #[error("{path}: claims {claimed}, the limit is {limit} {unit}; crop or coarsen the data")]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -71,12 +69,12 @@ pub enum ShapeError {
         reason: &'static str,
     },
     /// The volume holds no solid voxel.
-    #[error("the volume holds no solid voxel: every value is background")]
+    #[error(
+        "the volume holds no solid voxel: all values are background (zero, or below the threshold)"
+    )]
     EmptyVolume,
     /// The volume holds no background voxel.
-    #[error(
-        "the volume is solid throughout: it has no background voxel, so no surface; is it thresholded?"
-    )]
+    #[error("the volume is solid throughout: it has no background voxel, so no surface")]
     SolidVolume,
     /// The label asked for does not occur.
     #[error("label {label} does not occur; labels present: {present}")]
@@ -87,9 +85,7 @@ pub enum ShapeError {
         present: String,
     },
     /// The grain touches the border of the image.
-    #[error(
-        "label {label} touches the image border ({faces}), so part of the grain is missing; if the crop is merely tight, ask for padding"
-    )]
+    #[error("label {label} touches the image border ({faces}), so part of the grain is missing")]
     CutByBorder {
         /// Label.
         label: u32,
@@ -97,9 +93,7 @@ pub enum ShapeError {
         faces: String,
     },
     /// One label, several separate bodies.
-    #[error(
-        "label {label} consists of {count} separate pieces of {sizes} voxels; keep the largest, or label the pieces separately"
-    )]
+    #[error("label {label} consists of {count} separate pieces of {sizes} voxels")]
     SeveralPieces {
         /// Label.
         label: u32,
@@ -123,7 +117,8 @@ pub enum ShapeError {
     EmptyMesh,
     /// A face has no area.
     #[error(
-        "face {face} near {at:?} has no area; remove degenerate faces (in MeshLab: Remove Zero Area Faces)"
+        "face {face} near {} has no area; remove degenerate faces (in MeshLab: Remove Zero Area Faces)",
+        point(at)
     )]
     ZeroAreaFace {
         /// Index of the face in the file.
@@ -133,7 +128,8 @@ pub enum ShapeError {
     },
     /// An edge with one face only.
     #[error(
-        "the mesh is open: {edges} edges belong to one face only, the first near {at:?}; close the hole (in MeshLab: Close Holes; in Blender: Fill Holes)"
+        "the mesh is open: {edges} edges belong to one face only, the first near {}; close the hole (in MeshLab: Close Holes; in Blender: Fill Holes)",
+        point(at)
     )]
     Hole {
         /// Middle of an open edge, in file units.
@@ -143,7 +139,8 @@ pub enum ShapeError {
     },
     /// An edge with more than two faces.
     #[error(
-        "{faces} faces share the edge near {at:?}; a closed surface has two at every edge (in MeshLab: Repair Non Manifold Edges)"
+        "{faces} faces share the edge near {}; a closed surface has two at every edge (in MeshLab: Repair Non Manifold Edges)",
+        point(at)
     )]
     NonManifoldEdge {
         /// Middle of the edge, in file units.
@@ -153,7 +150,8 @@ pub enum ShapeError {
     },
     /// Two neighbours wound in opposite senses.
     #[error(
-        "faces {face} and {neighbour} near {at:?} are wound in opposite senses; make the orientation coherent (in MeshLab: Re-Orient All Faces Coherently)"
+        "faces {face} and {neighbour} near {} are wound in opposite senses; make the orientation coherent (in MeshLab: Re-Orient All Faces Coherently)",
+        point(at)
     )]
     FlippedFace {
         /// Index of a face.
@@ -163,10 +161,23 @@ pub enum ShapeError {
         /// Middle of the shared edge, in file units.
         at: DVec3,
     },
-    /// Normals point inwards everywhere.
+    /// The surface runs through itself.
     #[error(
-        "the mesh is inside out (its volume is {volume:.6e}); invert the faces, or ask for flipping"
+        "faces {face} and {other} cross near {} ({pairs} pairs cross in all), so inside and outside are not told apart there; repair the mesh (in MeshLab: Select Self Intersecting Faces; in Blender: Remesh)",
+        point(at)
     )]
+    SelfIntersection {
+        /// Index of a face.
+        face: usize,
+        /// Index of the face that it crosses.
+        other: usize,
+        /// Pairs of faces that cross.
+        pairs: usize,
+        /// A point that they share, in the mesh's units.
+        at: DVec3,
+    },
+    /// Normals point inwards everywhere.
+    #[error("the mesh is inside out (its volume is {volume:.6e})")]
     InsideOut {
         /// Signed volume, in file units cubed.
         volume: f64,
@@ -226,6 +237,12 @@ impl ShapeError {
             source,
         }
     }
+}
+
+/// A point as a person writes it.
+fn point(at: &DVec3) -> String {
+    let round = |x: f64| (1e6 * x).round() / 1e6 + 0.0;
+    format!("({}, {}, {})", round(at.x), round(at.y), round(at.z))
 }
 
 /// Short alias used throughout the crate.

@@ -10,6 +10,7 @@
 
 pub mod analytic;
 mod assemble;
+mod compare;
 mod error;
 pub mod family;
 mod feret;
@@ -34,6 +35,7 @@ mod surface;
 mod table;
 
 pub use assemble::ShapeOptions;
+pub use compare::Comparison;
 pub use error::{Result, ShapeError};
 pub use field::SampledField;
 pub use limits::{ReadLimits, SourceFile};

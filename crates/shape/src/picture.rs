@@ -2,7 +2,7 @@
 
 use crate::Shape;
 use crate::error::{Result, ShapeError};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -121,8 +121,17 @@ impl Picture {
     /// The three sides of a grain in a row: broad side, long side, end.
     pub fn three_sides(shape: &Shape, pixels: usize, nodes: bool) -> Picture {
         let width = 2.1 * shape.bounding_radius();
+        Picture::sides(shape, DMat3::IDENTITY, pixels, width, nodes)
+    }
+
+    /// The same of a grain in a frame that `turn` takes to its own; each side shows `width` [m].
+    pub fn sides(shape: &Shape, turn: DMat3, pixels: usize, width: f64, nodes: bool) -> Picture {
         let mut picture = Picture::blank(3 * pixels, pixels);
         for (n, view) in [View::BROAD, View::SIDE, View::END].into_iter().enumerate() {
+            let view = View {
+                right: turn * view.right,
+                up: turn * view.up,
+            };
             let side = Picture::of(shape, view, pixels, width, nodes);
             picture.paste(&side, n * pixels, 0);
         }

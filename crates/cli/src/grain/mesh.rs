@@ -3,7 +3,7 @@
 use grainwake_shape::ReadLimits;
 use grainwake_shape::mesh::{MeshOptions, read_mesh, shape_from_mesh};
 
-use super::{length, may_write, options, save};
+use super::{length, may_write, options, plausible, save};
 use crate::args::FromMeshArgs;
 use crate::exit::Exit;
 
@@ -20,5 +20,6 @@ pub fn from_mesh(args: &FromMeshArgs) -> Result<(), Exit> {
             flip: args.flip,
         },
     )?;
+    plausible(&shape, &args.new, "--unit")?;
     save(shape, &args.new)
 }

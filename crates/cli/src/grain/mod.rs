@@ -1,5 +1,6 @@
 //! `grainwake grain`: shapes in, `.grain` files out.
 
+mod compare;
 mod family;
 mod make;
 mod mesh;
@@ -24,12 +25,38 @@ pub fn grain(args: &GrainArgs) -> Result<(), Exit> {
         GrainCommand::Make(args) => make::make(&args.body),
         GrainCommand::Family(args) => family::family(args),
         GrainCommand::Info(args) => info(args),
+        GrainCommand::Compare(args) => compare::compare(args),
     }
 }
 
-/// A length given on the command line [m].
+/// A length given on the command line [m]; a unit alone is one of it.
 fn length(name: &str, text: &str) -> Result<f64, Exit> {
-    parse_length(text).map_err(|message| Exit::new(BAD_INPUT, format!("{name}: {message}")))
+    let one = || parse_length(&format!("1 {text}")).ok();
+    let found = match parse_length(text) {
+        Err(message) => one().ok_or(message),
+        found => found,
+    };
+    found.map_err(|message| Exit::new(BAD_INPUT, format!("{name}: {message}")))
+}
+
+/// Diameters [m] that grains have; others come of a wrong unit.
+const GRAINS: std::ops::Range<f64> = 1e-6..1.0;
+
+/// Refuses a grain of which `option` says that it is larger or smaller than grains are.
+fn plausible(shape: &Shape, new: &NewGrain, option: &str) -> Result<(), Exit> {
+    let diameter = shape.equivalent_diameter();
+    if GRAINS.contains(&diameter) || new.equivalent_diameter.is_some() {
+        return Ok(());
+    }
+    Err(Exit::with_help(
+        BAD_INPUT,
+        format!(
+            "the grain has an equivalent diameter of {diameter:.3e} m; grains have 1 um to 1 m"
+        ),
+        format!(
+            "is {option} right (mm for m, or m for mm)? --equivalent-diameter LENGTH gives any size"
+        ),
+    ))
 }
 
 fn options(new: &NewGrain) -> ShapeOptions {

@@ -10,7 +10,7 @@ use grainwake_shape::{ReadLimits, write_table};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use super::{finish, length, may_write, options, save};
+use super::{finish, length, may_write, options, plausible, save};
 use crate::args::FromScanArgs;
 use crate::exit::{BAD_INPUT, Exit};
 use crate::print;
@@ -59,10 +59,12 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
         return Err(Exit::with_help(
             BAD_INPUT,
             message,
-            "choose one with --label N, or give -o a folder to take them all",
+            "choose one with --label N, or give -o a folder to take them all; values that are grey, not labels, need --threshold",
         ));
     };
-    save(grain.shape?, &args.new)
+    let shape = grain.shape?;
+    plausible(&shape, &args.new, "--voxel")?;
+    save(shape, &args.new)
 }
 
 fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
@@ -120,6 +122,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     {
         match shape {
             Ok(shape) => {
+                plausible(&shape, &args.new, "--voxel")?;
                 let file = path(label);
                 let shape = finish(shape, &file, &args.new)?;
                 let record = shape.record();

@@ -33,10 +33,14 @@ pub fn shape_from_mesh(
             for t in &mut turned.triangles {
                 t.swap(1, 2);
             }
+            turned.check_crossings()?;
             from_closed(&turned, provenance.with("flip", true), &options.shape)
         }
         Err(error) => Err(error),
-        Ok(()) => from_closed(mesh, provenance, &options.shape),
+        Ok(()) => {
+            mesh.check_crossings()?;
+            from_closed(mesh, provenance, &options.shape)
+        }
     }
 }
 

@@ -57,6 +57,25 @@ impl Bvh {
         }
     }
 
+    /// Calls `found` with the number of every face whose box overlaps that of a triangle.
+    pub(crate) fn overlapping(&self, triangle: &[DVec3; 3], mut found: impl FnMut(u32)) {
+        let lower = triangle[0].min(triangle[1]).min(triangle[2]);
+        let upper = triangle[0].max(triangle[1]).max(triangle[2]);
+        let mut stack = vec![0u32];
+        while let Some(number) = stack.pop() {
+            let node = &self.nodes[number as usize];
+            if node.lower.cmpgt(upper).any() || node.upper.cmplt(lower).any() {
+                continue;
+            }
+            if node.count == 0 {
+                stack.extend([node.first, number + 1]);
+                continue;
+            }
+            let leaf = node.first as usize..(node.first + node.count) as usize;
+            self.faces[leaf].iter().for_each(|face| found(*face));
+        }
+    }
+
     /// Nearest point of the mesh to `x`. The search starts from triangle `hint` (in leaf order),
     /// which is left at the nearest one: a good start for a query nearby.
     pub(crate) fn nearest(&self, x: DVec3, hint: &mut u32) -> Nearest {

@@ -6,6 +6,7 @@ mod check;
 mod cube_sphere;
 mod distance;
 mod harmonics;
+mod intersect;
 mod obj;
 mod ply;
 mod read;

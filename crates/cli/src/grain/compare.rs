@@ -1,0 +1,110 @@
+//! `grain compare`.
+
+use comfy_table::{CellAlignment, Table, presets};
+use grainwake_shape::picture::Picture;
+use grainwake_shape::{Comparison, Record, Shape};
+use serde_json::json;
+
+use crate::args::CompareArgs;
+use crate::exit::Exit;
+use crate::print;
+
+/// Prints how far two grains are from each other.
+pub fn compare(args: &CompareArgs) -> Result<(), Exit> {
+    let first = Shape::load(&args.first)?;
+    let mut second = Shape::load(&args.second)?;
+    if args.same_size {
+        second = second.scaled_to_equivalent_diameter(first.equivalent_diameter())?;
+    }
+    let comparison = Comparison::of(&first, &second);
+    let (one, other) = (first.record(), second.record());
+    if args.json {
+        let object = json!({ "first": one, "second": other, "comparison": comparison });
+        print(&serde_json::to_string(&object)?)?;
+    } else {
+        print(&measures(&one, &other).to_string())?;
+        print(&surfaces(&comparison, first.equivalent_diameter()))?;
+    }
+    if let Some(path) = &args.picture {
+        let width = 2.1 * first.bounding_radius().max(second.bounding_radius());
+        let rows = [
+            Picture::sides(&first, glam::DMat3::IDENTITY, 320, width, false),
+            Picture::sides(&second, comparison.turn, 320, width, false),
+        ];
+        Picture::sheet(&rows, 1).save(path)?;
+    }
+    Ok(())
+}
+
+fn measures(one: &Record, other: &Record) -> Table {
+    let mm = |x: f64| 1e3 * x;
+    let rows = [
+        (
+            "equivalent diameter [mm]",
+            Some(mm(one.equivalent_diameter_m)),
+            Some(mm(other.equivalent_diameter_m)),
+        ),
+        ("a [mm]", Some(mm(one.a_m)), Some(mm(other.a_m))),
+        ("b [mm]", Some(mm(one.b_m)), Some(mm(other.b_m))),
+        ("c [mm]", Some(mm(one.c_m)), Some(mm(other.c_m))),
+        (
+            "elongation b/a",
+            Some(one.elongation),
+            Some(other.elongation),
+        ),
+        ("flatness c/b", Some(one.flatness), Some(other.flatness)),
+        (
+            "Krumbein sphericity",
+            Some(one.krumbein_sphericity),
+            Some(other.krumbein_sphericity),
+        ),
+        (
+            "Wadell sphericity",
+            Some(one.wadell_sphericity),
+            Some(other.wadell_sphericity),
+        ),
+        (
+            "Wadell roundness",
+            one.wadell_roundness,
+            other.wadell_roundness,
+        ),
+        ("convexity", one.convexity, other.convexity),
+        (
+            "surface area [mm2]",
+            Some(1e6 * one.surface_area_m2),
+            Some(1e6 * other.surface_area_m2),
+        ),
+    ];
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    table.set_header(["", "first", "second", "difference"]);
+    for (name, p, q) in rows {
+        let value = |x: Option<f64>| x.map_or("not measured".into(), |x| format!("{x:.4}"));
+        let difference = match (p, q) {
+            (Some(p), Some(q)) => format!("{:+.2} %", 100.0 * (q / p - 1.0)),
+            _ => "-".into(),
+        };
+        table.add_row([name.to_string(), value(p), value(q), difference]);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+fn surfaces(found: &Comparison, diameter: f64) -> String {
+    let line = |name: &str, x: f64| {
+        format!(
+            "{name:26} {:>10.5} mm  {:>8.3} % of the first one's diameter",
+            1e3 * x,
+            100.0 * x / diameter
+        )
+    };
+    [
+        "Surfaces, centroids together and principal axes along each other:".to_string(),
+        line("mean (first outside: +)", found.mean_distance_m),
+        line("root mean square", found.rms_distance_m),
+        line("largest", found.largest_distance_m),
+    ]
+    .join("\n")
+}

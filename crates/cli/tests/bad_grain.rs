@@ -1,0 +1,347 @@
+//! Damaged meshes and images: exit code 2, no grain file, and a message that names place and remedy.
+
+mod common;
+
+use common::grainwake;
+use std::path::Path;
+
+/// Runs `grain` with these words before `-o`; standard error must hold `words`.
+fn refused(command: &[&str], input: &Path, words: &[&str]) {
+    let out = input.with_extension("grain");
+    let done = grainwake()
+        .arg("grain")
+        .arg(command[0])
+        .arg(input)
+        .args(&command[1..])
+        .arg("-o")
+        .arg(&out)
+        .assert()
+        .code(2);
+    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    for word in words {
+        assert!(said.contains(word), "`{word}` is missing in:\n{said}");
+    }
+    assert!(!said.contains("panicked") && !out.exists());
+}
+
+type Face = [[f64; 3]; 3];
+
+/// A cube of edge 1, two faces a side.
+fn cube() -> Vec<Face> {
+    let corner = |n: usize| [(n & 1) as f64, (n >> 1 & 1) as f64, (n >> 2 & 1) as f64];
+    let sides = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    let faces = sides
+        .iter()
+        .flat_map(|s| [[s[0], s[1], s[2]], [s[0], s[2], s[3]]]);
+    faces.map(|f| f.map(corner)).collect()
+}
+
+fn refused_mesh(faces: &[Face], unit: &str, words: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("body.stl");
+    let mut text = "solid body\n".to_string();
+    for face in faces {
+        text += "facet normal 0 0 0\nouter loop\n";
+        for [x, y, z] in face {
+            text += &format!("vertex {x} {y} {z}\n");
+        }
+        text += "endloop\nendfacet\n";
+    }
+    std::fs::write(&path, text + "endsolid body\n").unwrap();
+    refused(&["from-mesh", "--unit", unit], &path, words);
+}
+
+#[test]
+fn the_cube_itself_is_taken_with_a_bare_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("cube.obj");
+    let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
+        f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n";
+    std::fs::write(&mesh, text).unwrap();
+    let out = folder.path().join("cube.grain");
+    let done = grainwake()
+        .args(["grain", "from-mesh"])
+        .arg(&mesh)
+        .args(["--unit", "mm", "-o"])
+        .arg(&out)
+        .assert()
+        .success();
+    let said = String::from_utf8_lossy(&done.get_output().stdout).into_owned();
+    assert!(said.contains("1.000000e-9 m3"), "{said}");
+}
+
+#[test]
+fn a_mesh_with_a_hole() {
+    refused_mesh(
+        &cube()[1..],
+        "1 mm",
+        &["the mesh is open: 3 edges", "near (", "Close Holes"],
+    );
+}
+
+#[test]
+fn a_mesh_with_a_face_without_area() {
+    let mut faces = cube();
+    faces.push([[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]);
+    refused_mesh(
+        &faces,
+        "1 mm",
+        &[
+            "face 12 near (0, 0, 0) has no area",
+            "Remove Zero Area Faces",
+        ],
+    );
+}
+
+#[test]
+fn a_mesh_inside_out() {
+    let mut faces = cube();
+    faces.iter_mut().for_each(|f| f.swap(1, 2));
+    refused_mesh(&faces, "1 mm", &["inside out", "--flip"]);
+}
+
+#[test]
+fn a_mesh_through_itself() {
+    let mut faces = cube();
+    // One corner is pulled through the opposite side.
+    let moved = faces
+        .iter_mut()
+        .flatten()
+        .filter(|p| **p == [1.0, 1.0, 1.0]);
+    moved.for_each(|p| *p = [0.3, 0.4, -0.5]);
+    refused_mesh(
+        &faces,
+        "1 mm",
+        &["cross near (", "pairs cross", "repair the mesh"],
+    );
+}
+
+#[test]
+fn millimetres_for_metres() {
+    let large: Vec<Face> = cube()
+        .iter()
+        .map(|f| f.map(|p| p.map(|x| 2.0 * x)))
+        .collect();
+    refused_mesh(
+        &large,
+        "1 m",
+        &[
+            "equivalent diameter of 2.481e0 m",
+            "is --unit right",
+            "1 um to 1 m",
+        ],
+    );
+    let small: Vec<Face> = cube()
+        .iter()
+        .map(|f| f.map(|p| p.map(|x| 2e-4 * x)))
+        .collect();
+    refused_mesh(&small, "1 mm", &["2.481e-7 m", "is --unit right"]);
+}
+
+#[test]
+fn a_mesh_that_is_not_a_number() {
+    let mut faces = cube();
+    faces[0][0][0] = f64::NAN;
+    refused_mesh(&faces, "1 mm", &["body.stl", "NaN"]);
+}
+
+/// An image of 24^3 bytes from a function of the distance from its middle.
+fn image(value: impl Fn(f64) -> u8) -> Vec<u8> {
+    let at = |n: usize| n as f64 - 11.5;
+    let mut bytes = Vec::new();
+    for k in 0..24 {
+        for j in 0..24 {
+            for i in 0..24 {
+                bytes.push(value(
+                    (at(i).powi(2) + at(j).powi(2) + at(k).powi(2)).sqrt(),
+                ));
+            }
+        }
+    }
+    bytes
+}
+
+fn nrrd(kind: &str, sizes: [usize; 3], bytes: &[u8]) -> Vec<u8> {
+    let [x, y, z] = sizes;
+    let mut file = format!(
+        "NRRD0004\ntype: {kind}\ndimension: 3\nsizes: {x} {y} {z}\nendian: little\nencoding: raw\n\n"
+    )
+    .into_bytes();
+    file.extend(bytes);
+    file
+}
+
+fn refused_image(name: &str, bytes: &[u8], words: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    refused(&["from-scan", "--voxel", "10 um"], &path, words);
+}
+
+const BALL: fn(f64) -> u8 = |r| u8::from(r < 8.0);
+
+#[test]
+fn an_image_of_the_wrong_size() {
+    let file = nrrd("uint8", [24, 24, 99], &image(BALL));
+    refused_image(
+        "ball.nrrd",
+        &file,
+        &["ball.nrrd", "57024 bytes", "13824", "export the file again"],
+    );
+}
+
+#[test]
+fn an_image_that_is_all_black_or_all_white() {
+    let black = nrrd("uint8", [24; 3], &image(|_| 0));
+    refused_image("black.nrrd", &black, &["no solid voxel", "--threshold"]);
+    let white = nrrd("uint8", [24; 3], &image(|_| 1));
+    refused_image("white.nrrd", &white, &["solid throughout", "--threshold"]);
+}
+
+#[test]
+fn a_grain_cut_by_every_border() {
+    let file = nrrd("uint8", [24; 3], &image(|r| u8::from(r < 15.0)));
+    refused_image(
+        "cut.nrrd",
+        &file,
+        &[
+            "touches the image border (low x, high x, low y, high y, low z, high z)",
+            "--pad",
+        ],
+    );
+}
+
+#[test]
+fn two_pieces_of_one_label() {
+    let file = nrrd(
+        "uint8",
+        [24; 3],
+        &image(|r| u8::from(r < 3.0 || (6.0..10.0).contains(&r))),
+    );
+    refused_image("two.nrrd", &file, &["2 separate pieces", "--largest-piece"]);
+}
+
+#[test]
+fn an_image_with_a_value_that_is_no_number() {
+    let mut values: Vec<f32> = image(BALL).iter().map(|v| f32::from(*v)).collect();
+    values[24 * (24 * 3 + 4) + 5] = f32::NAN;
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let file = nrrd("float", [24; 3], &bytes);
+    refused_image("nan.nrrd", &file, &["x 5, y 4, z 3", "not a finite number"]);
+}
+
+#[test]
+fn millimetres_for_micrometres() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ball.nrrd");
+    std::fs::write(&path, nrrd("uint8", [24; 3], &image(BALL))).unwrap();
+    refused(
+        &["from-scan", "--voxel", "100 mm"],
+        &path,
+        &["equivalent diameter", "is --voxel right"],
+    );
+}
+
+/// A TIFF file with a page for every slice of 24 x 24 bytes, in strips of the whole page.
+fn tiff(bytes: &[u8]) -> Vec<u8> {
+    let mut file = b"II*\0\x08\0\0\0".to_vec();
+    let pages = bytes.len() / 576;
+    for (n, page) in bytes.chunks_exact(576).enumerate() {
+        let data = file.len() as u32 + 2 + 9 * 12 + 4;
+        let entries: [(u16, u16, u32); 9] = [
+            (256, 4, 24),
+            (257, 4, 24),
+            (258, 3, 8),
+            (259, 3, 1),
+            (262, 3, 1),
+            (273, 4, data),
+            (277, 3, 1),
+            (278, 4, 24),
+            (279, 4, 576),
+        ];
+        file.extend((entries.len() as u16).to_le_bytes());
+        for (tag, kind, value) in entries {
+            file.extend(tag.to_le_bytes());
+            file.extend(kind.to_le_bytes());
+            file.extend(1u32.to_le_bytes());
+            file.extend(value.to_le_bytes());
+        }
+        let next = if n + 1 < pages { data + 576 } else { 0 };
+        file.extend(next.to_le_bytes());
+        file.extend(page);
+    }
+    file
+}
+
+#[test]
+fn a_truncated_tiff() {
+    let whole = tiff(&image(BALL));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ball.tif");
+    std::fs::write(&path, &whole).unwrap();
+    let out = folder.path().join("ball.grain");
+    let mut taken = grainwake();
+    taken
+        .args(["grain", "from-scan", "--voxel", "10 um"])
+        .arg(&path)
+        .arg("-o")
+        .arg(&out);
+    taken.assert().success();
+    for part in [whole.len() / 2, 100, 7] {
+        refused_image(
+            "part.tif",
+            &whole[..part],
+            &["part.tif: damaged", "export the file again"],
+        );
+    }
+}
+
+#[test]
+fn an_absurd_image_header() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("absurd.tif");
+    // One page of 10^6 x 10^6 samples of 32 bits that are not there.
+    let mut bytes: Vec<u8> = b"II*\0\x08\0\0\0".to_vec();
+    let entries: [(u16, u16, u32); 9] = [
+        (256, 4, 1_000_000),
+        (257, 4, 1_000_000),
+        (258, 3, 32),
+        (259, 3, 1),
+        (262, 3, 1),
+        (273, 4, 8),
+        (277, 3, 1),
+        (278, 4, 1_000_000),
+        (279, 4, 4_000_000),
+    ];
+    bytes.extend((entries.len() as u16).to_le_bytes());
+    for (tag, kind, value) in entries {
+        bytes.extend(tag.to_le_bytes());
+        bytes.extend(kind.to_le_bytes());
+        bytes.extend(1u32.to_le_bytes());
+        bytes.extend(value.to_le_bytes());
+    }
+    bytes.extend([0; 4]);
+    std::fs::write(&path, bytes).unwrap();
+    let out = folder.path().join("absurd.grain");
+    let start = std::time::Instant::now();
+    let done = grainwake()
+        .args(["grain", "from-scan"])
+        .arg(&path)
+        .args(["--voxel", "1 um", "-o"])
+        .arg(&out)
+        .assert()
+        .code(2);
+    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    assert!(
+        said.contains("absurd.tif") && said.contains("1000000"),
+        "{said}"
+    );
+    assert!(start.elapsed().as_secs() < 20 && !out.exists());
+}
