@@ -64,7 +64,7 @@ impl Motion {
         };
         let rows = behind
             .time
-            .partition_point(|t| *t <= until)
+            .partition_point(|t| *t < until)
             .min(ahead.len());
         let velocity = |h: &History| {
             h.velocity[..rows]

@@ -18,7 +18,10 @@ const LEFT: f64 = 40.0;
 const GAP: f64 = 20.0;
 const WIDTH: f64 = (PAGE - LEFT - GAP - 8.0) / 2.0;
 const HEIGHT: f64 = 128.0;
-const HEAD: f64 = 24.0;
+/// Above a panel, for its title.
+const HEAD: f64 = 20.0;
+/// Above all, for the legend.
+const LEGEND: f64 = 16.0;
 
 /// What is drawn of each run.
 #[derive(Clone, Copy, PartialEq)]
@@ -97,12 +100,15 @@ fn figure(
     let panels = data.factor_values(by);
     let lines = data.factor_values(within);
     let high_rows = panels.len().div_ceil(2);
-    let mut drawing = Drawing::new(PAGE, high_rows as f64 * (HEIGHT + HEAD) + 26.0 + 8.0);
+    let mut drawing = Drawing::new(
+        PAGE,
+        LEGEND + high_rows as f64 * (HEIGHT + HEAD) + 26.0 + 8.0,
+    );
     for (i, value) in panels.iter().enumerate() {
         let (column, row) = (i % 2, i / 2);
         let frame = Frame {
             x: LEFT + column as f64 * (WIDTH + GAP),
-            y: HEAD + row as f64 * (HEIGHT + HEAD),
+            y: LEGEND + HEAD + row as f64 * (HEIGHT + HEAD),
             width: WIDTH,
             height: HEIGHT,
             across: Axis::linear(TIME, 0.0, end, 6, true),
@@ -165,31 +171,32 @@ fn figure(
             curve(motion, COLOURS[n % 4], &run.name);
         }
         frame.outline(&mut drawing, (row + 1 == high_rows, column == 0));
-        let mut entries: Vec<(String, &str, Option<&str>)> = Vec::new();
-        if i == 0 {
-            entries.extend(lines.iter().enumerate().map(|(n, v)| {
-                (
-                    format!("{} = {}", symbol(within), value_text(*v)),
-                    COLOURS[n % 4],
-                    None,
-                )
-            }));
-        }
-        if i == 1 && what == What::Velocity {
-            entries.extend([
-                ("leading".to_owned(), INK, None),
-                ("trailing".to_owned(), INK, Some("3.5 1.8")),
-            ]);
-        }
-        if i == 1 && what == What::Gap && sphere.is_some() {
-            entries.push((
-                text::literal(reference.map_or("", String::as_str)),
-                INK,
-                None,
-            ));
-        }
-        legend(&mut drawing, &entries, frame.x + frame.width, frame.y - 4.0);
     }
+    let mut entries: Vec<(String, &str, Option<&str>)> = lines
+        .iter()
+        .enumerate()
+        .map(|(n, v)| {
+            let name = format!("{} = {}", symbol(within), value_text(*v));
+            (name, COLOURS[n % 4], None)
+        })
+        .collect();
+    match what {
+        What::Velocity => entries.extend([
+            ("leading".to_owned(), INK, None),
+            ("trailing".to_owned(), INK, Some("3.5 1.8")),
+        ]),
+        What::Gap if sphere.is_some() => {
+            let name = reference.map_or("", String::as_str);
+            entries.push((text::literal(name), INK, None));
+        }
+        What::Gap => {}
+    }
+    legend(
+        &mut drawing,
+        &entries,
+        LEFT + 2.0 * WIDTH + GAP,
+        LEGEND - 6.0,
+    );
     let (quantity, file) = match what {
         What::Gap => ("Distance of the centres", "gap"),
         What::Velocity => ("Vertical velocity", "velocity"),

@@ -27,7 +27,7 @@ pub fn figure(data: &Data) -> Option<Drawn> {
     let levels = data.levels(&wanted.by);
     let block = STEP * levels.len() as f64 + 8.0;
     let height = block * wanted.quantities.len() as f64;
-    let (left, gap) = (96.0, 14.0);
+    let (left, gap) = (96.0, 26.0);
     let panels = wanted.factors.len().max(1) as f64;
     let width = (PAGE - left - 8.0 - gap * (panels - 1.0)) / panels;
     let mut drawing = Drawing::new(PAGE, 26.0 + height + 26.0);
