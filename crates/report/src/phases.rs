@@ -121,7 +121,7 @@ pub fn pair_instants(phases: &[Phase], events: &[Event], closest: f64, end: f64)
         (Some(time), _) => instant(time, "role change"),
         (None, Some(tumbling)) => instant(middle(tumbling), "tumbling"),
         (None, None) => instant(
-            0.5 * (kiss + parted.map_or(end, |phase| phase.start)),
+            0.5 * (kiss + parted.map_or(landing, |phase| phase.start)),
             "in contact",
         ),
     };
@@ -289,6 +289,12 @@ mod tests {
         assert_eq!(
             names(&[], 5.0, 9.0),
             [("drafting", 3.0), ("closest", 5.0), ("apart", 7.0)]
+        );
+        // A pair that lands in touch, and lies there for long.
+        let events = log(&[(1.0, Kind::Kiss), (3.0, Kind::Landing)]);
+        assert_eq!(
+            names(&events, 1.0, 9.0)[2..],
+            [("in contact", 2.0), ("landing", 3.0)]
         );
         // Roles that change after the grains have parted.
         let events = log(&[

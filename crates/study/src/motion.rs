@@ -62,10 +62,7 @@ impl Motion {
         } else {
             (b, a)
         };
-        let rows = behind
-            .time
-            .partition_point(|t| *t < until)
-            .min(ahead.len());
+        let rows = behind.time.partition_point(|t| *t < until).min(ahead.len());
         let velocity = |h: &History| {
             h.velocity[..rows]
                 .iter()
