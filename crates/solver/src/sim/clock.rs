@@ -20,6 +20,9 @@ pub struct Clock {
 
 /// A step grows by this factor at most, which keeps the extrapolation in time tame.
 const LARGEST_GROWTH: f64 = 1.2;
+/// It grows by more, to take one step fewer to the next output, where it stays this far below its
+/// limit, so that it does not change to and fro.
+const CLEARLY: f64 = 0.95;
 
 impl Clock {
     /// At t = 0.
@@ -59,28 +62,34 @@ impl Clock {
     /// Next step [s]: by the rule, for a flow that crosses `rate` cells a second, and such that a
     /// whole number of equal steps ends at `limit` [s] from now.
     pub fn choose(&self, rate: f64, limit: f64) -> f64 {
-        let wanted = match self.rule {
-            StepRule::Fixed(step) => step,
+        let (largest, wanted) = match self.rule {
+            StepRule::Fixed(step) => (step, step),
             StepRule::Limits {
                 cfl,
                 viscous,
                 max_step,
             } => {
-                let growth = if self.steps == 0 {
+                let largest = (cfl / rate).min(viscous / self.viscous_rate).min(max_step);
+                let next = if self.steps == 0 {
                     self.first_step
                 } else {
                     LARGEST_GROWTH * self.last_step
                 };
-                (cfl / rate)
-                    .min(viscous / self.viscous_rate)
-                    .min(max_step)
-                    .min(growth)
+                (largest, next.min(largest))
             }
         };
-        if limit.is_finite() {
-            limit / (limit / wanted * (1.0 - 1e-12)).ceil().max(1.0)
+        if !limit.is_finite() {
+            return wanted;
+        }
+        let count = (limit / wanted * (1.0 - 1e-12)).ceil().max(1.0);
+        // One step fewer, where steps of this length were taken before: a fifth of an interval
+        // never became a fourth by the usual growth.
+        let fewer = limit / (count - 1.0);
+        let as_before = self.last_step * count >= limit * (1.0 - 1e-9);
+        if count > 1.0 && as_before && fewer <= CLEARLY * largest {
+            fewer
         } else {
-            wanted
+            limit / count
         }
     }
 
@@ -89,5 +98,68 @@ impl Clock {
         self.time += step;
         self.steps += 1;
         self.last_step = step;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps over an interval of 1, the last one before it being `last`, none above `largest`.
+    fn interval(last: f64, largest: f64) -> Vec<f64> {
+        let mut clock = Clock {
+            time: 0.0,
+            steps: 1,
+            last_step: last,
+            rule: StepRule::Limits {
+                cfl: largest,
+                viscous: f64::INFINITY,
+                max_step: f64::INFINITY,
+            },
+            viscous_rate: 1.0,
+            first_step: last,
+        };
+        let mut steps = Vec::new();
+        while clock.time < 1.0 - 1e-9 {
+            let step = clock.choose(1.0, 1.0 - clock.time);
+            assert!(step <= largest * (1.0 + 1e-9), "{step}");
+            clock.advance(step);
+            steps.push(step);
+        }
+        assert!((clock.time - 1.0).abs() < 1e-12);
+        steps
+    }
+
+    #[test]
+    fn steps_grow_up_to_the_limit_whatever_the_interval() {
+        for (largest, count) in [(0.27, 4), (0.36, 3), (0.53, 2), (1.5, 1)] {
+            let mut last = 0.05;
+            for _ in 0..12 {
+                last = interval(last, largest).pop().unwrap();
+            }
+            assert_eq!(interval(last, largest).len(), count, "{largest}");
+        }
+    }
+
+    #[test]
+    fn steps_grow_gently_from_a_small_one() {
+        let steps = interval(0.01, 0.2);
+        for pair in steps.windows(2) {
+            assert!(pair[1] <= 1.51 * pair[0], "{steps:?}");
+        }
+    }
+
+    #[test]
+    fn steps_shrink_at_once_and_evenly() {
+        let steps = interval(0.5, 0.11);
+        assert_eq!(steps.len(), 10);
+        assert!(steps.iter().all(|s| (s - 0.1).abs() < 1e-9), "{steps:?}");
+    }
+
+    #[test]
+    fn steps_near_their_limit_stay() {
+        // A third is within 5 % of the limit: four steps stay four, three stay three.
+        assert_eq!(interval(0.25, 0.34).len(), 4);
+        assert_eq!(interval(1.0 / 3.0, 0.34).len(), 3);
     }
 }
