@@ -36,6 +36,8 @@ pub struct Measures {
     pub role_changes: Option<f64>,
     /// Smallest distance of the centres.
     pub closest: Option<f64>,
+    /// Smallest distance of the surfaces; negative where they overlap.
+    pub closest_gap: Option<f64>,
     /// Distance of the centres at the first landing, or the end.
     pub final_distance: Option<f64>,
     /// Mean speed until the first landing.
@@ -58,7 +60,7 @@ pub struct Measures {
 }
 
 /// Names of the quantities, in the order of the table.
-pub const QUANTITIES: [&str; 21] = [
+pub const QUANTITIES: [&str; 22] = [
     "kiss_time",
     "kissing_stage",
     "contact_stage",
@@ -71,6 +73,7 @@ pub const QUANTITIES: [&str; 21] = [
     "repeated",
     "role_changes",
     "closest",
+    "closest_gap",
     "final_distance",
     "mean_speed_leading",
     "mean_speed_trailing",
@@ -105,13 +108,18 @@ impl Measures {
             let facts = run.facts.grains.get(*g);
             facts.is_none_or(|f| f.shape.as_deref() != Some("sphere"))
         });
-        Some(Measures::of_pair(&Pair {
+        let scales = story.scales?;
+        let mut found = Measures::of_pair(&Pair {
             grains: [&run.grains[behind], &run.grains[ahead]],
             up: story.up,
-            scales: story.scales?,
+            scales,
             events: &run.events,
             oblong,
-        }))
+        });
+        let until = found.landing_time.map(|t| t * scales.time());
+        found.closest_gap = closest_gap(run, until.unwrap_or(f64::INFINITY));
+        found.closest_gap = found.closest_gap.map(|gap| gap / scales.diameter);
+        Some(found)
     }
 
     /// Of a pair.
@@ -159,6 +167,7 @@ impl Measures {
             kisses,
             role_changes: count(&Kind::RoleChange),
             closest,
+            closest_gap: None,
             final_distance: last,
             mean_speed_trailing: pair.mean_speed(0, 0.0, until),
             mean_speed_leading: pair.mean_speed(1, 0.0, until),
@@ -179,6 +188,15 @@ impl Measures {
             number => number.as_f64(),
         }
     }
+}
+
+/// Smallest gap of the diagnostics before a time [m].
+fn closest_gap(run: &RunFolder, until: f64) -> Option<f64> {
+    let table = run.diagnostics.as_ref()?;
+    let rows = table.column("time")?.iter().zip(table.column("gap")?);
+    rows.filter(|(time, gap)| **time < until && gap.is_finite())
+        .map(|(_, gap)| *gap)
+        .reduce(f64::min)
 }
 
 impl Pair<'_> {

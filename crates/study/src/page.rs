@@ -9,6 +9,7 @@ use grainwake_report::figure::text::{escape, html};
 use crate::correlation::Correlation;
 use crate::figure::Drawn;
 use crate::judge::{Finding, Sample, samples};
+use crate::measure::Measures;
 use crate::plan::Manifest;
 use crate::stats::median;
 use crate::table::Row;
@@ -24,6 +25,9 @@ pub(crate) struct Content<'a> {
     pub figures: &'a [(Drawn, String)],
     pub notes: &'a [String],
 }
+
+/// A pair that comes this near without touching has missed narrowly [d]: a cell of the paper's mesh.
+const NARROWLY: f64 = 0.125;
 
 /// Columns of the table: heading and quantity.
 const COLUMNS: [(&str, &str); 9] = [
@@ -79,25 +83,20 @@ impl Content<'_> {
     fn lead(&self) -> String {
         let (done, all) = (self.done(), self.rows.len());
         let mut text = format!("{done} of {all} runs are finished");
-        let kissed = self
-            .rows
-            .iter()
-            .filter(|r| r.pair.as_ref().is_some_and(|p| p.kiss_time.is_some()))
-            .count();
-        let parted = self
-            .rows
-            .iter()
-            .filter(|r| r.pair.as_ref().is_some_and(|p| p.parted == Some(true)))
-            .count();
-        let again = self
-            .rows
-            .iter()
-            .filter(|r| r.pair.as_ref().is_some_and(|p| p.repeated == Some(true)))
-            .count();
+        let of = |what: fn(&Measures) -> bool| {
+            let pairs = self.rows.iter().filter_map(|r| r.pair.as_ref());
+            pairs.filter(|p| what(p)).count()
+        };
+        let kissed = of(|p| p.kiss_time.is_some());
+        let parted = of(|p| p.parted == Some(true));
+        let again = of(|p| p.repeated == Some(true));
+        let missed =
+            of(|p| p.kiss_time.is_none() && p.closest_gap.is_some_and(|gap| gap < NARROWLY));
         if done > 0 {
             let _ = write!(
                 text,
-                "; {kissed} pairs kissed before they landed, {parted} of them parted, {again} kissed more than once"
+                "; {kissed} pairs kissed before they landed, {parted} of them parted, {again} kissed more than once; \
+                 {missed} passed within {NARROWLY} d of each other without touching"
             );
         }
         let count = |verdict: &str| {
