@@ -6,7 +6,7 @@
 
 use crate::mesh::TriangleMesh;
 use glam::DVec3;
-use std::collections::HashMap;
+use std::sync::LazyLock;
 
 /// Regular samples: `dims` values, x fastest, the first at `lower`, `spacing` apart.
 pub(crate) struct Samples<'a> {
@@ -70,12 +70,15 @@ fn walk(mask: u8) -> [Option<u8>; 12] {
     next
 }
 
+/// [`walk`] of every pattern of signs.
+static WALKS: LazyLock<Vec<[Option<u8>; 12]>> = LazyLock::new(|| (0..=255).map(walk).collect());
+
 /// Closed surface where the values change sign; normals point to positive values.
 pub(crate) fn extract(samples: &Samples) -> TriangleMesh {
     let [nx, ny, nz] = samples.dims;
     let strides = [1, nx, nx * ny];
     let mut mesh = TriangleMesh::default();
-    let mut on_edge: HashMap<usize, u32> = HashMap::new();
+    let mut on_edges = OnEdges::new(strides[2]);
     let offset = |corner: u8| {
         (0..3)
             .map(|axis| usize::from(corner >> axis & 1) * strides[axis])
@@ -93,34 +96,67 @@ pub(crate) fn extract(samples: &Samples) -> TriangleMesh {
                 if mask == 0 || mask == 255 {
                     continue;
                 }
-                let mut vertex = |edge: usize| {
-                    let (corner, axis) = edge_ends(edge);
-                    let low = base + offsets[usize::from(corner)];
-                    *on_edge.entry(3 * low + axis).or_insert_with(|| {
-                        mesh.vertices.push(crossing(samples, low, axis, strides));
-                        (mesh.vertices.len() - 1) as u32
-                    })
-                };
-                let mut polygons: Vec<Vec<u32>> = Vec::new();
-                let mut next = walk(mask);
+                // The polygons of the cell, one after the other, and where each ends.
+                let (mut corners, mut ends) = ([0u32; 12], [0usize; 12]);
+                let (mut count, mut polygons) = (0, 0);
+                let mut next = WALKS[usize::from(mask)];
                 for start in 0..12 {
-                    let mut polygon = Vec::new();
-                    let mut at = start;
+                    let (mut at, first) = (start, count);
                     while let Some(after) = next[at].take() {
-                        polygon.push(vertex(at));
+                        let (corner, axis) = edge_ends(at);
+                        let low = base + offsets[usize::from(corner)];
+                        corners[count] = *on_edges.entry(low, axis).get_or_insert_with(|| {
+                            mesh.vertices.push(crossing(samples, low, axis, strides));
+                            (mesh.vertices.len() - 1) as u32
+                        });
+                        count += 1;
                         at = usize::from(after);
                     }
-                    if !polygon.is_empty() {
-                        polygons.push(polygon);
+                    if count > first {
+                        ends[polygons] = count;
+                        polygons += 1;
                     }
                 }
-                for polygon in polygons {
-                    fill(&mut mesh, &polygon);
+                let mut first = 0;
+                for end in &ends[..polygons] {
+                    fill(&mut mesh, &corners[first..*end]);
+                    first = *end;
                 }
             }
         }
+        on_edges.rise();
     }
     mesh
+}
+
+/// The vertices on the edges that leave the samples of two neighbouring planes.
+struct OnEdges {
+    /// Of the lower and of the upper plane, three a sample.
+    planes: [Vec<Option<u32>>; 2],
+    /// First sample of the lower plane.
+    first: usize,
+}
+
+impl OnEdges {
+    fn new(plane: usize) -> OnEdges {
+        OnEdges {
+            planes: [vec![None; 3 * plane], vec![None; 3 * plane]],
+            first: 0,
+        }
+    }
+
+    /// The vertex on the edge from sample `low` along `axis`.
+    fn entry(&mut self, low: usize, axis: usize) -> &mut Option<u32> {
+        let (at, plane) = (3 * (low - self.first) + axis, self.planes[0].len());
+        &mut self.planes[at / plane][at % plane]
+    }
+
+    /// One plane up.
+    fn rise(&mut self) {
+        self.planes.swap(0, 1);
+        self.planes[1].fill(None);
+        self.first += self.planes[0].len() / 3;
+    }
 }
 
 /// Where the value crosses zero between a sample and the next along `axis`. Kept a hair off the

@@ -140,14 +140,15 @@ fn one_piece(mask: &mut Mask, label: u32, largest: bool) -> Result<u64> {
 /// voxels: a field that is about the signed distance, at the level that gives that volume, taken
 /// on a grid `factor` times as fine.
 fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Result<TriangleMesh> {
-    let (mut fine, dims) = smooth::refine(field, dims, factor);
+    let (field, dims, lower) = near_surface(field, dims);
+    let (mut fine, dims) = smooth::refine(&field, dims, factor);
     let spacing = 1.0 / factor as f64;
     let mut mesh = TriangleMesh::default();
     // Newton's method: the volume changes by the area for every unit of level.
     for _ in 0..5 {
         let samples = Samples {
             dims,
-            lower: DVec3::ZERO,
+            lower,
             spacing,
             values: &fine,
         };
@@ -167,4 +168,34 @@ fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Resul
         }
     }
     Ok(mesh)
+}
+
+/// Samples that are at most so far outside lie in the box that the surface is taken from [voxels]:
+/// more than its level moves and the interpolation reaches.
+const NEAR: f32 = 2.5;
+
+/// The part of a field about the body, its dimensions, and where it begins.
+fn near_surface(field: &[f32], dims: [usize; 3]) -> (Vec<f32>, [usize; 3], DVec3) {
+    let [nx, ny, _] = dims;
+    let (mut low, mut high) = (dims, [0; 3]);
+    for (n, _) in field.iter().enumerate().filter(|(_, value)| **value < NEAR) {
+        for (axis, i) in [n % nx, n / nx % ny, n / nx / ny].into_iter().enumerate() {
+            low[axis] = low[axis].min(i);
+            high[axis] = high[axis].max(i);
+        }
+    }
+    if (0..3).any(|axis| low[axis] > high[axis]) {
+        return (field.to_vec(), dims, DVec3::ZERO);
+    }
+    let low = low.map(|n| n.saturating_sub(1));
+    let high: [usize; 3] = std::array::from_fn(|axis| (high[axis] + 2).min(dims[axis]));
+    let size: [usize; 3] = std::array::from_fn(|axis| high[axis] - low[axis]);
+    let mut part = Vec::with_capacity(size.iter().product());
+    for k in low[2]..high[2] {
+        for j in low[1]..high[1] {
+            let row = nx * (j + ny * k);
+            part.extend_from_slice(&field[row + low[0]..row + high[0]]);
+        }
+    }
+    (part, size, DVec3::from_array(low.map(|n| n as f64)))
 }
