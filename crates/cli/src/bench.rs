@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DQuat, DVec3};
-use grainwake_shape::Shape;
+use grainwake_shape::ShapeOptions;
+use grainwake_shape::analytic::ellipsoid;
 use grainwake_solver::coupling::Scheme;
 use grainwake_solver::dem::{ContactParams, Dof, Grain};
 use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
@@ -177,7 +178,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     0.5 * (values[(n - 1) / 2] + values[n / 2])
 }
 
-/// Two spheres of eight cells' diameter in water, one above the other, as in the main case.
+/// Two sampled grains of eight cells' diameter in water, one above the other, as in the main case.
 fn setup(cells: [usize; 3], scheme: Scheme) -> Setup {
     let spacing = DVec3::splat(0.25e-3);
     let mesh = Mesh {
@@ -186,7 +187,9 @@ fn setup(cells: [usize; 3], scheme: Scheme) -> Setup {
         origin: DVec3::ZERO,
     };
     let radius = 4.0 * spacing.x;
-    let shape = Arc::new(Shape::sphere(radius, 2000));
+    let axes = [1.1 * radius, radius, radius / 1.1];
+    let shape = ellipsoid(axes[0], axes[1], axes[2], &ShapeOptions::default());
+    let shape = Arc::new(shape.expect("a plain ellipsoid"));
     let grain = |height: f64| Grain {
         shape: shape.clone(),
         density: 1500.0,
