@@ -3,6 +3,7 @@
 #[path = "../../report/tests/synthetic/mod.rs"]
 mod synthetic;
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -110,6 +111,18 @@ fn names(rendered: &Rendered) -> Vec<String> {
     rendered.png.iter().map(stem).collect()
 }
 
+/// Smallest gap of the surfaces of every run, from the table.
+fn closest_gaps(folder: &Path) -> BTreeMap<String, Option<f64>> {
+    let text = std::fs::read_to_string(folder.join("table.json")).unwrap();
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let rows = value.as_array().unwrap().iter();
+    rows.map(|row| {
+        let name = row["name"].as_str().unwrap().to_owned();
+        (name, row["pair"]["closest_gap"].as_f64())
+    })
+    .collect()
+}
+
 fn findings(folder: &Path) -> Vec<(String, String)> {
     let text = std::fs::read_to_string(folder.join("analysis.json")).unwrap();
     let value: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -172,6 +185,10 @@ fn a_whole_study_gets_all_figures() {
         page.contains("<b>Shortest first contact</b>: g16-o3"),
         "the roundest, most spherical, broad side down"
     );
+    let gaps = closest_gaps(&folder);
+    let kissed = gaps["sphere"].expect("its diagnostics are there");
+    assert!(kissed.abs() < 0.02, "{kissed}: the surfaces meet");
+    assert_eq!(gaps["g01-o1"], None, "without diagnostics");
     let found = findings(&folder);
     let verdict = |claim: &str| {
         found
