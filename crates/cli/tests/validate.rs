@@ -131,8 +131,12 @@ fn saved_results_are_replaced_run_by_run() {
     assert_eq!(saved["results"].as_array().unwrap().len(), 4);
     assert_eq!(saved["runs"].as_array().unwrap().len(), 1);
     let steps = saved["runs"][0]["steps"].as_u64().unwrap();
+    let cells = saved["runs"][0]["cells"].as_u64().unwrap();
     let page = std::fs::read_to_string(folder.path().join("kept/ci.md")).unwrap();
-    assert!(page.contains(&format!("| fall/fall | {steps} |")), "{page}");
+    assert!(
+        page.contains(&format!("| fall/fall | {cells} | {steps} |")),
+        "{page}"
+    );
 }
 
 #[test]
