@@ -183,6 +183,13 @@ of = "z"
         page.contains("![Height of the ball](fall-height.png)"),
         "{page}"
     );
+    // A figure that is there is not replaced by one that lacks a run.
+    std::fs::write(figures.join("fall-height.png"), "of more runs").unwrap();
+    validate(folder.path(), &["--save", "kept"])
+        .success()
+        .stderr(contains("figure fall-height: kept as it is"));
+    let kept = std::fs::read_to_string(figures.join("fall-height.png"));
+    assert_eq!(kept.unwrap(), "of more runs");
     // Without --save nothing is drawn.
     std::fs::remove_dir_all(folder.path().join("kept")).unwrap();
     validate(folder.path(), &["--resume"]).success();

@@ -10,7 +10,14 @@ use crate::exit::Exit;
 /// A grain from a closed surface mesh.
 pub fn from_mesh(args: &FromMeshArgs) -> Result<(), Exit> {
     may_write(&args.new.output, args.new.force)?;
-    let unit = length("--unit", &args.unit)?;
+    // "mm" is "1 mm" here; elsewhere a length without a number is a slip.
+    let bare = args.unit.chars().all(char::is_alphabetic);
+    let unit = if bare {
+        format!("1 {}", args.unit)
+    } else {
+        args.unit.clone()
+    };
+    let unit = length("--unit", &unit)?;
     let (mesh, source) = read_mesh(&args.mesh, unit, &ReadLimits::default())?;
     let shape = shape_from_mesh(
         &mesh,

@@ -29,14 +29,9 @@ pub fn grain(args: &GrainArgs) -> Result<(), Exit> {
     }
 }
 
-/// A length given on the command line [m]; a unit alone is one of it.
+/// A length given on the command line [m].
 fn length(name: &str, text: &str) -> Result<f64, Exit> {
-    let one = || parse_length(&format!("1 {text}")).ok();
-    let found = match parse_length(text) {
-        Err(message) => one().ok_or(message),
-        found => found,
-    };
-    found.map_err(|message| Exit::new(BAD_INPUT, format!("{name}: {message}")))
+    parse_length(text).map_err(|message| Exit::new(BAD_INPUT, format!("{name}: {message}")))
 }
 
 /// Diameters [m] that grains have; others come of a wrong unit.

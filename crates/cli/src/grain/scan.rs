@@ -6,7 +6,7 @@ use grainwake_shape::picture::{Picture, View};
 use grainwake_shape::scan::{
     Denoise, Scan, ScanOptions, ScannedGrain, Threshold, read_volume, scan_volume,
 };
-use grainwake_shape::{ReadLimits, write_table};
+use grainwake_shape::{ReadLimits, Shape, write_table};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
@@ -107,8 +107,19 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
         folder.join("sheet.png"),
         folder.join("labels.tif"),
     );
-    for grain in grains.iter().filter(|g| g.shape.is_ok()) {
-        may_write(&path(grain.label), args.new.force)?;
+    let usable = || {
+        grains
+            .iter()
+            .filter_map(|g| Some((g.label, g.shape.as_ref().ok()?)))
+    };
+    for (label, _) in usable() {
+        may_write(&path(label), args.new.force)?;
+    }
+    // The largest alone: fragments may be small.
+    let size = |shape: &Shape| shape.equivalent_diameter();
+    let largest = usable().max_by(|a, b| size(a.1).total_cmp(&size(b.1)));
+    if let Some((_, shape)) = largest {
+        plausible(shape, &args.new, "--voxel")?;
     }
     for file in [&table, &sheet, &image] {
         may_write(file, args.new.force)?;
@@ -122,7 +133,6 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     {
         match shape {
             Ok(shape) => {
-                plausible(&shape, &args.new, "--voxel")?;
                 let file = path(label);
                 let shape = finish(shape, &file, &args.new)?;
                 let record = shape.record();

@@ -8,7 +8,7 @@ use grainwake_validation::Suite;
 use crate::exit::{Exit, IO};
 
 /// Draws the figures of `suites` that have data below `output` into `folder/figures`, and says on
-/// stderr what had to be left out; gives their number.
+/// stderr what had to be left out, or that an earlier figure stays for that; gives their number.
 pub fn add(folder: &Path, suites: &[Suite], output: &Path) -> Result<usize, Exit> {
     let place = folder.join("figures");
     std::fs::create_dir_all(&place)
@@ -18,6 +18,14 @@ pub fn add(folder: &Path, suites: &[Suite], output: &Path) -> Result<usize, Exit
         for figure in &suite.figures {
             let name = format!("{}-{}", suite.name, figure.name);
             let drawn = figure.draw(&output.join(&suite.name));
+            // A figure of more runs is not replaced by one of fewer.
+            if !drawn.notes.is_empty() && place.join(format!("{name}.png")).is_file() {
+                eprintln!(
+                    "figure {name}: kept as it is, delete it to draw what is here: {}",
+                    drawn.notes.join("; ")
+                );
+                continue;
+            }
             if !drawn.notes.is_empty() {
                 eprintln!("figure {name}: left out: {}", drawn.notes.join("; "));
             }

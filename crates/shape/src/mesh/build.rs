@@ -27,21 +27,20 @@ pub fn shape_from_mesh(
     let mut provenance = Provenance::new("mesh").with("faces", mesh.triangles.len());
     provenance.source.clone_from(&source.name);
     provenance.source_sha256.clone_from(&source.sha256);
-    match mesh.check_closed() {
+    let turned;
+    let closed = match mesh.check_closed() {
+        Ok(()) => mesh,
         Err(ShapeError::InsideOut { .. }) if options.flip => {
-            let mut turned = mesh.clone();
-            for t in &mut turned.triangles {
-                t.swap(1, 2);
-            }
-            turned.check_crossings()?;
-            from_closed(&turned, provenance.with("flip", true), &options.shape)
+            let mut copy = mesh.clone();
+            copy.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+            provenance = provenance.with("flip", true);
+            turned = copy;
+            &turned
         }
-        Err(error) => Err(error),
-        Ok(()) => {
-            mesh.check_crossings()?;
-            from_closed(mesh, provenance, &options.shape)
-        }
-    }
+        Err(error) => return Err(error),
+    };
+    closed.check_crossings()?;
+    from_closed(closed, provenance, &options.shape)
 }
 
 /// Shape of a mesh; its frame and bounds are found here, `provenance` tells the rest.

@@ -170,15 +170,15 @@ fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Resul
     Ok(mesh)
 }
 
-/// Samples that are at most so far outside lie in the box that the surface is taken from [voxels]:
+/// The box that the surface is taken from reaches so many samples beyond the inside of the field:
 /// more than its level moves and the interpolation reaches.
-const NEAR: f32 = 2.5;
+const AROUND: usize = 4;
 
 /// The part of a field about the body, its dimensions, and where it begins.
 fn near_surface(field: &[f32], dims: [usize; 3]) -> (Vec<f32>, [usize; 3], DVec3) {
     let [nx, ny, _] = dims;
     let (mut low, mut high) = (dims, [0; 3]);
-    for (n, _) in field.iter().enumerate().filter(|(_, value)| **value < NEAR) {
+    for (n, _) in field.iter().enumerate().filter(|(_, value)| **value < 0.0) {
         for (axis, i) in [n % nx, n / nx % ny, n / nx / ny].into_iter().enumerate() {
             low[axis] = low[axis].min(i);
             high[axis] = high[axis].max(i);
@@ -187,8 +187,8 @@ fn near_surface(field: &[f32], dims: [usize; 3]) -> (Vec<f32>, [usize; 3], DVec3
     if (0..3).any(|axis| low[axis] > high[axis]) {
         return (field.to_vec(), dims, DVec3::ZERO);
     }
-    let low = low.map(|n| n.saturating_sub(1));
-    let high: [usize; 3] = std::array::from_fn(|axis| (high[axis] + 2).min(dims[axis]));
+    let low = low.map(|n| n.saturating_sub(AROUND));
+    let high: [usize; 3] = std::array::from_fn(|a| (high[a] + AROUND + 1).min(dims[a]));
     let size: [usize; 3] = std::array::from_fn(|axis| high[axis] - low[axis]);
     let mut part = Vec::with_capacity(size.iter().product());
     for k in low[2]..high[2] {
