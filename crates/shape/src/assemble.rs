@@ -1,5 +1,6 @@
 //! From a distance function in the principal frame to a finished shape.
 
+use crate::distance::Distance;
 use crate::error::{Result, ShapeError, positive};
 use crate::field::SampledField;
 use crate::mesh::TriangleMesh;
@@ -44,9 +45,9 @@ const MARGIN: f64 = 0.125;
 const MARGIN_CELLS: f64 = 4.0;
 
 /// A body in (nearly) its principal frame.
-pub(crate) struct Body<F> {
-    /// Signed distance [m] at a point; the hint passes from one sample to the next.
-    pub distance: F,
+pub(crate) struct Body<D> {
+    /// Signed distance [m].
+    pub distance: D,
     /// Bounding box [m].
     pub lower: DVec3,
     /// Bounding box [m].
@@ -84,8 +85,8 @@ impl ShapeOptions {
 
 /// Samples the body, centres the field on its own centroid, measures it, spreads the nodes and
 /// passes the quality gate.
-pub(crate) fn assemble<F: Fn(DVec3, &mut u32) -> f64 + Sync>(
-    body: &Body<F>,
+pub(crate) fn assemble<D: Distance>(
+    body: &Body<D>,
     mut provenance: Provenance,
     options: &ShapeOptions,
 ) -> Result<Shape> {
@@ -122,10 +123,11 @@ pub(crate) fn assemble<F: Fn(DVec3, &mut u32) -> f64 + Sync>(
     let (lower, upper, radius) = bounds(&field, &mesh, &nodes);
     let mut morphology = Morphology::measure(&mesh, upper - lower, mass.volume);
     if options.roundness {
-        let (_, inscribed) = inscribed::sphere(&body.distance, body.lower, body.upper);
+        let distance = |x: DVec3, hint: &mut u32| body.distance.near(x, hint);
+        let (_, inscribed) = inscribed::sphere(&distance, body.lower, body.upper);
         morphology.inscribed_radius = Some(inscribed);
         morphology.wadell_roundness =
-            roundness::measure(&body.distance, body.lower, body.upper, inscribed);
+            roundness::measure(&distance, body.lower, body.upper, inscribed);
     }
     let second = DVec3::new(
         mass.second.x_axis.x,

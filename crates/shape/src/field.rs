@@ -1,8 +1,8 @@
 //! A signed distance sampled on a regular grid.
 
+use crate::distance::Distance;
 use crate::error::{Result, ShapeError};
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// Most samples that one field may hold.
 pub(crate) const MAX_SAMPLES: u64 = 1 << 26;
@@ -35,10 +35,9 @@ struct Place {
 }
 
 impl SampledField {
-    /// Samples `distance(x, hint)` (the hint, left by the sample before, may speed a search) on a
-    /// grid that covers the box with `margin` [m] to spare on every side.
+    /// Samples `distance` on a grid that covers the box with `margin` [m] to spare on every side.
     pub(crate) fn sample(
-        distance: impl Fn(DVec3, &mut u32) -> f64 + Sync,
+        distance: &impl Distance,
         lower: DVec3,
         upper: DVec3,
         spacing: f64,
@@ -59,19 +58,7 @@ impl SampledField {
         let dims = wide.map(|n| n - 2);
         let origin = 0.5 * (lower + upper) - 0.5 * spacing * cells;
         let first = origin - DVec3::splat(spacing);
-        let mut values = vec![0.0f64; wide.iter().product()];
-        values
-            .par_chunks_mut(wide[0])
-            .enumerate()
-            .for_each(|(row, line)| {
-                let (j, k) = (row % wide[1], row / wide[1]);
-                let mut hint = 0;
-                for (i, value) in line.iter_mut().enumerate() {
-                    let x = first + spacing * DVec3::new(i as f64, j as f64, k as f64);
-                    *value = distance(x, &mut hint);
-                }
-            });
-        let values = unbiased(&values, wide, spacing);
+        let values = unbiased(&distance.on_grid(first, spacing, wide), wide, spacing);
         Self::quantise(origin, spacing, dims, &values)
     }
 
@@ -374,7 +361,7 @@ mod tests {
 
     fn ball() -> SampledField {
         SampledField::sample(
-            |x, _| x.length() - 1.0,
+            &|x: DVec3, _: &mut u32| x.length() - 1.0,
             DVec3::splat(-1.0),
             DVec3::splat(1.0),
             2.0 / 48.0,
@@ -432,7 +419,7 @@ mod tests {
             };
             let corner = DVec3::new(1.0, radius, radius);
             let distance = |x, _: &mut u32| exact(x).0;
-            let field = SampledField::sample(distance, -corner, corner, 1.0 / 24.0, 0.25).unwrap();
+            let field = SampledField::sample(&distance, -corner, corner, 1.0 / 24.0, 0.25).unwrap();
             let off_grid = |x: &DVec3| x.cmplt(field.lower()).any() || x.cmpgt(field.upper()).any();
             for x in points(1.6, 4000).chain(points(8.0, 4000)).filter(off_grid) {
                 let (d, n) = exact(x);
@@ -449,7 +436,7 @@ mod tests {
         let corner = DVec3::new(1.0, 0.125, 0.125);
         let rod =
             |x: DVec3, _: &mut u32| (x - DVec3::X * x.x.clamp(-0.875, 0.875)).length() - 0.125;
-        let field = SampledField::sample(rod, -corner, corner, 1.0 / 24.0, 0.25).unwrap();
+        let field = SampledField::sample(&rod, -corner, corner, 1.0 / 24.0, 0.25).unwrap();
         let (mut spared, mut far) = (0, 0);
         for x in points(1.6, 8000) {
             let (full, limited) = (field.distance(x), field.distance_within(x, 0.4));
@@ -482,8 +469,13 @@ mod tests {
 
     #[test]
     fn an_absurd_resolution_is_refused() {
-        let refused =
-            SampledField::sample(|x, _| x.x, DVec3::splat(-1.0), DVec3::splat(1.0), 1e-6, 0.0);
+        let refused = SampledField::sample(
+            &|x: DVec3, _: &mut u32| x.x,
+            DVec3::splat(-1.0),
+            DVec3::splat(1.0),
+            1e-6,
+            0.0,
+        );
         assert!(matches!(refused, Err(ShapeError::BadParameter { .. })));
     }
 }

@@ -11,6 +11,7 @@
 pub mod analytic;
 mod assemble;
 mod compare;
+mod distance;
 mod error;
 pub mod family;
 mod feret;

@@ -272,7 +272,7 @@ mod tests {
     fn a_linear_field_is_integrated_exactly() {
         let normal = DVec3::new(0.2, 0.3, 0.9).normalize();
         let field = SampledField::sample(
-            |x, _: &mut u32| normal.dot(x),
+            &|x: DVec3, _: &mut u32| normal.dot(x),
             DVec3::splat(-1.0),
             DVec3::splat(1.0),
             0.125,
@@ -289,7 +289,7 @@ mod tests {
         let exact_volume = 4.0 / 3.0 * std::f64::consts::PI * a * b * c;
         let error = |cells: f64| {
             let field = SampledField::sample(
-                |x, _: &mut u32| ((x / DVec3::new(a, b, c)).length() - 1.0) * c,
+                &|x: DVec3, _: &mut u32| ((x / DVec3::new(a, b, c)).length() - 1.0) * c,
                 DVec3::new(-a, -b, -c),
                 DVec3::new(a, b, c),
                 2.0 / cells,

@@ -18,7 +18,7 @@ pub struct MeshOptions {
 }
 
 /// Shape of a closed mesh in metres: exact mass properties give the principal frame, and the
-/// exact distances to the triangles are sampled in it.
+/// distances to the triangles are sampled in it, the exact ones near the surface.
 pub fn shape_from_mesh(
     mesh: &TriangleMesh,
     source: &SourceFile,
@@ -59,7 +59,7 @@ pub(crate) fn from_closed(
     provenance.centroid = mass.centroid;
     provenance.rotation = DQuat::from_mat3(&axes);
     let body = Body {
-        distance: |x, hint: &mut u32| distance.near(x, hint),
+        distance,
         lower,
         upper,
         volume: Some(mass.volume),

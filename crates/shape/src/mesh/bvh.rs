@@ -39,6 +39,8 @@ pub(crate) struct Bvh {
     nodes: Vec<Node>,
     corners: Vec<[DVec3; 3]>,
     faces: Vec<u32>,
+    /// Place in leaf order of each face.
+    leaf: Vec<u32>,
 }
 
 impl Bvh {
@@ -50,10 +52,36 @@ impl Bvh {
         let mut nodes = Vec::new();
         split(mesh, &centres, &mut faces, 0, &mut nodes);
         let corners = faces.iter().map(|f| mesh.corners(*f as usize)).collect();
+        let mut leaf = vec![0; faces.len()];
+        for (n, face) in faces.iter().enumerate() {
+            leaf[*face as usize] = n as u32;
+        }
         Bvh {
             nodes,
             corners,
             faces,
+            leaf,
+        }
+    }
+
+    /// Lower and upper corner of the box about every face.
+    pub(crate) fn boxes(&self) -> impl Iterator<Item = [DVec3; 2]> {
+        let bounds = |[a, b, c]: &[DVec3; 3]| [a.min(*b).min(*c), a.max(*b).max(*c)];
+        self.corners.iter().map(bounds)
+    }
+
+    /// Nearest point of face `face` to `x`.
+    pub(crate) fn on_face(&self, x: DVec3, face: u32) -> Nearest {
+        self.on_leaf(x, self.leaf[face as usize])
+    }
+
+    /// Nearest point to `x` of the triangle that is number `n` in leaf order.
+    fn on_leaf(&self, x: DVec3, n: u32) -> Nearest {
+        let (point, feature) = nearest_on_triangle(x, &self.corners[n as usize]);
+        Nearest {
+            point,
+            face: self.faces[n as usize],
+            feature,
         }
     }
 
@@ -79,14 +107,8 @@ impl Bvh {
     /// Nearest point of the mesh to `x`. The search starts from triangle `hint` (in leaf order),
     /// which is left at the nearest one: a good start for a query nearby.
     pub(crate) fn nearest(&self, x: DVec3, hint: &mut u32) -> Nearest {
-        let start = *hint as usize;
-        let (point, feature) = nearest_on_triangle(x, &self.corners[start]);
-        let mut best = Nearest {
-            point,
-            face: self.faces[start],
-            feature,
-        };
-        let mut bound = point.distance_squared(x);
+        let mut best = self.on_leaf(x, *hint);
+        let mut bound = best.point.distance_squared(x);
         // Depth is at most about log2 of the triangle count: the split halves the list.
         let mut stack = [(0u32, 0.0f64); 64];
         stack[0] = (0, self.nodes[0].squared_distance(x));
@@ -99,17 +121,11 @@ impl Bvh {
             }
             let node = &self.nodes[number as usize];
             if node.count > 0 {
-                for n in node.first as usize..(node.first + node.count) as usize {
-                    let (point, feature) = nearest_on_triangle(x, &self.corners[n]);
-                    let distance = point.distance_squared(x);
+                for n in node.first..node.first + node.count {
+                    let found = self.on_leaf(x, n);
+                    let distance = found.point.distance_squared(x);
                     if distance < bound {
-                        bound = distance;
-                        *hint = n as u32;
-                        best = Nearest {
-                            point,
-                            face: self.faces[n],
-                            feature,
-                        };
+                        (bound, *hint, best) = (distance, n, found);
                     }
                 }
             } else {

@@ -1,8 +1,10 @@
-//! Exact signed distance to a closed mesh.
+//! Signed distance to a closed mesh.
 
 use super::TriangleMesh;
-use super::bvh::{Bvh, Feature};
+use super::bvh::{Bvh, Feature, Nearest};
 use super::check::Neighbours;
+use super::spread;
+use crate::distance::Distance;
 use crate::error::Result;
 use glam::DVec3;
 
@@ -11,6 +13,8 @@ use glam::DVec3;
 pub(crate) struct MeshDistance {
     bvh: Bvh,
     triangles: Vec<[u32; 3]>,
+    /// Faces across the edges of each face.
+    neighbours: Neighbours,
     face_normals: Vec<DVec3>,
     edge_normals: Vec<[DVec3; 3]>,
     corner_normals: Vec<DVec3>,
@@ -19,10 +23,10 @@ pub(crate) struct MeshDistance {
 impl MeshDistance {
     /// Checks the mesh and prepares it for queries.
     pub(crate) fn new(mesh: &TriangleMesh) -> Result<MeshDistance> {
-        Ok(Self::from_checked(mesh, &mesh.neighbours()?))
+        Ok(Self::from_checked(mesh, mesh.neighbours()?))
     }
 
-    fn from_checked(mesh: &TriangleMesh, neighbours: &Neighbours) -> MeshDistance {
+    fn from_checked(mesh: &TriangleMesh, neighbours: Neighbours) -> MeshDistance {
         let mut face_normals = Vec::with_capacity(mesh.triangles.len());
         let mut corner_normals = vec![DVec3::ZERO; mesh.vertices.len()];
         for (face, triangle) in mesh.triangles.iter().enumerate() {
@@ -45,15 +49,63 @@ impl MeshDistance {
         MeshDistance {
             bvh: Bvh::new(mesh),
             triangles: mesh.triangles.clone(),
+            neighbours,
             face_normals,
             edge_normals,
             corner_normals,
         }
     }
 
-    /// Signed distance [m] at `x`, negative inside; `hint` comes from a query nearby, or is 0.
-    pub(crate) fn near(&self, x: DVec3, hint: &mut u32) -> f64 {
-        let nearest = self.bvh.nearest(x, hint);
+    pub(super) fn bvh(&self) -> &Bvh {
+        &self.bvh
+    }
+
+    /// Place of the mesh whose distance to `x` is least among all places around it, downhill from
+    /// face `face`.
+    pub(super) fn downhill(&self, x: DVec3, face: u32) -> Nearest {
+        let mut best = self.bvh.on_face(x, face);
+        let mut distance = best.point.distance_squared(x);
+        let mut around = Vec::new();
+        loop {
+            around.clear();
+            match best.feature {
+                Feature::Face => (),
+                Feature::Edge(i) => {
+                    around.push(self.neighbours[best.face as usize][usize::from(i)])
+                }
+                Feature::Corner(i) => self.ring(best.face, usize::from(i), &mut around),
+            }
+            let places = around.iter().map(|face| self.bvh.on_face(x, *face));
+            let nearest = places
+                .map(|place| (place.point.distance_squared(x), place))
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            match nearest {
+                Some(nearer) if nearer.0 < distance => (distance, best) = nearer,
+                _ => return best,
+            }
+        }
+    }
+
+    /// The other faces at corner `corner` of face `face`.
+    fn ring(&self, face: u32, corner: usize, found: &mut Vec<u32>) {
+        let vertex = self.triangles[face as usize][corner];
+        let mut at = (face, corner);
+        // The next face lies across the edge that begins at the vertex.
+        loop {
+            let next = self.neighbours[at.0 as usize][at.1];
+            let place = self.triangles[next as usize]
+                .iter()
+                .position(|v| *v == vertex);
+            match place {
+                Some(place) if next != face => at = (next, place),
+                _ => return,
+            }
+            found.push(next);
+        }
+    }
+
+    /// Signed distance [m] of `x`, negative inside, whose nearest place on the mesh is known.
+    pub(super) fn signed(&self, x: DVec3, nearest: &Nearest) -> f64 {
         let face = nearest.face as usize;
         let normal = match nearest.feature {
             Feature::Face => self.face_normals[face],
@@ -64,6 +116,16 @@ impl MeshDistance {
         };
         let reach = x - nearest.point;
         reach.length().copysign(reach.dot(normal))
+    }
+}
+
+impl Distance for MeshDistance {
+    fn near(&self, x: DVec3, hint: &mut u32) -> f64 {
+        self.signed(x, &self.bvh.nearest(x, hint))
+    }
+
+    fn on_grid(&self, first: DVec3, spacing: f64, dims: [usize; 3]) -> Vec<f64> {
+        spread::on_grid(self, first, spacing, dims)
     }
 }
 

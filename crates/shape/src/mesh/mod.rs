@@ -10,6 +10,7 @@ mod intersect;
 mod obj;
 mod ply;
 mod read;
+mod spread;
 mod stl;
 mod weld;
 

@@ -2,7 +2,8 @@
 
 use super::grain::{self, Context};
 use super::grey::{Grey, LAYERS};
-use super::regions::{fill_cavities, pieces, regions};
+use super::regions::regions;
+use super::runs::{fill_cavities, pieces};
 use super::threshold::median;
 use super::volume::Voxels;
 use super::watershed::{HALO, add_halo, separate};

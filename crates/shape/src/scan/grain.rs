@@ -1,7 +1,8 @@
 //! The shape of one grain of a volume.
 
 use super::grey::Grey;
-use super::regions::{Region, crop, fill_cavities, pieces};
+use super::regions::{Region, crop};
+use super::runs::{fill_cavities, pieces};
 use super::{Mask, ScanOptions, smooth, transform};
 use crate::Shape;
 use crate::error::{Result, ShapeError};

@@ -11,6 +11,7 @@ use super::Mask;
 use super::smooth::gaussian;
 use super::transform;
 use super::watershed::HALO;
+use rayon::prelude::*;
 
 /// Grey values with the owner of each voxel: the label of its grain, with [`HALO`] the void
 /// around it, 0 elsewhere.
@@ -30,6 +31,9 @@ pub(crate) const LAYERS: usize = 4;
 /// Deep voxels from which a grain's own grey is taken; with fewer, that of all grains.
 const DEEP: usize = 300;
 
+/// Voxels that give the mean grey of an image's phases well enough.
+const ENOUGH: usize = 1 << 24;
+
 /// A grain's share of each voxel of a crop, ready to be cut at zero.
 pub(crate) struct Cut {
     /// About the signed distance near the surface [voxels].
@@ -45,28 +49,46 @@ impl Grey {
     /// axes; from all voxels of the phase where there are hardly any such.
     pub(crate) fn new(dims: [usize; 3], values: Vec<f32>, owner: Vec<u32>) -> Grey {
         let is_solid = |n: usize| owner[n] != 0 && owner[n] & HALO == 0;
-        let mut grey = [0.0; 2];
-        for (phase, mean) in [false, true].into_iter().zip(&mut grey) {
-            let mut deep = (0.0, 0u64);
-            let mut all = (0.0, 0u64);
-            for n in 0..values.len() {
-                if is_solid(n) != phase {
-                    continue;
+        // Sum and number of the deep voxels and of all, of both phases, slice by slice; of large
+        // images in a share of the rows.
+        let share = (values.len() / ENOUGH).max(1);
+        let row = |j: usize, k: usize| {
+            let start = dims[0] * (j + dims[1] * k);
+            start..start + dims[0]
+        };
+        let sums: Vec<[[(f64, u64); 2]; 2]> = (0..dims[2])
+            .into_par_iter()
+            .map(|k| {
+                let mut sums = [[(0.0, 0); 2]; 2];
+                let rows = (0..dims[1]).filter(|j| (j + k) % share == 0);
+                for n in rows.flat_map(|j| row(j, k)) {
+                    let phase = is_solid(n);
+                    let [deep, all] = &mut sums[usize::from(phase)];
+                    let add =
+                        |sum: &mut (f64, u64)| *sum = (sum.0 + f64::from(values[n]), sum.1 + 1);
+                    add(all);
+                    if far_from(dims, n, 4, |m| is_solid(m) != phase) {
+                        add(deep);
+                    }
                 }
-                all = (all.0 + f64::from(values[n]), all.1 + 1);
-                if far_from(dims, n, 4, |m| is_solid(m) != phase) {
-                    deep = (deep.0 + f64::from(values[n]), deep.1 + 1);
-                }
-            }
+                sums
+            })
+            .collect();
+        let mean = |phase: usize| {
+            let total = |which: usize| {
+                let slices = sums.iter().map(|s| s[phase][which]);
+                slices.fold((0.0, 0), |t, s| (t.0 + s.0, t.1 + s.1))
+            };
+            let (deep, all) = (total(0), total(1));
             let (sum, count) = if deep.1 >= 200 { deep } else { all };
-            *mean = sum / count.max(1) as f64;
-        }
+            sum / count.max(1) as f64
+        };
         Grey {
             dims,
             values,
             owner,
-            void: grey[0],
-            solid: grey[1],
+            void: mean(0),
+            solid: mean(1),
         }
     }
 

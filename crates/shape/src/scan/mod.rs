@@ -21,6 +21,7 @@ mod header;
 mod npy;
 mod npz;
 mod regions;
+mod runs;
 mod slices;
 mod smooth;
 mod threshold;

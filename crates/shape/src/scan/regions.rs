@@ -79,89 +79,9 @@ pub(crate) fn crop(
     Mask { dims: out, solid }
 }
 
-/// Numbers the connected pieces (sharing voxel faces) of the voxels that `solid` selects, from 1
-/// in the order of their first voxels; 0 elsewhere. Also their sizes.
-pub(crate) fn pieces(dims: [usize; 3], solid: impl Fn(usize) -> bool) -> (Vec<u32>, Vec<u64>) {
-    let count = dims.iter().product();
-    let mut number = vec![0u32; count];
-    let mut sizes = Vec::new();
-    let mut stack = Vec::new();
-    for start in 0..count {
-        if number[start] != 0 || !solid(start) {
-            continue;
-        }
-        let name = sizes.len() as u32 + 1;
-        number[start] = name;
-        stack.push(start);
-        let mut size = 0u64;
-        while let Some(at) = stack.pop() {
-            size += 1;
-            for next in neighbours(dims, at) {
-                if number[next] == 0 && solid(next) {
-                    number[next] = name;
-                    stack.push(next);
-                }
-            }
-        }
-        sizes.push(size);
-    }
-    (number, sizes)
-}
-
-/// Voxels that share a face with voxel `at`.
-fn neighbours(dims: [usize; 3], at: usize) -> impl Iterator<Item = usize> {
-    let strides = [1, dims[0], dims[0] * dims[1]];
-    (0..3).flat_map(move |axis| {
-        let place = at / strides[axis] % dims[axis];
-        let below = (place > 0).then(|| at - strides[axis]);
-        let above = (place + 1 < dims[axis]).then(|| at + strides[axis]);
-        below.into_iter().chain(above)
-    })
-}
-
-/// Makes cavities solid (background that cannot reach the mask's border, not even through
-/// voxel edges and corners); returns how many voxels that took.
-pub(crate) fn fill_cavities(mask: &mut Mask) -> u64 {
-    let [nx, ny, nz] = mask.dims;
-    let mut open = vec![false; mask.solid.len()];
-    // All of the border is outside.
-    let mut stack = Vec::new();
-    for row in 0..ny * nz {
-        let inner = row % ny > 0 && row % ny < ny - 1 && row / ny > 0 && row / ny < nz - 1;
-        for i in (0..nx).step_by(if inner { (nx - 1).max(1) } else { 1 }) {
-            let at = i + nx * row;
-            if !mask.solid[at] {
-                open[at] = true;
-                stack.push(at);
-            }
-        }
-    }
-    while let Some(at) = stack.pop() {
-        let (i, j, k) = (at % nx, at / nx % ny, at / nx / ny);
-        for c in k.saturating_sub(1)..=(k + 1).min(nz - 1) {
-            for b in j.saturating_sub(1)..=(j + 1).min(ny - 1) {
-                for a in i.saturating_sub(1)..=(i + 1).min(nx - 1) {
-                    let next = a + nx * (b + ny * c);
-                    if !open[next] && !mask.solid[next] {
-                        open[next] = true;
-                        stack.push(next);
-                    }
-                }
-            }
-        }
-    }
-    let mut filled = 0;
-    for (solid, open) in mask.solid.iter_mut().zip(open) {
-        if !*solid && !open {
-            *solid = true;
-            filled += 1;
-        }
-    }
-    filled
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::runs::{fill_cavities, pieces};
     use super::*;
 
     #[test]

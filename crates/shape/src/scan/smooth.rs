@@ -41,13 +41,12 @@ fn convolve(line: &mut [f32], kernel: &[f32]) {
     let padded: Vec<f32> = (0..line.len() + 2 * reach)
         .map(|i| line[i.saturating_sub(reach).min(last)])
         .collect();
-    for (i, out) in line.iter_mut().enumerate() {
-        let centre = i + reach;
-        let mut sum = kernel[0] * padded[centre];
-        for (n, weight) in kernel.iter().enumerate().skip(1) {
-            sum += weight * (padded[centre - n] + padded[centre + n]);
+    line.iter_mut().for_each(|out| *out *= kernel[0]);
+    for (n, weight) in kernel.iter().enumerate().skip(1) {
+        let sides = padded[reach - n..].iter().zip(&padded[reach + n..]);
+        for (out, (below, above)) in line.iter_mut().zip(sides) {
+            *out += weight * (below + above);
         }
-        *out = sum;
     }
 }
 

@@ -48,15 +48,18 @@ fn squared(mask: &Mask, target: bool) -> Vec<f32> {
 
 /// (x, y, z) with x fastest to (y, z, x) with y fastest.
 pub(super) fn transpose(from: &[f32], to: &mut [f32], [nx, ny, nz]: [usize; 3]) {
-    to.par_chunks_mut(ny * nz)
-        .enumerate()
-        .for_each(|(i, plane)| {
-            for k in 0..nz {
-                for j in 0..ny {
-                    plane[j + ny * k] = from[i + nx * (j + ny * k)];
-                }
+    // Some planes at once: a cache line of `from` is read whole.
+    const WIDTH: usize = 16;
+    let blocks = to.par_chunks_mut(WIDTH * ny * nz).enumerate();
+    blocks.for_each(|(block, planes)| {
+        let (first, width) = (block * WIDTH, planes.len() / (ny * nz));
+        for row in 0..ny * nz {
+            let line = &from[nx * row + first..][..width];
+            for (i, value) in line.iter().enumerate() {
+                planes[i * ny * nz + row] = *value;
             }
-        });
+        }
+    });
 }
 
 /// One dimension: min over q of (p - q)^2 + line[q], by the lower envelope of parabolas

@@ -7,26 +7,6 @@
 
 use rayon::prelude::*;
 
-/// Voxels by falling squared distance, which is a whole number.
-fn order(squared: &[f32]) -> Vec<u32> {
-    let highest = squared.par_iter().copied().reduce(|| 0.0, f32::max) as usize;
-    let mut starts = vec![0usize; highest + 2];
-    for s in squared.iter().filter(|s| **s > 0.0) {
-        // Highest first.
-        starts[highest - *s as usize + 1] += 1;
-    }
-    for n in 1..starts.len() {
-        starts[n] += starts[n - 1];
-    }
-    let mut out = vec![0u32; starts[highest + 1]];
-    for (n, s) in squared.iter().enumerate().filter(|(_, s)| **s > 0.0) {
-        let slot = &mut starts[highest - *s as usize];
-        out[*slot] = n as u32;
-        *slot += 1;
-    }
-    out
-}
-
 /// Hills that have been joined, with the height of the highest top.
 struct Hills {
     parent: Vec<u32>,
@@ -64,58 +44,166 @@ impl Hills {
 /// first voxels. Two hills are one grain if the saddle between them is at least `neck` times the
 /// lower top, or less than a voxel below it.
 pub(crate) fn separate(squared: &[f32], dims: [usize; 3], neck: f64) -> Vec<u32> {
-    let [nx, ny, nz] = dims;
-    let mut labels = vec![0u32; squared.len()];
+    let (mut labels, top) = basins(squared, dims);
     let mut hills = Hills {
-        parent: vec![0],
-        top: vec![0.0],
+        parent: (0..top.len() as u32).collect(),
+        top,
     };
-    for at in order(squared) {
+    let around = Around::new(dims);
+    // Where hills meet, from the highest place down.
+    for at in borders(squared, dims, &labels) {
         let at = at as usize;
-        let (i, j, k) = (at % nx, at / nx % ny, at / nx / ny);
         let height = squared[at].sqrt();
-        // The hills around, and the highest voxel among them: uphill is where this one belongs.
-        let mut around = [0u32; 26];
-        let mut count = 0;
-        let mut uphill = (0.0f32, 0u32);
-        for c in k.saturating_sub(1)..=(k + 1).min(nz - 1) {
-            for b in j.saturating_sub(1)..=(j + 1).min(ny - 1) {
-                for a in i.saturating_sub(1)..=(i + 1).min(nx - 1) {
+        let mut last = 0;
+        around.each(at, |n| {
+            if labels[n] == last || !earlier(squared, n, at) {
+                return;
+            }
+            if last != 0 {
+                let (p, q) = (hills.root(last), hills.root(labels[n]));
+                hills.join(p, q, height, neck);
+            }
+            last = labels[n];
+        });
+    }
+    let roots: Vec<u32> = (0..hills.parent.len() as u32)
+        .map(|n| hills.root(n))
+        .collect();
+    let mut names = vec![0u32; roots.len()];
+    let mut next = 0;
+    for label in labels.iter_mut().filter(|l| **l != 0) {
+        let name = &mut names[roots[*label as usize] as usize];
+        if *name == 0 {
+            next += 1;
+            *name = next;
+        }
+        *label = *name;
+    }
+    labels
+}
+
+/// The neighbours of a voxel that is not on the border, in the order of their indices.
+fn offsets([nx, ny, _]: [usize; 3]) -> [isize; 26] {
+    let mut found = [0; 26];
+    let steps = (0..27).filter(|n| *n != 13);
+    for (offset, n) in found.iter_mut().zip(steps) {
+        let (a, b, c) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+        *offset = a + nx as isize * (b + ny as isize * c);
+    }
+    found
+}
+
+/// The voxels around a voxel.
+struct Around {
+    dims: [usize; 3],
+    offsets: [isize; 26],
+}
+
+impl Around {
+    fn new(dims: [usize; 3]) -> Around {
+        Around {
+            dims,
+            offsets: offsets(dims),
+        }
+    }
+
+    /// Calls `see` for every voxel around voxel `at`, in the order of their indices.
+    #[inline]
+    fn each(&self, at: usize, mut see: impl FnMut(usize)) {
+        let [nx, ny, nz] = self.dims;
+        let (i, j, k) = (at % nx, at / nx % ny, at / nx / ny);
+        let inside = |i: usize, n: usize| i > 0 && i + 1 < n;
+        if inside(i, nx) && inside(j, ny) && inside(k, nz) {
+            for offset in self.offsets {
+                see(at.wrapping_add_signed(offset));
+            }
+            return;
+        }
+        let range = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
+        for c in range(k, nz) {
+            for b in range(j, ny) {
+                for a in range(i, nx) {
                     let n = a + nx * (b + ny * c);
-                    let label = labels[n];
-                    if label != 0 {
-                        around[count] = label;
-                        count += 1;
-                        if squared[n] > uphill.0 {
-                            uphill = (squared[n], label);
-                        }
+                    if n != at {
+                        see(n);
                     }
                 }
             }
         }
-        for n in 1..count {
-            let (p, q) = (hills.root(around[n - 1]), hills.root(around[n]));
-            hills.join(p, q, height, neck);
-        }
-        let mut own = uphill.1;
-        if own == 0 {
-            own = hills.parent.len() as u32;
-            hills.parent.push(own);
-            hills.top.push(height);
-        }
-        labels[at] = own;
     }
-    let mut names = vec![0u32; hills.parent.len()];
-    let mut next = 0;
-    for label in labels.iter_mut().filter(|l| **l != 0) {
-        let root = hills.root(*label) as usize;
-        if names[root] == 0 {
-            next += 1;
-            names[root] = next;
+}
+
+/// Whether voxel `n` comes before voxel `at` when the highest come first, and of equals those with
+/// the lower index. The void never does.
+#[inline]
+fn earlier(squared: &[f32], n: usize, at: usize) -> bool {
+    squared[n] > squared[at] || (squared[n] == squared[at] && n < at)
+}
+
+/// The hill (from 1) of every solid voxel: where the steepest way up from voxel to voxel ends. Also
+/// the height of each hill's top, and 0 for the void in front.
+fn basins(squared: &[f32], dims: [usize; 3]) -> (Vec<u32>, Vec<f32>) {
+    /// Marks the index of the voxel uphill, until the hill is known.
+    const UPHILL: u32 = 1 << 31;
+    let around = Around::new(dims);
+    let mut labels = vec![0u32; squared.len()];
+    let rows = labels.par_chunks_mut(dims[0]).enumerate();
+    rows.for_each(|(row, line)| {
+        for (i, label) in line.iter_mut().enumerate() {
+            let at = row * dims[0] + i;
+            if squared[at] > 0.0 {
+                // The first of the highest.
+                let mut uphill = at;
+                around.each(at, |n| {
+                    if squared[n] > squared[uphill] || (uphill == at && earlier(squared, n, at)) {
+                        uphill = n;
+                    }
+                });
+                *label = UPHILL | uphill as u32;
+            }
         }
-        *label = names[root];
+    });
+    let mut tops = vec![0.0];
+    let mut path = Vec::new();
+    for start in 0..labels.len() {
+        let mut at = start;
+        while labels[at] & UPHILL != 0 {
+            path.push(at);
+            let next = (labels[at] ^ UPHILL) as usize;
+            if next == at {
+                labels[at] = tops.len() as u32;
+                tops.push(squared[at].sqrt());
+            }
+            at = next;
+        }
+        let label = labels[at];
+        path.drain(..).for_each(|n| labels[n] = label);
     }
-    labels
+    (labels, tops)
+}
+
+/// Voxels at which hills meet, the highest first.
+fn borders(squared: &[f32], dims: [usize; 3], labels: &[u32]) -> Vec<u32> {
+    let around = Around::new(dims);
+    let meet = |at: &u32| {
+        let (own, at) = (labels[*at as usize], *at as usize);
+        let mut met = false;
+        if own != 0 {
+            around.each(at, |n| {
+                met |= labels[n] != own && earlier(squared, n, at);
+            });
+        }
+        met
+    };
+    let mut found: Vec<u32> = (0..labels.len() as u32)
+        .into_par_iter()
+        .filter(meet)
+        .collect();
+    found.par_sort_unstable_by(|p, q| {
+        let [a, b] = [p, q].map(|n| squared[*n as usize]);
+        b.total_cmp(&a).then(p.cmp(q))
+    });
+    found
 }
 
 /// Marks a void voxel that lies near a grain: the bit on top of the grain's label.
@@ -134,9 +222,9 @@ pub(crate) fn add_halo(labels: &mut [u32], dims: [usize; 3], layers: usize) {
             below.into_iter().chain(above)
         })
     };
-    let mut front: Vec<u32> = (0..labels.len())
-        .filter(|n| labels[*n] != 0 && around(*n).any(|m| labels[m] == 0))
-        .map(|n| n as u32)
+    let mut front: Vec<u32> = (0..labels.len() as u32)
+        .into_par_iter()
+        .filter(|n| labels[*n as usize] != 0 && around(*n as usize).any(|m| labels[m] == 0))
         .collect();
     for _ in 0..layers {
         let mut next = Vec::new();

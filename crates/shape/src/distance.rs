@@ -1,0 +1,31 @@
+//! What shapes are sampled from: a signed distance [m], negative inside.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// A signed distance [m] that can be asked anywhere.
+pub(crate) trait Distance: Sync {
+    /// Distance at `x`; the hint, left by a query nearby or 0, may speed a search.
+    fn near(&self, x: DVec3, hint: &mut u32) -> f64;
+
+    /// Distances at the samples of a grid, x fastest; the first lies at `first`.
+    fn on_grid(&self, first: DVec3, spacing: f64, dims: [usize; 3]) -> Vec<f64> {
+        let mut values = vec![0.0; dims.iter().product()];
+        let rows = values.par_chunks_mut(dims[0]).enumerate();
+        rows.for_each(|(row, line)| {
+            let (j, k) = (row % dims[1], row / dims[1]);
+            let mut hint = 0;
+            for (i, value) in line.iter_mut().enumerate() {
+                let x = first + spacing * DVec3::new(i as f64, j as f64, k as f64);
+                *value = self.near(x, &mut hint);
+            }
+        });
+        values
+    }
+}
+
+impl<F: Fn(DVec3, &mut u32) -> f64 + Sync> Distance for F {
+    fn near(&self, x: DVec3, hint: &mut u32) -> f64 {
+        self(x, hint)
+    }
+}

@@ -1,0 +1,234 @@
+//! Connected pieces of a volume, found by runs: stretches of equal voxels along x.
+
+use super::Mask;
+use rayon::prelude::*;
+
+/// Voxels `begin..end` along x.
+type Run = [u32; 2];
+
+/// The runs of the voxels that were selected, and which of them hang together.
+struct Runs {
+    dims: [usize; 3],
+    runs: Vec<Run>,
+    /// First run of every row, and the number of all at the end.
+    rows: Vec<usize>,
+    /// A run of the same piece, further up or itself.
+    parent: Vec<u32>,
+}
+
+impl Runs {
+    /// Runs of the voxels that `chosen` selects; those of one piece share voxel faces, or, if
+    /// `corners`, faces, edges or corners.
+    fn new(dims: [usize; 3], corners: bool, chosen: impl Fn(usize) -> bool + Sync) -> Runs {
+        let [nx, ny, nz] = dims;
+        let found: Vec<Vec<Run>> = (0..ny * nz)
+            .into_par_iter()
+            .map(|row| {
+                let mut runs: Vec<Run> = Vec::new();
+                for i in (0..nx).filter(|i| chosen(nx * row + i)) {
+                    match runs.last_mut() {
+                        Some(last) if last[1] as usize == i => last[1] += 1,
+                        _ => runs.push([i as u32, i as u32 + 1]),
+                    }
+                }
+                runs
+            })
+            .collect();
+        let mut rows = vec![0];
+        rows.extend(found.iter().scan(0, |sum, runs| {
+            *sum += runs.len();
+            Some(*sum)
+        }));
+        let runs = found.concat();
+        let parent = (0..runs.len() as u32).collect();
+        let mut all = Runs {
+            dims,
+            runs,
+            rows,
+            parent,
+        };
+        for row in 0..ny * nz {
+            let (j, k) = (row % ny, row / ny);
+            if j > 0 {
+                all.join(row, row - 1, corners);
+            }
+            if k > 0 {
+                all.join(row, row - ny, corners);
+            }
+            if k > 0 && corners {
+                if j > 0 {
+                    all.join(row, row - ny - 1, corners);
+                }
+                if j + 1 < ny {
+                    all.join(row, row - ny + 1, corners);
+                }
+            }
+        }
+        for n in 0..all.parent.len() {
+            all.parent[n] = all.root(n as u32);
+        }
+        all
+    }
+
+    /// First run of the piece of run `n`.
+    fn root(&mut self, mut n: u32) -> u32 {
+        while self.parent[n as usize] != n {
+            let above = self.parent[self.parent[n as usize] as usize];
+            self.parent[n as usize] = above;
+            n = above;
+        }
+        n
+    }
+
+    /// Joins the runs of two rows side by side that touch.
+    fn join(&mut self, row: usize, other: usize, corners: bool) {
+        let slack = u32::from(corners);
+        let (mut p, mut q) = (self.rows[row], self.rows[other]);
+        while p < self.rows[row + 1] && q < self.rows[other + 1] {
+            let ([a, b], [c, d]) = (self.runs[p], self.runs[q]);
+            if a < d + slack && c < b + slack {
+                let (r, s) = (self.root(p as u32), self.root(q as u32));
+                self.parent[r.max(s) as usize] = r.min(s);
+            }
+            if b < d {
+                p += 1;
+            } else {
+                q += 1;
+            }
+        }
+    }
+
+    /// Every run with the index of its first voxel.
+    fn each(&self) -> impl Iterator<Item = (usize, Run, usize)> {
+        let row_of = |row: usize| self.rows[row]..self.rows[row + 1];
+        (0..self.rows.len() - 1).flat_map(move |row| {
+            row_of(row).map(move |n| {
+                let run = self.runs[n];
+                (n, run, self.dims[0] * row + run[0] as usize)
+            })
+        })
+    }
+}
+
+/// Numbers the connected pieces (sharing voxel faces) of the voxels that `solid` selects, from 1
+/// in the order of their first voxels; 0 elsewhere. Also their sizes.
+pub(super) fn pieces(
+    dims: [usize; 3],
+    solid: impl Fn(usize) -> bool + Sync,
+) -> (Vec<u32>, Vec<u64>) {
+    let runs = Runs::new(dims, false, solid);
+    let mut number = vec![0u32; dims.iter().product()];
+    let mut names = vec![0u32; runs.runs.len()];
+    let mut sizes = Vec::new();
+    for (n, [begin, end], first) in runs.each() {
+        let root = runs.parent[n] as usize;
+        if root == n {
+            sizes.push(0);
+            names[n] = sizes.len() as u32;
+        }
+        let length = (end - begin) as usize;
+        sizes[names[root] as usize - 1] += length as u64;
+        number[first..first + length].fill(names[root]);
+    }
+    (number, sizes)
+}
+
+/// Makes cavities solid (background that cannot reach the mask's border, not even through
+/// voxel edges and corners); returns how many voxels that took.
+pub(super) fn fill_cavities(mask: &mut Mask) -> u64 {
+    let [nx, ny, nz] = mask.dims;
+    let runs = Runs::new(mask.dims, true, |n| !mask.solid[n]);
+    let mut open = vec![false; runs.runs.len()];
+    for (n, [begin, end], first) in runs.each() {
+        let (j, k) = (first / nx % ny, first / nx / ny);
+        let border = [begin == 0, end as usize == nx, j == 0, j + 1 == ny, k == 0];
+        if k + 1 == nz || border.contains(&true) {
+            open[runs.parent[n] as usize] = true;
+        }
+    }
+    let mut filled = 0;
+    for (n, [begin, end], first) in runs.each() {
+        if !open[runs.parent[n] as usize] {
+            let length = (end - begin) as usize;
+            mask.solid[first..first + length].fill(true);
+            filled += length as u64;
+        }
+    }
+    filled
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(count: usize, share: u64) -> Vec<bool> {
+        let mut state = 5u64;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            state >> 60 < share
+        };
+        (0..count).map(|_| next()).collect()
+    }
+
+    /// Pieces by flooding; neighbours differ by at most one along every axis, and along `axes` axes.
+    fn flood(dims: [usize; 3], chosen: &[bool], axes: usize) -> Vec<u32> {
+        let at = |n: usize| [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
+        let near = |p: usize, q: usize| {
+            let (p, q) = (at(p), at(q));
+            let off: Vec<usize> = (0..3).map(|a| p[a].abs_diff(q[a])).collect();
+            off.iter().all(|d| *d <= 1) && off.iter().sum::<usize>() <= axes
+        };
+        let mut number = vec![0; chosen.len()];
+        let mut last = 0;
+        for start in 0..chosen.len() {
+            if !chosen[start] || number[start] != 0 {
+                continue;
+            }
+            last += 1;
+            number[start] = last;
+            let mut stack = vec![start];
+            while let Some(p) = stack.pop() {
+                for q in 0..chosen.len() {
+                    if chosen[q] && number[q] == 0 && near(p, q) {
+                        number[q] = last;
+                        stack.push(q);
+                    }
+                }
+            }
+        }
+        number
+    }
+
+    #[test]
+    fn runs_find_what_flooding_finds() {
+        let dims = [9, 8, 7];
+        for share in [3, 6, 10, 13] {
+            let solid = noise(504, share);
+            let (number, sizes) = pieces(dims, |n| solid[n]);
+            assert_eq!(number, flood(dims, &solid, 1));
+            for (n, size) in sizes.iter().enumerate() {
+                let count = number.iter().filter(|p| **p == n as u32 + 1).count();
+                assert_eq!(count as u64, *size);
+            }
+            let void: Vec<bool> = solid.iter().map(|s| !s).collect();
+            let regions = flood(dims, &void, 3);
+            let reaches_border = |name: u32| {
+                (0..504).filter(|n| regions[*n] == name).any(|n| {
+                    let at = [n % 9, n / 9 % 8, n / 72];
+                    (0..3).any(|a| at[a] == 0 || at[a] + 1 == dims[a])
+                })
+            };
+            let expected: Vec<bool> = (0..504)
+                .map(|n| solid[n] || !reaches_border(regions[n]))
+                .collect();
+            let mut mask = Mask { dims, solid };
+            let before = mask.solid.iter().filter(|s| **s).count() as u64;
+            let filled = fill_cavities(&mut mask);
+            assert_eq!(mask.solid, expected);
+            let after = mask.solid.iter().filter(|s| **s).count() as u64;
+            assert_eq!(filled, after - before);
+        }
+    }
+}
