@@ -176,6 +176,9 @@ pub struct BenchArgs {
     /// Cells along x, y, z
     #[arg(long, num_args = 3, value_names = ["NX", "NY", "NZ"], default_values_t = [100, 100, 390])]
     pub size: Vec<usize>,
+    /// Grains, 8 cells across, spread evenly
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub grains: usize,
     /// Steps that are timed, after two that are not
     #[arg(long, default_value_t = 10)]
     pub steps: u64,

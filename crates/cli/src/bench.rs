@@ -43,10 +43,19 @@ const CUBES: [usize; 14] = [
 const TRIAD_LENGTH: usize = 1 << 23;
 const TRIAD_REPEATS: usize = 8;
 
+/// What is run.
+#[derive(Clone, Copy)]
+struct Load {
+    cells: [usize; 3],
+    grains: usize,
+    scheme: Scheme,
+}
+
 /// What was measured. The JSON names are stable.
 #[derive(Debug, Serialize)]
 struct Measured {
     cells: [usize; 3],
+    grains: usize,
     threads: usize,
     steps: u64,
     /// Median over the steps.
@@ -92,8 +101,15 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     };
     let measured: Vec<Measured> = threads::on(threads, || {
         let each = sizes.into_iter();
-        each.map(|size| measure(size, scheme, args.steps, threads))
-            .collect::<Result<_, Exit>>()
+        each.map(|cells| {
+            let load = Load {
+                cells,
+                grains: args.grains,
+                scheme,
+            };
+            measure(&load, args.steps, threads)
+        })
+        .collect::<Result<_, Exit>>()
     })??;
     match (args.json, &measured[..]) {
         (true, [one]) => print(&serde_json::to_string(one)?),
@@ -103,15 +119,10 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     }
 }
 
-fn measure(
-    cells: [usize; 3],
-    scheme: Scheme,
-    steps: u64,
-    threads: usize,
-) -> Result<Measured, Exit> {
+fn measure(load: &Load, steps: u64, threads: usize) -> Result<Measured, Exit> {
+    let Load { cells, grains, .. } = *load;
     let count = cells.iter().product::<usize>() as f64;
-    let mut sim =
-        Simulation::new(setup(cells, scheme)).map_err(|e| Exit::new(BAD_INPUT, e.to_string()))?;
+    let mut sim = Simulation::new(setup(load)?).map_err(|e| Exit::new(BAD_INPUT, e.to_string()))?;
     let advance = |sim: &mut Simulation| {
         sim.step(f64::INFINITY)
             .map_err(|e| Exit::new(3, e.to_string()))
@@ -159,6 +170,7 @@ fn measure(
     let limit = 1e9 * traffic / triad;
     Ok(Measured {
         cells,
+        grains,
         threads,
         steps,
         ns_per_cell_step: ns,
@@ -178,8 +190,44 @@ fn median(mut values: Vec<f64>) -> f64 {
     0.5 * (values[(n - 1) / 2] + values[n / 2])
 }
 
-/// Two sampled grains of eight cells' diameter in water, one above the other, as in the main case.
-fn setup(cells: [usize; 3], scheme: Scheme) -> Setup {
+/// Cells that a grain takes up along each axis, at least: its longest axis and two.
+const ROOM: usize = 11;
+
+/// Middles of the cells of the widest lattice with a place for each grain, as shares of the box.
+fn places(cells: [usize; 3], grains: usize) -> Result<Vec<DVec3>, Exit> {
+    let narrowest = cells.iter().copied().fold(usize::MAX, usize::min);
+    let across = |pitch: usize| cells.map(|n| n / pitch);
+    let pitch = (ROOM..=narrowest)
+        .rev()
+        .find(|pitch| across(*pitch).iter().product::<usize>() >= grains);
+    let Some(pitch) = pitch else {
+        let most = across(ROOM).iter().product::<usize>();
+        return Err(Exit::new(
+            BAD_INPUT,
+            format!(
+                "--grains {grains}: at most {most} fit into {cells:?} cells; a larger --size takes more"
+            ),
+        ));
+    };
+    let [nx, ny, nz] = across(pitch);
+    let middle = |n: usize, of: usize| (n as f64 + 0.5) / of as f64;
+    let all = (0..grains).map(|n| {
+        DVec3::new(
+            middle(n % nx, nx),
+            middle(n / nx % ny, ny),
+            middle(n / nx / ny, nz),
+        )
+    });
+    Ok(all.collect())
+}
+
+/// Sampled grains of eight cells' diameter in water.
+fn setup(load: &Load) -> Result<Setup, Exit> {
+    let Load {
+        cells,
+        grains,
+        scheme,
+    } = *load;
     let spacing = DVec3::splat(0.25e-3);
     let mesh = Mesh {
         cells,
@@ -190,19 +238,20 @@ fn setup(cells: [usize; 3], scheme: Scheme) -> Setup {
     let axes = [1.1 * radius, radius, radius / 1.1];
     let shape = ellipsoid(axes[0], axes[1], axes[2], &ShapeOptions::default());
     let shape = Arc::new(shape.expect("a plain ellipsoid"));
-    let grain = |height: f64| Grain {
+    let grain = |place: DVec3| Grain {
         shape: shape.clone(),
         density: 1500.0,
         pose: Pose {
-            position: mesh.extent() * DVec3::new(0.5, 0.5, height),
-            orientation: DQuat::IDENTITY,
+            position: mesh.extent() * place,
+            // Each turned its own way.
+            orientation: DQuat::from_scaled_axis(7.0 * place),
         },
         velocity: DVec3::ZERO,
         angular_velocity: DVec3::ZERO,
         translation: Dof::Free,
         rotation: Dof::Free,
     };
-    Setup {
+    Ok(Setup {
         prescription: Default::default(),
         mesh,
         boundaries: Boundaries([[Boundary::WALL; 2]; 3]),
@@ -215,14 +264,14 @@ fn setup(cells: [usize; 3], scheme: Scheme) -> Setup {
         }),
         scheme,
         gravity: DVec3::new(0.0, 0.0, -9.81),
-        grains: vec![grain(0.75), grain(0.25)],
+        grains: places(cells, grains)?.into_iter().map(grain).collect(),
         contact: ContactParams::default(),
         step: StepRule::Limits {
             cfl: 0.3,
             viscous: 0.2,
             max_step: 1e-3,
         },
-    }
+    })
 }
 
 /// Bandwidth of a = b + s c over arrays larger than the caches, best of several [bytes/s].
@@ -257,8 +306,8 @@ fn triad_bandwidth() -> f64 {
 fn table(m: &Measured) -> String {
     let mut lines = vec![
         format!(
-            "{} x {} x {} cells, two grains, {} threads, {} steps",
-            m.cells[0], m.cells[1], m.cells[2], m.threads, m.steps
+            "{} x {} x {} cells, {} grains, {} threads, {} steps",
+            m.cells[0], m.cells[1], m.cells[2], m.grains, m.threads, m.steps
         ),
         format!(
             "time        {:8.2} ns per cell per step",

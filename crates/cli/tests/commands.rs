@@ -233,7 +233,7 @@ fn schema_and_completions_are_printed() {
 fn bench_measures_time_memory_and_the_limit() {
     let done = grainwake()
         .args([
-            "bench", "--size", "24", "24", "48", "--steps", "2", "--json",
+            "bench", "--size", "24", "24", "48", "--grains", "7", "--steps", "2", "--json",
         ])
         .assert()
         .success();
@@ -250,6 +250,13 @@ fn bench_measures_time_memory_and_the_limit() {
         );
     }
     assert!(measured["passes"].as_array().is_some_and(|p| p.len() >= 7));
+    assert_eq!(measured["grains"], 7);
+    // Two by two by four places of eleven cells.
+    let many = grainwake()
+        .args(["bench", "--size", "24", "24", "48", "--grains", "17"])
+        .assert()
+        .code(2);
+    assert!(String::from_utf8_lossy(&many.get_output().stderr).contains("at most 16"));
 }
 
 #[test]

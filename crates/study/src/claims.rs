@@ -37,6 +37,9 @@ pub struct Claim {
     /// Which models count.
     #[serde(default)]
     pub when: BTreeMap<String, Condition>,
+    /// Whether pairs that landed before it happened are left out, not lower bounds.
+    #[serde(default)]
+    pub observed: bool,
 }
 
 /// A test of a quantity.
@@ -179,6 +182,8 @@ struct RawClaim {
     test: Loc<Test>,
     #[serde(rename = "where", default)]
     when: BTreeMap<String, Loc<Condition>>,
+    #[serde(default)]
+    observed: bool,
 }
 
 /// Checks names against the models of the study.
@@ -355,6 +360,7 @@ impl Analysis {
             part: raw.part,
             quantity: raw.quantity.value,
             test: raw.test.value,
+            observed: raw.observed,
             when: raw
                 .when
                 .into_iter()

@@ -119,7 +119,8 @@ pub fn judge(analysis: &Analysis, rows: &[Row]) -> Vec<Finding> {
 }
 
 fn one(claim: &Claim, rows: &[Row]) -> Finding {
-    let all = samples(rows, &claim.quantity, &claim.when);
+    let mut all = samples(rows, &claim.quantity, &claim.when);
+    all.retain(|s| !(claim.observed && s.bound));
     match &claim.test {
         Test::Trend { with, sign } => trend(claim, &all, with, *sign, ""),
         Test::Range { over, with, sign } => {
@@ -337,6 +338,9 @@ fn finding(
         Some(e) => says(e),
         None => format!("{n} models or pairs of models are finished: too few to say anything"),
     };
+    if claim.observed {
+        text += "; pairs that landed before are left out";
+    }
     if bounds > 0 {
         text += &format!("; {bounds} of them are lower bounds, as the pair landed before");
     }

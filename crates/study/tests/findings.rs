@@ -198,6 +198,11 @@ fn what_did_not_happen_before_the_landing_is_a_bound() {
             && says.contains("4 of them are lower bounds"),
         "{says}"
     );
+    let (found, says) = verdict(&late, &format!("observed = true\n{ORDER}"));
+    assert!(
+        found == "holds" && says.contains("for 12 of 12") && says.contains("are left out"),
+        "{says}"
+    );
     let parts = rows(|s, r, o| Measures {
         contact_stage: Some(5.0 * r),
         parted: Some(r < 0.7),
