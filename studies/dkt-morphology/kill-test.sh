@@ -21,7 +21,8 @@ echo "undisturbed: $length s"
 for kill in 1 2 3 4 5; do
   (study killed) & child=$!
   sleep "$((RANDOM % (length / 5) + 1)).$((RANDOM % 1000))"
-  kill -9 "$child" && echo "kill $kill: $(grep -c ',finished,' "$out/killed/table.csv" 2>/dev/null || true) finished in the table"
+  kill -9 "$child"
+  echo "kill $kill: $(find "$out/killed/runs" -name summary.json 2>/dev/null | wc -l) runs finished"
   wait "$child" 2>/dev/null || true
 done
 (study killed)

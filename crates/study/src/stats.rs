@@ -74,11 +74,11 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
 }
 
 /// Wilcoxon's signed-rank test of paired differences: their Hodges-Lehmann estimate (the median of
-/// all means of two), its interval, and the exact p value given the ties. None below four
-/// differences; the interval of fewer than six is all means of two, below 95 %.
+/// all means of two), its interval, and the exact p value given the ties. None below six
+/// differences: no interval of fewer reaches 95 %.
 pub fn signed_rank(differences: &[f64]) -> Option<Estimate> {
     let n = differences.len();
-    if n < 4 {
+    if n < 6 {
         return None;
     }
     let mut means: Vec<f64> = Vec::with_capacity(n * (n + 1) / 2);
