@@ -20,8 +20,8 @@ length=$((SECONDS - begin))
 echo "undisturbed: $length s"
 for kill in 1 2 3 4 5; do
   (study killed) & child=$!
-  sleep "$((RANDOM % (length / 5) + 1)).$((RANDOM % 1000))"
-  kill -9 "$child"
+  sleep "$((RANDOM % (length / 5 + 1) + 1)).$((RANDOM % 1000))"
+  kill -9 "$child" || { echo "the study ended before kill $kill" >&2; exit 1; }
   echo "kill $kill: $(find "$out/killed/runs" -name summary.json 2>/dev/null | wc -l) runs finished"
   wait "$child" 2>/dev/null || true
 done
@@ -30,4 +30,5 @@ without_wall() {
   awk -F, -v OFS=, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == "wall_s") wall = i } { $wall = ""; print }' "$1/table.csv"
 }
 diff <(without_wall "$out/whole") <(without_wall "$out/killed")
+[ "$(grep -c ',finished,' "$out/killed/table.csv")" = 65 ] || { echo "not all runs finished" >&2; exit 1; }
 echo "the same table: $(($(wc -l <"$out/whole/table.csv") - 1)) rows"

@@ -210,8 +210,11 @@ fn places(cells: [usize; 3], grains: usize) -> Result<Vec<DVec3>, Exit> {
         ));
     };
     let [nx, ny, nz] = across(pitch);
+    let total = nx * ny * nz;
     let middle = |n: usize, of: usize| (n as f64 + 0.5) / of as f64;
-    let all = (0..grains).map(|n| {
+    // Evenly among the places.
+    let all = (0..grains).map(|n| (2 * n + 1) * total / (2 * grains));
+    let all = all.map(|n| {
         DVec3::new(
             middle(n % nx, nx),
             middle(n / nx % ny, ny),
@@ -353,4 +356,27 @@ fn scaling(all: &[Measured]) -> String {
         before = m.ns_per_cell_step;
     }
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grains_have_room_and_are_spread_evenly() {
+        for (cells, grains) in [([100, 100, 390], 2), ([64, 64, 64], 100), ([200; 3], 1000)] {
+            let Ok(places) = places(cells, grains) else {
+                panic!("no room for {grains} in {cells:?}");
+            };
+            let size = DVec3::from_array(cells.map(|n| n as f64));
+            assert_eq!(places.len(), grains);
+            for (n, p) in places.iter().enumerate() {
+                let others = places[..n].iter().map(|q| ((*p - *q) * size).length());
+                assert!(others.fold(f64::INFINITY, f64::min) >= ROOM as f64);
+            }
+            let mean = places.iter().sum::<DVec3>() / grains as f64;
+            assert!((mean - DVec3::splat(0.5)).length() < 0.06, "{mean}");
+        }
+        assert!(places([24, 24, 48], 17).is_err());
+    }
 }

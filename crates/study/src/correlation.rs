@@ -51,7 +51,8 @@ pub fn correlations(analysis: &Analysis, rows: &[Row]) -> Vec<Correlation> {
                     .iter()
                     .filter_map(|s| Some((s, *s.factors.get(factor)?)))
                     .collect();
-                let (x, y): (Vec<f64>, Vec<f64>) = known.iter().map(|(s, f)| (*f, s.value)).unzip();
+                let (x, y): (Vec<f64>, Vec<f64>) =
+                    known.iter().map(|(s, f)| (*f, s.latest())).unzip();
                 let found = stats::spearman(&x, &y);
                 out.push(Correlation {
                     quantity: quantity.clone(),

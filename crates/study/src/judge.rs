@@ -51,6 +51,17 @@ pub struct Finding {
     pub p: Option<f64>,
 }
 
+impl Sample {
+    /// The value for a test by ranks: what had not happened by the landing comes last.
+    pub fn latest(&self) -> f64 {
+        if self.bound {
+            f64::INFINITY
+        } else {
+            self.value
+        }
+    }
+}
+
 /// A quantity of a row; of a pair that landed before it happened, the landing as a lower bound.
 pub fn value(row: &Row, quantity: &str) -> Option<(f64, bool)> {
     let pair = row.pair.as_ref().filter(|_| row.finished())?;
@@ -119,13 +130,16 @@ pub fn judge(analysis: &Analysis, rows: &[Row]) -> Vec<Finding> {
 }
 
 fn one(claim: &Claim, rows: &[Row]) -> Finding {
-    let mut all = samples(rows, &claim.quantity, &claim.when);
-    all.retain(|s| !(claim.observed && s.bound));
+    let every = samples(rows, &claim.quantity, &claim.when);
+    let seen = |all: Vec<Sample>| -> Vec<Sample> {
+        let counts = |s: &Sample| !(claim.observed && s.bound);
+        all.into_iter().filter(counts).collect()
+    };
+    let ranges = |over: &str| seen(ranges(&every, over));
+    let all = seen(every.clone());
     match &claim.test {
         Test::Trend { with, sign } => trend(claim, &all, with, *sign, ""),
-        Test::Range { over, with, sign } => {
-            trend(claim, &ranges(&all, over), with, *sign, "range of ")
-        }
+        Test::Range { over, with, sign } => trend(claim, &ranges(over), with, *sign, "range of "),
         Test::Order { axis, more, less } => {
             let pairs = pairs(&all, axis, more, less);
             let differences: Vec<f64> = pairs.iter().map(|(a, b)| a.value - b.value).collect();
@@ -225,7 +239,7 @@ fn trend(claim: &Claim, all: &[Sample], with: &str, sign: Sign, of: &str) -> Fin
         .iter()
         .filter_map(|s| Some((s, *s.factors.get(with)?)))
         .collect();
-    let (x, y): (Vec<f64>, Vec<f64>) = known.iter().map(|(s, f)| (*f, s.value)).unzip();
+    let (x, y): (Vec<f64>, Vec<f64>) = known.iter().map(|(s, f)| (*f, s.latest())).unzip();
     let found = stats::spearman(&x, &y);
     let says = |e: Estimate| {
         format!(
@@ -239,19 +253,29 @@ fn trend(claim: &Claim, all: &[Sample], with: &str, sign: Sign, of: &str) -> Fin
         )
     };
     let bounds = known.iter().filter(|(s, _)| s.bound).count();
-    finding(claim, known.len(), bounds, found, says, |e| {
+    let finding = finding(claim, known.len(), 0, found, says, |e| {
         let (up, down) = (e.low > 0.0, e.high < 0.0);
         match sign {
             Sign::Rises => verdict(up, down),
             Sign::Falls => verdict(down, up),
             Sign::None => verdict(false, up || down),
         }
-    })
+    });
+    let more = match bounds {
+        0 => String::new(),
+        n => format!("; {n} of them landed before and count as latest, alike"),
+    };
+    Finding {
+        bounds,
+        says: finding.says + &more,
+        ..finding
+    }
 }
 
 fn near(claim: &Claim, rows: &[Row], all: &[Sample], model: &str, within: f64) -> Finding {
     let own = samples(rows, &claim.quantity, &BTreeMap::new());
-    let Some(reference) = own.iter().find(|s| s.model == model) else {
+    let usable = |s: &&Sample| s.model == model && !(claim.observed && s.bound);
+    let Some(reference) = own.iter().find(usable) else {
         return finding(claim, 0, 0, None, |_| String::new(), |_| "open");
     };
     let others: Vec<&Sample> = all.iter().filter(|s| s.model != model).collect();
@@ -339,7 +363,7 @@ fn finding(
         None => format!("{n} models or pairs of models are finished: too few to say anything"),
     };
     if claim.observed {
-        text += "; pairs that landed before are left out";
+        text += "; what landed before is left out";
     }
     if bounds > 0 {
         text += &format!("; {bounds} of them are lower bounds, as the pair landed before");

@@ -103,6 +103,13 @@ fn verdict(rows: &[Row], claim: &str) -> (String, String) {
 
 const ORDER: &str = "quantity = \"kiss_time\"\ntest.order = { axis = \"orientation\", more = \"o1\", less = \"o3\" }";
 
+/// A claim that the kissing time goes with a factor in an orientation.
+fn trend(factor: &str, sign: &str, o: &str) -> String {
+    format!(
+        "quantity = \"kiss_time\"\ntest.trend = {{ with = \"{factor}\", sign = \"{sign}\" }}\nwhere = {{ orientation = \"{o}\" }}"
+    )
+}
+
 #[test]
 fn orders_hold_are_contradicted_or_stay_open() {
     let paper = rows(as_in_the_paper);
@@ -137,11 +144,6 @@ fn orders_hold_are_contradicted_or_stay_open() {
 #[test]
 fn trends_and_ranges_follow_the_factors() {
     let paper = rows(as_in_the_paper);
-    let trend = |factor: &str, sign: &str, o: &str| {
-        format!(
-            "quantity = \"kiss_time\"\ntest.trend = {{ with = \"{factor}\", sign = \"{sign}\" }}\nwhere = {{ orientation = \"{o}\" }}"
-        )
-    };
     assert_eq!(
         verdict(&paper, &trend("sphericity", "falls", "o1")).0,
         "holds"
@@ -202,6 +204,29 @@ fn what_did_not_happen_before_the_landing_is_a_bound() {
     assert!(
         found == "holds" && says.contains("for 12 of 12") && says.contains("are left out"),
         "{says}"
+    );
+    // The landing of a pair that never kissed is no early kiss.
+    let early = rows(|s, r, o| {
+        let mut m = as_in_the_paper(s, r, o);
+        if o == 1 && s < 0.5 {
+            m.kiss_time = None;
+            m.landing_time = Some(0.1);
+        }
+        m
+    });
+    let falls = trend("sphericity", "falls", "o1");
+    let (found, says) = verdict(&early, &falls);
+    assert!(
+        found == "holds" && says.contains("4 of them landed before and count as latest"),
+        "{says}"
+    );
+    let (_, says) = verdict(&early, &format!("observed = true\n{falls}"));
+    assert!(says.contains("n = 12"), "{says}");
+    let range = "observed = true\nquantity = \"kiss_time\"\ntest.range = { over = \"orientation\", with = \"sphericity\", sign = \"falls\" }";
+    let (_, says) = verdict(&early, range);
+    assert!(
+        says.contains("n = 12"),
+        "ranges with a gap do not count: {says}"
     );
     let parts = rows(|s, r, o| Measures {
         contact_stage: Some(5.0 * r),

@@ -67,7 +67,9 @@ fn signed_ranks_of_known_samples() {
     let found = signed_rank(&d).unwrap();
     assert_eq!((found.low, found.high), (means[29], means[136 - 30]));
     assert!(signed_rank(&[0.0; 8]).unwrap().p == 1.0);
-    assert!(signed_rank(&[1.0, 2.0]).is_none());
+    // Of five differences no interval reaches 95 %.
+    assert!(signed_rank(&[1.0, 2.0, 3.0, 4.0, 5.0]).is_none());
+    assert!(signed_rank(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).is_some());
 }
 
 #[test]

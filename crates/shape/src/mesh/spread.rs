@@ -3,7 +3,7 @@
 //! A search of the hierarchy gets slow away from the mesh, where many faces are about as near. A
 //! sample there tries the nearest faces of the samples beside it that are nearer, and walks downhill
 //! from the best. That is the exact distance but where the nearest place of a sample is nobody's
-//! around it, which is rare, far from the surface, and costs less than a tenth of a cell.
+//! around it, which is rare and far from the surface, and cost less than a tenth of a cell in the tests.
 
 use super::MeshDistance;
 use glam::DVec3;
@@ -82,7 +82,7 @@ fn band(mesh: &MeshDistance, first: DVec3, spacing: f64, dims: [usize; 3]) -> Ve
         let low = ((lower - first) / spacing - DVec3::splat(BAND)).ceil();
         let high = ((upper - first) / spacing + DVec3::splat(BAND)).floor();
         let range = |axis: usize| {
-            let end = (high[axis] as usize + 1).min(dims[axis]);
+            let end = ((high[axis] + 1.0).max(0.0) as usize).min(dims[axis]);
             (low[axis].max(0.0) as usize).min(end)..end
         };
         for k in range(2) {

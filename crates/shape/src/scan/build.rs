@@ -121,6 +121,15 @@ pub fn scan_volume(
 ) -> Result<Scan> {
     check(options)?;
     let dims = volume.dims;
+    // Indices share their words with a mark.
+    let count = dims.iter().product::<usize>();
+    if count >= 1 << 31 {
+        return Err(ShapeError::BadParameter {
+            name: "number of voxels",
+            value: count as f64,
+            reason: "must be below 2^31; crop the image, or bin it",
+        });
+    }
     let (labels, grey, threshold) = segment(volume, options, progress)?;
     let found = regions(dims, &labels);
     if found.is_empty() {

@@ -33,6 +33,8 @@ const DEEP: usize = 300;
 
 /// Voxels that give the mean grey of an image's phases well enough.
 const ENOUGH: usize = 1 << 24;
+/// Fewer deep voxels are no measure of a phase's grey.
+const FEW_DEEP: u64 = 200;
 
 /// A grain's share of each voxel of a crop, ready to be cut at zero.
 pub(crate) struct Cut {
@@ -49,46 +51,19 @@ impl Grey {
     /// axes; from all voxels of the phase where there are hardly any such.
     pub(crate) fn new(dims: [usize; 3], values: Vec<f32>, owner: Vec<u32>) -> Grey {
         let is_solid = |n: usize| owner[n] != 0 && owner[n] & HALO == 0;
-        // Sum and number of the deep voxels and of all, of both phases, slice by slice; of large
-        // images in a share of the rows.
+        // Of large images a share of the rows is enough, unless few voxels are deep.
         let share = (values.len() / ENOUGH).max(1);
-        let row = |j: usize, k: usize| {
-            let start = dims[0] * (j + dims[1] * k);
-            start..start + dims[0]
-        };
-        let sums: Vec<[[(f64, u64); 2]; 2]> = (0..dims[2])
-            .into_par_iter()
-            .map(|k| {
-                let mut sums = [[(0.0, 0); 2]; 2];
-                let rows = (0..dims[1]).filter(|j| (j + k) % share == 0);
-                for n in rows.flat_map(|j| row(j, k)) {
-                    let phase = is_solid(n);
-                    let [deep, all] = &mut sums[usize::from(phase)];
-                    let add =
-                        |sum: &mut (f64, u64)| *sum = (sum.0 + f64::from(values[n]), sum.1 + 1);
-                    add(all);
-                    if far_from(dims, n, 4, |m| is_solid(m) != phase) {
-                        add(deep);
-                    }
-                }
-                sums
-            })
-            .collect();
-        let mean = |phase: usize| {
-            let total = |which: usize| {
-                let slices = sums.iter().map(|s| s[phase][which]);
-                slices.fold((0.0, 0), |t, s| (t.0 + s.0, t.1 + s.1))
-            };
-            let (deep, all) = (total(0), total(1));
-            let (sum, count) = if deep.1 >= 200 { deep } else { all };
-            sum / count.max(1) as f64
-        };
+        let mut grey = mean_grey(dims, &values, is_solid, share);
+        if share > 1 && grey.iter().any(|(_, deep)| *deep < FEW_DEEP) {
+            grey = mean_grey(dims, &values, is_solid, 1);
+        }
+        let [(void, _), (solid, _)] = grey;
         Grey {
             dims,
             values,
             owner,
-            void: mean(0),
-            solid: mean(1),
+            void,
+            solid,
         }
     }
 
@@ -168,6 +143,48 @@ fn far_from(dims: [usize; 3], n: usize, reach: usize, other: impl Fn(usize) -> b
     })
 }
 
+/// Mean grey of void and of solid, each with the number of its deep voxels that were seen: from
+/// those, or from all voxels of the phase where there are hardly any such. One in `share` rows is
+/// looked at.
+fn mean_grey(
+    dims: [usize; 3],
+    values: &[f32],
+    is_solid: impl Fn(usize) -> bool + Sync,
+    share: usize,
+) -> [(f64, u64); 2] {
+    let row = |j: usize, k: usize| {
+        let start = dims[0] * (j + dims[1] * k);
+        start..start + dims[0]
+    };
+    // Sum and number of the deep voxels and of all, of both phases, slice by slice.
+    let slices: Vec<[[(f64, u64); 2]; 2]> = (0..dims[2])
+        .into_par_iter()
+        .map(|k| {
+            let mut sums = [[(0.0, 0); 2]; 2];
+            let rows = (0..dims[1]).filter(|j| (j + k) % share == 0);
+            for n in rows.flat_map(|j| row(j, k)) {
+                let phase = is_solid(n);
+                let [deep, all] = &mut sums[usize::from(phase)];
+                let add = |sum: &mut (f64, u64)| *sum = (sum.0 + f64::from(values[n]), sum.1 + 1);
+                add(all);
+                if far_from(dims, n, 4, |m| is_solid(m) != phase) {
+                    add(deep);
+                }
+            }
+            sums
+        })
+        .collect();
+    [0, 1].map(|phase| {
+        let total = |which: usize| {
+            let sums = slices.iter().map(|s| s[phase][which]);
+            sums.fold((0.0, 0), |t, s| (t.0 + s.0, t.1 + s.1))
+        };
+        let (deep, all) = (total(0), total(1));
+        let (sum, count) = if deep.1 >= FEW_DEEP { deep } else { all };
+        (sum / count.max(1) as f64, deep.1)
+    })
+}
+
 /// Median length of the gradient by central differences [per voxel] where a field of shares or its
 /// half minus it is close to its crossing.
 fn steepness(field: &[f32], dims: [usize; 3]) -> f64 {
@@ -219,4 +236,37 @@ fn blur(steepness: f64, sigma: f64) -> f64 {
         }
     }
     (low * low - sigma * sigma).max(0.0).sqrt().min(2.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_of_the_rows_gives_the_grey_of_all() {
+        let dims = [40, 40, 40];
+        let inside = |n: usize| {
+            let at = [n % 40, n / 40 % 40, n / 1600];
+            at.iter().all(|i| (8..32).contains(i))
+        };
+        // Solid 3, void 1, with a ripple, and the rim of the solid darker.
+        let value = |n: usize| {
+            let at = [n % 40, n / 40 % 40, n / 1600];
+            let rim = inside(n) && at.iter().any(|i| *i == 8 || *i == 31);
+            1.0 + 2.0 * f32::from(u8::from(inside(n))) - f32::from(u8::from(rim))
+                + 0.1 * (n as f32 * 0.7).sin()
+        };
+        let values: Vec<f32> = (0..64_000).map(value).collect();
+        for share in [1, 4] {
+            let [void, solid] = mean_grey(dims, &values, inside, share);
+            assert!((void.0 - 1.0).abs() < 0.01, "{}", void.0);
+            assert!(
+                (solid.0 - 3.0).abs() < 0.01,
+                "deep voxels alone: {}",
+                solid.0
+            );
+            // 16^3 are deep.
+            assert_eq!(solid.1 as usize, 4096 / share);
+        }
+    }
 }
