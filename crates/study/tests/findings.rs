@@ -202,7 +202,7 @@ fn what_did_not_happen_before_the_landing_is_a_bound() {
     );
     let (found, says) = verdict(&late, &format!("observed = true\n{ORDER}"));
     assert!(
-        found == "holds" && says.contains("for 12 of 12") && says.contains("are left out"),
+        found == "holds" && says.contains("for 12 of 12") && says.contains("is left out"),
         "{says}"
     );
     // The landing of a pair that never kissed is no early kiss.
