@@ -17,6 +17,7 @@ pub mod family;
 mod feret;
 mod field;
 mod grain_file;
+mod grid;
 mod hull;
 mod inscribed;
 mod limits;

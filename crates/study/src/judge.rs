@@ -26,6 +26,17 @@ pub struct Sample {
     pub bound: bool,
 }
 
+impl Sample {
+    /// The value for a test by ranks: what had not happened by the landing comes last.
+    pub fn latest(&self) -> f64 {
+        if self.bound {
+            f64::INFINITY
+        } else {
+            self.value
+        }
+    }
+}
+
 /// A claim and what the runs say about it. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
@@ -49,17 +60,6 @@ pub struct Finding {
     pub interval: Option<[f64; 2]>,
     /// Two-sided p value.
     pub p: Option<f64>,
-}
-
-impl Sample {
-    /// The value for a test by ranks: what had not happened by the landing comes last.
-    pub fn latest(&self) -> f64 {
-        if self.bound {
-            f64::INFINITY
-        } else {
-            self.value
-        }
-    }
 }
 
 /// A quantity of a row; of a pair that landed before it happened, the landing as a lower bound.
@@ -253,23 +253,14 @@ fn trend(claim: &Claim, all: &[Sample], with: &str, sign: Sign, of: &str) -> Fin
         )
     };
     let bounds = known.iter().filter(|(s, _)| s.bound).count();
-    let finding = finding(claim, known.len(), 0, found, says, |e| {
+    finding(claim, known.len(), bounds, found, says, |e| {
         let (up, down) = (e.low > 0.0, e.high < 0.0);
         match sign {
             Sign::Rises => verdict(up, down),
             Sign::Falls => verdict(down, up),
             Sign::None => verdict(false, up || down),
         }
-    });
-    let more = match bounds {
-        0 => String::new(),
-        n => format!("; {n} of them landed before and count as latest, alike"),
-    };
-    Finding {
-        bounds,
-        says: finding.says + &more,
-        ..finding
-    }
+    })
 }
 
 fn near(claim: &Claim, rows: &[Row], all: &[Sample], model: &str, within: f64) -> Finding {
@@ -366,7 +357,12 @@ fn finding(
         text += "; what landed before is left out";
     }
     if bounds > 0 {
-        text += &format!("; {bounds} of them are lower bounds, as the pair landed before");
+        text += &match claim.test {
+            Test::Trend { .. } | Test::Range { .. } => {
+                format!("; {bounds} of them landed before and count as latest, alike")
+            }
+            _ => format!("; {bounds} of them are lower bounds, as the pair landed before"),
+        };
     }
     Finding {
         claim: claim.says.clone(),

@@ -6,6 +6,7 @@
 //! around it, which is rare and far from the surface, and cost less than a tenth of a cell in the tests.
 
 use super::MeshDistance;
+use crate::grid::{beside, place};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::cmp::Reverse;
@@ -23,10 +24,7 @@ pub(super) fn on_grid(
     spacing: f64,
     dims: [usize; 3],
 ) -> Vec<f64> {
-    let at = |n: usize| {
-        let place = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
-        first + spacing * DVec3::from_array(place.map(|i| i as f64))
-    };
+    let at = |n: usize| first + spacing * DVec3::from_array(place(dims, n).map(|i| i as f64));
     let mut found = band(mesh, first, spacing, dims);
     let rows = found.par_chunks_mut(dims[0]).enumerate();
     rows.for_each(|(row, line)| {
@@ -53,9 +51,9 @@ pub(super) fn on_grid(
         }
         if !done[n] {
             let x = at(n);
-            let place = mesh.downhill(x, face);
-            face = place.face;
-            found[n] = (place.point.distance(x).copysign(value), face);
+            let nearest = mesh.downhill(x, face);
+            face = nearest.face;
+            found[n] = (nearest.point.distance(x).copysign(value), face);
             done[n] = true;
         }
         for m in beside(dims, n).filter(|m| !done[*m]) {
@@ -96,17 +94,6 @@ fn band(mesh: &MeshDistance, first: DVec3, spacing: f64, dims: [usize; 3]) -> Ve
     marks
 }
 
-/// Samples beside sample `n`.
-fn beside(dims: [usize; 3], n: usize) -> impl Iterator<Item = usize> {
-    let strides = [1, dims[0], dims[0] * dims[1]];
-    let place = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
-    (0..3).flat_map(move |axis| {
-        let below = (place[axis] > 0).then(|| n - strides[axis]);
-        let above = (place[axis] + 1 < dims[axis]).then(|| n + strides[axis]);
-        below.into_iter().chain(above)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -128,8 +115,7 @@ mod tests {
             let spread = distance.on_grid(first, spacing, dims);
             let mut worst = 0.0f64;
             for (n, value) in spread.iter().enumerate() {
-                let place = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
-                let x = first + spacing * DVec3::from_array(place.map(|i| i as f64));
+                let x = first + spacing * DVec3::from_array(place(dims, n).map(|i| i as f64));
                 let exact = distance.near(x, &mut 0);
                 assert_eq!(*value < 0.0, exact < 0.0, "at {x}");
                 worst = worst.max((value - exact).abs() / spacing);

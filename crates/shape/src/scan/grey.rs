@@ -73,7 +73,7 @@ impl Grey {
         let dims = mask.dims;
         let distance = transform::signed(mask);
         let place = |n: usize| -> Option<usize> {
-            let at = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
+            let at = crate::grid::place(dims, n);
             let mut index = 0;
             for axis in (0..3).rev() {
                 let i = usize::try_from(low[axis] + at[axis] as isize).ok()?;

@@ -160,6 +160,7 @@ pub(super) fn fill_cavities(mask: &mut Mask) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::place;
 
     fn noise(count: usize, share: u64) -> Vec<bool> {
         let mut state = 5u64;
@@ -174,7 +175,7 @@ mod tests {
 
     /// Pieces by flooding; neighbours differ by at most one along every axis, and along `axes` axes.
     fn flood(dims: [usize; 3], chosen: &[bool], axes: usize) -> Vec<u32> {
-        let at = |n: usize| [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
+        let at = |n: usize| place(dims, n);
         let near = |p: usize, q: usize| {
             let (p, q) = (at(p), at(q));
             let off: Vec<usize> = (0..3).map(|a| p[a].abs_diff(q[a])).collect();

@@ -5,6 +5,7 @@
 //! two grains where the neck is narrow against the smaller of them, and one grain with two tops
 //! otherwise.
 
+use crate::grid::{beside, place};
 use rayon::prelude::*;
 
 /// Hills that have been joined, with the height of the highest top.
@@ -111,7 +112,7 @@ impl Around {
     #[inline]
     fn each(&self, at: usize, mut see: impl FnMut(usize)) {
         let [nx, ny, nz] = self.dims;
-        let (i, j, k) = (at % nx, at / nx % ny, at / nx / ny);
+        let [i, j, k] = place(self.dims, at);
         let inside = |i: usize, n: usize| i > 0 && i + 1 < n;
         if inside(i, nx) && inside(j, ny) && inside(k, nz) {
             for offset in self.offsets {
@@ -212,25 +213,15 @@ pub(crate) const HALO: u32 = 1 << 31;
 /// Gives every void voxel within `layers` voxels of a grain to the nearest one, as its label with
 /// [`HALO`] set.
 pub(crate) fn add_halo(labels: &mut [u32], dims: [usize; 3], layers: usize) {
-    let [nx, ny, nz] = dims;
-    let strides = [1, nx, nx * ny];
-    let around = move |at: usize| {
-        let place = [at % nx, at / nx % ny, at / nx / ny];
-        (0..3).flat_map(move |axis| {
-            let below = (place[axis] > 0).then(|| at - strides[axis]);
-            let above = (place[axis] + 1 < [nx, ny, nz][axis]).then(|| at + strides[axis]);
-            below.into_iter().chain(above)
-        })
-    };
     let mut front: Vec<u32> = (0..labels.len() as u32)
         .into_par_iter()
-        .filter(|n| labels[*n as usize] != 0 && around(*n as usize).any(|m| labels[m] == 0))
+        .filter(|n| labels[*n as usize] != 0 && beside(dims, *n as usize).any(|m| labels[m] == 0))
         .collect();
     for _ in 0..layers {
         let mut next = Vec::new();
         for at in front {
             let label = labels[at as usize] | HALO;
-            for to in around(at as usize) {
+            for to in beside(dims, at as usize) {
                 if labels[to] == 0 {
                     labels[to] = label;
                     next.push(to as u32);
