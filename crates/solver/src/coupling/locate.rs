@@ -19,8 +19,10 @@ const TIE: f64 = 1e-9;
 pub struct ForcedFace {
     /// Component of the velocity.
     pub axis: usize,
-    /// Position in memory.
+    /// Position in memory, also that of the cell above it.
     pub at: usize,
+    /// Position of the cell below it, across a periodic edge if need be.
+    pub below: usize,
     /// From the grain's centroid to the face [m].
     pub arm: DVec3,
     /// Share by which the face takes the rigid velocity, 0 to 1.
@@ -29,7 +31,10 @@ pub struct ForcedFace {
     pub closed: f64,
     /// Part that all grains together close.
     pub closed_by_all: f64,
-    /// Velocity there without the drag of the grains [m/s]; known once the impulse is.
+    /// What the pressure takes from the face in the step, given back to its closed part [m/s]; known
+    /// once the impulse is, like `free`.
+    pub back: f64,
+    /// Velocity there without the drag of the grains [m/s].
     pub free: f64,
 }
 
@@ -95,6 +100,12 @@ impl Unknowns {
             strides: mesh.layout().strides(),
             periodic: [0, 1, 2].map(|axis| boundaries.is_periodic(axis)),
         }
+    }
+    /// Memory position of cell `cell` (counted from 1).
+    #[inline]
+    pub fn cell(&self, cell: IVec3) -> Option<usize> {
+        // No axis is normal to a cell.
+        self.at(3, cell)
     }
     /// Memory position of face `cell` (counted from 1) of component `component`.
     #[inline]
@@ -292,6 +303,10 @@ impl Locator {
                         let Some(at) = self.unknowns.at(component, cell) else {
                             continue;
                         };
+                        let lower = cell - IVec3::AXES[component];
+                        let Some(below) = self.unknowns.cell(lower) else {
+                            continue;
+                        };
                         if inside_rival {
                             continue;
                         }
@@ -317,10 +332,12 @@ impl Locator {
                             forced.push(ForcedFace {
                                 axis: component,
                                 at,
+                                below,
                                 arm: x - grain.pose.position,
                                 share,
                                 closed: own.closed / all.closed.max(1.0),
                                 closed_by_all,
+                                back: 0.0,
                                 free: 0.0,
                             });
                         }

@@ -26,6 +26,11 @@ pub struct Impulse {
 /// are `before`. `relief` is the time over which the closed part of a face takes the acceleration
 /// of the grains instead of the pressure gradient; zero turns both off. Faces that several grains
 /// hold take a part from each, and what one takes does not depend on the others' new velocities.
+///
+/// The pressure that a face feels is that of the last step moved with the grain,
+/// p* = p - dt U . grad p. Left where it was it would be a step behind the surface, and the drag of a
+/// moving grain of first order in the step (`docs/decisions/0011-pressure-moves-with-the-grain.md`).
+/// Away from the grain p and p* give the same flow: the projection takes up their difference.
 pub fn gather(
     flow: &Flow,
     fluid_density: f64,
@@ -43,11 +48,13 @@ pub fn gather(
         let lever = face.arm.cross(unit);
         let weight = [unit.x, unit.y, unit.z, lever.x, lever.y, lever.z];
         let predicted = flow.predicted.component(face.axis)[face.at];
-        let back = relief * pressure_gradient(flow, face.axis, face.at);
-        face.free = predicted + face.closed_by_all * back;
+        let (pull, change) = pressure_pull(flow, face, rigid_motion(before, face), relief);
+        face.back = pull + change;
+        face.free = predicted - change + face.closed_by_all * face.back;
         let follow = follow(face, relief);
-        let push =
-            face.closed * back - face.share * face.free - follow * rigid_velocity(before, face);
+        let push = face.closed * face.back
+            - face.share * face.free
+            - follow * rigid_velocity(before, face);
         for row in 0..6 {
             sum.constant[row] += w * push * weight[row];
             let pull = w * (face.share + follow) * weight[row];
@@ -114,11 +121,11 @@ pub fn advance(
 /// Gives the forced faces what the grain gives them; arguments as of [`gather`], which came before.
 pub fn impose(flow: &mut Flow, grain: &Grain, body: &Body, before: [DVec3; 2], relief: f64) {
     for face in &body.forced {
-        let back = relief * pressure_gradient(flow, face.axis, face.at);
         let rigid = rigid_velocity([grain.velocity, grain.angular_velocity], face);
         let change = rigid - rigid_velocity(before, face);
-        flow.predicted.component_mut(face.axis)[face.at] +=
-            face.closed * back + face.share * (rigid - face.free) + follow(face, relief) * change;
+        flow.predicted.component_mut(face.axis)[face.at] += face.closed * face.back
+            + face.share * (rigid - face.free)
+            + follow(face, relief) * change;
     }
 }
 
@@ -131,14 +138,36 @@ fn follow(face: &ForcedFace, relief: f64) -> f64 {
     }
 }
 
-/// Velocity along a face's axis of a body that moves at `[velocity, angular velocity]`.
-fn rigid_velocity([velocity, omega]: [DVec3; 2], face: &ForcedFace) -> f64 {
-    (velocity + omega.cross(face.arm))[face.axis]
+/// Velocity at a face of a body that moves at `[velocity, angular velocity]`.
+fn rigid_motion([velocity, omega]: [DVec3; 2], face: &ForcedFace) -> DVec3 {
+    velocity + omega.cross(face.arm)
 }
 
-fn pressure_gradient(flow: &Flow, axis: usize, at: usize) -> f64 {
-    let stride = flow.mesh().layout().strides()[axis];
-    (flow.pressure[at] - flow.pressure[at - stride]) / flow.mesh().spacing[axis]
+/// The same along the face's axis.
+fn rigid_velocity(motion: [DVec3; 2], face: &ForcedFace) -> f64 {
+    rigid_motion(motion, face)[face.axis]
+}
+
+/// What the pressure takes from a face over `dt` [m/s], and by how much that changes when the
+/// pressure moves at `velocity` for as long.
+fn pressure_pull(flow: &Flow, face: &ForcedFace, velocity: DVec3, dt: f64) -> (f64, f64) {
+    if dt == 0.0 {
+        return (0.0, 0.0);
+    }
+    let (p, strides) = (&flow.pressure, flow.mesh().layout().strides());
+    let spacing = flow.mesh().spacing;
+    let shift = 0.5 * dt * velocity / spacing;
+    let moved = |at: usize| -> f64 {
+        -(0..3)
+            .map(|axis| shift[axis] * (p[at + strides[axis]] - p[at - strides[axis]]))
+            .sum::<f64>()
+    };
+    let (above, below) = (face.at, face.below);
+    let push = dt / spacing[face.axis];
+    (
+        push * (p[above] - p[below]),
+        push * (moved(above) - moved(below)),
+    )
 }
 
 /// Replaces three equations by given velocities.
