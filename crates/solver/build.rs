@@ -1,4 +1,5 @@
 //! Puts the commit into the program where it is built from a repository; elsewhere does nothing.
+//! A program whose physics is not that of its commit says so: `5195945abcde+modified`.
 
 use std::path::Path;
 use std::process::Command;
@@ -16,7 +17,16 @@ fn main() {
     let Some(commit) = git(&["rev-parse", "--short=12", "HEAD"]) else {
         return;
     };
-    println!("cargo:rustc-env=GRAINWAKE_COMMIT={commit}");
+    let physics = ["src", "../shape/src"];
+    let changes = git(&[&["status", "--porcelain", "--"][..], &physics[..]].concat());
+    let mark = match changes {
+        Some(changes) if !changes.is_empty() => "+modified",
+        _ => "",
+    };
+    println!("cargo:rustc-env=GRAINWAKE_COMMIT={commit}{mark}");
+    for folder in physics {
+        println!("cargo:rerun-if-changed={folder}");
+    }
     for name in ["HEAD", "logs/HEAD"] {
         if let Some(path) =
             git(&["rev-parse", "--git-path", name]).filter(|p| Path::new(p).exists())

@@ -24,8 +24,8 @@ pub struct Impulse {
 
 /// Sums the impulse on the fluid as an affine function of the grain's new velocities; its old ones
 /// are `before`. `relief` is the time over which the closed part of a face takes the acceleration
-/// of the grains instead of the pressure gradient; zero turns both off. Faces that several grains
-/// hold take a part from each, and what one takes does not depend on the others' new velocities.
+/// of the grains instead of the pressure gradient; zero turns both off, and what follows. Faces that
+/// several grains hold take a part from each, and what one takes does not depend on the others' new velocities.
 ///
 /// The pressure that a face feels is that of the last step moved with the grain,
 /// p* = p - dt U . grad p. Left where it was it would be a step behind the surface, and the drag of a
@@ -48,8 +48,8 @@ pub fn gather(
         let lever = face.arm.cross(unit);
         let weight = [unit.x, unit.y, unit.z, lever.x, lever.y, lever.z];
         let predicted = flow.predicted.component(face.axis)[face.at];
-        let (pull, change) = pressure_pull(flow, face, rigid_motion(before, face), relief);
-        face.back = pull + change;
+        let (still, change) = pressure_pull(flow, face, rigid_motion(before, face), relief);
+        face.back = still + change;
         face.free = predicted - change + face.closed_by_all * face.back;
         let follow = follow(face, relief);
         let push = face.closed * face.back
@@ -148,8 +148,8 @@ fn rigid_velocity(motion: [DVec3; 2], face: &ForcedFace) -> f64 {
     rigid_motion(motion, face)[face.axis]
 }
 
-/// What the pressure takes from a face over `dt` [m/s], and by how much that changes when the
-/// pressure moves at `velocity` for as long.
+/// What the pressure takes from a face over `dt` [m/s] where it stands, and by how much that changes
+/// when the pressure moves at `velocity` for as long.
 fn pressure_pull(flow: &Flow, face: &ForcedFace, velocity: DVec3, dt: f64) -> (f64, f64) {
     if dt == 0.0 {
         return (0.0, 0.0);
