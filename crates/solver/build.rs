@@ -4,6 +4,15 @@
 use std::path::Path;
 use std::process::Command;
 
+/// Looks without touching the index.
+const STATUS: [&str; 5] = [
+    "--no-optional-locks",
+    "status",
+    "--porcelain",
+    "--untracked-files=all",
+    "--",
+];
+
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     let git = |arguments: &[&str]| {
@@ -18,13 +27,13 @@ fn main() {
         return;
     };
     let physics = ["src", "../shape/src"];
-    let changes = git(&[&["status", "--porcelain", "--"][..], &physics[..]].concat());
+    let changes = git(&[&STATUS[..], &physics[..]].concat());
     let mark = match changes {
-        Some(changes) if !changes.is_empty() => "+modified",
-        _ => "",
+        Some(changes) if changes.is_empty() => "",
+        _ => "+modified",
     };
     println!("cargo:rustc-env=GRAINWAKE_COMMIT={commit}{mark}");
-    for folder in physics {
+    for folder in physics.into_iter().filter(|f| Path::new(f).exists()) {
         println!("cargo:rerun-if-changed={folder}");
     }
     for name in ["HEAD", "logs/HEAD"] {

@@ -31,7 +31,7 @@ pub struct ForcedFace {
     pub closed: f64,
     /// Part that all grains together close.
     pub closed_by_all: f64,
-    /// What the pressure takes from the face in the step, given back to its closed part [m/s]; known
+    /// What the pressure takes from the face in the step, given back to its closed part [m/s]. Known
     /// once the impulse is, like `free`.
     pub back: f64,
     /// Velocity there without the drag of the grains [m/s].

@@ -24,13 +24,12 @@ pub struct Impulse {
 
 /// Sums the impulse on the fluid as an affine function of the grain's new velocities; its old ones
 /// are `before`. `relief` is the time over which the closed part of a face takes the acceleration
-/// of the grains instead of the pressure gradient; zero turns both off, and what follows. Faces that
-/// several grains hold take a part from each, and what one takes does not depend on the others' new velocities.
+/// of the grains instead of the pressure gradient; zero turns both off. Faces that several grains
+/// hold take a part from each, and what one takes does not depend on the others' new velocities.
 ///
-/// The pressure that a face feels is that of the last step moved with the grain,
-/// p* = p - dt U . grad p. Left where it was it would be a step behind the surface, and the drag of a
+/// The pressure given back to the closed part is that of the last step moved with the grain,
+/// p - dt U . grad p. Left where it was it would be a step behind the surface, and the drag of a
 /// moving grain of first order in the step (`docs/decisions/0011-pressure-moves-with-the-grain.md`).
-/// Away from the grain p and p* give the same flow: the projection takes up their difference.
 pub fn gather(
     flow: &Flow,
     fluid_density: f64,
@@ -48,9 +47,8 @@ pub fn gather(
         let lever = face.arm.cross(unit);
         let weight = [unit.x, unit.y, unit.z, lever.x, lever.y, lever.z];
         let predicted = flow.predicted.component(face.axis)[face.at];
-        let (still, change) = pressure_pull(flow, face, rigid_motion(before, face), relief);
-        face.back = still + change;
-        face.free = predicted - change + face.closed_by_all * face.back;
+        face.back = moved_pressure_pull(flow, face, before, relief);
+        face.free = predicted + face.closed_by_all * face.back;
         let follow = follow(face, relief);
         let push = face.closed * face.back
             - face.share * face.free
@@ -138,36 +136,32 @@ fn follow(face: &ForcedFace, relief: f64) -> f64 {
     }
 }
 
-/// Velocity at a face of a body that moves at `[velocity, angular velocity]`.
-fn rigid_motion([velocity, omega]: [DVec3; 2], face: &ForcedFace) -> DVec3 {
-    velocity + omega.cross(face.arm)
+/// Velocity along a face's axis of a body that moves at `[velocity, angular velocity]`.
+fn rigid_velocity([velocity, omega]: [DVec3; 2], face: &ForcedFace) -> f64 {
+    (velocity + omega.cross(face.arm))[face.axis]
 }
 
-/// The same along the face's axis.
-fn rigid_velocity(motion: [DVec3; 2], face: &ForcedFace) -> f64 {
-    rigid_motion(motion, face)[face.axis]
-}
-
-/// What the pressure takes from a face over `dt` [m/s] where it stands, and by how much that changes
-/// when the pressure moves at `velocity` for as long.
-fn pressure_pull(flow: &Flow, face: &ForcedFace, velocity: DVec3, dt: f64) -> (f64, f64) {
+/// What the pressure takes from a face over `dt` [m/s] once it has moved with a grain at
+/// `[velocity, angular velocity]` for as long.
+fn moved_pressure_pull(
+    flow: &Flow,
+    face: &ForcedFace,
+    [velocity, omega]: [DVec3; 2],
+    dt: f64,
+) -> f64 {
     if dt == 0.0 {
-        return (0.0, 0.0);
+        return 0.0;
     }
     let (p, strides) = (&flow.pressure, flow.mesh().layout().strides());
     let spacing = flow.mesh().spacing;
-    let shift = 0.5 * dt * velocity / spacing;
-    let moved = |at: usize| -> f64 {
-        -(0..3)
-            .map(|axis| shift[axis] * (p[at + strides[axis]] - p[at - strides[axis]]))
-            .sum::<f64>()
+    let half = 0.5 * spacing[face.axis] * DVec3::AXES[face.axis];
+    let moved = |at: usize, arm: DVec3| -> f64 {
+        let cells = 0.5 * dt * (velocity + omega.cross(arm)) / spacing;
+        let change = |axis: usize| cells[axis] * (p[at + strides[axis]] - p[at - strides[axis]]);
+        p[at] - (0..3).map(change).sum::<f64>()
     };
-    let (above, below) = (face.at, face.below);
-    let push = dt / spacing[face.axis];
-    (
-        push * (p[above] - p[below]),
-        push * (moved(above) - moved(below)),
-    )
+    let rise = moved(face.at, face.arm + half) - moved(face.below, face.arm - half);
+    dt / spacing[face.axis] * rise
 }
 
 /// Replaces three equations by given velocities.
