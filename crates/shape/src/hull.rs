@@ -13,10 +13,11 @@ struct Facet {
     alive: bool,
 }
 
-/// Volume [m^3] of the convex hull, or none where the points are flat or the construction is
-/// defeated by rounding.
-pub(crate) fn volume(points: &[DVec3]) -> Option<f64> {
-    Hull::build(points).and_then(|hull| hull.volume())
+/// Volume [m^3] of the convex hull and its corners, or none where the points are flat or the
+/// construction is defeated by rounding.
+pub(crate) fn measure(points: &[DVec3]) -> Option<(f64, Vec<DVec3>)> {
+    let hull = Hull::build(points)?;
+    Some((hull.volume()?, hull.corners()))
 }
 
 struct Hull<'a> {
@@ -194,6 +195,15 @@ impl<'a> Hull<'a> {
         Some(fresh)
     }
 
+    /// Its corners, each once.
+    fn corners(&self) -> Vec<DVec3> {
+        let alive = self.facets.iter().filter(|f| f.alive);
+        let mut corners: Vec<u32> = alive.flat_map(|f| f.corners).collect();
+        corners.sort_unstable();
+        corners.dedup();
+        corners.iter().map(|i| self.points[*i as usize]).collect()
+    }
+
     /// Volume, checked: no point may lie above a facet by more than rounding explains.
     fn volume(&self) -> Option<f64> {
         let reference = self.points[0];
@@ -216,6 +226,10 @@ impl<'a> Hull<'a> {
 mod tests {
     use super::*;
 
+    fn volume(points: &[DVec3]) -> Option<f64> {
+        measure(points).map(|(volume, _)| volume)
+    }
+
     #[test]
     fn hull_of_a_cube_with_points_inside_and_on_its_faces() {
         let mut points = Vec::new();
@@ -226,7 +240,16 @@ mod tests {
                 }
             }
         }
-        assert!((volume(&points).unwrap() - 1.0).abs() < 1e-12);
+        let (volume, corners) = measure(&points).unwrap();
+        assert!((volume - 1.0).abs() < 1e-12);
+        // Points on its edges and faces may count as corners, inner ones may not.
+        for corner in
+            (0..8).map(|c| DVec3::new(f64::from(c & 1), f64::from(c >> 1 & 1), f64::from(c >> 2)))
+        {
+            assert!(corners.contains(&corner), "{corner}");
+        }
+        let inner = |x: &DVec3| x.min_element() > 0.0 && x.max_element() < 1.0;
+        assert!(!corners.iter().any(inner));
     }
 
     #[test]

@@ -143,7 +143,7 @@ fn discs(samples: &[Sample], order: &[u32], bounds: (DVec3, DVec3), radius: f64)
     let mut kept = Vec::new();
     for &s in order {
         let sample = &samples[s as usize];
-        let crowded = grid.around(sample.position).any(|k: u32| {
+        let crowded = grid.any_around(sample.position, |k| {
             let other = &samples[k as usize];
             other.position.distance_squared(sample.position) < radius * radius
                 && other.normal.dot(sample.normal) > -0.2
@@ -189,20 +189,26 @@ fn assign(
     samples
         .par_iter()
         .map(|sample| {
-            let score = |n: u32| {
+            // The least of (behind, squared distance, number): a node behind the sample, on the far
+            // side of a thin plate, comes last.
+            let least = |best: (bool, f64, u32), n: u32| {
                 let squared = positions[n as usize].distance_squared(sample.position);
-                // A node behind the sample, on the far side of a thin plate, comes last.
+                if !best.0 && squared > best.1 {
+                    return best;
+                }
                 let behind = normals[n as usize].dot(sample.normal) < -0.2;
-                (behind, squared)
+                let score = (behind, squared, n);
+                if score < best { score } else { best }
             };
-            let better = |a: &u32, b: &u32| {
-                let (p, q) = (score(*a), score(*b));
-                p.0.cmp(&q.0).then(p.1.total_cmp(&q.1)).then(a.cmp(b))
-            };
-            grid.around(sample.position)
-                .min_by(better)
-                .or_else(|| (0..positions.len() as u32).min_by(better))
-                .unwrap_or(0)
+            let mut best = (true, f64::INFINITY, NONE);
+            grid.any_around(sample.position, |n| {
+                best = least(best, n);
+                false
+            });
+            if best.2 == NONE {
+                best = (0..positions.len() as u32).fold(best, least);
+            }
+            best.2
         })
         .collect()
 }
@@ -212,8 +218,14 @@ struct Buckets {
     lower: DVec3,
     size: f64,
     dims: [usize; 3],
-    items: Vec<Vec<u32>>,
+    /// The last point of each bucket, a place in `chain`, or [`NONE`].
+    heads: Vec<u32>,
+    /// Every point, with the one before it in its bucket.
+    chain: Vec<(u32, u32)>,
 }
+
+/// Stands for no point.
+const NONE: u32 = u32::MAX;
 
 impl Buckets {
     fn new(bounds: (DVec3, DVec3), size: f64) -> Buckets {
@@ -224,7 +236,8 @@ impl Buckets {
             lower,
             size,
             dims,
-            items: vec![Vec::new(); dims.iter().product()],
+            heads: vec![NONE; dims.iter().product()],
+            chain: Vec::new(),
         }
     }
 
@@ -240,15 +253,29 @@ impl Buckets {
 
     fn insert(&mut self, x: DVec3, item: u32) {
         let index = self.index(self.key(x));
-        self.items[index].push(item);
+        let head = &mut self.heads[index];
+        self.chain.push((item, *head));
+        *head = (self.chain.len() - 1) as u32;
     }
 
-    /// Items in the bucket of `x` and its 26 neighbours, in a fixed order.
-    fn around(&self, x: DVec3) -> impl Iterator<Item = u32> {
+    /// Is it so of any item in the bucket of `x` and its 26 neighbours? Asked in a fixed order.
+    fn any_around(&self, x: DVec3, mut is_so: impl FnMut(u32) -> bool) -> bool {
         let [i, j, k] = self.key(x);
-        (0..9).flat_map(move |n| {
-            let first = self.index([i - 1, j + n % 3 - 1, k + n / 3 - 1]);
-            self.items[first..first + 3].iter().flatten().copied()
-        })
+        for k in k - 1..=k + 1 {
+            for j in j - 1..=j + 1 {
+                let first = self.index([i - 1, j, k]);
+                for head in &self.heads[first..first + 3] {
+                    let mut at = *head;
+                    while at != NONE {
+                        let (item, next) = self.chain[at as usize];
+                        if is_so(item) {
+                            return true;
+                        }
+                        at = next;
+                    }
+                }
+            }
+        }
+        false
     }
 }

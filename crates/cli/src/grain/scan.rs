@@ -3,11 +3,10 @@
 use std::path::PathBuf;
 
 use grainwake_shape::picture::{Picture, View};
-use grainwake_shape::scan::{
-    Denoise, Scan, ScanOptions, ScannedGrain, Threshold, read_volume, scan_volume,
-};
+use grainwake_shape::scan::{Denoise, Scan, ScanOptions, Threshold, read_volume, scan_volume};
 use grainwake_shape::{ReadLimits, Shape, write_table};
 use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
 use serde_json::json;
 
 use super::{finish, length, may_write, options, plausible, save};
@@ -124,22 +123,28 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     for file in [&table, &sheet, &image] {
         may_write(file, args.new.force)?;
     }
-    let (mut rows, mut pictures, mut refused) = (Vec::new(), Vec::new(), 0);
-    for ScannedGrain {
-        label,
-        voxels,
-        shape,
-    } in grains
-    {
-        match shape {
-            Ok(shape) => {
-                let file = path(label);
+    let drawn: Vec<u32> = usable().take(SHEET.2).map(|(label, _)| label).collect();
+    let outcomes: Vec<_> = grains
+        .into_par_iter()
+        .map(|grain| {
+            let shape = grain.shape.map(|shape| {
+                let file = path(grain.label);
                 let shape = finish(shape, &file, &args.new)?;
-                let record = shape.record();
-                if pictures.len() < SHEET.2 {
+                let picture = drawn.binary_search(&grain.label).is_ok().then(|| {
                     let width = 2.1 * shape.bounding_radius();
-                    pictures.push(Picture::of(&shape, View::BROAD, SHEET.0, width, false));
-                }
+                    Picture::of(&shape, View::BROAD, SHEET.0, width, false)
+                });
+                Ok::<_, Exit>((file, shape.record(), picture))
+            });
+            (grain.label, grain.voxels, shape)
+        })
+        .collect();
+    let (mut rows, mut pictures, mut refused) = (Vec::new(), Vec::new(), 0);
+    for (label, voxels, outcome) in outcomes {
+        match outcome {
+            Ok(written) => {
+                let (file, record, picture) = written?;
+                pictures.extend(picture);
                 if args.new.json {
                     print(&json!({ "label": label, "voxels": voxels, "file": file, "record": record }).to_string())?;
                 } else {

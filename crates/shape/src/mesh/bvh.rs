@@ -1,6 +1,5 @@
 //! Bounding-volume hierarchy over triangles: which triangle is nearest to a point.
 
-use super::TriangleMesh;
 use glam::DVec3;
 
 /// Most triangles in a leaf.
@@ -39,40 +38,21 @@ pub(crate) struct Bvh {
     nodes: Vec<Node>,
     corners: Vec<[DVec3; 3]>,
     faces: Vec<u32>,
-    /// Place in leaf order of each face.
-    leaf: Vec<u32>,
 }
 
 impl Bvh {
-    pub(crate) fn new(mesh: &TriangleMesh) -> Bvh {
-        let mut faces: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-        let centres: Vec<DVec3> = (0..mesh.triangles.len())
-            .map(|f| mesh.corners(f).iter().sum::<DVec3>() / 3.0)
-            .collect();
+    /// Of the triangles with these corners.
+    pub(crate) fn new(triangles: &[[DVec3; 3]]) -> Bvh {
+        let mut faces: Vec<u32> = (0..triangles.len() as u32).collect();
+        let middle = |corners: &[DVec3; 3]| corners.iter().sum::<DVec3>() / 3.0;
+        let centres: Vec<DVec3> = triangles.iter().map(middle).collect();
         let mut nodes = Vec::new();
-        split(mesh, &centres, &mut faces, 0, &mut nodes);
-        let corners = faces.iter().map(|f| mesh.corners(*f as usize)).collect();
-        let mut leaf = vec![0; faces.len()];
-        for (n, face) in faces.iter().enumerate() {
-            leaf[*face as usize] = n as u32;
-        }
+        split(triangles, &centres, &mut faces, 0, &mut nodes);
         Bvh {
             nodes,
-            corners,
+            corners: faces.iter().map(|f| triangles[*f as usize]).collect(),
             faces,
-            leaf,
         }
-    }
-
-    /// Lower and upper corner of the box about every face.
-    pub(crate) fn boxes(&self) -> impl Iterator<Item = [DVec3; 2]> {
-        let bounds = |[a, b, c]: &[DVec3; 3]| [a.min(*b).min(*c), a.max(*b).max(*c)];
-        self.corners.iter().map(bounds)
-    }
-
-    /// Nearest point of face `face` to `x`.
-    pub(crate) fn on_face(&self, x: DVec3, face: u32) -> Nearest {
-        self.on_leaf(x, self.leaf[face as usize])
     }
 
     /// Nearest point to `x` of the triangle that is number `n` in leaf order.
@@ -161,7 +141,7 @@ impl Node {
 /// Builds the subtree of `faces` (which start at `first` in the whole list), halving it along the
 /// longest extent of the triangle centres.
 fn split(
-    mesh: &TriangleMesh,
+    triangles: &[[DVec3; 3]],
     centres: &[DVec3],
     faces: &mut [u32],
     first: usize,
@@ -170,7 +150,7 @@ fn split(
     let (mut lower, mut upper) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for f in faces.iter() {
-        for corner in mesh.corners(*f as usize) {
+        for corner in triangles[*f as usize] {
             lower = lower.min(corner);
             upper = upper.max(corner);
         }
@@ -201,14 +181,14 @@ fn split(
         p.total_cmp(&q).then(a.cmp(b))
     });
     let (left, right) = faces.split_at_mut(half);
-    split(mesh, centres, left, first, nodes);
+    split(triangles, centres, left, first, nodes);
     nodes[number].first = nodes.len() as u32;
     nodes[number].count = 0;
-    split(mesh, centres, right, first + half, nodes);
+    split(triangles, centres, right, first + half, nodes);
 }
 
 /// Nearest point of a triangle (Ericson, Real-Time Collision Detection, section 5.1.5).
-fn nearest_on_triangle(x: DVec3, [a, b, c]: &[DVec3; 3]) -> (DVec3, Feature) {
+pub(super) fn nearest_on_triangle(x: DVec3, [a, b, c]: &[DVec3; 3]) -> (DVec3, Feature) {
     let (ab, ac, ax) = (*b - *a, *c - *a, x - *a);
     let (d1, d2) = (ab.dot(ax), ac.dot(ax));
     if d1 <= 0.0 && d2 <= 0.0 {
@@ -248,12 +228,13 @@ mod tests {
     #[test]
     fn the_hierarchy_agrees_with_brute_force() {
         let mesh = crate::mesh::cube_sphere(8, |u| u * (1.0 + 0.3 * (5.0 * u.x).sin() * u.y));
-        let bvh = Bvh::new(&mesh);
+        let corners = mesh.faces();
+        let bvh = Bvh::new(&corners);
         for i in 0..200 {
             let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
             let x = 4.0 * u.fract() - DVec3::splat(2.0);
-            let brute = (0..mesh.triangles.len())
-                .map(|f| nearest_on_triangle(x, &mesh.corners(f)).0.distance(x))
+            let brute = (0..corners.len())
+                .map(|f| nearest_on_triangle(x, &corners[f]).0.distance(x))
                 .fold(f64::INFINITY, f64::min);
             assert!((bvh.nearest(x, &mut 0).point.distance(x) - brute).abs() < 1e-14);
         }

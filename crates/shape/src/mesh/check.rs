@@ -63,16 +63,31 @@ impl TriangleMesh {
 
     /// Two faces at every edge, wound in opposite senses along it.
     pub(crate) fn check_edges(&self) -> Result<Neighbours> {
-        // (low vertex, high vertex, face, edge of the face, runs from low to high)
-        let mut edges: Vec<(u32, u32, u32, u8, bool)> =
-            Vec::with_capacity(3 * self.triangles.len());
-        for (face, t) in self.triangles.iter().enumerate() {
-            for i in 0..3 {
-                let (a, b) = (t[i], t[(i + 1) % 3]);
-                edges.push((a.min(b), a.max(b), face as u32, i as u8, a < b));
+        // (low vertex, high vertex, face, edge of the face, runs from low to high), in order: put
+        // to their low vertex by counting, the few of a vertex sorted.
+        let each = |visit: &mut dyn FnMut((u32, u32, u32, u8, bool))| {
+            for (face, t) in self.triangles.iter().enumerate() {
+                for i in 0..3 {
+                    let (a, b) = (t[i], t[(i + 1) % 3]);
+                    visit((a.min(b), a.max(b), face as u32, i as u8, a < b));
+                }
             }
+        };
+        let mut ends = vec![0usize; self.vertices.len() + 1];
+        each(&mut |edge| ends[edge.0 as usize + 1] += 1);
+        for v in 1..ends.len() {
+            ends[v] += ends[v - 1];
         }
-        edges.sort_unstable();
+        let mut edges = vec![(0, 0, 0, 0, false); 3 * self.triangles.len()];
+        each(&mut |edge| {
+            let place = &mut ends[edge.0 as usize];
+            edges[*place] = edge;
+            *place += 1;
+        });
+        for (v, end) in ends[..self.vertices.len()].iter().enumerate() {
+            let start = if v == 0 { 0 } else { ends[v - 1] };
+            edges[start..*end].sort_unstable();
+        }
         let mut neighbours = vec![[0u32; 3]; self.triangles.len()];
         let mut open = (0usize, None);
         let mut flipped = None;

@@ -1,20 +1,24 @@
 //! Signed distance to a closed mesh.
 
 use super::TriangleMesh;
-use super::bvh::{Bvh, Feature, Nearest};
+use super::bvh::{Bvh, Feature, Nearest, nearest_on_triangle};
 use super::check::Neighbours;
 use super::spread;
 use crate::distance::Distance;
 use crate::error::Result;
 use glam::DVec3;
+use std::sync::OnceLock;
 
 /// Answers signed distances to a closed mesh: the exact distance to its triangles, the sign by
 /// angle-weighted pseudo-normals (Baerentzen and Aanaes 2005).
 pub(crate) struct MeshDistance {
-    bvh: Bvh,
+    /// Built when first asked.
+    bvh: OnceLock<Bvh>,
+    corners: Vec<[DVec3; 3]>,
     triangles: Vec<[u32; 3]>,
     /// Faces across the edges of each face.
     neighbours: Neighbours,
+    spokes: Spokes,
     face_normals: Vec<DVec3>,
     edge_normals: Vec<[DVec3; 3]>,
     corner_normals: Vec<DVec3>,
@@ -47,7 +51,9 @@ impl MeshDistance {
             .map(|(face, across)| across.map(|n| face_normals[face] + face_normals[n as usize]))
             .collect();
         MeshDistance {
-            bvh: Bvh::new(mesh),
+            bvh: OnceLock::new(),
+            corners: mesh.faces(),
+            spokes: Spokes::new(mesh),
             triangles: mesh.triangles.clone(),
             neighbours,
             face_normals,
@@ -56,51 +62,72 @@ impl MeshDistance {
         }
     }
 
-    pub(super) fn bvh(&self) -> &Bvh {
-        &self.bvh
+    /// Number of faces.
+    pub(super) fn faces(&self) -> u32 {
+        self.triangles.len() as u32
+    }
+
+    /// Square root of the mean area of a face [m].
+    pub(super) fn face_size(&self) -> f64 {
+        let twice = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a).length();
+        let area: f64 = self.corners.iter().map(twice).sum();
+        (0.5 * area / self.corners.len() as f64).sqrt()
+    }
+
+    /// Corners of face `face`.
+    pub(super) fn corners(&self, face: u32) -> &[DVec3; 3] {
+        &self.corners[face as usize]
+    }
+
+    /// Distance of `x` from the plane of face `face`; 0 where that has no area.
+    pub(super) fn height(&self, x: DVec3, face: u32) -> f64 {
+        let from = x - self.corners[face as usize][0];
+        from.dot(self.face_normals[face as usize]).abs()
+    }
+
+    /// Place of face `face` nearest to `x`.
+    pub(super) fn on_face(&self, x: DVec3, face: u32) -> Nearest {
+        let (point, feature) = nearest_on_triangle(x, self.corners(face));
+        Nearest {
+            point,
+            face,
+            feature,
+        }
     }
 
     /// Place of the mesh whose distance to `x` is least among all places around it, downhill from
     /// face `face`.
     pub(super) fn downhill(&self, x: DVec3, face: u32) -> Nearest {
-        let mut best = self.bvh.on_face(x, face);
+        let mut best = self.on_face(x, face);
         let mut distance = best.point.distance_squared(x);
-        let mut around = Vec::new();
         loop {
-            around.clear();
+            let number = best.face as usize;
+            let mut nearer = None;
+            let mut try_face = |face: u32| {
+                let place = self.on_face(x, face);
+                let squared = place.point.distance_squared(x);
+                if squared < distance {
+                    distance = squared;
+                    nearer = Some(place);
+                }
+            };
             match best.feature {
                 Feature::Face => (),
-                Feature::Edge(i) => {
-                    around.push(self.neighbours[best.face as usize][usize::from(i)])
+                Feature::Edge(i) => try_face(self.neighbours[number][usize::from(i)]),
+                Feature::Corner(i) => {
+                    let corner = self.triangles[number][usize::from(i)];
+                    let spokes = self.spokes.of(corner);
+                    // Where no edge leads downhill from the corner, no face does.
+                    let reach = x - best.point;
+                    if spokes.iter().any(|spoke| spoke.edge.dot(reach) > 0.0) {
+                        spokes.iter().for_each(|spoke| try_face(spoke.face));
+                    }
                 }
-                Feature::Corner(i) => self.ring(best.face, usize::from(i), &mut around),
             }
-            let places = around.iter().map(|face| self.bvh.on_face(x, *face));
-            let nearest = places
-                .map(|place| (place.point.distance_squared(x), place))
-                .min_by(|a, b| a.0.total_cmp(&b.0));
-            match nearest {
-                Some(nearer) if nearer.0 < distance => (distance, best) = nearer,
-                _ => return best,
+            match nearer {
+                Some(place) => best = place,
+                None => return best,
             }
-        }
-    }
-
-    /// The other faces at corner `corner` of face `face`.
-    fn ring(&self, face: u32, corner: usize, found: &mut Vec<u32>) {
-        let vertex = self.triangles[face as usize][corner];
-        let mut at = (face, corner);
-        // The next face lies across the edge that begins at the vertex.
-        loop {
-            let next = self.neighbours[at.0 as usize][at.1];
-            let place = self.triangles[next as usize]
-                .iter()
-                .position(|v| *v == vertex);
-            match place {
-                Some(place) if next != face => at = (next, place),
-                _ => return,
-            }
-            found.push(next);
         }
     }
 
@@ -119,9 +146,55 @@ impl MeshDistance {
     }
 }
 
+/// An edge that leaves a corner, and the face to the left of it.
+#[derive(Clone, Copy, Default)]
+struct Spoke {
+    edge: DVec3,
+    face: u32,
+}
+
+/// The spokes of every corner of a closed mesh, corner by corner.
+struct Spokes {
+    all: Vec<Spoke>,
+    /// Where the spokes of each corner begin, and the end of the last.
+    starts: Vec<u32>,
+}
+
+impl Spokes {
+    fn new(mesh: &TriangleMesh) -> Spokes {
+        let mut starts = vec![0u32; mesh.vertices.len() + 1];
+        for corner in mesh.triangles.iter().flatten() {
+            starts[*corner as usize + 1] += 1;
+        }
+        for v in 1..starts.len() {
+            starts[v] += starts[v - 1];
+        }
+        let mut all = vec![Spoke::default(); 3 * mesh.triangles.len()];
+        let mut next = starts.clone();
+        for (face, triangle) in mesh.triangles.iter().enumerate() {
+            let corners = mesh.corners(face);
+            for i in 0..3 {
+                let place = &mut next[triangle[i] as usize];
+                all[*place as usize] = Spoke {
+                    edge: corners[(i + 1) % 3] - corners[i],
+                    face: face as u32,
+                };
+                *place += 1;
+            }
+        }
+        Spokes { all, starts }
+    }
+
+    fn of(&self, corner: u32) -> &[Spoke] {
+        let corner = corner as usize;
+        &self.all[self.starts[corner] as usize..self.starts[corner + 1] as usize]
+    }
+}
+
 impl Distance for MeshDistance {
     fn near(&self, x: DVec3, hint: &mut u32) -> f64 {
-        self.signed(x, &self.bvh.nearest(x, hint))
+        let bvh = self.bvh.get_or_init(|| Bvh::new(&self.corners));
+        self.signed(x, &bvh.nearest(x, hint))
     }
 
     fn on_grid(&self, first: DVec3, spacing: f64, dims: [usize; 3]) -> Vec<f64> {

@@ -10,7 +10,7 @@ impl TriangleMesh {
     /// Refuses a surface with faces that cross each other; faces may touch. Two that share an edge
     /// are not looked at. The error names the first two in the order of the file.
     pub fn check_crossings(&self) -> Result<()> {
-        let bvh = Bvh::new(self);
+        let bvh = Bvh::new(&self.faces());
         let mut found: Vec<(u32, u32, DVec3)> = (0..self.triangles.len() as u32)
             .into_par_iter()
             .flat_map_iter(|face| {

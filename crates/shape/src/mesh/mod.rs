@@ -37,6 +37,11 @@ impl TriangleMesh {
         self.triangles[face].map(|v| self.vertices[v as usize])
     }
 
+    /// The corners of every face.
+    pub(crate) fn faces(&self) -> Vec<[DVec3; 3]> {
+        (0..self.triangles.len()).map(|f| self.corners(f)).collect()
+    }
+
     /// Volume [m^3] by the divergence theorem; negative where the faces point inwards.
     pub fn signed_volume(&self) -> f64 {
         let reference = self.vertices.first().copied().unwrap_or(DVec3::ZERO);

@@ -26,6 +26,10 @@ pub(crate) struct Grey {
 
 /// Distance from the surface beyond which a voxel is wholly solid or void [voxels].
 const BAND: f32 = 2.7;
+/// Distance up to which it is asked for: beyond [`DEEPER`] the band [voxels].
+const REACH: usize = 4;
+/// Beyond the band, where the grey of the grain is taken from [voxels].
+const DEEPER: f32 = 0.5;
 /// Layers of void that belong to a grain [voxels].
 pub(crate) const LAYERS: usize = 4;
 /// Deep voxels from which a grain's own grey is taken; with fewer, that of all grains.
@@ -71,7 +75,7 @@ impl Grey {
     /// may lie outside) holds its solid voxels, cavities filled.
     pub(crate) fn cut(&self, mask: &Mask, low: [isize; 3], label: u32, sigma: f64) -> Cut {
         let dims = mask.dims;
-        let distance = transform::signed(mask);
+        let distance = transform::signed_near(mask, REACH);
         let place = |n: usize| -> Option<usize> {
             let at = crate::grid::place(dims, n);
             let mut index = 0;
@@ -122,7 +126,7 @@ impl Grey {
     /// Mean grey of the grain's own deep voxels: grains differ.
     fn own_grey(&self, distance: &[f32], place: &impl Fn(usize) -> Option<usize>) -> f64 {
         let deep: Vec<f64> = (0..distance.len())
-            .filter(|n| distance[*n] < -BAND - 0.5)
+            .filter(|n| distance[*n] < -BAND - DEEPER)
             .filter_map(place)
             .map(|m| f64::from(self.values[m]))
             .collect();

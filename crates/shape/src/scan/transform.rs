@@ -3,15 +3,19 @@
 use super::Mask;
 use rayon::prelude::*;
 
-/// Stands for "no such voxel on this line"; its square stays finite.
-const FAR: f32 = 1e15;
+/// Stands for the square of the distance of "no such voxel on this line".
+const FAR: f32 = 1e30;
 
 /// Signed distance [voxels] of every voxel centre from the interface of the mask, negative
 /// inside: the exact distance to the nearest voxel centre of the other phase, less the half
 /// voxel by which the interface lies before it.
 pub(crate) fn signed(mask: &Mask) -> Vec<f32> {
-    let outside = squared(mask, true);
-    let inside = squared(mask, false);
+    let outside = squared(mask, true, lower_lines);
+    let inside = squared(mask, false, lower_lines);
+    difference(&outside, &inside)
+}
+
+fn difference(to_solid: &[f32], to_void: &[f32]) -> Vec<f32> {
     let distance = |(to_solid, to_void): (&f32, &f32)| {
         if *to_void > 0.0 {
             0.5 - to_void.sqrt()
@@ -19,29 +23,37 @@ pub(crate) fn signed(mask: &Mask) -> Vec<f32> {
             to_solid.sqrt() - 0.5
         }
     };
-    outside.par_iter().zip(&inside).map(distance).collect()
+    to_solid.par_iter().zip(to_void).map(distance).collect()
+}
+
+/// The same up to `reach` voxels; beyond, farther than that.
+pub(crate) fn signed_near(mask: &Mask, reach: usize) -> Vec<f32> {
+    let outside = squared(mask, true, |lines, n| lower_near(lines, n, reach));
+    let inside = squared(mask, false, |lines, n| lower_near(lines, n, reach));
+    difference(&outside, &inside)
 }
 
 /// Squared distance [voxels^2] of every voxel centre to the nearest void voxel's, 0 in the void.
 pub(crate) fn to_void(mask: &Mask) -> Vec<f32> {
-    squared(mask, false)
+    squared(mask, false, lower_lines)
 }
 
-/// Squared distance of every voxel to the nearest voxel whose mask value is `target`.
-fn squared(mask: &Mask, target: bool) -> Vec<f32> {
+/// Squared distance of every voxel to the nearest voxel whose mask value is `target`; `lower` brings
+/// it down along all lines of a length.
+fn squared(mask: &Mask, target: bool, lower: impl Fn(&mut [f32], usize)) -> Vec<f32> {
     let [nx, ny, nz] = mask.dims;
     let mut field: Vec<f32> = mask
         .solid
         .iter()
-        .map(|s| if *s == target { 0.0 } else { FAR * FAR })
+        .map(|s| if *s == target { 0.0 } else { FAR })
         .collect();
     let mut scratch = vec![0.0f32; field.len()];
-    field.par_chunks_mut(nx).for_each(envelope_in_place);
+    lower(&mut field, nx);
     // Lines along y and z are made contiguous first.
     transpose(&field, &mut scratch, [nx, ny, nz]);
-    scratch.par_chunks_mut(ny).for_each(envelope_in_place);
+    lower(&mut scratch, ny);
     transpose(&scratch, &mut field, [ny, nz, nx]);
-    field.par_chunks_mut(nz).for_each(envelope_in_place);
+    lower(&mut field, nz);
     transpose(&field, &mut scratch, [nz, nx, ny]);
     scratch
 }
@@ -62,42 +74,83 @@ pub(super) fn transpose(from: &[f32], to: &mut [f32], [nx, ny, nz]: [usize; 3]) 
     });
 }
 
+/// A parabola of the lower envelope: where it stands, how high its foot is, and from where on it is
+/// the lowest.
+#[derive(Clone, Copy)]
+struct Parabola {
+    centre: f64,
+    foot: f64,
+    start: f64,
+}
+
 /// One dimension: min over q of (p - q)^2 + line[q], by the lower envelope of parabolas
-/// (Felzenszwalb and Huttenlocher 2012).
-fn envelope_in_place(line: &mut [f32]) {
-    let n = line.len();
-    let values: Vec<f64> = line.iter().map(|v| f64::from(*v)).collect();
-    let mut centres = vec![0usize; n];
-    let mut starts = vec![0.0f64; n + 1];
-    let mut last = 0;
-    starts[0] = f64::NEG_INFINITY;
-    for q in 1..n {
-        loop {
-            let p = centres[last];
-            let (pf, qf) = (p as f64, q as f64);
-            let meet = ((values[q] + qf * qf) - (values[p] + pf * pf)) / (2.0 * (qf - pf));
-            if meet > starts[last] || last == 0 {
-                if meet <= starts[last] {
-                    centres[0] = q;
-                } else {
-                    last += 1;
-                    centres[last] = q;
-                    starts[last] = meet;
-                }
+/// (Felzenszwalb and Huttenlocher 2012). `envelope` is room for it.
+fn lower(line: &mut [f32], envelope: &mut Vec<Parabola>) {
+    envelope.clear();
+    // Parabolas without a foot are nowhere the lowest.
+    let feet = line.iter().enumerate().filter(|(_, v)| **v < FAR);
+    for (q, foot) in feet {
+        let (q, foot) = (q as f64, f64::from(*foot));
+        let mut start = f64::NEG_INFINITY;
+        while let Some(last) = envelope.last() {
+            let rise = (foot + q * q) - (last.foot + last.centre * last.centre);
+            start = rise / (2.0 * (q - last.centre));
+            if start > last.start {
                 break;
             }
-            last -= 1;
+            envelope.pop();
+            start = f64::NEG_INFINITY;
         }
+        let centre = q;
+        envelope.push(Parabola {
+            centre,
+            foot,
+            start,
+        });
     }
-    starts[last + 1] = f64::INFINITY;
-    let mut at = 0;
+    let mut lowest = envelope.iter().copied().peekable();
+    let Some(mut now) = lowest.next() else {
+        return;
+    };
     for (p, out) in line.iter_mut().enumerate() {
-        while starts[at + 1] < p as f64 {
-            at += 1;
+        let p = p as f64;
+        while let Some(next) = lowest.next_if(|next| next.start < p) {
+            now = next;
         }
-        let reach = p as f64 - centres[at] as f64;
-        *out = (reach * reach + values[centres[at]]) as f32;
+        *out = ((p - now.centre).powi(2) + now.foot) as f32;
     }
+}
+
+/// [`lower`] along every line of `length` values.
+fn lower_lines(field: &mut [f32], length: usize) {
+    let lines = field.par_chunks_mut(length);
+    // Lines of nothing but feet, or of none, stay as they are.
+    lines.for_each_init(Vec::new, |envelope, line| {
+        if line.iter().any(|v| *v > 0.0) {
+            lower(line, envelope);
+        }
+    });
+}
+
+/// [`lower`] along every line of `length` values, by the parabolas up to `reach` away alone.
+fn lower_near(field: &mut [f32], length: usize, reach: usize) {
+    let lines = field.par_chunks_mut(length);
+    lines.for_each_init(Vec::new, |padded, line| {
+        if line.iter().all(|v| *v == line[0]) {
+            return;
+        }
+        padded.clear();
+        padded.resize(reach, FAR);
+        padded.extend_from_slice(line);
+        padded.resize(length + 2 * reach, FAR);
+        for step in 1..=reach {
+            let rise = (step * step) as f32;
+            let sides = padded[reach - step..].iter().zip(&padded[reach + step..]);
+            for (out, (below, above)) in line.iter_mut().zip(sides) {
+                *out = out.min(below.min(*above) + rise);
+            }
+        }
+    });
 }
 
 #[cfg(test)]
@@ -118,6 +171,7 @@ mod tests {
             .collect();
         let mask = Mask { dims, solid };
         let found = signed(&mask);
+        let near = [1, 2, 3].map(|reach| signed_near(&mask, reach));
         let at = |n: usize| [n % 9, n / 9 % 7, n / 63].map(|v| v as f64);
         for n in 0..found.len() {
             let nearest = (0..found.len())
@@ -133,6 +187,15 @@ mod tests {
                 nearest - 0.5
             };
             assert!((f64::from(found[n]) - exact).abs() < 1e-5, "voxel {n}");
+            for reach in [1, 2, 3] {
+                let value = f64::from(near[reach - 1][n]);
+                if nearest <= reach as f64 {
+                    assert!((value - exact).abs() < 1e-5, "voxel {n}, reach {reach}");
+                } else {
+                    assert_eq!(value < 0.0, exact < 0.0);
+                    assert!(value.abs() > reach as f64 - 0.5, "voxel {n}, reach {reach}");
+                }
+            }
         }
     }
 }
