@@ -159,6 +159,19 @@ impl SampledField {
         }
     }
 
+    /// Signed distance [m] at `x`, none off the grid.
+    #[inline]
+    pub fn distance_on_grid(&self, x: DVec3) -> Option<f64> {
+        self.locate(x).map(|place| self.interpolate(&place))
+    }
+
+    /// Gradient of the distance at `x`, none off the grid.
+    #[inline]
+    pub fn gradient_on_grid(&self, x: DVec3) -> Option<DVec3> {
+        let place = self.locate(x)?;
+        Some(self.interpolate_with_gradient(&place).1)
+    }
+
     /// Signed distance [m] at `x` where that is at most `limit`, else infinity or the distance: what
     /// is clearly farther costs little off the grid.
     #[inline]

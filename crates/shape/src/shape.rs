@@ -120,6 +120,12 @@ impl Shape {
         }
     }
 
+    /// The distances on another grid, `spacing` [m] fine and `margin` [m] wider than the bounding box.
+    pub fn resampled(&self, spacing: f64, margin: f64) -> Result<SampledField> {
+        let distance = |x: DVec3, _: &mut u32| self.distance(x);
+        SampledField::sample(&distance, self.lower, self.upper, spacing, margin)
+    }
+
     /// How the distance is represented.
     pub fn field(&self) -> &Field {
         &self.field

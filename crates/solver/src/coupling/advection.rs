@@ -13,9 +13,10 @@
 //! Legend: q component carried, c velocity that carries it, d signed distance of a link.
 
 use glam::{DVec3, IVec3};
+use rayon::prelude::*;
 
 use super::aperture::aperture;
-use super::locate::{Body, Locator};
+use super::locate::Body;
 use crate::dem::Grain;
 use crate::flow::Flow;
 use crate::grid::FACE_OFFSET;
@@ -23,62 +24,86 @@ use crate::grid::FACE_OFFSET;
 /// Smallest aperture divided by; smaller ones are unstable on an impulsive start.
 const LEAST_APERTURE: f64 = 0.4;
 
-/// Corrects the tendency of the step just predicted; `bodies` are where `grains` were located.
-pub fn correct(locator: &Locator, flow: &mut Flow, grains: &[Grain], bodies: &[Body]) {
-    let cells = flow.mesh().cells;
-    for (grain, body) in grains.iter().zip(bodies) {
-        for component in 0..3 {
-            for along in (0..3).filter(|&axis| cells[axis] > 1) {
-                correct_links(locator, flow, grain, body, component, along);
+/// A correction of the flux from one face to the next, over the length of the link [m/s^2].
+#[derive(Clone, Copy, Debug)]
+pub struct Link {
+    from: usize,
+    to: usize,
+    flux: f64,
+}
+
+/// Corrects the tendency of the step just predicted; `bodies` are where `grains` were located, in a
+/// band of half-width `band` [m].
+pub fn correct(band: f64, flow: &mut Flow, grains: &[Grain], bodies: &mut [Body]) {
+    let flow_before = &*flow;
+    let each = bodies.par_iter_mut().zip(grains);
+    each.for_each(|(body, grain)| {
+        let mut links = std::mem::take(&mut body.links);
+        for (component, links) in links.iter_mut().enumerate() {
+            links.clear();
+            for along in (0..3).filter(|&axis| flow_before.mesh().cells[axis] > 1) {
+                correct_links(band, flow_before, grain, body, component, along, links);
             }
         }
-    }
+        body.links = links;
+    });
+    let bodies = &*bodies;
+    flow.add_tendency(|component, add| {
+        for link in bodies.iter().flat_map(|body| &body.links[component]) {
+            add(link.from, -link.flux);
+            add(link.to, link.flux);
+        }
+    });
 }
 
 /// Links of `component` along one axis.
 fn correct_links(
-    locator: &Locator,
-    flow: &mut Flow,
+    band: f64,
+    flow: &Flow,
     grain: &Grain,
     body: &Body,
     component: usize,
     along: usize,
+    links: &mut Vec<Link>,
 ) {
-    let (band, unknowns) = (locator.band(), locator.unknowns());
     let mesh = *flow.mesh();
     let across = mesh.layout().strides()[component];
     let step = IVec3::AXES[along];
     let inverse = 1.0 / mesh.spacing[along];
     let middle = DVec3::from_array(FACE_OFFSET[component]) + 0.5 * step.as_dvec3() - 1.0;
     let last = body.size - step;
+    let next = body.local(step.x, step.y, step.z);
+    let (q, c) = (
+        flow.velocity.component(component),
+        flow.velocity.component(along),
+    );
     for k in 0..last.z {
         for j in 0..last.y {
+            let row = body.local(0, j, k);
             for i in 0..last.x {
-                let there = IVec3::new(i, j, k) + step;
+                let here = row + i as usize;
                 let d = 0.5
-                    * (body.own_distance(component, body.local(i, j, k))
-                        + body.own_distance(component, body.local(there.x, there.y, there.z)));
+                    * (body.own_distance(component, here)
+                        + body.own_distance(component, here + next));
                 if d >= 2.0 * band || d <= -band {
                     continue;
                 }
-                let cell = body.first + IVec3::new(i, j, k);
-                let face = |shift: i32| unknowns.at(component, cell + shift * step);
+                let place = IVec3::new(i, j, k);
+                let face = |shift: i32| body.places.at(component, place + shift * step);
                 let (Some(from), Some(to)) = (face(0), face(1)) else {
                     continue;
                 };
-                let q = flow.velocity.component(component);
                 let mean = 0.5 * (q[from] + q[to]);
                 let carrier = if along == component {
                     mean
                 } else {
                     // Two faces of the carrying component share the link.
-                    let c = flow.velocity.component(along);
                     0.5 * (c[to] + c[to - across])
                 };
                 let mut flux = 0.0;
                 if d < band {
-                    let rigid =
-                        grain.velocity_at(mesh.origin + mesh.spacing * (cell.as_dvec3() + middle));
+                    let cell = (body.first + place).as_dvec3();
+                    let rigid = grain.velocity_at(mesh.origin + mesh.spacing * (cell + middle));
                     let relative = (carrier - rigid[along]) * (mean - rigid[component]);
                     flux += relative * (1.0 / aperture(d, band).max(LEAST_APERTURE) - 1.0);
                 }
@@ -87,8 +112,8 @@ fn correct_links(
                     let sixth = 7.0 * (q[from] + q[to]) - 8.0 * (q[b] + q[y]) + q[a] + q[z];
                     flux += carrier * sixth / 60.0;
                 }
-                flow.add_tendency(component, from, -flux * inverse);
-                flow.add_tendency(component, to, flux * inverse);
+                let flux = flux * inverse;
+                links.push(Link { from, to, flux });
             }
         }
     }

@@ -5,11 +5,16 @@ use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
 use super::Scheme;
+use super::advection::Link;
 use super::aperture::{aperture, drag};
+use super::near::{NearShape, NearShapes};
+use super::places::{Places, Unknowns};
 use crate::dem::Grain;
 use crate::flow::Boundaries;
 use crate::grid::{FACE_OFFSET, Mesh};
 
+/// Asks [`Places`] for cells: no axis is normal to them.
+const CELL: usize = 3;
 /// Distances that differ by less than this part of the band are equal: of two copies of a link
 /// across a periodic edge just one must count.
 const TIE: f64 = 1e-9;
@@ -50,6 +55,10 @@ pub struct Body {
     pub distance: [Vec<f64>; 3],
     /// Smallest distance from another grain there [m]; infinite where it does not matter.
     rival_distance: [Vec<f64>; 3],
+    /// Where the box lies in memory.
+    pub places: Places,
+    /// Corrections of the advection of each component.
+    pub links: [Vec<Link>; 3],
     /// Faces under its rigidity.
     pub forced: Vec<ForcedFace>,
 }
@@ -72,6 +81,12 @@ impl Body {
         }
     }
 
+    /// The forced faces of one component: they are listed component by component.
+    pub fn forced_along(&self, axis: usize) -> &[ForcedFace] {
+        let end = |axis: usize| self.forced.partition_point(|face| face.axis < axis);
+        &self.forced[end(axis)..end(axis + 1)]
+    }
+
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
         let distances: usize = self
@@ -80,50 +95,17 @@ impl Body {
             .chain(&self.rival_distance)
             .map(|values| size_of::<f64>() * values.capacity())
             .sum();
-        distances + size_of::<ForcedFace>() * self.forced.capacity()
+        let links: usize = self.links.iter().map(Vec::capacity).sum();
+        distances
+            + self.places.bytes()
+            + size_of::<Link>() * links
+            + size_of::<ForcedFace>() * self.forced.capacity()
     }
 }
 
-/// Maps box indices to memory, across periodic edges; `None` where the face is no unknown.
-#[derive(Clone, Copy)]
-pub struct Unknowns {
-    cells: IVec3,
-    strides: [usize; 3],
-    periodic: [bool; 3],
-}
-
-impl Unknowns {
-    pub fn new(mesh: &Mesh, boundaries: &Boundaries) -> Unknowns {
-        let [x, y, z] = mesh.cells.map(|n| n as i32);
-        Unknowns {
-            cells: IVec3::new(x, y, z),
-            strides: mesh.layout().strides(),
-            periodic: [0, 1, 2].map(|axis| boundaries.is_periodic(axis)),
-        }
-    }
-    /// Memory position of cell `cell` (counted from 1).
-    #[inline]
-    pub fn cell(&self, cell: IVec3) -> Option<usize> {
-        // No axis is normal to a cell.
-        self.at(3, cell)
-    }
-    /// Memory position of face `cell` (counted from 1) of component `component`.
-    #[inline]
-    pub fn at(&self, component: usize, cell: IVec3) -> Option<usize> {
-        let mut at = 0;
-        for axis in 0..3 {
-            let (i, n) = (cell[axis], self.cells[axis]);
-            let i = if self.periodic[axis] {
-                (i - 1).rem_euclid(n) + 1
-            } else if i > i32::from(axis == component) && i <= n {
-                i
-            } else {
-                return None;
-            };
-            at += i as usize * self.strides[axis];
-        }
-        Some(at)
-    }
+/// How far from its surface a grain matters [m].
+fn reach(eps: f64, mesh: &Mesh) -> f64 {
+    2.0 * eps + 0.5 * mesh.spacing.max_element()
 }
 
 /// Where to look for grains and how.
@@ -134,6 +116,7 @@ pub struct Locator {
     kinematic_viscosity: f64,
     /// Half-width of the band [m].
     eps: f64,
+    shapes: NearShapes,
 }
 
 impl Locator {
@@ -142,6 +125,7 @@ impl Locator {
         boundaries: &Boundaries,
         scheme: Scheme,
         kinematic_viscosity: f64,
+        grains: &[Grain],
     ) -> Locator {
         let flat = mesh.cells.map(|n| n == 1);
         let resolved: Vec<f64> = (0..3)
@@ -155,6 +139,7 @@ impl Locator {
             scheme,
             kinematic_viscosity,
             eps,
+            shapes: NearShapes::new(grains, eps, reach(eps, mesh)),
         }
     }
 
@@ -162,27 +147,30 @@ impl Locator {
     pub fn band(&self) -> f64 {
         self.eps
     }
-    pub fn unknowns(&self) -> &Unknowns {
-        &self.unknowns
+
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        self.shapes.bytes()
     }
 
     /// Finds all grains for a step of length `dt` [s].
     pub fn locate(&self, grains: &[Grain], dt: f64, bodies: &mut [Body]) {
         bodies.par_iter_mut().enumerate().for_each(|(index, body)| {
             let rivals = self.rivals(grains, index);
-            self.measure(grains, index, &rivals, body);
-            self.list(grains, index, &rivals, dt, body);
+            self.measure(&grains[index], self.shapes.of(index), &rivals, body);
+            self.unknowns.map(body.first, body.size, &mut body.places);
+            self.list(&grains[index], self.shapes.of(index), &rivals, dt, body);
         });
     }
 
     /// How far from its surface a grain matters [m].
     fn reach(&self) -> f64 {
-        2.0 * self.eps + 0.5 * self.mesh.spacing.max_element()
+        reach(self.eps, &self.mesh)
     }
 
-    /// Distances in the box about grain `index`.
-    fn measure(&self, grains: &[Grain], index: usize, rivals: &[Rival], body: &mut Body) {
-        let (mesh, grain) = (&self.mesh, &grains[index]);
+    /// Distances in the box about a grain.
+    fn measure(&self, grain: &Grain, shape: &NearShape, rivals: &[Rival], body: &mut Body) {
+        let mesh = &self.mesh;
         let centre = grain.pose.position;
         let reach = self.reach();
         let turn = glam::DMat3::from_quat(grain.pose.orientation);
@@ -213,12 +201,10 @@ impl Locator {
             }
             for k in 0..body.size.z {
                 for j in 0..body.size.y {
-                    for i in 0..body.size.x {
-                        let x = self.position(offset, body.first + IVec3::new(i, j, k));
-                        if (x - centre).length_squared() > far * far {
-                            continue;
-                        }
-                        let d = grain.shape.distance_within(grain.pose.to_body(x), reach);
+                    let start = self.position(offset, body.first + IVec3::new(0, j, k));
+                    for i in self.chord(start - centre, far, body.size.x) {
+                        let x = start + DVec3::X * (f64::from(i) * mesh.spacing.x);
+                        let d = shape.distance(grain.pose.to_body(x));
                         if d > reach {
                             continue;
                         }
@@ -226,9 +212,7 @@ impl Locator {
                         distance[at] = d;
                         rival_distance[at] = rivals
                             .iter()
-                            .map(|rival| {
-                                rival.distance_within(grains, x, reach) + rival.handicap * self.eps
-                            })
+                            .map(|rival| rival.distance(x, reach) + rival.handicap * self.eps)
                             .fold(f64::INFINITY, f64::min);
                     }
                 }
@@ -238,9 +222,22 @@ impl Locator {
         }
     }
 
+    /// Which of the `count` places of a row of faces, that begins at `start` from the centre of a ball of
+    /// radius `far`, lie in the ball.
+    fn chord(&self, start: DVec3, far: f64, count: i32) -> std::ops::Range<i32> {
+        let square = far * far - start.y * start.y - start.z * start.z;
+        if square <= 0.0 {
+            return 0..0;
+        }
+        let (half, h) = (square.sqrt(), self.mesh.spacing.x);
+        let from = ((-half - start.x) / h).ceil() as i32;
+        let to = ((half - start.x) / h).floor() as i32;
+        from.clamp(0, count)..(to + 1).clamp(0, count)
+    }
+
     /// Grains, and periodic images of them and of the grain itself, whose band may meet that of
     /// grain `index`.
-    fn rivals(&self, grains: &[Grain], index: usize) -> Vec<Rival> {
+    fn rivals<'a>(&'a self, grains: &'a [Grain], index: usize) -> Vec<Rival<'a>> {
         let (grain, extent, reach) = (&grains[index], self.mesh.extent(), self.reach());
         let mut rivals = Vec::new();
         for (other, rival) in grains.iter().enumerate() {
@@ -248,7 +245,7 @@ impl Locator {
             let limit = radii + 2.0 * reach;
             let apart = grain.pose.position - rival.pose.position;
             // Images along each axis that may be near enough: first, last.
-            let range = |axis: usize| match self.unknowns.periodic[axis] {
+            let range = |axis: usize| match self.unknowns.is_periodic(axis) {
                 true if self.mesh.cells[axis] > 1 => (
                     ((apart[axis] - limit) / extent[axis]).ceil() as i32,
                     ((apart[axis] + limit) / extent[axis]).floor() as i32,
@@ -268,7 +265,8 @@ impl Locator {
                             continue;
                         }
                         rivals.push(Rival {
-                            index: other,
+                            grain: rival,
+                            shape: self.shapes.of(other),
                             shift,
                             handicap: match own {
                                 true if image.to_array() > [0; 3] => -TIE,
@@ -283,9 +281,8 @@ impl Locator {
         rivals
     }
 
-    /// Lists the faces under the rigidity of grain `index`.
-    fn list(&self, grains: &[Grain], index: usize, rivals: &[Rival], dt: f64, body: &mut Body) {
-        let grain = &grains[index];
+    /// Lists the faces under the rigidity of a grain.
+    fn list(&self, grain: &Grain, shape: &NearShape, rivals: &[Rival], dt: f64, body: &mut Body) {
         let mut forced = std::mem::take(&mut body.forced);
         forced.clear();
         for (component, offset) in FACE_OFFSET.iter().enumerate() {
@@ -299,26 +296,26 @@ impl Locator {
                         }
                         let rival = body.rival_distance[component][local];
                         let inside_rival = rival <= -self.eps && rival < d;
-                        let cell = body.first + IVec3::new(i, j, k);
-                        let Some(at) = self.unknowns.at(component, cell) else {
-                            continue;
-                        };
-                        let lower = cell - IVec3::AXES[component];
-                        let Some(below) = self.unknowns.cell(lower) else {
-                            continue;
-                        };
                         if inside_rival {
                             continue;
                         }
-                        let x = self.position(offset, cell);
-                        let own = self.hold(grain, x, d, dt);
+                        let place = IVec3::new(i, j, k);
+                        let Some(at) = body.places.at(component, place) else {
+                            continue;
+                        };
+                        let lower = place - IVec3::AXES[component];
+                        let Some(below) = body.places.at(CELL, lower) else {
+                            continue;
+                        };
+                        let x = self.position(offset, body.first + place);
+                        let own = self.hold(grain, shape, x, d, dt);
                         let mut all = own;
                         if rival < 2.0 * self.eps && d > -self.eps {
                             for rival in rivals {
-                                let there = rival.distance_within(grains, x, 2.0 * self.eps);
+                                let there = rival.distance(x, 2.0 * self.eps);
                                 if there < 2.0 * self.eps {
-                                    let other = &grains[rival.index];
-                                    all = all + self.hold(other, x - rival.shift, there, dt);
+                                    let x = x - rival.shift;
+                                    all = all + self.hold(rival.grain, rival.shape, x, there, dt);
                                 }
                             }
                         }
@@ -349,11 +346,8 @@ impl Locator {
     }
 
     /// How a surface at distance `d` holds the face at `x` for a step of `dt`.
-    fn hold(&self, grain: &Grain, x: DVec3, d: f64, dt: f64) -> Hold {
-        let normal = || {
-            let (_, gradient) = grain.shape.distance_and_gradient(grain.pose.to_body(x));
-            grain.pose.orientation * gradient.normalize_or_zero()
-        };
+    fn hold(&self, grain: &Grain, shape: &NearShape, x: DVec3, d: f64, dt: f64) -> Hold {
+        let normal = || grain.pose.orientation * shape.normal(grain.pose.to_body(x));
         match self.scheme {
             Scheme::Aperture if d <= -self.eps => Hold {
                 strength: f64::INFINITY,
@@ -384,8 +378,9 @@ impl Locator {
 }
 
 /// Another grain nearby, or an image of the grain itself.
-struct Rival {
-    index: usize,
+struct Rival<'a> {
+    grain: &'a Grain,
+    shape: &'a NearShape,
     /// From the grain to the image in question [m].
     shift: DVec3,
     /// Added to its distance, as a part of the band, so that it has the faces as far from both or
@@ -393,12 +388,15 @@ struct Rival {
     handicap: f64,
 }
 
-impl Rival {
-    /// Distance of `x` from its surface [m] where that is at most `limit`.
-    fn distance_within(&self, grains: &[Grain], x: DVec3, limit: f64) -> f64 {
-        let grain = &grains[self.index];
-        let y = grain.pose.to_body(x - self.shift);
-        grain.shape.distance_within(y, limit)
+impl Rival<'_> {
+    /// Distance of `x` from its surface [m] where that is at most `limit`, else that or infinity.
+    fn distance(&self, x: DVec3, limit: f64) -> f64 {
+        let (pose, x) = (&self.grain.pose, x - self.shift);
+        let far = self.grain.shape.bounding_radius() + limit;
+        if x.distance_squared(pose.position) > far * far {
+            return f64::INFINITY;
+        }
+        self.shape.distance(pose.to_body(x))
     }
 }
 

@@ -3,9 +3,12 @@
 mod advection;
 mod aperture;
 mod locate;
+mod near;
+mod places;
 mod rigidity;
 
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::dem::Grain;
@@ -42,7 +45,8 @@ impl Coupling {
         kinematic_viscosity: f64,
         grains: &[Grain],
     ) -> Coupling {
-        let locator = Locator::new(flow.mesh(), flow.boundaries(), scheme, kinematic_viscosity);
+        let (mesh, boundaries) = (flow.mesh(), flow.boundaries());
+        let locator = Locator::new(mesh, boundaries, scheme, kinematic_viscosity, grains);
         let mut coupling = Coupling {
             scheme,
             fluid_density,
@@ -59,9 +63,9 @@ impl Coupling {
     }
 
     /// Corrects the advection just predicted where grains close part of a link.
-    pub fn correct_advection(&self, flow: &mut Flow, grains: &[Grain]) {
+    pub fn correct_advection(&mut self, flow: &mut Flow, grains: &[Grain]) {
         if self.scheme == Scheme::Aperture {
-            advection::correct(&self.locator, flow, grains, &self.bodies);
+            advection::correct(self.locator.band(), flow, grains, &mut self.bodies);
         }
     }
 
@@ -82,20 +86,15 @@ impl Coupling {
         } else {
             0.0
         };
-        for (index, body) in self.bodies.iter_mut().enumerate() {
-            let impulse = rigidity::gather(flow, self.fluid_density, body, before[index], relief);
-            loads[index] = rigidity::advance(
-                &mut grains[index],
-                before[index],
-                &impulse,
-                self.fluid_density,
-                other[index],
-                dt,
-            );
-        }
-        for (index, body) in self.bodies.iter().enumerate() {
-            rigidity::impose(flow, &grains[index], body, before[index], relief);
-        }
+        let (flow_before, fluid_density) = (&*flow, self.fluid_density);
+        let grains_with = self.bodies.par_iter_mut().zip(&mut *grains).zip(loads);
+        let each = grains_with.enumerate();
+        each.for_each(|(index, ((body, grain), load))| {
+            let before = before[index];
+            let impulse = rigidity::gather(flow_before, fluid_density, body, before, relief);
+            *load = rigidity::advance(grain, before, &impulse, fluid_density, other[index], dt);
+        });
+        rigidity::impose(flow, grains, &self.bodies, before, relief);
     }
 
     /// Gives the fluid inside and next to the grains their rigid velocity, for initial states.
@@ -109,13 +108,11 @@ impl Coupling {
         }
         // A step this long closes every face of the band.
         self.locate(grains, f64::MAX.sqrt());
-        let still = [DVec3::ZERO; 2];
-        for body in &mut self.bodies {
-            rigidity::gather(flow, self.fluid_density, body, still, 0.0);
+        let still = vec![[DVec3::ZERO; 2]; grains.len()];
+        for (body, still) in self.bodies.iter_mut().zip(&still) {
+            rigidity::gather(flow, self.fluid_density, body, *still, 0.0);
         }
-        for (grain, body) in grains.iter().zip(&self.bodies) {
-            rigidity::impose(flow, grain, body, still, 0.0);
-        }
+        rigidity::impose(flow, grains, &self.bodies, &still, 0.0);
         for axis in 0..3 {
             let (from, to) = (
                 flow.predicted.component(axis),
@@ -128,6 +125,6 @@ impl Coupling {
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        self.bodies.iter().map(Body::bytes).sum()
+        self.bodies.iter().map(Body::bytes).sum::<usize>() + self.locator.bytes()
     }
 }

@@ -10,10 +10,12 @@
 //! m_s and m_f masses of the grain and of the fluid it displaces.
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::locate::{Body, ForcedFace};
 use crate::dem::{Dof, Grain};
 use crate::flow::Flow;
+use crate::grid::FaceVector;
 use crate::math::{Load, Matrix6, Vector6, solve6};
 
 /// What a step of the fluid does to one grain.
@@ -116,15 +118,29 @@ pub fn advance(
     }
 }
 
-/// Gives the forced faces what the grain gives them; arguments as of [`gather`], which came before.
-pub fn impose(flow: &mut Flow, grain: &Grain, body: &Body, before: [DVec3; 2], relief: f64) {
-    for face in &body.forced {
-        let rigid = rigid_velocity([grain.velocity, grain.angular_velocity], face);
-        let change = rigid - rigid_velocity(before, face);
-        flow.predicted.component_mut(face.axis)[face.at] += face.closed * face.back
-            + face.share * (rigid - face.free)
-            + follow(face, relief) * change;
-    }
+/// Gives the forced faces what the grains give them; arguments as of [`gather`], which came before.
+pub fn impose(
+    flow: &mut Flow,
+    grains: &[Grain],
+    bodies: &[Body],
+    before: &[[DVec3; 2]],
+    relief: f64,
+) {
+    let FaceVector { x, y, z } = &mut flow.predicted;
+    let components: [&mut [f64]; 3] = [x, y, z];
+    let each = components.into_par_iter().enumerate();
+    each.for_each(|(axis, predicted)| {
+        for ((grain, body), before) in grains.iter().zip(bodies).zip(before) {
+            let now = [grain.velocity, grain.angular_velocity];
+            for face in body.forced_along(axis) {
+                let rigid = rigid_velocity(now, face);
+                let change = rigid - rigid_velocity(*before, face);
+                predicted[face.at] += face.closed * face.back
+                    + face.share * (rigid - face.free)
+                    + follow(face, relief) * change;
+            }
+        }
+    });
 }
 
 /// Part of the grain's change of velocity that a face takes beside its share of the velocity.
@@ -149,7 +165,7 @@ fn moved_pressure_pull(
     [velocity, omega]: [DVec3; 2],
     dt: f64,
 ) -> f64 {
-    if dt == 0.0 {
+    if dt == 0.0 || face.closed_by_all == 0.0 {
         return 0.0;
     }
     let (p, strides) = (&flow.pressure, flow.mesh().layout().strides());

@@ -3,6 +3,7 @@
 //! Legend: u velocity, p dynamic pressure over density, phi its increment, H tendency.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of};
 use crate::math::lanes::dispatch;
@@ -167,12 +168,21 @@ impl Flow {
         self.weight = now;
     }
 
-    /// Adds `extra` [m/s^2] to the tendency of one face after `predict`, as if it had been part of
-    /// H^n. Only for faces that are unknowns.
-    #[inline]
-    pub fn add_tendency(&mut self, axis: usize, at: usize, extra: f64) {
-        self.tendency.component_mut(axis)[at] += extra;
-        self.predicted.component_mut(axis)[at] += self.weight * extra;
+    /// Adds to the tendency after `predict`, as if it had been part of H^n. `each` is called for every
+    /// component, in parallel, with `add(at, extra)` [m/s^2]; only for faces that are unknowns.
+    pub fn add_tendency(&mut self, each: impl Fn(usize, &mut dyn FnMut(usize, f64)) + Sync) {
+        let weight = self.weight;
+        let FaceVector { x, y, z } = &mut self.tendency;
+        let tendency: [&mut [f64]; 3] = [x, y, z];
+        let FaceVector { x, y, z } = &mut self.predicted;
+        let predicted: [&mut [f64]; 3] = [x, y, z];
+        let components = tendency.into_par_iter().zip(predicted).enumerate();
+        components.for_each(|(component, (tendency, predicted))| {
+            each(component, &mut |at, extra| {
+                tendency[at] += extra;
+                predicted[at] += weight * extra;
+            });
+        });
     }
 
     /// Solves lap(phi) = div(u*)/dt, sets u = u* - dt grad(phi), p += phi, and fills the ghosts.

@@ -1,0 +1,141 @@
+//! Distances from a grain near it, at a few nanoseconds each wherever the point lies.
+//!
+//! The grid of a sampled shape ends closer to the surface than the flow asks for, and distances off
+//! it are searched for. Here a second, coarser grid about the first holds them.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::DVec3;
+use grainwake_shape::{Field, SampledField, Shape};
+
+use crate::dem::Grain;
+
+/// Samples of the coarse grid across the band.
+const SAMPLES: f64 = 3.0;
+
+/// The shapes of all grains with what lies about them.
+pub struct NearShapes {
+    /// Of each grain.
+    shapes: Vec<NearShape>,
+}
+
+/// A shape and the distances about it.
+#[derive(Clone)]
+pub struct NearShape {
+    shape: Arc<Shape>,
+    /// None where the shape answers by itself, like a sphere.
+    about: Option<Arc<SampledField>>,
+}
+
+impl NearShapes {
+    /// For distances up to `reach` [m] about the grains, in a flow with the band `eps` [m].
+    pub fn new(grains: &[Grain], eps: f64, reach: f64) -> NearShapes {
+        let mut known: HashMap<*const Shape, NearShape> = HashMap::new();
+        let of = |grain: &Grain| {
+            let near = known.entry(Arc::as_ptr(&grain.shape));
+            near.or_insert_with(|| NearShape::new(&grain.shape, eps, reach))
+                .clone()
+        };
+        NearShapes {
+            shapes: grains.iter().map(of).collect(),
+        }
+    }
+
+    /// That of grain `index`.
+    pub fn of(&self, index: usize) -> &NearShape {
+        &self.shapes[index]
+    }
+
+    /// Memory held beside the shapes [bytes].
+    pub fn bytes(&self) -> usize {
+        let mut fields: Vec<_> = self
+            .shapes
+            .iter()
+            .filter_map(|n| n.about.as_ref())
+            .collect();
+        fields.sort_by_key(|field| Arc::as_ptr(field));
+        fields.dedup_by_key(|field| Arc::as_ptr(field));
+        let levels = fields.iter().map(|field| field.levels().len());
+        size_of::<f32>() * levels.sum::<usize>()
+    }
+}
+
+impl NearShape {
+    fn new(shape: &Arc<Shape>, eps: f64, reach: f64) -> NearShape {
+        let about = if let Field::Sampled(field) = shape.field() {
+            // No finer than the shape itself, so that large grains cost no more than that.
+            let spacing = (eps / SAMPLES).max(field.spacing());
+            let margin = reach + spacing;
+            shape.resampled(spacing, margin).ok().map(Arc::new)
+        } else {
+            None
+        };
+        NearShape {
+            shape: shape.clone(),
+            about,
+        }
+    }
+
+    /// Signed distance [m] at `x` in the frame of the grain; may be infinite where it is more than
+    /// the reach.
+    #[inline]
+    pub fn distance(&self, x: DVec3) -> f64 {
+        match (self.shape.field(), &self.about) {
+            (Field::Sampled(field), Some(about)) => field
+                .distance_on_grid(x)
+                .or_else(|| about.distance_on_grid(x))
+                .unwrap_or(f64::INFINITY),
+            _ => self.shape.distance(x),
+        }
+    }
+
+    /// Unit normal at `x` in the frame of the grain, out of the grain.
+    #[inline]
+    pub fn normal(&self, x: DVec3) -> DVec3 {
+        let gradient = match (self.shape.field(), &self.about) {
+            (Field::Sampled(field), Some(about)) => field
+                .gradient_on_grid(x)
+                .or_else(|| about.gradient_on_grid(x))
+                .unwrap_or_else(|| self.shape.distance_and_gradient(x).1),
+            _ => self.shape.distance_and_gradient(x).1,
+        };
+        gradient.normalize_or_zero()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use grainwake_shape::{ShapeOptions, analytic};
+
+    #[test]
+    fn distances_about_a_shape_go_on_where_its_grid_ends() {
+        // An ellipsoid of 8 cells of the flow across.
+        let (eps, reach) = (0.25, 0.625);
+        let shape = analytic::ellipsoid(1.0, 0.8, 0.7, &ShapeOptions::default()).unwrap();
+        let shape = Arc::new(shape);
+        let near = NearShape::new(&shape, eps, reach);
+        let mut beyond = 0;
+        for i in 0..20_000 {
+            let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
+            let x = 1.7 * (2.0 * u.fract() - DVec3::ONE);
+            let (exact, gradient) = shape.distance_and_gradient(x);
+            if exact > reach {
+                assert!(near.distance(x) > 0.97 * reach, "at {x}");
+                continue;
+            }
+            let Field::Sampled(field) = shape.field() else {
+                unreachable!("ellipsoids are sampled")
+            };
+            if field.distance_on_grid(x).is_some() {
+                assert_eq!(near.distance(x), exact, "at {x}");
+                continue;
+            }
+            beyond += 1;
+            assert!((near.distance(x) - exact).abs() < 0.01 * eps, "at {x}");
+            assert!(near.normal(x).dot(gradient) > 0.995, "at {x}");
+        }
+        assert!(beyond > 1000, "{beyond}");
+    }
+}
