@@ -206,6 +206,33 @@ fn what_falls_short_is_exit_code_1_and_another_run_can_be_the_reference() {
 }
 
 #[test]
+fn a_run_asked_for_brings_those_it_is_compared_with_and_theirs() {
+    let slower = r#"
+[[run]]
+name = "slower"
+level = "full"
+set = ["gravity=[0,0,-1.5]"]
+
+[[run.check]]
+quantity = "acceleration"
+take = "slope"
+of = "vz"
+reference = { run = "slow" }
+tolerance = "10 %"
+"#;
+    let (folder, _) = suites(&format!("{SUITE}{slower}"));
+    let done = validate(folder.path(), &["fall/slower", "--level", "full", "--json"]).code(1);
+    let list: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
+    let of = |run: &str| {
+        let mut all = list.as_array().unwrap().iter();
+        all.find(|v| v["run"] == run && v["quantity"] == "acceleration")
+            .unwrap_or_else(|| panic!("{run} in {list}"))
+    };
+    assert_eq!(of("slower")["reference"], of("slow")["value"]);
+    assert_eq!(of("slow")["reference"], of("fall")["value"]);
+}
+
+#[test]
 fn finished_runs_are_kept_only_if_asked() {
     let (folder, suite) = suites(SUITE);
     validate(folder.path(), &[]).success();

@@ -1,6 +1,7 @@
 //! `validation.toml`: what is run, what is measured, and what it should be.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
+
 use std::path::{Path, PathBuf};
 
 use grainwake_solver::case::{Loc, Problem, Source, nearest};
@@ -189,20 +190,25 @@ impl Suite {
         build(&source, raw, folder, name).map_err(|p| SuiteError::Invalid(Box::new(p)))
     }
 
-    /// The suite with the runs whose names are `wanted`, and those that their checks compare with.
+    /// The suite with the runs whose names are `wanted`, those that their checks compare with, and so
+    /// on.
     pub fn only(mut self, wanted: impl Fn(&str) -> bool) -> Suite {
-        let needed: Vec<String> = self
-            .runs
-            .iter()
-            .filter(|run| wanted(&run.name))
-            .flat_map(|run| &run.checks)
-            .filter_map(|check| match &check.reference {
-                Some(Reference::Run(name)) => Some(name.clone()),
-                _ => None,
-            })
-            .collect();
-        self.runs
-            .retain(|run| wanted(&run.name) || needed.contains(&run.name));
+        // A run compares with earlier ones.
+        let mut needed = HashSet::new();
+        for run in self.runs.iter().rev() {
+            if wanted(&run.name) || needed.contains(&run.name) {
+                needed.insert(run.name.clone());
+                needed.extend(
+                    run.checks
+                        .iter()
+                        .filter_map(|check| match &check.reference {
+                            Some(Reference::Run(name)) => Some(name.clone()),
+                            _ => None,
+                        }),
+                );
+            }
+        }
+        self.runs.retain(|run| needed.contains(&run.name));
         self
     }
 
