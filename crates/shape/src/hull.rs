@@ -204,7 +204,7 @@ impl<'a> Hull<'a> {
         corners.iter().map(|i| self.points[*i as usize]).collect()
     }
 
-    /// Volume, checked: no point may lie above a facet by more than rounding explains.
+    /// Volume; of few points checked: none may lie above a facet by more than rounding explains.
     fn volume(&self) -> Option<f64> {
         let reference = self.points[0];
         let mut six = 0.0;

@@ -511,3 +511,21 @@ fn a_grain_that_meets_its_own_images_is_one_grain() {
     let drag = simulation.loads()[0].force.x;
     assert!((drag / (0.01 * volume) - 1.0).abs() < 1e-3, "{drag}");
 }
+
+/// A plane flow past a rod: one cell of the mesh along it, thick as the box is wide.
+#[test]
+fn a_sampled_grain_in_a_flat_box_is_held_and_takes_little_memory() {
+    let rod = grainwake_shape::analytic::capsule(0.1, 1.6, &Default::default()).unwrap();
+    let mut grain = sphere(1.0, DVec3::new(0.5, 0.5, 0.5), 1.0);
+    grain.shape = Arc::new(rod);
+    (grain.translation, grain.rotation) = (HELD, HELD);
+    let [x, y] = [PERIODIC, WALLS];
+    let mut case = setup([64, 64, 1], 1.0 / 64.0, [x, y, PERIODIC], 0.01, vec![grain]);
+    case.mesh.spacing.z = 1.0;
+    case.fluid.as_mut().unwrap().initial_velocity = DVec3::X;
+    let mut sim = Simulation::new(case).unwrap();
+    assert!(sim.bytes() < 8_000_000, "{} bytes", sim.bytes());
+    run(&mut sim, 0.05);
+    let drag = sim.loads()[0].force;
+    assert!(drag.x > 0.0 && drag.y.abs() < 1e-3 * drag.x, "{drag}");
+}

@@ -26,7 +26,7 @@ fn difference(to_solid: &[f32], to_void: &[f32]) -> Vec<f32> {
     to_solid.par_iter().zip(to_void).map(distance).collect()
 }
 
-/// The same up to `reach` voxels; beyond, farther than that.
+/// The same up to `reach` - 1/2 voxels; beyond, farther than that.
 pub(crate) fn signed_near(mask: &Mask, reach: usize) -> Vec<f32> {
     let outside = squared(mask, true, |lines, n| lower_near(lines, n, reach));
     let inside = squared(mask, false, |lines, n| lower_near(lines, n, reach));

@@ -103,9 +103,11 @@ impl Body {
     }
 }
 
-/// How far from its surface a grain matters [m].
+/// How far from its surface a grain matters [m]: links run along axes of more than one cell.
 fn reach(eps: f64, mesh: &Mesh) -> f64 {
-    2.0 * eps + 0.5 * mesh.spacing.max_element()
+    let spacings = (0..3).filter(|&axis| mesh.cells[axis] > 1);
+    let longest = spacings.map(|axis| mesh.spacing[axis]).fold(0.0, f64::max);
+    2.0 * eps + 0.5 * longest
 }
 
 /// Where to look for grains and how.

@@ -11,8 +11,9 @@ use grainwake_shape::{Field, SampledField, Shape};
 
 use crate::dem::Grain;
 
-/// Samples of the coarse grid across the band.
+/// Samples of the coarse grid in half the band, and across a grain: what counts more.
 const SAMPLES: f64 = 3.0;
+const ACROSS: f64 = 12.0;
 
 /// The shapes of all grains with what lies about them.
 pub struct NearShapes {
@@ -24,8 +25,10 @@ pub struct NearShapes {
 #[derive(Clone)]
 pub struct NearShape {
     shape: Arc<Shape>,
-    /// None where the shape answers by itself, like a sphere.
+    /// None where the shape answers by itself: a sphere, or a grid that reaches as far.
     about: Option<Arc<SampledField>>,
+    /// How far distances are asked for [m].
+    reach: f64,
 }
 
 impl NearShapes {
@@ -61,11 +64,20 @@ impl NearShapes {
     }
 }
 
+/// Does the grid of a field hold this box?
+fn holds(field: &SampledField, lower: DVec3, upper: DVec3) -> bool {
+    field.lower().cmple(lower).all() && field.upper().cmpge(upper).all()
+}
+
 impl NearShape {
     fn new(shape: &Arc<Shape>, eps: f64, reach: f64) -> NearShape {
-        let about = if let Field::Sampled(field) = shape.field() {
+        let about = if let Field::Sampled(field) = shape.field()
+            && !holds(field, shape.lower() - reach, shape.upper() + reach)
+        {
             // No finer than the shape itself, so that large grains cost no more than that.
-            let spacing = (eps / SAMPLES).max(field.spacing());
+            let thickness = (shape.upper() - shape.lower()).min_element();
+            let spacing = (eps / SAMPLES).min(thickness / ACROSS);
+            let spacing = spacing.max(field.spacing());
             let margin = reach + spacing;
             shape.resampled(spacing, margin).ok().map(Arc::new)
         } else {
@@ -74,6 +86,7 @@ impl NearShape {
         NearShape {
             shape: shape.clone(),
             about,
+            reach,
         }
     }
 
@@ -86,7 +99,7 @@ impl NearShape {
                 .distance_on_grid(x)
                 .or_else(|| about.distance_on_grid(x))
                 .unwrap_or(f64::INFINITY),
-            _ => self.shape.distance(x),
+            _ => self.shape.distance_within(x, self.reach),
         }
     }
 
@@ -109,33 +122,48 @@ mod tests {
     use super::*;
     use grainwake_shape::{ShapeOptions, analytic};
 
+    /// An ellipsoid of half-axes 1, .8 and .7.
+    fn ellipsoid() -> Arc<Shape> {
+        Arc::new(analytic::ellipsoid(1.0, 0.8, 0.7, &ShapeOptions::default()).unwrap())
+    }
+
     #[test]
     fn distances_about_a_shape_go_on_where_its_grid_ends() {
-        // An ellipsoid of 8 cells of the flow across.
-        let (eps, reach) = (0.25, 0.625);
-        let shape = analytic::ellipsoid(1.0, 0.8, 0.7, &ShapeOptions::default()).unwrap();
-        let shape = Arc::new(shape);
-        let near = NearShape::new(&shape, eps, reach);
-        let mut beyond = 0;
-        for i in 0..20_000 {
-            let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
-            let x = 1.7 * (2.0 * u.fract() - DVec3::ONE);
-            let (exact, gradient) = shape.distance_and_gradient(x);
-            if exact > reach {
-                assert!(near.distance(x) > 0.97 * reach, "at {x}");
-                continue;
+        let shape = ellipsoid();
+        let Field::Sampled(field) = shape.field() else {
+            unreachable!("ellipsoids are sampled")
+        };
+        // 8 and 3 cells of the flow across.
+        for (eps, tolerance) in [(0.25, 0.01), (0.67, 0.03)] {
+            let reach = 2.5 * eps;
+            let near = NearShape::new(&shape, eps, reach);
+            let mut beyond = 0;
+            for i in 0..20_000 {
+                let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
+                let x = (1.1 + reach) * (2.0 * u.fract() - DVec3::ONE);
+                let (exact, gradient) = shape.distance_and_gradient(x);
+                if exact > reach {
+                    assert!(near.distance(x) > 0.97 * reach, "at {x}");
+                } else if field.distance_on_grid(x).is_some() {
+                    assert_eq!(near.distance(x), exact, "at {x}");
+                } else {
+                    beyond += 1;
+                    let off = (near.distance(x) - exact).abs() / eps;
+                    assert!(off < tolerance, "{off} of the band at {x}");
+                    assert!(near.normal(x).dot(gradient) > 0.99, "at {x}");
+                }
             }
-            let Field::Sampled(field) = shape.field() else {
-                unreachable!("ellipsoids are sampled")
-            };
-            if field.distance_on_grid(x).is_some() {
-                assert_eq!(near.distance(x), exact, "at {x}");
-                continue;
-            }
-            beyond += 1;
-            assert!((near.distance(x) - exact).abs() < 0.01 * eps, "at {x}");
-            assert!(near.normal(x).dot(gradient) > 0.995, "at {x}");
+            assert!(beyond > 1000, "{beyond}");
         }
-        assert!(beyond > 1000, "{beyond}");
+    }
+
+    #[test]
+    fn a_grid_that_reaches_far_enough_is_not_doubled() {
+        let near = |eps| NearShape::new(&ellipsoid(), eps, 2.5 * eps);
+        assert!(near(0.25).about.is_some());
+        let near = near(0.05);
+        assert!(near.about.is_none());
+        assert!(near.distance(DVec3::new(0.0, 0.0, 5.0)) > 0.125);
+        assert!((near.distance(DVec3::new(0.0, 0.0, 0.8)) - 0.1).abs() < 1e-3);
     }
 }
