@@ -103,13 +103,6 @@ impl Body {
     }
 }
 
-/// How far from its surface a grain matters [m]: links run along axes of more than one cell.
-fn reach(eps: f64, mesh: &Mesh) -> f64 {
-    let spacings = (0..3).filter(|&axis| mesh.cells[axis] > 1);
-    let longest = spacings.map(|axis| mesh.spacing[axis]).fold(0.0, f64::max);
-    2.0 * eps + 0.5 * longest
-}
-
 /// Where to look for grains and how.
 pub struct Locator {
     mesh: Mesh,
@@ -118,6 +111,8 @@ pub struct Locator {
     kinematic_viscosity: f64,
     /// Half-width of the band [m].
     eps: f64,
+    /// How far from its surface a grain matters [m].
+    reach: f64,
     shapes: NearShapes,
 }
 
@@ -135,13 +130,16 @@ impl Locator {
             .map(|axis| mesh.spacing[axis])
             .collect();
         let eps = resolved.iter().sum::<f64>() / resolved.len().max(1) as f64;
+        // Links run along axes of more than one cell.
+        let reach = 2.0 * eps + 0.5 * resolved.iter().copied().fold(0.0, f64::max);
         Locator {
             mesh: *mesh,
             unknowns: Unknowns::new(mesh, boundaries),
             scheme,
             kinematic_viscosity,
             eps,
-            shapes: NearShapes::new(grains, eps, reach(eps, mesh)),
+            reach,
+            shapes: NearShapes::new(grains, eps, reach),
         }
     }
 
@@ -165,16 +163,11 @@ impl Locator {
         });
     }
 
-    /// How far from its surface a grain matters [m].
-    fn reach(&self) -> f64 {
-        reach(self.eps, &self.mesh)
-    }
-
     /// Distances in the box about a grain.
     fn measure(&self, grain: &Grain, shape: &NearShape, rivals: &[Rival], body: &mut Body) {
         let mesh = &self.mesh;
         let centre = grain.pose.position;
-        let reach = self.reach();
+        let reach = self.reach;
         let turn = glam::DMat3::from_quat(grain.pose.orientation);
         let (lower, upper) = (grain.shape.lower(), grain.shape.upper());
         let middle = centre + turn * (0.5 * (lower + upper));
@@ -240,7 +233,7 @@ impl Locator {
     /// Grains, and periodic images of them and of the grain itself, whose band may meet that of
     /// grain `index`.
     fn rivals<'a>(&'a self, grains: &'a [Grain], index: usize) -> Vec<Rival<'a>> {
-        let (grain, extent, reach) = (&grains[index], self.mesh.extent(), self.reach());
+        let (grain, extent, reach) = (&grains[index], self.mesh.extent(), self.reach);
         let mut rivals = Vec::new();
         for (other, rival) in grains.iter().enumerate() {
             let radii = grain.shape.bounding_radius() + rival.shape.bounding_radius();
