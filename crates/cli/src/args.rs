@@ -103,6 +103,9 @@ pub struct ValidateArgs {
     /// Add the results to LEVEL.json and LEVEL.md in this folder, with their provenance, and draw the figures
     #[arg(long, value_name = "DIR")]
     pub save: Option<PathBuf>,
+    /// Change a value of every case, for example run.precision="f32"
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
     /// Keep what is already there of the same cases and program
     #[arg(long)]
     pub resume: bool,
@@ -188,6 +191,9 @@ pub struct BenchArgs {
     /// Coupling scheme
     #[arg(long, default_value = "aperture", value_parser = ["aperture", "paper"])]
     pub scheme: String,
+    /// Floating-point type of the fields
+    #[arg(long, default_value = "f64", value_parser = ["f64", "f32"])]
+    pub precision: String,
     /// Measure cubes of 32 to 256 cells along each edge instead, awkward sizes among them
     #[arg(long, conflicts_with = "size")]
     pub scaling: bool,

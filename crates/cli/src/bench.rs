@@ -10,7 +10,7 @@ use grainwake_solver::coupling::Scheme;
 use grainwake_solver::dem::{ContactParams, Dof, Grain};
 use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
-use grainwake_solver::math::Pose;
+use grainwake_solver::math::{Pose, Precision};
 use grainwake_solver::sim::{Setup, Simulation, StepRule};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -19,8 +19,8 @@ use crate::args::BenchArgs;
 use crate::exit::{BAD_INPUT, Exit};
 use crate::{print, threads};
 
-/// Bytes per cell that each pass must move through memory, counting a read and a write of a double
-/// as eight each (what a store fetches before it writes is left out, as in the triad):
+/// Numbers per cell that each pass must move through memory, each read and each write counted (what
+/// a store fetches before it writes is left out, as in the triad):
 ///
 /// - predict: reads u (3), the old tendency (3), p; writes the tendency (3) and u* (3);
 /// - divergence: reads u* (3), writes the modes;
@@ -30,10 +30,10 @@ use crate::{print, threads};
 /// The passes cannot be merged: rigidity changes u* between the first two, every column needs all
 /// planes of modes, and every plane needs all columns.
 const TRAFFIC: [(&str, f64); 4] = [
-    ("predict", 8.0 * 13.0),
-    ("divergence", 8.0 * 4.0),
-    ("columns", 8.0 * 2.0),
-    ("correct", 8.0 * 9.0),
+    ("predict", 13.0),
+    ("divergence", 4.0),
+    ("columns", 2.0),
+    ("correct", 9.0),
 ];
 /// Cells along each edge of the cubes of `--scaling`: powers of two, round numbers, and primes.
 const CUBES: [usize; 14] = [
@@ -49,6 +49,7 @@ struct Load {
     cells: [usize; 3],
     grains: usize,
     scheme: Scheme,
+    precision: Precision,
 }
 
 /// What was measured. The JSON names are stable.
@@ -57,6 +58,7 @@ struct Measured {
     cells: [usize; 3],
     grains: usize,
     threads: usize,
+    precision: Precision,
     steps: u64,
     /// Median over the steps.
     ns_per_cell_step: f64,
@@ -94,6 +96,11 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     } else {
         Scheme::Aperture
     };
+    let precision = if args.precision == "f32" {
+        Precision::Single
+    } else {
+        Precision::Double
+    };
     let sizes = if args.scaling {
         CUBES.map(|n| [n; 3]).to_vec()
     } else {
@@ -106,6 +113,7 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
                 cells,
                 grains: args.grains,
                 scheme,
+                precision,
             };
             measure(&load, args.steps, threads)
         })
@@ -120,7 +128,12 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
 }
 
 fn measure(load: &Load, steps: u64, threads: usize) -> Result<Measured, Exit> {
-    let Load { cells, grains, .. } = *load;
+    let Load {
+        cells,
+        grains,
+        precision,
+        ..
+    } = *load;
     let count = cells.iter().product::<usize>() as f64;
     let mut sim = Simulation::new(setup(load)?).map_err(|e| Exit::new(BAD_INPUT, e.to_string()))?;
     let advance = |sim: &mut Simulation| {
@@ -146,10 +159,10 @@ fn measure(load: &Load, steps: u64, threads: usize) -> Result<Measured, Exit> {
     let bytes_per_cell = sim.bytes() as f64 / count;
     let names = sim.pass_times().map(|(name, _)| name);
     drop(sim);
-    let triad = triad_bandwidth();
+    let (triad, size) = (triad_bandwidth(), precision.bytes() as f64);
     let limit = |name: &str| {
-        let bytes = TRAFFIC.iter().find(|(pass, _)| *pass == name);
-        bytes.map(|(_, bytes)| 1e9 * bytes / triad)
+        let moved = TRAFFIC.iter().find(|(pass, _)| *pass == name);
+        moved.map(|(_, numbers)| 1e9 * numbers * size / triad)
     };
     let mut passes: Vec<Pass> = names
         .into_iter()
@@ -166,12 +179,13 @@ fn measure(load: &Load, steps: u64, threads: usize) -> Result<Measured, Exit> {
         ns_per_cell_step: (ns - named).max(0.0),
         limit_ns_per_cell_step: None,
     });
-    let traffic: f64 = TRAFFIC.iter().map(|(_, bytes)| bytes).sum();
+    let traffic = size * TRAFFIC.iter().map(|(_, numbers)| numbers).sum::<f64>();
     let limit = 1e9 * traffic / triad;
     Ok(Measured {
         cells,
         grains,
         threads,
+        precision,
         steps,
         ns_per_cell_step: ns,
         bytes_per_cell,
@@ -230,6 +244,7 @@ fn setup(load: &Load) -> Result<Setup, Exit> {
         cells,
         grains,
         scheme,
+        precision,
     } = *load;
     let spacing = DVec3::splat(0.25e-3);
     let mesh = Mesh {
@@ -265,6 +280,7 @@ fn setup(load: &Load) -> Result<Setup, Exit> {
             initial_velocity: DVec3::ZERO,
             advection: Advection::Central,
         }),
+        precision,
         scheme,
         gravity: DVec3::new(0.0, 0.0, -9.81),
         grains: places(cells, grains)?.into_iter().map(grain).collect(),
@@ -309,8 +325,14 @@ fn triad_bandwidth() -> f64 {
 fn table(m: &Measured) -> String {
     let mut lines = vec![
         format!(
-            "{} x {} x {} cells, {} grains, {} threads, {} steps",
-            m.cells[0], m.cells[1], m.cells[2], m.grains, m.threads, m.steps
+            "{} x {} x {} cells of {} bytes a number, {} grains, {} threads, {} steps",
+            m.cells[0],
+            m.cells[1],
+            m.cells[2],
+            m.precision.bytes(),
+            m.grains,
+            m.threads,
+            m.steps
         ),
         format!(
             "time        {:8.2} ns per cell per step",

@@ -251,6 +251,16 @@ fn bench_measures_time_memory_and_the_limit() {
     }
     assert!(measured["passes"].as_array().is_some_and(|p| p.len() >= 7));
     assert_eq!(measured["grains"], 7);
+    let single = grainwake()
+        .args(["bench", "--size", "24", "24", "48", "--grains", "7"])
+        .args(["--steps", "2", "--precision", "f32", "--json"])
+        .assert()
+        .success();
+    let single = json(&single.get_output().stdout);
+    assert_eq!(single["precision"], "f32");
+    assert_eq!(single["traffic_bytes_per_cell"], 112.0);
+    let bytes = |m: &serde_json::Value| m["bytes_per_cell"].as_f64().unwrap();
+    assert!(bytes(&single) < 0.8 * bytes(&measured), "{single}");
     // Two by two by four places of eleven cells.
     let many = grainwake()
         .args(["bench", "--size", "24", "24", "48", "--grains", "17"])

@@ -121,6 +121,18 @@ fn what_holds_is_said_and_json_has_the_stable_names() {
 }
 
 #[test]
+fn a_value_can_be_changed_in_every_case() {
+    let (folder, _) = suites(SUITE);
+    let moon = ["--set", "gravity=[0,0,-1.62]"];
+    validate(folder.path(), &moon)
+        .code(1)
+        .stderr(contains("acceleration: -1.62"));
+    validate(folder.path(), &["--set", "gravitas=1"])
+        .code(2)
+        .stderr(contains("gravity"));
+}
+
+#[test]
 fn saved_results_are_replaced_run_by_run() {
     let (folder, _) = suites(SUITE);
     let save = ["--save", "kept"];

@@ -264,9 +264,9 @@ fn values_out_of_range_are_refused() {
     );
     refused(
         "[time]",
-        "[run]\nprecision = \"f32\"\n[time]",
+        "[run]\nprecision = \"f16\"\n[time]",
         "run.precision",
-        &["f64"],
+        &["f16", "f32", "f64"],
     );
     refused(
         "[time]",

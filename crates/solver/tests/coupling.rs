@@ -9,7 +9,7 @@ use grainwake_solver::coupling::Scheme;
 use grainwake_solver::dem::{ContactParams, Dof, Grain};
 use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
-use grainwake_solver::math::{Formula, Pose};
+use grainwake_solver::math::{Formula, Pose, Precision};
 use grainwake_solver::sim::{Drive, Setup, Simulation, StepRule};
 
 /// Steps limited by this Courant number.
@@ -66,6 +66,7 @@ fn setup(
         },
         boundaries: Boundaries(boundaries),
         fluid: Some(water(nu)),
+        precision: Precision::Double,
         scheme: Scheme::Aperture,
         gravity: DVec3::ZERO,
         grains,
@@ -421,7 +422,7 @@ fn ten_cate_e4_on_the_coarse_mesh() {
 
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
-    let bits = |threads| {
+    let bits = |threads, precision| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
@@ -433,6 +434,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
             ];
             let mut case = setup([24, 24, 30], 1.0 / 8.0, [WALLS; 3], 0.02, grains);
             case.gravity = DVec3::new(0.0, 0.0, -5.0);
+            case.precision = precision;
             let mut sim = Simulation::new(case).unwrap();
             for _ in 0..40 {
                 sim.step(f64::INFINITY).unwrap();
@@ -442,12 +444,19 @@ fn bits_do_not_depend_on_the_number_of_threads() {
             state
         })
     };
-    let one = bits(1);
-    assert!(one == bits(2) && one == bits(3));
+    for precision in [Precision::Double, Precision::Single] {
+        let one = bits(1, precision);
+        assert!(one == bits(2, precision) && one == bits(3, precision));
+    }
 }
 
 #[test]
 fn a_restored_state_continues_with_the_same_bits() {
+    restores(Precision::Double);
+    restores(Precision::Single);
+}
+
+fn restores(precision: Precision) {
     let make = || {
         let grains = vec![
             sphere(1.0, DVec3::new(1.5, 1.5, 0.8), 1.5),
@@ -455,6 +464,7 @@ fn a_restored_state_continues_with_the_same_bits() {
         ];
         let mut case = setup([24, 24, 24], 1.0 / 8.0, [WALLS; 3], 0.02, grains);
         case.gravity = DVec3::new(0.0, 0.0, -5.0);
+        case.precision = precision;
         Simulation::new(case).unwrap()
     };
     let state = |sim: &Simulation| {
@@ -484,6 +494,50 @@ fn a_restored_state_continues_with_the_same_bits() {
         make().restore(&mut &middle[..middle.len() / 2]).is_err(),
         "a cut state must not pass"
     );
+}
+
+#[test]
+fn single_precision_settles_like_double_in_half_the_memory() {
+    let settle = |precision| {
+        let grains = vec![
+            sphere(1.0, DVec3::new(2.0, 2.03, 2.2), 1.5),
+            sphere(1.0, DVec3::new(2.1, 2.0, 3.6), 1.5),
+        ];
+        let mut case = setup([32, 32, 48], 1.0 / 8.0, [WALLS; 3], 0.02, grains);
+        case.gravity = DVec3::new(0.0, 0.0, -5.0);
+        case.precision = precision;
+        let mut sim = Simulation::new(case).unwrap();
+        let bytes = sim.bytes();
+        run(&mut sim, 1.0);
+        (sim, bytes)
+    };
+    let (double, double_bytes) = settle(Precision::Double);
+    let (single, single_bytes) = settle(Precision::Single);
+    let part = single_bytes as f64 / double_bytes as f64;
+    assert!(part < 0.6, "{part} of the memory");
+    for (a, b) in double.grains().iter().zip(single.grains()) {
+        let change = (a.velocity - b.velocity).length() / a.velocity.length();
+        let moved = (a.pose.position - b.pose.position).length();
+        println!(
+            "velocity {} differs by {change:.1e}, place {moved:.1e} d",
+            a.velocity
+        );
+        assert!(change < 1e-6 && moved < 1e-6, "{change:e}, {moved:e}");
+    }
+    for (a, b) in double.loads().iter().zip(single.loads()) {
+        let change = (a.force - b.force).length() / a.force.length();
+        println!("load differs by {change:.1e}");
+        assert!(change < 1e-3, "load {change:e}");
+    }
+    // Momentum is kept to the rounding of its fields.
+    let (d, s) = (double.diagnostics(), single.diagnostics());
+    println!(
+        "residuals {:.1e} {:.1e}, divergence {:.1e} {:.1e}",
+        d.momentum_residual, s.momentum_residual, d.max_divergence, s.max_divergence
+    );
+    assert!(d.momentum_residual < 1e-15 && s.momentum_residual < 1e-9);
+    assert!(d.max_divergence < 1e-13 && s.max_divergence < 1e-5);
+    assert!(s.max_divergence > 1e-9, "these are singles");
 }
 
 #[test]

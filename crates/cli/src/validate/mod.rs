@@ -39,7 +39,7 @@ impl From<SuiteError> for Exit {
 
 /// Runs validations and prints how far each number is from its reference.
 pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
-    let suites = chosen(Suite::all(&args.suites)?, &args.names)?;
+    let suites = chosen(all(args)?, &args.names)?;
     let level = match args.level.as_str() {
         "full" => Level::Full,
         _ => Level::Ci,
@@ -89,7 +89,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         print(&table(&verdicts).to_string())?;
     }
     if let Some(folder) = &args.save {
-        let all = Suite::all(&args.suites)?;
+        let all = all(args)?;
         saved::add(folder, &args.level, &verdicts, &args.output, &all)?;
         let drawn = pictures::add(folder, &suites, &args.output)?;
         pictures::list(folder, &all)?;
@@ -118,6 +118,15 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
             missed.join("\n")
         ),
     ))
+}
+
+/// All suites, their cases changed as `--set` says.
+fn all(args: &ValidateArgs) -> Result<Vec<Suite>, Exit> {
+    let mut suites = Suite::all(&args.suites)?;
+    for run in suites.iter_mut().flat_map(|suite| &mut suite.runs) {
+        run.set.extend(args.set.iter().cloned());
+    }
+    Ok(suites)
 }
 
 /// The suites that were asked for.

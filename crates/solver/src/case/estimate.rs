@@ -7,11 +7,12 @@ use crate::dem::Grain;
 use crate::flow::{Boundary, FluidParams};
 use crate::sim::{Setup, StepRule};
 
-/// Memory of the fields and the solver [bytes per cell], for the estimate; `grainwake bench`
-/// measures it.
-pub const BYTES_PER_CELL: f64 = 110.0;
-/// Time of a step on one thread [ns per cell], for the estimate; `grainwake bench` measures it.
-pub const NS_PER_CELL_STEP: f64 = 40.0;
+/// Numbers of the fields and the solver per cell, for the estimate; `grainwake bench` measures the
+/// bytes.
+const NUMBERS_PER_CELL: f64 = 13.75;
+/// Time of a step on one thread [ns per cell and byte of a number], for the estimate; `grainwake
+/// bench` measures it.
+const NS_PER_CELL_BYTE: f64 = 5.0;
 
 /// Galileo number sqrt(|rho_p / rho_f - 1| g d^3) / nu of a grain.
 pub fn galileo(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
@@ -115,8 +116,9 @@ impl Estimate {
         let cells = setup.mesh.cell_count();
         let contact_time_s = contact_time(setup);
         let wet = fluid.is_some();
+        let numbers = cells as f64 * setup.precision.bytes() as f64;
         let seconds_per_step = if wet {
-            cells as f64 * NS_PER_CELL_STEP * 1e-9 / threads.max(1) as f64
+            numbers * NS_PER_CELL_BYTE * 1e-9 / threads.max(1) as f64
         } else {
             0.0
         };
@@ -132,7 +134,7 @@ impl Estimate {
             steps: steps as u64,
             time_step_s,
             memory_bytes: if wet {
-                (cells as f64 * BYTES_PER_CELL) as u64
+                (numbers * NUMBERS_PER_CELL) as u64
             } else {
                 0
             },

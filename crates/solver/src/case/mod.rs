@@ -54,7 +54,7 @@ pub struct Case {
     pub resolved: String,
     /// Grain files that the case uses.
     pub shapes: Vec<ShapeFile>,
-    /// Hash of everything that decides the results up to a given time: `[run]`, `[expect]`, the
+    /// Hash of everything that decides the results up to a given time: threads, `[expect]`, the
     /// title, the end and the checkpoint intervals do not.
     pub digest: String,
 }
@@ -144,7 +144,8 @@ fn digest(
 ) -> Result<String, CaseError> {
     let mut core = resolved.clone();
     core.title = String::new();
-    core.run = RawRun::default();
+    // Rounding decides results; threads do not.
+    core.run.threads = RawRun::default().threads;
     core.expect = RawExpect::default();
     core.time.end = Default::default();
     core.time.stop = None;

@@ -20,6 +20,7 @@ use super::locate::Body;
 use crate::dem::Grain;
 use crate::flow::Flow;
 use crate::grid::FACE_OFFSET;
+use crate::math::Real;
 
 /// Smallest aperture divided by; smaller ones are unstable on an impulsive start.
 const LEAST_APERTURE: f64 = 0.4;
@@ -34,7 +35,7 @@ pub struct Link {
 
 /// Corrects the tendency of the step just predicted; `bodies` are where `grains` were located, in a
 /// band of half-width `band` [m].
-pub fn correct(band: f64, flow: &mut Flow, grains: &[Grain], bodies: &mut [Body]) {
+pub fn correct<R: Real>(band: f64, flow: &mut Flow<R>, grains: &[Grain], bodies: &mut [Body]) {
     let flow_before = &*flow;
     let each = bodies.par_iter_mut().zip(grains);
     each.for_each(|(body, grain)| {
@@ -57,9 +58,9 @@ pub fn correct(band: f64, flow: &mut Flow, grains: &[Grain], bodies: &mut [Body]
 }
 
 /// Links of `component` along one axis.
-fn correct_links(
+fn correct_links<R: Real>(
     band: f64,
-    flow: &Flow,
+    flow: &Flow<R>,
     grain: &Grain,
     body: &Body,
     component: usize,
@@ -73,9 +74,13 @@ fn correct_links(
     let middle = DVec3::from_array(FACE_OFFSET[component]) + 0.5 * step.as_dvec3() - 1.0;
     let last = body.size - step;
     let next = body.local(step.x, step.y, step.z);
-    let (q, c) = (
+    let (carried, carrying) = (
         flow.velocity.component(component),
         flow.velocity.component(along),
+    );
+    let (q, c) = (
+        |at: usize| carried[at].wide(),
+        |at: usize| carrying[at].wide(),
     );
     for k in 0..last.z {
         for j in 0..last.y {
@@ -93,12 +98,12 @@ fn correct_links(
                 let (Some(from), Some(to)) = (face(0), face(1)) else {
                     continue;
                 };
-                let mean = 0.5 * (q[from] + q[to]);
+                let mean = 0.5 * (q(from) + q(to));
                 let carrier = if along == component {
                     mean
                 } else {
                     // Two faces of the carrying component share the link.
-                    0.5 * (c[to] + c[to - across])
+                    0.5 * (c(to) + c(to - across))
                 };
                 let mut flux = 0.0;
                 if d < band {
@@ -109,7 +114,7 @@ fn correct_links(
                 }
                 if let (Some(a), Some(b), Some(y), Some(z)) = (face(-2), face(-1), face(2), face(3))
                 {
-                    let sixth = 7.0 * (q[from] + q[to]) - 8.0 * (q[b] + q[y]) + q[a] + q[z];
+                    let sixth = 7.0 * (q(from) + q(to)) - 8.0 * (q(b) + q(y)) + q(a) + q(z);
                     flux += carrier * sixth / 60.0;
                 }
                 let flux = flux * inverse;

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dem::Grain;
 use crate::flow::{Flow, FlowMeasures};
-use crate::math::Load;
+use crate::math::{Load, Real};
 
 use locate::{Body, Locator};
 
@@ -38,8 +38,8 @@ pub struct Coupling {
 
 impl Coupling {
     /// For the grains of a simulation on the grid of `flow`.
-    pub fn new(
-        flow: &Flow,
+    pub fn new<R: Real>(
+        flow: &Flow<R>,
         scheme: Scheme,
         fluid_density: f64,
         kinematic_viscosity: f64,
@@ -63,7 +63,7 @@ impl Coupling {
     }
 
     /// Corrects the advection just predicted where grains close part of a link.
-    pub fn correct_advection(&mut self, flow: &mut Flow, grains: &[Grain]) {
+    pub fn correct_advection<R: Real>(&mut self, flow: &mut Flow<R>, grains: &[Grain]) {
         if self.scheme == Scheme::Aperture {
             advection::correct(self.locator.band(), flow, grains, &mut self.bodies);
         }
@@ -72,9 +72,9 @@ impl Coupling {
     /// Imposes rigidity on the predicted velocity and advances the grains' velocities from
     /// `before` (velocity, angular velocity) under the fluid's impulse and the `other` loads.
     /// `loads` receives the hydrodynamic load on each grain.
-    pub fn impose_rigidity(
+    pub fn impose_rigidity<R: Real>(
         &mut self,
-        flow: &mut Flow,
+        flow: &mut Flow<R>,
         grains: &mut [Grain],
         before: &[[DVec3; 2]],
         other: &[Load],
@@ -98,7 +98,7 @@ impl Coupling {
     }
 
     /// Gives the fluid inside and next to the grains their rigid velocity, for initial states.
-    pub fn start(&mut self, flow: &mut Flow, grains: &[Grain]) -> FlowMeasures {
+    pub fn start<R: Real>(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> FlowMeasures {
         for axis in 0..3 {
             let (from, to) = (
                 flow.velocity.component(axis),

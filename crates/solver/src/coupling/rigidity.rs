@@ -16,7 +16,7 @@ use super::locate::{Body, ForcedFace};
 use crate::dem::{Dof, Grain};
 use crate::flow::Flow;
 use crate::grid::FaceVector;
-use crate::math::{Load, Matrix6, Vector6, solve6};
+use crate::math::{Load, Matrix6, Real, Vector6, solve6};
 
 /// What a step of the fluid does to one grain.
 pub struct Impulse {
@@ -32,8 +32,8 @@ pub struct Impulse {
 /// The pressure given back to the closed part is that of the last step moved with the grain,
 /// p - dt U . grad p. Left where it was it would be a step behind the surface, and the drag of a
 /// moving grain of first order in the step (`docs/decisions/0011-pressure-moves-with-the-grain.md`).
-pub fn gather(
-    flow: &Flow,
+pub fn gather<R: Real>(
+    flow: &Flow<R>,
     fluid_density: f64,
     body: &mut Body,
     before: [DVec3; 2],
@@ -48,7 +48,7 @@ pub fn gather(
         let unit = DVec3::AXES[face.axis];
         let lever = face.arm.cross(unit);
         let weight = [unit.x, unit.y, unit.z, lever.x, lever.y, lever.z];
-        let predicted = flow.predicted.component(face.axis)[face.at];
+        let predicted = flow.predicted.component(face.axis)[face.at].wide();
         face.back = moved_pressure_pull(flow, face, before, relief);
         face.free = predicted + face.closed_by_all * face.back;
         let follow = follow(face, relief);
@@ -119,15 +119,15 @@ pub fn advance(
 }
 
 /// Gives the forced faces what the grains give them; arguments as of [`gather`], which came before.
-pub fn impose(
-    flow: &mut Flow,
+pub fn impose<R: Real>(
+    flow: &mut Flow<R>,
     grains: &[Grain],
     bodies: &[Body],
     before: &[[DVec3; 2]],
     relief: f64,
 ) {
     let FaceVector { x, y, z } = &mut flow.predicted;
-    let components: [&mut [f64]; 3] = [x, y, z];
+    let components: [&mut [R]; 3] = [x, y, z];
     let each = components.into_par_iter().enumerate();
     each.for_each(|(axis, predicted)| {
         for ((grain, body), before) in grains.iter().zip(bodies).zip(before) {
@@ -135,9 +135,10 @@ pub fn impose(
             for face in body.forced_along(axis) {
                 let rigid = rigid_velocity(now, face);
                 let change = rigid - rigid_velocity(*before, face);
-                predicted[face.at] += face.closed * face.back
+                let gain = face.closed * face.back
                     + face.share * (rigid - face.free)
                     + follow(face, relief) * change;
+                predicted[face.at] = R::of(predicted[face.at].wide() + gain);
             }
         }
     });
@@ -159,8 +160,8 @@ fn rigid_velocity([velocity, omega]: [DVec3; 2], face: &ForcedFace) -> f64 {
 
 /// What the pressure takes from a face over `dt` [m/s] once it has moved with a grain at
 /// `[velocity, angular velocity]` for as long.
-fn moved_pressure_pull(
-    flow: &Flow,
+fn moved_pressure_pull<R: Real>(
+    flow: &Flow<R>,
     face: &ForcedFace,
     [velocity, omega]: [DVec3; 2],
     dt: f64,
@@ -168,13 +169,14 @@ fn moved_pressure_pull(
     if dt == 0.0 || face.closed_by_all == 0.0 {
         return 0.0;
     }
-    let (p, strides) = (&flow.pressure, flow.mesh().layout().strides());
+    let strides = flow.mesh().layout().strides();
+    let p = |at: usize| flow.pressure[at].wide();
     let spacing = flow.mesh().spacing;
     let half = 0.5 * spacing[face.axis] * DVec3::AXES[face.axis];
     let moved = |at: usize, arm: DVec3| -> f64 {
         let cells = 0.5 * dt * (velocity + omega.cross(arm)) / spacing;
-        let change = |axis: usize| cells[axis] * (p[at + strides[axis]] - p[at - strides[axis]]);
-        p[at] - (0..3).map(change).sum::<f64>()
+        let change = |axis: usize| cells[axis] * (p(at + strides[axis]) - p(at - strides[axis]));
+        p(at) - (0..3).map(change).sum::<f64>()
     };
     let rise = moved(face.at, face.arm + half) - moved(face.below, face.arm - half);
     dt / spacing[face.axis] * rise

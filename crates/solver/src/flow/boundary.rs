@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::grid::{Centre, FaceVector, Field, Layout, Mesh};
+use crate::math::Real;
 use crate::poisson::Ends;
 
 /// Condition on one face of the box.
@@ -69,7 +70,7 @@ impl Boundaries {
 
     /// Sets the normal velocity on every face where it is given, and the upper faces of periodic
     /// axes; outflow faces keep theirs.
-    pub fn set_normal(&self, velocity: &mut FaceVector) {
+    pub fn set_normal<R: Real>(&self, velocity: &mut FaceVector<R>) {
         let layout = velocity.x.layout();
         for axis in 0..3 {
             let normal = velocity.component_mut(axis);
@@ -77,7 +78,7 @@ impl Boundaries {
                 layout.wrap(normal, axis);
             }
             for (face, value) in self.given_faces(axis, layout.cells[axis]) {
-                layout.map_layer(normal, axis, face, face, |_| value);
+                layout.map_layer(normal, axis, face, face, |_| R::of(value));
             }
         }
     }
@@ -96,18 +97,19 @@ impl Boundaries {
     }
 
     /// Sets the given x and y faces of one plane.
-    pub fn set_normal_of_plane(&self, layout: Layout, [x, y]: [&mut [f64]; 2]) {
+    pub fn set_normal_of_plane<R: Real>(&self, layout: Layout, [x, y]: [&mut [R]; 2]) {
         let row = layout.row();
         for (face, value) in self.given_faces(0, layout.cells[0]) {
-            x.chunks_exact_mut(row).for_each(|row| row[face] = value);
+            x.chunks_exact_mut(row)
+                .for_each(|row| row[face] = R::of(value));
         }
         for (face, value) in self.given_faces(1, layout.cells[1]) {
-            y[face * row..(face + 1) * row].fill(value);
+            y[face * row..(face + 1) * row].fill(R::of(value));
         }
     }
 
     /// Fills the ghost layers of a velocity whose interior and boundary faces are set.
-    pub fn fill_ghosts(&self, velocity: &mut FaceVector) {
+    pub fn fill_ghosts<R: Real>(&self, velocity: &mut FaceVector<R>) {
         let layout = velocity.x.layout();
         for component in 0..3 {
             for plane in velocity
@@ -121,7 +123,7 @@ impl Boundaries {
     }
 
     /// Fills the ghosts along x and y of one plane of a velocity component.
-    pub fn fill_ghosts_of_plane(&self, layout: Layout, component: usize, plane: &mut [f64]) {
+    pub fn fill_ghosts_of_plane<R: Real>(&self, layout: Layout, component: usize, plane: &mut [R]) {
         let (row, [nx, ny, _]) = (layout.row(), layout.cells);
         for side in 0..2 {
             let (ghost, inner) = if side == 0 { (0, 1) } else { (nx + 1, nx) };
@@ -155,7 +157,7 @@ impl Boundaries {
     }
 
     /// Fills the ghost planes below and above, and the ghosts of the upper boundary faces.
-    pub fn fill_ghost_planes(&self, velocity: &mut FaceVector) {
+    pub fn fill_ghost_planes<R: Real>(&self, velocity: &mut FaceVector<R>) {
         let layout = velocity.x.layout();
         let (plane, nz) = (layout.plane(), layout.cells[2]);
         if !self.is_periodic(2) {
@@ -187,7 +189,7 @@ impl Boundaries {
     }
 
     /// Fills the ghosts along x and y of one plane of the pressure: zero normal gradient or periodic.
-    pub fn fill_pressure_of_plane(&self, layout: Layout, plane: &mut [f64]) {
+    pub fn fill_pressure_of_plane<R: Real>(&self, layout: Layout, plane: &mut [R]) {
         let (row, [nx, ny, _]) = (layout.row(), layout.cells);
         let periodic = self.is_periodic(0);
         for row in plane.chunks_exact_mut(row) {
@@ -198,12 +200,12 @@ impl Boundaries {
     }
 
     /// Fills the ghost planes of the pressure.
-    pub fn fill_pressure_planes(&self, pressure: &mut Field<Centre>) {
+    pub fn fill_pressure_planes<R: Real>(&self, pressure: &mut Field<Centre, R>) {
         let layout = pressure.layout();
         self.fill_pressure_ends(pressure, layout.plane(), 2, layout.cells[2]);
     }
 
-    fn fill_pressure_ends(&self, values: &mut [f64], layer: usize, axis: usize, n: usize) {
+    fn fill_pressure_ends<R: Real>(&self, values: &mut [R], layer: usize, axis: usize, n: usize) {
         for (ghost, inner) in [(0, 1), (n + 1, n)] {
             let mirror = if self.is_periodic(axis) {
                 Mirror::Wrap
@@ -215,7 +217,7 @@ impl Boundaries {
     }
 
     /// Fills all ghosts of the pressure.
-    pub fn fill_pressure(&self, pressure: &mut Field<Centre>) {
+    pub fn fill_pressure<R: Real>(&self, pressure: &mut Field<Centre, R>) {
         let layout = pressure.layout();
         for plane in pressure.chunks_exact_mut(layout.plane()) {
             self.fill_pressure_of_plane(layout, plane);
@@ -226,7 +228,13 @@ impl Boundaries {
     /// Moves the outflow faces of `next` by convection, d q / dt + C d q / d n = 0 with C the mean
     /// speed through the face, then shifts them all by one speed so that inflow equals outflow.
     /// `next` has its other boundary faces set. Without an outflow nothing is done.
-    pub fn convect_outflow(&self, mesh: &Mesh, now: &FaceVector, next: &mut FaceVector, dt: f64) {
+    pub fn convect_outflow<R: Real>(
+        &self,
+        mesh: &Mesh,
+        now: &FaceVector<R>,
+        next: &mut FaceVector<R>,
+        dt: f64,
+    ) {
         if !self
             .0
             .iter()
@@ -246,7 +254,10 @@ impl Boundaries {
                 let speed = (outward * faces.sum(old) / faces.count as f64).max(0.0);
                 let courant = (speed * dt / mesh.spacing[axis]).min(1.0);
                 let new = next.component_mut(axis);
-                faces.each(|at, inside| new[at] = old[at] - courant * (old[at] - old[inside]));
+                faces.each(|at, inside| {
+                    let (value, inside) = (old[at].wide(), old[inside].wide());
+                    new[at] = R::of(value - courant * (value - inside));
+                });
                 open += faces.area();
             }
             if boundary != Boundary::Periodic {
@@ -262,7 +273,7 @@ impl Boundaries {
                     let outward = if side == 0 { -1.0 } else { 1.0 };
                     let new = next.component_mut(axis);
                     BoundaryFaces::new(mesh, axis, face, face)
-                        .each(|at, _| new[at] -= outward * shift);
+                        .each(|at, _| new[at] = R::of(new[at].wide() - outward * shift));
                 }
             });
         }
@@ -297,16 +308,23 @@ fn second(inner: usize, n: usize) -> usize {
 
 /// Value beyond a wall that moves at `wall`, on the parabola through it and the two nearest values:
 /// the shear at the wall is then of second order.
-fn beyond_wall(wall: f64, near: f64, next: f64, n: usize) -> f64 {
-    if n == 1 {
-        2.0 * wall - near
+fn beyond_wall<R: Real>(wall: f64, near: R, next: R, n: usize) -> R {
+    R::of(if n == 1 {
+        2.0 * wall - near.wide()
     } else {
-        (8.0 * wall - 6.0 * near + next) / 3.0
-    }
+        (8.0 * wall - 6.0 * near.wide() + next.wide()) / 3.0
+    })
 }
 
 /// Fills the layer `ghost` of `layer` entries; `inner` is next to it and 1..=n are inside.
-fn reflect(values: &mut [f64], layer: usize, mirror: Mirror, ghost: usize, inner: usize, n: usize) {
+fn reflect<R: Real>(
+    values: &mut [R],
+    layer: usize,
+    mirror: Mirror,
+    ghost: usize,
+    inner: usize,
+    n: usize,
+) {
     let from = match mirror {
         Mirror::None => return,
         Mirror::Wrap => n + 1 - inner,
@@ -360,9 +378,9 @@ impl BoundaryFaces {
             }
         }
     }
-    fn sum(&self, values: &[f64]) -> f64 {
+    fn sum<R: Real>(&self, values: &[R]) -> f64 {
         let mut sum = 0.0;
-        self.each(|at, _| sum += values[at]);
+        self.each(|at, _| sum += values[at].wide());
         sum
     }
 }

@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::FlowMeasures;
 use crate::grid::{FaceVector, Layout};
+use crate::math::Real;
 use crate::math::lanes::{Kernel, Partial, RowWork, Single, Vector, along_row};
 use crate::poisson::{Plane, Solution};
 
@@ -22,20 +23,21 @@ pub struct PlaneMeasures {
 }
 
 /// Divergence of one plane of the prediction over dt, the right-hand side of the Poisson equation.
-pub struct Divergence<'a> {
+pub struct Divergence<'a, R> {
     pub layout: Layout,
     pub periodic: [bool; 3],
-    pub predicted: &'a FaceVector,
+    pub predicted: &'a FaceVector<R>,
     pub k: usize,
     /// 1/h along each axis [1/m].
     pub inverse: [f64; 3],
     pub dt: f64,
-    pub out: &'a mut Plane,
+    pub out: &'a mut Plane<R>,
 }
 
-impl Kernel for Divergence<'_> {
+impl<R: Real> Kernel for Divergence<'_, R> {
+    type Number = R;
     #[inline(always)]
-    fn run<V: Vector>(self) {
+    fn run<V: Vector<Number = R>>(self) {
         let Divergence {
             layout,
             periodic,
@@ -66,7 +68,7 @@ impl Kernel for Divergence<'_> {
                 along_row::<V>(n - 1, &mut work);
                 let last = [work.u[n], work.u[1]];
                 work.u = &last;
-                work.value::<Single>(n, 0);
+                work.value::<Single<R>>(n, 0);
             } else {
                 along_row::<V>(n, &mut work);
             }
@@ -80,56 +82,58 @@ fn next(at: usize, n: usize, periodic: bool) -> usize {
     if at == n && periodic { 1 } else { at + 1 }
 }
 
-struct DivergenceRow<'a> {
-    u: &'a [f64],
-    v: &'a [f64],
-    vp: &'a [f64],
-    w: &'a [f64],
-    wp: &'a [f64],
+struct DivergenceRow<'a, R> {
+    u: &'a [R],
+    v: &'a [R],
+    vp: &'a [R],
+    w: &'a [R],
+    wp: &'a [R],
     inverse: [f64; 3],
     dt: f64,
-    out: &'a mut [f64],
+    out: &'a mut [R],
 }
 
-impl DivergenceRow<'_> {
+impl<R: Real> DivergenceRow<'_, R> {
     /// Entries from `i` on, the x faces from place `at` of `u` on.
     #[inline(always)]
-    fn value<V: Vector>(&mut self, i: usize, at: usize) {
-        let load = |row: &[f64]| V::load(&row[i..]);
-        let [x, y, z] = self.inverse.map(V::splat);
+    fn value<V: Vector<Number = R>>(&mut self, i: usize, at: usize) {
+        let load = |row: &[R]| V::load(&row[i..]);
+        let [x, y, z] = self.inverse.map(V::constant);
         let u = [V::load(&self.u[at..]), V::load(&self.u[at + 1..])];
         let sum = (u[1] - u[0]) * x
             + (load(self.vp) - load(self.v)) * y
             + (load(self.wp) - load(self.w)) * z;
-        sum.over(V::splat(self.dt)).store(&mut self.out[i..]);
+        sum.over(V::constant(self.dt)).store(&mut self.out[i..]);
     }
 }
 
-impl RowWork for DivergenceRow<'_> {
+impl<R: Real> RowWork for DivergenceRow<'_, R> {
+    type Number = R;
     #[inline(always)]
-    fn at<V: Vector>(&mut self, i: usize) {
+    fn at<V: Vector<Number = R>>(&mut self, i: usize) {
         self.value::<V>(i, i);
     }
 }
 
 /// One plane of u = u* - dt grad f and p += f; ghosts are left to the caller.
-pub struct Correct<'a> {
+pub struct Correct<'a, R> {
     pub layout: Layout,
-    pub predicted: &'a FaceVector,
-    pub solution: Solution<'a>,
+    pub predicted: &'a FaceVector<R>,
+    pub solution: Solution<'a, R>,
     pub periodic: [bool; 3],
     pub k: usize,
     pub inverse: [f64; 3],
     /// dt/h along each axis [s/m].
     pub pull: [f64; 3],
-    pub velocity: [&'a mut [f64]; 3],
-    pub pressure: &'a mut [f64],
+    pub velocity: [&'a mut [R]; 3],
+    pub pressure: &'a mut [R],
     pub measures: &'a mut PlaneMeasures,
 }
 
-impl Kernel for Correct<'_> {
+impl<R: Real> Kernel for Correct<'_, R> {
+    type Number = R;
     #[inline(always)]
-    fn run<V: Vector>(self) {
+    fn run<V: Vector<Number = R>>(self) {
         let (layout, k, periodic) = (self.layout, self.k, self.periodic);
         let (row, [n, ny, nz]) = (layout.row(), layout.cells);
         let [x, y, z] = self.velocity;
@@ -163,16 +167,17 @@ impl Kernel for Correct<'_> {
                 along_row::<V>(n - 1, &mut work);
                 let last = [work.u[n], work.u[1]];
                 work.u = &last;
-                work.value::<Single>(n, 0);
+                work.value::<Single<R>>(n, 0);
             } else {
                 along_row::<V>(n, &mut work);
                 // The lower boundary face was summed with the others.
-                partial.momentum[0].add(1, Single::splat(-x[j * row + 1]));
+                let given = -x[j * row + 1].wide();
+                partial.momentum[0].add(1, Single::<R>::constant(given));
             }
-            rise[0] += self.pressure[j * row + n] - self.pressure[j * row + 1];
+            rise[0] += self.pressure[j * row + n].wide() - self.pressure[j * row + 1].wide();
         }
         for i in 1..=n {
-            rise[1] += self.pressure[ny * row + i] - self.pressure[row + i];
+            rise[1] += self.pressure[ny * row + i].wide() - self.pressure[row + i].wide();
         }
         *self.measures = PlaneMeasures {
             flow: FlowMeasures {
@@ -197,29 +202,29 @@ struct CorrectPartial {
     momentum: [Partial; 3],
 }
 
-struct CorrectRow<'a> {
-    q: [&'a [f64]; 3],
+struct CorrectRow<'a, R> {
+    q: [&'a [R]; 3],
     /// Prediction on the upper faces: from place `at` + 1, one row up in y and in z.
-    u: &'a [f64],
-    vp: &'a [f64],
-    wp: &'a [f64],
-    f: &'a [f64],
+    u: &'a [R],
+    vp: &'a [R],
+    wp: &'a [R],
+    f: &'a [R],
     /// The increment one row down in y and in z, and one up.
-    lower: [&'a [f64]; 2],
-    upper: [&'a [f64]; 2],
+    lower: [&'a [R]; 2],
+    upper: [&'a [R]; 2],
     inverse: [f64; 3],
     pull: [f64; 3],
-    out: [&'a mut [f64]; 3],
-    pressure: &'a mut [f64],
+    out: [&'a mut [R]; 3],
+    pressure: &'a mut [R],
     partial: &'a mut CorrectPartial,
     given: [bool; 3],
 }
 
-impl CorrectRow<'_> {
+impl<R: Real> CorrectRow<'_, R> {
     /// Entries from `i` on, the upper x faces from place `at` + 1 of `u` on.
     #[inline(always)]
-    fn value<V: Vector>(&mut self, i: usize, at: usize) {
-        let load = |row: &[f64]| V::load(&row[i..]);
+    fn value<V: Vector<Number = R>>(&mut self, i: usize, at: usize) {
+        let load = |row: &[R]| V::load(&row[i..]);
         let f = load(self.f);
         let lower = [
             V::load(&self.f[i - 1..]),
@@ -232,10 +237,13 @@ impl CorrectRow<'_> {
             load(self.upper[1]),
         ];
         let above = [V::load(&self.u[at + 1..]), load(self.vp), load(self.wp)];
-        let zero = V::splat(0.0);
+        let zero = V::constant(0.0);
         let (mut square, mut rate, mut divergence) = (zero, zero, zero);
         for axis in 0..3 {
-            let (pull, inverse) = (V::splat(self.pull[axis]), V::splat(self.inverse[axis]));
+            let (pull, inverse) = (
+                V::constant(self.pull[axis]),
+                V::constant(self.inverse[axis]),
+            );
             let q = load(self.q[axis]) - pull * (f - lower[axis]);
             let next = above[axis] - pull * (upper[axis] - f);
             q.store(&mut self.out[axis][i..]);
@@ -256,9 +264,10 @@ impl CorrectRow<'_> {
     }
 }
 
-impl RowWork for CorrectRow<'_> {
+impl<R: Real> RowWork for CorrectRow<'_, R> {
+    type Number = R;
     #[inline(always)]
-    fn at<V: Vector>(&mut self, i: usize) {
+    fn at<V: Vector<Number = R>>(&mut self, i: usize) {
         self.value::<V>(i, i);
     }
 }

@@ -6,6 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of};
+use crate::math::Real;
 use crate::math::lanes::dispatch;
 use crate::poisson::{Plane, Poisson, Stages};
 
@@ -29,18 +30,18 @@ pub struct FlowMeasures {
 }
 
 /// State of the fluid.
-pub struct Flow {
+pub struct Flow<R = f64> {
     mesh: Mesh,
     boundaries: Boundaries,
     coefficients: Coefficients,
     /// Velocity u^n [m/s].
-    pub velocity: FaceVector,
+    pub velocity: FaceVector<R>,
     /// Predicted velocity u* [m/s].
-    pub predicted: FaceVector,
+    pub predicted: FaceVector<R>,
     /// Dynamic pressure over density p^n [m^2/s^2].
-    pub pressure: Field<Centre>,
-    tendency: FaceVector,
-    poisson: Poisson,
+    pub pressure: Field<Centre, R>,
+    tendency: FaceVector<R>,
+    poisson: Poisson<R>,
     partial: Vec<PlaneMeasures>,
     previous_step: Option<f64>,
     weight: f64,
@@ -51,9 +52,9 @@ pub struct Flow {
     pressure_rise: DVec3,
 }
 
-impl Flow {
+impl<R: Real> Flow<R> {
     /// Fluid at its initial velocity, made free of divergence.
-    pub fn new(mesh: &Mesh, boundaries: Boundaries, params: &FluidParams) -> Flow {
+    pub fn new(mesh: &Mesh, boundaries: Boundaries, params: &FluidParams) -> Flow<R> {
         let mut flow = Flow {
             mesh: *mesh,
             boundaries,
@@ -74,9 +75,9 @@ impl Flow {
             impulse: DVec3::ZERO,
             pressure_rise: DVec3::ZERO,
         };
-        flow.velocity.x.fill(params.initial_velocity.x);
-        flow.velocity.y.fill(params.initial_velocity.y);
-        flow.velocity.z.fill(params.initial_velocity.z);
+        flow.velocity.x.fill(R::of(params.initial_velocity.x));
+        flow.velocity.y.fill(R::of(params.initial_velocity.y));
+        flow.velocity.z.fill(R::of(params.initial_velocity.z));
         flow.make_solenoidal();
         flow
     }
@@ -153,7 +154,7 @@ impl Flow {
         );
         for (face, value) in boundaries.given_faces(2, layout.cells[2]) {
             let plane = layout.plane();
-            pz[face * plane..(face + 1) * plane].fill(value);
+            pz[face * plane..(face + 1) * plane].fill(R::of(value));
         }
         let sum = self
             .partial
@@ -173,14 +174,14 @@ impl Flow {
     pub fn add_tendency(&mut self, each: impl Fn(usize, &mut dyn FnMut(usize, f64)) + Sync) {
         let weight = self.weight;
         let FaceVector { x, y, z } = &mut self.tendency;
-        let tendency: [&mut [f64]; 3] = [x, y, z];
+        let tendency: [&mut [R]; 3] = [x, y, z];
         let FaceVector { x, y, z } = &mut self.predicted;
-        let predicted: [&mut [f64]; 3] = [x, y, z];
+        let predicted: [&mut [R]; 3] = [x, y, z];
         let components = tendency.into_par_iter().zip(predicted).enumerate();
         components.for_each(|(component, (tendency, predicted))| {
             each(component, &mut |at, extra| {
-                tendency[at] += extra;
-                predicted[at] += weight * extra;
+                tendency[at] = R::of(tendency[at].wide() + extra);
+                predicted[at] = R::of(predicted[at].wide() + weight * extra);
             });
         });
     }
@@ -194,7 +195,7 @@ impl Flow {
         let walled = self.boundaries.walled();
         let periodic = walled.map(|walled| !walled);
         let (predicted, boundaries) = (&self.predicted, &self.boundaries);
-        let divergence = |k: usize, out: &mut Plane| {
+        let divergence = |k: usize, out: &mut Plane<R>| {
             dispatch(Divergence {
                 layout,
                 periodic,
@@ -266,7 +267,7 @@ impl Flow {
         let (plane, nz) = (layout.plane(), layout.cells[2]);
         for j in 1..=layout.cells[1] {
             for at in layout.index(1, j, 0)..=layout.index(layout.cells[0], j, 0) {
-                rise.z += self.pressure[nz * plane + at] - self.pressure[plane + at];
+                rise.z += self.pressure[nz * plane + at].wide() - self.pressure[plane + at].wide();
             }
         }
         self.pressure_rise = rise;
@@ -304,34 +305,26 @@ impl Flow {
         }
     }
 
-    /// Everything that a later step depends on.
-    pub fn state(&self) -> [&[f64]; 8] {
+    /// Everything that a later step depends on: fields, and sums over them.
+    pub fn state(&self) -> ([&[R]; 7], &[f64]) {
         let (u, h) = (&self.velocity, &self.tendency);
-        [
-            &u.x,
-            &u.y,
-            &u.z,
-            &h.x,
-            &h.y,
-            &h.z,
-            &self.pressure,
-            &self.tendency_sums,
-        ]
+        let fields = [&*u.x, &u.y, &u.z, &h.x, &h.y, &h.z, &self.pressure];
+        (fields, &self.tendency_sums)
     }
     /// The same to be overwritten by a state whose last step was `last_step` [s] long.
-    pub fn state_mut(&mut self, last_step: f64) -> [&mut [f64]; 8] {
+    pub fn state_mut(&mut self, last_step: f64) -> ([&mut [R]; 7], &mut [f64]) {
         self.previous_step = (last_step > 0.0).then_some(last_step);
         let (u, h) = (&mut self.velocity, &mut self.tendency);
-        [
-            &mut u.x,
+        let fields = [
+            &mut *u.x,
             &mut u.y,
             &mut u.z,
             &mut h.x,
             &mut h.y,
             &mut h.z,
             &mut self.pressure,
-            &mut self.tendency_sums,
-        ]
+        ];
+        (fields, &mut self.tendency_sums)
     }
 
     /// The grid.
@@ -344,7 +337,7 @@ impl Flow {
     }
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        8 * 10 * self.mesh.layout().len() + self.poisson.bytes()
+        R::BYTES * 10 * self.mesh.layout().len() + self.poisson.bytes()
     }
     /// Time spent in each stage of the Poisson solves, divergence and correction included.
     pub fn poisson_stages(&self) -> Stages {

@@ -11,7 +11,8 @@
 use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout, Mesh};
-use crate::math::lanes::{Kernel, Partial, RowWork, Vector, along_row};
+use crate::math::Real;
+use crate::math::lanes::{Kernel, Partial, RowWork, Single, Vector, along_row};
 
 /// Constants of the tendency.
 #[derive(Clone, Copy)]
@@ -44,12 +45,12 @@ impl Coefficients {
         link: [[V; 2]; 3],
     ) -> V {
         let twice = q + q;
-        let mut sum = V::splat(self.acceleration.to_array()[component]);
+        let mut sum = V::constant(self.acceleration.to_array()[component]);
         for axis in 0..3 {
             let ([qm, qp], [cm, cp]) = (neighbour[axis], link[axis]);
-            let diffusion = V::splat(self.nu_inverse_square[axis]) * (qm + qp - twice);
+            let diffusion = V::constant(self.nu_inverse_square[axis]) * (qm + qp - twice);
             let carried = cp * (q + qp) - cm * (qm + q);
-            sum = sum + (diffusion - V::splat(self.quarter_inverse[axis]) * carried);
+            sum = sum + (diffusion - V::constant(self.quarter_inverse[axis]) * carried);
         }
         sum
     }
@@ -67,25 +68,26 @@ pub struct Weights {
 }
 
 /// One plane of the prediction u* = u + now H + before H_old - dt grad p.
-pub struct PredictPlane<'a> {
+pub struct PredictPlane<'a, R> {
     pub layout: Layout,
     pub coefficients: &'a Coefficients,
     pub weights: Weights,
-    pub velocity: &'a FaceVector,
-    pub pressure: &'a [f64],
+    pub velocity: &'a FaceVector<R>,
+    pub pressure: &'a [R],
     /// Axes whose lower boundary face is given.
     pub walled: [bool; 3],
     pub k: usize,
     /// H_old, to be replaced by H.
-    pub tendency: [&'a mut [f64]; 3],
-    pub predicted: [&'a mut [f64]; 3],
+    pub tendency: [&'a mut [R]; 3],
+    pub predicted: [&'a mut [R]; 3],
     /// Receives the sum of H over the unknown faces of the plane.
     pub sum: &'a mut DVec3,
 }
 
-impl Kernel for PredictPlane<'_> {
+impl<R: Real> Kernel for PredictPlane<'_, R> {
+    type Number = R;
     #[inline(always)]
-    fn run<V: Vector>(self) {
+    fn run<V: Vector<Number = R>>(self) {
         let (layout, k) = (self.layout, self.k);
         let (row, plane, n) = (layout.row(), layout.plane(), layout.cells[0]);
         let FaceVector { x, y, z } = self.velocity;
@@ -117,7 +119,8 @@ impl Kernel for PredictPlane<'_> {
             along_row::<V>(n, &mut work);
             if self.walled[0] {
                 // The lower boundary face was summed with the others.
-                sums[0].add(1, crate::math::lanes::Single::splat(-tx[j * row + 1]));
+                let given = -tx[j * row + 1].wide();
+                sums[0].add(1, Single::<R>::constant(given));
             }
         }
         *self.sum = DVec3::from_array(sums.map(|sum| sum.sum()));
@@ -125,10 +128,10 @@ impl Kernel for PredictPlane<'_> {
 }
 
 /// A row and its four neighbours: here, one row down and up in y, one down and up in z.
-type Around<'a> = [&'a [f64]; 5];
+type Around<'a, R> = [&'a [R]; 5];
 
 #[inline(always)]
-fn around(values: &[f64], at: usize, row: usize, plane: usize) -> Around<'_> {
+fn around<R>(values: &[R], at: usize, row: usize, plane: usize) -> Around<'_, R> {
     [
         &values[at..][..row],
         &values[at - row..][..row],
@@ -138,27 +141,28 @@ fn around(values: &[f64], at: usize, row: usize, plane: usize) -> Around<'_> {
     ]
 }
 
-struct PredictRow<'a> {
+struct PredictRow<'a, R> {
     coefficients: &'a Coefficients,
     weights: Weights,
-    u: Around<'a>,
-    v: Around<'a>,
-    w: Around<'a>,
-    vpb: &'a [f64],
-    wmt: &'a [f64],
-    p: &'a [f64],
-    pm: &'a [f64],
-    pb: &'a [f64],
-    tendency: [&'a mut [f64]; 3],
-    predicted: [&'a mut [f64]; 3],
+    u: Around<'a, R>,
+    v: Around<'a, R>,
+    w: Around<'a, R>,
+    vpb: &'a [R],
+    wmt: &'a [R],
+    p: &'a [R],
+    pm: &'a [R],
+    pb: &'a [R],
+    tendency: [&'a mut [R]; 3],
+    predicted: [&'a mut [R]; 3],
     sums: &'a mut [Partial; 3],
     /// Components that are given on the whole row.
     given: [bool; 3],
 }
 
-impl RowWork for PredictRow<'_> {
+impl<R: Real> RowWork for PredictRow<'_, R> {
+    type Number = R;
     #[inline(always)]
-    fn at<V: Vector>(&mut self, i: usize) {
+    fn at<V: Vector<Number = R>>(&mut self, i: usize) {
         // Entries i - 1, i, i + 1 of a row.
         macro_rules! three {
             ($row:expr) => {{
@@ -210,10 +214,13 @@ impl RowWork for PredictRow<'_> {
         );
         let [pl, pc] = two!(self.p);
         let lower = [pl, V::load(&self.pm[i..]), V::load(&self.pb[i..])];
-        let (now, before) = (V::splat(self.weights.now), V::splat(self.weights.before));
+        let (now, before) = (
+            V::constant(self.weights.now),
+            V::constant(self.weights.before),
+        );
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
             let old = &mut self.tendency[axis][i..];
-            let push = V::splat(self.weights.push[axis]) * (pc - lower[axis]);
+            let push = V::constant(self.weights.push[axis]) * (pc - lower[axis]);
             (q + before * V::load(old) - push + now * h).store(&mut self.predicted[axis][i..]);
             h.store(old);
             if !self.given[axis] {

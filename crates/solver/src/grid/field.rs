@@ -12,6 +12,7 @@ use std::ops::{Deref, DerefMut};
 use glam::DVec3;
 
 use super::Mesh;
+use crate::math::Real;
 
 /// A place on the staggered cell.
 pub trait Location: Copy + Send + Sync + 'static {
@@ -86,7 +87,7 @@ impl Layout {
         [1, self.row(), self.plane()]
     }
     /// Copies both outermost interior layers of a periodic axis onto the ghosts across the box.
-    pub fn wrap(&self, values: &mut [f64], axis: usize) {
+    pub fn wrap<T: Copy>(&self, values: &mut [T], axis: usize) {
         let n = self.cells[axis];
         self.map_layer(values, axis, n, 0, |value| value);
         self.map_layer(values, axis, 1, n + 1, |value| value);
@@ -112,24 +113,24 @@ impl Layout {
         }
     }
     /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.
-    pub fn map_layer(
+    pub fn map_layer<T: Copy>(
         &self,
-        values: &mut [f64],
+        values: &mut [T],
         axis: usize,
         from: usize,
         to: usize,
-        f: impl Fn(f64) -> f64,
+        f: impl Fn(T) -> T,
     ) {
         self.map_layers(values, axis, [from; 2], to, |[value, _]| f(value));
     }
     /// The same of two layers.
-    pub fn map_layers(
+    pub fn map_layers<T: Copy>(
         &self,
-        values: &mut [f64],
+        values: &mut [T],
         axis: usize,
         from: [usize; 2],
         to: usize,
-        f: impl Fn([f64; 2]) -> f64,
+        f: impl Fn([T; 2]) -> T,
     ) {
         let stride = self.strides()[axis] as isize;
         let shift = from.map(|layer| (layer as isize - to as isize) * stride);
@@ -141,19 +142,19 @@ impl Layout {
 
 /// Values at one location of every cell.
 #[derive(Clone, Debug)]
-pub struct Field<L> {
+pub struct Field<L, R = f64> {
     layout: Layout,
-    values: Vec<f64>,
+    values: Vec<R>,
     location: PhantomData<L>,
 }
 
-impl<L: Location> Field<L> {
+impl<L: Location, R: Real> Field<L, R> {
     /// A field of zeros on `mesh`.
     pub fn zeros(mesh: &Mesh) -> Self {
         let layout = mesh.layout();
         Field {
             layout,
-            values: vec![0.0; layout.len()],
+            values: vec![R::default(); layout.len()],
             location: PhantomData,
         }
     }
@@ -164,18 +165,18 @@ impl<L: Location> Field<L> {
     }
     /// Value at (i, j, k); ghosts at 0 and n+1.
     #[inline]
-    pub fn at(&self, i: usize, j: usize, k: usize) -> f64 {
+    pub fn at(&self, i: usize, j: usize, k: usize) -> R {
         self.values[self.layout.index(i, j, k)]
     }
     /// Sets the value at (i, j, k).
     #[inline]
-    pub fn set(&mut self, i: usize, j: usize, k: usize, value: f64) {
+    pub fn set(&mut self, i: usize, j: usize, k: usize, value: R) {
         let at = self.layout.index(i, j, k);
         self.values[at] = value;
     }
     /// One row, ghosts included.
     #[inline]
-    pub fn row(&self, j: usize, k: usize) -> &[f64] {
+    pub fn row(&self, j: usize, k: usize) -> &[R] {
         let start = self.layout.index(0, j, k);
         &self.values[start..start + self.layout.row()]
     }
@@ -185,7 +186,8 @@ impl<L: Location> Field<L> {
         for k in 1..=nz + 1 {
             for j in 1..=ny + 1 {
                 for i in 1..=nx + 1 {
-                    self.set(i, j, k, f(mesh.position(L::OFFSET, [i, j, k])));
+                    let value = f(mesh.position(L::OFFSET, [i, j, k]));
+                    self.set(i, j, k, R::of(value));
                 }
             }
         }
@@ -201,32 +203,32 @@ impl<L: Location> Field<L> {
     }
 }
 
-impl<L> Deref for Field<L> {
-    type Target = [f64];
+impl<L, R> Deref for Field<L, R> {
+    type Target = [R];
     #[inline]
-    fn deref(&self) -> &[f64] {
+    fn deref(&self) -> &[R] {
         &self.values
     }
 }
-impl<L> DerefMut for Field<L> {
+impl<L, R> DerefMut for Field<L, R> {
     #[inline]
-    fn deref_mut(&mut self) -> &mut [f64] {
+    fn deref_mut(&mut self) -> &mut [R] {
         &mut self.values
     }
 }
 
 /// The three components of a vector field, each on its own faces.
 #[derive(Clone, Debug)]
-pub struct FaceVector {
+pub struct FaceVector<R = f64> {
     /// x component on x faces.
-    pub x: Field<FaceX>,
+    pub x: Field<FaceX, R>,
     /// y component on y faces.
-    pub y: Field<FaceY>,
+    pub y: Field<FaceY, R>,
     /// z component on z faces.
-    pub z: Field<FaceZ>,
+    pub z: Field<FaceZ, R>,
 }
 
-impl FaceVector {
+impl<R: Real> FaceVector<R> {
     /// A vector field of zeros.
     pub fn zeros(mesh: &Mesh) -> Self {
         FaceVector {
@@ -237,7 +239,7 @@ impl FaceVector {
     }
     /// Raw values of one component.
     #[inline]
-    pub fn component(&self, axis: usize) -> &[f64] {
+    pub fn component(&self, axis: usize) -> &[R] {
         match axis {
             0 => &self.x,
             1 => &self.y,
@@ -246,7 +248,7 @@ impl FaceVector {
     }
     /// Raw values of one component, to write.
     #[inline]
-    pub fn component_mut(&mut self, axis: usize) -> &mut [f64] {
+    pub fn component_mut(&mut self, axis: usize) -> &mut [R] {
         match axis {
             0 => &mut self.x,
             1 => &mut self.y,

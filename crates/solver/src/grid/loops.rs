@@ -12,11 +12,11 @@ use super::Layout;
 
 /// Calls `f(k, plane, partial)` for the interior planes k = 1..=nz of several fields in parallel,
 /// with one partial result a plane.
-pub fn for_planes_of<const N: usize, T: Send>(
+pub fn for_planes_of<const N: usize, R: Send, T: Send>(
     layout: Layout,
-    fields: [&mut [f64]; N],
+    fields: [&mut [R]; N],
     partial: &mut [T],
-    f: impl Fn(usize, [&mut [f64]; N], &mut T) + Sync,
+    f: impl Fn(usize, [&mut [R]; N], &mut T) + Sync,
 ) {
     let fields = fields.map(|field| Pieces::interior(layout, field));
     assert_eq!(partial.len(), layout.cells[2]);
@@ -28,20 +28,20 @@ pub fn for_planes_of<const N: usize, T: Send>(
 }
 
 /// Consecutive planes of several fields that one thread holds during [`for_runs`].
-pub struct Run<'a, const N: usize, T> {
+pub struct Run<'a, const N: usize, R, T> {
     range: Range<usize>,
-    fields: &'a [Pieces<f64>; N],
+    fields: &'a [Pieces<R>; N],
     partial: &'a Pieces<T>,
 }
 
-impl<const N: usize, T> Run<'_, N, T> {
+impl<const N: usize, R, T> Run<'_, N, R, T> {
     /// Its planes k.
     pub fn range(&self) -> Range<usize> {
         self.range.clone()
     }
     /// Plane k of each field and its partial result.
     #[inline]
-    pub fn plane(&mut self, k: usize) -> ([&mut [f64]; N], &mut T) {
+    pub fn plane(&mut self, k: usize) -> ([&mut [R]; N], &mut T) {
         assert!(self.range.contains(&k));
         // SAFETY: runs are disjoint, and the result borrows this one as a whole.
         unsafe {
@@ -52,12 +52,12 @@ impl<const N: usize, T> Run<'_, N, T> {
 }
 
 /// Calls `f(run, scratch)` for one run of consecutive interior planes a scratch slot, in parallel.
-pub fn for_runs<const N: usize, T: Send, S: Send>(
+pub fn for_runs<const N: usize, R: Send, T: Send, S: Send>(
     layout: Layout,
-    fields: [&mut [f64]; N],
+    fields: [&mut [R]; N],
     partial: &mut [T],
     scratch: &mut [S],
-    f: impl Fn(&mut Run<N, T>, &mut S) + Sync,
+    f: impl Fn(&mut Run<N, R, T>, &mut S) + Sync,
 ) {
     let fields = fields.map(|field| Pieces::interior(layout, field));
     let (planes, slots) = (layout.cells[2], scratch.len());
@@ -76,11 +76,11 @@ pub fn for_runs<const N: usize, T: Send, S: Send>(
 
 /// Calls `f(k, chunk, scratch)` for the chunks k = 0.. of `values` in parallel; each scratch slot
 /// serves a run of k.
-pub fn for_chunks<S: Send>(
-    values: &mut [f64],
+pub fn for_chunks<R: Send, S: Send>(
+    values: &mut [R],
     chunk: usize,
     scratch: &mut [S],
-    f: impl Fn(usize, &mut [f64], &mut S) + Sync,
+    f: impl Fn(usize, &mut [R], &mut S) + Sync,
 ) {
     let slots = scratch.len();
     let chunks = Pieces::new(values, chunk);
@@ -97,22 +97,22 @@ pub fn for_chunks<S: Send>(
 }
 
 /// Neighbouring columns through all planes that one thread holds during [`for_columns`].
-pub struct Columns<'a> {
-    start: *mut f64,
+pub struct Columns<'a, R> {
+    start: *mut R,
     stride: usize,
     planes: usize,
     width: usize,
-    borrow: PhantomData<&'a mut [f64]>,
+    borrow: PhantomData<&'a mut [R]>,
 }
 
-impl Columns<'_> {
+impl<R> Columns<'_, R> {
     /// Number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
     /// Their entries in plane `k`, counted from 0.
     #[inline(always)]
-    pub fn row(&mut self, k: usize) -> &mut [f64] {
+    pub fn row(&mut self, k: usize) -> &mut [R] {
         assert!(k < self.planes);
         // SAFETY: disjoint from all other columns, and borrowed from `self` as a whole.
         unsafe { std::slice::from_raw_parts_mut(self.start.add(k * self.stride), self.width) }
@@ -122,13 +122,13 @@ impl Columns<'_> {
 /// Cuts the first `len` entries of the planes of `values`, `stride` apart, into blocks of `width`
 /// columns and calls `f(first column, block, scratch)` in parallel; each scratch slot serves a run
 /// of blocks.
-pub fn for_columns<S: Send>(
-    values: &mut [f64],
+pub fn for_columns<R: Send, S: Send>(
+    values: &mut [R],
     stride: usize,
     len: usize,
     width: usize,
     scratch: &mut [S],
-    f: impl Fn(usize, &mut Columns, &mut S) + Sync,
+    f: impl Fn(usize, &mut Columns<R>, &mut S) + Sync,
 ) {
     assert!(len <= stride);
     let (slots, blocks, planes) = (scratch.len(), len.div_ceil(width), values.len() / stride);
@@ -188,9 +188,9 @@ impl<T> Pieces<T> {
     }
 }
 
-impl Pieces<f64> {
+impl<R> Pieces<R> {
     /// The interior planes of a field.
-    fn interior(layout: Layout, field: &mut [f64]) -> Pieces<f64> {
+    fn interior(layout: Layout, field: &mut [R]) -> Pieces<R> {
         assert_eq!(field.len(), layout.len());
         let plane = layout.plane();
         Pieces::new(&mut field[plane..plane * (layout.cells[2] + 1)], plane)

@@ -2,38 +2,37 @@
 
 use std::ops::{Deref, DerefMut};
 
-/// Doubles of a cache line.
-const LINE: usize = 8;
+use super::Real;
 
-/// A fixed number of doubles whose first lies at the start of a cache line. Nothing is touched
+/// A fixed number of numbers whose first lies at the start of a cache line. Nothing is touched
 /// when it is made: a page belongs to the thread that first writes to it.
 #[derive(Debug)]
-pub struct Aligned {
-    values: Vec<f64>,
+pub struct Aligned<R> {
+    values: Vec<R>,
     start: usize,
     len: usize,
 }
 
-impl Aligned {
+impl<R: Real> Aligned<R> {
     /// `len` zeros.
-    pub fn zeros(len: usize) -> Aligned {
-        let values = vec![0.0; len + LINE - 1];
+    pub fn zeros(len: usize) -> Aligned<R> {
+        let values = vec![R::default(); len + R::LANES - 1];
         // The buffer is never reallocated, so the start stays where it is.
-        let start = values.as_ptr().align_offset(LINE * size_of::<f64>());
+        let start = values.as_ptr().align_offset(R::LANES * R::BYTES);
         Aligned { values, start, len }
     }
 }
 
-impl Deref for Aligned {
-    type Target = [f64];
+impl<R> Deref for Aligned<R> {
+    type Target = [R];
     #[inline]
-    fn deref(&self) -> &[f64] {
+    fn deref(&self) -> &[R] {
         &self.values[self.start..self.start + self.len]
     }
 }
-impl DerefMut for Aligned {
+impl<R> DerefMut for Aligned<R> {
     #[inline]
-    fn deref_mut(&mut self) -> &mut [f64] {
+    fn deref_mut(&mut self) -> &mut [R] {
         &mut self.values[self.start..self.start + self.len]
     }
 }

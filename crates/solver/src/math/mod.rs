@@ -5,8 +5,10 @@ mod formula;
 pub mod lanes;
 mod linear;
 mod pose;
+mod real;
 
 pub use aligned::Aligned;
 pub use formula::Formula;
 pub use linear::{Matrix6, Vector6, solve6};
 pub use pose::{Load, Pose};
+pub use real::{Precision, Real};

@@ -10,10 +10,11 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use super::Ends;
 use super::chirp::Fourier;
+use crate::math::Real;
 use crate::math::lanes::{Complex, Kernel, Vector, as_complex};
 
 /// Transforms of one axis and the eigenvalues of minus the second difference.
-pub struct Axis {
+pub struct Axis<R> {
     /// Cells.
     pub n: usize,
     /// Place of cell i in the transform's input.
@@ -21,15 +22,15 @@ pub struct Axis {
     /// Eigenvalue of mode k [1/m^2], in the order in which modes are stored. On a periodic axis
     /// index k <= n/2 holds the cosine part of mode k, its mirror the sine part.
     pub eigenvalues: Vec<f64>,
-    fourier: Fourier,
+    fourier: Fourier<R>,
     /// cos and sin of pi k / 2n for cosine modes; 1 and 0 on a periodic axis.
-    turn: Vec<[f64; 2]>,
+    turn: Vec<[R; 2]>,
     /// Factors of the mode k = n/2, its own mirror, there and back.
-    middle: [f64; 2],
+    middle: [R; 2],
 }
 
-impl Axis {
-    pub fn new(n: usize, ends: Ends, spacing: f64) -> Axis {
+impl<R: Real> Axis<R> {
+    pub fn new(n: usize, ends: Ends, spacing: f64) -> Axis<R> {
         let neumann = ends == Ends::Neumann;
         let order = |i: usize| match i {
             _ if !neumann => i,
@@ -56,11 +57,11 @@ impl Axis {
             order: (0..n).map(order).collect(),
             eigenvalues: (0..n).map(eigenvalue).collect(),
             fourier: Fourier::new(n),
-            turn: (0..n).map(turn).collect(),
+            turn: (0..n).map(|k| turn(k).map(R::of)).collect(),
             middle: if neumann {
-                [FRAC_1_SQRT_2, 2.0 * FRAC_1_SQRT_2]
+                [FRAC_1_SQRT_2, 2.0 * FRAC_1_SQRT_2].map(R::of)
             } else {
-                [1.0; 2]
+                [R::of(1.0); 2]
             },
         }
     }
@@ -77,8 +78,8 @@ impl Axis {
 
     /// Spectra of pairs of lines -> modes: real parts of the first lines, imaginary of the second.
     #[inline(always)]
-    fn split<V: Vector>(&self, modes: &mut [Complex<V>]) {
-        let (n, half) = (self.n, V::splat(0.5));
+    fn split<V: Vector<Number = R>>(&self, modes: &mut [Complex<V>]) {
+        let (n, half) = (self.n, V::constant(0.5));
         for k in 1..n.div_ceil(2) {
             let (z, w) = (modes[k], modes[n - k]);
             let [cos, sin] = self.turn[k];
@@ -101,7 +102,7 @@ impl Axis {
     /// The way back. Real and imaginary parts are exchanged on the way into the transform, and so
     /// on the way out, which turns it into its inverse.
     #[inline(always)]
-    fn join<V: Vector>(&self, modes: &mut [Complex<V>]) {
+    fn join<V: Vector<Number = R>>(&self, modes: &mut [Complex<V>]) {
         let n = self.n;
         modes[0] = modes[0].exchanged();
         for k in 1..n.div_ceil(2) {
@@ -127,34 +128,35 @@ impl Axis {
 
 /// The transform of a block of lines. It is dispatched on its own, so that its many loops are
 /// compiled once for each instruction set and not once for each place that needs them.
-pub struct Lines<'a> {
-    pub axis: &'a Axis,
+pub struct Lines<'a, R> {
+    pub axis: &'a Axis<R>,
     /// Both buffers, one after the other; the first holds the lines.
     ///
     /// Forward: entry i at `order[i]` -> modes. Inverse: modes -> entry i at `order[i]`, with real
     /// and imaginary parts exchanged, unnormalised.
-    pub buffers: &'a mut [f64],
+    pub buffers: &'a mut [R],
     pub inverse: bool,
-    /// Whether the block has four lanes.
-    pub four: bool,
+    /// Whether the block has half the lanes of the widest register.
+    pub half: bool,
     /// Set to which of the buffers holds the result.
     pub second: &'a mut bool,
 }
 
-impl Kernel for Lines<'_> {
+impl<R: Real> Kernel for Lines<'_, R> {
+    type Number = R;
     #[inline(always)]
-    fn run<V: Vector>(self) {
-        if self.four && V::WIDTH > 4 {
-            self.transform::<V::Four>();
+    fn run<V: Vector<Number = R>>(self) {
+        if self.half {
+            self.transform::<V::Half>();
         } else {
             self.transform::<V>();
         }
     }
 }
 
-impl Lines<'_> {
+impl<R: Real> Lines<'_, R> {
     #[inline(always)]
-    fn transform<V: Vector>(self) {
+    fn transform<V: Vector<Number = R>>(self) {
         let axis = self.axis;
         let (a, b) = as_complex::<V>(self.buffers).split_at_mut(axis.buffer_len());
         let first = a.as_ptr();

@@ -3,6 +3,7 @@
 //! Outputs come in pairs k, r - k: with e_k the cosine sum over x_t + x_{r-t} and o_k the sine sum
 //! over x_t - x_{r-t} they are e_k - i o_k and e_k + i o_k.
 
+use crate::math::Real;
 use crate::math::lanes::{Complex, Vector, turned};
 
 /// A transform of fixed length `R`.
@@ -29,7 +30,10 @@ impl Butterfly<3> for Three {
     fn apply<V: Vector>([a, b, c]: [Complex<V>; 3]) -> [Complex<V>; 3] {
         const SIN: f64 = 0.866_025_403_784_438_6;
         let sum = b + c;
-        let [y, z] = turned(a - sum.scale(0.5), (b - c).scale(SIN));
+        let [y, z] = turned(
+            a - sum.scale(V::Number::of(0.5)),
+            (b - c).scale(V::Number::of(SIN)),
+        );
         [a + sum, y, z]
     }
 }
@@ -50,12 +54,12 @@ impl Butterfly<5> for Five {
         const SIN: [f64; 2] = [0.951_056_516_295_153_5, 0.587_785_252_292_473_1];
         let (p, q, r, s) = (b + e, c + d, b - e, c - d);
         let [y1, y4] = turned(
-            a + p.scale(COS[0]) + q.scale(COS[1]),
-            r.scale(SIN[0]) + s.scale(SIN[1]),
+            a + p.scale(V::Number::of(COS[0])) + q.scale(V::Number::of(COS[1])),
+            r.scale(V::Number::of(SIN[0])) + s.scale(V::Number::of(SIN[1])),
         );
         let [y2, y3] = turned(
-            a + p.scale(COS[1]) + q.scale(COS[0]),
-            r.scale(SIN[1]) - s.scale(SIN[0]),
+            a + p.scale(V::Number::of(COS[1])) + q.scale(V::Number::of(COS[0])),
+            r.scale(V::Number::of(SIN[1])) - s.scale(V::Number::of(SIN[0])),
         );
         [a + p + q, y1, y2, y3, y4]
     }
@@ -77,16 +81,27 @@ impl Butterfly<7> for Seven {
         let (p, q, r) = (b + g, c + f, d + e);
         let (u, v, w) = (b - g, c - f, d - e);
         let [y1, y6] = turned(
-            a + p.scale(COS[0]) + q.scale(COS[1]) + r.scale(COS[2]),
-            u.scale(SIN[0]) + v.scale(SIN[1]) + w.scale(SIN[2]),
+            a + p.scale(V::Number::of(COS[0]))
+                + q.scale(V::Number::of(COS[1]))
+                + r.scale(V::Number::of(COS[2])),
+            u.scale(V::Number::of(SIN[0]))
+                + v.scale(V::Number::of(SIN[1]))
+                + w.scale(V::Number::of(SIN[2])),
         );
         let [y2, y5] = turned(
-            a + p.scale(COS[1]) + q.scale(COS[2]) + r.scale(COS[0]),
-            u.scale(SIN[1]) - v.scale(SIN[2]) - w.scale(SIN[0]),
+            a + p.scale(V::Number::of(COS[1]))
+                + q.scale(V::Number::of(COS[2]))
+                + r.scale(V::Number::of(COS[0])),
+            u.scale(V::Number::of(SIN[1]))
+                - v.scale(V::Number::of(SIN[2]))
+                - w.scale(V::Number::of(SIN[0])),
         );
         let [y3, y4] = turned(
-            a + p.scale(COS[2]) + q.scale(COS[0]) + r.scale(COS[1]),
-            u.scale(SIN[2]) - v.scale(SIN[0]) + w.scale(SIN[1]),
+            a + p.scale(V::Number::of(COS[2]))
+                + q.scale(V::Number::of(COS[0]))
+                + r.scale(V::Number::of(COS[1])),
+            u.scale(V::Number::of(SIN[2])) - v.scale(V::Number::of(SIN[0]))
+                + w.scale(V::Number::of(SIN[1])),
         );
         [a + p + q + r, y1, y2, y3, y4, y5, y6]
     }

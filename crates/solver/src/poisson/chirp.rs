@@ -2,28 +2,29 @@
 //! (Bluestein): k t = (k^2 + t^2 - (k - t)^2) / 2.
 
 use super::fft::{Fft, LARGEST_PRIME, factors, root};
+use crate::math::Real;
 use crate::math::lanes::{Complex, Vector};
 
 /// A planned transform of any length.
-pub enum Fourier {
+pub enum Fourier<R> {
     /// Only small factors.
-    Direct(Fft),
+    Direct(Fft<R>),
     /// A padded convolution.
-    Padded(Chirp),
+    Padded(Chirp<R>),
 }
 
 /// A planned convolution.
-pub struct Chirp {
-    fft: Fft,
+pub struct Chirp<R> {
+    fft: Fft<R>,
     /// exp(-pi i t^2 / n), t < n.
-    chirp: Vec<[f64; 2]>,
+    chirp: Vec<[R; 2]>,
     /// Transform of the conjugate chirp over the padded length, over that length.
-    spectrum: Vec<[f64; 2]>,
+    spectrum: Vec<[R; 2]>,
 }
 
-impl Fourier {
+impl<R: Real> Fourier<R> {
     /// Plans for `n` points.
-    pub fn new(n: usize) -> Fourier {
+    pub fn new(n: usize) -> Fourier<R> {
         if factors(n).into_iter().all(|factor| factor <= LARGEST_PRIME) {
             return Fourier::Direct(Fft::new(n));
         }
@@ -44,12 +45,12 @@ impl Fourier {
                     sum[0] += re * c - im * s;
                     sum[1] += re * s + im * c;
                 }
-                sum.map(|value| value / padded as f64)
+                sum.map(|value| R::of(value / padded as f64))
             })
             .collect();
         Fourier::Padded(Chirp {
             fft: Fft::new(padded),
-            chirp,
+            chirp: chirp.into_iter().map(|turn| turn.map(R::of)).collect(),
             spectrum,
         })
     }
@@ -65,7 +66,7 @@ impl Fourier {
     /// Transforms the first entries of `a`, using both buffers; returns the one with the result,
     /// then the other.
     #[inline(always)]
-    pub fn run<'a, V: Vector>(
+    pub fn run<'a, V: Vector<Number = R>>(
         &self,
         a: &'a mut [Complex<V>],
         b: &'a mut [Complex<V>],

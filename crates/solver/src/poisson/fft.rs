@@ -9,6 +9,7 @@
 use std::f64::consts::PI;
 
 use super::butterfly::{Butterfly, Five, Four, Seven, Three, Two};
+use crate::math::Real;
 use crate::math::lanes::{Complex, Vector, turned};
 
 /// Largest prime factor that is transformed by its definition; measured, decision 0005.
@@ -47,29 +48,29 @@ pub fn factors(mut n: usize) -> Vec<usize> {
 }
 
 /// One pass.
-struct Pass {
+struct Pass<R> {
     radix: usize,
     blocks: usize,
     stride: usize,
     /// Twiddles: `radix - 1` for each block.
-    turn: Vec<[f64; 2]>,
+    turn: Vec<[R; 2]>,
     /// Cosines and sines of a prime radix without a butterfly, in the order in which `modes` reads.
-    circle: Vec<[f64; 2]>,
+    circle: Vec<[R; 2]>,
 }
 
 /// A planned transform.
-pub struct Fft {
-    passes: Vec<Pass>,
+pub struct Fft<R> {
+    passes: Vec<Pass<R>>,
 }
 
-impl Fft {
+impl<R: Real> Fft<R> {
     /// Plans for `n` points.
-    pub fn new(n: usize) -> Fft {
+    pub fn new(n: usize) -> Fft<R> {
         let (mut left, mut stride) = (n, 1);
         let pass = |radix: usize| {
             let blocks = left / radix;
             let turn = (0..blocks)
-                .flat_map(|p| (1..radix).map(move |t| root(p * t, left)))
+                .flat_map(|p| (1..radix).map(move |t| root(p * t, left).map(R::of)))
                 .collect();
             let pass = Pass {
                 radix,
@@ -89,7 +90,7 @@ impl Fft {
 
     /// Transforms `a`, using both buffers; returns the one with the result, then the other.
     #[inline(always)]
-    pub fn run<'a, V: Vector>(
+    pub fn run<'a, V: Vector<Number = R>>(
         &self,
         mut a: &'a mut [Complex<V>],
         mut b: &'a mut [Complex<V>],
@@ -112,7 +113,7 @@ impl Fft {
 /// A pass with a butterfly.
 #[inline(always)]
 fn step<V: Vector, B: Butterfly<R>, const R: usize>(
-    pass: &Pass,
+    pass: &Pass<V::Number>,
     source: &[Complex<V>],
     target: &mut [Complex<V>],
 ) {
@@ -181,7 +182,11 @@ fn cut<'a, T>(rest: &mut &'a mut [T], len: usize) -> &'a mut [T] {
 
 /// A pass of any odd prime radix; uses up `source`.
 #[inline(always)]
-fn prime_step<V: Vector>(pass: &Pass, source: &mut [Complex<V>], target: &mut [Complex<V>]) {
+fn prime_step<V: Vector>(
+    pass: &Pass<V::Number>,
+    source: &mut [Complex<V>],
+    target: &mut [Complex<V>],
+) {
     let (r, stride, span) = (pass.radix, pass.stride, pass.blocks * pass.stride);
     let half = r / 2;
     for at in 0..span {
@@ -211,7 +216,7 @@ fn prime_step<V: Vector>(pass: &Pass, source: &mut [Complex<V>], target: &mut [C
 /// Outputs k..k + K of a prime radix and their mirrors.
 #[inline(always)]
 fn modes<V: Vector, const K: usize>(
-    pass: &Pass,
+    pass: &Pass<V::Number>,
     source: &[Complex<V>],
     target: &mut [Complex<V>],
     at: usize,
@@ -243,7 +248,7 @@ fn modes<V: Vector, const K: usize>(
 }
 
 /// Cosine and sine of 2 pi k t / r, grouped as `prime_step` sums them.
-fn circle(r: usize) -> Vec<[f64; 2]> {
+fn circle<R: Real>(r: usize) -> Vec<[R; 2]> {
     let half = r / 2;
     let mut found = Vec::with_capacity(half * half);
     let mut k = 1;
@@ -256,7 +261,7 @@ fn circle(r: usize) -> Vec<[f64; 2]> {
         for t in 1..=half {
             for m in 0..together {
                 let [cos, sin] = root((k + m) * t, r);
-                found.push([cos, -sin]);
+                found.push([cos, -sin].map(R::of));
             }
         }
         k += together;

@@ -1,28 +1,32 @@
 //! Blocks of lines on their way into the transforms and out of them.
 
 use super::axis::{self, Axis};
-use crate::math::Aligned;
-use crate::math::lanes::{Complex, Vector, as_complex, dispatch};
+use crate::math::lanes::{Complex, MOST, Vector, as_complex, dispatch};
+use crate::math::{Aligned, Real};
 
 /// Both buffers of the transforms of one thread.
-pub struct Buffers(Aligned);
+pub struct Buffers<R>(Aligned<R>);
 
-impl Buffers {
-    pub fn new(axes: [&Axis; 2]) -> Buffers {
+impl<R: Real> Buffers<R> {
+    pub fn new(axes: [&Axis<R>; 2]) -> Buffers<R> {
         let longest = axes[0].buffer_len().max(axes[1].buffer_len());
-        Buffers(Aligned::zeros(2 * 16 * longest))
+        Buffers(Aligned::zeros(4 * R::LANES * longest))
     }
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.0)
     }
     /// Where the lines of `axis` are put.
     #[inline(always)]
-    pub fn lines<V: Vector>(&mut self, axis: &Axis) -> &mut [Complex<V>] {
+    pub fn lines<V: Vector<Number = R>>(&mut self, axis: &Axis<R>) -> &mut [Complex<V>] {
         &mut as_complex::<V>(&mut self.0)[..axis.n]
     }
     /// Transforms them.
     #[inline(always)]
-    pub fn transform<V: Vector>(&mut self, axis: &Axis, inverse: bool) -> &[Complex<V>] {
+    pub fn transform<V: Vector<Number = R>>(
+        &mut self,
+        axis: &Axis<R>,
+        inverse: bool,
+    ) -> &[Complex<V>] {
         let len = axis.buffer_len();
         let buffers = &mut self.0[..4 * V::WIDTH * len];
         let mut second = false;
@@ -30,7 +34,7 @@ impl Buffers {
             axis,
             buffers,
             inverse,
-            four: V::WIDTH == 4,
+            half: 2 * V::WIDTH == R::LANES,
             second: &mut second,
         });
         &as_complex::<V>(buffers)[if second { len } else { 0 }..][..axis.n]
@@ -47,7 +51,7 @@ pub struct Lines {
 
 impl Lines {
     #[inline(always)]
-    fn entry<V: Vector>(&self, values: &[f64], i: usize) -> Complex<V> {
+    fn entry<V: Vector>(&self, values: &[V::Number], i: usize) -> Complex<V> {
         let at = self.at + i * self.step;
         Complex {
             re: V::load(&values[at..]),
@@ -55,13 +59,13 @@ impl Lines {
         }
     }
     #[inline(always)]
-    pub fn load<V: Vector>(&self, values: &[f64], a: &mut [Complex<V>]) {
+    pub fn load<V: Vector>(&self, values: &[V::Number], a: &mut [Complex<V>]) {
         for (i, x) in a.iter_mut().enumerate() {
             *x = self.entry(values, i);
         }
     }
     #[inline(always)]
-    pub fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [f64]) {
+    pub fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
         for (i, x) in a.iter().enumerate() {
             let at = self.at + i * self.step;
             x.re.store(&mut values[at..]);
@@ -69,7 +73,12 @@ impl Lines {
         }
     }
     #[inline(always)]
-    pub fn forward<V: Vector>(&self, axis: &Axis, values: &mut [f64], buffers: &mut Buffers) {
+    pub fn forward<V: Vector>(
+        &self,
+        axis: &Axis<V::Number>,
+        values: &mut [V::Number],
+        buffers: &mut Buffers<V::Number>,
+    ) {
         let lines = buffers.lines::<V>(axis);
         for (i, &to) in axis.order.iter().enumerate() {
             lines[to] = self.entry(values, i);
@@ -77,7 +86,12 @@ impl Lines {
         self.store(buffers.transform::<V>(axis, false), values);
     }
     #[inline(always)]
-    pub fn inverse<V: Vector>(&self, axis: &Axis, values: &mut [f64], buffers: &mut Buffers) {
+    pub fn inverse<V: Vector>(
+        &self,
+        axis: &Axis<V::Number>,
+        values: &mut [V::Number],
+        buffers: &mut Buffers<V::Number>,
+    ) {
         self.load(values, buffers.lines::<V>(axis));
         let lines = buffers.transform::<V>(axis, true);
         for (i, &from) in axis.order.iter().enumerate() {
@@ -98,10 +112,10 @@ pub struct Rows {
 
 impl Rows {
     #[inline(always)]
-    pub fn load<V: Vector>(&self, order: &[usize], values: &[f64], a: &mut [Complex<V>]) {
+    pub fn load<V: Vector>(&self, order: &[usize], values: &[V::Number], a: &mut [Complex<V>]) {
         for (group, order) in order.chunks(V::WIDTH).enumerate() {
             let at = self.at + group * V::WIDTH;
-            let (mut re, mut im) = ([V::splat(0.0); 8], [V::splat(0.0); 8]);
+            let (mut re, mut im) = ([V::constant(0.0); MOST], [V::constant(0.0); MOST]);
             for row in 0..V::WIDTH {
                 re[row] = V::load(&values[at + row * self.pitch..]);
                 im[row] = V::load(&values[at + (row + self.second) * self.pitch..]);
@@ -114,10 +128,10 @@ impl Rows {
         }
     }
     #[inline(always)]
-    pub fn store<V: Vector>(&self, order: &[usize], a: &[Complex<V>], values: &mut [f64]) {
+    pub fn store<V: Vector>(&self, order: &[usize], a: &[Complex<V>], values: &mut [V::Number]) {
         for (group, order) in order.chunks(V::WIDTH).enumerate() {
             let at = self.at + group * V::WIDTH;
-            let (mut re, mut im) = ([V::splat(0.0); 8], [V::splat(0.0); 8]);
+            let (mut re, mut im) = ([V::constant(0.0); MOST], [V::constant(0.0); MOST]);
             for ((re, im), &from) in re.iter_mut().zip(&mut im).zip(order) {
                 (*re, *im) = (a[from].im, a[from].re);
             }

@@ -19,8 +19,8 @@ mod tridiagonal;
 use std::time::{Duration, Instant};
 
 use crate::grid::{Centre, Field, Mesh, Run, for_chunks, for_columns, for_runs};
-use crate::math::Aligned;
 use crate::math::lanes::dispatch;
+use crate::math::{Aligned, Real};
 use axis::Axis;
 use lines::Buffers;
 use plane::{Forward, Inverse, Shape};
@@ -50,34 +50,34 @@ pub struct Stages {
 
 /// One plane of the solution and its neighbours, ghosts included. Beyond the ends of the box lie
 /// the plane across it on a periodic axis, else the plane itself.
-pub struct Solution<'a> {
+pub struct Solution<'a, R> {
     /// Plane k.
-    pub here: &'a Plane,
+    pub here: &'a Plane<R>,
     /// Plane k - 1.
-    pub below: &'a Plane,
+    pub below: &'a Plane<R>,
     /// Plane k + 1.
-    pub above: &'a Plane,
+    pub above: &'a Plane<R>,
 }
 
 /// Solver for lap(phi) = f. Planned once for a mesh; solving allocates nothing.
-pub struct Poisson {
+pub struct Poisson<R = f64> {
     mesh: Mesh,
     ends: [Ends; 3],
-    axes: [Axis; 2],
+    axes: [Axis<R>; 2],
     along_z: Tridiagonal,
     shape: Shape,
-    modes: Aligned,
+    modes: Aligned<R>,
     /// Eigenvalue along x and y of each mode of a plane.
-    eigenvalues: Vec<f64>,
-    slots: Vec<Slot>,
-    columns: Vec<ColumnScratch>,
+    eigenvalues: Vec<R>,
+    slots: Vec<Slot<R>>,
+    columns: Vec<ColumnScratch<R>>,
     stages: Stages,
 }
 
 /// Scratch of one run of planes.
-struct Slot {
-    planes: [Plane; 3],
-    buffers: Buffers,
+struct Slot<R> {
+    planes: [Plane<R>; 3],
+    buffers: Buffers<R>,
 }
 
 /// Runs of planes or blocks of columns: enough to keep many threads busy, whatever their number.
@@ -85,26 +85,26 @@ const SLOTS: usize = 32;
 /// Planes of a run at least: the planes below and above each run are transformed twice.
 const LEAST_RUN: usize = 16;
 
-impl Poisson {
+impl<R: Real> Poisson<R> {
     /// Plans the solver for `mesh` with the given ends along x, y, z.
-    pub fn new(mesh: &Mesh, ends: [Ends; 3]) -> Poisson {
+    pub fn new(mesh: &Mesh, ends: [Ends; 3]) -> Poisson<R> {
         let [nx, ny, nz] = mesh.cells;
         let axes = [0, 1].map(|a| Axis::new(mesh.cells[a], ends[a], mesh.spacing[a]));
         let scale = 1.0 / (axes[0].norm() * axes[1].norm());
-        let shape = Shape::new(nx, ny);
-        let mut eigenvalues = vec![0.0; shape.modes()];
+        let shape = Shape::new::<R>(nx, ny);
+        let mut eigenvalues = vec![R::default(); shape.modes()];
         // Lines that only fill up a block must not be singular: what they hold, round-off of their
         // partners, would become infinite and come back to them.
         let filler = mesh.spacing.y.powi(-2);
         shape.each_mode(|at, i, j| {
             let along_y = axes[1].eigenvalues.get(j).unwrap_or(&filler);
-            eigenvalues[at] = axes[0].eigenvalues[i] + along_y;
+            eigenvalues[at] = R::of(axes[0].eigenvalues[i] + along_y);
         });
         let slot = || Slot {
             planes: [(); 3].map(|()| Plane::new(shape)),
             buffers: Buffers::new([&axes[0], &axes[1]]),
         };
-        let width = block_width(nz).min(shape.modes());
+        let width = block_width::<R>(nz).min(shape.modes());
         let blocks = shape.modes().div_ceil(width);
         Poisson {
             mesh: *mesh,
@@ -130,10 +130,10 @@ impl Poisson {
     /// right-hand side is taken to be zero and one value of the mean mode is pinned.
     pub fn solve<const N: usize, T: Send>(
         &mut self,
-        source: impl Fn(usize, &mut Plane) + Sync,
-        fields: [&mut [f64]; N],
+        source: impl Fn(usize, &mut Plane<R>) + Sync,
+        fields: [&mut [R]; N],
         partial: &mut [T],
-        sink: impl Fn(usize, Solution, &mut Run<N, T>) + Sync,
+        sink: impl Fn(usize, Solution<R>, &mut Run<N, R, T>) + Sync,
     ) {
         let start = Instant::now();
         let (axes, stride) = ([&self.axes[0], &self.axes[1]], self.shape.stride());
@@ -162,11 +162,11 @@ impl Poisson {
             &mut self.modes,
             stride,
             eigenvalues.len(),
-            block_width(nz),
+            block_width::<R>(nz),
             &mut self.columns,
             |at, columns, scratch| {
                 let lambda = &eigenvalues[at..at + columns.width()];
-                let singular = at == 0 && lambda[0] == 0.0;
+                let singular = at == 0 && lambda[0].wide() == 0.0;
                 dispatch(Solve {
                     system,
                     columns,
@@ -179,7 +179,7 @@ impl Poisson {
         let columns = Instant::now();
         let periodic = self.ends.map(|ends| ends == Ends::Periodic);
         let modes = &self.modes;
-        let invert = |k: usize, plane: &mut Plane, buffers: &mut Buffers| {
+        let invert = |k: usize, plane: &mut Plane<R>, buffers: &mut Buffers<R>| {
             dispatch(Inverse {
                 axes,
                 periodic: [periodic[0], periodic[1]],
@@ -230,11 +230,11 @@ impl Poisson {
 
     /// Replaces the right-hand side in the interior of `field` by the solution; ghosts are not
     /// touched.
-    pub fn solve_field(&mut self, field: &mut Field<Centre>) {
+    pub fn solve_field(&mut self, field: &mut Field<Centre, R>) {
         let layout = self.mesh.layout();
         let [nx, ny, nz] = layout.cells;
         let given = field.clone();
-        let source = |k: usize, plane: &mut Plane| {
+        let source = |k: usize, plane: &mut Plane<R>| {
             for j in 1..=ny {
                 plane.row_mut(j)[1..=nx].copy_from_slice(&given.row(j, k)[1..=nx]);
             }
@@ -261,7 +261,7 @@ impl Poisson {
             .map(|slot| slot.buffers.bytes() + slot.planes.iter().map(Plane::bytes).sum::<usize>())
             .sum();
         let columns: usize = self.columns.iter().map(ColumnScratch::bytes).sum();
-        8 * (self.modes.len() + self.eigenvalues.len()) + slots + columns
+        R::BYTES * (self.modes.len() + self.eigenvalues.len()) + slots + columns
     }
 }
 

@@ -1,38 +1,42 @@
 //! The transforms of one xy plane, in cache: cells to modes and back.
 //!
-//! Lines go through the transforms in blocks of sixteen (eight pairs) or eight (four pairs); the
-//! first half of a block are the real parts. Lines along y lie side by side in the plane; lines
-//! along x are turned over in registers on their way in, and their modes stay side by side, so
-//! that a plane of modes is a row of blocks, each [mode along x][line]. The pairs do not depend on
-//! the width of the registers, so neither do the bits.
+//! Lines go through the transforms in blocks of two cache lines (a full register of pairs) or one
+//! (half a register); the first half of a block are the real parts. Lines along y lie side by side
+//! in the plane; lines along x are turned over in registers on their way in, and their modes stay
+//! side by side, so that a plane of modes is a row of blocks, each [mode along x][line]. The pairs
+//! do not depend on the width of the registers, so neither do the bits.
+//!
+//! Legend: L numbers of a cache line.
 
 use super::axis::Axis;
 use super::lines::{Buffers, Lines, Rows};
-use crate::math::Aligned;
 use crate::math::lanes::{Kernel, Vector};
-
-/// Place of i = 1 in a row of a [`Plane`]: rows start on cache lines, with room for a ghost before.
-const FIRST: usize = 8;
+use crate::math::{Aligned, Real};
 
 /// Sizes of a plane of cells and of a plane of modes.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     nx: usize,
     ny: usize,
+    /// Numbers of a cache line: also the place of i = 1 in a row of a [`Plane`], whose rows start on
+    /// cache lines, with room for a ghost before.
+    line: usize,
     pitch: usize,
 }
 
 impl Shape {
-    pub fn new(nx: usize, ny: usize) -> Shape {
+    pub fn new<R: Real>(nx: usize, ny: usize) -> Shape {
+        let line = R::LANES;
         Shape {
             nx,
             ny,
-            pitch: FIRST + nx.next_multiple_of(8) + 8,
+            line,
+            pitch: line + nx.next_multiple_of(line) + line,
         }
     }
-    /// Lines along x, a multiple of eight.
+    /// Lines along x, a multiple of L.
     fn lines(&self) -> usize {
-        self.ny.next_multiple_of(8)
+        self.ny.next_multiple_of(self.line)
     }
     /// Modes of a plane, those of the lines beyond the last included.
     pub fn modes(&self) -> usize {
@@ -41,12 +45,12 @@ impl Shape {
     /// Distance of two planes of modes: an odd number of cache lines, so that a column of modes
     /// does not crowd into a few sets of the cache.
     pub fn stride(&self) -> usize {
-        8 * ((self.modes() / 8) | 1)
+        self.line * ((self.modes() / self.line) | 1)
     }
     /// Calls `f` with the place of each mode in its plane, its index along x and its line along x,
     /// both from 0; lines from `ny` on fill up the last block.
     pub fn each_mode(&self, mut f: impl FnMut(usize, usize, usize)) {
-        for (first, width) in blocks(self.lines()) {
+        for (first, width) in self.blocks(self.lines()) {
             for m in 0..self.nx {
                 for line in 0..width {
                     let at = first * self.nx + m * width + line;
@@ -55,25 +59,26 @@ impl Shape {
             }
         }
     }
-}
-
-/// First line and number of lines of each block.
-#[inline(always)]
-fn blocks(lines: usize) -> impl Iterator<Item = (usize, usize)> {
-    let lines = lines.next_multiple_of(8);
-    (0..lines)
-        .step_by(16)
-        .map(move |first| (first, if first + 16 <= lines { 16 } else { 8 }))
+    /// First line and number of lines, 2 L or L, of each block.
+    #[inline(always)]
+    fn blocks(&self, lines: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (line, whole) = (self.line, 2 * self.line);
+        let lines = lines.next_multiple_of(line);
+        (0..lines).step_by(whole).map(move |first| {
+            let rest = lines - first;
+            (first, if rest >= whole { whole } else { line })
+        })
+    }
 }
 
 /// A plane of cells with one layer of ghosts, rows on cache lines.
-pub struct Plane {
+pub struct Plane<R> {
     shape: Shape,
-    values: Aligned,
+    values: Aligned<R>,
 }
 
-impl Plane {
-    pub(super) fn new(shape: Shape) -> Plane {
+impl<R: Real> Plane<R> {
+    pub(super) fn new(shape: Shape) -> Plane<R> {
         Plane {
             shape,
             values: Aligned::zeros(shape.pitch * (shape.lines() + 2)),
@@ -84,18 +89,18 @@ impl Plane {
     }
     /// Row j, ghosts included: entries 0 to nx + 1.
     #[inline(always)]
-    pub fn row(&self, j: usize) -> &[f64] {
-        &self.values[j * self.shape.pitch + FIRST - 1..][..self.shape.nx + 2]
+    pub fn row(&self, j: usize) -> &[R] {
+        &self.values[j * self.shape.pitch + R::LANES - 1..][..self.shape.nx + 2]
     }
     /// Row j to write.
     #[inline(always)]
-    pub fn row_mut(&mut self, j: usize) -> &mut [f64] {
-        &mut self.values[j * self.shape.pitch + FIRST - 1..][..self.shape.nx + 2]
+    pub fn row_mut(&mut self, j: usize) -> &mut [R] {
+        &mut self.values[j * self.shape.pitch + R::LANES - 1..][..self.shape.nx + 2]
     }
     /// Sets the ghosts: the neighbours across a periodic axis, else the cells next to them.
     #[inline(always)]
     fn fill_ghosts(&mut self, [periodic_x, periodic_y]: [bool; 2]) {
-        let Shape { nx, ny, pitch } = self.shape;
+        let Shape { nx, ny, pitch, .. } = self.shape;
         for j in 1..=ny {
             let row = self.row_mut(j);
             let ends = [row[1], row[nx]];
@@ -112,28 +117,29 @@ impl Plane {
     fn clear_columns(&mut self) {
         let Shape { nx, pitch, .. } = self.shape;
         for row in self.values.chunks_exact_mut(pitch) {
-            row[FIRST + nx..FIRST + nx.next_multiple_of(8)].fill(0.0);
+            row[R::LANES + nx..R::LANES + nx.next_multiple_of(R::LANES)].fill(R::default());
         }
     }
     /// Clears what shares a block with lines along x.
     #[inline(always)]
     fn clear_rows(&mut self) {
         let Shape { ny, pitch, .. } = self.shape;
-        self.values[(ny + 1) * pitch..(self.shape.lines() + 1) * pitch].fill(0.0);
+        self.values[(ny + 1) * pitch..(self.shape.lines() + 1) * pitch].fill(R::default());
     }
 }
 
 /// Cells of `plane` -> `modes`; uses up the plane.
-pub struct Forward<'a> {
-    pub axes: [&'a Axis; 2],
-    pub plane: &'a mut Plane,
-    pub modes: &'a mut [f64],
-    pub buffers: &'a mut Buffers,
+pub struct Forward<'a, R> {
+    pub axes: [&'a Axis<R>; 2],
+    pub plane: &'a mut Plane<R>,
+    pub modes: &'a mut [R],
+    pub buffers: &'a mut Buffers<R>,
 }
 
-impl Kernel for Forward<'_> {
+impl<R: Real> Kernel for Forward<'_, R> {
+    type Number = R;
     #[inline(always)]
-    fn run<V: Vector>(self) {
+    fn run<V: Vector<Number = R>>(self) {
         let Forward {
             axes: [along_x, along_y],
             plane,
@@ -144,14 +150,14 @@ impl Kernel for Forward<'_> {
         plane.clear_columns();
         plane.clear_rows();
         let values = &mut plane.values[..];
-        for (first, width) in blocks(shape.nx) {
-            let at = shape.pitch + FIRST + first;
-            if width == 16 {
-                for lane in (0..8).step_by(V::WIDTH) {
+        for (first, width) in shape.blocks(shape.nx) {
+            let at = shape.pitch + R::LANES + first;
+            if width == 2 * R::LANES {
+                for lane in (0..R::LANES).step_by(V::WIDTH) {
                     let lines = Lines {
                         at: at + lane,
                         step: shape.pitch,
-                        second: 8,
+                        second: R::LANES,
                     };
                     lines.forward::<V>(along_y, values, buffers);
                 }
@@ -159,25 +165,25 @@ impl Kernel for Forward<'_> {
                 let lines = Lines {
                     at,
                     step: shape.pitch,
-                    second: 4,
+                    second: R::LANES / 2,
                 };
-                lines.forward::<V::Four>(along_y, values, buffers);
+                lines.forward::<V::Half>(along_y, values, buffers);
             }
         }
-        for (first, width) in blocks(shape.ny) {
-            let at = (first + 1) * shape.pitch + FIRST;
+        for (first, width) in shape.blocks(shape.ny) {
+            let at = (first + 1) * shape.pitch + R::LANES;
             let to = first * shape.nx;
-            if width == 16 {
-                for lane in (0..8).step_by(V::WIDTH) {
+            if width == 2 * R::LANES {
+                for lane in (0..R::LANES).step_by(V::WIDTH) {
                     let rows = Rows {
                         at: at + lane * shape.pitch,
                         pitch: shape.pitch,
-                        second: 8,
+                        second: R::LANES,
                     };
                     let lines = Lines {
                         at: to + lane,
-                        step: 16,
-                        second: 8,
+                        step: 2 * R::LANES,
+                        second: R::LANES,
                     };
                     rows.load(&along_x.order, values, buffers.lines::<V>(along_x));
                     lines.store(buffers.transform::<V>(along_x, false), modes);
@@ -186,32 +192,33 @@ impl Kernel for Forward<'_> {
                 let rows = Rows {
                     at,
                     pitch: shape.pitch,
-                    second: 4,
+                    second: R::LANES / 2,
                 };
                 let lines = Lines {
                     at: to,
-                    step: 8,
-                    second: 4,
+                    step: R::LANES,
+                    second: R::LANES / 2,
                 };
-                rows.load(&along_x.order, values, buffers.lines::<V::Four>(along_x));
-                lines.store(buffers.transform::<V::Four>(along_x, false), modes);
+                rows.load(&along_x.order, values, buffers.lines::<V::Half>(along_x));
+                lines.store(buffers.transform::<V::Half>(along_x, false), modes);
             }
         }
     }
 }
 
 /// `modes` -> cells of `plane` and its ghosts.
-pub struct Inverse<'a> {
-    pub axes: [&'a Axis; 2],
+pub struct Inverse<'a, R> {
+    pub axes: [&'a Axis<R>; 2],
     pub periodic: [bool; 2],
-    pub plane: &'a mut Plane,
-    pub modes: &'a [f64],
-    pub buffers: &'a mut Buffers,
+    pub plane: &'a mut Plane<R>,
+    pub modes: &'a [R],
+    pub buffers: &'a mut Buffers<R>,
 }
 
-impl Kernel for Inverse<'_> {
+impl<R: Real> Kernel for Inverse<'_, R> {
+    type Number = R;
     #[inline(always)]
-    fn run<V: Vector>(self) {
+    fn run<V: Vector<Number = R>>(self) {
         let Inverse {
             axes: [along_x, along_y],
             periodic,
@@ -221,20 +228,20 @@ impl Kernel for Inverse<'_> {
         } = self;
         let shape = plane.shape;
         let values = &mut plane.values[..];
-        for (first, width) in blocks(shape.ny) {
-            let at = (first + 1) * shape.pitch + FIRST;
+        for (first, width) in shape.blocks(shape.ny) {
+            let at = (first + 1) * shape.pitch + R::LANES;
             let from = first * shape.nx;
-            if width == 16 {
-                for lane in (0..8).step_by(V::WIDTH) {
+            if width == 2 * R::LANES {
+                for lane in (0..R::LANES).step_by(V::WIDTH) {
                     let rows = Rows {
                         at: at + lane * shape.pitch,
                         pitch: shape.pitch,
-                        second: 8,
+                        second: R::LANES,
                     };
                     let lines = Lines {
                         at: from + lane,
-                        step: 16,
-                        second: 8,
+                        step: 2 * R::LANES,
+                        second: R::LANES,
                     };
                     lines.load(modes, buffers.lines::<V>(along_x));
                     rows.store(
@@ -247,31 +254,31 @@ impl Kernel for Inverse<'_> {
                 let rows = Rows {
                     at,
                     pitch: shape.pitch,
-                    second: 4,
+                    second: R::LANES / 2,
                 };
                 let lines = Lines {
                     at: from,
-                    step: 8,
-                    second: 4,
+                    step: R::LANES,
+                    second: R::LANES / 2,
                 };
-                lines.load(modes, buffers.lines::<V::Four>(along_x));
+                lines.load(modes, buffers.lines::<V::Half>(along_x));
                 rows.store(
                     &along_x.order,
-                    buffers.transform::<V::Four>(along_x, true),
+                    buffers.transform::<V::Half>(along_x, true),
                     values,
                 );
             }
         }
         plane.clear_columns();
         let values = &mut plane.values[..];
-        for (first, width) in blocks(shape.nx) {
-            let at = shape.pitch + FIRST + first;
-            if width == 16 {
-                for lane in (0..8).step_by(V::WIDTH) {
+        for (first, width) in shape.blocks(shape.nx) {
+            let at = shape.pitch + R::LANES + first;
+            if width == 2 * R::LANES {
+                for lane in (0..R::LANES).step_by(V::WIDTH) {
                     let lines = Lines {
                         at: at + lane,
                         step: shape.pitch,
-                        second: 8,
+                        second: R::LANES,
                     };
                     lines.inverse::<V>(along_y, values, buffers);
                 }
@@ -279,9 +286,9 @@ impl Kernel for Inverse<'_> {
                 let lines = Lines {
                     at,
                     step: shape.pitch,
-                    second: 4,
+                    second: R::LANES / 2,
                 };
-                lines.inverse::<V::Four>(along_y, values, buffers);
+                lines.inverse::<V::Half>(along_y, values, buffers);
             }
         }
         plane.fill_ghosts(periodic);

@@ -9,35 +9,37 @@
 
 use super::Ends;
 use crate::grid::Columns;
-use crate::math::Aligned;
 use crate::math::lanes::{Kernel, Vector};
+use crate::math::{Aligned, Real};
 
-/// Doubles of cache that a block of columns may take.
-const CACHE: usize = 1 << 16;
+/// Bytes of cache that a block of columns may take.
+const CACHE: usize = 1 << 19;
 
-/// Columns of a block: a multiple of eight.
-pub fn block_width(nz: usize) -> usize {
-    (CACHE / 2 / nz / 16 * 16).max(16)
+/// Columns of a block: a multiple of two cache lines.
+pub fn block_width<R: Real>(nz: usize) -> usize {
+    let least = 2 * R::LANES;
+    (CACHE / R::BYTES / 2 / nz / least * least).max(least)
 }
 
 /// One block of columns in cache.
-pub struct ColumnScratch {
-    values: Aligned,
-    pivots: Aligned,
-    corner: Aligned,
-    carry: Aligned,
-    mean: Vec<f64>,
+pub struct ColumnScratch<R> {
+    values: Aligned<R>,
+    pivots: Aligned<R>,
+    corner: Aligned<R>,
+    carry: Aligned<R>,
+    /// Right-hand side of the mean mode and the pivots of its system.
+    mean: [Vec<f64>; 2],
 }
 
-impl ColumnScratch {
-    pub fn new(width: usize, nz: usize, ends: Ends) -> ColumnScratch {
+impl<R: Real> ColumnScratch<R> {
+    pub fn new(width: usize, nz: usize, ends: Ends) -> ColumnScratch<R> {
         let periodic = ends == Ends::Periodic && nz > 1;
         ColumnScratch {
             values: Aligned::zeros(width * nz),
             pivots: Aligned::zeros(width * nz),
             corner: Aligned::zeros(if periodic { width * nz } else { 0 }),
             carry: Aligned::zeros(2 * width),
-            mean: vec![0.0; nz],
+            mean: [(); 2].map(|()| vec![0.0; nz]),
         }
     }
     pub fn bytes(&self) -> usize {
@@ -48,7 +50,7 @@ impl ColumnScratch {
             carry,
             mean,
         } = self;
-        8 * (values.len() + pivots.len() + corner.len() + carry.len() + mean.len())
+        R::BYTES * (values.len() + pivots.len() + corner.len() + carry.len()) + 16 * mean[0].len()
     }
 }
 
@@ -74,17 +76,18 @@ impl Tridiagonal {
 
 /// Solves all columns of a block with the eigenvalues `lambda`; `singular` if the first of them is
 /// the mean mode, which is defined up to a constant.
-pub struct Solve<'a, 'b> {
+pub struct Solve<'a, 'b, R> {
     pub system: Tridiagonal,
-    pub columns: &'a mut Columns<'b>,
-    pub lambda: &'a [f64],
+    pub columns: &'a mut Columns<'b, R>,
+    pub lambda: &'a [R],
     pub singular: bool,
-    pub scratch: &'a mut ColumnScratch,
+    pub scratch: &'a mut ColumnScratch<R>,
 }
 
-impl Kernel for Solve<'_, '_> {
+impl<R: Real> Kernel for Solve<'_, '_, R> {
+    type Number = R;
     #[inline(always)]
-    fn run<V: Vector>(self) {
+    fn run<V: Vector<Number = R>>(self) {
         let Solve {
             system,
             columns,
@@ -98,12 +101,12 @@ impl Kernel for Solve<'_, '_> {
             Ends::Periodic => {
                 if singular {
                     for k in 0..system.n {
-                        scratch.mean[k] = columns.row(k)[0];
+                        scratch.mean[0][k] = columns.row(k)[0].wide();
                     }
                 }
                 system.solve_periodic::<V>(columns, lambda, scratch);
                 if singular {
-                    system.solve_mean(columns, &mut scratch.mean, &mut scratch.pivots);
+                    system.solve_mean(columns, &mut scratch.mean);
                 }
             }
         }
@@ -112,34 +115,34 @@ impl Kernel for Solve<'_, '_> {
 
 impl Tridiagonal {
     #[inline(always)]
-    fn solve_flat(&self, columns: &mut Columns, lambda: &[f64]) {
+    fn solve_flat<R: Real>(&self, columns: &mut Columns<R>, lambda: &[R]) {
         for (value, lambda) in columns.row(0).iter_mut().zip(lambda) {
-            *value = if *lambda == 0.0 {
+            *value = R::of(if lambda.wide() == 0.0 {
                 0.0
             } else {
-                -self.scale * *value / lambda
-            };
+                -self.scale * value.wide() / lambda.wide()
+            });
         }
     }
 
     #[inline(always)]
     fn solve_neumann<V: Vector>(
         &self,
-        columns: &mut Columns,
-        lambda: &[f64],
+        columns: &mut Columns<V::Number>,
+        lambda: &[V::Number],
         singular: bool,
-        scratch: &mut ColumnScratch,
+        scratch: &mut ColumnScratch<V::Number>,
     ) {
         let (n, width) = (self.n, lambda.len());
-        let (one, square) = (V::splat(1.0), V::splat(self.square));
-        let factor = V::splat(-self.square * self.scale);
+        let (one, square) = (V::constant(1.0), V::constant(self.square));
+        let factor = V::constant(-self.square * self.scale);
         let (values, pivots) = (
             &mut scratch.values[..n * width],
             &mut scratch.pivots[..n * width],
         );
         for k in 0..n {
             let open =
-                V::splat(2.0 - f64::from(u8::from(k == 0)) - f64::from(u8::from(k + 1 == n)));
+                V::constant(2.0 - f64::from(u8::from(k == 0)) - f64::from(u8::from(k + 1 == n)));
             let row = &columns.row(k)[..width];
             let (before, here) = pivots[..(k + 1) * width].split_at_mut(k * width);
             let (values_before, values_here) = values[..(k + 1) * width].split_at_mut(k * width);
@@ -160,7 +163,7 @@ impl Tridiagonal {
         }
         if singular {
             // The last pivot of the mean mode vanishes; the value there is pinned to zero.
-            values[(n - 1) * width] = 0.0;
+            values[(n - 1) * width] = V::Number::default();
         }
         let carry = &mut scratch.carry[..width];
         carry.copy_from_slice(&values[(n - 1) * width..]);
@@ -179,13 +182,16 @@ impl Tridiagonal {
     #[inline(always)]
     fn solve_periodic<V: Vector>(
         &self,
-        columns: &mut Columns,
-        lambda: &[f64],
-        scratch: &mut ColumnScratch,
+        columns: &mut Columns<V::Number>,
+        lambda: &[V::Number],
+        scratch: &mut ColumnScratch<V::Number>,
     ) {
         let (n, width) = (self.n, lambda.len());
-        let (one, two, zero) = (V::splat(1.0), V::splat(2.0), V::splat(0.0));
-        let (square, factor) = (V::splat(self.square), V::splat(-self.square * self.scale));
+        let (one, two, zero) = (V::constant(1.0), V::constant(2.0), V::constant(0.0));
+        let (square, factor) = (
+            V::constant(self.square),
+            V::constant(-self.square * self.scale),
+        );
         let ColumnScratch {
             values,
             pivots,
@@ -251,9 +257,9 @@ impl Tridiagonal {
         }
     }
 
-    /// The mean mode of a periodic axis: its first value is pinned to zero.
+    /// The mean mode of a periodic axis, in doubles: its first value is pinned to zero.
     #[inline(always)]
-    fn solve_mean(&self, columns: &mut Columns, f: &mut [f64], pivots: &mut [f64]) {
+    fn solve_mean<R: Real>(&self, columns: &mut Columns<R>, [f, pivots]: &mut [Vec<f64>; 2]) {
         let (n, factor) = (self.n, -self.square * self.scale);
         let (mut pivot, mut y) = (0.0, 0.0);
         for k in 1..n {
@@ -262,11 +268,11 @@ impl Tridiagonal {
             pivots[k] = pivot;
             f[k] = y;
         }
-        columns.row(0)[0] = 0.0;
+        columns.row(0)[0] = R::default();
         y = 0.0;
         for k in (1..n).rev() {
             y = f[k] + pivots[k] * y;
-            columns.row(k)[0] = y;
+            columns.row(k)[0] = R::of(y);
         }
     }
 }

@@ -32,13 +32,13 @@ impl Simulation {
     pub fn max_divergence(&self) -> f64 {
         self.fluid
             .as_ref()
-            .map_or(0.0, |fluid| fluid.measures.max_divergence)
+            .map_or(0.0, |fluid| fluid.measures().max_divergence)
     }
     /// CFL number of the last step; zero without fluid.
     pub fn cfl(&self) -> f64 {
-        self.fluid
-            .as_ref()
-            .map_or(0.0, |fluid| fluid.measures.max_rate * self.clock.last_step)
+        self.fluid.as_ref().map_or(0.0, |fluid| {
+            fluid.measures().max_rate * self.clock.last_step
+        })
     }
     /// Measures the present state.
     pub fn diagnostics(&self) -> Diagnostics {
@@ -53,12 +53,12 @@ impl Simulation {
             d.momentum += (grain.density - fluid_density) * grain.shape.volume() * grain.velocity;
         }
         if let (Some(fluid), Some(params)) = (&self.fluid, &self.setup.fluid) {
-            d.max_divergence = fluid.measures.max_divergence;
-            d.max_velocity = fluid.measures.max_velocity;
-            d.cfl = fluid.measures.max_rate * self.clock.last_step;
-            d.fluid_kinetic_energy = params.density * fluid.measures.kinetic_energy;
+            d.max_divergence = fluid.measures().max_divergence;
+            d.max_velocity = fluid.measures().max_velocity;
+            d.cfl = fluid.measures().max_rate * self.clock.last_step;
+            d.fluid_kinetic_energy = params.density * fluid.measures().kinetic_energy;
             d.slip = self.slip();
-            d.momentum += params.density * fluid.measures.momentum;
+            d.momentum += params.density * fluid.measures().momentum;
             let volume = self.setup.mesh.cell_volume() * self.setup.mesh.cell_count() as f64;
             let scale = params.density * volume * d.max_velocity;
             d.momentum_residual = if scale > 0.0 {

@@ -3,6 +3,7 @@
 mod clock;
 mod diagnostics;
 pub mod events;
+mod fluid;
 mod prescription;
 mod probe;
 mod setup;
@@ -11,12 +12,12 @@ mod step;
 
 use std::time::Duration;
 
-use crate::coupling::Coupling;
 use crate::dem::{Contact, Dynamics, Grain};
-use crate::flow::{Flow, FlowMeasures};
 use crate::grid::Mesh;
 use crate::math::Load;
 use crate::poisson::Stages;
+
+use fluid::Fluid;
 
 pub use clock::Clock;
 pub use diagnostics::Diagnostics;
@@ -24,18 +25,11 @@ pub use prescription::{Drive, Prescription};
 pub use setup::{Setup, SetupError, StepRule};
 pub use step::StepError;
 
-/// The fluid side of a simulation.
-struct Fluid {
-    flow: Flow,
-    coupling: Coupling,
-    measures: FlowMeasures,
-}
-
 /// A running simulation.
 pub struct Simulation {
     setup: Setup,
     clock: Clock,
-    fluid: Option<Fluid>,
+    fluid: Option<Box<dyn Fluid>>,
     dynamics: Dynamics,
     /// Hydrodynamic load on each grain over the last step.
     loads: Vec<Load>,
@@ -68,20 +62,7 @@ impl Simulation {
     pub fn new(setup: Setup) -> Result<Simulation, SetupError> {
         setup.validate()?;
         let enclosure = setup.enclosure();
-        let fluid = setup.fluid.map(|params| {
-            let mut flow = Flow::new(&setup.mesh, setup.boundaries, &params);
-            if let Some(velocity) = &setup.prescription.initial_velocity {
-                flow.start_from(|axis, at| velocity.component(axis, &at.to_array()));
-            }
-            let (density, nu) = (params.density, params.kinematic_viscosity);
-            let mut coupling = Coupling::new(&flow, setup.scheme, density, nu, &setup.grains);
-            let measures = coupling.start(&mut flow, &setup.grains);
-            Fluid {
-                flow,
-                coupling,
-                measures,
-            }
-        });
+        let fluid = setup.fluid.map(|params| fluid::start(&setup, &params));
         let count = setup.grains.len();
         Ok(Simulation {
             dynamics: Dynamics::new(setup.contact, enclosure),
@@ -94,9 +75,9 @@ impl Simulation {
                 contact: vec![Load::default(); count],
             },
             passes: Passes {
-                initial: fluid.as_ref().map_or(Stages::default(), |fluid: &Fluid| {
-                    fluid.flow.poisson_stages()
-                }),
+                initial: fluid
+                    .as_ref()
+                    .map_or(Stages::default(), |fluid| fluid.poisson_stages()),
                 ..Passes::default()
             },
             fluid,
@@ -143,7 +124,7 @@ impl Simulation {
         let stages = self
             .fluid
             .as_ref()
-            .map_or(p.initial, |fluid| fluid.flow.poisson_stages());
+            .map_or(p.initial, |fluid| fluid.poisson_stages());
         let [forward, columns, inverse] = [
             stages.forward - p.initial.forward,
             stages.columns - p.initial.columns,
@@ -165,8 +146,6 @@ impl Simulation {
     }
     /// Memory held by fields, solver and grains on the grid [bytes].
     pub fn bytes(&self) -> usize {
-        self.fluid
-            .as_ref()
-            .map_or(0, |fluid| fluid.flow.bytes() + fluid.coupling.bytes())
+        self.fluid.as_ref().map_or(0, |fluid| fluid.bytes())
     }
 }

@@ -3,33 +3,25 @@
 use glam::DVec3;
 
 use super::Simulation;
-use crate::flow::Flow;
-use crate::grid::{FACE_OFFSET, FaceVector};
+use crate::grid::FACE_OFFSET;
 
 impl Simulation {
-    fn flow(&self) -> Option<&Flow> {
-        self.fluid.as_ref().map(|fluid| &fluid.flow)
-    }
-    /// Face velocities [m/s], if there is a fluid.
-    pub fn velocity(&self) -> Option<&FaceVector> {
-        self.flow().map(|flow| &flow.velocity)
-    }
     /// Cell-centred velocity [m/s] of cell (i, j, k), counted from 0; zero without fluid.
     pub fn velocity_at(&self, cell: [usize; 3]) -> DVec3 {
-        let Some(flow) = self.flow() else {
+        let Some(fluid) = &self.fluid else {
             return DVec3::ZERO;
         };
+        let layout = self.setup.mesh.layout();
         let [i, j, k] = cell.map(|i| i + 1);
-        let FaceVector { x, y, z } = &flow.velocity;
-        0.5 * DVec3::new(
-            x.at(i, j, k) + x.at(i + 1, j, k),
-            y.at(i, j, k) + y.at(i, j + 1, k),
-            z.at(i, j, k) + z.at(i, j, k + 1),
-        )
+        let (at, strides) = (layout.index(i, j, k), layout.strides());
+        let mean = |axis: usize| {
+            0.5 * (fluid.velocity(axis, at) + fluid.velocity(axis, at + strides[axis]))
+        };
+        DVec3::new(mean(0), mean(1), mean(2))
     }
     /// Vorticity [1/s] at the centre of cell (i, j, k), counted from 0: mean of the four edges.
     pub fn vorticity_at(&self, cell: [usize; 3]) -> DVec3 {
-        let Some(flow) = self.flow() else {
+        let Some(fluid) = &self.fluid else {
             return DVec3::ZERO;
         };
         let h = self.setup.mesh.spacing;
@@ -39,8 +31,11 @@ impl Simulation {
         let at = layout.index(i, j, k);
         // Edge (b, c) at the lower corner of a cell: d u_c / d b - d u_b / d c.
         let edge = |b: usize, c: usize, at: usize| {
-            let (ub, uc) = (flow.velocity.component(b), flow.velocity.component(c));
-            (uc[at] - uc[at - strides[b]]) / h[b] - (ub[at] - ub[at - strides[c]]) / h[c]
+            let rise = |component: usize, along: usize| {
+                let q = |at: usize| fluid.velocity(component, at);
+                (q(at) - q(at - strides[along])) / h[along]
+            };
+            rise(c, b) - rise(b, c)
         };
         let mean = |b: usize, c: usize| {
             let (up, across) = (strides[b], strides[c]);
@@ -55,8 +50,9 @@ impl Simulation {
     pub fn pressure_at(&self, cell: [usize; 3]) -> f64 {
         let [i, j, k] = cell.map(|i| i + 1);
         let density = self.setup.fluid.map_or(0.0, |fluid| fluid.density);
-        self.flow()
-            .map_or(0.0, |flow| density * flow.pressure.at(i, j, k))
+        let at = self.setup.mesh.layout().index(i, j, k);
+        let pressure = self.fluid.as_ref().map(|fluid| fluid.pressure(at));
+        density * pressure.unwrap_or(0.0)
     }
     /// Solid fraction of cell (i, j, k), counted from 0, by the plane through the nearest surface.
     pub fn solid_fraction_at(&self, cell: [usize; 3]) -> f64 {
@@ -91,7 +87,7 @@ impl Simulation {
     /// Velocity [m/s] at a point by trilinear interpolation of each component; `None` outside the
     /// box or without fluid.
     pub fn interpolate_velocity(&self, x: DVec3) -> Option<DVec3> {
-        let flow = self.flow()?;
+        let fluid = self.fluid.as_ref()?;
         let mesh = &self.setup.mesh;
         let layout = mesh.layout();
         let strides = layout.strides();
@@ -119,7 +115,6 @@ impl Simulation {
                 at += i * strides[axis];
                 weight[axis] = s - i as f64;
             }
-            let q = flow.velocity.component(component);
             for corner in 0..8usize {
                 let (mut share, mut here) = (1.0, at);
                 for axis in 0..3 {
@@ -134,7 +129,7 @@ impl Simulation {
                     }
                 }
                 if share != 0.0 {
-                    velocity[component] += share * q[here];
+                    velocity[component] += share * fluid.velocity(component, here);
                 }
             }
         }

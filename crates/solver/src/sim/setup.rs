@@ -6,6 +6,7 @@ use crate::coupling::Scheme;
 use crate::dem::{ContactParams, Enclosure, Grain};
 use crate::flow::{Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
+use crate::math::Precision;
 
 use super::Prescription;
 
@@ -34,6 +35,8 @@ pub struct Setup {
     pub boundaries: Boundaries,
     /// The fluid; none for a dry run (contact only).
     pub fluid: Option<FluidParams>,
+    /// Numbers that the fields are made of.
+    pub precision: Precision,
     /// Coupling scheme.
     pub scheme: Scheme,
     /// Gravity [m/s^2].

@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 use glam::{DQuat, DVec3};
 
 use super::Simulation;
-use crate::math::Load;
+use crate::math::{Load, Real};
 
 impl Simulation {
     /// Writes the full state; reading it back continues with the same bits.
@@ -27,19 +27,8 @@ impl Simulation {
             }
         }
         if let Some(fluid) = &self.fluid {
-            let m = &fluid.measures;
-            out.numbers(&[
-                m.max_divergence,
-                m.max_rate,
-                m.max_velocity,
-                m.kinetic_energy,
-            ])?;
-            out.numbers(&m.momentum.to_array())?;
             out.numbers(&self.momentum_residual.to_array())?;
-            for values in fluid.flow.state() {
-                out.count(values.len() as u64)?;
-                out.numbers(values)?;
-            }
+            fluid.save(&mut out)?;
         }
         self.dynamics.save(out.0)
     }
@@ -64,70 +53,57 @@ impl Simulation {
             };
         }
         if let Some(fluid) = &mut self.fluid {
-            let m = &mut fluid.measures;
-            [
-                m.max_divergence,
-                m.max_rate,
-                m.max_velocity,
-                m.kinetic_energy,
-            ] = input.numbers()?;
-            m.momentum = DVec3::from_array(input.numbers()?);
             self.momentum_residual = DVec3::from_array(input.numbers()?);
-            for values in fluid.flow.state_mut(self.clock.last_step) {
-                input.expect(values.len(), "field entries")?;
-                input.fill(values)?;
-            }
-            fluid
-                .coupling
-                .locate(&self.setup.grains, self.clock.last_step);
+            fluid.restore(&mut input, self.clock.last_step)?;
+            fluid.locate(&self.setup.grains, self.clock.last_step);
         }
         self.dynamics.restore(input.0)
     }
 }
 
-struct Writer<'a>(&'a mut dyn Write);
+pub(super) struct Writer<'a>(&'a mut dyn Write);
 
 impl Writer<'_> {
-    fn count(&mut self, value: u64) -> io::Result<()> {
+    pub fn count(&mut self, value: u64) -> io::Result<()> {
         self.0.write_all(&value.to_le_bytes())
     }
-    fn numbers(&mut self, values: &[f64]) -> io::Result<()> {
+    pub fn numbers<R: Real>(&mut self, values: &[R]) -> io::Result<()> {
         let mut bytes = [0; 8 * 512];
         for chunk in values.chunks(512) {
-            for (out, value) in bytes.chunks_exact_mut(8).zip(chunk) {
-                out.copy_from_slice(&value.to_le_bytes());
+            for (out, value) in bytes.chunks_exact_mut(R::BYTES).zip(chunk) {
+                value.write_to(out);
             }
-            self.0.write_all(&bytes[..8 * chunk.len()])?;
+            self.0.write_all(&bytes[..R::BYTES * chunk.len()])?;
         }
         Ok(())
     }
 }
 
-struct Reader<'a>(&'a mut dyn Read);
+pub(super) struct Reader<'a>(&'a mut dyn Read);
 
 impl Reader<'_> {
-    fn count(&mut self) -> io::Result<u64> {
+    pub fn count(&mut self) -> io::Result<u64> {
         let mut bytes = [0; 8];
         self.0.read_exact(&mut bytes)?;
         Ok(u64::from_le_bytes(bytes))
     }
-    fn numbers<const N: usize>(&mut self) -> io::Result<[f64; N]> {
+    pub fn numbers<const N: usize>(&mut self) -> io::Result<[f64; N]> {
         let mut values = [0.0; N];
         self.fill(&mut values)?;
         Ok(values)
     }
-    fn fill(&mut self, values: &mut [f64]) -> io::Result<()> {
+    pub fn fill<R: Real>(&mut self, values: &mut [R]) -> io::Result<()> {
         let mut bytes = [0; 8 * 512];
         for chunk in values.chunks_mut(512) {
-            let bytes = &mut bytes[..8 * chunk.len()];
+            let bytes = &mut bytes[..R::BYTES * chunk.len()];
             self.0.read_exact(bytes)?;
-            for (value, bytes) in chunk.iter_mut().zip(bytes.chunks_exact(8)) {
-                *value = f64::from_le_bytes(bytes.try_into().expect("chunks of eight"));
+            for (value, bytes) in chunk.iter_mut().zip(bytes.chunks_exact(R::BYTES)) {
+                *value = R::read_from(bytes);
             }
         }
         Ok(())
     }
-    fn expect(&mut self, count: usize, what: &str) -> io::Result<()> {
+    pub fn expect(&mut self, count: usize, what: &str) -> io::Result<()> {
         let found = self.count()?;
         if found == count as u64 {
             return Ok(());

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Fluid, Simulation};
+use super::Simulation;
 use crate::coupling::Scheme;
 use crate::math::Load;
 
@@ -30,7 +30,7 @@ impl Simulation {
         let rate = self
             .fluid
             .as_ref()
-            .map_or(0.0, |fluid| fluid.measures.max_rate);
+            .map_or(0.0, |fluid| fluid.measures().max_rate);
         let dt = self.clock.choose(rate, limit);
         let Simulation {
             setup,
@@ -58,36 +58,30 @@ impl Simulation {
                 dynamics.advance(grains, &work.driving, dt, &mut work.contact);
                 prescription.drive(grains, end);
             }),
-            Some(Fluid {
-                flow,
-                coupling,
-                measures,
-            }) => {
+            Some(fluid) => {
                 if let Some(acceleration) = prescription.body_acceleration(now) {
-                    flow.set_body_acceleration(acceleration);
+                    fluid.set_body_acceleration(acceleration);
                 }
-                timed(&mut passes.predict, || flow.predict(dt));
-                timed(&mut passes.coupling, || {
-                    coupling.correct_advection(flow, grains)
-                });
+                timed(&mut passes.predict, || fluid.predict(dt));
+                timed(&mut passes.coupling, || fluid.correct_advection(grains));
                 timed(&mut passes.contact, || {
                     dynamics.advance(grains, &work.driving, dt, &mut work.contact)
                 });
                 prescription.drive(grains, end);
-                timed(&mut passes.coupling, || coupling.locate(grains, dt));
+                timed(&mut passes.coupling, || fluid.locate(grains, dt));
                 if setup.scheme == Scheme::Paper {
-                    timed(&mut passes.project, || flow.project_prediction(dt));
+                    timed(&mut passes.project, || fluid.project_prediction(dt));
                 }
                 for i in 0..grains.len() {
                     work.driving[i] = work.driving[i] + loads[i] * -1.0 + work.contact[i];
                 }
                 timed(&mut passes.coupling, || {
-                    coupling.impose_rigidity(flow, grains, &work.before, &work.driving, dt, loads);
+                    fluid.impose_rigidity(grains, &work.before, &work.driving, dt, loads);
                 });
-                let momentum = measures.momentum;
-                timed(&mut passes.project, || *measures = flow.project(dt));
-                self.momentum_residual =
-                    fluid_density * (measures.momentum - momentum - flow.boundary_impulse(dt));
+                let momentum = fluid.measures().momentum;
+                timed(&mut passes.project, || fluid.project(dt));
+                let gain = fluid.measures().momentum - momentum;
+                self.momentum_residual = fluid_density * (gain - fluid.boundary_impulse(dt));
                 for (grain, (before, load)) in grains.iter().zip(work.before.iter().zip(&*loads)) {
                     // What the fluid gave the grain, the fluid inside it included, it lost.
                     let displaced = fluid_density * grain.shape.volume();
@@ -123,7 +117,7 @@ impl Simulation {
             }
         }
         if let Some(fluid) = &self.fluid {
-            let m = &fluid.measures;
+            let m = fluid.measures();
             if !(m.kinetic_energy.is_finite() && m.max_divergence.is_finite()) {
                 return unstable(
                     "the velocity is not finite".into(),

@@ -151,6 +151,7 @@ pub(super) fn validate(
         mesh,
         boundaries,
         fluid: fluid_params.copied(),
+        precision: raw.run.precision.value,
         scheme,
         gravity,
         grains,

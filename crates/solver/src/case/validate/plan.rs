@@ -264,21 +264,8 @@ fn planes(
     planes
 }
 
-/// Threads; also refuses what the program does not have.
+/// Threads.
 pub(super) fn run(check: &mut Checker, raw: &RawRun) -> usize {
-    if raw.precision.value != "f64" {
-        let what = if raw.precision.value == "f32" {
-            "single precision is not available"
-        } else {
-            "unknown precision"
-        };
-        check.fail(
-            raw.precision.span.as_ref(),
-            "run.precision",
-            format!("{what}: found \"{}\"", raw.precision.value),
-            "accepted: \"f64\"",
-        );
-    }
     if raw.threads.value > 4096 {
         check.fail(
             raw.threads.span.as_ref(),

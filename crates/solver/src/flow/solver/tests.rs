@@ -28,7 +28,7 @@ fn noise(state: &mut u64) -> f64 {
 
 /// A random divergence-free velocity.
 fn random_flow(mesh: &Mesh, boundaries: Boundaries, nu: f64) -> Flow {
-    let mut flow = Flow::new(mesh, boundaries, &params(nu));
+    let mut flow = Flow::<f64>::new(mesh, boundaries, &params(nu));
     let mut state = 11;
     for axis in 0..3 {
         flow.velocity
@@ -174,7 +174,7 @@ fn taylor_green(n: usize, dt: f64, steps: usize, nu: f64, plane: [usize; 2]) -> 
         spacing: DVec3::splat(2.0 * PI / n as f64),
         origin: DVec3::ZERO,
     };
-    let mut flow = Flow::new(&mesh, PERIODIC, &params(nu));
+    let mut flow = Flow::<f64>::new(&mesh, PERIODIC, &params(nu));
     let exact = |axis: usize, x: DVec3, t: f64| {
         let (a, b) = (x[plane[0]], x[plane[1]]);
         let decay = (-2.0 * nu * t).exp();
@@ -229,7 +229,7 @@ fn taylor_green_is_second_order_in_time() {
             spacing: DVec3::splat(2.0 * PI / n as f64),
             origin: DVec3::ZERO,
         };
-        let mut flow = Flow::new(&mesh, PERIODIC, &params(0.05));
+        let mut flow = Flow::<f64>::new(&mesh, PERIODIC, &params(0.05));
         // Two superposed vortices interact, so that advection is not a gradient.
         flow.velocity
             .x
@@ -265,7 +265,7 @@ fn beltrami(n: usize) -> f64 {
         spacing: DVec3::splat(2.0 * PI / n as f64),
         origin: DVec3::ZERO,
     };
-    let mut flow = Flow::new(&mesh, PERIODIC, &params(nu));
+    let mut flow = Flow::<f64>::new(&mesh, PERIODIC, &params(nu));
     flow.velocity
         .x
         .fill_with(&mesh, |x| x.z.sin() + 0.7 * x.y.cos());
@@ -318,7 +318,7 @@ fn channel(n: usize, axis: usize) -> f64 {
         spacing: DVec3::splat(h),
         origin: DVec3::ZERO,
     };
-    let mut flow = Flow::new(&mesh, boundaries, &p);
+    let mut flow = Flow::<f64>::new(&mesh, boundaries, &p);
     let dt = 0.2 * h * h;
     for _ in 0..(2.0 / dt) as usize {
         flow.predict(dt);
@@ -358,7 +358,7 @@ fn decaying_shear(n: usize, axis: usize) -> f64 {
     };
     let mut boundaries = PERIODIC;
     boundaries.0[axis] = [Boundary::WALL; 2];
-    let mut flow = Flow::new(&mesh, boundaries, &params(1.0));
+    let mut flow = Flow::<f64>::new(&mesh, boundaries, &params(1.0));
     let at = |m: usize| {
         let mut index = [1; 3];
         index[axis] = m;
@@ -407,7 +407,7 @@ fn outflow_keeps_the_mass_of_the_box() {
     ]);
     let mut p = params(0.02);
     p.initial_velocity = velocity;
-    let mut flow = Flow::new(&mesh, boundaries, &p);
+    let mut flow = Flow::<f64>::new(&mesh, boundaries, &p);
     for _ in 0..200 {
         flow.predict(0.02);
         let m = flow.project(0.02);

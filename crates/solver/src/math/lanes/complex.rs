@@ -19,13 +19,13 @@ impl<V: Vector> Complex<V> {
     #[inline(always)]
     pub fn zero() -> Self {
         Complex {
-            re: V::splat(0.0),
-            im: V::splat(0.0),
+            re: V::constant(0.0),
+            im: V::constant(0.0),
         }
     }
     /// Product with one complex number.
     #[inline(always)]
-    pub fn times(self, [re, im]: [f64; 2]) -> Self {
+    pub fn times(self, [re, im]: [V::Number; 2]) -> Self {
         let (re, im) = (V::splat(re), V::splat(im));
         Complex {
             re: self.re * re - self.im * im,
@@ -42,7 +42,7 @@ impl<V: Vector> Complex<V> {
     }
     /// Product with one real number.
     #[inline(always)]
-    pub fn scale(self, factor: f64) -> Self {
+    pub fn scale(self, factor: V::Number) -> Self {
         let factor = V::splat(factor);
         Complex {
             re: self.re * factor,

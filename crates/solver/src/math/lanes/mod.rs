@@ -15,31 +15,42 @@ mod single;
 mod tests;
 #[cfg(target_arch = "x86_64")]
 mod x86;
+#[cfg(target_arch = "x86_64")]
+mod x86_transpose;
 
 use std::ops::{Add, Mul, Sub};
 use std::sync::atomic::{AtomicU8, Ordering};
 
+use super::Real;
 pub use complex::{Complex, turned};
-#[cfg(not(target_arch = "x86_64"))]
-use plain::Plain as Common;
 pub use single::Single;
-#[cfg(target_arch = "x86_64")]
-use x86::Pairs as Common;
+
+/// Numbers of the widest register.
+pub const MOST: usize = 16;
 
 /// A register of `WIDTH` numbers.
 pub trait Vector:
     Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
-    /// Numbers held: 8, 4 or 1.
+    /// Numbers held: 8, 4 or 1 doubles, 16, 8, 4 or 1 singles.
     const WIDTH: usize;
+    /// What it holds.
+    type Number: Real;
+    /// The vector of half a cache line of the same instruction set.
+    type Half: Vector<Number = Self::Number>;
     /// The vector of four lanes of the same instruction set.
-    type Four: Vector;
+    type Tail: Vector<Number = Self::Number>;
     /// The same number in every lane.
-    fn splat(value: f64) -> Self;
+    fn splat(value: Self::Number) -> Self;
+    /// The number nearest to `value` in every lane.
+    #[inline(always)]
+    fn constant(value: f64) -> Self {
+        Self::splat(Self::Number::of(value))
+    }
     /// The first `WIDTH` numbers of `from`.
-    fn load(from: &[f64]) -> Self;
+    fn load(from: &[Self::Number]) -> Self;
     /// Overwrites the first `WIDTH` numbers of `to`.
-    fn store(self, to: &mut [f64]);
+    fn store(self, to: &mut [Self::Number]);
     /// Lane-wise quotient.
     fn over(self, divisor: Self) -> Self;
     /// Lane-wise `self` where it is greater, else `other`.
@@ -47,58 +58,109 @@ pub trait Vector:
     /// Lane-wise absolute value.
     #[inline(always)]
     fn magnitude(self) -> Self {
-        self.larger(Self::splat(0.0) - self)
+        self.larger(Self::constant(0.0) - self)
     }
     /// Swaps rows and columns of `WIDTH` vectors.
     fn transpose(block: &mut [Self]);
+    /// Adds the lanes, as doubles, to the first `WIDTH` of `sums`.
+    fn add_to(self, sums: &mut [f64]);
+    /// Raises the first `WIDTH` of `tops` to the lanes, as doubles, where those are greater.
+    fn raise(self, tops: &mut [f64]);
+}
+
+/// The widest vectors of a number for each instruction set.
+pub trait Registers: Sized {
+    /// Of [`Level::Common`].
+    type Common: Vector<Number = Self>;
+    /// Of [`Level::Four`].
+    type Four: Vector<Number = Self>;
+    /// Of [`Level::Eight`].
+    type Eight: Vector<Number = Self>;
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Registers for f64 {
+    type Common = x86::Pairs;
+    type Four = x86::Four;
+    type Eight = x86::Eight;
+}
+#[cfg(target_arch = "x86_64")]
+impl Registers for f32 {
+    type Common = x86::SinglesTwice;
+    type Four = x86::EightSingles;
+    type Eight = x86::SixteenSingles;
+}
+#[cfg(not(target_arch = "x86_64"))]
+impl Registers for f64 {
+    type Common = plain::Plain<f64, 4>;
+    type Four = Self::Common;
+    type Eight = Self::Common;
+}
+#[cfg(not(target_arch = "x86_64"))]
+impl Registers for f32 {
+    type Common = plain::Plain<f32, 8>;
+    type Four = Self::Common;
+    type Eight = Self::Common;
 }
 
 /// Work on the neighbouring entries of a row.
 pub trait RowWork {
+    /// What rows are made of.
+    type Number: Real;
     /// Treats the `V::WIDTH` entries from `i` on.
-    fn at<V: Vector>(&mut self, i: usize);
+    fn at<V: Vector<Number = Self::Number>>(&mut self, i: usize);
 }
 
 /// Treats the entries 1..=n of a row, as many at a time as possible. Entry i always falls on lane
-/// (i - 1) % 8 of a sum kept in eight lanes, whatever the width.
+/// (i - 1) % LANES of a sum kept in as many lanes, whatever the width.
 #[inline(always)]
-pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork) {
+pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number>) {
     let mut i = 1;
     while i + V::WIDTH <= n + 1 {
         work.at::<V>(i);
         i += V::WIDTH;
     }
-    if i + 4 <= n + 1 {
-        work.at::<V::Four>(i);
+    let half = V::Number::LANES / 2;
+    if i + half <= n + 1 {
+        work.at::<V::Half>(i);
+        i += half;
+    }
+    if half > 4 && i + 4 <= n + 1 {
+        work.at::<V::Tail>(i);
         i += 4;
     }
     while i <= n {
-        work.at::<Single>(i);
+        work.at::<Single<V::Number>>(i);
         i += 1;
     }
 }
 
-/// Eight partial results of a row: a sum or a maximum in an order that no width changes.
+/// Partial results of a row in doubles: a sum or a maximum in an order that no width changes.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Partial([f64; 8]);
+pub struct Partial([f64; MOST]);
 
 impl Partial {
     /// Adds to the lanes of entry `i` and its neighbours.
     #[inline(always)]
     pub fn add<V: Vector>(&mut self, i: usize, value: V) {
-        let lanes = &mut self.0[(i - 1) % 8..];
-        (V::load(lanes) + value).store(lanes);
+        value.add_to(&mut self.0[(i - 1) % V::Number::LANES..]);
     }
     /// Keeps the larger in the lanes of entry `i` and its neighbours.
     #[inline(always)]
     pub fn keep_larger<V: Vector>(&mut self, i: usize, value: V) {
-        let lanes = &mut self.0[(i - 1) % 8..];
-        V::load(lanes).larger(value).store(lanes);
+        value.raise(&mut self.0[(i - 1) % V::Number::LANES..]);
     }
     /// Sum of the lanes.
     pub fn sum(&self) -> f64 {
-        let [a, b, c, d, e, f, g, h] = self.0;
-        ((a + e) + (c + g)) + ((b + f) + (d + h))
+        let mut lanes = self.0;
+        let mut half = MOST / 2;
+        while half > 0 {
+            for i in 0..half {
+                lanes[i] += lanes[i + half];
+            }
+            half /= 2;
+        }
+        lanes[0]
     }
     /// Largest of the lanes.
     pub fn largest(&self) -> f64 {
@@ -108,19 +170,21 @@ impl Partial {
 
 /// Work compiled for every instruction set.
 pub trait Kernel {
+    /// What it works on.
+    type Number: Real;
     /// The work, with the widest vectors of the instruction set; mark it `inline(always)`.
-    fn run<V: Vector>(self);
+    fn run<V: Vector<Number = Self::Number>>(self);
 }
 
 /// An instruction set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Level {
-    /// What every machine has: pairs of doubles on x86-64.
+    /// What every machine has: pairs of doubles, fours of singles on x86-64.
     Common = 1,
-    /// AVX2: registers of four doubles.
+    /// AVX2: registers of four doubles or eight singles.
     Four = 2,
-    /// AVX-512: registers of eight doubles.
+    /// AVX-512: registers of eight doubles or sixteen singles.
     Eight = 3,
 }
 
@@ -169,25 +233,25 @@ pub fn dispatch<K: Kernel>(kernel: K) {
         Level::Eight => unsafe { with_eight(kernel) },
         #[cfg(target_arch = "x86_64")]
         Level::Four => unsafe { with_four(kernel) },
-        _ => kernel.run::<Common>(),
+        _ => kernel.run::<<K::Number as Registers>::Common>(),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,avx512f,avx512vl")]
 fn with_eight<K: Kernel>(kernel: K) {
-    kernel.run::<x86::Eight>();
+    kernel.run::<<K::Number as Registers>::Eight>();
 }
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn with_four<K: Kernel>(kernel: K) {
-    kernel.run::<x86::Four>();
+    kernel.run::<<K::Number as Registers>::Four>();
 }
 
 /// The numbers of `values` as complex lanes; `values` must be aligned as [`super::Aligned`] is.
 #[inline(always)]
-pub fn as_complex<V: Vector>(values: &mut [f64]) -> &mut [Complex<V>] {
-    // SAFETY: every `Vector` here is `WIDTH` doubles without padding, for which any bits are valid.
+pub fn as_complex<V: Vector>(values: &mut [V::Number]) -> &mut [Complex<V>] {
+    // SAFETY: every `Vector` here is `WIDTH` numbers without padding, for which any bits are valid.
     let (head, lanes, _) = unsafe { values.align_to_mut::<Complex<V>>() };
     assert!(head.is_empty(), "lanes start on a cache line");
     lanes

@@ -1,56 +1,63 @@
-//! Four lanes without intrinsics, for any machine.
+//! Lanes without intrinsics, for any machine.
 
 use std::ops::{Add, Mul, Sub};
 
-use super::Vector;
+use super::{Real, Vector};
 
-/// Four numbers that the compiler may put into registers as it likes.
+/// `N` numbers that the compiler may put into registers as it likes.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub struct Plain([f64; 4]);
+pub struct Plain<R, const N: usize>([R; N]);
 
-impl Plain {
+impl<R: Copy, const N: usize> Plain<R, N> {
     #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let (a, b) = (self.0, other.0);
-        Plain([f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])])
+    fn zip(mut self, other: Self, f: impl Fn(R, R) -> R) -> Self {
+        for i in 0..N {
+            self.0[i] = f(self.0[i], other.0[i]);
+        }
+        self
     }
 }
-impl Add for Plain {
+
+impl<R: Real, const N: usize> Add for Plain<R, N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
         self.zip(other, |a, b| a + b)
     }
 }
-impl Sub for Plain {
+impl<R: Real, const N: usize> Sub for Plain<R, N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         self.zip(other, |a, b| a - b)
     }
 }
-impl Mul for Plain {
+impl<R: Real, const N: usize> Mul for Plain<R, N> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         self.zip(other, |a, b| a * b)
     }
 }
-impl Vector for Plain {
-    const WIDTH: usize = 4;
-    type Four = Plain;
+impl<R: Real, const N: usize> Vector for Plain<R, N> {
+    const WIDTH: usize = N;
+    type Number = R;
+    type Half = Self;
+    type Tail = Plain<R, 4>;
     #[inline(always)]
-    fn splat(value: f64) -> Self {
-        Plain([value; 4])
+    fn splat(value: R) -> Self {
+        Plain([value; N])
     }
     #[inline(always)]
-    fn load(from: &[f64]) -> Self {
-        Plain([from[0], from[1], from[2], from[3]])
+    fn load(from: &[R]) -> Self {
+        let mut numbers = [R::default(); N];
+        numbers.copy_from_slice(&from[..N]);
+        Plain(numbers)
     }
     #[inline(always)]
-    fn store(self, to: &mut [f64]) {
-        to[..4].copy_from_slice(&self.0);
+    fn store(self, to: &mut [R]) {
+        to[..N].copy_from_slice(&self.0);
     }
     #[inline(always)]
     fn over(self, divisor: Self) -> Self {
@@ -62,9 +69,23 @@ impl Vector for Plain {
     }
     #[inline(always)]
     fn transpose(block: &mut [Self]) {
-        let [a, b, c, d] = [block[0].0, block[1].0, block[2].0, block[3].0];
-        for i in 0..4 {
-            block[i] = Plain([a[i], b[i], c[i], d[i]]);
+        for i in 0..N {
+            for j in 0..i {
+                (block[i].0[j], block[j].0[i]) = (block[j].0[i], block[i].0[j]);
+            }
+        }
+    }
+    #[inline(always)]
+    fn add_to(self, sums: &mut [f64]) {
+        for (sum, lane) in sums[..N].iter_mut().zip(self.0) {
+            *sum += lane.wide();
+        }
+    }
+    #[inline(always)]
+    fn raise(self, tops: &mut [f64]) {
+        for (top, lane) in tops[..N].iter_mut().zip(self.0) {
+            let lane = lane.wide();
+            *top = if *top > lane { *top } else { lane };
         }
     }
 }

@@ -2,47 +2,49 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use super::Vector;
+use super::{Real, Vector};
 
 /// One number.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub struct Single(f64);
+pub struct Single<R>(R);
 
-impl Add for Single {
+impl<R: Real> Add for Single<R> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
         Single(self.0 + other.0)
     }
 }
-impl Sub for Single {
+impl<R: Real> Sub for Single<R> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Single(self.0 - other.0)
     }
 }
-impl Mul for Single {
+impl<R: Real> Mul for Single<R> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         Single(self.0 * other.0)
     }
 }
-impl Vector for Single {
+impl<R: Real> Vector for Single<R> {
     const WIDTH: usize = 1;
-    type Four = Single;
+    type Number = R;
+    type Half = Self;
+    type Tail = Self;
     #[inline(always)]
-    fn splat(value: f64) -> Self {
+    fn splat(value: R) -> Self {
         Single(value)
     }
     #[inline(always)]
-    fn load(from: &[f64]) -> Self {
+    fn load(from: &[R]) -> Self {
         Single(from[0])
     }
     #[inline(always)]
-    fn store(self, to: &mut [f64]) {
+    fn store(self, to: &mut [R]) {
         to[0] = self.0;
     }
     #[inline(always)]
@@ -55,4 +57,13 @@ impl Vector for Single {
     }
     #[inline(always)]
     fn transpose(_: &mut [Self]) {}
+    #[inline(always)]
+    fn add_to(self, sums: &mut [f64]) {
+        sums[0] += self.0.wide();
+    }
+    #[inline(always)]
+    fn raise(self, tops: &mut [f64]) {
+        let lane = self.0.wide();
+        tops[0] = if tops[0] > lane { tops[0] } else { lane };
+    }
 }

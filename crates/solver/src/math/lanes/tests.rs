@@ -3,25 +3,34 @@
 use super::plain::Plain;
 use super::*;
 
-/// Lane-wise arithmetic and the transpose of one kind of vector.
-struct Check;
+/// Lane-wise arithmetic and the transpose of the vectors of one number.
+struct Check<R>(std::marker::PhantomData<R>);
 
-impl Kernel for Check {
+impl<R: Real> Check<R> {
+    fn new() -> Self {
+        Check(std::marker::PhantomData)
+    }
+}
+
+impl<R: Real> Kernel for Check<R> {
+    type Number = R;
     #[inline(always)]
-    fn run<V: Vector>(self) {
+    fn run<V: Vector<Number = R>>(self) {
         check::<V>();
-        check::<V::Four>();
-        check::<Single>();
+        check::<V::Half>();
+        check::<V::Tail>();
+        check::<Single<R>>();
     }
 }
 
 #[inline(always)]
 fn check<V: Vector>() {
-    let a: [f64; 8] = std::array::from_fn(|i| (i as f64 + 0.3).sin());
-    let b: [f64; 8] = std::array::from_fn(|i| (i as f64 + 0.7).cos());
+    let number = V::Number::of;
+    let a: [V::Number; MOST] = std::array::from_fn(|i| number((i as f64 + 0.3).sin()));
+    let b: [V::Number; MOST] = std::array::from_fn(|i| number((i as f64 + 0.7).cos()));
     let (x, y) = (V::load(&a), V::load(&b));
-    let c = V::splat(0.1);
-    let mut found = [[0.0; 8]; 6];
+    let c = V::constant(0.1);
+    let mut found = [[V::Number::default(); MOST]; 6];
     for (found, v) in
         found
             .iter_mut()
@@ -29,28 +38,37 @@ fn check<V: Vector>() {
     {
         v.store(found);
     }
+    let (mut sums, mut tops) = ([1.0; MOST], [0.25; MOST]);
+    x.add_to(&mut sums);
+    x.raise(&mut tops);
+    assert_eq!(sums[V::WIDTH..], [1.0; MOST][V::WIDTH..]);
+    assert_eq!(tops[V::WIDTH..], [0.25; MOST][V::WIDTH..]);
     for i in 0..V::WIDTH {
+        // One operation in double precision rounds to the same single.
+        let (a, b) = (a[i].wide(), b[i].wide());
         let expected = [
-            a[i] + b[i],
-            a[i] - b[i],
-            a[i] * 0.1,
-            a[i] / b[i],
-            a[i].max(b[i]),
-            b[i].abs(),
+            a + b,
+            a - b,
+            a * number(0.1).wide(),
+            a / b,
+            a.max(b),
+            b.abs(),
         ];
         for (found, expected) in found.iter().zip(expected) {
-            assert_eq!(found[i].to_bits(), expected.to_bits());
+            let expected = number(expected).wide();
+            assert_eq!(found[i].wide().to_bits(), expected.to_bits());
         }
+        assert_eq!([sums[i], tops[i]], [1.0 + a, a.max(0.25)]);
     }
-    let rows: [[f64; 8]; 8] =
-        std::array::from_fn(|row| std::array::from_fn(|i| (10 * row + i) as f64));
-    let mut block = [V::splat(0.0); 8];
+    let rows: [[V::Number; MOST]; MOST] =
+        std::array::from_fn(|row| std::array::from_fn(|i| number((20 * row + i) as f64)));
+    let mut block = [V::constant(0.0); MOST];
     for (v, row) in block.iter_mut().zip(&rows) {
         *v = V::load(row);
     }
     V::transpose(&mut block);
     for i in 0..V::WIDTH {
-        let mut column = [0.0; 8];
+        let mut column = [V::Number::default(); MOST];
         block[i].store(&mut column);
         for row in 0..V::WIDTH {
             assert_eq!(column[row], rows[row][i]);
@@ -60,12 +78,47 @@ fn check<V: Vector>() {
 
 #[test]
 fn all_vectors_compute_alike() {
-    check::<Plain>();
-    Check.run::<Common>();
-    dispatch(Check);
+    check::<Plain<f64, 4>>();
+    check::<Plain<f32, 8>>();
+    each_level::<f64>();
+    each_level::<f32>();
+}
+
+fn each_level<R: Real>() {
+    Check::<R>::new().run::<R::Common>();
+    dispatch(Check::<R>::new());
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: just detected.
-        unsafe { with_four(Check) };
+        unsafe { with_four(Check::<R>::new()) };
+    }
+}
+
+#[test]
+fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
+    struct Sum<'a, R>(&'a [R], &'a mut Partial, &'a mut Vec<usize>);
+    impl<R: Real> RowWork for Sum<'_, R> {
+        type Number = R;
+        fn at<V: Vector<Number = R>>(&mut self, i: usize) {
+            self.1.add(i, V::load(&self.0[i..]));
+            self.2.extend(i..i + V::WIDTH);
+        }
+    }
+    fn sums<R: Real>(n: usize) {
+        let row: Vec<R> = (0..=n).map(|i| R::of((i as f64).sin())).collect();
+        let sum = |run: fn(usize, &mut Sum<R>)| {
+            let (mut partial, mut seen) = (Partial::default(), Vec::new());
+            run(n, &mut Sum(&row, &mut partial, &mut seen));
+            assert_eq!(seen, (1..=n).collect::<Vec<_>>());
+            partial.sum()
+        };
+        let one = sum(|n, work| along_row::<Single<R>>(n, work));
+        assert_eq!(one, sum(|n, work| along_row::<R::Common>(n, work)));
+        let plain: f64 = row[1..].iter().map(|x| x.wide()).sum();
+        assert!((one - plain).abs() < 1e-12, "{one} {plain}");
+    }
+    for n in 1..70 {
+        sums::<f64>(n);
+        sums::<f32>(n);
     }
 }

@@ -1,4 +1,5 @@
-//! Lanes of x86-64: two pairs of doubles (SSE2, on every machine), four (AVX2) and eight (AVX-512).
+//! Lanes of x86-64: two pairs of doubles or two fours of singles (SSE2, on every machine), four
+//! doubles or eight singles (AVX2), eight doubles or sixteen singles (AVX-512).
 //!
 //! SAFETY of every block here: the vectors are made by nothing but kernels that [`super::dispatch`]
 //! runs after it has found the instruction set on the machine, and every load and store cuts its
@@ -8,206 +9,204 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
 
 use super::Vector;
+use super::x86_transpose as turn;
 
-/// Two pairs of doubles.
-#[derive(Clone, Copy)]
-#[repr(C)]
-pub struct Pairs(__m128d, __m128d);
-/// Four doubles.
-#[derive(Clone, Copy)]
-#[repr(transparent)]
-pub struct Four(__m256d);
-/// Eight doubles.
-#[derive(Clone, Copy)]
-#[repr(transparent)]
-pub struct Eight(__m512d);
+/// A vector of one register, or of two side by side.
+macro_rules! vector {
+    (
+        $(#[$doc:meta])*
+        $name:ident: $width:literal x $number:ident in [$($i:tt: $register:ident),+],
+        half $half:ident, tail $tail:ident, transpose $transpose:path,
+        doubles $wide:ident [$($w:tt: $widen:path),+],
+        $add:ident, $sub:ident, $mul:ident, $div:ident, $max:ident,
+        $set:ident, $load:ident, $store:ident
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy)]
+        #[repr(C)]
+        pub struct $name($(pub(super) $register),+);
 
-macro_rules! pair_wise {
-    ($operator:ident, $function:ident, $intrinsic:ident) => {
-        impl $operator for Pairs {
+        impl Add for $name {
             type Output = Self;
             #[inline(always)]
-            fn $function(self, other: Self) -> Self {
+            fn add(self, other: Self) -> Self {
                 // SAFETY: see the head of this file.
-                unsafe { Pairs($intrinsic(self.0, other.0), $intrinsic(self.1, other.1)) }
+                unsafe { $name($($add(self.$i, other.$i)),+) }
+            }
+        }
+        impl Sub for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                // SAFETY: see the head of this file.
+                unsafe { $name($($sub(self.$i, other.$i)),+) }
+            }
+        }
+        impl Mul for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                // SAFETY: see the head of this file.
+                unsafe { $name($($mul(self.$i, other.$i)),+) }
+            }
+        }
+        impl Vector for $name {
+            const WIDTH: usize = $width;
+            type Number = $number;
+            type Half = $half;
+            type Tail = $tail;
+            #[inline(always)]
+            fn splat(value: $number) -> Self {
+                // SAFETY: see the head of this file.
+                unsafe { $name($(splat!($i, $set, value)),+) }
+            }
+            #[inline(always)]
+            fn load(from: &[$number]) -> Self {
+                let from = from[..$width].as_ptr();
+                // SAFETY: see the head of this file.
+                unsafe { $name($($load(from.add($i * $width / 2))),+) }
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [$number]) {
+                let to = to[..$width].as_mut_ptr();
+                // SAFETY: see the head of this file.
+                unsafe { $($store(to.add($i * $width / 2), self.$i));+ }
+            }
+            #[inline(always)]
+            fn over(self, divisor: Self) -> Self {
+                // SAFETY: see the head of this file.
+                unsafe { $name($($div(self.$i, divisor.$i)),+) }
+            }
+            #[inline(always)]
+            fn larger(self, other: Self) -> Self {
+                // SAFETY: see the head of this file.
+                unsafe { $name($($max(self.$i, other.$i)),+) }
+            }
+            #[inline(always)]
+            fn transpose(block: &mut [Self]) {
+                // SAFETY: see the head of this file.
+                unsafe { $transpose(block) }
+            }
+            #[inline(always)]
+            fn add_to(self, sums: &mut [f64]) {
+                $(
+                    let here = &mut sums[$w * $wide::WIDTH..];
+                    // SAFETY: see the head of this file.
+                    ($wide::load(here) + unsafe { $widen(self) }).store(here);
+                )+
+            }
+            #[inline(always)]
+            fn raise(self, tops: &mut [f64]) {
+                $(
+                    let here = &mut tops[$w * $wide::WIDTH..];
+                    // SAFETY: see the head of this file.
+                    $wide::load(here).larger(unsafe { $widen(self) }).store(here);
+                )+
             }
         }
     };
 }
-pair_wise!(Add, add, _mm_add_pd);
-pair_wise!(Sub, sub, _mm_sub_pd);
-pair_wise!(Mul, mul, _mm_mul_pd);
-
-macro_rules! lane_wise {
-    ($vector:ident, $operator:ident, $function:ident, $intrinsic:ident) => {
-        impl $operator for $vector {
-            type Output = Self;
-            #[inline(always)]
-            fn $function(self, other: Self) -> Self {
-                // SAFETY: see the head of this file.
-                unsafe { $vector($intrinsic(self.0, other.0)) }
-            }
-        }
+/// The same for every register of a vector.
+macro_rules! splat {
+    ($i:tt, $set:ident, $value:ident) => {
+        $set($value)
     };
 }
-lane_wise!(Four, Add, add, _mm256_add_pd);
-lane_wise!(Four, Sub, sub, _mm256_sub_pd);
-lane_wise!(Four, Mul, mul, _mm256_mul_pd);
-lane_wise!(Eight, Add, add, _mm512_add_pd);
-lane_wise!(Eight, Sub, sub, _mm512_sub_pd);
-lane_wise!(Eight, Mul, mul, _mm512_mul_pd);
 
-impl Vector for Pairs {
-    const WIDTH: usize = 4;
-    type Four = Pairs;
-    #[inline(always)]
-    fn splat(value: f64) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Pairs(_mm_set1_pd(value), _mm_set1_pd(value)) }
-    }
-    #[inline(always)]
-    fn load(from: &[f64]) -> Self {
-        let from = from[..4].as_ptr();
-        // SAFETY: see the head of this file.
-        unsafe { Pairs(_mm_loadu_pd(from), _mm_loadu_pd(from.add(2))) }
-    }
-    #[inline(always)]
-    fn store(self, to: &mut [f64]) {
-        let to = to[..4].as_mut_ptr();
-        // SAFETY: see the head of this file.
-        unsafe {
-            _mm_storeu_pd(to, self.0);
-            _mm_storeu_pd(to.add(2), self.1);
-        }
-    }
-    #[inline(always)]
-    fn over(self, divisor: Self) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Pairs(_mm_div_pd(self.0, divisor.0), _mm_div_pd(self.1, divisor.1)) }
-    }
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Pairs(_mm_max_pd(self.0, other.0), _mm_max_pd(self.1, other.1)) }
-    }
-    #[inline(always)]
-    fn transpose(block: &mut [Self]) {
-        let block = &mut block[..4];
-        let [a, b, c, d] = [block[0], block[1], block[2], block[3]];
-        // SAFETY: see the head of this file.
-        unsafe {
-            block[0] = Pairs(_mm_unpacklo_pd(a.0, b.0), _mm_unpacklo_pd(c.0, d.0));
-            block[1] = Pairs(_mm_unpackhi_pd(a.0, b.0), _mm_unpackhi_pd(c.0, d.0));
-            block[2] = Pairs(_mm_unpacklo_pd(a.1, b.1), _mm_unpacklo_pd(c.1, d.1));
-            block[3] = Pairs(_mm_unpackhi_pd(a.1, b.1), _mm_unpackhi_pd(c.1, d.1));
-        }
-    }
+vector! {
+    /// Two pairs of doubles.
+    Pairs: 4 x f64 in [0: __m128d, 1: __m128d],
+    half Pairs, tail Pairs, transpose turn::pairs,
+    doubles Pairs [0: same],
+    _mm_add_pd, _mm_sub_pd, _mm_mul_pd, _mm_div_pd, _mm_max_pd,
+    _mm_set1_pd, _mm_loadu_pd, _mm_storeu_pd
+}
+vector! {
+    /// Four doubles.
+    Four: 4 x f64 in [0: __m256d],
+    half Four, tail Four, transpose turn::four,
+    doubles Four [0: same],
+    _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_max_pd,
+    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd
+}
+vector! {
+    /// Eight doubles.
+    Eight: 8 x f64 in [0: __m512d],
+    half Four, tail Four, transpose turn::eight,
+    doubles Eight [0: same],
+    _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_max_pd,
+    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd
+}
+vector! {
+    /// Four singles.
+    FourSingles: 4 x f32 in [0: __m128],
+    half FourSingles, tail FourSingles, transpose turn::four_singles,
+    doubles Pairs [0: widen_four],
+    _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps, _mm_max_ps,
+    _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
+}
+vector! {
+    /// Four singles, twice.
+    SinglesTwice: 8 x f32 in [0: __m128, 1: __m128],
+    half SinglesTwice, tail FourSingles, transpose turn::singles_twice,
+    doubles Pairs [0: widen_first, 1: widen_second],
+    _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps, _mm_max_ps,
+    _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
+}
+vector! {
+    /// Eight singles.
+    EightSingles: 8 x f32 in [0: __m256],
+    half EightSingles, tail FourSingles, transpose turn::eight_singles,
+    doubles Four [0: widen_lower_four, 1: widen_upper_four],
+    _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps, _mm256_max_ps,
+    _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps
+}
+vector! {
+    /// Sixteen singles.
+    SixteenSingles: 16 x f32 in [0: __m512],
+    half EightSingles, tail FourSingles, transpose turn::sixteen_singles,
+    doubles Eight [0: widen_lower_eight, 1: widen_upper_eight],
+    _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps, _mm512_max_ps,
+    _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps
 }
 
-impl Vector for Four {
-    const WIDTH: usize = 4;
-    type Four = Four;
-    #[inline(always)]
-    fn splat(value: f64) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Four(_mm256_set1_pd(value)) }
-    }
-    #[inline(always)]
-    fn load(from: &[f64]) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Four(_mm256_loadu_pd(from[..4].as_ptr())) }
-    }
-    #[inline(always)]
-    fn store(self, to: &mut [f64]) {
-        // SAFETY: see the head of this file.
-        unsafe { _mm256_storeu_pd(to[..4].as_mut_ptr(), self.0) }
-    }
-    #[inline(always)]
-    fn over(self, divisor: Self) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Four(_mm256_div_pd(self.0, divisor.0)) }
-    }
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Four(_mm256_max_pd(self.0, other.0)) }
-    }
-    #[inline(always)]
-    fn transpose(block: &mut [Self]) {
-        let block = &mut block[..4];
-        let [a, b, c, d] = [block[0].0, block[1].0, block[2].0, block[3].0];
-        // SAFETY: see the head of this file.
-        unsafe {
-            let (e, f) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
-            let (g, h) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
-            block[0] = Four(_mm256_permute2f128_pd::<0x20>(e, g));
-            block[1] = Four(_mm256_permute2f128_pd::<0x20>(f, h));
-            block[2] = Four(_mm256_permute2f128_pd::<0x31>(e, g));
-            block[3] = Four(_mm256_permute2f128_pd::<0x31>(f, h));
-        }
-    }
+/// What has doubles already.
+#[inline(always)]
+unsafe fn same<V>(v: V) -> V {
+    v
 }
-
-impl Vector for Eight {
-    const WIDTH: usize = 8;
-    type Four = Four;
-    #[inline(always)]
-    fn splat(value: f64) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Eight(_mm512_set1_pd(value)) }
-    }
-    #[inline(always)]
-    fn load(from: &[f64]) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Eight(_mm512_loadu_pd(from[..8].as_ptr())) }
-    }
-    #[inline(always)]
-    fn store(self, to: &mut [f64]) {
-        // SAFETY: see the head of this file.
-        unsafe { _mm512_storeu_pd(to[..8].as_mut_ptr(), self.0) }
-    }
-    #[inline(always)]
-    fn over(self, divisor: Self) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Eight(_mm512_div_pd(self.0, divisor.0)) }
-    }
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        // SAFETY: see the head of this file.
-        unsafe { Eight(_mm512_max_pd(self.0, other.0)) }
-    }
-    /// Pairs of numbers are exchanged first, then pairs of pairs, twice.
-    #[inline(always)]
-    fn transpose(block: &mut [Self]) {
-        let block = &mut block[..8];
-        // SAFETY: see the head of this file.
-        unsafe {
-            let mut pairs = [block[0].0; 8];
-            for i in 0..4 {
-                let (a, b) = (block[2 * i].0, block[2 * i + 1].0);
-                pairs[i] = _mm512_unpacklo_pd(a, b);
-                pairs[4 + i] = _mm512_unpackhi_pd(a, b);
-            }
-            for i in 0..2 {
-                let [a, b, c, d] = [
-                    pairs[4 * i],
-                    pairs[4 * i + 1],
-                    pairs[4 * i + 2],
-                    pairs[4 * i + 3],
-                ];
-                let (even_ab, odd_ab) = (
-                    _mm512_shuffle_f64x2::<0x88>(a, b),
-                    _mm512_shuffle_f64x2::<0xdd>(a, b),
-                );
-                let (even_cd, odd_cd) = (
-                    _mm512_shuffle_f64x2::<0x88>(c, d),
-                    _mm512_shuffle_f64x2::<0xdd>(c, d),
-                );
-                block[i] = Eight(_mm512_shuffle_f64x2::<0x88>(even_ab, even_cd));
-                block[2 + i] = Eight(_mm512_shuffle_f64x2::<0x88>(odd_ab, odd_cd));
-                block[4 + i] = Eight(_mm512_shuffle_f64x2::<0xdd>(even_ab, even_cd));
-                block[6 + i] = Eight(_mm512_shuffle_f64x2::<0xdd>(odd_ab, odd_cd));
-            }
-        }
+#[inline(always)]
+unsafe fn pairs(v: __m128) -> Pairs {
+    unsafe { Pairs(_mm_cvtps_pd(v), _mm_cvtps_pd(_mm_movehl_ps(v, v))) }
+}
+#[inline(always)]
+unsafe fn widen_four(v: FourSingles) -> Pairs {
+    unsafe { pairs(v.0) }
+}
+#[inline(always)]
+unsafe fn widen_first(v: SinglesTwice) -> Pairs {
+    unsafe { pairs(v.0) }
+}
+#[inline(always)]
+unsafe fn widen_second(v: SinglesTwice) -> Pairs {
+    unsafe { pairs(v.1) }
+}
+#[inline(always)]
+unsafe fn widen_lower_four(v: EightSingles) -> Four {
+    unsafe { Four(_mm256_cvtps_pd(_mm256_castps256_ps128(v.0))) }
+}
+#[inline(always)]
+unsafe fn widen_upper_four(v: EightSingles) -> Four {
+    unsafe { Four(_mm256_cvtps_pd(_mm256_extractf128_ps::<1>(v.0))) }
+}
+#[inline(always)]
+unsafe fn widen_lower_eight(v: SixteenSingles) -> Eight {
+    unsafe { Eight(_mm512_cvtps_pd(_mm512_castps512_ps256(v.0))) }
+}
+#[inline(always)]
+unsafe fn widen_upper_eight(v: SixteenSingles) -> Eight {
+    unsafe {
+        let upper = _mm512_extractf64x4_pd::<1>(_mm512_castps_pd(v.0));
+        Eight(_mm512_cvtps_pd(_mm256_castpd_ps(upper)))
     }
 }

@@ -1,0 +1,88 @@
+//! The numbers that fields are made of.
+
+use std::fmt::Debug;
+use std::ops::{Add, Div, Mul, Sub};
+
+use serde::{Deserialize, Serialize};
+
+use super::lanes::Registers;
+
+/// Precision of the fields of a simulation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Precision {
+    /// Single: half the memory, up to twice the speed.
+    #[serde(rename = "f32")]
+    Single,
+    /// Double.
+    #[default]
+    #[serde(rename = "f64")]
+    Double,
+}
+
+impl Precision {
+    /// Bytes of a number.
+    pub fn bytes(self) -> usize {
+        match self {
+            Precision::Single => f32::BYTES,
+            Precision::Double => f64::BYTES,
+        }
+    }
+}
+
+/// A number of a field, `f64` or `f32`. Sums over the grid, and everything about grains, are
+/// doubles whatever the fields are.
+pub trait Real:
+    Registers
+    + Copy
+    + Debug
+    + Default
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Send
+    + Sync
+    + 'static
+{
+    /// Its size.
+    const BYTES: usize = size_of::<Self>();
+    /// How many fill a cache line, and the widest register: 8 or 16.
+    const LANES: usize = 64 / Self::BYTES;
+    /// What it stands for.
+    const PRECISION: Precision;
+    /// The nearest number to `value`.
+    fn of(value: f64) -> Self;
+    /// Its value.
+    fn wide(self) -> f64;
+    /// Writes it to the first bytes of `to`, little end first.
+    fn write_to(self, to: &mut [u8]);
+    /// Reads it from the first bytes of `from`, little end first.
+    fn read_from(from: &[u8]) -> Self;
+}
+
+macro_rules! real {
+    ($number:ident, $precision:ident) => {
+        impl Real for $number {
+            const PRECISION: Precision = Precision::$precision;
+            #[inline(always)]
+            fn of(value: f64) -> Self {
+                value as $number
+            }
+            #[inline(always)]
+            fn wide(self) -> f64 {
+                self.into()
+            }
+            fn write_to(self, to: &mut [u8]) {
+                to[..Self::BYTES].copy_from_slice(&self.to_le_bytes());
+            }
+            fn read_from(from: &[u8]) -> Self {
+                let mut bytes = [0; Self::BYTES];
+                bytes.copy_from_slice(&from[..Self::BYTES]);
+                $number::from_le_bytes(bytes)
+            }
+        }
+    };
+}
+real!(f64, Double);
+real!(f32, Single);
