@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use grainwake_solver::math::Precision;
 
 /// Drops real grains into real fluid.
 #[derive(Debug, Parser)]
@@ -104,7 +105,7 @@ pub struct ValidateArgs {
     #[arg(long, value_name = "DIR")]
     pub save: Option<PathBuf>,
     /// Change a value of every case, for example run.precision="f32"
-    #[arg(long = "set", value_name = "KEY=VALUE")]
+    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "save")]
     pub set: Vec<String>,
     /// Keep what is already there of the same cases and program
     #[arg(long)]
@@ -192,8 +193,8 @@ pub struct BenchArgs {
     #[arg(long, default_value = "aperture", value_parser = ["aperture", "paper"])]
     pub scheme: String,
     /// Floating-point type of the fields
-    #[arg(long, default_value = "f64", value_parser = ["f64", "f32"])]
-    pub precision: String,
+    #[arg(long, value_name = "f64|f32", default_value_t = Precision::Double)]
+    pub precision: Precision,
     /// Measure cubes of 32 to 256 cells along each edge instead, awkward sizes among them
     #[arg(long, conflicts_with = "size")]
     pub scaling: bool,

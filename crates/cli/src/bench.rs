@@ -39,8 +39,9 @@ const TRAFFIC: [(&str, f64); 4] = [
 const CUBES: [usize; 14] = [
     32, 48, 64, 67, 80, 96, 97, 100, 128, 131, 160, 192, 200, 256,
 ];
-/// Doubles in each array of the triad: 64 MiB, more than any cache here.
-const TRIAD_LENGTH: usize = 1 << 23;
+/// Least doubles in each array of the triad, 64 MiB: its three arrays are as large as the fields, so
+/// that both find the same caches, and never so small that handing out the work counts.
+const LEAST_TRIAD_LENGTH: usize = 1 << 23;
 const TRIAD_REPEATS: usize = 8;
 
 /// What is run.
@@ -96,11 +97,6 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     } else {
         Scheme::Aperture
     };
-    let precision = if args.precision == "f32" {
-        Precision::Single
-    } else {
-        Precision::Double
-    };
     let sizes = if args.scaling {
         CUBES.map(|n| [n; 3]).to_vec()
     } else {
@@ -113,7 +109,7 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
                 cells,
                 grains: args.grains,
                 scheme,
-                precision,
+                precision: args.precision,
             };
             measure(&load, args.steps, threads)
         })
@@ -156,10 +152,11 @@ fn measure(load: &Load, steps: u64, threads: usize) -> Result<Measured, Exit> {
         }));
     }
     let ns = median(totals);
-    let bytes_per_cell = sim.bytes() as f64 / count;
+    let bytes = sim.bytes();
+    let bytes_per_cell = bytes as f64 / count;
     let names = sim.pass_times().map(|(name, _)| name);
     drop(sim);
-    let (triad, size) = (triad_bandwidth(), precision.bytes() as f64);
+    let (triad, size) = (triad_bandwidth(bytes / 24), precision.bytes() as f64);
     let limit = |name: &str| {
         let moved = TRAFFIC.iter().find(|(pass, _)| *pass == name);
         moved.map(|(_, numbers)| 1e9 * numbers * size / triad)
@@ -293,11 +290,12 @@ fn setup(load: &Load) -> Result<Setup, Exit> {
     })
 }
 
-/// Bandwidth of a = b + s c over arrays larger than the caches, best of several [bytes/s].
-fn triad_bandwidth() -> f64 {
+/// Bandwidth of a = b + s c over three arrays of `length` doubles, best of several [bytes/s].
+fn triad_bandwidth(length: usize) -> f64 {
     const CHUNK: usize = 1 << 16;
+    let length = length.max(LEAST_TRIAD_LENGTH);
     let make = |value: f64| {
-        let mut array = vec![0.0; TRIAD_LENGTH];
+        let mut array = vec![0.0; length];
         array
             .par_chunks_mut(CHUNK)
             .for_each(|chunk| chunk.fill(value));
@@ -319,7 +317,7 @@ fn triad_bandwidth() -> f64 {
         best = best.min(start.elapsed().as_secs_f64());
         std::hint::black_box(&a);
     }
-    (3 * 8 * TRIAD_LENGTH) as f64 / best
+    (3 * 8 * length) as f64 / best
 }
 
 fn table(m: &Measured) -> String {

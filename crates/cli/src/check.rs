@@ -6,17 +6,22 @@ use grainwake_solver::case::estimate::Estimate;
 use crate::args::CheckArgs;
 use crate::exit::Exit;
 use crate::progress::clock;
-use crate::{print, threads};
+use crate::{kind, print, threads};
 
 /// Checks a case and prints what to expect of it.
 pub fn check(args: &CheckArgs) -> Result<(), Exit> {
-    let case = Case::load(&args.case, &args.set)?;
+    let case = kind::case(&args.case, &args.set)?;
     let threads = threads::resolve(args.threads.unwrap_or(case.threads));
     let estimate = Estimate::of(&case, threads);
     if args.json {
         return print(&serde_json::to_string(&estimate)?);
     }
     print(&table(&case, &estimate, threads))
+}
+
+/// What may spoil the results, a line each.
+pub fn warnings(e: &Estimate) -> impl Iterator<Item = String> {
+    e.warnings.iter().map(|w| format!("warning: {w}"))
 }
 
 fn table(case: &Case, e: &Estimate, threads: usize) -> String {
@@ -80,7 +85,7 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
         .iter()
         .map(|(name, value)| format!("{name:width$}  {value}"))
         .collect();
-    lines.extend(e.warnings.iter().map(|w| format!("warning: {w}")));
+    lines.extend(warnings(e));
     if e.warnings.is_empty() {
         lines.push("no warnings".into());
     }

@@ -7,6 +7,8 @@ use grainwake_solver::case::{CaseError, Problem};
 use grainwake_solver::output::RunError;
 use miette::{GraphicalReportHandler, GraphicalTheme};
 
+use crate::tell;
+
 /// The run did not give what `[expect]` says.
 pub const MISSED: u8 = 1;
 /// Bad input; nothing was written.
@@ -60,8 +62,8 @@ impl Exit {
         for problem in &self.problems {
             let mut text = String::new();
             match handler.render_report(&mut text, problem) {
-                Ok(()) => eprintln!("{}", text.trim_end_matches('\n')),
-                Err(_) => eprintln!("{problem}"),
+                Ok(()) => tell!("{}", text.trim_end_matches('\n')),
+                Err(_) => tell!("{problem}"),
             }
         }
         ExitCode::from(self.code)
@@ -113,25 +115,40 @@ impl From<ShapeError> for Exit {
             ShapeError::Io { source, .. } if source.kind() != std::io::ErrorKind::NotFound => IO,
             _ => BAD_INPUT,
         };
-        let help = match &error {
-            ShapeError::EmptyVolume | ShapeError::SolidVolume => {
-                "look at the image and its grey values; a grey image needs --threshold VALUE, otsu or otsu3"
-            }
-            ShapeError::CutByBorder { .. } => {
-                "scan a larger region; where the crop is merely tight, --pad takes the grain as cut there"
-            }
-            ShapeError::SeveralPieces { .. } => {
-                "--largest-piece keeps the largest, --split takes each piece as a grain"
-            }
-            ShapeError::InsideOut { .. } => "--flip inverts its faces",
-            ShapeError::TooFewVoxels { .. } => "scan it finer, or leave it out",
-            ShapeError::Malformed { .. } => {
-                "copy or export the file again; where it opens elsewhere, save it uncompressed"
-            }
-            _ => return Exit::new(code, error.to_string()),
-        };
-        Exit::with_help(code, error.to_string(), help)
+        match shape_help(&error) {
+            Some(help) => Exit::with_help(code, error.to_string(), help),
+            None => Exit::new(code, error.to_string()),
+        }
     }
+}
+
+/// Options that help against a refused shape.
+pub fn shape_help(error: &ShapeError) -> Option<String> {
+    let help = match error {
+        ShapeError::EmptyVolume | ShapeError::SolidVolume => {
+            "look at the image and its grey values; a grey image needs --threshold VALUE, otsu or otsu3"
+        }
+        ShapeError::CutByBorder { label, faces } if faces.split(", ").count() == 6 => {
+            return Some(format!(
+                "if label {label} is a whole phase: --split takes each of its pieces as a grain, --separate also parts grains that touch; if it is one grain: --pad takes it as cut there"
+            ));
+        }
+        ShapeError::CutByBorder { .. } => {
+            "scan a larger region; where the crop is merely tight, --pad takes the grain as cut there"
+        }
+        ShapeError::SeveralPieces { label, .. } => {
+            return Some(format!(
+                "if label {label} is a whole phase: --split takes each piece as a grain, --separate also parts grains that touch; if it is one grain: --largest-piece keeps the largest"
+            ));
+        }
+        ShapeError::InsideOut { .. } => "--flip inverts its faces",
+        ShapeError::TooFewVoxels { .. } => "scan it finer, or leave it out",
+        ShapeError::Malformed { .. } => {
+            "copy or export the file again; where it opens elsewhere, save it uncompressed"
+        }
+        _ => return None,
+    };
+    Some(help.into())
 }
 
 impl From<std::io::Error> for Exit {

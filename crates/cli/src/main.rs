@@ -1,10 +1,16 @@
 //! `grainwake`: reads its arguments, calls the libraries, prints.
 
+// The macros of the standard library panic where nobody reads on; `out` does not.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod args;
 mod bench;
 mod check;
 mod exit;
+mod expect;
 mod grain;
+mod kind;
+mod out;
 mod progress;
 mod report;
 mod run;
@@ -13,12 +19,10 @@ mod study_board;
 mod threads;
 mod validate;
 
-use std::io::Write;
-
 use clap::{CommandFactory, Parser};
 
 use args::{Cli, Command};
-use exit::Exit;
+use out::{print, tell};
 
 fn main() -> std::process::ExitCode {
     let cli = Cli::parse();
@@ -34,16 +38,11 @@ fn main() -> std::process::ExitCode {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(*shell, &mut Cli::command(), "grainwake", &mut script);
-            std::io::stdout().write_all(&script).map_err(Exit::from)
+            out::write(&script)
         }
     };
     match done {
         Ok(()) => std::process::ExitCode::SUCCESS,
         Err(exit) => exit.report(),
     }
-}
-
-/// One line (or more) on standard output.
-fn print(text: &str) -> Result<(), Exit> {
-    writeln!(std::io::stdout(), "{text}").map_err(Exit::from)
 }

@@ -9,6 +9,8 @@ use grainwake_solver::output::{Observer, Progress};
 use grainwake_solver::sim::events::Event;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::tell;
+
 /// Seconds between lines where there is no terminal.
 const LINE_INTERVAL: f64 = 10.0;
 const TICKS: u64 = 10_000;
@@ -54,7 +56,7 @@ impl Shown {
     fn line(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.println(text),
-            None => eprintln!("{text}"),
+            None => tell!("{text}"),
         }
     }
 
@@ -114,7 +116,7 @@ impl Observer for Shown {
             }
             None if self.last_line.elapsed().as_secs_f64() >= LINE_INTERVAL => {
                 self.last_line = Instant::now();
-                eprintln!("{:3.0} %  {}", 100.0 * p.time / p.end, self.describe(p));
+                tell!("{:3.0} %  {}", 100.0 * p.time / p.end, self.describe(p));
             }
             None => {}
         }

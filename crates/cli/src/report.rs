@@ -1,18 +1,21 @@
 //! `grainwake report`.
 
 use grainwake_report::{ReportError, render};
-use grainwake_study::Manifest;
+use grainwake_study::{Analysis, Manifest};
 
 use crate::args::ReportArgs;
 use crate::exit::{BAD_INPUT, Exit, IO};
-use crate::print;
+use crate::{print, tell};
 
 /// Draws the figures and the page of a run folder, or of a study folder.
 pub fn report(args: &ReportArgs) -> Result<(), Exit> {
     if Manifest::is_in(&args.run) {
         let done = grainwake_study::render(&args.run)?;
         for note in &done.notes {
-            eprintln!("note: {note}");
+            tell!("note: {note}");
+        }
+        if Manifest::read(&args.run)?.analysis == Analysis::default() {
+            tell!("note: no figures: the study file names no `analysis`");
         }
         let (finished, all) = done.runs;
         return print(&format!(
@@ -29,7 +32,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
         Exit::new(code, error.to_string())
     })?;
     for note in &done.notes {
-        eprintln!("note: {note}");
+        tell!("note: {note}");
     }
     print(&format!(
         "{} ({} figures)",

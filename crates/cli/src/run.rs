@@ -4,17 +4,18 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use grainwake_solver::case::estimate::Estimate;
 use grainwake_solver::case::{Case, Problem, Verdict};
 use grainwake_solver::output::{self, Ending, Existing, Options, RESOLVED, Summary};
 
 use crate::args::RunArgs;
 use crate::exit::{Exit, INTERRUPTED, MISSED};
 use crate::progress::Shown;
-use crate::{print, threads};
+use crate::{check, expect, kind, print, tell, threads};
 
 /// Runs a case.
 pub fn run(args: &RunArgs) -> Result<(), Exit> {
-    let case = Case::load(&args.case, &args.set)?;
+    let case = kind::case(&args.case, &args.set)?;
     let out = args
         .output
         .clone()
@@ -39,12 +40,13 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         } else {
             "dry".into()
         };
-        eprintln!(
+        tell!(
             "{}: {} grains, {what}, {threads} threads -> {}",
             args.case.display(),
             case.setup.grains.len(),
             out.display()
         );
+        check::warnings(&Estimate::of(&case, threads)).for_each(|w| tell!("{w}"));
     }
     let diameter = case
         .setup
@@ -71,7 +73,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         }
         Ending::AlreadyFinished(summary) => {
             if !args.quiet {
-                eprintln!("the run had finished before");
+                tell!("the run had finished before");
             }
             if !args.no_report && !out.join("report.html").exists() {
                 draw(args, &out);
@@ -90,9 +92,9 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
 /// Draws the report. The run is good without it, so trouble is told and no more.
 fn draw(args: &RunArgs, out: &Path) {
     match grainwake_report::render(out) {
-        Ok(done) if !args.quiet => eprintln!("report: {}", done.page.display()),
+        Ok(done) if !args.quiet => tell!("report: {}", done.page.display()),
         Ok(_) => {}
-        Err(error) => eprintln!(
+        Err(error) => tell!(
             "note: no report: {error}; `grainwake report {}` tries again",
             out.display()
         ),
@@ -111,10 +113,13 @@ fn conclude(args: &RunArgs, case: &Case, summary: &Summary, out: &Path) -> Resul
     } else if !args.quiet {
         print(&describe(summary, out))?;
     }
+    if !args.quiet {
+        verdicts.iter().for_each(|v| tell!("{}", expect::line(v)));
+    }
     let missed: Vec<Problem> = verdicts
         .iter()
         .filter(|v| !v.pass)
-        .map(Problem::from)
+        .map(expect::missed)
         .collect();
     if missed.is_empty() {
         Ok(())
@@ -176,7 +181,7 @@ pub(crate) fn watch_for_interrupt(stop: Arc<AtomicBool>) {
         if stop.swap(true, Ordering::Relaxed) {
             std::process::exit(i32::from(INTERRUPTED));
         }
-        eprintln!("interrupted: writing a checkpoint after this step (once more to stop at once)");
+        tell!("interrupted: writing a checkpoint after this step (once more to stop at once)");
     });
 }
 

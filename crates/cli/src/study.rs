@@ -5,15 +5,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use comfy_table::{CellAlignment, Table, presets};
 use grainwake_study::{
-    Options, Outcome, Plan, Row, Run, Selection, State, Study, StudyError, carry_out, state, table,
-    write_table,
+    Analysis, Options, Outcome, Plan, Row, Run, Selection, State, StudyError, carry_out, state,
+    table, write_table,
 };
 
 use crate::args::StudyArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO};
 use crate::progress::clock;
 use crate::study_board::Board;
-use crate::{print, run, threads};
+use crate::{kind, print, run, tell, threads};
 
 impl From<StudyError> for Exit {
     fn from(error: StudyError) -> Exit {
@@ -46,7 +46,7 @@ impl From<StudyError> for Exit {
 
 /// Runs a study.
 pub fn study(args: &StudyArgs) -> Result<(), Exit> {
-    let study = Study::read(&args.study)?;
+    let study = kind::study(&args.study)?;
     let selection = args
         .only
         .as_deref()
@@ -86,7 +86,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let stop = Arc::new(AtomicBool::new(false));
     run::watch_for_interrupt(stop.clone());
     if !args.quiet {
-        eprintln!(
+        tell!(
             "{}: {} of {} runs, {jobs} at once with {each} threads each -> {}",
             args.study.display(),
             chosen.len(),
@@ -113,7 +113,13 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         print(&pretty(&shown).to_string())?;
     }
     if !args.quiet {
-        eprintln!("{}", folder.join("table.csv").display());
+        tell!("{}", folder.join("table.csv").display());
+        if study.analysis == Analysis::default() {
+            tell!(
+                "note: the page of `grainwake report {}` has no figures: the study file names no `analysis`",
+                folder.display()
+            );
+        }
     }
     conclude(runs, &ended, stop.load(Ordering::Relaxed))
 }
@@ -138,7 +144,7 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
         ));
     }
     if ended.iter().any(|(_, o)| *o == Outcome::Elsewhere) {
-        eprintln!("note: some runs are in the hands of another program");
+        tell!("note: some runs are in the hands of another program");
     }
     let Some(code) = failed.iter().map(|(.., code)| *code).max() else {
         return Ok(());

@@ -12,6 +12,7 @@ use grainwake_study::{Outcome, Run, Watcher};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
 use crate::progress::clock;
+use crate::tell;
 
 /// Seconds between lines where there is no terminal.
 const LINE_INTERVAL: f64 = 60.0;
@@ -97,7 +98,7 @@ impl<'a> Board<'a> {
             Some(bars) => {
                 let _ = bars.println(text);
             }
-            None => eprintln!("{text}"),
+            None => tell!("{text}"),
         }
     }
 
@@ -166,7 +167,7 @@ impl Watcher for Board<'_> {
             inner.active.insert(run, active);
         });
         if !self.quiet && self.bars.is_none() {
-            eprintln!("{name}: started");
+            tell!("{name}: started");
         }
     }
 

@@ -96,6 +96,44 @@ fn the_cube_itself_is_taken_with_a_bare_unit() {
 }
 
 #[test]
+fn outputs_that_are_inputs_or_have_the_name_of_something_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    stl(&path("cube.stl"), &cube());
+    std::fs::write(path("ball.nrrd"), nrrd("uint8", [24; 3], &image(BALL))).unwrap();
+    std::fs::create_dir(path("slices")).unwrap();
+    let before = common::contents(folder.path());
+    let run = |words: &[&str], input: &str, out: &str, word: &str| {
+        let mut program = grainwake();
+        program.arg("grain").args(words);
+        if !input.is_empty() {
+            program.arg(path(input));
+        }
+        program.arg("-o").arg(path(out));
+        let done = program.assert().code(2);
+        let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        assert!(said.contains(word), "`{word}` is missing in:\n{said}");
+        assert_eq!(before, common::contents(folder.path()), "{out}");
+    };
+    let mesh = ["from-mesh", "--unit", "mm", "--force"];
+    run(&mesh, "cube.stl", "cube.stl", "is what is read");
+    run(&mesh, "cube.stl", "slices/../cube.stl", "is what is read");
+    run(&mesh, "cube.stl", "e2.stl", "e2.grain");
+    run(
+        &["make", "sphere", "2 mm"],
+        "",
+        "ball",
+        "does not end in .grain",
+    );
+    let scan = ["from-scan", "--voxel", "10 um", "--force"];
+    run(&scan, "ball.nrrd", "ball.nrrd", "is what is read");
+    run(&scan, "slices", "slices", "is what is read");
+    run(&scan, "ball.nrrd", "s.grian", "the name of a file");
+    let family = ["family", "--sphericity", "0.7", "--roundness", "0.5"];
+    run(&family, "", "all.grain", "the name of a file");
+}
+
+#[test]
 fn a_mesh_with_a_hole() {
     refused_mesh(
         &cube()[1..],
@@ -244,6 +282,61 @@ fn two_pieces_of_one_label() {
         &image(|r| u8::from(r < 3.0 || (6.0..10.0).contains(&r))),
     );
     refused_image("two.nrrd", &file, &["2 separate pieces", "--largest-piece"]);
+}
+
+/// `from-scan` into a folder; standard error.
+fn all_grains(bytes: &[u8], more: &[&str], code: i32) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("image.nrrd");
+    std::fs::write(&path, bytes).unwrap();
+    let mut program = grainwake();
+    program.args(["grain", "from-scan", "--voxel", "10 um", "--no-roundness"]);
+    program.arg(&path).args(more).arg("-o");
+    let done = program.arg(folder.path().join("out")).assert().code(code);
+    String::from_utf8_lossy(&done.get_output().stderr).into_owned()
+}
+
+#[test]
+fn a_grey_image_taken_for_labels() {
+    // Any noise will do; nothing at the border.
+    let mut noise = 1_u32;
+    let mut grey = image(|r| u8::from(r < 10.0));
+    for value in grey.iter_mut().filter(|v| **v > 0) {
+        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        *value = 100 + (noise >> 27) as u8;
+    }
+    let said = all_grains(&nrrd("uint8", [24; 3], &grey), &[], 2);
+    assert!(
+        said.contains("looks like a grey image") && said.contains("--threshold otsu"),
+        "{said}"
+    );
+    assert!(
+        said.contains("32 labels left out, each of several separate pieces: 100, 101, "),
+        "{said}"
+    );
+    assert!(said.lines().count() < 8, "{said}");
+    // With it the grain is there and nothing is said of grey.
+    let said = all_grains(
+        &nrrd("uint8", [24; 3], &grey),
+        &["--threshold", "otsu", "--largest-piece"],
+        0,
+    );
+    assert!(!said.contains("grey image"), "{said}");
+}
+
+#[test]
+fn a_whole_phase_taken_for_a_grain() {
+    let everywhere = nrrd("uint8", [24; 3], &image(|r| u8::from(r < 15.0)));
+    let said = all_grains(&everywhere, &[], 2);
+    for word in ["label 1 is a whole phase", "--split", "--separate", "--pad"] {
+        assert!(said.contains(word), "`{word}` is missing in:\n{said}");
+    }
+    let two = image(|r| u8::from(r < 3.0 || (6.0..10.0).contains(&r)));
+    let said = all_grains(&nrrd("uint8", [24; 3], &two), &[], 2);
+    assert!(
+        said.contains("label 1 is a whole phase") && said.contains("--largest-piece"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -125,6 +125,27 @@ fn a_periodic_mismatch() {
 }
 
 #[test]
+fn a_study_file_for_a_case() {
+    let (folder, _) = folder_with(WET);
+    let study = folder.path().join("study.toml");
+    let text = "title = \"two\"\nbase = \"case.toml\"\n[[adjust]]\nmodels = [\"*\"]\n";
+    std::fs::write(&study, text).unwrap();
+    for command in ["run", "check"] {
+        let done = grainwake().arg(command).arg(&study).assert().code(2);
+        let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        assert!(
+            said.contains("is a study file") && said.contains("grainwake study"),
+            "{said}"
+        );
+    }
+    // A slip in a case is told as before.
+    let slip = WET.replace("[time]", "[tyme]");
+    std::fs::write(&study, slip).unwrap();
+    let done = grainwake().arg("check").arg(&study).assert().code(2);
+    assert!(String::from_utf8_lossy(&done.get_output().stderr).contains("tyme"));
+}
+
+#[test]
 fn what_is_not_there_and_what_is_no_case() {
     let folder = tempfile::tempdir().unwrap();
     let done = grainwake()

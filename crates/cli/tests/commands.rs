@@ -3,6 +3,7 @@
 mod common;
 
 use common::{DRY, WET, folder_with, grainwake};
+use predicates::str::contains;
 use serde_json::Value;
 
 fn json(stdout: &[u8]) -> Value {
@@ -158,6 +159,67 @@ fn check_gives_the_derived_numbers() {
 }
 
 #[test]
+fn a_run_says_what_check_warns_of() {
+    let (folder, case) = folder_with(WET);
+    let short = ["--set", "time.end=4 ms"];
+    let mut check = grainwake();
+    check.arg("check").arg(&case).args(short);
+    let check = check.assert().success();
+    let said = String::from_utf8_lossy(&check.get_output().stdout).into_owned();
+    let warnings: Vec<&str> = said.lines().filter(|l| l.starts_with("warning")).collect();
+    assert!(!warnings.is_empty(), "{said}");
+    let run = |out: &str, more: &[&str]| {
+        let mut command = grainwake();
+        command.arg("run").arg(&case).arg("-o");
+        command.arg(folder.path().join(out)).args(more);
+        let done = command.args(short).assert().success();
+        String::from_utf8_lossy(&done.get_output().stderr).into_owned()
+    };
+    let told = run("a", &["--no-report"]);
+    assert!(warnings.iter().all(|w| told.contains(w)), "{told}");
+    assert_eq!(run("b", &["--no-report", "--quiet"]), "");
+}
+
+#[test]
+fn expectations_are_told_with_their_units() {
+    let (folder, case) = folder_with(&format!(
+        "{DRY}\n[expect]\nlanding_time = [\n\
+         {{ value = \"28.6 ms\", tolerance = \"1 %\", grain = 0 }},\n\
+         {{ value = \"50 ms\", tolerance = \"1 ms\", grain = 0 }},\n]\n\
+         end_time = {{ at_least = \"0.1 s\" }}\n"
+    ));
+    let run = |out: &str, more: &[&str]| {
+        let mut command = grainwake();
+        command.arg("run").arg(&case).arg("-o");
+        command.arg(folder.path().join(out)).args(more);
+        let done = command.arg("--no-report").assert().code(1);
+        String::from_utf8_lossy(&done.get_output().stderr).into_owned()
+    };
+    let told = run("a", &[]);
+    let line = |start: &str, end: &str| {
+        let mut lines = told.lines();
+        assert!(
+            lines.any(|l| l.starts_with(start) && l.ends_with(end)),
+            "{told}"
+        );
+    };
+    line("landing_time of grain 0: 0.02", " s: held");
+    line(
+        "landing_time of grain 0: 0.02",
+        ", expected 0.049 to 0.051 s: missed",
+    );
+    line("end_time: 0.12 s, expected at least 0.1 s: held", "");
+    let miss = "expected landing_time of grain 0: 0.049 to 0.051 s, but it is 0.02";
+    assert!(
+        told.contains(miss) && told.contains(" s (error -4"),
+        "{told}"
+    );
+    // A miss is a problem, and problems are told even when quiet.
+    let quiet = run("b", &["--quiet"]);
+    assert!(quiet.contains(miss) && !quiet.contains("held"), "{quiet}");
+}
+
+#[test]
 fn an_expectation_makes_a_case_a_test() {
     let (folder, case) = folder_with(&format!(
         "{DRY}\n[expect]\nlanding_time = {{ value = 0.0286, tolerance = \"1 %\", grain = 0 }}\n"
@@ -260,7 +322,7 @@ fn bench_measures_time_memory_and_the_limit() {
     assert_eq!(single["precision"], "f32");
     assert_eq!(single["traffic_bytes_per_cell"], 112.0);
     let bytes = |m: &serde_json::Value| m["bytes_per_cell"].as_f64().unwrap();
-    assert!(bytes(&single) < 0.8 * bytes(&measured), "{single}");
+    assert!(bytes(&single) < bytes(&measured), "{single}");
     // Two by two by four places of eleven cells.
     let many = grainwake()
         .args(["bench", "--size", "24", "24", "48", "--grains", "17"])
@@ -318,8 +380,8 @@ fn grains_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     for (name, axes) in [
-        ("long", ["3 mm", "2 mm", "1 mm"]),
-        ("flat", ["4 mm", "4 mm", "2 mm"]),
+        ("long.grain", ["3 mm", "2 mm", "1 mm"]),
+        ("flat.grain", ["4 mm", "4 mm", "2 mm"]),
     ] {
         let mut make = grainwake();
         make.args(["grain", "make", "ellipsoid"])
@@ -333,8 +395,8 @@ fn grains_are_compared() {
         let mut program = grainwake();
         program
             .args(["grain", "compare"])
-            .arg(path("long"))
-            .arg(path("flat"))
+            .arg(path("long.grain"))
+            .arg(path("flat.grain"))
             .args(more);
         program.assert().success().get_output().stdout.clone()
     };
@@ -361,6 +423,12 @@ fn grains_are_compared() {
         "{text}"
     );
     assert!(picture.exists());
+    let mut over = grainwake();
+    over.args(["grain", "compare"])
+        .args([path("long.grain"), path("flat.grain")])
+        .arg("--picture")
+        .arg(path("long.grain"));
+    over.assert().code(2).stderr(contains("is what is read"));
 }
 
 #[test]

@@ -157,6 +157,40 @@ fn one_share_after_the_other_is_the_whole() {
 }
 
 #[test]
+fn a_study_without_an_analysis_says_that_it_has_no_figures() {
+    let (folder, path) = study();
+    let out = folder.path().join("out");
+    let run = |more: &[&str]| {
+        let command = &mut grainwake();
+        command.arg("study").arg(&path).arg("-o").arg(&out);
+        command.args(["--set", "time.end=4 ms"]).args(more);
+        command.assert().success()
+    };
+    run(&[]).stderr(contains("names no `analysis`"));
+    run(&["--quiet"]).stderr("");
+    grainwake()
+        .arg("report")
+        .arg(&out)
+        .assert()
+        .success()
+        .stdout(contains("0 figures"))
+        .stderr(contains("names no `analysis`"));
+}
+
+#[test]
+fn a_case_for_a_study_file() {
+    let (folder, case) = folder_with(WET);
+    grainwake()
+        .arg("study")
+        .arg(&case)
+        .arg("-o")
+        .arg(folder.path().join("out"))
+        .assert()
+        .code(2)
+        .stderr(contains("is a case").and(contains("grainwake run")));
+}
+
+#[test]
 fn wrong_studies_end_with_2_and_a_place() {
     let (folder, path) = study();
     let out = folder.path().join("out");

@@ -10,7 +10,7 @@ pub enum PhaseKind {
     Drafting,
     /// In touch, in the order of the start.
     Kissing,
-    /// In touch, turning about each other.
+    /// Turning about each other, in touch or just parted.
     Tumbling,
     /// Apart after having touched.
     Separated,
@@ -61,6 +61,8 @@ pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
             (_, Landed) => Landed,
             (Some(Kind::Kiss), Drafting | Separated) => Kissing,
             (Some(Kind::RoleChange | Kind::Tumble) | None, Kissing) => Tumbling,
+            // A pair may turn on after a touch that has ended, before the parting is certain.
+            (Some(Kind::Tumble) | None, Separated) => Tumbling,
             (Some(Kind::Separation), Kissing | Tumbling) => Separated,
             (Some(Kind::Landing), _) => Landed,
             (_, same) => same,
@@ -82,6 +84,49 @@ pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
     });
     out.retain(|phase| phase.end > phase.start);
     out
+}
+
+/// When a pair met or parted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Time [s].
+    pub time: f64,
+    /// Whether a grain had landed before.
+    pub landed: bool,
+}
+
+/// First contact of the pair.
+pub fn kiss(events: &[Event]) -> Option<Moment> {
+    let time = first(events, &Kind::Kiss)?;
+    let landed = first(events, &Kind::Landing).is_some_and(|landing| landing <= time);
+    Some(Moment { time, landed })
+}
+
+/// The parting of a pair that has touched: its last separation before the first landing, unless it
+/// has met again by then; else its last separation of all, unless it has met again.
+pub fn parting(events: &[Event]) -> Option<Moment> {
+    let kiss = first(events, &Kind::Kiss)?;
+    let landing = first(events, &Kind::Landing).unwrap_or(f64::INFINITY);
+    let before = |end: f64| {
+        let meets = |event: &&Event| matches!(event.kind, Kind::Kiss | Kind::Separation);
+        let last = events
+            .iter()
+            .rfind(|event| meets(event) && event.time < end)?;
+        (last.kind == Kind::Separation && last.time >= kiss).then_some(last.time)
+    };
+    let time = before(landing).or_else(|| before(f64::INFINITY))?;
+    Some(Moment {
+        time,
+        landed: time >= landing,
+    })
+}
+
+/// Time of the first event of a kind [s].
+fn first(events: &[Event], kind: &Kind) -> Option<f64> {
+    events
+        .iter()
+        .find(|event| event.kind == *kind)
+        .map(|event| event.time)
 }
 
 /// A named instant.
@@ -116,8 +161,13 @@ pub fn pair_instants(phases: &[Phase], events: &[Event], closest: f64, end: f64)
         return out;
     };
     let middle = |phase: &Phase| 0.5 * (phase.start + phase.end);
-    let parted = of(PhaseKind::Separated);
-    let third = match (role_after(kiss), of(PhaseKind::Tumbling)) {
+    let parted = phases
+        .iter()
+        .rfind(|phase| phase.kind == PhaseKind::Separated);
+    let tumbling = of(PhaseKind::Tumbling);
+    // Where the tumbling comes after the separation, it takes the last place.
+    let apart = tumbling.filter(|t| parted.is_some_and(|p| p.start < t.start));
+    let third = match (role_after(kiss), tumbling.filter(|_| apart.is_none())) {
         (Some(time), _) => instant(time, "role change"),
         (None, Some(tumbling)) => instant(middle(tumbling), "tumbling"),
         (None, None) => instant(
@@ -125,9 +175,11 @@ pub fn pair_instants(phases: &[Phase], events: &[Event], closest: f64, end: f64)
             "in contact",
         ),
     };
-    let fourth = match parted {
-        Some(phase) => instant(0.5 * (phase.start.max(third.time) + phase.end), "separated"),
-        None => instant(landing, if landing < end { "landing" } else { "end" }),
+    let late = |phase: &Phase| 0.5 * (phase.start.max(third.time) + phase.end);
+    let fourth = match (apart, parted) {
+        (Some(phase), _) => instant(late(phase), "tumbling"),
+        (None, Some(phase)) => instant(late(phase), "separated"),
+        (None, None) => instant(landing, if landing < end { "landing" } else { "end" }),
     };
     vec![
         instant(0.6 * kiss, "drafting"),
@@ -239,6 +291,68 @@ mod tests {
         ]);
         let got: Vec<_> = phases(&events, None, 5.0).iter().map(|p| p.kind).collect();
         assert_eq!(got, [Drafting, Kissing, Drafting, Kissing, Separated]);
+    }
+
+    #[test]
+    fn tumbling_after_the_separation_is_kept() {
+        let events = log(&[
+            (1.0, Kind::Kiss),
+            (2.0, Kind::Separation),
+            (2.5, Kind::Tumble),
+            (5.0, Kind::Landing),
+        ]);
+        let got = phases(&events, Some(2.5), 6.0);
+        assert_eq!(
+            kinds(&got),
+            [
+                (Drafting, 0.0, 1.0),
+                (Kissing, 1.0, 2.0),
+                (Separated, 2.0, 2.5),
+                (Tumbling, 2.5, 5.0),
+                (Landed, 5.0, 6.0)
+            ]
+        );
+        let instants: Vec<_> = pair_instants(&got, &events, 1.2, 6.0)
+            .iter()
+            .map(|i| (i.name, i.time))
+            .collect();
+        assert_eq!(instants[2..], [("in contact", 1.5), ("tumbling", 3.75)]);
+    }
+
+    #[test]
+    fn kiss_and_parting_have_one_meaning() {
+        let of = |events: &[(f64, Kind)]| {
+            let events = log(events);
+            let told = |moment: Moment| (moment.time, moment.landed);
+            (kiss(&events).map(told), parting(&events).map(told))
+        };
+        let (touch, part, land) = (Kind::Kiss, Kind::Separation, Kind::Landing);
+        assert_eq!(of(&[(1.0, part.clone())]), (None, None));
+        // A bounce is no parting.
+        let bounce = [
+            (1.0, touch.clone()),
+            (1.1, part.clone()),
+            (2.0, touch.clone()),
+            (3.0, part.clone()),
+            (5.0, land.clone()),
+        ];
+        assert_eq!(of(&bounce), (Some((1.0, false)), Some((3.0, false))));
+        assert_eq!(of(&bounce[..3]), (Some((1.0, false)), None));
+        // What happens on the floor comes second.
+        let mut again = bounce.to_vec();
+        again.extend([(6.0, touch.clone()), (7.0, part.clone())]);
+        assert_eq!(of(&again).1, Some((3.0, false)));
+        let late = [
+            (1.0, land.clone()),
+            (2.0, touch.clone()),
+            (3.0, part.clone()),
+        ];
+        assert_eq!(of(&late), (Some((2.0, true)), Some((3.0, true))));
+        let landed_in_touch = [(1.0, touch), (2.0, land), (3.0, part)];
+        assert_eq!(
+            of(&landed_in_touch),
+            (Some((1.0, false)), Some((3.0, true)))
+        );
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use glam::DVec3;
 use serde_json::Value;
 
-use crate::phases::{self, Instant, Phase};
-use crate::run_folder::{History, RunFolder};
+use crate::phases::{self, Instant, Moment, Phase};
+use crate::run_folder::{Event, History, RunFolder};
 
 /// What was run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +52,10 @@ pub struct Story {
     pub pair: Option<[usize; 2]>,
     /// Phases of a pair.
     pub phases: Vec<Phase>,
+    /// First contact of a pair.
+    pub kiss: Option<Moment>,
+    /// When a pair that had touched parted.
+    pub parting: Option<Moment>,
     /// Instants that the pictures show.
     pub instants: Vec<Instant>,
     /// Whether any grain travels by a tenth of its diameter or more.
@@ -103,6 +107,9 @@ impl Story {
         } else {
             Vec::new()
         };
+        let of_pair = |moment: fn(&[Event]) -> Option<Moment>| {
+            pair.is_some().then(|| moment(&run.events)).flatten()
+        };
         let step = 0.1 * run.facts.diameter().unwrap_or(0.0);
         let far = |history: &History| {
             history
@@ -129,6 +136,8 @@ impl Story {
             up,
             pair,
             phases,
+            kiss: of_pair(phases::kiss),
+            parting: of_pair(phases::parting),
             instants,
             travels,
             end,
@@ -172,6 +181,16 @@ impl Story {
             }
             _ => format!("*t* = {} s", short(time)),
         }
+    }
+
+    /// When a pair met or parted, in words.
+    pub fn moment_text(&self, moment: Moment) -> String {
+        let landed = if moment.landed {
+            ", after the first has landed"
+        } else {
+            ""
+        };
+        format!("{}{landed}", self.time_text(moment.time))
     }
 }
 

@@ -417,11 +417,11 @@ fn other_runs_get_their_own_figures() {
         [
             "trajectories",
             "velocity",
-            "orientation",
             "speed",
             "vorticity",
             "diagnostics"
-        ]
+        ],
+        "a sphere that does not turn has no orientation to show"
     );
     let seen = text_of(&svg(&rendered, "velocity"));
     assert!(
@@ -444,6 +444,119 @@ fn other_runs_get_their_own_figures() {
     assert_eq!(names(&rendered), ["positions", "history", "diagnostics"]);
     let seen = text_of(&svg(&rendered, "positions"));
     assert!(seen.contains("height of the centre  [mm]"), "{seen}");
-    assert!(page(&rendered).contains("30 × rock.grain"));
+    assert!(page(&rendered).contains("30 grains</th><td>rock.grain, "));
+    remove(&folder);
+}
+
+/// Replaces the log of a run by these events at dimensionless times.
+fn write_log(folder: &Path, events: &[(f64, &str)]) {
+    let unit = (synthetic::D / synthetic::G).sqrt();
+    let line = |(s, name): &(f64, &str)| {
+        let time = s * unit;
+        format!("{{\"time\":{time},\"event\":\"{name}\",\"grains\":[0,1]}}\n")
+    };
+    let log: String = events.iter().map(line).collect();
+    std::fs::write(folder.join("events.jsonl"), log).unwrap();
+}
+
+/// What the page and the figure of the gap say of a pair with this log.
+fn told(events: &[(f64, &str)]) -> (String, String) {
+    let folder = small_pair(0.9);
+    std::fs::remove_dir_all(folder.join("slices")).unwrap();
+    let summary = folder.join("summary.json");
+    let mut value: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&summary).unwrap()).unwrap();
+    value.as_object_mut().unwrap().remove("tumble_time_s");
+    std::fs::write(&summary, value.to_string()).unwrap();
+    write_log(&folder, events);
+    let rendered = render(&folder).unwrap();
+    let out = (page(&rendered), text_of(&svg(&rendered, "gap")));
+    remove(&folder);
+    out
+}
+
+#[test]
+fn headline_and_figures_agree_on_kiss_and_parting() {
+    let (page, gap) = told(&[(5.0, "landing"), (7.94, "kiss"), (8.1, "separation")]);
+    assert!(!page.contains("did not touch"));
+    assert!(page.contains("The two grains kissed at"));
+    let late = ", after the first has landed";
+    assert!(page.matches(late).count() >= 4, "headline and caption");
+    assert!(gap.contains(&format!("They touch first at t √(g/d) = 7.94{late}.")));
+    assert!(gap.contains(&format!("They part at t √(g/d) = 8.10{late}.")));
+
+    let bounce = [
+        (13.2, "kiss"),
+        (13.6, "separation"),
+        (14.0, "kiss"),
+        (17.3, "separation"),
+        (44.0, "landing"),
+    ];
+    let (page, gap) = told(&bounce);
+    assert!(gap.contains("They part at t √(g/d) = 17.3."), "{gap}");
+    let parted = page.split(", and parted at ").nth(1).unwrap();
+    assert!(parted.split(". ").next().unwrap().ends_with("= 17.3"));
+    assert!(!page.contains(late));
+}
+
+#[test]
+fn tumbling_after_the_separation_stays_in_the_table() {
+    let (page, _) = told(&[
+        (13.2, "kiss"),
+        (13.6, "separation"),
+        (13.8, "tumble"),
+        (44.0, "landing"),
+    ]);
+    let spoken = page.split("aria-label=\"Phases: ").nth(1).unwrap();
+    let phases: Vec<&str> = spoken
+        .split('"')
+        .next()
+        .unwrap()
+        .split("; ")
+        .filter_map(|phase| phase.split(' ').next())
+        .collect();
+    assert_eq!(
+        phases,
+        ["drafting", "kissing", "separated", "tumbling", "landed"]
+    );
+    let lead = page.split("<p class=\"lead\">").nth(1).unwrap();
+    let [parted, tumbled] = ["parted at", "tumbled from"].map(|text| lead.find(text).unwrap());
+    assert!(parted < tumbled);
+}
+
+#[test]
+fn grains_are_named_by_number_and_fields_by_precision() {
+    let folder = small_pair(0.9);
+    let file = folder.join("case.resolved.toml");
+    let case = std::fs::read_to_string(&file).unwrap();
+    let said = page(&render(&folder).unwrap());
+    assert!(said.contains("2 grains</th><td>rock.grain, ") && !said.contains("single precision"));
+    let changed = case.replacen("rock.grain", "shapes/e.grain", 1) + "[run]\nprecision = \"f32\"\n";
+    std::fs::write(&file, changed).unwrap();
+    let said = page(&render(&folder).unwrap());
+    assert!(said.contains("grain 0</th><td>shapes/e.grain, "));
+    assert!(said.contains("grain 1</th><td>rock.grain, "));
+    assert!(said.contains("single precision"));
+    remove(&folder);
+}
+
+#[test]
+fn grains_that_do_not_turn_have_no_angular_speed() {
+    let folder = small_pair(0.9);
+    let file = folder.join("grains.csv");
+    let table = std::fs::read_to_string(&file).unwrap();
+    let still = |line: &str| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if cells[0] != "time" {
+            cells[12..15].fill("0");
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(&file, table.lines().map(still).collect::<String>()).unwrap();
+    let seen = text_of(&svg(&render(&folder).unwrap(), "orientation"));
+    assert!(
+        seen.contains("long axis  [°]") && !seen.contains("ω"),
+        "{seen}"
+    );
     remove(&folder);
 }

@@ -159,17 +159,11 @@ impl SampledField {
         }
     }
 
-    /// Signed distance [m] at `x`, none off the grid.
+    /// Signed distance [m] and its gradient at `x`, none off the grid.
     #[inline]
-    pub fn distance_on_grid(&self, x: DVec3) -> Option<f64> {
-        self.locate(x).map(|place| self.interpolate(&place))
-    }
-
-    /// Gradient of the distance at `x`, none off the grid.
-    #[inline]
-    pub fn gradient_on_grid(&self, x: DVec3) -> Option<DVec3> {
+    pub fn distance_and_gradient_on_grid(&self, x: DVec3) -> Option<(f64, DVec3)> {
         let place = self.locate(x)?;
-        Some(self.interpolate_with_gradient(&place).1)
+        Some(self.interpolate_with_gradient(&place))
     }
 
     /// Signed distance [m] at `x` where that is at most `limit`, else infinity or the distance: what
@@ -209,7 +203,7 @@ impl SampledField {
     }
 
     /// The cell around `x`, or none where `x` lies off the grid (or is NaN).
-    #[inline]
+    #[inline(always)]
     fn locate(&self, x: DVec3) -> Option<Place> {
         let s = (x - self.lower) * self.inverse_spacing;
         if s.cmpge(DVec3::ZERO).all() && s.cmple(self.last).all() {
@@ -220,7 +214,7 @@ impl SampledField {
     }
 
     /// The cell at `s`, given in spacings from the first sample and on the grid.
-    #[inline]
+    #[inline(always)]
     fn place(&self, s: DVec3) -> Place {
         // Through i32, which converts in one instruction each way; a grid has no more samples
         // along an axis than that holds.
@@ -236,7 +230,7 @@ impl SampledField {
     }
 
     /// The two levels along x at each of the four edges of the cell.
-    #[inline]
+    #[inline(always)]
     fn corners(&self, index: usize) -> [[f64; 2]; 4] {
         let nx = self.dims[0];
         let pair = |at: usize| {
@@ -247,7 +241,7 @@ impl SampledField {
         [pair(index), pair(index + nx), pair(above), pair(above + nx)]
     }
 
-    #[inline]
+    #[inline(always)]
     fn interpolate(&self, place: &Place) -> f64 {
         let f = place.fraction;
         let [a, b, c, d] = self
@@ -258,7 +252,7 @@ impl SampledField {
         self.quantum * (low + f.z * (high - low))
     }
 
-    #[inline]
+    #[inline(always)]
     fn interpolate_with_gradient(&self, place: &Place) -> (f64, DVec3) {
         let f = place.fraction;
         let corners = self.corners(place.index);

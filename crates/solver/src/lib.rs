@@ -10,5 +10,5 @@ pub mod flow;
 pub mod grid;
 pub mod math;
 pub mod output;
-pub mod poisson;
+mod poisson;
 pub mod sim;

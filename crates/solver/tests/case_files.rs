@@ -161,6 +161,10 @@ fn the_digest_follows_what_decides_the_results() {
         digest("[time]", "[output]\ncheckpoint_steps = 3\n[time]"),
         original
     );
+    assert_ne!(
+        digest("[time]", "[run]\nprecision = \"f32\"\n[time]"),
+        original
+    );
     assert_ne!(digest("1500 kg/m3", "1501 kg/m3"), original);
     assert_ne!(digest("1 mPa s", "1.1 mPa s"), original);
     assert_ne!(
@@ -225,6 +229,12 @@ fn wrong_units_name_the_right_one() {
         &["is a mass", "kg/m3"],
     );
     refused("\"1 s\"", "\"1 m\"", "time.end", &["is a length", "a time"]);
+    refused(
+        "\"1 mPa s\"",
+        "\"1 mPas\"",
+        "fluid.viscosity",
+        &["did you mean `mPa s`"],
+    );
     refused(
         "[\"12.5 mm\", \"12.5 mm\", \"80 mm\"]",
         "[\"12.5 mm\", \"12.5 kg\", \"80 mm\"]",
@@ -404,6 +414,119 @@ fn grains_must_stand_clear_and_inside() {
 }
 
 #[test]
+fn grains_beyond_the_box_say_what_helps() {
+    let position = "[\"12.5 mm\", \"12.5 mm\", \"80 mm\"]";
+    refused(
+        position,
+        "[\"12.5 mm\", \"12.5 mm\", 80]",
+        "grain.0.position",
+        &[
+            "beyond the upper z face (at 97.5 mm)",
+            "unit forgotten? bare numbers are metres",
+        ],
+    );
+    let far = problems(&PAIR.replace("\"80 mm\"]", "\"80 m\"]"));
+    assert!(!far[0].help.as_ref().unwrap().contains("metres"), "{far:?}");
+    for (from, to, key, words) in [
+        (
+            "diameter = \"2 mm\" }",
+            "diameter = \"30 mm\" }",
+            "grain.0.shape",
+            [
+                "larger than the box: 30 mm along x, the box has 25 mm",
+                "equivalent_diameter",
+            ],
+        ),
+        (
+            "density = \"1500 kg/m3\"",
+            "equivalent_diameter = 2\ndensity = \"1500 kg/m3\"",
+            "grain.0.equivalent_diameter",
+            ["larger than the box: 2 m", "bare numbers are metres"],
+        ),
+    ] {
+        refused(from, to, key, &words);
+        let found = problems(&PAIR.replacen(from, to, 1));
+        let helps = found.iter().filter_map(|p| p.help.as_ref());
+        let moves = helps.filter(|help| help.contains("move it by")).count();
+        // The grain above it may still be told to move.
+        assert!(moves <= 1, "{found:?}");
+    }
+}
+
+#[test]
+fn grains_within_each_other_overlap_by_all_there_is() {
+    for (height, depth) in [("80 mm", "2.0000 mm"), ("80.5 mm", "1.5000 mm")] {
+        refused(
+            "gap_above = { grain = 0, gap = \"3 mm\" }",
+            &format!("position = [\"12.5 mm\", \"12.5 mm\", \"{height}\"]"),
+            "grain.1.position",
+            &[&format!("overlap at the start by {depth}")],
+        );
+    }
+}
+
+#[test]
+fn free_grains_lighter_than_the_coupling_bears_are_refused() {
+    let density = "density = \"1500 kg/m3\"";
+    refused(
+        density,
+        "density = \"0.2 g/cm3\"",
+        "grain.0.density",
+        &["0.2 times the density", "added mass", "0.35", "350 kg/m3"],
+    );
+    refused(
+        density,
+        "density = 2.5",
+        "grain.0.density",
+        &["kg/m3? was a unit such as g/cm3 forgotten"],
+    );
+    let with_unit = problems(&PAIR.replace(density, "density = \"2.5 kg/m3\""));
+    let help = with_unit[0].help.as_ref().unwrap();
+    assert!(!help.contains("forgotten"), "{help}");
+    let packed = PAIR.replace(
+        "[time]",
+        "[[packing]]\ncount = 3\nshapes = [{ kind = \"sphere\", diameter = \"2 mm\" }]\ndensity = 200\nregion = { lower = [0, 0, 0], upper = [\"25 mm\", \"25 mm\", \"20 mm\"] }\n[time]",
+    );
+    let found = problems(&packed);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].key.as_deref(), Some("packing.0.density"));
+    // Held grains may be as light as they like, and so may grains without a fluid.
+    good(&PAIR.replacen(density, "density = 200\nmotion = \"fixed\"", 1));
+    let fluid = "[fluid]\ndensity = 1000\nviscosity = \"1 mPa s\"\n";
+    assert!(PAIR.contains(fluid));
+    good(
+        &PAIR
+            .replace(fluid, "")
+            .replacen(density, "density = 200", 1),
+    );
+}
+
+#[test]
+fn light_grains_are_warned_of() {
+    let warnings = |densities: [&str; 2], stop: &str| {
+        let text = PAIR
+            .replace("\"1500 kg/m3\"", densities[0])
+            .replace("\"1.5 g/cm3\"", densities[1])
+            .replace("end = \"1 s\"", &format!("end = \"1 s\"\n{stop}"));
+        Estimate::of(&good(&text), 1).warnings.join("\n")
+    };
+    let landing = "stop = \"landing\"";
+    let light = warnings(["400", "2000"], "");
+    assert!(light.contains("grain 0 has 0.40 times"), "{light}");
+    assert!(light.contains("1 of 2 free grains"), "{light}");
+    let rising = warnings(["600", "700"], landing);
+    assert!(rising.contains("they rise"), "{rising}");
+    assert!(rising.contains("\"landing\" cannot be met"), "{rising}");
+    assert!(!rising.contains("unstable"), "{rising}");
+    assert!(warnings(["600", "2000"], landing).contains("may never be met"));
+    let heavy = warnings(["1500", "2000"], landing);
+    assert!(
+        !heavy.contains("rise") && !heavy.contains("landing"),
+        "{heavy}"
+    );
+}
+
+#[test]
 fn shapes_must_be_whole() {
     refused(
         "shape = { kind = \"sphere\", diameter = \"2 mm\" }",
@@ -522,6 +645,16 @@ fn vectors_may_be_formulas() {
         &["finite number"],
     );
     fluid("body_acceleration = { formula = [\"t\", 0] }", &["three"]);
+    for (formula, words) in [
+        ("2*(t", "its brackets do not match; a formula may use t,"),
+        ("2*t 3", "it cannot be read"),
+        ("", "it is empty"),
+    ] {
+        fluid(
+            &format!("body_acceleration = {{ formula = [\"{formula}\", 0, 0] }}"),
+            &["the x component", words],
+        );
+    }
     fluid(
         "body_acceleration = { formula = [\"sqrt(t - 1)\", 0, 0] }",
         &["finite number"],
@@ -572,6 +705,7 @@ fn packings_become_grains() {
         "{}",
         crowded[0]
     );
+    assert_eq!(crowded.len(), 1, "{crowded:?}");
     let random = good(&text.replace("seed = 3", "seed = 3\narrangement = \"random\""));
     assert_eq!(random.setup.grains.len(), 60);
 }
@@ -627,4 +761,29 @@ fn overrides_are_located_too() {
             .map(|(name, line, _)| (name, line)),
         Some(("--set", 1))
     );
+}
+
+#[test]
+fn what_an_override_broke_is_told_of_the_override() {
+    let inline = "gap_above = { grain = 0, gap = \"3 mm\" }";
+    let table = "[grain.gap_above]\ngrain = 0\ngap = \"3 mm\"";
+    let stop = "end = \"1 s\"\nstop = { when = \"rest\", hold = \"1 s\" }";
+    for text in [PAIR.to_string(), PAIR.replace(inline, table)] {
+        let text = text.replace("end = \"1 s\"", stop);
+        for (set, key) in [
+            ("time.stop.hold=-1", "time.stop.hold"),
+            ("grain.1.gap_above.gap=15 mm", "grain.1.gap_above"),
+            ("grain.1.gap_above.gap=-1 mm", "grain.1.gap_above"),
+            ("grain.0.position.2=0.5 mm", "grain.0.position"),
+            ("domain.size.0=-1", "domain.size"),
+            ("grain.1.density=2", "grain.1.density"),
+        ] {
+            let case = Case::parse(&text, "case.toml", Path::new("."), &[set.into()]);
+            let error = case.map(|_| ()).unwrap_err();
+            let first = &error.problems()[0];
+            assert_eq!(first.place().map(|(name, ..)| name), Some("--set"), "{set}");
+            let found = first.key.as_deref().unwrap();
+            assert!(found.starts_with(key), "{set}: {first}");
+        }
+    }
 }

@@ -5,12 +5,17 @@ use grainwake_shape::picture::Picture;
 use grainwake_shape::{Comparison, Record, Shape};
 use serde_json::json;
 
+use super::not_input;
 use crate::args::CompareArgs;
 use crate::exit::Exit;
 use crate::print;
 
 /// Prints how far two grains are from each other.
 pub fn compare(args: &CompareArgs) -> Result<(), Exit> {
+    if let Some(picture) = &args.picture {
+        not_input(picture, &args.first)?;
+        not_input(picture, &args.second)?;
+    }
     let first = Shape::load(&args.first)?;
     let mut second = Shape::load(&args.second)?;
     if args.same_size {

@@ -4,7 +4,7 @@ use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
 use grainwake_shape::picture::Picture;
 use grainwake_shape::write_table;
 
-use super::{length, may_write, show};
+use super::{folder, length, may_write, show};
 use crate::args::FamilyArgs;
 use crate::exit::{BAD_INPUT, Exit};
 
@@ -13,6 +13,7 @@ const PIXELS: usize = 130;
 
 /// One grain for each pair of sphericity and roundness, numbered row by row.
 pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
+    folder(&args.output)?;
     let diameter = length("--equivalent-diameter", &args.equivalent_diameter)?;
     let mut options = family_options();
     options.nodes = args.nodes;

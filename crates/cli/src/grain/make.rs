@@ -2,7 +2,7 @@
 
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
-use super::{length, may_write, options, save};
+use super::{grain_file, length, may_write, options, save};
 use crate::args::Body;
 use crate::exit::Exit;
 
@@ -16,6 +16,7 @@ pub fn make(body: &Body) -> Result<(), Exit> {
         | Body::Capsule { new, .. }
         | Body::Superquadric { new, .. } => new,
     };
+    grain_file(&new.output)?;
     may_write(&new.output, new.force)?;
     save(build(body, &options(new))?, new)
 }

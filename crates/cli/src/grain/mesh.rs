@@ -3,12 +3,14 @@
 use grainwake_shape::ReadLimits;
 use grainwake_shape::mesh::{MeshOptions, read_mesh, shape_from_mesh};
 
-use super::{length, may_write, options, plausible, save};
+use super::{grain_file, length, may_write, not_input, options, plausible, save};
 use crate::args::FromMeshArgs;
 use crate::exit::Exit;
 
 /// A grain from a closed surface mesh.
 pub fn from_mesh(args: &FromMeshArgs) -> Result<(), Exit> {
+    not_input(&args.new.output, &args.mesh)?;
+    grain_file(&args.new.output)?;
     may_write(&args.new.output, args.new.force)?;
     // "mm" is "1 mm" here; elsewhere a length without a number is a slip.
     let bare = args.unit.chars().all(char::is_alphabetic);

@@ -4,6 +4,7 @@ mod compare;
 mod family;
 mod make;
 mod mesh;
+mod refused;
 mod scan;
 mod table;
 
@@ -77,6 +78,57 @@ fn may_write(path: &Path, force: bool) -> Result<(), Exit> {
     Ok(())
 }
 
+/// Refuses to write over what is read, whatever `--force` says.
+fn not_input(output: &Path, input: &Path) -> Result<(), Exit> {
+    let same = match (output.canonicalize(), input.canonicalize()) {
+        (Ok(output), Ok(input)) => output == input,
+        _ => false,
+    };
+    if same {
+        return Err(Exit::with_help(
+            BAD_INPUT,
+            format!("{} is what is read", output.display()),
+            "give the output another name",
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses a file that does not say by its name that it holds a grain.
+fn grain_file(path: &Path) -> Result<(), Exit> {
+    if path.extension().is_some_and(|e| e == "grain") {
+        return Ok(());
+    }
+    Err(Exit::with_help(
+        BAD_INPUT,
+        format!("{} does not end in .grain", path.display()),
+        format!("give -o {}", path.with_extension("grain").display()),
+    ))
+}
+
+/// Endings of files that are read and written here; those of grain files, rightly or wrongly
+/// spelled, begin with "gr".
+const FILES: [&str; 10] = [
+    "stl", "ply", "obj", "tif", "tiff", "npy", "npz", "nrrd", "mha", "png",
+];
+
+/// Refuses a new folder that has the name of a file, which is a slip.
+fn folder(path: &Path) -> Result<(), Exit> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let file = ending.is_some_and(|e| e.starts_with("gr") || FILES.contains(&e.as_str()));
+    if !file || path.is_dir() {
+        return Ok(());
+    }
+    Err(Exit::with_help(
+        BAD_INPUT,
+        format!(
+            "{} would be a folder with the name of a file",
+            path.display()
+        ),
+        "give -o a name without this ending; from-scan takes NAME.grain for one grain",
+    ))
+}
+
 /// Rescales as asked and saves.
 fn finish(shape: Shape, path: &Path, new: &NewGrain) -> Result<Shape, Exit> {
     let shape = match &new.equivalent_diameter {
@@ -107,6 +159,9 @@ fn show(shape: &Shape, path: &Path, json: bool) -> Result<(), Exit> {
 }
 
 fn info(args: &InfoArgs) -> Result<(), Exit> {
+    if let Some(picture) = &args.picture {
+        args.files.iter().try_for_each(|f| not_input(picture, f))?;
+    }
     let mut pictures = Vec::new();
     for path in &args.files {
         let shape = Shape::load(path)?;

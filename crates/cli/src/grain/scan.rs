@@ -9,19 +9,24 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::{finish, length, may_write, options, plausible, save};
+use super::refused::{Refused, advice, lines};
+use super::{finish, folder, length, may_write, not_input, options, plausible, save};
 use crate::args::FromScanArgs;
 use crate::exit::{BAD_INPUT, Exit};
-use crate::print;
+use crate::{print, tell};
 
 /// Pixels of one grain in the contact sheet, grains in a row, and the most it shows.
 const SHEET: (usize, usize, usize) = (110, 12, 600);
 
 /// One grain, or all grains of an image.
 pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
-    let one_file = args.new.output.extension().is_some_and(|e| e == "grain");
+    let output = &args.new.output;
+    let one_file = output.extension().is_some_and(|e| e == "grain");
+    not_input(output, &args.image)?;
     if one_file {
-        may_write(&args.new.output, args.new.force)?;
+        may_write(output, args.new.force)?;
+    } else {
+        folder(output)?;
     }
     let how = how(args)?;
     let (volume, source) = read_volume(&args.image, &ReadLimits::default())?;
@@ -38,7 +43,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     let scan = scan?;
     drop(volume);
     if let Some(threshold) = scan.threshold {
-        eprintln!("threshold {threshold}");
+        tell!("threshold {threshold}");
     }
     if !one_file {
         return all(args, scan);
@@ -58,7 +63,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
         return Err(Exit::with_help(
             BAD_INPUT,
             message,
-            "choose one with --label N, or give -o a folder to take them all; values that are grey, not labels, need --threshold",
+            "choose one with --label N, or give -o a folder to take them all; values that are grey, not labels, need --threshold otsu",
         ));
     };
     let shape = grain.shape?;
@@ -99,12 +104,12 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
 /// are listed with the reason.
 fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     let Scan { grains, labels, .. } = scan;
-    let folder = &args.new.output;
-    let path = |label: u32| -> PathBuf { folder.join(format!("label-{label:05}.grain")) };
+    let place = &args.new.output;
+    let path = |label: u32| -> PathBuf { place.join(format!("label-{label:05}.grain")) };
     let (table, sheet, image) = (
-        folder.join("table.csv"),
-        folder.join("sheet.png"),
-        folder.join("labels.tif"),
+        place.join("table.csv"),
+        place.join("sheet.png"),
+        place.join("labels.tif"),
     );
     let usable = || {
         grains
@@ -121,6 +126,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
         plausible(shape, &args.new, "--voxel")?;
     }
     for file in [&table, &sheet, &image] {
+        not_input(file, &args.image)?;
         may_write(file, args.new.force)?;
     }
     let drawn: Vec<u32> = usable().take(SHEET.2).map(|(label, _)| label).collect();
@@ -139,7 +145,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
             (grain.label, grain.voxels, shape)
         })
         .collect();
-    let (mut rows, mut pictures, mut refused) = (Vec::new(), Vec::new(), 0);
+    let (mut rows, mut pictures, mut refused) = (Vec::new(), Vec::new(), Vec::new());
     for (label, voxels, outcome) in outcomes {
         match outcome {
             Ok(written) => {
@@ -158,15 +164,21 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
                 }
                 rows.push((format!("label-{label:05}"), record));
             }
-            Err(reason) => {
-                refused += 1;
-                eprintln!("label {label} ({voxels} voxels) left out: {reason}");
-            }
+            Err(why) => refused.push(Refused { label, voxels, why }),
         }
     }
-    eprintln!("{} grains written, {refused} left out", rows.len());
+    lines(&refused).iter().for_each(|line| tell!("{line}"));
+    tell!("{} grains written, {} left out", rows.len(), refused.len());
+    let advice = advice(&refused, rows.len(), &labels, args);
     if rows.is_empty() {
-        return Err(Exit::new(BAD_INPUT, "no grain of the image can be used"));
+        let message = "no grain of the image can be used";
+        return Err(match advice {
+            Some(advice) => Exit::with_help(BAD_INPUT, message, advice),
+            None => Exit::new(BAD_INPUT, message),
+        });
+    }
+    if let Some(advice) = advice {
+        tell!("note: {advice}");
     }
     write_table(&table, &rows)?;
     Picture::sheet(&pictures, SHEET.1).save(&sheet)?;

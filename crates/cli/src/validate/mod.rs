@@ -18,7 +18,7 @@ use table::{line, table};
 use crate::args::ValidateArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, MISSED};
 use crate::progress::{Shown, clock};
-use crate::{print, run, threads};
+use crate::{print, run, tell, threads};
 
 impl From<SuiteError> for Exit {
     fn from(error: SuiteError) -> Exit {
@@ -39,7 +39,10 @@ impl From<SuiteError> for Exit {
 
 /// Runs validations and prints how far each number is from its reference.
 pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
-    let suites = chosen(all(args)?, &args.names)?;
+    let mut suites = chosen(Suite::all(&args.suites)?, &args.names)?;
+    for run in suites.iter_mut().flat_map(|suite| &mut suite.runs) {
+        run.set.extend(args.set.iter().cloned());
+    }
     let level = match args.level.as_str() {
         "full" => Level::Full,
         _ => Level::Ci,
@@ -68,7 +71,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
                 Err(why) => suite.failed(run, &why),
             };
             if !args.quiet {
-                found.iter().for_each(|v| eprintln!("  {}", line(v)));
+                found.iter().for_each(|v| tell!("  {}", line(v)));
             }
             verdicts.extend(found);
         }
@@ -89,17 +92,17 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         print(&table(&verdicts).to_string())?;
     }
     if let Some(folder) = &args.save {
-        let all = all(args)?;
+        let all = Suite::all(&args.suites)?;
         saved::add(folder, &args.level, &verdicts, &args.output, &all)?;
         let drawn = pictures::add(folder, &suites, &args.output)?;
         pictures::list(folder, &all)?;
         if !args.quiet {
-            eprintln!("{drawn} figures in {}", folder.join("figures").display());
+            tell!("{drawn} figures in {}", folder.join("figures").display());
         }
     }
     let short = verdicts.iter().filter(|v| !v.pass).count();
     if !args.quiet {
-        eprintln!(
+        tell!(
             "{} of {} hold, in {}",
             verdicts.len() - short,
             verdicts.len(),
@@ -118,15 +121,6 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
             missed.join("\n")
         ),
     ))
-}
-
-/// All suites, their cases changed as `--set` says.
-fn all(args: &ValidateArgs) -> Result<Vec<Suite>, Exit> {
-    let mut suites = Suite::all(&args.suites)?;
-    for run in suites.iter_mut().flat_map(|suite| &mut suite.runs) {
-        run.set.extend(args.set.iter().cloned());
-    }
-    Ok(suites)
 }
 
 /// The suites that were asked for.
@@ -183,7 +177,7 @@ fn there(run: &Run, folder: &Path) -> Result<bool, Exit> {
         return Ok(false);
     };
     if provenance.case_sha256 != Case::load(&run.case, &run.set)?.digest {
-        eprintln!("{}: left out: a run of another case", folder.display());
+        tell!("{}: left out: a run of another case", folder.display());
         return Ok(false);
     }
     Ok(true)
@@ -201,9 +195,13 @@ fn one(
     let threads = threads::resolve(args.threads);
     if !args.quiet {
         let cells = case.setup.mesh.cells;
-        eprintln!(
+        tell!(
             "{}/{}: {} x {} x {} cells",
-            suite.name, run.name, cells[0], cells[1], cells[2]
+            suite.name,
+            run.name,
+            cells[0],
+            cells[1],
+            cells[2]
         );
     }
     let options = Options {

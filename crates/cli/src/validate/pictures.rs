@@ -6,6 +6,7 @@ use grainwake_report::figure::plain;
 use grainwake_validation::Suite;
 
 use crate::exit::{Exit, IO};
+use crate::tell;
 
 /// Draws the figures of `suites` that have data below `output` into `folder/figures`, and says on
 /// stderr what had to be left out, or that an earlier figure stays for that; gives their number.
@@ -20,17 +21,17 @@ pub fn add(folder: &Path, suites: &[Suite], output: &Path) -> Result<usize, Exit
             let drawn = figure.draw(&output.join(&suite.name));
             // A figure of more runs is not replaced by one of fewer.
             if !drawn.notes.is_empty() && place.join(format!("{name}.png")).is_file() {
-                eprintln!(
+                tell!(
                     "figure {name}: kept as it is, delete it to draw what is here: {}",
                     drawn.notes.join("; ")
                 );
                 continue;
             }
             if !drawn.notes.is_empty() {
-                eprintln!("figure {name}: left out: {}", drawn.notes.join("; "));
+                tell!("figure {name}: left out: {}", drawn.notes.join("; "));
             }
             let Some(drawing) = drawn.drawing else {
-                eprintln!("figure {name}: not drawn, no run has data for it");
+                tell!("figure {name}: not drawn, no run has data for it");
                 continue;
             };
             let failed = |what| Exit::new(IO, format!("figure {name}: {what}"));

@@ -155,12 +155,13 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
         short(closest.1),
         short(last)
     );
-    for (kind, text) in [
-        (Kind::Kiss, "They touch first at"),
-        (Kind::RoleChange, "The roles change at"),
-        (Kind::Separation, "They part at"),
+    let told = |moment| scene.story.moment_text(moment);
+    for (text, when) in [
+        ("They touch first at", scene.story.kiss.map(told)),
+        ("The roles change at", scene.when(&Kind::RoleChange)),
+        ("They part at", scene.story.parting.map(told)),
     ] {
-        if let Some(when) = scene.when(&kind) {
+        if let Some(when) = when {
             caption.push_str(&format!(" {text} {when}."));
         }
     }
@@ -301,7 +302,7 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
     })
 }
 
-/// Angles of the long and short axis with gravity, and the angular speed.
+/// Angles of the long and short axis with gravity, and the angular speed where anything turns.
 pub fn orientation(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
     let moving = scene.moving();
     let up = scene.story.up;
@@ -351,29 +352,36 @@ pub fn orientation(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
                 .collect();
         }
         panels.extend([long, short_axis]);
-        caption.push_str("(a) Angle of the longest axis with the vertical and (b) of the shortest axis, the normal of the broad side: 0° in (b) is a grain that falls broad side first. (c) ");
+        caption.push_str("(a) Angle of the longest axis with the vertical and (b) of the shortest axis, the normal of the broad side: 0° in (b) is a grain that falls broad side first.");
     }
+    let turns = fastest > 0.0;
     let label = if scene.story.scales.is_some() {
         "|*ω*| √(*d*/*g*)  [–]"
     } else {
         "|*ω*|  [rad/s]"
     };
-    panels.push(panel(label, spin, &[0.0], 65.0));
-    caption.push_str(&format!(
-        "Angular speed, up to {}{}.",
-        short(fastest),
-        if scene.story.scales.is_some() {
-            " √(g/d)"
-        } else {
-            " rad/s"
-        }
-    ));
+    if turns {
+        caption.push_str(if panels.is_empty() { "" } else { " (c) " });
+        caption.push_str(&format!(
+            "Angular speed, up to {}{}.",
+            short(fastest),
+            if scene.story.scales.is_some() {
+                " √(g/d)"
+            } else {
+                " rad/s"
+            }
+        ));
+        panels.push(panel(label, spin, &[0.0], 65.0));
+    }
+    if panels.is_empty() {
+        return None;
+    }
     Some(Figure {
         name: "orientation",
-        title: if axes.is_empty() {
-            "Angular speed"
-        } else {
-            "Orientation and angular speed"
+        title: match (axes.is_empty(), turns) {
+            (true, _) => "Angular speed",
+            (false, true) => "Orientation and angular speed",
+            (false, false) => "Orientation",
         }
         .to_owned(),
         caption,

@@ -3,7 +3,7 @@
 mod tables;
 
 use crate::figure::{self, Figure};
-use crate::phases::PhaseKind;
+use crate::phases::{Phase, PhaseKind};
 use crate::run_folder::RunFolder;
 use crate::story::{Story, Subject, short};
 
@@ -106,36 +106,25 @@ fn lead(run: &RunFolder, story: &Story) -> String {
 }
 
 fn pair_sentence(story: &Story) -> String {
-    let Some(kiss) = story
-        .phases
-        .iter()
-        .find(|phase| phase.kind == PhaseKind::Kissing)
-    else {
+    let Some(kiss) = story.kiss else {
         return "The two grains did not touch. ".to_owned();
     };
-    let mut out = format!("The two grains kissed at {}", story.time_text(kiss.start));
-    if let Some(tumbling) = story
-        .phases
-        .iter()
-        .find(|phase| phase.kind == PhaseKind::Tumbling)
-    {
-        out.push_str(&format!(
-            ", tumbled from {}",
-            story.time_text(tumbling.start)
-        ));
+    let mut happened = vec![(kiss.time, format!("kissed at {}", story.moment_text(kiss)))];
+    let tumbling = |phase: &&Phase| phase.kind == PhaseKind::Tumbling;
+    if let Some(phase) = story.phases.iter().find(tumbling) {
+        let text = format!("tumbled from {}", story.time_text(phase.start));
+        happened.push((phase.start, text));
     }
-    if let Some(parted) = story
-        .phases
-        .iter()
-        .rev()
-        .find(|phase| phase.kind == PhaseKind::Separated)
-    {
-        out.push_str(&format!(
-            ", and parted at {}",
-            story.time_text(parted.start)
-        ));
+    if let Some(parting) = story.parting {
+        let text = format!("parted at {}", story.moment_text(parting));
+        happened.push((parting.time, text));
     }
-    out + ". "
+    happened.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut texts: Vec<String> = happened.into_iter().map(|(_, text)| text).collect();
+    if let [_, .., last] = &mut texts[..] {
+        last.insert_str(0, "and ");
+    }
+    format!("The two grains {}. ", texts.join(", "))
 }
 
 fn single_sentence(run: &RunFolder, story: &Story) -> String {

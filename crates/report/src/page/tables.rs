@@ -113,6 +113,9 @@ pub fn parameters(run: &RunFolder, story: &Story) -> String {
             &format!("{x} × {y} × {z} = {:.3} million", (x * y * z) as f64 / 1e6),
         );
     }
+    if facts.single_precision {
+        row(&mut numerics, "fields", "single precision");
+    }
     if let Some(cell) = facts.cell() {
         row(
             &mut numerics,
@@ -173,10 +176,11 @@ pub fn parameters(run: &RunFolder, story: &Story) -> String {
     )
 }
 
-/// One row for each kind of grain.
+/// One row for each kind of grain, called by its number or, where there are several, by how many
+/// they are.
 fn grain_rows(out: &mut String, run: &RunFolder) {
-    let mut kinds: Vec<(String, usize)> = Vec::new();
-    for grain in &run.facts.grains {
+    let mut kinds: Vec<(String, Vec<usize>)> = Vec::new();
+    for (index, grain) in run.facts.grains.iter().enumerate() {
         let mut text = literal(grain.shape.as_deref().unwrap_or("shape not known"));
         if let Some(diameter) = grain.diameter {
             text.push_str(&format!(", *d* = {} mm", short(1e3 * diameter)));
@@ -185,17 +189,17 @@ fn grain_rows(out: &mut String, run: &RunFolder) {
             text.push_str(&format!(", *ρ*_{{p}} = {} kg/m^{{3}}", short(density)));
         }
         match kinds.iter_mut().find(|(kind, _)| *kind == text) {
-            Some((_, count)) => *count += 1,
-            None => kinds.push((text, 1)),
+            Some((_, members)) => members.push(index),
+            None => kinds.push((text, vec![index])),
         }
     }
     let rest = kinds.len().saturating_sub(6);
-    for (text, count) in kinds.iter().take(6) {
-        row(
-            out,
-            if *count == 1 { "grain" } else { "grains" },
-            &format!("{count} × {text}"),
-        );
+    for (text, members) in kinds.iter().take(6) {
+        let name = match members[..] {
+            [one] => format!("grain {one}"),
+            _ => format!("{} grains", members.len()),
+        };
+        row(out, &name, text);
     }
     if rest > 0 {
         row(

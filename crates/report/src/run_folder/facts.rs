@@ -40,6 +40,8 @@ pub struct Facts {
     pub viscosity: Option<f64>,
     /// Coupling scheme.
     pub scheme: Option<String>,
+    /// Whether the fields are in single precision.
+    pub single_precision: bool,
     /// The grains.
     pub grains: Vec<GrainFacts>,
 }
@@ -116,6 +118,7 @@ fn facts_of(table: &Table) -> Facts {
         fluid_density: density,
         viscosity: kinematic.or_else(|| Some(dynamic? / density?)),
         scheme: word(section("coupling"), "scheme"),
+        single_precision: word(section("run"), "precision").as_deref() == Some("f32"),
         grains: table
             .get("grain")
             .and_then(Value::as_array)

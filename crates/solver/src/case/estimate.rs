@@ -3,8 +3,12 @@
 use glam::DVec3;
 
 use super::Case;
-use crate::dem::Grain;
+use super::readable::quantity;
+use crate::dem::{Dof, Grain};
 use crate::flow::{Boundary, FluidParams};
+use crate::math::Precision;
+use crate::output::Stop;
+use crate::sim::events::StopWhen;
 use crate::sim::{Setup, StepRule};
 
 /// Numbers of the fields and the solver per cell, for the estimate; `grainwake bench` measures the
@@ -13,6 +17,14 @@ const NUMBERS_PER_CELL: f64 = 13.75;
 /// Time of a step on one thread [ns per cell and byte of a number], for the estimate; `grainwake
 /// bench` measures it.
 const NS_PER_CELL_BYTE: f64 = 5.0;
+/// Steps over which the roundings of singles, all of one sign, come to .3 %.
+const MOST_SINGLE_STEPS: u64 = 50_000;
+
+/// Smallest density of a free grain over that of the fluid. A sphere of 8 cells in water is stable
+/// from .35 on and blows up at .30, whatever the step.
+pub(super) const LIGHTEST_FREE: f64 = 0.35;
+/// Below this density ratio a free grain is near that bound.
+const LIGHT: f64 = 0.5;
 
 /// Galileo number sqrt(|rho_p / rho_f - 1| g d^3) / nu of a grain.
 pub fn galileo(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
@@ -91,7 +103,7 @@ impl Estimate {
         let setup = &case.setup;
         let g = setup.gravity.length();
         let fluid = setup.fluid.as_ref();
-        let moving = |grain: &&Grain| grain.translation == crate::dem::Dof::Free;
+        let moving = |grain: &&Grain| grain.translation == Dof::Free;
         let fastest = fluid.and_then(|f| {
             let grains = setup.grains.iter().filter(moving);
             grains
@@ -116,9 +128,9 @@ impl Estimate {
         let cells = setup.mesh.cell_count();
         let contact_time_s = contact_time(setup);
         let wet = fluid.is_some();
-        let numbers = cells as f64 * setup.precision.bytes() as f64;
+        let field_bytes = cells as f64 * setup.precision.bytes() as f64;
         let seconds_per_step = if wet {
-            numbers * NS_PER_CELL_BYTE * 1e-9 / threads.max(1) as f64
+            field_bytes * NS_PER_CELL_BYTE * 1e-9 / threads.max(1) as f64
         } else {
             0.0
         };
@@ -134,7 +146,7 @@ impl Estimate {
             steps: steps as u64,
             time_step_s,
             memory_bytes: if wet {
-                (numbers * NUMBERS_PER_CELL) as u64
+                (field_bytes * NUMBERS_PER_CELL) as u64
             } else {
                 0
             },
@@ -151,9 +163,14 @@ impl Estimate {
             warnings: Vec::new(),
         };
         estimate.warnings = warnings(setup, &estimate);
+        estimate
+            .warnings
+            .extend(of_light_grains(setup, plan.stop.as_ref()));
         if time_step_s < 0.5 * allowed {
             let message = format!(
-                "an output every {time_step_s:.3e} s makes the steps shorter than the {allowed:.3e} s they could have: make [output] intervals longer"
+                "an output every {} makes the steps shorter than the {} they could have: make [output] intervals longer",
+                quantity(time_step_s, "s"),
+                quantity(allowed, "s")
             );
             estimate.warnings.push(message);
         }
@@ -164,10 +181,7 @@ impl Estimate {
 /// The step that the rule allows once the grains settle [s].
 pub(super) fn settled_time_step(setup: &Setup) -> f64 {
     let g = setup.gravity.length();
-    let speeds = setup
-        .grains
-        .iter()
-        .filter(|g| g.translation == crate::dem::Dof::Free);
+    let speeds = setup.grains.iter().filter(|g| g.translation == Dof::Free);
     let speed = setup.fluid.as_ref().map_or(0.0, |f| {
         speeds
             .map(|grain| terminal_speed(grain, f, g))
@@ -281,6 +295,13 @@ fn warnings(setup: &Setup, e: &Estimate) -> Vec<String> {
             ));
         }
     }
+    if setup.precision == Precision::Single && e.steps > MOST_SINGLE_STEPS {
+        found.push(format!(
+            "single precision loses what a step adds beyond its seventh digit: over {} steps speeds may drift by {:.1} %; \"f64\" does not",
+            e.steps,
+            100.0 * f64::from(f32::EPSILON) / 2.0 * e.steps as f64
+        ));
+    }
     if let Some(substeps) = e.contact_substeps.filter(|n| wet && *n > 200.0) {
         found.push(format!("contacts need {substeps:.0} sub-steps a step: a lower [contact] stiffness or a larger maximum_overlap is cheaper"));
     }
@@ -299,9 +320,47 @@ fn warnings(setup: &Setup, e: &Estimate) -> Vec<String> {
         let most = time_step(&limits, e.settling_speed_m_per_s.unwrap_or(0.0));
         if step > most {
             found.push(format!(
-                "the fixed step of {step:.3e} s is above the stability limit of about {most:.3e} s"
+                "the fixed step of {} is above the stability limit of about {}",
+                quantity(step, "s"),
+                quantity(most, "s")
             ));
         }
+    }
+    found
+}
+
+/// Warnings of free grains that are light beside the fluid: they rise, or are hard to couple.
+fn of_light_grains(setup: &Setup, stop: Option<&Stop>) -> Vec<String> {
+    let Some(fluid) = &setup.fluid else {
+        return Vec::new();
+    };
+    let grains = setup.grains.iter().enumerate();
+    let free: Vec<(usize, f64)> = grains
+        .filter(|(_, grain)| grain.translation == Dof::Free)
+        .map(|(index, grain)| (index, grain.density / fluid.density))
+        .collect();
+    let mut found = Vec::new();
+    let lightest = free.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((index, ratio)) = lightest.filter(|(_, ratio)| *ratio < LIGHT) {
+        found.push(format!(
+            "grain {index} has {ratio:.2} times the density of the fluid: free grains below {LIGHTEST_FREE} are unstable in this coupling (added mass), and this one is near that"
+        ));
+    }
+    let rising = free.iter().filter(|(_, ratio)| *ratio < 1.0).count();
+    if rising == 0 || setup.gravity == DVec3::ZERO {
+        return found;
+    }
+    let all = rising == free.len();
+    found.push(if all {
+        "the free grains are lighter than the fluid: they rise, and the settling speed is a rising speed".into()
+    } else {
+        format!("{rising} of {} free grains are lighter than the fluid and rise", free.len())
+    });
+    if stop.is_some_and(|stop| stop.when == StopWhen::Landing) {
+        found.push(format!(
+            "stop = \"landing\" {} be met: it waits until every free grain has touched the floor",
+            if all { "cannot" } else { "may never" }
+        ));
     }
     found
 }

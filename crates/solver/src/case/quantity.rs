@@ -143,7 +143,9 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
     let scale = parse_unit(unit).map_err(|error| match error {
         UnitError::Unknown(symbol) => {
             let symbols = known_symbols();
-            let hint = nearest(&symbol, symbols.iter().map(String::as_str))
+            let near = || nearest(&symbol, symbols.iter().map(String::as_str)).map(str::to_string);
+            let hint = parted(unit, &symbol, K::DIMENSION)
+                .or_else(near)
                 .map_or(String::new(), |s| format!(" (did you mean `{s}`?)"));
             format!(
                 "unknown unit `{symbol}` in \"{text}\"{hint}; write {}",
@@ -169,6 +171,17 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
         ));
     }
     Ok(scale.to_si(value))
+}
+
+/// The unit with a space or slash in `symbol` that gives it the right dimension: "mPas" is "mPa s".
+fn parted(unit: &str, symbol: &str, dimension: Dimension) -> Option<String> {
+    let cuts = symbol.char_indices().skip(1);
+    cuts.flat_map(|(cut, _)| [" ", "/"].map(|between| (cut, between)))
+        .map(|(cut, between)| {
+            let (first, second) = symbol.split_at(cut);
+            unit.replacen(symbol, &format!("{first}{between}{second}"), 1)
+        })
+        .find(|parted| parse_unit(parted).is_ok_and(|scale| scale.dimension == dimension))
 }
 
 /// Length of the leading number of `text`, in bytes.
@@ -368,6 +381,15 @@ mod tests {
             message.contains("dynamic viscosity") && message.contains("1 cSt"),
             "{message}"
         );
+        for (text, wanted) in [("1 mPas", "`mPa s`"), ("1 mPaS", "`mPa`")] {
+            let message = parse_quantity::<DynamicViscosity>(text).unwrap_err();
+            assert!(
+                message.contains(&format!("did you mean {wanted}?")),
+                "{message}"
+            );
+        }
+        let message = parse_quantity::<Density>("2 kgm3").unwrap_err();
+        assert!(message.contains("did you mean `kg/m3`?"), "{message}");
         assert!(parse_quantity::<Number>("45 deg").is_err());
         assert!(parse_quantity::<Length>("mm").is_err());
     }

@@ -1,5 +1,6 @@
 //! The text of a TOML file with its overrides, its keys and their places.
 
+use std::cmp::Reverse;
 use std::ops::Range;
 
 use serde::de::DeserializeOwned;
@@ -14,13 +15,39 @@ pub struct Source {
     name: String,
     text: String,
     overrides: Vec<Override>,
-    keys: Vec<(Range<usize>, String)>,
+    places: Vec<Place>,
 }
 
 struct Override {
     start: usize,
     line: String,
 }
+
+/// A key or a value, and where it stands.
+struct Place {
+    span: Range<usize>,
+    path: String,
+    written: Written,
+}
+
+/// What stands at a place.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Written {
+    /// A key.
+    Key,
+    /// A number without a unit.
+    Bare,
+    /// A list or table whose contents lie within its place.
+    Inline,
+    /// Another value.
+    Other,
+}
+
+/// Tables that a case cannot do without, and what they need.
+const NEEDED: [(&str, &str); 2] = [
+    ("domain", "size = [...] and cell_size = ..."),
+    ("time", "end = ..., for example end = \"1 s\""),
+];
 
 impl Source {
     /// Reads the text of a file called `name` and applies overrides such as `time.end=0.5`.
@@ -36,7 +63,7 @@ impl Source {
             name: name.into(),
             text: text.into(),
             overrides: Vec::new(),
-            keys: Vec::new(),
+            places: Vec::new(),
         };
         let mut start = text.len() + 1;
         for item in overrides {
@@ -57,20 +84,54 @@ impl Source {
             merge(table.get_mut(), extra.into_inner())
                 .map_err(|m| Problem::new(format!("--set {line}: {m}")))?;
         }
-        collect_keys(table.get_ref(), "", &mut source.keys);
+        collect_keys(table.get_ref(), "", text, &mut source.places);
         let value = T::deserialize(Deserializer::from(table)).map_err(|e| source.located(&e))?;
         Ok((source, value))
     }
 
     /// Dotted key of the innermost key or value that holds `span`.
     pub fn key_at(&self, span: &Range<usize>) -> Option<&str> {
-        self.keys
+        self.places
             .iter()
-            .filter(|(range, _)| {
-                range.start <= span.start && span.end <= range.end.max(range.start + 1)
-            })
-            .min_by_key(|(range, _)| range.len())
-            .map(|(_, key)| key.as_str())
+            .filter(|p| p.span.start <= span.start && span.end <= p.span.end.max(p.span.start + 1))
+            .min_by_key(|p| p.span.len())
+            .map(|p| p.path.as_str())
+    }
+
+    /// Whether a value at `key` or under it is a number without a unit.
+    pub(super) fn is_bare(&self, key: &str) -> bool {
+        let under = |path: &str| {
+            path.strip_prefix(key)
+                .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        self.places
+            .iter()
+            .any(|p| p.written == Written::Bare && under(&p.path))
+    }
+
+    /// Whether an override set what stands at `span`, or a part of it.
+    pub(super) fn is_overridden(&self, span: &Range<usize>) -> bool {
+        self.override_at(span.start).is_some() || self.changed_part(span).is_some()
+    }
+
+    /// The override in which this byte lies.
+    fn override_at(&self, start: usize) -> Option<&Override> {
+        self.overrides.iter().rev().find(|o| o.start <= start)
+    }
+
+    /// Of a list or table of the file: the part that the last override changed. What stands at
+    /// `span` is then not what counts.
+    fn changed_part(&self, span: &Range<usize>) -> Option<Range<usize>> {
+        let is_whole = |p: &&Place| p.span == *span && p.written == Written::Inline;
+        let under = format!("{}.", self.places.iter().find(is_whole)?.path);
+        let parts = self
+            .places
+            .iter()
+            .filter(|p| p.written != Written::Key && p.path.starts_with(&under));
+        let last = parts
+            .filter_map(|p| Some((self.override_at(p.span.start)?.start, p)))
+            .max_by_key(|(start, p)| (*start, Reverse(p.path.len())));
+        last.map(|(_, part)| part.span.clone())
     }
 
     /// Fills in the place and key of a problem.
@@ -80,14 +141,18 @@ impl Source {
             (None, Some(key)) => problem.key(key),
             _ => problem,
         };
-        match self.overrides.iter().rev().find(|o| o.start <= span.start) {
+        let (span, label) = match self.changed_part(span) {
+            Some(part) => (part, "changed here"),
+            None => (span.clone(), label),
+        };
+        match self.override_at(span.start) {
             Some(o) => problem.at(
                 "--set",
                 &o.line,
                 span.start - o.start..span.end - o.start,
                 label,
             ),
-            None => problem.at(&self.name, &self.text, span.clone(), label),
+            None => problem.at(&self.name, &self.text, span, label),
         }
     }
 
@@ -96,6 +161,12 @@ impl Source {
         let message = error.message();
         let span = error.span();
         let words: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+        // The whole file has an empty span.
+        let of_file = span.as_ref().is_none_or(Range::is_empty);
+        if let (true, true, [key, ..]) = (of_file, message.starts_with("missing field"), &words[..])
+        {
+            return self.missing_in_file(key);
+        }
         let owner = span
             .as_ref()
             .and_then(|s| self.key_at(s))
@@ -142,17 +213,83 @@ impl Source {
             .or_else(|| message.strip_prefix("invalid value: "))
         {
             (
-                format!("wrong kind of value: found {rest}"),
+                format!("wrong kind of value: {}", wrong_kind(rest)),
                 "here".into(),
                 None,
             )
         } else {
-            (message.trim_end().replace('\n', "; "), "here".into(), None)
+            (plainly(message), "here".into(), None)
         };
         let mut problem = Problem::new(text);
         problem.help = help;
         self.locate(problem, span.as_ref(), &label)
     }
+
+    /// A key or table of the file as a whole is missing: there is no line to point at.
+    fn missing_in_file(&self, key: &str) -> Problem {
+        let (what, help) = match NEEDED.iter().find(|(table, _)| *table == key) {
+            Some((table, with)) => (format!("table [{table}]"), format!("[{table}] with {with}")),
+            None => (format!("key `{key}`"), format!("`{key} = ...`")),
+        };
+        Problem::new(format!("the {what} is missing in {}", self.name))
+            .key(key)
+            .help(format!("add {help}; `grainwake schema` lists every key"))
+    }
+}
+
+/// "integer `3`, expected struct RawFluid" in the words of a case file.
+fn wrong_kind(text: &str) -> String {
+    let (found, expected) = text.split_once(", expected ").unwrap_or((text, ""));
+    let found = match found.split_once(' ') {
+        Some(("integer" | "boolean", value)) => value.replace('`', "").replace(" as i128", ""),
+        Some(("floating", value)) => value.replace("point ", "").replace('`', ""),
+        Some(("string", value)) => format!("the text {value}"),
+        _ => match found {
+            "map" => "a table".into(),
+            "sequence" => "a list".into(),
+            other => other.into(),
+        },
+    };
+    match expected {
+        "" => format!("found {found}"),
+        _ => format!("found {found}, expected {}", kind_of(expected)),
+    }
+}
+
+/// A kind of value of the TOML reader in the words of a case file.
+fn kind_of(expected: &str) -> String {
+    let first = expected.split(' ').next().unwrap_or_default();
+    match (first, expected) {
+        ("u8" | "u16" | "u32" | "u64" | "usize", _) => "a whole number, zero or more".into(),
+        ("i8" | "i16" | "i32" | "i64" | "isize", _) => "a whole number".into(),
+        ("f32" | "f64", _) => "a number".into(),
+        ("struct" | "map", _) | (_, "a map") => "a table of keys and values".into(),
+        (_, "a sequence") => "a list".into(),
+        (_, "a string" | "path string" | "string or table") => "text in quotes".into(),
+        (_, "a boolean") => "true or false".into(),
+        _ => match expected.strip_prefix("an array of length ") {
+            Some(count) => format!("a list of {count} values"),
+            None => expected.into(),
+        },
+    }
+}
+
+/// Other messages of the TOML reader that name what only it knows.
+fn plainly(message: &str) -> String {
+    let message = message.trim_end().replace('\n', "; ");
+    if let Some((count, expected)) = message
+        .strip_prefix("invalid length ")
+        .and_then(|rest| rest.split_once(", expected "))
+    {
+        return format!("found {count} values, expected {}", kind_of(expected));
+    }
+    if let Some(kind) = message.strip_prefix("wanted ") {
+        return format!("wrong kind of value: expected {}", kind_of(kind));
+    }
+    if message.starts_with("data did not match any variant") {
+        return "a value of this form is not accepted here".into();
+    }
+    message
 }
 
 /// "time.end=0.5" -> "time.end = 0.5"; a value that is not TOML is taken as a string.
@@ -240,32 +377,60 @@ fn merge<'i>(base: &mut DeTable<'i>, extra: DeTable<'i>) -> Result<(), String> {
     Ok(())
 }
 
-fn collect_keys(table: &DeTable<'_>, prefix: &str, keys: &mut Vec<(Range<usize>, String)>) {
+fn collect_keys(table: &DeTable<'_>, prefix: &str, text: &str, places: &mut Vec<Place>) {
     for (key, value) in table {
         let path = if prefix.is_empty() {
             key.get_ref().to_string()
         } else {
             format!("{prefix}.{}", key.get_ref())
         };
-        keys.push((key.span(), path.clone()));
-        collect_value(value, &path, keys);
+        places.push(Place {
+            span: key.span(),
+            path: path.clone(),
+            written: Written::Key,
+        });
+        collect_value(value, &path, text, places);
     }
 }
 
 fn collect_value(
     value: &serde_spanned::Spanned<DeValue<'_>>,
     path: &str,
-    keys: &mut Vec<(Range<usize>, String)>,
+    text: &str,
+    places: &mut Vec<Place>,
 ) {
-    keys.push((value.span(), path.to_string()));
+    places.push(Place {
+        span: value.span(),
+        path: path.to_string(),
+        written: written(value, text),
+    });
     match value.get_ref() {
-        DeValue::Table(table) => collect_keys(table, path, keys),
+        DeValue::Table(table) => collect_keys(table, path, text, places),
         DeValue::Array(items) => {
             for (index, item) in items.iter().enumerate() {
-                collect_value(item, &format!("{path}.{index}"), keys);
+                collect_value(item, &format!("{path}.{index}"), text, places);
             }
         }
         _ => {}
+    }
+}
+
+fn written(value: &serde_spanned::Spanned<DeValue<'_>>, text: &str) -> Written {
+    // The place of a table with a header is that header, and of a list of them the first.
+    let starts_with = |span: Range<usize>, mark: char| {
+        text.get(span)
+            .is_some_and(|written| written.starts_with(mark))
+    };
+    match value.get_ref() {
+        DeValue::Integer(_) | DeValue::Float(_) => Written::Bare,
+        DeValue::String(word) if word.trim().parse::<f64>().is_ok() => Written::Bare,
+        DeValue::Table(_) if starts_with(value.span(), '{') => Written::Inline,
+        DeValue::Array(items)
+            if starts_with(value.span(), '[') && items.iter().all(|i| !i.get_ref().is_table()) =>
+        {
+            Written::Inline
+        }
+        _ => Written::Other,
     }
 }
 
@@ -341,6 +506,88 @@ mod tests {
                 .message
                 .contains("no number 3")
         );
+    }
+
+    #[test]
+    fn what_an_override_changed_is_shown_instead_of_the_file() {
+        let text = CASE.replace(
+            "end = 1",
+            "end = 1\nstop = { when = \"rest\", hold = \"1 s\" }",
+        );
+        let set = [
+            "time.stop.hold=-1".to_string(),
+            "grain.0.shape.diameter=2".into(),
+        ];
+        let (source, case): (_, RawCase) = Source::parse("case.toml", &text, &set).unwrap();
+        let stop = case.time.stop.unwrap();
+        let p = source.locate(Problem::new("wrong"), stop.span.as_ref(), "here");
+        assert_eq!(p.place(), Some(("--set", 1, 18)));
+        assert_eq!(p.key.as_deref(), Some("time.stop"));
+        assert!(source.is_overridden(&stop.span.unwrap()));
+        // A header does not hold its values: it is right whatever they are.
+        let grain = case.grain[0].span.clone().unwrap();
+        let p = source.locate(Problem::new("wrong"), Some(&grain), "here");
+        assert_eq!(p.place().map(|(name, ..)| name), Some("case.toml"));
+        assert!(!source.is_overridden(&grain));
+    }
+
+    #[test]
+    fn bare_numbers_are_known() {
+        let set = [
+            "time.end=2 s".to_string(),
+            "grain.0.shape.diameter=2".into(),
+        ];
+        let (source, _): (_, RawCase) = Source::parse("case.toml", CASE, &set).unwrap();
+        assert!(source.is_bare("grain.0.density") && source.is_bare("grain.0.shape"));
+        assert!(source.is_bare("domain.size.1") && !source.is_bare("domain.size.3"));
+        assert!(!source.is_bare("time.end") && !source.is_bare("fluid.visc"));
+    }
+
+    #[test]
+    fn a_missing_table_is_named() {
+        let p = problem(&CASE.replace("[time]\nend = 1\n", ""), &[]);
+        assert_eq!(p.message, "the table [time] is missing in case.toml");
+        assert!(
+            p.help.as_ref().unwrap().contains("add [time] with end ="),
+            "{p:?}"
+        );
+        assert_eq!((p.key.as_deref(), p.place()), (Some("time"), None));
+        // What is missing in a table is told of that table.
+        let two = format!("{CASE}\n[[grain]]\nshape = {{ kind = \"sphere\", diameter = 0.1 }}\n");
+        let p = problem(&two, &[]);
+        assert_eq!(p.key.as_deref(), Some("grain.1"));
+        assert_eq!(p.place().map(|(_, line, _)| line), Some(16));
+    }
+
+    #[test]
+    fn kinds_of_values_have_plain_names() {
+        for (set, words) in [
+            (
+                "run.threads=-1",
+                "found -1, expected a whole number, zero or more",
+            ),
+            (
+                "run.threads=1.5",
+                "found 1.5, expected a whole number, zero or more",
+            ),
+            ("fluid=3", "found 3, expected a table of keys and values"),
+            ("packing=3", "found 3, expected a list"),
+            ("title=3", "found 3, expected text in quotes"),
+            ("output.at_events=3", "found 3, expected true or false"),
+            ("grain.0.file=true", "found true, expected text in quotes"),
+            (
+                "grain.0.orientation=[1, 2, \"a\", 3]",
+                "the text \"a\", expected a number",
+            ),
+            (
+                "domain.cells=[5, 5]",
+                "found 2 values, expected a list of 3 values",
+            ),
+            ("fluid.advection=3", "expected text in quotes"),
+        ] {
+            let p = problem(CASE, &[set]);
+            assert!(p.message.contains(words), "{set}: {p}");
+        }
     }
 
     #[test]

@@ -12,114 +12,291 @@
 //!
 //! Legend: q component carried, c velocity that carries it, d signed distance of a link.
 
+use std::ops::Range;
+
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
 use super::aperture::aperture;
 use super::locate::Body;
+use super::places::PAD;
 use crate::dem::Grain;
 use crate::flow::Flow;
-use crate::grid::FACE_OFFSET;
+use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Real;
+use crate::math::lanes::{Kernel, MOST, Vector, dispatch};
 
 /// Smallest aperture divided by; smaller ones are unstable on an impulsive start.
 const LEAST_APERTURE: f64 = 0.4;
+/// Places of the lanes along a row.
+const RAMP: [f64; MOST] = {
+    let mut ramp = [0.0; MOST];
+    let mut i = 0;
+    while i < MOST {
+        ramp[i] = i as f64;
+        i += 1;
+    }
+    ramp
+};
 
-/// A correction of the flux from one face to the next, over the length of the link [m/s^2].
-#[derive(Clone, Copy, Debug)]
-pub struct Link {
-    from: usize,
-    to: usize,
-    flux: f64,
+/// What one thread needs: the velocity in the box and about it, and the fluxes of a row.
+#[derive(Default)]
+struct Scratch {
+    velocity: [Vec<f64>; 3],
+    flux: Vec<f64>,
 }
 
 /// Corrects the tendency of the step just predicted; `bodies` are where `grains` were located, in a
 /// band of half-width `band` [m].
 pub fn correct<R: Real>(band: f64, flow: &mut Flow<R>, grains: &[Grain], bodies: &mut [Body]) {
-    let flow_before = &*flow;
+    let (mesh, velocity) = (*flow.mesh(), &flow.velocity);
     let each = bodies.par_iter_mut().zip(grains);
-    each.for_each(|(body, grain)| {
-        let mut links = std::mem::take(&mut body.links);
-        for (component, links) in links.iter_mut().enumerate() {
-            links.clear();
-            for along in (0..3).filter(|&axis| flow_before.mesh().cells[axis] > 1) {
-                correct_links(band, flow_before, grain, body, component, along, links);
-            }
+    each.for_each_init(Scratch::default, |scratch, (body, grain)| {
+        for component in 0..3 {
+            let copy = &mut scratch.velocity[component];
+            body.places.copy(velocity.component(component), copy);
+            // Vectors may reach beyond the last entry, though nothing of that is used.
+            copy.resize(copy.len() + MOST, 0.0);
         }
-        body.links = links;
+        let mut push = std::mem::take(&mut body.push);
+        dispatch(Links {
+            band,
+            mesh: &mesh,
+            grain,
+            body,
+            scratch,
+            push: &mut push,
+        });
+        body.push = push;
     });
     let bodies = &*bodies;
     flow.add_tendency(|component, add| {
-        for link in bodies.iter().flat_map(|body| &body.links[component]) {
-            add(link.from, -link.flux);
-            add(link.to, link.flux);
+        for body in bodies {
+            body.each_push(component, &mut *add);
         }
     });
 }
 
-/// Links of `component` along one axis.
-fn correct_links<R: Real>(
-    band: f64,
-    flow: &Flow<R>,
-    grain: &Grain,
-    body: &Body,
-    component: usize,
-    along: usize,
-    links: &mut Vec<Link>,
-) {
-    let mesh = *flow.mesh();
-    let across = mesh.layout().strides()[component];
-    let step = IVec3::AXES[along];
-    let inverse = 1.0 / mesh.spacing[along];
-    let middle = DVec3::from_array(FACE_OFFSET[component]) + 0.5 * step.as_dvec3() - 1.0;
-    let last = body.size - step;
-    let next = body.local(step.x, step.y, step.z);
-    let (carried, carrying) = (
-        flow.velocity.component(component),
-        flow.velocity.component(along),
-    );
-    let (q, c) = (
-        |at: usize| carried[at].wide(),
-        |at: usize| carrying[at].wide(),
-    );
-    for k in 0..last.z {
-        for j in 0..last.y {
-            let row = body.local(0, j, k);
-            for i in 0..last.x {
-                let here = row + i as usize;
-                let d = 0.5
-                    * (body.own_distance(component, here)
-                        + body.own_distance(component, here + next));
-                if d >= 2.0 * band || d <= -band {
-                    continue;
+impl Body {
+    /// Calls `add(memory position, push)` for the faces of a component that are pushed.
+    fn each_push(&self, component: usize, add: &mut dyn FnMut(usize, f64)) {
+        for k in 0..self.size.z {
+            for j in 0..self.size.y {
+                let row = self.local(0, j, k);
+                for i in 0..self.size.x {
+                    let push = self.push[component][row + i as usize];
+                    if push != 0.0
+                        && let Some(at) = self.places.at(component, IVec3::new(i, j, k))
+                    {
+                        add(at, push);
+                    }
                 }
-                let place = IVec3::new(i, j, k);
-                let face = |shift: i32| body.places.at(component, place + shift * step);
-                let (Some(from), Some(to)) = (face(0), face(1)) else {
-                    continue;
-                };
-                let mean = 0.5 * (q(from) + q(to));
-                let carrier = if along == component {
-                    mean
-                } else {
-                    // Two faces of the carrying component share the link.
-                    0.5 * (c(to) + c(to - across))
-                };
-                let mut flux = 0.0;
-                if d < band {
-                    let cell = (body.first + place).as_dvec3();
-                    let rigid = grain.velocity_at(mesh.origin + mesh.spacing * (cell + middle));
-                    let relative = (carrier - rigid[along]) * (mean - rigid[component]);
-                    flux += relative * (1.0 / aperture(d, band).max(LEAST_APERTURE) - 1.0);
-                }
-                if let (Some(a), Some(b), Some(y), Some(z)) = (face(-2), face(-1), face(2), face(3))
-                {
-                    let sixth = 7.0 * (q(from) + q(to)) - 8.0 * (q(b) + q(y)) + q(a) + q(z);
-                    flux += carrier * sixth / 60.0;
-                }
-                let flux = flux * inverse;
-                links.push(Link { from, to, flux });
             }
         }
+    }
+}
+
+/// The links of one grain.
+struct Links<'a> {
+    band: f64,
+    mesh: &'a Mesh,
+    grain: &'a Grain,
+    body: &'a Body,
+    scratch: &'a mut Scratch,
+    push: &'a mut [Vec<f64>; 3],
+}
+
+impl Kernel for Links<'_> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let Links {
+            band,
+            mesh,
+            grain,
+            body,
+            scratch,
+            push,
+        } = self;
+        let size = body.size;
+        let wide = size + 2 * PAD;
+        scratch.flux.resize(size.x as usize + MOST, 0.0);
+        for (component, push) in push.iter_mut().enumerate() {
+            push.clear();
+            push.resize((size.x * size.y * size.z) as usize, 0.0);
+            for along in (0..3).filter(|&axis| mesh.cells[axis] > 1) {
+                let lines = Lines::new(band, mesh, grain, body, component, along);
+                let step = IVec3::AXES[along];
+                for k in 0..size.z - step.z {
+                    for j in 0..size.y - step.y {
+                        let Some((range, inner)) = lines.ranges(j, k) else {
+                            continue;
+                        };
+                        let (start, end) = (range.start, range.end);
+                        let flux = &mut scratch.flux[..];
+                        // Near the ends of the grid there are no six faces.
+                        let first = inner.start.clamp(start, end);
+                        let last = inner.end.clamp(first, end);
+                        let at = PAD + wide.x * (j + PAD + wide.y * (k + PAD));
+                        let fields = [&scratch.velocity[component], &scratch.velocity[along]];
+                        let row = body.local(0, j, k);
+                        let next = row + body.local(step.x, step.y, step.z);
+                        let d = &body.distance[component][..];
+                        for (part, six) in [
+                            (start..first, false),
+                            (first..last, true),
+                            (last..end, false),
+                        ] {
+                            for i in part.step_by(V::WIDTH) {
+                                let (here, there) = (row + i as usize, next + i as usize);
+                                let d =
+                                    V::constant(0.5) * (V::load(&d[here..]) + V::load(&d[there..]));
+                                let at = (at + i) as usize;
+                                lines
+                                    .flux([j, k], i, at, d, fields, six)
+                                    .store(&mut flux[i as usize..]);
+                            }
+                        }
+                        for i in start as usize..end as usize {
+                            push[row + i] -= flux[i];
+                        }
+                        for i in start as usize..end as usize {
+                            push[next + i] += flux[i];
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The links of one component along one axis.
+struct Lines<'a> {
+    body: &'a Body,
+    component: usize,
+    along: usize,
+    band: f64,
+    /// Faces that are unknowns, along each axis.
+    unknowns: [Range<i32>; 3],
+    /// From a face to the next along the link, and to the next along the component, in the copy of
+    /// the velocity.
+    next: usize,
+    across: usize,
+    /// 1/h along the link [1/m].
+    inverse: f64,
+    /// Rigid velocity of the component and along the link in the middle of link (0, 0, 0), and its
+    /// change from a link to the next along each axis [m/s].
+    rigid: [[f64; 2]; 4],
+}
+
+impl Lines<'_> {
+    fn new<'a>(
+        band: f64,
+        mesh: &Mesh,
+        grain: &Grain,
+        body: &'a Body,
+        component: usize,
+        along: usize,
+    ) -> Lines<'a> {
+        let wide = body.size + 2 * PAD;
+        let stride = |axis: usize| [1, wide.x, wide.x * wide.y][axis] as usize;
+        let half = 0.5 * IVec3::AXES[along].as_dvec3();
+        let middle = DVec3::from_array(FACE_OFFSET[component]) + half - 1.0;
+        let first = mesh.origin + mesh.spacing * (body.first.as_dvec3() + middle);
+        let of = |v: DVec3| [v[component], v[along]];
+        let change = |axis: usize| {
+            of(grain
+                .angular_velocity
+                .cross(DVec3::AXES[axis] * mesh.spacing))
+        };
+        Lines {
+            body,
+            component,
+            along,
+            band,
+            unknowns: [0, 1, 2].map(|axis| body.places.unknowns(component, axis)),
+            next: stride(along),
+            across: stride(component),
+            inverse: 1.0 / mesh.spacing[along],
+            rigid: [
+                of(grain.velocity_at(first)),
+                change(0),
+                change(1),
+                change(2),
+            ],
+        }
+    }
+
+    /// Which links of a row are to be mended, and those of them with six faces in line.
+    fn ranges(&self, j: i32, k: i32) -> Option<(Range<i32>, Range<i32>)> {
+        let (body, along) = (self.body, self.along);
+        let step = IVec3::AXES[along];
+        let span = |j: i32, k: i32| body.spans[self.component][(j + body.size.y * k) as usize];
+        let (here, there) = (span(j, k), span(j + step.y, k + step.z));
+        let [ux, uy, uz] = &self.unknowns;
+        let inside = |j: i32, k: i32| uy.contains(&j) && uz.contains(&k);
+        if !(inside(j, k) && inside(j + step.y, k + step.z)) {
+            return None;
+        }
+        let start = here[0].max(there[0] - step.x).max(ux.start);
+        let end = here[1]
+            .min(there[1] - step.x)
+            .min(ux.end - step.x)
+            .min(body.size.x - step.x);
+        if start >= end {
+            return None;
+        }
+        let six = match along {
+            0 => ux.start + 2..ux.end - 3,
+            _ if inside(j - 2 * step.y, k - 2 * step.z)
+                && inside(j + 3 * step.y, k + 3 * step.z) =>
+            {
+                start..end
+            }
+            _ => 0..0,
+        };
+        Some((start..end, six))
+    }
+
+    /// Flux through the links from place `i` of row (j, k) on, whose lower faces are at `at` in the copy of
+    /// the velocity, over their length [m/s^2]; zero where `d` is not near the surface.
+    #[inline(always)]
+    fn flux<V: Vector<Number = f64>>(
+        &self,
+        [j, k]: [i32; 2],
+        i: i32,
+        at: usize,
+        d: V,
+        [q, c]: [&Vec<f64>; 2],
+        six: bool,
+    ) -> V {
+        let (half, one) = (V::constant(0.5), V::constant(1.0));
+        let face = |shift: isize| V::load(&q[at.wrapping_add_signed(shift * self.next as isize)..]);
+        let (from, to) = (face(0), face(1));
+        let mean = half * (from + to);
+        let carrier = if self.along == self.component {
+            mean
+        } else {
+            // Two faces of the carrying component share the link.
+            let to = at + self.next;
+            half * (V::load(&c[to..]) + V::load(&c[to - self.across..]))
+        };
+        let ramp = V::load(&RAMP);
+        let rigid = |of: usize| {
+            let [start, x, y, z] = self.rigid.map(|rigid| rigid[of]);
+            let first = start + f64::from(i) * x + f64::from(j) * y + f64::from(k) * z;
+            V::constant(first) + ramp * V::constant(x)
+        };
+        let relative = (carrier - rigid(1)) * (mean - rigid(0));
+        let open = aperture(d, self.band).larger(V::constant(LEAST_APERTURE));
+        let mut flux = relative * (one.over(open) - one);
+        if six {
+            let outer = V::constant(7.0) * (from + to) - V::constant(8.0) * (face(-1) + face(2));
+            let sixth = outer + face(-2) + face(3);
+            flux = flux + carrier * sixth * V::constant(1.0 / 60.0);
+        }
+        let near = d.is_below(V::constant(2.0 * self.band));
+        let outside = V::constant(-self.band).is_below(d);
+        flux * near * outside * V::constant(self.inverse)
     }
 }

@@ -9,11 +9,11 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use crate::math::lanes::Vector;
 
 /// sin(pi t) for |t| <= 1/2 to 1e-13, by its power series; the library's sine takes a multiple.
-#[inline]
-fn sine(t: f64) -> f64 {
+#[inline(always)]
+fn sine<V: Vector<Number = f64>>(t: V) -> V {
     const SERIES: [f64; 9] = {
         // (-1)^k pi^(2k+1) / (2k+1)!
         let mut series = [PI; 9];
@@ -25,55 +25,76 @@ fn sine(t: f64) -> f64 {
         series
     };
     let square = t * t;
-    t * SERIES.iter().rev().fold(0.0, |sum, c| sum * square + c)
+    let mut sum = V::constant(SERIES[8]);
+    for k in (0..8).rev() {
+        sum = sum * square + V::constant(SERIES[k]);
+    }
+    t * sum
 }
 
-/// Open fraction of a face at distance `d` [m].
-#[inline]
-pub fn aperture(d: f64, eps: f64) -> f64 {
-    let s = (d / eps).clamp(-1.0, 1.0);
-    // sin(pi s) is the same at s and at 1 - s.
-    let t = s.abs().min(1.0 - s.abs()).copysign(s);
-    0.5 * (1.0 + s + sine(t) / PI)
+/// Open fraction of faces at distances `d` [m], which may be infinite.
+#[inline(always)]
+pub fn aperture<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
+    let (one, half) = (V::constant(1.0), V::constant(0.5));
+    let s = clamped(d, eps);
+    // sin(pi s) = 2 sin(pi s / 2) cos(pi s / 2)
+    let product = sine(half * s) * sine(half * (one - s.magnitude()));
+    half * (one + s) + V::constant(1.0 / PI) * product
 }
 
 /// Integral of the aperture from deep inside to `d` [m]: 0 inside, d outside the band.
-#[inline]
-pub fn open_depth(d: f64, eps: f64) -> f64 {
-    if d >= eps {
-        return d;
-    }
-    let s = (d / eps).max(-1.0);
+#[inline(always)]
+pub fn open_depth<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
+    let (zero, one, half) = (V::constant(0.0), V::constant(1.0), V::constant(0.5));
+    let s = clamped(d, eps);
     // 1 + cos(pi s) = 2 sin^2(pi (1 - |s|) / 2)
-    let half = sine(0.5 * (1.0 - s.abs())) / PI;
-    0.5 * eps * (0.5 * (1.0 + s) * (1.0 + s) - 2.0 * half * half)
+    let sine = sine(half * (one - s.magnitude()));
+    let inside = half * (one + s) * (one + s) - V::constant(2.0 / (PI * PI)) * sine * sine;
+    let beyond = (d - V::constant(eps)).larger(zero);
+    V::constant(0.5 * eps) * inside + beyond
 }
 
-/// Drag coefficient [1/s] per unit kinematic viscosity [m^2/s] of a face at distance `d` from a
-/// surface with unit normal `n`, on a grid of `spacing`; infinite where the face is closed.
-pub fn drag(d: f64, n: DVec3, spacing: DVec3, eps: f64) -> f64 {
+/// d / eps, between -1 and 1.
+#[inline(always)]
+fn clamped<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
+    let one = V::constant(1.0);
+    (d * V::constant(1.0 / eps))
+        .larger(V::constant(-1.0))
+        .smaller(one)
+}
+
+/// Drag coefficient [1/s] per unit kinematic viscosity [m^2/s] of faces at distances `d` from a
+/// surface with unit normals `n`, on a grid of `spacing`; immense where a face is closed.
+#[inline(always)]
+pub fn drag<V: Vector<Number = f64>>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> V {
     let here = open_depth(d, eps);
-    let mut excess = 0.0;
+    let twice = here + here;
+    let mut excess = V::constant(0.0);
     for axis in 0..3 {
-        let (step, h) = (spacing[axis] * n[axis], spacing[axis]);
-        excess += (open_depth(d + step, eps) + open_depth(d - step, eps) - 2.0 * here) / (h * h);
+        let h = spacing[axis];
+        let step = V::constant(h) * n[axis];
+        let rise = open_depth(d + step, eps) + open_depth(d - step, eps) - twice;
+        excess = excess + rise * V::constant(1.0 / (h * h));
     }
-    if here <= 1e-12 * eps {
-        f64::INFINITY
-    } else {
-        excess.max(0.0) / here
-    }
+    let least = V::constant(1e-12 * eps);
+    excess.larger(V::constant(0.0)).over(here.larger(least))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::lanes::One;
+    use glam::DVec3;
+
+    fn open_depth(d: f64, eps: f64) -> f64 {
+        super::open_depth(One(d), eps).0
+    }
 
     #[test]
     fn the_series_is_the_sine() {
         for n in -500..=500 {
             let t = f64::from(n) / 1000.0;
-            assert!((sine(t) - (PI * t).sin()).abs() < 1e-13, "{t}");
+            assert!((sine(One(t)).0 - (PI * t).sin()).abs() < 1e-13, "{t}");
         }
     }
 
@@ -83,11 +104,15 @@ mod tests {
         let (mut sum, from) = (0.0, -1.2);
         let width = 2.4 / steps as f64;
         for i in 0..steps {
-            sum += aperture(from + (i as f64 + 0.5) * width, eps) * width;
+            sum += aperture(One(from + (i as f64 + 0.5) * width), eps).0 * width;
             let d = from + (i as f64 + 1.0) * width;
             assert!((sum - open_depth(d, eps)).abs() < 1e-8, "{d}");
         }
         assert_eq!(open_depth(-eps, eps), 0.0);
+        assert_eq!(open_depth(-9.0, eps), 0.0);
+        for (d, open) in [(-eps, 0.0), (eps, 1.0), (-9.0, 0.0), (f64::INFINITY, 1.0)] {
+            assert_eq!(aperture(One(d), eps).0, open);
+        }
     }
 
     #[test]
@@ -100,7 +125,9 @@ mod tests {
                 for e in [DVec3::X, DVec3::Y, DVec3::Z] {
                     lap += (u(0.5 * e) + u(-0.5 * e) - 2.0 * u(DVec3::ZERO)) / 0.25;
                 }
-                let residual = lap - drag(d, n, spacing, 0.5) * u(DVec3::ZERO);
+                let normal = n.to_array().map(One);
+                let drag = drag(One(d), normal, spacing.to_array(), 0.5).0;
+                let residual = lap - drag * u(DVec3::ZERO);
                 assert!(residual.abs() < 1e-12, "{d}: {residual:e}");
             }
         }

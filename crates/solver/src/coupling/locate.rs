@@ -1,23 +1,21 @@
 //! Where the grains lie on the grid: signed distances at the faces near each grain, and the list
 //! of faces that its rigidity acts on.
 
-use glam::{DVec3, IVec3};
+use glam::{DMat3, DVec3, IVec3};
 use rayon::prelude::*;
 
 use super::Scheme;
-use super::advection::Link;
-use super::aperture::{aperture, drag};
+use super::hold::{Faces, Hold, Holding};
 use super::near::{NearShape, NearShapes};
 use super::places::{Places, Unknowns};
+use super::rivals::{Rival, rivals};
 use crate::dem::Grain;
 use crate::flow::Boundaries;
 use crate::grid::{FACE_OFFSET, Mesh};
+use crate::math::lanes::MOST;
 
 /// Asks [`Places`] for cells: no axis is normal to them.
 const CELL: usize = 3;
-/// Distances that differ by less than this part of the band are equal: of two copies of a link
-/// across a periodic edge just one must count.
-const TIE: f64 = 1e-9;
 
 /// A face that a grain's rigidity acts on.
 #[derive(Clone, Copy, Debug)]
@@ -50,15 +48,15 @@ pub struct Body {
     pub first: IVec3,
     /// Cells of the box.
     pub size: IVec3,
-    /// Signed distance [m] at the faces of the box for each component; infinite where it does not
-    /// matter.
+    /// Signed distance [m] at the faces of the box for each component; infinite where another grain
+    /// is nearer, or where it does not matter. Some entries more follow the last.
     pub distance: [Vec<f64>; 3],
-    /// Smallest distance from another grain there [m]; infinite where it does not matter.
-    rival_distance: [Vec<f64>; 3],
+    /// Which faces of each row along x the distance matters at, for each component.
+    pub spans: [Vec<[i32; 2]>; 3],
     /// Where the box lies in memory.
     pub places: Places,
-    /// Corrections of the advection of each component.
-    pub links: [Vec<Link>; 3],
+    /// What is added to the tendency at the faces of the box for each component [m/s^2].
+    pub push: [Vec<f64>; 3],
     /// Faces under its rigidity.
     pub forced: Vec<ForcedFace>,
 }
@@ -70,17 +68,6 @@ impl Body {
         (i + self.size.x * (j + self.size.y * k)) as usize
     }
 
-    /// Distance from the grain at position `at`, where no other grain is nearer.
-    #[inline]
-    pub fn own_distance(&self, component: usize, at: usize) -> f64 {
-        let d = self.distance[component][at];
-        if d <= self.rival_distance[component][at] {
-            d
-        } else {
-            f64::INFINITY
-        }
-    }
-
     /// The forced faces of one component: they are listed component by component.
     pub fn forced_along(&self, axis: usize) -> &[ForcedFace] {
         let end = |axis: usize| self.forced.partition_point(|face| face.axis < axis);
@@ -89,18 +76,34 @@ impl Body {
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let distances: usize = self
-            .distance
-            .iter()
-            .chain(&self.rival_distance)
-            .map(|values| size_of::<f64>() * values.capacity())
-            .sum();
-        let links: usize = self.links.iter().map(Vec::capacity).sum();
-        distances
+        let values = self.distance.iter().chain(&self.push);
+        let spans: usize = self.spans.iter().map(Vec::capacity).sum();
+        values
+            .map(|v| size_of::<f64>() * v.capacity())
+            .sum::<usize>()
             + self.places.bytes()
-            + size_of::<Link>() * links
+            + size_of::<[i32; 2]>() * spans
             + size_of::<ForcedFace>() * self.forced.capacity()
     }
+}
+
+/// A face near a grain, on its way to the list of forced faces.
+struct Candidate {
+    axis: usize,
+    at: usize,
+    below: usize,
+    /// Where it is [m].
+    x: DVec3,
+    distance: f64,
+    /// From another grain.
+    rival: f64,
+}
+
+/// What one thread needs to locate grains.
+#[derive(Default)]
+struct Scratch {
+    candidates: Vec<Candidate>,
+    faces: Faces,
 }
 
 /// Where to look for grains and how.
@@ -155,22 +158,29 @@ impl Locator {
 
     /// Finds all grains for a step of length `dt` [s].
     pub fn locate(&self, grains: &[Grain], dt: f64, bodies: &mut [Body]) {
-        bodies.par_iter_mut().enumerate().for_each(|(index, body)| {
-            let rivals = self.rivals(grains, index);
-            self.measure(&grains[index], self.shapes.of(index), &rivals, body);
-            self.unknowns.map(body.first, body.size, &mut body.places);
-            self.list(&grains[index], self.shapes.of(index), &rivals, dt, body);
+        let holding = Holding {
+            scheme: self.scheme,
+            eps: self.eps,
+            spacing: self.mesh.spacing,
+            reach: dt * self.kinematic_viscosity,
+        };
+        let each = bodies.par_iter_mut().enumerate();
+        each.for_each_init(Scratch::default, |scratch, (index, body)| {
+            let (mesh, unknowns, shapes) = (&self.mesh, &self.unknowns, &self.shapes);
+            let rivals = rivals(mesh, unknowns, shapes, self.reach, grains, index);
+            let grain = &grains[index];
+            self.place(grain, body);
+            self.measure(grain, shapes.of(index), &rivals, body, scratch);
+            self.list(grain, &rivals, &holding, body, scratch);
         });
     }
 
-    /// Distances in the box about a grain.
-    fn measure(&self, grain: &Grain, shape: &NearShape, rivals: &[Rival], body: &mut Body) {
+    /// The box of cells about a grain.
+    fn place(&self, grain: &Grain, body: &mut Body) {
         let mesh = &self.mesh;
-        let centre = grain.pose.position;
-        let reach = self.reach;
-        let turn = glam::DMat3::from_quat(grain.pose.orientation);
+        let turn = DMat3::from_quat(grain.pose.orientation);
         let (lower, upper) = (grain.shape.lower(), grain.shape.upper());
-        let middle = centre + turn * (0.5 * (lower + upper));
+        let middle = grain.pose.position + turn * (0.5 * (lower + upper));
         let half = 0.5 * (upper - lower);
         let span =
             turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
@@ -180,40 +190,82 @@ impl Locator {
                 (body.first[axis], body.size[axis]) = (1, 1);
                 continue;
             }
-            let from = (middle[axis] - span[axis] - reach - mesh.origin[axis]) / h;
-            let to = (middle[axis] + span[axis] + reach - mesh.origin[axis]) / h;
+            let from = (middle[axis] - span[axis] - self.reach - mesh.origin[axis]) / h;
+            let to = (middle[axis] + span[axis] + self.reach - mesh.origin[axis]) / h;
             body.first[axis] = from.floor() as i32 + 1;
             body.size[axis] = to.floor() as i32 + 2 - body.first[axis];
         }
+        self.unknowns.map(body.first, body.size, &mut body.places);
+    }
+
+    /// Distances in the box about a grain, and the faces that its rigidity may act on.
+    fn measure(
+        &self,
+        grain: &Grain,
+        shape: &NearShape,
+        rivals: &[Rival],
+        body: &mut Body,
+        scratch: &mut Scratch,
+    ) {
+        let Scratch { candidates, faces } = scratch;
+        candidates.clear();
+        faces.clear();
+        let (mesh, eps, reach) = (&self.mesh, self.eps, self.reach);
+        let centre = grain.pose.position;
+        let turn = DMat3::from_quat(grain.pose.orientation);
+        let to_body = turn.transpose();
+        // One face further along x, in the frame of the grain.
+        let stride = to_body * (DVec3::X * mesh.spacing.x);
         let far = grain.shape.bounding_radius() + reach;
         let count = (body.size.x * body.size.y * body.size.z) as usize;
-        for (component, offset) in FACE_OFFSET.iter().enumerate() {
-            let mut distance = std::mem::take(&mut body.distance[component]);
-            let mut rival_distance = std::mem::take(&mut body.rival_distance[component]);
-            for values in [&mut distance, &mut rival_distance] {
-                values.clear();
-                values.resize(count, f64::INFINITY);
-            }
+        for (axis, offset) in FACE_OFFSET.iter().enumerate() {
+            let mut distance = std::mem::take(&mut body.distance[axis]);
+            distance.clear();
+            distance.resize(count + MOST, f64::INFINITY);
+            body.spans[axis].clear();
             for k in 0..body.size.z {
                 for j in 0..body.size.y {
                     let start = self.position(offset, body.first + IVec3::new(0, j, k));
+                    let own = to_body * (start - centre);
+                    let row = body.local(0, j, k);
+                    let mut span = [body.size.x, 0];
                     for i in self.chord(start - centre, far, body.size.x) {
-                        let x = start + DVec3::X * (f64::from(i) * mesh.spacing.x);
-                        let d = shape.distance(grain.pose.to_body(x));
+                        let (d, slope) = shape.distance_and_gradient(own + f64::from(i) * stride);
                         if d > reach {
                             continue;
                         }
-                        let at = body.local(i, j, k);
-                        distance[at] = d;
-                        rival_distance[at] = rivals
+                        span = [span[0].min(i), i + 1];
+                        let x = start + DVec3::X * (f64::from(i) * mesh.spacing.x);
+                        let rival = rivals
                             .iter()
-                            .map(|rival| rival.distance(x, reach) + rival.handicap * self.eps)
+                            .map(|rival| rival.distance(x, reach) + rival.handicap * eps)
                             .fold(f64::INFINITY, f64::min);
+                        if d <= rival {
+                            distance[row + i as usize] = d;
+                        }
+                        let inside_rival = rival <= -eps && rival < d;
+                        if d >= 2.0 * eps || inside_rival {
+                            continue;
+                        }
+                        let place = IVec3::new(i, j, k);
+                        let at = body.places.at(axis, place);
+                        let below = body.places.at(CELL, place - IVec3::AXES[axis]);
+                        if let (Some(at), Some(below)) = (at, below) {
+                            faces.push(d, turn * slope.normalize_or_zero());
+                            candidates.push(Candidate {
+                                axis,
+                                at,
+                                below,
+                                x,
+                                distance: d,
+                                rival,
+                            });
+                        }
                     }
+                    body.spans[axis].push(span);
                 }
             }
-            body.distance[component] = distance;
-            body.rival_distance[component] = rival_distance;
+            body.distance[axis] = distance;
         }
     }
 
@@ -230,137 +282,55 @@ impl Locator {
         from.clamp(0, count)..(to + 1).clamp(0, count)
     }
 
-    /// Grains, and periodic images of them and of the grain itself, whose band may meet that of
-    /// grain `index`.
-    fn rivals<'a>(&'a self, grains: &'a [Grain], index: usize) -> Vec<Rival<'a>> {
-        let (grain, extent, reach) = (&grains[index], self.mesh.extent(), self.reach);
-        let mut rivals = Vec::new();
-        for (other, rival) in grains.iter().enumerate() {
-            let radii = grain.shape.bounding_radius() + rival.shape.bounding_radius();
-            let limit = radii + 2.0 * reach;
-            let apart = grain.pose.position - rival.pose.position;
-            // Images along each axis that may be near enough: first, last.
-            let range = |axis: usize| match self.unknowns.is_periodic(axis) {
-                true if self.mesh.cells[axis] > 1 => (
-                    ((apart[axis] - limit) / extent[axis]).ceil() as i32,
-                    ((apart[axis] + limit) / extent[axis]).floor() as i32,
-                ),
-                _ => (0, 0),
-            };
-            let [(ax, bx), (ay, by), (az, bz)] = [range(0), range(1), range(2)];
-            for z in az..=bz {
-                for y in ay..=by {
-                    for x in ax..=bx {
-                        let image = IVec3::new(x, y, z);
-                        let shift = image.as_dvec3() * extent;
-                        let own = other == index;
-                        if own && image == IVec3::ZERO
-                            || (apart - shift).length_squared() > limit * limit
-                        {
-                            continue;
-                        }
-                        rivals.push(Rival {
-                            grain: rival,
-                            shape: self.shapes.of(other),
-                            shift,
-                            handicap: match own {
-                                true if image.to_array() > [0; 3] => -TIE,
-                                false if other < index => -TIE,
-                                _ => TIE,
-                            },
-                        });
-                    }
-                }
-            }
-        }
-        rivals
-    }
-
     /// Lists the faces under the rigidity of a grain.
-    fn list(&self, grain: &Grain, shape: &NearShape, rivals: &[Rival], dt: f64, body: &mut Body) {
-        let mut forced = std::mem::take(&mut body.forced);
-        forced.clear();
-        for (component, offset) in FACE_OFFSET.iter().enumerate() {
-            for k in 0..body.size.z {
-                for j in 0..body.size.y {
-                    for i in 0..body.size.x {
-                        let local = body.local(i, j, k);
-                        let d = body.distance[component][local];
-                        if d >= 2.0 * self.eps {
-                            continue;
-                        }
-                        let rival = body.rival_distance[component][local];
-                        let inside_rival = rival <= -self.eps && rival < d;
-                        if inside_rival {
-                            continue;
-                        }
-                        let place = IVec3::new(i, j, k);
-                        let Some(at) = body.places.at(component, place) else {
-                            continue;
-                        };
-                        let lower = place - IVec3::AXES[component];
-                        let Some(below) = body.places.at(CELL, lower) else {
-                            continue;
-                        };
-                        let x = self.position(offset, body.first + place);
-                        let own = self.hold(grain, shape, x, d, dt);
-                        let mut all = own;
-                        if rival < 2.0 * self.eps && d > -self.eps {
-                            for rival in rivals {
-                                let there = rival.distance(x, 2.0 * self.eps);
-                                if there < 2.0 * self.eps {
-                                    let x = x - rival.shift;
-                                    all = all + self.hold(rival.grain, rival.shape, x, there, dt);
-                                }
-                            }
-                        }
-                        let closed_by_all = all.closed.min(1.0);
-                        let share = if own.strength.is_finite() {
-                            own.strength / (1.0 + all.strength)
-                        } else {
-                            1.0
-                        };
-                        if share > 0.0 || own.closed > 0.0 {
-                            forced.push(ForcedFace {
-                                axis: component,
-                                at,
-                                below,
-                                arm: x - grain.pose.position,
-                                share,
-                                closed: own.closed / all.closed.max(1.0),
-                                closed_by_all,
-                                back: 0.0,
-                                free: 0.0,
-                            });
-                        }
+    fn list(
+        &self,
+        grain: &Grain,
+        rivals: &[Rival],
+        holding: &Holding,
+        body: &mut Body,
+        Scratch { candidates, faces }: &mut Scratch,
+    ) {
+        let eps = self.eps;
+        faces.hold(holding);
+        body.forced.clear();
+        for (index, face) in candidates.iter().enumerate() {
+            let inside = face.distance <= -eps && self.scheme == Scheme::Aperture;
+            let own = if inside {
+                Hold {
+                    strength: f64::INFINITY,
+                    closed: 1.0,
+                }
+            } else {
+                faces.at(index)
+            };
+            let mut all = own;
+            if face.rival < 2.0 * eps && face.distance > -eps {
+                for rival in rivals {
+                    let (there, slope) = rival.distance_and_gradient(face.x, 2.0 * eps);
+                    if there < 2.0 * eps {
+                        let normal = rival.grain.pose.orientation * slope.normalize_or_zero();
+                        all = all + holding.of(there, normal);
                     }
                 }
             }
-        }
-        body.forced = forced;
-    }
-
-    /// How a surface at distance `d` holds the face at `x` for a step of `dt`.
-    fn hold(&self, grain: &Grain, shape: &NearShape, x: DVec3, d: f64, dt: f64) -> Hold {
-        let normal = || grain.pose.orientation * shape.normal(grain.pose.to_body(x));
-        match self.scheme {
-            Scheme::Aperture if d <= -self.eps => Hold {
-                strength: f64::INFINITY,
-                closed: 1.0,
-            },
-            Scheme::Aperture => Hold {
-                strength: dt
-                    * self.kinematic_viscosity
-                    * drag(d, normal(), self.mesh.spacing, self.eps),
-                closed: 1.0 - aperture(d, self.eps),
-            },
-            Scheme::Paper => {
-                let width = normal().abs().dot(self.mesh.spacing);
-                let share = (0.5 - d / width).clamp(0.0, 1.0);
-                Hold {
-                    strength: share / (1.0 - share),
-                    closed: 0.0,
-                }
+            let share = if own.strength.is_finite() {
+                own.strength / (1.0 + all.strength)
+            } else {
+                1.0
+            };
+            if share > 0.0 || own.closed > 0.0 {
+                body.forced.push(ForcedFace {
+                    axis: face.axis,
+                    at: face.at,
+                    below: face.below,
+                    arm: face.x - grain.pose.position,
+                    share,
+                    closed: own.closed / all.closed.max(1.0),
+                    closed_by_all: all.closed.min(1.0),
+                    back: 0.0,
+                    free: 0.0,
+                });
             }
         }
     }
@@ -369,47 +339,5 @@ impl Locator {
     fn position(&self, offset: &[f64; 3], cell: IVec3) -> DVec3 {
         let offset = DVec3::from_array(*offset);
         self.mesh.origin + self.mesh.spacing * (cell.as_dvec3() - 1.0 + offset)
-    }
-}
-
-/// Another grain nearby, or an image of the grain itself.
-struct Rival<'a> {
-    grain: &'a Grain,
-    shape: &'a NearShape,
-    /// From the grain to the image in question [m].
-    shift: DVec3,
-    /// Added to its distance, as a part of the band, so that it has the faces as far from both or
-    /// has not.
-    handicap: f64,
-}
-
-impl Rival<'_> {
-    /// Distance of `x` from its surface [m] where that is at most `limit`, else that or infinity.
-    fn distance(&self, x: DVec3, limit: f64) -> f64 {
-        let (pose, x) = (&self.grain.pose, x - self.shift);
-        let far = self.grain.shape.bounding_radius() + limit;
-        if x.distance_squared(pose.position) > far * far {
-            return f64::INFINITY;
-        }
-        self.shape.distance(pose.to_body(x))
-    }
-}
-
-/// How surfaces hold a face.
-#[derive(Clone, Copy)]
-struct Hold {
-    /// Drag times the step: the face takes strength / (1 + strength) of the rigid velocity.
-    strength: f64,
-    /// Part closed to the pressure gradient.
-    closed: f64,
-}
-
-impl std::ops::Add for Hold {
-    type Output = Hold;
-    fn add(self, other: Hold) -> Hold {
-        Hold {
-            strength: self.strength + other.strength,
-            closed: self.closed + other.closed,
-        }
     }
 }

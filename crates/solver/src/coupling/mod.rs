@@ -2,10 +2,12 @@
 
 mod advection;
 mod aperture;
+mod hold;
 mod locate;
 mod near;
 mod places;
 mod rigidity;
+mod rivals;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -29,7 +31,7 @@ pub enum Scheme {
 }
 
 /// The grains on the grid.
-pub struct Coupling {
+pub(crate) struct Coupling {
     scheme: Scheme,
     fluid_density: f64,
     locator: Locator,

@@ -90,30 +90,22 @@ impl NearShape {
         }
     }
 
-    /// Signed distance [m] at `x` in the frame of the grain; may be infinite where it is more than
-    /// the reach.
+    /// Signed distance [m] and its gradient at `x`, both in the frame of the grain; the distance may
+    /// be infinite where it is more than the reach.
     #[inline]
-    pub fn distance(&self, x: DVec3) -> f64 {
-        match (self.shape.field(), &self.about) {
-            (Field::Sampled(field), Some(about)) => field
-                .distance_on_grid(x)
-                .or_else(|| about.distance_on_grid(x))
-                .unwrap_or(f64::INFINITY),
-            _ => self.shape.distance_within(x, self.reach),
-        }
-    }
-
-    /// Unit normal at `x` in the frame of the grain, out of the grain.
-    #[inline]
-    pub fn normal(&self, x: DVec3) -> DVec3 {
-        let gradient = match (self.shape.field(), &self.about) {
-            (Field::Sampled(field), Some(about)) => field
-                .gradient_on_grid(x)
-                .or_else(|| about.gradient_on_grid(x))
-                .unwrap_or_else(|| self.shape.distance_and_gradient(x).1),
-            _ => self.shape.distance_and_gradient(x).1,
+    pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
+        const FAR: (f64, DVec3) = (f64::INFINITY, DVec3::ZERO);
+        let Field::Sampled(field) = self.shape.field() else {
+            return self.shape.distance_and_gradient(x);
         };
-        gradient.normalize_or_zero()
+        if let Some(found) = field.distance_and_gradient_on_grid(x) {
+            return found;
+        }
+        match &self.about {
+            Some(about) => about.distance_and_gradient_on_grid(x).unwrap_or(FAR),
+            None if field.distance_within(x, self.reach) > self.reach => FAR,
+            None => field.distance_and_gradient(x),
+        }
     }
 }
 
@@ -142,15 +134,16 @@ mod tests {
                 let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
                 let x = (1.1 + reach) * (2.0 * u.fract() - DVec3::ONE);
                 let (exact, gradient) = shape.distance_and_gradient(x);
+                let (distance, slope) = near.distance_and_gradient(x);
                 if exact > reach {
-                    assert!(near.distance(x) > 0.97 * reach, "at {x}");
-                } else if field.distance_on_grid(x).is_some() {
-                    assert_eq!(near.distance(x), exact, "at {x}");
+                    assert!(distance > 0.97 * reach, "at {x}");
+                } else if field.distance_and_gradient_on_grid(x).is_some() {
+                    assert_eq!(distance, exact, "at {x}");
                 } else {
                     beyond += 1;
-                    let off = (near.distance(x) - exact).abs() / eps;
+                    let off = (distance - exact).abs() / eps;
                     assert!(off < tolerance, "{off} of the band at {x}");
-                    assert!(near.normal(x).dot(gradient) > 0.99, "at {x}");
+                    assert!(slope.normalize().dot(gradient) > 0.99, "at {x}");
                 }
             }
             assert!(beyond > 1000, "{beyond}");
@@ -163,7 +156,8 @@ mod tests {
         assert!(near(0.25).about.is_some());
         let near = near(0.05);
         assert!(near.about.is_none());
-        assert!(near.distance(DVec3::new(0.0, 0.0, 5.0)) > 0.125);
-        assert!((near.distance(DVec3::new(0.0, 0.0, 0.8)) - 0.1).abs() < 1e-3);
+        let distance = |z: f64| near.distance_and_gradient(DVec3::new(0.0, 0.0, z)).0;
+        assert!(distance(5.0) > 0.125);
+        assert!((distance(0.8) - 0.1).abs() < 1e-3);
     }
 }

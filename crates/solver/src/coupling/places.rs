@@ -1,9 +1,12 @@
 //! Where the cells and faces of a box about a grain lie in memory, across periodic edges.
 
+use std::ops::Range;
+
 use glam::IVec3;
 
 use crate::flow::Boundaries;
 use crate::grid::Mesh;
+use crate::math::Real;
 
 /// Which faces and cells are unknowns, and where.
 #[derive(Clone, Copy)]
@@ -14,7 +17,7 @@ pub struct Unknowns {
 }
 
 /// Cells beyond the box that may be asked for.
-const PAD: i32 = 3;
+pub const PAD: i32 = 3;
 /// Stands for "no unknown": more than any position, and so are sums with it.
 const NONE: usize = 1 << 60;
 
@@ -49,6 +52,17 @@ impl Unknowns {
                 table.clear();
                 table.extend((first[axis] - PAD..first[axis] + size[axis] + PAD).map(place));
             }
+            let entry = |i: i32| {
+                let i = if self.periodic[axis] {
+                    (i - 1).rem_euclid(n) + 1
+                } else {
+                    i.clamp(0, n + 1)
+                };
+                i as usize * stride
+            };
+            let lines = &mut places.lines[axis];
+            lines.clear();
+            lines.extend((first[axis] - PAD..first[axis] + size[axis] + PAD).map(entry));
         }
     }
 }
@@ -59,6 +73,8 @@ pub struct Places {
     /// For each axis the parts of the positions, of what is not normal to the axis and of faces
     /// that are.
     tables: [[Vec<usize>; 2]; 3],
+    /// The same of all entries of a field, unknown or not; beyond a wall the ghosts.
+    lines: [Vec<usize>; 3],
 }
 
 impl Places {
@@ -73,9 +89,35 @@ impl Places {
         (at < NONE).then_some(at)
     }
 
+    /// Positions along `axis` of the faces of `component` that are unknowns, off the box too: they
+    /// have no gaps, as only the ends of the grid take some away.
+    pub fn unknowns(&self, component: usize, axis: usize) -> Range<i32> {
+        let table = &self.tables[axis][usize::from(axis == component)];
+        let first = table.iter().take_while(|part| **part == NONE).count();
+        let last = table.iter().rev().take_while(|part| **part == NONE).count();
+        first as i32 - PAD..table.len() as i32 - last as i32 - PAD
+    }
+
+    /// Copies a field in the box and three cells about it, x fastest.
+    pub fn copy<R: Real>(&self, field: &[R], to: &mut Vec<f64>) {
+        to.clear();
+        let [x, y, z] = &self.lines;
+        let whole = x[x.len() - 1] == x[0] + x.len() - 1;
+        for z in z {
+            for y in y {
+                if whole {
+                    let line = &field[x[0] + y + z..][..x.len()];
+                    to.extend(line.iter().map(|value| value.wide()));
+                } else {
+                    to.extend(x.iter().map(|x| field[x + y + z].wide()));
+                }
+            }
+        }
+    }
+
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let tables = self.tables.iter().flatten();
+        let tables = self.tables.iter().flatten().chain(&self.lines);
         tables.map(|t| size_of::<usize>() * t.capacity()).sum()
     }
 }
@@ -103,5 +145,15 @@ mod tests {
         assert_eq!(at(3, 0, -1), None);
         assert_eq!(at(3, 0, 5), Some(6 + 60 + 80));
         assert_eq!(at(3, -3, 5), Some(3 + 60 + 80));
+        assert_eq!(places.unknowns(1, 0), -3..8);
+        assert_eq!([places.unknowns(1, 1), places.unknowns(0, 1)], [1..6, 0..6]);
+        // A field of memory positions: what lies where, ghosts beyond the wall included.
+        let field: Vec<f64> = (0..240).map(f64::from).collect();
+        let mut copy = Vec::new();
+        places.copy(&field, &mut copy);
+        let copied = |i: usize, j: usize, k: usize| copy[i + 3 + 11 * (j + 3 + 9 * (k + 3))];
+        assert_eq!(copied(4, 0, 0), 2.0 + 10.0 + 80.0);
+        assert_eq!(copied(0, 2, 0), 6.0 + 30.0 + 80.0);
+        assert_eq!(copy[3 + 11 * (2 + 27)], 6.0 + 80.0, "the ghost below");
     }
 }

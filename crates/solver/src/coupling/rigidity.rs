@@ -40,14 +40,8 @@ pub fn gather<R: Real>(
     relief: f64,
 ) -> Impulse {
     let w = fluid_density * flow.mesh().cell_volume();
-    let mut sum = Impulse {
-        constant: [0.0; 6],
-        slope: [[0.0; 6]; 6],
-    };
+    let mut sums = [Moments::default(); 3];
     for face in &mut body.forced {
-        let unit = DVec3::AXES[face.axis];
-        let lever = face.arm.cross(unit);
-        let weight = [unit.x, unit.y, unit.z, lever.x, lever.y, lever.z];
         let predicted = flow.predicted.component(face.axis)[face.at].wide();
         face.back = moved_pressure_pull(flow, face, before, relief);
         face.free = predicted + face.closed_by_all * face.back;
@@ -55,15 +49,45 @@ pub fn gather<R: Real>(
         let push = face.closed * face.back
             - face.share * face.free
             - follow * rigid_velocity(before, face);
-        for row in 0..6 {
-            sum.constant[row] += w * push * weight[row];
-            let pull = w * (face.share + follow) * weight[row];
-            for column in 0..6 {
-                sum.slope[row][column] += pull * weight[column];
+        sums[face.axis].add(push, face.share + follow, face);
+    }
+    let mut impulse = Impulse {
+        constant: [0.0; 6],
+        slope: [[0.0; 6]; 6],
+    };
+    for (axis, sum) in sums.iter().enumerate() {
+        let rows = [axis, 3 + (axis + 1) % 3, 3 + (axis + 2) % 3];
+        for (a, row) in rows.into_iter().enumerate() {
+            impulse.constant[row] += w * sum.push[a];
+            for (b, column) in rows.into_iter().enumerate() {
+                impulse.slope[row][column] += w * sum.pull[a + b + usize::from(a.min(b) > 0)];
             }
         }
     }
-    sum
+    impulse
+}
+
+/// Sums over the faces of one component, with the weights 1 and the two components that a lever
+/// arm x unit has: a force along the axis has no torque about it.
+#[derive(Clone, Copy, Default)]
+struct Moments {
+    push: [f64; 3],
+    /// Of 1, l, m, l l, l m and m m, l and m the levers.
+    pull: [f64; 6],
+}
+
+impl Moments {
+    #[inline]
+    fn add(&mut self, push: f64, pull: f64, face: &ForcedFace) {
+        let l = face.arm[(face.axis + 2) % 3];
+        let m = -face.arm[(face.axis + 1) % 3];
+        for (sum, weight) in self.push.iter_mut().zip([1.0, l, m]) {
+            *sum += push * weight;
+        }
+        for (sum, weight) in self.pull.iter_mut().zip([1.0, l, m, l * l, l * m, m * m]) {
+            *sum += pull * weight;
+        }
+    }
 }
 
 /// New velocities of the grain from `before` under the impulse and the `other` loads (weight less

@@ -70,7 +70,7 @@ impl Boundaries {
 
     /// Sets the normal velocity on every face where it is given, and the upper faces of periodic
     /// axes; outflow faces keep theirs.
-    pub fn set_normal<R: Real>(&self, velocity: &mut FaceVector<R>) {
+    pub(crate) fn set_normal<R: Real>(&self, velocity: &mut FaceVector<R>) {
         let layout = velocity.x.layout();
         for axis in 0..3 {
             let normal = velocity.component_mut(axis);
@@ -97,7 +97,7 @@ impl Boundaries {
     }
 
     /// Sets the given x and y faces of one plane.
-    pub fn set_normal_of_plane<R: Real>(&self, layout: Layout, [x, y]: [&mut [R]; 2]) {
+    pub(crate) fn set_normal_of_plane<R: Real>(&self, layout: Layout, [x, y]: [&mut [R]; 2]) {
         let row = layout.row();
         for (face, value) in self.given_faces(0, layout.cells[0]) {
             x.chunks_exact_mut(row)
@@ -108,22 +108,13 @@ impl Boundaries {
         }
     }
 
-    /// Fills the ghost layers of a velocity whose interior and boundary faces are set.
-    pub fn fill_ghosts<R: Real>(&self, velocity: &mut FaceVector<R>) {
-        let layout = velocity.x.layout();
-        for component in 0..3 {
-            for plane in velocity
-                .component_mut(component)
-                .chunks_exact_mut(layout.plane())
-            {
-                self.fill_ghosts_of_plane(layout, component, plane);
-            }
-        }
-        self.fill_ghost_planes(velocity);
-    }
-
     /// Fills the ghosts along x and y of one plane of a velocity component.
-    pub fn fill_ghosts_of_plane<R: Real>(&self, layout: Layout, component: usize, plane: &mut [R]) {
+    pub(crate) fn fill_ghosts_of_plane<R: Real>(
+        &self,
+        layout: Layout,
+        component: usize,
+        plane: &mut [R],
+    ) {
         let (row, [nx, ny, _]) = (layout.row(), layout.cells);
         for side in 0..2 {
             let (ghost, inner) = if side == 0 { (0, 1) } else { (nx + 1, nx) };
@@ -157,7 +148,7 @@ impl Boundaries {
     }
 
     /// Fills the ghost planes below and above, and the ghosts of the upper boundary faces.
-    pub fn fill_ghost_planes<R: Real>(&self, velocity: &mut FaceVector<R>) {
+    pub(crate) fn fill_ghost_planes<R: Real>(&self, velocity: &mut FaceVector<R>) {
         let layout = velocity.x.layout();
         let (plane, nz) = (layout.plane(), layout.cells[2]);
         if !self.is_periodic(2) {
@@ -189,7 +180,7 @@ impl Boundaries {
     }
 
     /// Fills the ghosts along x and y of one plane of the pressure: zero normal gradient or periodic.
-    pub fn fill_pressure_of_plane<R: Real>(&self, layout: Layout, plane: &mut [R]) {
+    pub(crate) fn fill_pressure_of_plane<R: Real>(&self, layout: Layout, plane: &mut [R]) {
         let (row, [nx, ny, _]) = (layout.row(), layout.cells);
         let periodic = self.is_periodic(0);
         for row in plane.chunks_exact_mut(row) {
@@ -200,7 +191,7 @@ impl Boundaries {
     }
 
     /// Fills the ghost planes of the pressure.
-    pub fn fill_pressure_planes<R: Real>(&self, pressure: &mut Field<Centre, R>) {
+    pub(crate) fn fill_pressure_planes<R: Real>(&self, pressure: &mut Field<Centre, R>) {
         let layout = pressure.layout();
         self.fill_pressure_ends(pressure, layout.plane(), 2, layout.cells[2]);
     }
@@ -216,19 +207,10 @@ impl Boundaries {
         }
     }
 
-    /// Fills all ghosts of the pressure.
-    pub fn fill_pressure<R: Real>(&self, pressure: &mut Field<Centre, R>) {
-        let layout = pressure.layout();
-        for plane in pressure.chunks_exact_mut(layout.plane()) {
-            self.fill_pressure_of_plane(layout, plane);
-        }
-        self.fill_pressure_planes(pressure);
-    }
-
     /// Moves the outflow faces of `next` by convection, d q / dt + C d q / d n = 0 with C the mean
     /// speed through the face, then shifts them all by one speed so that inflow equals outflow.
     /// `next` has its other boundary faces set. Without an outflow nothing is done.
-    pub fn convect_outflow<R: Real>(
+    pub(crate) fn convect_outflow<R: Real>(
         &self,
         mesh: &Mesh,
         now: &FaceVector<R>,
@@ -285,6 +267,29 @@ impl Boundaries {
                 f(axis, side, self.0[axis][side]);
             }
         }
+    }
+}
+
+#[cfg(test)]
+impl Boundaries {
+    /// Fills the ghost layers of a velocity whose interior and boundary faces are set.
+    pub(crate) fn fill_ghosts<R: Real>(&self, velocity: &mut FaceVector<R>) {
+        let layout = velocity.x.layout();
+        for component in 0..3 {
+            let planes = velocity.component_mut(component);
+            for plane in planes.chunks_exact_mut(layout.plane()) {
+                self.fill_ghosts_of_plane(layout, component, plane);
+            }
+        }
+        self.fill_ghost_planes(velocity);
+    }
+    /// Fills all ghosts of the pressure.
+    pub(crate) fn fill_pressure<R: Real>(&self, pressure: &mut Field<Centre, R>) {
+        let layout = pressure.layout();
+        for plane in pressure.chunks_exact_mut(layout.plane()) {
+            self.fill_pressure_of_plane(layout, plane);
+        }
+        self.fill_pressure_planes(pressure);
     }
 }
 

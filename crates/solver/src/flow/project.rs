@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::FlowMeasures;
 use crate::grid::{FaceVector, Layout};
 use crate::math::Real;
-use crate::math::lanes::{Kernel, Partial, RowWork, Single, Vector, along_row};
+use crate::math::lanes::{Kernel, One, Partial, RowWork, Vector, along_row};
 use crate::poisson::{Plane, Solution};
 
 /// What one plane contributes to the measures.
@@ -68,7 +68,7 @@ impl<R: Real> Kernel for Divergence<'_, R> {
                 along_row::<V>(n - 1, &mut work);
                 let last = [work.u[n], work.u[1]];
                 work.u = &last;
-                work.value::<Single<R>>(n, 0);
+                work.value::<One<R>>(n, 0);
             } else {
                 along_row::<V>(n, &mut work);
             }
@@ -167,12 +167,12 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 along_row::<V>(n - 1, &mut work);
                 let last = [work.u[n], work.u[1]];
                 work.u = &last;
-                work.value::<Single<R>>(n, 0);
+                work.value::<One<R>>(n, 0);
             } else {
                 along_row::<V>(n, &mut work);
                 // The lower boundary face was summed with the others.
                 let given = -x[j * row + 1].wide();
-                partial.momentum[0].add(1, Single::<R>::constant(given));
+                partial.momentum[0].add(1, One::<R>::constant(given));
             }
             rise[0] += self.pressure[j * row + n].wide() - self.pressure[j * row + 1].wide();
         }

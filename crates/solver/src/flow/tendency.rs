@@ -12,7 +12,7 @@ use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout, Mesh};
 use crate::math::Real;
-use crate::math::lanes::{Kernel, Partial, RowWork, Single, Vector, along_row};
+use crate::math::lanes::{Kernel, One, Partial, RowWork, Vector, along_row};
 
 /// Constants of the tendency.
 #[derive(Clone, Copy)]
@@ -120,7 +120,7 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
             if self.walled[0] {
                 // The lower boundary face was summed with the others.
                 let given = -tx[j * row + 1].wide();
-                sums[0].add(1, Single::<R>::constant(given));
+                sums[0].add(1, One::<R>::constant(given));
             }
         }
         *self.sum = DVec3::from_array(sums.map(|sum| sum.sum()));
@@ -221,7 +221,9 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
             let old = &mut self.tendency[axis][i..];
             let push = V::constant(self.weights.push[axis]) * (pc - lower[axis]);
-            (q + before * V::load(old) - push + now * h).store(&mut self.predicted[axis][i..]);
+            // What is small is summed first: in singles q would swallow it part by part.
+            let gain = now * h + before * V::load(old) - push;
+            (q + gain).store(&mut self.predicted[axis][i..]);
             h.store(old);
             if !self.given[axis] {
                 self.sums[axis].add(i, h);

@@ -164,6 +164,7 @@ impl<L: Location, R: Real> Field<L, R> {
         self.layout
     }
     /// Value at (i, j, k); ghosts at 0 and n+1.
+    #[cfg(test)]
     #[inline]
     pub fn at(&self, i: usize, j: usize, k: usize) -> R {
         self.values[self.layout.index(i, j, k)]
@@ -175,6 +176,7 @@ impl<L: Location, R: Real> Field<L, R> {
         self.values[at] = value;
     }
     /// One row, ghosts included.
+    #[cfg(test)]
     #[inline]
     pub fn row(&self, j: usize, k: usize) -> &[R] {
         let start = self.layout.index(0, j, k);
@@ -193,10 +195,12 @@ impl<L: Location, R: Real> Field<L, R> {
         }
     }
     /// Copies the interior across the box on a periodic axis (the upper boundary face included).
+    #[cfg(test)]
     pub fn wrap(&mut self, axis: usize) {
         self.layout.wrap(&mut self.values, axis);
     }
     /// Copies the layer `from` of an axis onto the layer `to`.
+    #[cfg(test)]
     pub fn copy_layer(&mut self, axis: usize, from: usize, to: usize) {
         self.layout
             .map_layer(&mut self.values, axis, from, to, |value| value);

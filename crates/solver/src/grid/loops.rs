@@ -153,11 +153,6 @@ pub fn for_columns<R: Send, S: Send>(
         });
 }
 
-/// Sum of partial results in the order of the planes.
-pub fn ordered_sum(partial: &[f64]) -> f64 {
-    partial.iter().sum()
-}
-
 /// A slice cut into equal pieces that threads may hold one at a time.
 struct Pieces<T> {
     start: *mut T,

@@ -4,6 +4,7 @@ mod field;
 mod loops;
 mod mesh;
 
-pub use field::{Centre, FACE_OFFSET, FaceVector, FaceX, FaceY, FaceZ, Field, Layout, Location};
-pub use loops::{Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, ordered_sum};
+pub use field::Layout;
+pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field};
+pub(crate) use loops::{Columns, Run, for_chunks, for_columns, for_planes_of, for_runs};
 pub use mesh::{Axis, Mesh};

@@ -2,13 +2,14 @@
 
 mod aligned;
 mod formula;
-pub mod lanes;
+pub(crate) mod lanes;
 mod linear;
 mod pose;
 mod real;
 
-pub use aligned::Aligned;
+pub(crate) use aligned::Aligned;
 pub use formula::Formula;
 pub use linear::{Matrix6, Vector6, solve6};
 pub use pose::{Load, Pose};
-pub use real::{Precision, Real};
+pub use real::Precision;
+pub(crate) use real::Real;

@@ -19,6 +19,26 @@ pub enum Precision {
     Double,
 }
 
+impl std::str::FromStr for Precision {
+    type Err = String;
+    fn from_str(name: &str) -> Result<Precision, String> {
+        match name {
+            "f64" => Ok(Precision::Double),
+            "f32" => Ok(Precision::Single),
+            _ => Err("accepted: f64, f32".into()),
+        }
+    }
+}
+
+impl std::fmt::Display for Precision {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Precision::Single => "f32",
+            Precision::Double => "f64",
+        })
+    }
+}
+
 impl Precision {
     /// Bytes of a number.
     pub fn bytes(self) -> usize {
@@ -31,7 +51,7 @@ impl Precision {
 
 /// A number of a field, `f64` or `f32`. Sums over the grid, and everything about grains, are
 /// doubles whatever the fields are.
-pub trait Real:
+pub(crate) trait Real:
     Registers
     + Copy
     + Debug
@@ -49,8 +69,6 @@ pub trait Real:
     const BYTES: usize = size_of::<Self>();
     /// How many fill a cache line, and the widest register: 8 or 16.
     const LANES: usize = 64 / Self::BYTES;
-    /// What it stands for.
-    const PRECISION: Precision;
     /// The nearest number to `value`.
     fn of(value: f64) -> Self;
     /// Its value.
@@ -62,9 +80,8 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($number:ident, $precision:ident) => {
+    ($number:ident) => {
         impl Real for $number {
-            const PRECISION: Precision = Precision::$precision;
             #[inline(always)]
             fn of(value: f64) -> Self {
                 value as $number
@@ -84,5 +101,5 @@ macro_rules! real {
         }
     };
 }
-real!(f64, Double);
-real!(f32, Single);
+real!(f64);
+real!(f32);

@@ -115,7 +115,8 @@ pub fn run(
     if resuming {
         provenance = Provenance::read(out).unwrap_or(provenance);
         if provenance.case_sha256 != job.digest {
-            let what = "its grains, fluid, box, contact, step or output times differ".into();
+            let what =
+                "its grains, fluid, box, contact, step, precision or output times differ".into();
             return Err(RunError::OtherCase {
                 folder: out.into(),
                 what,

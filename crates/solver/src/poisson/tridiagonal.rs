@@ -3,7 +3,9 @@
 //! With lambda = lambda_x + lambda_y and b = 2 + lambda dz^2 each reads
 //! -x[k-1] + b x[k] - x[k+1] = -dz^2 f[k], with b lowered by one next to a Neumann end and the
 //! corners closed by Sherman-Morrison on a periodic axis. A block of columns is eliminated at a
-//! time: as many as the cache holds, so that memory sees each mode once in and once out.
+//! time: as many as the cache holds, so that memory sees each mode once in and once out. All of it
+//! is in doubles, whatever the modes are: the lowest modes of a wide flat box have lambda dz^2 below
+//! the rounding of singles, and would be lost.
 //!
 //! Legend: y solution of the open system, q its answer to the corner, g = -b, v values in cache.
 
@@ -18,21 +20,21 @@ const CACHE: usize = 1 << 19;
 /// Columns of a block: a multiple of two cache lines.
 pub fn block_width<R: Real>(nz: usize) -> usize {
     let least = 2 * R::LANES;
-    (CACHE / R::BYTES / 2 / nz / least * least).max(least)
+    (CACHE / size_of::<f64>() / 2 / nz / least * least).max(least)
 }
 
 /// One block of columns in cache.
-pub struct ColumnScratch<R> {
-    values: Aligned<R>,
-    pivots: Aligned<R>,
-    corner: Aligned<R>,
-    carry: Aligned<R>,
+pub struct ColumnScratch {
+    values: Aligned<f64>,
+    pivots: Aligned<f64>,
+    corner: Aligned<f64>,
+    carry: Aligned<f64>,
     /// Right-hand side of the mean mode and the pivots of its system.
     mean: [Vec<f64>; 2],
 }
 
-impl<R: Real> ColumnScratch<R> {
-    pub fn new(width: usize, nz: usize, ends: Ends) -> ColumnScratch<R> {
+impl ColumnScratch {
+    pub fn new(width: usize, nz: usize, ends: Ends) -> ColumnScratch {
         let periodic = ends == Ends::Periodic && nz > 1;
         ColumnScratch {
             values: Aligned::zeros(width * nz),
@@ -50,7 +52,7 @@ impl<R: Real> ColumnScratch<R> {
             carry,
             mean,
         } = self;
-        R::BYTES * (values.len() + pivots.len() + corner.len() + carry.len()) + 16 * mean[0].len()
+        8 * (values.len() + pivots.len() + corner.len() + carry.len() + 2 * mean[0].len())
     }
 }
 
@@ -79,15 +81,15 @@ impl Tridiagonal {
 pub struct Solve<'a, 'b, R> {
     pub system: Tridiagonal,
     pub columns: &'a mut Columns<'b, R>,
-    pub lambda: &'a [R],
+    pub lambda: &'a [f64],
     pub singular: bool,
-    pub scratch: &'a mut ColumnScratch<R>,
+    pub scratch: &'a mut ColumnScratch,
 }
 
 impl<R: Real> Kernel for Solve<'_, '_, R> {
-    type Number = R;
+    type Number = f64;
     #[inline(always)]
-    fn run<V: Vector<Number = R>>(self) {
+    fn run<V: Vector<Number = f64>>(self) {
         let Solve {
             system,
             columns,
@@ -97,14 +99,14 @@ impl<R: Real> Kernel for Solve<'_, '_, R> {
         } = self;
         match system.ends {
             _ if system.n == 1 => system.solve_flat(columns, lambda),
-            Ends::Neumann => system.solve_neumann::<V>(columns, lambda, singular, scratch),
+            Ends::Neumann => system.solve_neumann::<V, R>(columns, lambda, singular, scratch),
             Ends::Periodic => {
                 if singular {
                     for k in 0..system.n {
                         scratch.mean[0][k] = columns.row(k)[0].wide();
                     }
                 }
-                system.solve_periodic::<V>(columns, lambda, scratch);
+                system.solve_periodic::<V, R>(columns, lambda, scratch);
                 if singular {
                     system.solve_mean(columns, &mut scratch.mean);
                 }
@@ -115,23 +117,23 @@ impl<R: Real> Kernel for Solve<'_, '_, R> {
 
 impl Tridiagonal {
     #[inline(always)]
-    fn solve_flat<R: Real>(&self, columns: &mut Columns<R>, lambda: &[R]) {
+    fn solve_flat<R: Real>(&self, columns: &mut Columns<R>, lambda: &[f64]) {
         for (value, lambda) in columns.row(0).iter_mut().zip(lambda) {
-            *value = R::of(if lambda.wide() == 0.0 {
+            *value = R::of(if *lambda == 0.0 {
                 0.0
             } else {
-                -self.scale * value.wide() / lambda.wide()
+                -self.scale * value.wide() / lambda
             });
         }
     }
 
     #[inline(always)]
-    fn solve_neumann<V: Vector>(
+    fn solve_neumann<V: Vector<Number = f64>, R: Real>(
         &self,
-        columns: &mut Columns<V::Number>,
-        lambda: &[V::Number],
+        columns: &mut Columns<R>,
+        lambda: &[f64],
         singular: bool,
-        scratch: &mut ColumnScratch<V::Number>,
+        scratch: &mut ColumnScratch,
     ) {
         let (n, width) = (self.n, lambda.len());
         let (one, square) = (V::constant(1.0), V::constant(self.square));
@@ -148,7 +150,7 @@ impl Tridiagonal {
             let (values_before, values_here) = values[..(k + 1) * width].split_at_mut(k * width);
             for i in (0..width).step_by(V::WIDTH) {
                 let b = open + V::load(&lambda[i..]) * square;
-                let f = factor * V::load(&row[i..]);
+                let f = factor * V::load_from(&row[i..]);
                 let (pivot, value) = if k == 0 {
                     let pivot = one.over(b);
                     (pivot, f * pivot)
@@ -163,28 +165,30 @@ impl Tridiagonal {
         }
         if singular {
             // The last pivot of the mean mode vanishes; the value there is pinned to zero.
-            values[(n - 1) * width] = V::Number::default();
+            values[(n - 1) * width] = 0.0;
         }
         let carry = &mut scratch.carry[..width];
         carry.copy_from_slice(&values[(n - 1) * width..]);
-        columns.row(n - 1).copy_from_slice(carry);
+        for (last, carry) in columns.row(n - 1).iter_mut().zip(&*carry) {
+            *last = R::of(*carry);
+        }
         for k in (0..n - 1).rev() {
             let row = columns.row(k);
             let (values, pivots) = (&values[k * width..][..width], &pivots[k * width..][..width]);
             for i in (0..width).step_by(V::WIDTH) {
                 let x = V::load(&values[i..]) + V::load(&pivots[i..]) * V::load(&carry[i..]);
                 x.store(&mut carry[i..]);
-                x.store(&mut row[i..]);
+                x.store_to(&mut row[i..]);
             }
         }
     }
 
     #[inline(always)]
-    fn solve_periodic<V: Vector>(
+    fn solve_periodic<V: Vector<Number = f64>, R: Real>(
         &self,
-        columns: &mut Columns<V::Number>,
-        lambda: &[V::Number],
-        scratch: &mut ColumnScratch<V::Number>,
+        columns: &mut Columns<R>,
+        lambda: &[f64],
+        scratch: &mut ColumnScratch,
     ) {
         let (n, width) = (self.n, lambda.len());
         let (one, two, zero) = (V::constant(1.0), V::constant(2.0), V::constant(0.0));
@@ -225,7 +229,7 @@ impl Tridiagonal {
                 let pivot = one.over(diagonal - before);
                 let at = k * width + i;
                 pivot.store(&mut pivots[at..]);
-                ((factor * V::load(&row[i..]) + y) * pivot).store(&mut values[at..]);
+                ((factor * V::load_from(&row[i..]) + y) * pivot).store(&mut values[at..]);
                 ((u + q) * pivot).store(&mut corner[at..]);
             }
         }
@@ -252,7 +256,7 @@ impl Tridiagonal {
             for i in (0..width).step_by(V::WIDTH) {
                 let at = k * width + i;
                 let x = V::load(&values[at..]) - V::load(&share[i..]) * V::load(&corner[at..]);
-                x.store(&mut row[i..]);
+                x.store_to(&mut row[i..]);
             }
         }
     }

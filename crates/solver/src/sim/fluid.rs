@@ -124,6 +124,7 @@ impl<R: Real> Fluid for FluidOf<R> {
         self.flow.bytes() + self.coupling.bytes()
     }
     fn save(&self, out: &mut Writer) -> io::Result<()> {
+        out.count(R::BYTES as u64)?;
         let m = &self.measures;
         out.numbers(&[
             m.max_divergence,
@@ -141,6 +142,7 @@ impl<R: Real> Fluid for FluidOf<R> {
         out.numbers(sums)
     }
     fn restore(&mut self, input: &mut Reader, last_step: f64) -> io::Result<()> {
+        input.expect(R::BYTES, "bytes a number")?;
         let m = &mut self.measures;
         [
             m.max_divergence,

@@ -66,7 +66,36 @@ impl FormulaTable {
             .collect::<Vec<_>>()
             .try_into()
             .map_err(|_| format!("found {found} formulas; expected three, for x, y and z"))?;
-        Formula::parse(text, V::NAMES)
+        Formula::parse(text.clone(), V::NAMES).map_err(|message| reworded(&text, message))
+    }
+}
+
+/// The message of a formula that cannot be read, without the parser's own words for it.
+fn reworded(text: &[String; 3], message: String) -> String {
+    for (name, component) in ["x", "y", "z"].iter().zip(text) {
+        let start = format!("the {name} component \"{component}\": ");
+        let Some((said, accepted)) = message
+            .strip_prefix(&start)
+            .and_then(|rest| rest.split_once("; a formula may use "))
+        else {
+            continue;
+        };
+        if !said.starts_with("unknown name") {
+            return format!("{start}{}; a formula may use {accepted}", fault(component));
+        }
+    }
+    message
+}
+
+/// What may be wrong with a formula that cannot be read.
+fn fault(formula: &str) -> &'static str {
+    let count = |mark| formula.matches(mark).count();
+    if formula.trim().is_empty() {
+        "it is empty (write 0 for nothing)"
+    } else if count('(') != count(')') {
+        "its brackets do not match"
+    } else {
+        "it cannot be read (every product needs its *, and functions take brackets)"
     }
 }
 

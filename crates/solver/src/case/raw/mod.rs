@@ -55,7 +55,7 @@ pub struct RawCase {
     /// What is written and when.
     #[serde(default)]
     pub output: RawOutput,
-    /// How the run is executed; has no effect on the results.
+    /// How the run is executed; threads have no effect on the results, precision rounds them.
     #[serde(default)]
     pub run: RawRun,
     /// Expected results, which make the case a test.

@@ -37,12 +37,12 @@ pub struct RawTime {
 }
 
 /// When to stop early.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RawStop {
     /// What must have happened.
     pub when: StopWhen,
     /// How long to go on after it [s].
-    pub hold: Quantity<Time>,
+    pub hold: Loc<Quantity<Time>>,
 }
 
 fn stop_word(word: &str) -> Result<StopWhen, String> {
@@ -66,8 +66,8 @@ fn stop_word(word: &str) -> Result<StopWhen, String> {
 #[serde(deny_unknown_fields)]
 pub struct StopTable {
     when: StopWhen,
-    #[serde(default = "no_time")]
-    hold: Quantity<Time>,
+    #[serde(default)]
+    hold: Loc<Quantity<Time>>,
 }
 
 fn no_time() -> Quantity<Time> {
@@ -82,7 +82,7 @@ impl Forms for RawStop {
     fn from_word(word: &str) -> Result<Self, String> {
         Ok(RawStop {
             when: stop_word(word)?,
-            hold: no_time(),
+            hold: no_time().into(),
         })
     }
     fn from_table(table: StopTable) -> Result<Self, String> {

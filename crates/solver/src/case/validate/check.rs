@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use crate::case::error::Problem;
 use crate::case::loc::Loc;
-use crate::case::quantity::Quantity;
+use crate::case::quantity::{Kind, Quantity};
+use crate::case::readable::{number, quantity};
 use crate::case::source::Source;
 
 /// Collects problems; a case is good when there are none.
@@ -34,22 +35,40 @@ impl<'a> Checker<'a> {
             .push(self.source.locate(problem, span, "here"));
     }
 
+    /// Whether a value at `key` or under it is written as a number without a unit.
+    pub fn is_bare(&self, key: &str) -> bool {
+        self.source.is_bare(key)
+    }
+
+    /// Whether an override set what stands at `span`, or a part of it.
+    pub fn is_overridden(&self, span: &Range<usize>) -> bool {
+        self.source.is_overridden(span)
+    }
+
     /// The value if it is above zero.
-    pub fn positive<K>(&mut self, value: &Loc<Quantity<K>>, key: &str, what: &str) -> Option<f64> {
+    pub fn positive<K: Kind>(
+        &mut self,
+        value: &Loc<Quantity<K>>,
+        key: &str,
+        what: &str,
+    ) -> Option<f64> {
         if value.si > 0.0 {
             return Some(value.si);
         }
         self.fail(
             value.span.as_ref(),
             key,
-            format!("{what} must be greater than zero, found {}", value.si),
+            format!(
+                "{what} must be greater than zero, found {}",
+                quantity(value.si, K::SI)
+            ),
             format!("give a positive `{key}`"),
         );
         None
     }
 
     /// The value if it lies in `low..=high`.
-    pub fn within<K>(
+    pub fn within<K: Kind>(
         &mut self,
         value: &Loc<Quantity<K>>,
         key: &str,
@@ -60,21 +79,16 @@ impl<'a> Checker<'a> {
             return Some(value.si);
         }
         let range = if high.is_finite() {
-            format!("between {low} and {high}")
+            format!("between {} and {}", number(low), number(high))
         } else {
-            format!("at least {low}")
+            format!("at least {}", number(low))
         };
         self.fail(
             value.span.as_ref(),
             key,
-            format!("found {}, which is out of range", value.si),
+            format!("found {}, which is out of range", quantity(value.si, K::SI)),
             format!("`{key}` must be {range}"),
         );
         None
     }
-}
-
-/// A number as people write it: six digits at most.
-pub(super) fn short(x: f64) -> f64 {
-    format!("{x:.5e}").parse().unwrap_or(x)
 }

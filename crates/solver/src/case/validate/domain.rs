@@ -2,10 +2,11 @@
 
 use glam::DVec3;
 
-use super::check::{Checker, short};
+use super::check::Checker;
 use crate::case::loc::Loc;
 use crate::case::quantity::Triple;
 use crate::case::raw::{AxisFaces, CellSize, Face, FaceKind, RawDomain};
+use crate::case::readable::{length, number, quantity, vector};
 use crate::flow::{Boundaries, Boundary};
 use crate::grid::Mesh;
 
@@ -24,8 +25,8 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
             size.span.as_ref(),
             "domain.size",
             format!(
-                "the edges of the box must be longer than zero, found {:?}",
-                size.si.to_array()
+                "the edges of the box must be longer than zero, found {}",
+                vector(size.si, "m")
             ),
             "give three positive lengths",
         );
@@ -65,9 +66,9 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
                     cells.span.as_ref(),
                     "domain.cells",
                     format!(
-                        "size {:?} m is not cells times cell_size, {:?} m",
-                        size.si.to_array(),
-                        extent.to_array()
+                        "size {} is not cells times cell_size, {}",
+                        vector(size.si, "m"),
+                        vector(extent, "m")
                     ),
                     "give two of size, cells and cell_size",
                 );
@@ -116,13 +117,13 @@ fn divide(
 ) -> Option<[usize; 3]> {
     let mut cells = [0; 3];
     for axis in 0..3 {
-        let (length, h) = (size.si[axis], cell.0[axis]);
-        let ratio = length / h;
+        let (edge, h) = (size.si[axis], cell.0[axis]);
+        let ratio = edge / h;
         if ratio > MOST_CELLS as f64 {
             check.fail(
                 cell.span.as_ref(),
                 "domain.cell_size",
-                format!("{ratio:.3e} cells along {}", AXES[axis]),
+                format!("{:.1} million cells along {}", 1e-6 * ratio, AXES[axis]),
                 "make the cells larger; was a unit forgotten?",
             );
             return None;
@@ -133,10 +134,19 @@ fn divide(
             check.fail(
                 cell.span.as_ref(),
                 "domain.cell_size",
-                format!("{length} m along {} is not a whole number of cells of {h} m ({ratio:.4} cells)", AXES[axis]),
                 format!(
-                    "take {} = {} m ({below} cells) or {} m ({above} cells), or keep the size with a cell of {} m",
-                    AXES[axis], short(below * h), short(above * h), short(length / whole)
+                    "{} along {} is not a whole number of cells of {} ({} cells)",
+                    length(edge),
+                    AXES[axis],
+                    length(h),
+                    number(ratio)
+                ),
+                format!(
+                    "take {} = {} ({below} cells) or {} ({above} cells), or keep the size with a cell of {}",
+                    AXES[axis],
+                    length(below * h),
+                    length(above * h),
+                    length(edge / whole)
                 ),
             );
             return None;
@@ -192,15 +202,17 @@ fn boundary(face: &Face, axis: usize, side: usize) -> Result<Boundary, (String, 
     match face.kind {
         FaceKind::Wall if velocity[axis] != 0.0 => Err((
             format!(
-                "a wall moves in its own plane, but this one has {} m/s along {}",
-                velocity[axis], AXES[axis]
+                "a wall moves in its own plane, but this one has {} along {}",
+                quantity(velocity[axis], "m/s"),
+                AXES[axis]
             ),
             format!("set the {} component of its velocity to zero", AXES[axis]),
         )),
         FaceKind::Inflow if velocity[axis] * [1.0, -1.0][side] < 0.0 => Err((
             format!(
-                "this inflow leaves the box ({} m/s along {})",
-                velocity[axis], AXES[axis]
+                "this inflow leaves the box ({} along {})",
+                quantity(velocity[axis], "m/s"),
+                AXES[axis]
             ),
             "turn the sign of its velocity, or make it an outflow".into(),
         )),
@@ -271,7 +283,8 @@ fn mass_balance(check: &mut Checker, raw: &RawDomain, boundaries: &Boundaries, m
             span.as_ref(),
             &format!("domain.boundaries.{}", AXES[axis]),
             format!(
-                "{entering:.4e} m3/s enter the box and nothing leaves it: no face is an outflow"
+                "{} enter the box and nothing leaves it: no face is an outflow",
+                quantity(1e3 * entering, "L/s")
             ),
             "make the opposite face an outflow",
         );

@@ -1,15 +1,18 @@
 //! `[[grain]]` -> grains.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::DVec3;
 use grainwake_shape::Shape;
 
 use super::check::Checker;
+use crate::case::estimate::LIGHTEST_FREE;
 use crate::case::loc::Loc;
 use crate::case::placement::{orientation, reach};
-use crate::case::quantity::Triple;
+use crate::case::quantity::{Density, Quantity, Triple};
 use crate::case::raw::{Law, Orientation, Position, RawGrain, Turns};
+use crate::case::readable::{number, quantity, vector};
 use crate::case::shapes::Library;
 use crate::dem::{Dof, Grain};
 use crate::math::Pose;
@@ -35,12 +38,16 @@ pub(super) fn grain(
     index: usize,
     earlier: &[Option<Grain>],
     vertical: (usize, f64),
+    fluid_density: Option<f64>,
 ) -> Option<(Grain, RawGrain)> {
     let before = check.problems.len();
     let key = |name: &str| format!("grain.{index}.{name}");
     let mut resolved = raw.value.clone();
     let shape = shape(check, library, raw, &mut resolved, index);
     let density = check.positive(&raw.density, &key("density"), "the density of a grain");
+    if raw.motion.velocity == Law::Free {
+        not_too_light(check, &raw.density, &key("density"), fluid_density);
+    }
     let turn = orientation(&raw.orientation, &raw.rotate);
     if let Err(message) = &turn {
         check.fail(
@@ -77,6 +84,39 @@ pub(super) fn grain(
     resolved.velocity = Some(Triple::new(velocity).into());
     resolved.angular_velocity = Some(Triple::new(angular_velocity).into());
     (check.problems.len() == before).then_some((grain, resolved))
+}
+
+/// Refuses a free grain that is too light for the coupling with a fluid of this density [kg/m3].
+pub(super) fn not_too_light(
+    check: &mut Checker,
+    density: &Loc<Quantity<Density>>,
+    key: &str,
+    fluid_density: Option<f64>,
+) {
+    let Some(fluid) = fluid_density.filter(|fluid| density.si < LIGHTEST_FREE * fluid) else {
+        return;
+    };
+    // What is not positive has been refused already.
+    if density.si <= 0.0 {
+        return;
+    }
+    let least = quantity(LIGHTEST_FREE * fluid, "kg/m3");
+    let mut help = format!(
+        "accepted: at least {LIGHTEST_FREE} times the fluid's density, {least}, or a grain whose velocity is prescribed (motion)"
+    );
+    if density.si < 30.0 && check.is_bare(key) {
+        help.push_str("; kg/m3? was a unit such as g/cm3 forgotten?");
+    }
+    check.fail(
+        density.span.as_ref(),
+        key,
+        format!(
+            "{} is {} times the density of the fluid: below {LIGHTEST_FREE} times it, free grains are unstable in this coupling (added mass)",
+            quantity(density.si, "kg/m3"),
+            number(density.si / fluid)
+        ),
+        help,
+    );
 }
 
 pub(super) fn shape(
@@ -177,7 +217,7 @@ pub(super) fn drives(grains: &[Loc<RawGrain>]) -> Vec<Drive> {
 /// Velocities at the start: the prescribed ones, else the given ones, else zero.
 fn velocities(check: &mut Checker, raw: &RawGrain, key: &dyn Fn(&str) -> String) -> [DVec3; 2] {
     let mut start =
-        |law: &Law, given: Option<(DVec3, &Option<std::ops::Range<usize>>)>, name: &str| {
+        |law: &Law, given: Option<(DVec3, &Option<Range<usize>>)>, name: &str, unit: &str| {
             let prescribed = match law {
                 Law::Free => None,
                 Law::Prescribed(v) => Some(*v),
@@ -189,9 +229,9 @@ fn velocities(check: &mut Checker, raw: &RawGrain, key: &dyn Fn(&str) -> String)
                         span.as_ref(),
                         &key(name),
                         format!(
-                            "the motion prescribes {:?}, but this is {:?}",
-                            v.to_array(),
-                            u.to_array()
+                            "the motion prescribes {}, but this is {}",
+                            vector(v, unit),
+                            vector(u, unit)
                         ),
                         format!("leave out `{name}`: a prescribed motion sets it"),
                     );
@@ -204,8 +244,13 @@ fn velocities(check: &mut Checker, raw: &RawGrain, key: &dyn Fn(&str) -> String)
     let velocity = raw.velocity.as_ref().map(|v| (v.si, &v.span));
     let spin = raw.angular_velocity.as_ref().map(|v| (v.si, &v.span));
     [
-        start(&raw.motion.velocity, velocity, "velocity"),
-        start(&raw.motion.angular_velocity, spin, "angular_velocity"),
+        start(&raw.motion.velocity, velocity, "velocity", "m/s"),
+        start(
+            &raw.motion.angular_velocity,
+            spin,
+            "angular_velocity",
+            "rad/s",
+        ),
     ]
 }
 

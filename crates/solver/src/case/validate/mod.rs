@@ -8,9 +8,9 @@ mod packings;
 mod physics;
 mod plan;
 
-use std::ops::Range;
 use std::path::Path;
 
+use self::arrangement::Site;
 use self::check::Checker;
 use super::error::{CaseError, Problem};
 use super::expect::{Expectation, expectations};
@@ -55,19 +55,19 @@ pub(super) fn validate(
     let vertical = grains::up(gravity);
     let mut standing: Vec<Option<Grain>> = Vec::new();
     let mut resolved: Vec<Loc<RawGrain>> = Vec::new();
-    let mut spans: Vec<Option<Range<usize>>> = Vec::new();
-    let place = |grain: &Loc<RawGrain>| {
-        let above = grain.gap_above.as_ref().and_then(|g| g.span.clone());
-        grain
-            .position
-            .as_ref()
-            .and_then(|p| p.span.clone())
-            .or(above)
-            .or(grain.span.clone())
-    };
+    let mut sites: Vec<Site> = Vec::new();
+    let fluid_density = fluid.as_ref().and_then(|f| f.as_ref()).map(|f| f.density);
     for (index, grain) in raw.grain.iter().enumerate() {
-        let built = grains::grain(&mut check, &mut library, grain, index, &standing, vertical);
-        spans.push(place(grain));
+        let built = grains::grain(
+            &mut check,
+            &mut library,
+            grain,
+            index,
+            &standing,
+            vertical,
+            fluid_density,
+        );
+        sites.push(Site::of(&check, grain, index, vertical.0));
         let (grain, raw_grain) = built.unzip();
         standing.push(grain);
         resolved.extend(raw_grain.map(Loc::none));
@@ -84,6 +84,7 @@ pub(super) fn validate(
         periodic: [0, 1, 2].map(|axis| boundaries.is_periodic(axis)),
         solid: boundaries.0.map(|sides| sides.map(|b| b.is_solid())),
     };
+    let before_packings = check.problems.len();
     for (index, packing) in raw.packing.iter().enumerate() {
         let there: Vec<Grain> = standing.iter().flatten().cloned().collect();
         for grain in packings::packing(
@@ -94,6 +95,7 @@ pub(super) fn validate(
             &there,
             &enclosure,
             vertical,
+            fluid_density,
         ) {
             let located = Loc {
                 value: grain,
@@ -106,20 +108,24 @@ pub(super) fn validate(
                 standing.len(),
                 &standing,
                 vertical,
+                // Told of the packing as a whole.
+                None,
             );
-            spans.push(packing.span.clone());
+            sites.push(Site::packed(packing.span.as_ref(), index));
             let (grain, raw_grain) = built.unzip();
             standing.push(grain);
             resolved.extend(raw_grain.map(Loc::none));
         }
     }
-    if standing.iter().any(Option::is_none) {
+    // Without grains that are meant to be there, more would be said that is not so.
+    let packed = check.problems.len() == before_packings;
+    if !packed || standing.iter().any(Option::is_none) {
         return Err(CaseError::Invalid(check.problems));
     }
     let mut grains: Vec<Grain> = standing.into_iter().flatten().collect();
     prescription.motions = grains::drives(&resolved);
     prescription.drive(&mut grains, 0.0);
-    arrangement::check(&mut check, &grains, &spans, &enclosure);
+    arrangement::check(&mut check, &grains, &sites, &enclosure);
     if dry && grains.is_empty() {
         check.fail(
             None,

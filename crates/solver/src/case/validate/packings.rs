@@ -1,13 +1,14 @@
 //! `[[packing]]` -> raw grains.
 
 use super::check::Checker;
-use super::grains::shape;
+use super::grains::{not_too_light, shape};
 use crate::case::loc::Loc;
 use crate::case::packing::{Ball, Random, Space};
 use crate::case::quantity::Quantity;
 use crate::case::raw::{
     Arrangement, Orientation, PackingOrientation, Position, RawGrain, RawPacking,
 };
+use crate::case::readable::vector;
 use crate::case::shapes::Library;
 use crate::dem::{Enclosure, Grain};
 
@@ -20,6 +21,7 @@ pub(super) fn packing(
     standing: &[Grain],
     enclosure: &Enclosure,
     vertical: (usize, f64),
+    fluid_density: Option<f64>,
 ) -> Vec<RawGrain> {
     let key = |name: &str| format!("packing.{index}.{name}");
     let count = raw.count.value;
@@ -49,6 +51,7 @@ pub(super) fn packing(
     ) else {
         return Vec::new();
     };
+    not_too_light(check, &raw.density, &key("density"), fluid_density);
     let diameters = raw.equivalent_diameter.as_ref();
     if let Some(range) = diameters.filter(|r| !(r.from > 0.0 && r.to >= r.from)) {
         check.fail(
@@ -125,9 +128,9 @@ pub(super) fn packing(
             &key("region"),
             "the region is empty or reaches out of the box",
             format!(
-                "the box goes from {:?} to {:?}",
-                enclosure.lower.to_array(),
-                enclosure.upper.to_array()
+                "the box goes from {} to {}",
+                vector(enclosure.lower, "m"),
+                vector(enclosure.upper, "m")
             ),
         );
         return Vec::new();
@@ -153,7 +156,9 @@ pub(super) fn packing(
     let centres = match centres {
         Ok(centres) => centres,
         Err(fit) => {
-            check.fail(region_span, &format!("packing.{index}"), format!("only {fit} of {count} grains find a place without touching"), "take fewer or smaller grains, a larger region, or less clearance; a lattice holds more than random places");
+            let count_span = raw.count.span.as_ref();
+            let span = count_span.filter(|span| check.is_overridden(span));
+            check.fail(span.or(region_span), &format!("packing.{index}"), format!("only {fit} of {count} grains find a place without touching"), "take fewer or smaller grains, a larger region, or less clearance; a lattice holds more than random places");
             return Vec::new();
         }
     };

@@ -7,6 +7,7 @@ use crate::case::estimate::terminal_speed;
 use crate::case::loc::Loc;
 use crate::case::quantity::Quantity;
 use crate::case::raw::{RawContact, RawFluid};
+use crate::case::readable::length;
 use crate::dem::{ContactParams, Grain};
 use crate::flow::FluidParams;
 use crate::grid::Mesh;
@@ -156,7 +157,7 @@ pub(super) fn contact(
         check.fail(
             raw.lubrication_gap.span.as_ref(),
             "contact.lubrication_gap",
-            format!("a lubrication gap of {gap} m needs a fluid"),
+            format!("a lubrication gap of {} needs a fluid", length(gap)),
             "add [fluid] or set lubrication_gap = 0",
         );
     }

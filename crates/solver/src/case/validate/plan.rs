@@ -5,6 +5,7 @@ use crate::case::estimate::{default_max_step, settled_time_step};
 use crate::case::loc::Loc;
 use crate::case::quantity::{Quantity, Time};
 use crate::case::raw::{RawOutput, RawRun, RawTime};
+use crate::case::readable::{length, quantity};
 use crate::dem::Grain;
 use crate::grid::Mesh;
 use crate::output::{Place, Plane, RunPlan, Stop};
@@ -85,8 +86,9 @@ pub(super) fn plan(
                 value.span.as_ref(),
                 &key,
                 format!(
-                    "an interval of {interval} s gives {:.1e} outputs",
-                    end / interval
+                    "an interval of {} gives {:.0} million outputs",
+                    quantity(interval, "s"),
+                    1e-6 * end / interval
                 ),
                 "make it longer; was a unit forgotten?",
             );
@@ -155,9 +157,9 @@ fn stop_rule(
     let span = raw.span.as_ref();
     if raw.hold.si < 0.0 {
         check.fail(
-            span,
-            "time.stop",
-            format!("a hold of {} s", raw.hold.si),
+            raw.hold.span.as_ref(),
+            "time.stop.hold",
+            format!("a hold of {}", quantity(raw.hold.si, "s")),
             "give zero or a positive time",
         );
     } else if raw.when == StopWhen::Separation && grains.len() != 2 {
@@ -232,8 +234,8 @@ fn planes(
                     check.fail(
                         at.span.as_ref(),
                         &key("at"),
-                        format!("{} m lies outside the box", at.si),
-                        format!("between {lower} and {upper} m"),
+                        format!("{} lies outside the box", length(at.si)),
+                        format!("between {} and {}", length(lower), length(upper)),
                     );
                 }
                 Place::At(at.si)

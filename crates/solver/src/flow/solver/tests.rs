@@ -423,3 +423,70 @@ fn outflow_keeps_the_mass_of_the_box() {
     // The floor slows the fluid, the lid does not.
     assert!(flow.velocity.x.at(18, 4, 1) < 0.8 * flow.velocity.x.at(18, 4, 8));
 }
+
+#[test]
+fn bits_of_a_step_do_not_depend_on_the_instruction_set() {
+    use crate::math::lanes::{Level, limit_level};
+    fn bits<R: Real>(boundaries: Boundaries) -> Vec<u64> {
+        let mesh = Mesh {
+            cells: [29, 11, 9],
+            spacing: DVec3::new(0.3, 0.4, 0.5),
+            origin: DVec3::ZERO,
+        };
+        let mut flow = Flow::<R>::new(&mesh, boundaries, &params(0.01));
+        flow.start_from(|axis, x| (x + DVec3::new(0.1, 0.2, 0.3)).to_array()[axis].sin());
+        let mut kept = Vec::new();
+        for _ in 0..3 {
+            flow.predict(0.05);
+            let measures = flow.project(0.05);
+            kept.extend([
+                measures.max_divergence,
+                measures.max_rate,
+                measures.kinetic_energy,
+            ]);
+            kept.extend(measures.momentum.to_array());
+        }
+        let (fields, sums) = flow.state();
+        let values = fields.into_iter().flatten().map(|value| value.wide());
+        let all = values.chain(sums.iter().copied()).chain(kept);
+        all.map(f64::to_bits).collect()
+    }
+    let walls = Boundaries([[Boundary::WALL; 2]; 3]);
+    for boundaries in [PERIODIC, walls] {
+        let levels = [Level::Avx512, Level::Avx2, Level::Common];
+        let [widest, middle, common] = levels.map(|level| {
+            limit_level(level);
+            [bits::<f64>(boundaries), bits::<f32>(boundaries)]
+        });
+        limit_level(Level::Avx512);
+        assert!(widest == middle && widest == common);
+    }
+}
+
+#[test]
+fn single_precision_follows_a_driven_flow() {
+    // A channel that speeds up from rest: what a step adds is small against the speed.
+    fn speed<R: Real>() -> f64 {
+        let mesh = Mesh {
+            cells: [4, 16, 4],
+            spacing: DVec3::splat(1.0 / 16.0),
+            origin: DVec3::ZERO,
+        };
+        let mut driven = params(0.1);
+        driven.body_acceleration = DVec3::X;
+        let sides = [
+            [Boundary::Periodic; 2],
+            [Boundary::WALL; 2],
+            [Boundary::Periodic; 2],
+        ];
+        let mut flow = Flow::<R>::new(&mesh, Boundaries(sides), &driven);
+        for _ in 0..4000 {
+            flow.predict(1e-3);
+            flow.project(1e-3);
+        }
+        flow.velocity.x.at(2, 8, 2).wide()
+    }
+    let (double, single) = (speed::<f64>(), speed::<f32>());
+    let off = (single / double - 1.0).abs();
+    assert!(double > 1.0 && off < 1e-5, "{double} {single}: {off:e}");
+}

@@ -8,9 +8,9 @@
 //! left outside would be compiled for the oldest machine.
 
 mod complex;
+mod one;
 #[cfg(any(test, not(target_arch = "x86_64")))]
 mod plain;
-mod single;
 #[cfg(test)]
 mod tests;
 #[cfg(target_arch = "x86_64")]
@@ -23,7 +23,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use super::Real;
 pub use complex::{Complex, turned};
-pub use single::Single;
+pub use one::One;
 
 /// Numbers of the widest register.
 pub const MOST: usize = 16;
@@ -51,10 +51,42 @@ pub trait Vector:
     fn load(from: &[Self::Number]) -> Self;
     /// Overwrites the first `WIDTH` numbers of `to`.
     fn store(self, to: &mut [Self::Number]);
+    /// The first `WIDTH` of other numbers, rounded to these.
+    #[inline(always)]
+    fn load_from<R: Real>(from: &[R]) -> Self {
+        let mut lanes = [Self::Number::default(); MOST];
+        for i in 0..Self::WIDTH {
+            lanes[i] = Self::Number::of(from[..Self::WIDTH][i].wide());
+        }
+        Self::load(&lanes)
+    }
+    /// Overwrites the first `WIDTH` of other numbers, rounded to those.
+    #[inline(always)]
+    fn store_to<R: Real>(self, to: &mut [R]) {
+        let mut lanes = [Self::Number::default(); MOST];
+        self.store(&mut lanes);
+        for i in 0..Self::WIDTH {
+            to[..Self::WIDTH][i] = R::of(lanes[i].wide());
+        }
+    }
     /// Lane-wise quotient.
     fn over(self, divisor: Self) -> Self;
     /// Lane-wise `self` where it is greater, else `other`.
     fn larger(self, other: Self) -> Self;
+    /// Lane-wise `self` where it is smaller, else `other`.
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        let zero = Self::constant(0.0);
+        zero - (zero - self).larger(zero - other)
+    }
+    /// Lane-wise 1 where it is smaller than `limit`, else 0; lanes may be infinite.
+    #[inline(always)]
+    fn is_below(self, limit: Self) -> Self {
+        let (zero, one) = (Self::constant(0.0), Self::constant(1.0));
+        // A ramp so steep that it is a step.
+        let steep = Self::constant(1e30);
+        ((limit - self) * steep).larger(zero).smaller(one)
+    }
     /// Lane-wise absolute value.
     #[inline(always)]
     fn magnitude(self) -> Self {
@@ -72,35 +104,35 @@ pub trait Vector:
 pub trait Registers: Sized {
     /// Of [`Level::Common`].
     type Common: Vector<Number = Self>;
-    /// Of [`Level::Four`].
-    type Four: Vector<Number = Self>;
-    /// Of [`Level::Eight`].
-    type Eight: Vector<Number = Self>;
+    /// Of [`Level::Avx2`].
+    type Avx2: Vector<Number = Self>;
+    /// Of [`Level::Avx512`].
+    type Avx512: Vector<Number = Self>;
 }
 
 #[cfg(target_arch = "x86_64")]
 impl Registers for f64 {
     type Common = x86::Pairs;
-    type Four = x86::Four;
-    type Eight = x86::Eight;
+    type Avx2 = x86::Four;
+    type Avx512 = x86::Eight;
 }
 #[cfg(target_arch = "x86_64")]
 impl Registers for f32 {
     type Common = x86::SinglesTwice;
-    type Four = x86::EightSingles;
-    type Eight = x86::SixteenSingles;
+    type Avx2 = x86::EightSingles;
+    type Avx512 = x86::SixteenSingles;
 }
 #[cfg(not(target_arch = "x86_64"))]
 impl Registers for f64 {
     type Common = plain::Plain<f64, 4>;
-    type Four = Self::Common;
-    type Eight = Self::Common;
+    type Avx2 = Self::Common;
+    type Avx512 = Self::Common;
 }
 #[cfg(not(target_arch = "x86_64"))]
 impl Registers for f32 {
     type Common = plain::Plain<f32, 8>;
-    type Four = Self::Common;
-    type Eight = Self::Common;
+    type Avx2 = Self::Common;
+    type Avx512 = Self::Common;
 }
 
 /// Work on the neighbouring entries of a row.
@@ -130,7 +162,7 @@ pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number
         i += 4;
     }
     while i <= n {
-        work.at::<Single<V::Number>>(i);
+        work.at::<One<V::Number>>(i);
         i += 1;
     }
 }
@@ -183,9 +215,9 @@ pub enum Level {
     /// What every machine has: pairs of doubles, fours of singles on x86-64.
     Common = 1,
     /// AVX2: registers of four doubles or eight singles.
-    Four = 2,
+    Avx2 = 2,
     /// AVX-512: registers of eight doubles or sixteen singles.
-    Eight = 3,
+    Avx512 = 3,
 }
 
 /// Level in use; 0 before the first question.
@@ -194,10 +226,10 @@ static LEVEL: AtomicU8 = AtomicU8::new(0);
 /// The level in use.
 pub fn level() -> Level {
     match LEVEL.load(Ordering::Relaxed) {
-        3 => Level::Eight,
-        2 => Level::Four,
+        3 => Level::Avx512,
+        2 => Level::Avx2,
         1 => Level::Common,
-        _ => limit_level(Level::Eight),
+        _ => limit_level(Level::Avx512),
     }
 }
 
@@ -212,9 +244,9 @@ pub fn limit_level(highest: Level) -> Level {
 #[cfg(target_arch = "x86_64")]
 fn widest() -> Level {
     if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
-        Level::Eight
+        Level::Avx512
     } else if is_x86_feature_detected!("avx2") {
-        Level::Four
+        Level::Avx2
     } else {
         Level::Common
     }
@@ -230,22 +262,22 @@ pub fn dispatch<K: Kernel>(kernel: K) {
     match level() {
         // SAFETY: `level` never exceeds what was detected on this machine.
         #[cfg(target_arch = "x86_64")]
-        Level::Eight => unsafe { with_eight(kernel) },
+        Level::Avx512 => unsafe { with_avx512(kernel) },
         #[cfg(target_arch = "x86_64")]
-        Level::Four => unsafe { with_four(kernel) },
+        Level::Avx2 => unsafe { with_avx2(kernel) },
         _ => kernel.run::<<K::Number as Registers>::Common>(),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,avx512f,avx512vl")]
-fn with_eight<K: Kernel>(kernel: K) {
-    kernel.run::<<K::Number as Registers>::Eight>();
+fn with_avx512<K: Kernel>(kernel: K) {
+    kernel.run::<<K::Number as Registers>::Avx512>();
 }
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn with_four<K: Kernel>(kernel: K) {
-    kernel.run::<<K::Number as Registers>::Four>();
+fn with_avx2<K: Kernel>(kernel: K) {
+    kernel.run::<<K::Number as Registers>::Avx2>();
 }
 
 /// The numbers of `values` as complex lanes; `values` must be aligned as [`super::Aligned`] is.

@@ -19,7 +19,7 @@ impl<R: Real> Kernel for Check<R> {
         check::<V>();
         check::<V::Half>();
         check::<V::Tail>();
-        check::<Single<R>>();
+        check::<One<R>>();
     }
 }
 
@@ -30,12 +30,17 @@ fn check<V: Vector>() {
     let b: [V::Number; MOST] = std::array::from_fn(|i| number((i as f64 + 0.7).cos()));
     let (x, y) = (V::load(&a), V::load(&b));
     let c = V::constant(0.1);
-    let mut found = [[V::Number::default(); MOST]; 6];
-    for (found, v) in
-        found
-            .iter_mut()
-            .zip([x + y, x - y, x * c, x.over(y), x.larger(y), y.magnitude()])
-    {
+    let mut found = [[V::Number::default(); MOST]; 8];
+    for (found, v) in found.iter_mut().zip([
+        x + y,
+        x - y,
+        x * c,
+        x.over(y),
+        x.larger(y),
+        y.magnitude(),
+        x.smaller(y),
+        x.is_below(y),
+    ]) {
         v.store(found);
     }
     let (mut sums, mut tops) = ([1.0; MOST], [0.25; MOST]);
@@ -53,12 +58,22 @@ fn check<V: Vector>() {
             a / b,
             a.max(b),
             b.abs(),
+            a.min(b),
+            f64::from(u8::from(a < b)),
         ];
         for (found, expected) in found.iter().zip(expected) {
             let expected = number(expected).wide();
             assert_eq!(found[i].wide().to_bits(), expected.to_bits());
         }
         assert_eq!([sums[i], tops[i]], [1.0 + a, a.max(0.25)]);
+    }
+    let doubles: [f64; MOST] = std::array::from_fn(|i| (i as f64 + 0.1).sin());
+    let (mut back, mut exact) = ([0.0; MOST], [0.0_f32; MOST]);
+    V::load_from(&doubles).store_to(&mut back);
+    V::load_from(&doubles).store_to(&mut exact);
+    for i in 0..V::WIDTH {
+        assert_eq!(back[i], number(doubles[i]).wide());
+        assert_eq!(exact[i], doubles[i] as f32);
     }
     let rows: [[V::Number; MOST]; MOST] =
         std::array::from_fn(|row| std::array::from_fn(|i| number((20 * row + i) as f64)));
@@ -90,30 +105,54 @@ fn each_level<R: Real>() {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: just detected.
-        unsafe { with_four(Check::<R>::new()) };
+        unsafe { with_avx2(Check::<R>::new()) };
+    }
+}
+
+/// Sums a row and notes the entries.
+struct Sum<'a, R> {
+    row: &'a [R],
+    sum: &'a mut Partial,
+    seen: &'a mut Vec<usize>,
+}
+impl<R: Real> RowWork for Sum<'_, R> {
+    type Number = R;
+    #[inline(always)]
+    fn at<V: Vector<Number = R>>(&mut self, i: usize) {
+        self.sum.add(i, V::load(&self.row[i..]));
+        self.seen.extend(i..i + V::WIDTH);
+    }
+}
+impl<R: Real> Kernel for Sum<'_, R> {
+    type Number = R;
+    #[inline(always)]
+    fn run<V: Vector<Number = R>>(mut self) {
+        along_row::<V>(self.row.len() - 1, &mut self);
     }
 }
 
 #[test]
 fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
-    struct Sum<'a, R>(&'a [R], &'a mut Partial, &'a mut Vec<usize>);
-    impl<R: Real> RowWork for Sum<'_, R> {
-        type Number = R;
-        fn at<V: Vector<Number = R>>(&mut self, i: usize) {
-            self.1.add(i, V::load(&self.0[i..]));
-            self.2.extend(i..i + V::WIDTH);
-        }
-    }
     fn sums<R: Real>(n: usize) {
         let row: Vec<R> = (0..=n).map(|i| R::of((i as f64).sin())).collect();
-        let sum = |run: fn(usize, &mut Sum<R>)| {
-            let (mut partial, mut seen) = (Partial::default(), Vec::new());
-            run(n, &mut Sum(&row, &mut partial, &mut seen));
+        let sum = |run: fn(Sum<R>)| {
+            let (mut sum, mut seen) = (Partial::default(), Vec::new());
+            run(Sum {
+                row: &row,
+                sum: &mut sum,
+                seen: &mut seen,
+            });
             assert_eq!(seen, (1..=n).collect::<Vec<_>>());
-            partial.sum()
+            sum.sum()
         };
-        let one = sum(|n, work| along_row::<Single<R>>(n, work));
-        assert_eq!(one, sum(|n, work| along_row::<R::Common>(n, work)));
+        let one = sum(|work| work.run::<One<R>>());
+        assert_eq!(one, sum(|work| work.run::<R::Common>()));
+        assert_eq!(one, sum(|work| dispatch(work)));
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: just detected.
+            assert_eq!(one, sum(|work| unsafe { with_avx2(work) }));
+        }
         let plain: f64 = row[1..].iter().map(|x| x.wide()).sum();
         assert!((one - plain).abs() < 1e-12, "{one} {plain}");
     }

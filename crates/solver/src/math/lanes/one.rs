@@ -7,41 +7,41 @@ use super::{Real, Vector};
 /// One number.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub struct Single<R>(R);
+pub struct One<R>(pub R);
 
-impl<R: Real> Add for Single<R> {
+impl<R: Real> Add for One<R> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Single(self.0 + other.0)
+        One(self.0 + other.0)
     }
 }
-impl<R: Real> Sub for Single<R> {
+impl<R: Real> Sub for One<R> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Single(self.0 - other.0)
+        One(self.0 - other.0)
     }
 }
-impl<R: Real> Mul for Single<R> {
+impl<R: Real> Mul for One<R> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        Single(self.0 * other.0)
+        One(self.0 * other.0)
     }
 }
-impl<R: Real> Vector for Single<R> {
+impl<R: Real> Vector for One<R> {
     const WIDTH: usize = 1;
     type Number = R;
     type Half = Self;
     type Tail = Self;
     #[inline(always)]
     fn splat(value: R) -> Self {
-        Single(value)
+        One(value)
     }
     #[inline(always)]
     fn load(from: &[R]) -> Self {
-        Single(from[0])
+        One(from[0])
     }
     #[inline(always)]
     fn store(self, to: &mut [R]) {
@@ -49,11 +49,11 @@ impl<R: Real> Vector for Single<R> {
     }
     #[inline(always)]
     fn over(self, divisor: Self) -> Self {
-        Single(self.0 / divisor.0)
+        One(self.0 / divisor.0)
     }
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
-        Single(if self.0 > other.0 { self.0 } else { other.0 })
+        One(if self.0 > other.0 { self.0 } else { other.0 })
     }
     #[inline(always)]
     fn transpose(_: &mut [Self]) {}

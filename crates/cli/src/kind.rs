@@ -1,0 +1,74 @@
+//! Case files and study files: a command that got the one for the other names the right command.
+
+use std::path::Path;
+
+use grainwake_solver::case::{Case, CaseError, Source};
+use grainwake_study::{Study, StudyError};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+use crate::exit::{BAD_INPUT, Exit};
+
+/// Keys that only one of the two has at its top.
+#[derive(Deserialize)]
+struct Marks {
+    domain: Option<IgnoredAny>,
+    grain: Option<IgnoredAny>,
+    packing: Option<IgnoredAny>,
+    base: Option<IgnoredAny>,
+    axis: Option<IgnoredAny>,
+    model: Option<IgnoredAny>,
+}
+
+#[derive(PartialEq)]
+enum Kind {
+    Case,
+    Study,
+}
+
+/// What a file is by its keys; none where they leave it open.
+fn kind(path: &Path) -> Option<Kind> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let (_, marks): (Source, Marks) = Source::parse("", &text, &[]).ok()?;
+    let case = marks.domain.or(marks.grain).or(marks.packing).is_some();
+    let study = marks.base.or(marks.axis).or(marks.model).is_some();
+    match (case, study) {
+        (true, false) => Some(Kind::Case),
+        (false, true) => Some(Kind::Study),
+        _ => None,
+    }
+}
+
+/// Reads a case file and applies overrides.
+pub fn case(path: &Path, set: &[String]) -> Result<Case, Exit> {
+    Case::load(path, set).map_err(|error| {
+        if matches!(error, CaseError::Invalid(_)) && kind(path) == Some(Kind::Study) {
+            return Exit::with_help(
+                BAD_INPUT,
+                format!("{} is a study file, not a case", path.display()),
+                format!(
+                    "run it with: grainwake study {}; --dry-run says what it would run",
+                    path.display()
+                ),
+            );
+        }
+        error.into()
+    })
+}
+
+/// Reads a study file.
+pub fn study(path: &Path) -> Result<Study, Exit> {
+    Study::read(path).map_err(|error| {
+        if matches!(error, StudyError::Invalid(_)) && kind(path) == Some(Kind::Case) {
+            return Exit::with_help(
+                BAD_INPUT,
+                format!("{} is a case, not a study file", path.display()),
+                format!(
+                    "run it with: grainwake run {}; a study file names it as its `base`",
+                    path.display()
+                ),
+            );
+        }
+        error.into()
+    })
+}

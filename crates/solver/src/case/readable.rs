@@ -1,0 +1,69 @@
+//! Numbers as people write them, for messages.
+
+use glam::DVec3;
+
+/// Units that take a prefix: those whose first part is not a power.
+const PREFIXED: [&str; 7] = ["m", "s", "m/s", "m/s2", "Pa s", "N/m", "L/s"];
+/// Prefixes, their powers of ten and the least number that takes them: "0.25 mm", but not "0.3 m".
+/// Beyond a thousand a plain number reads better than "1.2 ks".
+const PREFIXES: [(&str, i32, f64); 4] = [("", 0, 1.0), ("m", 3, 0.1), ("u", 6, 0.1), ("n", 9, 0.1)];
+
+/// Six digits at most; powers of ten only where there would be many zeros.
+pub(super) fn number(value: f64) -> String {
+    let rounded = six_digits(value);
+    if rounded == 0.0 || (1e-4..1e9).contains(&rounded.abs()) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    }
+}
+
+/// A value [SI] with its unit: "2.5 mm".
+pub(super) fn quantity(value: f64, unit: &str) -> String {
+    if unit == "1" {
+        return number(value);
+    }
+    let rounded = six_digits(value);
+    let scaled = |power: i32| six_digits(rounded * 10f64.powi(power));
+    let (prefix, power, _) = PREFIXES
+        .into_iter()
+        .filter(|_| PREFIXED.contains(&unit))
+        .find(|(_, power, least)| scaled(*power).abs() >= *least)
+        .unwrap_or(PREFIXES[0]);
+    format!("{} {prefix}{unit}", number(scaled(power)))
+}
+
+/// A length [m].
+pub(super) fn length(value: f64) -> String {
+    quantity(value, "m")
+}
+
+/// Three values [SI] with their unit: "[25 mm, 25 mm, 0 m]".
+pub(super) fn vector(value: DVec3, unit: &str) -> String {
+    let parts = value.to_array().map(|x| quantity(x, unit));
+    format!("[{}]", parts.join(", "))
+}
+
+fn six_digits(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_have_prefixes() {
+        let texts = [14.25, 2e-3, 0.25e-3, 0.1 + 0.2, 12e-6, -0.05, 0.0, 8e3].map(length);
+        let wanted = [
+            "14.25 m", "2 mm", "0.25 mm", "300 mm", "12 um", "-50 mm", "0 m", "8000 m",
+        ];
+        assert_eq!(texts, wanted);
+        assert_eq!(quantity(1e-3, "Pa s"), "1 mPa s");
+        assert_eq!(quantity(1500.0, "kg/m3"), "1500 kg/m3");
+        assert_eq!(quantity(1e-6, "m2/s"), "1e-6 m2/s");
+        assert_eq!(quantity(0.5, "1"), "0.5");
+        assert_eq!(number(3.1e-12), "3.1e-12");
+        assert_eq!(number(1.0 / 3.0), "0.333333");
+    }
+}
