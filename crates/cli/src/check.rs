@@ -2,6 +2,7 @@
 
 use grainwake_solver::case::Case;
 use grainwake_solver::case::estimate::Estimate;
+use grainwake_solver::case::readable::quantity;
 
 use crate::args::CheckArgs;
 use crate::exit::Exit;
@@ -58,22 +59,22 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
         "(equal-volume sphere)",
     ));
     rows.extend(number(
-        "expected settling speed",
+        "expected speed",
         e.settling_speed_m_per_s.map(|v| 1e3 * v),
-        "mm/s",
+        "mm/s (settling or rising)",
     ));
     rows.extend(number("blockage", e.blockage.map(|b| 100.0 * b), "%"));
     rows.push((
         "contact stiffness",
-        format!("{:.4e} N/m", case.setup.contact.normal_stiffness),
+        quantity(case.setup.contact.normal_stiffness, "N/m"),
     ));
     if let (Some(time), Some(substeps)) = (e.contact_time_s, e.contact_substeps) {
         rows.push((
             "contact time",
-            format!("{time:.3e} s ({substeps:.0} sub-steps a step)"),
+            format!("{} ({substeps:.0} sub-steps a step)", quantity(time, "s")),
         ));
     }
-    rows.push(("time step", format!("{:.4e} s", e.time_step_s)));
+    rows.push(("time step", quantity(e.time_step_s, "s")));
     rows.push(("steps", format!("{} to t = {} s", e.steps, case.plan.end)));
     rows.push(("memory", format!("{:.0} MB", e.memory_bytes as f64 / 1e6)));
     rows.push((

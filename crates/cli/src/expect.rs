@@ -1,5 +1,6 @@
 //! `[expect]` for people: what was expected, what the run gave, and whether it holds.
 
+use grainwake_solver::case::readable::quantity;
 use grainwake_solver::case::{Problem, Verdict};
 
 /// A line that says how a quantity compares with what was expected of it.
@@ -34,7 +35,7 @@ fn value(v: &Verdict) -> String {
 fn range(v: &Verdict) -> String {
     let unit = |x| with_unit(x, &v.quantity);
     match v.bound {
-        [Some(low), Some(high)] => format!("{} to {}", number(low), unit(high)),
+        [Some(low), Some(high)] => format!("{} to {}", unit(low), unit(high)),
         [Some(low), None] => format!("at least {}", unit(low)),
         [None, Some(high)] => format!("at most {}", unit(high)),
         [None, None] => "anything".into(),
@@ -51,10 +52,8 @@ fn error(v: &Verdict) -> String {
     }
 }
 
-fn with_unit(x: f64, quantity: &str) -> String {
-    format!("{} {}", number(x), unit(quantity))
-        .trim_end()
-        .into()
+fn with_unit(x: f64, name: &str) -> String {
+    quantity(x, unit(name))
 }
 
 /// Unit of a quantity of `[expect]`; its name may be followed by that of a grain.
@@ -62,23 +61,8 @@ fn unit(quantity: &str) -> &'static str {
     match quantity.split(' ').next() {
         Some("peak_settling_speed") => "m/s",
         Some("max_divergence") => "1/s",
-        Some("role_changes") => "",
+        Some("role_changes") => "1",
         _ => "s",
-    }
-}
-
-/// Five digits without zeros at the end.
-fn number(x: f64) -> String {
-    let size = x.abs();
-    if size != 0.0 && !(1e-4..1e6).contains(&size) {
-        return format!("{x:.3e}");
-    }
-    let digits = (4 - size.max(1e-9).log10().floor() as i32).clamp(0, 8) as usize;
-    let text = format!("{x:.digits$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').into()
-    } else {
-        text
     }
 }
 
@@ -110,16 +94,16 @@ mod tests {
         };
         assert_eq!(
             line(&speed),
-            "peak_settling_speed of grain 0: 0.196 m/s (error -2.00 %), expected 0.198 to 0.202 m/s: missed"
+            "peak_settling_speed of grain 0: 196 mm/s (error -2.00 %), expected 198 mm/s to 202 mm/s: missed"
         );
         assert_eq!(
             missed(&speed).to_string(),
-            "expected peak_settling_speed of grain 0: 0.198 to 0.202 m/s, but it is 0.196 m/s (error -2.00 %)"
+            "expected peak_settling_speed of grain 0: 198 mm/s to 202 mm/s, but it is 196 mm/s (error -2.00 %)"
         );
         let kiss = verdict("kiss_time", None, [Some(0.17), None]);
         assert_eq!(
             missed(&kiss).to_string(),
-            "expected kiss_time: at least 0.17 s, but it did not happen"
+            "expected kiss_time: at least 170 ms, but it did not happen"
         );
         let roles = Verdict {
             pass: true,
@@ -129,7 +113,7 @@ mod tests {
         let still = verdict("max_divergence", Some(2.5e-14), [None, Some(0.0)]);
         assert_eq!(
             line(&still),
-            "max_divergence: 2.500e-14 1/s, expected at most 0 1/s: missed"
+            "max_divergence: 2.5e-14 1/s, expected at most 0 1/s: missed"
         );
     }
 }

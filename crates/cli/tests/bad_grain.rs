@@ -189,7 +189,7 @@ fn millimetres_for_metres() {
         &large,
         "1 m",
         &[
-            "equivalent diameter of 2.481e0 m",
+            "equivalent diameter of 2.481",
             "is --unit right",
             "1 um to 1 m",
         ],
@@ -198,7 +198,7 @@ fn millimetres_for_metres() {
         .iter()
         .map(|f| f.map(|p| p.map(|x| 2e-4 * x)))
         .collect();
-    refused_mesh(&small, "1 mm", &["2.481e-7 m", "is --unit right"]);
+    refused_mesh(&small, "1 mm", &["of 0.2481", "is --unit right"]);
 }
 
 #[test]

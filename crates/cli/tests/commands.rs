@@ -203,15 +203,15 @@ fn expectations_are_told_with_their_units() {
             "{told}"
         );
     };
-    line("landing_time of grain 0: 0.02", " s: held");
+    line("landing_time of grain 0: 2", " ms: held");
     line(
-        "landing_time of grain 0: 0.02",
-        ", expected 0.049 to 0.051 s: missed",
+        "landing_time of grain 0: 2",
+        ", expected 49 ms to 51 ms: missed",
     );
-    line("end_time: 0.12 s, expected at least 0.1 s: held", "");
-    let miss = "expected landing_time of grain 0: 0.049 to 0.051 s, but it is 0.02";
+    line("end_time: 120 ms, expected at least 100 ms: held", "");
+    let miss = "expected landing_time of grain 0: 49 ms to 51 ms, but it is 2";
     assert!(
-        told.contains(miss) && told.contains(" s (error -4"),
+        told.contains(miss) && told.contains(" ms (error -4"),
         "{told}"
     );
     // A miss is a problem, and problems are told even when quiet.

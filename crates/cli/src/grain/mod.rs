@@ -13,6 +13,7 @@ use std::path::Path;
 use grainwake_shape::picture::Picture;
 use grainwake_shape::{Shape, ShapeOptions};
 use grainwake_solver::case::parse_length;
+use grainwake_solver::case::readable;
 
 use crate::args::{GrainArgs, GrainCommand, InfoArgs, NewGrain};
 use crate::exit::{BAD_INPUT, Exit};
@@ -47,7 +48,8 @@ fn plausible(shape: &Shape, new: &NewGrain, option: &str) -> Result<(), Exit> {
     Err(Exit::with_help(
         BAD_INPUT,
         format!(
-            "the grain has an equivalent diameter of {diameter:.3e} m; grains have 1 um to 1 m"
+            "the grain has an equivalent diameter of {}; grains have 1 um to 1 m",
+            readable::length(diameter)
         ),
         format!(
             "is {option} right (mm for m, or m for mm)? --equivalent-diameter LENGTH gives any size"

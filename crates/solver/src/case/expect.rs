@@ -2,10 +2,8 @@
 
 use serde::Serialize;
 
-use super::error::Problem;
 use super::quantity::Kind;
 use super::raw::{OneOrMany, RawExpect, RawExpected, Tolerance};
-use super::readable::number;
 use crate::output::Summary;
 
 /// A quantity that can be expected.
@@ -244,18 +242,5 @@ fn collect<K: Kind>(
             low,
             high,
         });
-    }
-}
-
-impl From<&Verdict> for Problem {
-    fn from(verdict: &Verdict) -> Problem {
-        let value = verdict.value.map_or("did not happen".to_string(), |v| {
-            format!("is {}", number(v))
-        });
-        let [low, high] = verdict.bound.map(|b| b.map_or("any".to_string(), number));
-        Problem::new(format!(
-            "expected {} between {low} and {high}, but it {value}",
-            verdict.quantity
-        ))
     }
 }

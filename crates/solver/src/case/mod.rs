@@ -13,7 +13,7 @@ mod packing;
 mod placement;
 mod quantity;
 mod raw;
-mod readable;
+pub mod readable;
 mod schema;
 mod shapes;
 mod source;

@@ -9,7 +9,7 @@ const PREFIXED: [&str; 7] = ["m", "s", "m/s", "m/s2", "Pa s", "N/m", "L/s"];
 const PREFIXES: [(&str, i32, f64); 4] = [("", 0, 1.0), ("m", 3, 0.1), ("u", 6, 0.1), ("n", 9, 0.1)];
 
 /// Six digits at most; powers of ten only where there would be many zeros.
-pub(super) fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     let rounded = six_digits(value);
     if rounded == 0.0 || (1e-4..1e9).contains(&rounded.abs()) {
         format!("{rounded}")
@@ -18,8 +18,8 @@ pub(super) fn number(value: f64) -> String {
     }
 }
 
-/// A value [SI] with its unit: "2.5 mm".
-pub(super) fn quantity(value: f64, unit: &str) -> String {
+/// A value [SI] with its unit, "1" where it has none: "2.5 mm".
+pub fn quantity(value: f64, unit: &str) -> String {
     if unit == "1" {
         return number(value);
     }
@@ -34,7 +34,7 @@ pub(super) fn quantity(value: f64, unit: &str) -> String {
 }
 
 /// A length [m].
-pub(super) fn length(value: f64) -> String {
+pub fn length(value: f64) -> String {
     quantity(value, "m")
 }
 
