@@ -64,7 +64,8 @@ fn layout(data: &Data, height: f64, top: f64) -> Option<Layout> {
         width: PAGE - 38.0 - 8.0,
         height,
         across,
-        up: Axis::linear(LABEL, 0.0, 1.06 * high, 5, false),
+        // Room for the labels of the blocks.
+        up: Axis::linear(LABEL, 0.0, 1.12 * high, 5, false),
     };
     let mut blocks: Vec<(usize, usize, f64)> = Vec::new();
     for (i, grain) in grains.iter().enumerate() {
@@ -96,29 +97,26 @@ fn layout(data: &Data, height: f64, top: f64) -> Option<Layout> {
 impl Layout {
     fn ground(&self, drawing: &mut Drawing, rows: Option<&str>) {
         let f = &self.frame;
-        for (n, (first, last, value)) in self.blocks.iter().enumerate() {
-            let (left, right) = (f.px(*first as f64), f.px(*last as f64 + 1.0));
-            drawing.rectangle(
-                left,
-                f.y,
-                right - left,
-                f.height,
-                &format!("fill=\"{}\"", SHADES[n % 2]),
-            );
-            if let Some(factor) = rows.filter(|_| value.is_finite()) {
-                let label = format!("{} = {}", symbol(factor), value_text(*value));
-                drawing.label(
-                    0.5 * (left + right),
-                    f.y + 9.0,
-                    Anchor::Middle,
-                    TEXT,
-                    INK,
-                    &label,
-                    false,
-                );
-            }
+        let blocks = || {
+            let each = self.blocks.iter().enumerate();
+            each.map(|(n, (first, last, value))| {
+                let (left, right) = (f.px(*first as f64), f.px(*last as f64 + 1.0));
+                (left, right, format!("fill=\"{}\"", SHADES[n % 2]), *value)
+            })
+        };
+        for (left, right, shade, _) in blocks() {
+            drawing.rectangle(left, f.y, right - left, f.height, &shade);
         }
         f.grid(drawing);
+        for (left, right, shade, value) in blocks() {
+            if let Some(factor) = rows.filter(|_| value.is_finite()) {
+                let label = format!("{} = {}", symbol(factor), value_text(value));
+                let (middle, width) = (0.5 * (left + right), text::width(&label, TEXT) + 4.0);
+                // No line of the grid runs through the letters.
+                drawing.rectangle(middle - 0.5 * width, f.y + 1.0, width, 11.0, &shade);
+                drawing.label(middle, f.y + 9.0, Anchor::Middle, TEXT, INK, &label, false);
+            }
+        }
         if let Some(reference) = &self.reference {
             f.level(drawing, reference.value);
         }
@@ -270,8 +268,8 @@ pub fn boxes(data: &Data) -> Option<Drawn> {
             widest = Some((high - low, grain));
         }
         let (x, half) = (f.px(i as f64 + 0.5), 7.0);
-        drawing.line(&[(x, f.py(low)), (x, f.py(high))], INK, HAIR, None);
-        for end in [low, high] {
+        for (from, end) in [(q1, low), (q3, high)] {
+            drawing.line(&[(x, f.py(from)), (x, f.py(end))], INK, HAIR, None);
             drawing.line(
                 &[(x - 3.5, f.py(end)), (x + 3.5, f.py(end))],
                 INK,
@@ -303,7 +301,8 @@ pub fn boxes(data: &Data) -> Option<Drawn> {
         );
     }
     f.outline(&mut drawing, (true, true));
-    let caption = match widest {
+    let bounds = layout.all.iter().filter(|s| s.bound).count();
+    let mut caption = match widest {
         Some((width, grain)) if drawn > 0 => format!(
             "Kissing times of the orientations of each grain: smallest, lower quartile, median, upper quartile and largest. The orientation matters most for {}, whose kissing times span {}.",
             text::literal(grain),
@@ -311,6 +310,11 @@ pub fn boxes(data: &Data) -> Option<Drawn> {
         ),
         _ => return None,
     };
+    if bounds > 0 {
+        caption += &format!(
+            " The {bounds} pairs that landed before they kissed count with the time of the landing."
+        );
+    }
     Some(Drawn {
         name: "fig14b-kissing-time-spread".into(),
         number: "14b".into(),
