@@ -323,11 +323,25 @@ fn override_line(item: &str) -> Result<String, Problem> {
     ))
 }
 
+/// Whether a table that overrides another is of another `kind`.
+fn changes_kind(old: &DeTable, new: &DeTable) -> bool {
+    let kind = |table: &DeTable| {
+        let value = table.get("kind")?.get_ref().as_str();
+        value.map(str::to_owned)
+    };
+    kind(new).is_some_and(|kind_of_new| kind(old).is_some_and(|old| old != kind_of_new))
+}
+
 fn merge<'i>(base: &mut DeTable<'i>, extra: DeTable<'i>) -> Result<(), String> {
     for (key, value) in extra {
         let name = key.get_ref().to_string();
         let old = base.get_mut(&key).map(|v| v.get_mut());
         match (old, value.get_ref()) {
+            // A shape of another kind shares no key with the one before.
+            (Some(DeValue::Table(old)), DeValue::Table(new)) if changes_kind(old, new) => {
+                base.remove(&key);
+                base.insert(key, value);
+            }
             (Some(DeValue::Table(_)), DeValue::Table(_)) => {
                 if let (Some(DeValue::Table(old)), DeValue::Table(new)) =
                     (base.get_mut(&key).map(|v| v.get_mut()), value.into_inner())
