@@ -9,6 +9,7 @@ mod error;
 pub mod estimate;
 mod expect;
 mod loc;
+mod overrides;
 mod packing;
 mod placement;
 mod quantity;
@@ -20,6 +21,7 @@ mod source;
 mod suggest;
 mod units;
 mod validate;
+mod wording;
 
 use std::path::Path;
 

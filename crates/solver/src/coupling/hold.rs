@@ -17,6 +17,19 @@ pub struct Hold {
     pub closed: f64,
 }
 
+impl Hold {
+    /// On faces deep inside.
+    pub fn whole(scheme: Scheme) -> Hold {
+        Hold {
+            strength: f64::INFINITY,
+            closed: match scheme {
+                Scheme::Aperture => 1.0,
+                Scheme::Paper => 0.0,
+            },
+        }
+    }
+}
+
 impl std::ops::Add for Hold {
     type Output = Hold;
     fn add(self, other: Hold) -> Hold {
@@ -35,7 +48,7 @@ pub struct Holding {
     pub eps: f64,
     pub spacing: DVec3,
     /// Kinematic viscosity times the step [m^2].
-    pub reach: f64,
+    pub diffusion: f64,
 }
 
 /// Faces about one surface; what holds them is found for all at once.
@@ -52,11 +65,13 @@ impl Faces {
         self.distance.clear();
         self.normal.iter_mut().for_each(Vec::clear);
     }
-    pub fn push(&mut self, distance: f64, normal: DVec3) {
+    /// Adds a face; returns its number.
+    pub fn push(&mut self, distance: f64, normal: DVec3) -> usize {
         self.distance.push(distance);
         for (list, n) in self.normal.iter_mut().zip(normal.to_array()) {
             list.push(n);
         }
+        self.distance.len() - 1
     }
     /// Finds the holds on all faces.
     pub fn hold(&mut self, holding: &Holding) {
@@ -81,7 +96,7 @@ impl Faces {
             }
         }
     }
-    /// The hold on a face that was pushed, counted from 0.
+    /// The hold on a face, by the number that `push` gave it.
     pub fn at(&self, index: usize) -> Hold {
         Hold {
             strength: self.strength[index],
@@ -111,7 +126,7 @@ impl Holding {
     fn near<V: Vector<Number = f64>>(&self, d: V, normal: [V; 3]) -> (V, V) {
         let drag = drag(d, normal, self.spacing.to_array(), self.eps);
         let closed = V::constant(1.0) - aperture(d, self.eps);
-        (V::constant(self.reach) * drag, closed)
+        (V::constant(self.diffusion) * drag, closed)
     }
 
     /// The paper's hold: a share of the rigid velocity as large as the solid fraction.

@@ -94,8 +94,9 @@ struct Candidate {
     below: usize,
     /// Where it is [m].
     x: DVec3,
-    distance: f64,
-    /// From another grain.
+    /// Its number among the faces whose hold is to be found; none deep inside.
+    near: Option<usize>,
+    /// Distance from another grain [m].
     rival: f64,
 }
 
@@ -162,7 +163,7 @@ impl Locator {
             scheme: self.scheme,
             eps: self.eps,
             spacing: self.mesh.spacing,
-            reach: dt * self.kinematic_viscosity,
+            diffusion: dt * self.kinematic_viscosity,
         };
         let each = bodies.par_iter_mut().enumerate();
         each.for_each_init(Scratch::default, |scratch, (index, body)| {
@@ -251,13 +252,13 @@ impl Locator {
                         let at = body.places.at(axis, place);
                         let below = body.places.at(CELL, place - IVec3::AXES[axis]);
                         if let (Some(at), Some(below)) = (at, below) {
-                            faces.push(d, turn * slope.normalize_or_zero());
+                            let normal = || turn * slope.normalize_or_zero();
                             candidates.push(Candidate {
                                 axis,
                                 at,
                                 below,
                                 x,
-                                distance: d,
+                                near: (d > -eps).then(|| faces.push(d, normal())),
                                 rival,
                             });
                         }
@@ -294,18 +295,12 @@ impl Locator {
         let eps = self.eps;
         faces.hold(holding);
         body.forced.clear();
-        for (index, face) in candidates.iter().enumerate() {
-            let inside = face.distance <= -eps && self.scheme == Scheme::Aperture;
-            let own = if inside {
-                Hold {
-                    strength: f64::INFINITY,
-                    closed: 1.0,
-                }
-            } else {
-                faces.at(index)
-            };
+        for face in candidates {
+            let own = face
+                .near
+                .map_or(Hold::whole(self.scheme), |number| faces.at(number));
             let mut all = own;
-            if face.rival < 2.0 * eps && face.distance > -eps {
+            if face.rival < 2.0 * eps && face.near.is_some() {
                 for rival in rivals {
                     let (there, slope) = rival.distance_and_gradient(face.x, 2.0 * eps);
                     if there < 2.0 * eps {
