@@ -484,9 +484,9 @@ fn free_grains_lighter_than_the_coupling_bears_are_refused() {
     let density = "density = \"1500 kg/m3\"";
     refused(
         density,
-        "density = \"0.2 g/cm3\"",
+        "density = \"0.005 g/cm3\"",
         "grain.0.density",
-        &["0.2 times the density", "added mass", "0.35", "350 kg/m3"],
+        &["0.005 times the density", "at least 0.01", "10 kg/m3"],
     );
     refused(
         density,
@@ -499,20 +499,16 @@ fn free_grains_lighter_than_the_coupling_bears_are_refused() {
     assert!(!help.contains("forgotten"), "{help}");
     let packed = PAIR.replace(
         "[time]",
-        "[[packing]]\ncount = 3\nshapes = [{ kind = \"sphere\", diameter = \"2 mm\" }]\ndensity = 200\nregion = { lower = [0, 0, 0], upper = [\"25 mm\", \"25 mm\", \"20 mm\"] }\n[time]",
+        "[[packing]]\ncount = 3\nshapes = [{ kind = \"sphere\", diameter = \"2 mm\" }]\ndensity = 2\nregion = { lower = [0, 0, 0], upper = [\"25 mm\", \"25 mm\", \"20 mm\"] }\n[time]",
     );
     let found = problems(&packed);
     assert_eq!(found.len(), 1, "{found:?}");
     assert_eq!(found[0].key.as_deref(), Some("packing.0.density"));
     // Held grains may be as light as they like, and so may grains without a fluid.
-    good(&PAIR.replacen(density, "density = 200\nmotion = \"fixed\"", 1));
+    good(&PAIR.replacen(density, "density = 2\nmotion = \"fixed\"", 1));
     let fluid = "[fluid]\ndensity = 1000\nviscosity = \"1 mPa s\"\n";
     assert!(PAIR.contains(fluid));
-    good(
-        &PAIR
-            .replace(fluid, "")
-            .replacen(density, "density = 200", 1),
-    );
+    good(&PAIR.replace(fluid, "").replacen(density, "density = 2", 1));
 }
 
 #[test]
@@ -526,12 +522,13 @@ fn light_grains_are_warned_of() {
     };
     let landing = "stop = \"landing\"";
     let light = warnings(["400", "2000"], "");
-    assert!(light.contains("grain 0 has 0.40 times"), "{light}");
     assert!(light.contains("1 of 2 free grains"), "{light}");
     let rising = warnings(["600", "700"], landing);
     assert!(rising.contains("they rise"), "{rising}");
-    assert!(rising.contains("\"landing\" cannot be met"), "{rising}");
-    assert!(!rising.contains("unstable"), "{rising}");
+    assert!(
+        rising.contains("upwards") && !rising.contains("never"),
+        "{rising}"
+    );
     assert!(warnings(["600", "2000"], landing).contains("may never be met"));
     let heavy = warnings(["1500", "2000"], landing);
     assert!(

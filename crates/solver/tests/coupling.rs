@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
+use grainwake_shape::analytic::ellipsoid;
 use grainwake_solver::coupling::Scheme;
 use grainwake_solver::dem::{ContactParams, Dof, Grain};
 use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
@@ -169,6 +170,106 @@ fn settling_is_stable_at_every_density_ratio() {
         }
         // The same submerged weight: the same speed in the end, whatever the inertia.
         assert!((0.5..0.9).contains(&speed), "ratio {ratio}: {speed}");
+    }
+}
+
+/// A light grain rises from rest under a weight less buoyancy of -1 per volume of unit density.
+fn rising(shape: Shape, ratio: f64, cells: usize, nu: f64) -> Setup {
+    let mut grain = sphere(1.0, DVec3::new(1.5, 1.5, 1.2), ratio);
+    grain.shape = Arc::new(shape);
+    let h = 1.0 / cells as f64;
+    let box_of = [3 * cells, 3 * cells, 6 * cells];
+    let mut case = setup(box_of, h, [WALLS; 3], nu, vec![grain]);
+    case.gravity = DVec3::new(0.0, 0.0, -1.0 / (1.0 - ratio).abs());
+    case.step = StepRule::Limits {
+        cfl: 0.3,
+        viscous: 0.2,
+        max_step: 0.01,
+    };
+    case
+}
+
+#[test]
+fn light_grains_rise_as_fast_as_heavy_ones_sink() {
+    let speed = |ratio: f64| {
+        let mut case = rising(Shape::sphere(0.5, 600), ratio, 8, 0.02);
+        case.mesh.cells[2] = 88;
+        if ratio > 1.0 {
+            case.grains[0].pose.position.z = 9.8;
+        }
+        let mut sim = Simulation::new(case).unwrap();
+        run(&mut sim, 9.0);
+        sim.grains()[0].velocity.z.abs()
+    };
+    let heavy = speed(1.01);
+    for ratio in [0.01, 0.1, 0.5, 0.99] {
+        let light = speed(ratio);
+        assert!(
+            (light / heavy - 1.0).abs() < 0.01,
+            "ratio {ratio}: {light}, {heavy}"
+        );
+    }
+}
+
+/// Without the fluid they carry they blow up here: the sphere below .45, the flat one below .55.
+#[test]
+fn light_grains_start_with_their_added_mass_and_stay_stable() {
+    let flat = ellipsoid(0.72, 0.72, 0.24, &Default::default()).unwrap();
+    for (name, shape) in [("sphere", Shape::sphere(0.5, 600)), ("flat", flat)] {
+        // Velocity after a tenth of the time it takes to fall its own diameter, more or less.
+        let start = |ratio: f64| {
+            let mut case = rising(shape.clone(), ratio, 16, 0.005);
+            case.step = StepRule::Fixed(0.002);
+            let mut sim = Simulation::new(case).unwrap();
+            run(&mut sim, 0.1);
+            let speed = sim.grains()[0].velocity.z;
+            (sim, speed)
+        };
+        // What resists a heavier grain beside its own mass, in displaced masses.
+        let added = 0.1 / start(1.01).1.abs() - 1.01;
+        for ratio in [0.01, 0.3] {
+            let (mut sim, speed) = start(ratio);
+            let expected = 0.1 / (ratio + added);
+            assert!(
+                (speed / expected - 1.0).abs() < 0.05,
+                "{name} {ratio}: {speed}, {expected}"
+            );
+            let mut fastest: f64 = 0.0;
+            while sim.time() < 0.7 {
+                sim.step(f64::INFINITY).unwrap();
+                fastest = fastest.max(sim.grains()[0].velocity.length());
+            }
+            assert!(fastest < 1.3, "{name} {ratio}: {fastest}");
+        }
+    }
+}
+
+/// What the step owes a light grain (its virtual mass acts a step late) does not add up.
+#[test]
+fn light_grains_keep_momentum_to_a_step() {
+    let mut case = rising(Shape::sphere(0.5, 600), 0.2, 8, 0.02);
+    case.boundaries = Boundaries([PERIODIC; 3]);
+    case.gravity = DVec3::ZERO;
+    case.grains[0].velocity = DVec3::new(1.0, 0.3, -0.2);
+    let mut sim = Simulation::new(case).unwrap();
+    let first = sim.diagnostics().momentum;
+    run(&mut sim, 3.0);
+    let lost = (sim.diagnostics().momentum - first).length() / first.length();
+    assert!(lost < 0.01, "{lost}");
+}
+
+#[test]
+fn light_grains_come_to_rest_under_the_ceiling() {
+    let mut case = rising(Shape::sphere(0.5, 600), 0.05, 8, 0.02);
+    case.grains[0].pose.position.z = 4.2;
+    let mut below = case.grains[0].clone();
+    below.pose.position += DVec3::new(0.3, 0.1, -1.2);
+    case.grains.push(below);
+    let mut sim = Simulation::new(case).unwrap();
+    run(&mut sim, 12.0);
+    for grain in sim.grains() {
+        let (z, v) = (grain.pose.position.z, grain.velocity.length());
+        assert!((5.4..5.52).contains(&z) && v < 0.02, "z {z}, speed {v}");
     }
 }
 

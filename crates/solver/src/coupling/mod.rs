@@ -30,6 +30,15 @@ pub enum Scheme {
     Paper,
 }
 
+/// How a grain moved at the start of a step: velocity and angular velocity.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Past {
+    /// [m/s] and [rad/s], space frame.
+    pub velocity: [DVec3; 2],
+    /// Their change over the step before, divided by its length [1/s].
+    pub acceleration: [DVec3; 2],
+}
+
 /// The grains on the grid.
 pub(crate) struct Coupling {
     scheme: Scheme,
@@ -72,13 +81,13 @@ impl Coupling {
     }
 
     /// Imposes rigidity on the predicted velocity and advances the grains' velocities from
-    /// `before` (velocity, angular velocity) under the fluid's impulse and the `other` loads.
+    /// `before` under the fluid's impulse and the `other` loads.
     /// `loads` receives the hydrodynamic load on each grain.
     pub fn impose_rigidity<R: Real>(
         &mut self,
         flow: &mut Flow<R>,
         grains: &mut [Grain],
-        before: &[[DVec3; 2]],
+        before: &[Past],
         other: &[Load],
         dt: f64,
         loads: &mut [Load],
@@ -92,9 +101,9 @@ impl Coupling {
         let grains_with = self.bodies.par_iter_mut().zip(&mut *grains).zip(loads);
         let each = grains_with.enumerate();
         each.for_each(|(index, ((body, grain), load))| {
-            let before = before[index];
-            let impulse = rigidity::gather(flow_before, fluid_density, body, before, relief);
-            *load = rigidity::advance(grain, before, &impulse, fluid_density, other[index], dt);
+            let past = &before[index];
+            let impulse = rigidity::gather(flow_before, fluid_density, body, past, relief);
+            *load = rigidity::advance(grain, past, &impulse, fluid_density, other[index], dt);
         });
         rigidity::impose(flow, grains, &self.bodies, before, relief);
     }
@@ -110,9 +119,9 @@ impl Coupling {
         }
         // A step this long closes every face of the band.
         self.locate(grains, f64::MAX.sqrt());
-        let still = vec![[DVec3::ZERO; 2]; grains.len()];
+        let still = vec![Past::default(); grains.len()];
         for (body, still) in self.bodies.iter_mut().zip(&still) {
-            rigidity::gather(flow, self.fluid_density, body, *still, 0.0);
+            rigidity::gather(flow, self.fluid_density, body, still, 0.0);
         }
         rigidity::impose(flow, grains, &self.bodies, &still, 0.0);
         for axis in 0..3 {

@@ -12,6 +12,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::Past;
 use super::locate::{Body, ForcedFace};
 use crate::dem::{Dof, Grain};
 use crate::flow::Flow;
@@ -25,7 +26,7 @@ pub struct Impulse {
 }
 
 /// Sums the impulse on the fluid as an affine function of the grain's new velocities; its old ones
-/// are `before`. `relief` is the time over which the closed part of a face takes the acceleration
+/// are in `past`. `relief` is the time over which the closed part of a face takes the acceleration
 /// of the grains instead of the pressure gradient; zero turns both off. Faces that several grains
 /// hold take a part from each, and what one takes does not depend on the others' new velocities.
 ///
@@ -36,9 +37,10 @@ pub fn gather<R: Real>(
     flow: &Flow<R>,
     fluid_density: f64,
     body: &mut Body,
-    before: [DVec3; 2],
+    past: &Past,
     relief: f64,
 ) -> Impulse {
+    let before = past.velocity;
     let w = fluid_density * flow.mesh().cell_volume();
     let mut sums = [Moments::default(); 3];
     for face in &mut body.forced {
@@ -90,11 +92,11 @@ impl Moments {
     }
 }
 
-/// New velocities of the grain from `before` under the impulse and the `other` loads (weight less
+/// New velocities of the grain from those in `past` under the impulse and the `other` loads (weight less
 /// buoyancy, contact) over `dt`; returns the hydrodynamic load on it.
 pub fn advance(
     grain: &mut Grain,
-    before: [DVec3; 2],
+    past: &Past,
     impulse: &Impulse,
     fluid_density: f64,
     other: Load,
@@ -102,18 +104,19 @@ pub fn advance(
 ) -> Load {
     let ratio = 1.0 - fluid_density / grain.density;
     let (mass, inertia) = (grain.mass() * ratio, grain.inertia() * ratio);
-    let [v, omega] = before;
+    let [v, omega] = past.velocity;
     let gyroscopic = omega.cross(inertia * omega);
     let momentum = mass * v + dt * other.force;
     let angular = inertia * omega + dt * (other.torque - gyroscopic);
+    let carried = Carried::by(grain, past, fluid_density, dt);
     let mut a = impulse.slope;
     let mut b = [0.0; 6];
     for row in 0..3 {
-        a[row][row] += mass;
-        b[row] = momentum[row] - impulse.constant[row];
-        b[3 + row] = angular[row] - impulse.constant[3 + row];
+        a[row][row] += mass + carried.mass;
+        b[row] = momentum[row] + carried.momentum[row] - impulse.constant[row];
+        b[3 + row] = angular[row] + carried.angular[row] - impulse.constant[3 + row];
         for column in 0..3 {
-            a[3 + row][3 + column] += inertia.col(column)[row];
+            a[3 + row][3 + column] += (inertia + carried.inertia).col(column)[row];
         }
     }
     prescribe(&mut a, &mut b, 0, grain.translation);
@@ -131,14 +134,44 @@ pub fn advance(
                 .map(|(m, x)| m * x)
                 .sum::<f64>()
     });
+    let force = DVec3::new(j[0], j[1], j[2]) + carried.mass * grain.velocity - carried.momentum;
+    let torque =
+        DVec3::new(j[3], j[4], j[5]) + carried.inertia * grain.angular_velocity - carried.angular;
     let displaced = fluid_density / grain.density;
     let fluid_inertia: DMat3 = grain.inertia() * displaced;
     Load {
-        force: (displaced * grain.mass() * (grain.velocity - v) - DVec3::new(j[0], j[1], j[2]))
-            / dt,
-        torque: (fluid_inertia * (grain.angular_velocity - omega) - DVec3::new(j[3], j[4], j[5]))
-            / dt
+        force: (displaced * grain.mass() * (grain.velocity - v) - force) / dt,
+        torque: (fluid_inertia * (grain.angular_velocity - omega) - torque) / dt
             + omega.cross(fluid_inertia * omega),
+    }
+}
+
+/// Fluid that a grain lighter than the fluid carries along, its virtual mass: as much as it
+/// displaces, on both sides of its equations, with the new acceleration on one and the last on the
+/// other. The fluid around a grain answers by the projection, one step late; without this, a light
+/// grain and that answer drive each other (`docs/decisions/0013-light-grains.md`).
+struct Carried {
+    mass: f64,
+    inertia: DMat3,
+    momentum: DVec3,
+    angular: DVec3,
+}
+
+impl Carried {
+    fn by(grain: &Grain, past: &Past, fluid_density: f64, dt: f64) -> Carried {
+        let displaced = if grain.density < fluid_density {
+            fluid_density / grain.density
+        } else {
+            0.0
+        };
+        let (mass, inertia) = (grain.mass() * displaced, grain.inertia() * displaced);
+        let goes_on = |which: usize| past.velocity[which] + dt * past.acceleration[which];
+        Carried {
+            mass,
+            inertia,
+            momentum: mass * goes_on(0),
+            angular: inertia * goes_on(1),
+        }
     }
 }
 
@@ -147,18 +180,18 @@ pub fn impose<R: Real>(
     flow: &mut Flow<R>,
     grains: &[Grain],
     bodies: &[Body],
-    before: &[[DVec3; 2]],
+    before: &[Past],
     relief: f64,
 ) {
     let FaceVector { x, y, z } = &mut flow.predicted;
     let components: [&mut [R]; 3] = [x, y, z];
     let each = components.into_par_iter().enumerate();
     each.for_each(|(axis, predicted)| {
-        for ((grain, body), before) in grains.iter().zip(bodies).zip(before) {
+        for ((grain, body), Past { velocity, .. }) in grains.iter().zip(bodies).zip(before) {
             let now = [grain.velocity, grain.angular_velocity];
             for face in body.forced_along(axis) {
                 let rigid = rigid_velocity(now, face);
-                let change = rigid - rigid_velocity(*before, face);
+                let change = rigid - rigid_velocity(*velocity, face);
                 let gain = face.closed * face.back
                     + face.share * (rigid - face.free)
                     + follow(face, relief) * change;

@@ -65,7 +65,8 @@ impl Recorder {
         let enclosure = setup.enclosure();
         let period =
             [0, 1, 2].map(|axis| enclosure.is_periodic(axis).then(|| enclosure.size()[axis]));
-        let params = EventParams::for_grains(sim.grains(), setup.gravity, period);
+        let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
+        let params = EventParams::for_grains(sim.grains(), setup.gravity, fluid_density, period);
         let gap = pair_gap(sim, &enclosure);
         Recorder {
             run: run.into(),

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::Setup;
 use super::state::{Reader, Writer};
-use crate::coupling::Coupling;
+use crate::coupling::{Coupling, Past};
 use crate::dem::Grain;
 use crate::flow::{Flow, FlowMeasures, FluidParams};
 use crate::math::{Load, Precision, Real};
@@ -22,7 +22,7 @@ pub(super) trait Fluid: Send + Sync {
     fn impose_rigidity(
         &mut self,
         grains: &mut [Grain],
-        before: &[[DVec3; 2]],
+        before: &[Past],
         other: &[Load],
         dt: f64,
         loads: &mut [Load],
@@ -93,7 +93,7 @@ impl<R: Real> Fluid for FluidOf<R> {
     fn impose_rigidity(
         &mut self,
         grains: &mut [Grain],
-        before: &[[DVec3; 2]],
+        before: &[Past],
         other: &[Load],
         dt: f64,
         loads: &mut [Load],

@@ -12,6 +12,7 @@ mod step;
 
 use std::time::Duration;
 
+use crate::coupling::Past;
 use crate::dem::{Contact, Dynamics, Grain};
 use crate::grid::Mesh;
 use crate::math::Load;
@@ -41,7 +42,7 @@ pub struct Simulation {
 
 /// Per-grain scratch of a step.
 struct Work {
-    before: Vec<[glam::DVec3; 2]>,
+    before: Vec<Past>,
     driving: Vec<Load>,
     contact: Vec<Load>,
 }

@@ -14,7 +14,8 @@ impl Simulation {
         out.count(self.clock.steps)?;
         out.numbers(&[self.clock.time, self.clock.last_step])?;
         out.count(self.setup.grains.len() as u64)?;
-        for (grain, load) in self.setup.grains.iter().zip(&self.loads) {
+        let grains = self.setup.grains.iter();
+        for ((grain, load), before) in grains.zip(&self.loads).zip(&self.work.before) {
             out.numbers(&grain.pose.position.to_array())?;
             out.numbers(&grain.pose.orientation.to_array())?;
             for v in [
@@ -22,6 +23,8 @@ impl Simulation {
                 grain.angular_velocity,
                 load.force,
                 load.torque,
+                before.velocity[0],
+                before.velocity[1],
             ] {
                 out.numbers(&v.to_array())?;
             }
@@ -42,7 +45,8 @@ impl Simulation {
         self.clock.steps = input.count()?;
         [self.clock.time, self.clock.last_step] = input.numbers()?;
         input.expect(self.setup.grains.len(), "grains")?;
-        for (grain, load) in self.setup.grains.iter_mut().zip(&mut self.loads) {
+        let grains = self.setup.grains.iter_mut();
+        for ((grain, load), before) in grains.zip(&mut self.loads).zip(&mut self.work.before) {
             grain.pose.position = DVec3::from_array(input.numbers()?);
             grain.pose.orientation = DQuat::from_array(input.numbers()?);
             grain.velocity = DVec3::from_array(input.numbers()?);
@@ -51,6 +55,10 @@ impl Simulation {
                 force: DVec3::from_array(input.numbers()?),
                 torque: DVec3::from_array(input.numbers()?),
             };
+            before.velocity = [
+                DVec3::from_array(input.numbers()?),
+                DVec3::from_array(input.numbers()?),
+            ];
         }
         if let Some(fluid) = &mut self.fluid {
             self.momentum_residual = DVec3::from_array(input.numbers()?);

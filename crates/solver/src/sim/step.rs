@@ -4,7 +4,8 @@
 use std::time::{Duration, Instant};
 
 use super::Simulation;
-use crate::coupling::Scheme;
+use crate::coupling::{Past, Scheme};
+use crate::dem::Grain;
 use crate::math::Load;
 
 /// Why a step could not be taken.
@@ -31,6 +32,7 @@ impl Simulation {
             .fluid
             .as_ref()
             .map_or(0.0, |fluid| fluid.measures().max_rate);
+        let last_step = self.clock.last_step;
         let dt = self.clock.choose(rate, limit);
         let Simulation {
             setup,
@@ -45,7 +47,7 @@ impl Simulation {
         let (now, end) = (self.clock.time, self.clock.time + dt);
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
         for (i, grain) in grains.iter().enumerate() {
-            work.before[i] = [grain.velocity, grain.angular_velocity];
+            work.before[i] = past(grain, &work.before[i], last_step);
             let weight = setup.gravity * (grain.density - fluid_density) * grain.shape.volume();
             work.driving[i] = Load {
                 force: weight,
@@ -86,7 +88,7 @@ impl Simulation {
                     // What the fluid gave the grain, the fluid inside it included, it lost.
                     let displaced = fluid_density * grain.shape.volume();
                     self.momentum_residual -=
-                        displaced * (grain.velocity - before[0]) - dt * load.force;
+                        displaced * (grain.velocity - before.velocity[0]) - dt * load.force;
                 }
             }
         }
@@ -133,6 +135,21 @@ impl Simulation {
             }
         }
         Ok(())
+    }
+}
+
+/// How a grain moves now, `last_step` [s] after it moved as `before`.
+fn past(grain: &Grain, before: &Past, last_step: f64) -> Past {
+    let velocity = [grain.velocity, grain.angular_velocity];
+    let change = |which: usize| (velocity[which] - before.velocity[which]) / last_step;
+    let started = last_step > 0.0;
+    Past {
+        velocity,
+        acceleration: if started {
+            [change(0), change(1)]
+        } else {
+            Default::default()
+        },
     }
 }
 

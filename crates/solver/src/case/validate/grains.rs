@@ -111,7 +111,7 @@ pub(super) fn not_too_light(
         density.span.as_ref(),
         key,
         format!(
-            "{} is {} times the density of the fluid: below {LIGHTEST_FREE} times it, free grains are unstable in this coupling (added mass)",
+            "{} is {} times the density of the fluid: below {LIGHTEST_FREE} times it, free grains become unstable in this coupling",
             quantity(density.si, "kg/m3"),
             number(density.si / fluid)
         ),

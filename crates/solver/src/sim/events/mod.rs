@@ -10,7 +10,7 @@ mod tracker;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::dem::Grain;
+use crate::dem::{Dof, Grain};
 
 pub use tracker::{Tracker, TrackerState};
 
@@ -104,7 +104,8 @@ pub struct Event {
 /// Thresholds. `for_grains` chooses them from the grains and gravity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EventParams {
-    /// Unit vector along gravity; -z without gravity.
+    /// Unit vector the way the grains settle: along gravity, or against it if all free grains are
+    /// lighter than the fluid; -z without gravity.
     pub down: DVec3,
     /// The face that grains land on: axis and side.
     pub floor: (u8, u8),
@@ -125,8 +126,19 @@ pub struct EventParams {
 impl EventParams {
     /// Separation beyond 0.05 d for sqrt(d/g), tumbling from 45 degrees, role change beyond
     /// 0.02 d, rest below 0.001 sqrt(g d); d is the mean equal-volume diameter.
-    pub fn for_grains(grains: &[Grain], gravity: DVec3, period: [Option<f64>; 3]) -> EventParams {
+    pub fn for_grains(
+        grains: &[Grain],
+        gravity: DVec3,
+        fluid_density: f64,
+        period: [Option<f64>; 3],
+    ) -> EventParams {
+        let mut free = grains
+            .iter()
+            .filter(|grain| grain.translation == Dof::Free)
+            .peekable();
+        let rise = free.peek().is_some() && free.all(|grain| grain.density < fluid_density);
         let down = gravity.try_normalize().unwrap_or(DVec3::NEG_Z);
+        let down = if rise { -down } else { down };
         let magnitude = down.abs();
         let axis = if magnitude.z >= magnitude.x && magnitude.z >= magnitude.y {
             2

@@ -344,7 +344,7 @@ mod tests {
         let grains = |x: f64, z: f64| [grain(0.0, 0.0), grain(x, z)];
         let gap = |x: f64, z: f64| x.hypot(z) - 1.0;
         let start = grains(path[0].1, path[0].2);
-        let params = EventParams::for_grains(&start, DVec3::new(0.0, 0.0, -1.0), [None; 3]);
+        let params = EventParams::for_grains(&start, DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
         let mut tracker = Tracker::new(params, &start, Some(gap(path[0].1, path[0].2)));
         for &(t, x, z) in path {
             let contacts = if gap(x, z) <= 0.0 {
@@ -406,7 +406,8 @@ mod tests {
     #[test]
     fn a_grain_that_lands_beside_one_on_the_floor_does_not_change_roles() {
         let grains = |z: f64| [grain(0.0, 0.0), grain(3.0, z)];
-        let params = EventParams::for_grains(&grains(1.0), DVec3::new(0.0, 0.0, -1.0), [None; 3]);
+        let params =
+            EventParams::for_grains(&grains(1.0), DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
         let (axis, side) = params.floor;
         for (contacts, changes) in [
             (vec![touch(0, Partner::Wall { axis, side })], 0),
@@ -480,7 +481,7 @@ mod tests {
     fn landing_and_rest_need_all_free_grains() {
         let mut grains = [grain(0.0, 0.5), grain(3.0, 0.5), grain(6.0, 5.0)];
         grains[2].translation = Dof::Prescribed(DVec3::ZERO);
-        let params = EventParams::for_grains(&grains, DVec3::new(0.0, 0.0, -1.0), [None; 3]);
+        let params = EventParams::for_grains(&grains, DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
         let mut tracker = Tracker::new(params, &grains, None);
         let floor = Partner::Wall { axis: 2, side: 0 };
         let events = tracker.update(
@@ -516,6 +517,7 @@ mod tests {
         let params = EventParams::for_grains(
             &grains,
             DVec3::new(0.0, 0.0, -1.0),
+            0.0,
             [Some(10.0), None, None],
         );
         let tracker = Tracker::new(params, &grains, Some(0.2));
@@ -530,7 +532,7 @@ mod tests {
         let whole = follow(&path);
         let text = serde_json::to_string(follow(&path[..20]).state()).unwrap();
         let start = [grain(0.0, 0.0), grain(path[0].1, path[0].2)];
-        let params = EventParams::for_grains(&start, DVec3::new(0.0, 0.0, -1.0), [None; 3]);
+        let params = EventParams::for_grains(&start, DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
         let mut tracker = Tracker::new(params, &start, Some(1.0));
         tracker.restore(serde_json::from_str(&text).unwrap());
         for &(t, x, z) in &path[20..] {
