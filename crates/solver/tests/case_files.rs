@@ -152,17 +152,19 @@ fn a_resolved_case_resolves_to_itself() {
 }
 
 #[test]
-fn a_shape_of_another_kind_replaces_the_one_before() {
+fn an_override_replaces_what_its_key_names() {
     let text = "[fluid]\ndensity = 1000\nviscosity = 1e-3\n[domain]\nsize = [0.01, 0.01, 0.01]\ncell_size = 5e-4\n\
         [[grain]]\nshape = { kind = \"sphere\", diameter = 2e-3 }\ndensity = 1500\nposition = [5e-3, 5e-3, 5e-3]\n[time]\nend = 1\n";
     let load = |set: &str| Case::parse(text, "ball.toml", Path::new(""), &[set.to_owned()]);
     let case = load("grain.0.shape={ kind = \"ellipsoid\", size = [3e-3, 2e-3, 2e-3] }").unwrap();
     let extent = case.setup.grains[0].shape.upper() - case.setup.grains[0].shape.lower();
     assert!((extent.max_element() - 3e-3).abs() < 1e-5, "{extent}");
-    // Of the same kind only what is named changes.
-    let larger = load("grain.0.shape={ diameter = 3e-3 }").unwrap();
+    // A longer key changes only what it names.
+    let larger = load("grain.0.shape.diameter=3e-3").unwrap();
     let diameter = larger.setup.grains[0].shape.equivalent_diameter();
     assert!((diameter - 3e-3).abs() < 1e-12);
+    let lost = load("grain.0.shape={ diameter = 3e-3 }").unwrap_err();
+    assert!(lost.to_string().contains("kind"), "{lost}");
 }
 
 #[test]

@@ -112,15 +112,33 @@ fn base(
     Some(path)
 }
 
-/// The settings of a table, in order of the keys.
+/// The settings of a table, in order of the keys. A dotted key replaces what it names; a section of the
+/// case with a table sets the keys of that table.
 fn settings(set: &RawSet) -> Vec<Setting> {
-    set.iter()
-        .map(|(key, value)| Setting {
-            key: key.clone(),
-            value: inline(&value.value),
-            span: value.span.clone(),
-        })
-        .collect()
+    let mut found = Vec::new();
+    for (key, value) in set {
+        let nested = !key.contains('.');
+        spread(key.clone(), &value.value, nested, &mut |key, text| {
+            found.push(Setting {
+                key,
+                value: text,
+                span: value.span.clone(),
+            });
+        });
+    }
+    found
+}
+
+/// Calls `found` with the dotted key and the text of a value, or of all values in a `nested` table.
+fn spread(key: String, value: &Value, nested: bool, found: &mut dyn FnMut(String, String)) {
+    match value {
+        Value::Table(table) if nested => {
+            for (inner, value) in table {
+                spread(format!("{key}.{inner}"), value, nested, found);
+            }
+        }
+        value => found(key, inline(value)),
+    }
 }
 
 /// A value on one line.

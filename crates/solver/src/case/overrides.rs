@@ -1,6 +1,7 @@
 //! `key=value` overrides of a file: their text, and how they are laid over its tables.
 
-use toml::de::{DeTable, DeValue};
+use toml::Spanned;
+use toml::de::{DeArray, DeTable, DeValue};
 
 use super::error::Problem;
 
@@ -35,71 +36,73 @@ pub(super) fn override_line(item: &str) -> Result<String, Problem> {
     ))
 }
 
-/// Whether a table that overrides another is of another `kind`.
-fn changes_kind(old: &DeTable, new: &DeTable) -> bool {
-    let kind = |table: &DeTable| {
-        let value = table.get("kind")?.get_ref().as_str();
-        value.map(str::to_owned)
-    };
-    kind(new).is_some_and(|kind_of_new| kind(old).is_some_and(|old| old != kind_of_new))
-}
-
-/// Lays the overrides of a table over it.
-pub(super) fn merge<'i>(base: &mut DeTable<'i>, extra: DeTable<'i>) -> Result<(), String> {
+/// Lays `extra`, one override with a key of `parts` parts, over a file: what the key names is replaced
+/// as a whole, and all beside it stays.
+pub(super) fn lay_over<'i>(
+    base: &mut DeTable<'i>,
+    extra: DeTable<'i>,
+    parts: usize,
+) -> Result<(), String> {
     for (key, value) in extra {
         let name = key.get_ref().to_string();
-        let old = base.get_mut(&key).map(|v| v.get_mut());
-        match (old, value.get_ref()) {
-            // A shape of another kind shares no key with the one before.
-            (Some(DeValue::Table(old)), DeValue::Table(new)) if changes_kind(old, new) => {
-                base.remove(&key);
-                base.insert(key, value);
+        let span = value.span();
+        let old = base.get_mut(&key).map(|old| old.get_mut());
+        let value = match (old, value.into_inner()) {
+            (Some(DeValue::Table(old)), DeValue::Table(new)) if parts > 1 => {
+                lay_over(old, new, parts - 1)?;
+                continue;
             }
-            (Some(DeValue::Table(_)), DeValue::Table(_)) => {
-                if let (Some(DeValue::Table(old)), DeValue::Table(new)) =
-                    (base.get_mut(&key).map(|v| v.get_mut()), value.into_inner())
-                {
-                    merge(old, new)?;
-                }
-            }
-            // `{ formula = ... }` in place of `[x, y, z]`, not `vector.0 = ...`.
+            // Not `vector.formula = ...`, which takes the place of `[x, y, z]`.
             (Some(DeValue::Array(items)), DeValue::Table(new))
-                if items.iter().all(|item| !item.get_ref().is_table())
-                    && new
-                        .keys()
-                        .all(|key| key.get_ref().parse::<usize>().is_err()) =>
+                if parts > 1 && (is_of_tables(items) || has_index(&new)) =>
             {
-                base.remove(&key);
-                base.insert(key, value);
+                lay_over_list(&name, items, new, parts - 1)?;
+                continue;
             }
-            (Some(DeValue::Array(items)), DeValue::Table(_)) => {
-                let DeValue::Table(new) = value.into_inner() else {
-                    continue;
-                };
-                let count = items.len();
-                for (index, item) in new {
-                    let at: usize = index.get_ref().parse().map_err(|_| {
-                        format!("`{name}` is a list: write {name}.0 for its first element")
-                    })?;
-                    let slot = items.get_mut(at).ok_or_else(|| format!("`{name}` has {count} elements, there is no number {at} (they count from 0)"))?;
-                    match (slot.get_mut(), item.get_ref()) {
-                        (DeValue::Table(_), DeValue::Table(_)) => {
-                            if let (DeValue::Table(old), DeValue::Table(new)) =
-                                (slot.get_mut(), item.into_inner())
-                            {
-                                merge(old, new)?;
-                            }
-                        }
-                        _ => *slot = item,
-                    }
-                }
+            (_, value) => value,
+        };
+        // The map would keep the old key and its place.
+        base.remove(&key);
+        base.insert(key, Spanned::new(span, value));
+    }
+    Ok(())
+}
+
+fn is_of_tables(items: &DeArray) -> bool {
+    items.iter().any(|item| item.get_ref().is_table())
+}
+
+fn has_index(table: &DeTable) -> bool {
+    table
+        .keys()
+        .any(|key| key.get_ref().parse::<usize>().is_ok())
+}
+
+/// The same for an element of the list `name`.
+fn lay_over_list<'i>(
+    name: &str,
+    items: &mut DeArray<'i>,
+    extra: DeTable<'i>,
+    parts: usize,
+) -> Result<(), String> {
+    let count = items.len();
+    for (index, value) in extra {
+        let at: usize = index
+            .get_ref()
+            .parse()
+            .map_err(|_| format!("`{name}` is a list: write {name}.0 for its first element"))?;
+        let slot = items.get_mut(at).ok_or_else(|| {
+            format!("`{name}` has {count} elements, there is no number {at} (they count from 0)")
+        })?;
+        let span = value.span();
+        let value = match (slot.get_mut(), value.into_inner()) {
+            (DeValue::Table(old), DeValue::Table(new)) if parts > 1 => {
+                lay_over(old, new, parts - 1)?;
+                continue;
             }
-            _ => {
-                // The map would keep the old key and its place.
-                base.remove(&key);
-                base.insert(key, value);
-            }
-        }
+            (_, value) => value,
+        };
+        *slot = Spanned::new(span, value);
     }
     Ok(())
 }

@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
 use super::error::Problem;
-use super::overrides::{merge, override_line};
+use super::overrides::{lay_over, override_line};
 use super::suggest::nearest;
 use super::wording::{plainly, wrong_kind};
 
@@ -83,7 +83,11 @@ impl Source {
             .collect();
         for (item, line) in padded.iter().zip(overrides) {
             let extra = DeTable::parse(item).map_err(|e| source.located(&e))?;
-            merge(table.get_mut(), extra.into_inner())
+            let parts = line
+                .split('=')
+                .next()
+                .map_or(1, |key| key.split('.').count());
+            lay_over(table.get_mut(), extra.into_inner(), parts)
                 .map_err(|m| Problem::new(format!("--set {line}: {m}")))?;
         }
         collect_keys(table.get_ref(), "", text, &mut source.places);

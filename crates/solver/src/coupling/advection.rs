@@ -24,89 +24,95 @@ use crate::dem::Grain;
 use crate::flow::Flow;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Real;
-use crate::math::lanes::{Kernel, MOST, Vector, dispatch};
+use crate::math::lanes::{Kernel, MOST, RAMP, Vector, dispatch};
 
 /// Smallest aperture divided by; smaller ones are unstable on an impulsive start.
 const LEAST_APERTURE: f64 = 0.4;
-/// Places of the lanes along a row.
-const RAMP: [f64; MOST] = {
-    let mut ramp = [0.0; MOST];
-    let mut i = 0;
-    while i < MOST {
-        ramp[i] = i as f64;
-        i += 1;
-    }
-    ramp
-};
-
-/// What one thread needs: the velocity in the box and about it, and the fluxes of a row.
+/// What one thread needs: copies of the velocity in a box and about it, and the fluxes of a row.
 #[derive(Default)]
-struct Scratch {
-    velocity: [Vec<f64>; 3],
+struct Scratch<R> {
+    velocity: [Vec<R>; 3],
     flux: Vec<f64>,
+}
+
+/// The velocity in a box and three cells about it, in the fields or copied.
+struct View<'a, R> {
+    components: [&'a [R]; 3],
+    strides: [usize; 3],
+    /// Position of cell (0, 0, 0) of the box.
+    origin: usize,
+}
+
+impl<'a, R: Real> View<'a, R> {
+    fn new(flow: &'a Flow<R>, body: &Body, copies: &'a mut [Vec<R>; 3]) -> View<'a, R> {
+        let (layout, velocity) = (flow.mesh().layout(), &flow.velocity);
+        let low = body.first - PAD;
+        // A plane more above, for vectors that reach beyond the last entry.
+        let high = body.first + body.size + PAD - IVec3::ONE;
+        let cells = IVec3::from_array(layout.cells.map(|n| n as i32));
+        if low.cmpge(IVec3::ZERO).all() && high.cmple(cells).all() {
+            let [x, y, z] = body.first.to_array().map(|first| first as usize);
+            return View {
+                components: [0, 1, 2].map(|axis| velocity.component(axis)),
+                strides: layout.strides(),
+                origin: layout.index(x, y, z),
+            };
+        }
+        for (axis, copy) in copies.iter_mut().enumerate() {
+            body.places.copy(velocity.component(axis), copy);
+            copy.resize(copy.len() + MOST, R::default());
+        }
+        let wide = (body.size + 2 * PAD).to_array().map(|n| n as usize);
+        let strides = [1, wide[0], wide[0] * wide[1]];
+        View {
+            components: copies.each_ref().map(|copy| &copy[..]),
+            strides,
+            origin: PAD as usize * strides.iter().sum::<usize>(),
+        }
+    }
 }
 
 /// Corrects the tendency of the step just predicted; `bodies` are where `grains` were located, in a
 /// band of half-width `band` [m].
 pub fn correct<R: Real>(band: f64, flow: &mut Flow<R>, grains: &[Grain], bodies: &mut [Body]) {
-    let (mesh, velocity) = (*flow.mesh(), &flow.velocity);
+    let (mesh, from) = (*flow.mesh(), &*flow);
     let each = bodies.par_iter_mut().zip(grains);
     each.for_each_init(Scratch::default, |scratch, (body, grain)| {
-        for component in 0..3 {
-            let copy = &mut scratch.velocity[component];
-            body.places.copy(velocity.component(component), copy);
-            // Vectors may reach beyond the last entry, though nothing of that is used.
-            copy.resize(copy.len() + MOST, 0.0);
-        }
         let mut push = std::mem::take(&mut body.push);
         dispatch(Links {
             band,
             mesh: &mesh,
             grain,
             body,
-            scratch,
+            velocity: View::new(from, body, &mut scratch.velocity),
+            flux: &mut scratch.flux,
             push: &mut push,
         });
         body.push = push;
     });
-    let bodies = &*bodies;
-    flow.add_tendency(|component, add| {
-        for body in bodies {
-            body.each_push(component, &mut *add);
+    let (bodies, layout) = (&*bodies, mesh.layout());
+    flow.add_tendency(|component, slab, add| {
+        for body in bodies.iter().filter(|body| body.lies_in(&slab, layout)) {
+            let rows = body.rows[component].iter();
+            for row in rows.filter(|row| slab.contains(&row.at)) {
+                add(row.at, &body.push[component][row.first..][..row.count]);
+            }
         }
     });
 }
 
-impl Body {
-    /// Calls `add(memory position, push)` for the faces of a component that are pushed.
-    fn each_push(&self, component: usize, add: &mut dyn FnMut(usize, f64)) {
-        for k in 0..self.size.z {
-            for j in 0..self.size.y {
-                let row = self.local(0, j, k);
-                for i in 0..self.size.x {
-                    let push = self.push[component][row + i as usize];
-                    if push != 0.0
-                        && let Some(at) = self.places.at(component, IVec3::new(i, j, k))
-                    {
-                        add(at, push);
-                    }
-                }
-            }
-        }
-    }
-}
-
 /// The links of one grain.
-struct Links<'a> {
+struct Links<'a, R> {
     band: f64,
     mesh: &'a Mesh,
     grain: &'a Grain,
     body: &'a Body,
-    scratch: &'a mut Scratch,
+    velocity: View<'a, R>,
+    flux: &'a mut Vec<f64>,
     push: &'a mut [Vec<f64>; 3],
 }
 
-impl Kernel for Links<'_> {
+impl<R: Real> Kernel for Links<'_, R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
@@ -115,17 +121,17 @@ impl Kernel for Links<'_> {
             mesh,
             grain,
             body,
-            scratch,
+            velocity,
+            flux,
             push,
         } = self;
         let size = body.size;
-        let wide = size + 2 * PAD;
-        scratch.flux.resize(size.x as usize + MOST, 0.0);
+        flux.resize(size.x as usize + MOST, 0.0);
         for (component, push) in push.iter_mut().enumerate() {
             push.clear();
             push.resize((size.x * size.y * size.z) as usize, 0.0);
             for along in (0..3).filter(|&axis| mesh.cells[axis] > 1) {
-                let lines = Lines::new(band, mesh, grain, body, component, along);
+                let lines = Lines::new(band, mesh, grain, body, &velocity, component, along);
                 let step = IVec3::AXES[along];
                 for k in 0..size.z - step.z {
                     for j in 0..size.y - step.y {
@@ -133,12 +139,11 @@ impl Kernel for Links<'_> {
                             continue;
                         };
                         let (start, end) = (range.start, range.end);
-                        let flux = &mut scratch.flux[..];
                         // Near the ends of the grid there are no six faces.
                         let first = inner.start.clamp(start, end);
                         let last = inner.end.clamp(first, end);
-                        let at = PAD + wide.x * (j + PAD + wide.y * (k + PAD));
-                        let fields = [&scratch.velocity[component], &scratch.velocity[along]];
+                        let [_, line, plane] = velocity.strides;
+                        let at = velocity.origin + j as usize * line + k as usize * plane;
                         let row = body.local(0, j, k);
                         let next = row + body.local(step.x, step.y, step.z);
                         let d = &body.distance[component][..];
@@ -151,9 +156,9 @@ impl Kernel for Links<'_> {
                                 let (here, there) = (row + i as usize, next + i as usize);
                                 let d =
                                     V::constant(0.5) * (V::load(&d[here..]) + V::load(&d[there..]));
-                                let at = (at + i) as usize;
+                                let at = at + i as usize;
                                 lines
-                                    .flux([j, k], i, at, d, fields, six)
+                                    .flux([j, k], i, at, d, six)
                                     .store(&mut flux[i as usize..]);
                             }
                         }
@@ -171,15 +176,16 @@ impl Kernel for Links<'_> {
 }
 
 /// The links of one component along one axis.
-struct Lines<'a> {
+struct Lines<'a, R> {
     body: &'a Body,
+    /// The component carried and that along the links.
+    fields: [&'a [R]; 2],
     component: usize,
     along: usize,
     band: f64,
     /// Faces that are unknowns, along each axis.
     unknowns: [Range<i32>; 3],
-    /// From a face to the next along the link, and to the next along the component, in the copy of
-    /// the velocity.
+    /// From a face to the next along the link, and to the next along the component, in the fields.
     next: usize,
     across: usize,
     /// 1/h along the link [1/m].
@@ -189,17 +195,16 @@ struct Lines<'a> {
     rigid: [[f64; 2]; 4],
 }
 
-impl Lines<'_> {
-    fn new<'a>(
+impl<'a, R: Real> Lines<'a, R> {
+    fn new(
         band: f64,
         mesh: &Mesh,
         grain: &Grain,
         body: &'a Body,
+        velocity: &View<'a, R>,
         component: usize,
         along: usize,
-    ) -> Lines<'a> {
-        let wide = body.size + 2 * PAD;
-        let stride = |axis: usize| [1, wide.x, wide.x * wide.y][axis] as usize;
+    ) -> Lines<'a, R> {
         let half = 0.5 * IVec3::AXES[along].as_dvec3();
         let middle = DVec3::from_array(FACE_OFFSET[component]) + half - 1.0;
         let first = mesh.origin + mesh.spacing * (body.first.as_dvec3() + middle);
@@ -215,8 +220,9 @@ impl Lines<'_> {
             along,
             band,
             unknowns: [0, 1, 2].map(|axis| body.places.unknowns(component, axis)),
-            next: stride(along),
-            across: stride(component),
+            fields: [velocity.components[component], velocity.components[along]],
+            next: velocity.strides[along],
+            across: velocity.strides[component],
             inverse: 1.0 / mesh.spacing[along],
             rigid: [
                 of(grain.velocity_at(first)),
@@ -258,8 +264,8 @@ impl Lines<'_> {
         Some((start..end, six))
     }
 
-    /// Flux through the links from place `i` of row (j, k) on, whose lower faces are at `at` in the copy of
-    /// the velocity, over their length [m/s^2]; zero where `d` is not near the surface.
+    /// Flux through the links from place `i` of row (j, k) on, whose lower faces are at `at` in the
+    /// fields, over their length [m/s^2]; zero where `d` is not near the surface.
     #[inline(always)]
     fn flux<V: Vector<Number = f64>>(
         &self,
@@ -267,11 +273,12 @@ impl Lines<'_> {
         i: i32,
         at: usize,
         d: V,
-        [q, c]: [&Vec<f64>; 2],
         six: bool,
     ) -> V {
         let (half, one) = (V::constant(0.5), V::constant(1.0));
-        let face = |shift: isize| V::load(&q[at.wrapping_add_signed(shift * self.next as isize)..]);
+        let [q, c] = self.fields;
+        let face =
+            |shift: isize| V::load_from(&q[at.wrapping_add_signed(shift * self.next as isize)..]);
         let (from, to) = (face(0), face(1));
         let mean = half * (from + to);
         let carrier = if self.along == self.component {
@@ -279,7 +286,7 @@ impl Lines<'_> {
         } else {
             // Two faces of the carrying component share the link.
             let to = at + self.next;
-            half * (V::load(&c[to..]) + V::load(&c[to - self.across..]))
+            half * (V::load_from(&c[to..]) + V::load_from(&c[to - self.across..]))
         };
         let ramp = V::load(&RAMP);
         let rigid = |of: usize| {

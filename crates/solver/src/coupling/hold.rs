@@ -28,6 +28,15 @@ impl Hold {
             },
         }
     }
+    /// Share of the rigid velocity that a face takes where grains hold it with `all` their strength.
+    #[inline]
+    pub fn share(self, all: Hold) -> f64 {
+        if self.strength.is_finite() {
+            self.strength / (1.0 + all.strength)
+        } else {
+            1.0
+        }
+    }
 }
 
 impl std::ops::Add for Hold {
@@ -66,9 +75,9 @@ impl Faces {
         self.normal.iter_mut().for_each(Vec::clear);
     }
     /// Adds a face; returns its number.
-    pub fn push(&mut self, distance: f64, normal: DVec3) -> usize {
+    pub fn push(&mut self, distance: f64, normal: [f64; 3]) -> usize {
         self.distance.push(distance);
-        for (list, n) in self.normal.iter_mut().zip(normal.to_array()) {
+        for (list, n) in self.normal.iter_mut().zip(normal) {
             list.push(n);
         }
         self.distance.len() - 1

@@ -2,8 +2,10 @@
 
 mod advection;
 mod aperture;
+mod forced;
 mod hold;
 mod locate;
+mod measure;
 mod near;
 mod places;
 mod rigidity;

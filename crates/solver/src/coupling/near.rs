@@ -10,6 +10,7 @@ use glam::DVec3;
 use grainwake_shape::{Field, SampledField, Shape};
 
 use crate::dem::Grain;
+use crate::math::lanes::{MOST, Vector};
 
 /// Samples of the coarse grid in half the band, and across a grain: what counts more.
 const SAMPLES: f64 = 3.0;
@@ -27,8 +28,6 @@ pub struct NearShape {
     shape: Arc<Shape>,
     /// None where the shape answers by itself: a sphere, or a grid that reaches as far.
     about: Option<Arc<SampledField>>,
-    /// How far distances are asked for [m].
-    reach: f64,
 }
 
 impl NearShapes {
@@ -86,7 +85,6 @@ impl NearShape {
         NearShape {
             shape: shape.clone(),
             about,
-            reach,
         }
     }
 
@@ -98,20 +96,139 @@ impl NearShape {
         let Field::Sampled(field) = self.shape.field() else {
             return self.shape.distance_and_gradient(x);
         };
-        if let Some(found) = field.distance_and_gradient_on_grid(x) {
-            return found;
-        }
-        match &self.about {
-            Some(about) => about.distance_and_gradient_on_grid(x).unwrap_or(FAR),
-            None if field.distance_within(x, self.reach) > self.reach => FAR,
-            None => field.distance_and_gradient(x),
+        let found = field.distance_and_gradient_on_grid(x);
+        // Without a second grid the first reaches as far as is asked for.
+        let about = || self.about.as_ref()?.distance_and_gradient_on_grid(x);
+        found.or_else(about).unwrap_or(FAR)
+    }
+
+    /// The same at the points whose coordinates are the lanes of `x`, bit for bit; what is infinite
+    /// there may be merely farther than anything here.
+    #[inline(always)]
+    pub fn lanes<V: Vector<Number = f64>>(&self, x: [V; 3]) -> (V, [V; 3]) {
+        match (self.shape.field(), &self.about) {
+            (Field::Sphere(radius), _) => about_sphere(*radius, x),
+            (Field::Sampled(field), None) => {
+                let (d, slope, off) = on_grid(field, x);
+                (d + off * V::constant(FAR), slope)
+            }
+            (Field::Sampled(field), Some(about)) => {
+                let off = off_grid(field, x);
+                if off.is_zero() {
+                    let (d, slope, _) = on_grid(field, x);
+                    return (d, slope);
+                }
+                let (far, far_slope, off_all) = on_grid(about, x);
+                let far = far + off_all * V::constant(FAR);
+                let on = V::constant(1.0) - off;
+                if on.is_zero() {
+                    return (far, far_slope);
+                }
+                let (near, near_slope, _) = on_grid(field, x);
+                let mut slope = near_slope;
+                for axis in 0..3 {
+                    slope[axis] = on * near_slope[axis] + off * far_slope[axis];
+                }
+                (on * near + off * far, slope)
+            }
+            _ => self.one_by_one(x),
         }
     }
+
+    /// The same for any other kind of field.
+    #[cold]
+    fn one_by_one<V: Vector<Number = f64>>(&self, x: [V; 3]) -> (V, [V; 3]) {
+        let mut points = [[0.0; MOST]; 3];
+        x.iter()
+            .zip(&mut points)
+            .for_each(|(x, lanes)| x.store(lanes));
+        let mut distances = [0.0; MOST];
+        for n in 0..V::WIDTH {
+            let x = DVec3::from_array(points.map(|lanes| lanes[n]));
+            let (d, slope) = self.distance_and_gradient(x);
+            distances[n] = d.min(FAR);
+            for axis in 0..3 {
+                points[axis][n] = slope[axis];
+            }
+        }
+        (V::load(&distances), points.map(|lanes| V::load(&lanes)))
+    }
+}
+
+/// Farther than anything [m].
+const FAR: f64 = 1e100;
+
+#[inline(always)]
+fn about_sphere<V: Vector<Number = f64>>(radius: f64, [x, y, z]: [V; 3]) -> (V, [V; 3]) {
+    let length = (x * x + y * y + z * z).root();
+    let divisor = length.larger(V::constant(f64::MIN_POSITIVE));
+    let normal = [x.over(divisor), y.over(divisor), z.over(divisor)];
+    (length - V::constant(radius), normal)
+}
+
+/// 1 where a point is off the grid of a field, else 0.
+#[inline(always)]
+fn off_grid<V: Vector<Number = f64>>(field: &SampledField, x: [V; 3]) -> V {
+    let zero = V::constant(0.0);
+    let inverse = V::constant(1.0 / field.spacing());
+    let mut outside = zero;
+    for axis in 0..3 {
+        let last = V::constant(field.dims()[axis] as f64 - 1.0);
+        let s = (x[axis] - V::constant(field.lower()[axis])) * inverse;
+        outside = outside + (s - s.larger(zero).smaller(last)).magnitude();
+    }
+    // Whatever is off the grid is so by more than a rounding.
+    zero.is_below(outside)
+}
+
+/// Distance and gradient on the grid of a field, and 1 where a point is off it, else 0.
+#[inline(always)]
+fn on_grid<V: Vector<Number = f64>>(field: &SampledField, x: [V; 3]) -> (V, [V; 3], V) {
+    let (zero, one) = (V::constant(0.0), V::constant(1.0));
+    let inverse = 1.0 / field.spacing();
+    let (lower, dims) = (field.lower(), field.dims());
+    let mut cell = [zero; 3];
+    let mut fraction = [zero; 3];
+    for axis in 0..3 {
+        let last = V::constant(dims[axis] as f64 - 1.0);
+        let s = (x[axis] - V::constant(lower[axis])) * V::constant(inverse);
+        let place = s.larger(zero).smaller(last);
+        cell[axis] = place.floor().smaller(last - one);
+        fraction[axis] = place - cell[axis];
+    }
+    let row = V::constant(dims[0] as f64);
+    let plane = V::constant((dims[0] * dims[1]) as f64);
+    let at = cell[0] + row * cell[1] + plane * cell[2];
+    let [fx, fy, fz] = fraction;
+    // Value and slope on the four edges along x.
+    let (a, s) = edge(field, at, fx);
+    let (b, t) = edge(field, at + row, fx);
+    let (c, u) = edge(field, at + plane, fx);
+    let (d, v) = edge(field, at + plane + row, fx);
+    let (low, high) = (a + fy * (b - a), c + fy * (d - c));
+    let (slope_low, slope_high) = (s + fy * (t - s), u + fy * (v - u));
+    let scale = V::constant(field.quantum() * inverse);
+    let gradient = [
+        scale * (slope_low + fz * (slope_high - slope_low)),
+        scale * ((b - a) + fz * ((d - c) - (b - a))),
+        scale * (high - low),
+    ];
+    let distance = V::constant(field.quantum()) * (low + fz * (high - low));
+    (distance, gradient, off_grid(field, x))
+}
+
+/// Value between the samples at `at` and the next along x, and the slope from one to the other.
+#[inline(always)]
+fn edge<V: Vector<Number = f64>>(field: &SampledField, at: V, x: V) -> (V, V) {
+    let [low, high] = V::pairs(field.levels(), at);
+    let slope = high - low;
+    (low + x * slope, slope)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::lanes::{Kernel, One, dispatch};
     use grainwake_shape::{ShapeOptions, analytic};
 
     /// An ellipsoid of half-axes 1, .8 and .7.
@@ -147,6 +264,55 @@ mod tests {
                 }
             }
             assert!(beyond > 1000, "{beyond}");
+        }
+    }
+
+    /// Compares lanes with single points.
+    struct Alike<'a>(&'a NearShape);
+    impl Kernel for Alike<'_> {
+        type Number = f64;
+        #[inline(always)]
+        fn run<V: Vector<Number = f64>>(self) {
+            let mut far = 0;
+            for i in 0..4000 {
+                let mut points = [[0.0; MOST]; 3];
+                for n in 0..V::WIDTH {
+                    let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779);
+                    let u = u * f64::from(i * 16 + n as i32);
+                    let x = 2.0 * (2.0 * u.fract() - DVec3::ONE);
+                    (0..3).for_each(|axis| points[axis][n] = x[axis]);
+                }
+                let (d, slope) = self.0.lanes(points.map(|lanes| V::load(&lanes)));
+                let (mut distance, mut slopes) = ([0.0; MOST], [[0.0; MOST]; 3]);
+                d.store(&mut distance);
+                slope
+                    .iter()
+                    .zip(&mut slopes)
+                    .for_each(|(v, lanes)| v.store(lanes));
+                for n in 0..V::WIDTH {
+                    let x = DVec3::from_array(points.map(|lanes| lanes[n]));
+                    let (d, slope) = self.0.distance_and_gradient(x);
+                    if d == f64::INFINITY {
+                        far += 1;
+                        assert!(distance[n] > 1e90, "at {x}");
+                    } else {
+                        assert_eq!(distance[n], d, "at {x}");
+                        assert_eq!(slopes.map(|lanes| lanes[n]), slope.to_array(), "at {x}");
+                    }
+                }
+            }
+            let sphere = matches!(self.0.shape.field(), Field::Sphere(_));
+            assert_eq!(far > 0, !sphere);
+        }
+    }
+
+    #[test]
+    fn lanes_are_the_single_points() {
+        let sphere = Arc::new(Shape::sphere(0.8, 100));
+        for (shape, eps) in [(ellipsoid(), 0.25), (ellipsoid(), 0.05), (sphere, 0.25)] {
+            let near = NearShape::new(&shape, eps, 2.5 * eps);
+            dispatch(Alike(&near));
+            Alike(&near).run::<One<f64>>();
         }
     }
 

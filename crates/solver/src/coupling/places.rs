@@ -98,8 +98,66 @@ impl Places {
         first as i32 - PAD..table.len() as i32 - last as i32 - PAD
     }
 
+    /// Calls `found(part, at, below)` for the parts of `range` of row (j, k) of component `component` that
+    /// are unknowns and lie in memory without a gap: positions of the first face (and of the cell
+    /// above it) and of the cell below it.
+    #[inline]
+    pub fn runs(
+        &self,
+        component: usize,
+        [j, k]: [i32; 2],
+        range: Range<i32>,
+        mut found: impl FnMut(Range<i32>, usize, usize),
+    ) {
+        const CELL: usize = 3;
+        let pair = |i: i32| {
+            let place = IVec3::new(i, j, k);
+            let at = self.at(component, place)?;
+            let below = self.at(CELL, place - IVec3::AXES[component])?;
+            Some((at, below))
+        };
+        if range.is_empty() {
+            return;
+        }
+        // Places only follow each other or jump back, and end where the grid does.
+        if let (Some(first), Some(last)) = (pair(range.start), pair(range.end - 1)) {
+            let ahead = range.len() - 1;
+            if last == (first.0 + ahead, first.1 + ahead) {
+                return found(range, first.0, first.1);
+            }
+        }
+        let mut i = range.start;
+        while i < range.end {
+            let Some((at, below)) = pair(i) else {
+                i += 1;
+                continue;
+            };
+            let from = i;
+            i += 1;
+            while i < range.end {
+                let ahead = (i - from) as usize;
+                if pair(i) != Some((at + ahead, below + ahead)) {
+                    break;
+                }
+                i += 1;
+            }
+            found(from..i, at, below);
+        }
+    }
+
+    /// From the first to the last plane in memory that the box has faces or cells in.
+    pub fn planes(&self) -> Range<usize> {
+        let tables = self.tables[2].iter();
+        let parts = tables.flat_map(|table| &table[PAD as usize..table.len() - PAD as usize]);
+        let parts = parts.copied().filter(|part| *part != NONE);
+        let (first, last) = parts.fold((usize::MAX, 0), |(first, last), part| {
+            (first.min(part), last.max(part))
+        });
+        first..last + 1
+    }
+
     /// Copies a field in the box and three cells about it, x fastest.
-    pub fn copy<R: Real>(&self, field: &[R], to: &mut Vec<f64>) {
+    pub fn copy<R: Real>(&self, field: &[R], to: &mut Vec<R>) {
         to.clear();
         let [x, y, z] = &self.lines;
         let whole = x[x.len() - 1] == x[0] + x.len() - 1;
@@ -107,9 +165,9 @@ impl Places {
             for y in y {
                 if whole {
                     let line = &field[x[0] + y + z..][..x.len()];
-                    to.extend(line.iter().map(|value| value.wide()));
+                    to.extend_from_slice(line);
                 } else {
-                    to.extend(x.iter().map(|x| field[x + y + z].wide()));
+                    to.extend(x.iter().map(|x| field[x + y + z]));
                 }
             }
         }

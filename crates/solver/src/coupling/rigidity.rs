@@ -9,14 +9,17 @@
 //! Legend: w mass of a face's cell, J impulse on the fluid, M its derivative by the velocities,
 //! m_s and m_f masses of the grain and of the fluid it displaces.
 
+use std::ops::Range;
+
 use glam::{DMat3, DVec3};
-use rayon::prelude::*;
 
 use super::Past;
-use super::locate::{Body, ForcedFace};
+use super::forced::Forced;
+use super::locate::Body;
 use crate::dem::{Dof, Grain};
 use crate::flow::Flow;
-use crate::grid::FaceVector;
+use crate::grid::{FaceVector, for_slabs};
+use crate::math::lanes::{Kernel, Partial, RAMP, RowWork, Vector, along_row, dispatch};
 use crate::math::{Load, Matrix6, Real, Vector6, solve6};
 
 /// What a step of the fluid does to one grain.
@@ -40,19 +43,15 @@ pub fn gather<R: Real>(
     past: &Past,
     relief: f64,
 ) -> Impulse {
-    let before = past.velocity;
-    let w = fluid_density * flow.mesh().cell_volume();
     let mut sums = [Moments::default(); 3];
-    for face in &mut body.forced {
-        let predicted = flow.predicted.component(face.axis)[face.at].wide();
-        face.back = moved_pressure_pull(flow, face, before, relief);
-        face.free = predicted + face.closed_by_all * face.back;
-        let follow = follow(face, relief);
-        let push = face.closed * face.back
-            - face.share * face.free
-            - follow * rigid_velocity(before, face);
-        sums[face.axis].add(push, face.share + follow, face);
-    }
+    dispatch(Gather {
+        flow,
+        body,
+        before: past.velocity,
+        relief,
+        sums: &mut sums,
+    });
+    let w = fluid_density * flow.mesh().cell_volume();
     let mut impulse = Impulse {
         constant: [0.0; 6],
         slope: [[0.0; 6]; 6],
@@ -79,15 +78,193 @@ struct Moments {
 }
 
 impl Moments {
-    #[inline]
-    fn add(&mut self, push: f64, pull: f64, face: &ForcedFace) {
-        let l = face.arm[(face.axis + 2) % 3];
-        let m = -face.arm[(face.axis + 1) % 3];
-        for (sum, weight) in self.push.iter_mut().zip([1.0, l, m]) {
-            *sum += push * weight;
+    /// Adds a run of component `axis` whose first face has this `arm`, by its sums of push and pull
+    /// with the powers of the way along x.
+    fn add(&mut self, axis: usize, arm: DVec3, push: [f64; 2], pull: [f64; 3]) {
+        // A lever is a + b x.
+        let along = |component: usize| [arm[component], if component == 0 { 1.0 } else { 0.0 }];
+        let [l, m] = [along((axis + 2) % 3), along((axis + 1) % 3).map(|v| -v)];
+        let once = |v: [f64; 2], sum: &[f64]| v[0] * sum[0] + v[1] * sum[1];
+        let twice = |v: [f64; 2], w: [f64; 2]| v[0] * once(w, &pull) + v[1] * once(w, &pull[1..]);
+        let pushes = [push[0], once(l, &push), once(m, &push)];
+        let pulls = [
+            pull[0],
+            once(l, &pull),
+            once(m, &pull),
+            twice(l, l),
+            twice(l, m),
+            twice(m, m),
+        ];
+        self.push
+            .iter_mut()
+            .zip(pushes)
+            .for_each(|(sum, x)| *sum += x);
+        self.pull
+            .iter_mut()
+            .zip(pulls)
+            .for_each(|(sum, x)| *sum += x);
+    }
+}
+
+/// What a run of faces needs of the rigid motion: at its first face, and the change to the next.
+#[derive(Clone, Copy)]
+struct Rigid {
+    first: DVec3,
+    change: DVec3,
+}
+
+impl Rigid {
+    /// Velocity of a body at `[velocity, angular velocity]` along a run that begins at `arm`.
+    fn of([velocity, omega]: [DVec3; 2], arm: DVec3, spacing: DVec3) -> Rigid {
+        Rigid {
+            first: velocity + omega.cross(arm),
+            change: omega.cross(DVec3::X * spacing.x),
         }
-        for (sum, weight) in self.pull.iter_mut().zip([1.0, l, m, l * l, l * m, m * m]) {
-            *sum += pull * weight;
+    }
+    /// A component at the faces `i` of the run.
+    #[inline(always)]
+    fn at<V: Vector<Number = f64>>(&self, axis: usize, i: V) -> V {
+        V::constant(self.first[axis]) + V::constant(self.change[axis]) * i
+    }
+}
+
+/// The lanes of a vector, counted from `n`.
+#[inline(always)]
+fn count_from<V: Vector<Number = f64>>(n: usize) -> V {
+    V::constant(n as f64) + V::load(&RAMP)
+}
+
+/// Part of the grain's change of velocity that a face takes beside its share of the velocity; `relieved`
+/// is 1, or 0 without relief.
+#[inline(always)]
+fn follow<V: Vector<Number = f64>>(share: V, closed: V, relieved: f64) -> V {
+    V::constant(relieved) * (V::constant(1.0) - share) * closed
+}
+
+fn relieved(relief: f64) -> f64 {
+    if relief > 0.0 { 1.0 } else { 0.0 }
+}
+
+/// Sums over the forced faces of one grain; leaves what the faces know in their lists.
+struct Gather<'a, R> {
+    flow: &'a Flow<R>,
+    body: &'a mut Body,
+    before: [DVec3; 2],
+    relief: f64,
+    sums: &'a mut [Moments; 3],
+}
+
+impl<R: Real> Kernel for Gather<'_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let forced = &mut self.body.forced;
+        let faces = forced.share.len();
+        forced.back.resize(faces, 0.0);
+        forced.free.resize(faces, 0.0);
+        let spacing = self.flow.mesh().spacing;
+        let strides = self.flow.mesh().layout().strides();
+        let Forced {
+            runs,
+            share,
+            closed,
+            closed_by_all,
+            back,
+            free,
+        } = forced;
+        for (axis, runs) in runs.iter().enumerate() {
+            let half = 0.5 * spacing[axis] * DVec3::AXES[axis];
+            for run in runs {
+                let faces = run.first..run.first + run.count;
+                let mut work = GatherRun {
+                    axis,
+                    predicted: &self.flow.predicted.component(axis)[run.at..],
+                    pressure: &self.flow.pressure,
+                    strides,
+                    cells: [run.at, run.below],
+                    rigid: Rigid::of(self.before, run.arm, spacing),
+                    sides: [half, -half]
+                        .map(|half| Rigid::of(self.before, run.arm + half, spacing)),
+                    drift: (0.5 * self.relief / spacing).to_array(),
+                    pull: self.relief / spacing[axis],
+                    relieved: relieved(self.relief),
+                    spacing: spacing.x,
+                    share: &share[faces.clone()],
+                    closed: &closed[faces.clone()],
+                    closed_by_all: &closed_by_all[faces.clone()],
+                    back: &mut back[faces.clone()],
+                    free: &mut free[faces],
+                    sums: Default::default(),
+                };
+                along_row::<V>(run.count, &mut work);
+                let [push, push_x, pull, pull_x, pull_xx] = work.sums.map(|sum| sum.sum());
+                self.sums[axis].add(axis, run.arm, [push, push_x], [pull, pull_x, pull_xx]);
+            }
+        }
+    }
+}
+
+/// One run; the lists are of its faces.
+struct GatherRun<'a, R> {
+    axis: usize,
+    predicted: &'a [R],
+    pressure: &'a [R],
+    strides: [usize; 3],
+    /// The first of the cells above and below the faces.
+    cells: [usize; 2],
+    rigid: Rigid,
+    /// Motion of the middles of those cells.
+    sides: [Rigid; 2],
+    /// Half a step over the spacing along each axis [s/m].
+    drift: [f64; 3],
+    /// A step over the spacing along the component [s/m].
+    pull: f64,
+    relieved: f64,
+    spacing: f64,
+    share: &'a [f64],
+    closed: &'a [f64],
+    closed_by_all: &'a [f64],
+    back: &'a mut [f64],
+    free: &'a mut [f64],
+    /// Of push, push x, pull, pull x and pull x x.
+    sums: [Partial; 5],
+}
+
+impl<R: Real> GatherRun<'_, R> {
+    /// Pressure of the cells from face `n` on, above or below it, moved with the grain for a step.
+    #[inline(always)]
+    fn moved<V: Vector<Number = f64>>(&self, side: usize, n: usize) -> V {
+        let at = self.cells[side] + n;
+        let p = |at: usize| V::load_from(&self.pressure[at..]);
+        let mut moved = p(at);
+        for axis in 0..3 {
+            let stride = self.strides[axis];
+            let cells = V::constant(self.drift[axis]) * self.sides[side].at(axis, count_from(n));
+            moved = moved - cells * (p(at + stride) - p(at - stride));
+        }
+        moved
+    }
+}
+
+impl<R: Real> RowWork for GatherRun<'_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn at<V: Vector<Number = f64>>(&mut self, i: usize) {
+        let n = i - 1;
+        let x = V::constant(self.spacing) * count_from(n);
+        let (share, closed) = (V::load(&self.share[n..]), V::load(&self.closed[n..]));
+        let back = V::constant(self.pull) * (self.moved::<V>(0, n) - self.moved(1, n));
+        let predicted = V::load_from(&self.predicted[n..]);
+        let free = predicted + V::load(&self.closed_by_all[n..]) * back;
+        let follow = follow(share, closed, self.relieved);
+        let push = closed * back - share * free - follow * self.rigid.at(self.axis, count_from(n));
+        let pull = share + follow;
+        back.store(&mut self.back[n..]);
+        free.store(&mut self.free[n..]);
+        let [push_x, pull_x] = [push * x, pull * x];
+        let sums = [push, push_x, pull, pull_x, pull_x * x];
+        for (sum, value) in self.sums.iter_mut().zip(sums) {
+            sum.add(i, value);
         }
     }
 }
@@ -183,60 +360,96 @@ pub fn impose<R: Real>(
     before: &[Past],
     relief: f64,
 ) {
+    let (mesh, relieved) = (*flow.mesh(), relieved(relief));
     let FaceVector { x, y, z } = &mut flow.predicted;
-    let components: [&mut [R]; 3] = [x, y, z];
-    let each = components.into_par_iter().enumerate();
-    each.for_each(|(axis, predicted)| {
-        for ((grain, body), Past { velocity, .. }) in grains.iter().zip(bodies).zip(before) {
-            let now = [grain.velocity, grain.angular_velocity];
-            for face in body.forced_along(axis) {
-                let rigid = rigid_velocity(now, face);
-                let change = rigid - rigid_velocity(*velocity, face);
-                let gain = face.closed * face.back
-                    + face.share * (rigid - face.free)
-                    + follow(face, relief) * change;
-                predicted[face.at] = R::of(predicted[face.at].wide() + gain);
+    for_slabs(
+        mesh.layout(),
+        [[&mut **x], [y], [z]],
+        |axis, from, [predicted]| {
+            let slab = from..from + predicted.len();
+            for ((grain, body), past) in grains.iter().zip(bodies).zip(before) {
+                if body.lies_in(&slab, mesh.layout()) {
+                    dispatch(Impose {
+                        axis,
+                        spacing: mesh.spacing,
+                        grain,
+                        forced: &body.forced,
+                        before: past.velocity,
+                        relieved,
+                        slab: slab.clone(),
+                        predicted: &mut *predicted,
+                    });
+                }
             }
+        },
+    );
+}
+
+/// What one grain gives the faces of a component in a slab of memory.
+struct Impose<'a, R> {
+    axis: usize,
+    spacing: DVec3,
+    grain: &'a Grain,
+    forced: &'a Forced,
+    before: [DVec3; 2],
+    relieved: f64,
+    slab: Range<usize>,
+    predicted: &'a mut [R],
+}
+
+impl<R: Real> Kernel for Impose<'_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let now = [self.grain.velocity, self.grain.angular_velocity];
+        let change = [0, 1].map(|which| now[which] - self.before[which]);
+        let forced = self.forced;
+        let runs = forced.runs[self.axis].iter();
+        for run in runs.filter(|run| self.slab.contains(&run.at)) {
+            let faces = run.first..run.first + run.count;
+            let at = run.at - self.slab.start;
+            let mut work = ImposeRun {
+                axis: self.axis,
+                rigid: Rigid::of(now, run.arm, self.spacing),
+                change: Rigid::of(change, run.arm, self.spacing),
+                relieved: self.relieved,
+                share: &forced.share[faces.clone()],
+                closed: &forced.closed[faces.clone()],
+                back: &forced.back[faces.clone()],
+                free: &forced.free[faces],
+                predicted: &mut self.predicted[at..at + run.count],
+            };
+            along_row::<V>(run.count, &mut work);
         }
-    });
-}
-
-/// Part of the grain's change of velocity that a face takes beside its share of the velocity.
-fn follow(face: &ForcedFace, relief: f64) -> f64 {
-    if relief > 0.0 {
-        (1.0 - face.share) * face.closed
-    } else {
-        0.0
     }
 }
 
-/// Velocity along a face's axis of a body that moves at `[velocity, angular velocity]`.
-fn rigid_velocity([velocity, omega]: [DVec3; 2], face: &ForcedFace) -> f64 {
-    (velocity + omega.cross(face.arm))[face.axis]
+/// One run; the lists are of its faces.
+struct ImposeRun<'a, R> {
+    axis: usize,
+    rigid: Rigid,
+    change: Rigid,
+    relieved: f64,
+    share: &'a [f64],
+    closed: &'a [f64],
+    back: &'a [f64],
+    free: &'a [f64],
+    predicted: &'a mut [R],
 }
 
-/// What the pressure takes from a face over `dt` [m/s] once it has moved with a grain at
-/// `[velocity, angular velocity]` for as long.
-fn moved_pressure_pull<R: Real>(
-    flow: &Flow<R>,
-    face: &ForcedFace,
-    [velocity, omega]: [DVec3; 2],
-    dt: f64,
-) -> f64 {
-    if dt == 0.0 || face.closed_by_all == 0.0 {
-        return 0.0;
+impl<R: Real> RowWork for ImposeRun<'_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn at<V: Vector<Number = f64>>(&mut self, i: usize) {
+        let n = i - 1;
+        let load = |list: &[f64]| V::load(&list[n..]);
+        let (share, closed) = (load(self.share), load(self.closed));
+        let place = count_from(n);
+        let gain = closed * load(self.back)
+            + share * (self.rigid.at(self.axis, place) - load(self.free))
+            + follow(share, closed, self.relieved) * self.change.at(self.axis, place);
+        (V::load_from(&self.predicted[n..]) + gain).store_to(&mut self.predicted[n..]);
     }
-    let strides = flow.mesh().layout().strides();
-    let p = |at: usize| flow.pressure[at].wide();
-    let spacing = flow.mesh().spacing;
-    let half = 0.5 * spacing[face.axis] * DVec3::AXES[face.axis];
-    let moved = |at: usize, arm: DVec3| -> f64 {
-        let cells = 0.5 * dt * (velocity + omega.cross(arm)) / spacing;
-        let change = |axis: usize| cells[axis] * (p(at + strides[axis]) - p(at - strides[axis]));
-        p(at) - (0..3).map(change).sum::<f64>()
-    };
-    let rise = moved(face.at, face.arm + half) - moved(face.below, face.arm - half);
-    dt / spacing[face.axis] * rise
 }
 
 /// Replaces three equations by given velocities.

@@ -2,10 +2,11 @@
 //!
 //! Legend: u velocity, p dynamic pressure over density, phi its increment, H tendency.
 
-use glam::DVec3;
-use rayon::prelude::*;
+use std::ops::Range;
 
-use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of};
+use glam::DVec3;
+
+use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of, for_slabs};
 use crate::math::Real;
 use crate::math::lanes::dispatch;
 use crate::poisson::{Plane, Poisson, Stages};
@@ -170,20 +171,34 @@ impl<R: Real> Flow<R> {
     }
 
     /// Adds to the tendency after `predict`, as if it had been part of H^n. `each` is called for every
-    /// component, in parallel, with `add(at, extra)` [m/s^2]; only for faces that are unknowns.
-    pub fn add_tendency(&mut self, each: impl Fn(usize, &mut dyn FnMut(usize, f64)) + Sync) {
+    /// component and slab of memory, in parallel, with `add(at, extra)` [m/s^2] for neighbouring faces
+    /// from `at` on; only for unknowns within the slab.
+    pub fn add_tendency(
+        &mut self,
+        each: impl Fn(usize, Range<usize>, &mut dyn FnMut(usize, &[f64])) + Sync,
+    ) {
         let weight = self.weight;
         let FaceVector { x, y, z } = &mut self.tendency;
-        let tendency: [&mut [R]; 3] = [x, y, z];
-        let FaceVector { x, y, z } = &mut self.predicted;
-        let predicted: [&mut [R]; 3] = [x, y, z];
-        let components = tendency.into_par_iter().zip(predicted).enumerate();
-        components.for_each(|(component, (tendency, predicted))| {
-            each(component, &mut |at, extra| {
-                tendency[at] = R::of(tendency[at].wide() + extra);
-                predicted[at] = R::of(predicted[at].wide() + weight * extra);
-            });
-        });
+        let FaceVector {
+            x: px,
+            y: py,
+            z: pz,
+        } = &mut self.predicted;
+        let fields = [[&mut **x, px], [y, py], [z, pz]];
+        for_slabs(
+            self.mesh.layout(),
+            fields,
+            |component, from, [tendency, predicted]| {
+                each(component, from..from + tendency.len(), &mut |at, extra| {
+                    let part = at - from..at - from + extra.len();
+                    let values = tendency[part.clone()].iter_mut().zip(&mut predicted[part]);
+                    for ((tendency, predicted), extra) in values.zip(extra) {
+                        *tendency = R::of(tendency.wide() + extra);
+                        *predicted = R::of(predicted.wide() + weight * extra);
+                    }
+                });
+            },
+        );
     }
 
     /// Solves lap(phi) = div(u*)/dt, sets u = u* - dt grad(phi), p += phi, and fills the ghosts.

@@ -27,6 +27,32 @@ pub fn for_planes_of<const N: usize, R: Send, T: Send>(
     });
 }
 
+/// Calls `f(component, start, parts)` in parallel for slabs of whole planes, ghosts included, of the
+/// fields of three components; `start` is where the slab begins in memory.
+pub fn for_slabs<const N: usize, R: Send>(
+    layout: Layout,
+    components: [[&mut [R]; N]; 3],
+    f: impl Fn(usize, usize, [&mut [R]; N]) + Sync,
+) {
+    // Enough for even shares, wherever the grains crowd.
+    let slabs = 4 * rayon::current_num_threads();
+    let length = (layout.cells[2] + 2).div_ceil(slabs) * layout.plane();
+    let mut tasks = Vec::with_capacity(3 * slabs);
+    for (component, mut fields) in components.into_iter().enumerate() {
+        for start in (0..layout.len()).step_by(length) {
+            let size = length.min(layout.len() - start);
+            let parts = fields.each_mut().map(|field| {
+                let part = field.split_off_mut(..size);
+                part.expect("fields have the entries of their layout")
+            });
+            tasks.push((component, start, parts));
+        }
+    }
+    tasks
+        .into_par_iter()
+        .for_each(|(component, start, parts)| f(component, start, parts));
+}
+
 /// Consecutive planes of several fields that one thread holds during [`for_runs`].
 pub struct Run<'a, const N: usize, R, T> {
     range: Range<usize>,

@@ -6,5 +6,5 @@ mod mesh;
 
 pub use field::Layout;
 pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field};
-pub(crate) use loops::{Columns, Run, for_chunks, for_columns, for_planes_of, for_runs};
+pub(crate) use loops::{Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, for_slabs};
 pub use mesh::{Axis, Mesh};

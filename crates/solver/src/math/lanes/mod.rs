@@ -92,6 +92,46 @@ pub trait Vector:
     fn magnitude(self) -> Self {
         self.larger(Self::constant(0.0) - self)
     }
+    /// Whether every lane is zero.
+    #[inline(always)]
+    fn is_zero(self) -> bool {
+        let mut lanes = [Self::Number::default(); MOST];
+        self.store(&mut lanes);
+        lanes[..Self::WIDTH].iter().all(|lane| lane.wide() == 0.0)
+    }
+    /// Lane-wise largest whole number that is not greater.
+    #[inline(always)]
+    fn floor(self) -> Self {
+        self.each(f64::floor)
+    }
+    /// Lane-wise square root.
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.each(f64::sqrt)
+    }
+    /// Lane-wise `f`, one by one.
+    #[inline(always)]
+    fn each(self, f: impl Fn(f64) -> f64) -> Self {
+        let mut lanes = [Self::Number::default(); MOST];
+        self.store(&mut lanes);
+        for lane in &mut lanes[..Self::WIDTH] {
+            *lane = Self::Number::of(f(lane.wide()));
+        }
+        Self::load(&lanes)
+    }
+    /// Of each lane of `at`, a whole number, the entry of `from` there and the next.
+    #[inline(always)]
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+        let mut lanes = [[Self::Number::default(); MOST]; 2];
+        at.store(&mut lanes[0]);
+        for n in 0..Self::WIDTH {
+            let at = lanes[0][n].wide() as usize;
+            let pair = &from[at..at + 2];
+            lanes[0][n] = Self::Number::of(f64::from(pair[0]));
+            lanes[1][n] = Self::Number::of(f64::from(pair[1]));
+        }
+        lanes.map(|lanes| Self::load(&lanes))
+    }
     /// Swaps rows and columns of `WIDTH` vectors.
     fn transpose(block: &mut [Self]);
     /// Adds the lanes, as doubles, to the first `WIDTH` of `sums`.
@@ -134,6 +174,17 @@ impl Registers for f32 {
     type Avx2 = Self::Common;
     type Avx512 = Self::Common;
 }
+
+/// Numbers of the lanes.
+pub const RAMP: [f64; MOST] = {
+    let mut ramp = [0.0; MOST];
+    let mut i = 0;
+    while i < MOST {
+        ramp[i] = i as f64;
+        i += 1;
+    }
+    ramp
+};
 
 /// Work on the neighbouring entries of a row.
 pub trait RowWork {

@@ -67,6 +67,25 @@ fn check<V: Vector>() {
         }
         assert_eq!([sums[i], tops[i]], [1.0 + a, a.max(0.25)]);
     }
+    let signed: [V::Number; MOST] = std::array::from_fn(|i| number(1.7 * i as f64 - 5.0));
+    let (mut floors, mut roots) = ([V::Number::default(); MOST], [V::Number::default(); MOST]);
+    V::load(&signed).floor().store(&mut floors);
+    V::load(&signed).magnitude().root().store(&mut roots);
+    let table: Vec<f32> = (0..40).map(|n| (n * n) as f32).collect();
+    let places: [V::Number; MOST] = std::array::from_fn(|i| number((7 * i % 39) as f64));
+    let mut pairs = [[V::Number::default(); MOST]; 2];
+    let [low, high] = V::pairs(&table, V::load(&places));
+    low.store(&mut pairs[0]);
+    high.store(&mut pairs[1]);
+    for i in 0..V::WIDTH {
+        assert_eq!(floors[i].wide(), signed[i].wide().floor());
+        assert_eq!(roots[i], number(signed[i].wide().abs().sqrt()));
+        let at = 7 * i % 39;
+        assert_eq!(
+            pairs.map(|p| p[i].wide()),
+            [at, at + 1].map(|n| (n * n) as f64)
+        );
+    }
     let doubles: [f64; MOST] = std::array::from_fn(|i| (i as f64 + 0.1).sin());
     let (mut back, mut exact) = ([0.0; MOST], [0.0_f32; MOST]);
     V::load_from(&doubles).store_to(&mut back);

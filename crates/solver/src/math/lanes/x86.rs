@@ -20,6 +20,7 @@ macro_rules! vector {
         doubles $wide:ident [$($w:tt: $widen:path),+],
         $add:ident, $sub:ident, $mul:ident, $div:ident, $max:ident,
         $set:ident, $load:ident, $store:ident
+        $(; $($own:item)*)?
     ) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
@@ -82,6 +83,7 @@ macro_rules! vector {
                 // SAFETY: see the head of this file.
                 unsafe { $name($($max(self.$i, other.$i)),+) }
             }
+            $($($own)*)?
             #[inline(always)]
             fn transpose(block: &mut [Self]) {
                 // SAFETY: see the head of this file.
@@ -127,7 +129,42 @@ vector! {
     half Four, tail Four, transpose turn::four,
     doubles Four [0: same],
     _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_max_pd,
-    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd
+    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd;
+    #[inline(always)]
+    fn is_zero(self) -> bool {
+        // SAFETY: see the head of this file.
+        unsafe {
+            let zeros = _mm256_cmp_pd::<_CMP_EQ_OQ>(self.0, _mm256_setzero_pd());
+            _mm256_movemask_pd(zeros) == 0xf
+        }
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Four(_mm256_floor_pd(self.0)) }
+    }
+    #[inline(always)]
+    fn root(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Four(_mm256_sqrt_pd(self.0)) }
+    }
+    #[inline(always)]
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+        // SAFETY: see the head of this file; all pairs are found to lie in the slice.
+        unsafe {
+            let last = _mm256_set1_pd(from.len() as f64 - 2.0);
+            let below = _mm256_cmp_pd::<_CMP_LE_OQ>(at.0, last);
+            let above = _mm256_cmp_pd::<_CMP_GE_OQ>(at.0, _mm256_setzero_pd());
+            assert_eq!(_mm256_movemask_pd(_mm256_and_pd(below, above)), 0xf);
+            let places = _mm256_cvttpd_epi32(at.0);
+            let pairs = _mm256_i32gather_epi64::<4>(from.as_ptr().cast(), places);
+            let apart = _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7);
+            let apart = _mm256_permutevar8x32_epi32(pairs, apart);
+            let low = _mm_castsi128_ps(_mm256_castsi256_si128(apart));
+            let high = _mm_castsi128_ps(_mm256_extracti128_si256::<1>(apart));
+            [Four(_mm256_cvtps_pd(low)), Four(_mm256_cvtps_pd(high))]
+        }
+    }
 }
 vector! {
     /// Eight doubles.
@@ -135,7 +172,39 @@ vector! {
     half Four, tail Four, transpose turn::eight,
     doubles Eight [0: same],
     _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_max_pd,
-    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd
+    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd;
+    #[inline(always)]
+    fn is_zero(self) -> bool {
+        // SAFETY: see the head of this file.
+        unsafe { _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(self.0, _mm512_setzero_pd()) == 0xff }
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        const DOWN: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
+        // SAFETY: see the head of this file.
+        unsafe { Eight(_mm512_roundscale_pd::<DOWN>(self.0)) }
+    }
+    #[inline(always)]
+    fn root(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Eight(_mm512_sqrt_pd(self.0)) }
+    }
+    #[inline(always)]
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+        // SAFETY: see the head of this file; all pairs are found to lie in the slice.
+        unsafe {
+            let last = _mm512_set1_pd(from.len() as f64 - 2.0);
+            let below = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(at.0, last);
+            let above = _mm512_cmp_pd_mask::<_CMP_GE_OQ>(at.0, _mm512_setzero_pd());
+            assert_eq!(below & above, 0xff);
+            let places = _mm512_cvttpd_epi32(at.0);
+            let pairs = _mm512_i32gather_epi64::<4>(places, from.as_ptr().cast());
+            let low = _mm256_castsi256_ps(_mm512_cvtepi64_epi32(pairs));
+            let high = _mm512_cvtepi64_epi32(_mm512_srli_epi64::<32>(pairs));
+            let high = _mm256_castsi256_ps(high);
+            [Eight(_mm512_cvtps_pd(low)), Eight(_mm512_cvtps_pd(high))]
+        }
+    }
 }
 vector! {
     /// Four singles.

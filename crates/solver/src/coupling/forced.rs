@@ -1,0 +1,74 @@
+//! The faces that a grain's rigidity acts on, in runs along x.
+
+use glam::DVec3;
+
+/// Neighbouring faces of one component in a row of the grid, with no gap in memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Run {
+    /// Position in memory of the first face, also that of the cell above it.
+    pub at: usize,
+    /// Position of the cell below it, across a periodic edge if need be.
+    pub below: usize,
+    /// From the grain's centroid to the first face [m].
+    pub arm: DVec3,
+    /// Place of the first face in the lists of [`Forced`].
+    pub first: usize,
+    /// Number of faces.
+    pub count: usize,
+}
+
+/// Forced faces of all components; a few between them that are not forced have zeros.
+#[derive(Clone, Debug, Default)]
+pub struct Forced {
+    /// Of each component.
+    pub runs: [Vec<Run>; 3],
+    /// Share by which a face takes the rigid velocity, 0 to 1.
+    pub share: Vec<f64>,
+    /// Part of a face that the grain closes to the pressure gradient, 0 to 1.
+    pub closed: Vec<f64>,
+    /// Part that all grains together close.
+    pub closed_by_all: Vec<f64>,
+    /// What the pressure takes from a face in the step, given back to its closed part [m/s]. Known
+    /// once the impulse is, like `free`.
+    pub back: Vec<f64>,
+    /// Velocity there without the drag of the grains [m/s].
+    pub free: Vec<f64>,
+}
+
+impl Forced {
+    pub fn clear(&mut self) {
+        self.runs.iter_mut().for_each(Vec::clear);
+        let Forced {
+            share,
+            closed,
+            closed_by_all,
+            ..
+        } = self;
+        share.clear();
+        closed.clear();
+        closed_by_all.clear();
+    }
+
+    /// Adds a face; returns its place.
+    #[inline]
+    pub fn push(&mut self, share: f64, closed: f64) -> usize {
+        self.share.push(share);
+        self.closed.push(closed);
+        self.closed_by_all.push(closed);
+        self.share.len() - 1
+    }
+
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        let lists = [
+            &self.share,
+            &self.closed,
+            &self.closed_by_all,
+            &self.back,
+            &self.free,
+        ];
+        let runs: usize = self.runs.iter().map(Vec::capacity).sum();
+        let values: usize = lists.iter().map(|list| list.capacity()).sum();
+        size_of::<Run>() * runs + size_of::<f64>() * values
+    }
+}
