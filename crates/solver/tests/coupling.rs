@@ -255,7 +255,7 @@ fn light_grains_keep_momentum_to_a_step() {
     let first = sim.diagnostics().momentum;
     run(&mut sim, 3.0);
     let lost = (sim.diagnostics().momentum - first).length() / first.length();
-    assert!(lost < 0.01, "{lost}");
+    assert!(lost < 1e-3, "{lost}");
 }
 
 #[test]
@@ -271,6 +271,78 @@ fn light_grains_come_to_rest_under_the_ceiling() {
         let (z, v) = (grain.pose.position.z, grain.velocity.length());
         assert!((5.4..5.52).contains(&z) && v < 0.02, "z {z}, speed {v}");
     }
+}
+
+/// A uniform acceleration in a closed box is balanced by the pressure: on the closed parts of faces neither
+/// acts.
+#[test]
+fn fluid_pressed_against_a_held_grain_stays_at_rest() {
+    let mut ball = sphere(1.0, DVec3::new(1.03, 1.08, 0.94), 1.0);
+    (ball.translation, ball.rotation) = (HELD, HELD);
+    let mut case = setup([16, 16, 16], 1.0 / 8.0, [WALLS; 3], 0.2, vec![ball]);
+    case.fluid.as_mut().unwrap().body_acceleration = DVec3::new(0.0, 1.0, -3.0);
+    let mut sim = Simulation::new(case).unwrap();
+    run(&mut sim, 3.0);
+    // What the start set going dies out; without the balance .018 remain.
+    let speed = sim.diagnostics().max_velocity;
+    assert!(speed < 1e-5, "{speed:e}");
+}
+
+/// Grains a little lighter and heavier than the fluid are alike, also at the ceiling, and none leaves it faster
+/// than it came.
+#[test]
+fn light_grains_rebound_no_faster_than_they_hit() {
+    let rebound = |ratio: f64| {
+        let mut case = rising(Shape::sphere(0.5, 600), ratio, 8, 0.002);
+        // Upwards by the same weight in the fluid.
+        case.gravity.z = 1.0 / (ratio - 1.0);
+        case.contact.restitution = 0.9;
+        case.grains[0].pose.position.z = 2.5;
+        let mut sim = Simulation::new(case).unwrap();
+        let (mut impact, mut fastest) = (0.0_f64, 0.0_f64);
+        while sim.time() < 6.0 {
+            let before = sim.grains()[0].velocity.z;
+            sim.step(f64::INFINITY).unwrap();
+            if !sim.contacts().is_empty() && impact == 0.0 {
+                impact = before;
+            }
+            if impact > 0.0 {
+                fastest = fastest.max(-sim.grains()[0].velocity.z);
+            }
+        }
+        println!("{ratio}: {impact} {fastest}");
+        assert!(impact > 0.1, "ratio {ratio}: {impact}");
+        fastest / impact
+    };
+    let heavy = rebound(1.01);
+    assert!((rebound(0.99) / heavy - 1.0).abs() < 0.1);
+    for ratio in [0.02, 0.2, 0.5, 0.8] {
+        assert!(rebound(ratio) < 1.0, "ratio {ratio}");
+    }
+}
+
+#[test]
+fn load_of_a_prescribed_grain_does_not_depend_on_its_density() {
+    let loads = |density: f64| {
+        let mut ball = sphere(1.0, DVec3::splat(1.5), density);
+        (ball.translation, ball.rotation) = (HELD, HELD);
+        let mut case = setup([24, 24, 24], 1.0 / 8.0, [WALLS; 3], 0.05, vec![ball]);
+        case.step = StepRule::Fixed(0.01);
+        let shaken = ["0".into(), "0".into(), "sin(9*t)".into()];
+        case.prescription.motions = vec![Drive {
+            grain: 0,
+            velocity: Some(Formula::parse(shaken, &["t"]).unwrap()),
+            angular_velocity: None,
+        }];
+        let mut sim = Simulation::new(case).unwrap();
+        run(&mut sim, 0.3);
+        sim.loads()[0].force
+    };
+    let (light, heavy) = (loads(0.02), loads(7.0));
+    assert!(
+        (light - heavy).length() < 1e-12 * heavy.length(),
+        "{light} {heavy}"
+    );
 }
 
 #[test]

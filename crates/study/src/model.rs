@@ -129,11 +129,16 @@ fn settings(set: &RawSet) -> Vec<Setting> {
     found
 }
 
+/// Keys of tables that stand for one value.
+const ONE_VALUE: [&str; 2] = ["kind", "formula"];
+
 /// Calls `found` with the dotted key and the text of a value, or of all values in a `nested` table.
 fn spread(key: String, value: &Value, nested: bool, found: &mut dyn FnMut(String, String)) {
     match value {
-        Value::Table(table) if nested => {
+        // A shape or a formula is one value.
+        Value::Table(table) if nested && !ONE_VALUE.iter().any(|key| table.contains_key(*key)) => {
             for (inner, value) in table {
+                let nested = !inner.contains('.');
                 spread(format!("{key}.{inner}"), value, nested, found);
             }
         }

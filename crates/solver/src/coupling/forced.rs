@@ -17,7 +17,7 @@ pub struct Run {
     pub count: usize,
 }
 
-/// Forced faces of all components; a few between them that are not forced have zeros.
+/// Forced faces of all components; faces between them that are not forced have zeros.
 #[derive(Clone, Debug, Default)]
 pub struct Forced {
     /// Of each component.

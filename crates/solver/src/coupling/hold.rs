@@ -18,16 +18,6 @@ pub struct Hold {
 }
 
 impl Hold {
-    /// On faces deep inside.
-    pub fn whole(scheme: Scheme) -> Hold {
-        Hold {
-            strength: f64::INFINITY,
-            closed: match scheme {
-                Scheme::Aperture => 1.0,
-                Scheme::Paper => 0.0,
-            },
-        }
-    }
     /// Share of the rigid velocity that a face takes where grains hold it with `all` their strength.
     #[inline]
     pub fn share(self, all: Hold) -> f64 {

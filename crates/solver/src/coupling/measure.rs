@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3, IVec3};
 
 use super::Scheme;
 use super::forced::Run;
-use super::hold::{Faces, Hold};
+use super::hold::Faces;
 use super::locate::{Body, PushRow};
 use super::near::NearShape;
 use super::rivals::Rival;
@@ -40,7 +40,7 @@ enum Role {
     /// Nothing.
     #[default]
     Free,
-    /// Takes all of it: the face is deep inside.
+    /// Takes all of it: the face is deep inside (the paper's coupling asks its shares themselves).
     Whole,
     /// Holds it, perhaps with others; that far is it from them [m].
     Near(f64),
@@ -166,7 +166,7 @@ impl Kernel for Measure<'_> {
                     let inside_rival = rival <= -eps && rival < d;
                     if d < 2.0 * eps && !inside_rival {
                         forced = [forced[0].min(i), i + 1];
-                        row.role[at] = if d > -eps {
+                        row.role[at] = if d > -eps || scheme == Scheme::Paper {
                             Role::Near(rival)
                         } else {
                             Role::Whole
@@ -198,7 +198,7 @@ impl Kernel for Measure<'_> {
                             let at = i as usize;
                             match row.role[at] {
                                 Role::Free => _ = list.push(0.0, 0.0),
-                                Role::Whole => _ = list.push(1.0, Hold::whole(scheme).closed),
+                                Role::Whole => _ = list.push(1.0, 1.0),
                                 Role::Near(rival) => {
                                     places.push(list.push(0.0, 0.0));
                                     let normal = [0, 1, 2].map(|axis| row.normal[axis][at]);

@@ -77,8 +77,10 @@ impl NearShape {
             let thickness = (shape.upper() - shape.lower()).min_element();
             let spacing = (eps / SAMPLES).min(thickness / ACROSS);
             let spacing = spacing.max(field.spacing());
-            let margin = reach + spacing;
-            shape.resampled(spacing, margin).ok().map(Arc::new)
+            // Coarser where that would be too many samples.
+            let mut coarser = (0..20).map(|doublings| f64::from(1 << doublings) * spacing);
+            let about = coarser.find_map(|spacing| shape.resampled(spacing, reach + spacing).ok());
+            about.map(Arc::new)
         } else {
             None
         };
@@ -228,7 +230,7 @@ fn edge<V: Vector<Number = f64>>(field: &SampledField, at: V, x: V) -> (V, V) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::lanes::{Kernel, One, dispatch};
+    use crate::math::lanes::{Kernel, One, Registers, dispatch};
     use grainwake_shape::{ShapeOptions, analytic};
 
     /// An ellipsoid of half-axes 1, .8 and .7.
@@ -312,6 +314,7 @@ mod tests {
         for (shape, eps) in [(ellipsoid(), 0.25), (ellipsoid(), 0.05), (sphere, 0.25)] {
             let near = NearShape::new(&shape, eps, 2.5 * eps);
             dispatch(Alike(&near));
+            Alike(&near).run::<<f64 as Registers>::Common>();
             Alike(&near).run::<One<f64>>();
         }
     }

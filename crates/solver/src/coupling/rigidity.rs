@@ -187,6 +187,7 @@ impl<R: Real> Kernel for Gather<'_, R> {
                         .map(|half| Rigid::of(self.before, run.arm + half, spacing)),
                     drift: (0.5 * self.relief / spacing).to_array(),
                     pull: self.relief / spacing[axis],
+                    driven: self.relief * self.flow.body_acceleration()[axis],
                     relieved: relieved(self.relief),
                     spacing: spacing.x,
                     share: &share[faces.clone()],
@@ -219,6 +220,8 @@ struct GatherRun<'a, R> {
     drift: [f64; 3],
     /// A step over the spacing along the component [s/m].
     pull: f64,
+    /// What a uniform acceleration gives a face in the step [m/s].
+    driven: f64,
     relieved: f64,
     spacing: f64,
     share: &'a [f64],
@@ -253,7 +256,8 @@ impl<R: Real> RowWork for GatherRun<'_, R> {
         let n = i - 1;
         let x = V::constant(self.spacing) * count_from(n);
         let (share, closed) = (V::load(&self.share[n..]), V::load(&self.closed[n..]));
-        let back = V::constant(self.pull) * (self.moved::<V>(0, n) - self.moved(1, n));
+        let rise = self.moved::<V>(0, n) - self.moved(1, n);
+        let back = V::constant(self.pull) * rise - V::constant(self.driven);
         let predicted = V::load_from(&self.predicted[n..]);
         let free = predicted + V::load(&self.closed_by_all[n..]) * back;
         let follow = follow(share, closed, self.relieved);
@@ -323,10 +327,10 @@ pub fn advance(
     }
 }
 
-/// Fluid that a grain lighter than the fluid carries along, its virtual mass: as much as it
-/// displaces, on both sides of its equations, with the new acceleration on one and the last on the
-/// other. The fluid around a grain answers by the projection, one step late; without this, a light
-/// grain and that answer drive each other (`docs/decisions/0013-light-grains.md`).
+/// Fluid that a grain lighter than the fluid carries along, its virtual mass, on both sides of its
+/// equations, with the new acceleration on one and the last on the other. The fluid around a grain
+/// answers by the projection, one step late; without this, a light grain and that answer drive each
+/// other (`docs/decisions/0013-light-grains.md`).
 struct Carried {
     mass: f64,
     inertia: DMat3,
@@ -334,14 +338,17 @@ struct Carried {
     angular: DVec3,
 }
 
+/// Below this density ratio a grain carries all the fluid that it displaces; above, less and less, and
+/// none from 1 on.
+const CARRIES_ALL: f64 = 0.8;
+
 impl Carried {
     fn by(grain: &Grain, past: &Past, fluid_density: f64, dt: f64) -> Carried {
-        let displaced = if grain.density < fluid_density {
-            fluid_density / grain.density
-        } else {
-            0.0
-        };
-        let (mass, inertia) = (grain.mass() * displaced, grain.inertia() * displaced);
+        let ratio = grain.density / fluid_density;
+        let part = ((1.0 - ratio) / (1.0 - CARRIES_ALL)).clamp(0.0, 1.0) / ratio;
+        let free = |dof: Dof| if dof == Dof::Free { part } else { 0.0 };
+        let mass = grain.mass() * free(grain.translation);
+        let inertia = grain.inertia() * free(grain.rotation);
         let goes_on = |which: usize| past.velocity[which] + dt * past.acceleration[which];
         Carried {
             mass,

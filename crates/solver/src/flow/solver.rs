@@ -96,6 +96,10 @@ impl<R: Real> Flow<R> {
     pub fn set_body_acceleration(&mut self, acceleration: DVec3) {
         self.coefficients.acceleration = acceleration;
     }
+    /// That acceleration.
+    pub fn body_acceleration(&self) -> DVec3 {
+        self.coefficients.acceleration
+    }
 
     /// Projects the present velocity onto the divergence-free fields with the given boundaries;
     /// the pressure is left alone. For initial states.

@@ -23,8 +23,8 @@ impl Simulation {
                 grain.angular_velocity,
                 load.force,
                 load.torque,
-                before.velocity[0],
-                before.velocity[1],
+                before.acceleration[0],
+                before.acceleration[1],
             ] {
                 out.numbers(&v.to_array())?;
             }
@@ -55,7 +55,7 @@ impl Simulation {
                 force: DVec3::from_array(input.numbers()?),
                 torque: DVec3::from_array(input.numbers()?),
             };
-            before.velocity = [
+            before.acceleration = [
                 DVec3::from_array(input.numbers()?),
                 DVec3::from_array(input.numbers()?),
             ];

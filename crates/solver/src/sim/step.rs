@@ -3,6 +3,8 @@
 
 use std::time::{Duration, Instant};
 
+use glam::DVec3;
+
 use super::Simulation;
 use crate::coupling::{Past, Scheme};
 use crate::dem::Grain;
@@ -32,7 +34,6 @@ impl Simulation {
             .fluid
             .as_ref()
             .map_or(0.0, |fluid| fluid.measures().max_rate);
-        let last_step = self.clock.last_step;
         let dt = self.clock.choose(rate, limit);
         let Simulation {
             setup,
@@ -47,11 +48,11 @@ impl Simulation {
         let (now, end) = (self.clock.time, self.clock.time + dt);
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
         for (i, grain) in grains.iter().enumerate() {
-            work.before[i] = past(grain, &work.before[i], last_step);
+            work.before[i].velocity = [grain.velocity, grain.angular_velocity];
             let weight = setup.gravity * (grain.density - fluid_density) * grain.shape.volume();
             work.driving[i] = Load {
                 force: weight,
-                torque: glam::DVec3::ZERO,
+                torque: DVec3::ZERO,
             } + loads[i];
         }
         prescription.drive(grains, now + 0.5 * dt);
@@ -84,7 +85,9 @@ impl Simulation {
                 timed(&mut passes.project, || fluid.project(dt));
                 let gain = fluid.measures().momentum - momentum;
                 self.momentum_residual = fluid_density * (gain - fluid.boundary_impulse(dt));
-                for (grain, (before, load)) in grains.iter().zip(work.before.iter().zip(&*loads)) {
+                for (i, (grain, load)) in grains.iter().zip(&*loads).enumerate() {
+                    let before = &mut work.before[i];
+                    before.acceleration = acceleration(grain, before, &work.contact[i], dt);
                     // What the fluid gave the grain, the fluid inside it included, it lost.
                     let displaced = fluid_density * grain.shape.volume();
                     self.momentum_residual -=
@@ -138,19 +141,14 @@ impl Simulation {
     }
 }
 
-/// How a grain moves now, `last_step` [s] after it moved as `before`.
-fn past(grain: &Grain, before: &Past, last_step: f64) -> Past {
-    let velocity = [grain.velocity, grain.angular_velocity];
-    let change = |which: usize| (velocity[which] - before.velocity[which]) / last_step;
-    let started = last_step > 0.0;
-    Past {
-        velocity,
-        acceleration: if started {
-            [change(0), change(1)]
-        } else {
-            Default::default()
-        },
+/// Change of a grain's velocities over a step of `dt` [s] that goes on in the next: that of an impact does
+/// not.
+fn acceleration(grain: &Grain, before: &Past, contact: &Load, dt: f64) -> [DVec3; 2] {
+    if *contact != Load::default() {
+        return Default::default();
     }
+    let [velocity, omega] = before.velocity;
+    [grain.velocity - velocity, grain.angular_velocity - omega].map(|change| change / dt)
 }
 
 fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {

@@ -150,7 +150,9 @@ vector! {
     }
     #[inline(always)]
     fn pairs(from: &[f32], at: Self) -> [Self; 2] {
-        // SAFETY: see the head of this file; all pairs are found to lie in the slice.
+        assert!(from.len() <= i32::MAX as usize);
+        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places fit
+        // the indices.
         unsafe {
             let last = _mm256_set1_pd(from.len() as f64 - 2.0);
             let below = _mm256_cmp_pd::<_CMP_LE_OQ>(at.0, last);
@@ -191,7 +193,9 @@ vector! {
     }
     #[inline(always)]
     fn pairs(from: &[f32], at: Self) -> [Self; 2] {
-        // SAFETY: see the head of this file; all pairs are found to lie in the slice.
+        assert!(from.len() <= i32::MAX as usize);
+        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places fit
+        // the indices.
         unsafe {
             let last = _mm512_set1_pd(from.len() as f64 - 2.0);
             let below = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(at.0, last);

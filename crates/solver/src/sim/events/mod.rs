@@ -138,7 +138,11 @@ impl EventParams {
             .peekable();
         let rise = free.peek().is_some() && free.all(|grain| grain.density < fluid_density);
         let down = gravity.try_normalize().unwrap_or(DVec3::NEG_Z);
-        let down = if rise { -down } else { down };
+        let down = if rise && gravity != DVec3::ZERO {
+            -down
+        } else {
+            down
+        };
         let magnitude = down.abs();
         let axis = if magnitude.z >= magnitude.x && magnitude.z >= magnitude.y {
             2
