@@ -273,6 +273,20 @@ fn light_grains_come_to_rest_under_the_ceiling() {
     }
 }
 
+#[test]
+fn a_grain_thrown_out_of_the_world_is_no_panic() {
+    let mut ball = sphere(1.0, DVec3::splat(1.5), 2.0);
+    (ball.translation, ball.rotation) = (Dof::Prescribed(DVec3::new(1e12, 0.0, 0.0)), HELD);
+    let mut case = setup([12, 12, 12], 0.25, [PERIODIC; 3], 0.05, vec![ball]);
+    case.step = StepRule::Fixed(0.01);
+    let mut sim = Simulation::new(case).unwrap();
+    for _ in 0..3 {
+        if sim.step(f64::INFINITY).is_err() {
+            return;
+        }
+    }
+}
+
 /// A uniform acceleration in a closed box is balanced by the pressure: on the closed parts of faces neither
 /// acts.
 #[test]

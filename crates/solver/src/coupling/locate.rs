@@ -173,10 +173,12 @@ impl Locator {
                 (body.first[axis], body.size[axis]) = (1, 1);
                 continue;
             }
-            let from = (middle[axis] - span[axis] - self.reach - mesh.origin[axis]) / h;
-            let to = (middle[axis] + span[axis] + self.reach - mesh.origin[axis]) / h;
-            body.first[axis] = from.floor() as i32 + 1;
-            body.size[axis] = to.floor() as i32 + 2 - body.first[axis];
+            // Grains that a failing run has thrown far away must not overflow before it is stopped.
+            let cell = |x: f64| ((x - mesh.origin[axis]) / h).floor().clamp(-1e9, 1e9) as i32;
+            let from = cell(middle[axis] - span[axis] - self.reach);
+            let to = cell(middle[axis] + span[axis] + self.reach);
+            body.first[axis] = from + 1;
+            body.size[axis] = to + 2 - body.first[axis];
         }
         self.unknowns.map(body.first, body.size, &mut body.places);
     }
