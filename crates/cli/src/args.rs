@@ -280,7 +280,7 @@ pub struct FromScanArgs {
     pub label: Option<u32>,
     /// How solid is told from void in a grey image: a grey value, "otsu", or "otsu3" (the upper of
     /// two thresholds)
-    #[arg(long, value_name = "VALUE|otsu|otsu3")]
+    #[arg(long, value_name = "VALUE|otsu|otsu3", allow_negative_numbers = true)]
     pub threshold: Option<String>,
     /// Take a median of 27 voxels before the threshold
     #[arg(long)]
@@ -320,9 +320,9 @@ pub struct FamilyArgs {
     /// Wadell roundnesses, 0.05 to 0.95: the columns
     #[arg(long, value_delimiter = ',', required = true, value_name = "R,...")]
     pub roundness: Vec<f64>,
-    /// Flatness c/b, 0.2 to 1
-    #[arg(long, default_value_t = 0.8, value_name = "RATIO")]
-    pub flatness: f64,
+    /// Flatness c/b, 0.2 to 1, no less than S^3 [default: 0.8, or more where the sphericity demands it]
+    #[arg(long, value_name = "RATIO")]
+    pub flatness: Option<f64>,
     /// The same seed gives the same grains
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,

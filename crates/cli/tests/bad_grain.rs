@@ -284,6 +284,173 @@ fn two_pieces_of_one_label() {
     refused_image("two.nrrd", &file, &["2 separate pieces", "--largest-piece"]);
 }
 
+/// Two balls with labels 7 and 9.
+fn two_balls() -> Vec<u8> {
+    let ball = |n: usize, middle: f64| {
+        let at = |n: usize, middle: f64| (n as f64 - middle).powi(2);
+        at(n % 24, middle) + at(n / 24 % 24, middle) + at(n / 576, middle) < 16.0
+    };
+    let value = |n| 7 * u8::from(ball(n, 6.3)) + 9 * u8::from(ball(n, 16.6));
+    (0..24 * 24 * 24).map(value).collect()
+}
+
+#[test]
+fn two_grains_for_one_file() {
+    refused_image(
+        "two.nrrd",
+        &nrrd("uint8", [24; 3], &two_balls()),
+        &[
+            "two.nrrd holds 2 grains",
+            "two.grain",
+            "labels are 7, 9",
+            "--label N",
+        ],
+    );
+}
+
+#[test]
+fn a_float_image_without_a_threshold() {
+    let values = image(BALL).into_iter().map(|v| f32::from(v) - 0.25);
+    let bytes: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
+    refused_image(
+        "grey.nrrd",
+        &nrrd("float", [24; 3], &bytes),
+        &["grey.nrrd: the image has grey values", "--threshold otsu"],
+    );
+}
+
+#[test]
+fn a_threshold_in_hounsfield_units() {
+    let values = image(BALL).into_iter().map(|v| 900 * i16::from(v) - 1000);
+    let bytes: Vec<u8> = values.flat_map(i16::to_le_bytes).collect();
+    let file = nrrd("int16", [24; 3], &bytes);
+    for threshold in ["-500", "-1.5e2"] {
+        let said = all_grains(&file, &["--threshold", threshold], 0);
+        let number: f64 = threshold.parse().unwrap();
+        assert!(said.contains(&format!("threshold {number}")), "{said}");
+    }
+}
+
+#[test]
+fn a_header_that_tells_of_less_than_its_file_holds_or_of_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("ball.raw"), image(BALL)).unwrap();
+    let command = ["from-scan", "--voxel", "10 um"];
+    let header = |raw: &str| {
+        format!(
+            "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 24 24 20\nencoding: raw\n\
+             data file: {raw}\n"
+        )
+    };
+    let path = folder.path().join("ball.nhdr");
+    std::fs::write(&path, header("ball.raw")).unwrap();
+    refused(
+        &command,
+        &path,
+        &["ball.nhdr", "11520 bytes", "ball.raw", "13824", "byte skip"],
+    );
+    std::fs::write(&path, header("none.raw")).unwrap();
+    refused(&command, &path, &["ball.nhdr", "none.raw", "not there"]);
+    let path = folder.path().join("ball.mhd");
+    let header = "NDims = 3\nDimSize = 24 24 20\nElementType = MET_UCHAR\nElementDataFile = ";
+    std::fs::write(&path, format!("{header}ball.raw\n")).unwrap();
+    refused(
+        &command,
+        &path,
+        &["ball.mhd", "11520", "13824", "HeaderSize"],
+    );
+}
+
+#[test]
+fn a_folder_without_one_of_its_slices() {
+    let folder = tempfile::tempdir().unwrap();
+    let slices = folder.path().join("slices");
+    std::fs::create_dir(&slices).unwrap();
+    for (n, slice) in image(BALL).chunks_exact(576).enumerate() {
+        std::fs::write(slices.join(format!("s{n}.tif")), tiff(slice)).unwrap();
+    }
+    let run = |code: i32| {
+        let mut program = grainwake();
+        program.args(["grain", "from-scan", "--voxel", "10 um", "--no-roundness"]);
+        program.arg(&slices).arg("-o");
+        let done = program.arg(folder.path().join("ball.grain")).assert();
+        String::from_utf8_lossy(&done.code(code).get_output().stderr).into_owned()
+    };
+    std::fs::rename(slices.join("s17.tif"), folder.path().join("s17.tif")).unwrap();
+    let said = run(2);
+    assert!(
+        said.contains("after s16.tif: numbers 17;") && said.contains("rename"),
+        "{said}"
+    );
+    std::fs::rename(folder.path().join("s17.tif"), slices.join("s17.tif")).unwrap();
+    run(0);
+}
+
+#[test]
+fn grains_of_an_earlier_run_do_not_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let (image, out) = (folder.path().join("image.nrrd"), folder.path().join("out"));
+    std::fs::write(&image, nrrd("uint8", [24; 3], &two_balls())).unwrap();
+    let run = |more: &[&str], code: i32| {
+        let mut program = grainwake();
+        program.args(["grain", "from-scan", "--voxel", "10 um", "--no-roundness"]);
+        program.arg(&image).args(more).arg("-o").arg(&out);
+        let done = program.assert().code(code);
+        String::from_utf8_lossy(&done.get_output().stderr).into_owned()
+    };
+    let grains = || -> Vec<String> {
+        let files = common::contents(&out).into_iter().map(|(name, _)| name);
+        files.filter(|name| name.ends_with(".grain")).collect()
+    };
+    run(&[], 0);
+    assert_eq!(grains(), ["label-00007.grain", "label-00009.grain"]);
+    for own in ["label-mine.grain", "label-1.grain", "mine.grain"] {
+        std::fs::copy(out.join("label-00007.grain"), out.join(own)).unwrap();
+    }
+    // Other numbers than before: the old ones belong to no table.
+    let said = run(&["--split"], 2);
+    assert!(
+        said.contains("label-00007.grain is there already"),
+        "{said}"
+    );
+    // What gives no grain removes none.
+    run(&["--threshold", "200", "--force"], 2);
+    assert_eq!(grains().len(), 5);
+    run(&["--split", "--force"], 0);
+    assert_eq!(
+        grains(),
+        [
+            "label-00001.grain",
+            "label-00002.grain",
+            "label-1.grain",
+            "label-mine.grain",
+            "mine.grain"
+        ]
+    );
+}
+
+#[test]
+fn a_flatness_that_the_sphericity_does_not_allow() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut program = grainwake();
+    program.args([
+        "grain",
+        "family",
+        "--sphericity",
+        "0.9",
+        "--roundness",
+        "0.5",
+    ]);
+    program.args(["--flatness", "0.5", "-o"]).arg(&out);
+    let done = program.assert().code(2);
+    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    for word in ["flatness = 0.5", "--sphericity 0.9", "0.729 to 1"] {
+        assert!(said.contains(word), "`{word}` is missing in:\n{said}");
+    }
+    assert!(!out.exists());
+}
+
 /// `from-scan` into a folder; standard error.
 fn all_grains(bytes: &[u8], more: &[&str], code: i32) -> String {
     let folder = tempfile::tempdir().unwrap();
@@ -345,7 +512,15 @@ fn an_image_with_a_value_that_is_no_number() {
     values[24 * (24 * 3 + 4) + 5] = f32::NAN;
     let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
     let file = nrrd("float", [24; 3], &bytes);
-    refused_image("nan.nrrd", &file, &["x 5, y 4, z 3", "not a finite number"]);
+    refused_image(
+        "nan.nrrd",
+        &file,
+        &[
+            "nan.nrrd",
+            "x 5, y 4, z 3 is NaN, not a finite number",
+            "value of the void",
+        ],
+    );
 }
 
 #[test]

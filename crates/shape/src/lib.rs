@@ -40,7 +40,7 @@ pub use assemble::ShapeOptions;
 pub use compare::Comparison;
 pub use error::{Result, ShapeError};
 pub use field::SampledField;
-pub use limits::{ReadLimits, SourceFile};
+pub use limits::{Memory, ReadLimits, SourceFile};
 pub use morphology::{Morphology, Record};
 pub use provenance::Provenance;
 pub use quality::{Quality, QualityBounds};

@@ -14,6 +14,25 @@ pub struct ReadLimits {
     pub voxels: u64,
     /// Largest mesh [faces or vertices].
     pub mesh_elements: u64,
+    /// Memory that a volume has to fit in, where that is known.
+    pub memory: Option<Memory>,
+}
+
+/// Memory at hand, and what work on a volume takes of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Memory {
+    /// Free to be taken [bytes].
+    pub available: u64,
+    /// Taken by one voxel [bytes].
+    pub per_voxel: u64,
+}
+
+impl Memory {
+    /// What so many voxels take [bytes], if it is more than there is.
+    fn lacking(&self, voxels: u64) -> Option<u64> {
+        let needed = voxels.saturating_mul(self.per_voxel);
+        (needed > self.available).then_some(needed)
+    }
 }
 
 impl Default for ReadLimits {
@@ -22,8 +41,66 @@ impl Default for ReadLimits {
             file_bytes: 4 << 30,
             voxels: 1 << 29,
             mesh_elements: 20_000_000,
+            memory: None,
         }
     }
+}
+
+impl ReadLimits {
+    /// Volumes up to what this machine has memory for, if one voxel takes so many bytes; the
+    /// default where the system does not tell.
+    pub fn of_this_machine(per_voxel: u64) -> ReadLimits {
+        // Linux alone says what can be had without swapping.
+        let told = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+        ReadLimits::default().within(mem_available(&told), per_voxel)
+    }
+
+    fn within(self, available: Option<u64>, per_voxel: u64) -> ReadLimits {
+        let Some(available) = available else {
+            return self;
+        };
+        ReadLimits {
+            file_bytes: self.file_bytes.min(available),
+            // Indices of voxels share 32 bits with a mark.
+            voxels: (1 << 31) - 1,
+            memory: Some(Memory {
+                available,
+                per_voxel,
+            }),
+            ..self
+        }
+    }
+
+    /// Refuses dimensions that are over the limits; returns the number of voxels.
+    pub(crate) fn admit(&self, path: &Path, dims: [u64; 3]) -> Result<u64> {
+        let too_large = |more: String, limit, unit| ShapeError::TooLarge {
+            path: path.to_owned(),
+            claimed: format!("{} x {} x {} voxels{more}", dims[0], dims[1], dims[2]),
+            limit,
+            unit,
+        };
+        let voxels = dims.iter().try_fold(1u64, |n, d| n.checked_mul(*d));
+        let Some(voxels) = voxels.filter(|n| *n <= self.voxels) else {
+            return Err(too_large(String::new(), self.voxels, "voxels"));
+        };
+        let lacking = self.memory.and_then(|m| Some((m.lacking(voxels)?, m)));
+        if let Some((needed, memory)) = lacking {
+            let needed = needed.div_ceil(1_000_000);
+            return Err(too_large(
+                format!(", which take {needed} MB of memory"),
+                memory.available / 1_000_000,
+                "MB that are free",
+            ));
+        }
+        Ok(voxels)
+    }
+}
+
+/// Available memory [bytes] by the text of /proc/meminfo.
+fn mem_available(told: &str) -> Option<u64> {
+    let line = told.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kib.checked_mul(1024)
 }
 
 /// A file's name (without its folder) and the SHA-256 of its bytes, for provenance.
@@ -73,4 +150,35 @@ pub(crate) fn extension(path: &Path) -> String {
 
 pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_volume_has_to_fit_into_the_memory_there_is() {
+        let told = "MemTotal:       24000000 kB\nMemAvailable:    4000000 kB\nSwapFree: 0 kB\n";
+        assert_eq!(mem_available(told), Some(4_096_000_000));
+        assert_eq!(mem_available("MemTotal: 24000000 kB\n"), None);
+        assert_eq!(mem_available("MemAvailable: many kB\n"), None);
+        let path = Path::new("a.npy");
+        let read = |available, edge| {
+            let limits = ReadLimits::default().within(available, 20);
+            limits.admit(path, [edge; 3]).map_err(|e| e.to_string())
+        };
+        // Unknown memory: the fixed limit, 2^29 voxels.
+        assert_eq!(read(None, 812), Ok(812 * 812 * 812));
+        assert!(read(None, 813).is_err());
+        // 400^3 voxels take 1.28 GB.
+        assert_eq!(read(Some(1_280_000_000), 400), Ok(64_000_000));
+        let said = read(Some(1_279_999_999), 400).unwrap_err();
+        for word in ["a.npy", "400 x 400 x 400", "1280 MB", "1279 MB", "crop"] {
+            assert!(said.contains(word), "`{word}` is missing in: {said}");
+        }
+        // Much memory: up to what indices can count.
+        assert!(read(Some(1 << 40), 1290).is_ok());
+        assert!(read(Some(1 << 40), 1291).is_err());
+        assert!(read(Some(1 << 40), 1 << 40).is_err());
+    }
 }

@@ -13,6 +13,7 @@ fn limits() -> ReadLimits {
         file_bytes: 1 << 20,
         voxels: 1 << 16,
         mesh_elements: 1 << 14,
+        ..Default::default()
     }
 }
 

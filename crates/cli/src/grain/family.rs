@@ -2,7 +2,7 @@
 
 use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
 use grainwake_shape::picture::Picture;
-use grainwake_shape::write_table;
+use grainwake_shape::{ShapeError, write_table};
 
 use super::{folder, length, may_write, show};
 use crate::args::FamilyArgs;
@@ -31,11 +31,10 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
     let mut shapes = Vec::with_capacity(count);
     for &sphericity in &args.sphericity {
         for &roundness in &args.roundness {
-            let target = FamilyTarget {
-                flatness: args.flatness,
-                ..FamilyTarget::new(sphericity, roundness, diameter)
-            };
-            shapes.push(family_grain(&target, args.seed, &options)?);
+            let mut target = FamilyTarget::new(sphericity, roundness, diameter);
+            target.flatness = args.flatness.unwrap_or(target.flatness);
+            let shape = family_grain(&target, args.seed, &options);
+            shapes.push(shape.map_err(|error| refused(error, sphericity))?);
         }
     }
     std::fs::create_dir_all(&args.output)?;
@@ -50,4 +49,22 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
     write_table(&table, &rows)?;
     Picture::sheet(&pictures, args.roundness.len()).save(&sheet)?;
     Ok(())
+}
+
+/// With the range of a flatness that cannot be had.
+fn refused(error: ShapeError, sphericity: f64) -> Exit {
+    let ShapeError::BadParameter {
+        name: "flatness", ..
+    } = error
+    else {
+        return error.into();
+    };
+    let least = (1e3 * sphericity.powi(3).max(0.2) - 1e-3).ceil() / 1e3;
+    Exit::with_help(
+        BAD_INPUT,
+        error.to_string(),
+        format!(
+            "with --sphericity {sphericity} it can be {least} to 1; without --flatness it is chosen"
+        ),
+    )
 }

@@ -1,9 +1,11 @@
 //! `grain from-scan`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use grainwake_shape::picture::{Picture, View};
-use grainwake_shape::scan::{Denoise, Scan, ScanOptions, Threshold, read_volume, scan_volume};
+use grainwake_shape::scan::{
+    Denoise, Scan, ScanOptions, ScannedGrain, Threshold, read_volume, scan_volume,
+};
 use grainwake_shape::{ReadLimits, Shape, write_table};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
@@ -12,7 +14,7 @@ use serde_json::json;
 use super::refused::{Refused, advice, lines};
 use super::{finish, folder, length, may_write, not_input, options, plausible, save};
 use crate::args::FromScanArgs;
-use crate::exit::{BAD_INPUT, Exit};
+use crate::exit::{BAD_INPUT, Exit, IO};
 use crate::{print, tell};
 
 /// Pixels of one grain in the contact sheet, grains in a row, and the most it shows.
@@ -29,7 +31,8 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
         folder(output)?;
     }
     let how = how(args)?;
-    let (volume, source) = read_volume(&args.image, &ReadLimits::default())?;
+    let limits = ReadLimits::of_this_machine(how.bytes_per_voxel());
+    let (volume, source) = read_volume(&args.image, &limits)?;
     let bar = ProgressBar::new(0);
     if let Ok(style) = ProgressStyle::with_template("{msg:10} {bar:40} {pos}/{len} {eta}") {
         bar.set_style(style);
@@ -48,23 +51,24 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     if !one_file {
         return all(args, scan);
     }
-    let mut grains = scan.grains;
-    let Some(grain) = grains.pop().filter(|_| grains.is_empty()) else {
-        let labels: Vec<String> = grains
-            .iter()
-            .take(10)
-            .map(|g| g.label.to_string())
-            .collect();
-        let message = format!(
-            "the image holds {} grains, the first with labels {}",
-            grains.len() + 1,
-            labels.join(", ")
-        );
-        return Err(Exit::with_help(
-            BAD_INPUT,
-            message,
-            "choose one with --label N, or give -o a folder to take them all; values that are grey, not labels, need --threshold otsu",
-        ));
+    let grain = match <[ScannedGrain; 1]>::try_from(scan.grains) {
+        Ok([grain]) => grain,
+        Err(grains) => {
+            let labels = grains.iter().take(10).map(|g| g.label.to_string());
+            let message = format!(
+                "{} holds {} grains, for the one file {}; their labels are {}{}",
+                args.image.display(),
+                grains.len(),
+                output.display(),
+                labels.collect::<Vec<_>>().join(", "),
+                if grains.len() > 10 { ", ..." } else { "" }
+            );
+            return Err(Exit::with_help(
+                BAD_INPUT,
+                message,
+                "choose one with --label N, or give -o a folder to take them all; values that are grey, not labels, need --threshold otsu",
+            ));
+        }
     };
     let shape = grain.shape?;
     plausible(&shape, &args.new, "--voxel")?;
@@ -100,6 +104,19 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
     Ok(how)
 }
 
+/// Grain files of an earlier run in a folder.
+fn earlier(folder: &Path) -> Vec<PathBuf> {
+    let ours = |path: &PathBuf| {
+        let name = path.file_name().and_then(|name| name.to_str());
+        let number = name.and_then(|n| n.strip_prefix("label-")?.strip_suffix(".grain"));
+        number.is_some_and(|n| n.len() >= 5 && n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(ours).collect();
+    files.sort();
+    files
+}
+
 /// Every grain into a folder, with table, contact sheet and label image; those that are refused
 /// are listed with the reason.
 fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
@@ -116,8 +133,9 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
             .iter()
             .filter_map(|g| Some((g.label, g.shape.as_ref().ok()?)))
     };
-    for (label, _) in usable() {
-        may_write(&path(label), args.new.force)?;
+    let earlier = earlier(place);
+    for file in &earlier {
+        may_write(file, args.new.force)?;
     }
     // The largest alone: fragments may be small.
     let size = |shape: &Shape| shape.equivalent_diameter();
@@ -128,6 +146,11 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     for file in [&table, &sheet, &image] {
         not_input(file, &args.image)?;
         may_write(file, args.new.force)?;
+    }
+    // The table and the label image will not know of them.
+    for file in earlier.iter().filter(|_| largest.is_some()) {
+        let failed = |e| Exit::new(IO, format!("cannot remove {}: {e}", file.display()));
+        std::fs::remove_file(file).map_err(failed)?;
     }
     let drawn: Vec<u32> = usable().take(SHEET.2).map(|(label, _)| label).collect();
     let outcomes: Vec<_> = grains

@@ -24,20 +24,20 @@ pub struct FamilyTarget {
     pub sphericity: f64,
     /// Wadell roundness R (Eq. 39), 0.05 to 0.95.
     pub roundness: f64,
-    /// Flatness c / b: 1 for rods and balls, small for plates. Raised where the sphericity
-    /// demands it (c / b can be no less than S^3).
+    /// Flatness c / b: 1 for rods and balls, small for plates, but no less than S^3.
     pub flatness: f64,
     /// Diameter of the sphere of equal volume [m].
     pub equivalent_diameter: f64,
 }
 
 impl FamilyTarget {
-    /// A grain of this sphericity, roundness and equivalent diameter [m], with c / b = 0.8.
+    /// A grain of this sphericity, roundness and equivalent diameter [m], with c / b = 0.8, or more
+    /// where the sphericity demands it.
     pub fn new(sphericity: f64, roundness: f64, equivalent_diameter: f64) -> FamilyTarget {
         FamilyTarget {
             sphericity,
             roundness,
-            flatness: 0.8,
+            flatness: sphericity.powi(3).max(0.8),
             equivalent_diameter,
         }
     }
@@ -74,6 +74,14 @@ impl FamilyTarget {
                     reason,
                 });
             }
+        }
+        // S^3 = (b/a) (c/a), and b is no longer than a. The slack is for decimals.
+        if self.flatness < self.sphericity.powi(3) - 1e-6 {
+            return Err(ShapeError::BadParameter {
+                name: "flatness",
+                value: self.flatness,
+                reason: "must be no less than the cube of the sphericity",
+            });
         }
         positive("equivalent diameter", self.equivalent_diameter).map(|_| ())
     }

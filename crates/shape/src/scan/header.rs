@@ -6,7 +6,7 @@ use super::volume::{Volume, count};
 use crate::error::{Result, ShapeError};
 use crate::limits::{ReadLimits, read_bytes};
 use flate2::read::{MultiGzDecoder, ZlibDecoder};
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 /// Longest header [bytes].
@@ -21,7 +21,8 @@ struct Fields {
     packed: Packed,
     /// File of the voxels, or none for the header's own.
     beside: Option<String>,
-    skip: u64,
+    /// Bytes before the voxels; -1 for those that are too many.
+    skip: i64,
 }
 
 #[derive(Default, PartialEq)]
@@ -70,9 +71,8 @@ pub(super) fn read_nrrd(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
             }
             "data file" | "datafile" => fields.beside = Some(value.to_owned()),
             "byte skip" | "byteskip" => {
-                fields.skip = value
-                    .parse()
-                    .map_err(|_| malformed("byte skip is no whole number"))?;
+                fields.skip =
+                    skip(value).ok_or_else(|| malformed("byte skip is not 0, 1, ... or -1"))?;
             }
             _ => {}
         }
@@ -106,9 +106,8 @@ pub(super) fn read_meta(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
             "BinaryDataByteOrderMSB" | "ElementByteOrderMSB" => fields.big = yes,
             "CompressedData" if yes => fields.packed = Packed::Zlib,
             "HeaderSize" => {
-                fields.skip = value
-                    .parse()
-                    .map_err(|_| malformed("HeaderSize is no whole number"))?;
+                fields.skip =
+                    skip(value).ok_or_else(|| malformed("HeaderSize is not 0, 1, ... or -1"))?;
             }
             "ElementDataFile" => fields.beside = Some(value.to_owned()),
             _ => {}
@@ -126,6 +125,10 @@ fn sizes(value: &str) -> Vec<u64> {
         .split_whitespace()
         .map(|n| n.parse().unwrap_or(0))
         .collect()
+}
+
+fn skip(value: &str) -> Option<i64> {
+    value.parse().ok().filter(|n| *n >= -1)
 }
 
 fn nrrd_type(value: &str) -> Option<Number> {
@@ -177,7 +180,7 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
             fields.sizes
         )));
     };
-    let voxels = count(path, [nx, ny, nz], limits)?;
+    let voxels = count(path, [nx, ny, nz], limits)? as u64;
     let Some(mut number) = fields.number else {
         return Err(unsupported(
             "the type of the voxels is missing or unknown; save whole or floating numbers".into(),
@@ -193,13 +196,38 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
             )));
         }
         Some(name) => {
-            apart = read_bytes(&path.with_file_name(name), limits)?.0;
+            apart = match read_bytes(&path.with_file_name(name), limits) {
+                Err(ShapeError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => {
+                    return Err(unsupported(format!(
+                        "its voxels lie in {name:?}, which is not there; put it in the same \
+                         folder, or correct its name in the header"
+                    )));
+                }
+                read => read?.0,
+            };
             &apart
         }
     };
-    let skip = usize::try_from(fields.skip).unwrap_or(usize::MAX);
-    let data = data.get(skip..).unwrap_or(&[]);
-    let needed = voxels as u64 * number.width as u64;
+    let needed = voxels * number.width as u64;
+    let raw = fields.packed == Packed::Raw;
+    let skip = match fields.skip {
+        -1 if raw => (data.len() as u64).saturating_sub(needed),
+        -1 => return Err(unsupported("a byte skip of -1 is for raw voxels".into())),
+        skip => skip as u64,
+    };
+    let data = data
+        .get(usize::try_from(skip).unwrap_or(usize::MAX)..)
+        .unwrap_or(&[]);
+    // More than the header states: slices that nobody would miss.
+    if let Some(name) = fields.beside.filter(|_| raw && data.len() as u64 > needed) {
+        return Err(unsupported(format!(
+            "the header states {nx} x {ny} x {nz} voxels of {} bytes, {needed} bytes; {name:?} \
+             has {} after a byte skip of {skip}; correct the sizes (DimSize), or the byte skip \
+             (HeaderSize), which is -1 where the voxels end the file",
+            number.width,
+            data.len()
+        )));
+    }
     let mut plain = Vec::new();
     let failed = |e: std::io::Error| ShapeError::malformed(path, format!("packed voxels: {e}"));
     let data = match fields.packed {
@@ -290,6 +318,31 @@ mod tests {
             .into_bytes();
         local.extend_from_slice(&little);
         assert_eq!(read_meta(&path, &local, &limits()).unwrap(), expect);
+        // Bytes in front of the voxels are skipped where the header says so; slices that it does
+        // not tell of are not dropped in silence.
+        let ending = apart.replace("skip: 5", "skip: -1");
+        assert_eq!(
+            read_nrrd(&path, ending.as_bytes(), &limits()).unwrap(),
+            expect
+        );
+        let said = |read: Result<Volume>| read.unwrap_err().to_string();
+        let fewer = said(read_nrrd(
+            &path,
+            apart.replace("3 2 1", "3 1 1").as_bytes(),
+            &limits(),
+        ));
+        for word in ["3 x 1 x 1", "6 bytes", "a.raw", "has 12", "skip of 5"] {
+            assert!(fewer.contains(word), "`{word}` is missing in: {fewer}");
+        }
+        let fewer = meta.replace("HeaderSize = 5", "HeaderSize = 3");
+        let fewer = said(read_meta(&path, fewer.as_bytes(), &limits()));
+        assert!(fewer.contains("has 14"), "{fewer}");
+        let none = apart.replace("a.raw", "none.raw");
+        let none = said(read_nrrd(&path, none.as_bytes(), &limits()));
+        assert!(
+            none.contains("a.nrrd") && none.contains("none.raw"),
+            "{none}"
+        );
         // A file elsewhere is not fetched.
         let away = apart.replace("a.raw", "../a.raw");
         assert!(matches!(

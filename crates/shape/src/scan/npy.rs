@@ -11,8 +11,38 @@ use std::path::Path;
 
 /// Longest header that is read [bytes].
 const LONGEST_HEADER: usize = 1 << 16;
+/// What is needed of a file to know what it holds [bytes].
+pub(super) const HEAD: u64 = LONGEST_HEADER as u64 + 12;
 
 pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
+    header(path, bytes, limits)?.volume(path, bytes)
+}
+
+/// What a header says.
+pub(super) struct Array {
+    number: Number,
+    dims: [usize; 3],
+    fortran: bool,
+    /// Where the values begin.
+    start: usize,
+}
+
+impl Array {
+    /// Length of the file [bytes].
+    pub(super) fn bytes(&self) -> u64 {
+        let values = self.dims.iter().product::<usize>() as u64;
+        self.start as u64 + values * self.number.width as u64
+    }
+
+    /// The volume in the whole file.
+    pub(super) fn volume(&self, path: &Path, bytes: &[u8]) -> Result<Volume> {
+        let data = bytes.get(self.start..).unwrap_or(&[]);
+        self.number.volume(path, self.dims, self.fortran, data)
+    }
+}
+
+/// What the head of a file, or all of it, says of the array.
+pub(super) fn header(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Array> {
     let malformed = |reason: &str| ShapeError::malformed(path, reason);
     if !bytes.starts_with(b"\x93NUMPY") {
         return Err(malformed("it does not begin with the NPY signature"));
@@ -51,7 +81,12 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
             header.descr
         ),
     })?;
-    number.volume(path, dims, header.fortran, &bytes[start + length..])
+    Ok(Array {
+        number,
+        dims,
+        fortran: header.fortran,
+        start: start + length,
+    })
 }
 
 impl Number {
@@ -97,7 +132,7 @@ impl Number {
                 });
             }
         }
-        Volume::from_numbers(dims, values.map(|v| v as f32).collect())
+        Volume::from_numbers(path, dims, values.map(|v| v as f32).collect())
     }
 }
 
@@ -263,7 +298,8 @@ mod tests {
         assert!(matches!(flat, Err(ShapeError::Unsupported { .. })));
         let nan: Vec<u8> = [f32::NAN; 8].iter().flat_map(|v| v.to_le_bytes()).collect();
         let nan = open(&file(&header("(2, 2, 2)"), &nan));
-        assert!(matches!(nan, Err(ShapeError::NotFinite { .. })));
+        let said = nan.unwrap_err().to_string();
+        assert!(said.contains("x 0, y 0, z 0 is NaN"), "{said}");
         let nested = "(".repeat(60_000);
         assert!(open(&file(&header(&nested), &[])).is_err());
         let good = file(&header("(2, 2, 2)"), &[0; 32]);

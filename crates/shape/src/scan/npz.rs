@@ -21,21 +21,28 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
             ),
         });
     };
-    let file = archive.by_name(name).map_err(|e| malformed(&e))?;
+    let mut file = archive.by_name(name).map_err(|e| malformed(&e))?;
     let mut plain = Vec::new();
-    // What it claims is not trusted: no more is unpacked than a file may have.
-    file.take(limits.file_bytes + 1)
+    // The header alone at first: what it states is refused before it is unpacked.
+    file.by_ref()
+        .take(npy::HEAD)
         .read_to_end(&mut plain)
         .map_err(|e| malformed(&e))?;
-    if plain.len() as u64 > limits.file_bytes {
+    let array = npy::header(path, &plain, limits)?;
+    if array.bytes() > limits.file_bytes {
         return Err(ShapeError::TooLarge {
             path: path.to_owned(),
-            claimed: format!("at least {} bytes unpacked", plain.len()),
+            claimed: format!("{} bytes unpacked", array.bytes()),
             limit: limits.file_bytes,
             unit: "bytes",
         });
     }
-    npy::read(path, &plain, limits)
+    // One byte more: the archive's checksum is compared at the end.
+    let rest = (array.bytes() + 1).saturating_sub(plain.len() as u64);
+    file.take(rest)
+        .read_to_end(&mut plain)
+        .map_err(|e| malformed(&e))?;
+    array.volume(path, &plain)
 }
 
 #[cfg(test)]
@@ -44,17 +51,22 @@ mod tests {
     use std::io::Write;
 
     fn archive(names: &[&str]) -> Vec<u8> {
+        packed(names, "(1, 2, 3)", &[0, 1, 2, 3, 4, 5])
+    }
+
+    fn packed(names: &[&str], shape: &str, data: &[u8]) -> Vec<u8> {
         let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
         for name in names {
             let options = zip::write::SimpleFileOptions::default();
             writer.start_file(*name, options).unwrap();
-            let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (1, 2, 3), }\n";
+            let header =
+                format!("{{'descr': '|u1', 'fortran_order': False, 'shape': {shape}, }}\n");
             writer.write_all(b"\x93NUMPY\x01\x00").unwrap();
             writer
                 .write_all(&(header.len() as u16).to_le_bytes())
                 .unwrap();
             writer.write_all(header.as_bytes()).unwrap();
-            writer.write_all(&[0, 1, 2, 3, 4, 5]).unwrap();
+            writer.write_all(data).unwrap();
         }
         writer.finish().unwrap().into_inner()
     }
@@ -76,5 +88,29 @@ mod tests {
             bad[at] ^= 0x55;
             let _ = read(path, &bad, &limits);
         }
+    }
+
+    #[test]
+    fn what_the_header_states_is_refused_before_it_is_unpacked() {
+        let limits = ReadLimits {
+            file_bytes: 1 << 20,
+            voxels: 1 << 21,
+            ..Default::default()
+        };
+        let data = vec![0; 3 << 20];
+        for (shape, stated) in [
+            ("(128, 128, 192)", "192 x 128 x 128 voxels"),
+            ("(128, 128, 96)", "bytes unpacked"),
+        ] {
+            let file = packed(&["a.npy"], shape, &data);
+            let error = read(Path::new("a.npz"), &file, &limits).unwrap_err();
+            assert!(error.to_string().contains(stated), "{error}");
+        }
+        // Of what lies behind the array no more is unpacked than a byte.
+        let file = packed(&["a.npy"], "(1, 2, 3)", &data);
+        assert_eq!(
+            read(Path::new("a.npz"), &file, &limits).unwrap().dims,
+            [3, 2, 1]
+        );
     }
 }

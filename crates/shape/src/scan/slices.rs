@@ -16,7 +16,13 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, Source
             files.push(path);
         }
     }
-    files.sort_by_key(|path| by_number(path));
+    files.sort_by_cached_key(|path| by_number(path));
+    if let Some(reason) = gap(&files) {
+        return Err(ShapeError::Unsupported {
+            path: folder.to_owned(),
+            reason,
+        });
+    }
     let mut dims = [0; 3];
     let mut labels: Vec<u32> = Vec::new();
     let mut numbers: Option<Vec<f32>> = None;
@@ -34,7 +40,9 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, Source
             return Err(ShapeError::malformed(path, reason));
         }
         dims = [slice.dims[0], slice.dims[1], dims[2] + 1];
-        count(folder, dims.map(|n| n as u64), limits)?;
+        // All of them are counted on the first: the rest is not read in vain.
+        let all = [dims[0], dims[1], files.len()];
+        count(folder, all.map(|n| n as u64), limits)?;
         match (&mut numbers, slice.voxels) {
             (None, Voxels::Labels(v)) => labels.extend(v),
             (all, voxels) => {
@@ -57,7 +65,7 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, Source
             dims,
             voxels: Voxels::Labels(labels),
         },
-        Some(numbers) => Volume::from_numbers(dims, numbers)?,
+        Some(numbers) => Volume::from_numbers(folder, dims, numbers)?,
     };
     let name = folder
         .file_name()
@@ -65,6 +73,51 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, Source
         .unwrap_or_default();
     let sha256 = hex(&digest.finalize());
     Ok((volume, SourceFile { name, sha256 }))
+}
+
+/// Which numbers are missing among slices whose names differ by a number only, or are there twice.
+/// The numbers may count by twos or tens.
+fn gap(files: &[PathBuf]) -> Option<String> {
+    let name = |n: usize| files[n].file_name().unwrap_or_default().to_string_lossy();
+    let keys: Vec<_> = files.iter().map(|path| by_number(path)).collect();
+    // Neighbours with the numbers that tell them apart.
+    let beside = |(n, pair): (usize, &[Vec<(u128, String)>])| {
+        let (one, next) = (&pair[0], &pair[1]);
+        let alike = one.len() == next.len() && one.iter().zip(next).all(|(p, q)| p.1 == q.1);
+        let numbers = one.iter().zip(next).map(|(p, q)| (p.0, q.0));
+        let (low, high) = numbers.clone().find(|(p, q)| p != q).unwrap_or((0, 0));
+        let differ = numbers.filter(|(p, q)| p != q).count();
+        (alike && differ <= 1).then_some((n, low, high))
+    };
+    let pairs: Vec<_> = keys.windows(2).enumerate().filter_map(beside).collect();
+    let step = pairs.iter().map(|(_, low, high)| high - low).min()?;
+    if step == 0 {
+        let (n, ..) = pairs.iter().find(|(_, low, high)| low == high)?;
+        return Some(format!(
+            "{} and {} have the same number; leave one of them",
+            name(*n),
+            name(n + 1)
+        ));
+    }
+    let (n, ..) = pairs.iter().find(|(_, low, high)| high - low > step)?;
+    let between = |(_, low, high): &(usize, u128, u128)| {
+        let high = *high;
+        std::iter::successors(Some(low + step), move |m| Some(m + step))
+            .take_while(move |m| *m < high)
+    };
+    let missing: Vec<String> = pairs
+        .iter()
+        .flat_map(between)
+        .take(11)
+        .map(|m| m.to_string())
+        .collect();
+    let more = if missing.len() > 10 { ", ..." } else { "" };
+    Some(format!(
+        "slices are missing after {}: numbers {}{more}; add them, or rename the slices so that they \
+         count without a gap",
+        name(*n),
+        missing[..missing.len().min(10)].join(", ")
+    ))
 }
 
 /// Key that puts slice 9 before slice 10: digits count by their number, the rest as text.
@@ -109,7 +162,7 @@ mod tests {
         assert!(read(folder.path(), &limits).is_err());
         write("slice_10.tif", 2, &[5, 6]);
         write("slice_9.tif", 2, &[3, 4]);
-        write("slice_1.tif", 2, &[1, 2]);
+        write("slice_8.tif", 2, &[1, 2]);
         let (volume, source) = read(folder.path(), &limits).unwrap();
         assert_eq!(
             volume,
@@ -119,5 +172,44 @@ mod tests {
         write("slice_11.tif", 1, &[7]);
         let error = read(folder.path(), &limits).unwrap_err();
         assert!(error.to_string().contains("slice_11"), "{error}");
+    }
+
+    #[test]
+    fn a_slice_that_is_missing_is_named() {
+        let names = |names: &[&str]| -> Vec<PathBuf> { names.iter().map(PathBuf::from).collect() };
+        let all: Vec<PathBuf> = (0..40).map(|n| format!("s{n}.tif").into()).collect();
+        assert_eq!(gap(&all), None);
+        let some = |keep: fn(usize) -> bool| -> Vec<PathBuf> {
+            (0..40)
+                .filter(|n| keep(*n))
+                .map(|n| all[n].clone())
+                .collect()
+        };
+        let said = gap(&some(|n| n != 17)).unwrap();
+        assert!(said.contains("after s16.tif: numbers 17;"), "{said}");
+        let said = gap(&some(|n| n != 17 && n != 30)).unwrap();
+        assert!(said.contains("after s16.tif: numbers 17, 30;"), "{said}");
+        let said = gap(&some(|n| !(5..=35).contains(&n))).unwrap();
+        assert!(
+            said.contains("5, 6, 7, 8, 9, 10, 11, 12, 13, 14, ...;"),
+            "{said}"
+        );
+        // By tens, with other numbers that stay, and with more than a number that differs.
+        assert_eq!(gap(&some(|n| n % 10 == 0)), None);
+        let said = gap(&some(|n| n % 4 == 0 && n != 8)).unwrap();
+        assert!(said.contains("after s4.tif: numbers 8;"), "{said}");
+        let said = gap(&names(&["2_5um_001.tif", "2_5um_002.tif", "2_5um_004.tif"])).unwrap();
+        assert!(said.contains("numbers 3;"), "{said}");
+        assert_eq!(gap(&names(&["a1.tif", "b2.tif", "c7.tif", "d.tif"])), None);
+        assert_eq!(gap(&names(&["t1_s1.tif", "t1_s2.tif", "t2_s4.tif"])), None);
+        let said = gap(&names(&["s1.tif", "s01.tif", "s2.tif"])).unwrap();
+        assert!(said.contains("the same number"), "{said}");
+        // Refused before a slice is read.
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["s1.tif", "s2.tif", "s4.tif"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let error = read(folder.path(), &ReadLimits::default()).unwrap_err();
+        assert!(error.to_string().contains("numbers 3;"), "{error}");
     }
 }

@@ -43,11 +43,16 @@ impl Volume {
     }
 
     /// Decides between labels and grey values: whole non-negative numbers are labels.
-    pub(super) fn from_numbers(dims: [usize; 3], values: Vec<f32>) -> Result<Volume> {
+    pub(super) fn from_numbers(path: &Path, dims: [usize; 3], values: Vec<f32>) -> Result<Volume> {
         if let Some(n) = values.iter().position(|v| !v.is_finite()) {
             let (i, j, k) = (n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]);
-            return Err(ShapeError::NotFinite {
-                what: format!("the value of voxel x {i}, y {j}, z {k}"),
+            return Err(ShapeError::Unsupported {
+                path: path.to_owned(),
+                reason: format!(
+                    "the value of voxel x {i}, y {j}, z {k} is {}, not a finite number; give such \
+                     voxels the value of the void and save the image again",
+                    values[n]
+                ),
             });
         }
         // Beyond this f32 skips whole numbers, so that labels could merge.
@@ -120,16 +125,9 @@ impl Volume {
 
 /// Refuses dimensions that are empty or over the limit; returns the number of voxels.
 pub(super) fn count(path: &Path, dims: [u64; 3], limits: &ReadLimits) -> Result<usize> {
-    let product = dims.iter().try_fold(1u64, |n, d| n.checked_mul(*d));
-    match product {
-        Some(0) => Err(ShapeError::malformed(path, "the image has no voxels")),
-        Some(n) if n <= limits.voxels && usize::try_from(n).is_ok() => Ok(n as usize),
-        _ => Err(ShapeError::TooLarge {
-            path: path.to_owned(),
-            claimed: format!("{} x {} x {} voxels", dims[0], dims[1], dims[2]),
-            limit: limits.voxels,
-            unit: "voxels",
-        }),
+    match limits.admit(path, dims)? {
+        0 => Err(ShapeError::malformed(path, "the image has no voxels")),
+        n => Ok(n as usize),
     }
 }
 
