@@ -133,7 +133,7 @@ pub fn shape_help(error: &ShapeError) -> Option<String> {
                 "if label {label} is a whole phase: --split takes each of its pieces as a grain, --separate also parts grains that touch; if it is one grain: --pad takes it as cut there"
             ));
         }
-        ShapeError::CutByBorder { .. } => {
+        ShapeError::CutByBorder { .. } | ShapeError::CutByView { .. } => {
             "scan a larger region; where the crop is merely tight, --pad takes the grain as cut there"
         }
         ShapeError::SeveralPieces { label, .. } => {

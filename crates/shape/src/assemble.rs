@@ -126,8 +126,9 @@ pub(crate) fn assemble<D: Distance>(
         let distance = |x: DVec3, hint: &mut u32| body.distance.near(x, hint);
         let (_, inscribed) = inscribed::sphere(&distance, body.lower, body.upper);
         morphology.inscribed_radius = Some(inscribed);
+        let surface = roundness::Surface::of(&provenance.method);
         morphology.wadell_roundness =
-            roundness::measure(&distance, body.lower, body.upper, inscribed);
+            roundness::measure(&distance, body.lower, body.upper, inscribed, surface);
     }
     let second = DVec3::new(
         mass.second.x_axis.x,

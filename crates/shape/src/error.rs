@@ -84,6 +84,12 @@ pub enum ShapeError {
         /// The labels there are (the first few).
         present: String,
     },
+    /// The grain reaches the edge of the field of view.
+    #[error("label {label} reaches the edge of the field of view, so part of the grain is missing")]
+    CutByView {
+        /// Label in the image.
+        label: u32,
+    },
     /// The grain touches the border of the image.
     #[error("label {label} touches the image border ({faces}), so part of the grain is missing")]
     CutByBorder {

@@ -23,6 +23,23 @@ const PAPER: [u8; 3] = [255, 255, 255];
 const STONE: DVec3 = DVec3::new(222.0, 200.0, 165.0);
 /// Colour of a surface node.
 const NODE: [u8; 3] = [150, 30, 30];
+/// Colour of numbers.
+const INK: [u8; 3] = [60, 60, 60];
+/// Pixels along the edge of a node or a dot of a digit.
+const DOT: usize = 2;
+/// Rows of the digits, three dots each.
+const DIGITS: [[u8; 5]; 10] = [
+    [7, 5, 5, 5, 7],
+    [2, 6, 2, 2, 7],
+    [7, 1, 7, 4, 7],
+    [7, 1, 7, 1, 7],
+    [5, 5, 7, 1, 1],
+    [7, 4, 7, 1, 7],
+    [7, 4, 7, 5, 7],
+    [7, 1, 1, 1, 1],
+    [7, 5, 7, 5, 7],
+    [7, 5, 7, 1, 7],
+];
 /// Rays along the edge of a pixel.
 const RAYS: usize = 2;
 
@@ -150,6 +167,29 @@ impl Picture {
         sheet
     }
 
+    /// The same with a number in its upper left corner.
+    pub fn numbered(mut self, number: u32) -> Picture {
+        for (place, digit) in number.to_string().bytes().enumerate() {
+            let rows = DIGITS[usize::from(digit - b'0')];
+            let left = DOT * (1 + 4 * place);
+            for (j, row) in rows.into_iter().enumerate() {
+                for i in (0..3).filter(|i| row >> (2 - i) & 1 == 1) {
+                    self.dot(left + DOT * i, DOT * (1 + j), INK);
+                }
+            }
+        }
+        self
+    }
+
+    /// A square of `DOT` pixels with this upper left corner.
+    fn dot(&mut self, x: usize, y: usize, colour: [u8; 3]) {
+        for y in y..(y + DOT).min(self.height) {
+            for x in x..(x + DOT).min(self.width) {
+                self.pixels[x + self.width * y] = colour;
+            }
+        }
+    }
+
     fn mark_nodes(&mut self, shape: &Shape, view: View, width: f64) {
         let towards_eye = view.right.cross(view.up);
         let scale = self.width as f64 / width;
@@ -165,10 +205,7 @@ impl Picture {
             }
             let x = 0.5 * self.width as f64 + scale * node.position.dot(view.right);
             let y = 0.5 * self.height as f64 - scale * node.position.dot(view.up);
-            let (x, y) = (x as usize, y as usize);
-            if x < self.width && y < self.height {
-                self.pixels[x + self.width * y] = NODE;
-            }
+            self.dot(x as usize, y as usize, NODE);
         }
     }
 }
@@ -196,4 +233,33 @@ fn shade(normal: DVec3, light: DVec3, towards_eye: DVec3) -> DVec3 {
     let lit = normal.dot(light).max(0.0);
     let rim = normal.dot(towards_eye).clamp(0.0, 1.0);
     STONE * ((0.25 + 0.75 * lit) * (0.45 + 0.55 * rim.sqrt())).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_stand_in_the_corner() {
+        let picture = Picture::blank(30, 16).numbered(41);
+        let shown: Vec<String> = (0..7)
+            .map(|j| {
+                let row = (0..9).map(|i| picture.pixels[DOT * i + 30 * DOT * j]);
+                row.map(|pixel| if pixel == INK { '#' } else { '.' })
+                    .collect()
+            })
+            .collect();
+        let wanted = [
+            ".........",
+            ".#.#..#..",
+            ".#.#.##..",
+            ".###..#..",
+            "...#..#..",
+            "...#.###.",
+            ".........",
+        ];
+        assert_eq!(shown, wanted);
+        // What does not fit is left out.
+        Picture::blank(5, 5).numbered(12345);
+    }
 }

@@ -9,6 +9,11 @@
 //! Curvatures are those of the level set at the distance t outside, where even a sharp edge has
 //! the radius t: they come from derivatives of a Gaussian of the distance, at two widths, and the
 //! roundness is extrapolated to the width zero.
+//!
+//! The surface of a scan is noisy: where its radius is about R_in anyway (spheres, the sides of
+//! cylinders) half of it would pass for corners. There only what a much wider Gaussian sees as
+//! corners counts, the others are wider too, and corners that hardly turn the surface count in
+//! proportion.
 
 use crate::surface::{Samples, extract};
 use glam::{DMat3, DVec3};
@@ -20,13 +25,62 @@ const CELLS: f64 = 10.0;
 const LEVEL: f64 = 4.0;
 /// Widths of the Gaussian (standard deviations) [samples].
 const WIDTHS: [f64; 2] = [1.0, 1.5];
+/// The same for a scan.
+const WIDTHS_OF_SCAN: [f64; 2] = [1.4, 2.1];
+/// Width of the Gaussian that tells the corners of a scan from its noise [samples].
+const COARSE: f64 = 4.0;
+/// Radii below this share of R_in, seen by that Gaussian, are corners.
+const COARSE_CORNER: f64 = 0.98;
+/// Corners of a scan that turn the surface by less than this share of what a sphere turns count
+/// in proportion.
+const LEAST_TURN: f64 = 0.05;
 /// Radii below this share of R_in are corners.
 const CORNER: f64 = 0.99;
 /// Reach of the Gaussian in widths.
 const REACH: f64 = 4.5;
 
-/// Detail finer than this share of R_in is smoothed away: the wider Gaussian.
-pub(crate) const CUTOFF: f64 = WIDTHS[1] / CELLS;
+/// Reach of the coarse one, whose tails matter less.
+const REACH_OF_COARSE: f64 = 4.0;
+
+/// What the surface comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Surface {
+    /// A closed form or a mesh.
+    Exact,
+    /// An image, with its noise and its staircase.
+    Scanned,
+}
+
+impl Surface {
+    /// By the method of the provenance.
+    pub(crate) fn of(method: &str) -> Surface {
+        if method == "scan" {
+            Surface::Scanned
+        } else {
+            Surface::Exact
+        }
+    }
+
+    fn widths(self) -> [f64; 2] {
+        match self {
+            Surface::Exact => WIDTHS,
+            Surface::Scanned => WIDTHS_OF_SCAN,
+        }
+    }
+
+    /// Samples around the level set that the Gaussians reach.
+    fn reach(self) -> f64 {
+        match self {
+            Surface::Exact => REACH * WIDTHS[1],
+            Surface::Scanned => REACH_OF_COARSE * COARSE,
+        }
+    }
+
+    /// Detail finer than this share of R_in is smoothed away: the wider Gaussian.
+    pub(crate) fn cutoff(self) -> f64 {
+        self.widths()[1] / CELLS
+    }
+}
 
 /// Distance less the level on a grid around the level set; farther off it is only a bound.
 struct Band {
@@ -43,10 +97,11 @@ pub(crate) fn measure(
     lower: DVec3,
     upper: DVec3,
     inscribed: f64,
+    surface: Surface,
 ) -> Option<f64> {
     let spacing = inscribed / CELLS;
     let level = LEVEL * spacing;
-    let band = Band::around(distance, lower, upper, spacing, level)?;
+    let band = Band::around(distance, lower, upper, spacing, [level, surface.reach()])?;
     let mesh = extract(&Samples {
         dims: band.dims,
         lower: band.lower,
@@ -60,15 +115,39 @@ pub(crate) fn measure(
             areas[*v as usize] += (b - a).cross(c - a).length() / 6.0;
         }
     }
-    let [narrow, wide] = WIDTHS.map(|width| {
+    // Radius of the surface under a vertex from the larger curvature of the level set there.
+    let radius = |k1: f64| {
+        if k1 > 0.0 {
+            1.0 / k1 - level
+        } else {
+            f64::INFINITY
+        }
+    };
+    let eligible: Vec<bool> = match surface {
+        Surface::Exact => vec![true; mesh.vertices.len()],
+        Surface::Scanned => mesh
+            .vertices
+            .par_iter()
+            .map(|x| {
+                let [k1, _] = band.curvatures(*x, COARSE, REACH_OF_COARSE);
+                radius(k1) < COARSE_CORNER * inscribed
+            })
+            .collect(),
+    };
+    let widths = surface.widths();
+    let [narrow, wide] = widths.map(|width| {
         let turned: Vec<(f64, f64)> = mesh
             .vertices
             .par_iter()
             .zip(&areas)
-            .map(|(x, area)| {
-                let [k1, k2] = band.curvatures(*x, width);
-                let radius = 1.0 / k1 - level;
-                if k1 > 0.0 && radius < CORNER * inscribed {
+            .zip(&eligible)
+            .map(|((x, area), eligible)| {
+                if !eligible {
+                    return (0.0, 0.0);
+                }
+                let [k1, k2] = band.curvatures(*x, width, REACH);
+                let radius = radius(k1);
+                if radius < CORNER * inscribed {
                     let weight = area * k1 * (1.0 - level * k2).max(0.0);
                     (weight, weight * radius / inscribed)
                 } else {
@@ -79,12 +158,23 @@ pub(crate) fn measure(
         let (weight, sum) = turned
             .iter()
             .fold((0.0, 0.0), |s, t| (s.0 + t.0, s.1 + t.1));
-        // No corner at all: a sphere, or a rod with spherical ends.
-        if weight > 0.0 { sum / weight } else { 1.0 }
+        if weight <= 0.0 {
+            // No corner at all: a sphere, or a rod with spherical ends.
+            return 1.0;
+        }
+        let least = match surface {
+            Surface::Exact => 0.0,
+            Surface::Scanned => LEAST_TURN * 4.0 * std::f64::consts::PI * inscribed,
+        };
+        if weight < least {
+            1.0 - (1.0 - sum / weight) * weight / least
+        } else {
+            sum / weight
+        }
     });
     // The bands along the edges where the Gaussian sees face and edge are as wide as it is.
-    let slope = (wide - narrow) / (WIDTHS[1] - WIDTHS[0]);
-    Some((narrow - slope * WIDTHS[0]).clamp(0.0, 1.0))
+    let slope = (wide - narrow) / (widths[1] - widths[0]);
+    Some((narrow - slope * widths[0]).clamp(0.0, 1.0))
 }
 
 impl Band {
@@ -93,10 +183,10 @@ impl Band {
         lower: DVec3,
         upper: DVec3,
         spacing: f64,
-        level: f64,
+        [level, reach]: [f64; 2],
     ) -> Option<Band> {
         const BLOCK: usize = 8;
-        let reach = (REACH * WIDTHS[1]).ceil() + 2.0;
+        let reach = reach.ceil() + 2.0;
         let margin = level + reach * spacing;
         let blocks = ((upper - lower + DVec3::splat(2.0 * margin)) / (spacing * BLOCK as f64))
             .ceil()
@@ -154,10 +244,10 @@ impl Band {
     }
 
     /// Principal curvatures, the larger first, of the level set through `x`, where the field is
-    /// smoothed by a Gaussian of this width [samples].
-    fn curvatures(&self, x: DVec3, width: f64) -> [f64; 2] {
+    /// smoothed by a Gaussian of this width [samples] and this reach [widths].
+    fn curvatures(&self, x: DVec3, width: f64, reach: f64) -> [f64; 2] {
         let s = (x - self.lower) / self.spacing;
-        let reach = (REACH * width).ceil() as i64;
+        let reach = (reach * width).ceil() as i64;
         let taps: [Vec<[f64; 3]>; 3] = std::array::from_fn(|axis| {
             let centre = s[axis].round() as i64;
             (centre - reach..=centre + reach)
@@ -273,7 +363,7 @@ mod tests {
     fn turned_rounded_cubes_have_twice_their_radius() {
         let cube = DVec3::splat(0.9);
         for radius in [0.0, 0.1, 0.2, 0.3, 0.4] {
-            let found = measure(&rounded_cube(radius), -cube, cube, 0.5).unwrap();
+            let found = measure(&rounded_cube(radius), -cube, cube, 0.5, Surface::Exact).unwrap();
             println!("rounded cube {radius}: {found:.4}");
             assert!((found - 2.0 * radius).abs() < 0.02, "{radius}: {found}");
         }
@@ -296,7 +386,7 @@ mod tests {
                 of_spheroid(axes.x, 1.0)
             };
             let body = |x: DVec3, _: &mut u32| crate::analytic::ellipsoid_distance(axes, x);
-            let found = measure(&body, -axes, axes, axes.z).unwrap();
+            let found = measure(&body, -axes, axes, axes.z, Surface::Exact).unwrap();
             println!("ellipsoid {axes}: {found:.4}, exact {exact:.4}");
             assert!((found - exact).abs() < 0.02, "{axes}: {found} for {exact}");
         }
@@ -320,7 +410,8 @@ mod tests {
                 q.max(glam::DVec2::ZERO).length() + q.max_element().min(0.0) - rounding
             };
             let inscribed = 1f64.min(0.5 * length);
-            let found = measure(&body, DVec3::splat(-2.5), DVec3::splat(2.5), inscribed).unwrap();
+            let half = DVec3::splat(2.5);
+            let found = measure(&body, -half, half, inscribed, Surface::Exact).unwrap();
             println!("cylinder {length} {rounding}: {found:.4}");
             assert!((found - exact).abs() < 0.08, "{found} for {exact}");
         }

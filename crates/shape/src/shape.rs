@@ -244,7 +244,9 @@ impl Shape {
             krumbein_sphericity: m.krumbein_sphericity,
             wadell_sphericity: m.wadell_sphericity,
             wadell_roundness: m.wadell_roundness,
-            roundness_cutoff_m: m.inscribed_radius.map(|r| roundness::CUTOFF * r),
+            roundness_cutoff_m: m
+                .inscribed_radius
+                .map(|r| roundness::Surface::of(&self.provenance.method).cutoff() * r),
             inscribed_radius_m: m.inscribed_radius,
             convexity: m.convexity,
             surface_area_m2: m.area,

@@ -44,7 +44,8 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
         shape.save(&path)?;
         show(shape, &path, args.json)?;
         rows.push((format!("{:02}", n + 1), shape.record()));
-        pictures.push(Picture::three_sides(shape, PIXELS, false));
+        let number = n as u32 + 1;
+        pictures.push(Picture::three_sides(shape, PIXELS, false).numbered(number));
     }
     write_table(&table, &rows)?;
     Picture::sheet(&pictures, args.roundness.len()).save(&sheet)?;

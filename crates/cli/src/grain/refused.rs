@@ -61,6 +61,7 @@ fn together(reason: &str, group: &[&Refused]) -> String {
 fn reason(why: &ShapeError) -> String {
     match why {
         ShapeError::CutByBorder { .. } => "cut by the image border".into(),
+        ShapeError::CutByView { .. } => "cut by the edge of the field of view".into(),
         ShapeError::SeveralPieces { .. } => "each of several separate pieces".into(),
         ShapeError::TooFewVoxels { needed, .. } => format!("each of fewer than {needed} voxels"),
         other => other.to_string(),

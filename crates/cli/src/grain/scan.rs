@@ -173,7 +173,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
         match outcome {
             Ok(written) => {
                 let (file, record, picture) = written?;
-                pictures.extend(picture);
+                pictures.extend(picture.map(|picture| picture.numbered(label)));
                 if args.new.json {
                     print(&json!({ "label": label, "voxels": voxels, "file": file, "record": record }).to_string())?;
                 } else {

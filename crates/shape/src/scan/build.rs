@@ -1,5 +1,6 @@
 //! Shapes from a volume.
 
+use super::field_of_view::FieldOfView;
 use super::grain::{self, Context};
 use super::grey::{Grey, LAYERS};
 use super::regions::regions;
@@ -13,6 +14,7 @@ use crate::assemble::ShapeOptions;
 use crate::error::{Result, ShapeError, positive};
 use crate::limits::SourceFile;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How a volume is turned into shapes.
@@ -134,7 +136,12 @@ pub fn scan_volume(
             reason: "must be below 2^31; crop the image, or bin it",
         });
     }
-    let (labels, grey, threshold) = segment(volume, source, options, progress)?;
+    let Segments {
+        labels,
+        grey,
+        threshold,
+        cut_by_view,
+    } = segment(volume, source, options, progress)?;
     let found = regions(dims, &labels);
     if found.is_empty() {
         return Err(ShapeError::EmptyVolume);
@@ -160,6 +167,7 @@ pub fn scan_volume(
         labels: &labels,
         grey: grey.as_ref(),
         threshold,
+        cut_by_view: &cut_by_view,
         source,
         options,
     };
@@ -209,15 +217,22 @@ fn check(options: &ScanOptions) -> Result<()> {
     within("threshold", threshold, f64::MIN, f64::MAX, "must be finite")
 }
 
-/// Labels of the volume, its grey values where surfaces are to be taken from them, and the
-/// threshold.
-#[allow(clippy::type_complexity)]
+/// Labels of the volume and what else was found on the way.
+struct Segments {
+    labels: Vec<u32>,
+    /// Where surfaces are to be taken from grey values.
+    grey: Option<Grey>,
+    threshold: Option<f64>,
+    /// Labels at the edge of the field of view.
+    cut_by_view: BTreeSet<u32>,
+}
+
 fn segment(
     volume: &Volume,
     source: &SourceFile,
     options: &ScanOptions,
     progress: Progress,
-) -> Result<(Vec<u32>, Option<Grey>, Option<f64>)> {
+) -> Result<Segments> {
     let dims = volume.dims;
     let values = match (&volume.voxels, options.threshold) {
         (Voxels::Labels(labels), None) => {
@@ -228,7 +243,12 @@ fn segment(
                     divide(&phase, dims, options, progress)?
                 }
             };
-            return Ok((divided, None, None));
+            return Ok(Segments {
+                labels: divided,
+                grey: None,
+                threshold: None,
+                cut_by_view: BTreeSet::new(),
+            });
         }
         (Voxels::Grey(_), None) => {
             return Err(ShapeError::Unsupported {
@@ -258,17 +278,23 @@ fn segment(
         .collect();
     drop(clean);
     let labels = divide(&binary, dims, options, progress)?;
+    let view = FieldOfView::of(&values, dims, cut);
+    let mut segments = Segments {
+        cut_by_view: view.map_or_else(BTreeSet::new, |view| view.cuts(&labels)),
+        labels,
+        grey: None,
+        threshold: Some(cut),
+    };
     // A binary image has no grey to go by.
     let two = values
         .iter()
         .all(|v| *v == values[0] || *v == 0.0 || *v == 1.0 || *v == 255.0);
-    if !options.sub_voxel || two || labels.iter().any(|l| *l >= HALO) {
-        return Ok((labels, None, Some(cut)));
+    if options.sub_voxel && !two && segments.labels.iter().all(|l| *l < HALO) {
+        let mut owner = segments.labels.clone();
+        add_halo(&mut owner, dims, LAYERS);
+        segments.grey = Some(Grey::new(dims, values, owner));
     }
-    let mut owner = labels.clone();
-    add_halo(&mut owner, dims, LAYERS);
-    let grey = Grey::new(dims, values, owner);
-    Ok((labels, Some(grey), Some(cut)))
+    Ok(segments)
 }
 
 /// Fills, splits and separates as asked.

@@ -11,6 +11,7 @@ use crate::mesh::{TriangleMesh, from_closed};
 use crate::provenance::Provenance;
 use crate::surface::{Samples, extract};
 use glam::DVec3;
+use std::collections::BTreeSet;
 
 /// Fewest voxels of a grain: a ball of five voxels across.
 const FEWEST: u64 = 64;
@@ -30,6 +31,8 @@ pub(super) struct Context<'a> {
     pub labels: &'a [u32],
     pub grey: Option<&'a Grey>,
     pub threshold: Option<f64>,
+    /// Labels at the edge of the field of view.
+    pub cut_by_view: &'a BTreeSet<u32>,
     pub source: &'a SourceFile,
     pub options: &'a ScanOptions,
 }
@@ -46,6 +49,9 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
     let faces = region.faces(dims);
     if !faces.is_empty() && !options.pad {
         return Err(ShapeError::CutByBorder { label, faces });
+    }
+    if context.cut_by_view.contains(&label) && !options.pad {
+        return Err(ShapeError::CutByView { label });
     }
     let smoothing = SMOOTHING[usize::from(context.grey.is_none())];
     let smoothing = options.smoothing.unwrap_or(smoothing);

@@ -15,6 +15,7 @@
 //! hold 3 % more or less than the sphere, which nothing computed from the mask can mend.
 
 mod build;
+mod field_of_view;
 mod grain;
 mod grey;
 mod header;
