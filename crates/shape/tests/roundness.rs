@@ -76,13 +76,13 @@ fn noise_makes_no_corners_on_a_scanned_sphere() {
 fn scanned_bodies_with_corners_keep_them() {
     let mut missed = Vec::new();
     for (name, exact, bound) in [
-        ("cube", 0.0, [0.13, 0.06]),
+        ("cube", 0.0, [0.11, 0.04]),
         ("cube", 0.2, [0.05, 0.05]),
         ("cube", 0.4, [0.05, 0.05]),
         ("cube", 0.6, [0.05, 0.05]),
         ("cube", 0.8, [0.05, 0.05]),
-        ("cylinder", 0.0, [0.20, 0.08]),
-        ("spheroid 1.5", 0.874, [0.08, 0.05]),
+        ("cylinder", 0.0, [0.16, 0.02]),
+        ("spheroid 1.5", 0.874, [0.065, 0.04]),
     ] {
         for (across, bound) in [40.0, 80.0].into_iter().zip(bound) {
             let found = match name {

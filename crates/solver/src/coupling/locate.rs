@@ -43,6 +43,8 @@ pub struct Body {
     pub spans: [Vec<[i32; 2]>; 3],
     /// Where the box lies in memory.
     pub places: Places,
+    /// From its first to its last plane there.
+    pub planes: Range<usize>,
     /// What is added to the tendency at the faces of the box for each component [m/s^2].
     pub push: [Vec<f64>; 3],
     /// Where those faces lie.
@@ -60,8 +62,7 @@ impl Body {
 
     /// Whether faces of the box may lie in a part of a field.
     pub fn lies_in(&self, part: &Range<usize>, layout: Layout) -> bool {
-        let planes = self.places.planes();
-        planes.start < part.end && part.start < planes.end + layout.plane()
+        self.planes.start < part.end && part.start < self.planes.end + layout.plane()
     }
 
     /// Memory held [bytes].
@@ -181,6 +182,7 @@ impl Locator {
             body.size[axis] = to + 2 - body.first[axis];
         }
         self.unknowns.map(body.first, body.size, &mut body.places);
+        body.planes = body.places.planes();
     }
 
     /// Finds what holds the faces near the surface of a grain.
