@@ -24,7 +24,7 @@ use crate::dem::Grain;
 use crate::flow::Flow;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Real;
-use crate::math::lanes::{Kernel, MOST, RAMP, Vector, dispatch};
+use crate::math::lanes::{Kernel, MOST, RAMP, Vector, dispatch, prefetch};
 
 /// Smallest aperture divided by; smaller ones are unstable on an impulsive start.
 const LEAST_APERTURE: f64 = 0.4;
@@ -68,6 +68,20 @@ impl<'a, R: Real> View<'a, R> {
             components: copies.each_ref().map(|copy| &copy[..]),
             strides,
             origin: PAD as usize * strides.iter().sum::<usize>(),
+        }
+    }
+}
+
+impl<R> View<'_, R> {
+    /// Asks for the box of `size` cells to be brought near.
+    #[inline(always)]
+    fn prefetch(&self, size: IVec3) {
+        let [nx, ny, nz] = size.to_array().map(|n| n as usize);
+        let [_, line, plane] = self.strides;
+        for field in self.components {
+            for (k, j) in (0..nz).flat_map(|k| (0..ny).map(move |j| (k, j))) {
+                prefetch(field, self.origin + j * line + k * plane, nx);
+            }
         }
     }
 }
@@ -126,10 +140,15 @@ impl<R: Real> Kernel for Links<'_, R> {
             push,
         } = self;
         let size = body.size;
+        velocity.prefetch(size);
         flux.resize(size.x as usize + MOST, 0.0);
         for (component, push) in push.iter_mut().enumerate() {
-            push.clear();
             push.resize((size.x * size.y * size.z) as usize, 0.0);
+            for (row, span) in body.spans[component].iter().enumerate() {
+                let first = row * size.x as usize;
+                let [start, end] = span.map(|at| first + at as usize);
+                push[start..end].fill(0.0);
+            }
             for along in (0..3).filter(|&axis| mesh.cells[axis] > 1) {
                 let lines = Lines::new(band, mesh, grain, body, &velocity, component, along);
                 let step = IVec3::AXES[along];

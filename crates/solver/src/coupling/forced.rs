@@ -36,28 +36,6 @@ pub struct Forced {
 }
 
 impl Forced {
-    pub fn clear(&mut self) {
-        self.runs.iter_mut().for_each(Vec::clear);
-        let Forced {
-            share,
-            closed,
-            closed_by_all,
-            ..
-        } = self;
-        share.clear();
-        closed.clear();
-        closed_by_all.clear();
-    }
-
-    /// Adds a face; returns its place.
-    #[inline]
-    pub fn push(&mut self, share: f64, closed: f64) -> usize {
-        self.share.push(share);
-        self.closed.push(closed);
-        self.closed_by_all.push(closed);
-        self.share.len() - 1
-    }
-
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
         let lists = [

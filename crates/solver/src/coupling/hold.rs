@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::Scheme;
 use super::aperture::{aperture, drag};
+use super::forced::Forced;
 use crate::math::lanes::{Kernel, MOST, One, Vector, dispatch};
 
 /// How surfaces hold a face.
@@ -50,56 +51,87 @@ pub struct Holding {
     pub diffusion: f64,
 }
 
-/// Faces about one surface; what holds them is found for all at once.
+/// The faces that one grain may force, in the order of its lists; what holds them is found for all at
+/// once.
 #[derive(Debug, Default)]
 pub struct Faces {
+    count: usize,
+    /// Signed distances [m] and unit normals; what follows the last face is of no meaning.
     distance: Vec<f64>,
     normal: [Vec<f64>; 3],
     strength: Vec<f64>,
-    closed: Vec<f64>,
 }
 
 impl Faces {
     pub fn clear(&mut self) {
-        self.distance.clear();
-        self.normal.iter_mut().for_each(Vec::clear);
+        self.count = 0;
     }
-    /// Adds a face; returns its number.
-    pub fn push(&mut self, distance: f64, normal: [f64; 3]) -> usize {
-        self.distance.push(distance);
-        for (list, n) in self.normal.iter_mut().zip(normal) {
-            list.push(n);
+    /// Number of faces.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+    /// Adds neighbouring faces of a row, given by vectors.
+    #[inline(always)]
+    pub fn extend<V: Vector<Number = f64>>(
+        &mut self,
+        count: usize,
+        distance: &[f64],
+        normal: [&[f64]; 3],
+    ) {
+        let first = self.count;
+        self.count += count;
+        let lists = [&mut self.distance].into_iter().chain(&mut self.normal);
+        let from = [distance].into_iter().chain(normal);
+        for (list, from) in lists.zip(from) {
+            if list.len() < self.count + MOST {
+                list.resize(2 * (self.count + MOST), 0.0);
+            }
+            for n in (0..count).step_by(V::WIDTH) {
+                V::load(&from[n..]).store(&mut list[first + n..]);
+            }
         }
-        self.distance.len() - 1
     }
-    /// Finds the holds on all faces.
-    pub fn hold(&mut self, holding: &Holding) {
-        let count = self.distance.len();
-        // What fills up the last vector is far away.
+    /// Takes a face from the grain: another one holds it.
+    pub fn forgo(&mut self, index: usize, holding: &Holding) {
+        self.distance[index] = holding.away();
+    }
+    /// Finds the holds on all faces, as far as no other grain is near, for the lists of `forced`.
+    pub fn hold(&mut self, holding: &Holding, forced: &mut Forced) {
+        let count = self.count;
         let padded = count.next_multiple_of(MOST);
-        self.distance.resize(padded, 4.0 * holding.eps);
-        self.normal.iter_mut().for_each(|n| n.resize(padded, 0.0));
+        self.distance.resize(padded.max(self.distance.len()), 0.0);
+        self.normal
+            .iter_mut()
+            .for_each(|n| n.resize(padded.max(n.len()), 0.0));
+        self.distance[count..padded].fill(holding.away());
         self.strength.resize(padded, 0.0);
-        self.closed.resize(padded, 0.0);
+        forced.share.resize(padded, 0.0);
+        forced.closed.resize(padded, 0.0);
         match holding.scheme {
             Scheme::Aperture => dispatch(Apertures {
                 holding,
                 faces: self,
+                forced,
             }),
             Scheme::Paper => {
                 for at in 0..count {
                     let normal = DVec3::from_array([0, 1, 2].map(|axis| self.normal[axis][at]));
                     let hold = holding.blend(self.distance[at], normal);
-                    (self.strength[at], self.closed[at]) = (hold.strength, hold.closed);
+                    self.strength[at] = hold.strength;
+                    (forced.share[at], forced.closed[at]) = (hold.share(hold), hold.closed);
                 }
             }
         }
+        forced.share.truncate(count);
+        forced.closed.truncate(count);
+        forced.closed_by_all.clear();
+        forced.closed_by_all.extend_from_slice(&forced.closed);
     }
-    /// The hold on a face, by the number that `push` gave it.
-    pub fn at(&self, index: usize) -> Hold {
+    /// The hold of the grain on a face near its surface, found before for the lists of `forced`.
+    pub fn at(&self, index: usize, forced: &Forced) -> Hold {
         Hold {
             strength: self.strength[index],
-            closed: self.closed[index],
+            closed: forced.closed[index],
         }
     }
 }
@@ -118,6 +150,11 @@ impl Holding {
             }
             Scheme::Paper => self.blend(d, normal),
         }
+    }
+
+    /// A distance that is far away [m].
+    fn away(&self) -> f64 {
+        4.0 * self.eps
     }
 
     /// Strength and closed part of faces.
@@ -142,6 +179,7 @@ impl Holding {
 struct Apertures<'a> {
     holding: &'a Holding,
     faces: &'a mut Faces,
+    forced: &'a mut Forced,
 }
 
 impl Kernel for Apertures<'_> {
@@ -152,14 +190,31 @@ impl Kernel for Apertures<'_> {
             distance,
             normal: [x, y, z],
             strength,
-            closed,
+            ..
         } = self.faces;
-        for at in (0..distance.len()).step_by(V::WIDTH) {
+        let Forced { share, closed, .. } = self.forced;
+        let (zero, one) = (V::constant(0.0), V::constant(1.0));
+        let (inside, outside) = (
+            V::constant(-self.holding.eps),
+            V::constant(2.0 * self.holding.eps),
+        );
+        for at in (0..strength.len()).step_by(V::WIDTH) {
             let load = |values: &[f64]| V::load(&values[at..]);
-            let normal = [load(x), load(y), load(z)];
-            let (drag, part) = self.holding.near(load(distance), normal);
+            let d = load(distance);
+            // Faces deep inside take all of the grain's motion.
+            let shallow = inside.is_below(d);
+            if shallow.is_zero() {
+                one.store(&mut share[at..]);
+                one.store(&mut closed[at..]);
+                continue;
+            }
+            let (drag, part) = self.holding.near(d, [load(x), load(y), load(z)]);
+            // The grain does nothing beyond its faces, which may enclose some where it is concave.
+            let drag = d.where_below(outside, drag, zero);
             drag.store(&mut strength[at..]);
-            part.store(&mut closed[at..]);
+            let taken = drag.over(one + drag);
+            inside.where_below(d, taken, one).store(&mut share[at..]);
+            inside.where_below(d, part, one).store(&mut closed[at..]);
         }
     }
 }

@@ -37,7 +37,7 @@ pub struct Body {
     /// Cells of the box.
     pub size: IVec3,
     /// Signed distance [m] at the faces of the box for each component; infinite where another grain
-    /// is nearer, or where it does not matter. Some entries more follow the last.
+    /// is nearer, without meaning where it does not matter. Some entries more follow the last.
     pub distance: [Vec<f64>; 3],
     /// Which faces of each row along x the distance matters at, for each component.
     pub spans: [Vec<[i32; 2]>; 3],
@@ -45,7 +45,8 @@ pub struct Body {
     pub places: Places,
     /// From its first to its last plane there.
     pub planes: Range<usize>,
-    /// What is added to the tendency at the faces of the box for each component [m/s^2].
+    /// What is added to the tendency at the faces of the box for each component [m/s^2], where the distance
+    /// matters.
     pub push: [Vec<f64>; 3],
     /// Where those faces lie.
     pub rows: [Vec<PushRow>; 3],
@@ -146,8 +147,7 @@ impl Locator {
             self.place(grain, body);
             dispatch(Measure {
                 mesh,
-                scheme: self.scheme,
-                eps: self.eps,
+                holding: &holding,
                 reach: self.reach,
                 grain,
                 shape: shapes.of(index),
@@ -193,22 +193,11 @@ impl Locator {
         forced: &mut Forced,
         scratch: &mut Scratch,
     ) {
-        let Scratch {
-            faces,
-            places,
-            shared,
-            ..
-        } = scratch;
-        faces.hold(holding);
-        for (number, &place) in places.iter().enumerate() {
-            let own = faces.at(number);
-            forced.share[place] = own.share(own);
-            forced.closed[place] = own.closed;
-            forced.closed_by_all[place] = own.closed;
-        }
+        let Scratch { faces, shared, .. } = scratch;
+        faces.hold(holding, forced);
         let near = 2.0 * self.eps;
-        for &(number, x) in &*shared {
-            let (own, place) = (faces.at(number), places[number]);
+        for &(place, x) in &*shared {
+            let own = faces.at(place, forced);
             let mut all = own;
             for rival in rivals {
                 let (there, slope) = rival.distance_and_gradient(x, near);

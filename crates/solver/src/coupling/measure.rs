@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3, IVec3};
 
 use super::Scheme;
 use super::forced::Run;
-use super::hold::Faces;
+use super::hold::{Faces, Holding};
 use super::locate::{Body, PushRow};
 use super::near::NearShape;
 use super::rivals::Rival;
@@ -18,50 +18,28 @@ use crate::math::lanes::{Kernel, MOST, RAMP, Vector};
 /// What one thread needs to locate grains.
 #[derive(Default)]
 pub struct Scratch {
-    /// Faces near the surface, whose hold is to be found.
+    /// Faces that the grain may force.
     pub faces: Faces,
-    /// Place of each of them in the list of forced ones.
-    pub places: Vec<usize>,
     /// Which of them other grains may hold as well, and where they are [m].
     pub shared: Vec<(usize, DVec3)>,
-    row: Row,
+    normals: Normals,
 }
 
-/// A row of faces: distances, unit normals in the space frame, and what the grain does to each.
+/// Unit normals, in the space frame, of a row of faces.
 #[derive(Default)]
-struct Row {
-    distance: Vec<f64>,
-    normal: [Vec<f64>; 3],
-    role: Vec<Role>,
-}
+struct Normals([Vec<f64>; 3]);
 
-#[derive(Clone, Copy, Default)]
-enum Role {
-    /// Nothing.
-    #[default]
-    Free,
-    /// Takes all of it: the face is deep inside (the paper's coupling asks its shares themselves).
-    Whole,
-    /// Holds it, perhaps with others; that far is it from them [m].
-    Near(f64),
-}
-
-impl Row {
-    fn resize(&mut self, count: usize) {
-        self.distance.resize(count, 0.0);
-        self.normal.iter_mut().for_each(|n| n.resize(count, 0.0));
-        self.role.resize(count, Role::Free);
-    }
-
-    /// Distances and normals of the faces in `range`. In the frame of the shape, which is turned by
-    /// `turn`, the face 0 is at `first` and the others follow by `step`.
+impl Normals {
+    /// Finds them and the distances of the faces in `range`. In the frame of the shape, which is turned
+    /// by `turn`, the face 0 is at `first` and the others follow by `step`. Some entries beyond the range
+    /// are overwritten.
     #[inline(always)]
     fn fill<V: Vector<Number = f64>>(
         &mut self,
+        distances: &mut [f64],
         shape: &NearShape,
         turn: DMat3,
-        first: DVec3,
-        step: DVec3,
+        [first, step]: [DVec3; 2],
         range: Range<i32>,
     ) {
         let columns = turn.to_cols_array_2d();
@@ -76,8 +54,8 @@ impl Row {
             let inverse = V::constant(1.0).over(length.larger(V::constant(f64::MIN_POSITIVE)));
             let unit = [x * inverse, y * inverse, z * inverse];
             let at = i as usize;
-            distance.store(&mut self.distance[at..]);
-            for (axis, list) in self.normal.iter_mut().enumerate() {
+            distance.store(&mut distances[at..]);
+            for (axis, list) in self.0.iter_mut().enumerate() {
                 let normal = V::constant(columns[0][axis]) * unit[0]
                     + V::constant(columns[1][axis]) * unit[1]
                     + V::constant(columns[2][axis]) * unit[2];
@@ -87,11 +65,10 @@ impl Row {
     }
 }
 
-/// The measurement of one grain; `eps` and `reach` as in [`super::locate::Locator`].
+/// The measurement of one grain; `reach` as in [`super::locate::Locator`].
 pub struct Measure<'a> {
     pub mesh: &'a Mesh,
-    pub scheme: Scheme,
-    pub eps: f64,
+    pub holding: &'a Holding,
     pub reach: f64,
     pub grain: &'a Grain,
     pub shape: &'a NearShape,
@@ -106,8 +83,7 @@ impl Kernel for Measure<'_> {
     fn run<V: Vector<Number = f64>>(self) {
         let Measure {
             mesh,
-            scheme,
-            eps,
+            holding,
             reach,
             grain,
             shape,
@@ -115,23 +91,30 @@ impl Kernel for Measure<'_> {
             body,
             scratch,
         } = self;
+        let (eps, blended) = (holding.eps, holding.scheme == Scheme::Paper);
         let turn = DMat3::from_quat(grain.pose.orientation);
         let to_body = turn.transpose();
         let step = DVec3::X * mesh.spacing.x;
-        let far = grain.shape.bounding_radius() + reach;
+        let body_step = to_body * step;
+        let around = Around {
+            far: grain.shape.bounding_radius() + reach,
+            lower: grain.shape.lower() - reach,
+            upper: grain.shape.upper() + reach,
+            h: mesh.spacing.x,
+            per_step: 1.0 / body_step,
+        };
         let size = body.size;
         let count = (size.x * size.y * size.z) as usize;
         let Scratch {
             faces,
-            places,
             shared,
-            row,
+            normals,
         } = scratch;
         faces.clear();
-        places.clear();
         shared.clear();
-        row.resize(size.x as usize + MOST);
-        body.forced.clear();
+        let wide = size.x as usize + MOST;
+        normals.0.iter_mut().for_each(|n| n.resize(wide, 0.0));
+        body.forced.runs.iter_mut().for_each(Vec::clear);
         let nearest = |x: DVec3| {
             let others = rivals.iter();
             others
@@ -140,92 +123,103 @@ impl Kernel for Measure<'_> {
         };
         for (axis, offset) in FACE_OFFSET.iter().enumerate() {
             let distance = &mut body.distance[axis];
-            distance.clear();
             distance.resize(count + MOST, f64::INFINITY);
             body.spans[axis].clear();
             body.rows[axis].clear();
             for (k, j) in (0..size.z).flat_map(|k| (0..size.y).map(move |j| (k, j))) {
                 let start = position(mesh, offset, body.first + IVec3::new(0, j, k));
                 let arm = start - grain.pose.position;
-                let range = chord(arm, far, mesh.spacing.x, size.x);
-                row.fill::<V>(shape, turn, to_body * arm, to_body * step, range.clone());
-                let distance = &mut distance[(size.x * (j + size.y * k)) as usize..];
-                let (mut span, mut forced) = ([size.x, 0], [size.x, 0]);
-                for i in range {
-                    let at = i as usize;
-                    let d = row.distance[at];
-                    row.role[at] = Role::Free;
-                    if d > reach {
-                        continue;
-                    }
-                    span = [span[0].min(i), i + 1];
-                    let rival = nearest(start + f64::from(i) * step);
-                    if d <= rival {
-                        distance[at] = d;
-                    }
-                    let inside_rival = rival <= -eps && rival < d;
-                    if d < 2.0 * eps && !inside_rival {
-                        forced = [forced[0].min(i), i + 1];
-                        row.role[at] = if d > -eps || scheme == Scheme::Paper {
-                            Role::Near(rival)
-                        } else {
-                            Role::Whole
-                        };
-                    }
-                }
-                body.spans[axis].push(span);
-                let (rows, list) = (&mut body.rows[axis], &mut body.forced);
-                body.places
-                    .runs(axis, [j, k], span[0]..span[1], |part, at, below| {
-                        rows.push(PushRow {
-                            at,
-                            first: (part.start + size.x * (j + size.y * k)) as usize,
-                            count: part.len(),
-                        });
-                        let faces_in = part.start.max(forced[0])..part.end.min(forced[1]);
-                        if faces_in.is_empty() {
-                            return;
-                        }
-                        let ahead = (faces_in.start - part.start) as usize;
-                        list.runs[axis].push(Run {
+                let row = [to_body * arm, body_step];
+                let range = around.row(arm, row[0], size.x);
+                let first = (size.x * (j + size.y * k)) as usize;
+                let distance = &mut distance[first..];
+                normals.fill::<V>(distance, shape, turn, row, range.clone());
+                let span = within(distance, range, reach);
+                let forced = within(distance, span.clone(), 2.0 * eps);
+                body.spans[axis].push([span.start, span.end]);
+                let (rows, runs) = (&mut body.rows[axis], &mut body.forced.runs[axis]);
+                body.places.runs(axis, [j, k], span, |part, at, below| {
+                    rows.push(PushRow {
+                        at,
+                        first: first + part.start as usize,
+                        count: part.len(),
+                    });
+                    let held = part.start.max(forced.start)..part.end.min(forced.end);
+                    let number = faces.count();
+                    if !held.is_empty() {
+                        let from = held.start as usize;
+                        let ahead = (held.start - part.start) as usize;
+                        runs.push(Run {
                             at: at + ahead,
                             below: below + ahead,
-                            arm: arm + f64::from(faces_in.start) * step,
-                            first: list.share.len(),
-                            count: faces_in.len(),
+                            arm: arm + f64::from(held.start) * step,
+                            first: number,
+                            count: held.len(),
                         });
-                        for i in faces_in {
-                            let at = i as usize;
-                            match row.role[at] {
-                                Role::Free => _ = list.push(0.0, 0.0),
-                                Role::Whole => _ = list.push(1.0, 1.0),
-                                Role::Near(rival) => {
-                                    places.push(list.push(0.0, 0.0));
-                                    let normal = [0, 1, 2].map(|axis| row.normal[axis][at]);
-                                    let number = faces.push(row.distance[at], normal);
-                                    if rival < 2.0 * eps {
-                                        shared.push((number, start + f64::from(i) * step));
-                                    }
-                                }
+                        let normal = normals.0.each_ref().map(|list| &list[from..]);
+                        faces.extend::<V>(held.len(), &distance[from..], normal);
+                    }
+                    if rivals.is_empty() {
+                        return;
+                    }
+                    for i in part {
+                        let (x, d) = (start + f64::from(i) * step, &mut distance[i as usize]);
+                        let rival = nearest(x);
+                        if held.contains(&i) {
+                            let face = number + (i - held.start) as usize;
+                            if rival <= -eps && rival < *d {
+                                faces.forgo(face, holding);
+                            } else if rival < 2.0 * eps && (*d > -eps || blended) {
+                                shared.push((face, x));
                             }
                         }
-                    });
+                        if *d > rival {
+                            *d = f64::INFINITY;
+                        }
+                    }
+                });
             }
         }
     }
 }
 
-/// Which of the `count` places of a row, `h` apart, lie in the ball of radius `far` about a centre from
-/// which the first is at `start`.
-fn chord(start: DVec3, far: f64, h: f64, count: i32) -> Range<i32> {
-    let square = far * far - start.y * start.y - start.z * start.z;
-    if square <= 0.0 {
+/// The part of `range` from the first to the last place that is no farther than `limit`.
+fn within(distance: &[f64], range: Range<i32>, limit: f64) -> Range<i32> {
+    let near = |i: &i32| distance[*i as usize] <= limit;
+    let Some(start) = range.clone().find(near) else {
         return 0..0;
+    };
+    let last = range.rev().find(near).unwrap_or(start);
+    start..last + 1
+}
+
+/// What lies about a grain.
+struct Around {
+    /// Radius of a ball about its centroid that holds all of it [m].
+    far: f64,
+    /// A box in its own frame that does [m].
+    lower: DVec3,
+    upper: DVec3,
+    /// Spacing of the faces of a row [m]; one over a step along it, in the grain's frame [1/m].
+    h: f64,
+    per_step: DVec3,
+}
+
+impl Around {
+    /// Which of the `count` faces of a row may matter; the first is at `arm` from the centroid and at
+    /// `first` in the frame of the grain.
+    fn row(&self, arm: DVec3, first: DVec3, count: i32) -> Range<i32> {
+        let square = self.far * self.far - arm.y * arm.y - arm.z * arm.z;
+        if square <= 0.0 {
+            return 0..0;
+        }
+        let half = square.sqrt();
+        let [a, b] = [self.lower, self.upper].map(|side| (side - first) * self.per_step);
+        let (from, to) = (a.min(b).max_element(), a.max(b).min_element());
+        let from = from.max((-half - arm.x) / self.h).ceil() as i32;
+        let to = to.min((half - arm.x) / self.h).floor() as i32;
+        from.clamp(0, count)..(to.saturating_add(1)).clamp(0, count)
     }
-    let half = square.sqrt();
-    let from = ((-half - start.x) / h).ceil() as i32;
-    let to = ((half - start.x) / h).floor() as i32;
-    from.clamp(0, count)..(to + 1).clamp(0, count)
 }
 
 #[inline]

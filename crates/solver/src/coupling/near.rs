@@ -27,7 +27,14 @@ pub struct NearShapes {
 pub struct NearShape {
     shape: Arc<Shape>,
     /// None where the shape answers by itself: a sphere, or a grid that reaches as far.
-    about: Option<Arc<SampledField>>,
+    about: Option<Arc<About>>,
+}
+
+/// The coarse grid about the grid of a shape.
+struct About {
+    field: SampledField,
+    /// Levels of the shape's grid, then those of this one: lanes on either grid find theirs in one list.
+    levels: Vec<f32>,
 }
 
 impl NearShapes {
@@ -51,14 +58,16 @@ impl NearShapes {
 
     /// Memory held beside the shapes [bytes].
     pub fn bytes(&self) -> usize {
-        let mut fields: Vec<_> = self
+        let mut grids: Vec<_> = self
             .shapes
             .iter()
             .filter_map(|n| n.about.as_ref())
             .collect();
-        fields.sort_by_key(|field| Arc::as_ptr(field));
-        fields.dedup_by_key(|field| Arc::as_ptr(field));
-        let levels = fields.iter().map(|field| field.levels().len());
+        grids.sort_by_key(|about| Arc::as_ptr(about));
+        grids.dedup_by_key(|about| Arc::as_ptr(about));
+        let levels = grids
+            .iter()
+            .map(|about| about.field.levels().len() + about.levels.len());
         size_of::<f32>() * levels.sum::<usize>()
     }
 }
@@ -80,7 +89,11 @@ impl NearShape {
             // Coarser where that would be too many samples.
             let mut coarser = (0..20).map(|doublings| f64::from(1 << doublings) * spacing);
             let about = coarser.find_map(|spacing| shape.resampled(spacing, reach + spacing).ok());
-            about.map(Arc::new)
+            about.map(|about| {
+                let levels = [field.levels(), about.levels()].concat();
+                let field = about;
+                Arc::new(About { field, levels })
+            })
         } else {
             None
         };
@@ -100,7 +113,7 @@ impl NearShape {
         };
         let found = field.distance_and_gradient_on_grid(x);
         // Without a second grid the first reaches as far as is asked for.
-        let about = || self.about.as_ref()?.distance_and_gradient_on_grid(x);
+        let about = || self.about.as_ref()?.field.distance_and_gradient_on_grid(x);
         found.or_else(about).unwrap_or(FAR)
     }
 
@@ -111,27 +124,20 @@ impl NearShape {
         match (self.shape.field(), &self.about) {
             (Field::Sphere(radius), _) => about_sphere(*radius, x),
             (Field::Sampled(field), None) => {
-                let (d, slope, off) = on_grid(field, x);
+                let off = off_grid(field, x);
+                let (d, slope) = on_grid(Grid::of(field), field.levels(), x);
                 (d + off * V::constant(FAR), slope)
             }
             (Field::Sampled(field), Some(about)) => {
                 let off = off_grid(field, x);
                 if off.is_zero() {
-                    let (d, slope, _) = on_grid(field, x);
-                    return (d, slope);
+                    return on_grid(Grid::of(field), &about.levels, x);
                 }
-                let (far, far_slope, off_all) = on_grid(about, x);
-                let far = far + off_all * V::constant(FAR);
-                let on = V::constant(1.0) - off;
-                if on.is_zero() {
-                    return (far, far_slope);
-                }
-                let (near, near_slope, _) = on_grid(field, x);
-                let mut slope = near_slope;
-                for axis in 0..3 {
-                    slope[axis] = on * near_slope[axis] + off * far_slope[axis];
-                }
-                (on * near + off * far, slope)
+                let mut beyond = Grid::of(&about.field);
+                beyond.first = V::constant(field.levels().len() as f64);
+                let grid = Grid::of(field).or_where(off, beyond);
+                let (d, slope) = on_grid(grid, &about.levels, x);
+                (d + off_grid(&about.field, x) * V::constant(FAR), slope)
             }
             _ => self.one_by_one(x),
         }
@@ -183,46 +189,93 @@ fn off_grid<V: Vector<Number = f64>>(field: &SampledField, x: [V; 3]) -> V {
     zero.is_below(outside)
 }
 
-/// Distance and gradient on the grid of a field, and 1 where a point is off it, else 0.
+/// The grid of a field, which may be another one for each lane.
+#[derive(Clone, Copy)]
+struct Grid<V> {
+    lower: [V; 3],
+    inverse: V,
+    /// Number of the last sample along each axis.
+    last: [V; 3],
+    /// From one row and one plane of samples to the next.
+    strides: [V; 2],
+    /// Place of the first sample in the list of levels.
+    first: V,
+    /// What a level is [m], and that over the spacing.
+    quantum: V,
+    slope: V,
+}
+
+impl<V: Vector<Number = f64>> Grid<V> {
+    #[inline(always)]
+    fn of(field: &SampledField) -> Grid<V> {
+        let (lower, dims, inverse) = (field.lower(), field.dims(), 1.0 / field.spacing());
+        let last = |axis: usize| V::constant(dims[axis] as f64 - 1.0);
+        Grid {
+            lower: [lower.x, lower.y, lower.z].map(V::constant),
+            inverse: V::constant(inverse),
+            last: [last(0), last(1), last(2)],
+            strides: [dims[0], dims[0] * dims[1]].map(|stride| V::constant(stride as f64)),
+            first: V::constant(0.0),
+            quantum: V::constant(field.quantum()),
+            slope: V::constant(field.quantum() * inverse),
+        }
+    }
+
+    /// This one where `off` is 0, `other` where it is 1.
+    #[inline(always)]
+    fn or_where(self, off: V, other: Grid<V>) -> Grid<V> {
+        let half = V::constant(0.5);
+        let mut both = self;
+        for axis in 0..3 {
+            both.lower[axis] = off.where_below(half, self.lower[axis], other.lower[axis]);
+            both.last[axis] = off.where_below(half, self.last[axis], other.last[axis]);
+        }
+        for n in 0..2 {
+            both.strides[n] = off.where_below(half, self.strides[n], other.strides[n]);
+        }
+        both.inverse = off.where_below(half, self.inverse, other.inverse);
+        both.first = off.where_below(half, self.first, other.first);
+        both.quantum = off.where_below(half, self.quantum, other.quantum);
+        both.slope = off.where_below(half, self.slope, other.slope);
+        both
+    }
+}
+
+/// Distance and gradient on a grid whose samples are in `levels`; of points off it, those of the nearest
+/// point on it.
 #[inline(always)]
-fn on_grid<V: Vector<Number = f64>>(field: &SampledField, x: [V; 3]) -> (V, [V; 3], V) {
+fn on_grid<V: Vector<Number = f64>>(grid: Grid<V>, levels: &[f32], x: [V; 3]) -> (V, [V; 3]) {
     let (zero, one) = (V::constant(0.0), V::constant(1.0));
-    let inverse = 1.0 / field.spacing();
-    let (lower, dims) = (field.lower(), field.dims());
     let mut cell = [zero; 3];
     let mut fraction = [zero; 3];
     for axis in 0..3 {
-        let last = V::constant(dims[axis] as f64 - 1.0);
-        let s = (x[axis] - V::constant(lower[axis])) * V::constant(inverse);
-        let place = s.larger(zero).smaller(last);
-        cell[axis] = place.floor().smaller(last - one);
+        let s = (x[axis] - grid.lower[axis]) * grid.inverse;
+        let place = s.larger(zero).smaller(grid.last[axis]);
+        cell[axis] = place.floor().smaller(grid.last[axis] - one);
         fraction[axis] = place - cell[axis];
     }
-    let row = V::constant(dims[0] as f64);
-    let plane = V::constant((dims[0] * dims[1]) as f64);
-    let at = cell[0] + row * cell[1] + plane * cell[2];
+    let [row, plane] = grid.strides;
+    let at = grid.first + cell[0] + row * cell[1] + plane * cell[2];
     let [fx, fy, fz] = fraction;
     // Value and slope on the four edges along x.
-    let (a, s) = edge(field, at, fx);
-    let (b, t) = edge(field, at + row, fx);
-    let (c, u) = edge(field, at + plane, fx);
-    let (d, v) = edge(field, at + plane + row, fx);
+    let (a, s) = edge(levels, at, fx);
+    let (b, t) = edge(levels, at + row, fx);
+    let (c, u) = edge(levels, at + plane, fx);
+    let (d, v) = edge(levels, at + plane + row, fx);
     let (low, high) = (a + fy * (b - a), c + fy * (d - c));
     let (slope_low, slope_high) = (s + fy * (t - s), u + fy * (v - u));
-    let scale = V::constant(field.quantum() * inverse);
     let gradient = [
-        scale * (slope_low + fz * (slope_high - slope_low)),
-        scale * ((b - a) + fz * ((d - c) - (b - a))),
-        scale * (high - low),
+        grid.slope * (slope_low + fz * (slope_high - slope_low)),
+        grid.slope * ((b - a) + fz * ((d - c) - (b - a))),
+        grid.slope * (high - low),
     ];
-    let distance = V::constant(field.quantum()) * (low + fz * (high - low));
-    (distance, gradient, off_grid(field, x))
+    (grid.quantum * (low + fz * (high - low)), gradient)
 }
 
 /// Value between the samples at `at` and the next along x, and the slope from one to the other.
 #[inline(always)]
-fn edge<V: Vector<Number = f64>>(field: &SampledField, at: V, x: V) -> (V, V) {
-    let [low, high] = V::pairs(field.levels(), at);
+fn edge<V: Vector<Number = f64>>(levels: &[f32], at: V, x: V) -> (V, V) {
+    let [low, high] = V::pairs(levels, at);
     let slope = high - low;
     (low + x * slope, slope)
 }

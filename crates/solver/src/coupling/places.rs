@@ -7,6 +7,7 @@ use glam::IVec3;
 use crate::flow::Boundaries;
 use crate::grid::Mesh;
 use crate::math::Real;
+use crate::math::lanes::prefetch;
 
 /// Which faces and cells are unknowns, and where.
 #[derive(Clone, Copy)]
@@ -18,6 +19,8 @@ pub struct Unknowns {
 
 /// Cells beyond the box that may be asked for.
 pub const PAD: i32 = 3;
+/// How many rows ahead memory is asked for.
+const AHEAD: usize = 4;
 /// Stands for "no unknown": more than any position, and so are sums with it.
 const NONE: usize = 1 << 60;
 
@@ -160,9 +163,13 @@ impl Places {
     pub fn copy<R: Real>(&self, field: &[R], to: &mut Vec<R>) {
         to.clear();
         let [x, y, z] = &self.lines;
+        let lines = y;
         let whole = x[x.len() - 1] == x[0] + x.len() - 1;
         for z in z {
-            for y in y {
+            for (row, y) in y.iter().enumerate() {
+                if let Some(y) = lines.get(row + AHEAD) {
+                    prefetch(field, x[0] + y + z, x.len());
+                }
                 if whole {
                     let line = &field[x[0] + y + z..][..x.len()];
                     to.extend_from_slice(line);

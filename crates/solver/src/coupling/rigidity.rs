@@ -19,8 +19,11 @@ use super::locate::Body;
 use crate::dem::{Dof, Grain};
 use crate::flow::Flow;
 use crate::grid::{FaceVector, for_slabs};
-use crate::math::lanes::{Kernel, Partial, RAMP, RowWork, Vector, along_row, dispatch};
+use crate::math::lanes::{Kernel, Partial, RAMP, RowWork, Vector, along_row, dispatch, prefetch};
 use crate::math::{Load, Matrix6, Real, Vector6, solve6};
+
+/// How many runs ahead memory is asked for.
+const AHEAD: usize = 8;
 
 /// What a step of the fluid does to one grain.
 pub struct Impulse {
@@ -174,7 +177,12 @@ impl<R: Real> Kernel for Gather<'_, R> {
         } = forced;
         for (axis, runs) in runs.iter().enumerate() {
             let half = 0.5 * spacing[axis] * DVec3::AXES[axis];
-            for run in runs {
+            for (number, run) in runs.iter().enumerate() {
+                if let Some(run) = runs.get(number + AHEAD) {
+                    prefetch(self.flow.predicted.component(axis), run.at, run.count);
+                    prefetch(&self.flow.pressure, run.at, run.count);
+                    prefetch(&self.flow.pressure, run.at + strides[2], run.count);
+                }
                 let faces = run.first..run.first + run.count;
                 let mut work = GatherRun {
                     axis,

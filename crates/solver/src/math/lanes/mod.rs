@@ -74,18 +74,13 @@ pub trait Vector:
     /// Lane-wise `self` where it is greater, else `other`.
     fn larger(self, other: Self) -> Self;
     /// Lane-wise `self` where it is smaller, else `other`.
-    #[inline(always)]
-    fn smaller(self, other: Self) -> Self {
-        let zero = Self::constant(0.0);
-        zero - (zero - self).larger(zero - other)
-    }
-    /// Lane-wise 1 where it is smaller than `limit`, else 0; lanes may be infinite.
+    fn smaller(self, other: Self) -> Self;
+    /// Lane-wise `yes` where it is smaller than `limit`, else `no`.
+    fn where_below(self, limit: Self, yes: Self, no: Self) -> Self;
+    /// Lane-wise 1 where it is smaller than `limit`, else 0.
     #[inline(always)]
     fn is_below(self, limit: Self) -> Self {
-        let (zero, one) = (Self::constant(0.0), Self::constant(1.0));
-        // A ramp so steep that it is a step.
-        let steep = Self::constant(1e30);
-        ((limit - self) * steep).larger(zero).smaller(one)
+        self.where_below(limit, Self::constant(1.0), Self::constant(0.0))
     }
     /// Lane-wise absolute value.
     #[inline(always)]
@@ -249,6 +244,25 @@ impl Partial {
     pub fn largest(&self) -> f64 {
         self.0.into_iter().fold(0.0, f64::max)
     }
+}
+
+/// Asks for the entries of a list from `at` to `at + count` to be brought near: short rows end before the
+/// processor guesses that they are read. Nothing happens where there are none.
+#[inline(always)]
+pub fn prefetch<T>(list: &[T], at: usize, count: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let per_line = (64 / size_of::<T>()).max(1);
+        for at in (at..at + count + per_line).step_by(per_line) {
+            if let Some(entry) = list.get(at) {
+                // SAFETY: the entry exists, and a prefetch changes nothing.
+                unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(entry).cast()) };
+            }
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (list, at, count);
 }
 
 /// Work compiled for every instruction set.

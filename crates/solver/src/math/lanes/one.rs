@@ -56,6 +56,14 @@ impl<R: Real> Vector for One<R> {
         One(if self.0 > other.0 { self.0 } else { other.0 })
     }
     #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        One(if self.0 < other.0 { self.0 } else { other.0 })
+    }
+    #[inline(always)]
+    fn where_below(self, limit: Self, yes: Self, no: Self) -> Self {
+        if self.0 < limit.0 { yes } else { no }
+    }
+    #[inline(always)]
     fn transpose(_: &mut [Self]) {}
     #[inline(always)]
     fn add_to(self, sums: &mut [f64]) {

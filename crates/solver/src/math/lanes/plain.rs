@@ -68,6 +68,19 @@ impl<R: Real, const N: usize> Vector for Plain<R, N> {
         self.zip(other, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn where_below(self, limit: Self, yes: Self, mut no: Self) -> Self {
+        for i in 0..N {
+            if self.0[i] < limit.0[i] {
+                no.0[i] = yes.0[i];
+            }
+        }
+        no
+    }
+    #[inline(always)]
     fn transpose(block: &mut [Self]) {
         for i in 0..N {
             for j in 0..i {

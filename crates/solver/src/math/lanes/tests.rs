@@ -30,7 +30,7 @@ fn check<V: Vector>() {
     let b: [V::Number; MOST] = std::array::from_fn(|i| number((i as f64 + 0.7).cos()));
     let (x, y) = (V::load(&a), V::load(&b));
     let c = V::constant(0.1);
-    let mut found = [[V::Number::default(); MOST]; 8];
+    let mut found = [[V::Number::default(); MOST]; 9];
     for (found, v) in found.iter_mut().zip([
         x + y,
         x - y,
@@ -40,6 +40,7 @@ fn check<V: Vector>() {
         y.magnitude(),
         x.smaller(y),
         x.is_below(y),
+        x.where_below(y, c, x),
     ]) {
         v.store(found);
     }
@@ -60,6 +61,7 @@ fn check<V: Vector>() {
             b.abs(),
             a.min(b),
             f64::from(u8::from(a < b)),
+            if a < b { number(0.1).wide() } else { a },
         ];
         for (found, expected) in found.iter().zip(expected) {
             let expected = number(expected).wide();

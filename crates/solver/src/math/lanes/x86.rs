@@ -18,8 +18,8 @@ macro_rules! vector {
         $name:ident: $width:literal x $number:ident in [$($i:tt: $register:ident),+],
         half $half:ident, tail $tail:ident, transpose $transpose:path,
         doubles $wide:ident [$($w:tt: $widen:path),+],
-        $add:ident, $sub:ident, $mul:ident, $div:ident, $max:ident,
-        $set:ident, $load:ident, $store:ident
+        $add:ident, $sub:ident, $mul:ident, $div:ident, $max:ident, $min:ident,
+        $chosen:path, $set:ident, $load:ident, $store:ident
         $(; $($own:item)*)?
     ) => {
         $(#[$doc])*
@@ -83,6 +83,16 @@ macro_rules! vector {
                 // SAFETY: see the head of this file.
                 unsafe { $name($($max(self.$i, other.$i)),+) }
             }
+            #[inline(always)]
+            fn smaller(self, other: Self) -> Self {
+                // SAFETY: see the head of this file.
+                unsafe { $name($($min(self.$i, other.$i)),+) }
+            }
+            #[inline(always)]
+            fn where_below(self, limit: Self, yes: Self, no: Self) -> Self {
+                // SAFETY: see the head of this file.
+                unsafe { $name($($chosen(self.$i, limit.$i, yes.$i, no.$i)),+) }
+            }
             $($($own)*)?
             #[inline(always)]
             fn transpose(block: &mut [Self]) {
@@ -120,16 +130,16 @@ vector! {
     Pairs: 4 x f64 in [0: __m128d, 1: __m128d],
     half Pairs, tail Pairs, transpose turn::pairs,
     doubles Pairs [0: same],
-    _mm_add_pd, _mm_sub_pd, _mm_mul_pd, _mm_div_pd, _mm_max_pd,
-    _mm_set1_pd, _mm_loadu_pd, _mm_storeu_pd
+    _mm_add_pd, _mm_sub_pd, _mm_mul_pd, _mm_div_pd, _mm_max_pd, _mm_min_pd,
+    choose128_pd, _mm_set1_pd, _mm_loadu_pd, _mm_storeu_pd
 }
 vector! {
     /// Four doubles.
     Four: 4 x f64 in [0: __m256d],
     half Four, tail Four, transpose turn::four,
     doubles Four [0: same],
-    _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_max_pd,
-    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd;
+    _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_max_pd, _mm256_min_pd,
+    choose256_pd, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd;
     #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of this file.
@@ -173,8 +183,8 @@ vector! {
     Eight: 8 x f64 in [0: __m512d],
     half Four, tail Four, transpose turn::eight,
     doubles Eight [0: same],
-    _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_max_pd,
-    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd;
+    _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_max_pd, _mm512_min_pd,
+    choose512_pd, _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd;
     #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of this file.
@@ -215,32 +225,32 @@ vector! {
     FourSingles: 4 x f32 in [0: __m128],
     half FourSingles, tail FourSingles, transpose turn::four_singles,
     doubles Pairs [0: widen_four],
-    _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps, _mm_max_ps,
-    _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
+    _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps, _mm_max_ps, _mm_min_ps,
+    choose128_ps, _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
 }
 vector! {
     /// Four singles, twice.
     SinglesTwice: 8 x f32 in [0: __m128, 1: __m128],
     half SinglesTwice, tail FourSingles, transpose turn::singles_twice,
     doubles Pairs [0: widen_first, 1: widen_second],
-    _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps, _mm_max_ps,
-    _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
+    _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps, _mm_max_ps, _mm_min_ps,
+    choose128_ps, _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
 }
 vector! {
     /// Eight singles.
     EightSingles: 8 x f32 in [0: __m256],
     half EightSingles, tail FourSingles, transpose turn::eight_singles,
     doubles Four [0: widen_lower_four, 1: widen_upper_four],
-    _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps, _mm256_max_ps,
-    _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps
+    _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps,
+    choose256_ps, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps
 }
 vector! {
     /// Sixteen singles.
     SixteenSingles: 16 x f32 in [0: __m512],
     half EightSingles, tail FourSingles, transpose turn::sixteen_singles,
     doubles Eight [0: widen_lower_eight, 1: widen_upper_eight],
-    _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps, _mm512_max_ps,
-    _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps
+    _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps, _mm512_max_ps, _mm512_min_ps,
+    choose512_ps, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps
 }
 
 /// What has doubles already.
@@ -282,4 +292,34 @@ unsafe fn widen_upper_eight(v: SixteenSingles) -> Eight {
         let upper = _mm512_extractf64x4_pd::<1>(_mm512_castps_pd(v.0));
         Eight(_mm512_cvtps_pd(_mm256_castpd_ps(upper)))
     }
+}
+#[inline(always)]
+unsafe fn choose128_pd(a: __m128d, limit: __m128d, yes: __m128d, no: __m128d) -> __m128d {
+    unsafe {
+        let below = _mm_cmplt_pd(a, limit);
+        _mm_or_pd(_mm_and_pd(below, yes), _mm_andnot_pd(below, no))
+    }
+}
+#[inline(always)]
+unsafe fn choose128_ps(a: __m128, limit: __m128, yes: __m128, no: __m128) -> __m128 {
+    unsafe {
+        let below = _mm_cmplt_ps(a, limit);
+        _mm_or_ps(_mm_and_ps(below, yes), _mm_andnot_ps(below, no))
+    }
+}
+#[inline(always)]
+unsafe fn choose256_pd(a: __m256d, limit: __m256d, yes: __m256d, no: __m256d) -> __m256d {
+    unsafe { _mm256_blendv_pd(no, yes, _mm256_cmp_pd::<_CMP_LT_OQ>(a, limit)) }
+}
+#[inline(always)]
+unsafe fn choose256_ps(a: __m256, limit: __m256, yes: __m256, no: __m256) -> __m256 {
+    unsafe { _mm256_blendv_ps(no, yes, _mm256_cmp_ps::<_CMP_LT_OQ>(a, limit)) }
+}
+#[inline(always)]
+unsafe fn choose512_pd(a: __m512d, limit: __m512d, yes: __m512d, no: __m512d) -> __m512d {
+    unsafe { _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, limit), no, yes) }
+}
+#[inline(always)]
+unsafe fn choose512_ps(a: __m512, limit: __m512, yes: __m512, no: __m512) -> __m512 {
+    unsafe { _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, limit), no, yes) }
 }
