@@ -15,11 +15,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::dem::Grain;
+use crate::dem::{Grain, Response};
 use crate::flow::{Flow, FlowMeasures};
 use crate::math::{Load, Real};
 
 use locate::{Body, Locator};
+use rigidity::{Impulse, Motion};
 
 /// How rigidity is imposed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,6 +48,8 @@ pub(crate) struct Coupling {
     fluid_density: f64,
     locator: Locator,
     bodies: Vec<Body>,
+    /// Of each grain in the present step.
+    coupled: Vec<(Impulse, Motion)>,
 }
 
 impl Coupling {
@@ -65,6 +68,7 @@ impl Coupling {
             fluid_density,
             locator,
             bodies: vec![Body::default(); grains.len()],
+            coupled: Vec::new(),
         };
         coupling.locate(grains, 1.0);
         coupling
@@ -82,32 +86,69 @@ impl Coupling {
         }
     }
 
-    /// Imposes rigidity on the predicted velocity and advances the grains' velocities from
-    /// `before` under the fluid's impulse and the `other` loads.
-    /// `loads` receives the hydrodynamic load on each grain.
+    /// Time over which the closed part of a face takes the acceleration of the grains.
+    fn relief(&self, dt: f64) -> f64 {
+        if self.scheme == Scheme::Aperture {
+            dt
+        } else {
+            0.0
+        }
+    }
+
+    /// Finds what the fluid will take from the grains as they go on from `before` under the `other` loads
+    /// (weight less buoyancy), as equations for their new velocities.
+    pub fn couple<R: Real>(
+        &mut self,
+        flow: &Flow<R>,
+        grains: &[Grain],
+        before: &[Past],
+        other: &[Load],
+        dt: f64,
+    ) {
+        let (relief, density) = (self.relief(dt), self.fluid_density);
+        let each = self.bodies.par_iter_mut().zip(grains).enumerate();
+        let coupled = each.map(|(index, (body, grain))| {
+            let past = &before[index];
+            let impulse = rigidity::gather(flow, density, body, past, relief);
+            let motion = Motion::new(grain, past, &impulse, density, other[index], dt);
+            (impulse, motion)
+        });
+        coupled.collect_into_vec(&mut self.coupled);
+    }
+
+    /// How the grains answer contact in this step, after [`Coupling::couple`].
+    pub fn responses(
+        &self,
+        grains: &[Grain],
+        before: &[Past],
+        added_density: f64,
+        dt: f64,
+    ) -> Vec<Response> {
+        let each = self.coupled.iter().zip(grains).zip(before);
+        each.map(|(((_, motion), grain), past)| motion.response(grain, past, added_density, dt))
+            .collect()
+    }
+
+    /// Gives the grains their new velocities, under the mean `contact` loads too, and imposes rigidity on
+    /// the predicted velocity; after [`Coupling::couple`]. `loads` receives the hydrodynamic load on each
+    /// grain.
     pub fn impose_rigidity<R: Real>(
         &mut self,
         flow: &mut Flow<R>,
         grains: &mut [Grain],
         before: &[Past],
-        other: &[Load],
+        contact: &[Load],
         dt: f64,
         loads: &mut [Load],
     ) {
-        let relief = if self.scheme == Scheme::Aperture {
-            dt
-        } else {
-            0.0
-        };
-        let (flow_before, fluid_density) = (&*flow, self.fluid_density);
-        let grains_with = self.bodies.par_iter_mut().zip(&mut *grains).zip(loads);
-        let each = grains_with.enumerate();
-        each.for_each(|(index, ((body, grain), load))| {
-            let past = &before[index];
-            let impulse = rigidity::gather(flow_before, fluid_density, body, past, relief);
-            *load = rigidity::advance(grain, past, &impulse, fluid_density, other[index], dt);
-        });
-        rigidity::impose(flow, grains, &self.bodies, before, relief);
+        let density = self.fluid_density;
+        let each = self.coupled.par_iter().zip(&mut *grains).zip(loads);
+        each.enumerate()
+            .for_each(|(index, (((impulse, motion), grain), load))| {
+                let (past, contact) = (&before[index], contact[index]);
+                *load = rigidity::advance(grain, past, impulse, motion, density, contact, dt);
+            });
+        rigidity::impose(flow, grains, &self.bodies, before, self.relief(dt));
     }
 
     /// Gives the fluid inside and next to the grains their rigid velocity, for initial states.

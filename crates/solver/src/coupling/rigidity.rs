@@ -16,7 +16,7 @@ use glam::{DMat3, DVec3};
 use super::Past;
 use super::forced::Forced;
 use super::locate::Body;
-use crate::dem::{Dof, Grain};
+use crate::dem::{Dof, Grain, Response};
 use crate::flow::Flow;
 use crate::grid::{FaceVector, for_slabs};
 use crate::math::lanes::{Kernel, Partial, RAMP, RowWork, Vector, along_row, dispatch, prefetch};
@@ -281,40 +281,115 @@ impl<R: Real> RowWork for GatherRun<'_, R> {
     }
 }
 
-/// New velocities of the grain from those in `past` under the impulse and the `other` loads (weight less
-/// buoyancy, contact) over `dt`; returns the hydrodynamic load on it.
+/// Newton's and Euler's equations of one grain and the fluid it holds over a step, as a linear system for
+/// its new velocities.
+#[derive(Clone, Copy)]
+pub struct Motion {
+    matrix: Matrix6,
+    right: Vector6,
+    carried: Carried,
+}
+
+impl Motion {
+    /// From the velocities in `past`, under the impulse and the `other` loads (weight less buoyancy) over
+    /// `dt`, without contact.
+    pub fn new(
+        grain: &Grain,
+        past: &Past,
+        impulse: &Impulse,
+        fluid_density: f64,
+        other: Load,
+        dt: f64,
+    ) -> Motion {
+        let ratio = 1.0 - fluid_density / grain.density;
+        let (mass, inertia) = (grain.mass() * ratio, grain.inertia() * ratio);
+        let [v, omega] = past.velocity;
+        let gyroscopic = omega.cross(inertia * omega);
+        let momentum = mass * v + dt * other.force;
+        let angular = inertia * omega + dt * (other.torque - gyroscopic);
+        let carried = Carried::by(grain, past, fluid_density, dt);
+        let mut a = impulse.slope;
+        let mut b = [0.0; 6];
+        for row in 0..3 {
+            a[row][row] += mass + carried.mass;
+            b[row] = momentum[row] + carried.momentum[row] - impulse.constant[row];
+            b[3 + row] = angular[row] + carried.angular[row] - impulse.constant[3 + row];
+            for column in 0..3 {
+                a[3 + row][3 + column] += (inertia + carried.inertia).col(column)[row];
+            }
+        }
+        prescribe(&mut a, &mut b, 0, grain.translation);
+        prescribe(&mut a, &mut b, 3, grain.rotation);
+        Motion {
+            matrix: a,
+            right: b,
+            carried,
+        }
+    }
+
+    /// How the grain answers contact within the step, so that it leaves its sub-steps as [`advance`] will
+    /// have it. Its mass is at least its own with `added_density` of the fluid, most of which answers by
+    /// the projection, one step late (`docs/decisions/0014-contact-and-fluid-at-once.md`).
+    pub fn response(&self, grain: &Grain, past: &Past, added_density: f64, dt: f64) -> Response {
+        let [v, omega] = past.velocity;
+        let before = [v.x, v.y, v.z, omega.x, omega.y, omega.z];
+        // What there is to accelerate it, with its mass before that grows.
+        let mut drive: Vector6 = std::array::from_fn(|row| {
+            let held: f64 = (0..6).map(|n| self.matrix[row][n] * before[n]).sum();
+            (self.right[row] - held) / dt
+        });
+        let mut a = self.matrix;
+        let least = grain.mass() + added_density * grain.shape.volume();
+        let mean = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
+        let free = [grain.translation, grain.rotation].map(|dof| dof == Dof::Free);
+        if free[0] {
+            for (axis, row) in a.iter_mut().take(3).enumerate() {
+                row[axis] += (least - mean).max(0.0);
+            }
+        }
+        let column = |n: usize| {
+            let mut unit = [0.0; 6];
+            unit[n] = if free[n / 3] { 1.0 } else { 0.0 };
+            solve6(a, unit).unwrap_or([0.0; 6])
+        };
+        let columns: [Vector6; 6] = std::array::from_fn(column);
+        for (n, dof) in free.into_iter().enumerate() {
+            if !dof {
+                drive[3 * n..3 * n + 3].fill(0.0);
+            }
+        }
+        Response::new(drive, columns)
+    }
+}
+
+/// New velocities of the grain under its motion's equations and the mean `contact` load over `dt`; returns
+/// the hydrodynamic load on it.
 pub fn advance(
     grain: &mut Grain,
     past: &Past,
     impulse: &Impulse,
+    motion: &Motion,
     fluid_density: f64,
-    other: Load,
+    contact: Load,
     dt: f64,
 ) -> Load {
-    let ratio = 1.0 - fluid_density / grain.density;
-    let (mass, inertia) = (grain.mass() * ratio, grain.inertia() * ratio);
     let [v, omega] = past.velocity;
-    let gyroscopic = omega.cross(inertia * omega);
-    let momentum = mass * v + dt * other.force;
-    let angular = inertia * omega + dt * (other.torque - gyroscopic);
-    let carried = Carried::by(grain, past, fluid_density, dt);
-    let mut a = impulse.slope;
-    let mut b = [0.0; 6];
-    for row in 0..3 {
-        a[row][row] += mass + carried.mass;
-        b[row] = momentum[row] + carried.momentum[row] - impulse.constant[row];
-        b[3 + row] = angular[row] + carried.angular[row] - impulse.constant[3 + row];
-        for column in 0..3 {
-            a[3 + row][3 + column] += (inertia + carried.inertia).col(column)[row];
+    let mut right = motion.right;
+    let free = [grain.translation, grain.rotation].map(|dof| dof == Dof::Free);
+    for axis in 0..3 {
+        if free[0] {
+            right[axis] += dt * contact.force[axis];
+        }
+        if free[1] {
+            right[3 + axis] += dt * contact.torque[axis];
         }
     }
-    prescribe(&mut a, &mut b, 0, grain.translation);
-    prescribe(&mut a, &mut b, 3, grain.rotation);
     // Positive definite whenever a face is forced; a grain without faces moves on as it was.
-    let x = solve6(a, b).unwrap_or([v.x, v.y, v.z, omega.x, omega.y, omega.z]);
+    let x = solve6(motion.matrix, right).unwrap_or([v.x, v.y, v.z, omega.x, omega.y, omega.z]);
     grain.velocity = DVec3::new(x[0], x[1], x[2]);
     grain.angular_velocity = DVec3::new(x[3], x[4], x[5]);
 
+    let carried = &motion.carried;
     let j: Vector6 = std::array::from_fn(|row| {
         impulse.constant[row]
             + impulse.slope[row]
@@ -339,6 +414,7 @@ pub fn advance(
 /// equations, with the new acceleration on one and the last on the other. The fluid around a grain
 /// answers by the projection, one step late; without this, a light grain and that answer drive each
 /// other (`docs/decisions/0013-light-grains.md`).
+#[derive(Clone, Copy)]
 struct Carried {
     mass: f64,
     inertia: DMat3,

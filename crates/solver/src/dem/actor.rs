@@ -10,9 +10,10 @@ use super::enclosure::Enclosure;
 use super::grain::Grain;
 use super::history::Slot;
 use super::law::{Law, Motion, Pair};
-use super::motion::MidStep;
+use super::motion::{Inertia, MidStep};
 use super::narrow_phase::Body;
 use super::node_tree::NodeTree;
+use super::response::Response;
 use crate::math::Load;
 
 /// A pair that is known to be apart is looked at again when this many times its motion could close it.
@@ -32,6 +33,8 @@ pub(super) struct Actor {
     pub mid: MidStep,
     /// Contact load at the last look.
     pub contact: Load,
+    /// How it answers contact, where that is known.
+    pub response: Option<Response>,
     /// One over the mass that resists a contact, added mass included [1/kg].
     pub inverse_mass: f64,
     /// The same of the grain alone [1/kg].
@@ -77,6 +80,7 @@ impl Actor {
             moved: 0.0,
             mid: MidStep::default(),
             contact: Load::default(),
+            response: None,
             inverse_mass: 0.0,
             own_inverse_mass: 0.0,
             searched: DVec3::ZERO,
@@ -84,12 +88,12 @@ impl Actor {
         }
     }
 
-    /// One over the mass that resists the present loads [1/kg].
-    pub fn resisting(&self) -> f64 {
-        if self.contact.force == DVec3::ZERO {
-            self.own_inverse_mass
-        } else {
-            self.inverse_mass
+    /// What resists the present loads.
+    pub fn inertia(&self) -> Inertia<'_> {
+        match &self.response {
+            Some(response) => Inertia::InFluid(response),
+            None if self.contact.force == DVec3::ZERO => Inertia::Own(self.own_inverse_mass),
+            None => Inertia::Own(self.inverse_mass),
         }
     }
 

@@ -11,8 +11,9 @@ use super::history::{PairKey, Slot, renew};
 use super::law::Law;
 use super::motion::{kick, kick_and_drift};
 use super::params::ContactParams;
+use super::response::Response;
 use super::{Contact, Partner};
-use crate::math::Load;
+use crate::math::{Load, Pose};
 
 /// Part of its bounding radius that a grain may always move before the pairs are searched again.
 const SKIN: f64 = 0.01;
@@ -35,6 +36,28 @@ pub struct Dynamics {
     balls: Vec<Ball>,
     old_slots: Vec<Slot>,
     spare_slots: Vec<Slot>,
+    start: Start,
+}
+
+/// Pose, velocity and angular velocity.
+type State = (Pose, DVec3, DVec3);
+
+fn state(grain: &Grain) -> State {
+    (grain.pose, grain.velocity, grain.angular_velocity)
+}
+
+fn set(grains: &mut [Grain], states: &[State]) {
+    for (grain, (pose, velocity, spin)) in grains.iter_mut().zip(states) {
+        (grain.pose, grain.velocity, grain.angular_velocity) = (*pose, *velocity, *spin);
+    }
+}
+
+/// What a step started from.
+#[derive(Clone, Debug, Default)]
+struct Start {
+    slots: Vec<Slot>,
+    last: Vec<DVec3>,
+    states: Vec<State>,
 }
 
 impl Dynamics {
@@ -51,6 +74,7 @@ impl Dynamics {
             balls: Vec::new(),
             old_slots: Vec::new(),
             spare_slots: Vec::new(),
+            start: Start::default(),
         }
     }
     /// Contacts at the end of the last step, ordered by grain, then partner.
@@ -91,19 +115,68 @@ impl Dynamics {
             return 0;
         }
         self.follow(grains);
-        self.search(grains, loads, dt);
-        let done = if self.slots.len() < WORTH_THREADS {
-            self.run(grains, loads, dt, mean_contact)
-        } else {
-            // Into the pool once, not once for each sub-step: a caller outside it would have to wait
-            // for a worker to wake every time.
-            rayon::scope(|_| self.run(grains, loads, dt, mean_contact))
-        };
+        self.actors
+            .iter_mut()
+            .for_each(|actor| actor.response = None);
+        let done = self.go(grains, loads, dt, mean_contact);
         self.last.clear();
         self.last
             .extend(grains.iter().map(|grain| grain.pose.position));
         self.report(grains);
         done
+    }
+
+    /// Keeps what [`Dynamics::again`] goes back to.
+    pub fn remember(&mut self, grains: &[Grain]) {
+        self.start.slots.clone_from(&self.slots);
+        self.start.last.clone_from(&self.last);
+        self.start.states.clear();
+        self.start.states.extend(grains.iter().map(state));
+    }
+
+    /// The contact that there is over the step that [`Dynamics::advance`] took, after
+    /// [`Dynamics::remember`], if the grains answer it by `responses`: with the fluid of the same step in
+    /// them. Nothing else changes.
+    pub fn again(
+        &mut self,
+        grains: &mut [Grain],
+        responses: &[Response],
+        dt: f64,
+        mean_contact: &mut [Load],
+    ) {
+        mean_contact.fill(Load::default());
+        let mut start = std::mem::take(&mut self.start);
+        let ends: Vec<_> = grains.iter().map(state).collect();
+        std::mem::swap(&mut self.slots, &mut start.slots);
+        std::mem::swap(&mut self.last, &mut start.last);
+        set(grains, &start.states);
+        self.follow(grains);
+        for (actor, response) in self.actors.iter_mut().zip(responses) {
+            actor.response = Some(*response);
+        }
+        self.go(grains, &[], dt, mean_contact);
+        std::mem::swap(&mut self.slots, &mut start.slots);
+        std::mem::swap(&mut self.last, &mut start.last);
+        set(grains, &ends);
+        self.start = start;
+    }
+
+    /// The step, once the actors are there.
+    fn go(
+        &mut self,
+        grains: &mut [Grain],
+        loads: &[Load],
+        dt: f64,
+        mean_contact: &mut [Load],
+    ) -> usize {
+        self.search(grains, loads, dt);
+        if self.slots.len() < WORTH_THREADS {
+            self.run(grains, loads, dt, mean_contact)
+        } else {
+            // Into the pool once, not once for each sub-step: a caller outside it would have to wait
+            // for a worker to wake every time.
+            rayon::scope(|_| self.run(grains, loads, dt, mean_contact))
+        }
     }
 
     /// The sub-steps of one step.
@@ -127,7 +200,7 @@ impl Dynamics {
                     *mean += actor.contact * half_mean;
                 }
                 let load = load_of(i) + actor.contact;
-                actor.mid = kick_and_drift(grain, &load, actor.resisting(), damping, step);
+                actor.mid = kick_and_drift(grain, &load, actor.inertia(), damping, step);
             }
             ahead -= 1;
             done += 1;
@@ -145,7 +218,7 @@ impl Dynamics {
                     grain,
                     &actor.mid,
                     &(load_of(i) + actor.contact),
-                    actor.resisting(),
+                    actor.inertia(),
                     damping,
                     step,
                 );
@@ -200,13 +273,17 @@ impl Dynamics {
         let reach = 0.5 * self.law.reach();
         for (i, (grain, actor)) in grains.iter().zip(&mut self.actors).enumerate() {
             let load = loads.get(i).copied().unwrap_or_default() + actor.contact;
-            actor.inverse_mass = grain.inverse_mass(self.law.params.added_density);
             actor.own_inverse_mass = grain.inverse_mass(0.0);
+            let acceleration = match &actor.response {
+                Some(response) => response.to(&load)[0].length(),
+                None => load.force.length() * actor.own_inverse_mass,
+            };
+            actor.inverse_mass = match &actor.response {
+                Some(response) => response.inverse_mass(),
+                None => grain.inverse_mass(self.law.params.added_density),
+            };
             let speed = match grain.translation {
-                Dof::Free => {
-                    grain.velocity.length()
-                        + 0.5 * dt * load.force.length() * actor.own_inverse_mass
-                }
+                Dof::Free => grain.velocity.length() + 0.5 * dt * acceleration,
                 Dof::Prescribed(velocity) => velocity.length(),
             };
             let radius = grain.shape.bounding_radius();

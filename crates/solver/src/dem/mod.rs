@@ -17,6 +17,7 @@ mod motion;
 mod narrow_phase;
 mod node_tree;
 mod params;
+mod response;
 pub mod rotation;
 mod state;
 mod target;
@@ -30,6 +31,7 @@ pub use enclosure::Enclosure;
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
 pub use grain::{Dof, Grain};
 pub use params::ContactParams;
+pub use response::Response;
 
 /// What a grain touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use super::grain::{Dof, Grain};
+use super::response::Response;
 use super::rotation::{half_kick_explicit, half_kick_implicit, turn_by_cayley, turn_exactly};
 use crate::math::Load;
 
@@ -23,11 +24,20 @@ pub(super) struct MidStep {
     pub predicted_spin: DVec3,
 }
 
-/// First half kick and drift: moves the pose to n+1. `inverse_mass` [1/kg] is what resists the load.
+/// What resists a load.
+#[derive(Clone, Copy)]
+pub(super) enum Inertia<'a> {
+    /// The grain's own inertia, and a mass, given by one over it [1/kg].
+    Own(f64),
+    /// The grain in a fluid; the load is that of contact alone.
+    InFluid(&'a Response),
+}
+
+/// First half kick and drift: moves the pose to n+1.
 pub(super) fn kick_and_drift(
     grain: &mut Grain,
     load: &Load,
-    inverse_mass: f64,
+    inertia: Inertia,
     damping: f64,
     step: f64,
 ) -> MidStep {
@@ -35,7 +45,11 @@ pub(super) fn kick_and_drift(
     let mut mid = MidStep::default();
     match grain.translation {
         Dof::Free => {
-            let change = half * (load.force * inverse_mass - damping * grain.velocity);
+            let acceleration = match inertia {
+                Inertia::Own(inverse_mass) => load.force * inverse_mass,
+                Inertia::InFluid(response) => response.to(load)[0],
+            };
+            let change = half * (acceleration - damping * grain.velocity);
             mid.velocity = grain.velocity + change;
             mid.predicted_velocity = mid.velocity + change;
         }
@@ -50,9 +64,15 @@ pub(super) fn kick_and_drift(
         Dof::Free => {
             let to_body = grain.pose.orientation.conjugate();
             let omega = to_body * grain.angular_velocity;
-            let torque = to_body * load.torque;
-            let omega_mid =
-                half_kick_explicit(grain.principal_inertia(), omega, torque, damping, half);
+            let omega_mid = match inertia {
+                Inertia::Own(_) => {
+                    let torque = to_body * load.torque;
+                    half_kick_explicit(grain.principal_inertia(), omega, torque, damping, half)
+                }
+                Inertia::InFluid(response) => {
+                    omega + half * (to_body * response.to(load)[1] - damping * omega)
+                }
+            };
             grain.pose.orientation = turn_by_cayley(grain.pose.orientation, omega_mid, step);
             // The turn is about omega_mid itself, so its space components are the same before and after.
             mid.spin = grain.pose.orientation * omega_mid;
@@ -73,23 +93,34 @@ pub(super) fn kick(
     grain: &mut Grain,
     mid: &MidStep,
     load: &Load,
-    inverse_mass: f64,
+    inertia: Inertia,
     damping: f64,
     step: f64,
 ) {
     let half = 0.5 * step;
+    let shrink = 1.0 + damping * half;
+    let (force, torque) = (load.force, load.torque);
     if grain.translation == Dof::Free {
-        grain.velocity = (mid.velocity + half * load.force * inverse_mass) / (1.0 + damping * half);
+        let acceleration = match inertia {
+            Inertia::Own(inverse_mass) => force * inverse_mass,
+            Inertia::InFluid(response) => response.to(load)[0],
+        };
+        grain.velocity = (mid.velocity + half * acceleration) / shrink;
     }
     if grain.rotation == Dof::Free {
-        let to_body = grain.pose.orientation.conjugate();
-        let omega = half_kick_implicit(
-            grain.principal_inertia(),
-            to_body * mid.spin,
-            to_body * load.torque,
-            damping,
-            half,
-        );
-        grain.angular_velocity = grain.pose.orientation * omega;
+        grain.angular_velocity = match inertia {
+            Inertia::Own(_) => {
+                let to_body = grain.pose.orientation.conjugate();
+                let omega = half_kick_implicit(
+                    grain.principal_inertia(),
+                    to_body * mid.spin,
+                    to_body * torque,
+                    damping,
+                    half,
+                );
+                grain.pose.orientation * omega
+            }
+            Inertia::InFluid(response) => (mid.spin + half * response.to(load)[1]) / shrink,
+        };
     }
 }

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::Setup;
 use super::state::{Reader, Writer};
 use crate::coupling::{Coupling, Past};
-use crate::dem::Grain;
+use crate::dem::{Grain, Response};
 use crate::flow::{Flow, FlowMeasures, FluidParams};
 use crate::math::{Load, Precision, Real};
 use crate::poisson::Stages;
@@ -19,11 +19,19 @@ pub(super) trait Fluid: Send + Sync {
     fn correct_advection(&mut self, grains: &[Grain]);
     fn locate(&mut self, grains: &[Grain], dt: f64);
     fn project_prediction(&mut self, dt: f64);
+    fn couple(&mut self, grains: &[Grain], before: &[Past], other: &[Load], dt: f64);
+    fn responses(
+        &self,
+        grains: &[Grain],
+        before: &[Past],
+        added_density: f64,
+        dt: f64,
+    ) -> Vec<Response>;
     fn impose_rigidity(
         &mut self,
         grains: &mut [Grain],
         before: &[Past],
-        other: &[Load],
+        contact: &[Load],
         dt: f64,
         loads: &mut [Load],
     );
@@ -90,17 +98,29 @@ impl<R: Real> Fluid for FluidOf<R> {
     fn project_prediction(&mut self, dt: f64) {
         self.flow.project_prediction(dt);
     }
+    fn couple(&mut self, grains: &[Grain], before: &[Past], other: &[Load], dt: f64) {
+        self.coupling.couple(&self.flow, grains, before, other, dt);
+    }
+    fn responses(
+        &self,
+        grains: &[Grain],
+        before: &[Past],
+        added_density: f64,
+        dt: f64,
+    ) -> Vec<Response> {
+        self.coupling.responses(grains, before, added_density, dt)
+    }
     fn impose_rigidity(
         &mut self,
         grains: &mut [Grain],
         before: &[Past],
-        other: &[Load],
+        contact: &[Load],
         dt: f64,
         loads: &mut [Load],
     ) {
         let flow = &mut self.flow;
         self.coupling
-            .impose_rigidity(flow, grains, before, other, dt, loads);
+            .impose_rigidity(flow, grains, before, contact, dt, loads);
     }
     fn project(&mut self, dt: f64) {
         self.measures = self.flow.project(dt);

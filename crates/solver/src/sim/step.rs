@@ -68,6 +68,7 @@ impl Simulation {
                 timed(&mut passes.predict, || fluid.predict(dt));
                 timed(&mut passes.coupling, || fluid.correct_advection(grains));
                 timed(&mut passes.contact, || {
+                    dynamics.remember(grains);
                     dynamics.advance(grains, &work.driving, dt, &mut work.contact)
                 });
                 prescription.drive(grains, end);
@@ -75,11 +76,24 @@ impl Simulation {
                 if setup.scheme == Scheme::Paper {
                     timed(&mut passes.project, || fluid.project_prediction(dt));
                 }
-                for i in 0..grains.len() {
-                    work.driving[i] = work.driving[i] + loads[i] * -1.0 + work.contact[i];
+                for (driving, load) in work.driving.iter_mut().zip(&*loads) {
+                    *driving = *driving + *load * -1.0;
                 }
                 timed(&mut passes.coupling, || {
-                    fluid.impose_rigidity(grains, &work.before, &work.driving, dt, loads);
+                    fluid.couple(grains, &work.before, &work.driving, dt)
+                });
+                // Contact again where there was some, now that the fluid's answer of this step is known.
+                if work.contact.iter().any(|load| *load != Load::default()) {
+                    let added = dynamics.params().added_density;
+                    let responses = fluid.responses(grains, &work.before, added, dt);
+                    prescription.drive(grains, now + 0.5 * dt);
+                    timed(&mut passes.contact, || {
+                        dynamics.again(grains, &responses, dt, &mut work.contact)
+                    });
+                    prescription.drive(grains, end);
+                }
+                timed(&mut passes.coupling, || {
+                    fluid.impose_rigidity(grains, &work.before, &work.contact, dt, loads);
                 });
                 let momentum = fluid.measures().momentum;
                 timed(&mut passes.project, || fluid.project(dt));
