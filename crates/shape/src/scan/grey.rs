@@ -48,6 +48,9 @@ pub(crate) struct Cut {
     pub volume: f64,
     /// Standard deviation of the scanner's blur [voxels].
     pub blur: f64,
+    /// Standard deviation of a Gaussian that leaves an edge as steep as blur and smoothing
+    /// together did [voxels].
+    pub width: f64,
 }
 
 impl Grey {
@@ -120,6 +123,9 @@ impl Grey {
             field: field.iter().map(|v| v / slope).collect(),
             volume,
             blur,
+            width: 1.0
+                / (f64::from(a) / blur.hypot(sigma)
+                    + f64::from(1.0 - a) / (blur * blur + 2.0 * sigma * sigma).sqrt()),
         }
     }
 

@@ -10,13 +10,14 @@
 //! the radius t: they come from derivatives of a Gaussian of the distance, at two widths, and the
 //! roundness is extrapolated to the width zero.
 //!
-//! The surface of a scan is noisy: where its radius is about R_in anyway (spheres, the sides of
-//! cylinders) half of it would pass for corners. There only what a much wider Gaussian sees as
-//! corners counts, the others are wider too, and corners that hardly turn the surface count in
-//! proportion.
+//! Scans have their own rule: [`scan`].
 
+mod edge;
+mod scan;
+
+use crate::distance::Distance;
 use crate::surface::{Samples, extract};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 
 /// Samples along the radius of the inscribed sphere.
@@ -25,60 +26,32 @@ const CELLS: f64 = 10.0;
 const LEVEL: f64 = 4.0;
 /// Widths of the Gaussian (standard deviations) [samples].
 const WIDTHS: [f64; 2] = [1.0, 1.5];
-/// The same for a scan.
-const WIDTHS_OF_SCAN: [f64; 2] = [1.4, 2.1];
-/// Width of the Gaussian that tells the corners of a scan from its noise [samples].
-const COARSE: f64 = 4.0;
-/// Radii below this share of R_in, seen by that Gaussian, are corners.
-const COARSE_CORNER: f64 = 0.98;
-/// Corners of a scan that turn the surface by less than this share of what a sphere turns count
-/// in proportion.
-const LEAST_TURN: f64 = 0.05;
 /// Radii below this share of R_in are corners.
 const CORNER: f64 = 0.99;
 /// Reach of the Gaussian in widths.
 const REACH: f64 = 4.5;
-
-/// Reach of the coarse one, whose tails matter less.
-const REACH_OF_COARSE: f64 = 4.0;
+/// Most samples of a grid.
+const LARGEST: f64 = 5e7;
 
 /// What the surface comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Surface {
     /// A closed form or a mesh.
     Exact,
-    /// An image, with its noise and its staircase.
-    Scanned,
+    /// A grain of a family, none of whose faces lie along its axes. Told apart so that the
+    /// committed grains of the study stay what the generator gives, to the bit.
+    Family,
+    /// An image, which blur and smoothing of this standard deviation [m] have gone over.
+    Scanned { image: f64 },
 }
 
-impl Surface {
-    /// By the method of the provenance.
-    pub(crate) fn of(method: &str) -> Surface {
-        if method == "scan" {
-            Surface::Scanned
-        } else {
-            Surface::Exact
-        }
-    }
-
-    fn widths(self) -> [f64; 2] {
-        match self {
-            Surface::Exact => WIDTHS,
-            Surface::Scanned => WIDTHS_OF_SCAN,
-        }
-    }
-
-    /// Samples around the level set that the Gaussians reach.
-    fn reach(self) -> f64 {
-        match self {
-            Surface::Exact => REACH * WIDTHS[1],
-            Surface::Scanned => REACH_OF_COARSE * COARSE,
-        }
-    }
-
-    /// Detail finer than this share of R_in is smoothed away: the wider Gaussian.
-    pub(crate) fn cutoff(self) -> f64 {
-        self.widths()[1] / CELLS
+/// Detail finer than this share of R_in is smoothed away: the wider Gaussian. By the method of the
+/// provenance.
+pub(crate) fn cutoff(method: &str) -> f64 {
+    if method == "scan" {
+        scan::WIDTHS[1]
+    } else {
+        WIDTHS[1] / CELLS
     }
 }
 
@@ -93,15 +66,33 @@ struct Band {
 /// Roundness of the body in the box with the largest inscribed sphere of radius `inscribed`, or
 /// none where the grid would be too large.
 pub(crate) fn measure(
-    distance: &(impl Fn(DVec3, &mut u32) -> f64 + Sync),
+    distance: &impl Distance,
     lower: DVec3,
     upper: DVec3,
     inscribed: f64,
     surface: Surface,
 ) -> Option<f64> {
+    match surface {
+        Surface::Exact => {
+            // Edges along the grid would have few and regular samples: it is turned.
+            let turn = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(0.37, 0.81, -0.52)));
+            let middle = 0.5 * (lower + upper);
+            let turned =
+                |x: DVec3, hint: &mut u32| distance.near(middle + turn * (x - middle), hint);
+            // Of the box about the turned box.
+            let half = turn.transpose().abs() * (0.5 * (upper - lower));
+            of_exact(&turned, middle - half, middle + half, inscribed)
+        }
+        Surface::Family => of_exact(distance, lower, upper, inscribed),
+        Surface::Scanned { image } => scan::measure(distance, lower, upper, inscribed, image),
+    }
+}
+
+fn of_exact(distance: &impl Distance, lower: DVec3, upper: DVec3, inscribed: f64) -> Option<f64> {
     let spacing = inscribed / CELLS;
     let level = LEVEL * spacing;
-    let band = Band::around(distance, lower, upper, spacing, [level, surface.reach()])?;
+    let near = |x: DVec3, hint: &mut u32| distance.near(x, hint);
+    let band = Band::around(&near, lower, upper, spacing, [level, REACH * WIDTHS[1]])?;
     let mesh = extract(&Samples {
         dims: band.dims,
         lower: band.lower,
@@ -123,28 +114,12 @@ pub(crate) fn measure(
             f64::INFINITY
         }
     };
-    let eligible: Vec<bool> = match surface {
-        Surface::Exact => vec![true; mesh.vertices.len()],
-        Surface::Scanned => mesh
-            .vertices
-            .par_iter()
-            .map(|x| {
-                let [k1, _] = band.curvatures(*x, COARSE, REACH_OF_COARSE);
-                radius(k1) < COARSE_CORNER * inscribed
-            })
-            .collect(),
-    };
-    let widths = surface.widths();
-    let [narrow, wide] = widths.map(|width| {
+    let [narrow, wide] = WIDTHS.map(|width| {
         let turned: Vec<(f64, f64)> = mesh
             .vertices
             .par_iter()
             .zip(&areas)
-            .zip(&eligible)
-            .map(|((x, area), eligible)| {
-                if !eligible {
-                    return (0.0, 0.0);
-                }
+            .map(|(x, area)| {
                 let [k1, k2] = band.curvatures(*x, width, REACH);
                 let radius = radius(k1);
                 if radius < CORNER * inscribed {
@@ -158,26 +133,42 @@ pub(crate) fn measure(
         let (weight, sum) = turned
             .iter()
             .fold((0.0, 0.0), |s, t| (s.0 + t.0, s.1 + t.1));
-        if weight <= 0.0 {
-            // No corner at all: a sphere, or a rod with spherical ends.
-            return 1.0;
-        }
-        let least = match surface {
-            Surface::Exact => 0.0,
-            Surface::Scanned => LEAST_TURN * 4.0 * std::f64::consts::PI * inscribed,
-        };
-        if weight < least {
-            1.0 - (1.0 - sum / weight) * weight / least
-        } else {
+        if weight > 0.0 {
             sum / weight
+        } else {
+            // No corner at all: a sphere, or a rod with spherical ends.
+            1.0
         }
     });
     // The bands along the edges where the Gaussian sees face and edge are as wide as it is.
-    let slope = (wide - narrow) / (widths[1] - widths[0]);
-    Some((narrow - slope * widths[0]).clamp(0.0, 1.0))
+    let slope = (wide - narrow) / (WIDTHS[1] - WIDTHS[0]);
+    Some((narrow - slope * WIDTHS[0]).clamp(0.0, 1.0))
 }
 
 impl Band {
+    /// All around the body.
+    fn whole(
+        distance: &impl Distance,
+        lower: DVec3,
+        upper: DVec3,
+        spacing: f64,
+        [level, reach]: [f64; 2],
+    ) -> Option<Band> {
+        let cells = ((upper - lower + DVec3::splat(2.0 * (level + reach))) / spacing).ceil();
+        if cells.element_product() > LARGEST {
+            return None;
+        }
+        let first = 0.5 * (lower + upper) - 0.5 * spacing * cells;
+        let dims = cells.to_array().map(|n| n as usize + 1);
+        let values = distance.on_grid(first, spacing, dims);
+        Some(Band {
+            dims,
+            lower: first,
+            spacing,
+            values: values.iter().map(|v| (v - level) as f32).collect(),
+        })
+    }
+
     fn around(
         distance: &(impl Fn(DVec3, &mut u32) -> f64 + Sync),
         lower: DVec3,
@@ -246,6 +237,13 @@ impl Band {
     /// Principal curvatures, the larger first, of the level set through `x`, where the field is
     /// smoothed by a Gaussian of this width [samples] and this reach [widths].
     fn curvatures(&self, x: DVec3, width: f64, reach: f64) -> [f64; 2] {
+        let (gradient, hessian) = self.derivatives(x, width, reach);
+        principal(gradient, hessian)
+    }
+
+    /// Gradient and second derivatives at `x` of the field smoothed by a Gaussian of this width
+    /// [samples] and this reach [widths].
+    fn derivatives(&self, x: DVec3, width: f64, reach: f64) -> (DVec3, DMat3) {
         let s = (x - self.lower) / self.spacing;
         let reach = (reach * width).ceil() as i64;
         let taps: [Vec<[f64; 3]>; 3] = std::array::from_fn(|axis| {
@@ -304,7 +302,7 @@ impl Band {
             DVec3::new(xy, yy, yz),
             DVec3::new(zx, yz, zz),
         ) * (1.0 / (h * self.spacing));
-        principal(gradient, hessian)
+        (gradient, hessian)
     }
 }
 
