@@ -78,7 +78,7 @@ impl Chain {
     }
 }
 
-/// Spread of what two measurements and this model agree to: what it is off on bodies without noise.
+/// Spread of what two measurements and this model agree to: about what it is off without noise.
 const MISFIT: f64 = 0.01;
 /// Spread of the angles that edges turn by, about a right angle.
 const ANGLES: f64 = 0.4;
