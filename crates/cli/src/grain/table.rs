@@ -59,7 +59,7 @@ pub fn of(r: &Record, path: &Path) -> String {
         ("surface area", format!("{:.6e} m2", r.surface_area_m2)),
         ("principal moments", {
             let [x, y, z] = r.inertia_m5.map(|i| format!("{i:.5e}"));
-            format!("{x}, {y}, {z} m5 (times the density)")
+            format!("{x}, {y}, {z} m5 (of unit density)")
         }),
         ("surface nodes", r.surface_nodes.to_string()),
     ];
