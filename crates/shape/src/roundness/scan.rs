@@ -8,8 +8,9 @@
 //! corners are measured with two Gaussians, and the radius is that of the edges which would be
 //! measured so ([`super::edge`]).
 
+use super::CORNER;
+use super::band::{Band, principal};
 use super::edge::{Chain, radius_of};
-use super::{Band, CORNER, principal};
 use crate::distance::Distance;
 use crate::scan::gaussian;
 use crate::surface::{Samples, extract};
