@@ -54,6 +54,10 @@ pub(crate) struct Body<D> {
     pub upper: DVec3,
     /// Exact volume [m^3] where known.
     pub volume: Option<f64>,
+    /// Exact area [m^2] where known: the sampled surface has no sharp edges.
+    pub area: Option<f64>,
+    /// What the distance comes from.
+    pub surface: roundness::Surface,
 }
 
 impl ShapeOptions {
@@ -113,7 +117,12 @@ pub(crate) fn assemble<D: Distance>(
     let count = options.nodes.unwrap_or_else(|| {
         ((mesh.area() / (diameter / 20.0).powi(2)).round() as usize).clamp(16, 1_000_000)
     });
-    let nodes = nodes::spread(&field, &mesh, count);
+    let mut nodes = nodes::spread(&field, &mesh, count);
+    let area = body.area.unwrap_or_else(|| mesh.area());
+    if body.area.is_some() {
+        let share = area / mesh.area();
+        nodes.iter_mut().for_each(|n| n.area *= share);
+    }
     let quality = Quality {
         gradient_error: quality::gradient_error(&field, &nodes),
         volume_error: body.volume.map(|v| mass.volume / v - 1.0),
@@ -121,14 +130,18 @@ pub(crate) fn assemble<D: Distance>(
     options.bounds.check(&quality)?;
 
     let (lower, upper, radius) = bounds(&field, &mesh, &nodes);
-    let mut morphology = Morphology::measure(&mesh, upper - lower, mass.volume);
+    let mut morphology = Morphology::measure(&mesh, upper - lower, mass.volume, area);
     if options.roundness {
         let distance = |x: DVec3, hint: &mut u32| body.distance.near(x, hint);
         let (_, inscribed) = inscribed::sphere(&distance, body.lower, body.upper);
         morphology.inscribed_radius = Some(inscribed);
-        let surface = roundness::Surface::of(&provenance.method);
-        morphology.wadell_roundness =
-            roundness::measure(&distance, body.lower, body.upper, inscribed, surface);
+        morphology.wadell_roundness = roundness::measure(
+            &body.distance,
+            body.lower,
+            body.upper,
+            inscribed,
+            body.surface,
+        );
     }
     let second = DVec3::new(
         mass.second.x_axis.x,

@@ -38,12 +38,17 @@ pub struct Morphology {
 }
 
 impl Morphology {
-    pub(crate) fn measure(mesh: &TriangleMesh, extents: DVec3, volume: f64) -> Morphology {
+    pub(crate) fn measure(
+        mesh: &TriangleMesh,
+        extents: DVec3,
+        volume: f64,
+        area: f64,
+    ) -> Morphology {
         // The mesh is inscribed where the surface is convex: compare like with like.
         let own = mesh.signed_volume();
         let hull = hull::measure(&mesh.vertices);
         let convexity = hull.as_ref().map(|(hull, _)| (own / hull).min(1.0));
-        let mut morphology = Self::new(extents, mesh.area(), volume, convexity);
+        let mut morphology = Self::new(extents, area, volume, convexity);
         // Calipers touch the hull alone.
         let touched = hull.map_or_else(|| mesh.vertices.clone(), |(_, corners)| corners);
         morphology.feret = Some(feret::lengths(&touched));

@@ -246,7 +246,7 @@ impl Shape {
             wadell_roundness: m.wadell_roundness,
             roundness_cutoff_m: m
                 .inscribed_radius
-                .map(|r| roundness::Surface::of(&self.provenance.method).cutoff() * r),
+                .map(|r| roundness::cutoff(&self.provenance.method) * r),
             inscribed_radius_m: m.inscribed_radius,
             convexity: m.convexity,
             surface_area_m2: m.area,

@@ -1,11 +1,16 @@
 //! Readers against arbitrary and damaged bytes: a refusal or a result, never a panic, and no more
-//! memory than the limits allow.
+//! memory than the limits allow. `PROPTEST_CASES` sets the number of cases.
+
+#[path = "common/tiled.rs"]
+mod tiled;
 
 use grainwake_shape::mesh::read_mesh;
 use grainwake_shape::scan::{Volume, read_volume};
 use grainwake_shape::{ReadLimits, Shape};
 use proptest::prelude::*;
+use std::io::Write;
 use std::path::Path;
+use tiled::Layout;
 
 /// Small, so that a file that claims much is refused.
 fn limits() -> ReadLimits {
@@ -17,16 +22,54 @@ fn limits() -> ReadLimits {
     }
 }
 
-/// Hands the bytes to the reader of this extension.
+/// Data beside a detached header.
+const RAW: [u8; 60] = [7; 60];
+
+/// Hands the bytes to the reader of this extension: `slices` is the second of three in a folder.
 fn open(extension: &str, bytes: &[u8]) -> bool {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(format!("a.{extension}"));
-    std::fs::write(&path, bytes).unwrap();
+    match extension {
+        "slices" => {
+            std::fs::create_dir(&path).unwrap();
+            for slice in ["1", "3"] {
+                std::fs::write(path.join(format!("a_{slice}.tif")), slice_file()).unwrap();
+            }
+            std::fs::write(path.join("a_2.tif"), bytes).unwrap();
+        }
+        "tiled" | "big" => {
+            let path = folder.path().join("a.tif");
+            std::fs::write(&path, bytes).unwrap();
+            return read_volume(&path, &limits()).is_ok();
+        }
+        _ => std::fs::write(&path, bytes).unwrap(),
+    }
+    if matches!(extension, "nhdr" | "mhd") {
+        std::fs::write(folder.path().join("a.raw"), RAW).unwrap();
+    }
     match extension {
         "grain" => Shape::load(&path).is_ok(),
         "stl" | "obj" | "ply" | "anm" => read_mesh(&path, 1e-3, &limits()).is_ok(),
         _ => read_volume(&path, &limits()).is_ok(),
     }
+}
+
+/// One slice of a folder.
+fn slice_file() -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    let labels = (0..20).collect();
+    let slice = Volume::from_labels([5, 4, 1], labels).unwrap();
+    slice.save_labels(&path).unwrap();
+    std::fs::read(&path).unwrap()
+}
+
+fn zipped(name: &str, bytes: &[u8]) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default();
+    archive.start_file(name, options).unwrap();
+    archive.write_all(bytes).unwrap();
+    archive.finish().unwrap().into_inner()
 }
 
 /// A sound file of each kind.
@@ -49,6 +92,10 @@ fn sound() -> Vec<(&'static str, Vec<u8>)> {
     let mut meta =
         b"NDims = 3\nDimSize = 5 4 3\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n".to_vec();
     meta.extend(&data);
+    let apart =
+        b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 5 4 3\nencoding: raw\ndata file: a.raw\n";
+    let meta_apart =
+        b"NDims = 3\nDimSize = 5 4 3\nElementType = MET_UCHAR\nElementDataFile = a.raw\n";
     let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
                property float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n\
                0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
@@ -66,7 +113,13 @@ fn sound() -> Vec<(&'static str, Vec<u8>)> {
     let anm = "0 0 3.0 0\n1 0 0.3 0\n1 1 0.2 -0.1\n";
     vec![
         ("tif", tiff),
+        ("tiled", Layout { wide: false }.file()),
+        ("big", Layout { wide: true }.file()),
+        ("slices", slice_file()),
+        ("npz", zipped("a.npy", &npy)),
         ("npy", npy),
+        ("nhdr", apart.to_vec()),
+        ("mhd", meta_apart.to_vec()),
         ("nrrd", nrrd),
         ("mha", meta),
         ("ply", ply.into()),
@@ -85,8 +138,21 @@ fn sound_files_are_read() {
     assert!(!Path::new("a.tif").exists());
 }
 
+/// Cases without `PROPTEST_CASES`.
+const CASES: u32 = 150;
+
+fn config() -> ProptestConfig {
+    let default = ProptestConfig::default();
+    let asked = std::env::var_os("PROPTEST_CASES").is_some();
+    ProptestConfig {
+        cases: if asked { default.cases } else { CASES },
+        failure_persistence: None,
+        ..default
+    }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config())]
 
     #[test]
     fn damaged_files_do_not_bring_the_readers_down(
@@ -102,6 +168,10 @@ proptest! {
                 bytes.truncate(cut.index(bytes.len()));
             }
             open(extension, &bytes);
+            // The sum of an archive gives damage away: also what is packed is damaged.
+            if extension == "npy" {
+                open("npz", &zipped("a.npy", &bytes));
+            }
         }
     }
 

@@ -58,14 +58,15 @@ fn errors(shape: &Shape, axes: DVec3, body: &dyn Fn(DVec3) -> f64) -> Errors {
     }
 }
 
-/// Grey and mask routes for one body, blurred by `blur` voxels, with 5 percent noise.
-fn both(axes: DVec3, turn: DQuat, off: DVec3, blur: f64, seed: u64) -> [Errors; 2] {
+/// Grey and mask routes for one body, blurred by `blur` voxels, with noise as a share of the
+/// contrast.
+fn both(axes: DVec3, turn: DQuat, off: DVec3, [blur, noise]: [f64; 2], seed: u64) -> [Errors; 2] {
     let n = (2.0 * axes.max_element()).ceil() as usize + 16;
     let dims = [n; 3];
     let centre = DVec3::splat(0.5 * n as f64) + off;
     let body = ellipsoid(axes, turn, centre);
     let exact = shares(dims, &[&body], &[(centre, axes.max_element())]);
-    let image = greys(&blurred(&exact, dims, blur), 0.05, seed);
+    let image = greys(&blurred(&exact, dims, blur), noise, seed);
     let volume = Volume::from_labels(dims, image).unwrap();
     [true, false].map(|sub_voxel| {
         let options = ScanOptions {
@@ -96,7 +97,7 @@ fn a_blurred_noisy_body_of_twenty_voxels_is_found_to_a_twentieth_of_a_voxel() {
     ];
     for axes in [DVec3::splat(10.0), DVec3::new(13.0, 10.0, 7.7)] {
         for (seed, (turn, off)) in places.into_iter().enumerate() {
-            let [grey, mask] = both(axes, turn, off, 1.0, seed as u64);
+            let [grey, mask] = both(axes, turn, off, [1.0, 0.05], seed as u64);
             println!(
                 "{axes}: grey: volume {:+.4}, surface {:.3}, inertia {:.4}; mask: {:+.4}, {:.3}, {:.4}",
                 grey.volume, grey.surface, grey.inertia, mask.volume, mask.surface, mask.inertia
@@ -116,10 +117,45 @@ fn the_blur_need_not_be_known() {
             axes,
             DQuat::from_rotation_x(0.4),
             DVec3::new(0.2, 0.1, 0.4),
-            blur,
+            [blur, 0.05],
             5,
         );
         println!("{radius} {blur}: {grey:?} {mask:?}");
         assert!(grey.volume.abs() < 4e-3 && grey.surface < 0.06, "{grey:?}");
+    }
+}
+
+/// Position of the surface over the diameter, against voxels per diameter: from grey values the error
+/// of the position falls with the voxels until noise is all that is left, from a mask it stays the
+/// same share of a voxel.
+#[test]
+fn the_surface_converges_with_the_voxels() {
+    let places = [
+        (0.4, DVec3::new(0.2, 0.1, 0.4)),
+        (1.3, DVec3::new(-0.35, 0.27, 0.05)),
+        (2.2, DVec3::new(0.11, -0.43, 0.31)),
+    ];
+    for (noise, least) in [(0.0, [1.5, 0.8]), (0.05, [0.8, 0.8])] {
+        // Root mean square over the places [voxels], grey and mask.
+        let found = [10.0, 20.0, 40.0].map(|across| {
+            let axes = DVec3::new(1.2, 1.0, 0.85) * (0.5 * across);
+            let mut squares = [0.0; 2];
+            for (seed, (angle, off)) in places.into_iter().enumerate() {
+                let turn = DQuat::from_scaled_axis(DVec3::new(0.5, -0.3, 0.8) * angle);
+                let errors = both(axes, turn, off, [1.0, noise], seed as u64);
+                for (square, error) in squares.iter_mut().zip(errors) {
+                    *square += error.surface * error.surface / places.len() as f64;
+                }
+            }
+            squares.map(f64::sqrt)
+        });
+        for (n, route) in ["grey", "mask"].into_iter().enumerate() {
+            let errors = found.map(|f| f[n]);
+            // Of the error over the diameter.
+            let order = 1.0 + 0.5 * (errors[0] / errors[2]).log2();
+            println!("noise {noise}, {route}: {errors:.4?} voxel, order {order:.2}");
+            assert!(order > least[n], "{route}: order {order}");
+        }
+        assert!(found.iter().all(|[grey, mask]| grey < mask), "{found:?}");
     }
 }

@@ -376,7 +376,8 @@ fn absurd_headers_are_refused() {
 /// Real meshes pass the gate, match their exact volume and the independent morphology table, lie
 /// within a thousandth of the diameter of the mesh (but on the sharpest ridges), and their nodes
 /// lie on the surface.
-fn check_real_grains(wanted: &dyn Fn(&str) -> bool) {
+#[test]
+fn real_grains_agree_with_the_table() {
     let (Some(folder), Some(table)) = (shared("grains/meshes"), shared("grains/table.csv")) else {
         return;
     };
@@ -392,11 +393,11 @@ fn check_real_grains(wanted: &dyn Fn(&str) -> bool) {
         .filter(|p| p.extension().is_some_and(|e| e == "ply"))
     {
         let name = path.file_stem().unwrap().to_str().unwrap();
-        if !wanted(name) {
-            continue;
-        }
         let (mesh, source) = read_mesh(path, 1e-3, &ReadLimits::default()).unwrap();
-        let shape = shape_from_mesh(&mesh, &source, &MeshOptions::default()).unwrap();
+        // The table holds no roundness, which takes longest.
+        let mut options = MeshOptions::default();
+        options.shape.roundness = false;
+        let shape = shape_from_mesh(&mesh, &source, &options).unwrap();
         let quality = shape.quality().unwrap();
         let m = shape.morphology();
         let p = shape.provenance();
@@ -451,18 +452,16 @@ fn check_real_grains(wanted: &dyn Fn(&str) -> bool) {
         close(m.convexity.unwrap(), convexity, 5e-3);
         seen += 1;
     }
-    assert!(seen >= 2, "only {seen} meshes");
+    assert!(seen >= 12, "only {seen} meshes");
 }
 
-#[test]
-fn real_grains_agree_with_the_table() {
-    check_real_grains(&|name| matches!(name, "fdot57_D-00002" | "ma165_05720"));
-}
-
-#[test]
-#[ignore = "twelve grains, some ten seconds: run with --ignored"]
-fn all_real_grains_agree_with_the_table() {
-    check_real_grains(&|_| true);
+fn mesh_area(shape: &Shape) -> f64 {
+    let (vertices, triangles) = shape.surface_mesh();
+    let mesh = TriangleMesh {
+        vertices,
+        triangles,
+    };
+    mesh.area()
 }
 
 fn check_nodes(shape: &Shape) {
@@ -529,8 +528,10 @@ fn nodes_and_surface_meshes_of_simple_bodies() {
         };
         mesh.check_closed().unwrap();
         close(mesh.signed_volume(), shape.volume(), 0.02);
-        close(mesh.area(), shape.surface_area(), 1e-9);
+        // Area is exact where it is known; the mesh cuts sharp edges off.
+        close(mesh.area(), shape.surface_area(), 0.03);
     }
+    close(mesh_area(&bodies[0]), bodies[0].surface_area(), 1e-9);
     close(bodies[0].nodes().len() as f64, 1257.0, 0.01);
     let asked = ShapeOptions {
         nodes: Some(300),

@@ -4,6 +4,7 @@ use super::sorted;
 use crate::assemble::{Body, assemble};
 use crate::error::Result;
 use crate::provenance::Provenance;
+use crate::roundness::Surface;
 use crate::{Shape, ShapeOptions};
 use glam::DVec3;
 
@@ -21,6 +22,8 @@ pub fn ellipsoid(a: f64, b: f64, c: f64, options: &ShapeOptions) -> Result<Shape
         lower: -axes,
         upper: axes,
         volume: Some(4.0 / 3.0 * std::f64::consts::PI * a * b * c),
+        area: None,
+        surface: Surface::Exact,
     };
     assemble(&body, provenance, options)
 }

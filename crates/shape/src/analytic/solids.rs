@@ -5,6 +5,7 @@ use crate::assemble::{Body, assemble};
 use crate::error::{Result, ShapeError, positive};
 use crate::mesh::{self, cube_sphere};
 use crate::provenance::Provenance;
+use crate::roundness::Surface;
 use crate::{Shape, ShapeOptions};
 use glam::{DVec2, DVec3, Vec3Swizzles};
 use std::f64::consts::PI;
@@ -36,6 +37,7 @@ pub fn rounded_box(
         + radius * faces
         + PI * radius * radius * edges.element_sum()
         + 4.0 / 3.0 * PI * radius.powi(3);
+    let area = faces + 2.0 * PI * radius * edges.element_sum() + 4.0 * PI * radius * radius;
     let provenance = Provenance::new("analytic")
         .with("body", "rounded_box")
         .with("length_m", lengths[0])
@@ -50,6 +52,8 @@ pub fn rounded_box(
         lower: -half,
         upper: half,
         volume: Some(volume),
+        area: Some(area),
+        surface: Surface::Exact,
     };
     assemble(&body, provenance, options)
 }
@@ -79,6 +83,8 @@ pub fn cylinder(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shap
         lower: -extent,
         upper: extent,
         volume: Some(PI * radius * radius * length),
+        area: Some(2.0 * PI * radius * (radius + length)),
+        surface: Surface::Exact,
     };
     assemble(&body, provenance, options)
 }
@@ -101,6 +107,8 @@ pub fn capsule(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shape
         lower: -extent,
         upper: extent,
         volume: Some(PI * radius * radius * (length + 4.0 / 3.0 * radius)),
+        area: Some(2.0 * PI * radius * (length + 2.0 * radius)),
+        surface: Surface::Exact,
     };
     assemble(&body, provenance, options)
 }
@@ -144,7 +152,7 @@ pub fn superquadric(
         .with("c_m", semi_axes[2])
         .with("e1", e1)
         .with("e2", e2);
-    mesh::from_closed(&mesh, provenance, options)
+    mesh::from_closed(&mesh, Surface::Exact, provenance, options)
 }
 
 #[cfg(test)]
@@ -202,6 +210,27 @@ mod tests {
         assert!(brick.volume() > 0.97 * 8.0 * 1.8 && brick.volume() < 8.0 * 1.8);
         close(brick.upper().x, 2.0, 3e-3);
         assert!(matches!(brick.field(), Field::Sampled(_)));
+    }
+
+    /// Edges along the grid of the field, which cuts them off, and of the roundness.
+    #[test]
+    fn sharp_bodies_have_their_area_and_no_roundness() {
+        let bodies = [
+            (rounded_box(2.0, 2.0, 2.0, 0.0, &options()), 24.0, 8.0),
+            (rounded_box(3.0, 2.0, 2.0, 0.0, &options()), 32.0, 12.0),
+            (cylinder(1.0, 2.0, &options()), 6.0 * PI, 2.0 * PI),
+        ];
+        for (shape, area, volume) in bodies {
+            let shape = shape.unwrap();
+            let m = shape.morphology();
+            let nodes: f64 = shape.nodes().iter().map(|n| n.area).sum();
+            close(nodes, area, 1e-9);
+            let exact = (36.0 * PI * volume * volume).cbrt() / area;
+            close(m.wadell_sphericity, exact, 0.01);
+            let roundness = m.wadell_roundness.unwrap();
+            println!("{:.4} for {exact:.4}, {roundness:.4}", m.wadell_sphericity);
+            assert!(roundness < 0.05, "{roundness}");
+        }
     }
 
     #[test]

@@ -14,6 +14,7 @@ use crate::assemble::{Body, assemble};
 use crate::error::{Result, ShapeError, positive};
 use crate::provenance::Provenance;
 use crate::random::Random;
+use crate::roundness::Surface;
 use crate::{Shape, ShapeOptions};
 use glam::{DMat3, DQuat, DVec3};
 
@@ -136,6 +137,8 @@ pub fn family_grain(target: &FamilyTarget, seed: u64, options: &ShapeOptions) ->
             lower: stone.lower * size,
             upper: stone.upper * size,
             volume: Some(stone.volume * size.powi(3)),
+            area: None,
+            surface: Surface::Family,
         };
         let provenance = Provenance::new("family")
             .with("sphericity", target.sphericity)

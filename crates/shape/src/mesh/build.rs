@@ -5,6 +5,7 @@ use crate::assemble::{Body, ShapeOptions, assemble};
 use crate::error::{Result, ShapeError};
 use crate::limits::SourceFile;
 use crate::provenance::Provenance;
+use crate::roundness::Surface;
 use crate::{Shape, mass, principal};
 use glam::DQuat;
 
@@ -40,12 +41,13 @@ pub fn shape_from_mesh(
         Err(error) => return Err(error),
     };
     closed.check_crossings()?;
-    from_closed(closed, provenance, &options.shape)
+    from_closed(closed, Surface::Exact, provenance, &options.shape)
 }
 
 /// Shape of a mesh; its frame and bounds are found here, `provenance` tells the rest.
 pub(crate) fn from_closed(
     mesh: &TriangleMesh,
+    surface: Surface,
     mut provenance: Provenance,
     options: &ShapeOptions,
 ) -> Result<Shape> {
@@ -63,6 +65,9 @@ pub(crate) fn from_closed(
         lower,
         upper,
         volume: Some(mass.volume),
+        // That of a scan has the roughness of its noise, which the sampling takes off.
+        area: (surface == Surface::Exact).then(|| mesh.area()),
+        surface,
     };
     assemble(&body, provenance, options)
 }

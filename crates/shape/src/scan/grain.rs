@@ -9,6 +9,7 @@ use crate::error::{Result, ShapeError};
 use crate::limits::SourceFile;
 use crate::mesh::{TriangleMesh, from_closed};
 use crate::provenance::Provenance;
+use crate::roundness::Surface;
 use crate::surface::{Samples, extract};
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -88,19 +89,20 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
     if let Some(neck) = options.separate {
         provenance = provenance.with("separate", neck);
     }
-    let (field, volume) = match context.grey {
+    let (field, volume, image) = match context.grey {
         Some(grey) => {
             let low = region.lower.map(|n| n as isize - margin as isize);
             let cut = grey.cut(&mask, low, label, smoothing);
             provenance = provenance
                 .with("surface", "grey")
                 .with("blur_voxels", format!("{:.3}", cut.blur));
-            (cut.field, cut.volume)
+            (cut.field, cut.volume, cut.width)
         }
         None => {
             let distance = transform::signed(&mask);
             let field = smooth::unshrinking(&distance, mask.dims, smoothing);
-            (field, (voxels + filled) as f64)
+            let width = smooth::width(smoothing);
+            (field, (voxels + filled) as f64, width)
         }
     };
     let mut mesh = surface(&field, mask.dims, volume, factor)?;
@@ -114,7 +116,10 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
     let mut finish = options.shape.clone();
     let enough = ((CELLS.0 * longest as f64).ceil() as usize).max(CELLS.1);
     finish.cells = finish.cells.min(enough);
-    from_closed(&mesh, provenance, &finish)
+    let surface = Surface::Scanned {
+        image: options.voxel * image,
+    };
+    from_closed(&mesh, surface, provenance, &finish)
 }
 
 /// Refuses, or on request drops, all but the largest piece; returns the voxels kept.

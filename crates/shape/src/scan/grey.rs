@@ -39,6 +39,10 @@ const DEEP: usize = 300;
 const ENOUGH: usize = 1 << 24;
 /// Fewer deep voxels are no measure of a phase's grey.
 const FEW_DEEP: u64 = 200;
+/// So many less deep ones are a better one than all voxels, which the blur of the surface darkens.
+const SOME_DEEP: u64 = 24;
+/// Steps along the axes without a voxel of the other phase that make a voxel deep.
+const CLEAR: usize = 4;
 
 /// A grain's share of each voxel of a crop, ready to be cut at zero.
 pub(crate) struct Cut {
@@ -48,11 +52,14 @@ pub(crate) struct Cut {
     pub volume: f64,
     /// Standard deviation of the scanner's blur [voxels].
     pub blur: f64,
+    /// Standard deviation of a Gaussian that leaves an edge as steep as blur and smoothing
+    /// together did [voxels].
+    pub width: f64,
 }
 
 impl Grey {
     /// Mean grey of the phases from voxels that have none of the other within `reach` along the
-    /// axes; from all voxels of the phase where there are hardly any such.
+    /// axes; from the deepest where there are hardly any such.
     pub(crate) fn new(dims: [usize; 3], values: Vec<f32>, owner: Vec<u32>) -> Grey {
         let is_solid = |n: usize| owner[n] != 0 && owner[n] & HALO == 0;
         // Of large images a share of the rows is enough, unless few voxels are deep.
@@ -120,6 +127,9 @@ impl Grey {
             field: field.iter().map(|v| v / slope).collect(),
             volume,
             blur,
+            width: 1.0
+                / (f64::from(a) / blur.hypot(sigma)
+                    + f64::from(1.0 - a) / (blur * blur + 2.0 * sigma * sigma).sqrt()),
         }
     }
 
@@ -137,19 +147,22 @@ impl Grey {
     }
 }
 
-/// Is no voxel up to `reach` along the axes of the kind `other`?
-fn far_from(dims: [usize; 3], n: usize, reach: usize, other: impl Fn(usize) -> bool) -> bool {
+/// Steps along the axes, in all directions, that end on no voxel of the kind `other`; [`CLEAR`] at
+/// most.
+fn clear(dims: [usize; 3], n: usize, other: impl Fn(usize) -> bool) -> usize {
     let strides = [1, dims[0], dims[0] * dims[1]];
-    (0..3).all(|axis| {
-        let i = n / strides[axis] % dims[axis];
-        let below = (1..=reach.min(i)).all(|s| !other(n - s * strides[axis]));
-        below && (1..=reach.min(dims[axis] - 1 - i)).all(|s| !other(n + s * strides[axis]))
-    })
+    let blocked = (1..=CLEAR).find(|s| {
+        (0..3).any(|axis| {
+            let i = n / strides[axis] % dims[axis];
+            let below = *s <= i && other(n - s * strides[axis]);
+            below || (i + s < dims[axis] && other(n + s * strides[axis]))
+        })
+    });
+    blocked.map_or(CLEAR, |s| s - 1)
 }
 
 /// Mean grey of void and of solid, each with the number of its deep voxels that were seen: from
-/// those, or from all voxels of the phase where there are hardly any such. One in `share` rows is
-/// looked at.
+/// those, or from the deepest of which there are some. One in `share` rows is looked at.
 fn mean_grey(
     dims: [usize; 3],
     values: &[f32],
@@ -160,31 +173,33 @@ fn mean_grey(
         let start = dims[0] * (j + dims[1] * k);
         start..start + dims[0]
     };
-    // Sum and number of the deep voxels and of all, of both phases, slice by slice.
-    let slices: Vec<[[(f64, u64); 2]; 2]> = (0..dims[2])
+    // Sum and number of the voxels of both phases by their clear steps, slice by slice.
+    let slices: Vec<[[(f64, u64); CLEAR + 1]; 2]> = (0..dims[2])
         .into_par_iter()
         .map(|k| {
-            let mut sums = [[(0.0, 0); 2]; 2];
+            let mut sums = [[(0.0, 0); CLEAR + 1]; 2];
             let rows = (0..dims[1]).filter(|j| (j + k) % share == 0);
             for n in rows.flat_map(|j| row(j, k)) {
                 let phase = is_solid(n);
-                let [deep, all] = &mut sums[usize::from(phase)];
-                let add = |sum: &mut (f64, u64)| *sum = (sum.0 + f64::from(values[n]), sum.1 + 1);
-                add(all);
-                if far_from(dims, n, 4, |m| is_solid(m) != phase) {
-                    add(deep);
-                }
+                let sum = &mut sums[usize::from(phase)][clear(dims, n, |m| is_solid(m) != phase)];
+                *sum = (sum.0 + f64::from(values[n]), sum.1 + 1);
             }
             sums
         })
         .collect();
     [0, 1].map(|phase| {
-        let total = |which: usize| {
-            let sums = slices.iter().map(|s| s[phase][which]);
+        let total = |steps: usize| {
+            let sums = slices.iter().flat_map(|s| &s[phase][steps..]);
             sums.fold((0.0, 0), |t, s| (t.0 + s.0, t.1 + s.1))
         };
-        let (deep, all) = (total(0), total(1));
-        let (sum, count) = if deep.1 >= FEW_DEEP { deep } else { all };
+        let deep = total(CLEAR);
+        let some = |sum: &(f64, u64)| sum.1 >= SOME_DEEP;
+        let (sum, count) = if deep.1 >= FEW_DEEP {
+            deep
+        } else {
+            let shallower = [CLEAR - 1, CLEAR - 2].map(total);
+            shallower.into_iter().find(some).unwrap_or_else(|| total(0))
+        };
         (sum / count.max(1) as f64, deep.1)
     })
 }

@@ -25,6 +25,7 @@ mod regions;
 mod runs;
 mod slices;
 mod smooth;
+pub(crate) use smooth::gaussian;
 mod threshold;
 mod tiff;
 mod transform;

@@ -15,6 +15,11 @@ pub(crate) fn unshrinking(field: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f3
         .collect()
 }
 
+/// Standard deviation of a Gaussian that leaves an edge as steep as [`unshrinking`] does.
+pub(crate) fn width(sigma: f64) -> f64 {
+    sigma / (2.0 - std::f64::consts::FRAC_1_SQRT_2)
+}
+
 /// Plain Gaussian smoothing; beyond the border the outermost value continues.
 pub(crate) fn gaussian(field: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f32> {
     let reach = (4.0 * sigma).ceil() as usize;

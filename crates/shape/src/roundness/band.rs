@@ -1,0 +1,192 @@
+//! Distances around a level set, and its curvatures.
+
+use crate::distance::Distance;
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+/// Most samples of a grid.
+const LARGEST: f64 = 5e7;
+
+/// Distance less the level on a grid around the level set; farther off it is only a bound.
+pub(super) struct Band {
+    pub dims: [usize; 3],
+    pub lower: DVec3,
+    pub spacing: f64,
+    pub values: Vec<f32>,
+}
+
+impl Band {
+    /// All around the body.
+    pub(super) fn whole(
+        distance: &impl Distance,
+        lower: DVec3,
+        upper: DVec3,
+        spacing: f64,
+        [level, reach]: [f64; 2],
+    ) -> Option<Band> {
+        let cells = ((upper - lower + DVec3::splat(2.0 * (level + reach))) / spacing).ceil();
+        if cells.element_product() > LARGEST {
+            return None;
+        }
+        let first = 0.5 * (lower + upper) - 0.5 * spacing * cells;
+        let dims = cells.to_array().map(|n| n as usize + 1);
+        let values = distance.on_grid(first, spacing, dims);
+        Some(Band {
+            dims,
+            lower: first,
+            spacing,
+            values: values.iter().map(|v| (v - level) as f32).collect(),
+        })
+    }
+
+    pub(super) fn around(
+        distance: &(impl Fn(DVec3, &mut u32) -> f64 + Sync),
+        lower: DVec3,
+        upper: DVec3,
+        spacing: f64,
+        [level, reach]: [f64; 2],
+    ) -> Option<Band> {
+        const BLOCK: usize = 8;
+        let reach = reach.ceil() + 2.0;
+        let margin = level + reach * spacing;
+        let blocks = ((upper - lower + DVec3::splat(2.0 * margin)) / (spacing * BLOCK as f64))
+            .ceil()
+            .to_array();
+        if blocks.iter().product::<f64>() > 1e5 {
+            return None;
+        }
+        let blocks = blocks.map(|n| n as usize);
+        let dims = blocks.map(|n| n * BLOCK);
+        let first =
+            0.5 * (lower + upper) - 0.5 * spacing * DVec3::from_array(dims.map(|n| n as f64 - 1.0));
+        let at = |i: usize, j: usize, k: usize| {
+            first + spacing * DVec3::new(i as f64, j as f64, k as f64)
+        };
+        // Values are needed where a Gaussian about the level set reaches, corners included.
+        let needed = 3f64.sqrt() * (reach + 0.5 * BLOCK as f64) * spacing;
+        let near: Vec<f64> = (0..blocks.iter().product())
+            .into_par_iter()
+            .map_init(
+                || 0,
+                |hint, n| {
+                    let (i, j, k) = (
+                        n % blocks[0],
+                        n / blocks[0] % blocks[1],
+                        n / blocks[0] / blocks[1],
+                    );
+                    let half = spacing * DVec3::splat(0.5 * (BLOCK as f64 - 1.0));
+                    distance(at(BLOCK * i, BLOCK * j, BLOCK * k) + half, hint) - level
+                },
+            )
+            .collect();
+        let mut values = vec![0.0f32; dims.iter().product()];
+        values
+            .par_chunks_mut(dims[0])
+            .enumerate()
+            .for_each(|(row, line)| {
+                let (j, k) = (row % dims[1], row / dims[1]);
+                let mut hint = 0;
+                for (i, value) in line.iter_mut().enumerate() {
+                    let block = i / BLOCK + blocks[0] * (j / BLOCK + blocks[1] * (k / BLOCK));
+                    let centre = near[block];
+                    *value = if centre.abs() > needed {
+                        centre as f32
+                    } else {
+                        (distance(at(i, j, k), &mut hint) - level) as f32
+                    };
+                }
+            });
+        Some(Band {
+            dims,
+            lower: first,
+            spacing,
+            values,
+        })
+    }
+
+    /// Principal curvatures, the larger first, of the level set through `x`, where the field is
+    /// smoothed by a Gaussian of this width [samples] and this reach [widths].
+    pub(super) fn curvatures(&self, x: DVec3, width: f64, reach: f64) -> [f64; 2] {
+        let (gradient, hessian) = self.derivatives(x, width, reach);
+        principal(gradient, hessian)
+    }
+
+    /// Gradient and second derivatives at `x` of the field smoothed by a Gaussian of this width
+    /// [samples] and this reach [widths].
+    pub(super) fn derivatives(&self, x: DVec3, width: f64, reach: f64) -> (DVec3, DMat3) {
+        let s = (x - self.lower) / self.spacing;
+        let reach = (reach * width).ceil() as i64;
+        let taps: [Vec<[f64; 3]>; 3] = std::array::from_fn(|axis| {
+            let centre = s[axis].round() as i64;
+            (centre - reach..=centre + reach)
+                .map(|n| {
+                    // Derivatives of the Gaussian by the position of its centre.
+                    let d = (n as f64 - s[axis]) / width;
+                    let g = (-0.5 * d * d).exp();
+                    [g, g * d / width, g * (d * d - 1.0) / (width * width)]
+                })
+                .collect()
+        });
+        let total: f64 = (0..3)
+            .map(|axis| taps[axis].iter().map(|t| t[0]).sum::<f64>())
+            .product();
+        let start: [usize; 3] =
+            std::array::from_fn(|axis| (s[axis].round() as i64 - reach).max(0) as usize);
+        let [mut gx, mut gy, mut gz] = [0.0; 3];
+        let [mut xx, mut yy, mut zz, mut xy, mut yz, mut zx] = [0.0; 6];
+        for (k, z) in taps[2].iter().enumerate() {
+            // Sums over x and y of the derivatives (by x, by y).
+            let [mut p00, mut p10, mut p20, mut p01, mut p11, mut p02] = [0.0; 6];
+            for (j, y) in taps[1].iter().enumerate() {
+                let row =
+                    start[0] + self.dims[0] * ((start[1] + j) + self.dims[1] * (start[2] + k));
+                let [mut q0, mut q1, mut q2] = [0.0; 3];
+                let line = self.values.get(row..row + taps[0].len()).unwrap_or(&[]);
+                for (value, x) in line.iter().zip(&taps[0]) {
+                    let v = f64::from(*value);
+                    q0 += v * x[0];
+                    q1 += v * x[1];
+                    q2 += v * x[2];
+                }
+                p00 += y[0] * q0;
+                p10 += y[0] * q1;
+                p20 += y[0] * q2;
+                p01 += y[1] * q0;
+                p11 += y[1] * q1;
+                p02 += y[2] * q0;
+            }
+            gx += z[0] * p10;
+            gy += z[0] * p01;
+            gz += z[1] * p00;
+            xx += z[0] * p20;
+            yy += z[0] * p02;
+            zz += z[2] * p00;
+            xy += z[0] * p11;
+            yz += z[1] * p01;
+            zx += z[1] * p10;
+        }
+        let h = self.spacing * total;
+        let gradient = DVec3::new(gx, gy, gz) / h;
+        let hessian = DMat3::from_cols(
+            DVec3::new(xx, xy, zx),
+            DVec3::new(xy, yy, yz),
+            DVec3::new(zx, yz, zz),
+        ) * (1.0 / (h * self.spacing));
+        (gradient, hessian)
+    }
+}
+
+/// Principal curvatures of the level set of a function with this gradient and Hessian.
+pub(super) fn principal(gradient: DVec3, hessian: DMat3) -> [f64; 2] {
+    let slope = gradient.length();
+    if slope < 1e-3 {
+        return [0.0; 2];
+    }
+    let normal = gradient / slope;
+    let e = normal.any_orthonormal_vector();
+    let f = normal.cross(e);
+    let (he, hf) = (hessian * e / slope, hessian * f / slope);
+    let (mean, half) = (0.5 * (e.dot(he) + f.dot(hf)), 0.5 * (e.dot(he) - f.dot(hf)));
+    let root = half.hypot(e.dot(hf));
+    [mean + root, mean - root]
+}
