@@ -3,10 +3,11 @@
 use grainwake_solver::case::Case;
 use grainwake_solver::case::estimate::Estimate;
 use grainwake_solver::case::readable::quantity;
+use grainwake_solver::dem::Grain;
 
 use crate::args::CheckArgs;
 use crate::exit::Exit;
-use crate::progress::clock;
+use crate::progress::{clock, count};
 use crate::{kind, print, threads};
 
 /// Checks a case and prints what to expect of it.
@@ -52,7 +53,10 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
         value.map(|v| (name, format!("{v:.4} {unit}").trim_end().to_string()))
     };
     rows.extend(number("cells per diameter", e.cells_per_diameter, ""));
-    rows.extend(number("Galileo number", e.galileo, ""));
+    // Where the grains differ it is that of one of them.
+    let which = e.galileo_grain.filter(|_| differ(case));
+    let which = which.map_or(String::new(), |i| format!("(grain {i}, the largest)"));
+    rows.extend(number("Galileo number", e.galileo, &which));
     rows.extend(number(
         "expected Reynolds number",
         e.reynolds,
@@ -79,7 +83,7 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     rows.push(("memory", format!("{:.0} MB", e.memory_bytes as f64 / 1e6)));
     rows.push((
         "wall time",
-        format!("about {} on {threads} threads", clock(e.wall_s)),
+        format!("about {} on {}", clock(e.wall_s), count(threads, "thread")),
     ));
     let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     let mut lines: Vec<String> = rows
@@ -91,6 +95,17 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
         lines.push("no warnings".into());
     }
     lines.join("\n")
+}
+
+/// Whether the grains have different diameters or densities.
+fn differ(case: &Case) -> bool {
+    let of = |pick: &dyn Fn(&Grain) -> f64| {
+        let values = case.setup.grains.iter().map(pick);
+        values.fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)))
+    };
+    let sizes = of(&|g| g.shape.equivalent_diameter());
+    let densities = of(&|g| g.density);
+    [sizes, densities].iter().any(|(a, b)| b - a > 1e-9 * b)
 }
 
 fn grains(case: &Case) -> String {

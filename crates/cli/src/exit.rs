@@ -97,9 +97,9 @@ impl From<RunError> for Exit {
             RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => {
                 Some("the disk is full: free some space, then continue with --resume")
             }
-            RunError::Io { .. } => {
-                Some("check the folder and its permissions, then continue with --resume")
-            }
+            RunError::Io { .. } => Some(
+                "check the folder and its permissions; a run that has begun goes on with --resume",
+            ),
             _ => None,
         };
         match help {

@@ -77,7 +77,7 @@ impl Shown {
             });
             text += &format!("  gap {gap}  {}", phase.name());
         } else if p.contacts > 0 {
-            text += &format!("  {} contacts", p.contacts);
+            text += &format!("  {}", count(p.contacts, "contact"));
         }
         text
     }
@@ -89,6 +89,11 @@ fn per_second(rate: f64) -> String {
     } else {
         format!("{:.1} s/step", 1.0 / rate.max(1e-9))
     }
+}
+
+/// A number of things: "1 grain", "2 grains".
+pub fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
 /// Seconds as "1:02:03" or "2:03".

@@ -14,8 +14,8 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
         for note in &done.notes {
             tell!("note: {note}");
         }
-        if Manifest::read(&args.run)?.analysis == Analysis::default() {
-            tell!("note: no figures: the study file names no `analysis`");
+        if done.png.is_empty() && Manifest::read(&args.run)?.analysis == Analysis::default() {
+            tell!("note: no figures: no run has results to draw");
         }
         let (finished, all) = done.runs;
         return print(&format!(

@@ -10,7 +10,7 @@ use grainwake_solver::output::{self, Ending, Existing, Options, RESOLVED, Summar
 
 use crate::args::RunArgs;
 use crate::exit::{Exit, INTERRUPTED, MISSED};
-use crate::progress::Shown;
+use crate::progress::{Shown, count};
 use crate::{check, expect, kind, print, tell, threads};
 
 /// Runs a case.
@@ -41,9 +41,10 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
             "dry".into()
         };
         tell!(
-            "{}: {} grains, {what}, {threads} threads -> {}",
+            "{}: {}, {what}, {} -> {}",
             args.case.display(),
-            case.setup.grains.len(),
+            count(case.setup.grains.len(), "grain"),
+            count(threads, "thread"),
             out.display()
         );
         check::warnings(&Estimate::of(&case, threads)).for_each(|w| tell!("{w}"));
@@ -66,8 +67,10 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
                 INTERRUPTED,
                 message,
                 format!(
-                    "continue with: grainwake run {} --resume",
-                    out.join(RESOLVED).display()
+                    "continue with: grainwake run {} --resume{}",
+                    out.join(RESOLVED).display(),
+                    args.threads
+                        .map_or(String::new(), |n| format!(" --threads {n}"))
                 ),
             ))
         }
@@ -111,7 +114,7 @@ fn conclude(args: &RunArgs, case: &Case, summary: &Summary, out: &Path) -> Resul
         }
         print(&value.to_string())?;
     } else if !args.quiet {
-        print(&describe(summary, out))?;
+        print(&describe(summary, case.setup.fluid.is_some(), out))?;
     }
     if !args.quiet {
         verdicts.iter().for_each(|v| tell!("{}", expect::line(v)));
@@ -128,16 +131,18 @@ fn conclude(args: &RunArgs, case: &Case, summary: &Summary, out: &Path) -> Resul
     }
 }
 
-fn describe(s: &Summary, out: &Path) -> String {
+fn describe(s: &Summary, wet: bool, out: &Path) -> String {
     let time = |t: Option<f64>| t.map_or("-".to_string(), |t| format!("{t:.4} s"));
     let mut lines = vec![format!(
-        "done at t = {:.4} s ({}) after {} steps in {}; largest |div u| {:.1e} 1/s",
+        "done at t = {:.4} s ({}) after {} in {}",
         s.end_time_s,
         s.ended_by,
-        s.steps,
-        crate::progress::clock(s.wall_s),
-        s.max_divergence
+        count(s.steps as usize, "step"),
+        crate::progress::clock(s.wall_s)
     )];
+    if wet {
+        lines[0] += &format!("; largest |div u| {:.1e} 1/s", s.max_divergence);
+    }
     if let Some(pair) = &s.pair {
         lines.push(format!(
             "kiss {}  tumbling {}  separation {}  role changes {}",

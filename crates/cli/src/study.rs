@@ -11,7 +11,7 @@ use grainwake_study::{
 
 use crate::args::StudyArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO};
-use crate::progress::clock;
+use crate::progress::{clock, count};
 use crate::study_board::Board;
 use crate::{kind, print, run, tell, threads};
 
@@ -87,10 +87,11 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     run::watch_for_interrupt(stop.clone());
     if !args.quiet {
         tell!(
-            "{}: {} of {} runs, {jobs} at once with {each} threads each -> {}",
+            "{}: {} of {}, {jobs} at once with {} each -> {}",
             args.study.display(),
             chosen.len(),
-            runs.len(),
+            count(runs.len(), "run"),
+            count(each, "thread"),
             folder.display()
         );
     }
@@ -116,7 +117,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         tell!("{}", folder.join("table.csv").display());
         if study.analysis == Analysis::default() {
             tell!(
-                "note: the page of `grainwake report {}` has no figures: the study file names no `analysis`",
+                "note: `grainwake report {}` draws the figures; claims and more figures come with an `analysis` file (docs/study.md)",
                 folder.display()
             );
         }
@@ -229,16 +230,17 @@ fn intent(
         .max()
         .unwrap_or(0);
     lines.push(format!(
-        "{to_do} of {} to do; at most {} with {jobs} at once, {threads} threads each (an estimate; runs that stop early take less), {:.1} GB of memory",
+        "{to_do} of {} to do; at most {} with {jobs} at once, {} each (an estimate; runs that stop early take less), {:.1} GB of memory",
         states.len(),
         clock(wall / (jobs * threads) as f64),
+        count(threads, "thread"),
         jobs as f64 * largest as f64 / 1e9
     ));
     lines.join("\n")
 }
 
 fn pretty(rows: &[&Row]) -> Table {
-    let columns: [(&str, &str); 8] = [
+    const PAIR: [(&str, &str); 8] = [
         ("kiss", "kiss_time"),
         ("contact", "contact_stage"),
         ("tumble", "tumble_time"),
@@ -248,6 +250,23 @@ fn pretty(rows: &[&Row]) -> Table {
         ("passes", "role_changes"),
         ("mean v", "mean_speed_leading"),
     ];
+    const SETTLING: [(&str, &str); 8] = [
+        ("grains", "grains"),
+        ("landed", "landed"),
+        ("peak v [m/s]", "peak_speed_m_per_s"),
+        ("final v [m/s]", "final_speed_m_per_s"),
+        ("final Re", "final_reynolds"),
+        ("lands at [s]", "landing_time_s"),
+        ("drift/d", "drift"),
+        ("turned [deg]", "turned"),
+    ];
+    let settling = rows.iter().any(|row| row.settling.is_some());
+    let pairs = !settling || rows.iter().any(|row| row.pair.is_some());
+    let columns: Vec<(&str, &str)> = [(pairs, PAIR), (settling, SETTLING)]
+        .into_iter()
+        .filter(|(shown, _)| *shown)
+        .flat_map(|(_, columns)| columns)
+        .collect();
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
     let header = ["run", "state"]
@@ -256,17 +275,16 @@ fn pretty(rows: &[&Row]) -> Table {
     table.set_header(header.chain(["wall"]));
     for row in rows {
         let mut cells = vec![row.name.clone(), row.state.clone()];
-        cells.extend(columns.iter().map(|(_, name)| {
-            match row.pair.as_ref().and_then(|p| p.get(name)) {
-                Some(v) if v.fract() == 0.0 => format!("{v:.0}"),
-                Some(v) => format!("{v:.3}"),
-                None => "-".into(),
-            }
+        cells.extend(columns.iter().map(|(_, name)| match row.measured(name) {
+            Some(v) if v.fract() == 0.0 => format!("{v:.0}"),
+            Some(v) if v.abs() < 0.1 => format!("{v:.5}"),
+            Some(v) => format!("{v:.3}"),
+            None => "-".into(),
         }));
         cells.push(row.wall_s.map_or("-".into(), clock));
         table.add_row(cells);
     }
-    for column in 2..11 {
+    for column in 2..columns.len() + 3 {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }

@@ -85,8 +85,8 @@ fn a_run_folder_holds_what_the_reference_says() {
         .sum::<f64>()
         * 0.125e-9;
     let spheres = 2.0 * std::f64::consts::PI / 6.0 * 8e-9;
-    // Four cells across a sphere: planes in place of curved surfaces hold some ten percent more.
-    assert!((solid / spheres - 1.0).abs() < 0.15, "{solid} {spheres}");
+    // Four cells across a sphere.
+    assert!((solid / spheres - 1.0).abs() < 0.01, "{solid} {spheres}");
     assert!(array("velocity").data.iter().any(|v| *v < -1e-4));
     let slice =
         grainwake_solver::output::vti::read(&out.join("slices/y-grain0_000002.vti")).unwrap();

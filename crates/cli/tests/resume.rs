@@ -151,8 +151,13 @@ fn the_resolved_case_gives_the_same_bits() {
 /// A run that has not finished, with two checkpoints.
 fn unfinished(folder: &Path, case: &Path) -> PathBuf {
     let out = folder.join("run");
-    run(case, &out, &["--set", "time.end=30 ms"]).success();
+    run(case, &out, &["--set", "time.end=20 ms"]).success();
+    // A finished run keeps its last checkpoint alone; one that goes on keeps the one before.
+    let before = checkpoints(&out).pop().unwrap();
+    let bytes = std::fs::read(&before).unwrap();
+    run(case, &out, &["--resume", "--set", "time.end=30 ms"]).success();
     std::fs::remove_file(out.join("summary.json")).unwrap();
+    std::fs::write(before, bytes).unwrap();
     assert_eq!(checkpoints(&out).len(), 2);
     out
 }
@@ -320,6 +325,10 @@ fn a_run_that_blows_up_keeps_its_last_checkpoint() {
     assert!(
         said.contains("unstable") && said.contains("try") && said.contains("checkpoint"),
         "{said}"
+    );
+    assert!(
+        said.contains("a smaller [time] step") && !said.contains("cfl"),
+        "the case has a fixed step: {said}"
     );
     assert!(
         !checkpoints(&out).is_empty()

@@ -157,7 +157,7 @@ fn one_share_after_the_other_is_the_whole() {
 }
 
 #[test]
-fn a_study_without_an_analysis_says_that_it_has_no_figures() {
+fn a_study_without_an_analysis_has_figures_all_the_same() {
     let (folder, path) = study();
     let out = folder.path().join("out");
     let run = |more: &[&str]| {
@@ -166,15 +166,15 @@ fn a_study_without_an_analysis_says_that_it_has_no_figures() {
         command.args(["--set", "time.end=4 ms"]).args(more);
         command.assert().success()
     };
-    run(&[]).stderr(contains("names no `analysis`"));
+    run(&[]).stderr(contains("`analysis` file"));
     run(&["--quiet"]).stderr("");
     grainwake()
         .arg("report")
         .arg(&out)
         .assert()
         .success()
-        .stdout(contains("0 figures"))
-        .stderr(contains("names no `analysis`"));
+        .stdout(contains("1 figures"));
+    assert!(out.join("figures/fig01-gap.png").is_file());
 }
 
 #[test]

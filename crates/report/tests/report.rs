@@ -448,6 +448,76 @@ fn other_runs_get_their_own_figures() {
     remove(&folder);
 }
 
+#[test]
+fn few_grains_are_shown_one_by_one() {
+    let folder = synthetic::folder("few");
+    synthetic::heap(&folder, 12, true);
+    let rendered = render(&folder).unwrap();
+    assert_eq!(
+        names(&rendered),
+        [
+            "positions",
+            "trajectories",
+            "grains",
+            "history",
+            "diagnostics"
+        ]
+    );
+    let seen = text_of(&svg(&rendered, "grains"));
+    for grain in 0..12 {
+        assert!(seen.contains(&format!("grain {grain}")), "{seen}");
+    }
+    assert!(seen.contains("height  [mm]") && seen.contains("vz  [m/s]"));
+    assert!(svg(&rendered, "grains").contains("stroke-dasharray"));
+    let said = page(&rendered);
+    assert!(said.contains("true outlines") && !said.contains("left the box"));
+    // A grain that falls out of the box is not claimed to be drawn.
+    let file = folder.join("grains.csv");
+    let table = std::fs::read_to_string(&file).unwrap();
+    let out = |line: &str| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if cells[0] != "time" && cells[1] == "7" && cells[0].parse::<f64>().unwrap() > 0.3 {
+            cells[4] = "-0.05";
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(&file, table.lines().map(out).collect::<String>()).unwrap();
+    assert!(page(&render(&folder).unwrap()).contains("Grain 7 has left the box"));
+    remove(&folder);
+}
+
+#[test]
+fn round_off_is_not_a_turn_and_the_summary_knows_all_steps() {
+    let folder = small_pair(0.9);
+    let file = folder.join("grains.csv");
+    let table = std::fs::read_to_string(&file).unwrap();
+    let still = |line: &str| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if cells[0] != "time" {
+            cells[12..15].fill("3e-18");
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(&file, table.lines().map(still).collect::<String>()).unwrap();
+    let summary = folder.join("summary.json");
+    let mut value: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&summary).unwrap()).unwrap();
+    (value["max_divergence"], value["max_cfl"]) = (4.56e-9.into(), 0.789.into());
+    std::fs::write(&summary, value.to_string()).unwrap();
+    let rendered = render(&folder).unwrap();
+    let seen = text_of(&svg(&rendered, "orientation"));
+    assert!(
+        seen.contains("long axis  [°]") && !seen.contains("ω"),
+        "{seen}"
+    );
+    let said = page(&rendered);
+    assert!(said.contains("0.789 at most in any step"), "{said}");
+    assert!(said.matches("4.56×10<sup>−9</sup>").count() >= 2);
+    let tilt = text_of(&svg(&rendered, "gap"));
+    assert!(tilt.contains("45") && tilt.contains("135"), "{tilt}");
+    remove(&folder);
+}
+
 /// Replaces the log of a run by these events at dimensionless times.
 fn write_log(folder: &Path, events: &[(f64, &str)]) {
     let unit = (synthetic::D / synthetic::G).sqrt();

@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use grainwake_solver::case::{Loc, Problem, Source, nearest};
 use serde::{Deserialize, Serialize};
 
+use crate::error::of_a_study;
 use crate::measure::QUANTITIES;
 use crate::model::Model;
 use crate::plan::MEASURED;
+use crate::settling::SETTLING;
 
 /// What is asked of the results: claims, correlations, figures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -186,6 +188,11 @@ struct RawClaim {
     observed: bool,
 }
 
+/// What can be asked for: of a pair, of other grains.
+fn quantities() -> impl Iterator<Item = &'static str> + Clone {
+    QUANTITIES.into_iter().chain(SETTLING)
+}
+
 /// Checks names against the models of the study.
 struct Names<'a> {
     source: &'a Source,
@@ -213,12 +220,7 @@ impl Names<'_> {
         Err(self.source.locate(problem, span, "here"))
     }
     fn quantity(&self, name: &Loc<String>) -> Result<(), Problem> {
-        self.check(
-            "quantity",
-            &name.value,
-            QUANTITIES.into_iter(),
-            name.span.as_ref(),
-        )
+        self.check("quantity", &name.value, quantities(), name.span.as_ref())
     }
     fn axis(&self, name: &str, span: Option<&std::ops::Range<usize>>) -> Result<(), Problem> {
         self.check(
@@ -323,7 +325,7 @@ impl Analysis {
     /// What is wrong, with its place.
     pub fn parse(name: &str, text: &str, models: &[Model]) -> Result<Analysis, Vec<Problem>> {
         let (source, raw): (Source, RawAnalysis) =
-            Source::parse(name, text, &[]).map_err(|p| vec![p])?;
+            Source::parse(name, text, &[]).map_err(|p| vec![of_a_study(p)])?;
         let names = Names {
             source: &source,
             models,
@@ -341,7 +343,7 @@ impl Analysis {
         if let Some(Loc { value, span }) = &raw.correlations {
             let span = span.as_ref();
             value.quantities.iter().for_each(|q| {
-                note(names.check("quantity", q, QUANTITIES.into_iter(), span));
+                note(names.check("quantity", q, quantities(), span));
             });
             value
                 .factors

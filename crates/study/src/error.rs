@@ -76,3 +76,12 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
         .and_then(|()| std::fs::rename(&temporary, path))
         .at("write", path)
 }
+
+/// Points to the page that has the keys of studies: `grainwake schema` has those of cases.
+pub(crate) fn of_a_study(mut problem: Problem) -> Problem {
+    let here = "docs/study.md lists the keys of study and analysis files";
+    problem.help = problem
+        .help
+        .map(|help| help.replace("`grainwake schema` lists every key", here));
+    problem
+}

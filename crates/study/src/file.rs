@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use grainwake_solver::case::{Loc, Problem, Source, parse_length};
 
 use crate::claims::Analysis;
-use crate::error::{At, StudyError};
+use crate::error::{At, StudyError, of_a_study};
 use crate::model::{self, Model};
 use crate::raw::{Length, RawEnsemble, RawStudy};
 
@@ -56,7 +56,7 @@ impl Study {
     /// [`StudyError`] with every problem found and its place.
     pub fn parse(text: &str, path: &Path) -> Result<Study, StudyError> {
         let (source, raw): (Source, RawStudy) =
-            Source::parse(&path.display().to_string(), text, &[])?;
+            Source::parse(&path.display().to_string(), text, &[]).map_err(of_a_study)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let models = model::expand(&source, &raw, folder).map_err(StudyError::Invalid)?;
         let ensemble = match &raw.ensemble {

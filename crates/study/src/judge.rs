@@ -64,11 +64,14 @@ pub struct Finding {
 
 /// A quantity of a row; of a pair that landed before it happened, the landing as a lower bound.
 pub fn value(row: &Row, quantity: &str) -> Option<(f64, bool)> {
-    let pair = row.pair.as_ref().filter(|_| row.finished())?;
-    if let Some(value) = row.get(quantity) {
-        let bound = quantity == "contact_stage" && pair.parted == Some(false);
-        return Some((value, bound));
+    if !row.finished() {
+        return None;
     }
+    if let Some(value) = row.get(quantity) {
+        let together = row.pair.as_ref().is_some_and(|p| p.parted == Some(false));
+        return Some((value, quantity == "contact_stage" && together));
+    }
+    let pair = row.pair.as_ref()?;
     let landing = pair.landing_time.map(|time| (time, true));
     match quantity {
         "kiss_time" => landing,

@@ -9,6 +9,7 @@
 mod claims;
 pub mod correlation;
 mod error;
+mod fall;
 pub mod figure;
 mod file;
 pub mod judge;
@@ -22,6 +23,7 @@ mod raw;
 mod report;
 mod runner;
 mod select;
+mod settling;
 mod state;
 pub mod stats;
 mod table;
@@ -37,8 +39,9 @@ pub use plan::{MEASURED, Manifest, Plan, Run};
 pub use report::{Rendered, render};
 pub use runner::{Options, Outcome, Watcher, carry_out};
 pub use select::Selection;
+pub use settling::{Fallen, SETTLING, Settling};
 pub use state::{State, state};
-pub use table::{Row, csv_of, table, write_table};
+pub use table::{GRAINS, Row, columns, csv_of, table, write_table};
 
 /// Subfolder of a study folder that holds the run folders.
 pub const RUNS: &str = "runs";

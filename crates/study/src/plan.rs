@@ -129,11 +129,7 @@ impl Plan {
     pub fn settle(&self, folder: &Path) -> Result<(), StudyError> {
         self.admit(folder)?;
         std::fs::create_dir_all(folder.join(RUNS)).at("create", folder)?;
-        let text = serde_json::to_string_pretty(&self.manifest).map_err(std::io::Error::from);
-        write_whole(
-            &folder.join(MANIFEST),
-            text.at("write", &folder.join(MANIFEST))?.as_bytes(),
-        )
+        self.manifest.write(folder)
     }
 
     /// Whether the study may go into the folder; nothing is written.
@@ -181,6 +177,16 @@ impl Manifest {
             file,
             what: error.to_string(),
         })
+    }
+
+    /// Into a study folder.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub(crate) fn write(&self, folder: &Path) -> Result<(), StudyError> {
+        let file = folder.join(MANIFEST);
+        let text = serde_json::to_string_pretty(self).map_err(std::io::Error::from);
+        write_whole(&file, text.at("write", &file)?.as_bytes())
     }
 
     /// Whether a folder holds a study.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::correlation::correlations;
 use crate::error::{At, StudyError, write_whole};
 use crate::figure::{self, Data, Drawn};
+use crate::file::Study;
 use crate::judge::judge;
 use crate::motion::{Motion, thin};
 use crate::page::{self, Content};
@@ -29,10 +30,14 @@ pub struct Rendered {
 /// Draws the figures, tests the claims and writes the page of a study folder, whatever part of its
 /// runs is finished.
 ///
+/// The analysis is that of the study file as it is now, if it is still where it was.
+///
 /// # Errors
-/// If the folder holds no study, or a file cannot be written.
+/// If the folder holds no study, the study file or its analysis has become wrong, or a file cannot be written.
 pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
-    let manifest = Manifest::read(folder)?;
+    let mut manifest = Manifest::read(folder)?;
+    refresh(&mut manifest, folder)?;
+    let manifest = manifest;
     let rows = table(&manifest, folder);
     write_table(&rows, folder)?;
     let done: Vec<(&Run, &Row)> = manifest
@@ -95,6 +100,19 @@ pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
     };
     write_whole(&out.page, content.html().as_bytes())?;
     Ok(out)
+}
+
+/// Takes the analysis from the study file, which may have been changed since the study was run.
+fn refresh(manifest: &mut Manifest, folder: &Path) -> Result<(), StudyError> {
+    if !manifest.study.is_file() {
+        return Ok(());
+    }
+    let now = Study::read(&manifest.study)?;
+    if now.title == manifest.title && now.analysis != manifest.analysis {
+        manifest.analysis = now.analysis;
+        manifest.write(folder)?;
+    }
+    Ok(())
 }
 
 type Written = (Vec<PathBuf>, Vec<(Drawn, String)>);

@@ -1,13 +1,13 @@
 //! Runs what is missing, several runs at once, each alone in what befalls it.
 
 use std::collections::VecDeque;
-use std::fs::File;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use grainwake_solver::output::checkpoint;
+use grainwake_solver::output::lock::{self, Asked};
 use grainwake_solver::output::{self, Ending, Existing, Observer, Progress, RunError, Summary};
 use grainwake_solver::sim::events::Event;
 
@@ -134,6 +134,8 @@ fn one(
 ) -> Outcome {
     match attempt(run, index, study, options, watcher) {
         Ok(outcome) => outcome,
+        // `grainwake run` has it.
+        Err(RunError::InUse { .. }) => Outcome::Elsewhere,
         Err(error) => {
             if let RunError::Io { source, .. } = &error
                 && source.kind() == std::io::ErrorKind::StorageFull
@@ -152,7 +154,7 @@ fn attempt(
     options: &Options,
     watcher: &dyn Watcher,
 ) -> Result<Outcome, RunError> {
-    let Some(_lock) = lock(run, study)? else {
+    let Asked::Taken(_lock) = lock(run, study)? else {
         return Ok(Outcome::Elsewhere);
     };
     let folder = run.folder(study);
@@ -207,22 +209,15 @@ fn attempt(
 }
 
 /// Takes a run for this program; the lock goes with it, however it ends.
-fn lock(run: &Run, study: &Path) -> Result<Option<File>, RunError> {
+fn lock(run: &Run, study: &Path) -> Result<Asked, RunError> {
     let folder = study.join("locks");
     let path = folder.join(format!("{}.lock", run.name));
-    let io = |action: &'static str, source: std::io::Error| RunError::Io {
-        action,
-        path: path.clone(),
+    let taken = std::fs::create_dir_all(&folder).and_then(|()| lock::take(&path));
+    taken.map_err(|source| RunError::Io {
+        action: "lock",
+        path,
         source,
-    };
-    std::fs::create_dir_all(&folder).map_err(|e| io("create", e))?;
-    let file = File::create(&path).map_err(|e| io("create", e))?;
-    match file.try_lock() {
-        Ok(()) => Ok(Some(file)),
-        Err(std::fs::TryLockError::WouldBlock) => Ok(None),
-        // A file system without locks: whoever shares it must share out the runs.
-        Err(std::fs::TryLockError::Error(_)) => Ok(Some(file)),
-    }
+    })
 }
 
 /// Removes the checkpoints of a finished run: they are by far the largest of its files.

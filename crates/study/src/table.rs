@@ -12,7 +12,11 @@ use serde::{Deserialize, Serialize};
 use crate::error::{StudyError, write_whole};
 use crate::measure::{Measures, QUANTITIES};
 use crate::plan::{Manifest, Run};
+use crate::settling::{Fallen, SETTLING, Settling};
 use crate::state::{State, state_for};
+
+/// Table of each grain of the runs that are no pairs, in the study folder.
+pub const GRAINS: &str = "settling.csv";
 
 /// A run and what came out of it. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,6 +56,9 @@ pub struct Row {
     pub max_divergence: Option<f64>,
     /// What was measured on the pair; only of a finished run.
     pub pair: Option<Measures>,
+    /// What was measured on a single grain, or on three and more; only of a finished run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub settling: Option<Settling>,
 }
 
 impl Row {
@@ -77,6 +84,7 @@ impl Row {
             threads: None,
             max_divergence: None,
             pair: None,
+            settling: None,
         };
         match &found {
             State::Failed(why) => row.remark = Some(why.clone()),
@@ -105,6 +113,7 @@ impl Row {
             Ok(run) => {
                 row.gravity_m_per_s2 = run.facts.gravity.map(|g| g.to_array());
                 row.pair = Measures::of(&run);
+                row.settling = Settling::of(&run);
             }
             Err(error) => row.remark = Some(error.to_string()),
         }
@@ -126,8 +135,14 @@ impl Row {
 
     /// A quantity, a factor or a number of the run by name.
     pub fn get(&self, name: &str) -> Option<f64> {
-        let measured = self.pair.as_ref().and_then(|pair| pair.get(name));
-        measured.or_else(|| self.factors.get(name).copied())
+        self.measured(name)
+            .or_else(|| self.factors.get(name).copied())
+    }
+
+    /// A measured quantity by name.
+    pub fn measured(&self, name: &str) -> Option<f64> {
+        let of_pair = self.pair.as_ref().and_then(|pair| pair.get(name));
+        of_pair.or_else(|| self.settling.as_ref()?.get(name))
     }
 }
 
@@ -170,7 +185,87 @@ pub fn write_table(rows: &[Row], study: &Path) -> Result<(), StudyError> {
         source: error.into(),
     })?;
     write_whole(&json, text.as_bytes())?;
+    if rows.iter().any(|row| row.settling.is_some()) {
+        write_whole(&study.join(GRAINS), grains_csv(rows).as_bytes())?;
+    }
     write_whole(&study.join("table.csv"), csv_of(rows).as_bytes())
+}
+
+/// Names of the measured quantities that runs of these kinds have, in order.
+pub fn columns(rows: &[Row]) -> Vec<&'static str> {
+    let settling = rows.iter().any(|row| row.settling.is_some());
+    let pairs = !settling || rows.iter().any(|row| row.pair.is_some());
+    let mut out: Vec<&str> = Vec::new();
+    if pairs {
+        out.extend(QUANTITIES);
+    }
+    if settling {
+        let more = SETTLING
+            .into_iter()
+            .filter(|q| !QUANTITIES.contains(q) || !pairs);
+        out.extend(more);
+    }
+    out
+}
+
+/// A row for each grain of the runs that are no pairs, SI units.
+fn grains_csv(rows: &[Row]) -> String {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    // Writing to memory does not fail.
+    let _ = out.write_record([
+        "run",
+        "model",
+        "member",
+        "grain",
+        "diameter_m",
+        "peak_speed_m_per_s",
+        "peak_reynolds",
+        "final_speed_m_per_s",
+        "final_reynolds",
+        "speed_change",
+        "mean_speed_m_per_s",
+        "landing_time_s",
+        "drift_m",
+        "long_axis_deg",
+        "turned_deg",
+    ]);
+    let each = |row: &Row| row.settling.as_ref().map(|s| s.each.clone());
+    for row in rows {
+        for Fallen {
+            grain,
+            diameter_m,
+            peak_speed_m_per_s,
+            peak_reynolds,
+            final_speed_m_per_s,
+            final_reynolds,
+            speed_change,
+            mean_speed_m_per_s,
+            landing_time_s,
+            drift_m,
+            long_axis_deg,
+            turned_deg,
+        } in each(row).unwrap_or_default()
+        {
+            let numbers = [
+                Some(diameter_m),
+                Some(peak_speed_m_per_s),
+                peak_reynolds,
+                final_speed_m_per_s,
+                final_reynolds,
+                speed_change,
+                mean_speed_m_per_s,
+                landing_time_s,
+                Some(drift_m),
+                long_axis_deg,
+                Some(turned_deg),
+            ];
+            let names = [row.name.clone(), row.model.clone()];
+            let counts = [row.member, grain].map(|n| n.to_string());
+            let cells = names.into_iter().chain(counts);
+            let _ = out.write_record(cells.chain(numbers.map(number)));
+        }
+    }
+    String::from_utf8(out.into_inner().unwrap_or_default()).unwrap_or_default()
 }
 
 /// The table as comma-separated text; what is not known is empty.
@@ -180,6 +275,8 @@ pub fn csv_of(rows: &[Row]) -> String {
     };
     let axes = union(|r| r.levels.keys().cloned().collect());
     let factors = union(|r| r.factors.keys().cloned().collect());
+    let quantities = columns(rows);
+    let pairs = quantities.contains(&"kiss_time");
     let plain = [
         "diameter_m",
         "kiss_time_s",
@@ -191,6 +288,9 @@ pub fn csv_of(rows: &[Row]) -> String {
         "id",
         "remark",
     ];
+    let plain = plain
+        .into_iter()
+        .filter(|name| pairs || *name != "kiss_time_s");
     let mut out = csv::Writer::from_writer(Vec::new());
     // Writing to memory does not fail; a row of another length cannot come about.
     let header = ["run", "model", "member", "state"]
@@ -200,7 +300,7 @@ pub fn csv_of(rows: &[Row]) -> String {
         .chain(axes.iter().cloned())
         .chain(factors.iter().cloned());
     let header = header
-        .chain(QUANTITIES.map(str::to_owned))
+        .chain(quantities.iter().map(|q| (*q).to_owned()))
         .chain(plain.map(str::to_owned));
     let _ = out.write_record(header);
     for row in rows {
@@ -215,14 +315,10 @@ pub fn csv_of(rows: &[Row]) -> String {
                 .map(|a| row.levels.get(a).cloned().unwrap_or_default()),
         );
         cells.extend(factors.iter().map(|f| number(row.factors.get(f).copied())));
-        cells.extend(
-            QUANTITIES
-                .iter()
-                .map(|q| number(row.pair.as_ref().and_then(|p| p.get(q)))),
-        );
+        cells.extend(quantities.iter().map(|q| number(row.measured(q))));
+        cells.push(row.diameter_m.map_or(String::new(), |v| format!("{v:e}")));
+        cells.extend(pairs.then(|| number(row.kiss_time_s)));
         cells.extend([
-            row.diameter_m.map_or(String::new(), |v| format!("{v:e}")),
-            number(row.kiss_time_s),
             row.steps.map_or(String::new(), |v| v.to_string()),
             number(row.end_time_s),
             row.wall_s.map_or(String::new(), |v| format!("{v:.1}")),

@@ -14,6 +14,17 @@ pub fn short(value: f64) -> String {
     format!("{value:.digits$}").replace('-', "−")
 }
 
+/// Quantities that are counted.
+const COUNTS: [&str; 4] = ["kisses", "role_changes", "grains", "landed"];
+
+/// The value of a quantity: a count as a whole number where it is one, else three significant digits.
+pub fn number(quantity: &str, value: f64) -> String {
+    if COUNTS.contains(&quantity) && value.fract() == 0.0 {
+        return format!("{value:.0}");
+    }
+    short(value)
+}
+
 /// In hundredths.
 pub fn percent(value: f64) -> String {
     format!("{:.1} %", 100.0 * value).replace('-', "−")
@@ -25,5 +36,17 @@ pub fn p_text(p: f64) -> String {
         "below 0.0001".into()
     } else {
         format!("{p:.4}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn counts_are_whole_numbers() {
+        assert_eq!(number("kisses", 1.0), "1");
+        assert_eq!(number("kiss_time", 1.0), "1.00");
+        assert_eq!(number("kisses", 1.5), "1.50");
     }
 }

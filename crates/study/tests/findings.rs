@@ -60,6 +60,7 @@ fn row(
         wall_s: None,
         threads: None,
         max_divergence: None,
+        settling: None,
         pair: Some(pair),
     }
 }

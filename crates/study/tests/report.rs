@@ -230,6 +230,42 @@ fn a_whole_study_gets_all_figures() {
     assert!(drawn.contains(&"fig15-gap-by-row".into()) && !drawn.contains(&"fig08-g04-o1".into()));
 }
 
+/// Leaves of the analysis what `figures` says, in a folder whose study file is gone.
+fn ask_only(folder: &Path, figures: serde_json::Value) {
+    let file = folder.join("study.json");
+    let mut plan: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
+    plan["study"] = "/nowhere/study.toml".into();
+    plan["analysis"] = serde_json::json!({ "figures": figures });
+    std::fs::write(&file, plan.to_string()).unwrap();
+}
+
+#[test]
+fn figures_of_a_study_of_ones_own_count_from_one() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = study(root.path(), |run| run.name.starts_with("g04"));
+    ask_only(
+        &folder,
+        serde_json::json!({ "stories": ["g04-o1", "g05-o1"] }),
+    );
+    let rendered = render(&folder).unwrap();
+    assert_eq!(names(&rendered), ["fig01-g04-o1", "fig02-vorticity-g04-o1"]);
+    let page = std::fs::read_to_string(&rendered.page).unwrap();
+    assert!(page.contains("<b>Figure 1. Drafting") && !page.contains("Figure 8"));
+    assert!(page.contains("the pictures of g05-o1 are left out"));
+    // Without any wish: all pairs together, against what was varied.
+    ask_only(&folder, serde_json::json!({}));
+    let rendered = render(&folder).unwrap();
+    assert_eq!(names(&rendered), ["fig01-gap", "fig02-kissing-time"]);
+    let svg = std::fs::read_to_string(rendered.png[1].with_extension("svg")).unwrap();
+    assert!(svg.contains("kissing time") && svg.contains("orientation"));
+    let page = std::fs::read_to_string(&rendered.page).unwrap();
+    assert!(
+        page.contains("<td class=\"number\">1</td>"),
+        "kisses are counted"
+    );
+}
+
 #[test]
 fn a_part_of_a_study_is_drawn_and_what_is_missing_is_said() {
     let root = tempfile::tempdir().unwrap();

@@ -71,7 +71,7 @@ impl Scene<'_> {
     }
 
     /// One curve of a grain over the time axis.
-    fn curve(&self, grain: usize, value: impl Fn(&History, usize) -> f64) -> Series {
+    pub(super) fn curve(&self, grain: usize, value: impl Fn(&History, usize) -> f64) -> Series {
         let (_, factor) = self.story.time_axis();
         let history = &self.run.grains[grain];
         let points = (0..history.len())
@@ -140,12 +140,14 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
     if scales.is_some() {
         distance.levels.push((1.0, "*D*_{r} = *d*".to_owned()));
     }
+    let largest = tilt.iter().map(|p| p.1).fold(0.0, f64::max);
     let mut turn = panel(
         "tilt of the pair  [°]",
         vec![series(None, tilt, style::GREEN)],
         &[0.0, 90.0],
         70.0,
     );
+    turn.y = Axis::degrees(&turn.y.label, 0.0, largest.max(90.0));
     turn.levels.push((90.0, "side by side".to_owned()));
     let unit_name = if scales.is_some() { "diameters" } else { "m" };
     let mut caption = format!(
@@ -297,93 +299,6 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
     Some(Figure {
         name: "velocity",
         title: "Velocity of the grain".to_owned(),
-        caption,
-        drawing: stack(&scene.time(), &panels, &scene.marks()),
-    })
-}
-
-/// Angles of the long and short axis with gravity, and the angular speed where anything turns.
-pub fn orientation(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
-    let moving = scene.moving();
-    let up = scene.story.up;
-    let unit = scene.story.scales.map_or(1.0, |s| 1.0 / s.time());
-    let spin: Vec<Series> = moving
-        .iter()
-        .map(|g| scene.curve(*g, |h, row| h.angular_velocity[row].length() / unit))
-        .collect();
-    let fastest = spin
-        .iter()
-        .flat_map(|s| s.points.iter().map(|p| p.1))
-        .fold(0.0, f64::max);
-    let angle = |row_axis: DVec3| row_axis.dot(up).abs().min(1.0).acos().to_degrees();
-    let axes: Vec<_> = moving
-        .iter()
-        .filter_map(|g| Some((*g, scene.bodies.get(g)?.axes()?)))
-        .collect();
-    let mut panels = Vec::new();
-    let mut caption = String::new();
-    if axes.is_empty() {
-        let round = moving.iter().all(|g| {
-            scene
-                .run
-                .facts
-                .grains
-                .get(*g)
-                .is_some_and(|f| f.shape.as_deref() == Some("sphere"))
-        });
-        if !round && scene.bodies.is_empty() {
-            notes.push(
-                "the axes of the grains are not drawn: there is no surface of them in grains/"
-                    .to_owned(),
-            );
-        }
-    } else {
-        let curves = |pick: fn(&super::silhouette::Axes) -> DVec3| -> Vec<Series> {
-            axes.iter()
-                .map(|(g, axes)| scene.curve(*g, |h, row| angle(h.orientation[row] * pick(axes))))
-                .collect()
-        };
-        let mut long = panel("long axis  [°]", curves(|a| a.long), &[0.0, 90.0], 70.0);
-        let mut short_axis = panel("short axis  [°]", curves(|a| a.short), &[0.0, 90.0], 70.0);
-        for panel in [&mut long, &mut short_axis] {
-            panel.y = Axis::linear(&panel.y.label, 0.0, 90.0, 3, true);
-            panel.y.ticks = (0..=3)
-                .map(|i| (30.0 * f64::from(i), (30 * i).to_string()))
-                .collect();
-        }
-        panels.extend([long, short_axis]);
-        caption.push_str("(a) Angle of the longest axis with the vertical and (b) of the shortest axis, the normal of the broad side: 0° in (b) is a grain that falls broad side first.");
-    }
-    let turns = fastest > 0.0;
-    let label = if scene.story.scales.is_some() {
-        "|*ω*| √(*d*/*g*)  [–]"
-    } else {
-        "|*ω*|  [rad/s]"
-    };
-    if turns {
-        caption.push_str(if panels.is_empty() { "" } else { " (c) " });
-        caption.push_str(&format!(
-            "Angular speed, up to {}{}.",
-            short(fastest),
-            if scene.story.scales.is_some() {
-                " √(g/d)"
-            } else {
-                " rad/s"
-            }
-        ));
-        panels.push(panel(label, spin, &[0.0], 65.0));
-    }
-    if panels.is_empty() {
-        return None;
-    }
-    Some(Figure {
-        name: "orientation",
-        title: match (axes.is_empty(), turns) {
-            (true, _) => "Angular speed",
-            (false, true) => "Orientation and angular speed",
-            (false, false) => "Orientation",
-        }
-        .to_owned(),
         caption,
         drawing: stack(&scene.time(), &panels, &scene.marks()),
     })

@@ -140,13 +140,9 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
         grains.len(),
         short(time),
         AXES[depth],
-        if scene.bodies.is_empty() {
-            "circles of equal volume"
-        } else {
-            "true outlines"
-        },
+        scene.drawn_as(&grains),
         short(1e3 * (high - run.facts.lower[up]))
-    );
+    ) + &scene.left_out(&grains);
     Some(Figure {
         name: "positions",
         title: "Where the grains lie".to_owned(),

@@ -67,6 +67,58 @@ pub fn many(scene: &Scene) -> Option<Figure> {
     })
 }
 
+/// Most grains that are drawn one by one.
+pub const FEW: usize = 12;
+
+/// Height and vertical velocity of each of a few grains.
+pub fn each(scene: &Scene) -> Option<Figure> {
+    const DASHED: Option<&str> = Some("3.5 1.6");
+    let moving = scene.moving();
+    if moving.len() > FEW || !scene.story.travels {
+        return None;
+    }
+    let up = scene.story.up;
+    let curves = |value: &dyn Fn(&History, usize) -> f64| -> Vec<Series> {
+        let one = |(n, grain): (usize, &usize)| Series {
+            dash: DASHED.filter(|_| n >= style::GRAIN_COLOURS),
+            colour: style::grain_colour(n),
+            ..scene.curve(*grain, value)
+        };
+        moving.iter().enumerate().map(one).collect()
+    };
+    let fastest = |grain: &usize| {
+        let speeds = scene.run.grains[*grain].velocity.iter().map(|v| -v.dot(up));
+        speeds.max_by(|a, b| a.abs().total_cmp(&b.abs()))
+    };
+    let named: Vec<String> = moving
+        .iter()
+        .filter_map(|grain| Some(format!("{} of grain {grain}", short(fastest(grain)?))))
+        .collect();
+    let panels = [
+        panel(
+            "height  [mm]",
+            curves(&|h, row| 1e3 * h.position[row].dot(up)),
+            &[],
+            110.0,
+        ),
+        panel(
+            "*v*_{z}  [m/s]",
+            curves(&|h, row| h.velocity[row].dot(up)),
+            &[0.0],
+            110.0,
+        ),
+    ];
+    Some(Figure {
+        name: "grains",
+        title: "Height and velocity of each grain".to_owned(),
+        caption: format!(
+            "(a) Height of the centre of each grain. (b) Vertical velocity (down is negative); the largest settling speeds [m/s] are {}.",
+            named.join(", ")
+        ),
+        drawing: stack(&scene.time(), &panels, &scene.marks()),
+    })
+}
+
 /// Force of the fluid on a grain that is held or driven.
 pub fn force(scene: &Scene) -> Option<Figure> {
     let driven = !scene.story.travels || scene.story.scales.is_none();
@@ -127,12 +179,21 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
             .filter(|v| v.is_finite())
             .fold(0.0, f64::max)
     };
+    // The summary knows all steps, the table those that were written.
+    let highest = |name: &str, points: &Points| {
+        let of_all = scene
+            .run
+            .summary
+            .as_ref()
+            .and_then(|s| s.get(name)?.as_f64());
+        of_all.unwrap_or(0.0).max(peak(points))
+    };
     let mut panels = Vec::new();
     let mut parts = Vec::new();
     if let Some(divergence) = points(&["max_divergence", "divergence"]) {
         parts.push(format!(
-            "largest divergence after projection, {} 1/s at most",
-            short(peak(&divergence))
+            "largest divergence after projection, {} 1/s at most after any step",
+            short(highest("max_divergence", &divergence))
         ));
         panels.extend(log_panel(
             "max |div *u*|  [1/s]",
@@ -141,7 +202,10 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
         ));
     }
     if let Some(cfl) = points(&["cfl"]) {
-        parts.push(format!("Courant number, {} at most", short(peak(&cfl))));
+        parts.push(format!(
+            "Courant number, {} at most in any step",
+            short(highest("max_cfl", &cfl))
+        ));
         panels.push(panel(
             "CFL  [–]",
             vec![series(None, cfl, style::INK)],
@@ -151,7 +215,7 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
     }
     if let Some(residual) = points(&["momentum_residual"]) {
         let residual: Points = residual.into_iter().map(|(t, v)| (t, v.abs())).collect();
-        parts.push(format!("momentum of fluid, grains and walls that a step leaves unaccounted for, as a fraction of the mass of the fluid times its largest velocity, {} at most", short(peak(&residual))));
+        parts.push(format!("momentum of fluid, grains and walls that a step leaves unaccounted for, as a fraction of the mass of the fluid times its largest velocity, {} at most in the rows of the table", short(peak(&residual))));
         panels.extend(log_panel(
             "residual  [–]",
             vec![series(None, residual, style::PURPLE)],
@@ -179,7 +243,7 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
         .enumerate()
         .map(|(i, part)| format!("({}) {part}", char::from(b'a' + i as u8)));
     let caption = format!(
-        "What the method may break, step by step: {}.",
+        "What the method may break: {}.",
         letters.collect::<Vec<_>>().join("; ")
     );
     Some(Figure {

@@ -10,6 +10,7 @@ pub mod frame;
 mod heap;
 mod history;
 pub mod lines;
+mod orientation;
 pub mod plan;
 pub mod raster;
 pub mod section;
@@ -89,7 +90,7 @@ pub fn all(
             out.extend(trajectory::figure(&scene));
             out.extend(curves::gap(&scene));
             out.extend(curves::pair_velocity(&scene));
-            out.extend(curves::orientation(&scene, notes));
+            out.extend(orientation::figure(&scene, notes));
         }
         Subject::Single => {
             if story.travels {
@@ -97,10 +98,14 @@ pub fn all(
                 out.extend(curves::single_velocity(&scene));
             }
             out.extend(history::force(&scene));
-            out.extend(curves::orientation(&scene, notes));
+            out.extend(orientation::figure(&scene, notes));
         }
         Subject::Many => {
             out.extend(heap::positions(&scene));
+            if story.travels && scene.moving().len() <= history::FEW {
+                out.extend(trajectory::figure(&scene));
+            }
+            out.extend(history::each(&scene));
             out.extend(history::many(&scene));
         }
         Subject::Flow => {}

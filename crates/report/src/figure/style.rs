@@ -39,7 +39,10 @@ pub const ORANGE: &str = "#e69f00";
 /// Okabe-Ito sky blue.
 pub const SKY: &str = "#56b4e9";
 
+/// Number of colours that grains have.
+pub const GRAIN_COLOURS: usize = 6;
+
 /// Colour of the n-th grain.
 pub fn grain_colour(grain: usize) -> &'static str {
-    [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY][grain % 6]
+    [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY][grain % GRAIN_COLOURS]
 }

@@ -45,6 +45,48 @@ impl Scene<'_> {
             .filter(|_| facts.shape.as_deref() == Some("sphere"))
     }
 
+    /// What the grains are drawn as, in words.
+    pub fn drawn_as(&self, grains: &[usize]) -> &'static str {
+        let known = |g: &usize| self.bodies.contains_key(g) || self.sphere_diameter(*g).is_some();
+        match grains.iter().filter(|g| known(g)).count() {
+            n if n == grains.len() => "true outlines",
+            0 => "circles of equal volume",
+            _ => "true outlines where their surfaces are known, else circles of equal volume",
+        }
+    }
+
+    /// A sentence on grains whose centres are outside the box at the end, which no picture shows; else nothing.
+    pub fn left_out(&self, grains: &[usize]) -> String {
+        let Some(size) = self.run.facts.size else {
+            return String::new();
+        };
+        let (low, high) = (self.run.facts.lower, self.run.facts.lower + size);
+        let outside = |grain: &&usize| {
+            let last = self.run.grains[**grain].position.last();
+            last.is_some_and(|x| {
+                let x = self.run.wrapped(*x);
+                x.cmplt(low).any() || x.cmpgt(high).any()
+            })
+        };
+        let names: Vec<String> = grains
+            .iter()
+            .filter(outside)
+            .map(usize::to_string)
+            .collect();
+        match names.len() {
+            0 => String::new(),
+            1 => format!(
+                " Grain {} has left the box and is not shown there.",
+                names[0]
+            ),
+            n if n <= 6 => format!(
+                " Grains {} have left the box and are not shown there.",
+                names.join(", ")
+            ),
+            n => format!(" {n} grains have left the box and are not shown there."),
+        }
+    }
+
     /// The axis nearest to the vertical, and the two others.
     pub fn vertical(&self) -> (usize, [usize; 2]) {
         let up = self.story.up.abs();
@@ -78,7 +120,9 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     };
     let room = COLUMN - LEFT - MIDDLE - RIGHT;
     let scale = (room / (first.width() + second.width())).min(330.0 / first.height());
-    let top = 8.0 + 10.0 * grains.len() as f64;
+    // The names of a pair are long, those of more grains stand side by side.
+    let columns = if grains.len() > 2 { 4 } else { 1 };
+    let top = 8.0 + 10.0 * grains.len().div_ceil(columns) as f64;
     let free = room - scale * (first.width() + second.width());
     let plans = [
         Plan {
@@ -94,9 +138,15 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     ];
     let mut drawing = Drawing::new(COLUMN, top + plans[0].height() + 26.0);
     for (i, grain) in grains.iter().enumerate() {
-        let (x, y) = (plans[0].corner.0, 8.0 + 10.0 * i as f64);
+        let column = (i % columns) as f64 * (COLUMN - LEFT) / columns as f64;
+        let left = if columns == 1 {
+            plans[0].corner.0
+        } else {
+            LEFT
+        };
+        let (x, y) = (left + column, 8.0 + 10.0 * (i / columns) as f64);
         let colour = grain_colour(scene.story.grain_rank(*grain));
-        drawing.line(&[(x, y), (x + 14.0, y)], colour, style::LINE, None);
+        drawing.line(&[(x, y), (x + 14.0, y)], colour, style::LINE, dash(i));
         drawing.label(
             x + 17.0,
             y + 0.36 * SMALL,
@@ -137,12 +187,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
             )
         })
         .collect();
-    let known = |g: &usize| scene.bodies.contains_key(g) || scene.sphere_diameter(*g).is_some();
-    let drawn = if grains.iter().all(known) {
-        "true outlines"
-    } else {
-        "circles of equal volume"
-    };
+    let drawn = scene.drawn_as(&grains);
     let mut caption = format!(
         "Paths of the centres seen along {} and {}, at equal scale, with the grains as {drawn}",
         AXES[sides[1]], AXES[sides[0]]
@@ -152,6 +197,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     } else {
         format!(" at the start (pale) and at {}.", named.join("; "))
     });
+    caption.push_str(&scene.left_out(&grains));
     if let Some(drift) = drift(scene, &grains, up) {
         caption.push_str(&format!(
             " Largest sideways drift: {} mm.",
@@ -169,6 +215,11 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         caption,
         drawing,
     })
+}
+
+/// Dashes tell grains of one colour apart.
+fn dash(n: usize) -> Option<&'static str> {
+    (n >= style::GRAIN_COLOURS).then_some("3.5 1.6")
 }
 
 /// The box, or the part of it that the paths fill.
@@ -221,7 +272,7 @@ fn draw_paths(
     up: usize,
     drawing: &mut Drawing,
 ) {
-    for grain in grains {
+    for (n, grain) in grains.iter().enumerate() {
         let history = &scene.run.grains[*grain];
         let colour = grain_colour(scene.story.grain_rank(*grain));
         let start = plan.path(&scene.outline(*grain, 0, side, up), true);
@@ -260,7 +311,7 @@ fn draw_paths(
                     &run.drain(..).map(|p| plan.at(p)).collect::<Vec<_>>(),
                     colour,
                     0.9,
-                    None,
+                    dash(n),
                 );
             }
             run.push(point);
@@ -269,7 +320,7 @@ fn draw_paths(
             &run.iter().map(|p| plan.at(*p)).collect::<Vec<_>>(),
             colour,
             0.9,
-            None,
+            dash(n),
         );
     }
 }

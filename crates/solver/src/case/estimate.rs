@@ -2,13 +2,10 @@
 
 use glam::DVec3;
 
-use super::Case;
 use super::readable::quantity;
+use super::{Case, warnings};
 use crate::dem::{Dof, Grain};
 use crate::flow::{Boundary, FluidParams};
-use crate::math::Precision;
-use crate::output::Stop;
-use crate::sim::events::StopWhen;
 use crate::sim::{Setup, StepRule};
 
 /// Numbers of the fields and the solver per cell, for the estimate; `grainwake bench` measures the
@@ -17,8 +14,6 @@ const NUMBERS_PER_CELL: f64 = 13.75;
 /// Time of a step on one thread [ns per cell and byte of a number], for the estimate; `grainwake
 /// bench` measures it.
 const NS_PER_CELL_BYTE: f64 = 5.0;
-/// Steps over which the roundings of singles, all of one sign, come to .3 %.
-const MOST_SINGLE_STEPS: u64 = 50_000;
 
 /// Smallest density of a free grain over that of the fluid: tested for spheres, flat and long
 /// grains. At a tenth of it some become unstable.
@@ -77,6 +72,8 @@ pub struct Estimate {
     pub memory_bytes: u64,
     /// Largest Galileo number of the grains.
     pub galileo: Option<f64>,
+    /// The free grain that has it.
+    pub galileo_grain: Option<usize>,
     /// Settling Reynolds number of the equal-volume sphere at that Galileo number.
     pub reynolds: Option<f64>,
     /// Settling speed of that sphere [m/s].
@@ -101,15 +98,18 @@ impl Estimate {
         let setup = &case.setup;
         let g = setup.gravity.length();
         let fluid = setup.fluid.as_ref();
-        let moving = |grain: &&Grain| grain.translation == Dof::Free;
+        let moving = |grain: &Grain| grain.translation == Dof::Free;
         let fastest = fluid.and_then(|f| {
-            let grains = setup.grains.iter().filter(moving);
+            let grains = setup.grains.iter().enumerate();
+            // Of equal ones the first.
             grains
-                .max_by(|a, b| galileo(a, f, g).total_cmp(&galileo(b, f, g)))
-                .map(|grain| (grain, f))
+                .filter(|(_, grain)| moving(grain))
+                .rev()
+                .max_by(|a, b| galileo(a.1, f, g).total_cmp(&galileo(b.1, f, g)))
+                .map(|(index, grain)| (index, grain, f))
         });
-        let galileo = fastest.map(|(grain, f)| galileo(grain, f, g));
-        let speed = fastest.map(|(grain, f)| terminal_speed(grain, f, g));
+        let galileo = fastest.map(|(_, grain, f)| galileo(grain, f, g));
+        let speed = fastest.map(|(_, grain, f)| terminal_speed(grain, f, g));
         let smallest = setup
             .grains
             .iter()
@@ -149,6 +149,7 @@ impl Estimate {
                 0
             },
             galileo,
+            galileo_grain: fastest.map(|(index, ..)| index),
             reynolds: galileo.map(settling_reynolds),
             settling_speed_m_per_s: speed,
             cells_per_diameter: (wet && smallest.is_finite())
@@ -160,10 +161,7 @@ impl Estimate {
                 * (seconds_per_step + grains_per_step * substeps.unwrap_or(1.0).min(50.0)),
             warnings: Vec::new(),
         };
-        estimate.warnings = warnings(setup, &estimate);
-        estimate
-            .warnings
-            .extend(of_light_grains(setup, plan.stop.as_ref()));
+        estimate.warnings = warnings::all(case, &estimate);
         if time_step_s < 0.5 * allowed {
             let message = format!(
                 "an output every {} makes the steps shorter than the {} they could have: make [output] intervals longer",
@@ -189,7 +187,7 @@ pub(super) fn settled_time_step(setup: &Setup) -> f64 {
 }
 
 /// The step that the rule allows at `speed` [s].
-fn time_step(setup: &Setup, speed: f64) -> f64 {
+pub(super) fn time_step(setup: &Setup, speed: f64) -> f64 {
     let resolved = (0..3).filter(|axis| setup.mesh.cells[*axis] > 1);
     let h: Vec<f64> = resolved.map(|axis| setup.mesh.spacing[axis]).collect();
     match setup.step {
@@ -247,143 +245,6 @@ fn blockage(setup: &Setup) -> Option<f64> {
     Some(std::f64::consts::FRAC_PI_4 * largest * largest * along / extent.element_product())
 }
 
-fn warnings(setup: &Setup, e: &Estimate) -> Vec<String> {
-    let mut found = Vec::new();
-    if let Some(n) = e.cells_per_diameter.filter(|n| *n < 8.0) {
-        found.push(format!("only {n:.1} cells across the smallest grain: below 8 forces are rough; make cell_size smaller"));
-    }
-    if let (Some(n), Some(re)) = (e.cells_per_diameter, e.reynolds) {
-        let error = 0.02 * re / (n * n);
-        if error > 0.1 {
-            found.push(format!(
-                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells); expect forces off by 10 % or more",
-                n / re.sqrt()
-            ));
-        }
-    }
-    if let Some(blockage) = e.blockage.filter(|b| *b > 0.05) {
-        let closed =
-            (0..3).any(|axis| !setup.boundaries.is_periodic(axis) && setup.gravity[axis] == 0.0);
-        let what = if closed {
-            "the walls slow the grains"
-        } else {
-            "the grain feels its own images"
-        };
-        found.push(format!("a grain blocks {:.0} % of the cross-section: {what}; widen the box for an unbounded fluid", 100.0 * blockage));
-    }
-    // A dry run has nothing but contact to compute.
-    let wet = setup.fluid.is_some();
-    // On a small grid it does not matter.
-    let large = wet && setup.mesh.cell_count() > 1_000_000;
-    for (axis, &n) in setup.mesh.cells.iter().enumerate() {
-        if large && largest_prime(n) > LARGEST_CHEAP_PRIME {
-            let near = |step: i64| {
-                let mut m = n as i64;
-                while m > 1 && largest_prime(m as usize) > 5 {
-                    m += step;
-                }
-                m
-            };
-            found.push(format!(
-                "{n} cells along {} have a large prime factor, {}: a step takes half as long again; {} or {} cells are fast",
-                ["x", "y", "z"][axis],
-                largest_prime(n),
-                near(-1),
-                near(1)
-            ));
-        }
-    }
-    if setup.precision == Precision::Single && e.steps > MOST_SINGLE_STEPS {
-        found.push(format!(
-            "single precision loses what a step adds beyond its seventh digit: over {} steps speeds may drift by {:.1} %; \"f64\" does not",
-            e.steps,
-            100.0 * f64::from(f32::EPSILON) / 2.0 * e.steps as f64
-        ));
-    }
-    if let Some(substeps) = e.contact_substeps.filter(|n| wet && *n > 200.0) {
-        found.push(format!("contacts need {substeps:.0} sub-steps a step: a lower [contact] stiffness or a larger maximum_overlap is cheaper"));
-    }
-    if let Some(overlap) = expected_overlap(setup).filter(|overlap| *overlap > 0.05) {
-        found.push(format!("a grain at its settling speed would overlap by {:.0} % of its diameter at impact: raise [contact] stiffness", 100.0 * overlap));
-    }
-    if let StepRule::Fixed(step) = setup.step {
-        let limits = Setup {
-            step: StepRule::Limits {
-                cfl: 0.6,
-                viscous: 0.216,
-                max_step: f64::INFINITY,
-            },
-            ..setup.clone()
-        };
-        let most = time_step(&limits, e.settling_speed_m_per_s.unwrap_or(0.0));
-        if step > most {
-            found.push(format!(
-                "the fixed step of {} is above the stability limit of about {}",
-                quantity(step, "s"),
-                quantity(most, "s")
-            ));
-        }
-    }
-    found
-}
-
-/// Warnings of free grains that are light beside the fluid: they rise.
-fn of_light_grains(setup: &Setup, stop: Option<&Stop>) -> Vec<String> {
-    let Some(fluid) = &setup.fluid else {
-        return Vec::new();
-    };
-    let grains = setup.grains.iter();
-    let free: Vec<f64> = grains
-        .filter(|grain| grain.translation == Dof::Free)
-        .map(|grain| grain.density / fluid.density)
-        .collect();
-    let mut found = Vec::new();
-    let rising = free.iter().filter(|ratio| **ratio < 1.0).count();
-    if rising == 0 || setup.gravity == DVec3::ZERO {
-        return found;
-    }
-    let all = rising == free.len();
-    found.push(if all {
-        "the free grains are lighter than the fluid: they rise, and settling, landing and leading are meant upwards".into()
-    } else {
-        format!("{rising} of {} free grains are lighter than the fluid and rise", free.len())
-    });
-    if !all && stop.is_some_and(|stop| stop.when == StopWhen::Landing) {
-        found.push(
-            "stop = \"landing\" may never be met: it waits until every free grain has touched the floor"
-                .into(),
-        );
-    }
-    found
-}
-
-/// Prime factors of a number of cells up to this one cost no more than others.
-const LARGEST_CHEAP_PRIME: usize = 13;
-
-/// Largest prime factor of `n`; 1 of 1.
-fn largest_prime(mut n: usize) -> usize {
-    let (mut largest, mut factor) = (1, 2);
-    while factor * factor <= n {
-        while n.is_multiple_of(factor) {
-            (largest, n) = (factor, n / factor);
-        }
-        factor += 1;
-    }
-    largest.max(n)
-}
-
-/// Overlap of an impact at the settling speed over the diameter, largest.
-fn expected_overlap(setup: &Setup) -> Option<f64> {
-    let fluid = setup.fluid.as_ref()?;
-    let g = setup.gravity.length();
-    let of = |grain: &Grain| {
-        let speed = terminal_speed(grain, fluid, g).max(grain.velocity.length());
-        speed * (grain.mass() / setup.contact.normal_stiffness).sqrt()
-            / grain.shape.equivalent_diameter()
-    };
-    setup.grains.iter().map(of).reduce(f64::max)
-}
-
 /// Longest step from which a run starts if none is given [s]: gravity moves a grain by a cell
 /// (dry: a fiftieth of its diameter) from rest in it.
 pub(super) fn default_max_step(
@@ -414,12 +275,6 @@ pub(super) fn default_max_step(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn prime_factors_are_found() {
-        let found = [1, 2, 97, 100, 131, 390, 2 * 53].map(largest_prime);
-        assert_eq!(found, [1, 2, 97, 5, 131, 13, 53]);
-    }
 
     #[test]
     fn settling_numbers_of_the_paper() {

@@ -203,17 +203,17 @@ fn collect<K: Kind>(
             .as_ref()
             .and_then(|v| v.span.as_ref())
             .or(place.as_ref());
+        if let Some((span, message, help)) = contradiction(item) {
+            fail(span.or(place.as_ref()), &key, message, help);
+            continue;
+        }
         let bounds = match (&item.value, &item.tolerance, &item.at_least, &item.at_most) {
             (Some(value), Some(tolerance), None, None) => {
                 let width = match tolerance.value {
                     Tolerance::Absolute(q) => q.si,
                     Tolerance::Relative(fraction) => fraction * value.si.abs(),
                 };
-                if width >= 0.0 {
-                    Some((value.si - width, value.si + width))
-                } else {
-                    None
-                }
+                Some((value.si - width, value.si + width))
             }
             (None, None, low, high) if low.is_some() || high.is_some() => Some((
                 low.as_ref().map_or(f64::NEG_INFINITY, |q| q.si),
@@ -243,4 +243,30 @@ fn collect<K: Kind>(
             high,
         });
     }
+}
+
+/// What is wrong with a bound that is complete: place, message, help.
+fn contradiction<K: Kind>(
+    item: &RawExpected<K>,
+) -> Option<(Option<&std::ops::Range<usize>>, String, &'static str)> {
+    if let Some(tolerance) = &item.tolerance {
+        let (size, text) = match tolerance.value {
+            Tolerance::Absolute(q) => (q.si, format!("{}", q.si)),
+            Tolerance::Relative(fraction) => (fraction, format!("{} %", 100.0 * fraction)),
+        };
+        if size.is_nan() || size < 0.0 {
+            let message = format!(
+                "a tolerance of {text}: it is the largest difference either way, zero or more"
+            );
+            let help = "write it without its sign, tolerance = \"2 %\"";
+            return Some((tolerance.span.as_ref(), message, help));
+        }
+    }
+    if let (Some(low), Some(high)) = (&item.at_least, &item.at_most)
+        && low.si > high.si
+    {
+        let message = format!("at_least, {}, is above at_most, {}", low.si, high.si);
+        return Some((low.span.as_ref(), message, "exchange them"));
+    }
+    None
 }

@@ -21,6 +21,7 @@ mod source;
 mod suggest;
 mod units;
 mod validate;
+mod warnings;
 mod wording;
 
 use std::path::Path;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use grainwake_shape::{Shape, ShapeOptions, analytic};
+use grainwake_shape::{Shape, ShapeError, ShapeOptions, analytic};
 
 use super::loc::Loc;
 use super::quantity::{Length, Quantity};
@@ -188,9 +188,12 @@ fn construct(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
         ),
     };
     shape.map_err(|error| {
-        (
-            error.to_string(),
-            "change the sizes of this shape".to_string(),
-        )
+        let help = match error {
+            ShapeError::BadParameter { name: "nodes", .. } => {
+                "give another number of surface nodes; without `nodes` there are about 2000"
+            }
+            _ => "change the sizes of this shape",
+        };
+        (error.to_string(), help.to_string())
     })
 }

@@ -1,4 +1,5 @@
-//! Checkpoints: the whole state in one file, checksummed, synced, renamed; two are kept.
+//! Checkpoints: the whole state in one file, checksummed, synced, renamed; two are kept while a
+//! run goes on, the last one of a finished run.
 //!
 //! Layout: signature, version, length of the record, the record (JSON), the state of the
 //! simulation, SHA-256 of all before it.
@@ -12,6 +13,7 @@ use sha2::{Digest, Sha256};
 
 use super::error::{Context, RunError};
 use super::file::{sync_folder, write_whole};
+use super::meetings::Meetings;
 use super::pvd::Picture;
 use super::tables::Lengths;
 use crate::sim::Simulation;
@@ -48,6 +50,9 @@ pub struct Record {
     pub last_row: Option<f64>,
     /// What has happened.
     pub tracker: TrackerState,
+    /// Which of a few grains have met.
+    #[serde(default)]
+    pub meetings: Meetings,
 }
 
 struct Hashed<'a> {
@@ -106,7 +111,12 @@ pub(super) fn write(run: &Path, record: &Record, sim: &Simulation) -> Result<(),
     })
     .and_then(|()| sync_folder(&folder))
     .context("write", &path)?;
-    for old in list(run).into_iter().skip(2) {
+    keep(run, 2)
+}
+
+/// Removes all checkpoints but the newest `count`.
+pub(super) fn keep(run: &Path, count: usize) -> Result<(), RunError> {
+    for old in list(run).into_iter().skip(count) {
         std::fs::remove_file(&old).context("remove", &old)?;
     }
     Ok(())

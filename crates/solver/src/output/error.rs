@@ -19,6 +19,14 @@ pub enum RunError {
         /// What to do.
         remedy: String,
     },
+    /// Another program writes into the folder.
+    #[error("another run{} is writing into {}; wait for it or stop it, or give another folder with -o", process.map_or(String::new(), |p| format!(" (process {p})")), folder.display())]
+    InUse {
+        /// The run folder.
+        folder: PathBuf,
+        /// Its process number, where known.
+        process: Option<u32>,
+    },
     /// The numerics failed.
     #[error("{source}\nThe last good checkpoint, at t = {time:.6e} s, is kept in {}", folder.display())]
     Unstable {
@@ -61,7 +69,10 @@ impl RunError {
     /// Exit code of the command line: 2 bad input, 3 numerics, 4 input/output.
     pub fn exit_code(&self) -> u8 {
         match self {
-            RunError::Setup(_) | RunError::Occupied { .. } | RunError::OtherCase { .. } => 2,
+            RunError::Setup(_)
+            | RunError::Occupied { .. }
+            | RunError::InUse { .. }
+            | RunError::OtherCase { .. } => 2,
             RunError::Unstable { .. } => 3,
             RunError::Io { .. } | RunError::NoCheckpoint { .. } => 4,
         }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::checkpoint;
 use super::error::{Context, RunError};
+use super::lock::{self, Asked, Lock};
 use super::pictures;
 use super::provenance::{self, Provenance};
 use super::summary::Summary;
@@ -75,7 +76,7 @@ pub(super) fn look(folder: &Path) -> Result<Found, RunError> {
     // A kill in the first moments leaves empty folders and temporary files at most.
     let foreign = entries.flatten().any(|entry| {
         let empty = std::fs::read_dir(entry.path()).is_ok_and(|mut inside| inside.next().is_none());
-        !empty && !is_temporary(&entry.path())
+        !empty && !is_temporary(&entry.path()) && entry.file_name() != lock::FILE
     });
     Ok(if foreign {
         Found::Foreign
@@ -86,6 +87,12 @@ pub(super) fn look(folder: &Path) -> Result<Found, RunError> {
 
 /// Whether a run may go into the folder; nothing is written.
 pub(super) fn admit(folder: &Path, existing: Existing) -> Result<Found, RunError> {
+    if folder.exists() && !folder.is_dir() {
+        return Err(RunError::Occupied {
+            what: format!("{} is a file, not a folder", folder.display()),
+            remedy: "give the folder of the run with -o".into(),
+        });
+    }
     let found = look(folder)?;
     let occupied = |what: &str, remedy: &str| {
         Err(RunError::Occupied {
@@ -114,7 +121,20 @@ pub(super) fn admit(folder: &Path, existing: Existing) -> Result<Found, RunError
     }
 }
 
-/// Removes what a run leaves in its folder, and nothing else.
+/// Makes the folder, if need be, and takes it for this program.
+pub(super) fn take(folder: &Path) -> Result<Lock, RunError> {
+    std::fs::create_dir_all(folder).context("create", folder)?;
+    let path = folder.join(lock::FILE);
+    match lock::take(&path).context("lock", &path)? {
+        Asked::Taken(lock) => Ok(lock),
+        Asked::Elsewhere(process) => Err(RunError::InUse {
+            folder: folder.into(),
+            process,
+        }),
+    }
+}
+
+/// Removes what a run leaves in its folder, and nothing else; its lock stays.
 pub(super) fn clear(folder: &Path) -> Result<(), RunError> {
     // The mark of a run folder goes last: a clearing that is cut short can be repeated.
     let files = [

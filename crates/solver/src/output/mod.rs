@@ -3,9 +3,12 @@
 //! [`run()`] takes a [`Job`] and a folder. What it writes is listed in `docs/reference/run-folder.md`.
 
 pub mod checkpoint;
+mod compare;
 mod error;
 mod file;
 mod folder;
+pub mod lock;
+mod meetings;
 mod pictures;
 mod plan;
 pub mod provenance;

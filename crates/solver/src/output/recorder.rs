@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::checkpoint::{self, Record};
 use super::error::{Context, RunError};
+use super::meetings::{FEW, Meetings};
 use super::pictures::Pictures;
 use super::plan::RunPlan;
 use super::pvd::{self, Picture};
@@ -46,6 +47,9 @@ pub(super) struct Recorder {
     tables: Tables,
     pictures: Pictures,
     tracker: Tracker,
+    meetings: Meetings,
+    /// Grains that do not touch for so long have parted [s].
+    hold: f64,
     next: [u64; 4],
     shown: Vec<Picture>,
     max_divergence: f64,
@@ -78,6 +82,8 @@ impl Recorder {
             tables,
             pictures: Pictures::new(&plan.planes, sim),
             tracker: Tracker::new(params, sim.grains(), gap),
+            meetings: Meetings::default(),
+            hold: params.separation_hold,
             next: [0; 4],
             shown: Vec::new(),
             max_divergence: sim.max_divergence(),
@@ -114,6 +120,7 @@ impl Recorder {
             Tables::reopen(run, record.lengths)?,
         );
         recorder.tracker.restore(record.tracker);
+        recorder.meetings = record.meetings;
         recorder.next = record.next;
         recorder.shown = record.pictures;
         recorder.max_divergence = record.max_divergence;
@@ -148,9 +155,13 @@ impl Recorder {
         self.max_cfl = self.max_cfl.max(sim.cfl());
         let gap = pair_gap(sim, &self.enclosure);
         let before = self.tracker.events().len();
-        let events = self
+        let mut events = self
             .tracker
             .update(sim.time(), sim.grains(), sim.contacts(), gap);
+        if (3..=FEW).contains(&sim.grains().len()) {
+            let met = self.meetings.update(sim.time(), sim.contacts(), self.hold);
+            events.extend(met);
+        }
         self.tables.events(&events)?;
         self.due(sim)?;
         if self.at_events {
@@ -239,6 +250,7 @@ impl Recorder {
             max_cfl: self.max_cfl,
             last_row: self.last_row,
             tracker: self.tracker.state().clone(),
+            meetings: self.meetings.clone(),
         };
         checkpoint::write(&self.run, &record, sim)
     }
@@ -246,6 +258,15 @@ impl Recorder {
     /// What has happened so far.
     pub fn tracker(&self) -> &Tracker {
         &self.tracker
+    }
+
+    /// Everything that has happened, in the order in which it became certain.
+    fn events(&self) -> Vec<Event> {
+        let mut events = self.tracker.events().to_vec();
+        events.extend_from_slice(&self.meetings.events);
+        // A stable sort: what became certain in one step stays in the order of the log.
+        events.sort_by(|a, b| a.confirmed.total_cmp(&b.confirmed));
+        events
     }
 
     /// The results so far.
@@ -266,7 +287,7 @@ impl Recorder {
             steps: sim.steps(),
             end_time_s: sim.time(),
             wall_s,
-            events: tracker.events().to_vec(),
+            events: self.events(),
             max_divergence: self.max_divergence,
             max_cfl: self.max_cfl,
             ended_by: ended_by.into(),

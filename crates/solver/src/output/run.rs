@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::checkpoint;
+use super::compare::differing;
 use super::error::{Context, RunError};
 use super::file::write_whole;
 use super::folder::{self, Existing, Found, RESOLVED, SUMMARY};
@@ -13,7 +14,7 @@ use super::provenance::{Provenance, Session};
 use super::recorder::Recorder;
 use super::summary::Summary;
 use crate::sim::events::{Event, Phase, StopWhen};
-use crate::sim::{Setup, Simulation, StepError};
+use crate::sim::{Setup, Simulation, StepError, StepRule};
 
 /// What is to be run.
 #[derive(Clone, Debug)]
@@ -108,6 +109,10 @@ pub fn run(
     options: &Options,
     observer: &mut dyn Observer,
 ) -> Result<Ending, RunError> {
+    // First without a trace in a folder that is not ours, then for good: another program may have
+    // come between.
+    folder::admit(out, options.existing.settle(out, &job.digest))?;
+    let _lock = folder::take(out)?;
     let existing = options.existing.settle(out, &job.digest);
     let found = folder::admit(out, existing)?;
     let mut provenance = Provenance::new(&job.digest);
@@ -115,8 +120,7 @@ pub fn run(
     if resuming {
         provenance = Provenance::read(out).unwrap_or(provenance);
         if provenance.case_sha256 != job.digest {
-            let what =
-                "its grains, fluid, box, contact, step, precision or output times differ".into();
+            let what = differing(out, &job.resolved);
             return Err(RunError::OtherCase {
                 folder: out.into(),
                 what,
@@ -144,9 +148,7 @@ pub fn run(
             "resuming at t = {:.6e} s, step {}",
             record.time, record.steps
         )),
-        None if resuming => {
-            observer.note("no checkpoint had been written yet: starting from the beginning")
-        }
+        None if resuming => observer.note("there is no checkpoint: starting from the beginning"),
         None => {}
     }
     if record.is_none() && found != Found::Empty {
@@ -297,17 +299,32 @@ impl Running {
             writeln!(out)
         })
         .context("write", &path)?;
+        // The last one is enough to go on to a later end.
+        checkpoint::keep(&self.out, 1)?;
         Ok(Ending::Finished(summary))
     }
 
+    /// What to try, by the key that the case has for its steps.
+    fn advice(&self, remedy: &str) -> String {
+        let own = match self.sim.setup().step {
+            StepRule::Fixed(_) => "a smaller [time] step",
+            StepRule::Limits { .. } => "a smaller [time] cfl",
+        };
+        remedy
+            .replace("a smaller [time] cfl, a smaller fixed step", own)
+            .replace("a smaller [time] cfl", own)
+            .replace("a smaller time step", own)
+    }
+
     /// Notes what was seen; the last good checkpoint stays as it is.
-    fn failed(&mut self, source: StepError, time: f64) -> RunError {
+    fn failed(&mut self, mut source: StepError, time: f64) -> RunError {
         let StepError::Unstable {
             time: at,
             step,
             what,
             remedy,
-        } = &source;
+        } = &mut source;
+        *remedy = self.advice(remedy);
         let failure = serde_json::json!({ "time": at, "step": step, "what": what, "remedy": remedy, "checkpoint_time": time });
         let path = self.out.join("failure.json");
         let kept =

@@ -3,7 +3,11 @@
 use glam::DVec3;
 
 use super::Simulation;
+use crate::dem::Grain;
 use crate::grid::FACE_OFFSET;
+
+/// Cells near a surface are cut into so many along each axis.
+const PARTS: usize = 4;
 
 impl Simulation {
     /// Cell-centred velocity [m/s] of cell (i, j, k), counted from 0; zero without fluid.
@@ -54,12 +58,19 @@ impl Simulation {
         let pressure = self.fluid.as_ref().map(|fluid| fluid.pressure(at));
         density * pressure.unwrap_or(0.0)
     }
-    /// Solid fraction of cell (i, j, k), counted from 0, by the plane through the nearest surface.
+    /// Part of the volume of cell (i, j, k), counted from 0, that is solid. Cells near a surface are cut
+    /// into smaller ones, and each of these by the plane through the nearest surface.
     pub fn solid_fraction_at(&self, cell: [usize; 3]) -> f64 {
         let mesh = &self.setup.mesh;
         let x = mesh.position([0.5; 3], cell.map(|i| i + 1));
         let extent = mesh.extent();
-        let mut fraction: f64 = 0.0;
+        // A box of one cell along an axis is seen in its middle plane.
+        let parts = mesh.cells.map(|n| if n > 1 { PARTS } else { 1 });
+        let edge = DVec3::from_array([0, 1, 2].map(|axis| {
+            let resolved = mesh.cells[axis] > 1;
+            if resolved { mesh.spacing[axis] } else { 0.0 }
+        }));
+        let mut near: Vec<(&Grain, DVec3)> = Vec::new();
         for grain in &self.setup.grains {
             let mut arm = x - grain.pose.position;
             for axis in 0..3 {
@@ -71,17 +82,42 @@ impl Simulation {
             if arm.length_squared() > reach * reach {
                 continue;
             }
-            let (d, gradient) = grain
-                .shape
-                .distance_and_gradient(grain.pose.orientation.conjugate() * arm);
-            let normal = grain.pose.orientation * gradient.normalize_or_zero();
-            let width = normal
-                .abs()
-                .dot(mesh.spacing)
-                .max(mesh.spacing.min_element());
-            fraction = fraction.max((0.5 - d / width).clamp(0.0, 1.0));
+            let back = grain.pose.orientation.conjugate();
+            let (d, _) = grain.shape.distance_and_gradient(back * arm);
+            // The distance changes by no more than the way to the farthest corner.
+            if d <= -0.5 * edge.length() {
+                return 1.0;
+            }
+            if d < 0.5 * edge.length() {
+                near.push((grain, arm));
+            }
         }
-        fraction
+        if near.is_empty() {
+            return 0.0;
+        }
+        let part = edge / DVec3::from_array(parts.map(|n| n as f64));
+        let thinnest = (0..3)
+            .filter(|axis| part[*axis] > 0.0)
+            .map(|axis| part[axis])
+            .fold(f64::INFINITY, f64::min);
+        let place =
+            |i: usize, axis: usize| (i as f64 + 0.5 - 0.5 * parts[axis] as f64) * part[axis];
+        let mut sum = 0.0;
+        for (i, j, k) in (0..parts[0])
+            .flat_map(|i| (0..parts[1]).flat_map(move |j| (0..parts[2]).map(move |k| (i, j, k))))
+        {
+            let offset = DVec3::new(place(i, 0), place(j, 1), place(k, 2));
+            let share = near.iter().map(|(grain, arm)| {
+                let turn = grain.pose.orientation;
+                let point = turn.conjugate() * (*arm + offset);
+                let (d, gradient) = grain.shape.distance_and_gradient(point);
+                let normal = turn * gradient.normalize_or_zero();
+                let width = normal.abs().dot(part).max(thinnest);
+                (0.5 - d / width).clamp(0.0, 1.0)
+            });
+            sum += share.fold(0.0, f64::max);
+        }
+        sum / parts.iter().product::<usize>() as f64
     }
 
     /// Velocity [m/s] at a point by trilinear interpolation of each component; `None` outside the

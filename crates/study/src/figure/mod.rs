@@ -1,8 +1,10 @@
 //! Figures of a study, each a drawing with its caption.
 
 mod compare;
+mod default;
 mod grains;
 mod kiss;
+mod legend;
 mod setup;
 mod stories;
 mod trends;
@@ -104,8 +106,33 @@ pub fn all(data: &Data, notes: &mut Vec<String>) -> Vec<Drawn> {
     out.extend(kiss::by_model(data));
     out.extend(kiss::boxes(data));
     out.extend(compare::figures(data, notes));
+    out.extend(default::figures(data));
     out.extend(trends::figure(data));
+    if !as_in_the_paper(data) {
+        renumber(&mut out);
+    }
     out
+}
+
+/// Whether the study shows the grains, set-ups and orientations that the paper's first figures do.
+fn as_in_the_paper(data: &Data) -> bool {
+    let plan = &data.manifest.analysis.figures;
+    plan.grains.is_some() && plan.orientations.is_some() && plan.setup.is_some()
+}
+
+/// Counts figures from 1, in their names too.
+fn renumber(figures: &mut [Drawn]) {
+    for (i, figure) in figures.iter_mut().enumerate() {
+        figure.number = (i + 1).to_string();
+        let plain = |name: &str| -> Option<String> {
+            let (number, rest) = name.strip_prefix("fig")?.split_once('-')?;
+            number
+                .starts_with(|c: char| c.is_ascii_digit())
+                .then(|| rest.to_owned())
+        };
+        let name = plain(&figure.name).unwrap_or_else(|| figure.name.clone());
+        figure.name = format!("fig{:02}-{name}", i + 1);
+    }
 }
 
 /// A factor as axis labels have it: its first letter in italics.

@@ -4,6 +4,7 @@ use grainwake_report::figure::Figure;
 use grainwake_report::figure::style::{COLUMN, PAGE};
 use grainwake_report::figure::svg::Drawing;
 use grainwake_report::figure::text;
+use grainwake_report::story::Subject;
 use grainwake_report::{Told, tell};
 
 use super::{Data, Drawn};
@@ -23,15 +24,14 @@ pub fn figures(data: &Data, notes: &mut Vec<String>) -> Vec<Drawn> {
                 .any(|r| r.name == run.name && r.state != "stale" && r.state != "missing")
         });
         let told = run.map(|run| tell(&run.folder(data.folder)));
+        let which = if super::as_in_the_paper(data) {
+            format!("figures {} and {}", numbers.0, numbers.1)
+        } else {
+            format!("the pictures of {name}")
+        };
         match told {
-            None => notes.push(format!(
-                "figures {} and {} are left out: there is no run {name}",
-                numbers.0, numbers.1
-            )),
-            Some(Err(error)) => notes.push(format!(
-                "figures {} and {} are left out: {error}",
-                numbers.0, numbers.1
-            )),
+            None => notes.push(format!("{which} are left out: there is no run {name}")),
+            Some(Err(error)) => notes.push(format!("{which} are left out: {error}")),
             Some(Ok(told)) => {
                 paths.extend(path_and_speed(name, numbers.0, &told));
                 whirls.extend(vorticity(name, numbers.1, &told));
@@ -80,10 +80,13 @@ fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<Drawn> {
     for (figure, y) in placed {
         drawing.inset(&figure.drawing, PAGE - COLUMN, y, figure.name);
     }
-    let mut caption = format!(
-        "Left: {} Right: gap of the centres and tilt of their line.",
-        path.caption
-    );
+    let pair = told.story.subject == Subject::Pair;
+    let beside = if pair {
+        "gap of the centres and tilt of their line"
+    } else {
+        "velocity against time"
+    };
+    let mut caption = format!("Left: {} Right: {beside}.", path.caption);
     if let Some(speed) = speed {
         drawing.inset(
             &speed.drawing,
@@ -98,7 +101,11 @@ fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<Drawn> {
     Some(Drawn {
         name: format!("fig{number:02}-{name}"),
         number: number.to_string(),
-        title: format!("Drafting, kissing and tumbling of {}", text::literal(name)),
+        title: if pair {
+            format!("Drafting, kissing and tumbling of {}", text::literal(name))
+        } else {
+            format!("Path of {}", text::literal(name))
+        },
         caption: caption + state(told),
         drawing,
     })

@@ -153,7 +153,12 @@ pub(super) fn shape(
             resolved.nodes = Some(nodes.unwrap_or(crate::case::shapes::DEFAULT_NODES).into());
             library
                 .closed_form(shape, nodes)
-                .map_err(|refusal| (shape.span.clone(), key("shape"), refusal))
+                .map_err(|refusal| match &raw.nodes {
+                    Some(nodes) if refusal.0.starts_with("nodes") => {
+                        (nodes.span.clone(), key("nodes"), refusal)
+                    }
+                    _ => (shape.span.clone(), key("shape"), refusal),
+                })
         }
         (Some(_), Some(shape)) => Err((
             shape.span.clone(),

@@ -1,5 +1,7 @@
 //! The page of a study: one HTML file without scripts or outside resources.
 
+mod settling;
+
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -13,7 +15,7 @@ use crate::measure::Measures;
 use crate::plan::Manifest;
 use crate::stats::median;
 use crate::table::Row;
-use crate::words::{p_text, plain, short};
+use crate::words::{number, p_text, plain, short};
 
 /// What is on the page.
 pub(crate) struct Content<'a> {
@@ -51,11 +53,18 @@ impl Content<'_> {
             self.lead()
         );
         out += &self.notices();
-        section(
-            &mut out,
-            "Which kiss first, which part first, and how sure",
-            &self.answers(),
-        );
+        let settle = self.rows.iter().any(|r| r.settling.is_some());
+        if settle {
+            let answers = settling::answers(self);
+            section(&mut out, "Which settle fastest, and how sure", &answers);
+        }
+        if self.has_pairs() {
+            section(
+                &mut out,
+                "Which kiss first, which part first, and how sure",
+                &self.answers(),
+            );
+        }
         if !self.findings.is_empty() {
             section(&mut out, "The claims and what the runs say", &self.claims());
         }
@@ -80,6 +89,12 @@ impl Content<'_> {
         out
     }
 
+    /// Whether any finished run is a pair; taken to be so while none is finished.
+    fn has_pairs(&self) -> bool {
+        let settle = self.rows.iter().any(|r| r.settling.is_some());
+        !settle || self.rows.iter().any(|r| r.pair.is_some())
+    }
+
     fn lead(&self) -> String {
         let (done, all) = (self.done(), self.rows.len());
         let mut text = format!("{done} of {all} runs are finished");
@@ -92,7 +107,8 @@ impl Content<'_> {
         let again = of(|p| p.repeated == Some(true));
         let missed =
             of(|p| p.kiss_time.is_none() && p.closest_gap.is_some_and(|gap| gap < NARROWLY));
-        if done > 0 {
+        text += &settling::lead(self.rows).unwrap_or_default();
+        if done > 0 && self.has_pairs() {
             let _ = write!(
                 text,
                 "; {kissed} pairs kissed before they landed, {parted} of them parted, {again} kissed more than once; \
@@ -193,7 +209,7 @@ impl Content<'_> {
 
     fn certainty(&self, kiss: &[Sample], part: &[Sample]) -> String {
         if self.rows.iter().all(|r| r.member == 0) {
-            return "<p><b>How sure</b>: every model was run once. Up to the first contact the motion follows from the start; after it the motion is sensitive to the smallest disturbance, and an <code>[ensemble]</code> of repetitions tells how much. The tests below go by ranks over all grains, so that no single run decides.</p>\n".into();
+            return "<p><b>How sure</b>: every model was run once. Up to the first contact the motion follows from the start; after it the motion is sensitive to the smallest disturbance, and an <code>[ensemble]</code> of repetitions tells how much. Claims and correlations go by ranks over all models, so that no single run decides.</p>\n".into();
         }
         let spread = |list: &[Sample]| {
             let several: Vec<f64> = list
@@ -204,7 +220,7 @@ impl Content<'_> {
             median(&several).map_or("not known".into(), |m| format!("{:.1} %", 100.0 * m))
         };
         format!(
-            "<p><b>How sure</b>: models were repeated with small random offsets of the start. The range of the repetitions, relative to their median, is {} for the first contact and {} for the time in contact (medians over the models). Differences of single grains below that say nothing.</p>\n",
+            "<p><b>How sure</b>: models were repeated with small random offsets of the start. The range of the repetitions, relative to their median, is {} for the first contact and {} for the time in contact (medians over the models). Differences of single models below that say nothing.</p>\n",
             spread(kiss),
             spread(part)
         )
@@ -227,21 +243,37 @@ impl Content<'_> {
         out + "</tbody></table></div>\n"
     }
 
+    /// Columns of the table that any run has.
+    fn columns(&self) -> Vec<(&'static str, &'static str)> {
+        let known = |(_, name): &(&str, &str)| self.rows.iter().any(|r| r.measured(name).is_some());
+        let mut out = Vec::new();
+        if self.has_pairs() {
+            out.extend(COLUMNS);
+        }
+        out.extend(settling::COLUMNS.into_iter().filter(known));
+        out
+    }
+
     fn table(&self) -> String {
-        let head: String = COLUMNS
+        let columns = self.columns();
+        let head: String = columns
             .iter()
             .map(|(name, _)| format!("<th class=\"number\">{name}</th>"))
             .collect();
-        let mut out = format!(
-            "<p>Dimensionless; v is the mean speed until the first landing, ≥ a lower bound. All quantities are in <code>table.csv</code>.</p>\n<div class=\"scroll\"><table><thead><tr><th>run</th><th>state</th>{head}<th class=\"number\">wall [min]</th></tr></thead><tbody>\n"
+        let mut out = String::new();
+        if self.has_pairs() {
+            out += "<p>Dimensionless; v is the mean speed until the first landing, ≥ a lower bound. All quantities are in <code>table.csv</code>.</p>\n";
+        }
+        if self.rows.iter().any(|r| r.settling.is_some()) {
+            out += &settling::note();
+        }
+        let _ = writeln!(
+            out,
+            "<div class=\"scroll\"><table><thead><tr><th>run</th><th>state</th>{head}<th class=\"number\">wall [min]</th></tr></thead><tbody>"
         );
         for row in self.rows {
             let cell = |name: &str| {
-                let value = row
-                    .pair
-                    .as_ref()
-                    .and_then(|p| p.get(name))
-                    .map_or("–".into(), short);
+                let value = row.measured(name).map_or("–".into(), |v| number(name, v));
                 let bound = name == "contact_stage"
                     && row.pair.as_ref().is_some_and(|p| p.parted == Some(false));
                 format!(
@@ -249,7 +281,7 @@ impl Content<'_> {
                     if bound { "≥ " } else { "" }
                 )
             };
-            let cells: String = COLUMNS.iter().map(|(_, name)| cell(name)).collect();
+            let cells: String = columns.iter().map(|(_, name)| cell(name)).collect();
             let wall = row
                 .wall_s
                 .map_or("–".into(), |s| format!("{:.1}", s / 60.0));

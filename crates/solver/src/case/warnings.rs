@@ -1,0 +1,248 @@
+//! What may spoil the results of a case, said before it runs.
+
+use glam::DVec3;
+
+use super::Case;
+use super::estimate::{Estimate, terminal_speed, time_step};
+use super::readable::quantity;
+use crate::dem::{Dof, Grain};
+use crate::math::Precision;
+use crate::output::{Place, Plane, Stop};
+use crate::sim::events::StopWhen;
+use crate::sim::{Setup, StepRule};
+
+/// Steps over which the roundings of singles, all of one sign, come to .3 %.
+const MOST_SINGLE_STEPS: u64 = 50_000;
+/// More steps than any run has: a unit must be wrong.
+const ABSURD_STEPS: u64 = 100_000_000;
+/// A grain that settles with a smaller Reynolds number does not move.
+const ABSURD_REYNOLDS: f64 = 1e-4;
+
+/// All warnings of a case.
+pub(super) fn all(case: &Case, e: &Estimate) -> Vec<String> {
+    let mut found = of_units(&case.setup, e);
+    found.extend(of_numbers(&case.setup, e));
+    found.extend(of_light_grains(&case.setup, case.plan.stop.as_ref()));
+    found.extend(of_dry(case));
+    found
+}
+
+/// Numbers that no run has, from a unit mistaken.
+fn of_units(setup: &Setup, e: &Estimate) -> Vec<String> {
+    let mut found = Vec::new();
+    if e.steps > ABSURD_STEPS {
+        let viscous = matches!(setup.step, StepRule::Limits { .. }) && setup.fluid.is_some();
+        let cause = if viscous {
+            "look at the units of viscosity, cell_size and time.end"
+        } else {
+            "look at the units of time.step and time.end"
+        };
+        found.push(format!(
+            "{:.1e} steps of {} to the end are more than can be run: {cause}",
+            e.steps as f64,
+            quantity(e.time_step_s, "s")
+        ));
+    }
+    let falls = setup.gravity != DVec3::ZERO;
+    if let (Some(re), Some(speed)) = (e.reynolds, e.settling_speed_m_per_s)
+        && falls
+        && re < ABSURD_REYNOLDS
+    {
+        found.push(format!(
+            "the grains settle at Re {re:.1e} and {}: they will hardly move; look at the units of viscosity, densities and diameters",
+            quantity(speed, "m/s")
+        ));
+    }
+    found
+}
+
+/// Whether the planes are not those of a case that gives none.
+fn own_planes(case: &Case) -> bool {
+    let mesh = &case.setup.mesh;
+    let middle = mesh.origin + 0.5 * mesh.extent();
+    let usual = |plane: &Plane| match plane.place {
+        Place::Grain(_) => plane.axis < 2,
+        Place::At(at) => {
+            plane.axis < 2 && (at - middle[plane.axis]).abs() < 1e-9 * mesh.extent()[plane.axis]
+        }
+    };
+    !case.plan.planes.iter().all(usual)
+}
+
+/// What is asked for of the flow of a case without one.
+fn of_dry(case: &Case) -> Option<String> {
+    if case.setup.fluid.is_some() {
+        return None;
+    }
+    let table: toml::Table = case.resolved.parse().ok()?;
+    let section = |name: &str| table.get(name).and_then(toml::Value::as_table);
+    let asked = [
+        (own_planes(case), "output.planes"),
+        (case.plan.slices > 0.0, "output.slices"),
+        (case.plan.fields > 0.0, "output.fields"),
+        (
+            section("expect").is_some_and(|e| e.contains_key("max_divergence")),
+            "expect.max_divergence",
+        ),
+    ];
+    let names: Vec<&str> = asked
+        .iter()
+        .filter(|(is, _)| *is)
+        .map(|(_, name)| *name)
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "there is no [fluid], so the run is dry and {} {} no effect: add [fluid] with density and viscosity if it was forgotten",
+            names.join(", "),
+            if names.len() == 1 { "has" } else { "have" }
+        )
+    })
+}
+
+fn of_numbers(setup: &Setup, e: &Estimate) -> Vec<String> {
+    let mut found = Vec::new();
+    if let Some(n) = e.cells_per_diameter.filter(|n| *n < 8.0) {
+        found.push(format!("only {n:.1} cells across the smallest grain: below 8 forces are rough; make cell_size smaller"));
+    }
+    if let (Some(n), Some(re)) = (e.cells_per_diameter, e.reynolds) {
+        let error = 0.02 * re / (n * n);
+        if error > 0.1 {
+            found.push(format!(
+                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells); expect forces off by 10 % or more",
+                n / re.sqrt()
+            ));
+        }
+    }
+    if let Some(blockage) = e.blockage.filter(|b| *b > 0.05) {
+        let closed =
+            (0..3).any(|axis| !setup.boundaries.is_periodic(axis) && setup.gravity[axis] == 0.0);
+        let what = if closed {
+            "the walls slow the grains"
+        } else {
+            "the grain feels its own images"
+        };
+        found.push(format!("a grain blocks {:.0} % of the cross-section: {what}; widen the box for an unbounded fluid", 100.0 * blockage));
+    }
+    // A dry run has nothing but contact to compute.
+    let wet = setup.fluid.is_some();
+    // On a small grid it does not matter.
+    let large = wet && setup.mesh.cell_count() > 1_000_000;
+    for (axis, &n) in setup.mesh.cells.iter().enumerate() {
+        if large && largest_prime(n) > LARGEST_CHEAP_PRIME {
+            let near = |step: i64| {
+                let mut m = n as i64;
+                while m > 1 && largest_prime(m as usize) > 5 {
+                    m += step;
+                }
+                m
+            };
+            found.push(format!(
+                "{n} cells along {} have a large prime factor, {}: a step takes half as long again; {} or {} cells are fast",
+                ["x", "y", "z"][axis],
+                largest_prime(n),
+                near(-1),
+                near(1)
+            ));
+        }
+    }
+    if setup.precision == Precision::Single && e.steps > MOST_SINGLE_STEPS {
+        found.push(format!(
+            "single precision loses what a step adds beyond its seventh digit: over {} steps speeds may drift by {:.1} %; \"f64\" does not",
+            e.steps,
+            100.0 * f64::from(f32::EPSILON) / 2.0 * e.steps as f64
+        ));
+    }
+    if let Some(substeps) = e.contact_substeps.filter(|n| wet && *n > 200.0) {
+        found.push(format!("contacts need {substeps:.0} sub-steps a step: a lower [contact] stiffness or a larger maximum_overlap is cheaper"));
+    }
+    if let Some(overlap) = expected_overlap(setup).filter(|overlap| *overlap > 0.05) {
+        found.push(format!("a grain at its settling speed would overlap by {:.0} % of its diameter at impact: raise [contact] stiffness", 100.0 * overlap));
+    }
+    if let StepRule::Fixed(step) = setup.step {
+        let limits = Setup {
+            step: StepRule::Limits {
+                cfl: 0.6,
+                viscous: 0.216,
+                max_step: f64::INFINITY,
+            },
+            ..setup.clone()
+        };
+        let most = time_step(&limits, e.settling_speed_m_per_s.unwrap_or(0.0));
+        if step > most {
+            found.push(format!(
+                "the fixed step of {} is above the stability limit of about {}",
+                quantity(step, "s"),
+                quantity(most, "s")
+            ));
+        }
+    }
+    found
+}
+
+/// Warnings of free grains that are light beside the fluid: they rise.
+fn of_light_grains(setup: &Setup, stop: Option<&Stop>) -> Vec<String> {
+    let Some(fluid) = &setup.fluid else {
+        return Vec::new();
+    };
+    let grains = setup.grains.iter();
+    let free: Vec<f64> = grains
+        .filter(|grain| grain.translation == Dof::Free)
+        .map(|grain| grain.density / fluid.density)
+        .collect();
+    let mut found = Vec::new();
+    let rising = free.iter().filter(|ratio| **ratio < 1.0).count();
+    if rising == 0 || setup.gravity == DVec3::ZERO {
+        return found;
+    }
+    let all = rising == free.len();
+    found.push(if all {
+        "the free grains are lighter than the fluid: they rise, and settling, landing and leading are meant upwards".into()
+    } else {
+        format!("{rising} of {} free grains are lighter than the fluid and rise", free.len())
+    });
+    if !all && stop.is_some_and(|stop| stop.when == StopWhen::Landing) {
+        found.push(
+            "stop = \"landing\" may never be met: it waits until every free grain has touched the floor"
+                .into(),
+        );
+    }
+    found
+}
+
+/// Prime factors of a number of cells up to this one cost no more than others.
+const LARGEST_CHEAP_PRIME: usize = 13;
+
+/// Largest prime factor of `n`; 1 of 1.
+fn largest_prime(mut n: usize) -> usize {
+    let (mut largest, mut factor) = (1, 2);
+    while factor * factor <= n {
+        while n.is_multiple_of(factor) {
+            (largest, n) = (factor, n / factor);
+        }
+        factor += 1;
+    }
+    largest.max(n)
+}
+
+/// Overlap of an impact at the settling speed over the diameter, largest.
+fn expected_overlap(setup: &Setup) -> Option<f64> {
+    let fluid = setup.fluid.as_ref()?;
+    let g = setup.gravity.length();
+    let of = |grain: &Grain| {
+        let speed = terminal_speed(grain, fluid, g).max(grain.velocity.length());
+        speed * (grain.mass() / setup.contact.normal_stiffness).sqrt()
+            / grain.shape.equivalent_diameter()
+    };
+    setup.grains.iter().map(of).reduce(f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prime_factors_are_found() {
+        let found = [1, 2, 97, 100, 131, 390, 2 * 53].map(largest_prime);
+        assert_eq!(found, [1, 2, 97, 5, 131, 13, 53]);
+    }
+}
