@@ -540,6 +540,49 @@ fn light_grains_are_warned_of() {
 }
 
 #[test]
+fn ways_out_are_warned_of() {
+    let warnings = |from: &str, to: &str| {
+        assert!(PAIR.contains(from), "{from}");
+        Estimate::of(&good(&PAIR.replacen(from, to, 1)), 1)
+            .warnings
+            .join("\n")
+    };
+    let walls = |z: &str| {
+        let cell = "cell_size = \"0.25 mm\"";
+        let walls =
+            format!("{cell}\nboundaries = {{ x = \"periodic\", y = \"periodic\", z = {z} }}");
+        warnings(cell, &walls)
+    };
+    let none = [
+        "leave through",
+        "faster and faster",
+        "given motion",
+        "one cell thick",
+    ];
+    let quiet = walls("\"wall\"");
+    assert!(none.iter().all(|text| !quiet.contains(text)), "{quiet}");
+    let open = walls("[\"outflow\", \"wall\"]");
+    assert!(open.contains("lower face of z"), "{open}");
+    let up = walls("[\"wall\", \"outflow\"]");
+    assert!(!up.contains("leave through"), "{up}");
+    // 2 x 500 kg/m^3 x 4.19 mm^3 g over 1000 kg/m^3 x 60.9 cm^3.
+    let fall = walls("\"periodic\"");
+    assert!(
+        fall.contains("body_acceleration = [0, 0, 6.7442e-4]"),
+        "{fall}"
+    );
+    let position = "position = [\"12.5 mm\", \"12.5 mm\", \"80 mm\"]";
+    let given = warnings(
+        position,
+        &format!("{position}\nmotion = {{ velocity = [0, 0, \"-0.1 m/s\"] }}"),
+    );
+    assert!(
+        given.contains("grain 0") && given.contains("lower wall of z at t = 790 ms"),
+        "{given}"
+    );
+}
+
+#[test]
 fn shapes_must_be_whole() {
     refused(
         "shape = { kind = \"sphere\", diameter = \"2 mm\" }",

@@ -5,7 +5,8 @@ use glam::DVec3;
 use super::Case;
 use super::estimate::{Estimate, terminal_speed, time_step};
 use super::readable::quantity;
-use crate::dem::{Dof, Grain};
+use crate::dem::{Dof, Grain, outside};
+use crate::flow::Boundary;
 use crate::math::Precision;
 use crate::output::{Place, Plane, Stop};
 use crate::sim::events::StopWhen;
@@ -24,7 +25,132 @@ pub(super) fn all(case: &Case, e: &Estimate) -> Vec<String> {
     found.extend(of_numbers(&case.setup, e));
     found.extend(of_light_grains(&case.setup, case.plan.stop.as_ref()));
     found.extend(of_dry(case));
+    found.extend(of_open_faces(&case.setup));
+    found.extend(of_endless_fall(&case.setup));
+    found.extend(of_given_motions(&case.setup, case.plan.end));
+    found.extend(of_flat_boxes(&case.setup));
     found
+}
+
+fn is_free(grain: &&Grain) -> bool {
+    grain.translation == Dof::Free
+}
+
+/// Faces that grains fall, or rise, out through.
+fn of_open_faces(setup: &Setup) -> Vec<String> {
+    let density = setup.fluid.as_ref().map_or(0.0, |fluid| fluid.density);
+    let weights = setup.grains.iter().filter(is_free);
+    let pulls: Vec<DVec3> = weights
+        .map(|grain| setup.gravity * (grain.density - density).signum())
+        .collect();
+    let mut found = Vec::new();
+    for (axis, side) in (0..6).map(|k| (k / 2, k % 2)) {
+        let outward = if side == 0 { -1.0 } else { 1.0 };
+        let boundary = setup.boundaries.0[axis][side];
+        let open = !boundary.is_solid() && !setup.boundaries.is_periodic(axis);
+        let falls = pulls
+            .iter()
+            .any(|pull| outward * pull[axis] > 0.5 * pull.length() && *pull != DVec3::ZERO);
+        if open && falls {
+            found.push(format!(
+                "grains may leave through the {} face of {}: outside they go on in free fall, feel no fluid and still count in tables and speeds; make it a \"wall\", or end the run before",
+                ["lower", "upper"][side],
+                ["x", "y", "z"][axis]
+            ));
+        }
+    }
+    found
+}
+
+/// A box in which nothing holds fluid and grains against gravity.
+fn of_endless_fall(setup: &Setup) -> Option<String> {
+    let fluid = setup.fluid.as_ref()?;
+    let holds = |axis: usize| {
+        let walls = setup.boundaries.0[axis];
+        !setup.boundaries.is_periodic(axis)
+            && (setup.gravity[axis] != 0.0
+                || walls
+                    .iter()
+                    .any(|wall| !matches!(wall, Boundary::Slip | Boundary::FreeSurface)))
+    };
+    let held = setup.grains.iter().any(|grain| !is_free(&grain));
+    let driven =
+        fluid.body_acceleration != DVec3::ZERO || setup.prescription.body_acceleration.is_some();
+    if setup.gravity == DVec3::ZERO || held || driven || (0..3).any(holds) {
+        return None;
+    }
+    let (mut weight, mut solid) = (0.0, 0.0);
+    for grain in &setup.grains {
+        weight += (grain.density - fluid.density) * grain.shape.volume();
+        solid += grain.shape.volume();
+    }
+    let open = setup.mesh.extent().element_product() - solid;
+    let balance = -weight / (fluid.density * open) * setup.gravity;
+    (weight != 0.0).then(|| {
+        let balance = balance.to_array().map(|a| match a == 0.0 {
+            true => "0".into(),
+            false => format!("{a:.4e}"),
+        });
+        format!(
+            "no wall and no held grain carries the weight: grains and fluid fall together, faster and faster; [fluid] body_acceleration = [{}] (m/s2) balances it within a percent",
+            balance.join(", ")
+        )
+    })
+}
+
+/// Given motions that take a grain through a wall.
+fn of_given_motions(setup: &Setup, end: f64) -> Vec<String> {
+    const STEPS: u32 = 1000;
+    let (mut grains, enclosure) = (setup.grains.clone(), setup.enclosure());
+    let dt = end / f64::from(STEPS);
+    let motions = setup.prescription.motions.iter();
+    let driven: Vec<usize> = motions.map(|drive| drive.grain).collect();
+    let moves = |index: &usize| match grains[*index].translation {
+        Dof::Prescribed(velocity) => velocity != DVec3::ZERO || driven.contains(index),
+        Dof::Free => false,
+    };
+    let moving: Vec<usize> = (0..grains.len()).filter(moves).collect();
+    let mut found = Vec::new();
+    let mut gone = vec![false; grains.len()];
+    for step in 0..STEPS {
+        let middle = (f64::from(step) + 0.5) * dt;
+        setup.prescription.drive(&mut grains, middle);
+        for &index in &moving {
+            if gone[index] {
+                continue;
+            }
+            let grain = &mut grains[index];
+            if let Dof::Prescribed(velocity) = grain.translation {
+                grain.pose.position += dt * velocity;
+            }
+            let out = outside(std::slice::from_ref(grain), &enclosure);
+            let through = |axis: usize, side: usize| setup.boundaries.0[axis][side].is_solid();
+            if let Some(out) = out.iter().find(|out| through(out.axis, out.side)) {
+                gone[index] = true;
+                found.push(format!(
+                    "the given motion of grain {index} takes it through the {} wall of {} at t = {}: nothing stops a given motion",
+                    ["lower", "upper"][out.side],
+                    ["x", "y", "z"][out.axis],
+                    quantity(middle + 0.5 * dt, "s")
+                ));
+            }
+        }
+    }
+    found
+}
+
+/// Grains in a box one cell thick, where they stand for bodies of its whole depth.
+fn of_flat_boxes(setup: &Setup) -> Option<String> {
+    setup.fluid.as_ref()?;
+    let axis = (0..3).find(|axis| setup.mesh.cells[*axis] == 1)?;
+    let mut free = setup.grains.iter().filter(is_free);
+    free.next().map(|_| {
+        let name = ["x", "y", "z"][axis];
+        format!(
+            "the box is one cell thick along {name}: the flow sees a grain as a body of the whole depth, {}, but its weight and inertia are those of its own shape; make it nearly as deep",
+            quantity(setup.mesh.extent()[axis], "m")
+        )
+    })
 }
 
 /// Numbers that no run has, from a unit mistaken.
