@@ -42,7 +42,7 @@ fn make(folder: &Path) -> Result<()> {
             pictures.push(Picture::three_sides(&shape, 130, false));
         }
     }
-    write_table(&folder.join("table.csv"), &rows)?;
+    write_table(&folder.join("table.csv"), &rows, &[])?;
     Picture::sheet(&pictures, 4).save(&folder.join("sheet.png"))
 }
 

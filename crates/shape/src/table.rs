@@ -27,14 +27,23 @@ const COLUMNS: [&str; 19] = [
     "inertia_z_m5",
 ];
 
-/// Writes one row for each grain: its name and its measures; what is not measured stays empty.
-pub fn write_table(path: &Path, rows: &[(String, Record)]) -> Result<()> {
+/// Writes one row for each grain: its name, its measures, and `more` columns of that many numbers; what is not
+/// measured stays empty.
+pub fn write_table(
+    path: &Path,
+    rows: &[(String, Record)],
+    more: &[(&str, Vec<f64>)],
+) -> Result<()> {
     let failed = |e: csv::Error| ShapeError::io(path, std::io::Error::other(e));
     let mut writer = csv::Writer::from_path(path).map_err(failed)?;
     writer
-        .write_record(std::iter::once("grain").chain(COLUMNS))
+        .write_record(
+            std::iter::once("grain")
+                .chain(COLUMNS)
+                .chain(more.iter().map(|(name, _)| *name)),
+        )
         .map_err(failed)?;
-    for (name, r) in rows {
+    for (row, (name, r)) in rows.iter().enumerate() {
         let values = [
             Some(r.volume_m3),
             Some(r.equivalent_diameter_m),
@@ -56,7 +65,11 @@ pub fn write_table(path: &Path, rows: &[(String, Record)]) -> Result<()> {
             Some(r.inertia_m5[1]),
             Some(r.inertia_m5[2]),
         ];
-        let texts = values.map(|v| v.map_or(String::new(), |v| format!("{v:.7e}")));
+        let more = more.iter().map(|(_, values)| values.get(row).copied());
+        let values = values.into_iter().chain(more);
+        let texts: Vec<String> = values
+            .map(|v| v.map_or(String::new(), |v| format!("{v:.7e}")))
+            .collect();
         writer
             .write_record(std::iter::once(name).chain(&texts))
             .map_err(failed)?;

@@ -47,7 +47,7 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
         let number = n as u32 + 1;
         pictures.push(Picture::three_sides(shape, PIXELS, false).numbered(number));
     }
-    write_table(&table, &rows)?;
+    write_table(&table, &rows, &[])?;
     Picture::sheet(&pictures, args.roundness.len()).save(&sheet)?;
     Ok(())
 }

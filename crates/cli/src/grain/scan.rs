@@ -104,6 +104,9 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
     Ok(how)
 }
 
+/// Cuts over more than this part of a surface decide its roundness.
+const MUCH_SHARED: f64 = 0.01;
+
 /// Grain files of an earlier run in a folder.
 fn earlier(folder: &Path) -> Vec<PathBuf> {
     let ours = |path: &PathBuf| {
@@ -165,17 +168,18 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
                 });
                 Ok::<_, Exit>((file, shape.record(), picture))
             });
-            (grain.label, grain.voxels, shape)
+            ((grain.label, grain.voxels, grain.shared_surface), shape)
         })
         .collect();
     let (mut rows, mut pictures, mut refused) = (Vec::new(), Vec::new(), Vec::new());
-    for (label, voxels, outcome) in outcomes {
+    let mut shared = Vec::new();
+    for ((label, voxels, shared_surface), outcome) in outcomes {
         match outcome {
             Ok(written) => {
                 let (file, record, picture) = written?;
                 pictures.extend(picture.map(|picture| picture.numbered(label)));
                 if args.new.json {
-                    print(&json!({ "label": label, "voxels": voxels, "file": file, "record": record }).to_string())?;
+                    print(&json!({ "label": label, "voxels": voxels, "shared_surface": shared_surface, "file": file, "record": record }).to_string())?;
                 } else {
                     print(&format!(
                         "{}  {} voxels, equivalent diameter {:.4} mm, Krumbein sphericity {:.3}",
@@ -186,6 +190,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
                     ))?;
                 }
                 rows.push((format!("label-{label:05}"), record));
+                shared.push(shared_surface);
             }
             Err(why) => refused.push(Refused { label, voxels, why }),
         }
@@ -203,7 +208,16 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     if let Some(advice) = advice {
         tell!("note: {advice}");
     }
-    write_table(&table, &rows)?;
+    let cut = shared.iter().filter(|part| **part > MUCH_SHARED).count();
+    if cut > 0 && !args.no_roundness {
+        tell!(
+            "note: {cut} of {} grains were cut from neighbours over more than {:.0} % of their surface (shared_surface in {}): the edges of the cuts make their roundness too small",
+            rows.len(),
+            100.0 * MUCH_SHARED,
+            table.display()
+        );
+    }
+    write_table(&table, &rows, &[("shared_surface", shared)])?;
     Picture::sheet(&pictures, SHEET.1).save(&sheet)?;
     labels.save_labels(&image)?;
     Ok(())

@@ -4,6 +4,7 @@ use super::field_of_view::FieldOfView;
 use super::grain::{self, Context};
 use super::grey::{Grey, LAYERS};
 use super::regions::regions;
+use super::regions::shared_surfaces;
 use super::runs::{fill_cavities, pieces};
 use super::threshold::median;
 use super::volume::Voxels;
@@ -90,6 +91,8 @@ pub struct ScannedGrain {
     pub label: u32,
     /// Its voxels.
     pub voxels: u64,
+    /// Part of its voxels' faces that are another grain's too: where it was cut off, not its own surface.
+    pub shared_surface: f64,
     /// The shape, or why there is none.
     pub shape: Result<Shape>,
 }
@@ -171,6 +174,7 @@ pub fn scan_volume(
         source,
         options,
     };
+    let shared = shared_surfaces(dims, &labels);
     let done = AtomicU64::new(0);
     let total = wanted.len() as u64;
     progress("shapes", 0, total);
@@ -182,6 +186,7 @@ pub fn scan_volume(
             ScannedGrain {
                 label: **label,
                 voxels: region.voxels,
+                shared_surface: shared.get(label).copied().unwrap_or(0.0),
                 shape,
             }
         })

@@ -1,7 +1,7 @@
 //! Regions of a labelled volume: where they lie, whether they are whole.
 
 use super::Mask;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Extent of one label.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +79,29 @@ pub(crate) fn crop(
     Mask { dims: out, solid }
 }
 
+/// For each label the part of its faces beyond which another label begins.
+pub(crate) fn shared_surfaces(dims: [usize; 3], labels: &[u32]) -> HashMap<u32, f64> {
+    let strides = [1, dims[0], dims[0] * dims[1]];
+    let mut faces: HashMap<u32, [u64; 2]> = HashMap::new();
+    for (axis, stride) in strides.into_iter().enumerate() {
+        for (at, (&here, &there)) in labels.iter().zip(&labels[stride..]).enumerate() {
+            if here == there || at / stride % dims[axis] + 1 == dims[axis] {
+                continue;
+            }
+            for label in [here, there].into_iter().filter(|label| *label != 0) {
+                let [all, shared] = faces.entry(label).or_default();
+                *all += 1;
+                *shared += u64::from(here != 0 && there != 0);
+            }
+        }
+    }
+    let part = |[all, shared]: [u64; 2]| shared as f64 / all as f64;
+    faces
+        .into_iter()
+        .map(|(label, n)| (label, part(n)))
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::runs::{fill_cavities, pieces};
@@ -117,5 +140,25 @@ mod tests {
         let (number, sizes) = pieces(dims, |n| labels[n] != 0);
         assert_eq!(sizes, [26, 1]);
         assert_eq!(number[at(5, 0, 4)], 2);
+    }
+
+    #[test]
+    fn cut_faces_are_shared() {
+        // Two cubes of two voxels side by side along y, and one alone; on the image's own border there are
+        // no faces.
+        let dims = [6, 4, 2];
+        let labels: Vec<u32> = (0..48)
+            .map(|at| match (at % 6, at / 6 % 4) {
+                (1..=2, 0..=1) => 1,
+                (1..=2, 2..=3) => 2,
+                (4..=5, 1..=2) => 7,
+                _ => 0,
+            })
+            .collect();
+        let found = shared_surfaces(dims, &labels);
+        assert_eq!(found[&1], 4.0 / 12.0);
+        assert_eq!(found[&2], 4.0 / 12.0);
+        assert_eq!(found[&7], 0.0);
+        assert_eq!(found.len(), 3);
     }
 }
