@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use grainwake_solver::case::Problem;
 use rayon::prelude::*;
 
 use crate::correlation::correlations;
@@ -33,10 +34,10 @@ pub struct Rendered {
 /// The analysis is that of the study file as it is now, if it is still where it was.
 ///
 /// # Errors
-/// If the folder holds no study, the study file or its analysis has become wrong, or a file cannot be written.
+/// If the folder holds no study, its analysis has become wrong, or a file cannot be written.
 pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
     let mut manifest = Manifest::read(folder)?;
-    refresh(&mut manifest, folder)?;
+    let stale = refresh(&mut manifest, folder)?;
     let manifest = manifest;
     let rows = table(&manifest, folder);
     write_table(&rows, folder)?;
@@ -74,7 +75,7 @@ pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
             .at("write", &file)?
             .as_bytes(),
     )?;
-    let mut notes: Vec<String> = Vec::new();
+    let mut notes: Vec<String> = stale.into_iter().collect();
     let data = Data {
         manifest: &manifest,
         rows: &rows,
@@ -102,17 +103,32 @@ pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
     Ok(out)
 }
 
-/// Takes the analysis from the study file, which may have been changed since the study was run.
-fn refresh(manifest: &mut Manifest, folder: &Path) -> Result<(), StudyError> {
+/// Takes the analysis from the study file, which may have been changed since the study was run. A wrong
+/// analysis is an error; a study file that is wrong otherwise, or whose cases are gone, leaves the analysis
+/// as it was, which is returned as a note.
+fn refresh(manifest: &mut Manifest, folder: &Path) -> Result<Option<String>, StudyError> {
     if !manifest.study.is_file() {
-        return Ok(());
+        return Ok(None);
     }
-    let now = Study::read(&manifest.study)?;
-    if now.title == manifest.title && now.analysis != manifest.analysis {
-        manifest.analysis = now.analysis;
-        manifest.write(folder)?;
+    let elsewhere = |problem: &Problem| {
+        let file = manifest.study.display().to_string();
+        problem.place().is_some_and(|(name, ..)| name != file)
+    };
+    match Study::read(&manifest.study) {
+        Ok(now) if now.title == manifest.title && now.analysis != manifest.analysis => {
+            manifest.analysis = now.analysis;
+            manifest.write(folder)?;
+            Ok(None)
+        }
+        Ok(_) => Ok(None),
+        Err(StudyError::Invalid(problems)) if problems.iter().any(elsewhere) => {
+            Err(StudyError::Invalid(problems))
+        }
+        Err(error) => Ok(Some(format!(
+            "the analysis is that of the last `grainwake study`, as the study file cannot be used now: {}",
+            error.to_string().lines().next().unwrap_or_default()
+        ))),
     }
-    Ok(())
 }
 
 type Written = (Vec<PathBuf>, Vec<(Drawn, String)>);

@@ -165,6 +165,19 @@ impl Settling {
     }
 }
 
+/// Settling speed at a time [m/s], between rows in proportion.
+fn speed(history: &History, up: DVec3, time: f64) -> Option<f64> {
+    let after = history.time.partition_point(|t| *t < time);
+    let row = |row: usize| Some((*history.time.get(row)?, -history.velocity.get(row)?.dot(up)));
+    let Some((end, v)) = row(after) else {
+        return row(history.len().checked_sub(1)?).map(|(_, v)| v);
+    };
+    let Some((start, before)) = after.checked_sub(1).and_then(row) else {
+        return Some(v);
+    };
+    Some(before + (time - start) / (end - start) * (v - before))
+}
+
 /// Where the final speed of a grain is measured.
 struct Stretch {
     /// Begin and end [s].
@@ -199,8 +212,7 @@ impl Fallen {
         let stretch = Stretch::of(history, up, rows, diameter, landing.is_some());
         let settled = stretch.as_ref().map(|s| s.fallen / (s.time.1 - s.time.0));
         let change = stretch.as_ref().and_then(|s| {
-            let at = |time: f64| Some(-history.velocity[history.nearest(time)?].dot(up));
-            Some((at(s.time.1)? - at(s.time.0)?) / settled?)
+            Some((speed(history, up, s.time.1)? - speed(history, up, s.time.0)?) / settled?)
         });
         let start = history.position[0];
         let fallen = (start - history.position[rows - 1]).dot(up);

@@ -29,8 +29,14 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
         .unwrap_or(0.05 * (high - low))
         .max(1e-9);
     let span = |axis: usize| -> Option<(f64, f64)> {
-        let (a, b) = extent(grains.iter().map(|g| place(*g)[axis]))?;
-        let (a, b) = (a - margin, b + margin);
+        let reach = |g: usize| {
+            let own = run.facts.grains.get(g).and_then(|facts| facts.diameter);
+            margin.max(own.unwrap_or(0.0))
+        };
+        let ends = grains
+            .iter()
+            .flat_map(|g| [place(*g)[axis] - reach(*g), place(*g)[axis] + reach(*g)]);
+        let (a, b) = extent(ends)?;
         let Some(size) = run.facts.size else {
             return Some((a, b));
         };
