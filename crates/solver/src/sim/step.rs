@@ -77,7 +77,7 @@ impl Simulation {
                     timed(&mut passes.project, || fluid.project_prediction(dt));
                 }
                 for (driving, load) in work.driving.iter_mut().zip(&*loads) {
-                    *driving = *driving + *load * -1.0;
+                    *driving += *load * -1.0;
                 }
                 timed(&mut passes.coupling, || {
                     fluid.couple(grains, &work.before, &work.driving, dt)
