@@ -329,7 +329,8 @@ impl Motion {
 
     /// How the grain answers contact within the step, so that it leaves its sub-steps as [`advance`] will
     /// have it. Its mass is at least its own with `added_density` of the fluid, most of which answers by
-    /// the projection, one step late (`docs/decisions/0014-contact-and-fluid-at-once.md`).
+    /// the projection, one step late (`docs/decisions/0014-contact-and-fluid-at-once.md`); not so where
+    /// it touched something in the step before: struck again ahead of that answer, it would gain.
     pub fn response(&self, grain: &Grain, past: &Past, added_density: f64, dt: f64) -> Response {
         let [v, omega] = past.velocity;
         let before = [v.x, v.y, v.z, omega.x, omega.y, omega.z];
@@ -339,6 +340,9 @@ impl Motion {
             (self.right[row] - held) / dt
         });
         let mut a = self.matrix;
+        // After a step with contact there is no acceleration that goes on.
+        let flew = past.acceleration != [DVec3::ZERO; 2];
+        let added_density = if flew { added_density } else { 0.0 };
         let least = grain.mass() + added_density * grain.shape.volume();
         let mean = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
         let free = [grain.translation, grain.rotation].map(|dof| dof == Dof::Free);

@@ -1,5 +1,5 @@
 //! The time step. It reads like the paper: predict, move the grains (contact sub-steps), locate
-//! the solid, impose rigidity, project.
+//! the solid, impose rigidity (after contact with the fluid's answer of this step, where there is some), project.
 
 use std::time::{Duration, Instant};
 
