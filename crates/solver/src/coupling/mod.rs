@@ -7,6 +7,7 @@ mod hold;
 mod locate;
 mod measure;
 mod near;
+mod newton;
 mod places;
 mod rigidity;
 mod rivals;
@@ -20,7 +21,8 @@ use crate::flow::{Flow, FlowMeasures};
 use crate::math::{Load, Real};
 
 use locate::{Body, Locator};
-use rigidity::{Impulse, Motion};
+use newton::Motion;
+use rigidity::Impulse;
 
 /// How rigidity is imposed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -146,7 +148,7 @@ impl Coupling {
         each.enumerate()
             .for_each(|(index, (((impulse, motion), grain), load))| {
                 let (past, contact) = (&before[index], contact[index]);
-                *load = rigidity::advance(grain, past, impulse, motion, density, contact, dt);
+                *load = newton::advance(grain, past, impulse, motion, density, contact, dt);
             });
         rigidity::impose(flow, grains, &self.bodies, before, self.relief(dt));
     }
@@ -179,6 +181,7 @@ impl Coupling {
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        self.bodies.iter().map(Body::bytes).sum::<usize>() + self.locator.bytes()
+        let coupled = size_of::<(Impulse, Motion)>() * self.coupled.capacity();
+        self.bodies.iter().map(Body::bytes).sum::<usize>() + self.locator.bytes() + coupled
     }
 }
