@@ -42,6 +42,8 @@ pub(crate) struct Past {
     pub velocity: [DVec3; 2],
     /// Their change over the step before, divided by its length [1/s].
     pub acceleration: [DVec3; 2],
+    /// What of them came of contact in the step before, and goes to the fluid around the grain in this.
+    pub owed: [DVec3; 2],
 }
 
 /// The grains on the grid.

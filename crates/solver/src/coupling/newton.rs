@@ -61,20 +61,19 @@ impl Motion {
 
     /// How the grain answers contact within the step, so that it leaves its sub-steps as [`advance`] will
     /// have it. Its mass is at least its own with `added_density` of the fluid, most of which answers by
-    /// the projection, one step late (`docs/decisions/0014-contact-and-fluid-at-once.md`); not so where
-    /// it touched something in the step before: struck again ahead of that answer, it would gain.
+    /// the projection, one step late: what an impact gave beyond that the grain owes the fluid, and does not
+    /// start with (`docs/decisions/0014-contact-and-fluid-at-once.md`).
     pub fn response(&self, grain: &Grain, past: &Past, added_density: f64, dt: f64) -> Response {
-        let [v, omega] = past.velocity;
+        let start: [DVec3; 2] = std::array::from_fn(|n| past.velocity[n] - past.owed[n]);
+        let [v, omega] = start;
         let before = [v.x, v.y, v.z, omega.x, omega.y, omega.z];
-        // What there is to accelerate it, with its mass before that grows.
+        // What there is to accelerate it, the answer to the last impact included, with its mass before that
+        // grows.
         let mut drive: Vector6 = std::array::from_fn(|row| {
             let held: f64 = (0..6).map(|n| self.matrix[row][n] * before[n]).sum();
             (self.right[row] - held) / dt
         });
         let mut a = self.matrix;
-        // After a step with contact there is no acceleration that goes on.
-        let flew = past.acceleration != [DVec3::ZERO; 2];
-        let added_density = if flew { added_density } else { 0.0 };
         let least = grain.mass() + added_density * grain.shape.volume();
         let mean = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
         let free = [grain.translation, grain.rotation].map(|dof| dof == Dof::Free);
@@ -94,7 +93,7 @@ impl Motion {
                 drive[3 * n..3 * n + 3].fill(0.0);
             }
         }
-        Response::new(drive, columns)
+        Response::new(start, drive, columns)
     }
 }
 

@@ -4,6 +4,7 @@ use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
 use super::actor::{Actor, look_at};
+use super::again::Start;
 use super::broad_phase::{Ball, BroadPhase};
 use super::enclosure::Enclosure;
 use super::grain::{Dof, Grain};
@@ -11,9 +12,8 @@ use super::history::{PairKey, Slot, renew};
 use super::law::Law;
 use super::motion::{kick, kick_and_drift};
 use super::params::ContactParams;
-use super::response::Response;
 use super::{Contact, Partner};
-use crate::math::{Load, Pose};
+use crate::math::Load;
 
 /// Part of its bounding radius that a grain may always move before the pairs are searched again.
 const SKIN: f64 = 0.01;
@@ -31,33 +31,12 @@ pub struct Dynamics {
     pub(super) slots: Vec<Slot>,
     /// Where every grain was at the end of the last step [m].
     pub(super) last: Vec<DVec3>,
-    actors: Vec<Actor>,
+    pub(super) actors: Vec<Actor>,
     broad: BroadPhase,
     balls: Vec<Ball>,
     old_slots: Vec<Slot>,
     spare_slots: Vec<Slot>,
-    start: Start,
-}
-
-/// Pose, velocity and angular velocity.
-type State = (Pose, DVec3, DVec3);
-
-fn state(grain: &Grain) -> State {
-    (grain.pose, grain.velocity, grain.angular_velocity)
-}
-
-fn set(grains: &mut [Grain], states: &[State]) {
-    for (grain, (pose, velocity, spin)) in grains.iter_mut().zip(states) {
-        (grain.pose, grain.velocity, grain.angular_velocity) = (*pose, *velocity, *spin);
-    }
-}
-
-/// What a step started from.
-#[derive(Clone, Debug, Default)]
-struct Start {
-    slots: Vec<Slot>,
-    last: Vec<DVec3>,
-    states: Vec<State>,
+    pub(super) start: Start,
 }
 
 impl Dynamics {
@@ -119,50 +98,12 @@ impl Dynamics {
             .iter_mut()
             .for_each(|actor| actor.response = None);
         let done = self.go(grains, loads, dt, mean_contact);
-        self.last.clear();
-        self.last
-            .extend(grains.iter().map(|grain| grain.pose.position));
-        self.report(grains);
+        self.finish(grains);
         done
     }
 
-    /// Keeps what [`Dynamics::again`] goes back to.
-    pub fn remember(&mut self, grains: &[Grain]) {
-        self.start.slots.clone_from(&self.slots);
-        self.start.last.clone_from(&self.last);
-        self.start.states.clear();
-        self.start.states.extend(grains.iter().map(state));
-    }
-
-    /// The contact that there is over the step that [`Dynamics::advance`] took, after
-    /// [`Dynamics::remember`], if the grains answer it by `responses`: with the fluid of the same step in
-    /// them. Nothing else changes.
-    pub fn again(
-        &mut self,
-        grains: &mut [Grain],
-        responses: &[Response],
-        dt: f64,
-        mean_contact: &mut [Load],
-    ) {
-        mean_contact.fill(Load::default());
-        let mut start = std::mem::take(&mut self.start);
-        let ends: Vec<_> = grains.iter().map(state).collect();
-        std::mem::swap(&mut self.slots, &mut start.slots);
-        std::mem::swap(&mut self.last, &mut start.last);
-        set(grains, &start.states);
-        self.follow(grains);
-        for (actor, response) in self.actors.iter_mut().zip(responses) {
-            actor.response = Some(*response);
-        }
-        self.go(grains, &[], dt, mean_contact);
-        std::mem::swap(&mut self.slots, &mut start.slots);
-        std::mem::swap(&mut self.last, &mut start.last);
-        set(grains, &ends);
-        self.start = start;
-    }
-
     /// The step, once the actors are there.
-    fn go(
+    pub(super) fn go(
         &mut self,
         grains: &mut [Grain],
         loads: &[Load],
@@ -229,7 +170,7 @@ impl Dynamics {
 
     /// Brings the actors in line with the grains: prescribed velocities, shapes, and jumps by whole
     /// periods.
-    fn follow(&mut self, grains: &mut [Grain]) {
+    pub(super) fn follow(&mut self, grains: &mut [Grain]) {
         for grain in grains.iter_mut() {
             if let Dof::Prescribed(velocity) = grain.translation {
                 grain.velocity = velocity;
@@ -381,7 +322,11 @@ impl Dynamics {
         }
     }
 
-    fn report(&mut self, grains: &[Grain]) {
+    /// Keeps where the grains are and what touches at the end of a step.
+    pub(super) fn finish(&mut self, grains: &[Grain]) {
+        self.last.clear();
+        self.last
+            .extend(grains.iter().map(|grain| grain.pose.position));
         self.contacts.clear();
         for slot in self.slots.iter().filter(|slot| slot.touched) {
             let grain = slot.key.grain as usize;

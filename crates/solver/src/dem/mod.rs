@@ -5,6 +5,7 @@
 //! `rotation`) in sub-steps of the contact time.
 
 mod actor;
+mod again;
 mod broad_phase;
 mod deepest;
 mod dynamics;
@@ -26,6 +27,7 @@ use glam::DVec3;
 
 use crate::math::Load;
 
+pub use again::State;
 pub use dynamics::Dynamics;
 pub use enclosure::Enclosure;
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};

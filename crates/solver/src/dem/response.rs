@@ -7,6 +7,8 @@ use crate::math::{Load, Matrix6, Vector6};
 /// Change of a grain's velocities by what acts on it, over one step.
 #[derive(Clone, Copy, Debug)]
 pub struct Response {
+    /// Velocity [m/s] and angular velocity [rad/s] that it starts from, space frame.
+    pub(super) start: [DVec3; 2],
     /// Acceleration without contact [m/s^2] and angular acceleration [rad/s^2], space frame.
     free: [DVec3; 2],
     /// One over mass and inertia, those of the fluid it moves included, by columns: what a unit force
@@ -16,8 +18,9 @@ pub struct Response {
 
 impl Response {
     /// From the loads that act all the time [N] and [N m], and the columns of the inverse of the 6 x 6 mass.
-    pub fn new(drive: Vector6, inverse: Matrix6) -> Response {
+    pub fn new(start: [DVec3; 2], drive: Vector6, inverse: Matrix6) -> Response {
         let mut response = Response {
+            start,
             free: Default::default(),
             inverse,
         };

@@ -20,7 +20,7 @@ use crate::sim::Simulation;
 use crate::sim::events::TrackerState;
 
 const SIGNATURE: &[u8; 8] = b"GWCKPT\r\n";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const CHECKSUM: u64 = 32;
 const LARGEST_RECORD: u64 = 1 << 30;
 /// Folder of the checkpoints in a run folder.

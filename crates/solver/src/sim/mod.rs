@@ -13,9 +13,9 @@ mod step;
 use std::time::Duration;
 
 use crate::coupling::Past;
-use crate::dem::{Contact, Dynamics, Grain};
+use crate::dem::{Contact, Dynamics, Grain, State};
 use crate::grid::Mesh;
-use crate::math::Load;
+use crate::math::{Load, Pose};
 use crate::poisson::Stages;
 
 use fluid::Fluid;
@@ -45,6 +45,10 @@ struct Work {
     before: Vec<Past>,
     driving: Vec<Load>,
     contact: Vec<Load>,
+    /// Where the sub-steps of contact leave the grains.
+    ends: Vec<State>,
+    /// Where the faces near the grains were last found.
+    located: Vec<Pose>,
 }
 
 /// Time spent in each stage since the start.
@@ -74,6 +78,8 @@ impl Simulation {
                 before: vec![Default::default(); count],
                 driving: vec![Load::default(); count],
                 contact: vec![Load::default(); count],
+                ends: setup.grains.iter().map(State::of).collect(),
+                located: setup.grains.iter().map(|grain| grain.pose).collect(),
             },
             passes: Passes {
                 initial: fluid

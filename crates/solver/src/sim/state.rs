@@ -25,12 +25,18 @@ impl Simulation {
                 load.torque,
                 before.acceleration[0],
                 before.acceleration[1],
+                before.owed[0],
+                before.owed[1],
             ] {
                 out.numbers(&v.to_array())?;
             }
         }
         if let Some(fluid) = &self.fluid {
             out.numbers(&self.momentum_residual.to_array())?;
+            for pose in &self.work.located {
+                out.numbers(&pose.position.to_array())?;
+                out.numbers(&pose.orientation.to_array())?;
+            }
             fluid.save(&mut out)?;
         }
         self.dynamics.save(out.0)
@@ -55,15 +61,21 @@ impl Simulation {
                 force: DVec3::from_array(input.numbers()?),
                 torque: DVec3::from_array(input.numbers()?),
             };
-            before.acceleration = [
-                DVec3::from_array(input.numbers()?),
-                DVec3::from_array(input.numbers()?),
-            ];
+            for change in before.acceleration.iter_mut().chain(&mut before.owed) {
+                *change = DVec3::from_array(input.numbers()?);
+            }
         }
         if let Some(fluid) = &mut self.fluid {
             self.momentum_residual = DVec3::from_array(input.numbers()?);
+            // The faces are those of where the grains were last located, which contact may have changed.
+            let mut grains = self.setup.grains.clone();
+            for (grain, pose) in grains.iter_mut().zip(&mut self.work.located) {
+                pose.position = DVec3::from_array(input.numbers()?);
+                pose.orientation = DQuat::from_array(input.numbers()?);
+                grain.pose = *pose;
+            }
             fluid.restore(&mut input, self.clock.last_step)?;
-            fluid.locate(&self.setup.grains, self.clock.last_step);
+            fluid.locate(&grains, self.clock.last_step);
         }
         self.dynamics.restore(input.0)
     }

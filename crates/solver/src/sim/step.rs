@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::Simulation;
 use crate::coupling::{Past, Scheme};
-use crate::dem::Grain;
+use crate::dem::{Grain, State};
 use crate::math::Load;
 
 /// Why a step could not be taken.
@@ -83,12 +83,13 @@ impl Simulation {
                     fluid.couple(grains, &work.before, &work.driving, dt)
                 });
                 // Contact again where there was some, now that the fluid's answer of this step is known.
-                if work.contact.iter().any(|load| *load != Load::default()) {
+                let again = work.contact.iter().any(|load| *load != Load::default());
+                if again {
                     let added = dynamics.params().added_density;
                     let responses = fluid.responses(grains, &work.before, added, dt);
                     prescription.drive(grains, now + 0.5 * dt);
                     timed(&mut passes.contact, || {
-                        dynamics.again(grains, &responses, dt, &mut work.contact)
+                        dynamics.again(grains, &responses, dt, &mut work.contact, &mut work.ends)
                     });
                     prescription.drive(grains, end);
                 }
@@ -99,9 +100,15 @@ impl Simulation {
                 timed(&mut passes.project, || fluid.project(dt));
                 let gain = fluid.measures().momentum - momentum;
                 self.momentum_residual = fluid_density * (gain - fluid.boundary_impulse(dt));
-                for (i, (grain, load)) in grains.iter().zip(&*loads).enumerate() {
+                for (i, (grain, load)) in grains.iter_mut().zip(&*loads).enumerate() {
+                    // The faces were found for the poses of the first time.
+                    work.located[i] = grain.pose;
+                    if again {
+                        grain.pose = work.ends[i].pose;
+                    }
                     let before = &mut work.before[i];
                     before.acceleration = acceleration(grain, before, &work.contact[i], dt);
+                    before.owed = owed(grain, &work.ends[i], &work.contact[i]);
                     // What the fluid gave the grain, the fluid inside it included, it lost.
                     let displaced = fluid_density * grain.shape.volume();
                     self.momentum_residual -=
@@ -163,6 +170,15 @@ fn acceleration(grain: &Grain, before: &Past, contact: &Load, dt: f64) -> [DVec3
     }
     let [velocity, omega] = before.velocity;
     [grain.velocity - velocity, grain.angular_velocity - omega].map(|change| change / dt)
+}
+
+/// What contact gave a grain beyond the velocities it leaves its sub-steps with.
+fn owed(grain: &Grain, end: &State, contact: &Load) -> [DVec3; 2] {
+    if *contact == Load::default() {
+        return Default::default();
+    }
+    let [velocity, omega] = end.velocities;
+    [grain.velocity - velocity, grain.angular_velocity - omega]
 }
 
 fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {

@@ -17,9 +17,10 @@ use crate::sim::Prescription;
 const MAXIMUM_OVERLAP: f64 = 0.01;
 /// Roughness over the smallest equal-volume radius, where none is given.
 const ROUGHNESS: f64 = 3e-3;
-/// Added mass of a sphere that touches a wall or its like, over the mass of the fluid that it
-/// displaces (potential flow: Hicks 1879).
-const ADDED_MASS: f64 = 0.803;
+/// Added mass of a sphere in contact, over the mass of the fluid that it displaces: .5 far from a wall and .803
+/// at it in potential flow (Hicks 1879), .75 on the grid; undamped impacts give the speed back with .7
+/// (`docs/decisions/0014-contact-and-fluid-at-once.md`).
+const ADDED_MASS: f64 = 0.7;
 
 /// The fluid; the viscosity is kept as a kinematic one.
 pub(super) fn fluid(
