@@ -19,6 +19,7 @@ mod scan;
 use crate::distance::Distance;
 use crate::surface::{Samples, extract};
 use band::Band;
+pub(crate) use edge::Kernel;
 use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 
@@ -40,8 +41,8 @@ pub(crate) enum Surface {
     /// A grain of a family, none of whose faces lie along its axes. Told apart so that the
     /// committed grains of the study stay what the generator gives, to the bit.
     Family,
-    /// An image, which blur and smoothing of this standard deviation [m] have gone over.
-    Scanned { image: f64 },
+    /// An image, which blur and smoothing [m] have gone over.
+    Scanned { image: Kernel },
 }
 
 /// Detail finer than this share of R_in is smoothed away: the wider Gaussian. By the method of the

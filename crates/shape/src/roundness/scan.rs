@@ -2,16 +2,19 @@
 //!
 //! Noise bends the surface of a scan: where its radius is about R_in anyway (spheres, the sides of
 //! cylinders) half of it would pass for corners. There only what a much wider Gaussian sees as
-//! corners counts, and corners that hardly turn the surface count in proportion.
+//! corners counts, and only as far as the surface bends in the direction in which that one sees it
+//! bend: beside the rim of a cylinder it sees the rim, and ripples around the cylinder are none of it.
+//! Corners that hardly turn the surface count in proportion.
 //!
 //! Blur, smoothing and the Gaussians widen the corners that are left: area and turning of the
 //! corners are measured with two Gaussians, and the radius is that of the edges which would be
 //! measured so ([`super::edge`]).
 
 use super::CORNER;
-use super::band::{Band, principal};
-use super::edge::{Chain, radius_of};
+use super::band::Band;
+use super::edge::{Chain, Kernel, radius_of};
 use crate::distance::Distance;
+use crate::mesh::TriangleMesh;
 use crate::scan::gaussian;
 use crate::surface::{Samples, extract};
 use glam::{DMat3, DVec3};
@@ -40,14 +43,13 @@ const PARTS: usize = 4;
 type Bend = (DVec3, DMat3);
 
 /// Roundness of the body in the box with the largest inscribed sphere of radius `inscribed`, whose
-/// surface comes from an image that blur and smoothing of the standard deviation `image` [m] have
-/// gone over; none where the grid would be too large.
+/// surface comes from an image that blur and smoothing [m] have gone over; none where the grid would be too large.
 pub(super) fn measure(
     distance: &impl Distance,
     lower: DVec3,
     upper: DVec3,
     inscribed: f64,
-    image: f64,
+    image: Kernel,
 ) -> Option<f64> {
     let spacing = inscribed / CELLS;
     let reach = spacing * (4.0 * COARSE * CELLS + REACH).ceil();
@@ -83,13 +85,12 @@ pub(super) fn measure(
             let part = (b - a).cross(c - a).length() / (2.0 * (PARTS * PARTS) as f64);
             let part = part / (inscribed * inscribed);
             for weights in parts() {
-                // The tensor is interpolated, not k1: that has a kink where it changes direction.
-                let [k1, k2] = between(&fine, triangle, weights);
-                if k1 * (CORNER + LEVEL) <= 1.0 {
+                let (seen, along) = sharpest(&coarse, triangle, weights);
+                if seen * (COARSE_CORNER + LEVEL) <= 1.0 {
                     continue;
                 }
-                let [seen, _] = between(&coarse, triangle, weights);
-                if seen * (COARSE_CORNER + LEVEL) <= 1.0 {
+                let [k1, k2] = along_and_across(&fine, triangle, weights, along);
+                if k1 * (CORNER + LEVEL) <= 1.0 {
                     continue;
                 }
                 let below = part * (1.0 - LEVEL * k2).max(0.0);
@@ -104,28 +105,70 @@ pub(super) fn measure(
     if found.iter().any(|(_, turn)| *turn <= 0.0) {
         return Some(1.0);
     }
-    let roundness = radius_of([0, 1].map(|n| {
-        let chain = Chain {
-            image: image / inscribed,
-            level: LEVEL,
-            width: WIDTHS[n],
-            corner: CORNER,
-        };
-        (chain, found[n].0 / found[n].1)
-    }));
+    // Between the vertices the curvatures are interpolated, which widens them.
+    let interpolated = spread(&mesh) / (inscribed * inscribed);
+    let chain = Chain {
+        image: image.map(|(weight, deviation)| (weight, deviation / inscribed)),
+        level: LEVEL,
+        widths: WIDTHS.map(|width| (width * width + interpolated).sqrt()),
+        corner: CORNER,
+    };
+    let found = found.map(|(area, turn)| area / turn);
+    let roundness = radius_of(&chain, found);
     let least = LEAST_TURN * 4.0 * std::f64::consts::PI;
     Some(1.0 - (1.0 - roundness) * (turn / least).min(1.0))
 }
 
-/// Principal curvatures [1/R_in], the larger first, at a place in a triangle.
-fn between(bends: &[Bend], triangle: &[u32; 3], weights: [f64; 3]) -> [f64; 2] {
+/// Variance [m^2], along any one direction, that linear interpolation between the vertices adds to
+/// what they carry: in a triangle a 24th of the sum of its squared sides.
+fn spread(mesh: &TriangleMesh) -> f64 {
+    let (mut sum, mut whole) = (0.0, 0.0);
+    for face in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(face);
+        let area = (b - a).cross(c - a).length();
+        let sides = a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
+        sum += area * sides / 24.0;
+        whole += area;
+    }
+    sum / whole
+}
+
+/// Unit normal and second derivatives at a place in a triangle. The tensor is interpolated, not
+/// its larger curvature: that has a kink where it changes direction.
+fn between(bends: &[Bend], triangle: &[u32; 3], weights: [f64; 3]) -> Bend {
     let (mut normal, mut hessian) = (DVec3::ZERO, DMat3::ZERO);
     for (v, weight) in triangle.iter().zip(weights) {
         let (n, h) = bends[*v as usize];
         normal += weight * n;
         hessian += h * weight;
     }
-    principal(normal, hessian)
+    let length = normal.length().max(1e-9);
+    (normal / length, hessian * (1.0 / length))
+}
+
+/// The larger principal curvature [1/R_in] at a place in a triangle, and the direction it is along.
+fn sharpest(bends: &[Bend], triangle: &[u32; 3], weights: [f64; 3]) -> (f64, DVec3) {
+    let (normal, hessian) = between(bends, triangle, weights);
+    let e = normal.any_orthonormal_vector();
+    let f = normal.cross(e);
+    let (he, hf) = (hessian * e, hessian * f);
+    let (mean, half) = (0.5 * (e.dot(he) + f.dot(hf)), 0.5 * (e.dot(he) - f.dot(hf)));
+    let both = e.dot(hf);
+    let (sine, cosine) = (0.5 * both.atan2(half)).sin_cos();
+    (mean + half.hypot(both), cosine * e + sine * f)
+}
+
+/// Curvatures [1/R_in] at a place in a triangle along this direction and across it.
+fn along_and_across(
+    bends: &[Bend],
+    triangle: &[u32; 3],
+    weights: [f64; 3],
+    along: DVec3,
+) -> [f64; 2] {
+    let (normal, hessian) = between(bends, triangle, weights);
+    let e = (along - normal * normal.dot(along)).normalize_or_zero();
+    let f = normal.cross(e);
+    [e.dot(hessian * e), f.dot(hessian * f)]
 }
 
 /// Weights of the corners at the middles of the equal parts of a triangle.
