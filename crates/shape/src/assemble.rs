@@ -140,7 +140,7 @@ pub(crate) fn assemble<D: Distance>(
             body.lower,
             body.upper,
             inscribed,
-            body.surface,
+            &body.surface,
         );
     }
     let second = DVec3::new(

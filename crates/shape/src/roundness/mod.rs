@@ -34,15 +34,16 @@ const CORNER: f64 = 0.99;
 /// Reach of the Gaussian in widths.
 const REACH: f64 = 4.5;
 /// What the surface comes from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Surface {
     /// A closed form or a mesh.
     Exact,
     /// A grain of a family, none of whose faces lie along its axes. Told apart so that the
     /// committed grains of the study stay what the generator gives, to the bit.
     Family,
-    /// An image, which blur and smoothing [m] have gone over.
-    Scanned { image: Kernel },
+    /// An image, which blur and smoothing [m] have gone over, and places [m] of the surface where the
+    /// grain was cut from its neighbours.
+    Scanned { image: Kernel, cuts: Vec<DVec3> },
 }
 
 /// Detail finer than this share of R_in is smoothed away: the wider Gaussian. By the method of the
@@ -62,7 +63,7 @@ pub(crate) fn measure(
     lower: DVec3,
     upper: DVec3,
     inscribed: f64,
-    surface: Surface,
+    surface: &Surface,
 ) -> Option<f64> {
     match surface {
         Surface::Exact => {
@@ -76,7 +77,9 @@ pub(crate) fn measure(
             of_exact(&turned, middle - half, middle + half, inscribed)
         }
         Surface::Family => of_exact(distance, lower, upper, inscribed),
-        Surface::Scanned { image } => scan::measure(distance, lower, upper, inscribed, image),
+        Surface::Scanned { image, cuts } => {
+            scan::measure(distance, [lower, upper], inscribed, *image, cuts)
+        }
     }
 }
 
@@ -177,7 +180,7 @@ mod tests {
     fn turned_rounded_cubes_have_twice_their_radius() {
         let cube = DVec3::splat(0.9);
         for radius in [0.0, 0.1, 0.2, 0.3, 0.4] {
-            let found = measure(&rounded_cube(radius), -cube, cube, 0.5, Surface::Exact).unwrap();
+            let found = measure(&rounded_cube(radius), -cube, cube, 0.5, &Surface::Exact).unwrap();
             println!("rounded cube {radius}: {found:.4}");
             assert!((found - 2.0 * radius).abs() < 0.02, "{radius}: {found}");
         }
@@ -200,7 +203,7 @@ mod tests {
                 of_spheroid(axes.x, 1.0)
             };
             let body = |x: DVec3, _: &mut u32| crate::analytic::ellipsoid_distance(axes, x);
-            let found = measure(&body, -axes, axes, axes.z, Surface::Exact).unwrap();
+            let found = measure(&body, -axes, axes, axes.z, &Surface::Exact).unwrap();
             println!("ellipsoid {axes}: {found:.4}, exact {exact:.4}");
             assert!((found - exact).abs() < 0.02, "{axes}: {found} for {exact}");
         }
@@ -225,7 +228,7 @@ mod tests {
             };
             let inscribed = 1f64.min(0.5 * length);
             let half = DVec3::splat(2.5);
-            let found = measure(&body, -half, half, inscribed, Surface::Exact).unwrap();
+            let found = measure(&body, -half, half, inscribed, &Surface::Exact).unwrap();
             println!("cylinder {length} {rounding}: {found:.4}");
             assert!((found - exact).abs() < 0.08, "{found} for {exact}");
         }

@@ -19,6 +19,7 @@ use crate::scan::gaussian;
 use crate::surface::{Samples, extract};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use std::f64::consts::PI;
 
 /// Samples along the radius of the inscribed sphere.
 const CELLS: f64 = 12.0;
@@ -32,6 +33,11 @@ const COARSE: f64 = 0.4;
 const COARSE_CORNER: f64 = 0.98;
 /// Corners that turn the surface by less than this share of what a sphere turns count in proportion.
 const LEAST_TURN: f64 = 0.05;
+/// Level set nearer to a cut than above a place of the surface so far from it is left out: so far does the
+/// wider Gaussian carry the edge of the cut [R_in].
+const CLEAR: f64 = 0.5;
+/// Part of the surface that must be left.
+const LEAST_LEFT: f64 = 0.25;
 /// Width of the last of the Gaussians, which gives the derivatives between the samples [samples].
 const LAST: f64 = 1.0;
 /// Its reach [widths].
@@ -43,13 +49,15 @@ const PARTS: usize = 4;
 type Bend = (DVec3, DMat3);
 
 /// Roundness of the body in the box with the largest inscribed sphere of radius `inscribed`, whose
-/// surface comes from an image that blur and smoothing [m] have gone over; none where the grid would be too large.
+/// surface comes from an image that blur and smoothing [m] have gone over, away from the places
+/// `cuts` [m] where it was cut; none where hardly any surface is left, or the grid would be too
+/// large.
 pub(super) fn measure(
     distance: &impl Distance,
-    lower: DVec3,
-    upper: DVec3,
+    [lower, upper]: [DVec3; 2],
     inscribed: f64,
     image: Kernel,
+    cuts: &[DVec3],
 ) -> Option<f64> {
     let spacing = inscribed / CELLS;
     let reach = spacing * (4.0 * COARSE * CELLS + REACH).ceil();
@@ -60,6 +68,10 @@ pub(super) fn measure(
         spacing,
         values: &band.values,
     });
+    let (natural, left) = natural(&mesh, inscribed, cuts);
+    if left < LEAST_LEFT {
+        return None;
+    }
     let bends = |width: f64| -> Vec<Bend> {
         let before = (width * CELLS).powi(2) - LAST * LAST;
         let smooth = Band {
@@ -81,6 +93,9 @@ pub(super) fn measure(
         // Area and turning [R_in^2, R_in].
         let (mut area, mut turn) = (0.0, 0.0);
         for (face, triangle) in mesh.triangles.iter().enumerate() {
+            if triangle.iter().any(|v| !natural[*v as usize]) {
+                continue;
+            }
             let [a, b, c] = mesh.corners(face);
             let part = (b - a).cross(c - a).length() / (2.0 * (PARTS * PARTS) as f64);
             let part = part / (inscribed * inscribed);
@@ -115,8 +130,24 @@ pub(super) fn measure(
     };
     let found = found.map(|(area, turn)| area / turn);
     let roundness = radius_of(&chain, found);
-    let least = LEAST_TURN * 4.0 * std::f64::consts::PI;
+    let least = LEAST_TURN * 4.0 * PI * left;
     Some(1.0 - (1.0 - roundness) * (turn / least).min(1.0))
+}
+
+/// Which vertices of the level set lie clear of the cuts, and about the part of the surface that does.
+fn natural(mesh: &TriangleMesh, inscribed: f64, cuts: &[DVec3]) -> (Vec<bool>, f64) {
+    let near = inscribed * LEVEL.hypot(CLEAR);
+    let clear: Vec<bool> = mesh
+        .vertices
+        .par_iter()
+        .map(|x| {
+            cuts.iter()
+                .all(|cut| x.distance_squared(*cut) > near * near)
+        })
+        .collect();
+    let left = clear.iter().filter(|clear| **clear).count();
+    let part = left as f64 / clear.len().max(1) as f64;
+    (clear, part)
 }
 
 /// Variance [m^2], along any one direction, that linear interpolation between the vertices adds to
@@ -181,4 +212,78 @@ fn parts() -> impl Iterator<Item = [f64; 3]> {
             [1.0 - u - v, u, v]
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHARP: Kernel = [(1.0, 0.0), (0.0, 0.0)];
+
+    fn roundness(body: impl Fn(DVec3) -> f64 + Sync, cuts: &[DVec3]) -> Option<f64> {
+        let body = |x: DVec3, _: &mut u32| body(x);
+        let bounds = [DVec3::splat(-2.0), DVec3::splat(2.0)];
+        measure(&body, bounds, 1.0, SHARP, cuts)
+    }
+
+    /// Places on the unit sphere that are so far up.
+    fn on_sphere(above: f64) -> Vec<DVec3> {
+        let places = (0..2000).map(|n| {
+            let (z, turn) = (f64::from(n) / 999.5 - 1.0, 2.4 * f64::from(n));
+            let across = (1.0 - z * z).max(0.0).sqrt();
+            DVec3::new(across * turn.cos(), across * turn.sin(), z)
+        });
+        places.filter(|x| x.z >= above).collect()
+    }
+
+    #[test]
+    fn the_edge_of_a_cut_is_no_corner() {
+        // Flat beyond two thirds of the height.
+        let body = |x: DVec3| {
+            let (ball, across) = (x.length() - 1.0, x.truncate().length());
+            let rim = (1.0 - 0.66f64 * 0.66).sqrt();
+            if x.z > 0.66 && across < rim {
+                (x.z - 0.66).max(ball)
+            } else if x.z > 0.66 * x.length() {
+                f64::hypot(across - rim, x.z - 0.66).copysign(x.z - 0.66)
+            } else {
+                ball.max(x.z - 0.66)
+            }
+        };
+        let cut: Vec<DVec3> = on_sphere(0.66)
+            .into_iter()
+            .map(|x| DVec3::new(x.x, x.y, 0.66))
+            .collect();
+        let (whole, own) = (
+            roundness(body, &[]).unwrap(),
+            roundness(body, &cut).unwrap(),
+        );
+        println!("with the cut {whole:.3}, without {own:.3}");
+        assert!(whole < 0.7 && own > 0.98, "{whole}, {own}");
+        // Where hardly anything is left, nothing is said.
+        assert_eq!(roundness(body, &on_sphere(-0.4)), None);
+    }
+
+    /// The side of a cylinder is as round as the largest sphere in it, and its rim is curved.
+    #[test]
+    fn rims_and_edges_have_their_radius() {
+        let turn = glam::DQuat::from_scaled_axis(DVec3::new(0.37, 0.81, -0.52));
+        for radius in [0.0, 0.2, 0.4, 0.8] {
+            let cylinder = |x: DVec3| {
+                let x = turn * x;
+                let q = glam::DVec2::new(x.truncate().length(), x.z.abs()) - (1.0 - radius);
+                q.max(glam::DVec2::ZERO).length() + q.max_element().min(0.0) - radius
+            };
+            let cube = |x: DVec3| {
+                let q = (turn * x).abs() - (1.0 - radius);
+                q.max(DVec3::ZERO).length() + q.max_element().min(0.0) - radius
+            };
+            let found = [roundness(cylinder, &[]), roundness(cube, &[])].map(Option::unwrap);
+            println!("{radius}: rim {:.3}, cube {:.3}", found[0], found[1]);
+            assert!(
+                found.iter().all(|r| (r - radius).abs() < 0.025),
+                "{found:?}"
+            );
+        }
+    }
 }
