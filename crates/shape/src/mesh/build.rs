@@ -71,8 +71,7 @@ pub(crate) fn from_closed(
         lower,
         upper,
         volume: Some(mass.volume),
-        // That of a scan has the roughness of its noise, which the sampling takes off.
-        area: (surface == Surface::Exact).then(|| mesh.area()),
+        area: Some(mesh.area()),
         surface,
     };
     assemble(&body, provenance, options)

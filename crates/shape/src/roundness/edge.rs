@@ -16,6 +16,25 @@ use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 /// image amount to.
 pub(crate) type Kernel = [(f64, f64); 2];
 
+/// A section through an edge in the image.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Section {
+    /// Where the level set turns on one side of the edge: arc length from its middle, and by how much.
+    turns: Vec<(f64, f64)>,
+    /// By how much the surface is shorter than that of the body.
+    pub shorter: f64,
+    /// Area of the body's section that lies outside of it.
+    pub outside: f64,
+}
+
+/// Edges that would be measured as those of a body are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Edges {
+    pub radius: f64,
+    /// Angle by which the surface turns in them.
+    pub angle: f64,
+}
+
 /// What a measurement does to an edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chain {
@@ -43,9 +62,9 @@ const FLAT: f64 = 5.0;
 const BELL: (i32, f64) = (20, 4.0);
 
 impl Chain {
-    /// Where the level set turns on one side of the edge: arc length from its middle, and by how much.
-    /// Of an edge of this radius that turns by `angle`.
-    fn outline(&self, radius: f64, angle: f64) -> Vec<(f64, f64)> {
+    /// Section through such an edge.
+    pub(super) fn section(&self, edges: Edges) -> Section {
+        let Edges { radius, angle } = edges;
         let image = self.image.map(|(weight, s)| (weight, s.max(FINEST)));
         let (sine, cosine) = (0.5 * angle).sin_cos();
         // Height of the body over the line across the edge, from where the faces would meet.
@@ -84,27 +103,37 @@ impl Chain {
         };
         let step = (radius * sine + FLAT * widest * cosine) / POINTS as f64;
         let (mut height, mut tilt, mut place) = (surface(0.0, body(0.0)), 0.0, 0.0);
-        let mut found = Vec::with_capacity(POINTS + 1);
+        let mut turns = Vec::with_capacity(POINTS + 1);
+        let mut length = 0.0;
+        let mut outside = 0.5 * (body(0.0) - height) * step;
         for n in 1..=POINTS {
             let next = surface(step * n as f64, height - step * f64::tan(tilt));
             let steeper = f64::atan2(height - next, step);
             let turn = steeper - tilt;
             // At the point before, where the two chords meet.
-            found.push((place + 0.5 * self.level * turn, turn));
-            place += self.level * turn + step.hypot(height - next);
+            turns.push((place + 0.5 * self.level * turn, turn));
+            let chord = step.hypot(height - next);
+            place += self.level * turn + chord;
+            length += chord;
+            outside += (body(step * n as f64) - next) * step;
             (height, tilt) = (next, steeper);
         }
         let turn = 0.5 * angle - tilt;
-        found.push((place + 0.5 * self.level * turn, turn));
-        found
+        turns.push((place + 0.5 * self.level * turn, turn));
+        let own = 0.5 * angle * radius + FLAT * widest;
+        Section {
+            turns,
+            shorter: 2.0 * (own - length),
+            outside: 2.0 * outside,
+        }
     }
 
     /// Area of the corner and turning of the surface in it, both per length of an edge with this
-    /// outline, as a Gaussian of this width sees it.
-    fn of_edge(&self, outline: &[(f64, f64)], width: f64) -> (f64, f64) {
+    /// section, as a Gaussian of this width sees it.
+    pub(super) fn of_edge(&self, section: &Section, width: f64) -> (f64, f64) {
         let smoothed = |s: f64| {
-            let sum: f64 = outline
-                .iter()
+            let turns = section.turns.iter();
+            let sum: f64 = turns
                 .map(|(at, turn)| turn * (bell((s - at) / width) + bell((s + at) / width)))
                 .sum();
             sum / (width * (2.0 * PI).sqrt())
@@ -133,21 +162,38 @@ impl Chain {
 
     /// What is measured with both widths of a body with edges like this, as long as those of a cube, and
     /// corners like its, which are taken as they are.
-    fn of_body(&self, radius: f64, angle: f64) -> [f64; 2] {
-        let outline = self.outline(radius, angle);
-        let length = 24.0 * (1.0 - radius);
-        let corners = 4.0 * PI * radius;
+    fn of_body(&self, edges: Edges) -> [f64; 2] {
+        let section = self.section(edges);
+        let (length, corners) = body(edges.radius);
         self.widths.map(|width| {
-            let (area, turn) = self.of_edge(&outline, width);
-            (length * area + corners * radius) / (length * turn + corners).max(1e-9)
+            let (area, turn) = self.of_edge(&section, width);
+            (length * area + corners * edges.radius) / (length * turn + corners).max(1e-9)
         })
     }
+
+    /// Length of such edges of a body for whose corners the narrower Gaussian finds this turning.
+    pub(super) fn length(&self, edges: Edges, section: &Section, turning: f64) -> f64 {
+        let (length, corners) = body(edges.radius);
+        let (_, turn) = self.of_edge(section, self.widths[0]);
+        turning * length / (length * turn + corners).max(1e-9)
+    }
+}
+
+/// Length of the edges of a cube with edges of this radius, and the turning of the surface at its
+/// corners.
+fn body(radius: f64) -> (f64, f64) {
+    (24.0 * (1.0 - radius), 4.0 * PI * radius)
 }
 
 /// Spread of what two measurements and this model agree to: about what it is off without noise.
 const MISFIT: f64 = 0.01;
 /// Spread of the angles that edges turn by, about a right angle.
 const ANGLES: f64 = 0.4;
+/// Sharp edges of right angles.
+const RIGHT: Edges = Edges {
+    radius: 0.0,
+    angle: FRAC_PI_2,
+};
 /// Angles for which the model is worked out, a right one among them: the first, and their steps.
 const BLUNTEST: f64 = 0.25 * PI;
 const APART: f64 = 0.05 * PI;
@@ -157,23 +203,26 @@ const RADII: usize = 16;
 /// Parts that its steps of angle and radius are cut into.
 const FINER: [usize; 2] = [9, 30];
 
-/// Radius of the edges for which measurements of two widths found these values. The wider
+/// The edges for which measurements of two widths found these values. The wider
 /// one tells at what angle the edges turn: blunt ones are rounded more. Where edges are round, the
 /// angle matters little, and is about a right one.
-pub(super) fn radius_of(chain: &Chain, found: [f64; 2]) -> f64 {
+pub(super) fn edges_of(chain: &Chain, found: [f64; 2]) -> Edges {
     let table: Vec<[f64; 2]> = (0..=TRIED * (RADII + 1) + RADII)
         .into_par_iter()
         .map(|n| {
             let (angle, radius) = (n / (RADII + 1), n % (RADII + 1));
-            let angle = BLUNTEST + APART * angle as f64;
-            chain.of_body(radius as f64 / RADII as f64, angle)
+            chain.of_body(Edges {
+                angle: BLUNTEST + APART * angle as f64,
+                radius: radius as f64 / RADII as f64,
+            })
         })
         .collect();
     let [angles, radii] = [TRIED * FINER[0], RADII * FINER[1]];
-    let (mut best, mut radius) = (f64::INFINITY, 0.0);
+    let (mut best, mut edges) = (f64::INFINITY, RIGHT);
     for n in 0..=angles {
         let (row, u) = between(n, FINER[0], TRIED);
-        let unusual = (BLUNTEST + APART * n as f64 / FINER[0] as f64 - FRAC_PI_2) / ANGLES;
+        let angle = BLUNTEST + APART * n as f64 / FINER[0] as f64;
+        let unusual = (angle - FRAC_PI_2) / ANGLES;
         for m in 0..=radii {
             let (column, v) = between(m, FINER[1], RADII);
             let at = row * (RADII + 1) + column;
@@ -184,11 +233,12 @@ pub(super) fn radius_of(chain: &Chain, found: [f64; 2]) -> f64 {
                 misfit += ((model - value) / MISFIT).powi(2);
             }
             if misfit < best {
-                (best, radius) = (misfit, m as f64 / radii as f64);
+                let radius = m as f64 / radii as f64;
+                (best, edges) = (misfit, Edges { radius, angle });
             }
         }
     }
-    radius
+    edges
 }
 
 /// Step of the table, of `steps`, in which part `n` lies when each is cut into `parts`, and how far in.
@@ -235,7 +285,7 @@ mod tests {
                 widths: [0.02, 0.03],
                 ..chain(0.0)
             };
-            let [found, _] = chain.of_body(radius, FRAC_PI_2);
+            let [found, _] = chain.of_body(Edges { radius, ..RIGHT });
             assert!((found - radius).abs() < 0.03, "{found} for {radius}");
         }
     }
@@ -252,9 +302,9 @@ mod tests {
             (0.0275, 0.8, [0.8154, 0.8259]),
         ] {
             let chain = chain(image);
-            let outline = chain.outline(radius, FRAC_PI_2);
+            let section = chain.section(Edges { radius, ..RIGHT });
             for (width, exact) in chain.widths.into_iter().zip(exact) {
-                let (area, turn) = chain.of_edge(&outline, width);
+                let (area, turn) = chain.of_edge(&section, width);
                 println!("{image} {radius} {width}: {:.4}, {exact}", area / turn);
                 // The wider Gaussian reaches through the body, which the section knows nothing of.
                 assert!((area / turn - exact).abs() < 0.008, "{}", area / turn);
@@ -268,7 +318,8 @@ mod tests {
             for degrees in [60f64, 70.0, 90.0, 110.0] {
                 for radius in [0.0, 0.2, 0.5, 0.8] {
                     let chain = chain(image);
-                    let back = radius_of(&chain, chain.of_body(radius, degrees.to_radians()));
+                    let angle = degrees.to_radians();
+                    let back = edges_of(&chain, chain.of_body(Edges { radius, angle })).radius;
                     // The guess of a right angle draws a little, most where an edge is sharp.
                     let bound = if radius < 0.1 { 0.1 } else { 0.05 };
                     println!("{image} {degrees} {radius}: {back:.3}");
@@ -276,6 +327,44 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A quarter plane under a Gaussian is half where the product of two error functions is.
+    #[test]
+    fn an_image_takes_length_and_area_off_an_edge() {
+        let (s, step) = (0.05, 1e-4);
+        let half = |x: f64| 0.5 * (1.0 + error_function(x / (SQRT_2 * s)));
+        // Depth below the one face at each depth below the other, from the middle on.
+        let other = |depth: f64| {
+            let (mut low, mut high) = (0.0, 1.0);
+            for _ in 0..40 {
+                let middle = 0.5 * (low + high);
+                if half(middle) * half(depth) < 0.5 {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            low
+        };
+        let middle = (0..).map(|n| f64::from(n) * step).find(|d| other(*d) <= *d);
+        let middle = middle.unwrap();
+        let (mut length, mut outside) = (0.0, 0.5 * middle * middle);
+        for n in 0..3000 {
+            let depth = middle + f64::from(n) * step;
+            let (here, next) = (other(depth), other(depth + step));
+            length += step.hypot(here - next);
+            outside += 0.5 * step * (here + next);
+        }
+        let chain = chain(s);
+        let found = chain.section(RIGHT);
+        let shorter = 2.0 * (middle + 3000.0 * step - length);
+        println!(
+            "{shorter:.5} {:.5}, {outside:.6} {:.6}",
+            found.shorter, found.outside
+        );
+        assert!((found.shorter / shorter - 1.0).abs() < 0.02);
+        assert!((found.outside / (2.0 * outside) - 1.0).abs() < 0.05);
     }
 
     #[test]

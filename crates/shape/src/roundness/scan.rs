@@ -12,7 +12,8 @@
 
 use super::CORNER;
 use super::band::Band;
-use super::edge::{Chain, Kernel, radius_of};
+use super::edge::{Chain, Kernel, edges_of};
+use super::{Lost, Reading};
 use crate::distance::Distance;
 use crate::mesh::TriangleMesh;
 use crate::scan::gaussian;
@@ -58,7 +59,7 @@ pub(super) fn measure(
     inscribed: f64,
     image: Kernel,
     cuts: &[DVec3],
-) -> Option<f64> {
+) -> Option<Reading> {
     let spacing = inscribed / CELLS;
     let reach = spacing * (4.0 * COARSE * CELLS + REACH).ceil();
     let band = Band::whole(distance, lower, upper, spacing, [LEVEL * inscribed, reach])?;
@@ -118,7 +119,7 @@ pub(super) fn measure(
     let found = WIDTHS.map(corners);
     let (_, turn) = found[0];
     if found.iter().any(|(_, turn)| *turn <= 0.0) {
-        return Some(1.0);
+        return Some(Reading::of(1.0));
     }
     // Between the vertices the curvatures are interpolated, which widens them.
     let interpolated = spread(&mesh) / (inscribed * inscribed);
@@ -129,9 +130,19 @@ pub(super) fn measure(
         corner: CORNER,
     };
     let found = found.map(|(area, turn)| area / turn);
-    let roundness = radius_of(&chain, found);
+    let edges = edges_of(&chain, found);
     let least = LEAST_TURN * 4.0 * PI * left;
-    Some(1.0 - (1.0 - roundness) * (turn / least).min(1.0))
+    let section = chain.section(edges);
+    let length = chain.length(edges, &section, turn);
+    Some(Reading {
+        roundness: 1.0 - (1.0 - edges.radius) * (turn / least).min(1.0),
+        lost: Some(Lost {
+            area: length * section.shorter * inscribed.powi(2),
+            volume: length * section.outside * inscribed.powi(3),
+            level: LEVEL * inscribed,
+            area_there: mesh.area(),
+        }),
+    })
 }
 
 /// Which vertices of the level set lie clear of the cuts, and about the part of the surface that does.
@@ -223,7 +234,7 @@ mod tests {
     fn roundness(body: impl Fn(DVec3) -> f64 + Sync, cuts: &[DVec3]) -> Option<f64> {
         let body = |x: DVec3, _: &mut u32| body(x);
         let bounds = [DVec3::splat(-2.0), DVec3::splat(2.0)];
-        measure(&body, bounds, 1.0, SHARP, cuts)
+        measure(&body, bounds, 1.0, SHARP, cuts).map(|reading| reading.roundness)
     }
 
     /// Places on the unit sphere that are so far up.
