@@ -54,7 +54,7 @@ pub(crate) struct Body<D> {
     pub upper: DVec3,
     /// Exact volume [m^3] where known.
     pub volume: Option<f64>,
-    /// Exact area [m^2] where known: the sampled surface has no sharp edges.
+    /// Area [m^2] where known: sampling cuts edges off, more than the noise of a scan adds.
     pub area: Option<f64>,
     /// What the distance comes from.
     pub surface: roundness::Surface,
@@ -135,13 +135,17 @@ pub(crate) fn assemble<D: Distance>(
         let distance = |x: DVec3, hint: &mut u32| body.distance.near(x, hint);
         let (_, inscribed) = inscribed::sphere(&distance, body.lower, body.upper);
         morphology.inscribed_radius = Some(inscribed);
-        morphology.wadell_roundness = roundness::measure(
+        let reading = roundness::measure(
             &body.distance,
             body.lower,
             body.upper,
             inscribed,
-            body.surface,
+            &body.surface,
         );
+        morphology.wadell_roundness = reading.map(|reading| reading.roundness);
+        if let Some(lost) = reading.and_then(|reading| reading.lost) {
+            morphology.set_area(lost.restored(area), mass.volume);
+        }
     }
     let second = DVec3::new(
         mass.second.x_axis.x,

@@ -73,6 +73,11 @@ impl Morphology {
         }
     }
 
+    pub(crate) fn set_area(&mut self, area: f64, volume: f64) {
+        self.area = area;
+        self.wadell_sphericity = PI.cbrt() * (6.0 * volume).powf(2.0 / 3.0) / area;
+    }
+
     /// Elongation b / a.
     pub fn elongation(&self) -> f64 {
         self.b / self.a

@@ -4,7 +4,8 @@ mod common;
 
 use common::{close, shared};
 use grainwake_shape::mesh::{MeshOptions, read_mesh, shape_from_mesh};
-use grainwake_shape::{ReadLimits, Shape};
+use grainwake_shape::scan::{Denoise, ScanOptions, Threshold, read_volume, shapes_from_volume};
+use grainwake_shape::{ReadLimits, Shape, ShapeError};
 use std::path::{Path, PathBuf};
 
 fn kept(name: &str) -> PathBuf {
@@ -49,4 +50,40 @@ fn the_aggregate_is_what_its_mesh_gives() {
     close(file.volume(), made.volume(), 1e-9);
     close(file.inertia().x, made.inertia().x, 1e-9);
     assert_eq!(file.nodes().len(), made.nodes().len());
+}
+
+/// `cases/scan-pair`: of a volume with five grains that touch two are whole, and are the files kept.
+#[test]
+fn the_pair_of_the_scan_is_what_its_volume_gives() {
+    let volume = kept("../scan-pair/powder-crop.tif");
+    assert!(std::fs::metadata(&volume).unwrap().len() < 200_000);
+    let (volume, source) = read_volume(&volume, &ReadLimits::default()).unwrap();
+    let options = ScanOptions {
+        threshold: Some(Threshold::Otsu),
+        denoise: Denoise::Median,
+        separate: Some(0.87),
+        ..ScanOptions::new(2e-6)
+    };
+    let grains = shapes_from_volume(&volume, &source, &options).unwrap();
+    assert_eq!(grains.len(), 5);
+    for grain in grains {
+        let path = kept(&format!(
+            "../scan-pair/grains/label-{:05}.grain",
+            grain.label
+        ));
+        match grain.shape {
+            Ok(made) => {
+                let file = Shape::load(&path).unwrap();
+                close(file.volume(), made.volume(), 1e-9);
+                close(file.surface_area(), made.surface_area(), 1e-6);
+                let [old, new] = [&file, &made].map(|s| s.morphology().wadell_roundness.unwrap());
+                close(old, new, 1e-6);
+                assert!(grain.shared_surface > 0.1);
+            }
+            Err(error) => {
+                assert!(matches!(error, ShapeError::CutByBorder { .. }), "{error}");
+                assert!(!path.exists());
+            }
+        }
+    }
 }

@@ -7,6 +7,7 @@ mod bodies;
 mod render;
 
 use bodies::{Body, Scan};
+use grainwake_shape::ShapeOptions;
 use rayon::prelude::*;
 
 /// Noise of the scans, as a share of the contrast.
@@ -42,14 +43,26 @@ fn scanned_bodies_have_the_roundness_of_their_edges() {
             });
             let line = format!("{name} of {}: {coarse:.3}, {fine:.3}", body.roundness);
             println!("{line}");
-            // Of cylinders of 80 voxels, one in seven lies a little above the bound of 0.08.
-            let slack = if *name == "cylinder" { 0.01 } else { 0.0 };
-            let within = |found: f64| body.holds(found) || body.holds(found - slack);
-            let good = within(coarse) && within(fine) && (fine - coarse).abs() <= 0.03 + slack;
+            let good = body.holds(coarse) && body.holds(fine) && (fine - coarse).abs() <= 0.03;
             (!good).then_some(line)
         })
         .collect();
     assert!(missed.is_empty(), "{missed:?}");
+}
+
+/// Blur and smoothing round sharp edges and take 3 percent off the area of a box of 40 voxels, which
+/// the model of the edge gives back.
+#[test]
+fn scanned_bodies_have_their_area_though_blur_rounds_their_edges() {
+    for (name, bound) in [("box", 0.018), ("box.1", 0.006), ("spheroid", 0.003)] {
+        let body = Body::named(name);
+        let [_, exact, _] = body.others.unwrap();
+        let scan = Scan::new(&body, 1, 40.0, 1.0);
+        let shape = scan.shape_with(NOISE, 2, false, ShapeOptions::default());
+        let found = shape.morphology().wadell_sphericity;
+        println!("{name}: {found:.4} for {exact:.4}");
+        assert!((found / exact - 1.0).abs() < bound, "{name}: {found}");
+    }
 }
 
 /// Edges that do not turn by right angles, of which the rule knows nothing beforehand.
@@ -58,6 +71,6 @@ fn sharp_edges_of_any_angle_are_sharp() {
     for name in ["octahedron", "tetrahedron", "prism"] {
         let found = Scan::new(&Body::named(name), 1, 40.0, 1.0).roundness(NOISE, 1);
         println!("{name}: {found:.3}");
-        assert!(found < 0.12, "{name}: {found}");
+        assert!(found < 0.1, "{name}: {found}");
     }
 }

@@ -211,7 +211,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     let cut = shared.iter().filter(|part| **part > MUCH_SHARED).count();
     if cut > 0 && !args.no_roundness {
         tell!(
-            "note: {cut} of {} grains were cut from neighbours over more than {:.0} % of their surface (shared_surface in {}): the edges of the cuts make their roundness too small",
+            "note: {cut} of {} grains were cut from neighbours over more than {:.0} % of their surface (shared_surface in {}): their roundness is that of what lies clear of the cuts, and left out where too little does",
             rows.len(),
             100.0 * MUCH_SHARED,
             table.display()

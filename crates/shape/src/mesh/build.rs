@@ -47,7 +47,7 @@ pub fn shape_from_mesh(
 /// Shape of a mesh; its frame and bounds are found here, `provenance` tells the rest.
 pub(crate) fn from_closed(
     mesh: &TriangleMesh,
-    surface: Surface,
+    mut surface: Surface,
     mut provenance: Provenance,
     options: &ShapeOptions,
 ) -> Result<Shape> {
@@ -58,6 +58,12 @@ pub(crate) fn from_closed(
     let local = mesh.in_frame(mass.centroid, axes);
     let (lower, upper) = local.bounds();
     let distance = MeshDistance::new(&local)?;
+    if let Surface::Scanned { cuts, .. } = &mut surface {
+        let to_frame = axes.transpose();
+        for place in cuts {
+            *place = to_frame * (*place - mass.centroid);
+        }
+    }
     provenance.centroid = mass.centroid;
     provenance.rotation = DQuat::from_mat3(&axes);
     let body = Body {
@@ -65,8 +71,7 @@ pub(crate) fn from_closed(
         lower,
         upper,
         volume: Some(mass.volume),
-        // That of a scan has the roughness of its noise, which the sampling takes off.
-        area: (surface == Surface::Exact).then(|| mesh.area()),
+        area: Some(mesh.area()),
         surface,
     };
     assemble(&body, provenance, options)

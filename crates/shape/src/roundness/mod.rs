@@ -19,8 +19,10 @@ mod scan;
 use crate::distance::Distance;
 use crate::surface::{Samples, extract};
 use band::Band;
+pub(crate) use edge::Kernel;
 use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
+use std::f64::consts::PI;
 
 /// Samples along the radius of the inscribed sphere.
 const CELLS: f64 = 10.0;
@@ -33,15 +35,16 @@ const CORNER: f64 = 0.99;
 /// Reach of the Gaussian in widths.
 const REACH: f64 = 4.5;
 /// What the surface comes from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Surface {
     /// A closed form or a mesh.
     Exact,
     /// A grain of a family, none of whose faces lie along its axes. Told apart so that the
     /// committed grains of the study stay what the generator gives, to the bit.
     Family,
-    /// An image, which blur and smoothing of this standard deviation [m] have gone over.
-    Scanned { image: f64 },
+    /// An image, which blur and smoothing [m] have gone over, and places [m] of the surface where the
+    /// grain was cut from its neighbours.
+    Scanned { image: Kernel, cuts: Vec<DVec3> },
 }
 
 /// Detail finer than this share of R_in is smoothed away: the wider Gaussian. By the method of the
@@ -54,6 +57,45 @@ pub(crate) fn cutoff(method: &str) -> f64 {
     }
 }
 
+/// What is read off the corners of a body.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reading {
+    pub roundness: f64,
+    /// What an image has taken off the edges.
+    pub lost: Option<Lost>,
+}
+
+impl Reading {
+    fn of(roundness: f64) -> Reading {
+        Reading {
+            roundness,
+            lost: None,
+        }
+    }
+}
+
+/// What an image takes off the edges of a body whose volume it keeps: a surface that rounds them is
+/// shorter, and lies a little farther out everywhere.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lost {
+    /// Area [m^2].
+    pub area: f64,
+    /// Volume beside the edges [m^3].
+    pub volume: f64,
+    /// Distance [m] of a level set outside, and its area [m^2].
+    pub level: f64,
+    pub area_there: f64,
+}
+
+impl Lost {
+    /// Area [m^2] of a body whose image has this one.
+    pub(crate) fn restored(&self, area: f64) -> f64 {
+        // Steiner's formula for the growth of the area with the distance.
+        let growth = (self.area_there - area) / self.level - 4.0 * PI * self.level;
+        area + self.area - self.volume / area * growth
+    }
+}
+
 /// Roundness of the body in the box with the largest inscribed sphere of radius `inscribed`, or
 /// none where the grid would be too large.
 pub(crate) fn measure(
@@ -61,8 +103,8 @@ pub(crate) fn measure(
     lower: DVec3,
     upper: DVec3,
     inscribed: f64,
-    surface: Surface,
-) -> Option<f64> {
+    surface: &Surface,
+) -> Option<Reading> {
     match surface {
         Surface::Exact => {
             // Edges along the grid would have few and regular samples: it is turned.
@@ -72,10 +114,12 @@ pub(crate) fn measure(
                 |x: DVec3, hint: &mut u32| distance.near(middle + turn * (x - middle), hint);
             // Of the box about the turned box.
             let half = turn.transpose().abs() * (0.5 * (upper - lower));
-            of_exact(&turned, middle - half, middle + half, inscribed)
+            of_exact(&turned, middle - half, middle + half, inscribed).map(Reading::of)
         }
-        Surface::Family => of_exact(distance, lower, upper, inscribed),
-        Surface::Scanned { image } => scan::measure(distance, lower, upper, inscribed, image),
+        Surface::Family => of_exact(distance, lower, upper, inscribed).map(Reading::of),
+        Surface::Scanned { image, cuts } => {
+            scan::measure(distance, [lower, upper], inscribed, *image, cuts)
+        }
     }
 }
 
@@ -176,7 +220,9 @@ mod tests {
     fn turned_rounded_cubes_have_twice_their_radius() {
         let cube = DVec3::splat(0.9);
         for radius in [0.0, 0.1, 0.2, 0.3, 0.4] {
-            let found = measure(&rounded_cube(radius), -cube, cube, 0.5, Surface::Exact).unwrap();
+            let found = measure(&rounded_cube(radius), -cube, cube, 0.5, &Surface::Exact)
+                .unwrap()
+                .roundness;
             println!("rounded cube {radius}: {found:.4}");
             assert!((found - 2.0 * radius).abs() < 0.02, "{radius}: {found}");
         }
@@ -199,7 +245,9 @@ mod tests {
                 of_spheroid(axes.x, 1.0)
             };
             let body = |x: DVec3, _: &mut u32| crate::analytic::ellipsoid_distance(axes, x);
-            let found = measure(&body, -axes, axes, axes.z, Surface::Exact).unwrap();
+            let found = measure(&body, -axes, axes, axes.z, &Surface::Exact)
+                .unwrap()
+                .roundness;
             println!("ellipsoid {axes}: {found:.4}, exact {exact:.4}");
             assert!((found - exact).abs() < 0.02, "{axes}: {found} for {exact}");
         }
@@ -224,7 +272,9 @@ mod tests {
             };
             let inscribed = 1f64.min(0.5 * length);
             let half = DVec3::splat(2.5);
-            let found = measure(&body, -half, half, inscribed, Surface::Exact).unwrap();
+            let found = measure(&body, -half, half, inscribed, &Surface::Exact)
+                .unwrap()
+                .roundness;
             println!("cylinder {length} {rounding}: {found:.4}");
             assert!((found - exact).abs() < 0.08, "{found} for {exact}");
         }

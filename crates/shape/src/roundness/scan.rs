@@ -2,20 +2,25 @@
 //!
 //! Noise bends the surface of a scan: where its radius is about R_in anyway (spheres, the sides of
 //! cylinders) half of it would pass for corners. There only what a much wider Gaussian sees as
-//! corners counts, and corners that hardly turn the surface count in proportion.
+//! corners counts, and only as far as the surface bends in the direction in which that one sees it
+//! bend: beside the rim of a cylinder it sees the rim, and ripples around the cylinder are none of it.
+//! Corners that hardly turn the surface count in proportion.
 //!
 //! Blur, smoothing and the Gaussians widen the corners that are left: area and turning of the
 //! corners are measured with two Gaussians, and the radius is that of the edges which would be
 //! measured so ([`super::edge`]).
 
 use super::CORNER;
-use super::band::{Band, principal};
-use super::edge::{Chain, radius_of};
+use super::band::Band;
+use super::edge::{Chain, Kernel, edges_of};
+use super::{Lost, Reading};
 use crate::distance::Distance;
+use crate::mesh::TriangleMesh;
 use crate::scan::gaussian;
 use crate::surface::{Samples, extract};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use std::f64::consts::PI;
 
 /// Samples along the radius of the inscribed sphere.
 const CELLS: f64 = 12.0;
@@ -29,6 +34,11 @@ const COARSE: f64 = 0.4;
 const COARSE_CORNER: f64 = 0.98;
 /// Corners that turn the surface by less than this share of what a sphere turns count in proportion.
 const LEAST_TURN: f64 = 0.05;
+/// Level set nearer to a cut than above a place of the surface so far from it is left out: so far does the
+/// wider Gaussian carry the edge of the cut [R_in].
+const CLEAR: f64 = 0.5;
+/// Part of the surface that must be left.
+const LEAST_LEFT: f64 = 0.25;
 /// Width of the last of the Gaussians, which gives the derivatives between the samples [samples].
 const LAST: f64 = 1.0;
 /// Its reach [widths].
@@ -40,15 +50,16 @@ const PARTS: usize = 4;
 type Bend = (DVec3, DMat3);
 
 /// Roundness of the body in the box with the largest inscribed sphere of radius `inscribed`, whose
-/// surface comes from an image that blur and smoothing of the standard deviation `image` [m] have
-/// gone over; none where the grid would be too large.
+/// surface comes from an image that blur and smoothing [m] have gone over, away from the places
+/// `cuts` [m] where it was cut; none where hardly any surface is left, or the grid would be too
+/// large.
 pub(super) fn measure(
     distance: &impl Distance,
-    lower: DVec3,
-    upper: DVec3,
+    [lower, upper]: [DVec3; 2],
     inscribed: f64,
-    image: f64,
-) -> Option<f64> {
+    image: Kernel,
+    cuts: &[DVec3],
+) -> Option<Reading> {
     let spacing = inscribed / CELLS;
     let reach = spacing * (4.0 * COARSE * CELLS + REACH).ceil();
     let band = Band::whole(distance, lower, upper, spacing, [LEVEL * inscribed, reach])?;
@@ -58,6 +69,10 @@ pub(super) fn measure(
         spacing,
         values: &band.values,
     });
+    let (natural, left) = natural(&mesh, inscribed, cuts);
+    if left < LEAST_LEFT {
+        return None;
+    }
     let bends = |width: f64| -> Vec<Bend> {
         let before = (width * CELLS).powi(2) - LAST * LAST;
         let smooth = Band {
@@ -79,17 +94,19 @@ pub(super) fn measure(
         // Area and turning [R_in^2, R_in].
         let (mut area, mut turn) = (0.0, 0.0);
         for (face, triangle) in mesh.triangles.iter().enumerate() {
+            if triangle.iter().any(|v| !natural[*v as usize]) {
+                continue;
+            }
             let [a, b, c] = mesh.corners(face);
             let part = (b - a).cross(c - a).length() / (2.0 * (PARTS * PARTS) as f64);
             let part = part / (inscribed * inscribed);
             for weights in parts() {
-                // The tensor is interpolated, not k1: that has a kink where it changes direction.
-                let [k1, k2] = between(&fine, triangle, weights);
-                if k1 * (CORNER + LEVEL) <= 1.0 {
+                let (seen, along) = sharpest(&coarse, triangle, weights);
+                if seen * (COARSE_CORNER + LEVEL) <= 1.0 {
                     continue;
                 }
-                let [seen, _] = between(&coarse, triangle, weights);
-                if seen * (COARSE_CORNER + LEVEL) <= 1.0 {
+                let [k1, k2] = along_and_across(&fine, triangle, weights, along);
+                if k1 * (CORNER + LEVEL) <= 1.0 {
                     continue;
                 }
                 let below = part * (1.0 - LEVEL * k2).max(0.0);
@@ -102,30 +119,98 @@ pub(super) fn measure(
     let found = WIDTHS.map(corners);
     let (_, turn) = found[0];
     if found.iter().any(|(_, turn)| *turn <= 0.0) {
-        return Some(1.0);
+        return Some(Reading::of(1.0));
     }
-    let roundness = radius_of([0, 1].map(|n| {
-        let chain = Chain {
-            image: image / inscribed,
-            level: LEVEL,
-            width: WIDTHS[n],
-            corner: CORNER,
-        };
-        (chain, found[n].0 / found[n].1)
-    }));
-    let least = LEAST_TURN * 4.0 * std::f64::consts::PI;
-    Some(1.0 - (1.0 - roundness) * (turn / least).min(1.0))
+    // Between the vertices the curvatures are interpolated, which widens them.
+    let interpolated = spread(&mesh) / (inscribed * inscribed);
+    let chain = Chain {
+        image: image.map(|(weight, deviation)| (weight, deviation / inscribed)),
+        level: LEVEL,
+        widths: WIDTHS.map(|width| (width * width + interpolated).sqrt()),
+        corner: CORNER,
+    };
+    let found = found.map(|(area, turn)| area / turn);
+    let edges = edges_of(&chain, found);
+    let least = LEAST_TURN * 4.0 * PI * left;
+    let section = chain.section(edges);
+    let length = chain.length(edges, &section, turn);
+    Some(Reading {
+        roundness: 1.0 - (1.0 - edges.radius) * (turn / least).min(1.0),
+        lost: Some(Lost {
+            area: length * section.shorter * inscribed.powi(2),
+            volume: length * section.outside * inscribed.powi(3),
+            level: LEVEL * inscribed,
+            area_there: mesh.area(),
+        }),
+    })
 }
 
-/// Principal curvatures [1/R_in], the larger first, at a place in a triangle.
-fn between(bends: &[Bend], triangle: &[u32; 3], weights: [f64; 3]) -> [f64; 2] {
+/// Which vertices of the level set lie clear of the cuts, and about the part of the surface that does.
+fn natural(mesh: &TriangleMesh, inscribed: f64, cuts: &[DVec3]) -> (Vec<bool>, f64) {
+    let near = inscribed * LEVEL.hypot(CLEAR);
+    let clear: Vec<bool> = mesh
+        .vertices
+        .par_iter()
+        .map(|x| {
+            cuts.iter()
+                .all(|cut| x.distance_squared(*cut) > near * near)
+        })
+        .collect();
+    let left = clear.iter().filter(|clear| **clear).count();
+    let part = left as f64 / clear.len().max(1) as f64;
+    (clear, part)
+}
+
+/// Variance [m^2], along any one direction, that linear interpolation between the vertices adds to
+/// what they carry: in a triangle a 24th of the sum of its squared sides.
+fn spread(mesh: &TriangleMesh) -> f64 {
+    let (mut sum, mut whole) = (0.0, 0.0);
+    for face in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(face);
+        let area = (b - a).cross(c - a).length();
+        let sides = a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
+        sum += area * sides / 24.0;
+        whole += area;
+    }
+    sum / whole
+}
+
+/// Unit normal and second derivatives at a place in a triangle. The tensor is interpolated, not
+/// its larger curvature: that has a kink where it changes direction.
+fn between(bends: &[Bend], triangle: &[u32; 3], weights: [f64; 3]) -> Bend {
     let (mut normal, mut hessian) = (DVec3::ZERO, DMat3::ZERO);
     for (v, weight) in triangle.iter().zip(weights) {
         let (n, h) = bends[*v as usize];
         normal += weight * n;
         hessian += h * weight;
     }
-    principal(normal, hessian)
+    let length = normal.length().max(1e-9);
+    (normal / length, hessian * (1.0 / length))
+}
+
+/// The larger principal curvature [1/R_in] at a place in a triangle, and the direction it is along.
+fn sharpest(bends: &[Bend], triangle: &[u32; 3], weights: [f64; 3]) -> (f64, DVec3) {
+    let (normal, hessian) = between(bends, triangle, weights);
+    let e = normal.any_orthonormal_vector();
+    let f = normal.cross(e);
+    let (he, hf) = (hessian * e, hessian * f);
+    let (mean, half) = (0.5 * (e.dot(he) + f.dot(hf)), 0.5 * (e.dot(he) - f.dot(hf)));
+    let both = e.dot(hf);
+    let (sine, cosine) = (0.5 * both.atan2(half)).sin_cos();
+    (mean + half.hypot(both), cosine * e + sine * f)
+}
+
+/// Curvatures [1/R_in] at a place in a triangle along this direction and across it.
+fn along_and_across(
+    bends: &[Bend],
+    triangle: &[u32; 3],
+    weights: [f64; 3],
+    along: DVec3,
+) -> [f64; 2] {
+    let (normal, hessian) = between(bends, triangle, weights);
+    let e = (along - normal * normal.dot(along)).normalize_or_zero();
+    let f = normal.cross(e);
+    [e.dot(hessian * e), f.dot(hessian * f)]
 }
 
 /// Weights of the corners at the middles of the equal parts of a triangle.
@@ -138,4 +223,78 @@ fn parts() -> impl Iterator<Item = [f64; 3]> {
             [1.0 - u - v, u, v]
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHARP: Kernel = [(1.0, 0.0), (0.0, 0.0)];
+
+    fn roundness(body: impl Fn(DVec3) -> f64 + Sync, cuts: &[DVec3]) -> Option<f64> {
+        let body = |x: DVec3, _: &mut u32| body(x);
+        let bounds = [DVec3::splat(-2.0), DVec3::splat(2.0)];
+        measure(&body, bounds, 1.0, SHARP, cuts).map(|reading| reading.roundness)
+    }
+
+    /// Places on the unit sphere that are so far up.
+    fn on_sphere(above: f64) -> Vec<DVec3> {
+        let places = (0..2000).map(|n| {
+            let (z, turn) = (f64::from(n) / 999.5 - 1.0, 2.4 * f64::from(n));
+            let across = (1.0 - z * z).max(0.0).sqrt();
+            DVec3::new(across * turn.cos(), across * turn.sin(), z)
+        });
+        places.filter(|x| x.z >= above).collect()
+    }
+
+    #[test]
+    fn the_edge_of_a_cut_is_no_corner() {
+        // Flat beyond two thirds of the height.
+        let body = |x: DVec3| {
+            let (ball, across) = (x.length() - 1.0, x.truncate().length());
+            let rim = (1.0 - 0.66f64 * 0.66).sqrt();
+            if x.z > 0.66 && across < rim {
+                (x.z - 0.66).max(ball)
+            } else if x.z > 0.66 * x.length() {
+                f64::hypot(across - rim, x.z - 0.66).copysign(x.z - 0.66)
+            } else {
+                ball.max(x.z - 0.66)
+            }
+        };
+        let cut: Vec<DVec3> = on_sphere(0.66)
+            .into_iter()
+            .map(|x| DVec3::new(x.x, x.y, 0.66))
+            .collect();
+        let (whole, own) = (
+            roundness(body, &[]).unwrap(),
+            roundness(body, &cut).unwrap(),
+        );
+        println!("with the cut {whole:.3}, without {own:.3}");
+        assert!(whole < 0.7 && own > 0.98, "{whole}, {own}");
+        // Where hardly anything is left, nothing is said.
+        assert_eq!(roundness(body, &on_sphere(-0.4)), None);
+    }
+
+    /// The side of a cylinder is as round as the largest sphere in it, and its rim is curved.
+    #[test]
+    fn rims_and_edges_have_their_radius() {
+        let turn = glam::DQuat::from_scaled_axis(DVec3::new(0.37, 0.81, -0.52));
+        for radius in [0.0, 0.2, 0.4, 0.8] {
+            let cylinder = |x: DVec3| {
+                let x = turn * x;
+                let q = glam::DVec2::new(x.truncate().length(), x.z.abs()) - (1.0 - radius);
+                q.max(glam::DVec2::ZERO).length() + q.max_element().min(0.0) - radius
+            };
+            let cube = |x: DVec3| {
+                let q = (turn * x).abs() - (1.0 - radius);
+                q.max(DVec3::ZERO).length() + q.max_element().min(0.0) - radius
+            };
+            let found = [roundness(cylinder, &[]), roundness(cube, &[])].map(Option::unwrap);
+            println!("{radius}: rim {:.3}, cube {:.3}", found[0], found[1]);
+            assert!(
+                found.iter().all(|r| (r - radius).abs() < 0.025),
+                "{found:?}"
+            );
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! The shape of one grain of a volume.
 
 use super::grey::Grey;
-use super::regions::{Region, crop};
+use super::regions::{Region, crop, cuts};
 use super::runs::{fill_cavities, pieces};
 use super::{Mask, ScanOptions, smooth, transform};
 use crate::Shape;
@@ -96,13 +96,13 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
             provenance = provenance
                 .with("surface", "grey")
                 .with("blur_voxels", format!("{:.3}", cut.blur));
-            (cut.field, cut.volume, cut.width)
+            (cut.field, cut.volume, cut.kernel)
         }
         None => {
             let distance = transform::signed(&mask);
             let field = smooth::unshrinking(&distance, mask.dims, smoothing);
-            let width = smooth::width(smoothing);
-            (field, (voxels + filled) as f64, width)
+            let kernel = smooth::kernel(smoothing);
+            (field, (voxels + filled) as f64, kernel)
         }
     };
     let mut mesh = surface(&field, mask.dims, volume, factor)?;
@@ -116,8 +116,10 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
     let mut finish = options.shape.clone();
     let enough = ((CELLS.0 * longest as f64).ceil() as usize).max(CELLS.1);
     finish.cells = finish.cells.min(enough);
+    let places = cuts(dims, labels, label, region);
     let surface = Surface::Scanned {
-        image: options.voxel * image,
+        image: image.map(|(weight, deviation)| (weight, options.voxel * deviation)),
+        cuts: places.into_iter().map(|x| options.voxel * x).collect(),
     };
     from_closed(&mesh, surface, provenance, &finish)
 }

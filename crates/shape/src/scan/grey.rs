@@ -11,7 +11,9 @@ use super::Mask;
 use super::smooth::gaussian;
 use super::transform;
 use super::watershed::HALO;
+use crate::roundness::Kernel;
 use rayon::prelude::*;
+use std::f64::consts::SQRT_2;
 
 /// Grey values with the owner of each voxel: the label of its grain, with [`HALO`] the void
 /// around it, 0 elsewhere.
@@ -52,9 +54,8 @@ pub(crate) struct Cut {
     pub volume: f64,
     /// Standard deviation of the scanner's blur [voxels].
     pub blur: f64,
-    /// Standard deviation of a Gaussian that leaves an edge as steep as blur and smoothing
-    /// together did [voxels].
-    pub width: f64,
+    /// What blur and smoothing together have done to the shares [voxels].
+    pub kernel: Kernel,
 }
 
 impl Grey {
@@ -127,9 +128,10 @@ impl Grey {
             field: field.iter().map(|v| v / slope).collect(),
             volume,
             blur,
-            width: 1.0
-                / (f64::from(a) / blur.hypot(sigma)
-                    + f64::from(1.0 - a) / (blur * blur + 2.0 * sigma * sigma).sqrt()),
+            kernel: [
+                (f64::from(a), blur.hypot(sigma)),
+                (f64::from(1.0 - a), blur.hypot(SQRT_2 * sigma)),
+            ],
         }
     }
 

@@ -1,6 +1,7 @@
 //! Regions of a labelled volume: where they lie, whether they are whole.
 
 use super::Mask;
+use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
 
 /// Extent of one label.
@@ -77,6 +78,33 @@ pub(crate) fn crop(
         }
     }
     Mask { dims: out, solid }
+}
+
+/// Middles [voxels from the image's corner] of the faces of this label, which lies in this region,
+/// beyond which another label begins.
+pub(crate) fn cuts(dims: [usize; 3], labels: &[u32], label: u32, region: &Region) -> Vec<DVec3> {
+    let strides = [1, dims[0], dims[0] * dims[1]];
+    let (low, high) = (region.lower, region.upper);
+    let mut found = Vec::new();
+    for (k, j) in (low[2]..=high[2]).flat_map(|k| (low[1]..=high[1]).map(move |j| (k, j))) {
+        for i in low[0]..=high[0] {
+            let (place, at) = ([i, j, k], i + strides[1] * j + strides[2] * k);
+            if labels[at] != label {
+                continue;
+            }
+            let other = |n: usize| labels[n] != label && labels[n] != 0;
+            let middle = DVec3::new(i as f64, j as f64, k as f64) + 0.5;
+            for (axis, step) in DVec3::AXES.into_iter().enumerate() {
+                if place[axis] > 0 && other(at - strides[axis]) {
+                    found.push(middle - 0.5 * step);
+                }
+                if place[axis] + 1 < dims[axis] && other(at + strides[axis]) {
+                    found.push(middle + 0.5 * step);
+                }
+            }
+        }
+    }
+    found
 }
 
 /// For each label the part of its faces beyond which another label begins.
@@ -160,5 +188,11 @@ mod tests {
         assert_eq!(found[&2], 4.0 / 12.0);
         assert_eq!(found[&7], 0.0);
         assert_eq!(found.len(), 3);
+        let places = |label| cuts(dims, &labels, label, &regions(dims, &labels)[&label]);
+        // The plane between the two cubes, and nothing at the third.
+        assert_eq!(places(1).len(), 4);
+        assert!(places(1).iter().all(|x| x.y == 2.0));
+        assert_eq!(places(1), places(2));
+        assert!(places(7).is_empty());
     }
 }

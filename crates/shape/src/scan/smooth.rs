@@ -1,6 +1,7 @@
 //! Taking the staircase off a distance field, without shrinking the body.
 
 use super::transform::transpose;
+use crate::roundness::Kernel;
 use rayon::prelude::*;
 
 /// Gaussian smoothing by `sigma` [voxels], applied as 2 G - G G: the second moment of that
@@ -15,9 +16,9 @@ pub(crate) fn unshrinking(field: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f3
         .collect()
 }
 
-/// Standard deviation of a Gaussian that leaves an edge as steep as [`unshrinking`] does.
-pub(crate) fn width(sigma: f64) -> f64 {
-    sigma / (2.0 - std::f64::consts::FRAC_1_SQRT_2)
+/// The kernel of [`unshrinking`].
+pub(crate) fn kernel(sigma: f64) -> Kernel {
+    [(2.0, sigma), (-1.0, std::f64::consts::SQRT_2 * sigma)]
 }
 
 /// Plain Gaussian smoothing; beyond the border the outermost value continues.
