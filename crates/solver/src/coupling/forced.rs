@@ -17,7 +17,8 @@ pub struct Run {
     pub count: usize,
 }
 
-/// Forced faces of all components; faces between them that are not forced have zeros.
+/// Forced faces of all components; faces between them that are not forced have zeros. In each list some
+/// entries more follow the last.
 #[derive(Clone, Debug, Default)]
 pub struct Forced {
     /// Of each component.

@@ -70,7 +70,14 @@ impl Faces {
     pub fn count(&self) -> usize {
         self.count
     }
-    /// Adds neighbouring faces of a row, given by vectors.
+    /// Makes room for `count` more faces.
+    pub fn reserve(&mut self, count: usize) {
+        let needed = self.count + count + MOST;
+        for list in [&mut self.distance].into_iter().chain(&mut self.normal) {
+            list.resize(list.len().max(needed), 0.0);
+        }
+    }
+    /// Adds neighbouring faces of a row, for which there is room; of the lists more than these are read.
     #[inline(always)]
     pub fn extend<V: Vector<Number = f64>>(
         &mut self,
@@ -80,15 +87,12 @@ impl Faces {
     ) {
         let first = self.count;
         self.count += count;
-        let lists = [&mut self.distance].into_iter().chain(&mut self.normal);
-        let from = [distance].into_iter().chain(normal);
-        for (list, from) in lists.zip(from) {
-            if list.len() < self.count + MOST {
-                list.resize(2 * (self.count + MOST), 0.0);
-            }
-            for n in (0..count).step_by(V::WIDTH) {
-                V::load(&from[n..]).store(&mut list[first + n..]);
-            }
+        let [x, y, z] = &mut self.normal;
+        for n in (0..count).step_by(V::WIDTH) {
+            V::load(&distance[n..]).store(&mut self.distance[first + n..]);
+            V::load(&normal[0][n..]).store(&mut x[first + n..]);
+            V::load(&normal[1][n..]).store(&mut y[first + n..]);
+            V::load(&normal[2][n..]).store(&mut z[first + n..]);
         }
     }
     /// Takes a face from the grain: another one holds it.
@@ -122,8 +126,11 @@ impl Faces {
                 }
             }
         }
-        forced.share.truncate(count);
-        forced.closed.truncate(count);
+        // Zeros follow, which registers may reach into.
+        for list in [&mut forced.share, &mut forced.closed] {
+            list.truncate(count);
+            list.resize(count + MOST, 0.0);
+        }
         forced.closed_by_all.clear();
         forced.closed_by_all.extend_from_slice(&forced.closed);
     }

@@ -112,16 +112,20 @@ impl Places {
         range: Range<i32>,
         mut found: impl FnMut(Range<i32>, usize, usize),
     ) {
-        const CELL: usize = 3;
-        let pair = |i: i32| {
-            let place = IVec3::new(i, j, k);
-            let at = self.at(component, place)?;
-            let below = self.at(CELL, place - IVec3::AXES[component])?;
-            Some((at, below))
-        };
         if range.is_empty() {
             return;
         }
+        let part = |axis: usize, normal: bool, place: i32| {
+            self.tables[axis][usize::from(normal)][(place + PAD) as usize]
+        };
+        let down = IVec3::AXES[component];
+        let line = part(1, component == 1, j) + part(2, component == 2, k);
+        let line_below = part(1, false, j - down.y) + part(2, false, k - down.z);
+        let pair = |i: i32| {
+            let at = part(0, component == 0, i) + line;
+            let below = part(0, false, i - down.x) + line_below;
+            (at < NONE && below < NONE).then_some((at, below))
+        };
         // Places only follow each other or jump back, and end where the grid does.
         if let (Some(first), Some(last)) = (pair(range.start), pair(range.end - 1)) {
             let ahead = range.len() - 1;

@@ -69,6 +69,44 @@ pub trait Vector:
             to[..Self::WIDTH][i] = R::of(lanes[i].wide());
         }
     }
+    /// The `WIDTH` numbers of a list from `at` on, zeros where it has ended.
+    #[inline(always)]
+    fn load_within<R: Real>(list: &[R], at: usize) -> Self {
+        match list.get(at..at.wrapping_add(Self::WIDTH)) {
+            Some(all) => Self::load_from(all),
+            None => Self::load(&end_of(list, at)),
+        }
+    }
+    /// Adds the first `count` lanes to the numbers of a list from `at` on; it may end with these.
+    #[inline(always)]
+    fn add_some<R: Real>(self, count: usize, list: &mut [R], at: usize) {
+        let Some(all) = list.get_mut(at..at + Self::WIDTH) else {
+            return self.add_at_end(count, list, at);
+        };
+        let before = Self::load_from(all);
+        Self::ramp()
+            .where_below(Self::constant(count as f64), before + self, before)
+            .store_to(all);
+    }
+    /// The same one by one.
+    #[cold]
+    #[inline(never)]
+    fn add_at_end<R: Real>(self, count: usize, list: &mut [R], at: usize) {
+        let mut lanes = [Self::Number::default(); MOST];
+        self.store(&mut lanes);
+        for (entry, lane) in list[at..].iter_mut().zip(&lanes[..count.min(Self::WIDTH)]) {
+            *entry = R::of(entry.wide() + lane.wide());
+        }
+    }
+    /// The numbers of the lanes.
+    #[inline(always)]
+    fn ramp() -> Self {
+        let mut lanes = [Self::Number::default(); MOST];
+        for i in 0..Self::WIDTH {
+            lanes[i] = Self::Number::of(RAMP[i]);
+        }
+        Self::load(&lanes)
+    }
     /// Lane-wise quotient.
     fn over(self, divisor: Self) -> Self;
     /// Lane-wise `self` where it is greater, else `other`.
@@ -181,6 +219,18 @@ pub const RAMP: [f64; MOST] = {
     ramp
 };
 
+/// What is left of a list from `at` on, then zeros.
+#[cold]
+#[inline(never)]
+fn end_of<R: Real, N: Real>(list: &[R], at: usize) -> [N; MOST] {
+    let mut lanes = [N::default(); MOST];
+    let left = list.get(at..).unwrap_or(&[]);
+    for (lane, entry) in lanes.iter_mut().zip(left) {
+        *lane = N::of(entry.wide());
+    }
+    lanes
+}
+
 /// Work on the neighbouring entries of a row.
 pub trait RowWork {
     /// What rows are made of.
@@ -254,7 +304,7 @@ pub fn prefetch<T>(list: &[T], at: usize, count: usize) {
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         let per_line = (64 / size_of::<T>()).max(1);
-        for at in (at..at + count + per_line).step_by(per_line) {
+        for at in (at..at.wrapping_add(count + per_line)).step_by(per_line) {
             if let Some(entry) = list.get(at) {
                 // SAFETY: the entry exists, and a prefetch changes nothing.
                 unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(entry).cast()) };
