@@ -187,7 +187,10 @@ impl<R: Real> Kernel for Links<'_, R> {
                             continue;
                         };
                         if along == 0 {
-                            lines.each(&row, distance, |n, value: V| value.store(&mut flux[1 + n..]));
+                            for n in (0..row.count).step_by(V::WIDTH) {
+                                let value: V = lines.flux(&row, n, distance);
+                                value.store(&mut flux[1 + n..]);
+                            }
                             let end = row.count.next_multiple_of(V::WIDTH);
                             V::constant(0.0).store(&mut flux[1 + end..]);
                             for n in (0..row.count + 1).step_by(V::WIDTH) {
@@ -196,10 +199,11 @@ impl<R: Real> Kernel for Links<'_, R> {
                             }
                         } else {
                             let zero = V::constant(0.0);
-                            lines.each(&row, distance, |n, value: V| {
+                            for n in (0..row.count).step_by(V::WIDTH) {
+                                let value: V = lines.flux(&row, n, distance);
                                 (zero - value).add_to(&mut push[row.here + n..]);
                                 value.add_to(&mut push[row.there + n..]);
-                            });
+                            }
                         }
                     }
                 }
@@ -314,45 +318,30 @@ impl<'a, R: Real> Lines<'a, R> {
         })
     }
 
-    /// Calls `found(n, fluxes)` for the links of a row from the `n`th on, as many as there are lanes; zeros
-    /// follow the last.
+    /// The face of the component carried `shift` faces along the links from those from `at` on.
     #[inline(always)]
-    fn each<V: Vector<Number = f64>>(
-        &self,
-        row: &Row,
-        distance: &[f64],
-        mut found: impl FnMut(usize, V),
-    ) {
-        let whole = row.six == (0..row.count);
-        for n in (0..row.count).step_by(V::WIDTH) {
-            let of = |at: usize| V::load(&distance[at + n..]);
-            let d = V::constant(0.5) * (of(row.here) + of(row.there));
-            let count = V::constant(n as f64) + V::ramp();
-            let end = V::constant(row.count as f64);
-            let flux = self.flux(row, n, count, d, whole);
-            found(n, count.where_below(end, flux, V::constant(0.0)));
-        }
+    fn face<V: Vector<Number = f64>>(&self, at: usize, shift: isize) -> V {
+        let away = shift.wrapping_mul(self.next as isize);
+        V::load_within(self.fields[0], at.wrapping_add_signed(away))
     }
 
-    /// Flux through the links of a row from the `n`th on over their length [m/s^2]; zero where `d` is not
-    /// near the surface. `count` are the numbers of the links; `whole`: all have six faces in line.
+    /// Rigid velocity of the component, or along the link, at links of a row.
     #[inline(always)]
-    fn flux<V: Vector<Number = f64>>(
-        &self,
-        row: &Row,
-        n: usize,
-        count: V,
-        d: V,
-        whole: bool,
-    ) -> V {
+    fn rigid<V: Vector<Number = f64>>(&self, row: &Row, of: usize, count: V) -> V {
+        V::constant(row.rigid[of]) + count * V::constant(self.rigid[1][of])
+    }
+
+    /// Flux through the links of a row from the `n`th on over their length [m/s^2]; zero where they are not
+    /// near the surface and after the last.
+    #[inline(always)]
+    fn flux<V: Vector<Number = f64>>(&self, row: &Row, n: usize, distance: &[f64]) -> V {
         let (zero, half, one) = (V::constant(0.0), V::constant(0.5), V::constant(1.0));
-        let [q, c] = self.fields;
+        let d = V::load(&distance[row.here + n..]) + V::load(&distance[row.there + n..]);
+        let d = half * d;
+        let count = V::constant(n as f64) + V::ramp();
+        let c = self.fields[1];
         let at = row.at.wrapping_add(n);
-        let face = |shift: isize| {
-            let away = shift.wrapping_mul(self.next as isize);
-            V::load_within(q, at.wrapping_add_signed(away))
-        };
-        let (from, to) = (face(0), face(1));
+        let (from, to): (V, V) = (self.face(at, 0), self.face(at, 1));
         let mean = half * (from + to);
         let carrier = if self.along == self.component {
             mean
@@ -361,26 +350,24 @@ impl<'a, R: Real> Lines<'a, R> {
             let to = at + self.next;
             half * (V::load_within(c, to) + V::load_within(c, to - self.across))
         };
-        let rigid =
-            |of: usize| V::constant(row.rigid[of]) + count * V::constant(self.rigid[1][of]);
-        let relative = (carrier - rigid(1)) * (mean - rigid(0));
+        let relative = carrier - self.rigid(row, 1, count);
+        let relative = relative * (mean - self.rigid(row, 0, count));
         let open = aperture(d, self.band).larger(V::constant(LEAST_APERTURE));
         let mut flux = relative * (one.over(open) - one);
-        if whole || !row.six.is_empty() {
-            let outer = V::constant(7.0) * (from + to) - V::constant(8.0) * (face(-1) + face(2));
-            let sixth = outer + face(-2) + face(3);
-            let more = carrier * sixth * V::constant(1.0 / 60.0);
-            flux = flux
-                + if whole {
-                    more
-                } else {
-                    let [first, last] = [row.six.start, row.six.end].map(|n| V::constant(n as f64));
-                    let more = count.where_below(last, more, zero);
-                    count.where_below(first, zero, more)
-                };
+        if !row.six.is_empty() {
+            let outer: V = self.face::<V>(at, -1) + self.face(at, 2);
+            let outer = V::constant(7.0) * (from + to) - V::constant(8.0) * outer;
+            let sixth = outer + self.face(at, -2) + self.face(at, 3);
+            let mut more = carrier * sixth * V::constant(1.0 / 60.0);
+            if row.six != (0..row.count) {
+                more = count.where_below(V::constant(row.six.end as f64), more, zero);
+                more = count.where_below(V::constant(row.six.start as f64), zero, more);
+            }
+            flux = flux + more;
         }
         let near = d.is_below(V::constant(2.0 * self.band));
         let outside = V::constant(-self.band).is_below(d);
-        flux * near * outside * V::constant(self.inverse)
+        let flux = flux * near * outside * V::constant(self.inverse);
+        count.where_below(V::constant(row.count as f64), flux, zero)
     }
 }

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::Scheme;
 use super::aperture::{aperture, drag};
 use super::forced::Forced;
+use super::near::load_all;
 use crate::math::lanes::{Kernel, MOST, One, Vector, dispatch};
 
 /// How surfaces hold a face.
@@ -195,7 +196,7 @@ impl Kernel for Apertures<'_> {
     fn run<V: Vector<Number = f64>>(self) {
         let Faces {
             distance,
-            normal: [x, y, z],
+            normal,
             strength,
             ..
         } = self.faces;
@@ -206,8 +207,7 @@ impl Kernel for Apertures<'_> {
             V::constant(2.0 * self.holding.eps),
         );
         for at in (0..strength.len()).step_by(V::WIDTH) {
-            let load = |values: &[f64]| V::load(&values[at..]);
-            let d = load(distance);
+            let d = V::load(&distance[at..]);
             // Faces deep inside take all of the grain's motion.
             let shallow = inside.is_below(d);
             if shallow.is_zero() {
@@ -215,7 +215,7 @@ impl Kernel for Apertures<'_> {
                 one.store(&mut closed[at..]);
                 continue;
             }
-            let (drag, part) = self.holding.near(d, [load(x), load(y), load(z)]);
+            let (drag, part) = self.holding.near(d, load_all(normal, at));
             // The grain does nothing beyond its faces, which may enclose some where it is concave.
             let drag = d.where_below(outside, drag, zero);
             drag.store(&mut strength[at..]);

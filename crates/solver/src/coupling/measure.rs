@@ -9,7 +9,7 @@ use super::Scheme;
 use super::forced::Run;
 use super::hold::{Faces, Holding};
 use super::locate::{Body, PushRow, Span};
-use super::near::NearShape;
+use super::near::{NearShape, Spare, load_all, store_all};
 use super::rivals::Rival;
 use crate::dem::Grain;
 use crate::grid::{FACE_OFFSET, Mesh};
@@ -37,12 +37,15 @@ struct Part {
 /// Faces near a grain, one row after the other so that registers are full: first where they are, in its
 /// frame, then the unit normals, in the space frame. Some entries more follow the last.
 #[derive(Default)]
-struct Points([Vec<f64>; 3]);
+struct Points {
+    faces: [Vec<f64>; 3],
+    spare: Spare,
+}
 
 impl Points {
     /// Makes room for `count` faces.
     fn reserve(&mut self, count: usize) {
-        for list in &mut self.0 {
+        for list in &mut self.faces {
             list.resize(list.len().max(count + MOST), 0.0);
         }
     }
@@ -52,9 +55,9 @@ impl Points {
         for i in (span.start..span.end).step_by(V::WIDTH) {
             let count = V::constant(f64::from(i)) + V::ramp();
             let at = span.place(i);
-            for (n, list) in self.0.iter_mut().enumerate() {
+            for n in 0..3 {
                 let x = V::constant(first[n]) + count * V::constant(step[n]);
-                x.store(&mut list[at..]);
+                x.store(&mut self.faces[n][at..]);
             }
         }
     }
@@ -68,19 +71,19 @@ impl Points {
         count: usize,
     ) {
         let columns = turn.to_cols_array_2d();
+        shape.measure::<V>(&mut self.faces, distances, count, &mut self.spare);
         for at in (0..count).step_by(V::WIDTH) {
-            let point = self.0.each_ref().map(|list| V::load(&list[at..]));
-            let (distance, [x, y, z]) = shape.lanes(point);
+            let [x, y, z] = load_all::<V>(&self.faces, at);
             let length = (x * x + y * y + z * z).root();
             let inverse = V::constant(1.0).over(length.larger(V::constant(f64::MIN_POSITIVE)));
             let unit = [x * inverse, y * inverse, z * inverse];
-            distance.store(&mut distances[at..]);
-            for (axis, list) in self.0.iter_mut().enumerate() {
-                let normal = V::constant(columns[0][axis]) * unit[0]
+            let mut normal = unit;
+            for axis in 0..3 {
+                normal[axis] = V::constant(columns[0][axis]) * unit[0]
                     + V::constant(columns[1][axis]) * unit[1]
                     + V::constant(columns[2][axis]) * unit[2];
-                normal.store(&mut list[at..]);
             }
+            store_all(normal, &mut self.faces, at);
         }
     }
 }
@@ -183,7 +186,7 @@ impl Kernel for Measure<'_> {
                                 count: held.len(),
                             });
                             let from = normals + (held.start - all.start) as usize;
-                            let normal = points.0.each_ref().map(|list| &list[from..]);
+                            let normal = points.faces.each_ref().map(|list| &list[from..]);
                             faces.extend::<V>(held.len(), &distance[known + from..], normal);
                         }
                         if !rivals.is_empty() {
@@ -310,8 +313,9 @@ impl Around {
         for axis in 0..3 {
             let first =
                 V::constant(a[axis]) * x + V::constant(b[axis]) * y + V::constant(c[axis]) * z;
-            let side = |side: f64| (V::constant(side) - first) * V::constant(self.per_step[axis]);
-            let (low, high) = (side(self.lower[axis]), side(self.upper[axis]));
+            let per_step = V::constant(self.per_step[axis]);
+            let low = (V::constant(self.lower[axis]) - first) * per_step;
+            let high = (V::constant(self.upper[axis]) - first) * per_step;
             from = from.larger(low.smaller(high));
             to = to.smaller(low.larger(high));
             first.store(&mut rows.first[axis]);

@@ -117,29 +117,50 @@ impl NearShape {
         found.or_else(about).unwrap_or(FAR)
     }
 
-    /// The same at the points whose coordinates are the lanes of `x`, bit for bit; what is infinite
-    /// there may be merely farther than anything here.
+    /// The same at the first `count` points of lists of coordinates, bit for bit; what is infinite there
+    /// may be merely farther than anything here. The gradients come in the place of the points. More entries
+    /// must follow, which are overwritten.
     #[inline(always)]
-    pub fn lanes<V: Vector<Number = f64>>(&self, x: [V; 3]) -> (V, [V; 3]) {
-        match (self.shape.field(), &self.about) {
-            (Field::Sphere(radius), _) => about_sphere(*radius, x),
-            (Field::Sampled(field), None) => {
-                let off = off_grid(field, x);
-                let (d, slope) = on_grid(Grid::of(field), field.levels(), x);
-                (d + off * V::constant(FAR), slope)
+    pub fn measure<V: Vector<Number = f64>>(
+        &self,
+        points: &mut [Vec<f64>; 3],
+        distances: &mut [f64],
+        count: usize,
+        spare: &mut Spare,
+    ) {
+        let Field::Sampled(field) = self.shape.field() else {
+            for at in (0..count).step_by(V::WIDTH) {
+                let x = load_all::<V>(points, at);
+                let (distance, slope) = match self.shape.field() {
+                    Field::Sphere(radius) => about_sphere(*radius, x),
+                    _ => self.one_by_one(x),
+                };
+                distance.store(&mut distances[at..]);
+                store_all(slope, points, at);
             }
-            (Field::Sampled(field), Some(about)) => {
-                let off = off_grid(field, x);
-                if off.is_zero() {
-                    return on_grid(Grid::of(field), &about.levels, x);
-                }
-                let mut beyond = Grid::of(&about.field);
-                beyond.first = V::constant(field.levels().len() as f64);
-                let grid = Grid::of(field).or_where(off, beyond);
-                let (d, slope) = on_grid(grid, &about.levels, x);
-                (d + off_grid(&about.field, x) * V::constant(FAR), slope)
-            }
-            _ => self.one_by_one(x),
+            return;
+        };
+        // Samples are far apart in memory. Little but their loads is in the second loop, so that the
+        // processor has those of several vectors under way at once.
+        let grids = Grids::of(field, self.about.as_deref());
+        let Spare { cell, which } = spare;
+        for list in [&mut *cell, &mut *which] {
+            list.resize(list.len().max(count + MOST), 0.0);
+        }
+        for at in (0..count).step_by(V::WIDTH) {
+            let spot = grids.find(load_all::<V>(points, at));
+            spot.cell.store(&mut cell[at..]);
+            spot.which.store(&mut which[at..]);
+            store_all(spot.fraction, points, at);
+        }
+        for at in (0..count).step_by(V::WIDTH) {
+            let (distance, slope) = grids.read(Spot {
+                cell: V::load(&cell[at..]),
+                which: V::load(&which[at..]),
+                fraction: load_all::<V>(points, at),
+            });
+            distance.store(&mut distances[at..]);
+            store_all(slope, points, at);
         }
     }
 
@@ -174,23 +195,32 @@ fn about_sphere<V: Vector<Number = f64>>(radius: f64, [x, y, z]: [V; 3]) -> (V, 
     (length - V::constant(radius), normal)
 }
 
-/// 1 where a point is off the grid of a field, else 0.
+/// A vector from each list. (No closure in a kernel touches vectors: it would not be inlined.)
 #[inline(always)]
-fn off_grid<V: Vector<Number = f64>>(field: &SampledField, x: [V; 3]) -> V {
-    let zero = V::constant(0.0);
-    let inverse = V::constant(1.0 / field.spacing());
-    let mut outside = zero;
-    for axis in 0..3 {
-        let last = V::constant(field.dims()[axis] as f64 - 1.0);
-        let s = (x[axis] - V::constant(field.lower()[axis])) * inverse;
-        outside = outside + (s - s.larger(zero).smaller(last)).magnitude();
-    }
-    // Whatever is off the grid is so by more than a rounding.
-    zero.is_below(outside)
+pub fn load_all<V: Vector<Number = f64>>([x, y, z]: &[Vec<f64>; 3], at: usize) -> [V; 3] {
+    [V::load(&x[at..]), V::load(&y[at..]), V::load(&z[at..])]
 }
 
-/// The grid of a field, which may be another one for each lane.
-#[derive(Clone, Copy)]
+/// Stores vectors in as many lists.
+#[inline(always)]
+pub fn store_all<V: Vector<Number = f64>>(
+    values: [V; 3],
+    [x, y, z]: &mut [Vec<f64>; 3],
+    at: usize,
+) {
+    values[0].store(&mut x[at..]);
+    values[1].store(&mut y[at..]);
+    values[2].store(&mut z[at..]);
+}
+
+/// Lists that [`NearShape::measure`] needs.
+#[derive(Default)]
+pub struct Spare {
+    cell: Vec<f64>,
+    which: Vec<f64>,
+}
+
+/// The grid of a field.
 struct Grid<V> {
     lower: [V; 3],
     inverse: V,
@@ -207,69 +237,134 @@ struct Grid<V> {
 
 impl<V: Vector<Number = f64>> Grid<V> {
     #[inline(always)]
-    fn of(field: &SampledField) -> Grid<V> {
-        let (lower, dims, inverse) = (field.lower(), field.dims(), 1.0 / field.spacing());
-        let last = |axis: usize| V::constant(dims[axis] as f64 - 1.0);
+    fn of(field: &SampledField, first: usize) -> Grid<V> {
+        let (dims, inverse) = (field.dims(), 1.0 / field.spacing());
+        let mut lower = [V::constant(0.0); 3];
+        let mut last = lower;
+        for axis in 0..3 {
+            lower[axis] = V::constant(field.lower()[axis]);
+            last[axis] = V::constant(dims[axis] as f64 - 1.0);
+        }
+        let (row, plane) = (dims[0] as f64, (dims[0] * dims[1]) as f64);
         Grid {
-            lower: [lower.x, lower.y, lower.z].map(V::constant),
+            lower,
             inverse: V::constant(inverse),
-            last: [last(0), last(1), last(2)],
-            strides: [dims[0], dims[0] * dims[1]].map(|stride| V::constant(stride as f64)),
-            first: V::constant(0.0),
+            last,
+            strides: [V::constant(row), V::constant(plane)],
+            first: V::constant(first as f64),
             quantum: V::constant(field.quantum()),
             slope: V::constant(field.quantum() * inverse),
         }
     }
 
-    /// This one where `off` is 0, `other` where it is 1.
+    /// Where points are on it, those off it at the nearest point on it; and 1 for those, else 0.
     #[inline(always)]
-    fn or_where(self, off: V, other: Grid<V>) -> Grid<V> {
-        let half = V::constant(0.5);
-        let mut both = self;
+    fn find(&self, x: [V; 3]) -> (Spot<V>, V) {
+        let (zero, one) = (V::constant(0.0), V::constant(1.0));
+        let mut cell = [zero; 3];
+        let mut fraction = [zero; 3];
+        let mut outside = zero;
         for axis in 0..3 {
-            both.lower[axis] = off.where_below(half, self.lower[axis], other.lower[axis]);
-            both.last[axis] = off.where_below(half, self.last[axis], other.last[axis]);
+            let s = (x[axis] - self.lower[axis]) * self.inverse;
+            let place = s.larger(zero).smaller(self.last[axis]);
+            outside = outside + (s - place).magnitude();
+            cell[axis] = place.floor().smaller(self.last[axis] - one);
+            fraction[axis] = place - cell[axis];
         }
-        for n in 0..2 {
-            both.strides[n] = off.where_below(half, self.strides[n], other.strides[n]);
-        }
-        both.inverse = off.where_below(half, self.inverse, other.inverse);
-        both.first = off.where_below(half, self.first, other.first);
-        both.quantum = off.where_below(half, self.quantum, other.quantum);
-        both.slope = off.where_below(half, self.slope, other.slope);
-        both
+        let [row, plane] = self.strides;
+        let spot = Spot {
+            cell: self.first + cell[0] + row * cell[1] + plane * cell[2],
+            which: zero,
+            fraction,
+        };
+        // Whatever is off the grid is so by more than a rounding.
+        (spot, zero.is_below(outside))
     }
 }
 
-/// Distance and gradient on a grid whose samples are in `levels`; of points off it, those of the nearest
-/// point on it.
-#[inline(always)]
-fn on_grid<V: Vector<Number = f64>>(grid: Grid<V>, levels: &[f32], x: [V; 3]) -> (V, [V; 3]) {
-    let (zero, one) = (V::constant(0.0), V::constant(1.0));
-    let mut cell = [zero; 3];
-    let mut fraction = [zero; 3];
-    for axis in 0..3 {
-        let s = (x[axis] - grid.lower[axis]) * grid.inverse;
-        let place = s.larger(zero).smaller(grid.last[axis]);
-        cell[axis] = place.floor().smaller(grid.last[axis] - one);
-        fraction[axis] = place - cell[axis];
+/// Where points are among the samples.
+struct Spot<V> {
+    /// Place of the first corner of the cell in the list of levels.
+    cell: V,
+    /// Of the cell, along each axis.
+    fraction: [V; 3],
+    /// On the grid of the shape 0, on the one about it 1, off both 2.
+    which: V,
+}
+
+/// The grid of a shape and the one about it.
+struct Grids<'a, V> {
+    own: Grid<V>,
+    about: Option<Grid<V>>,
+    levels: &'a [f32],
+}
+
+impl<'a, V: Vector<Number = f64>> Grids<'a, V> {
+    #[inline(always)]
+    fn of(field: &'a SampledField, about: Option<&'a About>) -> Grids<'a, V> {
+        Grids {
+            own: Grid::of(field, 0),
+            about: about.map(|about| Grid::of(&about.field, field.levels().len())),
+            levels: about.map_or(field.levels(), |about| &about.levels),
+        }
     }
-    let [row, plane] = grid.strides;
-    let at = grid.first + cell[0] + row * cell[1] + plane * cell[2];
-    let [fx, fy, fz] = fraction;
-    // Value and slope on the four edges along x.
-    let (a, s) = edge(levels, at, fx);
-    let (b, t) = edge(levels, at + row, fx);
-    let (c, u) = edge(levels, at + plane, fx);
-    let (d, v) = edge(levels, at + plane + row, fx);
-    let (low, high) = (a + fy * (b - a), c + fy * (d - c));
-    let (slope_low, slope_high) = (s + fy * (t - s), u + fy * (v - u));
-    let gradient = [
-        grid.slope * (slope_low + fz * (slope_high - slope_low)),
-        grid.slope * ((b - a) + fz * ((d - c) - (b - a))),
-        grid.slope * (high - low),
-    ];
-    (grid.quantum * (low + fz * (high - low)), gradient)
+
+    #[inline(always)]
+    fn find(&self, x: [V; 3]) -> Spot<V> {
+        let (mut spot, off) = self.own.find(x);
+        if off.is_zero() {
+            return spot;
+        }
+        let Some(about) = &self.about else {
+            spot.which = off + off;
+            return spot;
+        };
+        let half = V::constant(0.5);
+        let (other, off_both) = about.find(x);
+        spot.cell = off.where_below(half, spot.cell, other.cell);
+        for axis in 0..3 {
+            let fraction = &mut spot.fraction[axis];
+            *fraction = off.where_below(half, *fraction, other.fraction[axis]);
+        }
+        spot.which = off + off * off_both;
+        spot
+    }
+
+    /// Distance and gradient.
+    #[inline(always)]
+    fn read(&self, spot: Spot<V>) -> (V, [V; 3]) {
+        let [fx, fy, fz] = spot.fraction;
+        let Grid {
+            strides: [mut row, mut plane],
+            mut quantum,
+            slope: mut unit,
+            ..
+        } = self.own;
+        if let Some(about) = &self.about
+            && !spot.which.is_zero()
+        {
+            let (which, half) = (spot.which, V::constant(0.5));
+            row = which.where_below(half, row, about.strides[0]);
+            plane = which.where_below(half, plane, about.strides[1]);
+            quantum = which.where_below(half, quantum, about.quantum);
+            unit = which.where_below(half, unit, about.slope);
+        }
+        // Value and slope on the four edges along x.
+        let (at, levels) = (spot.cell, self.levels);
+        let (a, s) = edge(levels, at, fx);
+        let (b, t) = edge(levels, at + row, fx);
+        let (c, u) = edge(levels, at + plane, fx);
+        let (d, v) = edge(levels, at + plane + row, fx);
+        let (low, high) = (a + fy * (b - a), c + fy * (d - c));
+        let (slope_low, slope_high) = (s + fy * (t - s), u + fy * (v - u));
+        let gradient = [
+            unit * (slope_low + fz * (slope_high - slope_low)),
+            unit * ((b - a) + fz * ((d - c) - (b - a))),
+            unit * (high - low),
+        ];
+        let far = V::constant(1.5).is_below(spot.which) * V::constant(FAR);
+        (quantum * (low + fz * (high - low)) + far, gradient)
+    }
 }
 
 /// Value between the samples at `at` and the next along x, and the slope from one to the other.
@@ -329,30 +424,28 @@ mod tests {
         #[inline(always)]
         fn run<V: Vector<Number = f64>>(self) {
             let mut far = 0;
-            for i in 0..4000 {
-                let mut points = [[0.0; MOST]; 3];
-                for n in 0..V::WIDTH {
+            let mut spare = Spare::default();
+            for i in 0..2000 {
+                let mut points = [0; 3].map(|_| vec![0.0; 2 * MOST]);
+                for n in 0..MOST {
                     let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779);
                     let u = u * f64::from(i * 16 + n as i32);
                     let x = 2.0 * (2.0 * u.fract() - DVec3::ONE);
                     (0..3).for_each(|axis| points[axis][n] = x[axis]);
                 }
-                let (d, slope) = self.0.lanes(points.map(|lanes| V::load(&lanes)));
-                let (mut distance, mut slopes) = ([0.0; MOST], [[0.0; MOST]; 3]);
-                d.store(&mut distance);
-                slope
-                    .iter()
-                    .zip(&mut slopes)
-                    .for_each(|(v, lanes)| v.store(lanes));
-                for n in 0..V::WIDTH {
-                    let x = DVec3::from_array(points.map(|lanes| lanes[n]));
+                let (mut slopes, mut distance) = (points.clone(), [0.0; 2 * MOST]);
+                self.0
+                    .measure::<V>(&mut slopes, &mut distance, MOST, &mut spare);
+                for n in 0..MOST {
+                    let of = |lists: &[Vec<f64>; 3]| DVec3::from_array(lists.each_ref().map(|list| list[n]));
+                    let x = of(&points);
                     let (d, slope) = self.0.distance_and_gradient(x);
                     if d == f64::INFINITY {
                         far += 1;
                         assert!(distance[n] > 1e90, "at {x}");
                     } else {
                         assert_eq!(distance[n], d, "at {x}");
-                        assert_eq!(slopes.map(|lanes| lanes[n]), slope.to_array(), "at {x}");
+                        assert_eq!(of(&slopes), slope, "at {x}");
                     }
                 }
             }

@@ -87,9 +87,11 @@ impl Moments {
         let [pull_l, pull_m] = [pull * l, pull * m];
         let pushes = [push, push * l, push * m];
         let pulls = [pull, pull_l, pull_m, pull_l * l, pull_l * m, pull_m * m];
-        let sums = self.push.iter_mut().chain(&mut self.pull);
-        for (sum, value) in sums.zip(pushes.into_iter().chain(pulls)) {
-            sum.add(n + 1, value);
+        for (sum, value) in self.push.iter_mut().zip(&pushes) {
+            sum.add(n + 1, *value);
+        }
+        for (sum, value) in self.pull.iter_mut().zip(&pulls) {
+            sum.add(n + 1, *value);
         }
     }
 }
@@ -186,9 +188,8 @@ impl<R: Real> Kernel for Gather<'_, R> {
                 };
                 for n in (0..run.count).step_by(V::WIDTH) {
                     let at = run.first + n;
-                    let [share, closed, by_all] =
-                        [&*share, &*closed, &*closed_by_all].map(|list| V::load(&list[at..]));
-                    let known = work.at(n, share, closed, by_all, &mut self.sums[axis]);
+                    let closed = [V::load(&closed[at..]), V::load(&closed_by_all[at..])];
+                    let known = work.at(n, V::load(&share[at..]), closed, &mut self.sums[axis]);
                     // Beyond the run these are of no meaning until the next one comes.
                     known.back.store(&mut back[at..]);
                     known.free.store(&mut free[at..]);
@@ -229,12 +230,13 @@ impl<R: Real> GatherRun<'_, R> {
     #[inline(always)]
     fn moved<V: Vector<Number = f64>>(&self, side: usize, n: usize) -> V {
         let at = [self.run.at, self.run.below][side] + n;
-        let p = |at: usize| V::load_within(self.pressure, at);
-        let mut moved = p(at);
+        let mut moved = V::load_within(self.pressure, at);
         for axis in 0..3 {
             let stride = self.strides[axis];
             let cells = V::constant(self.drift[axis]) * self.sides[side].at(axis, count_from(n));
-            moved = moved - cells * (p(at + stride) - p(at - stride));
+            let ahead = V::load_within(self.pressure, at + stride);
+            let behind = V::load_within(self.pressure, at - stride);
+            moved = moved - cells * (ahead - behind);
         }
         moved
     }
@@ -245,8 +247,7 @@ impl<R: Real> GatherRun<'_, R> {
         &self,
         n: usize,
         share: V,
-        closed: V,
-        closed_by_all: V,
+        [closed, closed_by_all]: [V; 2],
         sums: &mut Moments,
     ) -> Known<V> {
         let count = count_from::<V>(n);
@@ -257,10 +258,12 @@ impl<R: Real> GatherRun<'_, R> {
         let follow = follow(share, closed, self.relieved);
         let push = closed * back - share * free - follow * self.rigid.at(self.axis, count);
         let pull = share + follow;
-        let [x, y, z] = self.run.arm.to_array().map(V::constant);
-        let arm = [x + V::constant(self.spacing) * count, y, z];
+        let arm = self.run.arm;
+        let x = V::constant(arm.x) + V::constant(self.spacing) * count;
+        let arm = [x, V::constant(arm.y), V::constant(arm.z)];
         let (zero, end) = (V::constant(0.0), V::constant(self.run.count as f64));
-        let [push, pull] = [push, pull].map(|value| count.where_below(end, value, zero));
+        let push = count.where_below(end, push, zero);
+        let pull = count.where_below(end, pull, zero);
         sums.add(self.axis, n, arm, push, pull);
         Known { back, free }
     }
@@ -323,11 +326,13 @@ impl<R: Real> Kernel for Impose<'_, R> {
             let rigid = Rigid::of(now, run.arm, self.spacing);
             let change = Rigid::of(change, run.arm, self.spacing);
             for n in (0..run.count).step_by(V::WIDTH) {
-                let load = |list: &[f64]| V::load(&list[run.first + n..]);
-                let (share, closed) = (load(&forced.share), load(&forced.closed));
+                let at = run.first + n;
+                let (share, closed) =
+                    (V::load(&forced.share[at..]), V::load(&forced.closed[at..]));
+                let (back, free) = (V::load(&forced.back[at..]), V::load(&forced.free[at..]));
                 let place = count_from(n);
-                let gain = closed * load(&forced.back)
-                    + share * (rigid.at(self.axis, place) - load(&forced.free))
+                let gain = closed * back
+                    + share * (rigid.at(self.axis, place) - free)
                     + follow(share, closed, self.relieved) * change.at(self.axis, place);
                 let at = run.at - self.slab.start + n;
                 gain.add_some(run.count - n, self.predicted, at);
