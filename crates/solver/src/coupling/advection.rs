@@ -80,7 +80,8 @@ impl<R> View<'_, R> {
     #[inline(always)]
     fn row(&self, [j, k]: [i32; 2]) -> usize {
         let [_, line, plane] = self.strides;
-        self.origin.wrapping_add(j as usize * line + k as usize * plane)
+        self.origin
+            .wrapping_add(j as usize * line + k as usize * plane)
     }
     /// Asks for the box of `size` cells to be brought near.
     #[inline(always)]

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::Scheme;
 use super::aperture::{aperture, drag};
 use super::forced::Forced;
-use super::near::load_all;
+use super::samples::load_all;
 use crate::math::lanes::{Kernel, MOST, One, Vector, dispatch};
 
 /// How surfaces hold a face.
@@ -133,7 +133,6 @@ impl Faces {
             list.resize(count + MOST, 0.0);
         }
         forced.closed_by_all.clear();
-        forced.closed_by_all.extend_from_slice(&forced.closed);
     }
     /// The hold of the grain on a face near its surface, found before for the lists of `forced`.
     pub fn at(&self, index: usize, forced: &Forced) -> Hold {

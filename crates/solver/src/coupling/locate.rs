@@ -207,6 +207,9 @@ impl Locator {
         let Scratch { faces, shared, .. } = scratch;
         faces.hold(holding, forced);
         let near = 2.0 * self.eps;
+        if !shared.is_empty() {
+            forced.closed_by_all.extend_from_slice(&forced.closed);
+        }
         for &(place, x) in &*shared {
             let own = faces.at(place, forced);
             let mut all = own;

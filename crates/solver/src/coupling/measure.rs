@@ -9,8 +9,9 @@ use super::Scheme;
 use super::forced::Run;
 use super::hold::{Faces, Holding};
 use super::locate::{Body, PushRow, Span};
-use super::near::{NearShape, Spare, load_all, store_all};
+use super::near::{NearShape, Spare};
 use super::rivals::Rival;
+use super::samples::{load_all, store_all};
 use crate::dem::Grain;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::lanes::{Kernel, MOST, Vector};
@@ -309,7 +310,11 @@ impl Around {
         let x = V::constant(arm.x);
         let (mut from, mut to) = ((zero - half - x) * per_step, (half - x) * per_step);
         let mut rows = Rows::default();
-        let [a, b, c] = [self.to_body.x_axis, self.to_body.y_axis, self.to_body.z_axis];
+        let [a, b, c] = [
+            self.to_body.x_axis,
+            self.to_body.y_axis,
+            self.to_body.z_axis,
+        ];
         for axis in 0..3 {
             let first =
                 V::constant(a[axis]) * x + V::constant(b[axis]) * y + V::constant(c[axis]) * z;

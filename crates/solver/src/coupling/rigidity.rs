@@ -82,7 +82,14 @@ struct Moments {
 impl Moments {
     /// Adds faces of component `axis` at the places `arm` from the centroid, in the lanes from the `n`th on.
     #[inline(always)]
-    fn add<V: Vector<Number = f64>>(&mut self, axis: usize, n: usize, arm: [V; 3], push: V, pull: V) {
+    fn add<V: Vector<Number = f64>>(
+        &mut self,
+        axis: usize,
+        n: usize,
+        arm: [V; 3],
+        push: V,
+        pull: V,
+    ) {
         let (l, m) = (arm[(axis + 2) % 3], V::constant(0.0) - arm[(axis + 1) % 3]);
         let [pull_l, pull_m] = [pull * l, pull * m];
         let pushes = [push, push * l, push * m];
@@ -150,8 +157,7 @@ impl<R: Real> Kernel for Gather<'_, R> {
     fn run<V: Vector<Number = f64>>(self) {
         let forced = &mut self.body.forced;
         let faces = forced.share.len();
-        forced.back.resize(faces, 0.0);
-        forced.free.resize(faces, 0.0);
+        forced.taken.resize(faces, 0.0);
         let spacing = self.flow.mesh().spacing;
         let strides = self.flow.mesh().layout().strides();
         let Forced {
@@ -159,9 +165,13 @@ impl<R: Real> Kernel for Gather<'_, R> {
             share,
             closed,
             closed_by_all,
-            back,
-            free,
+            taken,
         } = forced;
+        let by_all = if closed_by_all.is_empty() {
+            &*closed
+        } else {
+            closed_by_all
+        };
         for (axis, runs) in runs.iter().enumerate() {
             let half = 0.5 * spacing[axis] * DVec3::AXES[axis];
             let field = self.flow.predicted.component(axis);
@@ -188,11 +198,11 @@ impl<R: Real> Kernel for Gather<'_, R> {
                 };
                 for n in (0..run.count).step_by(V::WIDTH) {
                     let at = run.first + n;
-                    let closed = [V::load(&closed[at..]), V::load(&closed_by_all[at..])];
-                    let known = work.at(n, V::load(&share[at..]), closed, &mut self.sums[axis]);
-                    // Beyond the run these are of no meaning until the next one comes.
-                    known.back.store(&mut back[at..]);
-                    known.free.store(&mut free[at..]);
+                    let closed = [V::load(&closed[at..]), V::load(&by_all[at..])];
+                    let share = V::load(&share[at..]);
+                    // Beyond the run this is of no meaning until the next one comes.
+                    work.at(n, share, closed, &mut self.sums[axis])
+                        .store(&mut taken[at..]);
                 }
             }
         }
@@ -219,12 +229,6 @@ struct GatherRun<'a, R> {
     spacing: f64,
 }
 
-/// What is to be known of faces afterwards, as in [`Forced`].
-struct Known<V> {
-    back: V,
-    free: V,
-}
-
 impl<R: Real> GatherRun<'_, R> {
     /// Pressure of the cells from face `n` on, above or below it, moved with the grain for a step.
     #[inline(always)]
@@ -241,7 +245,7 @@ impl<R: Real> GatherRun<'_, R> {
         moved
     }
 
-    /// Adds the faces from the `n`th on to the sums.
+    /// Adds the faces from the `n`th on to the sums; what they take from a grain at rest.
     #[inline(always)]
     fn at<V: Vector<Number = f64>>(
         &self,
@@ -249,14 +253,15 @@ impl<R: Real> GatherRun<'_, R> {
         share: V,
         [closed, closed_by_all]: [V; 2],
         sums: &mut Moments,
-    ) -> Known<V> {
+    ) -> V {
         let count = count_from::<V>(n);
         let rise = self.moved::<V>(0, n) - self.moved(1, n);
         let back = V::constant(self.pull) * rise - V::constant(self.driven);
         let predicted = V::load_within(self.predicted, self.run.at + n);
         let free = predicted + closed_by_all * back;
         let follow = follow(share, closed, self.relieved);
-        let push = closed * back - share * free - follow * self.rigid.at(self.axis, count);
+        let taken = closed * back - share * free;
+        let push = taken - follow * self.rigid.at(self.axis, count);
         let pull = share + follow;
         let arm = self.run.arm;
         let x = V::constant(arm.x) + V::constant(self.spacing) * count;
@@ -265,7 +270,7 @@ impl<R: Real> GatherRun<'_, R> {
         let push = count.where_below(end, push, zero);
         let pull = count.where_below(end, pull, zero);
         sums.add(self.axis, n, arm, push, pull);
-        Known { back, free }
+        taken
     }
 }
 
@@ -327,12 +332,10 @@ impl<R: Real> Kernel for Impose<'_, R> {
             let change = Rigid::of(change, run.arm, self.spacing);
             for n in (0..run.count).step_by(V::WIDTH) {
                 let at = run.first + n;
-                let (share, closed) =
-                    (V::load(&forced.share[at..]), V::load(&forced.closed[at..]));
-                let (back, free) = (V::load(&forced.back[at..]), V::load(&forced.free[at..]));
+                let (share, closed) = (V::load(&forced.share[at..]), V::load(&forced.closed[at..]));
                 let place = count_from(n);
-                let gain = closed * back
-                    + share * (rigid.at(self.axis, place) - free)
+                let gain = V::load(&forced.taken[at..])
+                    + share * rigid.at(self.axis, place)
                     + follow(share, closed, self.relieved) * change.at(self.axis, place);
                 let at = run.at - self.slab.start + n;
                 gain.add_some(run.count - n, self.predicted, at);

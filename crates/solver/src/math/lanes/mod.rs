@@ -5,12 +5,15 @@
 //! a sum, and no result depends on the number of lanes, so the bits are the same everywhere.
 //!
 //! Everything that a kernel calls must be inlined into it, hence the many `inline(always)`: what is
-//! left outside would be compiled for the oldest machine.
+//! left outside would be compiled for the oldest machine. So would be closures over vectors, also those
+//! given to `map` of an array: where they are called more than once they are not inlined, and then every
+//! operation in them is a call. Write functions that are always inlined, or loops.
 
 mod complex;
 mod one;
 #[cfg(any(test, not(target_arch = "x86_64")))]
 mod plain;
+mod rows;
 #[cfg(test)]
 mod tests;
 #[cfg(target_arch = "x86_64")]
@@ -24,6 +27,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use super::Real;
 pub use complex::{Complex, turned};
 pub use one::One;
+pub use rows::{Partial, RowWork, along_row};
 
 /// Numbers of the widest register.
 pub const MOST: usize = 16;
@@ -229,71 +233,6 @@ fn end_of<R: Real, N: Real>(list: &[R], at: usize) -> [N; MOST] {
         *lane = N::of(entry.wide());
     }
     lanes
-}
-
-/// Work on the neighbouring entries of a row.
-pub trait RowWork {
-    /// What rows are made of.
-    type Number: Real;
-    /// Treats the `V::WIDTH` entries from `i` on.
-    fn at<V: Vector<Number = Self::Number>>(&mut self, i: usize);
-}
-
-/// Treats the entries 1..=n of a row, as many at a time as possible. Entry i always falls on lane
-/// (i - 1) % LANES of a sum kept in as many lanes, whatever the width.
-#[inline(always)]
-pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number>) {
-    let mut i = 1;
-    while i + V::WIDTH <= n + 1 {
-        work.at::<V>(i);
-        i += V::WIDTH;
-    }
-    let half = V::Number::LANES / 2;
-    if i + half <= n + 1 {
-        work.at::<V::Half>(i);
-        i += half;
-    }
-    if half > 4 && i + 4 <= n + 1 {
-        work.at::<V::Tail>(i);
-        i += 4;
-    }
-    while i <= n {
-        work.at::<One<V::Number>>(i);
-        i += 1;
-    }
-}
-
-/// Partial results of a row in doubles: a sum or a maximum in an order that no width changes.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Partial([f64; MOST]);
-
-impl Partial {
-    /// Adds to the lanes of entry `i` and its neighbours.
-    #[inline(always)]
-    pub fn add<V: Vector>(&mut self, i: usize, value: V) {
-        value.add_to(&mut self.0[(i - 1) % V::Number::LANES..]);
-    }
-    /// Keeps the larger in the lanes of entry `i` and its neighbours.
-    #[inline(always)]
-    pub fn keep_larger<V: Vector>(&mut self, i: usize, value: V) {
-        value.raise(&mut self.0[(i - 1) % V::Number::LANES..]);
-    }
-    /// Sum of the lanes.
-    pub fn sum(&self) -> f64 {
-        let mut lanes = self.0;
-        let mut half = MOST / 2;
-        while half > 0 {
-            for i in 0..half {
-                lanes[i] += lanes[i + half];
-            }
-            half /= 2;
-        }
-        lanes[0]
-    }
-    /// Largest of the lanes.
-    pub fn largest(&self) -> f64 {
-        self.0.into_iter().fold(0.0, f64::max)
-    }
 }
 
 /// Asks for the entries of a list from `at` to `at + count` to be brought near: short rows end before the
