@@ -18,13 +18,13 @@ use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
 use super::aperture::aperture;
-use super::locate::Body;
+use super::locate::{Body, PushRow};
 use super::places::PAD;
 use crate::dem::Grain;
-use crate::flow::Flow;
+use crate::flow::{Flow, TendencySlab};
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Real;
-use crate::math::lanes::{Kernel, MOST, RAMP, Vector, dispatch, prefetch};
+use crate::math::lanes::{Kernel, MOST, Vector, dispatch, prefetch};
 
 /// Smallest aperture divided by; smaller ones are unstable on an impulsive start.
 const LEAST_APERTURE: f64 = 0.4;
@@ -39,28 +39,31 @@ struct Scratch<R> {
 struct View<'a, R> {
     components: [&'a [R]; 3],
     strides: [usize; 3],
-    /// Position of cell (0, 0, 0) of the box.
+    /// Position of cell (0, 0, 0) of the box, if it were in memory: counted with wrapping.
     origin: usize,
 }
 
 impl<'a, R: Real> View<'a, R> {
     fn new(flow: &'a Flow<R>, body: &Body, copies: &'a mut [Vec<R>; 3]) -> View<'a, R> {
         let (layout, velocity) = (flow.mesh().layout(), &flow.velocity);
-        let low = body.first - PAD;
-        // A plane more above, for vectors that reach beyond the last entry.
-        let high = body.first + body.size + PAD - IVec3::ONE;
-        let cells = IVec3::from_array(layout.cells.map(|n| n as i32));
-        if low.cmpge(IVec3::ZERO).all() && high.cmple(cells).all() {
-            let [x, y, z] = body.first.to_array().map(|first| first as usize);
+        let walled = flow.boundaries().walled();
+        let direct = (0..3).all(|axis| {
+            let low = body.first[axis] - PAD;
+            let high = body.first[axis] + body.size[axis] + PAD - 1;
+            walled[axis] || low >= 0 && high <= layout.cells[axis] as i32
+        });
+        // What lies beyond a wall is no unknown, so no link reaches there.
+        if direct {
+            let strides = layout.strides();
+            let along = |axis: usize| (body.first[axis] as usize).wrapping_mul(strides[axis]);
             return View {
                 components: [0, 1, 2].map(|axis| velocity.component(axis)),
-                strides: layout.strides(),
-                origin: layout.index(x, y, z),
+                strides,
+                origin: along(0).wrapping_add(along(1)).wrapping_add(along(2)),
             };
         }
         for (axis, copy) in copies.iter_mut().enumerate() {
             body.places.copy(velocity.component(axis), copy);
-            copy.resize(copy.len() + MOST, R::default());
         }
         let wide = (body.size + 2 * PAD).to_array().map(|n| n as usize);
         let strides = [1, wide[0], wide[0] * wide[1]];
@@ -73,14 +76,19 @@ impl<'a, R: Real> View<'a, R> {
 }
 
 impl<R> View<'_, R> {
+    /// Position of the first place of row (j, k).
+    #[inline(always)]
+    fn row(&self, [j, k]: [i32; 2]) -> usize {
+        let [_, line, plane] = self.strides;
+        self.origin
+            .wrapping_add(j as usize * line + k as usize * plane)
+    }
     /// Asks for the box of `size` cells to be brought near.
     #[inline(always)]
     fn prefetch(&self, size: IVec3) {
-        let [nx, ny, nz] = size.to_array().map(|n| n as usize);
-        let [_, line, plane] = self.strides;
         for field in self.components {
-            for (k, j) in (0..nz).flat_map(|k| (0..ny).map(move |j| (k, j))) {
-                prefetch(field, self.origin + j * line + k * plane, nx);
+            for (k, j) in (0..size.z).flat_map(|k| (0..size.y).map(move |j| (k, j))) {
+                prefetch(field, self.row([j, k]), size.x as usize);
             }
         }
     }
@@ -105,14 +113,37 @@ pub fn correct<R: Real>(band: f64, flow: &mut Flow<R>, grains: &[Grain], bodies:
         body.push = push;
     });
     let (bodies, layout) = (&*bodies, mesh.layout());
-    flow.add_tendency(|component, slab, add| {
-        for body in bodies.iter().filter(|body| body.lies_in(&slab, layout)) {
-            let rows = body.rows[component].iter();
-            for row in rows.filter(|row| slab.contains(&row.at)) {
-                add(row.at, &body.push[component][row.first..][..row.count]);
-            }
+    flow.add_tendency(|component, mut slab| {
+        let part = slab.range();
+        for body in bodies.iter().filter(|body| body.lies_in(&part, layout)) {
+            dispatch(Pushes {
+                rows: &body.rows[component],
+                push: &body.push[component],
+                slab: &mut slab,
+            });
         }
     });
+}
+
+/// What one grain adds to the tendency of a component in a slab of memory.
+struct Pushes<'a, 'b, R> {
+    rows: &'a [PushRow],
+    push: &'a [f64],
+    slab: &'a mut TendencySlab<'b, R>,
+}
+
+impl<R: Real> Kernel for Pushes<'_, '_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let part = self.slab.range();
+        for row in self.rows.iter().filter(|row| part.contains(&row.at)) {
+            for n in (0..row.count).step_by(V::WIDTH) {
+                let push = V::load(&self.push[row.first + n..]);
+                self.slab.add(row.at + n, row.count - n, push);
+            }
+        }
+    }
 }
 
 /// The links of one grain.
@@ -141,51 +172,39 @@ impl<R: Real> Kernel for Links<'_, R> {
         } = self;
         let size = body.size;
         velocity.prefetch(size);
-        flux.resize(size.x as usize + MOST, 0.0);
+        // A zero comes before the fluxes of a row.
+        flux.clear();
+        flux.resize(size.x as usize + 2 * MOST, 0.0);
         for (component, push) in push.iter_mut().enumerate() {
-            push.resize((size.x * size.y * size.z) as usize, 0.0);
-            for (row, span) in body.spans[component].iter().enumerate() {
-                let first = row * size.x as usize;
-                let [start, end] = span.map(|at| first + at as usize);
-                push[start..end].fill(0.0);
-            }
+            let distance = &body.distance[component][..];
+            push.clear();
+            push.resize(distance.len(), 0.0);
             for along in (0..3).filter(|&axis| mesh.cells[axis] > 1) {
                 let lines = Lines::new(band, mesh, grain, body, &velocity, component, along);
                 let step = IVec3::AXES[along];
                 for k in 0..size.z - step.z {
                     for j in 0..size.y - step.y {
-                        let Some((range, inner)) = lines.ranges(j, k) else {
+                        let Some(row) = lines.row([j, k], velocity.row([j, k])) else {
                             continue;
                         };
-                        let (start, end) = (range.start, range.end);
-                        // Near the ends of the grid there are no six faces.
-                        let first = inner.start.clamp(start, end);
-                        let last = inner.end.clamp(first, end);
-                        let [_, line, plane] = velocity.strides;
-                        let at = velocity.origin + j as usize * line + k as usize * plane;
-                        let row = body.local(0, j, k);
-                        let next = row + body.local(step.x, step.y, step.z);
-                        let d = &body.distance[component][..];
-                        for (part, six) in [
-                            (start..first, false),
-                            (first..last, true),
-                            (last..end, false),
-                        ] {
-                            for i in part.step_by(V::WIDTH) {
-                                let (here, there) = (row + i as usize, next + i as usize);
-                                let d =
-                                    V::constant(0.5) * (V::load(&d[here..]) + V::load(&d[there..]));
-                                let at = at + i as usize;
-                                lines
-                                    .flux([j, k], i, at, d, six)
-                                    .store(&mut flux[i as usize..]);
+                        if along == 0 {
+                            for n in (0..row.count).step_by(V::WIDTH) {
+                                let value: V = lines.flux(&row, n, distance);
+                                value.store(&mut flux[1 + n..]);
                             }
-                        }
-                        for i in start as usize..end as usize {
-                            push[row + i] -= flux[i];
-                        }
-                        for i in start as usize..end as usize {
-                            push[next + i] += flux[i];
+                            let end = row.count.next_multiple_of(V::WIDTH);
+                            V::constant(0.0).store(&mut flux[1 + end..]);
+                            for n in (0..row.count + 1).step_by(V::WIDTH) {
+                                let gain = V::load(&flux[n..]) - V::load(&flux[n + 1..]);
+                                gain.add_to(&mut push[row.here + n..]);
+                            }
+                        } else {
+                            let zero = V::constant(0.0);
+                            for n in (0..row.count).step_by(V::WIDTH) {
+                                let value: V = lines.flux(&row, n, distance);
+                                (zero - value).add_to(&mut push[row.here + n..]);
+                                value.add_to(&mut push[row.there + n..]);
+                            }
                         }
                     }
                 }
@@ -212,6 +231,20 @@ struct Lines<'a, R> {
     /// Rigid velocity of the component and along the link in the middle of link (0, 0, 0), and its
     /// change from a link to the next along each axis [m/s].
     rigid: [[f64; 2]; 4],
+}
+
+/// Neighbouring links of a row.
+struct Row {
+    /// Where their lower faces and their upper ones are in the lists of [`Body`].
+    here: usize,
+    there: usize,
+    /// Where the lower ones are in the fields.
+    at: usize,
+    count: usize,
+    /// Those with six faces in line.
+    six: Range<usize>,
+    /// Rigid velocity of the component and along the link at the first [m/s].
+    rigid: [f64; 2],
 }
 
 impl<'a, R: Real> Lines<'a, R> {
@@ -252,77 +285,90 @@ impl<'a, R: Real> Lines<'a, R> {
         }
     }
 
-    /// Which links of a row are to be mended, and those of them with six faces in line.
-    fn ranges(&self, j: i32, k: i32) -> Option<(Range<i32>, Range<i32>)> {
+    /// The links of row (j, k) to be mended; the row begins at `origin` in the fields.
+    #[inline(always)]
+    fn row(&self, [j, k]: [i32; 2], origin: usize) -> Option<Row> {
         let (body, along) = (self.body, self.along);
-        let step = IVec3::AXES[along];
-        let span = |j: i32, k: i32| body.spans[self.component][(j + body.size.y * k) as usize];
-        let (here, there) = (span(j, k), span(j + step.y, k + step.z));
+        let [x, y, z] = [0, 1, 2].map(|axis| i32::from(axis == along));
+        let span = |j: i32, k: i32| &body.spans[self.component][(j + body.size.y * k) as usize];
+        let (here, there) = (span(j, k), span(j + y, k + z));
         let [ux, uy, uz] = &self.unknowns;
+        let start = here.start.max(there.start - x).max(ux.start);
+        let end = here.end.min(there.end - x).min(ux.end - x);
         let inside = |j: i32, k: i32| uy.contains(&j) && uz.contains(&k);
-        if !(inside(j, k) && inside(j + step.y, k + step.z)) {
+        if start >= end || !(inside(j, k) && inside(j + y, k + z)) {
             return None;
         }
-        let start = here[0].max(there[0] - step.x).max(ux.start);
-        let end = here[1]
-            .min(there[1] - step.x)
-            .min(ux.end - step.x)
-            .min(body.size.x - step.x);
-        if start >= end {
-            return None;
-        }
+        // Near the ends of the grid there are no six faces.
         let six = match along {
-            0 => ux.start + 2..ux.end - 3,
-            _ if inside(j - 2 * step.y, k - 2 * step.z)
-                && inside(j + 3 * step.y, k + 3 * step.z) =>
-            {
-                start..end
-            }
-            _ => 0..0,
+            0 => (ux.start + 2).clamp(start, end)..(ux.end - 3).clamp(start, end),
+            _ if inside(j - 2 * y, k - 2 * z) && inside(j + 3 * y, k + 3 * z) => start..end,
+            _ => start..start,
         };
-        Some((start..end, six))
+        let rigid = [0, 1].map(|of| {
+            let [first, x, y, z] = self.rigid.map(|rigid| rigid[of]);
+            first + f64::from(start) * x + f64::from(j) * y + f64::from(k) * z
+        });
+        Some(Row {
+            here: here.place(start),
+            there: there.place(start + x),
+            at: origin.wrapping_add(start as usize),
+            count: (end - start) as usize,
+            six: (six.start - start) as usize..(six.end - start) as usize,
+            rigid,
+        })
     }
 
-    /// Flux through the links from place `i` of row (j, k) on, whose lower faces are at `at` in the
-    /// fields, over their length [m/s^2]; zero where `d` is not near the surface.
+    /// The face of the component carried `shift` faces along the links from those from `at` on.
     #[inline(always)]
-    fn flux<V: Vector<Number = f64>>(
-        &self,
-        [j, k]: [i32; 2],
-        i: i32,
-        at: usize,
-        d: V,
-        six: bool,
-    ) -> V {
-        let (half, one) = (V::constant(0.5), V::constant(1.0));
-        let [q, c] = self.fields;
-        let face =
-            |shift: isize| V::load_from(&q[at.wrapping_add_signed(shift * self.next as isize)..]);
-        let (from, to) = (face(0), face(1));
+    fn face<V: Vector<Number = f64>>(&self, at: usize, shift: isize) -> V {
+        let away = shift.wrapping_mul(self.next as isize);
+        V::load_within(self.fields[0], at.wrapping_add_signed(away))
+    }
+
+    /// Rigid velocity of the component, or along the link, at links of a row.
+    #[inline(always)]
+    fn rigid<V: Vector<Number = f64>>(&self, row: &Row, of: usize, count: V) -> V {
+        V::constant(row.rigid[of]) + count * V::constant(self.rigid[1][of])
+    }
+
+    /// Flux through the links of a row from the `n`th on over their length [m/s^2]; zero where they are not
+    /// near the surface and after the last.
+    #[inline(always)]
+    fn flux<V: Vector<Number = f64>>(&self, row: &Row, n: usize, distance: &[f64]) -> V {
+        let (zero, half, one) = (V::constant(0.0), V::constant(0.5), V::constant(1.0));
+        let d = V::load(&distance[row.here + n..]) + V::load(&distance[row.there + n..]);
+        let d = half * d;
+        let count = V::constant(n as f64) + V::ramp();
+        let c = self.fields[1];
+        let at = row.at.wrapping_add(n);
+        let (from, to): (V, V) = (self.face(at, 0), self.face(at, 1));
         let mean = half * (from + to);
         let carrier = if self.along == self.component {
             mean
         } else {
             // Two faces of the carrying component share the link.
             let to = at + self.next;
-            half * (V::load_from(&c[to..]) + V::load_from(&c[to - self.across..]))
+            half * (V::load_within(c, to) + V::load_within(c, to - self.across))
         };
-        let ramp = V::load(&RAMP);
-        let rigid = |of: usize| {
-            let [start, x, y, z] = self.rigid.map(|rigid| rigid[of]);
-            let first = start + f64::from(i) * x + f64::from(j) * y + f64::from(k) * z;
-            V::constant(first) + ramp * V::constant(x)
-        };
-        let relative = (carrier - rigid(1)) * (mean - rigid(0));
+        let relative = carrier - self.rigid(row, 1, count);
+        let relative = relative * (mean - self.rigid(row, 0, count));
         let open = aperture(d, self.band).larger(V::constant(LEAST_APERTURE));
         let mut flux = relative * (one.over(open) - one);
-        if six {
-            let outer = V::constant(7.0) * (from + to) - V::constant(8.0) * (face(-1) + face(2));
-            let sixth = outer + face(-2) + face(3);
-            flux = flux + carrier * sixth * V::constant(1.0 / 60.0);
+        if !row.six.is_empty() {
+            let outer: V = self.face::<V>(at, -1) + self.face(at, 2);
+            let outer = V::constant(7.0) * (from + to) - V::constant(8.0) * outer;
+            let sixth = outer + self.face(at, -2) + self.face(at, 3);
+            let mut more = carrier * sixth * V::constant(1.0 / 60.0);
+            if row.six != (0..row.count) {
+                more = count.where_below(V::constant(row.six.end as f64), more, zero);
+                more = count.where_below(V::constant(row.six.start as f64), zero, more);
+            }
+            flux = flux + more;
         }
         let near = d.is_below(V::constant(2.0 * self.band));
         let outside = V::constant(-self.band).is_below(d);
-        flux * near * outside * V::constant(self.inverse)
+        let flux = flux * near * outside * V::constant(self.inverse);
+        count.where_below(V::constant(row.count as f64), flux, zero)
     }
 }

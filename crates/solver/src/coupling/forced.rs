@@ -17,7 +17,8 @@ pub struct Run {
     pub count: usize,
 }
 
-/// Forced faces of all components; faces between them that are not forced have zeros.
+/// Forced faces of all components; faces between them that are not forced have zeros. In each list some
+/// entries more follow the last.
 #[derive(Clone, Debug, Default)]
 pub struct Forced {
     /// Of each component.
@@ -26,25 +27,18 @@ pub struct Forced {
     pub share: Vec<f64>,
     /// Part of a face that the grain closes to the pressure gradient, 0 to 1.
     pub closed: Vec<f64>,
-    /// Part that all grains together close.
+    /// Part that all grains together close; empty where no other grain is near.
     pub closed_by_all: Vec<f64>,
-    /// What the pressure takes from a face in the step, given back to its closed part [m/s]. Known
-    /// once the impulse is, like `free`.
-    pub back: Vec<f64>,
-    /// Velocity there without the drag of the grains [m/s].
-    pub free: Vec<f64>,
+    /// What a face takes from a grain at rest that goes on resting [m/s]: the pressure of the step given back
+    /// to its closed part, less its share of the velocity that it would have without drag. Known once the
+    /// impulse is.
+    pub taken: Vec<f64>,
 }
 
 impl Forced {
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let lists = [
-            &self.share,
-            &self.closed,
-            &self.closed_by_all,
-            &self.back,
-            &self.free,
-        ];
+        let lists = [&self.share, &self.closed, &self.closed_by_all, &self.taken];
         let runs: usize = self.runs.iter().map(Vec::capacity).sum();
         let values: usize = lists.iter().map(|list| list.capacity()).sum();
         size_of::<Run>() * runs + size_of::<f64>() * values

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::Scheme;
 use super::aperture::{aperture, drag};
 use super::forced::Forced;
+use super::samples::load_all;
 use crate::math::lanes::{Kernel, MOST, One, Vector, dispatch};
 
 /// How surfaces hold a face.
@@ -70,7 +71,14 @@ impl Faces {
     pub fn count(&self) -> usize {
         self.count
     }
-    /// Adds neighbouring faces of a row, given by vectors.
+    /// Makes room for `count` more faces.
+    pub fn reserve(&mut self, count: usize) {
+        let needed = self.count + count + MOST;
+        for list in [&mut self.distance].into_iter().chain(&mut self.normal) {
+            list.resize(list.len().max(needed), 0.0);
+        }
+    }
+    /// Adds neighbouring faces of a row, for which there is room; of the lists more than these are read.
     #[inline(always)]
     pub fn extend<V: Vector<Number = f64>>(
         &mut self,
@@ -80,15 +88,12 @@ impl Faces {
     ) {
         let first = self.count;
         self.count += count;
-        let lists = [&mut self.distance].into_iter().chain(&mut self.normal);
-        let from = [distance].into_iter().chain(normal);
-        for (list, from) in lists.zip(from) {
-            if list.len() < self.count + MOST {
-                list.resize(2 * (self.count + MOST), 0.0);
-            }
-            for n in (0..count).step_by(V::WIDTH) {
-                V::load(&from[n..]).store(&mut list[first + n..]);
-            }
+        let [x, y, z] = &mut self.normal;
+        for n in (0..count).step_by(V::WIDTH) {
+            V::load(&distance[n..]).store(&mut self.distance[first + n..]);
+            V::load(&normal[0][n..]).store(&mut x[first + n..]);
+            V::load(&normal[1][n..]).store(&mut y[first + n..]);
+            V::load(&normal[2][n..]).store(&mut z[first + n..]);
         }
     }
     /// Takes a face from the grain: another one holds it.
@@ -122,10 +127,12 @@ impl Faces {
                 }
             }
         }
-        forced.share.truncate(count);
-        forced.closed.truncate(count);
+        // Zeros follow, which registers may reach into.
+        for list in [&mut forced.share, &mut forced.closed] {
+            list.truncate(count);
+            list.resize(count + MOST, 0.0);
+        }
         forced.closed_by_all.clear();
-        forced.closed_by_all.extend_from_slice(&forced.closed);
     }
     /// The hold of the grain on a face near its surface, found before for the lists of `forced`.
     pub fn at(&self, index: usize, forced: &Forced) -> Hold {
@@ -188,7 +195,7 @@ impl Kernel for Apertures<'_> {
     fn run<V: Vector<Number = f64>>(self) {
         let Faces {
             distance,
-            normal: [x, y, z],
+            normal,
             strength,
             ..
         } = self.faces;
@@ -199,8 +206,7 @@ impl Kernel for Apertures<'_> {
             V::constant(2.0 * self.holding.eps),
         );
         for at in (0..strength.len()).step_by(V::WIDTH) {
-            let load = |values: &[f64]| V::load(&values[at..]);
-            let d = load(distance);
+            let d = V::load(&distance[at..]);
             // Faces deep inside take all of the grain's motion.
             let shallow = inside.is_below(d);
             if shallow.is_zero() {
@@ -208,7 +214,7 @@ impl Kernel for Apertures<'_> {
                 one.store(&mut closed[at..]);
                 continue;
             }
-            let (drag, part) = self.holding.near(d, [load(x), load(y), load(z)]);
+            let (drag, part) = self.holding.near(d, load_all(normal, at));
             // The grain does nothing beyond its faces, which may enclose some where it is concave.
             let drag = d.where_below(outside, drag, zero);
             drag.store(&mut strength[at..]);

@@ -18,6 +18,24 @@ use crate::flow::Boundaries;
 use crate::grid::{Layout, Mesh};
 use crate::math::lanes::dispatch;
 
+/// The faces of a row along x that matter.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Span {
+    /// Places along x, counted from the side of the box: the first, and the one after the last.
+    pub start: i32,
+    pub end: i32,
+    /// Place of the first in the lists of [`Body`].
+    pub first: usize,
+}
+
+impl Span {
+    /// Place of the face at `i` in the lists of [`Body`].
+    #[inline(always)]
+    pub fn place(&self, i: i32) -> usize {
+        self.first + (i - self.start) as usize
+    }
+}
+
 /// Neighbouring faces of a row that advection beside the grain may push.
 #[derive(Clone, Copy, Debug)]
 pub struct PushRow {
@@ -36,17 +54,16 @@ pub struct Body {
     pub first: IVec3,
     /// Cells of the box.
     pub size: IVec3,
-    /// Signed distance [m] at the faces of the box for each component; infinite where another grain
-    /// is nearer, without meaning where it does not matter. Some entries more follow the last.
+    /// Signed distance [m] at faces near the grain for each component, row by row; infinite where another
+    /// grain is nearer. Some entries more follow the last.
     pub distance: [Vec<f64>; 3],
-    /// Which faces of each row along x the distance matters at, for each component.
-    pub spans: [Vec<[i32; 2]>; 3],
+    /// Which faces of each row of the box these are.
+    pub spans: [Vec<Span>; 3],
     /// Where the box lies in memory.
     pub places: Places,
     /// From its first to its last plane there.
     pub planes: Range<usize>,
-    /// What is added to the tendency at the faces of the box for each component [m/s^2], where the distance
-    /// matters.
+    /// What is added to the tendency at the same faces [m/s^2].
     pub push: [Vec<f64>; 3],
     /// Where those faces lie.
     pub rows: [Vec<PushRow>; 3],
@@ -55,12 +72,6 @@ pub struct Body {
 }
 
 impl Body {
-    /// Position of cell `(i, j, k)` of the box (from 0) in `distance`.
-    #[inline]
-    pub fn local(&self, i: i32, j: i32, k: i32) -> usize {
-        (i + self.size.x * (j + self.size.y * k)) as usize
-    }
-
     /// Whether faces of the box may lie in a part of a field.
     pub fn lies_in(&self, part: &Range<usize>, layout: Layout) -> bool {
         self.planes.start < part.end && part.start < self.planes.end + layout.plane()
@@ -75,7 +86,7 @@ impl Body {
             .map(|v| size_of::<f64>() * v.capacity())
             .sum::<usize>()
             + self.places.bytes()
-            + size_of::<[i32; 2]>() * spans
+            + size_of::<Span>() * spans
             + size_of::<PushRow>() * rows
             + self.forced.bytes()
     }
@@ -196,6 +207,9 @@ impl Locator {
         let Scratch { faces, shared, .. } = scratch;
         faces.hold(holding, forced);
         let near = 2.0 * self.eps;
+        if !shared.is_empty() {
+            forced.closed_by_all.extend_from_slice(&forced.closed);
+        }
         for &(place, x) in &*shared {
             let own = faces.at(place, forced);
             let mut all = own;

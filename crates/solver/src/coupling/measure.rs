@@ -8,12 +8,13 @@ use glam::{DMat3, DVec3, IVec3};
 use super::Scheme;
 use super::forced::Run;
 use super::hold::{Faces, Holding};
-use super::locate::{Body, PushRow};
-use super::near::NearShape;
+use super::locate::{Body, PushRow, Span};
+use super::near::{NearShape, Spare};
 use super::rivals::Rival;
+use super::samples::{load_all, store_all};
 use crate::dem::Grain;
 use crate::grid::{FACE_OFFSET, Mesh};
-use crate::math::lanes::{Kernel, MOST, RAMP, Vector};
+use crate::math::lanes::{Kernel, MOST, Vector};
 
 /// What one thread needs to locate grains.
 #[derive(Default)]
@@ -22,45 +23,68 @@ pub struct Scratch {
     pub faces: Faces,
     /// Which of them other grains may hold as well, and where they are [m].
     pub shared: Vec<(usize, DVec3)>,
-    normals: Normals,
+    points: Points,
+    parts: Vec<Part>,
 }
 
-/// Unit normals, in the space frame, of a row of faces.
-#[derive(Default)]
-struct Normals([Vec<f64>; 3]);
+/// Part of a row with no gap in memory: places along x, positions of the first face and of the cell
+/// below it.
+struct Part {
+    range: Range<i32>,
+    at: usize,
+    below: usize,
+}
 
-impl Normals {
-    /// Finds them and the distances of the faces in `range`. In the frame of the shape, which is turned
-    /// by `turn`, the face 0 is at `first` and the others follow by `step`. Some entries beyond the range
-    /// are overwritten.
+/// Faces near a grain, one row after the other so that registers are full: first where they are, in its
+/// frame, then the unit normals, in the space frame. Some entries more follow the last.
+#[derive(Default)]
+struct Points {
+    faces: [Vec<f64>; 3],
+    spare: Spare,
+}
+
+impl Points {
+    /// Makes room for `count` faces.
+    fn reserve(&mut self, count: usize) {
+        for list in &mut self.faces {
+            list.resize(list.len().max(count + MOST), 0.0);
+        }
+    }
+    /// Writes the faces of a `span`; the face 0 of the row is at `first`, the others follow by `step`.
     #[inline(always)]
-    fn fill<V: Vector<Number = f64>>(
+    fn place<V: Vector<Number = f64>>(&mut self, span: Span, [first, step]: [DVec3; 2]) {
+        for i in (span.start..span.end).step_by(V::WIDTH) {
+            let count = V::constant(f64::from(i)) + V::ramp();
+            let at = span.place(i);
+            for n in 0..3 {
+                let x = V::constant(first[n]) + count * V::constant(step[n]);
+                x.store(&mut self.faces[n][at..]);
+            }
+        }
+    }
+    /// Finds the distances of the first `count` faces and puts the normals in the place of the points.
+    #[inline(always)]
+    fn measure<V: Vector<Number = f64>>(
         &mut self,
         distances: &mut [f64],
         shape: &NearShape,
         turn: DMat3,
-        [first, step]: [DVec3; 2],
-        range: Range<i32>,
+        count: usize,
     ) {
         let columns = turn.to_cols_array_2d();
-        for i in range.step_by(V::WIDTH) {
-            let count = V::constant(f64::from(i)) + V::load(&RAMP);
-            let mut x = [count; 3];
-            for n in 0..3 {
-                x[n] = V::constant(first[n]) + count * V::constant(step[n]);
-            }
-            let (distance, [x, y, z]) = shape.lanes(x);
+        shape.measure::<V>(&mut self.faces, distances, count, &mut self.spare);
+        for at in (0..count).step_by(V::WIDTH) {
+            let [x, y, z] = load_all::<V>(&self.faces, at);
             let length = (x * x + y * y + z * z).root();
             let inverse = V::constant(1.0).over(length.larger(V::constant(f64::MIN_POSITIVE)));
             let unit = [x * inverse, y * inverse, z * inverse];
-            let at = i as usize;
-            distance.store(&mut distances[at..]);
-            for (axis, list) in self.0.iter_mut().enumerate() {
-                let normal = V::constant(columns[0][axis]) * unit[0]
+            let mut normal = unit;
+            for axis in 0..3 {
+                normal[axis] = V::constant(columns[0][axis]) * unit[0]
                     + V::constant(columns[1][axis]) * unit[1]
                     + V::constant(columns[2][axis]) * unit[2];
-                normal.store(&mut list[at..]);
             }
+            store_all(normal, &mut self.faces, at);
         }
     }
 }
@@ -91,134 +115,242 @@ impl Kernel for Measure<'_> {
             body,
             scratch,
         } = self;
-        let (eps, blended) = (holding.eps, holding.scheme == Scheme::Paper);
+        let eps = holding.eps;
         let turn = DMat3::from_quat(grain.pose.orientation);
-        let to_body = turn.transpose();
         let step = DVec3::X * mesh.spacing.x;
-        let body_step = to_body * step;
-        let around = Around {
-            far: grain.shape.bounding_radius() + reach,
-            lower: grain.shape.lower() - reach,
-            upper: grain.shape.upper() + reach,
-            h: mesh.spacing.x,
-            per_step: 1.0 / body_step,
-        };
+        let around = Around::new(grain, reach, mesh.spacing, turn.transpose());
         let size = body.size;
-        let count = (size.x * size.y * size.z) as usize;
         let Scratch {
             faces,
             shared,
-            normals,
+            points,
+            parts,
         } = scratch;
         faces.clear();
         shared.clear();
-        let wide = size.x as usize + MOST;
-        normals.0.iter_mut().for_each(|n| n.resize(wide, 0.0));
+        points.reserve((size.x * size.y) as usize);
         body.forced.runs.iter_mut().for_each(Vec::clear);
-        let nearest = |x: DVec3| {
-            let others = rivals.iter();
-            others
-                .map(|rival| rival.distance(x, reach) + rival.handicap * eps)
-                .fold(f64::INFINITY, f64::min)
-        };
         for (axis, offset) in FACE_OFFSET.iter().enumerate() {
-            let distance = &mut body.distance[axis];
-            distance.resize(count + MOST, f64::INFINITY);
-            body.spans[axis].clear();
-            body.rows[axis].clear();
-            for (k, j) in (0..size.z).flat_map(|k| (0..size.y).map(move |j| (k, j))) {
-                let start = position(mesh, offset, body.first + IVec3::new(0, j, k));
-                let arm = start - grain.pose.position;
-                let row = [to_body * arm, body_step];
-                let range = around.row(arm, row[0], size.x);
-                let first = (size.x * (j + size.y * k)) as usize;
-                let distance = &mut distance[first..];
-                normals.fill::<V>(distance, shape, turn, row, range.clone());
-                let span = within(distance, range, reach);
-                let forced = within(distance, span.clone(), 2.0 * eps);
-                body.spans[axis].push([span.start, span.end]);
-                let (rows, runs) = (&mut body.rows[axis], &mut body.forced.runs[axis]);
-                body.places.runs(axis, [j, k], span, |part, at, below| {
-                    rows.push(PushRow {
-                        at,
-                        first: first + part.start as usize,
-                        count: part.len(),
+            let (distance, spans) = (&mut body.distance[axis], &mut body.spans[axis]);
+            let (rows, runs) = (&mut body.rows[axis], &mut body.forced.runs[axis]);
+            spans.clear();
+            rows.clear();
+            let corner = position(mesh, offset, body.first);
+            let arm = corner - grain.pose.position;
+            let mut known = 0;
+            for k in 0..size.z {
+                let mut count = 0;
+                for from in (0..size.y).step_by(V::WIDTH) {
+                    let near = around.rows::<V>(arm, [from, k], size.x);
+                    for n in 0..V::WIDTH.min((size.y - from) as usize) {
+                        let (span, first) = near.of(n, count);
+                        points.place::<V>(span, [first, around.step]);
+                        count = span.place(span.end);
+                        spans.push(span);
+                    }
+                }
+                distance.resize(distance.len().max(known + count + MOST), f64::INFINITY);
+                points.measure::<V>(&mut distance[known..], shape, turn, count);
+                faces.reserve(count);
+                let plane = (size.y * k) as usize;
+                for (j, span) in spans[plane..].iter_mut().enumerate() {
+                    let normals = span.first;
+                    span.first += known;
+                    let all = *span;
+                    *span = within(distance, all, reach);
+                    let forced = within(distance, *span, 2.0 * eps);
+                    let j = j as i32;
+                    let up = DVec3::new(0.0, f64::from(j), f64::from(k));
+                    let start = corner + mesh.spacing * up;
+                    parts.clear();
+                    let range = span.start..span.end;
+                    (body.places).runs(axis, [j, k], range, |range, at, below| {
+                        parts.push(Part { range, at, below });
                     });
-                    let held = part.start.max(forced.start)..part.end.min(forced.end);
-                    let number = faces.count();
-                    if !held.is_empty() {
-                        let from = held.start as usize;
-                        let ahead = (held.start - part.start) as usize;
-                        runs.push(Run {
-                            at: at + ahead,
-                            below: below + ahead,
-                            arm: arm + f64::from(held.start) * step,
-                            first: number,
-                            count: held.len(),
+                    for part in &*parts {
+                        let range = part.range.clone();
+                        let first = span.place(range.start);
+                        rows.push(PushRow {
+                            at: part.at,
+                            first,
+                            count: range.len(),
                         });
-                        let normal = normals.0.each_ref().map(|list| &list[from..]);
-                        faces.extend::<V>(held.len(), &distance[from..], normal);
-                    }
-                    if rivals.is_empty() {
-                        return;
-                    }
-                    for i in part {
-                        let (x, d) = (start + f64::from(i) * step, &mut distance[i as usize]);
-                        let rival = nearest(x);
-                        if held.contains(&i) {
-                            let face = number + (i - held.start) as usize;
-                            if rival <= -eps && rival < *d {
-                                faces.forgo(face, holding);
-                            } else if rival < 2.0 * eps && (*d > -eps || blended) {
-                                shared.push((face, x));
-                            }
+                        let held = range.start.max(forced.start)..range.end.min(forced.end);
+                        let number = faces.count();
+                        if !held.is_empty() {
+                            let ahead = (held.start - range.start) as usize;
+                            runs.push(Run {
+                                at: part.at + ahead,
+                                below: part.below + ahead,
+                                arm: start - grain.pose.position + f64::from(held.start) * step,
+                                first: number,
+                                count: held.len(),
+                            });
+                            let from = normals + (held.start - all.start) as usize;
+                            let normal = points.faces.each_ref().map(|list| &list[from..]);
+                            faces.extend::<V>(held.len(), &distance[known + from..], normal);
                         }
-                        if *d > rival {
-                            *d = f64::INFINITY;
+                        if !rivals.is_empty() {
+                            let contest = Contest {
+                                rivals,
+                                holding,
+                                reach,
+                                start,
+                                step,
+                            };
+                            let distance = &mut distance[first..];
+                            contest.settle(range, held, distance, number, faces, shared);
                         }
                     }
-                });
+                }
+                known += count;
             }
         }
     }
 }
 
-/// The part of `range` from the first to the last place that is no farther than `limit`.
-fn within(distance: &[f64], range: Range<i32>, limit: f64) -> Range<i32> {
-    let near = |i: &i32| distance[*i as usize] <= limit;
-    let Some(start) = range.clone().find(near) else {
-        return 0..0;
-    };
-    let last = range.rev().find(near).unwrap_or(start);
-    start..last + 1
+/// A row of faces that other grains may take; the first is at `start` [m].
+struct Contest<'a> {
+    rivals: &'a [Rival<'a>],
+    holding: &'a Holding,
+    reach: f64,
+    start: DVec3,
+    step: DVec3,
+}
+
+impl Contest<'_> {
+    /// Gives the faces in `range`, at these distances, to the grain that is nearest; those of them that are
+    /// `held` are in the list `faces` from `number` on.
+    fn settle(
+        &self,
+        range: Range<i32>,
+        held: Range<i32>,
+        distance: &mut [f64],
+        number: usize,
+        faces: &mut Faces,
+        shared: &mut Vec<(usize, DVec3)>,
+    ) {
+        let (eps, blended) = (self.holding.eps, self.holding.scheme == Scheme::Paper);
+        for (i, d) in range.zip(distance) {
+            let x = self.start + f64::from(i) * self.step;
+            let others = self.rivals.iter();
+            let rival = others
+                .map(|rival| rival.distance(x, self.reach) + rival.handicap * eps)
+                .fold(f64::INFINITY, f64::min);
+            if held.contains(&i) {
+                let face = number + (i - held.start) as usize;
+                if rival <= -eps && rival < *d {
+                    faces.forgo(face, self.holding);
+                } else if rival < 2.0 * eps && (*d > -eps || blended) {
+                    shared.push((face, x));
+                }
+            }
+            if *d > rival {
+                *d = f64::INFINITY;
+            }
+        }
+    }
+}
+
+/// The part of a span from the first to the last face that is no farther than `limit`.
+#[inline(always)]
+fn within(distance: &[f64], mut span: Span, limit: f64) -> Span {
+    let near = |place: usize| distance[place] <= limit;
+    while span.start < span.end && !near(span.first) {
+        span.start += 1;
+        span.first += 1;
+    }
+    while span.start < span.end && !near(span.place(span.end) - 1) {
+        span.end -= 1;
+    }
+    span
 }
 
 /// What lies about a grain.
 struct Around {
-    /// Radius of a ball about its centroid that holds all of it [m].
+    /// Square of the radius of a ball about its centroid that holds all of it [m^2].
     far: f64,
     /// A box in its own frame that does [m].
     lower: DVec3,
     upper: DVec3,
-    /// Spacing of the faces of a row [m]; one over a step along it, in the grain's frame [1/m].
-    h: f64,
+    spacing: DVec3,
+    to_body: DMat3,
+    /// From a face of a row to the next in the frame of the grain [m], and one over that.
+    step: DVec3,
     per_step: DVec3,
 }
 
 impl Around {
-    /// Which of the `count` faces of a row may matter; the first is at `arm` from the centroid and at
-    /// `first` in the frame of the grain.
-    fn row(&self, arm: DVec3, first: DVec3, count: i32) -> Range<i32> {
-        let square = self.far * self.far - arm.y * arm.y - arm.z * arm.z;
-        if square <= 0.0 {
-            return 0..0;
+    fn new(grain: &Grain, reach: f64, spacing: DVec3, to_body: DMat3) -> Around {
+        let far = grain.shape.bounding_radius() + reach;
+        let step = to_body * (DVec3::X * spacing.x);
+        // Finite where a row runs along a side of the box.
+        let per_step = step.map(|s| if s.abs() > 1e-200 { 1.0 / s } else { 1e200 });
+        Around {
+            far: far * far,
+            lower: grain.shape.lower() - reach,
+            upper: grain.shape.upper() + reach,
+            spacing,
+            to_body,
+            step,
+            per_step,
         }
-        let half = square.sqrt();
-        let [a, b] = [self.lower, self.upper].map(|side| (side - first) * self.per_step);
-        let (from, to) = (a.min(b).max_element(), a.max(b).min_element());
-        let from = from.max((-half - arm.x) / self.h).ceil() as i32;
-        let to = to.min((half - arm.x) / self.h).floor() as i32;
-        from.clamp(0, count)..(to.saturating_add(1)).clamp(0, count)
+    }
+
+    /// The rows (j, k) and above of `count` faces each; face (0, 0, 0) is at `arm` from the centroid.
+    #[inline(always)]
+    fn rows<V: Vector<Number = f64>>(&self, arm: DVec3, [j, k]: [i32; 2], count: i32) -> Rows {
+        let zero = V::constant(0.0);
+        let z = V::constant(arm.z + self.spacing.z * f64::from(k));
+        let step = V::constant(f64::from(j)) + V::ramp();
+        let y = V::constant(arm.y) + V::constant(self.spacing.y) * step;
+        let square = V::constant(self.far) - y * y - z * z;
+        let half = square.larger(zero).root();
+        let per_step = V::constant(1.0 / self.spacing.x);
+        let x = V::constant(arm.x);
+        let (mut from, mut to) = ((zero - half - x) * per_step, (half - x) * per_step);
+        let mut rows = Rows::default();
+        let [a, b, c] = [
+            self.to_body.x_axis,
+            self.to_body.y_axis,
+            self.to_body.z_axis,
+        ];
+        for axis in 0..3 {
+            let first =
+                V::constant(a[axis]) * x + V::constant(b[axis]) * y + V::constant(c[axis]) * z;
+            let per_step = V::constant(self.per_step[axis]);
+            let low = (V::constant(self.lower[axis]) - first) * per_step;
+            let high = (V::constant(self.upper[axis]) - first) * per_step;
+            from = from.larger(low.smaller(high));
+            to = to.smaller(low.larger(high));
+            first.store(&mut rows.first[axis]);
+        }
+        // From the first face not before to the one after the last not behind, if the ball is met.
+        let end = V::constant(f64::from(count));
+        let start = (zero - (zero - from).floor()).larger(zero).smaller(end);
+        let stop = (to.floor() + V::constant(1.0)).larger(start).smaller(end);
+        start.store(&mut rows.start);
+        zero.where_below(square, stop, start).store(&mut rows.end);
+        rows
+    }
+}
+
+/// Which faces may matter of as many rows as a register has lanes.
+#[derive(Default)]
+struct Rows {
+    /// Face 0 in the frame of the grain [m].
+    first: [[f64; MOST]; 3],
+    start: [f64; MOST],
+    end: [f64; MOST],
+}
+
+impl Rows {
+    /// Of row `n` the faces, listed from place `first` on, and where face 0 is.
+    #[inline(always)]
+    fn of(&self, n: usize, first: usize) -> (Span, DVec3) {
+        let [start, end] = [self.start[n] as i32, self.end[n] as i32];
+        let span = Span { start, end, first };
+        (span, DVec3::from_array(self.first.map(|lanes| lanes[n])))
     }
 }
 

@@ -11,6 +11,7 @@ mod newton;
 mod places;
 mod rigidity;
 mod rivals;
+mod samples;
 
 use glam::DVec3;
 use rayon::prelude::*;

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use grainwake_shape::{Field, SampledField, Shape};
 
+use super::samples::{Grids, Spot, load_all, store_all};
 use crate::dem::Grain;
 use crate::math::lanes::{MOST, Vector};
 
@@ -31,10 +32,10 @@ pub struct NearShape {
 }
 
 /// The coarse grid about the grid of a shape.
-struct About {
-    field: SampledField,
+pub struct About {
+    pub field: SampledField,
     /// Levels of the shape's grid, then those of this one: lanes on either grid find theirs in one list.
-    levels: Vec<f32>,
+    pub levels: Vec<f32>,
 }
 
 impl NearShapes {
@@ -117,29 +118,50 @@ impl NearShape {
         found.or_else(about).unwrap_or(FAR)
     }
 
-    /// The same at the points whose coordinates are the lanes of `x`, bit for bit; what is infinite
-    /// there may be merely farther than anything here.
+    /// The same at the first `count` points of lists of coordinates, bit for bit; what is infinite there
+    /// may be merely farther than anything here. The gradients come in the place of the points. More entries
+    /// must follow, which are overwritten.
     #[inline(always)]
-    pub fn lanes<V: Vector<Number = f64>>(&self, x: [V; 3]) -> (V, [V; 3]) {
-        match (self.shape.field(), &self.about) {
-            (Field::Sphere(radius), _) => about_sphere(*radius, x),
-            (Field::Sampled(field), None) => {
-                let off = off_grid(field, x);
-                let (d, slope) = on_grid(Grid::of(field), field.levels(), x);
-                (d + off * V::constant(FAR), slope)
+    pub fn measure<V: Vector<Number = f64>>(
+        &self,
+        points: &mut [Vec<f64>; 3],
+        distances: &mut [f64],
+        count: usize,
+        spare: &mut Spare,
+    ) {
+        let Field::Sampled(field) = self.shape.field() else {
+            for at in (0..count).step_by(V::WIDTH) {
+                let x = load_all::<V>(points, at);
+                let (distance, slope) = match self.shape.field() {
+                    Field::Sphere(radius) => about_sphere(*radius, x),
+                    _ => self.one_by_one(x),
+                };
+                distance.store(&mut distances[at..]);
+                store_all(slope, points, at);
             }
-            (Field::Sampled(field), Some(about)) => {
-                let off = off_grid(field, x);
-                if off.is_zero() {
-                    return on_grid(Grid::of(field), &about.levels, x);
-                }
-                let mut beyond = Grid::of(&about.field);
-                beyond.first = V::constant(field.levels().len() as f64);
-                let grid = Grid::of(field).or_where(off, beyond);
-                let (d, slope) = on_grid(grid, &about.levels, x);
-                (d + off_grid(&about.field, x) * V::constant(FAR), slope)
-            }
-            _ => self.one_by_one(x),
+            return;
+        };
+        // Samples are far apart in memory. Little but their loads is in the second loop, so that the
+        // processor has those of several vectors under way at once.
+        let grids = Grids::of(field, self.about.as_deref());
+        let Spare { cell, which } = spare;
+        for list in [&mut *cell, &mut *which] {
+            list.resize(list.len().max(count + MOST), 0.0);
+        }
+        for at in (0..count).step_by(V::WIDTH) {
+            let spot = grids.find(load_all::<V>(points, at));
+            spot.cell.store(&mut cell[at..]);
+            spot.which.store(&mut which[at..]);
+            store_all(spot.fraction, points, at);
+        }
+        for at in (0..count).step_by(V::WIDTH) {
+            let (distance, slope) = grids.read(Spot {
+                cell: V::load(&cell[at..]),
+                which: V::load(&which[at..]),
+                fraction: load_all::<V>(points, at),
+            });
+            distance.store(&mut distances[at..]);
+            store_all(slope, points, at);
         }
     }
 
@@ -163,8 +185,15 @@ impl NearShape {
     }
 }
 
+/// Lists that [`NearShape::measure`] needs.
+#[derive(Default)]
+pub struct Spare {
+    cell: Vec<f64>,
+    which: Vec<f64>,
+}
+
 /// Farther than anything [m].
-const FAR: f64 = 1e100;
+pub const FAR: f64 = 1e100;
 
 #[inline(always)]
 fn about_sphere<V: Vector<Number = f64>>(radius: f64, [x, y, z]: [V; 3]) -> (V, [V; 3]) {
@@ -172,112 +201,6 @@ fn about_sphere<V: Vector<Number = f64>>(radius: f64, [x, y, z]: [V; 3]) -> (V, 
     let divisor = length.larger(V::constant(f64::MIN_POSITIVE));
     let normal = [x.over(divisor), y.over(divisor), z.over(divisor)];
     (length - V::constant(radius), normal)
-}
-
-/// 1 where a point is off the grid of a field, else 0.
-#[inline(always)]
-fn off_grid<V: Vector<Number = f64>>(field: &SampledField, x: [V; 3]) -> V {
-    let zero = V::constant(0.0);
-    let inverse = V::constant(1.0 / field.spacing());
-    let mut outside = zero;
-    for axis in 0..3 {
-        let last = V::constant(field.dims()[axis] as f64 - 1.0);
-        let s = (x[axis] - V::constant(field.lower()[axis])) * inverse;
-        outside = outside + (s - s.larger(zero).smaller(last)).magnitude();
-    }
-    // Whatever is off the grid is so by more than a rounding.
-    zero.is_below(outside)
-}
-
-/// The grid of a field, which may be another one for each lane.
-#[derive(Clone, Copy)]
-struct Grid<V> {
-    lower: [V; 3],
-    inverse: V,
-    /// Number of the last sample along each axis.
-    last: [V; 3],
-    /// From one row and one plane of samples to the next.
-    strides: [V; 2],
-    /// Place of the first sample in the list of levels.
-    first: V,
-    /// What a level is [m], and that over the spacing.
-    quantum: V,
-    slope: V,
-}
-
-impl<V: Vector<Number = f64>> Grid<V> {
-    #[inline(always)]
-    fn of(field: &SampledField) -> Grid<V> {
-        let (lower, dims, inverse) = (field.lower(), field.dims(), 1.0 / field.spacing());
-        let last = |axis: usize| V::constant(dims[axis] as f64 - 1.0);
-        Grid {
-            lower: [lower.x, lower.y, lower.z].map(V::constant),
-            inverse: V::constant(inverse),
-            last: [last(0), last(1), last(2)],
-            strides: [dims[0], dims[0] * dims[1]].map(|stride| V::constant(stride as f64)),
-            first: V::constant(0.0),
-            quantum: V::constant(field.quantum()),
-            slope: V::constant(field.quantum() * inverse),
-        }
-    }
-
-    /// This one where `off` is 0, `other` where it is 1.
-    #[inline(always)]
-    fn or_where(self, off: V, other: Grid<V>) -> Grid<V> {
-        let half = V::constant(0.5);
-        let mut both = self;
-        for axis in 0..3 {
-            both.lower[axis] = off.where_below(half, self.lower[axis], other.lower[axis]);
-            both.last[axis] = off.where_below(half, self.last[axis], other.last[axis]);
-        }
-        for n in 0..2 {
-            both.strides[n] = off.where_below(half, self.strides[n], other.strides[n]);
-        }
-        both.inverse = off.where_below(half, self.inverse, other.inverse);
-        both.first = off.where_below(half, self.first, other.first);
-        both.quantum = off.where_below(half, self.quantum, other.quantum);
-        both.slope = off.where_below(half, self.slope, other.slope);
-        both
-    }
-}
-
-/// Distance and gradient on a grid whose samples are in `levels`; of points off it, those of the nearest
-/// point on it.
-#[inline(always)]
-fn on_grid<V: Vector<Number = f64>>(grid: Grid<V>, levels: &[f32], x: [V; 3]) -> (V, [V; 3]) {
-    let (zero, one) = (V::constant(0.0), V::constant(1.0));
-    let mut cell = [zero; 3];
-    let mut fraction = [zero; 3];
-    for axis in 0..3 {
-        let s = (x[axis] - grid.lower[axis]) * grid.inverse;
-        let place = s.larger(zero).smaller(grid.last[axis]);
-        cell[axis] = place.floor().smaller(grid.last[axis] - one);
-        fraction[axis] = place - cell[axis];
-    }
-    let [row, plane] = grid.strides;
-    let at = grid.first + cell[0] + row * cell[1] + plane * cell[2];
-    let [fx, fy, fz] = fraction;
-    // Value and slope on the four edges along x.
-    let (a, s) = edge(levels, at, fx);
-    let (b, t) = edge(levels, at + row, fx);
-    let (c, u) = edge(levels, at + plane, fx);
-    let (d, v) = edge(levels, at + plane + row, fx);
-    let (low, high) = (a + fy * (b - a), c + fy * (d - c));
-    let (slope_low, slope_high) = (s + fy * (t - s), u + fy * (v - u));
-    let gradient = [
-        grid.slope * (slope_low + fz * (slope_high - slope_low)),
-        grid.slope * ((b - a) + fz * ((d - c) - (b - a))),
-        grid.slope * (high - low),
-    ];
-    (grid.quantum * (low + fz * (high - low)), gradient)
-}
-
-/// Value between the samples at `at` and the next along x, and the slope from one to the other.
-#[inline(always)]
-fn edge<V: Vector<Number = f64>>(levels: &[f32], at: V, x: V) -> (V, V) {
-    let [low, high] = V::pairs(levels, at);
-    let slope = high - low;
-    (low + x * slope, slope)
 }
 
 #[cfg(test)]
@@ -329,30 +252,30 @@ mod tests {
         #[inline(always)]
         fn run<V: Vector<Number = f64>>(self) {
             let mut far = 0;
-            for i in 0..4000 {
-                let mut points = [[0.0; MOST]; 3];
-                for n in 0..V::WIDTH {
+            let mut spare = Spare::default();
+            for i in 0..2000 {
+                let mut points = [0; 3].map(|_| vec![0.0; 2 * MOST]);
+                for n in 0..MOST {
                     let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779);
                     let u = u * f64::from(i * 16 + n as i32);
                     let x = 2.0 * (2.0 * u.fract() - DVec3::ONE);
                     (0..3).for_each(|axis| points[axis][n] = x[axis]);
                 }
-                let (d, slope) = self.0.lanes(points.map(|lanes| V::load(&lanes)));
-                let (mut distance, mut slopes) = ([0.0; MOST], [[0.0; MOST]; 3]);
-                d.store(&mut distance);
-                slope
-                    .iter()
-                    .zip(&mut slopes)
-                    .for_each(|(v, lanes)| v.store(lanes));
-                for n in 0..V::WIDTH {
-                    let x = DVec3::from_array(points.map(|lanes| lanes[n]));
+                let (mut slopes, mut distance) = (points.clone(), [0.0; 2 * MOST]);
+                self.0
+                    .measure::<V>(&mut slopes, &mut distance, MOST, &mut spare);
+                for n in 0..MOST {
+                    let of = |lists: &[Vec<f64>; 3]| {
+                        DVec3::from_array(lists.each_ref().map(|list| list[n]))
+                    };
+                    let x = of(&points);
                     let (d, slope) = self.0.distance_and_gradient(x);
                     if d == f64::INFINITY {
                         far += 1;
                         assert!(distance[n] > 1e90, "at {x}");
                     } else {
                         assert_eq!(distance[n], d, "at {x}");
-                        assert_eq!(slopes.map(|lanes| lanes[n]), slope.to_array(), "at {x}");
+                        assert_eq!(of(&slopes), slope, "at {x}");
                     }
                 }
             }

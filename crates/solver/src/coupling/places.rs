@@ -81,17 +81,6 @@ pub struct Places {
 }
 
 impl Places {
-    /// Memory position of face `(i, j, k)` of the box (from 0, up to three cells off it) of component
-    /// `component`; of the cell, where that is 3. None where it is no unknown.
-    #[inline]
-    pub fn at(&self, component: usize, cell: IVec3) -> Option<usize> {
-        let part = |axis: usize| {
-            self.tables[axis][usize::from(axis == component)][(cell[axis] + PAD) as usize]
-        };
-        let at = part(0) + part(1) + part(2);
-        (at < NONE).then_some(at)
-    }
-
     /// Positions along `axis` of the faces of `component` that are unknowns, off the box too: they
     /// have no gaps, as only the ends of the grid take some away.
     pub fn unknowns(&self, component: usize, axis: usize) -> Range<i32> {
@@ -112,16 +101,20 @@ impl Places {
         range: Range<i32>,
         mut found: impl FnMut(Range<i32>, usize, usize),
     ) {
-        const CELL: usize = 3;
-        let pair = |i: i32| {
-            let place = IVec3::new(i, j, k);
-            let at = self.at(component, place)?;
-            let below = self.at(CELL, place - IVec3::AXES[component])?;
-            Some((at, below))
-        };
         if range.is_empty() {
             return;
         }
+        let part = |axis: usize, normal: bool, place: i32| {
+            self.tables[axis][usize::from(normal)][(place + PAD) as usize]
+        };
+        let down = IVec3::AXES[component];
+        let line = part(1, component == 1, j) + part(2, component == 2, k);
+        let line_below = part(1, false, j - down.y) + part(2, false, k - down.z);
+        let pair = |i: i32| {
+            let at = part(0, component == 0, i) + line;
+            let below = part(0, false, i - down.x) + line_below;
+            (at < NONE && below < NONE).then_some((at, below))
+        };
         // Places only follow each other or jump back, and end where the grid does.
         if let (Some(first), Some(last)) = (pair(range.start), pair(range.end - 1)) {
             let ahead = range.len() - 1;
@@ -200,7 +193,14 @@ mod tests {
         };
         let mut places = Places::default();
         unknowns.map(IVec3::new(6, 1, 1), IVec3::new(5, 3, 1), &mut places);
-        let at = |component, i, j| places.at(component, IVec3::new(i, j, 0));
+        // Memory position of a face, of the cell where the component is 3.
+        let at = |component, i, j| {
+            let part = |axis: usize, place: i32| {
+                places.tables[axis][usize::from(axis == component)][(place + PAD) as usize]
+            };
+            let at = part(0, i) + part(1, j) + part(2, 0);
+            (at < NONE).then_some(at)
+        };
         // Cell 6 + 4 is cell 2 across the edge.
         assert_eq!(at(3, 4, 0), Some(2 + 10 + 80));
         assert_eq!(at(0, 3, 2), Some(1 + 30 + 80));

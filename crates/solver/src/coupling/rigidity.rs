@@ -11,12 +11,12 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::Past;
-use super::forced::Forced;
+use super::forced::{Forced, Run};
 use super::locate::Body;
 use crate::dem::Grain;
 use crate::flow::Flow;
 use crate::grid::{FaceVector, for_slabs};
-use crate::math::lanes::{Kernel, Partial, RAMP, RowWork, Vector, along_row, dispatch, prefetch};
+use crate::math::lanes::{Kernel, Partial, Vector, dispatch, prefetch};
 use crate::math::{Matrix6, Real, Vector6};
 
 /// How many runs ahead memory is asked for.
@@ -58,11 +58,12 @@ pub fn gather<R: Real>(
         slope: [[0.0; 6]; 6],
     };
     for (axis, sum) in sums.iter().enumerate() {
+        let (push, pull) = (sum.push.map(|s| s.sum()), sum.pull.map(|s| s.sum()));
         let rows = [axis, 3 + (axis + 1) % 3, 3 + (axis + 2) % 3];
         for (a, row) in rows.into_iter().enumerate() {
-            impulse.constant[row] += w * sum.push[a];
+            impulse.constant[row] += w * push[a];
             for (b, column) in rows.into_iter().enumerate() {
-                impulse.slope[row][column] += w * sum.pull[a + b + usize::from(a.min(b) > 0)];
+                impulse.slope[row][column] += w * pull[a + b + usize::from(a.min(b) > 0)];
             }
         }
     }
@@ -73,37 +74,32 @@ pub fn gather<R: Real>(
 /// arm x unit has: a force along the axis has no torque about it.
 #[derive(Clone, Copy, Default)]
 struct Moments {
-    push: [f64; 3],
+    push: [Partial; 3],
     /// Of 1, l, m, l l, l m and m m, l and m the levers.
-    pull: [f64; 6],
+    pull: [Partial; 6],
 }
 
 impl Moments {
-    /// Adds a run of component `axis` whose first face has this `arm`, by its sums of push and pull
-    /// with the powers of the way along x.
-    fn add(&mut self, axis: usize, arm: DVec3, push: [f64; 2], pull: [f64; 3]) {
-        // A lever is a + b x.
-        let along = |component: usize| [arm[component], if component == 0 { 1.0 } else { 0.0 }];
-        let [l, m] = [along((axis + 2) % 3), along((axis + 1) % 3).map(|v| -v)];
-        let once = |v: [f64; 2], sum: &[f64]| v[0] * sum[0] + v[1] * sum[1];
-        let twice = |v: [f64; 2], w: [f64; 2]| v[0] * once(w, &pull) + v[1] * once(w, &pull[1..]);
-        let pushes = [push[0], once(l, &push), once(m, &push)];
-        let pulls = [
-            pull[0],
-            once(l, &pull),
-            once(m, &pull),
-            twice(l, l),
-            twice(l, m),
-            twice(m, m),
-        ];
-        self.push
-            .iter_mut()
-            .zip(pushes)
-            .for_each(|(sum, x)| *sum += x);
-        self.pull
-            .iter_mut()
-            .zip(pulls)
-            .for_each(|(sum, x)| *sum += x);
+    /// Adds faces of component `axis` at the places `arm` from the centroid, in the lanes from the `n`th on.
+    #[inline(always)]
+    fn add<V: Vector<Number = f64>>(
+        &mut self,
+        axis: usize,
+        n: usize,
+        arm: [V; 3],
+        push: V,
+        pull: V,
+    ) {
+        let (l, m) = (arm[(axis + 2) % 3], V::constant(0.0) - arm[(axis + 1) % 3]);
+        let [pull_l, pull_m] = [pull * l, pull * m];
+        let pushes = [push, push * l, push * m];
+        let pulls = [pull, pull_l, pull_m, pull_l * l, pull_l * m, pull_m * m];
+        for (sum, value) in self.push.iter_mut().zip(&pushes) {
+            sum.add(n + 1, *value);
+        }
+        for (sum, value) in self.pull.iter_mut().zip(&pulls) {
+            sum.add(n + 1, *value);
+        }
     }
 }
 
@@ -132,7 +128,7 @@ impl Rigid {
 /// The lanes of a vector, counted from `n`.
 #[inline(always)]
 fn count_from<V: Vector<Number = f64>>(n: usize) -> V {
-    V::constant(n as f64) + V::load(&RAMP)
+    V::constant(n as f64) + V::ramp()
 }
 
 /// Part of the grain's change of velocity that a face takes beside its share of the velocity; `relieved`
@@ -161,8 +157,7 @@ impl<R: Real> Kernel for Gather<'_, R> {
     fn run<V: Vector<Number = f64>>(self) {
         let forced = &mut self.body.forced;
         let faces = forced.share.len();
-        forced.back.resize(faces, 0.0);
-        forced.free.resize(faces, 0.0);
+        forced.taken.resize(faces, 0.0);
         let spacing = self.flow.mesh().spacing;
         let strides = self.flow.mesh().layout().strides();
         let Forced {
@@ -170,24 +165,28 @@ impl<R: Real> Kernel for Gather<'_, R> {
             share,
             closed,
             closed_by_all,
-            back,
-            free,
+            taken,
         } = forced;
+        let by_all = if closed_by_all.is_empty() {
+            &*closed
+        } else {
+            closed_by_all
+        };
         for (axis, runs) in runs.iter().enumerate() {
             let half = 0.5 * spacing[axis] * DVec3::AXES[axis];
+            let field = self.flow.predicted.component(axis);
             for (number, run) in runs.iter().enumerate() {
                 if let Some(run) = runs.get(number + AHEAD) {
-                    prefetch(self.flow.predicted.component(axis), run.at, run.count);
+                    prefetch(field, run.at, run.count);
                     prefetch(&self.flow.pressure, run.at, run.count);
                     prefetch(&self.flow.pressure, run.at + strides[2], run.count);
                 }
-                let faces = run.first..run.first + run.count;
-                let mut work = GatherRun {
+                let work = GatherRun {
                     axis,
-                    predicted: &self.flow.predicted.component(axis)[run.at..],
+                    run,
+                    predicted: field,
                     pressure: &self.flow.pressure,
                     strides,
-                    cells: [run.at, run.below],
                     rigid: Rigid::of(self.before, run.arm, spacing),
                     sides: [half, -half]
                         .map(|half| Rigid::of(self.before, run.arm + half, spacing)),
@@ -196,31 +195,29 @@ impl<R: Real> Kernel for Gather<'_, R> {
                     driven: self.relief * self.flow.body_acceleration()[axis],
                     relieved: relieved(self.relief),
                     spacing: spacing.x,
-                    share: &share[faces.clone()],
-                    closed: &closed[faces.clone()],
-                    closed_by_all: &closed_by_all[faces.clone()],
-                    back: &mut back[faces.clone()],
-                    free: &mut free[faces],
-                    sums: Default::default(),
                 };
-                along_row::<V>(run.count, &mut work);
-                let [push, push_x, pull, pull_x, pull_xx] = work.sums.map(|sum| sum.sum());
-                self.sums[axis].add(axis, run.arm, [push, push_x], [pull, pull_x, pull_xx]);
+                for n in (0..run.count).step_by(V::WIDTH) {
+                    let at = run.first + n;
+                    let closed = [V::load(&closed[at..]), V::load(&by_all[at..])];
+                    let share = V::load(&share[at..]);
+                    // Beyond the run this is of no meaning until the next one comes.
+                    work.at(n, share, closed, &mut self.sums[axis])
+                        .store(&mut taken[at..]);
+                }
             }
         }
     }
 }
 
-/// One run; the lists are of its faces.
+/// One run.
 struct GatherRun<'a, R> {
     axis: usize,
+    run: &'a Run,
     predicted: &'a [R],
     pressure: &'a [R],
     strides: [usize; 3],
-    /// The first of the cells above and below the faces.
-    cells: [usize; 2],
     rigid: Rigid,
-    /// Motion of the middles of those cells.
+    /// Motion of the middles of the cells above and below the faces.
     sides: [Rigid; 2],
     /// Half a step over the spacing along each axis [s/m].
     drift: [f64; 3],
@@ -230,52 +227,50 @@ struct GatherRun<'a, R> {
     driven: f64,
     relieved: f64,
     spacing: f64,
-    share: &'a [f64],
-    closed: &'a [f64],
-    closed_by_all: &'a [f64],
-    back: &'a mut [f64],
-    free: &'a mut [f64],
-    /// Of push, push x, pull, pull x and pull x x.
-    sums: [Partial; 5],
 }
 
 impl<R: Real> GatherRun<'_, R> {
     /// Pressure of the cells from face `n` on, above or below it, moved with the grain for a step.
     #[inline(always)]
     fn moved<V: Vector<Number = f64>>(&self, side: usize, n: usize) -> V {
-        let at = self.cells[side] + n;
-        let p = |at: usize| V::load_from(&self.pressure[at..]);
-        let mut moved = p(at);
+        let at = [self.run.at, self.run.below][side] + n;
+        let mut moved = V::load_within(self.pressure, at);
         for axis in 0..3 {
             let stride = self.strides[axis];
             let cells = V::constant(self.drift[axis]) * self.sides[side].at(axis, count_from(n));
-            moved = moved - cells * (p(at + stride) - p(at - stride));
+            let ahead = V::load_within(self.pressure, at + stride);
+            let behind = V::load_within(self.pressure, at - stride);
+            moved = moved - cells * (ahead - behind);
         }
         moved
     }
-}
 
-impl<R: Real> RowWork for GatherRun<'_, R> {
-    type Number = f64;
+    /// Adds the faces from the `n`th on to the sums; what they take from a grain at rest.
     #[inline(always)]
-    fn at<V: Vector<Number = f64>>(&mut self, i: usize) {
-        let n = i - 1;
-        let x = V::constant(self.spacing) * count_from(n);
-        let (share, closed) = (V::load(&self.share[n..]), V::load(&self.closed[n..]));
+    fn at<V: Vector<Number = f64>>(
+        &self,
+        n: usize,
+        share: V,
+        [closed, closed_by_all]: [V; 2],
+        sums: &mut Moments,
+    ) -> V {
+        let count = count_from::<V>(n);
         let rise = self.moved::<V>(0, n) - self.moved(1, n);
         let back = V::constant(self.pull) * rise - V::constant(self.driven);
-        let predicted = V::load_from(&self.predicted[n..]);
-        let free = predicted + V::load(&self.closed_by_all[n..]) * back;
+        let predicted = V::load_within(self.predicted, self.run.at + n);
+        let free = predicted + closed_by_all * back;
         let follow = follow(share, closed, self.relieved);
-        let push = closed * back - share * free - follow * self.rigid.at(self.axis, count_from(n));
+        let taken = closed * back - share * free;
+        let push = taken - follow * self.rigid.at(self.axis, count);
         let pull = share + follow;
-        back.store(&mut self.back[n..]);
-        free.store(&mut self.free[n..]);
-        let [push_x, pull_x] = [push * x, pull * x];
-        let sums = [push, push_x, pull, pull_x, pull_x * x];
-        for (sum, value) in self.sums.iter_mut().zip(sums) {
-            sum.add(i, value);
-        }
+        let arm = self.run.arm;
+        let x = V::constant(arm.x) + V::constant(self.spacing) * count;
+        let arm = [x, V::constant(arm.y), V::constant(arm.z)];
+        let (zero, end) = (V::constant(0.0), V::constant(self.run.count as f64));
+        let push = count.where_below(end, push, zero);
+        let pull = count.where_below(end, pull, zero);
+        sums.add(self.axis, n, arm, push, pull);
+        taken
     }
 }
 
@@ -333,48 +328,18 @@ impl<R: Real> Kernel for Impose<'_, R> {
         let forced = self.forced;
         let runs = forced.runs[self.axis].iter();
         for run in runs.filter(|run| self.slab.contains(&run.at)) {
-            let faces = run.first..run.first + run.count;
-            let at = run.at - self.slab.start;
-            let mut work = ImposeRun {
-                axis: self.axis,
-                rigid: Rigid::of(now, run.arm, self.spacing),
-                change: Rigid::of(change, run.arm, self.spacing),
-                relieved: self.relieved,
-                share: &forced.share[faces.clone()],
-                closed: &forced.closed[faces.clone()],
-                back: &forced.back[faces.clone()],
-                free: &forced.free[faces],
-                predicted: &mut self.predicted[at..at + run.count],
-            };
-            along_row::<V>(run.count, &mut work);
+            let rigid = Rigid::of(now, run.arm, self.spacing);
+            let change = Rigid::of(change, run.arm, self.spacing);
+            for n in (0..run.count).step_by(V::WIDTH) {
+                let at = run.first + n;
+                let (share, closed) = (V::load(&forced.share[at..]), V::load(&forced.closed[at..]));
+                let place = count_from(n);
+                let gain = V::load(&forced.taken[at..])
+                    + share * rigid.at(self.axis, place)
+                    + follow(share, closed, self.relieved) * change.at(self.axis, place);
+                let at = run.at - self.slab.start + n;
+                gain.add_some(run.count - n, self.predicted, at);
+            }
         }
-    }
-}
-
-/// One run; the lists are of its faces.
-struct ImposeRun<'a, R> {
-    axis: usize,
-    rigid: Rigid,
-    change: Rigid,
-    relieved: f64,
-    share: &'a [f64],
-    closed: &'a [f64],
-    back: &'a [f64],
-    free: &'a [f64],
-    predicted: &'a mut [R],
-}
-
-impl<R: Real> RowWork for ImposeRun<'_, R> {
-    type Number = f64;
-    #[inline(always)]
-    fn at<V: Vector<Number = f64>>(&mut self, i: usize) {
-        let n = i - 1;
-        let load = |list: &[f64]| V::load(&list[n..]);
-        let (share, closed) = (load(self.share), load(self.closed));
-        let place = count_from(n);
-        let gain = closed * load(self.back)
-            + share * (self.rigid.at(self.axis, place) - load(self.free))
-            + follow(share, closed, self.relieved) * self.change.at(self.axis, place);
-        (V::load_from(&self.predicted[n..]) + gain).store_to(&mut self.predicted[n..]);
     }
 }

@@ -55,6 +55,9 @@ pub fn rivals<'a>(
         let radii = grain.shape.bounding_radius() + rival.shape.bounding_radius();
         let limit = radii + 2.0 * reach;
         let apart = grain.pose.position - rival.pose.position;
+        if (0..3).any(|axis| apart[axis].abs() > limit && !unknowns.is_periodic(axis)) {
+            continue;
+        }
         // Images along each axis that may be near enough: first, last.
         let range = |axis: usize| match unknowns.is_periodic(axis) {
             true if mesh.cells[axis] > 1 => (

@@ -11,4 +11,4 @@ mod tendency;
 
 pub use boundary::{Boundaries, Boundary};
 pub use params::{Advection, FluidParams};
-pub(crate) use solver::{Flow, FlowMeasures};
+pub(crate) use solver::{Flow, FlowMeasures, TendencySlab};

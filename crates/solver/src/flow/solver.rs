@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of, for_slabs};
 use crate::math::Real;
-use crate::math::lanes::dispatch;
+use crate::math::lanes::{Vector, dispatch};
 use crate::poisson::{Plane, Poisson, Stages};
 
 use super::project::{Correct, Divergence, PlaneMeasures};
@@ -51,6 +51,29 @@ pub struct Flow<R = f64> {
     impulse: DVec3,
     /// Pressure at the upper end less that at the lower end, summed over the lines along each axis.
     pressure_rise: DVec3,
+}
+
+/// What [`Flow::add_tendency`] adds to: one component in a slab of memory.
+pub struct TendencySlab<'a, R> {
+    from: usize,
+    weight: f64,
+    tendency: &'a mut [R],
+    predicted: &'a mut [R],
+}
+
+impl<R: Real> TendencySlab<'_, R> {
+    /// Where it lies in memory.
+    pub fn range(&self) -> Range<usize> {
+        self.from..self.from + self.tendency.len()
+    }
+    /// Adds the first `count` lanes of `extra` [m/s^2] to the faces from `at` on; only for unknowns within
+    /// the slab.
+    #[inline(always)]
+    pub fn add<V: Vector<Number = f64>>(&mut self, at: usize, count: usize, extra: V) {
+        let at = at - self.from;
+        extra.add_some(count, self.tendency, at);
+        (V::constant(self.weight) * extra).add_some(count, self.predicted, at);
+    }
 }
 
 impl<R: Real> Flow<R> {
@@ -175,12 +198,8 @@ impl<R: Real> Flow<R> {
     }
 
     /// Adds to the tendency after `predict`, as if it had been part of H^n. `each` is called for every
-    /// component and slab of memory, in parallel, with `add(at, extra)` [m/s^2] for neighbouring faces
-    /// from `at` on; only for unknowns within the slab.
-    pub fn add_tendency(
-        &mut self,
-        each: impl Fn(usize, Range<usize>, &mut dyn FnMut(usize, &[f64])) + Sync,
-    ) {
+    /// component and slab of memory, in parallel.
+    pub fn add_tendency(&mut self, each: impl Fn(usize, TendencySlab<R>) + Sync) {
         let weight = self.weight;
         let FaceVector { x, y, z } = &mut self.tendency;
         let FaceVector {
@@ -193,14 +212,13 @@ impl<R: Real> Flow<R> {
             self.mesh.layout(),
             fields,
             |component, from, [tendency, predicted]| {
-                each(component, from..from + tendency.len(), &mut |at, extra| {
-                    let part = at - from..at - from + extra.len();
-                    let values = tendency[part.clone()].iter_mut().zip(&mut predicted[part]);
-                    for ((tendency, predicted), extra) in values.zip(extra) {
-                        *tendency = R::of(tendency.wide() + extra);
-                        *predicted = R::of(predicted.wide() + weight * extra);
-                    }
-                });
+                let slab = TendencySlab {
+                    from,
+                    weight,
+                    tendency,
+                    predicted,
+                };
+                each(component, slab);
             },
         );
     }

@@ -5,12 +5,15 @@
 //! a sum, and no result depends on the number of lanes, so the bits are the same everywhere.
 //!
 //! Everything that a kernel calls must be inlined into it, hence the many `inline(always)`: what is
-//! left outside would be compiled for the oldest machine.
+//! left outside would be compiled for the oldest machine. So would be closures over vectors, also those
+//! given to `map` of an array: where they are called more than once they are not inlined, and then every
+//! operation in them is a call. Write functions that are always inlined, or loops.
 
 mod complex;
 mod one;
 #[cfg(any(test, not(target_arch = "x86_64")))]
 mod plain;
+mod rows;
 #[cfg(test)]
 mod tests;
 #[cfg(target_arch = "x86_64")]
@@ -24,6 +27,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use super::Real;
 pub use complex::{Complex, turned};
 pub use one::One;
+pub use rows::{Partial, RowWork, along_row};
 
 /// Numbers of the widest register.
 pub const MOST: usize = 16;
@@ -68,6 +72,44 @@ pub trait Vector:
         for i in 0..Self::WIDTH {
             to[..Self::WIDTH][i] = R::of(lanes[i].wide());
         }
+    }
+    /// The `WIDTH` numbers of a list from `at` on, zeros where it has ended.
+    #[inline(always)]
+    fn load_within<R: Real>(list: &[R], at: usize) -> Self {
+        match list.get(at..at.wrapping_add(Self::WIDTH)) {
+            Some(all) => Self::load_from(all),
+            None => Self::load(&end_of(list, at)),
+        }
+    }
+    /// Adds the first `count` lanes to the numbers of a list from `at` on; it may end with these.
+    #[inline(always)]
+    fn add_some<R: Real>(self, count: usize, list: &mut [R], at: usize) {
+        let Some(all) = list.get_mut(at..at + Self::WIDTH) else {
+            return self.add_at_end(count, list, at);
+        };
+        let before = Self::load_from(all);
+        Self::ramp()
+            .where_below(Self::constant(count as f64), before + self, before)
+            .store_to(all);
+    }
+    /// The same one by one.
+    #[cold]
+    #[inline(never)]
+    fn add_at_end<R: Real>(self, count: usize, list: &mut [R], at: usize) {
+        let mut lanes = [Self::Number::default(); MOST];
+        self.store(&mut lanes);
+        for (entry, lane) in list[at..].iter_mut().zip(&lanes[..count.min(Self::WIDTH)]) {
+            *entry = R::of(entry.wide() + lane.wide());
+        }
+    }
+    /// The numbers of the lanes.
+    #[inline(always)]
+    fn ramp() -> Self {
+        let mut lanes = [Self::Number::default(); MOST];
+        for i in 0..Self::WIDTH {
+            lanes[i] = Self::Number::of(RAMP[i]);
+        }
+        Self::load(&lanes)
     }
     /// Lane-wise quotient.
     fn over(self, divisor: Self) -> Self;
@@ -181,69 +223,16 @@ pub const RAMP: [f64; MOST] = {
     ramp
 };
 
-/// Work on the neighbouring entries of a row.
-pub trait RowWork {
-    /// What rows are made of.
-    type Number: Real;
-    /// Treats the `V::WIDTH` entries from `i` on.
-    fn at<V: Vector<Number = Self::Number>>(&mut self, i: usize);
-}
-
-/// Treats the entries 1..=n of a row, as many at a time as possible. Entry i always falls on lane
-/// (i - 1) % LANES of a sum kept in as many lanes, whatever the width.
-#[inline(always)]
-pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number>) {
-    let mut i = 1;
-    while i + V::WIDTH <= n + 1 {
-        work.at::<V>(i);
-        i += V::WIDTH;
+/// What is left of a list from `at` on, then zeros.
+#[cold]
+#[inline(never)]
+fn end_of<R: Real, N: Real>(list: &[R], at: usize) -> [N; MOST] {
+    let mut lanes = [N::default(); MOST];
+    let left = list.get(at..).unwrap_or(&[]);
+    for (lane, entry) in lanes.iter_mut().zip(left) {
+        *lane = N::of(entry.wide());
     }
-    let half = V::Number::LANES / 2;
-    if i + half <= n + 1 {
-        work.at::<V::Half>(i);
-        i += half;
-    }
-    if half > 4 && i + 4 <= n + 1 {
-        work.at::<V::Tail>(i);
-        i += 4;
-    }
-    while i <= n {
-        work.at::<One<V::Number>>(i);
-        i += 1;
-    }
-}
-
-/// Partial results of a row in doubles: a sum or a maximum in an order that no width changes.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Partial([f64; MOST]);
-
-impl Partial {
-    /// Adds to the lanes of entry `i` and its neighbours.
-    #[inline(always)]
-    pub fn add<V: Vector>(&mut self, i: usize, value: V) {
-        value.add_to(&mut self.0[(i - 1) % V::Number::LANES..]);
-    }
-    /// Keeps the larger in the lanes of entry `i` and its neighbours.
-    #[inline(always)]
-    pub fn keep_larger<V: Vector>(&mut self, i: usize, value: V) {
-        value.raise(&mut self.0[(i - 1) % V::Number::LANES..]);
-    }
-    /// Sum of the lanes.
-    pub fn sum(&self) -> f64 {
-        let mut lanes = self.0;
-        let mut half = MOST / 2;
-        while half > 0 {
-            for i in 0..half {
-                lanes[i] += lanes[i + half];
-            }
-            half /= 2;
-        }
-        lanes[0]
-    }
-    /// Largest of the lanes.
-    pub fn largest(&self) -> f64 {
-        self.0.into_iter().fold(0.0, f64::max)
-    }
+    lanes
 }
 
 /// Asks for the entries of a list from `at` to `at + count` to be brought near: short rows end before the
@@ -254,7 +243,7 @@ pub fn prefetch<T>(list: &[T], at: usize, count: usize) {
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         let per_line = (64 / size_of::<T>()).max(1);
-        for at in (at..at + count + per_line).step_by(per_line) {
+        for at in (at..at.wrapping_add(count + per_line)).step_by(per_line) {
             if let Some(entry) = list.get(at) {
                 // SAFETY: the entry exists, and a prefetch changes nothing.
                 unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(entry).cast()) };

@@ -182,3 +182,38 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
         sums::<f32>(n);
     }
 }
+
+/// Reads and adds at the end of a list.
+struct Ends;
+
+impl Kernel for Ends {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let list: Vec<f32> = (1..40).map(|n| n as f32).collect();
+        for at in [0, 3, 30, 38, 39, 60] {
+            let mut lanes = [0.0; MOST];
+            V::load_within(&list, at).store(&mut lanes);
+            for n in 0..V::WIDTH {
+                let entry = list.get(at + n).copied().unwrap_or(0.0);
+                assert_eq!(lanes[n], f64::from(entry), "{at} {n}");
+            }
+        }
+        for (at, count) in [(5, 1), (5, V::WIDTH), (39 - V::WIDTH, 2), (38, 1)] {
+            let mut sums = list.clone();
+            (V::ramp() + V::constant(1.0)).add_some(count, &mut sums, at);
+            for (n, (sum, entry)) in sums.iter().zip(&list).enumerate() {
+                let inside = (at..at + count.min(V::WIDTH)).contains(&n);
+                let more = if inside { (n - at + 1) as f32 } else { 0.0 };
+                assert_eq!(*sum, entry + more, "{at} {count} {n}");
+            }
+        }
+    }
+}
+
+#[test]
+fn lists_may_end_within_a_vector() {
+    dispatch(Ends);
+    Ends.run::<<f64 as Registers>::Common>();
+    Ends.run::<One<f64>>();
+}
