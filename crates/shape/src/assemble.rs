@@ -132,8 +132,12 @@ pub(crate) fn assemble<D: Distance>(
     let (lower, upper, radius) = bounds(&field, &mesh, &nodes);
     let mut morphology = Morphology::measure(&mesh, upper - lower, mass.volume, area);
     if options.roundness {
-        let distance = |x: DVec3, hint: &mut u32| body.distance.near(x, hint);
-        let (_, inscribed) = inscribed::sphere(&distance, body.lower, body.upper);
+        // Scans have meshes of many small faces, which are slow to ask.
+        let about = |x: DVec3, hint: &mut u32| match body.surface {
+            roundness::Surface::Scanned { .. } => field.distance(x - off),
+            _ => body.distance.near(x, hint),
+        };
+        let (_, inscribed) = inscribed::sphere(&body.distance, &about, body.lower, body.upper);
         morphology.inscribed_radius = Some(inscribed);
         let reading = roundness::measure(
             &body.distance,

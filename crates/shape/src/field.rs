@@ -7,6 +7,10 @@ use glam::DVec3;
 /// Most samples that one field may hold.
 pub(crate) const MAX_SAMPLES: u64 = 1 << 26;
 
+/// Distance from the surface up to which a mesh is asked face by face [cells]: the surface, the volume
+/// and the normals of the field are made from what lies nearer.
+const BAND: f64 = 2.5;
+
 /// Levels between zero and the largest magnitude; a power of two below f32's 2^24, so that every
 /// stored level is exact.
 const LEVELS: f64 = (1u32 << 17) as f64;
@@ -58,7 +62,7 @@ impl SampledField {
         let dims = wide.map(|n| n - 2);
         let origin = 0.5 * (lower + upper) - 0.5 * spacing * cells;
         let first = origin - DVec3::splat(spacing);
-        let values = unbiased(&distance.on_grid(first, spacing, wide), wide, spacing);
+        let values = unbiased(&distance.on_grid(first, spacing, wide, BAND), wide, spacing);
         Self::quantise(origin, spacing, dims, &values)
     }
 

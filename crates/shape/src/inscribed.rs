@@ -1,5 +1,6 @@
 //! The largest sphere inside a body.
 
+use crate::distance::Distance;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -10,12 +11,14 @@ const CANDIDATES: usize = 4;
 
 /// Place and value of the maximum of a concave function in a ball of radius `reach` about
 /// `start`, by the ellipsoid method (Shor; Yudin and Nemirovski 1976); `depth` gives value and
-/// uphill direction. The place is known to `reach` times 0.945 to the power of `rounds`.
+/// uphill direction. The place is known to `reach` times 0.945 to the power of `rounds`; where it
+/// cannot `beat` this value, the search ends early.
 pub(crate) fn deepest(
     depth: impl Fn(DVec3) -> (f64, DVec3),
     start: DVec3,
     reach: f64,
     rounds: usize,
+    beat: f64,
 ) -> (DVec3, f64) {
     let mut x = start;
     let mut shape = DMat3::IDENTITY * (reach * reach);
@@ -27,10 +30,12 @@ pub(crate) fn deepest(
         }
         let stretched = shape * uphill;
         let squared = uphill.dot(stretched);
-        if squared.is_nan() || squared <= 0.0 {
+        // A concave function rises no further than this in the ellipsoid.
+        let rise = squared.sqrt();
+        if rise.is_nan() || rise <= 0.0 || value + rise < beat {
             break;
         }
-        let step = stretched / squared.sqrt();
+        let step = stretched / rise;
         // The smallest ellipsoid around the half that may hold the maximum.
         x += step / 4.0;
         let outer = DMat3::from_cols(step * step.x, step * step.y, step * step.z);
@@ -40,9 +45,11 @@ pub(crate) fn deepest(
 }
 
 /// Centre and radius [m] of the largest sphere in the body within the box, to about a millionth
-/// of the box where the depth is concave around its deepest place.
+/// of the box where the depth is concave around its deepest place. The search starts from where
+/// `about`, a rough distance, is lowest.
 pub(crate) fn sphere(
-    distance: &(impl Fn(DVec3, &mut u32) -> f64 + Sync),
+    distance: &impl Distance,
+    about: &impl Distance,
     lower: DVec3,
     upper: DVec3,
 ) -> (DVec3, f64) {
@@ -55,7 +62,7 @@ pub(crate) fn sphere(
     };
     let depths: Vec<f64> = (0..dims.iter().product())
         .into_par_iter()
-        .map_init(|| 0, |hint, n| -distance(place(n), hint))
+        .map_init(|| 0, |hint, n| -about.near(place(n), hint))
         .collect();
     let highest = |n: usize| {
         let at = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
@@ -71,18 +78,17 @@ pub(crate) fn sphere(
     candidates.sort_by(|p, q| depths[*q].total_cmp(&depths[*p]).then(p.cmp(q)));
     let step = 1e-4 * spacing;
     let depth = |x: DVec3| {
-        let mut hint = 0;
-        let mut value = |x: DVec3| -distance(x, &mut hint);
-        let slope = DVec3::AXES.map(|a| (value(x + step * a) - value(x - step * a)) / (2.0 * step));
-        (value(x), DVec3::from_array(slope))
+        let (distance, slope) = distance.with_slope(x, step, &mut 0);
+        (-distance, -slope)
     };
-    candidates
-        .iter()
-        .take(CANDIDATES)
-        .map(|n| deepest(depth, place(*n), 5.0 * spacing, 240))
-        .fold((0.5 * (lower + upper), 0.0), |best, found| {
-            if found.1 > best.1 { found } else { best }
-        })
+    let mut best = (0.5 * (lower + upper), 0.0);
+    for start in candidates.iter().take(CANDIDATES) {
+        let found = deepest(depth, place(*start), 5.0 * spacing, 240, best.1);
+        if found.1 > best.1 {
+            best = found;
+        }
+    }
+    best
 }
 
 #[cfg(test)]
@@ -97,7 +103,7 @@ mod tests {
             let q = (turn * x).abs() - DVec3::new(2.0, 0.7, 0.5);
             q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
         };
-        let (_, radius) = sphere(&boxed, DVec3::splat(-2.2), DVec3::splat(2.2));
+        let (_, radius) = sphere(&boxed, &boxed, DVec3::splat(-2.2), DVec3::splat(2.2));
         assert!((radius - 0.5).abs() < 1e-6, "{radius}");
         // A needle that thickens slowly and ends in a flat base: the ridge of the depth rises
         // slowly and crosses the grid askew.
@@ -108,13 +114,14 @@ mod tests {
             flank.max(-y.z)
         };
         let exact = 3.0 * half.sin() / (1.0 + half.sin());
-        let (_, radius) = sphere(&cone, DVec3::splat(-3.2), DVec3::splat(3.2));
+        let (_, radius) = sphere(&cone, &cone, DVec3::splat(-3.2), DVec3::splat(3.2));
         assert!((radius / exact - 1.0).abs() < 1e-5, "{radius} {exact}");
         let balls = |x: DVec3, _: &mut u32| {
             let left = (x + 1.2 * DVec3::X).length() - 0.99;
             left.min((x - 1.2 * DVec3::X).length() - 1.0)
         };
         let (centre, radius) = sphere(
+            &balls,
             &balls,
             DVec3::new(-2.2, -1.0, -1.0),
             DVec3::new(2.2, 1.0, 1.0),

@@ -205,7 +205,7 @@ pub(super) fn inscribed(balls: &[Ball], start: DVec3, reach: f64) -> (DVec3, f64
             .min_by(|p, q| p.0.total_cmp(&q.0))
             .unwrap_or((f64::NEG_INFINITY, DVec3::X))
     };
-    deepest(depth, start, reach, 700)
+    deepest(depth, start, reach, 700, f64::NEG_INFINITY)
 }
 
 #[cfg(test)]

@@ -197,8 +197,15 @@ impl Distance for MeshDistance {
         self.signed(x, &bvh.nearest(x, hint))
     }
 
-    fn on_grid(&self, first: DVec3, spacing: f64, dims: [usize; 3]) -> Vec<f64> {
-        spread::on_grid(self, first, spacing, dims)
+    fn with_slope(&self, x: DVec3, _: f64, hint: &mut u32) -> (f64, DVec3) {
+        let bvh = self.bvh.get_or_init(|| Bvh::new(&self.corners));
+        let nearest = bvh.nearest(x, hint);
+        let distance = self.signed(x, &nearest);
+        (distance, (x - nearest.point) / distance)
+    }
+
+    fn on_grid(&self, first: DVec3, spacing: f64, dims: [usize; 3], band: f64) -> Vec<f64> {
+        spread::on_grid(self, first, spacing, dims, band)
     }
 }
 

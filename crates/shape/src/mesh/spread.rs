@@ -10,20 +10,19 @@ use super::MeshDistance;
 use super::bvh::Nearest;
 use glam::{DVec3, Vec3};
 
-/// Distance from the mesh up to which every face is tried [cells]: what the surface, the volume and the
-/// normals of the field are made from lies nearer.
-const BAND: f64 = 2.5;
 /// Width of a bucket of the front [cells]: within one, samples are taken in any order.
 const BUCKET: f64 = 0.25;
 /// Size of the faces below which one of their points stands for them [cells].
 const FINE: f64 = 0.7;
 
-/// Signed distances [m] at the samples of a grid, x fastest; the first lies at `first`.
+/// Signed distances [m] at the samples of a grid, x fastest; the first lies at `first`. Up to `band`
+/// [cells] from the mesh every face is tried.
 pub(super) fn on_grid(
     mesh: &MeshDistance,
     first: DVec3,
     spacing: f64,
     dims: [usize; 3],
+    band: f64,
 ) -> Vec<f64> {
     let grid = Grid {
         first: first - DVec3::splat(spacing),
@@ -31,7 +30,7 @@ pub(super) fn on_grid(
         dims: dims.map(|n| n + 2),
     };
     let mut front = Front::new(mesh, &grid);
-    front.settle_band();
+    front.settle_band(band);
     for n in grid.samples() {
         if front.open[n] == SETTLED {
             front.reach(n);
@@ -128,13 +127,13 @@ impl<'a> Front<'a> {
         };
     }
 
-    /// Settles the samples less than [`BAND`] from the mesh: tries every face at those about it.
-    fn settle_band(&mut self) {
+    /// Settles the samples less than `band` [cells] from the mesh: tries every face at those about it.
+    fn settle_band(&mut self, band: f64) {
         let (mesh, grid) = (self.mesh, self.grid);
         for face in 0..mesh.faces() {
             let [a, b, c] = *mesh.corners(face);
-            let low = ((a.min(b).min(c) - grid.first) / grid.spacing - DVec3::splat(BAND)).ceil();
-            let high = ((a.max(b).max(c) - grid.first) / grid.spacing + DVec3::splat(BAND)).floor();
+            let low = ((a.min(b).min(c) - grid.first) / grid.spacing - DVec3::splat(band)).ceil();
+            let high = ((a.max(b).max(c) - grid.first) / grid.spacing + DVec3::splat(band)).floor();
             let middle = (a + b + c) / 3.0;
             let radius = [a, b, c].map(|corner| corner.distance(middle));
             let radius = radius.into_iter().fold(0.0, f64::max);
@@ -147,7 +146,7 @@ impl<'a> Front<'a> {
                     for i in range(0) {
                         let n = grid.index([i, j, k]);
                         let x = grid.position(n);
-                        let best = self.values[n].min(BAND * grid.spacing);
+                        let best = self.values[n].min(band * grid.spacing);
                         // Neither the ball about the face nor its plane is farther than the face.
                         let outside = x.distance_squared(middle) >= (best + radius).powi(2);
                         if outside || mesh.height(x, face) >= best {
@@ -223,6 +222,7 @@ impl<'a> Front<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
     use crate::distance::Distance;
     use crate::grid::place;
     use crate::mesh::cube_sphere;
@@ -234,24 +234,24 @@ mod tests {
             let r = 1.0 + 0.25 * (4.0 * u.x + 1.0).sin() * (3.0 * u.y).cos() - 0.3 * u.z;
             u * r * DVec3::new(1.3, 1.0, 0.6)
         };
-        for faces in [4, 40] {
+        for (faces, band) in [(4, 2.5), (40, 2.5), (4, 1.0), (40, 1.0)] {
             let mesh = cube_sphere(faces, lump);
             let distance = MeshDistance::new(&mesh).unwrap();
             let (spacing, dims) = (0.08, [50, 44, 30]);
             let first = DVec3::new(-2.0, -1.75, -1.2);
-            let spread = distance.on_grid(first, spacing, dims);
+            let spread = distance.on_grid(first, spacing, dims, band);
             // In the band and beyond.
             let mut worst = [0.0f64; 2];
             for (n, value) in spread.iter().enumerate() {
                 let x = first + spacing * DVec3::from_array(place(dims, n).map(|i| i as f64));
                 let exact = distance.near(x, &mut 0);
                 assert_eq!(*value < 0.0, exact < 0.0, "at {x}");
-                let worst = &mut worst[usize::from(exact.abs() >= BAND * spacing)];
+                let worst = &mut worst[usize::from(exact.abs() >= band * spacing)];
                 *worst = worst.max((value - exact).abs() / spacing);
             }
             assert!(
                 worst[0] < 1e-9 && worst[1] < 0.1,
-                "{worst:?} cells with {faces}"
+                "{worst:?} cells with {faces}, band {band}"
             );
         }
     }

@@ -4,6 +4,9 @@ use crate::distance::Distance;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+/// Distance from the surface within which a mesh is asked face by face [samples]; the Gaussians blur
+/// what is beyond.
+const EXACT: f64 = 1.0;
 /// Most samples of a grid.
 const LARGEST: f64 = 5e7;
 
@@ -30,7 +33,7 @@ impl Band {
         }
         let first = 0.5 * (lower + upper) - 0.5 * spacing * cells;
         let dims = cells.to_array().map(|n| n as usize + 1);
-        let values = distance.on_grid(first, spacing, dims);
+        let values = distance.on_grid(first, spacing, dims, EXACT);
         Some(Band {
             dims,
             lower: first,
