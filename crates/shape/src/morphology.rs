@@ -65,7 +65,7 @@ impl Morphology {
             c,
             area,
             krumbein_sphericity: (b * c / (a * a)).cbrt(),
-            wadell_sphericity: PI.cbrt() * (6.0 * volume).powf(2.0 / 3.0) / area,
+            wadell_sphericity: wadell_sphericity(area, volume),
             wadell_roundness: None,
             inscribed_radius: None,
             feret: None,
@@ -75,7 +75,7 @@ impl Morphology {
 
     pub(crate) fn set_area(&mut self, area: f64, volume: f64) {
         self.area = area;
-        self.wadell_sphericity = PI.cbrt() * (6.0 * volume).powf(2.0 / 3.0) / area;
+        self.wadell_sphericity = wadell_sphericity(area, volume);
     }
 
     /// Elongation b / a.
@@ -157,4 +157,9 @@ pub struct Record {
     pub source_sha256: String,
     /// Content hash of the shape.
     pub digest: String,
+}
+
+/// Area of the sphere of this volume [m^3] over this area [m^2].
+fn wadell_sphericity(area: f64, volume: f64) -> f64 {
+    PI.cbrt() * (6.0 * volume).powf(2.0 / 3.0) / area
 }

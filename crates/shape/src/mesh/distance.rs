@@ -131,6 +131,12 @@ impl MeshDistance {
         }
     }
 
+    /// The nearest place of all.
+    fn nearest(&self, x: DVec3, hint: &mut u32) -> Nearest {
+        let bvh = self.bvh.get_or_init(|| Bvh::new(&self.corners));
+        bvh.nearest(x, hint)
+    }
+
     /// Signed distance [m] of `x`, negative inside, whose nearest place on the mesh is known.
     pub(super) fn signed(&self, x: DVec3, nearest: &Nearest) -> f64 {
         let face = nearest.face as usize;
@@ -193,13 +199,11 @@ impl Spokes {
 
 impl Distance for MeshDistance {
     fn near(&self, x: DVec3, hint: &mut u32) -> f64 {
-        let bvh = self.bvh.get_or_init(|| Bvh::new(&self.corners));
-        self.signed(x, &bvh.nearest(x, hint))
+        self.signed(x, &self.nearest(x, hint))
     }
 
     fn with_slope(&self, x: DVec3, _: f64, hint: &mut u32) -> (f64, DVec3) {
-        let bvh = self.bvh.get_or_init(|| Bvh::new(&self.corners));
-        let nearest = bvh.nearest(x, hint);
+        let nearest = self.nearest(x, hint);
         let distance = self.signed(x, &nearest);
         (distance, (x - nearest.point) / distance)
     }

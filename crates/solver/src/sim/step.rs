@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::Simulation;
 use crate::coupling::{Past, Scheme};
-use crate::dem::{Grain, State};
+use crate::dem::{Dof, Grain, State};
 use crate::math::Load;
 
 /// Why a step could not be taken.
@@ -178,7 +178,18 @@ fn owed(grain: &Grain, end: &State, contact: &Load) -> [DVec3; 2] {
         return Default::default();
     }
     let [velocity, omega] = end.velocities;
-    [grain.velocity - velocity, grain.angular_velocity - omega]
+    // A velocity that is given owes nothing.
+    let of = |dof: Dof, change: DVec3| {
+        if dof == Dof::Free {
+            change
+        } else {
+            DVec3::ZERO
+        }
+    };
+    [
+        of(grain.translation, grain.velocity - velocity),
+        of(grain.rotation, grain.angular_velocity - omega),
+    ]
 }
 
 fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {
