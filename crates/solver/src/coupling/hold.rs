@@ -148,12 +148,17 @@ impl Holding {
     pub fn of(&self, d: f64, normal: DVec3) -> Hold {
         match self.scheme {
             Scheme::Aperture => {
-                let normal = normal.to_array().map(One);
-                let (strength, closed) = self.near(One(d), normal);
-                Hold {
-                    strength: strength.0,
-                    closed: closed.0,
-                }
+                let mut hold = Hold {
+                    strength: 0.0,
+                    closed: 0.0,
+                };
+                dispatch(OneFace {
+                    holding: self,
+                    d,
+                    normal,
+                    hold: &mut hold,
+                });
+                hold
             }
             Scheme::Paper => self.blend(d, normal),
         }
@@ -180,6 +185,27 @@ impl Holding {
             strength: share / (1.0 - share),
             closed: 0.0,
         }
+    }
+}
+
+/// The hold on one face, with the instructions of the machine.
+struct OneFace<'a> {
+    holding: &'a Holding,
+    d: f64,
+    normal: DVec3,
+    hold: &'a mut Hold,
+}
+
+impl Kernel for OneFace<'_> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let [x, y, z] = self.normal.to_array();
+        let (strength, closed) = self.holding.near(One(self.d), [One(x), One(y), One(z)]);
+        *self.hold = Hold {
+            strength: strength.0,
+            closed: closed.0,
+        };
     }
 }
 

@@ -16,7 +16,7 @@ use super::locate::Body;
 use crate::dem::Grain;
 use crate::flow::Flow;
 use crate::grid::{FaceVector, for_slabs};
-use crate::math::lanes::{Kernel, Partial, Vector, dispatch, prefetch};
+use crate::math::lanes::{Kernel, Partial, Stencil, Vector, dispatch, prefetch};
 use crate::math::{Matrix6, Real, Vector6};
 
 /// How many runs ahead memory is asked for.
@@ -121,7 +121,10 @@ impl Rigid {
     /// A component at the faces `i` of the run.
     #[inline(always)]
     fn at<V: Vector<Number = f64>>(&self, axis: usize, i: V) -> V {
-        V::constant(self.first[axis]) + V::constant(self.change[axis]) * i
+        i.mul_add(
+            V::constant(self.change[axis]),
+            V::constant(self.first[axis]),
+        )
     }
 }
 
@@ -160,6 +163,8 @@ impl<R: Real> Kernel for Gather<'_, R> {
         forced.taken.resize(faces, 0.0);
         let spacing = self.flow.mesh().spacing;
         let strides = self.flow.mesh().layout().strides();
+        let [x, y, z] = strides.map(|stride| stride as isize);
+        let around = Stencil::new([0, x, -x, y, -y, z, -z]);
         let Forced {
             runs,
             share,
@@ -186,7 +191,7 @@ impl<R: Real> Kernel for Gather<'_, R> {
                     run,
                     predicted: field,
                     pressure: &self.flow.pressure,
-                    strides,
+                    around,
                     rigid: Rigid::of(self.before, run.arm, spacing),
                     sides: [half, -half]
                         .map(|half| Rigid::of(self.before, run.arm + half, spacing)),
@@ -215,7 +220,8 @@ struct GatherRun<'a, R> {
     run: &'a Run,
     predicted: &'a [R],
     pressure: &'a [R],
-    strides: [usize; 3],
+    /// A cell, and those ahead and behind along each axis.
+    around: Stencil<7>,
     rigid: Rigid,
     /// Motion of the middles of the cells above and below the faces.
     sides: [Rigid; 2],
@@ -234,13 +240,10 @@ impl<R: Real> GatherRun<'_, R> {
     #[inline(always)]
     fn moved<V: Vector<Number = f64>>(&self, side: usize, n: usize) -> V {
         let at = [self.run.at, self.run.below][side] + n;
-        let mut moved = V::load_within(self.pressure, at);
+        let [mut moved, rest @ ..] = self.around.load_within::<V, R>(self.pressure, at);
         for axis in 0..3 {
-            let stride = self.strides[axis];
-            let cells = V::constant(self.drift[axis]) * self.sides[side].at(axis, count_from(n));
-            let ahead = V::load_within(self.pressure, at + stride);
-            let behind = V::load_within(self.pressure, at - stride);
-            moved = moved - cells * (ahead - behind);
+            let cells = V::constant(-self.drift[axis]) * self.sides[side].at(axis, count_from(n));
+            moved = cells.mul_add(rest[2 * axis] - rest[2 * axis + 1], moved);
         }
         moved
     }
@@ -255,12 +258,16 @@ impl<R: Real> GatherRun<'_, R> {
         sums: &mut Moments,
     ) -> V {
         let count = count_from::<V>(n);
-        let rise = self.moved::<V>(0, n) - self.moved(1, n);
-        let back = V::constant(self.pull) * rise - V::constant(self.driven);
         let predicted = V::load_within(self.predicted, self.run.at + n);
-        let free = predicted + closed_by_all * back;
         let follow = follow(share, closed, self.relieved);
-        let taken = closed * back - share * free;
+        let (mut free, mut taken) = (predicted, V::constant(0.0));
+        // Beside the band nothing is closed.
+        if !closed_by_all.is_zero() {
+            let rise = self.moved::<V>(0, n) - self.moved(1, n);
+            let back = rise.mul_add(V::constant(self.pull), V::constant(-self.driven));
+            (free, taken) = (closed_by_all.mul_add(back, predicted), closed * back);
+        }
+        let taken = (V::constant(0.0) - share).mul_add(free, taken);
         let push = taken - follow * self.rigid.at(self.axis, count);
         let pull = share + follow;
         let arm = self.run.arm;

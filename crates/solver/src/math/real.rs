@@ -73,6 +73,8 @@ pub(crate) trait Real:
     fn of(value: f64) -> Self;
     /// Its value.
     fn wide(self) -> f64;
+    /// `self * factor + term`, rounded once.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
     /// Writes it to the first bytes of `to`, little end first.
     fn write_to(self, to: &mut [u8]);
     /// Reads it from the first bytes of `from`, little end first.
@@ -89,6 +91,10 @@ macro_rules! real {
             #[inline(always)]
             fn wide(self) -> f64 {
                 self.into()
+            }
+            #[inline(always)]
+            fn mul_add(self, factor: Self, term: Self) -> Self {
+                $number::mul_add(self, factor, term)
             }
             fn write_to(self, to: &mut [u8]) {
                 to[..Self::BYTES].copy_from_slice(&self.to_le_bytes());

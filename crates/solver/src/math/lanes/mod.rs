@@ -1,8 +1,9 @@
 //! Vector registers and the choice among instruction sets, made once when the program runs.
 //!
 //! A [`Kernel`] is written once over [`Vector`] and compiled for each instruction set; [`dispatch`]
-//! calls the widest that the machine has. All of them round alike: no kernel fuses a product with
-//! a sum, and no result depends on the number of lanes, so the bits are the same everywhere.
+//! calls the widest that the machine has. All of them round alike: a product is fused with a sum where a
+//! kernel says so and nowhere else, and no result depends on the number of lanes, so the bits are the same
+//! everywhere. (Machines without AVX2 have no such instruction and pay for it with a call.)
 //!
 //! Everything that a kernel calls must be inlined into it, hence the many `inline(always)`: what is
 //! left outside would be compiled for the oldest machine. So would be closures over vectors, also those
@@ -14,6 +15,7 @@ mod one;
 #[cfg(any(test, not(target_arch = "x86_64")))]
 mod plain;
 mod rows;
+mod stencil;
 #[cfg(test)]
 mod tests;
 #[cfg(target_arch = "x86_64")]
@@ -28,6 +30,7 @@ use super::Real;
 pub use complex::{Complex, turned};
 pub use one::One;
 pub use rows::{Partial, RowWork, along_row};
+pub use stencil::Stencil;
 
 /// Numbers of the widest register.
 pub const MOST: usize = 16;
@@ -124,6 +127,8 @@ pub trait Vector:
     fn is_below(self, limit: Self) -> Self {
         self.where_below(limit, Self::constant(1.0), Self::constant(0.0))
     }
+    /// Lane-wise `self * factor + term`, rounded once.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
     /// Lane-wise absolute value.
     #[inline(always)]
     fn magnitude(self) -> Self {
@@ -135,6 +140,16 @@ pub trait Vector:
         let mut lanes = [Self::Number::default(); MOST];
         self.store(&mut lanes);
         lanes[..Self::WIDTH].iter().all(|lane| lane.wide() == 0.0)
+    }
+    /// The lanes moved up by one, the last of `before` first.
+    #[inline(always)]
+    fn behind(self, before: Self) -> Self {
+        let mut lanes = [[Self::Number::default(); MOST]; 2];
+        before.store(&mut lanes[0]);
+        self.store(&mut lanes[1]);
+        lanes[1].copy_within(..Self::WIDTH - 1, 1);
+        lanes[1][0] = lanes[0][Self::WIDTH - 1];
+        Self::load(&lanes[1])
     }
     /// Lane-wise largest whole number that is not greater.
     #[inline(always)]
@@ -268,7 +283,7 @@ pub trait Kernel {
 pub enum Level {
     /// What every machine has: pairs of doubles, fours of singles on x86-64.
     Common = 1,
-    /// AVX2: registers of four doubles or eight singles.
+    /// AVX2 with FMA: registers of four doubles or eight singles.
     Avx2 = 2,
     /// AVX-512: registers of eight doubles or sixteen singles.
     Avx512 = 3,
@@ -297,12 +312,12 @@ pub fn limit_level(highest: Level) -> Level {
 
 #[cfg(target_arch = "x86_64")]
 fn widest() -> Level {
-    if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
-        Level::Avx512
-    } else if is_x86_feature_detected!("avx2") {
-        Level::Avx2
-    } else {
+    if !(is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")) {
         Level::Common
+    } else if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
+        Level::Avx512
+    } else {
+        Level::Avx2
     }
 }
 #[cfg(not(target_arch = "x86_64"))]
@@ -324,12 +339,12 @@ pub fn dispatch<K: Kernel>(kernel: K) {
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,avx512f,avx512vl")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
 fn with_avx512<K: Kernel>(kernel: K) {
     kernel.run::<<K::Number as Registers>::Avx512>();
 }
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 fn with_avx2<K: Kernel>(kernel: K) {
     kernel.run::<<K::Number as Registers>::Avx2>();
 }

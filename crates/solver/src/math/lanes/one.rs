@@ -64,6 +64,10 @@ impl<R: Real> Vector for One<R> {
         if self.0 < limit.0 { yes } else { no }
     }
     #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        One(self.0.mul_add(factor.0, term.0))
+    }
+    #[inline(always)]
     fn transpose(_: &mut [Self]) {}
     #[inline(always)]
     fn add_to(self, sums: &mut [f64]) {

@@ -81,6 +81,13 @@ impl<R: Real, const N: usize> Vector for Plain<R, N> {
         no
     }
     #[inline(always)]
+    fn mul_add(mut self, factor: Self, term: Self) -> Self {
+        for i in 0..N {
+            self.0[i] = self.0[i].mul_add(factor.0[i], term.0[i]);
+        }
+        self
+    }
+    #[inline(always)]
     fn transpose(block: &mut [Self]) {
         for i in 0..N {
             for j in 0..i {

@@ -30,7 +30,7 @@ fn check<V: Vector>() {
     let b: [V::Number; MOST] = std::array::from_fn(|i| number((i as f64 + 0.7).cos()));
     let (x, y) = (V::load(&a), V::load(&b));
     let c = V::constant(0.1);
-    let mut found = [[V::Number::default(); MOST]; 9];
+    let mut found = [[V::Number::default(); MOST]; 10];
     for (found, v) in found.iter_mut().zip([
         x + y,
         x - y,
@@ -41,6 +41,7 @@ fn check<V: Vector>() {
         x.smaller(y),
         x.is_below(y),
         x.where_below(y, c, x),
+        x.mul_add(y, c),
     ]) {
         v.store(found);
     }
@@ -62,6 +63,7 @@ fn check<V: Vector>() {
             a.min(b),
             f64::from(u8::from(a < b)),
             if a < b { number(0.1).wide() } else { a },
+            number(a).mul_add(number(b), number(0.1)).wide(),
         ];
         for (found, expected) in found.iter().zip(expected) {
             let expected = number(expected).wide();
@@ -88,6 +90,10 @@ fn check<V: Vector>() {
             [at, at + 1].map(|n| (n * n) as f64)
         );
     }
+    let mut behind = [V::Number::default(); MOST];
+    x.behind(y).store(&mut behind);
+    assert_eq!(behind[0], b[V::WIDTH - 1]);
+    assert_eq!(behind[1..V::WIDTH], a[..V::WIDTH - 1]);
     let doubles: [f64; MOST] = std::array::from_fn(|i| (i as f64 + 0.1).sin());
     let (mut back, mut exact) = ([0.0; MOST], [0.0_f32; MOST]);
     V::load_from(&doubles).store_to(&mut back);
@@ -124,7 +130,7 @@ fn each_level<R: Real>() {
     Check::<R>::new().run::<R::Common>();
     dispatch(Check::<R>::new());
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // SAFETY: just detected.
         unsafe { with_avx2(Check::<R>::new()) };
     }
@@ -170,7 +176,7 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
         assert_eq!(one, sum(|work| work.run::<R::Common>()));
         assert_eq!(one, sum(|work| dispatch(work)));
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
             // SAFETY: just detected.
             assert_eq!(one, sum(|work| unsafe { with_avx2(work) }));
         }

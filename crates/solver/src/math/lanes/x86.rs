@@ -19,7 +19,7 @@ macro_rules! vector {
         half $half:ident, tail $tail:ident, transpose $transpose:path,
         doubles $wide:ident [$($w:tt: $widen:path),+],
         $add:ident, $sub:ident, $mul:ident, $div:ident, $max:ident, $min:ident,
-        $chosen:path, $set:ident, $load:ident, $store:ident
+        $chosen:path, $fused:path, $set:ident, $load:ident, $store:ident
         $(; $($own:item)*)?
     ) => {
         $(#[$doc])*
@@ -93,6 +93,11 @@ macro_rules! vector {
                 // SAFETY: see the head of this file.
                 unsafe { $name($($chosen(self.$i, limit.$i, yes.$i, no.$i)),+) }
             }
+            #[inline(always)]
+            fn mul_add(self, factor: Self, term: Self) -> Self {
+                // SAFETY: see the head of this file.
+                unsafe { $name($($fused(self.$i, factor.$i, term.$i)),+) }
+            }
             $($($own)*)?
             #[inline(always)]
             fn transpose(block: &mut [Self]) {
@@ -131,7 +136,7 @@ vector! {
     half Pairs, tail Pairs, transpose turn::pairs,
     doubles Pairs [0: same],
     _mm_add_pd, _mm_sub_pd, _mm_mul_pd, _mm_div_pd, _mm_max_pd, _mm_min_pd,
-    choose128_pd, _mm_set1_pd, _mm_loadu_pd, _mm_storeu_pd
+    choose128_pd, fused128_pd, _mm_set1_pd, _mm_loadu_pd, _mm_storeu_pd
 }
 vector! {
     /// Four doubles.
@@ -139,13 +144,21 @@ vector! {
     half Four, tail Four, transpose turn::four,
     doubles Four [0: same],
     _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_max_pd, _mm256_min_pd,
-    choose256_pd, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd;
+    choose256_pd, _mm256_fmadd_pd, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd;
     #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of this file.
         unsafe {
             let zeros = _mm256_cmp_pd::<_CMP_EQ_OQ>(self.0, _mm256_setzero_pd());
             _mm256_movemask_pd(zeros) == 0xf
+        }
+    }
+    #[inline(always)]
+    fn behind(self, before: Self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe {
+            let middle = _mm256_permute2f128_pd::<0x21>(before.0, self.0);
+            Four(_mm256_shuffle_pd::<0b0101>(middle, self.0))
         }
     }
     #[inline(always)]
@@ -184,11 +197,20 @@ vector! {
     half Four, tail Four, transpose turn::eight,
     doubles Eight [0: same],
     _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_max_pd, _mm512_min_pd,
-    choose512_pd, _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd;
+    choose512_pd, _mm512_fmadd_pd, _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd;
     #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of this file.
         unsafe { _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(self.0, _mm512_setzero_pd()) == 0xff }
+    }
+    #[inline(always)]
+    fn behind(self, before: Self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe {
+            let (lanes, before) = (_mm512_castpd_si512(self.0), _mm512_castpd_si512(before.0));
+            let moved = _mm512_alignr_epi64::<7>(lanes, before);
+            Eight(_mm512_castsi512_pd(moved))
+        }
     }
     #[inline(always)]
     fn floor(self) -> Self {
@@ -226,7 +248,7 @@ vector! {
     half FourSingles, tail FourSingles, transpose turn::four_singles,
     doubles Pairs [0: widen_four],
     _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps, _mm_max_ps, _mm_min_ps,
-    choose128_ps, _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
+    choose128_ps, fused128_ps, _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
 }
 vector! {
     /// Four singles, twice.
@@ -234,7 +256,7 @@ vector! {
     half SinglesTwice, tail FourSingles, transpose turn::singles_twice,
     doubles Pairs [0: widen_first, 1: widen_second],
     _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps, _mm_max_ps, _mm_min_ps,
-    choose128_ps, _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
+    choose128_ps, fused128_ps, _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
 }
 vector! {
     /// Eight singles.
@@ -242,7 +264,7 @@ vector! {
     half EightSingles, tail FourSingles, transpose turn::eight_singles,
     doubles Four [0: widen_lower_four, 1: widen_upper_four],
     _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps,
-    choose256_ps, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps
+    choose256_ps, _mm256_fmadd_ps, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps
 }
 vector! {
     /// Sixteen singles.
@@ -250,7 +272,7 @@ vector! {
     half EightSingles, tail FourSingles, transpose turn::sixteen_singles,
     doubles Eight [0: widen_lower_eight, 1: widen_upper_eight],
     _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps, _mm512_max_ps, _mm512_min_ps,
-    choose512_ps, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps
+    choose512_ps, _mm512_fmadd_ps, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps
 }
 
 /// What has doubles already.
@@ -322,4 +344,31 @@ unsafe fn choose512_pd(a: __m512d, limit: __m512d, yes: __m512d, no: __m512d) ->
 #[inline(always)]
 unsafe fn choose512_ps(a: __m512, limit: __m512, yes: __m512, no: __m512) -> __m512 {
     unsafe { _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, limit), no, yes) }
+}
+// Machines of this level have no such instruction: one by one, by the library.
+#[inline(always)]
+unsafe fn fused128_pd(a: __m128d, factor: __m128d, term: __m128d) -> __m128d {
+    let (mut lanes, mut factors, mut terms) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+    unsafe {
+        _mm_storeu_pd(lanes.as_mut_ptr(), a);
+        _mm_storeu_pd(factors.as_mut_ptr(), factor);
+        _mm_storeu_pd(terms.as_mut_ptr(), term);
+        for n in 0..2 {
+            lanes[n] = f64::mul_add(lanes[n], factors[n], terms[n]);
+        }
+        _mm_loadu_pd(lanes.as_ptr())
+    }
+}
+#[inline(always)]
+unsafe fn fused128_ps(a: __m128, factor: __m128, term: __m128) -> __m128 {
+    let (mut lanes, mut factors, mut terms) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+    unsafe {
+        _mm_storeu_ps(lanes.as_mut_ptr(), a);
+        _mm_storeu_ps(factors.as_mut_ptr(), factor);
+        _mm_storeu_ps(terms.as_mut_ptr(), term);
+        for n in 0..4 {
+            lanes[n] = f32::mul_add(lanes[n], factors[n], terms[n]);
+        }
+        _mm_loadu_ps(lanes.as_ptr())
+    }
 }

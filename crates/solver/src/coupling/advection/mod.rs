@@ -1,0 +1,176 @@
+//! Advection next to a grain, mended where central differences are at their worst.
+//!
+//! 1. A face value near the surface stands for its open part only, q = A u, so a link's product of
+//!    two such values carries A^2 u u where the flux is A u u: the part relative to the grain is
+//!    divided by the aperture of the link.
+//! 2. The boundary layer is about a cell thick and moves with the grain. Second-order central
+//!    differences carry such a profile at about two thirds of its speed; within two cells of the
+//!    surface the mean of two faces gives way to the sixth-order mean of six.
+//!
+//! Both are fluxes between two faces, so they move no momentum in or out
+//! (`docs/decisions/0003-advection-next-to-grains.md` has the measurements).
+//!
+mod links;
+
+use glam::IVec3;
+use rayon::prelude::*;
+
+use super::locate::{Body, PushRow};
+use super::places::PAD;
+use crate::dem::Grain;
+use crate::flow::{Flow, TendencySlab};
+use crate::grid::Mesh;
+use crate::math::Real;
+use crate::math::lanes::{Kernel, MOST, Vector, dispatch, prefetch};
+use links::{Lines, Planes};
+
+/// What one thread needs: copies of the velocity in a box and about it, and a plane there.
+#[derive(Default)]
+struct Scratch<R> {
+    velocity: [Vec<R>; 3],
+    planes: Planes,
+}
+
+/// The velocity in a box and three cells about it, in the fields or copied.
+struct View<'a, R> {
+    components: [&'a [R]; 3],
+    strides: [usize; 3],
+    /// Position of cell (0, 0, 0) of the box, if it were in memory: counted with wrapping.
+    origin: usize,
+}
+
+impl<'a, R: Real> View<'a, R> {
+    fn new(flow: &'a Flow<R>, body: &Body, copies: &'a mut [Vec<R>; 3]) -> View<'a, R> {
+        let (layout, velocity) = (flow.mesh().layout(), &flow.velocity);
+        let walled = flow.boundaries().walled();
+        // What lies beyond a wall is no unknown, so no link reaches there. Registers reach beyond a row.
+        let direct = layout.cells[0] >= MOST
+            && (0..3).all(|axis| {
+                let high = body.first[axis] + body.size[axis] + PAD - 1;
+                walled[axis] || body.first[axis] >= PAD && high <= layout.cells[axis] as i32 + 1
+            });
+        if direct {
+            let strides = layout.strides();
+            let along = |axis: usize| (body.first[axis] as usize).wrapping_mul(strides[axis]);
+            return View {
+                components: [0, 1, 2].map(|axis| velocity.component(axis)),
+                strides,
+                origin: along(0).wrapping_add(along(1)).wrapping_add(along(2)),
+            };
+        }
+        for (axis, copy) in copies.iter_mut().enumerate() {
+            body.places.copy(velocity.component(axis), copy);
+            copy.resize(copy.len() + MOST, R::default());
+        }
+        let wide = (body.size + 2 * PAD).to_array().map(|n| n as usize);
+        let strides = [1, wide[0], wide[0] * wide[1]];
+        View {
+            components: copies.each_ref().map(|copy| &copy[..]),
+            strides,
+            origin: PAD as usize * strides.iter().sum::<usize>(),
+        }
+    }
+}
+
+impl<R> View<'_, R> {
+    /// Position of the first place of row (j, k).
+    #[inline(always)]
+    fn row(&self, [j, k]: [i32; 2]) -> usize {
+        let [_, line, plane] = self.strides;
+        self.origin
+            .wrapping_add(j as usize * line + k as usize * plane)
+    }
+    /// Asks for the box of `size` cells to be brought near.
+    #[inline(always)]
+    fn prefetch(&self, size: IVec3) {
+        for field in self.components {
+            for (k, j) in (0..size.z).flat_map(|k| (0..size.y).map(move |j| (k, j))) {
+                prefetch(field, self.row([j, k]), size.x as usize);
+            }
+        }
+    }
+}
+
+/// Corrects the tendency of the step just predicted; `bodies` are where `grains` were located, in a
+/// band of half-width `band` [m].
+pub fn correct<R: Real>(band: f64, flow: &mut Flow<R>, grains: &[Grain], bodies: &mut [Body]) {
+    let (mesh, from) = (*flow.mesh(), &*flow);
+    let each = bodies.par_iter_mut().zip(grains);
+    each.for_each_init(Scratch::default, |scratch, (body, grain)| {
+        let mut push = std::mem::take(&mut body.push);
+        dispatch(Links {
+            band,
+            mesh: &mesh,
+            grain,
+            body,
+            velocity: View::new(from, body, &mut scratch.velocity),
+            planes: &mut scratch.planes,
+            push: &mut push,
+        });
+        body.push = push;
+    });
+    let (bodies, layout) = (&*bodies, mesh.layout());
+    flow.add_tendency(|component, mut slab| {
+        let part = slab.range();
+        for body in bodies.iter().filter(|body| body.lies_in(&part, layout)) {
+            dispatch(Pushes {
+                rows: &body.rows[component],
+                push: &body.push[component],
+                slab: &mut slab,
+            });
+        }
+    });
+}
+
+/// What one grain adds to the tendency of a component in a slab of memory.
+struct Pushes<'a, 'b, R> {
+    rows: &'a [PushRow],
+    push: &'a [f64],
+    slab: &'a mut TendencySlab<'b, R>,
+}
+
+impl<R: Real> Kernel for Pushes<'_, '_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let part = self.slab.range();
+        for row in self.rows.iter().filter(|row| part.contains(&row.at)) {
+            for n in (0..row.count).step_by(V::WIDTH) {
+                let push = V::load(&self.push[row.first + n..]);
+                self.slab.add(row.at + n, row.count - n, push);
+            }
+        }
+    }
+}
+
+/// The links of one grain.
+struct Links<'a, R> {
+    band: f64,
+    mesh: &'a Mesh,
+    grain: &'a Grain,
+    body: &'a Body,
+    velocity: View<'a, R>,
+    planes: &'a mut Planes,
+    push: &'a mut [Vec<f64>; 3],
+}
+
+impl<R: Real> Kernel for Links<'_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let Links {
+            band,
+            mesh,
+            grain,
+            body,
+            velocity,
+            planes,
+            push,
+        } = self;
+        velocity.prefetch(body.size);
+        for (component, push) in push.iter_mut().enumerate() {
+            push.resize(body.distance[component].len(), 0.0);
+            Lines::new(band, mesh, grain, body, &velocity, component).push::<V>(planes, push);
+        }
+    }
+}
