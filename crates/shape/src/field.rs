@@ -1,6 +1,6 @@
 //! A signed distance sampled on a regular grid.
 
-use crate::distance::Distance;
+use crate::distance::{Distance, EVERYWHERE};
 use crate::error::{Result, ShapeError};
 use glam::DVec3;
 
@@ -62,7 +62,8 @@ impl SampledField {
         let dims = wide.map(|n| n - 2);
         let origin = 0.5 * (lower + upper) - 0.5 * spacing * cells;
         let first = origin - DVec3::splat(spacing);
-        let values = unbiased(&distance.on_grid(first, spacing, wide, BAND), wide, spacing);
+        let values = distance.on_grid(first, spacing, wide, BAND, EVERYWHERE);
+        let values = unbiased(&values, wide, spacing);
         Self::quantise(origin, spacing, dims, &values)
     }
 

@@ -14,7 +14,7 @@ const CANDIDATES: usize = 4;
 /// uphill direction. The place is known to `reach` times 0.945 to the power of `rounds`; where it
 /// cannot `beat` this value, the search ends early.
 pub(crate) fn deepest(
-    depth: impl Fn(DVec3) -> (f64, DVec3),
+    mut depth: impl FnMut(DVec3) -> (f64, DVec3),
     start: DVec3,
     reach: f64,
     rounds: usize,
@@ -77,13 +77,14 @@ pub(crate) fn sphere(
     let mut candidates: Vec<usize> = (0..depths.len()).filter(|n| highest(*n)).collect();
     candidates.sort_by(|p, q| depths[*q].total_cmp(&depths[*p]).then(p.cmp(q)));
     let step = 1e-4 * spacing;
-    let depth = |x: DVec3| {
-        let (distance, slope) = distance.with_slope(x, step, &mut 0);
+    let mut closing_in = distance.closing_in(step);
+    let mut depth = |x: DVec3| {
+        let (distance, slope) = closing_in(x);
         (-distance, -slope)
     };
     let mut best = (0.5 * (lower + upper), 0.0);
     for start in candidates.iter().take(CANDIDATES) {
-        let found = deepest(depth, place(*start), 5.0 * spacing, 240, best.1);
+        let found = deepest(&mut depth, place(*start), 5.0 * spacing, 240, best.1);
         if found.1 > best.1 {
             best = found;
         }

@@ -1,6 +1,7 @@
 //! Signed distance to a closed mesh.
 
 use super::TriangleMesh;
+use super::about::About;
 use super::bvh::{Bvh, Feature, Nearest, nearest_on_triangle};
 use super::check::Neighbours;
 use super::spread;
@@ -79,10 +80,9 @@ impl MeshDistance {
         &self.corners[face as usize]
     }
 
-    /// Distance of `x` from the plane of face `face`; 0 where that has no area.
-    pub(super) fn height(&self, x: DVec3, face: u32) -> f64 {
-        let from = x - self.corners[face as usize][0];
-        from.dot(self.face_normals[face as usize]).abs()
+    /// Unit normal of face `face`; 0 where that has no area.
+    pub(super) fn normal(&self, face: u32) -> DVec3 {
+        self.face_normals[face as usize]
     }
 
     /// Place of face `face` nearest to `x`.
@@ -117,11 +117,10 @@ impl MeshDistance {
                 Feature::Corner(i) => {
                     let corner = self.triangles[number][usize::from(i)];
                     let spokes = self.spokes.of(corner);
-                    // Where no edge leads downhill from the corner, no face does.
+                    // Of a face with no edge that leads downhill from the corner it is the nearest place.
                     let reach = x - best.point;
-                    if spokes.iter().any(|spoke| spoke.edge.dot(reach) > 0.0) {
-                        spokes.iter().for_each(|spoke| try_face(spoke.face));
-                    }
+                    let falls = |spoke: &&Spoke| spoke.edges.iter().any(|e| e.dot(reach) > 0.0);
+                    spokes.iter().filter(falls).for_each(|s| try_face(s.face));
                 }
             }
             match nearer {
@@ -132,7 +131,7 @@ impl MeshDistance {
     }
 
     /// The nearest place of all.
-    fn nearest(&self, x: DVec3, hint: &mut u32) -> Nearest {
+    pub(super) fn nearest(&self, x: DVec3, hint: &mut u32) -> Nearest {
         let bvh = self.bvh.get_or_init(|| Bvh::new(&self.corners));
         bvh.nearest(x, hint)
     }
@@ -152,10 +151,10 @@ impl MeshDistance {
     }
 }
 
-/// An edge that leaves a corner, and the face to the left of it.
+/// The edges of a face that leave a corner.
 #[derive(Clone, Copy, Default)]
 struct Spoke {
-    edge: DVec3,
+    edges: [DVec3; 2],
     face: u32,
 }
 
@@ -182,7 +181,7 @@ impl Spokes {
             for i in 0..3 {
                 let place = &mut next[triangle[i] as usize];
                 all[*place as usize] = Spoke {
-                    edge: corners[(i + 1) % 3] - corners[i],
+                    edges: [1, 2].map(|n| corners[(i + n) % 3] - corners[i]),
                     face: face as u32,
                 };
                 *place += 1;
@@ -202,14 +201,24 @@ impl Distance for MeshDistance {
         self.signed(x, &self.nearest(x, hint))
     }
 
-    fn with_slope(&self, x: DVec3, _: f64, hint: &mut u32) -> (f64, DVec3) {
-        let nearest = self.nearest(x, hint);
-        let distance = self.signed(x, &nearest);
-        (distance, (x - nearest.point) / distance)
+    fn closing_in(&self, _: f64) -> impl FnMut(DVec3) -> (f64, DVec3) {
+        let mut about = About::new(self);
+        move |x| {
+            let nearest = about.nearest(x);
+            let distance = self.signed(x, &nearest);
+            (distance, (x - nearest.point) / distance)
+        }
     }
 
-    fn on_grid(&self, first: DVec3, spacing: f64, dims: [usize; 3], band: f64) -> Vec<f64> {
-        spread::on_grid(self, first, spacing, dims, band)
+    fn on_grid(
+        &self,
+        first: DVec3,
+        spacing: f64,
+        dims: [usize; 3],
+        band: f64,
+        needed: [f64; 2],
+    ) -> Vec<f64> {
+        spread::on_grid(self, first, spacing, dims, band, needed)
     }
 }
 

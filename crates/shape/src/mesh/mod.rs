@@ -1,5 +1,6 @@
 //! Closed triangle meshes: reading, checking, exact distances, and shapes from them.
 
+mod about;
 mod build;
 mod bvh;
 mod check;

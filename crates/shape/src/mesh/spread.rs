@@ -16,13 +16,15 @@ const BUCKET: f64 = 0.25;
 const FINE: f64 = 0.7;
 
 /// Signed distances [m] at the samples of a grid, x fastest; the first lies at `first`. Up to `band`
-/// [cells] from the mesh every face is tried.
+/// [cells] from the mesh every face is tried. What is not between the least and the most that are `needed` [m]
+/// may be NaN.
 pub(super) fn on_grid(
     mesh: &MeshDistance,
     first: DVec3,
     spacing: f64,
     dims: [usize; 3],
     band: f64,
+    [least, most]: [f64; 2],
 ) -> Vec<f64> {
     let grid = Grid {
         first: first - DVec3::splat(spacing),
@@ -31,8 +33,10 @@ pub(super) fn on_grid(
     };
     let mut front = Front::new(mesh, &grid);
     front.settle_band(band);
+    // From what is not needed nothing nearer is reached.
+    let needed = |value: f64| least <= value && value <= most;
     for n in grid.samples() {
-        if front.open[n] == SETTLED {
+        if front.open[n] == SETTLED && needed(front.values[n]) {
             front.reach(n);
         }
     }
@@ -43,10 +47,20 @@ pub(super) fn on_grid(
         let x = grid.position(n);
         let nearest = mesh.downhill(x, front.origins[n].face);
         let distance = nearest.point.distance(x);
-        front.settle(n, &nearest, distance.copysign(front.values[n]));
-        front.reach(n);
+        let value = distance.copysign(front.values[n]);
+        front.settle(n, &nearest, value);
+        if needed(value) {
+            front.reach(n);
+        }
     }
-    grid.samples().map(|n| front.values[n]).collect()
+    let value = |n: usize| {
+        if front.open[n] == SETTLED {
+            front.values[n]
+        } else {
+            f64::NAN
+        }
+    };
+    grid.samples().map(value).collect()
 }
 
 /// The samples, in a layer of others that spares looking for the border.
@@ -62,8 +76,13 @@ impl Grid {
     }
 
     fn position(&self, n: usize) -> DVec3 {
-        let place = crate::grid::place(self.dims, n);
-        self.first + self.spacing * DVec3::from_array(place.map(|i| i as f64))
+        self.at(crate::grid::place(self.dims, n))
+    }
+
+    fn at(&self, place: [usize; 3]) -> DVec3 {
+        // By way of u32, which converts in one instruction.
+        let place = place.map(|i| f64::from(i as u32));
+        self.first + self.spacing * DVec3::from_array(place)
     }
 
     /// The samples without the layer.
@@ -130,6 +149,7 @@ impl<'a> Front<'a> {
     /// Settles the samples less than `band` [cells] from the mesh: tries every face at those about it.
     fn settle_band(&mut self, band: f64) {
         let (mesh, grid) = (self.mesh, self.grid);
+        let per_cell = 1.0 / grid.spacing;
         for face in 0..mesh.faces() {
             let [a, b, c] = *mesh.corners(face);
             let low = ((a.min(b).min(c) - grid.first) / grid.spacing - DVec3::splat(band)).ceil();
@@ -141,15 +161,33 @@ impl<'a> Front<'a> {
                 let end = ((high[axis] + 1.0).max(1.0) as usize).min(grid.dims[axis] - 1);
                 (low[axis].max(1.0) as usize).min(end)..end
             };
-            for k in range(2) {
-                for j in range(1) {
-                    for i in range(0) {
+            let normal = mesh.normal(face);
+            let reach = (band * grid.spacing + radius).powi(2);
+            let [along, across, up] = [0, 1, 2].map(range);
+            for k in up {
+                for j in across.clone() {
+                    // The part of the row in the ball.
+                    let row = grid.at([0, j, k]);
+                    let first = row - middle;
+                    let half = reach - first.y * first.y - first.z * first.z;
+                    if half < 0.0 {
+                        continue;
+                    }
+                    let ends = [-1.0, 1.0].map(|side| (side * half.sqrt() - first.x) * per_cell);
+                    let low = (ends[0] as usize).max(along.start);
+                    for i in low..along.end.min(ends[1] as usize + 1) {
                         let n = grid.index([i, j, k]);
-                        let x = grid.position(n);
+                        let x = row.with_x(row.x + grid.spacing * f64::from(i as u32));
                         let best = self.values[n].min(band * grid.spacing);
-                        // Neither the ball about the face nor its plane is farther than the face.
-                        let outside = x.distance_squared(middle) >= (best + radius).powi(2);
-                        if outside || mesh.height(x, face) >= best {
+                        // No place in the ball about the face is nearer, or none in its circle in the plane.
+                        let from = x - middle;
+                        let squared = from.length_squared();
+                        if squared >= (best + radius).powi(2) {
+                            continue;
+                        }
+                        let height = from.dot(normal).powi(2);
+                        let aside = ((squared - height).max(0.0).sqrt() - radius).max(0.0);
+                        if height + aside * aside >= best * best {
                             continue;
                         }
                         let nearest = mesh.on_face(x, face);
@@ -223,7 +261,7 @@ impl<'a> Front<'a> {
 mod tests {
     use super::*;
 
-    use crate::distance::Distance;
+    use crate::distance::{Distance, EVERYWHERE};
     use crate::grid::place;
     use crate::mesh::cube_sphere;
 
@@ -239,7 +277,14 @@ mod tests {
             let distance = MeshDistance::new(&mesh).unwrap();
             let (spacing, dims) = (0.08, [50, 44, 30]);
             let first = DVec3::new(-2.0, -1.75, -1.2);
-            let spread = distance.on_grid(first, spacing, dims, band);
+            let spread = distance.on_grid(first, spacing, dims, band, EVERYWHERE);
+            let needed = distance.on_grid(first, spacing, dims, band, [-0.1, 0.3]);
+            for (all, some) in spread.iter().zip(&needed) {
+                let same = (all - some).abs() < 0.1 * spacing;
+                let left_out = !(-0.1..=0.3).contains(all);
+                assert!(same || left_out, "{some} for {all}");
+            }
+            assert!(needed.iter().filter(|v| v.is_nan()).count() > needed.len() / 4);
             // In the band and beyond.
             let mut worst = [0.0f64; 2];
             for (n, value) in spread.iter().enumerate() {

@@ -62,7 +62,15 @@ pub(super) fn measure(
 ) -> Option<Reading> {
     let spacing = inscribed / CELLS;
     let reach = spacing * (4.0 * COARSE * CELLS + REACH).ceil();
-    let band = Band::whole(distance, lower, upper, spacing, [LEVEL * inscribed, reach])?;
+    // Farther off only the coarse Gaussian reaches.
+    let near = inscribed * REACH * WIDTHS[1];
+    let band = Band::whole(
+        distance,
+        lower,
+        upper,
+        spacing,
+        [LEVEL * inscribed, reach, near],
+    )?;
     let mesh = extract(&Samples {
         dims: band.dims,
         lower: band.lower,
@@ -89,34 +97,32 @@ pub(super) fn measure(
             .collect()
     };
     let coarse = bends(COARSE);
-    let corners = |width: f64| {
-        let fine = bends(width);
-        // Area and turning [R_in^2, R_in].
-        let (mut area, mut turn) = (0.0, 0.0);
-        for (face, triangle) in mesh.triangles.iter().enumerate() {
-            if triangle.iter().any(|v| !natural[*v as usize]) {
+    let fine = WIDTHS.map(bends);
+    // Area and turning [R_in^2, R_in], by width.
+    let mut found = [(0.0, 0.0); 2];
+    for (face, triangle) in mesh.triangles.iter().enumerate() {
+        if triangle.iter().any(|v| !natural[*v as usize]) {
+            continue;
+        }
+        let [a, b, c] = mesh.corners(face);
+        let part = (b - a).cross(c - a).length() / (2.0 * (PARTS * PARTS) as f64);
+        let part = part / (inscribed * inscribed);
+        for weights in parts() {
+            let (seen, along) = sharpest(&coarse, triangle, weights);
+            if seen * (COARSE_CORNER + LEVEL) <= 1.0 {
                 continue;
             }
-            let [a, b, c] = mesh.corners(face);
-            let part = (b - a).cross(c - a).length() / (2.0 * (PARTS * PARTS) as f64);
-            let part = part / (inscribed * inscribed);
-            for weights in parts() {
-                let (seen, along) = sharpest(&coarse, triangle, weights);
-                if seen * (COARSE_CORNER + LEVEL) <= 1.0 {
-                    continue;
-                }
-                let [k1, k2] = along_and_across(&fine, triangle, weights, along);
+            for (fine, (area, turn)) in fine.iter().zip(&mut found) {
+                let [k1, k2] = along_and_across(fine, triangle, weights, along);
                 if k1 * (CORNER + LEVEL) <= 1.0 {
                     continue;
                 }
                 let below = part * (1.0 - LEVEL * k2).max(0.0);
-                area += below * (1.0 - LEVEL * k1);
-                turn += below * k1;
+                *area += below * (1.0 - LEVEL * k1);
+                *turn += below * k1;
             }
         }
-        (area, turn)
-    };
-    let found = WIDTHS.map(corners);
+    }
     let (_, turn) = found[0];
     if found.iter().any(|(_, turn)| *turn <= 0.0) {
         return Some(Reading::of(1.0));
