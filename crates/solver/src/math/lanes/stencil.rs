@@ -51,7 +51,7 @@ impl<const N: usize> Stencil<N> {
     #[inline(always)]
     fn fits<V: Vector, R: Real>(&self, list: &[R], at: usize) -> bool {
         let first = at.wrapping_add_signed(self.low);
-        let span = self.high.wrapping_sub(self.low) as usize + V::WIDTH;
+        let span = self.high.abs_diff(self.low).saturating_add(V::WIDTH);
         first <= list.len() && span <= list.len() - first
     }
 }

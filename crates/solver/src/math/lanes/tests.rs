@@ -223,3 +223,47 @@ fn lists_may_end_within_a_vector() {
     Ends.run::<<f64 as Registers>::Common>();
     Ends.run::<One<f64>>();
 }
+
+/// Reads about places of a list, at its ends too.
+struct Around;
+
+impl Kernel for Around {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let list: Vec<f32> = (1..60).map(|n| n as f32).collect();
+        let offsets = [0, 3, -2, 20];
+        let stencil = Stencil::new(offsets);
+        for at in [0, 1, 2, 10, 20, 38, 50, 58, 70, usize::MAX] {
+            let found = stencil.load_within::<V, f32>(&list, at);
+            for (offset, found) in offsets.into_iter().zip(found) {
+                let mut lanes = [0.0; MOST];
+                found.store(&mut lanes);
+                for n in 0..V::WIDTH {
+                    let place = at.wrapping_add_signed(offset).wrapping_add(n);
+                    // All or nothing before the list begins.
+                    let first = at.wrapping_add_signed(offset);
+                    let entry = list.get(place).filter(|_| first < list.len());
+                    assert_eq!(lanes[n], f64::from(entry.copied().unwrap_or(0.0)), "{at}");
+                }
+            }
+        }
+        let all = stencil.load::<V, f32>(&list, 2);
+        let mut lanes = [0.0; MOST];
+        all[2].store(&mut lanes);
+        assert_eq!(lanes[0], 1.0);
+    }
+}
+
+#[test]
+fn stencils_read_what_is_there() {
+    dispatch(Around);
+    Around.run::<<f64 as Registers>::Common>();
+    Around.run::<One<f64>>();
+    let list = [1.0; 40];
+    for (offsets, at) in [([0, 39], 1), ([-3, 0], 2), ([isize::MIN, isize::MAX], 20)] {
+        let stencil = Stencil::new(offsets);
+        let read = || stencil.load::<One<f64>, f64>(&list, at);
+        assert!(std::panic::catch_unwind(read).is_err(), "{offsets:?}");
+    }
+}
