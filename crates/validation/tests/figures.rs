@@ -142,7 +142,11 @@ fn all_kinds_are_drawn() {
     let (runs, suite) = suite(SUITE);
     let suite = suite.unwrap();
     fill(&runs);
-    let drawn: Vec<Drawn> = suite.figures.iter().map(|f| f.draw(&runs)).collect();
+    let drawn: Vec<Drawn> = suite
+        .figures
+        .iter()
+        .map(|f| f.draw(&runs, |_, _| None))
+        .collect();
     for one in &drawn {
         assert!(one.notes.is_empty(), "{:?}", one.notes);
     }
@@ -164,18 +168,26 @@ fn what_is_missing_is_left_out_and_named() {
     let (runs, suite) = suite(&SUITE.replace("speed.csv", "lost.csv"));
     let suite = suite.unwrap();
     for figure in &suite.figures {
-        let drawn = figure.draw(&runs);
+        let drawn = figure.draw(&runs, |_, _| None);
         assert!(drawn.drawing.is_none(), "{} without runs", figure.name);
         assert!(drawn.notes.iter().any(|n| n.contains("no finished run")));
     }
     fill(&runs);
     std::fs::remove_file(runs.join("coarse/summary.json")).unwrap();
-    let drawn = suite.figures[0].draw(&runs);
+    let drawn = suite.figures[0].draw(&runs, |_, _| None);
     assert!(drawn.drawing.is_some());
     assert!(drawn.notes[0].contains("\"published\"") && drawn.notes[0].contains("lost.csv"));
-    let drawn = suite.figures[1].draw(&runs);
+    let drawn = suite.figures[1].draw(&runs, |_, _| None);
     assert_eq!(drawn.notes, ["no finished run coarse"]);
     assert!(svg(&drawn).contains("order 2.00"));
+    // Its number may have been kept though the run was not.
+    let kept = |run: &str, quantity: &str| (run == "coarse" && quantity == "z").then_some(2.5);
+    let with = suite.figures[1].draw(&runs, kept);
+    assert!(with.notes.is_empty(), "{:?}", with.notes);
+    std::fs::write(runs.join("coarse/summary.json"), "{}").unwrap();
+    let all = suite.figures[1].draw(&runs, |_, _| None);
+    assert_eq!(svg(&with), svg(&all));
+    assert_ne!(svg(&with), svg(&drawn));
 }
 
 #[test]

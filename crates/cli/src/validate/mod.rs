@@ -93,8 +93,8 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     }
     if let Some(folder) = &args.save {
         let all = Suite::all(&args.suites)?;
-        saved::add(folder, &args.level, &verdicts, &args.output, &all)?;
-        let drawn = pictures::add(folder, &suites, &args.output)?;
+        let saved = saved::add(folder, &args.level, &verdicts, &args.output, &all)?;
+        let drawn = pictures::add(folder, &suites, &args.output, &saved)?;
         pictures::list(folder, &all)?;
         if !args.quiet {
             tell!("{drawn} figures in {}", folder.join("figures").display());

@@ -5,12 +5,14 @@ use std::path::Path;
 use grainwake_report::figure::plain;
 use grainwake_validation::Suite;
 
+use super::saved::Saved;
 use crate::exit::{Exit, IO};
 use crate::tell;
 
-/// Draws the figures of `suites` that have data below `output` into `folder/figures`, and says on
-/// stderr what had to be left out, or that an earlier figure stays for that; gives their number.
-pub fn add(folder: &Path, suites: &[Suite], output: &Path) -> Result<usize, Exit> {
+/// Draws the figures of `suites` that have data below `output`, or numbers among the `saved` results,
+/// into `folder/figures`, and says on stderr what had to be left out, or that an earlier figure stays
+/// for that; gives their number.
+pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Result<usize, Exit> {
     let place = folder.join("figures");
     std::fs::create_dir_all(&place)
         .map_err(|e| Exit::new(IO, format!("{}: {e}", place.display())))?;
@@ -18,7 +20,9 @@ pub fn add(folder: &Path, suites: &[Suite], output: &Path) -> Result<usize, Exit
     for suite in suites {
         for figure in &suite.figures {
             let name = format!("{}-{}", suite.name, figure.name);
-            let drawn = figure.draw(&output.join(&suite.name));
+            let drawn = figure.draw(&output.join(&suite.name), |run, quantity| {
+                saved.value(&suite.name, run, quantity)
+            });
             // A figure of more runs is not replaced by one of fewer.
             if !drawn.notes.is_empty() && place.join(format!("{name}.png")).is_file() {
                 tell!(

@@ -13,9 +13,17 @@ use crate::exit::{Exit, IO};
 
 /// Contents of `LEVEL.json`.
 #[derive(Default, Serialize, Deserialize)]
-struct Saved {
+pub struct Saved {
     results: Vec<Verdict>,
     runs: Vec<Source>,
+}
+
+impl Saved {
+    /// A quantity of a run.
+    pub fn value(&self, name: &str, run: &str, quantity: &str) -> Option<f64> {
+        let of = |v: &&Verdict| v.name == name && v.run == run && v.quantity == quantity;
+        self.results.iter().find(of)?.value
+    }
 }
 
 /// Where the numbers of a run come from.
@@ -42,14 +50,14 @@ impl Source {
 }
 
 /// Adds `verdicts` of runs below `output` to the results in `folder`, in place of earlier ones of
-/// the same runs; all are listed in the order of the `suites`.
+/// the same runs; all are listed in the order of the `suites`. Gives them all.
 pub fn add(
     folder: &Path,
     level: &str,
     verdicts: &[Verdict],
     output: &Path,
     suites: &[Suite],
-) -> Result<(), Exit> {
+) -> Result<Saved, Exit> {
     let failed = |path: &Path, what: &dyn std::fmt::Display| {
         Exit::new(IO, format!("{}: {what}", path.display()))
     };
@@ -101,7 +109,8 @@ pub fn add(
     std::fs::write(&json, serde_json::to_string_pretty(&saved)? + "\n")
         .map_err(|e| failed(&json, &e))?;
     let page = folder.join(format!("{level}.md"));
-    std::fs::write(&page, markdown(level, &saved)).map_err(|e| failed(&page, &e))
+    std::fs::write(&page, markdown(level, &saved)).map_err(|e| failed(&page, &e))?;
+    Ok(saved)
 }
 
 /// Where a run stands in the suites: by name of the suite, then in its order.

@@ -62,7 +62,8 @@ impl<'a> About<'a> {
                 best = Some((distance, place));
             }
         }
-        None
+        let all = self.faces.len() == self.mesh.faces() as usize;
+        best.filter(|_| all).map(|(_, place)| place)
     }
 
     fn collect(&mut self, x: DVec3) {

@@ -62,7 +62,7 @@ pub(super) fn measure(
 ) -> Option<Reading> {
     let spacing = inscribed / CELLS;
     let reach = spacing * (4.0 * COARSE * CELLS + REACH).ceil();
-    // Farther off only the coarse Gaussian reaches.
+    // Farther off hardly any but the coarse Gaussian reaches.
     let near = inscribed * REACH * WIDTHS[1];
     let band = Band::whole(
         distance,

@@ -9,6 +9,8 @@ mod probe;
 mod setup;
 mod state;
 mod step;
+#[cfg(test)]
+mod tests;
 
 use std::time::Duration;
 

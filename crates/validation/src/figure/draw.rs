@@ -59,15 +59,16 @@ fn notes(gaps: Vec<Gap>) -> Vec<String> {
 }
 
 impl Figure {
-    /// Draws what there are data for; `runs` holds the run folders of the suite.
-    pub fn draw(&self, runs: &Path) -> Drawn {
+    /// Draws what there are data for; `runs` holds the run folders of the suite. The numbers (run,
+    /// quantity) of runs that are not there may have been `saved`.
+    pub fn draw(&self, runs: &Path, saved: impl Fn(&str, &str) -> Option<f64>) -> Drawn {
         let mut gaps = Vec::new();
         let drawing = match &self.content {
             Content::Plot { across, up, series } => {
                 let mut shown = Vec::new();
                 let mut measured = false;
                 for one in series {
-                    match one.shown(runs, &mut gaps) {
+                    match one.shown(runs, &saved, &mut gaps) {
                         Ok(found) => {
                             let reference = matches!(one.data, Data::Reference { .. });
                             measured |= !reference && !found.is_empty();
@@ -155,7 +156,12 @@ impl Series {
     }
 
     /// The points, and what else is drawn with them.
-    fn shown(&self, runs: &Path, gaps: &mut Vec<Gap>) -> Result<Vec<Shown>, Gap> {
+    fn shown(
+        &self,
+        runs: &Path,
+        saved: impl Fn(&str, &str) -> Option<f64>,
+        gaps: &mut Vec<Gap>,
+    ) -> Result<Vec<Shown>, Gap> {
         let mut shown = Shown {
             label: self.label.clone(),
             colour: self.colour,
@@ -198,7 +204,7 @@ impl Series {
                 slope,
             } => {
                 for point in points {
-                    match point.value(runs, *error) {
+                    match point.value(runs, &saved, *error) {
                         Ok(y) => shown.points.push((point.x, y)),
                         Err(gap) => gaps.push(self.named(gap)),
                     }
@@ -223,8 +229,16 @@ impl Series {
 }
 
 impl Point {
-    fn value(&self, runs: &Path, error: bool) -> Result<f64, Gap> {
-        let value = self.check.measure(&finished(runs, &self.run)?)?;
+    fn value(
+        &self,
+        runs: &Path,
+        saved: impl Fn(&str, &str) -> Option<f64>,
+        error: bool,
+    ) -> Result<f64, Gap> {
+        let value = match finished(runs, &self.run) {
+            Ok(folder) => self.check.measure(&folder)?,
+            Err(gap) => saved(&self.run, &self.check.quantity).ok_or(gap)?,
+        };
         Ok(match self.reference {
             Some(reference) if error => ((value - reference) / reference).abs(),
             _ => value,
