@@ -6,10 +6,10 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::super::aperture::surplus;
-use super::super::locate::Body;
-use super::super::places::PAD;
 use super::View;
+use crate::coupling::aperture::surplus;
+use crate::coupling::locate::Body;
+use crate::coupling::places::PAD;
 use crate::dem::Grain;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Real;
@@ -31,16 +31,18 @@ pub struct Planes {
 }
 
 impl Planes {
-    /// Makes room for a box.
-    fn clear(&mut self, body: &Body) {
+    /// Makes room for a box, before the first plane.
+    fn begin(&mut self, body: &Body) {
         self.line = body.size.x as usize + MOST;
         let count = self.line * (body.size.y as usize + 2) + MOST;
         let [here, next] = &mut self.distance;
         let [z, before] = &mut self.z;
         for list in [here, next, &mut self.x, &mut self.y, z, before] {
-            list.clear();
             list.resize(count, 0.0);
         }
+        // Nothing comes from before the first plane, and along x where there are no links.
+        before.fill(0.0);
+        self.x.fill(0.0);
     }
     fn place(&self, i: i32, j: i32) -> usize {
         i as usize + (j + 1) as usize * self.line
@@ -144,7 +146,7 @@ impl<'a, R: Real> Lines<'a, R> {
     #[inline(always)]
     pub fn push<V: Vector<Number = f64>>(&self, planes: &mut Planes, to: &mut [f64]) {
         let size = self.body.size;
-        planes.clear(self.body);
+        planes.begin(self.body);
         self.unfold::<V>(0, planes);
         for k in 0..size.z {
             self.unfold::<V>(k + 1, planes);
@@ -228,24 +230,24 @@ impl<'a, R: Real> Lines<'a, R> {
                 rigid[along][of] = first + x * by_x + y * by_y + z * by_z;
             }
         }
-        let mut before = V::constant(0.0);
+        let (half, mut before) = (V::constant(0.5), V::constant(0.0));
         for n in (0..(row.end - row.start) as usize).step_by(V::WIDTH) {
             let (at, place) = (at.wrapping_add(n), place + n);
             let count = V::constant(n as f64) + V::ramp();
             let here = V::load(&planes.distance[this][place..]);
             if self.axes[0].exists {
-                let d = here + V::load(&planes.distance[this][place + 1..]);
+                let d = half * (here + V::load(&planes.distance[this][place + 1..]));
                 let flux = self.flux::<V, INNER>(0, six[0], rigid[0], at, count, d);
                 (flux.behind(before) - flux).store(&mut planes.x[place..]);
                 before = flux;
             }
             if self.axes[1].exists {
-                let d = here + V::load(&planes.distance[this][place + planes.line..]);
+                let d = half * (here + V::load(&planes.distance[this][place + planes.line..]));
                 let flux = self.flux::<V, INNER>(1, six[1], rigid[1], at, count, d);
                 flux.store(&mut planes.y[place..]);
             }
             if self.axes[2].exists {
-                let d = here + V::load(&planes.distance[other][place..]);
+                let d = half * (here + V::load(&planes.distance[other][place..]));
                 let flux = self.flux::<V, INNER>(2, six[2], rigid[2], at, count, d);
                 flux.store(&mut planes.z[this][place..]);
             }
@@ -289,8 +291,8 @@ impl<'a, R: Real> Lines<'a, R> {
     }
 
     /// Flux through links along an axis over their length [m/s^2]; zero where they are not near the surface.
-    /// They are number `count` of the row, their lower faces are from `at` on in the fields, and their
-    /// distance is half of `twice`; `rigid` is U at the first.
+    /// They are number `count` of the row, and their lower faces are from `at` on in the fields; `rigid` is U
+    /// at the first.
     #[inline(always)]
     fn flux<V: Vector<Number = f64>, const INNER: bool>(
         &self,
@@ -299,7 +301,7 @@ impl<'a, R: Real> Lines<'a, R> {
         rigid: [f64; 2],
         at: usize,
         count: V,
-        twice: V,
+        d: V,
     ) -> V {
         let (zero, half) = (V::constant(0.0), V::constant(0.5));
         let axis = &self.axes[along];
@@ -319,11 +321,11 @@ impl<'a, R: Real> Lines<'a, R> {
             share = count.where_below(V::constant(six.end), share, zero);
             share = count.where_below(V::constant(six.start), zero, share);
         }
-        let surplus = surplus(half * twice, self.band);
+        let surplus = surplus(d, self.band);
         let flux = (mean * relative).mul_add(surplus, share * sixth);
         let flux = flux * V::constant(axis.inverse);
-        let flux = twice.where_below(V::constant(4.0 * self.band), flux, zero);
-        V::constant(-2.0 * self.band).where_below(twice, flux, zero)
+        let flux = d.where_below(V::constant(2.0 * self.band), flux, zero);
+        V::constant(-self.band).where_below(d, flux, zero)
     }
 }
 

@@ -9,7 +9,7 @@
 //!
 //! Both are fluxes between two faces, so they move no momentum in or out
 //! (`docs/decisions/0003-advection-next-to-grains.md` has the measurements).
-//!
+
 mod links;
 
 use glam::IVec3;
