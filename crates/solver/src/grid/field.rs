@@ -12,7 +12,7 @@ use std::ops::{Deref, DerefMut};
 use glam::DVec3;
 
 use super::Mesh;
-use crate::math::Real;
+use crate::math::{Real, zeros};
 
 /// A place on the staggered cell.
 pub trait Location: Copy + Send + Sync + 'static {
@@ -154,7 +154,7 @@ impl<L: Location, R: Real> Field<L, R> {
         let layout = mesh.layout();
         Field {
             layout,
-            values: vec![R::default(); layout.len()],
+            values: zeros(layout.len()),
             location: PhantomData,
         }
     }
