@@ -8,6 +8,8 @@
 //! Legend: q velocity component, c velocity through a link; u, v, w components along x, y, z; the
 //! letters after them: m/p one row down/up in y, b/t one down/up in z.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout, Mesh};
@@ -77,10 +79,12 @@ pub struct PredictPlane<'a, R> {
     /// Axes whose lower boundary face is given.
     pub walled: [bool; 3],
     pub k: usize,
+    /// The rows of the plane to treat, one part of it after the other.
+    pub rows: Range<usize>,
     /// H_old, to be replaced by H.
     pub tendency: [&'a mut [R]; 3],
     pub predicted: [&'a mut [R]; 3],
-    /// Receives the sum of H over the unknown faces of the plane.
+    /// The sum of H over the unknown faces of the plane is added to it.
     pub sum: &'a mut DVec3,
 }
 
@@ -94,7 +98,7 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
         let [tx, ty, tz] = self.tendency;
         let [px, py, pz] = self.predicted;
         let mut sums = [Partial::default(); 3];
-        for j in 1..=layout.cells[1] {
+        for j in self.rows {
             let (at, here) = (layout.index(0, j, k), j * row..(j + 1) * row);
             let mut work = PredictRow {
                 coefficients: self.coefficients,
@@ -123,7 +127,7 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
                 sums[0].add(1, One::<R>::constant(given));
             }
         }
-        *self.sum = DVec3::from_array(sums.map(|sum| sum.sum()));
+        *self.sum += DVec3::from_array(sums.map(|sum| sum.sum()));
     }
 }
 
