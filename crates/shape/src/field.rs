@@ -3,6 +3,7 @@
 use crate::distance::{Distance, EVERYWHERE};
 use crate::error::{Result, ShapeError};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Most samples that one field may hold.
 pub(crate) const MAX_SAMPLES: u64 = 1 << 26;
@@ -31,6 +32,18 @@ pub struct SampledField {
     levels: Vec<f32>,
 }
 
+/// An error where that many samples are too many.
+fn affordable(samples: f64) -> Result<()> {
+    if samples.is_nan() || samples > MAX_SAMPLES as f64 {
+        return Err(ShapeError::BadParameter {
+            name: "samples of the distance field",
+            value: samples,
+            reason: "too many; ask for fewer cells across the grain",
+        });
+    }
+    Ok(())
+}
+
 /// The cell that holds a point, with the point's place in it.
 struct Place {
     cell: [usize; 3],
@@ -49,14 +62,7 @@ impl SampledField {
     ) -> Result<SampledField> {
         let size = upper - lower + DVec3::splat(2.0 * margin);
         let cells = (size / spacing).ceil().max(DVec3::splat(2.0));
-        let samples = (cells.x + 1.0) * (cells.y + 1.0) * (cells.z + 1.0);
-        if samples.is_nan() || samples > MAX_SAMPLES as f64 {
-            return Err(ShapeError::BadParameter {
-                name: "samples of the distance field",
-                value: samples,
-                reason: "too many; ask for fewer cells across the grain",
-            });
-        }
+        affordable((cells.x + 1.0) * (cells.y + 1.0) * (cells.z + 1.0))?;
         // One layer more on every side, for the second differences.
         let wide = [cells.x, cells.y, cells.z].map(|n| n as usize + 3);
         let dims = wide.map(|n| n - 2);
@@ -65,6 +71,47 @@ impl SampledField {
         let values = distance.on_grid(first, spacing, wide, BAND, EVERYWHERE);
         let values = unbiased(&values, wide, spacing);
         Self::quantise(origin, spacing, dims, &values)
+    }
+
+    /// The same samples with more about them, by `distance`, so that the box is covered with `margin` [m] to
+    /// spare on every side.
+    pub(crate) fn extended(
+        &self,
+        distance: impl Fn(DVec3) -> f64 + Sync,
+        lower: DVec3,
+        upper: DVec3,
+        margin: f64,
+    ) -> Result<SampledField> {
+        let more = |missing: DVec3| {
+            let layers = ((missing + margin) * self.inverse_spacing).ceil();
+            layers.max(DVec3::ZERO).to_array()
+        };
+        let (below, above) = (more(self.lower - lower), more(upper - self.upper()));
+        let wide = [0, 1, 2].map(|axis| below[axis] + self.dims[axis] as f64 + above[axis]);
+        affordable(wide.iter().product())?;
+        let (dims, below) = (wide.map(|n| n as usize), below.map(|n| n as usize));
+        let origin = self.lower - self.spacing * DVec3::from_array(below.map(|n| n as f64));
+        let level = |at: [usize; 3]| {
+            let [i, j, k] = [0, 1, 2].map(|axis| at[axis].wrapping_sub(below[axis]));
+            if i < self.dims[0] && j < self.dims[1] && k < self.dims[2] {
+                return self.levels[self.index(i, j, k)];
+            }
+            let x = origin + self.spacing * DVec3::from_array(at.map(|n| n as f64));
+            (distance(x) / self.quantum).round() as f32
+        };
+        let count = dims.iter().product::<usize>();
+        let levels = (0..count).into_par_iter().map(|n| {
+            let [nx, ny, _] = dims;
+            level([n % nx, n / nx % ny, n / nx / ny])
+        });
+        let (spacing, quantum) = (self.spacing, self.quantum);
+        Ok(Self::from_levels(
+            origin,
+            spacing,
+            dims,
+            quantum,
+            levels.collect(),
+        ))
     }
 
     fn quantise(

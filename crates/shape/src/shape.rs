@@ -120,10 +120,18 @@ impl Shape {
         }
     }
 
-    /// The distances on another grid, `spacing` [m] fine and `margin` [m] wider than the bounding box.
-    pub fn resampled(&self, spacing: f64, margin: f64) -> Result<SampledField> {
-        let distance = |x: DVec3, _: &mut u32| self.distance(x);
-        SampledField::sample(&distance, self.lower, self.upper, spacing, margin)
+    /// The distances on a grid that is `margin` [m] wider than the bounding box, and `spacing` [m] fine or as the
+    /// shape's own, whose samples it then has, where that is coarser.
+    pub fn distances(&self, spacing: f64, margin: f64) -> Result<SampledField> {
+        match &self.field {
+            Field::Sampled(own) if own.spacing() >= spacing => {
+                own.extended(|x| self.distance(x), self.lower, self.upper, margin)
+            }
+            _ => {
+                let distance = |x: DVec3, _: &mut u32| self.distance(x);
+                SampledField::sample(&distance, self.lower, self.upper, spacing, margin)
+            }
+        }
     }
 
     /// How the distance is represented.

@@ -123,9 +123,10 @@ fn clamped<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
 }
 
 /// Drag coefficient [1/s] per unit kinematic viscosity [m^2/s] of faces at distances `d` from a
-/// surface with unit normals `n`, on a grid of `spacing`; immense where a face is closed.
+/// surface with unit normals `n`, on a grid of `spacing`; immense where a face is closed. It is the quotient of
+/// the two numbers, of which the second is positive.
 #[inline(always)]
-pub fn drag<V: Vector<Number = f64>>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> V {
+pub fn drag<V: Vector<Number = f64>>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
     let here = open_depth(d, eps);
     let twice = here + here;
     let mut excess = V::constant(0.0);
@@ -136,7 +137,7 @@ pub fn drag<V: Vector<Number = f64>>(d: V, n: [V; 3], spacing: [f64; 3], eps: f6
         excess = rise.mul_add(V::constant(1.0 / (h * h)), excess);
     }
     let least = V::constant(1e-12 * eps);
-    excess.larger(V::constant(0.0)).over(here.larger(least))
+    [excess.larger(V::constant(0.0)), here.larger(least)]
 }
 
 #[cfg(test)]
@@ -208,8 +209,8 @@ mod tests {
                     lap += (u(0.5 * e) + u(-0.5 * e) - 2.0 * u(DVec3::ZERO)) / 0.25;
                 }
                 let normal = n.to_array().map(One);
-                let drag = drag(One(d), normal, spacing.to_array(), 0.5).0;
-                let residual = lap - drag * u(DVec3::ZERO);
+                let [excess, depth] = drag(One(d), normal, spacing.to_array(), 0.5);
+                let residual = lap - excess.0 / depth.0 * u(DVec3::ZERO);
                 assert!(residual.abs() < 1e-12, "{d}: {residual:e}");
             }
         }

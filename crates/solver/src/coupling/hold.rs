@@ -60,7 +60,6 @@ pub struct Faces {
     /// Signed distances [m] and unit normals; what follows the last face is of no meaning.
     distance: Vec<f64>,
     normal: [Vec<f64>; 3],
-    strength: Vec<f64>,
 }
 
 impl Faces {
@@ -109,7 +108,6 @@ impl Faces {
             .iter_mut()
             .for_each(|n| n.resize(padded.max(n.len()), 0.0));
         self.distance[count..padded].fill(holding.away());
-        self.strength.resize(padded, 0.0);
         forced.share.resize(padded, 0.0);
         forced.closed.resize(padded, 0.0);
         match holding.scheme {
@@ -120,9 +118,7 @@ impl Faces {
             }),
             Scheme::Paper => {
                 for at in 0..count {
-                    let normal = DVec3::from_array([0, 1, 2].map(|axis| self.normal[axis][at]));
-                    let hold = holding.blend(self.distance[at], normal);
-                    self.strength[at] = hold.strength;
+                    let hold = self.at(at, holding);
                     (forced.share[at], forced.closed[at]) = (hold.share(hold), hold.closed);
                 }
             }
@@ -134,12 +130,10 @@ impl Faces {
         }
         forced.closed_by_all.clear();
     }
-    /// The hold of the grain on a face near its surface, found before for the lists of `forced`.
-    pub fn at(&self, index: usize, forced: &Forced) -> Hold {
-        Hold {
-            strength: self.strength[index],
-            closed: forced.closed[index],
-        }
+    /// The hold of the grain on a face.
+    pub fn at(&self, index: usize, holding: &Holding) -> Hold {
+        let normal = self.normal.each_ref().map(|list| list[index]);
+        holding.of(self.distance[index], DVec3::from_array(normal))
     }
 }
 
@@ -169,12 +163,16 @@ impl Holding {
         4.0 * self.eps
     }
 
-    /// Strength and closed part of faces.
+    /// Strength of the hold on faces, as the quotient of two numbers, and closed part.
     #[inline(always)]
-    fn near<V: Vector<Number = f64>>(&self, d: V, normal: [V; 3]) -> (V, V) {
-        let drag = drag(d, normal, self.spacing.to_array(), self.eps);
+    fn near<V: Vector<Number = f64>>(&self, d: V, normal: [V; 3]) -> ([V; 2], V) {
+        let [drag, depth] = drag(d, normal, self.spacing.to_array(), self.eps);
+        let strength = V::constant(self.diffusion) * drag;
+        // The grain does nothing beyond its faces, which may enclose some where it is concave.
+        let outside = V::constant(2.0 * self.eps);
+        let strength = d.where_below(outside, strength, V::constant(0.0));
         let closed = V::constant(1.0) - aperture(d, self.eps);
-        (V::constant(self.diffusion) * drag, closed)
+        ([strength, depth], closed)
     }
 
     /// The paper's hold: a share of the rigid velocity as large as the solid fraction.
@@ -201,9 +199,9 @@ impl Kernel for OneFace<'_> {
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
         let [x, y, z] = self.normal.to_array();
-        let (strength, closed) = self.holding.near(One(self.d), [One(x), One(y), One(z)]);
+        let ([strength, depth], closed) = self.holding.near(One(self.d), [One(x), One(y), One(z)]);
         *self.hold = Hold {
-            strength: strength.0,
+            strength: strength.0 / depth.0,
             closed: closed.0,
         };
     }
@@ -211,7 +209,7 @@ impl Kernel for OneFace<'_> {
 
 struct Apertures<'a> {
     holding: &'a Holding,
-    faces: &'a mut Faces,
+    faces: &'a Faces,
     forced: &'a mut Forced,
 }
 
@@ -220,18 +218,12 @@ impl Kernel for Apertures<'_> {
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
         let Faces {
-            distance,
-            normal,
-            strength,
-            ..
+            distance, normal, ..
         } = self.faces;
         let Forced { share, closed, .. } = self.forced;
-        let (zero, one) = (V::constant(0.0), V::constant(1.0));
-        let (inside, outside) = (
-            V::constant(-self.holding.eps),
-            V::constant(2.0 * self.holding.eps),
-        );
-        for at in (0..strength.len()).step_by(V::WIDTH) {
+        let one = V::constant(1.0);
+        let inside = V::constant(-self.holding.eps);
+        for at in (0..share.len()).step_by(V::WIDTH) {
             let d = V::load(&distance[at..]);
             // Faces deep inside take all of the grain's motion.
             let shallow = inside.is_below(d);
@@ -240,11 +232,9 @@ impl Kernel for Apertures<'_> {
                 one.store(&mut closed[at..]);
                 continue;
             }
-            let (drag, part) = self.holding.near(d, load_all(normal, at));
-            // The grain does nothing beyond its faces, which may enclose some where it is concave.
-            let drag = d.where_below(outside, drag, zero);
-            drag.store(&mut strength[at..]);
-            let taken = drag.over(one + drag);
+            let ([strength, depth], part) = self.holding.near(d, load_all(normal, at));
+            // strength / (1 + strength), by one division.
+            let taken = strength.over(depth + strength);
             inside.where_below(d, taken, one).store(&mut share[at..]);
             inside.where_below(d, part, one).store(&mut closed[at..]);
         }

@@ -4,7 +4,6 @@
 use std::ops::Range;
 
 use glam::{DMat3, IVec3};
-use rayon::prelude::*;
 
 use super::Scheme;
 use super::forced::Forced;
@@ -12,7 +11,7 @@ use super::hold::Holding;
 use super::measure::{Measure, Scratch};
 use super::near::NearShapes;
 use super::places::{Places, Unknowns};
-use super::rivals::{Rival, rivals};
+use super::rivals::{Neighbours, Rival};
 use crate::dem::Grain;
 use crate::flow::Boundaries;
 use crate::grid::{Layout, Mesh};
@@ -103,6 +102,7 @@ pub struct Locator {
     /// How far from its surface a grain matters [m].
     reach: f64,
     shapes: NearShapes,
+    neighbours: Neighbours,
 }
 
 impl Locator {
@@ -129,6 +129,7 @@ impl Locator {
             eps,
             reach,
             shapes: NearShapes::new(grains, eps, reach),
+            neighbours: Neighbours::default(),
         }
     }
 
@@ -142,32 +143,41 @@ impl Locator {
         self.shapes.bytes()
     }
 
-    /// Finds all grains for a step of length `dt` [s].
-    pub fn locate(&self, grains: &[Grain], dt: f64, bodies: &mut [Body]) {
+    /// Finds which grains may share faces, before [`Locator::locate`].
+    pub fn find_neighbours(&mut self, grains: &[Grain]) {
+        self.neighbours
+            .find(&self.mesh, &self.unknowns, self.reach, grains);
+    }
+
+    /// Finds grain `index` for a step of length `dt` [s].
+    pub fn locate(
+        &self,
+        grains: &[Grain],
+        index: usize,
+        dt: f64,
+        body: &mut Body,
+        scratch: &mut Scratch,
+    ) {
         let holding = Holding {
             scheme: self.scheme,
             eps: self.eps,
             spacing: self.mesh.spacing,
             diffusion: dt * self.kinematic_viscosity,
         };
-        let each = bodies.par_iter_mut().enumerate();
-        each.for_each_init(Scratch::default, |scratch, (index, body)| {
-            let (mesh, unknowns, shapes) = (&self.mesh, &self.unknowns, &self.shapes);
-            let rivals = rivals(mesh, unknowns, shapes, self.reach, grains, index);
-            let grain = &grains[index];
-            self.place(grain, body);
-            dispatch(Measure {
-                mesh,
-                holding: &holding,
-                reach: self.reach,
-                grain,
-                shape: shapes.of(index),
-                rivals: &rivals,
-                body: &mut *body,
-                scratch: &mut *scratch,
-            });
-            self.hold(&rivals, &holding, &mut body.forced, scratch);
+        let (mesh, shapes, grain) = (&self.mesh, &self.shapes, &grains[index]);
+        let rivals = self.neighbours.of(index, mesh, shapes, grains);
+        self.place(grain, body);
+        dispatch(Measure {
+            mesh,
+            holding: &holding,
+            reach: self.reach,
+            grain,
+            shape: shapes.of(index),
+            rivals: &rivals,
+            body: &mut *body,
+            scratch: &mut *scratch,
         });
+        self.hold(&rivals, &holding, &mut body.forced, scratch);
     }
 
     /// The box of cells about a grain.
@@ -211,7 +221,7 @@ impl Locator {
             forced.closed_by_all.extend_from_slice(&forced.closed);
         }
         for &(place, x) in &*shared {
-            let own = faces.at(place, forced);
+            let own = faces.at(place, holding);
             let mut all = own;
             for rival in rivals {
                 let (there, slope) = rival.distance_and_gradient(x, near);

@@ -75,8 +75,7 @@ impl Points {
         shape.measure::<V>(&mut self.faces, distances, count, &mut self.spare);
         for at in (0..count).step_by(V::WIDTH) {
             let [x, y, z] = load_all::<V>(&self.faces, at);
-            let length = (x * x + y * y + z * z).root();
-            let inverse = V::constant(1.0).over(length.larger(V::constant(f64::MIN_POSITIVE)));
+            let inverse = (x * x + y * y + z * z).inverse_root();
             let unit = [x * inverse, y * inverse, z * inverse];
             let mut normal = unit;
             for axis in 0..3 {
@@ -157,8 +156,8 @@ impl Kernel for Measure<'_> {
                     let normals = span.first;
                     span.first += known;
                     let all = *span;
-                    *span = within(distance, all, reach);
-                    let forced = within(distance, *span, 2.0 * eps);
+                    let forced;
+                    [*span, forced] = within::<V>(distance, all, [reach, 2.0 * eps]);
                     let j = j as i32;
                     let up = DVec3::new(0.0, f64::from(j), f64::from(k));
                     let start = corner + mesh.spacing * up;
@@ -252,18 +251,27 @@ impl Contest<'_> {
     }
 }
 
-/// The part of a span from the first to the last face that is no farther than `limit`.
+/// The parts of a span from the first to the last face that is no farther than each limit.
 #[inline(always)]
-fn within(distance: &[f64], mut span: Span, limit: f64) -> Span {
-    let near = |place: usize| distance[place] <= limit;
-    while span.start < span.end && !near(span.first) {
-        span.start += 1;
-        span.first += 1;
+fn within<V: Vector<Number = f64>>(distance: &[f64], all: Span, limits: [f64; 2]) -> [Span; 2] {
+    let count = (all.end - all.start) as usize;
+    let mut parts = [[count, count]; 2];
+    for at in (0..count).step_by(V::WIDTH) {
+        let d = V::load(&distance[all.first + at..]);
+        let here = u32::MAX >> (32 - (count - at).min(V::WIDTH));
+        for (limit, [start, end]) in limits.iter().zip(&mut parts) {
+            let near = here & !V::constant(*limit).mask_below(d);
+            if near != 0 {
+                *start = (*start).min(at + near.trailing_zeros() as usize);
+                *end = at + 32 - near.leading_zeros() as usize;
+            }
+        }
     }
-    while span.start < span.end && !near(span.place(span.end) - 1) {
-        span.end -= 1;
-    }
-    span
+    parts.map(|[start, end]| Span {
+        start: all.start + start as i32,
+        end: all.start + end as i32,
+        first: all.first + start,
+    })
 }
 
 /// What lies about a grain.

@@ -22,6 +22,7 @@ use crate::flow::{Flow, FlowMeasures};
 use crate::math::{Load, Real};
 
 use locate::{Body, Locator};
+use measure::Scratch;
 use newton::Motion;
 use rigidity::Impulse;
 
@@ -81,7 +82,12 @@ impl Coupling {
 
     /// Finds the faces near the grains at their present poses, for a step of length `dt` [s].
     pub fn locate(&mut self, grains: &[Grain], dt: f64) {
-        self.locator.locate(grains, dt, &mut self.bodies);
+        self.locator.find_neighbours(grains);
+        let locator = &self.locator;
+        let each = self.bodies.par_iter_mut().enumerate();
+        each.for_each_init(Scratch::default, |scratch, (index, body)| {
+            locator.locate(grains, index, dt, body, scratch);
+        });
     }
 
     /// Corrects the advection just predicted where grains close part of a link.
@@ -100,8 +106,9 @@ impl Coupling {
         }
     }
 
-    /// Finds what the fluid will take from the grains as they go on from `before` under the `other` loads
-    /// (weight less buoyancy), as equations for their new velocities.
+    /// Finds the faces near the grains at their present poses, and what the fluid will take from the grains as
+    /// they go on from `before` under the `other` loads (weight less buoyancy), as equations for their new
+    /// velocities. One grain after the other, while its lists are near.
     pub fn couple<R: Real>(
         &mut self,
         flow: &Flow<R>,
@@ -110,9 +117,11 @@ impl Coupling {
         other: &[Load],
         dt: f64,
     ) {
-        let (relief, density) = (self.relief(dt), self.fluid_density);
+        self.locator.find_neighbours(grains);
+        let (locator, relief, density) = (&self.locator, self.relief(dt), self.fluid_density);
         let each = self.bodies.par_iter_mut().zip(grains).enumerate();
-        let coupled = each.map(|(index, (body, grain))| {
+        let coupled = each.map_init(Scratch::default, |scratch, (index, (body, grain))| {
+            locator.locate(grains, index, dt, body, scratch);
             let past = &before[index];
             let impulse = rigidity::gather(flow, density, body, past, relief);
             let motion = Motion::new(grain, past, &impulse, density, other[index], dt);

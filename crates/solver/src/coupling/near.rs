@@ -1,19 +1,20 @@
 //! Distances from a grain near it, at a few nanoseconds each wherever the point lies.
 //!
 //! The grid of a sampled shape ends closer to the surface than the flow asks for, and distances off
-//! it are searched for. Here a second, coarser grid about the first holds them.
+//! it are searched for; where the grain is a few cells across it is also finer than the flow can tell, and
+//! what is read from it would not stay near the processor. Here a wider and, if so, coarser grid holds them.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::DVec3;
-use grainwake_shape::{Field, SampledField, Shape};
+use grainwake_shape::{Field, Shape};
 
-use super::samples::{Grids, Spot, load_all, store_all};
+use super::samples::{Grid, Samples, Spot, load_all, store_all};
 use crate::dem::Grain;
 use crate::math::lanes::{MOST, Vector};
 
-/// Samples of the coarse grid in half the band, and across a grain: what counts more.
+/// Samples in half the band, and across a grain, as far as the shape has them: what counts more.
 const SAMPLES: f64 = 3.0;
 const ACROSS: f64 = 12.0;
 
@@ -27,15 +28,8 @@ pub struct NearShapes {
 #[derive(Clone)]
 pub struct NearShape {
     shape: Arc<Shape>,
-    /// None where the shape answers by itself: a sphere, or a grid that reaches as far.
-    about: Option<Arc<About>>,
-}
-
-/// The coarse grid about the grid of a shape.
-pub struct About {
-    pub field: SampledField,
-    /// Levels of the shape's grid, then those of this one: lanes on either grid find theirs in one list.
-    pub levels: Vec<f32>,
+    /// None where the shape answers by itself: a sphere.
+    samples: Option<Arc<Samples>>,
 }
 
 impl NearShapes {
@@ -59,48 +53,30 @@ impl NearShapes {
 
     /// Memory held beside the shapes [bytes].
     pub fn bytes(&self) -> usize {
-        let mut grids: Vec<_> = self
-            .shapes
-            .iter()
-            .filter_map(|n| n.about.as_ref())
-            .collect();
-        grids.sort_by_key(|about| Arc::as_ptr(about));
-        grids.dedup_by_key(|about| Arc::as_ptr(about));
-        let levels = grids
-            .iter()
-            .map(|about| about.field.levels().len() + about.levels.len());
-        size_of::<f32>() * levels.sum::<usize>()
+        let samples = self.shapes.iter().filter_map(|near| near.samples.as_ref());
+        let mut samples: Vec<_> = samples.collect();
+        samples.sort_by_key(|samples| Arc::as_ptr(samples));
+        samples.dedup_by_key(|samples| Arc::as_ptr(samples));
+        samples.iter().map(|samples| samples.bytes()).sum()
     }
-}
-
-/// Does the grid of a field hold this box?
-fn holds(field: &SampledField, lower: DVec3, upper: DVec3) -> bool {
-    field.lower().cmple(lower).all() && field.upper().cmpge(upper).all()
 }
 
 impl NearShape {
     fn new(shape: &Arc<Shape>, eps: f64, reach: f64) -> NearShape {
-        let about = if let Field::Sampled(field) = shape.field()
-            && !holds(field, shape.lower() - reach, shape.upper() + reach)
-        {
-            // No finer than the shape itself, so that large grains cost no more than that.
-            let thickness = (shape.upper() - shape.lower()).min_element();
-            let spacing = (eps / SAMPLES).min(thickness / ACROSS);
-            let spacing = spacing.max(field.spacing());
-            // Coarser where that would be too many samples.
-            let mut coarser = (0..20).map(|doublings| f64::from(1 << doublings) * spacing);
-            let about = coarser.find_map(|spacing| shape.resampled(spacing, reach + spacing).ok());
-            about.map(|about| {
-                let levels = [field.levels(), about.levels()].concat();
-                let field = about;
-                Arc::new(About { field, levels })
-            })
-        } else {
-            None
+        let samples = match shape.field() {
+            Field::Sampled(_) => {
+                let thickness = (shape.upper() - shape.lower()).min_element();
+                let spacing = (eps / SAMPLES).min(thickness / ACROSS);
+                // Coarser where that would be too many samples.
+                let mut coarser = (0..20).map(|n| spacing * f64::from(1 << n));
+                let field = coarser.find_map(|fine| shape.distances(fine, reach + fine).ok());
+                field.map(|field| Arc::new(Samples::new(field)))
+            }
+            _ => None,
         };
         NearShape {
             shape: shape.clone(),
-            about,
+            samples,
         }
     }
 
@@ -109,18 +85,18 @@ impl NearShape {
     #[inline]
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         const FAR: (f64, DVec3) = (f64::INFINITY, DVec3::ZERO);
-        let Field::Sampled(field) = self.shape.field() else {
+        let Some(samples) = &self.samples else {
             return self.shape.distance_and_gradient(x);
         };
-        let found = field.distance_and_gradient_on_grid(x);
-        // Without a second grid the first reaches as far as is asked for.
-        let about = || self.about.as_ref()?.field.distance_and_gradient_on_grid(x);
-        found.or_else(about).unwrap_or(FAR)
+        samples
+            .field
+            .distance_and_gradient_on_grid(x)
+            .unwrap_or(FAR)
     }
 
     /// The same at the first `count` points of lists of coordinates, bit for bit; what is infinite there
     /// may be merely farther than anything here. The gradients come in the place of the points. More entries
-    /// must follow, which are overwritten.
+    /// must follow, off are overwritten.
     #[inline(always)]
     pub fn measure<V: Vector<Number = f64>>(
         &self,
@@ -129,7 +105,7 @@ impl NearShape {
         count: usize,
         spare: &mut Spare,
     ) {
-        let Field::Sampled(field) = self.shape.field() else {
+        let Some(samples) = &self.samples else {
             for at in (0..count).step_by(V::WIDTH) {
                 let x = load_all::<V>(points, at);
                 let (distance, slope) = match self.shape.field() {
@@ -143,21 +119,21 @@ impl NearShape {
         };
         // Samples are far apart in memory. Little but their loads is in the second loop, so that the
         // processor has those of several vectors under way at once.
-        let grids = Grids::of(field, self.about.as_deref());
-        let Spare { cell, which } = spare;
-        for list in [&mut *cell, &mut *which] {
+        let grid = Grid::of(samples);
+        let Spare { cell, off } = spare;
+        for list in [&mut *cell, &mut *off] {
             list.resize(list.len().max(count + MOST), 0.0);
         }
         for at in (0..count).step_by(V::WIDTH) {
-            let spot = grids.find(load_all::<V>(points, at));
+            let spot = grid.find(load_all::<V>(points, at));
             spot.cell.store(&mut cell[at..]);
-            spot.which.store(&mut which[at..]);
+            spot.off.store(&mut off[at..]);
             store_all(spot.fraction, points, at);
         }
         for at in (0..count).step_by(V::WIDTH) {
-            let (distance, slope) = grids.read(Spot {
+            let (distance, slope) = grid.read(Spot {
                 cell: V::load(&cell[at..]),
-                which: V::load(&which[at..]),
+                off: V::load(&off[at..]),
                 fraction: load_all::<V>(points, at),
             });
             distance.store(&mut distances[at..]);
@@ -189,7 +165,7 @@ impl NearShape {
 #[derive(Default)]
 pub struct Spare {
     cell: Vec<f64>,
-    which: Vec<f64>,
+    off: Vec<f64>,
 }
 
 /// Farther than anything [m].
@@ -215,16 +191,21 @@ mod tests {
     }
 
     #[test]
-    fn distances_about_a_shape_go_on_where_its_grid_ends() {
+    fn distances_about_a_shape_are_those_of_the_shape_and_go_on_where_its_grid_ends() {
         let shape = ellipsoid();
         let Field::Sampled(field) = shape.field() else {
             unreachable!("ellipsoids are sampled")
         };
-        // 8 and 3 cells of the flow across.
-        for (eps, tolerance) in [(0.25, 0.01), (0.67, 0.03)] {
+        // 25, 8 and 3 cells of the flow across. Errors as parts of the half-axis: the most and their mean
+        // near the surface, and the most beyond.
+        for (eps, most, mean, about) in [
+            (0.08, 0.0, 0.0, 0.0005),
+            (0.25, 0.0015, 0.00003, 0.003),
+            (0.67, 0.01, 0.0001, 0.02),
+        ] {
             let reach = 2.5 * eps;
             let near = NearShape::new(&shape, eps, reach);
-            let mut beyond = 0;
+            let (mut beyond, mut errors) = (0, Vec::new());
             for i in 0..20_000 {
                 let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
                 let x = (1.1 + reach) * (2.0 * u.fract() - DVec3::ONE);
@@ -232,16 +213,27 @@ mod tests {
                 let (distance, slope) = near.distance_and_gradient(x);
                 if exact > reach {
                     assert!(distance > 0.97 * reach, "at {x}");
-                } else if field.distance_and_gradient_on_grid(x).is_some() {
-                    assert_eq!(distance, exact, "at {x}");
+                    continue;
+                }
+                let error = distance - exact;
+                if field.distance_and_gradient_on_grid(x).is_some() {
+                    if exact.abs() < 0.1 {
+                        errors.push(error);
+                        assert!(error.abs() <= most, "{error} at {x}, eps {eps}");
+                    }
                 } else {
                     beyond += 1;
-                    let off = (distance - exact).abs() / eps;
-                    assert!(off < tolerance, "{off} of the band at {x}");
+                    assert!(error.abs() < about, "{error} at {x}, eps {eps}");
                     assert!(slope.normalize().dot(gradient) > 0.99, "at {x}");
                 }
             }
-            assert!(beyond > 1000, "{beyond}");
+            let found = errors.iter().sum::<f64>() / errors.len() as f64;
+            println!(
+                "{eps}: mean {found}, beyond {beyond}, near {}",
+                errors.len()
+            );
+            assert!(found.abs() <= mean, "{found} at {eps}");
+            assert!(errors.len() > 200, "{}", errors.len());
         }
     }
 
@@ -293,16 +285,5 @@ mod tests {
             Alike(&near).run::<<f64 as Registers>::Common>();
             Alike(&near).run::<One<f64>>();
         }
-    }
-
-    #[test]
-    fn a_grid_that_reaches_far_enough_is_not_doubled() {
-        let near = |eps| NearShape::new(&ellipsoid(), eps, 2.5 * eps);
-        assert!(near(0.25).about.is_some());
-        let near = near(0.05);
-        assert!(near.about.is_none());
-        let distance = |z: f64| near.distance_and_gradient(DVec3::new(0.0, 0.0, z)).0;
-        assert!(distance(5.0) > 0.125);
-        assert!((distance(0.8) - 0.1).abs() < 1e-3);
     }
 }

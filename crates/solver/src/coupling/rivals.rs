@@ -1,10 +1,10 @@
 //! Grains that may hold the same faces: others nearby, and periodic images.
 
-use glam::{DVec3, IVec3};
+use glam::DVec3;
 
 use super::near::{NearShape, NearShapes};
 use super::places::Unknowns;
-use crate::dem::Grain;
+use crate::dem::{Ball, BroadPhase, Enclosure, Grain, Partner};
 use crate::grid::Mesh;
 
 /// Distances that differ by less than this part of the band are equal: of two copies of a link
@@ -39,58 +39,79 @@ impl Rival<'_> {
     }
 }
 
-/// Grains, and periodic images of them and of the grain itself, whose band may meet that of
-/// grain `index`; faces matter up to `reach` [m] from a surface.
-pub fn rivals<'a>(
-    mesh: &Mesh,
-    unknowns: &Unknowns,
-    shapes: &'a NearShapes,
-    reach: f64,
-    grains: &'a [Grain],
-    index: usize,
-) -> Vec<Rival<'a>> {
-    let (grain, extent) = (&grains[index], mesh.extent());
-    let mut rivals = Vec::new();
-    for (other, rival) in grains.iter().enumerate() {
-        let radii = grain.shape.bounding_radius() + rival.shape.bounding_radius();
-        let limit = radii + 2.0 * reach;
-        let apart = grain.pose.position - rival.pose.position;
-        if (0..3).any(|axis| apart[axis].abs() > limit && !unknowns.is_periodic(axis)) {
-            continue;
-        }
-        // Images along each axis that may be near enough: first, last.
-        let range = |axis: usize| match unknowns.is_periodic(axis) {
-            true if mesh.cells[axis] > 1 => (
-                ((apart[axis] - limit) / extent[axis]).ceil() as i32,
-                ((apart[axis] + limit) / extent[axis]).floor() as i32,
-            ),
-            _ => (0, 0),
+/// Which grains, and periodic images of them and of the grain itself, each grain may have to share faces with.
+#[derive(Default)]
+pub struct Neighbours {
+    search: BroadPhase,
+    balls: Vec<Ball>,
+    /// In the order of the grains.
+    found: Vec<Neighbour>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Neighbour {
+    grain: usize,
+    other: usize,
+    /// How many periods the other one stands from its own position, along z first.
+    image: [i32; 3],
+}
+
+impl Neighbours {
+    /// Finds those whose bands may meet; faces matter up to `reach` [m] from a surface.
+    pub fn find(&mut self, mesh: &Mesh, unknowns: &Unknowns, reach: f64, grains: &[Grain]) {
+        let enclosure = Enclosure {
+            lower: mesh.origin,
+            upper: mesh.origin + mesh.extent(),
+            periodic: [0, 1, 2].map(|axis| unknowns.is_periodic(axis) && mesh.cells[axis] > 1),
+            solid: [[false; 2]; 3],
         };
-        let [(ax, bx), (ay, by), (az, bz)] = [range(0), range(1), range(2)];
-        for z in az..=bz {
-            for y in ay..=by {
-                for x in ax..=bx {
-                    let image = IVec3::new(x, y, z);
-                    let shift = image.as_dvec3() * extent;
-                    let own = other == index;
-                    if own && image == IVec3::ZERO
-                        || (apart - shift).length_squared() > limit * limit
-                    {
-                        continue;
-                    }
-                    rivals.push(Rival {
-                        grain: rival,
-                        shape: shapes.of(other),
-                        shift,
-                        handicap: match own {
-                            true if image.to_array() > [0; 3] => -TIE,
-                            false if other < index => -TIE,
-                            _ => TIE,
-                        },
-                    });
-                }
+        self.balls.clear();
+        self.balls.extend(grains.iter().map(|grain| Ball {
+            center: grain.pose.position,
+            radius: grain.shape.bounding_radius() + reach,
+        }));
+        self.search.search(&self.balls, &enclosure);
+        self.found.clear();
+        for pair in &self.search.pairs {
+            let Partner::Grain(other) = pair.partner else {
+                continue;
+            };
+            let (grain, [x, y, z]) = (pair.grain as usize, pair.image.to_array());
+            for (grain, other, sign) in [(grain, other, 1), (other, grain, -1)] {
+                let image = [z, y, x].map(|periods| sign * periods);
+                self.found.push(Neighbour {
+                    grain,
+                    other,
+                    image,
+                });
             }
         }
+        self.found.sort_unstable();
     }
-    rivals
+
+    /// Those of grain `index`.
+    pub fn of<'a>(
+        &self,
+        index: usize,
+        mesh: &Mesh,
+        shapes: &'a NearShapes,
+        grains: &'a [Grain],
+    ) -> Vec<Rival<'a>> {
+        let first = self.found.partition_point(|one| one.grain < index);
+        let own = self.found[first..].iter();
+        let rivals = own.take_while(|one| one.grain == index).map(|one| {
+            let [z, y, x] = one.image;
+            Rival {
+                grain: &grains[one.other],
+                shape: shapes.of(one.other),
+                shift: DVec3::new(f64::from(x), f64::from(y), f64::from(z)) * mesh.extent(),
+                handicap: match one.other == index {
+                    true if [x, y, z] > [0; 3] => -TIE,
+                    false if one.other < index => -TIE,
+                    _ => TIE,
+                },
+            }
+        });
+        rivals.collect()
+    }
 }

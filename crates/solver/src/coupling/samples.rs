@@ -3,8 +3,42 @@
 
 use grainwake_shape::SampledField;
 
-use super::near::{About, FAR};
+use super::near::FAR;
 use crate::math::lanes::Vector;
+
+/// Distances about a shape, as far as the flow asks for them.
+pub struct Samples {
+    pub field: SampledField,
+    /// Its levels; each is followed by the one above it along y, so that the four of a side of a
+    /// cell are neighbours and half as many cache lines are touched.
+    levels: Vec<f32>,
+}
+
+impl Samples {
+    pub fn new(field: SampledField) -> Samples {
+        let levels = paired(&field);
+        Samples { field, levels }
+    }
+
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        size_of::<f32>() * (self.field.levels().len() + self.levels.len())
+    }
+}
+
+/// The levels of a field, each followed by the one above it along y.
+fn paired(field: &SampledField) -> Vec<f32> {
+    let [nx, ny, _] = field.dims();
+    let planes = field.levels().chunks(nx * ny);
+    let paired = planes.flat_map(|plane| {
+        let above = plane[nx..].iter().chain(&plane[(ny - 1) * nx..]);
+        plane
+            .iter()
+            .zip(above)
+            .flat_map(|(here, above)| [*here, *above])
+    });
+    paired.collect()
+}
 
 /// A vector from each list. (No closure in a kernel touches vectors: it would not be inlined.)
 #[inline(always)]
@@ -24,66 +58,18 @@ pub fn store_all<V: Vector<Number = f64>>(
     values[2].store(&mut z[at..]);
 }
 
-/// The grid of a field.
-struct Grid<V> {
+/// The grid of samples.
+pub struct Grid<'a, V> {
     lower: [V; 3],
     inverse: V,
     /// Number of the last sample along each axis.
     last: [V; 3],
-    /// From one row and one plane of samples to the next.
+    /// From one row and one plane of samples to the next in the list of levels.
     strides: [V; 2],
-    /// Place of the first sample in the list of levels.
-    first: V,
     /// What a level is [m], and that over the spacing.
     quantum: V,
     slope: V,
-}
-
-impl<V: Vector<Number = f64>> Grid<V> {
-    #[inline(always)]
-    fn of(field: &SampledField, first: usize) -> Grid<V> {
-        let (dims, inverse) = (field.dims(), 1.0 / field.spacing());
-        let mut lower = [V::constant(0.0); 3];
-        let mut last = lower;
-        for axis in 0..3 {
-            lower[axis] = V::constant(field.lower()[axis]);
-            last[axis] = V::constant(dims[axis] as f64 - 1.0);
-        }
-        let (row, plane) = (dims[0] as f64, (dims[0] * dims[1]) as f64);
-        Grid {
-            lower,
-            inverse: V::constant(inverse),
-            last,
-            strides: [V::constant(row), V::constant(plane)],
-            first: V::constant(first as f64),
-            quantum: V::constant(field.quantum()),
-            slope: V::constant(field.quantum() * inverse),
-        }
-    }
-
-    /// Where points are on it, those off it at the nearest point on it; and 1 for those, else 0.
-    #[inline(always)]
-    fn find(&self, x: [V; 3]) -> (Spot<V>, V) {
-        let (zero, one) = (V::constant(0.0), V::constant(1.0));
-        let mut cell = [zero; 3];
-        let mut fraction = [zero; 3];
-        let mut outside = zero;
-        for axis in 0..3 {
-            let s = (x[axis] - self.lower[axis]) * self.inverse;
-            let place = s.larger(zero).smaller(self.last[axis]);
-            outside = outside + (s - place).magnitude();
-            cell[axis] = place.floor().smaller(self.last[axis] - one);
-            fraction[axis] = place - cell[axis];
-        }
-        let [row, plane] = self.strides;
-        let spot = Spot {
-            cell: self.first + cell[0] + row * cell[1] + plane * cell[2],
-            which: zero,
-            fraction,
-        };
-        // Whatever is off the grid is so by more than a rounding.
-        (spot, zero.is_below(outside))
-    }
+    levels: &'a [f32],
 }
 
 /// Where points are among the samples.
@@ -92,90 +78,81 @@ pub struct Spot<V> {
     pub cell: V,
     /// Of the cell, along each axis.
     pub fraction: [V; 3],
-    /// On the grid of the shape 0, on the one about it 1, off both 2.
-    pub which: V,
+    /// How far off the grid, in spacings.
+    pub off: V,
 }
 
-/// The grid of a shape and the one about it.
-pub struct Grids<'a, V> {
-    own: Grid<V>,
-    about: Option<Grid<V>>,
-    levels: &'a [f32],
-}
-
-impl<'a, V: Vector<Number = f64>> Grids<'a, V> {
+impl<'a, V: Vector<Number = f64>> Grid<'a, V> {
     #[inline(always)]
-    pub fn of(field: &'a SampledField, about: Option<&'a About>) -> Grids<'a, V> {
-        Grids {
-            own: Grid::of(field, 0),
-            about: about.map(|about| Grid::of(&about.field, field.levels().len())),
-            levels: about.map_or(field.levels(), |about| &about.levels),
+    pub fn of(samples: &'a Samples) -> Grid<'a, V> {
+        let field = &samples.field;
+        let (dims, inverse) = (field.dims(), 1.0 / field.spacing());
+        let mut lower = [V::constant(0.0); 3];
+        let mut last = lower;
+        for axis in 0..3 {
+            lower[axis] = V::constant(field.lower()[axis]);
+            last[axis] = V::constant(dims[axis] as f64 - 1.0);
+        }
+        let (row, plane) = (2 * dims[0], 2 * dims[0] * dims[1]);
+        Grid {
+            lower,
+            inverse: V::constant(inverse),
+            last,
+            strides: [V::constant(row as f64), V::constant(plane as f64)],
+            quantum: V::constant(field.quantum()),
+            slope: V::constant(field.quantum() * inverse),
+            levels: &samples.levels,
         }
     }
 
+    /// Where points are; those off the grid, at the nearest point on it.
     #[inline(always)]
-    /// Where points are; those off both grids, at the nearest point on the outer one.
     pub fn find(&self, x: [V; 3]) -> Spot<V> {
-        let (mut spot, off) = self.own.find(x);
-        if off.is_zero() {
-            return spot;
-        }
-        let Some(about) = &self.about else {
-            spot.which = off + off;
-            return spot;
-        };
-        let half = V::constant(0.5);
-        let (other, off_both) = about.find(x);
-        spot.cell = off.where_below(half, spot.cell, other.cell);
+        let (zero, one) = (V::constant(0.0), V::constant(1.0));
+        let mut cell = [zero; 3];
+        let mut fraction = [zero; 3];
+        let mut off = zero;
         for axis in 0..3 {
-            let fraction = &mut spot.fraction[axis];
-            *fraction = off.where_below(half, *fraction, other.fraction[axis]);
+            let s = (x[axis] - self.lower[axis]) * self.inverse;
+            let place = s.larger(zero).smaller(self.last[axis]);
+            off = off + (s - place).magnitude();
+            cell[axis] = place.floor().smaller(self.last[axis] - one);
+            fraction[axis] = place - cell[axis];
         }
-        spot.which = off + off * off_both;
-        spot
+        let [row, plane] = self.strides;
+        Spot {
+            cell: (cell[0] + cell[0]) + row * cell[1] + plane * cell[2],
+            fraction,
+            off,
+        }
     }
 
     /// Distance and gradient.
     #[inline(always)]
     pub fn read(&self, spot: Spot<V>) -> (V, [V; 3]) {
         let [fx, fy, fz] = spot.fraction;
-        let Grid {
-            strides: [mut row, mut plane],
-            mut quantum,
-            slope: mut unit,
-            ..
-        } = self.own;
-        if let Some(about) = &self.about
-            && !spot.which.is_zero()
-        {
-            let (which, half) = (spot.which, V::constant(0.5));
-            row = which.where_below(half, row, about.strides[0]);
-            plane = which.where_below(half, plane, about.strides[1]);
-            quantum = which.where_below(half, quantum, about.quantum);
-            unit = which.where_below(half, unit, about.slope);
-        }
+        let [_, plane] = self.strides;
         // Value and slope on the four edges along x.
-        let (at, levels) = (spot.cell, self.levels);
-        let (a, s) = edge(levels, at, fx);
-        let (b, t) = edge(levels, at + row, fx);
-        let (c, u) = edge(levels, at + plane, fx);
-        let (d, v) = edge(levels, at + plane + row, fx);
+        let [[a, s], [b, t]] = edges(self.levels, spot.cell, fx);
+        let [[c, u], [d, v]] = edges(self.levels, spot.cell + plane, fx);
         let (low, high) = (a + fy * (b - a), c + fy * (d - c));
         let (slope_low, slope_high) = (s + fy * (t - s), u + fy * (v - u));
         let gradient = [
-            unit * (slope_low + fz * (slope_high - slope_low)),
-            unit * ((b - a) + fz * ((d - c) - (b - a))),
-            unit * (high - low),
+            self.slope * (slope_low + fz * (slope_high - slope_low)),
+            self.slope * ((b - a) + fz * ((d - c) - (b - a))),
+            self.slope * (high - low),
         ];
-        let far = V::constant(1.5).is_below(spot.which) * V::constant(FAR);
-        (quantum * (low + fz * (high - low)) + far, gradient)
+        // Whatever is off the grid is so by more than a rounding.
+        let far = V::constant(0.0).is_below(spot.off) * V::constant(FAR);
+        (self.quantum * (low + fz * (high - low)) + far, gradient)
     }
 }
 
-/// Value between the samples at `at` and the next along x, and the slope from one to the other.
+/// Values between the samples at `at` and the next along x, and the slopes from these to those, on two edges
+/// of a cell.
 #[inline(always)]
-fn edge<V: Vector<Number = f64>>(levels: &[f32], at: V, x: V) -> (V, V) {
-    let [low, high] = V::pairs(levels, at);
-    let slope = high - low;
-    (low + x * slope, slope)
+fn edges<V: Vector<Number = f64>>(levels: &[f32], at: V, x: V) -> [[V; 2]; 2] {
+    let [first, second, after_first, after_second] = V::fours(levels, at);
+    let (s, t) = (after_first - first, after_second - second);
+    [[first + x * s, s], [second + x * t, t]]
 }

@@ -12,7 +12,7 @@ const MOST_PERIODS: i32 = 4;
 
 /// A bounding sphere, grown by what the grain may move.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ball {
+pub(crate) struct Ball {
     /// Centre [m].
     pub center: DVec3,
     /// Radius with margin [m].
@@ -29,7 +29,7 @@ struct Point {
 
 /// Buffers of the search, kept from one to the next.
 #[derive(Clone, Debug, Default)]
-pub(super) struct BroadPhase {
+pub(crate) struct BroadPhase {
     points: Vec<Point>,
     /// Index into `points` of each grain itself, inside the box along periodic axes.
     homes: Vec<Option<u32>>,

@@ -8,7 +8,7 @@ use crate::math::Load;
 
 /// A pair: ordered by grain, then partner (grains before walls), then image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct PairKey {
+pub(crate) struct PairKey {
     /// First grain.
     pub grain: u32,
     /// What it may touch.

@@ -28,6 +28,7 @@ use glam::DVec3;
 use crate::math::Load;
 
 pub use again::State;
+pub(crate) use broad_phase::{Ball, BroadPhase};
 pub use dynamics::Dynamics;
 pub use enclosure::Enclosure;
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};

@@ -72,7 +72,6 @@ impl Simulation {
                     dynamics.advance(grains, &work.driving, dt, &mut work.contact)
                 });
                 prescription.drive(grains, end);
-                timed(&mut passes.coupling, || fluid.locate(grains, dt));
                 if setup.scheme == Scheme::Paper {
                     timed(&mut passes.project, || fluid.project_prediction(dt));
                 }

@@ -21,6 +21,8 @@ use crate::math::lanes::{MOST, Stencil, Vector};
 #[derive(Default)]
 pub struct Planes {
     line: usize,
+    /// Which rows of each plane have faces near.
+    rows: Vec<Range<i32>>,
     /// Signed distances [m] in this plane and the next, infinite where no link may end.
     distance: [Vec<f64>; 2],
     /// What the links along x bring, and what leaves along y, and along z from this plane and the one
@@ -31,9 +33,9 @@ pub struct Planes {
 }
 
 impl Planes {
-    /// Makes room for a box, before the first plane.
-    fn begin(&mut self, body: &Body) {
-        self.line = body.size.x as usize + MOST;
+    /// Makes room for a box, before the first plane; registers of `width` reach beyond its rows.
+    fn begin(&mut self, body: &Body, width: usize) {
+        self.line = body.size.x as usize + width;
         let count = self.line * (body.size.y as usize + 2) + MOST;
         let [here, next] = &mut self.distance;
         let [z, before] = &mut self.z;
@@ -43,6 +45,21 @@ impl Planes {
         // Nothing comes from before the first plane, and along x where there are no links.
         before.fill(0.0);
         self.x.fill(0.0);
+    }
+    /// Part of a list in which plane `k` and those beside it have links.
+    fn about(&self, k: i32) -> Range<usize> {
+        let from = (k - 1).max(0) as usize;
+        let to = (k + 2).min(self.rows.len() as i32) as usize;
+        let (mut first, mut last) = (i32::MAX, i32::MIN);
+        for rows in self.rows[from..to].iter().filter(|rows| !rows.is_empty()) {
+            (first, last) = (first.min(rows.start), last.max(rows.end));
+        }
+        if first > last {
+            return 0..0;
+        }
+        // One more row on each side, and one register.
+        let line = self.line;
+        first as usize * line..((last + 2) as usize * line).min(self.y.len())
     }
     fn place(&self, i: i32, j: i32) -> usize {
         i as usize + (j + 1) as usize * self.line
@@ -60,6 +77,10 @@ pub struct Lines<'a, R> {
     /// Whether all faces about the box are, so that all links have six in line.
     inner: bool,
     axes: [Axis; 3],
+    /// Of the links along each axis U of the component and U along the link, two by two (the last two entries are
+    /// of no meaning): in the middle of link (0, 0, 0), and the change from a link to the next along each axis
+    /// [m/s].
+    rigid: [[f64; 8]; 4],
 }
 
 /// The links along one axis.
@@ -74,9 +95,6 @@ struct Axis {
     alone: Stencil<6>,
     /// 1/h along the link [1/m].
     inverse: f64,
-    /// U, of the component and along the link, in the middle of link (0, 0, 0), and its change from a link
-    /// to the next along each axis [m/s].
-    rigid: [[f64; 4]; 2],
 }
 
 /// A row of unknowns near the grain.
@@ -108,13 +126,18 @@ impl<'a, R: Real> Lines<'a, R> {
         velocity: &'a View<'a, R>,
         component: usize,
     ) -> Lines<'a, R> {
-        let axes = [0, 1, 2].map(|along| {
+        let mut rigid = [[0.0; 8]; 4];
+        for along in 0..3 {
             let middle = DVec3::from_array(FACE_OFFSET[component]) - 1.0;
             let middle = body.first.as_dvec3() + middle + 0.5 * DVec3::AXES[along];
             let first = grain.velocity_at(mesh.origin + mesh.spacing * middle);
-            let spin = grain.angular_velocity;
-            let change = DVec3::AXES.map(|axis| spin.cross(axis * mesh.spacing));
-            let rigid = |of: usize| [first[of], change[0][of], change[1][of], change[2][of]];
+            let change = DVec3::AXES.map(|axis| grain.angular_velocity.cross(axis * mesh.spacing));
+            for (of, place) in [component, along].into_iter().zip(2 * along..) {
+                rigid[0][place] = first[of];
+                (0..3).for_each(|axis| rigid[1 + axis][place] = change[axis][of]);
+            }
+        }
+        let axes = [0, 1, 2].map(|along| {
             let [next, across] = [along, component].map(|axis| velocity.strides[axis] as isize);
             Axis {
                 exists: mesh.cells[along] > 1,
@@ -125,7 +148,6 @@ impl<'a, R: Real> Lines<'a, R> {
                 },
                 alone: Stencil::new([0, next, 0, next, 0, next]),
                 inverse: 1.0 / mesh.spacing[along],
-                rigid: [rigid(component), rigid(along)],
             }
         });
         let unknowns = [0, 1, 2].map(|axis| body.places.unknowns(component, axis));
@@ -139,6 +161,7 @@ impl<'a, R: Real> Lines<'a, R> {
             unknowns,
             inner,
             axes,
+            rigid,
         }
     }
 
@@ -146,20 +169,31 @@ impl<'a, R: Real> Lines<'a, R> {
     #[inline(always)]
     pub fn push<V: Vector<Number = f64>>(&self, planes: &mut Planes, to: &mut [f64]) {
         let size = self.body.size;
-        planes.begin(self.body);
+        planes.begin(self.body, V::WIDTH);
+        let rows = |k| {
+            let near = |j: &i32| self.row(*j, k).is_some();
+            let first = (0..size.y).find(near);
+            let last = (0..size.y).rev().find(near);
+            first
+                .zip(last)
+                .map_or(0..0, |(first, last)| first..last + 1)
+        };
+        planes.rows.clear();
+        planes.rows.extend((0..size.z).map(rows));
         self.unfold::<V>(0, planes);
         for k in 0..size.z {
             self.unfold::<V>(k + 1, planes);
-            planes.y.fill(0.0);
-            planes.z[(k % 2) as usize].fill(0.0);
-            for row in (0..size.y).filter_map(|j| self.row(j, k)) {
+            let (near, rows) = (planes.rows[k as usize].clone(), planes.about(k));
+            planes.y[rows.clone()].fill(0.0);
+            planes.z[(k % 2) as usize][rows].fill(0.0);
+            for row in near.clone().filter_map(|j| self.row(j, k)) {
                 if self.inner {
                     self.send::<V, true>(row, planes);
                 } else {
                     self.send::<V, false>(row, planes);
                 }
             }
-            for row in (0..size.y).filter_map(|j| self.row(j, k)) {
+            for row in near.clone().filter_map(|j| self.row(j, k)) {
                 self.receive::<V>(row, planes, to);
             }
         }
@@ -188,7 +222,8 @@ impl<'a, R: Real> Lines<'a, R> {
     #[inline(always)]
     fn unfold<V: Vector<Number = f64>>(&self, k: i32, planes: &mut Planes) {
         let which = (k % 2) as usize;
-        planes.distance[which].fill(f64::INFINITY);
+        let rows = planes.about(k);
+        planes.distance[which][rows].fill(f64::INFINITY);
         if k >= self.body.size.z {
             return;
         }
@@ -223,12 +258,10 @@ impl<'a, R: Real> Lines<'a, R> {
             [self.six(0, row), self.six(1, row), self.six(2, row)]
         };
         let [x, y, z] = [row.start, row.j, row.k].map(f64::from);
-        let mut rigid = [[0.0; 2]; 3];
-        for along in 0..3 {
-            for of in 0..2 {
-                let [first, by_x, by_y, by_z] = self.axes[along].rigid[of];
-                rigid[along][of] = first + x * by_x + y * by_y + z * by_z;
-            }
+        let [first, by_x, by_y, by_z] = &self.rigid;
+        let mut rigid = [0.0; 8];
+        for n in 0..8 {
+            rigid[n] = first[n] + x * by_x[n] + y * by_y[n] + z * by_z[n];
         }
         let (half, mut before) = (V::constant(0.5), V::constant(0.0));
         for n in (0..(row.end - row.start) as usize).step_by(V::WIDTH) {
@@ -237,18 +270,18 @@ impl<'a, R: Real> Lines<'a, R> {
             let here = V::load(&planes.distance[this][place..]);
             if self.axes[0].exists {
                 let d = half * (here + V::load(&planes.distance[this][place + 1..]));
-                let flux = self.flux::<V, INNER>(0, six[0], rigid[0], at, count, d);
+                let flux = self.flux::<V, INNER>(0, six[0], &rigid, at, count, d);
                 (flux.behind(before) - flux).store(&mut planes.x[place..]);
                 before = flux;
             }
             if self.axes[1].exists {
                 let d = half * (here + V::load(&planes.distance[this][place + planes.line..]));
-                let flux = self.flux::<V, INNER>(1, six[1], rigid[1], at, count, d);
+                let flux = self.flux::<V, INNER>(1, six[1], &rigid, at, count, d);
                 flux.store(&mut planes.y[place..]);
             }
             if self.axes[2].exists {
                 let d = half * (here + V::load(&planes.distance[other][place..]));
-                let flux = self.flux::<V, INNER>(2, six[2], rigid[2], at, count, d);
+                let flux = self.flux::<V, INNER>(2, six[2], &rigid, at, count, d);
                 flux.store(&mut planes.z[this][place..]);
             }
         }
@@ -298,7 +331,7 @@ impl<'a, R: Real> Lines<'a, R> {
         &self,
         along: usize,
         six: Six,
-        rigid: [f64; 2],
+        rigid: &[f64; 8],
         at: usize,
         count: V,
         d: V,
@@ -311,9 +344,10 @@ impl<'a, R: Real> Lines<'a, R> {
         let both = from + to;
         let (mean, carrier) = (half * both, half * (first + second));
         // From the first link of the row on U changes evenly.
-        let by = [axis.rigid[0][1], axis.rigid[1][1]];
-        let mean = mean - count.mul_add(V::constant(by[0]), V::constant(rigid[0]));
-        let relative = carrier - count.mul_add(V::constant(by[1]), V::constant(rigid[1]));
+        let by = &self.rigid[1];
+        let [own, along] = [2 * along, 2 * along + 1];
+        let mean = mean - count.mul_add(V::constant(by[own]), V::constant(rigid[own]));
+        let relative = carrier - count.mul_add(V::constant(by[along]), V::constant(rigid[along]));
         let outer = V::constant(-8.0).mul_add(below + above, far_below + far_above);
         let sixth = both.mul_add(V::constant(7.0), outer);
         let mut share = carrier * V::constant(1.0 / 60.0);

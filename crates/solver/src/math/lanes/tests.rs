@@ -45,6 +45,7 @@ fn check<V: Vector>() {
     ]) {
         v.store(found);
     }
+    assert_eq!(x.mask_below(y).checked_shr(V::WIDTH as u32).unwrap_or(0), 0);
     let (mut sums, mut tops) = ([1.0; MOST], [0.25; MOST]);
     x.add_to(&mut sums);
     x.raise(&mut tops);
@@ -70,25 +71,31 @@ fn check<V: Vector>() {
             assert_eq!(found[i].wide().to_bits(), expected.to_bits());
         }
         assert_eq!([sums[i], tops[i]], [1.0 + a, a.max(0.25)]);
+        assert_eq!(x.mask_below(y) >> i & 1 == 1, a < b);
     }
     let signed: [V::Number; MOST] = std::array::from_fn(|i| number(1.7 * i as f64 - 5.0));
     let (mut floors, mut roots) = ([V::Number::default(); MOST], [V::Number::default(); MOST]);
     V::load(&signed).floor().store(&mut floors);
     V::load(&signed).magnitude().root().store(&mut roots);
-    let table: Vec<f32> = (0..40).map(|n| (n * n) as f32).collect();
+    let table: Vec<f32> = (0..42).map(|n| (n * n) as f32).collect();
     let places: [V::Number; MOST] = std::array::from_fn(|i| number((7 * i % 39) as f64));
-    let mut pairs = [[V::Number::default(); MOST]; 2];
-    let [low, high] = V::pairs(&table, V::load(&places));
-    low.store(&mut pairs[0]);
-    high.store(&mut pairs[1]);
+    let mut fours = [[V::Number::default(); MOST]; 4];
+    for (lanes, found) in fours.iter_mut().zip(V::fours(&table, V::load(&places))) {
+        found.store(lanes);
+    }
+    let mut inverses = [V::Number::default(); MOST];
+    (x * x).inverse_root().store(&mut inverses);
     for i in 0..V::WIDTH {
         assert_eq!(floors[i].wide(), signed[i].wide().floor());
         assert_eq!(roots[i], number(signed[i].wide().abs().sqrt()));
         let at = 7 * i % 39;
         assert_eq!(
-            pairs.map(|p| p[i].wide()),
-            [at, at + 1].map(|n| (n * n) as f64)
+            fours.map(|p| p[i].wide()),
+            [at, at + 1, at + 2, at + 3].map(|n| (n * n) as f64)
         );
+        let square = a[i].wide() * a[i].wide();
+        let within = if V::Number::BYTES == 4 { 1e-6 } else { 2e-10 };
+        assert!((square * inverses[i].wide().powi(2) - 1.0).abs() < within);
     }
     let mut behind = [V::Number::default(); MOST];
     x.behind(y).store(&mut behind);

@@ -8,8 +8,8 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
 
-use super::Vector;
 use super::x86_transpose as turn;
+use super::{INVERSE_ROOT_OF_ONE, Vector};
 
 /// A vector of one register, or of two side by side.
 macro_rules! vector {
@@ -154,6 +154,14 @@ vector! {
         }
     }
     #[inline(always)]
+    fn mask_below(self, limit: Self) -> u32 {
+        // SAFETY: see the head of this file.
+        unsafe {
+            let below = _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, limit.0);
+            _mm256_movemask_pd(below) as u32
+        }
+    }
+    #[inline(always)]
     fn behind(self, before: Self) -> Self {
         // SAFETY: see the head of this file.
         unsafe {
@@ -172,22 +180,37 @@ vector! {
         unsafe { Four(_mm256_sqrt_pd(self.0)) }
     }
     #[inline(always)]
-    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
-        assert!(from.len() <= i32::MAX as usize);
-        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places fit
+    fn inverse_root_guess(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe {
+            let half = _mm256_srli_epi64::<1>(_mm256_castpd_si256(self.0));
+            let one = _mm256_set1_epi64x(INVERSE_ROOT_OF_ONE as i64);
+            Four(_mm256_castsi256_pd(_mm256_sub_epi64(one, half)))
+        }
+    }
+    #[inline(always)]
+    fn fours(from: &[f32], at: Self) -> [Self; 4] {
+        assert!(4 <= from.len() && from.len() <= i32::MAX as usize);
+        // SAFETY: see the head of this file; all fours are found to lie in the slice, whose places fit
         // the indices.
         unsafe {
-            let last = _mm256_set1_pd(from.len() as f64 - 2.0);
+            let last = _mm256_set1_pd(from.len() as f64 - 4.0);
             let below = _mm256_cmp_pd::<_CMP_LE_OQ>(at.0, last);
             let above = _mm256_cmp_pd::<_CMP_GE_OQ>(at.0, _mm256_setzero_pd());
             assert_eq!(_mm256_movemask_pd(_mm256_and_pd(below, above)), 0xf);
             let places = _mm256_cvttpd_epi32(at.0);
-            let pairs = _mm256_i32gather_epi64::<4>(from.as_ptr().cast(), places);
             let apart = _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7);
-            let apart = _mm256_permutevar8x32_epi32(pairs, apart);
-            let low = _mm_castsi128_ps(_mm256_castsi256_si128(apart));
-            let high = _mm_castsi128_ps(_mm256_extracti128_si256::<1>(apart));
-            [Four(_mm256_cvtps_pd(low)), Four(_mm256_cvtps_pd(high))]
+            let mut fours = [at; 4];
+            for half in 0..2 {
+                let first = from.as_ptr().add(2 * half).cast();
+                let pairs = _mm256_i32gather_epi64::<4>(first, places);
+                let pairs = _mm256_permutevar8x32_epi32(pairs, apart);
+                let low = _mm_castsi128_ps(_mm256_castsi256_si128(pairs));
+                let high = _mm_castsi128_ps(_mm256_extracti128_si256::<1>(pairs));
+                fours[2 * half] = Four(_mm256_cvtps_pd(low));
+                fours[2 * half + 1] = Four(_mm256_cvtps_pd(high));
+            }
+            fours
         }
     }
 }
@@ -202,6 +225,11 @@ vector! {
     fn is_zero(self) -> bool {
         // SAFETY: see the head of this file.
         unsafe { _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(self.0, _mm512_setzero_pd()) == 0xff }
+    }
+    #[inline(always)]
+    fn mask_below(self, limit: Self) -> u32 {
+        // SAFETY: see the head of this file.
+        unsafe { u32::from(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, limit.0)) }
     }
     #[inline(always)]
     fn behind(self, before: Self) -> Self {
@@ -224,21 +252,36 @@ vector! {
         unsafe { Eight(_mm512_sqrt_pd(self.0)) }
     }
     #[inline(always)]
-    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
-        assert!(from.len() <= i32::MAX as usize);
-        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places fit
+    fn inverse_root_guess(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe {
+            let half = _mm512_srli_epi64::<1>(_mm512_castpd_si512(self.0));
+            let one = _mm512_set1_epi64(INVERSE_ROOT_OF_ONE as i64);
+            Eight(_mm512_castsi512_pd(_mm512_sub_epi64(one, half)))
+        }
+    }
+    #[inline(always)]
+    fn fours(from: &[f32], at: Self) -> [Self; 4] {
+        assert!(4 <= from.len() && from.len() <= i32::MAX as usize);
+        // SAFETY: see the head of this file; all fours are found to lie in the slice, whose places fit
         // the indices.
         unsafe {
-            let last = _mm512_set1_pd(from.len() as f64 - 2.0);
+            let last = _mm512_set1_pd(from.len() as f64 - 4.0);
             let below = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(at.0, last);
             let above = _mm512_cmp_pd_mask::<_CMP_GE_OQ>(at.0, _mm512_setzero_pd());
             assert_eq!(below & above, 0xff);
             let places = _mm512_cvttpd_epi32(at.0);
-            let pairs = _mm512_i32gather_epi64::<4>(places, from.as_ptr().cast());
-            let low = _mm256_castsi256_ps(_mm512_cvtepi64_epi32(pairs));
-            let high = _mm512_cvtepi64_epi32(_mm512_srli_epi64::<32>(pairs));
-            let high = _mm256_castsi256_ps(high);
-            [Eight(_mm512_cvtps_pd(low)), Eight(_mm512_cvtps_pd(high))]
+            let mut fours = [at; 4];
+            for half in 0..2 {
+                let first = from.as_ptr().add(2 * half).cast();
+                let pairs = _mm512_i32gather_epi64::<4>(places, first);
+                let low = _mm256_castsi256_ps(_mm512_cvtepi64_epi32(pairs));
+                let high = _mm512_cvtepi64_epi32(_mm512_srli_epi64::<32>(pairs));
+                let high = _mm256_castsi256_ps(high);
+                fours[2 * half] = Eight(_mm512_cvtps_pd(low));
+                fours[2 * half + 1] = Eight(_mm512_cvtps_pd(high));
+            }
+            fours
         }
     }
 }
