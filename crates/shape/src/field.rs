@@ -522,6 +522,25 @@ mod tests {
     }
 
     #[test]
+    fn an_extended_field_has_its_samples_and_more_about_them() {
+        let field = ball();
+        let far = |x: DVec3| field.distance(x);
+        let wide = field
+            .extended(far, DVec3::splat(-1.0), DVec3::splat(1.0), 1.5)
+            .unwrap();
+        assert!(wide.lower().max_element() <= -2.5 && wide.upper().min_element() >= 2.5);
+        for x in points(2.4, 2000) {
+            let (d, _) = wide.distance_and_gradient_on_grid(x).unwrap();
+            match field.distance_and_gradient_on_grid(x) {
+                Some((own, _)) => assert!((d - own).abs() < 1e-12, "at {x}"),
+                None => assert!((d - far(x)).abs() < 0.1 * field.spacing(), "at {x}"),
+            }
+        }
+        let absurd = field.extended(far, DVec3::splat(-1.0), DVec3::splat(1.0), 1e6);
+        assert!(matches!(absurd, Err(ShapeError::BadParameter { .. })));
+    }
+
+    #[test]
     fn nan_in_nan_out() {
         assert!(ball().distance(DVec3::NAN).is_nan());
     }

@@ -61,7 +61,7 @@ impl Neighbours {
     pub fn find(&mut self, mesh: &Mesh, unknowns: &Unknowns, reach: f64, grains: &[Grain]) {
         let enclosure = Enclosure {
             lower: mesh.origin,
-            upper: mesh.origin + mesh.extent(),
+            upper: mesh.upper(),
             periodic: [0, 1, 2].map(|axis| unknowns.is_periodic(axis) && mesh.cells[axis] > 1),
             solid: [[false; 2]; 3],
         };
@@ -113,5 +113,74 @@ impl Neighbours {
             }
         });
         rivals.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::DQuat;
+    use grainwake_shape::Shape;
+
+    use super::*;
+    use crate::dem::Dof;
+    use crate::flow::{Boundaries, Boundary};
+    use crate::math::Pose;
+
+    #[test]
+    fn neighbours_see_each_other_across_an_edge_and_share_its_faces() {
+        let mesh = Mesh {
+            cells: [32, 16, 16],
+            spacing: DVec3::splat(0.25),
+            origin: DVec3::new(-1.0, 0.0, 0.0),
+        };
+        let boundaries = Boundaries([[Boundary::Periodic; 2]; 3]);
+        let unknowns = Unknowns::new(&mesh, &boundaries);
+        let shape = Arc::new(Shape::sphere(0.5, 100));
+        // The first and the last 1.1 apart across x; the second has none near but its own images along y.
+        let at = |x: f64| Grain {
+            shape: shape.clone(),
+            density: 2.0,
+            pose: Pose {
+                position: DVec3::new(x, 2.0, 2.0),
+                orientation: DQuat::IDENTITY,
+            },
+            velocity: DVec3::ZERO,
+            angular_velocity: DVec3::ZERO,
+            translation: Dof::Free,
+            rotation: Dof::Free,
+        };
+        let grains = [at(-0.5), at(3.0), at(6.4)];
+        let shapes = NearShapes::new(&grains, 0.25, 0.6);
+        let mut neighbours = Neighbours::default();
+        let found = |neighbours: &Neighbours, index| -> Vec<(DVec3, f64)> {
+            let rivals = neighbours.of(index, &mesh, &shapes, &grains);
+            rivals
+                .iter()
+                .map(|rival| (rival.shift, rival.handicap))
+                .collect()
+        };
+        neighbours.find(&mesh, &unknowns, 0.6, &grains);
+        let along_x = DVec3::new(8.0, 0.0, 0.0);
+        assert_eq!(found(&neighbours, 0), [(-along_x, TIE)]);
+        assert_eq!(found(&neighbours, 1), []);
+        assert_eq!(found(&neighbours, 2), [(along_x, -TIE)]);
+        // With a reach of more than half a period every grain meets its own images too.
+        neighbours.find(&mesh, &unknowns, 1.6, &grains[1..2]);
+        let along_y = DVec3::new(0.0, 4.0, 0.0);
+        let along_z = DVec3::new(0.0, 0.0, 4.0);
+        let own = [
+            (-along_z, TIE),
+            (-along_y, TIE),
+            (along_y, -TIE),
+            (along_z, -TIE),
+        ];
+        let rivals = neighbours.of(0, &mesh, &shapes, &grains[1..2]);
+        let rivals: Vec<_> = rivals
+            .iter()
+            .map(|rival| (rival.shift, rival.handicap))
+            .collect();
+        assert_eq!(rivals, own);
     }
 }

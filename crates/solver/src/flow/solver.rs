@@ -6,19 +6,14 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::grid::{Centre, FaceVector, Field, Layout, Mesh, for_planes_of, for_slabs};
+use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of, for_slabs, row_blocks};
 use crate::math::Real;
 use crate::math::lanes::{Vector, dispatch};
 use crate::poisson::{Plane, Poisson, Stages};
 
 use super::project::{Correct, Divergence, PlaneMeasures};
-use super::tendency::{Coefficients, PredictPlane, Weights};
+use super::tendency::{Coefficients, PLANES_AT_ONCE, PredictPlane, Weights};
 use super::{Boundaries, FluidParams};
-
-/// Bytes that stay near a processor, in its own cache.
-const NEAR: usize = 768 << 10;
-/// Planes that the prediction has in hand: three of each component, two of the pressure, six to be written.
-const PLANES_AT_ONCE: usize = 17;
 
 /// What a projection measures on the way, over the whole grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -79,17 +74,6 @@ impl<R: Real> TendencySlab<'_, R> {
         extra.add_some(count, self.tendency, at);
         (V::constant(self.weight) * extra).add_some(count, self.predicted, at);
     }
-}
-
-/// Parts of every plane small enough that those of a few planes of the velocity stay near the processor until the
-/// next plane asks for them again.
-fn blocks<R: Real>(layout: Layout) -> impl Iterator<Item = Range<usize>> {
-    let lines = layout.cells[1];
-    let most = (NEAR / (PLANES_AT_ONCE * layout.row() * R::BYTES)).max(8);
-    let length = lines.div_ceil(lines.div_ceil(most));
-    (1..=lines)
-        .step_by(length)
-        .map(move |first| first..(first + length).min(lines + 1))
 }
 
 impl<R: Real> Flow<R> {
@@ -179,7 +163,7 @@ impl<R: Real> Flow<R> {
         self.partial
             .iter_mut()
             .for_each(|plane| plane.tendency = DVec3::ZERO);
-        for rows in blocks::<R>(layout) {
+        for rows in row_blocks(layout, PLANES_AT_ONCE * R::BYTES) {
             for_planes_of(
                 layout,
                 [&mut *x, y, z, px, py, pz],

@@ -69,7 +69,10 @@ pub struct Weights {
     pub push: [f64; 3],
 }
 
-/// One plane of the prediction u* = u + now H + before H_old - dt grad p.
+/// Planes that the prediction has in hand: three of each component, two of the pressure, six to be written.
+pub const PLANES_AT_ONCE: usize = 17;
+
+/// Rows of a plane of the prediction u* = u + now H + before H_old - dt grad p.
 pub struct PredictPlane<'a, R> {
     pub layout: Layout,
     pub coefficients: &'a Coefficients,

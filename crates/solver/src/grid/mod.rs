@@ -6,5 +6,7 @@ mod mesh;
 
 pub use field::Layout;
 pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field};
-pub(crate) use loops::{Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, for_slabs};
+pub(crate) use loops::{
+    Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, for_slabs, row_blocks,
+};
 pub use mesh::{Axis, Mesh};
