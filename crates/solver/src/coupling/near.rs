@@ -15,7 +15,7 @@ use crate::dem::Grain;
 use crate::math::lanes::{MOST, Vector};
 
 /// Samples in half the band, and across a grain, as far as the shape has them: what counts more.
-const SAMPLES: f64 = 3.0;
+const SAMPLES: f64 = 4.0;
 const ACROSS: f64 = 12.0;
 
 /// The shapes of all grains with what lies about them.
@@ -200,8 +200,8 @@ mod tests {
         // near the surface, and the most beyond.
         for (eps, most, mean, about) in [
             (0.08, 0.0, 0.0, 0.0005),
-            (0.25, 0.0015, 0.00003, 0.003),
-            (0.67, 0.01, 0.0001, 0.02),
+            (0.25, 0.0008, 0.00003, 0.002),
+            (0.67, 0.006, 0.0001, 0.015),
         ] {
             let reach = 2.5 * eps;
             let near = NearShape::new(&shape, eps, reach);
