@@ -8,9 +8,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::DVec3;
-use grainwake_shape::{Field, Shape};
+use grainwake_shape::{Field, SampledField, Shape};
 
-use super::samples::{Grid, Samples, Spot, load_all, store_all};
+use super::samples::{Grid, Spot, load_all, store_all};
 use crate::dem::Grain;
 use crate::math::lanes::{MOST, Vector};
 
@@ -29,7 +29,7 @@ pub struct NearShapes {
 pub struct NearShape {
     shape: Arc<Shape>,
     /// None where the shape answers by itself: a sphere.
-    samples: Option<Arc<Samples>>,
+    samples: Option<Arc<SampledField>>,
 }
 
 impl NearShapes {
@@ -57,7 +57,8 @@ impl NearShapes {
         let mut samples: Vec<_> = samples.collect();
         samples.sort_by_key(|samples| Arc::as_ptr(samples));
         samples.dedup_by_key(|samples| Arc::as_ptr(samples));
-        samples.iter().map(|samples| samples.bytes()).sum()
+        let levels = samples.iter().map(|samples| samples.levels().len());
+        size_of::<f32>() * levels.sum::<usize>()
     }
 }
 
@@ -70,7 +71,7 @@ impl NearShape {
                 // Coarser where that would be too many samples.
                 let mut coarser = (0..20).map(|n| spacing * f64::from(1 << n));
                 let field = coarser.find_map(|fine| shape.distances(fine, reach + fine).ok());
-                field.map(|field| Arc::new(Samples::new(field)))
+                field.map(Arc::new)
             }
             _ => None,
         };
@@ -88,15 +89,12 @@ impl NearShape {
         let Some(samples) = &self.samples else {
             return self.shape.distance_and_gradient(x);
         };
-        samples
-            .field
-            .distance_and_gradient_on_grid(x)
-            .unwrap_or(FAR)
+        samples.distance_and_gradient_on_grid(x).unwrap_or(FAR)
     }
 
     /// The same at the first `count` points of lists of coordinates, bit for bit; what is infinite there
     /// may be merely farther than anything here. The gradients come in the place of the points. More entries
-    /// must follow, off are overwritten.
+    /// must follow, which are overwritten.
     #[inline(always)]
     pub fn measure<V: Vector<Number = f64>>(
         &self,

@@ -1,44 +1,10 @@
-//! Samples of a field, and of a coarser one about it, read for the lanes of vectors: each lane finds its
-//! own grid. Finding the samples and reading them are two steps, for a loop of its own each.
+//! Samples of a field read for the lanes of vectors. Finding the samples and reading them are two steps, for
+//! a loop of its own each.
 
 use grainwake_shape::SampledField;
 
 use super::near::FAR;
 use crate::math::lanes::Vector;
-
-/// Distances about a shape, as far as the flow asks for them.
-pub struct Samples {
-    pub field: SampledField,
-    /// Its levels; each is followed by the one above it along y, so that the four of a side of a
-    /// cell are neighbours and half as many cache lines are touched.
-    levels: Vec<f32>,
-}
-
-impl Samples {
-    pub fn new(field: SampledField) -> Samples {
-        let levels = paired(&field);
-        Samples { field, levels }
-    }
-
-    /// Memory held [bytes].
-    pub fn bytes(&self) -> usize {
-        size_of::<f32>() * (self.field.levels().len() + self.levels.len())
-    }
-}
-
-/// The levels of a field, each followed by the one above it along y.
-fn paired(field: &SampledField) -> Vec<f32> {
-    let [nx, ny, _] = field.dims();
-    let planes = field.levels().chunks(nx * ny);
-    let paired = planes.flat_map(|plane| {
-        let above = plane[nx..].iter().chain(&plane[(ny - 1) * nx..]);
-        plane
-            .iter()
-            .zip(above)
-            .flat_map(|(here, above)| [*here, *above])
-    });
-    paired.collect()
-}
 
 /// A vector from each list. (No closure in a kernel touches vectors: it would not be inlined.)
 #[inline(always)]
@@ -84,8 +50,7 @@ pub struct Spot<V> {
 
 impl<'a, V: Vector<Number = f64>> Grid<'a, V> {
     #[inline(always)]
-    pub fn of(samples: &'a Samples) -> Grid<'a, V> {
-        let field = &samples.field;
+    pub fn of(field: &'a SampledField) -> Grid<'a, V> {
         let (dims, inverse) = (field.dims(), 1.0 / field.spacing());
         let mut lower = [V::constant(0.0); 3];
         let mut last = lower;
@@ -93,7 +58,7 @@ impl<'a, V: Vector<Number = f64>> Grid<'a, V> {
             lower[axis] = V::constant(field.lower()[axis]);
             last[axis] = V::constant(dims[axis] as f64 - 1.0);
         }
-        let (row, plane) = (2 * dims[0], 2 * dims[0] * dims[1]);
+        let (row, plane) = (dims[0], dims[0] * dims[1]);
         Grid {
             lower,
             inverse: V::constant(inverse),
@@ -101,7 +66,7 @@ impl<'a, V: Vector<Number = f64>> Grid<'a, V> {
             strides: [V::constant(row as f64), V::constant(plane as f64)],
             quantum: V::constant(field.quantum()),
             slope: V::constant(field.quantum() * inverse),
-            levels: &samples.levels,
+            levels: field.levels(),
         }
     }
 
@@ -121,7 +86,7 @@ impl<'a, V: Vector<Number = f64>> Grid<'a, V> {
         }
         let [row, plane] = self.strides;
         Spot {
-            cell: (cell[0] + cell[0]) + row * cell[1] + plane * cell[2],
+            cell: cell[0] + row * cell[1] + plane * cell[2],
             fraction,
             off,
         }
@@ -131,10 +96,13 @@ impl<'a, V: Vector<Number = f64>> Grid<'a, V> {
     #[inline(always)]
     pub fn read(&self, spot: Spot<V>) -> (V, [V; 3]) {
         let [fx, fy, fz] = spot.fraction;
-        let [_, plane] = self.strides;
+        let [row, plane] = self.strides;
         // Value and slope on the four edges along x.
-        let [[a, s], [b, t]] = edges(self.levels, spot.cell, fx);
-        let [[c, u], [d, v]] = edges(self.levels, spot.cell + plane, fx);
+        let (at, levels) = (spot.cell, self.levels);
+        let [a, s] = edge(levels, at, fx);
+        let [b, t] = edge(levels, at + row, fx);
+        let [c, u] = edge(levels, at + plane, fx);
+        let [d, v] = edge(levels, at + plane + row, fx);
         let (low, high) = (a + fy * (b - a), c + fy * (d - c));
         let (slope_low, slope_high) = (s + fy * (t - s), u + fy * (v - u));
         let gradient = [
@@ -148,11 +116,10 @@ impl<'a, V: Vector<Number = f64>> Grid<'a, V> {
     }
 }
 
-/// Values between the samples at `at` and the next along x, and the slopes from these to those, on two edges
-/// of a cell.
+/// Value between the samples at `at` and the next along x, and the slope from one to the other.
 #[inline(always)]
-fn edges<V: Vector<Number = f64>>(levels: &[f32], at: V, x: V) -> [[V; 2]; 2] {
-    let [first, second, after_first, after_second] = V::fours(levels, at);
-    let (s, t) = (after_first - first, after_second - second);
-    [[first + x * s, s], [second + x * t, t]]
+fn edge<V: Vector<Number = f64>>(levels: &[f32], at: V, x: V) -> [V; 2] {
+    let [low, high] = V::pairs(levels, at);
+    let slope = high - low;
+    [low + x * slope, slope]
 }

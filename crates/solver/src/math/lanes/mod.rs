@@ -198,16 +198,16 @@ pub trait Vector:
     fn inverse_root_guess(self) -> Self {
         self.each(|x| f64::from_bits(INVERSE_ROOT_OF_ONE - (x.to_bits() >> 1)))
     }
-    /// Of each lane of `at`, a whole number, the entry of `from` there and the next three.
+    /// Of each lane of `at`, a whole number, the entry of `from` there and the next.
     #[inline(always)]
-    fn fours(from: &[f32], at: Self) -> [Self; 4] {
-        let mut lanes = [[Self::Number::default(); MOST]; 4];
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+        let mut lanes = [[Self::Number::default(); MOST]; 2];
         at.store(&mut lanes[0]);
         for n in 0..Self::WIDTH {
             let at = lanes[0][n].wide() as usize;
-            for (lane, entry) in lanes.iter_mut().zip(&from[at..at + 4]) {
-                lane[n] = Self::Number::of(f64::from(*entry));
-            }
+            let pair = &from[at..at + 2];
+            lanes[0][n] = Self::Number::of(f64::from(pair[0]));
+            lanes[1][n] = Self::Number::of(f64::from(pair[1]));
         }
         lanes.map(|lanes| Self::load(&lanes))
     }

@@ -189,28 +189,22 @@ vector! {
         }
     }
     #[inline(always)]
-    fn fours(from: &[f32], at: Self) -> [Self; 4] {
-        assert!(4 <= from.len() && from.len() <= i32::MAX as usize);
-        // SAFETY: see the head of this file; all fours are found to lie in the slice, whose places fit
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+        assert!(from.len() <= i32::MAX as usize);
+        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places fit
         // the indices.
         unsafe {
-            let last = _mm256_set1_pd(from.len() as f64 - 4.0);
+            let last = _mm256_set1_pd(from.len() as f64 - 2.0);
             let below = _mm256_cmp_pd::<_CMP_LE_OQ>(at.0, last);
             let above = _mm256_cmp_pd::<_CMP_GE_OQ>(at.0, _mm256_setzero_pd());
             assert_eq!(_mm256_movemask_pd(_mm256_and_pd(below, above)), 0xf);
             let places = _mm256_cvttpd_epi32(at.0);
+            let pairs = _mm256_i32gather_epi64::<4>(from.as_ptr().cast(), places);
             let apart = _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7);
-            let mut fours = [at; 4];
-            for half in 0..2 {
-                let first = from.as_ptr().add(2 * half).cast();
-                let pairs = _mm256_i32gather_epi64::<4>(first, places);
-                let pairs = _mm256_permutevar8x32_epi32(pairs, apart);
-                let low = _mm_castsi128_ps(_mm256_castsi256_si128(pairs));
-                let high = _mm_castsi128_ps(_mm256_extracti128_si256::<1>(pairs));
-                fours[2 * half] = Four(_mm256_cvtps_pd(low));
-                fours[2 * half + 1] = Four(_mm256_cvtps_pd(high));
-            }
-            fours
+            let apart = _mm256_permutevar8x32_epi32(pairs, apart);
+            let low = _mm_castsi128_ps(_mm256_castsi256_si128(apart));
+            let high = _mm_castsi128_ps(_mm256_extracti128_si256::<1>(apart));
+            [Four(_mm256_cvtps_pd(low)), Four(_mm256_cvtps_pd(high))]
         }
     }
 }
@@ -261,27 +255,21 @@ vector! {
         }
     }
     #[inline(always)]
-    fn fours(from: &[f32], at: Self) -> [Self; 4] {
-        assert!(4 <= from.len() && from.len() <= i32::MAX as usize);
-        // SAFETY: see the head of this file; all fours are found to lie in the slice, whose places fit
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+        assert!(from.len() <= i32::MAX as usize);
+        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places fit
         // the indices.
         unsafe {
-            let last = _mm512_set1_pd(from.len() as f64 - 4.0);
+            let last = _mm512_set1_pd(from.len() as f64 - 2.0);
             let below = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(at.0, last);
             let above = _mm512_cmp_pd_mask::<_CMP_GE_OQ>(at.0, _mm512_setzero_pd());
             assert_eq!(below & above, 0xff);
             let places = _mm512_cvttpd_epi32(at.0);
-            let mut fours = [at; 4];
-            for half in 0..2 {
-                let first = from.as_ptr().add(2 * half).cast();
-                let pairs = _mm512_i32gather_epi64::<4>(places, first);
-                let low = _mm256_castsi256_ps(_mm512_cvtepi64_epi32(pairs));
-                let high = _mm512_cvtepi64_epi32(_mm512_srli_epi64::<32>(pairs));
-                let high = _mm256_castsi256_ps(high);
-                fours[2 * half] = Eight(_mm512_cvtps_pd(low));
-                fours[2 * half + 1] = Eight(_mm512_cvtps_pd(high));
-            }
-            fours
+            let pairs = _mm512_i32gather_epi64::<4>(places, from.as_ptr().cast());
+            let low = _mm256_castsi256_ps(_mm512_cvtepi64_epi32(pairs));
+            let high = _mm512_cvtepi64_epi32(_mm512_srli_epi64::<32>(pairs));
+            let high = _mm256_castsi256_ps(high);
+            [Eight(_mm512_cvtps_pd(low)), Eight(_mm512_cvtps_pd(high))]
         }
     }
 }
