@@ -28,7 +28,7 @@ pub fn for_planes_of<const N: usize, R: Send, T: Send>(
 }
 
 /// Bytes that stay in a processor's own cache.
-const NEAR: usize = 768 << 10;
+const NEAR: usize = 1536 << 10;
 
 /// The rows 1..=ny of every plane in parts: what is in hand at once, `bytes` a place of a plane, stays near the
 /// processor until the next plane asks for it again. No result may depend on how many parts there are but by
@@ -241,8 +241,8 @@ mod tests {
     fn blocks_are_all_rows_once() {
         for (cells, blocks) in [
             ([8, 1, 4], 1),
-            ([100, 100, 8], 2),
-            ([160, 160, 8], 5),
+            ([100, 100, 8], 1),
+            ([160, 160, 8], 3),
             ([9000, 37, 2], 5),
         ] {
             let found: Vec<_> = row_blocks(Layout { cells }, 17 * 8).collect();
