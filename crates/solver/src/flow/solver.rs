@@ -135,7 +135,7 @@ impl<R: Real> Flow<R> {
         self.boundaries.set_normal(&mut self.predicted);
         self.boundaries
             .convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, 0.0);
-        let pressure = self.pressure.clone();
+        let pressure = self.pressure.to_vec();
         let measures = self.project(1.0);
         self.pressure.copy_from_slice(&pressure);
         measures
@@ -272,7 +272,7 @@ impl<R: Real> Flow<R> {
                 // The upper boundary faces are left as predicted.
                 if walled[0] {
                     for j in 1..=ny {
-                        let at = (j + 1) * row - 1;
+                        let at = j * row + nx + 1;
                         x[at] = predicted.x[k * plane + at];
                     }
                 }
@@ -285,7 +285,6 @@ impl<R: Real> Flow<R> {
                 }
                 boundaries.fill_pressure_of_plane(layout, p);
             });
-        debug_assert_eq!(row, nx + 2);
         if walled[2] {
             let upper = (nz + 1) * plane..;
             z[upper.clone()].copy_from_slice(&predicted.z[upper]);

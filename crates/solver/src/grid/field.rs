@@ -1,7 +1,9 @@
 //! Fields on the staggered grid. The location is part of the type, so that a face field cannot be
 //! passed for a centre field.
 //!
-//! Every field has one ghost layer on each side and the same shape (nx+2, ny+2, nz+2), x fastest.
+//! Every field has one ghost layer on each side and the same shape (nx+2, ny+2, nz+2), x fastest. In memory a
+//! row is as long as the next number of eights, with i = 1 at the start of a cache line (of half a line in every
+//! other row of singles): a vector of neighbours is then read as one line and not as parts of two.
 //! Cell (i, j, k) of the interior has 1 <= i <= nx and so on. A face field stores the *lower* face
 //! of each cell: face i of `FaceX` lies between cells i-1 and i, so a box with walls has its upper
 //! boundary face at index nx+1.
@@ -12,7 +14,7 @@ use std::ops::{Deref, DerefMut};
 use glam::DVec3;
 
 use super::Mesh;
-use crate::math::{Real, zeros};
+use crate::math::{Aligned, Real};
 
 /// A place on the staggered cell.
 pub trait Location: Copy + Send + Sync + 'static {
@@ -57,24 +59,48 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Entries of a row, ghosts included.
+    /// Places of a row in memory: its entries, ghosts included, and what fills up the last eight.
     #[inline]
     pub fn row(&self) -> usize {
-        self.cells[0] + 2
+        (self.cells[0] + 2).next_multiple_of(8)
     }
-    /// Entries of a plane, ghosts included.
+    /// Places of a plane, ghosts included.
     #[inline]
     pub fn plane(&self) -> usize {
         self.row() * (self.cells[1] + 2)
     }
-    /// Entries of a field, ghosts included.
+    /// Places of a field, ghosts included.
     #[inline]
     pub fn len(&self) -> usize {
         self.plane() * (self.cells[2] + 2)
     }
+    /// Entries of a field, ghosts included, without what fills up its rows.
+    pub fn entries(&self) -> usize {
+        self.cells.iter().map(|n| n + 2).product()
+    }
     /// A layout always has ghosts, so it is never empty.
     pub fn is_empty(&self) -> bool {
         false
+    }
+    /// The rows of a field, ghosts included, without what fills them up.
+    pub fn rows<'a, T>(
+        &self,
+        values: &'a [T],
+    ) -> impl ExactSizeIterator<Item = &'a [T]> + use<'a, T> {
+        let entries = self.cells[0] + 2;
+        values
+            .chunks_exact(self.row())
+            .map(move |row| &row[..entries])
+    }
+    /// The same to write.
+    pub fn rows_mut<'a, T>(
+        &self,
+        values: &'a mut [T],
+    ) -> impl ExactSizeIterator<Item = &'a mut [T]> + use<'a, T> {
+        let entries = self.cells[0] + 2;
+        values
+            .chunks_exact_mut(self.row())
+            .map(move |row| &mut row[..entries])
     }
     /// Position of (i, j, k) in memory.
     #[inline]
@@ -141,10 +167,10 @@ impl Layout {
 }
 
 /// Values at one location of every cell.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Field<L, R = f64> {
     layout: Layout,
-    values: Vec<R>,
+    values: Aligned<R>,
     location: PhantomData<L>,
 }
 
@@ -154,7 +180,7 @@ impl<L: Location, R: Real> Field<L, R> {
         let layout = mesh.layout();
         Field {
             layout,
-            values: zeros(layout.len()),
+            values: Aligned::with_head(1, layout.len()),
             location: PhantomData,
         }
     }
@@ -207,6 +233,19 @@ impl<L: Location, R: Real> Field<L, R> {
     }
 }
 
+#[cfg(test)]
+impl<L, R: Real> Clone for Field<L, R> {
+    fn clone(&self) -> Self {
+        let mut values = Aligned::with_head(1, self.values.len());
+        values.copy_from_slice(&self.values);
+        Field {
+            layout: self.layout,
+            values,
+            location: PhantomData,
+        }
+    }
+}
+
 impl<L, R> Deref for Field<L, R> {
     type Target = [R];
     #[inline]
@@ -222,7 +261,7 @@ impl<L, R> DerefMut for Field<L, R> {
 }
 
 /// The three components of a vector field, each on its own faces.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct FaceVector<R = f64> {
     /// x component on x faces.
     pub x: Field<FaceX, R>,
@@ -258,5 +297,41 @@ impl<R: Real> FaceVector<R> {
             1 => &mut self.y,
             _ => &mut self.z,
         }
+    }
+}
+
+#[cfg(test)]
+impl<R: Real> Clone for FaceVector<R> {
+    fn clone(&self) -> Self {
+        FaceVector {
+            x: self.x.clone(),
+            y: self.y.clone(),
+            z: self.z.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_start_on_cache_lines_and_have_their_entries() {
+        let mesh = Mesh {
+            cells: [5, 3, 2],
+            spacing: DVec3::ONE,
+            origin: DVec3::ZERO,
+        };
+        let layout = mesh.layout();
+        let mut field = Field::<Centre>::zeros(&mesh);
+        for (n, row) in layout.rows_mut(&mut field).enumerate() {
+            assert_eq!(row.len(), 7);
+            assert!(row[1..].as_ptr().addr().is_multiple_of(64));
+            row.fill(n as f64);
+        }
+        assert_eq!(layout.rows(&field).len(), 5 * 4);
+        assert_eq!(layout.entries(), 7 * 5 * 4);
+        assert_eq!(field.at(6, 2, 1), 7.0);
+        assert_eq!(field.at(0, 3, 1), 8.0);
     }
 }

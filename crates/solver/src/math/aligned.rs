@@ -4,8 +4,8 @@ use std::ops::{Deref, DerefMut};
 
 use super::Real;
 
-/// A fixed number of numbers whose first lies at the start of a cache line. Nothing is touched
-/// when it is made: a page belongs to the thread that first writes to it.
+/// A fixed number of numbers, one of which, the first unless said, lies at the start of a cache line. Nothing
+/// is touched when it is made: a page belongs to the thread that first writes to it.
 #[derive(Debug)]
 pub struct Aligned<R> {
     values: Vec<R>,
@@ -16,9 +16,15 @@ pub struct Aligned<R> {
 impl<R: Real> Aligned<R> {
     /// `len` zeros.
     pub fn zeros(len: usize) -> Aligned<R> {
-        let values: Vec<R> = zeros(len + R::LANES - 1);
+        Aligned::with_head(0, len)
+    }
+    /// `len` zeros, of which entry `head` lies at the start of a cache line.
+    pub fn with_head(head: usize, len: usize) -> Aligned<R> {
+        assert!(head <= R::LANES);
+        let values: Vec<R> = zeros(len + 2 * R::LANES - 1);
         // The buffer is never reallocated, so the start stays where it is.
-        let start = values.as_ptr().align_offset(R::LANES * R::BYTES);
+        let line = values.as_ptr().align_offset(R::LANES * R::BYTES);
+        let start = line + R::LANES - head;
         Aligned { values, start, len }
     }
 }
@@ -38,7 +44,7 @@ impl<R> DerefMut for Aligned<R> {
 }
 
 /// `len` zeros, not touched yet, in large pages where the system has them.
-pub fn zeros<R: Real>(len: usize) -> Vec<R> {
+fn zeros<R: Real>(len: usize) -> Vec<R> {
     let values = vec![R::default(); len];
     #[cfg(target_os = "linux")]
     ask_for_large_pages(&values);

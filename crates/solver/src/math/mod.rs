@@ -7,7 +7,7 @@ mod linear;
 mod pose;
 mod real;
 
-pub(crate) use aligned::{Aligned, zeros};
+pub(crate) use aligned::Aligned;
 pub use formula::Formula;
 pub use linear::{Matrix6, Vector6, solve6};
 pub use pose::{Load, Pose};

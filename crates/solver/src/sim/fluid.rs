@@ -154,9 +154,12 @@ impl<R: Real> Fluid for FluidOf<R> {
         ])?;
         out.numbers(&m.momentum.to_array())?;
         let (fields, sums) = self.flow.state();
+        let layout = self.flow.mesh().layout();
         for values in fields {
-            out.count(values.len() as u64)?;
-            out.numbers(values)?;
+            out.count(layout.entries() as u64)?;
+            for row in layout.rows(values) {
+                out.numbers(row)?;
+            }
         }
         out.count(sums.len() as u64)?;
         out.numbers(sums)
@@ -171,10 +174,13 @@ impl<R: Real> Fluid for FluidOf<R> {
             m.kinetic_energy,
         ] = input.numbers()?;
         m.momentum = DVec3::from_array(input.numbers()?);
+        let layout = self.flow.mesh().layout();
         let (fields, sums) = self.flow.state_mut(last_step);
         for values in fields {
-            input.expect(values.len(), "field entries")?;
-            input.fill(values)?;
+            input.expect(layout.entries(), "field entries")?;
+            for row in layout.rows_mut(values) {
+                input.fill(row)?;
+            }
         }
         input.expect(sums.len(), "sums")?;
         input.fill(sums)
