@@ -17,6 +17,7 @@ pub struct Three;
 pub struct Four;
 pub struct Five;
 pub struct Seven;
+pub struct Eight;
 
 impl Butterfly<2> for Two {
     #[inline(always)]
@@ -104,5 +105,29 @@ impl Butterfly<7> for Seven {
                 + w.scale(V::Number::of(SIN[1])),
         );
         [a + p + q + r, y1, y2, y3, y4, y5, y6]
+    }
+}
+
+impl Butterfly<8> for Eight {
+    #[inline(always)]
+    fn apply<V: Vector>([a, b, c, d, e, f, g, h]: [Complex<V>; 8]) -> [Complex<V>; 8] {
+        use std::f64::consts::FRAC_1_SQRT_2;
+        // Fours of the even and of the odd inputs.
+        let [p, q, r, s] = Four::apply([a, c, e, g]);
+        let [t, u, v, w] = Four::apply([b, d, f, h]);
+        let half = V::Number::of(FRAC_1_SQRT_2);
+        // Times exp(-i pi / 4) and exp(-3 i pi / 4).
+        let u = Complex {
+            re: u.re + u.im,
+            im: u.im - u.re,
+        }
+        .scale(half);
+        let w = Complex {
+            re: w.im - w.re,
+            im: V::constant(0.0) - (w.re + w.im),
+        }
+        .scale(half);
+        let [y2, y6] = turned(r, v);
+        [p + t, q + u, y2, s + w, p - t, q - u, y6, s - w]
     }
 }

@@ -107,6 +107,10 @@ impl<R: Real> Fourier<R> {
 /// The smallest convenient length that holds the convolution.
 fn padded(n: usize) -> usize {
     (2 * n - 1..)
-        .find(|len| factors(*len).into_iter().all(|factor| factor <= 5))
+        .find(|len| {
+            factors(*len)
+                .into_iter()
+                .all(|factor| [2, 3, 4, 5, 8].contains(&factor))
+        })
         .unwrap_or(2 * n)
 }

@@ -1,14 +1,14 @@
 //! Complex Fourier transforms of any length, as many at once as a register has lanes.
 //!
 //! Stockham's self-sorting scheme: one pass over the data a factor, from one buffer to the other,
-//! no bit reversal. Factors 2, 3, 4, 5 and 7 have butterflies of their own, other primes a loop
+//! no bit reversal. Factors 2, 3, 4, 5, 7 and 8 have butterflies of their own, other primes a loop
 //! over pairs of outputs; beyond `LARGEST_PRIME` the length is padded instead (`chirp.rs`).
 //!
 //! Legend: r radix, blocks twiddled groups of a pass, stride distance of what a pass has merged.
 
 use std::f64::consts::PI;
 
-use super::butterfly::{Butterfly, Five, Four, Seven, Three, Two};
+use super::butterfly::{Butterfly, Eight, Five, Four, Seven, Three, Two};
 use crate::math::Real;
 use crate::math::lanes::{Complex, Vector, turned};
 
@@ -26,7 +26,19 @@ pub fn root(numerator: usize, denominator: usize) -> [f64; 2] {
 /// Factors in the order of the passes.
 pub fn factors(mut n: usize) -> Vec<usize> {
     let mut found = Vec::new();
-    for radix in [4, 2, 3, 5, 7] {
+    // As few passes for the powers of two as there can be.
+    let mut twos = n.trailing_zeros();
+    n >>= twos;
+    while twos > 0 {
+        let taken = match twos {
+            1 | 2 => twos,
+            4 => 2,
+            _ => 3,
+        };
+        found.push(1 << taken);
+        twos -= taken;
+    }
+    for radix in [3, 5, 7] {
         while n.is_multiple_of(radix) {
             found.push(radix);
             n /= radix;
@@ -77,7 +89,7 @@ impl<R: Real> Fft<R> {
                 blocks,
                 stride,
                 turn,
-                circle: if radix > 7 { circle(radix) } else { Vec::new() },
+                circle: if radix > 8 { circle(radix) } else { Vec::new() },
             };
             left = blocks;
             stride *= radix;
@@ -102,6 +114,7 @@ impl<R: Real> Fft<R> {
                 4 => step::<V, Four, 4>(pass, a, b),
                 5 => step::<V, Five, 5>(pass, a, b),
                 7 => step::<V, Seven, 7>(pass, a, b),
+                8 => step::<V, Eight, 8>(pass, a, b),
                 _ => prime_step(pass, a, b),
             }
             std::mem::swap(&mut a, &mut b);
