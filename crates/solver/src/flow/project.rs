@@ -125,6 +125,8 @@ pub struct Correct<'a, R> {
     pub inverse: [f64; 3],
     /// dt/h along each axis [s/m].
     pub pull: [f64; 3],
+    /// Whether the velocity is written past the caches.
+    pub past_caches: bool,
     pub velocity: [&'a mut [R]; 3],
     pub pressure: &'a mut [R],
     pub measures: &'a mut PlaneMeasures,
@@ -160,6 +162,8 @@ impl<R: Real> Kernel for Correct<'_, R> {
                     &mut z[here.clone()],
                 ],
                 pressure: &mut self.pressure[here],
+                n,
+                past_caches: self.past_caches,
                 partial: &mut partial,
                 given: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
             };
@@ -179,6 +183,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
         for i in 1..=n {
             rise[1] += self.pressure[ny * row + i].wide() - self.pressure[row + i].wide();
         }
+        V::fence();
         *self.measures = PlaneMeasures {
             flow: FlowMeasures {
                 max_divergence: partial.divergence.largest(),
@@ -216,6 +221,8 @@ struct CorrectRow<'a, R> {
     pull: [f64; 3],
     out: [&'a mut [R]; 3],
     pressure: &'a mut [R],
+    n: usize,
+    past_caches: bool,
     partial: &'a mut CorrectPartial,
     given: [bool; 3],
 }
@@ -239,6 +246,8 @@ impl<R: Real> CorrectRow<'_, R> {
         let above = [V::load(&self.u[at + 1..]), load(self.vp), load(self.wp)];
         let zero = V::constant(0.0);
         let (mut square, mut rate, mut divergence) = (zero, zero, zero);
+        // The ends of a row are looked at again for the ghosts.
+        let past = self.past_caches && i > 1 && i + V::WIDTH <= self.n;
         for axis in 0..3 {
             let (pull, inverse) = (
                 V::constant(self.pull[axis]),
@@ -246,7 +255,12 @@ impl<R: Real> CorrectRow<'_, R> {
             );
             let q = load(self.q[axis]) - pull * (f - lower[axis]);
             let next = above[axis] - pull * (upper[axis] - f);
-            q.store(&mut self.out[axis][i..]);
+            let to = &mut self.out[axis][i..];
+            if past {
+                q.store_past(to);
+            } else {
+                q.store(to);
+            }
             square = square + q * q;
             rate = rate + q.magnitude() * inverse;
             divergence = divergence + (next - q) * inverse;

@@ -7,8 +7,8 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of, for_slabs, row_blocks};
-use crate::math::Real;
 use crate::math::lanes::{Vector, dispatch};
+use crate::math::{Real, last_cache};
 use crate::poisson::{Plane, Poisson, Stages};
 
 use super::project::{Correct, Divergence, PlaneMeasures};
@@ -43,6 +43,8 @@ pub struct Flow<R = f64> {
     pub pressure: Field<Centre, R>,
     tendency: FaceVector<R>,
     poisson: Poisson<R>,
+    /// Whether what is written as a whole goes past the caches.
+    past_caches: bool,
     partial: Vec<PlaneMeasures>,
     previous_step: Option<f64>,
     weight: f64,
@@ -92,6 +94,7 @@ impl<R: Real> Flow<R> {
             pressure: Field::zeros(mesh),
             tendency: FaceVector::zeros(mesh),
             poisson: Poisson::new(mesh, boundaries.pressure_ends()),
+            past_caches: false,
             partial: vec![PlaneMeasures::default(); mesh.cells[2]],
             previous_step: None,
             weight: 0.0,
@@ -99,6 +102,8 @@ impl<R: Real> Flow<R> {
             impulse: DVec3::ZERO,
             pressure_rise: DVec3::ZERO,
         };
+        flow.past_caches = flow.bytes() > last_cache() / 4 * 3;
+        flow.poisson.past_caches = flow.past_caches;
         flow.velocity.x.fill(R::of(params.initial_velocity.x));
         flow.velocity.y.fill(R::of(params.initial_velocity.y));
         flow.velocity.z.fill(R::of(params.initial_velocity.z));
@@ -153,7 +158,7 @@ impl<R: Real> Flow<R> {
         };
         let (layout, walled) = (self.mesh.layout(), self.boundaries.walled());
         let (velocity, pressure, boundaries) = (&self.velocity, &self.pressure, &self.boundaries);
-        let coefficients = &self.coefficients;
+        let (coefficients, past_caches) = (&self.coefficients, self.past_caches);
         let FaceVector { x, y, z } = &mut self.tendency;
         let FaceVector {
             x: px,
@@ -177,6 +182,7 @@ impl<R: Real> Flow<R> {
                         pressure,
                         walled,
                         k,
+                        past_caches,
                         rows: rows.clone(),
                         tendency: [x, y, z],
                         predicted: [&mut *px, &mut *py, pz],
@@ -240,6 +246,7 @@ impl<R: Real> Flow<R> {
         let walled = self.boundaries.walled();
         let periodic = walled.map(|walled| !walled);
         let (predicted, boundaries) = (&self.predicted, &self.boundaries);
+        let past_caches = self.past_caches;
         let divergence = |k: usize, out: &mut Plane<R>| {
             dispatch(Divergence {
                 layout,
@@ -265,6 +272,7 @@ impl<R: Real> Flow<R> {
                     k,
                     inverse,
                     pull: inverse.map(|inverse| dt * inverse),
+                    past_caches,
                     velocity: [&mut *x, &mut *y, &mut *z],
                     pressure: &mut *p,
                     measures,

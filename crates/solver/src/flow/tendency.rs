@@ -82,6 +82,8 @@ pub struct PredictPlane<'a, R> {
     /// Axes whose lower boundary face is given.
     pub walled: [bool; 3],
     pub k: usize,
+    /// Whether the prediction is written past the caches.
+    pub past_caches: bool,
     /// The rows of the plane to treat, one part of it after the other.
     pub rows: Range<usize>,
     /// H_old, to be replaced by H.
@@ -121,6 +123,8 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
                 ],
                 predicted: [&mut px[here.clone()], &mut py[here.clone()], &mut pz[here]],
                 sums: &mut sums,
+                n,
+                past_caches: self.past_caches,
                 given: [false, self.walled[1] && j == 1, self.walled[2] && k == 1],
             };
             along_row::<V>(n, &mut work);
@@ -130,6 +134,7 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
                 sums[0].add(1, One::<R>::constant(given));
             }
         }
+        V::fence();
         *self.sum += DVec3::from_array(sums.map(|sum| sum.sum()));
     }
 }
@@ -162,6 +167,8 @@ struct PredictRow<'a, R> {
     tendency: [&'a mut [R]; 3],
     predicted: [&'a mut [R]; 3],
     sums: &'a mut [Partial; 3],
+    n: usize,
+    past_caches: bool,
     /// Components that are given on the whole row.
     given: [bool; 3],
 }
@@ -225,12 +232,19 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
             V::constant(self.weights.now),
             V::constant(self.weights.before),
         );
+        // The ends of a row are looked at again for the boundaries.
+        let past = self.past_caches && i > 1 && i + V::WIDTH <= self.n;
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
             let old = &mut self.tendency[axis][i..];
             let push = V::constant(self.weights.push[axis]) * (pc - lower[axis]);
             // What is small is summed first: in singles q would swallow it part by part.
             let gain = now * h + before * V::load(old) - push;
-            (q + gain).store(&mut self.predicted[axis][i..]);
+            let to = &mut self.predicted[axis][i..];
+            if past {
+                (q + gain).store_past(to);
+            } else {
+                (q + gain).store(to);
+            }
             h.store(old);
             if !self.given[axis] {
                 self.sums[axis].add(i, h);

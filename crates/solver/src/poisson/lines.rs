@@ -73,6 +73,14 @@ impl Lines {
         }
     }
     #[inline(always)]
+    pub fn store_past<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
+        for (i, x) in a.iter().enumerate() {
+            let at = self.at + i * self.step;
+            x.re.store_past(&mut values[at..]);
+            x.im.store_past(&mut values[at + self.second..]);
+        }
+    }
+    #[inline(always)]
     pub fn forward<V: Vector>(
         &self,
         axis: &Axis<V::Number>,

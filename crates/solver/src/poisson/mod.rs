@@ -74,6 +74,8 @@ pub struct Poisson<R = f64> {
     slots: Vec<Slot<R>>,
     columns: Vec<ColumnScratch>,
     stages: Stages,
+    /// Whether the modes are written past the caches on the way there.
+    pub past_caches: bool,
 }
 
 /// Scratch of one run of planes.
@@ -123,6 +125,7 @@ impl<R: Real> Poisson<R> {
                 .collect(),
             axes,
             stages: Stages::default(),
+            past_caches: false,
         }
     }
 
@@ -138,6 +141,7 @@ impl<R: Real> Poisson<R> {
         sink: impl Fn(usize, Solution<R>, &mut Run<N, R, T>) + Sync,
     ) {
         let start = Instant::now();
+        let past_caches = self.past_caches;
         let (axes, stride) = ([&self.axes[0], &self.axes[1]], self.shape.stride());
         for_chunks(
             &mut self.modes,
@@ -154,6 +158,7 @@ impl<R: Real> Poisson<R> {
                     plane,
                     modes,
                     buffers,
+                    past_caches,
                 });
             },
         );

@@ -134,6 +134,8 @@ pub struct Forward<'a, R> {
     pub plane: &'a mut Plane<R>,
     pub modes: &'a mut [R],
     pub buffers: &'a mut Buffers<R>,
+    /// Whether the modes are written past the caches.
+    pub past_caches: bool,
 }
 
 impl<R: Real> Kernel for Forward<'_, R> {
@@ -145,6 +147,7 @@ impl<R: Real> Kernel for Forward<'_, R> {
             plane,
             modes,
             buffers,
+            past_caches,
         } = self;
         let shape = plane.shape;
         plane.clear_columns();
@@ -186,7 +189,13 @@ impl<R: Real> Kernel for Forward<'_, R> {
                         second: R::LANES,
                     };
                     rows.load(&along_x.order, values, buffers.lines::<V>(along_x));
-                    lines.store(buffers.transform::<V>(along_x, false), modes);
+                    let found = buffers.transform::<V>(along_x, false);
+                    // Narrower registers would write a line in parts.
+                    if past_caches && V::WIDTH == R::LANES {
+                        lines.store_past(found, modes);
+                    } else {
+                        lines.store(found, modes);
+                    }
                 }
             } else {
                 let rows = Rows {
@@ -203,6 +212,7 @@ impl<R: Real> Kernel for Forward<'_, R> {
                 lines.store(buffers.transform::<V::Half>(along_x, false), modes);
             }
         }
+        V::fence();
     }
 }
 

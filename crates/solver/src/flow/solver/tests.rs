@@ -425,15 +425,16 @@ fn outflow_keeps_the_mass_of_the_box() {
 }
 
 #[test]
-fn bits_of_a_step_do_not_depend_on_the_instruction_set() {
+fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
     use crate::math::lanes::{Level, limit_level};
-    fn bits<R: Real>(boundaries: Boundaries) -> Vec<u64> {
+    fn bits<R: Real>(boundaries: Boundaries, past_caches: bool) -> Vec<u64> {
         let mesh = Mesh {
             cells: [29, 11, 9],
             spacing: DVec3::new(0.3, 0.4, 0.5),
             origin: DVec3::ZERO,
         };
         let mut flow = Flow::<R>::new(&mesh, boundaries, &params(0.01));
+        (flow.past_caches, flow.poisson.past_caches) = (past_caches, past_caches);
         flow.start_from(|axis, x| (x + DVec3::new(0.1, 0.2, 0.3)).to_array()[axis].sin());
         let mut kept = Vec::new();
         for _ in 0..3 {
@@ -456,7 +457,10 @@ fn bits_of_a_step_do_not_depend_on_the_instruction_set() {
         let levels = [Level::Avx512, Level::Avx2, Level::Common];
         let [widest, middle, common] = levels.map(|level| {
             limit_level(level);
-            [bits::<f64>(boundaries), bits::<f32>(boundaries)]
+            let [near, past] = [false, true]
+                .map(|past| [bits::<f64>(boundaries, past), bits::<f32>(boundaries, past)]);
+            assert!(near == past, "past the caches, {level:?}");
+            near
         });
         limit_level(Level::Avx512);
         assert!(widest == middle && widest == common);

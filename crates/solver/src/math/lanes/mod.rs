@@ -58,6 +58,15 @@ pub trait Vector:
     fn load(from: &[Self::Number]) -> Self;
     /// Overwrites the first `WIDTH` numbers of `to`.
     fn store(self, to: &mut [Self::Number]);
+    /// The same past the caches where `to` starts on a register: they need not fetch first what is overwritten
+    /// as a whole, nor keep what is not read soon. [`Self::fence`] before another thread reads it.
+    #[inline(always)]
+    fn store_past(self, to: &mut [Self::Number]) {
+        self.store(to);
+    }
+    /// Lets nothing written later be seen before what [`Self::store_past`] wrote.
+    #[inline(always)]
+    fn fence() {}
     /// The first `WIDTH` of other numbers, rounded to these.
     #[inline(always)]
     fn load_from<R: Real>(from: &[R]) -> Self {

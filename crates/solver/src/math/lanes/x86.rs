@@ -19,7 +19,7 @@ macro_rules! vector {
         half $half:ident, tail $tail:ident, transpose $transpose:path,
         doubles $wide:ident [$($w:tt: $widen:path),+],
         $add:ident, $sub:ident, $mul:ident, $div:ident, $max:ident, $min:ident,
-        $chosen:path, $fused:path, $set:ident, $load:ident, $store:ident
+        $chosen:path, $fused:path, $set:ident, $load:ident, $store:ident, $past:ident
         $(; $($own:item)*)?
     ) => {
         $(#[$doc])*
@@ -72,6 +72,21 @@ macro_rules! vector {
                 let to = to[..$width].as_mut_ptr();
                 // SAFETY: see the head of this file.
                 unsafe { $($store(to.add($i * $width / 2), self.$i));+ }
+            }
+            #[inline(always)]
+            fn store_past(self, to: &mut [$number]) {
+                let register = 0_usize $(.max(size_of_val(&self.$i)))+;
+                if !to.as_ptr().addr().is_multiple_of(register) {
+                    return self.store(to);
+                }
+                let to = to[..$width].as_mut_ptr();
+                // SAFETY: see the head of this file; the registers fall on multiples of their size.
+                unsafe { $($past(to.add($i * $width / 2), self.$i));+ }
+            }
+            #[inline(always)]
+            fn fence() {
+                // SAFETY: every machine of this architecture has the instruction.
+                unsafe { _mm_sfence() }
             }
             #[inline(always)]
             fn over(self, divisor: Self) -> Self {
@@ -136,7 +151,7 @@ vector! {
     half Pairs, tail Pairs, transpose turn::pairs,
     doubles Pairs [0: same],
     _mm_add_pd, _mm_sub_pd, _mm_mul_pd, _mm_div_pd, _mm_max_pd, _mm_min_pd,
-    choose128_pd, fused128_pd, _mm_set1_pd, _mm_loadu_pd, _mm_storeu_pd
+    choose128_pd, fused128_pd, _mm_set1_pd, _mm_loadu_pd, _mm_storeu_pd, _mm_stream_pd
 }
 vector! {
     /// Four doubles.
@@ -144,7 +159,7 @@ vector! {
     half Four, tail Four, transpose turn::four,
     doubles Four [0: same],
     _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_max_pd, _mm256_min_pd,
-    choose256_pd, _mm256_fmadd_pd, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd;
+    choose256_pd, _mm256_fmadd_pd, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_stream_pd;
     #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of this file.
@@ -214,7 +229,7 @@ vector! {
     half Four, tail Four, transpose turn::eight,
     doubles Eight [0: same],
     _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_max_pd, _mm512_min_pd,
-    choose512_pd, _mm512_fmadd_pd, _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd;
+    choose512_pd, _mm512_fmadd_pd, _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_stream_pd;
     #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of this file.
@@ -279,7 +294,7 @@ vector! {
     half FourSingles, tail FourSingles, transpose turn::four_singles,
     doubles Pairs [0: widen_four],
     _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps, _mm_max_ps, _mm_min_ps,
-    choose128_ps, fused128_ps, _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
+    choose128_ps, fused128_ps, _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps, _mm_stream_ps
 }
 vector! {
     /// Four singles, twice.
@@ -287,7 +302,7 @@ vector! {
     half SinglesTwice, tail FourSingles, transpose turn::singles_twice,
     doubles Pairs [0: widen_first, 1: widen_second],
     _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps, _mm_max_ps, _mm_min_ps,
-    choose128_ps, fused128_ps, _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps
+    choose128_ps, fused128_ps, _mm_set1_ps, _mm_loadu_ps, _mm_storeu_ps, _mm_stream_ps
 }
 vector! {
     /// Eight singles.
@@ -295,7 +310,7 @@ vector! {
     half EightSingles, tail FourSingles, transpose turn::eight_singles,
     doubles Four [0: widen_lower_four, 1: widen_upper_four],
     _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps,
-    choose256_ps, _mm256_fmadd_ps, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps
+    choose256_ps, _mm256_fmadd_ps, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_stream_ps
 }
 vector! {
     /// Sixteen singles.
@@ -303,7 +318,7 @@ vector! {
     half EightSingles, tail FourSingles, transpose turn::sixteen_singles,
     doubles Eight [0: widen_lower_eight, 1: widen_upper_eight],
     _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps, _mm512_max_ps, _mm512_min_ps,
-    choose512_ps, _mm512_fmadd_ps, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps
+    choose512_ps, _mm512_fmadd_ps, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_stream_ps
 }
 
 /// What has doubles already.
