@@ -121,10 +121,10 @@ impl Shape {
     }
 
     /// The distances on a grid that is `margin` [m] wider than the bounding box, and `spacing` [m] fine or as the
-    /// shape's own, whose samples it then has, where that is coarser.
+    /// shape's own, whose samples it then has, where that is not much finer (a tenth).
     pub fn distances(&self, spacing: f64, margin: f64) -> Result<SampledField> {
         match &self.field {
-            Field::Sampled(own) if own.spacing() >= spacing => {
+            Field::Sampled(own) if own.spacing() >= 0.9 * spacing => {
                 own.extended(|x| self.distance(x), self.lower, self.upper, margin)
             }
             _ => {

@@ -6,11 +6,11 @@ use super::Partner;
 use super::enclosure::Enclosure;
 use super::history::PairKey;
 
-/// Images further than this many periods are not looked for: a grain several times larger than a
-/// periodic box has no meaning.
+/// Images further than this many periods are not looked for: a grain, with what it may move or reach, several
+/// times larger than a periodic box has no meaning.
 const MOST_PERIODS: i32 = 4;
 
-/// A bounding sphere, grown by what the grain may move.
+/// A bounding sphere, grown by what the grain may move, or by how far from it the flow minds.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ball {
     /// Centre [m].

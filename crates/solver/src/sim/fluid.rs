@@ -17,6 +17,7 @@ pub(super) trait Fluid: Send + Sync {
     fn set_body_acceleration(&mut self, acceleration: DVec3);
     fn predict(&mut self, dt: f64);
     fn correct_advection(&mut self, grains: &[Grain]);
+    /// Finds the faces near restored grains; in a step [`Fluid::couple`] does.
     fn locate(&mut self, grains: &[Grain], dt: f64);
     fn project_prediction(&mut self, dt: f64);
     fn couple(&mut self, grains: &[Grain], before: &[Past], other: &[Load], dt: f64);

@@ -57,9 +57,8 @@ impl Planes {
         if first > last {
             return 0..0;
         }
-        // One more row on each side, and one register.
-        let line = self.line;
-        first as usize * line..((last + 2) as usize * line).min(self.y.len())
+        // One more row on each side.
+        first as usize * self.line..(last + 2) as usize * self.line
     }
     fn place(&self, i: i32, j: i32) -> usize {
         i as usize + (j + 1) as usize * self.line
@@ -350,13 +349,14 @@ impl<'a, R: Real> Lines<'a, R> {
         let relative = carrier - count.mul_add(V::constant(by[along]), V::constant(rigid[along]));
         let outer = V::constant(-8.0).mul_add(below + above, far_below + far_above);
         let sixth = both.mul_add(V::constant(7.0), outer);
-        let mut share = carrier * V::constant(1.0 / 60.0);
+        let mut smoother = carrier * V::constant(1.0 / 60.0) * sixth;
         if !INNER {
-            share = count.where_below(V::constant(six.end), share, zero);
-            share = count.where_below(V::constant(six.start), zero, share);
+            // What was read beyond the ends may be anything.
+            smoother = count.where_below(V::constant(six.end), smoother, zero);
+            smoother = count.where_below(V::constant(six.start), zero, smoother);
         }
         let surplus = surplus(d, self.band);
-        let flux = (mean * relative).mul_add(surplus, share * sixth);
+        let flux = (mean * relative).mul_add(surplus, smoother);
         let flux = flux * V::constant(axis.inverse);
         let flux = d.where_below(V::constant(2.0 * self.band), flux, zero);
         V::constant(-self.band).where_below(d, flux, zero)

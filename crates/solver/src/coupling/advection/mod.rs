@@ -174,3 +174,66 @@ impl<R: Real> Kernel for Links<'_, R> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::{DQuat, DVec3};
+    use grainwake_shape::Shape;
+
+    use crate::coupling::{Coupling, Scheme};
+    use crate::dem::{Dof, Grain};
+    use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
+    use crate::grid::Mesh;
+    use crate::math::Pose;
+
+    #[test]
+    fn what_fills_up_rows_reaches_no_link() {
+        let mesh = Mesh {
+            cells: [24; 3],
+            spacing: DVec3::splat(0.25),
+            origin: DVec3::ZERO,
+        };
+        let params = FluidParams {
+            density: 1.0,
+            kinematic_viscosity: 0.01,
+            body_acceleration: DVec3::ZERO,
+            initial_velocity: DVec3::ZERO,
+            advection: Advection::Central,
+        };
+        // Close to a corner of the box: links on both sides have less than six faces in line.
+        let grain = |place: f64| Grain {
+            shape: Arc::new(Shape::sphere(1.0, 100)),
+            density: 2.0,
+            pose: Pose {
+                position: DVec3::splat(place),
+                orientation: DQuat::IDENTITY,
+            },
+            velocity: DVec3::ONE,
+            angular_velocity: DVec3::ZERO,
+            translation: Dof::Free,
+            rotation: Dof::Free,
+        };
+        let grains = [grain(1.1), grain(4.9)];
+        let predicted = |filling: f64| {
+            let boundaries = Boundaries([[Boundary::WALL; 2]; 3]);
+            let mut flow = Flow::<f64>::new(&mesh, boundaries, &params);
+            flow.start_from(|axis, x| (3.0 * x).to_array()[(axis + 1) % 3].sin());
+            let (row, entries) = (mesh.layout().row(), mesh.cells[0] + 2);
+            assert!(row > entries);
+            for axis in 0..3 {
+                let rows = flow.velocity.component_mut(axis).chunks_exact_mut(row);
+                rows.for_each(|row| row[entries..].fill(filling));
+            }
+            let mut coupling = Coupling::new(&flow, Scheme::Aperture, 1.0, 0.01, &grains);
+            flow.predict(0.01);
+            let before: Vec<f64> = flow.predicted.component(0).to_vec();
+            coupling.correct_advection(&mut flow, &grains);
+            assert!(flow.predicted.component(0) != before);
+            let all = (0..3).flat_map(|axis| flow.predicted.component(axis).to_vec());
+            all.map(f64::to_bits).collect::<Vec<_>>()
+        };
+        assert!(predicted(0.0) == predicted(f64::NAN));
+    }
+}

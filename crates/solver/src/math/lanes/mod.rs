@@ -190,7 +190,8 @@ pub trait Vector:
         }
         Self::load(&lanes)
     }
-    /// Lane-wise one over the square root of what is not negative, within 1e-10; some large number of 0.
+    /// Lane-wise one over the square root of what is not negative, within 1e-10; some large number of 0
+    /// (of a double, that is: a single cannot hold it).
     /// A root and a quotient take five times as long.
     #[inline(always)]
     fn inverse_root(self) -> Self {
@@ -205,7 +206,7 @@ pub trait Vector:
     /// The same within .035: half the exponent, turned around.
     #[inline(always)]
     fn inverse_root_guess(self) -> Self {
-        self.each(|x| f64::from_bits(INVERSE_ROOT_OF_ONE - (x.to_bits() >> 1)))
+        self.each(|x| f64::from_bits(INVERSE_ROOT_OF_ONE.wrapping_sub(x.to_bits() >> 1)))
     }
     /// Of each lane of `at`, a whole number, the entry of `from` there and the next.
     #[inline(always)]
