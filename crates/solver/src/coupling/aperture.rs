@@ -54,19 +54,19 @@ const LEAST_APERTURE_AT: f64 = 1.1008391240275971;
 
 /// sin(pi s) for |s| <= 1, to 1e-14.
 #[inline(always)]
-fn sine<V: Vector<Number = f64>>(s: V) -> V {
+fn sine<V: Vector>(s: V) -> V {
     s * vanishing(s, &SINE)
 }
 
 /// cos(pi s / 2) for |s| <= 1, to 1e-14.
 #[inline(always)]
-fn cosine<V: Vector<Number = f64>>(s: V) -> V {
+fn cosine<V: Vector>(s: V) -> V {
     vanishing(s, &COSINE)
 }
 
 /// (1 - s^2) times a polynomial in s^2.
 #[inline(always)]
-fn vanishing<V: Vector<Number = f64>>(s: V, series: &[f64]) -> V {
+fn vanishing<V: Vector>(s: V, series: &[f64]) -> V {
     let square = s * s;
     let (last, others) = series.split_last().expect("a series has terms");
     let mut sum = V::constant(*last);
@@ -78,7 +78,7 @@ fn vanishing<V: Vector<Number = f64>>(s: V, series: &[f64]) -> V {
 
 /// Open fraction of faces at distances `d` [m], which may be infinite.
 #[inline(always)]
-pub fn aperture<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
+pub fn aperture<V: Vector>(d: V, eps: f64) -> V {
     let (one, half) = (V::constant(1.0), V::constant(0.5));
     let s = clamped(d, eps);
     sine(s).mul_add(V::constant(0.5 / PI), half * (one + s))
@@ -87,7 +87,7 @@ pub fn aperture<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
 /// 1 / A - 1 of the aperture A at distances `d` [m], or of 0.4 where A is smaller; within 3e-8. Smaller
 /// ones to divide by are unstable on an impulsive start.
 #[inline(always)]
-pub fn surplus<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
+pub fn surplus<V: Vector>(d: V, eps: f64) -> V {
     let closer = d.mul_add(V::constant(-1.0 / eps), V::constant(1.0));
     let t = closer
         .larger(V::constant(0.0))
@@ -102,7 +102,7 @@ pub fn surplus<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
 
 /// Integral of the aperture from deep inside to `d` [m]: 0 inside, d outside the band.
 #[inline(always)]
-pub fn open_depth<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
+pub fn open_depth<V: Vector>(d: V, eps: f64) -> V {
     let (zero, one, half) = (V::constant(0.0), V::constant(1.0), V::constant(0.5));
     let s = clamped(d, eps);
     // 1 + cos(pi s) = 2 cos^2(pi s / 2)
@@ -115,7 +115,7 @@ pub fn open_depth<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
 
 /// d / eps, between -1 and 1.
 #[inline(always)]
-fn clamped<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
+fn clamped<V: Vector>(d: V, eps: f64) -> V {
     let one = V::constant(1.0);
     (d * V::constant(1.0 / eps))
         .larger(V::constant(-1.0))
@@ -126,7 +126,7 @@ fn clamped<V: Vector<Number = f64>>(d: V, eps: f64) -> V {
 /// surface with unit normals `n`, on a grid of `spacing`; immense where a face is closed. It is the quotient of
 /// the two numbers, of which the second is positive.
 #[inline(always)]
-pub fn drag<V: Vector<Number = f64>>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
+pub fn drag<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
     let here = open_depth(d, eps);
     let twice = here + here;
     let mut excess = V::constant(0.0);

@@ -24,11 +24,11 @@ pub struct Forced {
     /// Of each component.
     pub runs: [Vec<Run>; 3],
     /// Share by which a face takes the rigid velocity, 0 to 1.
-    pub share: Vec<f64>,
+    pub share: Vec<f32>,
     /// Part of a face that the grain closes to the pressure gradient, 0 to 1.
-    pub closed: Vec<f64>,
+    pub closed: Vec<f32>,
     /// Part that all grains together close; empty where no other grain is near.
-    pub closed_by_all: Vec<f64>,
+    pub closed_by_all: Vec<f32>,
     /// What a face takes from a grain at rest that goes on resting [m/s]: the pressure of the step given back
     /// to its closed part, less its share of the velocity that it would have without drag. Known once the
     /// impulse is.
@@ -38,9 +38,11 @@ pub struct Forced {
 impl Forced {
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let lists = [&self.share, &self.closed, &self.closed_by_all, &self.taken];
+        let lists = [&self.share, &self.closed, &self.closed_by_all];
         let runs: usize = self.runs.iter().map(Vec::capacity).sum();
         let values: usize = lists.iter().map(|list| list.capacity()).sum();
-        size_of::<Run>() * runs + size_of::<f64>() * values
+        size_of::<Run>() * runs
+            + size_of::<f32>() * values
+            + size_of::<f64>() * self.taken.capacity()
     }
 }

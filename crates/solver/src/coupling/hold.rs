@@ -58,8 +58,8 @@ pub struct Holding {
 pub struct Faces {
     count: usize,
     /// Signed distances [m] and unit normals; what follows the last face is of no meaning.
-    distance: Vec<f64>,
-    normal: [Vec<f64>; 3],
+    distance: Vec<f32>,
+    normal: [Vec<f32>; 3],
 }
 
 impl Faces {
@@ -79,11 +79,11 @@ impl Faces {
     }
     /// Adds neighbouring faces of a row, for which there is room; of the lists more than these are read.
     #[inline(always)]
-    pub fn extend<V: Vector<Number = f64>>(
+    pub fn extend<V: Vector<Number = f32>>(
         &mut self,
         count: usize,
-        distance: &[f64],
-        normal: [&[f64]; 3],
+        distance: &[f32],
+        normal: [&[f32]; 3],
     ) {
         let first = self.count;
         self.count += count;
@@ -97,7 +97,7 @@ impl Faces {
     }
     /// Takes a face from the grain: another one holds it.
     pub fn forgo(&mut self, index: usize, holding: &Holding) {
-        self.distance[index] = holding.away();
+        self.distance[index] = holding.away() as f32;
     }
     /// Finds the holds on all faces, as far as no other grain is near, for the lists of `forced`.
     pub fn hold(&mut self, holding: &Holding, forced: &mut Forced) {
@@ -107,7 +107,7 @@ impl Faces {
         self.normal
             .iter_mut()
             .for_each(|n| n.resize(padded.max(n.len()), 0.0));
-        self.distance[count..padded].fill(holding.away());
+        self.distance[count..padded].fill(holding.away() as f32);
         forced.share.resize(padded, 0.0);
         forced.closed.resize(padded, 0.0);
         match holding.scheme {
@@ -119,7 +119,8 @@ impl Faces {
             Scheme::Paper => {
                 for at in 0..count {
                     let hold = self.at(at, holding);
-                    (forced.share[at], forced.closed[at]) = (hold.share(hold), hold.closed);
+                    forced.share[at] = hold.share(hold) as f32;
+                    forced.closed[at] = hold.closed as f32;
                 }
             }
         }
@@ -132,8 +133,9 @@ impl Faces {
     }
     /// The hold of the grain on a face.
     pub fn at(&self, index: usize, holding: &Holding) -> Hold {
-        let normal = self.normal.each_ref().map(|list| list[index]);
-        holding.of(self.distance[index], DVec3::from_array(normal))
+        let normal = self.normal.each_ref().map(|list| f64::from(list[index]));
+        let distance = f64::from(self.distance[index]);
+        holding.of(distance, DVec3::from_array(normal))
     }
 }
 
@@ -165,7 +167,7 @@ impl Holding {
 
     /// Strength of the hold on faces, as the quotient of two numbers, and closed part.
     #[inline(always)]
-    fn near<V: Vector<Number = f64>>(&self, d: V, normal: [V; 3]) -> ([V; 2], V) {
+    fn near<V: Vector>(&self, d: V, normal: [V; 3]) -> ([V; 2], V) {
         let [drag, depth] = drag(d, normal, self.spacing.to_array(), self.eps);
         let strength = V::constant(self.diffusion) * drag;
         // The grain does nothing beyond its faces, which may enclose some where it is concave.
@@ -214,9 +216,9 @@ struct Apertures<'a> {
 }
 
 impl Kernel for Apertures<'_> {
-    type Number = f64;
+    type Number = f32;
     #[inline(always)]
-    fn run<V: Vector<Number = f64>>(self) {
+    fn run<V: Vector<Number = f32>>(self) {
         let Faces {
             distance, normal, ..
         } = self.faces;

@@ -40,7 +40,7 @@ impl Span {
 pub struct PushRow {
     /// Position in memory of the first.
     pub at: usize,
-    /// Its place in [`Body::push`].
+    /// Its place in the lists of [`Body`].
     pub first: usize,
     /// Number of faces.
     pub count: usize,
@@ -55,15 +55,13 @@ pub struct Body {
     pub size: IVec3,
     /// Signed distance [m] at faces near the grain for each component, row by row; infinite where another
     /// grain is nearer. Some entries more follow the last.
-    pub distance: [Vec<f64>; 3],
+    pub distance: [Vec<f32>; 3],
     /// Which faces of each row of the box these are.
     pub spans: [Vec<Span>; 3],
     /// Where the box lies in memory.
     pub places: Places,
     /// From its first to its last plane there.
     pub planes: Range<usize>,
-    /// What is added to the tendency at the same faces [m/s^2].
-    pub push: [Vec<f64>; 3],
     /// Where those faces lie.
     pub rows: [Vec<PushRow>; 3],
     /// Faces under its rigidity.
@@ -78,12 +76,10 @@ impl Body {
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let values = self.distance.iter().chain(&self.push);
+        let distances: usize = self.distance.iter().map(Vec::capacity).sum();
         let spans: usize = self.spans.iter().map(Vec::capacity).sum();
         let rows: usize = self.rows.iter().map(Vec::capacity).sum();
-        values
-            .map(|v| size_of::<f64>() * v.capacity())
-            .sum::<usize>()
+        size_of::<f32>() * distances
             + self.places.bytes()
             + size_of::<Span>() * spans
             + size_of::<PushRow>() * rows
@@ -162,7 +158,8 @@ impl Locator {
             scheme: self.scheme,
             eps: self.eps,
             spacing: self.mesh.spacing,
-            diffusion: dt * self.kinematic_viscosity,
+            // Singles hold what it is multiplied with.
+            diffusion: (dt * self.kinematic_viscosity).min(1e20 * self.eps * self.eps),
         };
         let (mesh, shapes, grain) = (&self.mesh, &self.shapes, &grains[index]);
         let rivals = self.neighbours.of(index, mesh, shapes, grains);
@@ -230,9 +227,9 @@ impl Locator {
                     all = all + holding.of(there, normal);
                 }
             }
-            forced.share[place] = own.share(all);
-            forced.closed[place] = own.closed / all.closed.max(1.0);
-            forced.closed_by_all[place] = all.closed.min(1.0);
+            forced.share[place] = own.share(all) as f32;
+            forced.closed[place] = (own.closed / all.closed.max(1.0)) as f32;
+            forced.closed_by_all[place] = all.closed.min(1.0) as f32;
         }
     }
 }

@@ -39,7 +39,7 @@ struct Part {
 /// frame, then the unit normals, in the space frame. Some entries more follow the last.
 #[derive(Default)]
 struct Points {
-    faces: [Vec<f64>; 3],
+    faces: [Vec<f32>; 3],
     spare: Spare,
 }
 
@@ -52,7 +52,7 @@ impl Points {
     }
     /// Writes the faces of a `span`; the face 0 of the row is at `first`, the others follow by `step`.
     #[inline(always)]
-    fn place<V: Vector<Number = f64>>(&mut self, span: Span, [first, step]: [DVec3; 2]) {
+    fn place<V: Vector<Number = f32>>(&mut self, span: Span, [first, step]: [DVec3; 2]) {
         for i in (span.start..span.end).step_by(V::WIDTH) {
             let count = V::constant(f64::from(i)) + V::ramp();
             let at = span.place(i);
@@ -64,9 +64,9 @@ impl Points {
     }
     /// Finds the distances of the first `count` faces and puts the normals in the place of the points.
     #[inline(always)]
-    fn measure<V: Vector<Number = f64>>(
+    fn measure<V: Vector<Number = f32>>(
         &mut self,
-        distances: &mut [f64],
+        distances: &mut [f32],
         shape: &NearShape,
         turn: DMat3,
         count: usize,
@@ -101,9 +101,9 @@ pub struct Measure<'a> {
 }
 
 impl Kernel for Measure<'_> {
-    type Number = f64;
+    type Number = f32;
     #[inline(always)]
-    fn run<V: Vector<Number = f64>>(self) {
+    fn run<V: Vector<Number = f32>>(self) {
         let Measure {
             mesh,
             holding,
@@ -148,7 +148,7 @@ impl Kernel for Measure<'_> {
                         spans.push(span);
                     }
                 }
-                distance.resize(distance.len().max(known + count + MOST), f64::INFINITY);
+                distance.resize(distance.len().max(known + count + MOST), f32::INFINITY);
                 points.measure::<V>(&mut distance[known..], shape, turn, count);
                 faces.reserve(count);
                 let plane = (size.y * k) as usize;
@@ -224,7 +224,7 @@ impl Contest<'_> {
         &self,
         range: Range<i32>,
         held: Range<i32>,
-        distance: &mut [f64],
+        distance: &mut [f32],
         number: usize,
         faces: &mut Faces,
         shared: &mut Vec<(usize, DVec3)>,
@@ -232,20 +232,21 @@ impl Contest<'_> {
         let (eps, blended) = (self.holding.eps, self.holding.scheme == Scheme::Paper);
         for (i, d) in range.zip(distance) {
             let x = self.start + f64::from(i) * self.step;
+            let own = f64::from(*d);
             let others = self.rivals.iter();
             let rival = others
-                .map(|rival| rival.distance(x, self.reach) + rival.handicap * eps)
+                .map(|rival| rival.distance(x, self.reach) + rival.handicap)
                 .fold(f64::INFINITY, f64::min);
             if held.contains(&i) {
                 let face = number + (i - held.start) as usize;
-                if rival <= -eps && rival < *d {
+                if rival <= -eps && rival < own {
                     faces.forgo(face, self.holding);
-                } else if rival < 2.0 * eps && (*d > -eps || blended) {
+                } else if rival < 2.0 * eps && (own > -eps || blended) {
                     shared.push((face, x));
                 }
             }
-            if *d > rival {
-                *d = f64::INFINITY;
+            if own > rival {
+                *d = f32::INFINITY;
             }
         }
     }
@@ -253,7 +254,7 @@ impl Contest<'_> {
 
 /// The parts of a span from the first to the last face that is no farther than each limit.
 #[inline(always)]
-fn within<V: Vector<Number = f64>>(distance: &[f64], all: Span, limits: [f64; 2]) -> [Span; 2] {
+fn within<V: Vector<Number = f32>>(distance: &[f32], all: Span, limits: [f64; 2]) -> [Span; 2] {
     let count = (all.end - all.start) as usize;
     let mut parts = [[count, count]; 2];
     for at in (0..count).step_by(V::WIDTH) {
@@ -292,8 +293,9 @@ impl Around {
     fn new(grain: &Grain, reach: f64, spacing: DVec3, to_body: DMat3) -> Around {
         let far = grain.shape.bounding_radius() + reach;
         let step = to_body * (DVec3::X * spacing.x);
-        // Finite where a row runs along a side of the box.
-        let per_step = step.map(|s| if s.abs() > 1e-200 { 1.0 / s } else { 1e200 });
+        // Singles hold it where a row runs along a side of the box.
+        let least = 1e-8 * spacing.x;
+        let per_step = step.map(|s| 1.0 / if s.abs() > least { s } else { least });
         Around {
             far: far * far,
             lower: grain.shape.lower() - reach,
@@ -307,7 +309,7 @@ impl Around {
 
     /// The rows (j, k) and above of `count` faces each; face (0, 0, 0) is at `arm` from the centroid.
     #[inline(always)]
-    fn rows<V: Vector<Number = f64>>(&self, arm: DVec3, [j, k]: [i32; 2], count: i32) -> Rows {
+    fn rows<V: Vector<Number = f32>>(&self, arm: DVec3, [j, k]: [i32; 2], count: i32) -> Rows {
         let zero = V::constant(0.0);
         let z = V::constant(arm.z + self.spacing.z * f64::from(k));
         let step = V::constant(f64::from(j)) + V::ramp();
@@ -347,9 +349,9 @@ impl Around {
 #[derive(Default)]
 struct Rows {
     /// Face 0 in the frame of the grain [m].
-    first: [[f64; MOST]; 3],
-    start: [f64; MOST],
-    end: [f64; MOST],
+    first: [[f32; MOST]; 3],
+    start: [f32; MOST],
+    end: [f32; MOST],
 }
 
 impl Rows {
@@ -358,7 +360,10 @@ impl Rows {
     fn of(&self, n: usize, first: usize) -> (Span, DVec3) {
         let [start, end] = [self.start[n] as i32, self.end[n] as i32];
         let span = Span { start, end, first };
-        (span, DVec3::from_array(self.first.map(|lanes| lanes[n])))
+        (
+            span,
+            DVec3::from_array(self.first.map(|lanes| f64::from(lanes[n]))),
+        )
     }
 }
 

@@ -21,6 +21,7 @@ use crate::dem::{Grain, Response};
 use crate::flow::{Flow, FlowMeasures};
 use crate::math::{Load, Real};
 
+use advection::Push;
 use locate::{Body, Locator};
 use measure::Scratch;
 use newton::Motion;
@@ -54,6 +55,7 @@ pub(crate) struct Coupling {
     fluid_density: f64,
     locator: Locator,
     bodies: Vec<Body>,
+    pushes: Vec<Push>,
     /// Of each grain in the present step.
     coupled: Vec<(Impulse, Motion)>,
 }
@@ -74,6 +76,7 @@ impl Coupling {
             fluid_density,
             locator,
             bodies: vec![Body::default(); grains.len()],
+            pushes: vec![Push::default(); grains.len()],
             coupled: Vec::new(),
         };
         coupling.locate(grains, 1.0);
@@ -93,7 +96,8 @@ impl Coupling {
     /// Corrects the advection just predicted where grains close part of a link.
     pub fn correct_advection<R: Real>(&mut self, flow: &mut Flow<R>, grains: &[Grain]) {
         if self.scheme == Scheme::Aperture {
-            advection::correct(self.locator.band(), flow, grains, &mut self.bodies);
+            let band = self.locator.band();
+            advection::correct(band, flow, grains, &self.bodies, &mut self.pushes);
         }
     }
 
@@ -194,6 +198,10 @@ impl Coupling {
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
         let coupled = size_of::<(Impulse, Motion)>() * self.coupled.capacity();
-        self.bodies.iter().map(Body::bytes).sum::<usize>() + self.locator.bytes() + coupled
+        let pushes = self.pushes.iter().flatten().map(Vec::capacity);
+        self.bodies.iter().map(Body::bytes).sum::<usize>()
+            + size_of::<f64>() * pushes.sum::<usize>()
+            + self.locator.bytes()
+            + coupled
     }
 }

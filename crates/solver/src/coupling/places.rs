@@ -7,7 +7,7 @@ use glam::IVec3;
 use crate::flow::Boundaries;
 use crate::grid::Mesh;
 use crate::math::Real;
-use crate::math::lanes::prefetch;
+use crate::math::lanes::{prefetch, prefetch_ahead};
 
 /// Which faces and cells are unknowns, and where.
 #[derive(Clone, Copy)]
@@ -150,6 +150,20 @@ impl Places {
             (first.min(part), last.max(part))
         });
         first..last + 1
+    }
+
+    /// Asks for plane `k` of a field in the box, which is read soon; nothing happens beyond the last.
+    #[inline]
+    pub fn ask_ahead<R>(&self, field: &[R], k: usize) {
+        const BESIDE: usize = PAD as usize;
+        let [x, y, z] = &self.lines;
+        if k + 2 * BESIDE >= z.len() {
+            return;
+        }
+        for line in &y[BESIDE..y.len() - BESIDE] {
+            let first = x[BESIDE] + line + z[k + BESIDE];
+            prefetch_ahead(field, first, x.len() - 2 * BESIDE);
+        }
     }
 
     /// Copies a field in the box and three cells about it, x fastest.

@@ -112,10 +112,19 @@ struct Rigid {
 
 impl Rigid {
     /// Velocity of a body at `[velocity, angular velocity]` along a run that begins at `arm`.
+    #[inline(always)]
     fn of([velocity, omega]: [DVec3; 2], arm: DVec3, spacing: DVec3) -> Rigid {
         Rigid {
             first: velocity + omega.cross(arm),
             change: omega.cross(DVec3::X * spacing.x),
+        }
+    }
+    /// The same beside the run, where the velocity is `more`.
+    #[inline(always)]
+    fn beside(self, more: DVec3) -> Rigid {
+        Rigid {
+            first: self.first + more,
+            ..self
         }
     }
     /// A component at the faces `i` of the run.
@@ -179,6 +188,7 @@ impl<R: Real> Kernel for Gather<'_, R> {
         };
         for (axis, runs) in runs.iter().enumerate() {
             let half = 0.5 * spacing[axis] * DVec3::AXES[axis];
+            let above = self.before[1].cross(half);
             let field = self.flow.predicted.component(axis);
             for (number, run) in runs.iter().enumerate() {
                 if let Some(run) = runs.get(number + AHEAD) {
@@ -186,15 +196,15 @@ impl<R: Real> Kernel for Gather<'_, R> {
                     prefetch(&self.flow.pressure, run.at, run.count);
                     prefetch(&self.flow.pressure, run.at + strides[2], run.count);
                 }
+                let rigid = Rigid::of(self.before, run.arm, spacing);
                 let work = GatherRun {
                     axis,
                     run,
                     predicted: field,
                     pressure: &self.flow.pressure,
                     around,
-                    rigid: Rigid::of(self.before, run.arm, spacing),
-                    sides: [half, -half]
-                        .map(|half| Rigid::of(self.before, run.arm + half, spacing)),
+                    rigid,
+                    sides: [above, -above].map(|more| rigid.beside(more)),
                     drift: (0.5 * self.relief / spacing).to_array(),
                     pull: self.relief / spacing[axis],
                     driven: self.relief * self.flow.body_acceleration()[axis],
@@ -203,8 +213,8 @@ impl<R: Real> Kernel for Gather<'_, R> {
                 };
                 for n in (0..run.count).step_by(V::WIDTH) {
                     let at = run.first + n;
-                    let closed = [V::load(&closed[at..]), V::load(&by_all[at..])];
-                    let share = V::load(&share[at..]);
+                    let closed = [V::load_from(&closed[at..]), V::load_from(&by_all[at..])];
+                    let share = V::load_from(&share[at..]);
                     // Beyond the run this is of no meaning until the next one comes.
                     work.at(n, share, closed, &mut self.sums[axis])
                         .store(&mut taken[at..]);
@@ -339,7 +349,8 @@ impl<R: Real> Kernel for Impose<'_, R> {
             let change = Rigid::of(change, run.arm, self.spacing);
             for n in (0..run.count).step_by(V::WIDTH) {
                 let at = run.first + n;
-                let (share, closed) = (V::load(&forced.share[at..]), V::load(&forced.closed[at..]));
+                let share = V::load_from(&forced.share[at..]);
+                let closed = V::load_from(&forced.closed[at..]);
                 let place = count_from(n);
                 let gain = V::load(&forced.taken[at..])
                     + share * rigid.at(self.axis, place)

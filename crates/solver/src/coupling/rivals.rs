@@ -7,9 +7,9 @@ use super::places::Unknowns;
 use crate::dem::{Ball, BroadPhase, Enclosure, Grain, Partner};
 use crate::grid::Mesh;
 
-/// Distances that differ by less than this part of the band are equal: of two copies of a link
-/// across a periodic edge just one must count.
-const TIE: f64 = 1e-9;
+/// Distances that differ by less than this part of the size of both grains are equal, being found in single
+/// precision: of two copies of a link across a periodic edge, and of a link as far from both, just one must count.
+const TIE: f64 = 1e-6;
 
 /// Another grain nearby, or an image of the grain itself.
 pub struct Rival<'a> {
@@ -17,8 +17,7 @@ pub struct Rival<'a> {
     pub shape: &'a NearShape,
     /// From the grain to the image in question [m].
     pub shift: DVec3,
-    /// Added to its distance, as a part of the band, so that it has the faces as far from both or
-    /// has not.
+    /// Added to its distance [m], so that it has the faces as far from both or has not.
     pub handicap: f64,
 }
 
@@ -101,14 +100,15 @@ impl Neighbours {
         let own = self.found[first..].iter();
         let rivals = own.take_while(|one| one.grain == index).map(|one| {
             let [z, y, x] = one.image;
+            let tie = TIE * (self.balls[index].radius + self.balls[one.other].radius);
             Rival {
                 grain: &grains[one.other],
                 shape: shapes.of(one.other),
                 shift: DVec3::new(f64::from(x), f64::from(y), f64::from(z)) * mesh.extent(),
                 handicap: match one.other == index {
-                    true if [x, y, z] > [0; 3] => -TIE,
-                    false if one.other < index => -TIE,
-                    _ => TIE,
+                    true if [x, y, z] > [0; 3] => -tie,
+                    false if one.other < index => -tie,
+                    _ => tie,
                 },
             }
         });
@@ -121,11 +121,15 @@ mod tests {
     use std::sync::Arc;
 
     use glam::DQuat;
-    use grainwake_shape::Shape;
+    use grainwake_shape::{Shape, ShapeOptions, analytic};
 
     use super::*;
+    use crate::coupling::Scheme;
+    use crate::coupling::locate::{Body, Locator};
+    use crate::coupling::measure::Scratch;
     use crate::dem::Dof;
     use crate::flow::{Boundaries, Boundary};
+    use crate::grid::FACE_OFFSET;
     use crate::math::Pose;
 
     #[test]
@@ -162,19 +166,21 @@ mod tests {
                 .collect()
         };
         neighbours.find(&mesh, &unknowns, 0.6, &grains);
+        let tie = 2.2 * TIE;
         let along_x = DVec3::new(8.0, 0.0, 0.0);
-        assert_eq!(found(&neighbours, 0), [(-along_x, TIE)]);
+        assert_eq!(found(&neighbours, 0), [(-along_x, tie)]);
         assert_eq!(found(&neighbours, 1), []);
-        assert_eq!(found(&neighbours, 2), [(along_x, -TIE)]);
+        assert_eq!(found(&neighbours, 2), [(along_x, -tie)]);
         // With a reach of more than half a period every grain meets its own images too.
         neighbours.find(&mesh, &unknowns, 1.6, &grains[1..2]);
+        let tie = 4.2 * TIE;
         let along_y = DVec3::new(0.0, 4.0, 0.0);
         let along_z = DVec3::new(0.0, 0.0, 4.0);
         let own = [
-            (-along_z, TIE),
-            (-along_y, TIE),
-            (along_y, -TIE),
-            (along_z, -TIE),
+            (-along_z, tie),
+            (-along_y, tie),
+            (along_y, -tie),
+            (along_z, -tie),
         ];
         let rivals = neighbours.of(0, &mesh, &shapes, &grains[1..2]);
         let rivals: Vec<_> = rivals
@@ -182,5 +188,64 @@ mod tests {
             .map(|rival| (rival.shift, rival.handicap))
             .collect();
         assert_eq!(rivals, own);
+    }
+
+    #[test]
+    fn every_face_near_two_grains_is_of_one_of_them() {
+        let mesh = Mesh {
+            cells: [40, 24, 24],
+            spacing: DVec3::splat(0.1),
+            origin: DVec3::ZERO,
+        };
+        let boundaries = Boundaries([[Boundary::WALL; 2]; 3]);
+        let options = ShapeOptions::default();
+        let shape = Arc::new(analytic::ellipsoid(0.4, 0.35, 0.3, &options).unwrap());
+        // Faces in the middle between them are as far from both.
+        let at = |x: f64| Grain {
+            shape: shape.clone(),
+            density: 2.0,
+            pose: Pose {
+                position: DVec3::new(x, 1.2, 1.2),
+                orientation: DQuat::IDENTITY,
+            },
+            velocity: DVec3::ZERO,
+            angular_velocity: DVec3::ZERO,
+            translation: Dof::Free,
+            rotation: Dof::Free,
+        };
+        let grains = [at(1.55), at(2.45)];
+        let mut locator = Locator::new(&mesh, &boundaries, Scheme::Aperture, 0.01, &grains);
+        locator.find_neighbours(&grains);
+        let mut owners = [0, 1, 2].map(|_| vec![0; mesh.layout().len()]);
+        let mut between = 0;
+        for index in 0..2 {
+            let (mut body, mut scratch) = (Body::default(), Scratch::default());
+            locator.locate(&grains, index, 0.01, &mut body, &mut scratch);
+            for (component, rows) in body.rows.iter().enumerate() {
+                for (row, n) in rows
+                    .iter()
+                    .flat_map(|row| (0..row.count).map(move |n| (row, n)))
+                {
+                    let owned = body.distance[component][row.first + n].is_finite();
+                    owners[component][row.at + n] += i32::from(owned);
+                }
+            }
+        }
+        for (component, owners) in owners.iter().enumerate() {
+            let [row, plane] = [mesh.layout().row(), mesh.layout().plane()];
+            for (at, owners) in owners.iter().enumerate() {
+                let cell = [at % row, at % plane / row, at / plane].map(|n| n as f64 - 1.0);
+                let offset = DVec3::from_array(FACE_OFFSET[component]);
+                let x = mesh.spacing * (DVec3::from_array(cell) + offset);
+                let [one, other] = grains
+                    .each_ref()
+                    .map(|grain| grain.shape.distance(grain.pose.to_body(x)));
+                if one.min(other) < 0.2 {
+                    between += i32::from((one - other).abs() < 1e-9);
+                    assert_eq!(*owners, 1, "component {component} at {x}");
+                }
+            }
+        }
+        assert!(between > 20, "{between}");
     }
 }

@@ -8,17 +8,13 @@ use crate::math::lanes::Vector;
 
 /// A vector from each list. (No closure in a kernel touches vectors: it would not be inlined.)
 #[inline(always)]
-pub fn load_all<V: Vector<Number = f64>>([x, y, z]: &[Vec<f64>; 3], at: usize) -> [V; 3] {
+pub fn load_all<V: Vector>([x, y, z]: &[Vec<V::Number>; 3], at: usize) -> [V; 3] {
     [V::load(&x[at..]), V::load(&y[at..]), V::load(&z[at..])]
 }
 
 /// Stores vectors in as many lists.
 #[inline(always)]
-pub fn store_all<V: Vector<Number = f64>>(
-    values: [V; 3],
-    [x, y, z]: &mut [Vec<f64>; 3],
-    at: usize,
-) {
+pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [Vec<V::Number>; 3], at: usize) {
     values[0].store(&mut x[at..]);
     values[1].store(&mut y[at..]);
     values[2].store(&mut z[at..]);
@@ -48,7 +44,7 @@ pub struct Spot<V> {
     pub off: V,
 }
 
-impl<'a, V: Vector<Number = f64>> Grid<'a, V> {
+impl<'a, V: Vector> Grid<'a, V> {
     #[inline(always)]
     pub fn of(field: &'a SampledField) -> Grid<'a, V> {
         let (dims, inverse) = (field.dims(), 1.0 / field.spacing());
@@ -111,14 +107,15 @@ impl<'a, V: Vector<Number = f64>> Grid<'a, V> {
             self.slope * (high - low),
         ];
         // Whatever is off the grid is so by more than a rounding.
-        let far = V::constant(0.0).is_below(spot.off) * V::constant(FAR);
-        (self.quantum * (low + fz * (high - low)) + far, gradient)
+        let distance = self.quantum * (low + fz * (high - low));
+        let distance = V::constant(0.0).where_below(spot.off, V::constant(FAR), distance);
+        (distance, gradient)
     }
 }
 
 /// Value between the samples at `at` and the next along x, and the slope from one to the other.
 #[inline(always)]
-fn edge<V: Vector<Number = f64>>(levels: &[f32], at: V, x: V) -> [V; 2] {
+fn edge<V: Vector>(levels: &[f32], at: V, x: V) -> [V; 2] {
     let [low, high] = V::pairs(levels, at);
     let slope = high - low;
     [low + x * slope, slope]

@@ -49,8 +49,8 @@ impl Precision {
     }
 }
 
-/// A number of a field, `f64` or `f32`. Sums over the grid, and everything about grains, are
-/// doubles whatever the fields are.
+/// A number of a field, `f64` or `f32`. Sums over the grid, and the motion of grains, are doubles
+/// whatever the fields are.
 pub(crate) trait Real:
     Registers
     + Copy
@@ -75,14 +75,21 @@ pub(crate) trait Real:
     fn wide(self) -> f64;
     /// `self * factor + term`, rounded once.
     fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// One over its square root within .035: half the exponent, turned around.
+    fn inverse_root_guess(self) -> Self;
     /// Writes it to the first bytes of `to`, little end first.
     fn write_to(self, to: &mut [u8]);
     /// Reads it from the first bytes of `from`, little end first.
     fn read_from(from: &[u8]) -> Self;
 }
 
+/// Bits of a number near one, plus half of them.
+pub(crate) const INVERSE_ROOT_OF_ONE: u64 = 0x5fe6_eb50_c7b5_37a9;
+/// The same of a single.
+pub(crate) const INVERSE_ROOT_OF_ONE_SINGLE: u32 = 0x5f37_5a86;
+
 macro_rules! real {
-    ($number:ident) => {
+    ($number:ident, $inverse_root_of_one:ident) => {
         impl Real for $number {
             #[inline(always)]
             fn of(value: f64) -> Self {
@@ -96,6 +103,10 @@ macro_rules! real {
             fn mul_add(self, factor: Self, term: Self) -> Self {
                 $number::mul_add(self, factor, term)
             }
+            #[inline(always)]
+            fn inverse_root_guess(self) -> Self {
+                $number::from_bits($inverse_root_of_one.wrapping_sub(self.to_bits() >> 1))
+            }
             fn write_to(self, to: &mut [u8]) {
                 to[..Self::BYTES].copy_from_slice(&self.to_le_bytes());
             }
@@ -107,5 +118,5 @@ macro_rules! real {
         }
     };
 }
-real!(f64);
-real!(f32);
+real!(f64, INVERSE_ROOT_OF_ONE);
+real!(f32, INVERSE_ROOT_OF_ONE_SINGLE);

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::View;
+use super::{Next, View};
 use crate::coupling::aperture::surplus;
 use crate::coupling::locate::Body;
 use crate::coupling::places::PAD;
@@ -166,7 +166,12 @@ impl<'a, R: Real> Lines<'a, R> {
 
     /// Writes what the links bring to the list `to` of all faces of the component.
     #[inline(always)]
-    pub fn push<V: Vector<Number = f64>>(&self, planes: &mut Planes, to: &mut [f64]) {
+    pub fn push<V: Vector<Number = f64>>(
+        &self,
+        next: &Option<Next<R>>,
+        planes: &mut Planes,
+        to: &mut [f64],
+    ) {
         let size = self.body.size;
         planes.begin(self.body, V::WIDTH);
         let rows = |k| {
@@ -181,6 +186,9 @@ impl<'a, R: Real> Lines<'a, R> {
         planes.rows.extend((0..size.z).map(rows));
         self.unfold::<V>(0, planes);
         for k in 0..size.z {
+            if let Some(next) = next {
+                next.ask(self.component, k);
+            }
             self.unfold::<V>(k + 1, planes);
             let (near, rows) = (planes.rows[k as usize].clone(), planes.about(k));
             planes.y[rows.clone()].fill(0.0);
@@ -235,7 +243,7 @@ impl<'a, R: Real> Lines<'a, R> {
                 V::ramp()
                     .where_below(
                         left,
-                        V::load(&list[row.listed + n..]),
+                        V::load_from(&list[row.listed + n..]),
                         V::constant(f64::INFINITY),
                     )
                     .store(&mut planes.distance[which][to + n..]);

@@ -12,7 +12,6 @@
 
 mod links;
 
-use glam::IVec3;
 use rayon::prelude::*;
 
 use super::locate::{Body, PushRow};
@@ -21,7 +20,7 @@ use crate::dem::Grain;
 use crate::flow::{Flow, TendencySlab};
 use crate::grid::Mesh;
 use crate::math::Real;
-use crate::math::lanes::{Kernel, MOST, Vector, dispatch, prefetch};
+use crate::math::lanes::{Kernel, MOST, Vector, dispatch, prefetch_ahead};
 use links::{Lines, Planes};
 
 /// What one thread needs: copies of the velocity in a box and about it, and a plane there.
@@ -80,46 +79,69 @@ impl<R> View<'_, R> {
         self.origin
             .wrapping_add(j as usize * line + k as usize * plane)
     }
-    /// Asks for the box of `size` cells to be brought near.
-    #[inline(always)]
-    fn prefetch(&self, size: IVec3) {
-        for field in self.components {
-            for (k, j) in (0..size.z).flat_map(|k| (0..size.y).map(move |j| (k, j))) {
-                prefetch(field, self.row([j, k]), size.x as usize);
-            }
-        }
-    }
 }
 
+/// What the links of one grain bring to the faces in the lists of its [`Body`] [m/s^2].
+pub type Push = [Vec<f64>; 3];
+
 /// Corrects the tendency of the step just predicted; `bodies` are where `grains` were located, in a
-/// band of half-width `band` [m].
-pub fn correct<R: Real>(band: f64, flow: &mut Flow<R>, grains: &[Grain], bodies: &mut [Body]) {
+/// band of half-width `band` [m]. Leaves what the links bring in `pushes`.
+pub fn correct<R: Real>(
+    band: f64,
+    flow: &mut Flow<R>,
+    grains: &[Grain],
+    bodies: &[Body],
+    pushes: &mut [Push],
+) {
     let (mesh, from) = (*flow.mesh(), &*flow);
-    let each = bodies.par_iter_mut().zip(grains);
-    each.for_each_init(Scratch::default, |scratch, (body, grain)| {
-        let mut push = std::mem::take(&mut body.push);
+    let each = pushes.par_iter_mut().zip(grains).enumerate();
+    each.for_each_init(Scratch::default, |scratch, (index, (push, grain))| {
+        let body = &bodies[index];
         dispatch(Links {
             band,
             mesh: &mesh,
             grain,
             body,
             velocity: View::new(from, body, &mut scratch.velocity),
+            next: bodies.get(index + 1).map(|body| Next {
+                body,
+                velocity: [0, 1, 2].map(|axis| from.velocity.component(axis)),
+            }),
             planes: &mut scratch.planes,
-            push: &mut push,
+            push,
         });
-        body.push = push;
     });
-    let (bodies, layout) = (&*bodies, mesh.layout());
+    let (pushes, layout) = (&*pushes, mesh.layout());
     flow.add_tendency(|component, mut slab| {
         let part = slab.range();
-        for body in bodies.iter().filter(|body| body.lies_in(&part, layout)) {
-            dispatch(Pushes {
-                rows: &body.rows[component],
-                push: &body.push[component],
-                slab: &mut slab,
-            });
+        for (body, push) in bodies.iter().zip(pushes) {
+            if body.lies_in(&part, layout) {
+                dispatch(Pushes {
+                    rows: &body.rows[component],
+                    push: &push[component],
+                    slab: &mut slab,
+                });
+            }
         }
     });
+}
+
+/// The grain that comes next: what is read of it is asked for while there is something else to do.
+pub struct Next<'a, R> {
+    body: &'a Body,
+    velocity: [&'a [R]; 3],
+}
+
+impl<R> Next<'_, R> {
+    /// Asks for plane `k` of a component.
+    #[inline]
+    fn ask(&self, component: usize, k: i32) {
+        let body = self.body;
+        body.places.ask_ahead(self.velocity[component], k as usize);
+        let list = &body.distance[component];
+        let share = list.len() / body.size.z.max(1) as usize;
+        prefetch_ahead(list, k as usize * share, share);
+    }
 }
 
 /// What one grain adds to the tendency of a component in a slab of memory.
@@ -150,8 +172,9 @@ struct Links<'a, R> {
     grain: &'a Grain,
     body: &'a Body,
     velocity: View<'a, R>,
+    next: Option<Next<'a, R>>,
     planes: &'a mut Planes,
-    push: &'a mut [Vec<f64>; 3],
+    push: &'a mut Push,
 }
 
 impl<R: Real> Kernel for Links<'_, R> {
@@ -164,13 +187,14 @@ impl<R: Real> Kernel for Links<'_, R> {
             grain,
             body,
             velocity,
+            next,
             planes,
             push,
         } = self;
-        velocity.prefetch(body.size);
         for (component, push) in push.iter_mut().enumerate() {
             push.resize(body.distance[component].len(), 0.0);
-            Lines::new(band, mesh, grain, body, &velocity, component).push::<V>(planes, push);
+            Lines::new(band, mesh, grain, body, &velocity, component)
+                .push::<V>(&next, planes, push);
         }
     }
 }

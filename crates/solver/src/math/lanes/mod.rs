@@ -34,6 +34,8 @@ pub use stencil::Stencil;
 
 /// Numbers of the widest register.
 pub const MOST: usize = 16;
+/// Entries of a list whose places singles can hold.
+pub const MOST_PLACES: usize = 1 << 24;
 
 /// A register of `WIDTH` numbers.
 pub trait Vector:
@@ -190,9 +192,8 @@ pub trait Vector:
         }
         Self::load(&lanes)
     }
-    /// Lane-wise one over the square root of what is not negative, within 1e-10; some large number of 0
-    /// (of a double, that is: a single cannot hold it).
-    /// A root and a quotient take five times as long.
+    /// Lane-wise one over the square root of what is not negative, within 1e-10 or what singles can hold; some
+    /// large number of 0. A root and a quotient take five times as long.
     #[inline(always)]
     fn inverse_root(self) -> Self {
         let (half, more) = (Self::constant(-0.5) * self, Self::constant(1.5));
@@ -206,7 +207,12 @@ pub trait Vector:
     /// The same within .035: half the exponent, turned around.
     #[inline(always)]
     fn inverse_root_guess(self) -> Self {
-        self.each(|x| f64::from_bits(INVERSE_ROOT_OF_ONE.wrapping_sub(x.to_bits() >> 1)))
+        let mut lanes = [Self::Number::default(); MOST];
+        self.store(&mut lanes);
+        for lane in &mut lanes[..Self::WIDTH] {
+            *lane = lane.inverse_root_guess();
+        }
+        Self::load(&lanes)
     }
     /// Of each lane of `at`, a whole number, the entry of `from` there and the next.
     #[inline(always)]
@@ -228,9 +234,6 @@ pub trait Vector:
     /// Raises the first `WIDTH` of `tops` to the lanes, as doubles, where those are greater.
     fn raise(self, tops: &mut [f64]);
 }
-
-/// Bits of a number near one, plus half of them.
-const INVERSE_ROOT_OF_ONE: u64 = 0x5fe6_eb50_c7b5_37a9;
 
 /// The widest vectors of a number for each instruction set.
 pub trait Registers: Sized {
@@ -295,18 +298,31 @@ fn end_of<R: Real, N: Real>(list: &[R], at: usize) -> [N; MOST] {
 #[inline(always)]
 pub fn prefetch<T>(list: &[T], at: usize, count: usize) {
     #[cfg(target_arch = "x86_64")]
-    {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        let per_line = (64 / size_of::<T>()).max(1);
-        for at in (at..at.wrapping_add(count + per_line)).step_by(per_line) {
-            if let Some(entry) = list.get(at) {
-                // SAFETY: the entry exists, and a prefetch changes nothing.
-                unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(entry).cast()) };
-            }
-        }
-    }
+    prefetch_to::<{ std::arch::x86_64::_MM_HINT_T0 }, T>(list, at, count);
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (list, at, count);
+}
+
+/// The same, not quite so near: what is read soon but not next.
+#[inline(always)]
+pub fn prefetch_ahead<T>(list: &[T], at: usize, count: usize) {
+    #[cfg(target_arch = "x86_64")]
+    prefetch_to::<{ std::arch::x86_64::_MM_HINT_T1 }, T>(list, at, count);
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (list, at, count);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn prefetch_to<const HINT: i32, T>(list: &[T], at: usize, count: usize) {
+    use std::arch::x86_64::_mm_prefetch;
+    let per_line = (64 / size_of::<T>()).max(1);
+    for at in (at..at.wrapping_add(count + per_line)).step_by(per_line) {
+        if let Some(entry) = list.get(at) {
+            // SAFETY: the entry exists, and a prefetch changes nothing.
+            unsafe { _mm_prefetch::<HINT>(std::ptr::from_ref(entry).cast()) };
+        }
+    }
 }
 
 /// Work compiled for every instruction set.

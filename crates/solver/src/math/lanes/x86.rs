@@ -8,8 +8,12 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
 
+use super::Vector;
 use super::x86_transpose as turn;
-use super::{INVERSE_ROOT_OF_ONE, Vector};
+use crate::math::real::{INVERSE_ROOT_OF_ONE, INVERSE_ROOT_OF_ONE_SINGLE};
+
+/// Rounding to the whole number below.
+const DOWN: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
 
 /// A vector of one register, or of two side by side.
 macro_rules! vector {
@@ -251,7 +255,6 @@ vector! {
     }
     #[inline(always)]
     fn floor(self) -> Self {
-        const DOWN: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
         // SAFETY: see the head of this file.
         unsafe { Eight(_mm512_roundscale_pd::<DOWN>(self.0)) }
     }
@@ -310,7 +313,67 @@ vector! {
     half EightSingles, tail FourSingles, transpose turn::eight_singles,
     doubles Four [0: widen_lower_four, 1: widen_upper_four],
     _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps,
-    choose256_ps, _mm256_fmadd_ps, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_stream_ps
+    choose256_ps, _mm256_fmadd_ps, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_stream_ps;
+    #[inline(always)]
+    fn is_zero(self) -> bool {
+        // SAFETY: see the head of this file.
+        unsafe {
+            let zeros = _mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, _mm256_setzero_ps());
+            _mm256_movemask_ps(zeros) == 0xff
+        }
+    }
+    #[inline(always)]
+    fn mask_below(self, limit: Self) -> u32 {
+        // SAFETY: see the head of this file.
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, limit.0)) as u32 }
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { EightSingles(_mm256_floor_ps(self.0)) }
+    }
+    #[inline(always)]
+    fn root(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { EightSingles(_mm256_sqrt_ps(self.0)) }
+    }
+    #[inline(always)]
+    fn inverse_root_guess(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe {
+            let half = _mm256_srli_epi32::<1>(_mm256_castps_si256(self.0));
+            let one = _mm256_set1_epi32(INVERSE_ROOT_OF_ONE_SINGLE as i32);
+            EightSingles(_mm256_castsi256_ps(_mm256_sub_epi32(one, half)))
+        }
+    }
+    #[inline(always)]
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+        assert!(from.len() <= super::MOST_PLACES);
+        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places singles hold.
+        unsafe {
+            let last = _mm256_set1_ps(from.len() as f32 - 2.0);
+            let below = _mm256_cmp_ps::<_CMP_LE_OQ>(at.0, last);
+            let above = _mm256_cmp_ps::<_CMP_GE_OQ>(at.0, _mm256_setzero_ps());
+            assert_eq!(_mm256_movemask_ps(_mm256_and_ps(below, above)), 0xff);
+            let places = _mm256_cvttps_epi32(at.0);
+            let [lower, upper] = [
+                _mm256_castsi256_si128(places),
+                _mm256_extracti128_si256::<1>(places),
+            ];
+            let lower = _mm256_i32gather_epi64::<4>(from.as_ptr().cast(), lower);
+            let upper = _mm256_i32gather_epi64::<4>(from.as_ptr().cast(), upper);
+            let [lower, upper] = [_mm256_castsi256_ps(lower), _mm256_castsi256_ps(upper)];
+            // Of each half register the firsts, then the seconds.
+            let first = _mm256_shuffle_ps::<0b10_00_10_00>(lower, upper);
+            let second = _mm256_shuffle_ps::<0b11_01_11_01>(lower, upper);
+            let first = _mm256_permute4x64_pd::<0b11_01_10_00>(_mm256_castps_pd(first));
+            let second = _mm256_permute4x64_pd::<0b11_01_10_00>(_mm256_castps_pd(second));
+            [
+                EightSingles(_mm256_castpd_ps(first)),
+                EightSingles(_mm256_castpd_ps(second)),
+            ]
+        }
+    }
 }
 vector! {
     /// Sixteen singles.
@@ -318,7 +381,64 @@ vector! {
     half EightSingles, tail FourSingles, transpose turn::sixteen_singles,
     doubles Eight [0: widen_lower_eight, 1: widen_upper_eight],
     _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps, _mm512_max_ps, _mm512_min_ps,
-    choose512_ps, _mm512_fmadd_ps, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_stream_ps
+    choose512_ps, _mm512_fmadd_ps, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_stream_ps;
+    #[inline(always)]
+    fn is_zero(self) -> bool {
+        // SAFETY: see the head of this file.
+        unsafe { _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, _mm512_setzero_ps()) == 0xffff }
+    }
+    #[inline(always)]
+    fn mask_below(self, limit: Self) -> u32 {
+        // SAFETY: see the head of this file.
+        unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, limit.0)) }
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { SixteenSingles(_mm512_roundscale_ps::<DOWN>(self.0)) }
+    }
+    #[inline(always)]
+    fn root(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { SixteenSingles(_mm512_sqrt_ps(self.0)) }
+    }
+    #[inline(always)]
+    fn inverse_root_guess(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe {
+            let half = _mm512_srli_epi32::<1>(_mm512_castps_si512(self.0));
+            let one = _mm512_set1_epi32(INVERSE_ROOT_OF_ONE_SINGLE as i32);
+            SixteenSingles(_mm512_castsi512_ps(_mm512_sub_epi32(one, half)))
+        }
+    }
+    #[inline(always)]
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+        assert!(from.len() <= super::MOST_PLACES);
+        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places singles hold.
+        unsafe {
+            let last = _mm512_set1_ps(from.len() as f32 - 2.0);
+            let below = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(at.0, last);
+            let above = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(at.0, _mm512_setzero_ps());
+            assert_eq!(below & above, 0xffff);
+            let places = _mm512_cvttps_epi32(at.0);
+            let [lower, upper] = [
+                _mm512_castsi512_si256(places),
+                _mm512_extracti64x4_epi64::<1>(places),
+            ];
+            let lower = _mm512_i32gather_epi64::<4>(lower, from.as_ptr().cast());
+            let upper = _mm512_i32gather_epi64::<4>(upper, from.as_ptr().cast());
+            let first = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+            let second = _mm512_add_epi32(first, _mm512_set1_epi32(1));
+            let [first, second] = [
+                _mm512_permutex2var_epi32(lower, first, upper),
+                _mm512_permutex2var_epi32(lower, second, upper),
+            ];
+            [
+                SixteenSingles(_mm512_castsi512_ps(first)),
+                SixteenSingles(_mm512_castsi512_ps(second)),
+            ]
+        }
+    }
 }
 
 /// What has doubles already.
