@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use glam::{DMat3, IVec3};
+use glam::{DMat3, DVec3, IVec3};
 
 use super::Scheme;
 use super::forced::Forced;
@@ -49,6 +49,8 @@ pub struct PushRow {
 /// One grain on the grid.
 #[derive(Clone, Debug, Default)]
 pub struct Body {
+    /// Where its centroid was found [m].
+    pub position: DVec3,
     /// Lower corner of the box of cells about the grain; counted from 1, may lie across a periodic edge.
     pub first: IVec3,
     /// Cells of the box.
@@ -64,8 +66,6 @@ pub struct Body {
     pub planes: Range<usize>,
     /// Where those faces lie.
     pub rows: [Vec<PushRow>; 3],
-    /// Faces under its rigidity.
-    pub forced: Forced,
 }
 
 impl Body {
@@ -83,8 +83,13 @@ impl Body {
             + self.places.bytes()
             + size_of::<Span>() * spans
             + size_of::<PushRow>() * rows
-            + self.forced.bytes()
     }
+}
+
+/// What is found of a grain.
+pub struct Found<'a> {
+    pub body: &'a mut Body,
+    pub forced: &'a mut Forced,
 }
 
 /// Where to look for grains and how.
@@ -134,25 +139,38 @@ impl Locator {
         self.eps
     }
 
+    /// How far from its surface a grain matters [m].
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
         self.shapes.bytes()
     }
 
-    /// Finds which grains may share faces, before [`Locator::locate`].
-    pub fn find_neighbours(&mut self, grains: &[Grain]) {
+    /// Finds which grains may share faces, before [`Locator::locate`]; grain i also those that it had near where
+    /// it was, `travel(i)` [m] from here.
+    pub fn find_neighbours(&mut self, grains: &[Grain], travel: impl Fn(usize) -> f64) {
+        let (mesh, unknowns) = (&self.mesh, &self.unknowns);
         self.neighbours
-            .find(&self.mesh, &self.unknowns, self.reach, grains);
+            .find(mesh, unknowns, self.reach, grains, travel);
     }
 
-    /// Finds grain `index` for a step of length `dt` [s].
+    /// Whether no other grain has faces near that are near this one, here or where both were.
+    pub fn is_alone(&self, index: usize) -> bool {
+        self.neighbours.has_none(index)
+    }
+
+    /// Finds grain `index` for a step of length `dt` [s], and the faces that it forces.
     pub fn locate(
         &self,
         grains: &[Grain],
         index: usize,
         dt: f64,
-        body: &mut Body,
+        Found { body, forced }: Found,
         scratch: &mut Scratch,
+        ahead: impl Fn(usize, [i32; 2]),
     ) {
         let holding = Holding {
             scheme: self.scheme,
@@ -163,6 +181,7 @@ impl Locator {
         };
         let (mesh, shapes, grain) = (&self.mesh, &self.shapes, &grains[index]);
         let rivals = self.neighbours.of(index, mesh, shapes, grains);
+        body.position = grain.pose.position;
         self.place(grain, body);
         dispatch(Measure {
             mesh,
@@ -171,10 +190,12 @@ impl Locator {
             grain,
             shape: shapes.of(index),
             rivals: &rivals,
-            body: &mut *body,
+            body,
+            forced: &mut *forced,
             scratch: &mut *scratch,
+            ahead,
         });
-        self.hold(&rivals, &holding, &mut body.forced, scratch);
+        self.hold(&rivals, &holding, forced, scratch);
     }
 
     /// The box of cells about a grain.

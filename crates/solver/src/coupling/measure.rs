@@ -6,7 +6,7 @@ use std::ops::Range;
 use glam::{DMat3, DVec3, IVec3};
 
 use super::Scheme;
-use super::forced::Run;
+use super::forced::{Forced, Run};
 use super::hold::{Faces, Holding};
 use super::locate::{Body, PushRow, Span};
 use super::near::{NearShape, Spare};
@@ -89,7 +89,7 @@ impl Points {
 }
 
 /// The measurement of one grain; `reach` as in [`super::locate::Locator`].
-pub struct Measure<'a> {
+pub struct Measure<'a, A> {
     pub mesh: &'a Mesh,
     pub holding: &'a Holding,
     pub reach: f64,
@@ -97,10 +97,13 @@ pub struct Measure<'a> {
     pub shape: &'a NearShape,
     pub rivals: &'a [Rival<'a>],
     pub body: &'a mut Body,
+    pub forced: &'a mut Forced,
     pub scratch: &'a mut Scratch,
+    /// Called for every component and plane k of so many.
+    pub ahead: A,
 }
 
-impl Kernel for Measure<'_> {
+impl<A: Fn(usize, [i32; 2])> Kernel for Measure<'_, A> {
     type Number = f32;
     #[inline(always)]
     fn run<V: Vector<Number = f32>>(self) {
@@ -112,7 +115,9 @@ impl Kernel for Measure<'_> {
             shape,
             rivals,
             body,
+            forced,
             scratch,
+            ahead,
         } = self;
         let eps = holding.eps;
         let turn = DMat3::from_quat(grain.pose.orientation);
@@ -128,16 +133,17 @@ impl Kernel for Measure<'_> {
         faces.clear();
         shared.clear();
         points.reserve((size.x * size.y) as usize);
-        body.forced.runs.iter_mut().for_each(Vec::clear);
+        forced.runs.iter_mut().for_each(Vec::clear);
         for (axis, offset) in FACE_OFFSET.iter().enumerate() {
             let (distance, spans) = (&mut body.distance[axis], &mut body.spans[axis]);
-            let (rows, runs) = (&mut body.rows[axis], &mut body.forced.runs[axis]);
+            let (rows, runs) = (&mut body.rows[axis], &mut forced.runs[axis]);
             spans.clear();
             rows.clear();
             let corner = position(mesh, offset, body.first);
             let arm = corner - grain.pose.position;
             let mut known = 0;
             for k in 0..size.z {
+                ahead(axis, [k, size.z]);
                 let mut count = 0;
                 for from in (0..size.y).step_by(V::WIDTH) {
                     let near = around.rows::<V>(arm, [from, k], size.x);
@@ -156,8 +162,8 @@ impl Kernel for Measure<'_> {
                     let normals = span.first;
                     span.first += known;
                     let all = *span;
-                    let forced;
-                    [*span, forced] = within::<V>(distance, all, [reach, 2.0 * eps]);
+                    let close;
+                    [*span, close] = within::<V>(distance, all, [reach, 2.0 * eps]);
                     let j = j as i32;
                     let up = DVec3::new(0.0, f64::from(j), f64::from(k));
                     let start = corner + mesh.spacing * up;
@@ -174,7 +180,7 @@ impl Kernel for Measure<'_> {
                             first,
                             count: range.len(),
                         });
-                        let held = range.start.max(forced.start)..range.end.min(forced.end);
+                        let held = range.start.max(close.start)..range.end.min(close.end);
                         let number = faces.count();
                         if !held.is_empty() {
                             let ahead = (held.start - range.start) as usize;

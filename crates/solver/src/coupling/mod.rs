@@ -12,6 +12,7 @@ mod places;
 mod rigidity;
 mod rivals;
 mod samples;
+mod site;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -21,11 +22,8 @@ use crate::dem::{Grain, Response};
 use crate::flow::{Flow, FlowMeasures};
 use crate::math::{Load, Real};
 
-use advection::Push;
-use locate::{Body, Locator};
-use measure::Scratch;
-use newton::Motion;
-use rigidity::Impulse;
+use locate::Locator;
+use site::{Nearby, Site, Visit, in_turn};
 
 /// How rigidity is imposed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -54,10 +52,7 @@ pub(crate) struct Coupling {
     scheme: Scheme,
     fluid_density: f64,
     locator: Locator,
-    bodies: Vec<Body>,
-    pushes: Vec<Push>,
-    /// Of each grain in the present step.
-    coupled: Vec<(Impulse, Motion)>,
+    sites: Vec<Site>,
 }
 
 impl Coupling {
@@ -75,9 +70,7 @@ impl Coupling {
             scheme,
             fluid_density,
             locator,
-            bodies: vec![Body::default(); grains.len()],
-            pushes: vec![Push::default(); grains.len()],
-            coupled: Vec::new(),
+            sites: grains.iter().map(|_| Site::default()).collect(),
         };
         coupling.locate(grains, 1.0);
         coupling
@@ -85,19 +78,31 @@ impl Coupling {
 
     /// Finds the faces near the grains at their present poses, for a step of length `dt` [s].
     pub fn locate(&mut self, grains: &[Grain], dt: f64) {
-        self.locator.find_neighbours(grains);
+        self.find(grains, dt);
+        self.let_go();
+    }
+
+    /// The same with the faces that they force.
+    fn find(&mut self, grains: &[Grain], dt: f64) {
+        self.locator.find_neighbours(grains, |_| 0.0);
         let locator = &self.locator;
-        let each = self.bodies.par_iter_mut().enumerate();
-        each.for_each_init(Scratch::default, |scratch, (index, body)| {
-            locator.locate(grains, index, dt, body, scratch);
+        let each = self.sites.par_iter_mut().enumerate();
+        each.for_each_init(Default::default, |scratch, (index, site)| {
+            locator.locate(grains, index, dt, site.found(), scratch, |_, _| {});
         });
     }
 
-    /// Corrects the advection just predicted where grains close part of a link.
-    pub fn correct_advection<R: Real>(&mut self, flow: &mut Flow<R>, grains: &[Grain]) {
-        if self.scheme == Scheme::Aperture {
-            let band = self.locator.band();
-            advection::correct(band, flow, grains, &self.bodies, &mut self.pushes);
+    /// Gives up the lists of forced faces, which grains that stand alone never need again.
+    fn let_go(&mut self) {
+        for site in &mut self.sites {
+            site.forced = Default::default();
+        }
+    }
+
+    /// Keeps how the grains stand and move as the flow is predicted, for [`Coupling::couple`].
+    pub fn remember(&mut self, grains: &[Grain]) {
+        for (site, grain) in self.sites.iter_mut().zip(grains) {
+            site.remember(grain);
         }
     }
 
@@ -110,28 +115,81 @@ impl Coupling {
         }
     }
 
-    /// Finds the faces near the grains at their present poses, and what the fluid will take from the grains as
-    /// they go on from `before` under the `other` loads (weight less buoyancy), as equations for their new
-    /// velocities. One grain after the other, while its lists are near.
+    /// Corrects the advection of the prediction next to the grains where they were; finds the faces near
+    /// them at their present poses, and what the fluid will take from them as they go on from `before` under
+    /// the loads `other` (weight less buoyancy), as equations for their new velocities. Whatever had a `contact`
+    /// load in this step, or others near, waits for [`Coupling::impose_rigidity`]; the others are done at once,
+    /// one after the other, while what is known of them is near the processor.
     pub fn couple<R: Real>(
         &mut self,
-        flow: &Flow<R>,
+        flow: &mut Flow<R>,
         grains: &[Grain],
         before: &[Past],
+        contact: &[Load],
         other: &[Load],
         dt: f64,
     ) {
-        self.locator.find_neighbours(grains);
-        let (locator, relief, density) = (&self.locator, self.relief(dt), self.fluid_density);
-        let each = self.bodies.par_iter_mut().zip(grains).enumerate();
-        let coupled = each.map_init(Scratch::default, |scratch, (index, (body, grain))| {
-            locator.locate(grains, index, dt, body, scratch);
-            let past = &before[index];
-            let impulse = rigidity::gather(flow, density, body, past, relief);
-            let motion = Motion::new(grain, past, &impulse, density, other[index], dt);
-            (impulse, motion)
+        self.find_alone(grains, contact);
+        self.correct_advection(flow);
+        let (known, predictions) = flow.prediction();
+        let visit = Visit {
+            locator: &self.locator,
+            grains,
+            known,
+            predictions,
+            corrects: self.scheme == Scheme::Aperture,
+            fluid_density: self.fluid_density,
+            relief: self.relief(dt),
+            dt,
+        };
+        in_turn(&mut self.sites, |index, site, next, nearby| {
+            let next = next.filter(|next| next.alone);
+            visit.run(index, site, next, nearby, &before[index], other[index]);
         });
-        coupled.collect_into_vec(&mut self.coupled);
+    }
+
+    /// Finds the grains that no other one has faces near of, where they are and where they were.
+    fn find_alone(&mut self, grains: &[Grain], contact: &[Load]) {
+        let (sites, reach) = (&self.sites, self.locator.reach());
+        let travel = |index: usize| {
+            let from: &Site = &sites[index];
+            grains[index].pose.position.distance(from.body.position)
+        };
+        // One that came across a periodic edge is elsewhere altogether.
+        let near = |index: usize| travel(index) <= reach;
+        (self.locator).find_neighbours(grains, |i| if near(i) { travel(i) } else { 0.0 });
+        let alone: Vec<bool> = (0..grains.len())
+            .map(|i| near(i) && contact[i] == Load::default() && self.locator.is_alone(i))
+            .collect();
+        for (site, alone) in self.sites.iter_mut().zip(alone) {
+            site.alone = alone;
+        }
+    }
+
+    /// Corrects the advection just predicted where grains that do not stand alone close part of a link.
+    fn correct_advection<R: Real>(&mut self, flow: &mut Flow<R>) {
+        if self.scheme != Scheme::Aperture || self.sites.iter().all(|site| site.alone) {
+            return;
+        }
+        let (known, _) = flow.prediction();
+        let band = self.locator.band();
+        in_turn(&mut self.sites, |_, site, _, nearby: &mut Nearby<R>| {
+            if !site.alone {
+                let Site {
+                    stand, body, push, ..
+                } = site;
+                let scratch = &mut nearby.advection;
+                advection::find(band, &known, stand, body, None, scratch, push);
+            }
+        });
+        let (layout, sites) = (flow.mesh().layout(), &self.sites);
+        flow.for_predictions(|component, mut prediction| {
+            for Site { body, push, .. } in sites.iter().filter(|site| !site.alone) {
+                if body.lies_in(prediction.range(), layout) {
+                    advection::add(body, push, component, &mut prediction);
+                }
+            }
+        });
     }
 
     /// How the grains answer contact in this step, after [`Coupling::couple`].
@@ -142,14 +200,14 @@ impl Coupling {
         added_density: f64,
         dt: f64,
     ) -> Vec<Response> {
-        let each = self.coupled.iter().zip(grains).zip(before);
-        each.map(|(((_, motion), grain), past)| motion.response(grain, past, added_density, dt))
+        let each = self.sites.iter().zip(grains).zip(before);
+        each.map(|((site, grain), past)| site.motion.response(grain, past, added_density, dt))
             .collect()
     }
 
     /// Gives the grains their new velocities, under the mean `contact` loads too, and imposes rigidity on
-    /// the predicted velocity; after [`Coupling::couple`]. `loads` receives the hydrodynamic load on each
-    /// grain.
+    /// the predicted velocity where that is still to be done; after [`Coupling::couple`]. `loads` receives
+    /// the hydrodynamic load on each grain.
     pub fn impose_rigidity<R: Real>(
         &mut self,
         flow: &mut Flow<R>,
@@ -160,13 +218,39 @@ impl Coupling {
         loads: &mut [Load],
     ) {
         let density = self.fluid_density;
-        let each = self.coupled.par_iter().zip(&mut *grains).zip(loads);
-        each.enumerate()
-            .for_each(|(index, (((impulse, motion), grain), load))| {
-                let (past, contact) = (&before[index], contact[index]);
-                *load = newton::advance(grain, past, impulse, motion, density, contact, dt);
-            });
-        rigidity::impose(flow, grains, &self.bodies, before, self.relief(dt));
+        let each = self.sites.par_iter_mut().zip(&mut *grains).zip(loads);
+        each.enumerate().for_each(|(index, ((site, grain), load))| {
+            *load = site.advance(grain, &before[index], contact[index], density, dt);
+        });
+        for (index, site) in self.sites.iter_mut().enumerate() {
+            if site.alone && site.due.is_some() {
+                // It met something after all: what it has beyond what it was thought to have comes on top.
+                let scratch = &mut Default::default();
+                (self.locator).locate(grains, index, dt, site.found(), scratch, |_, _| {});
+                site.forced.taken.clear();
+                site.forced.taken.resize(site.forced.share.len(), 0.0);
+            }
+        }
+        self.impose(flow, self.relief(dt));
+    }
+
+    /// Gives the faces what is due to them.
+    fn impose<R: Real>(&self, flow: &mut Flow<R>, relief: f64) {
+        let (mesh, sites) = (*flow.mesh(), &self.sites);
+        if sites.iter().all(|site| site.due.is_none()) {
+            return;
+        }
+        flow.for_predictions(|axis, mut prediction| {
+            for site in sites {
+                let Some(motions) = site.due else {
+                    continue;
+                };
+                if site.body.lies_in(prediction.range(), mesh.layout()) {
+                    let forced = &site.forced;
+                    rigidity::impose(axis, mesh.spacing, forced, motions, relief, &mut prediction);
+                }
+            }
+        });
     }
 
     /// Gives the fluid inside and next to the grains their rigid velocity, for initial states.
@@ -179,12 +263,23 @@ impl Coupling {
             to.copy_from_slice(from);
         }
         // A step this long closes every face of the band.
-        self.locate(grains, f64::MAX.sqrt());
-        let still = vec![Past::default(); grains.len()];
-        for (body, still) in self.bodies.iter_mut().zip(&still) {
-            rigidity::gather(flow, self.fluid_density, body, still, 0.0);
+        self.find(grains, f64::MAX.sqrt());
+        let (known, predictions) = flow.prediction();
+        let still = Past::default();
+        for (site, grain) in self.sites.iter_mut().zip(grains) {
+            let forced = &mut site.forced;
+            rigidity::gather(
+                &known,
+                &predictions,
+                self.fluid_density,
+                forced,
+                &still,
+                0.0,
+            );
+            site.due = Some([still.velocity, [grain.velocity, grain.angular_velocity]]);
         }
-        rigidity::impose(flow, grains, &self.bodies, &still, 0.0);
+        self.impose(flow, 0.0);
+        self.let_go();
         for axis in 0..3 {
             let (from, to) = (
                 flow.predicted.component(axis),
@@ -197,11 +292,6 @@ impl Coupling {
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let coupled = size_of::<(Impulse, Motion)>() * self.coupled.capacity();
-        let pushes = self.pushes.iter().flatten().map(Vec::capacity);
-        self.bodies.iter().map(Body::bytes).sum::<usize>()
-            + size_of::<f64>() * pushes.sum::<usize>()
-            + self.locator.bytes()
-            + coupled
+        self.sites.iter().map(Site::bytes).sum::<usize>() + self.locator.bytes()
     }
 }

@@ -15,7 +15,7 @@ use crate::math::{Load, Matrix6, Vector6, solve6};
 
 /// Newton's and Euler's equations of one grain and the fluid it holds over a step, as a linear system for
 /// its new velocities.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct Motion {
     matrix: Matrix6,
     right: Vector6,
@@ -97,17 +97,9 @@ impl Motion {
     }
 }
 
-/// New velocities of the grain under its motion's equations and the mean `contact` load over `dt`; returns
-/// the hydrodynamic load on it.
-pub fn advance(
-    grain: &mut Grain,
-    past: &Past,
-    impulse: &Impulse,
-    motion: &Motion,
-    fluid_density: f64,
-    contact: Load,
-    dt: f64,
-) -> Load {
+/// Sets the velocities of the grain to what they are under its motion's equations and the mean `contact` load
+/// over `dt`.
+pub fn advance(grain: &mut Grain, past: &Past, motion: &Motion, contact: Load, dt: f64) {
     let [v, omega] = past.velocity;
     let mut right = motion.right;
     let free = [grain.translation, grain.rotation].map(|dof| dof == Dof::Free);
@@ -123,7 +115,20 @@ pub fn advance(
     let x = solve6(motion.matrix, right).unwrap_or([v.x, v.y, v.z, omega.x, omega.y, omega.z]);
     grain.velocity = DVec3::new(x[0], x[1], x[2]);
     grain.angular_velocity = DVec3::new(x[3], x[4], x[5]);
+}
 
+/// The hydrodynamic load on the grain, after [`advance`].
+pub fn load(
+    grain: &Grain,
+    past: &Past,
+    impulse: &Impulse,
+    motion: &Motion,
+    fluid_density: f64,
+    dt: f64,
+) -> Load {
+    let [v, omega] = past.velocity;
+    let now = [grain.velocity, grain.angular_velocity].map(|u| u.to_array());
+    let x: Vector6 = std::array::from_fn(|n| now[n / 3][n % 3]);
     let carried = &motion.carried;
     let j: Vector6 = std::array::from_fn(|row| {
         impulse.constant[row]
@@ -149,7 +154,7 @@ pub fn advance(
 /// equations, with the new acceleration on one and the last on the other. The fluid around a grain
 /// answers by the projection, one step late; without this, a light grain and that answer drive each
 /// other (`docs/decisions/0013-light-grains.md`).
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Carried {
     mass: f64,
     inertia: DMat3,

@@ -152,17 +152,29 @@ impl Places {
         first..last + 1
     }
 
-    /// Asks for plane `k` of a field in the box, which is read soon; nothing happens beyond the last.
+    /// Number of planes in the box and about it.
+    pub fn planes_about(&self) -> usize {
+        self.lines[2].len()
+    }
+
+    /// Asks for some planes of a field in the box and about it, which is read soon, but for its corners.
     #[inline]
-    pub fn ask_ahead<R>(&self, field: &[R], k: usize) {
-        const BESIDE: usize = PAD as usize;
+    pub fn ask_ahead<R>(&self, field: &[R], planes: Range<usize>) {
         let [x, y, z] = &self.lines;
-        if k + 2 * BESIDE >= z.len() {
-            return;
-        }
-        for line in &y[BESIDE..y.len() - BESIDE] {
-            let first = x[BESIDE] + line + z[k + BESIDE];
-            prefetch_ahead(field, first, x.len() - 2 * BESIDE);
+        // From 0 in the middle to 1 at the end.
+        let off = |n: usize, of: usize| ((2 * n + 1) as f32 / of as f32 - 1.0).abs();
+        for k in planes {
+            let w = off(k, z.len());
+            for (j, line) in y.iter().enumerate() {
+                let v = off(j, y.len());
+                let part = (1.4 - v.max(w)).min(1.75 - v - w).min(1.0);
+                if v + w > 1.4 || part <= 0.0 {
+                    continue;
+                }
+                let count = (part * x.len() as f32) as usize;
+                let first = x[0] + (x.len() - count) / 2 + line + z[k];
+                prefetch_ahead(field, first, count);
+            }
         }
     }
 

@@ -6,16 +6,11 @@
 //!
 //! Legend: w mass of a face's cell.
 
-use std::ops::Range;
-
 use glam::DVec3;
 
 use super::Past;
 use super::forced::{Forced, Run};
-use super::locate::Body;
-use crate::dem::Grain;
-use crate::flow::Flow;
-use crate::grid::{FaceVector, for_slabs};
+use crate::flow::{Known, Prediction};
 use crate::math::lanes::{Kernel, Partial, Stencil, Vector, dispatch, prefetch};
 use crate::math::{Matrix6, Real, Vector6};
 
@@ -23,6 +18,7 @@ use crate::math::{Matrix6, Real, Vector6};
 const AHEAD: usize = 8;
 
 /// What a step of the fluid does to one grain.
+#[derive(Default)]
 pub struct Impulse {
     /// At rest, and its derivative by the six velocities.
     pub constant: Vector6,
@@ -38,21 +34,23 @@ pub struct Impulse {
 /// p - dt U . grad p. Left where it was it would be a step behind the surface, and the drag of a
 /// moving grain of first order in the step (`docs/decisions/0011-pressure-moves-with-the-grain.md`).
 pub fn gather<R: Real>(
-    flow: &Flow<R>,
+    known: &Known<R>,
+    predictions: &[Prediction<R>; 3],
     fluid_density: f64,
-    body: &mut Body,
+    forced: &mut Forced,
     past: &Past,
     relief: f64,
 ) -> Impulse {
     let mut sums = [Moments::default(); 3];
     dispatch(Gather {
-        flow,
-        body,
+        known,
+        predictions,
+        forced,
         before: past.velocity,
         relief,
         sums: &mut sums,
     });
-    let w = fluid_density * flow.mesh().cell_volume();
+    let w = fluid_density * known.mesh.cell_volume();
     let mut impulse = Impulse {
         constant: [0.0; 6],
         slope: [[0.0; 6]; 6],
@@ -156,8 +154,9 @@ fn relieved(relief: f64) -> f64 {
 
 /// Sums over the forced faces of one grain; leaves what the faces know in their lists.
 struct Gather<'a, R> {
-    flow: &'a Flow<R>,
-    body: &'a mut Body,
+    known: &'a Known<'a, R>,
+    predictions: &'a [Prediction<'a, R>; 3],
+    forced: &'a mut Forced,
     before: [DVec3; 2],
     relief: f64,
     sums: &'a mut [Moments; 3],
@@ -167,11 +166,12 @@ impl<R: Real> Kernel for Gather<'_, R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let forced = &mut self.body.forced;
+        let Known { mesh, pressure, .. } = self.known;
+        let forced = self.forced;
         let faces = forced.share.len();
         forced.taken.resize(faces, 0.0);
-        let spacing = self.flow.mesh().spacing;
-        let strides = self.flow.mesh().layout().strides();
+        let spacing = mesh.spacing;
+        let strides = mesh.layout().strides();
         let [x, y, z] = strides.map(|stride| stride as isize);
         let around = Stencil::new([0, x, -x, y, -y, z, -z]);
         let Forced {
@@ -189,25 +189,25 @@ impl<R: Real> Kernel for Gather<'_, R> {
         for (axis, runs) in runs.iter().enumerate() {
             let half = 0.5 * spacing[axis] * DVec3::AXES[axis];
             let above = self.before[1].cross(half);
-            let field = self.flow.predicted.component(axis);
+            let prediction = &self.predictions[axis];
             for (number, run) in runs.iter().enumerate() {
                 if let Some(run) = runs.get(number + AHEAD) {
-                    prefetch(field, run.at, run.count);
-                    prefetch(&self.flow.pressure, run.at, run.count);
-                    prefetch(&self.flow.pressure, run.at + strides[2], run.count);
+                    prediction.ask(run.at, run.count, false);
+                    prefetch(pressure, run.at, run.count);
+                    prefetch(pressure, run.at + strides[2], run.count);
                 }
                 let rigid = Rigid::of(self.before, run.arm, spacing);
                 let work = GatherRun {
                     axis,
                     run,
-                    predicted: field,
-                    pressure: &self.flow.pressure,
+                    predicted: prediction.velocity(run.at, run.count),
+                    pressure,
                     around,
                     rigid,
                     sides: [above, -above].map(|more| rigid.beside(more)),
                     drift: (0.5 * self.relief / spacing).to_array(),
                     pull: self.relief / spacing[axis],
-                    driven: self.relief * self.flow.body_acceleration()[axis],
+                    driven: self.relief * self.known.body_acceleration[axis],
                     relieved: relieved(self.relief),
                     spacing: spacing.x,
                 };
@@ -228,6 +228,7 @@ impl<R: Real> Kernel for Gather<'_, R> {
 struct GatherRun<'a, R> {
     axis: usize,
     run: &'a Run,
+    /// u* of its faces [m/s].
     predicted: &'a [R],
     pressure: &'a [R],
     /// A cell, and those ahead and behind along each axis.
@@ -268,7 +269,7 @@ impl<R: Real> GatherRun<'_, R> {
         sums: &mut Moments,
     ) -> V {
         let count = count_from::<V>(n);
-        let predicted = V::load_within(self.predicted, self.run.at + n);
+        let predicted = V::load_some(&self.predicted[n..]);
         let follow = follow(share, closed, self.relieved);
         let (mut free, mut taken) = (predicted, V::constant(0.0));
         // Beside the band nothing is closed.
@@ -291,62 +292,49 @@ impl<R: Real> GatherRun<'_, R> {
     }
 }
 
-/// Gives the forced faces what the grains give them; arguments as of [`gather`], which came before.
+/// Gives the forced faces of a component, as far as they lie in the prediction, what a grain gives them that now
+/// has the velocity and angular velocity `now`; the other arguments as of [`gather`], which came before.
 pub fn impose<R: Real>(
-    flow: &mut Flow<R>,
-    grains: &[Grain],
-    bodies: &[Body],
-    before: &[Past],
-    relief: f64,
-) {
-    let (mesh, relieved) = (*flow.mesh(), relieved(relief));
-    let FaceVector { x, y, z } = &mut flow.predicted;
-    for_slabs(
-        mesh.layout(),
-        [[&mut **x], [y], [z]],
-        |axis, from, [predicted]| {
-            let slab = from..from + predicted.len();
-            for ((grain, body), past) in grains.iter().zip(bodies).zip(before) {
-                if body.lies_in(&slab, mesh.layout()) {
-                    dispatch(Impose {
-                        axis,
-                        spacing: mesh.spacing,
-                        grain,
-                        forced: &body.forced,
-                        before: past.velocity,
-                        relieved,
-                        slab: slab.clone(),
-                        predicted: &mut *predicted,
-                    });
-                }
-            }
-        },
-    );
-}
-
-/// What one grain gives the faces of a component in a slab of memory.
-struct Impose<'a, R> {
     axis: usize,
     spacing: DVec3,
-    grain: &'a Grain,
-    forced: &'a Forced,
-    before: [DVec3; 2],
-    relieved: f64,
-    slab: Range<usize>,
-    predicted: &'a mut [R],
+    forced: &Forced,
+    [before, now]: [[DVec3; 2]; 2],
+    relief: f64,
+    prediction: &mut Prediction<R>,
+) {
+    dispatch(Impose {
+        axis,
+        spacing,
+        forced,
+        now,
+        change: [0, 1].map(|which| now[which] - before[which]),
+        relieved: relieved(relief),
+        prediction,
+    });
 }
 
-impl<R: Real> Kernel for Impose<'_, R> {
+/// What one grain gives the faces of a component.
+struct Impose<'a, 'b, R> {
+    axis: usize,
+    spacing: DVec3,
+    forced: &'a Forced,
+    now: [DVec3; 2],
+    change: [DVec3; 2],
+    relieved: f64,
+    prediction: &'a mut Prediction<'b, R>,
+}
+
+impl<R: Real> Kernel for Impose<'_, '_, R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let now = [self.grain.velocity, self.grain.angular_velocity];
-        let change = [0, 1].map(|which| now[which] - self.before[which]);
         let forced = self.forced;
+        let part = self.prediction.range().clone();
         let runs = forced.runs[self.axis].iter();
-        for run in runs.filter(|run| self.slab.contains(&run.at)) {
-            let rigid = Rigid::of(now, run.arm, self.spacing);
-            let change = Rigid::of(change, run.arm, self.spacing);
+        for run in runs.filter(|run| part.contains(&run.at)) {
+            let rigid = Rigid::of(self.now, run.arm, self.spacing);
+            let change = Rigid::of(self.change, run.arm, self.spacing);
+            let predicted = self.prediction.velocity_mut(run.at, run.count);
             for n in (0..run.count).step_by(V::WIDTH) {
                 let at = run.first + n;
                 let share = V::load_from(&forced.share[at..]);
@@ -355,8 +343,7 @@ impl<R: Real> Kernel for Impose<'_, R> {
                 let gain = V::load(&forced.taken[at..])
                     + share * rigid.at(self.axis, place)
                     + follow(share, closed, self.relieved) * change.at(self.axis, place);
-                let at = run.at - self.slab.start + n;
-                gain.add_some(run.count - n, self.predicted, at);
+                gain.add_some(&mut predicted[n..]);
             }
         }
     }

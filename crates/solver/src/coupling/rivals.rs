@@ -43,6 +43,7 @@ impl Rival<'_> {
 pub struct Neighbours {
     search: BroadPhase,
     balls: Vec<Ball>,
+    reach: f64,
     /// In the order of the grains.
     found: Vec<Neighbour>,
 }
@@ -56,19 +57,29 @@ struct Neighbour {
 }
 
 impl Neighbours {
-    /// Finds those whose bands may meet; faces matter up to `reach` [m] from a surface.
-    pub fn find(&mut self, mesh: &Mesh, unknowns: &Unknowns, reach: f64, grains: &[Grain]) {
+    /// Finds those whose bands may meet; faces matter up to `reach` [m] from a surface. Grain i came `travel(i)`
+    /// [m], and what it may have met on the way counts.
+    pub fn find(
+        &mut self,
+        mesh: &Mesh,
+        unknowns: &Unknowns,
+        reach: f64,
+        grains: &[Grain],
+        travel: impl Fn(usize) -> f64,
+    ) {
         let enclosure = Enclosure {
             lower: mesh.origin,
             upper: mesh.upper(),
             periodic: [0, 1, 2].map(|axis| unknowns.is_periodic(axis) && mesh.cells[axis] > 1),
             solid: [[false; 2]; 3],
         };
+        self.reach = reach;
         self.balls.clear();
-        self.balls.extend(grains.iter().map(|grain| Ball {
+        let balls = grains.iter().enumerate().map(|(index, grain)| Ball {
             center: grain.pose.position,
-            radius: grain.shape.bounding_radius() + reach,
-        }));
+            radius: grain.shape.bounding_radius() + reach + travel(index),
+        });
+        self.balls.extend(balls);
         self.search.search(&self.balls, &enclosure);
         self.found.clear();
         for pair in &self.search.pairs {
@@ -88,6 +99,12 @@ impl Neighbours {
         self.found.sort_unstable();
     }
 
+    /// Whether grain `index` has none.
+    pub fn has_none(&self, index: usize) -> bool {
+        let first = self.found.partition_point(|one| one.grain < index);
+        self.found.get(first).is_none_or(|one| one.grain != index)
+    }
+
     /// Those of grain `index`.
     pub fn of<'a>(
         &self,
@@ -98,9 +115,10 @@ impl Neighbours {
     ) -> Vec<Rival<'a>> {
         let first = self.found.partition_point(|one| one.grain < index);
         let own = self.found[first..].iter();
+        let size = |index: usize| grains[index].shape.bounding_radius() + self.reach;
         let rivals = own.take_while(|one| one.grain == index).map(|one| {
             let [z, y, x] = one.image;
-            let tie = TIE * (self.balls[index].radius + self.balls[one.other].radius);
+            let tie = TIE * (size(index) + size(one.other));
             Rival {
                 grain: &grains[one.other],
                 shape: shapes.of(one.other),
@@ -125,7 +143,8 @@ mod tests {
 
     use super::*;
     use crate::coupling::Scheme;
-    use crate::coupling::locate::{Body, Locator};
+    use crate::coupling::forced::Forced;
+    use crate::coupling::locate::{Body, Found, Locator};
     use crate::coupling::measure::Scratch;
     use crate::dem::Dof;
     use crate::flow::{Boundaries, Boundary};
@@ -165,14 +184,14 @@ mod tests {
                 .map(|rival| (rival.shift, rival.handicap))
                 .collect()
         };
-        neighbours.find(&mesh, &unknowns, 0.6, &grains);
+        neighbours.find(&mesh, &unknowns, 0.6, &grains, |_| 0.0);
         let tie = 2.2 * TIE;
         let along_x = DVec3::new(8.0, 0.0, 0.0);
         assert_eq!(found(&neighbours, 0), [(-along_x, tie)]);
         assert_eq!(found(&neighbours, 1), []);
         assert_eq!(found(&neighbours, 2), [(along_x, -tie)]);
         // With a reach of more than half a period every grain meets its own images too.
-        neighbours.find(&mesh, &unknowns, 1.6, &grains[1..2]);
+        neighbours.find(&mesh, &unknowns, 1.6, &grains[1..2], |_| 0.0);
         let tie = 4.2 * TIE;
         let along_y = DVec3::new(0.0, 4.0, 0.0);
         let along_z = DVec3::new(0.0, 0.0, 4.0);
@@ -215,12 +234,23 @@ mod tests {
         };
         let grains = [at(1.55), at(2.45)];
         let mut locator = Locator::new(&mesh, &boundaries, Scheme::Aperture, 0.01, &grains);
-        locator.find_neighbours(&grains);
+        locator.find_neighbours(&grains, |_| 0.0);
         let mut owners = [0, 1, 2].map(|_| vec![0; mesh.layout().len()]);
         let mut between = 0;
         for index in 0..2 {
-            let (mut body, mut scratch) = (Body::default(), Scratch::default());
-            locator.locate(&grains, index, 0.01, &mut body, &mut scratch);
+            let (mut body, mut forced) = (Body::default(), Forced::default());
+            let found = Found {
+                body: &mut body,
+                forced: &mut forced,
+            };
+            locator.locate(
+                &grains,
+                index,
+                0.01,
+                found,
+                &mut Scratch::default(),
+                |_, _| {},
+            );
             for (component, rows) in body.rows.iter().enumerate() {
                 for (row, n) in rows
                     .iter()

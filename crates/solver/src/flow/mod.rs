@@ -5,10 +5,12 @@
 
 mod boundary;
 mod params;
+mod prediction;
 mod project;
 mod solver;
 mod tendency;
 
 pub use boundary::{Boundaries, Boundary};
 pub use params::{Advection, FluidParams};
-pub(crate) use solver::{Flow, FlowMeasures, TendencySlab};
+pub(crate) use prediction::{Known, Prediction};
+pub(crate) use solver::{Flow, FlowMeasures};

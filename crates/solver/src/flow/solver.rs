@@ -2,12 +2,10 @@
 //!
 //! Legend: u velocity, p dynamic pressure over density, phi its increment, H tendency.
 
-use std::ops::Range;
-
 use glam::DVec3;
 
-use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of, for_slabs, row_blocks};
-use crate::math::lanes::{Vector, dispatch};
+use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of, row_blocks};
+use crate::math::lanes::dispatch;
 use crate::math::{Real, last_cache};
 use crate::poisson::{Plane, Poisson, Stages};
 
@@ -32,50 +30,27 @@ pub struct FlowMeasures {
 
 /// State of the fluid.
 pub struct Flow<R = f64> {
-    mesh: Mesh,
-    boundaries: Boundaries,
-    coefficients: Coefficients,
+    pub(super) mesh: Mesh,
+    pub(super) boundaries: Boundaries,
+    pub(super) coefficients: Coefficients,
     /// Velocity u^n [m/s].
     pub velocity: FaceVector<R>,
     /// Predicted velocity u* [m/s].
     pub predicted: FaceVector<R>,
     /// Dynamic pressure over density p^n [m^2/s^2].
     pub pressure: Field<Centre, R>,
-    tendency: FaceVector<R>,
+    pub(super) tendency: FaceVector<R>,
     poisson: Poisson<R>,
     /// Whether what is written as a whole goes past the caches.
     past_caches: bool,
     partial: Vec<PlaneMeasures>,
     previous_step: Option<f64>,
-    weight: f64,
+    pub(super) weight: f64,
     /// Sums of H over the unknown faces, of the last step and of the one before, three each.
     tendency_sums: [f64; 6],
     impulse: DVec3,
     /// Pressure at the upper end less that at the lower end, summed over the lines along each axis.
     pressure_rise: DVec3,
-}
-
-/// What [`Flow::add_tendency`] adds to: one component in a slab of memory.
-pub struct TendencySlab<'a, R> {
-    from: usize,
-    weight: f64,
-    tendency: &'a mut [R],
-    predicted: &'a mut [R],
-}
-
-impl<R: Real> TendencySlab<'_, R> {
-    /// Where it lies in memory.
-    pub fn range(&self) -> Range<usize> {
-        self.from..self.from + self.tendency.len()
-    }
-    /// Adds the first `count` lanes of `extra` [m/s^2] to the faces from `at` on; only for unknowns within
-    /// the slab.
-    #[inline(always)]
-    pub fn add<V: Vector<Number = f64>>(&mut self, at: usize, count: usize, extra: V) {
-        let at = at - self.from;
-        extra.add_some(count, self.tendency, at);
-        (V::constant(self.weight) * extra).add_some(count, self.predicted, at);
-    }
 }
 
 impl<R: Real> Flow<R> {
@@ -123,10 +98,6 @@ impl<R: Real> Flow<R> {
     /// Uniform acceleration that drives the flow from now on [m/s^2].
     pub fn set_body_acceleration(&mut self, acceleration: DVec3) {
         self.coefficients.acceleration = acceleration;
-    }
-    /// That acceleration.
-    pub fn body_acceleration(&self) -> DVec3 {
-        self.coefficients.acceleration
     }
 
     /// Projects the present velocity onto the divergence-free fields with the given boundaries;
@@ -209,32 +180,6 @@ impl<R: Real> Flow<R> {
             .convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, dt);
         self.previous_step = Some(dt);
         self.weight = now;
-    }
-
-    /// Adds to the tendency after `predict`, as if it had been part of H^n. `each` is called for every
-    /// component and slab of memory, in parallel.
-    pub fn add_tendency(&mut self, each: impl Fn(usize, TendencySlab<R>) + Sync) {
-        let weight = self.weight;
-        let FaceVector { x, y, z } = &mut self.tendency;
-        let FaceVector {
-            x: px,
-            y: py,
-            z: pz,
-        } = &mut self.predicted;
-        let fields = [[&mut **x, px], [y, py], [z, pz]];
-        for_slabs(
-            self.mesh.layout(),
-            fields,
-            |component, from, [tendency, predicted]| {
-                let slab = TendencySlab {
-                    from,
-                    weight,
-                    tendency,
-                    predicted,
-                };
-                each(component, slab);
-            },
-        );
     }
 
     /// Solves lap(phi) = div(u*)/dt, sets u = u* - dt grad(phi), p += phi, and fills the ghosts.

@@ -3,6 +3,7 @@
 mod field;
 mod loops;
 mod mesh;
+mod part;
 
 pub use field::Layout;
 pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field};
@@ -10,3 +11,4 @@ pub(crate) use loops::{
     Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, for_slabs, row_blocks,
 };
 pub use mesh::{Axis, Mesh};
+pub(crate) use part::Part;

@@ -16,11 +16,18 @@ use crate::poisson::Stages;
 pub(super) trait Fluid: Send + Sync {
     fn set_body_acceleration(&mut self, acceleration: DVec3);
     fn predict(&mut self, dt: f64);
-    fn correct_advection(&mut self, grains: &[Grain]);
+    fn remember(&mut self, grains: &[Grain]);
     /// Finds the faces near restored grains; in a step [`Fluid::couple`] does.
     fn locate(&mut self, grains: &[Grain], dt: f64);
     fn project_prediction(&mut self, dt: f64);
-    fn couple(&mut self, grains: &[Grain], before: &[Past], other: &[Load], dt: f64);
+    fn couple(
+        &mut self,
+        grains: &[Grain],
+        before: &[Past],
+        contact: &[Load],
+        other: &[Load],
+        dt: f64,
+    );
     fn responses(
         &self,
         grains: &[Grain],
@@ -90,8 +97,8 @@ impl<R: Real> Fluid for FluidOf<R> {
     fn predict(&mut self, dt: f64) {
         self.flow.predict(dt);
     }
-    fn correct_advection(&mut self, grains: &[Grain]) {
-        self.coupling.correct_advection(&mut self.flow, grains);
+    fn remember(&mut self, grains: &[Grain]) {
+        self.coupling.remember(grains);
     }
     fn locate(&mut self, grains: &[Grain], dt: f64) {
         self.coupling.locate(grains, dt);
@@ -99,8 +106,17 @@ impl<R: Real> Fluid for FluidOf<R> {
     fn project_prediction(&mut self, dt: f64) {
         self.flow.project_prediction(dt);
     }
-    fn couple(&mut self, grains: &[Grain], before: &[Past], other: &[Load], dt: f64) {
-        self.coupling.couple(&self.flow, grains, before, other, dt);
+    fn couple(
+        &mut self,
+        grains: &[Grain],
+        before: &[Past],
+        contact: &[Load],
+        other: &[Load],
+        dt: f64,
+    ) {
+        let flow = &mut self.flow;
+        self.coupling
+            .couple(flow, grains, before, contact, other, dt);
     }
     fn responses(
         &self,

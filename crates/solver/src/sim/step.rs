@@ -66,7 +66,7 @@ impl Simulation {
                     fluid.set_body_acceleration(acceleration);
                 }
                 timed(&mut passes.predict, || fluid.predict(dt));
-                timed(&mut passes.coupling, || fluid.correct_advection(grains));
+                fluid.remember(grains);
                 timed(&mut passes.contact, || {
                     dynamics.remember(grains);
                     dynamics.advance(grains, &work.driving, dt, &mut work.contact)
@@ -79,7 +79,8 @@ impl Simulation {
                     *driving += *load * -1.0;
                 }
                 timed(&mut passes.coupling, || {
-                    fluid.couple(grains, &work.before, &work.driving, dt)
+                    let (contact, driving) = (&work.contact, &work.driving);
+                    fluid.couple(grains, &work.before, contact, driving, dt)
                 });
                 // Contact again where there was some, now that the fluid's answer of this step is known.
                 let again = work.contact.iter().any(|load| *load != Load::default());

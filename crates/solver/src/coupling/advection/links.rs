@@ -6,11 +6,10 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::{Next, View};
+use super::{Ahead, Stand, View};
 use crate::coupling::aperture::surplus;
 use crate::coupling::locate::Body;
 use crate::coupling::places::PAD;
-use crate::dem::Grain;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Real;
 use crate::math::lanes::{MOST, Stencil, Vector};
@@ -120,7 +119,7 @@ impl<'a, R: Real> Lines<'a, R> {
     pub fn new(
         band: f64,
         mesh: &Mesh,
-        grain: &Grain,
+        stand: &Stand,
         body: &'a Body,
         velocity: &'a View<'a, R>,
         component: usize,
@@ -129,8 +128,8 @@ impl<'a, R: Real> Lines<'a, R> {
         for along in 0..3 {
             let middle = DVec3::from_array(FACE_OFFSET[component]) - 1.0;
             let middle = body.first.as_dvec3() + middle + 0.5 * DVec3::AXES[along];
-            let first = grain.velocity_at(mesh.origin + mesh.spacing * middle);
-            let change = DVec3::AXES.map(|axis| grain.angular_velocity.cross(axis * mesh.spacing));
+            let first = stand.velocity_at(mesh.origin + mesh.spacing * middle);
+            let change = DVec3::AXES.map(|axis| stand.angular_velocity.cross(axis * mesh.spacing));
             for (of, place) in [component, along].into_iter().zip(2 * along..) {
                 rigid[0][place] = first[of];
                 (0..3).for_each(|axis| rigid[1 + axis][place] = change[axis][of]);
@@ -168,7 +167,7 @@ impl<'a, R: Real> Lines<'a, R> {
     #[inline(always)]
     pub fn push<V: Vector<Number = f64>>(
         &self,
-        next: &Option<Next<R>>,
+        ahead: &Ahead<R>,
         planes: &mut Planes,
         to: &mut [f64],
     ) {
@@ -186,9 +185,7 @@ impl<'a, R: Real> Lines<'a, R> {
         planes.rows.extend((0..size.z).map(rows));
         self.unfold::<V>(0, planes);
         for k in 0..size.z {
-            if let Some(next) = next {
-                next.ask(self.component, k);
-            }
+            ahead.ask(self.component, k, size.z);
             self.unfold::<V>(k + 1, planes);
             let (near, rows) = (planes.rows[k as usize].clone(), planes.about(k));
             planes.y[rows.clone()].fill(0.0);

@@ -12,12 +12,12 @@
 
 mod links;
 
-use rayon::prelude::*;
+use glam::DVec3;
 
 use super::locate::{Body, PushRow};
 use super::places::PAD;
 use crate::dem::Grain;
-use crate::flow::{Flow, TendencySlab};
+use crate::flow::{Known, Prediction};
 use crate::grid::Mesh;
 use crate::math::Real;
 use crate::math::lanes::{Kernel, MOST, Vector, dispatch, prefetch_ahead};
@@ -25,9 +25,35 @@ use links::{Lines, Planes};
 
 /// What one thread needs: copies of the velocity in a box and about it, and a plane there.
 #[derive(Default)]
-struct Scratch<R> {
+pub struct Scratch<R> {
     velocity: [Vec<R>; 3],
     planes: Planes,
+}
+
+/// How a grain moves as the flow is predicted.
+#[derive(Clone, Copy, Default)]
+pub struct Stand {
+    /// [m]
+    pub position: DVec3,
+    /// [m/s]
+    pub velocity: DVec3,
+    /// [rad/s]
+    pub angular_velocity: DVec3,
+}
+
+impl Stand {
+    /// That of a grain at present.
+    pub fn of(grain: &Grain) -> Stand {
+        Stand {
+            position: grain.pose.position,
+            velocity: grain.velocity,
+            angular_velocity: grain.angular_velocity,
+        }
+    }
+    /// Velocity of the material point at `x` [m/s].
+    fn velocity_at(&self, x: DVec3) -> DVec3 {
+        self.velocity + self.angular_velocity.cross(x - self.position)
+    }
 }
 
 /// The velocity in a box and three cells about it, in the fields or copied.
@@ -39,9 +65,9 @@ struct View<'a, R> {
 }
 
 impl<'a, R: Real> View<'a, R> {
-    fn new(flow: &'a Flow<R>, body: &Body, copies: &'a mut [Vec<R>; 3]) -> View<'a, R> {
-        let (layout, velocity) = (flow.mesh().layout(), &flow.velocity);
-        let walled = flow.boundaries().walled();
+    fn new(known: &Known<'a, R>, body: &Body, copies: &'a mut [Vec<R>; 3]) -> View<'a, R> {
+        let (layout, velocity) = (known.mesh.layout(), known.velocity);
+        let walled = known.boundaries.walled();
         // What lies beyond a wall is no unknown, so no link reaches there. Registers reach beyond a row.
         let direct = layout.cells[0] >= MOST
             && (0..3).all(|axis| {
@@ -84,83 +110,97 @@ impl<R> View<'_, R> {
 /// What the links of one grain bring to the faces in the lists of its [`Body`] [m/s^2].
 pub type Push = [Vec<f64>; 3];
 
-/// Corrects the tendency of the step just predicted; `bodies` are where `grains` were located, in a
-/// band of half-width `band` [m]. Leaves what the links bring in `pushes`.
-pub fn correct<R: Real>(
+/// Finds what the links of a grain bring, which was found at `body` and moves as it did there, in a band of
+/// half-width `band` [m].
+pub fn find<R: Real>(
     band: f64,
-    flow: &mut Flow<R>,
-    grains: &[Grain],
-    bodies: &[Body],
-    pushes: &mut [Push],
+    known: &Known<R>,
+    stand: &Stand,
+    body: &Body,
+    predictions: Option<&[Prediction<R>; 3]>,
+    scratch: &mut Scratch<R>,
+    push: &mut Push,
 ) {
-    let (mesh, from) = (*flow.mesh(), &*flow);
-    let each = pushes.par_iter_mut().zip(grains).enumerate();
-    each.for_each_init(Scratch::default, |scratch, (index, (push, grain))| {
-        let body = &bodies[index];
-        dispatch(Links {
-            band,
-            mesh: &mesh,
-            grain,
-            body,
-            velocity: View::new(from, body, &mut scratch.velocity),
-            next: bodies.get(index + 1).map(|body| Next {
-                body,
-                velocity: [0, 1, 2].map(|axis| from.velocity.component(axis)),
-            }),
-            planes: &mut scratch.planes,
-            push,
-        });
+    dispatch(Links {
+        band,
+        mesh: known.mesh,
+        stand,
+        body,
+        velocity: View::new(known, body, &mut scratch.velocity),
+        ahead: Ahead {
+            rows: &body.rows,
+            predictions,
+            pressure: known.pressure,
+        },
+        planes: &mut scratch.planes,
+        push,
     });
-    let (pushes, layout) = (&*pushes, mesh.layout());
-    flow.add_tendency(|component, mut slab| {
-        let part = slab.range();
-        for (body, push) in bodies.iter().zip(pushes) {
-            if body.lies_in(&part, layout) {
-                dispatch(Pushes {
-                    rows: &body.rows[component],
-                    push: &push[component],
-                    slab: &mut slab,
-                });
+}
+
+/// Adds that to a component of the prediction, as far as it lies there.
+pub fn add<R: Real>(body: &Body, push: &Push, component: usize, prediction: &mut Prediction<R>) {
+    dispatch(Pushes {
+        rows: &body.rows[component],
+        push: &push[component],
+        prediction,
+    });
+}
+
+/// What a grain pushes, asked for while its links are found.
+struct Ahead<'a, R> {
+    rows: &'a [Vec<PushRow>; 3],
+    predictions: Option<&'a [Prediction<'a, R>; 3]>,
+    pressure: &'a [R],
+}
+
+impl<R: Real> Ahead<'_, R> {
+    /// Asks for plane `k` of a component, out of `count`.
+    #[inline]
+    fn ask(&self, component: usize, k: i32, count: i32) {
+        let Some(predictions) = self.predictions else {
+            return;
+        };
+        let rows = &self.rows[component];
+        let share = rows.len().div_ceil(count as usize);
+        for row in rows.iter().skip(k as usize * share).take(share) {
+            predictions[component].ask(row.at, row.count, true);
+            if component == 0 {
+                prefetch_ahead(self.pressure, row.at - 1, row.count + 1);
             }
         }
-    });
-}
-
-/// The grain that comes next: what is read of it is asked for while there is something else to do.
-pub struct Next<'a, R> {
-    body: &'a Body,
-    velocity: [&'a [R]; 3],
-}
-
-impl<R> Next<'_, R> {
-    /// Asks for plane `k` of a component.
-    #[inline]
-    fn ask(&self, component: usize, k: i32) {
-        let body = self.body;
-        body.places.ask_ahead(self.velocity[component], k as usize);
-        let list = &body.distance[component];
-        let share = list.len() / body.size.z.max(1) as usize;
-        prefetch_ahead(list, k as usize * share, share);
     }
 }
 
-/// What one grain adds to the tendency of a component in a slab of memory.
+/// Asks for what the links of the grain at `body` read of a component: the `k`th share of as many as `of`.
+#[inline]
+pub fn ask<R: Real>(known: &Known<R>, body: &Body, component: usize, [k, of]: [i32; 2]) {
+    let share = |count: usize| {
+        let end = |k: i32| k as usize * count / of as usize;
+        end(k)..end(k + 1)
+    };
+    let field = known.velocity.component(component);
+    body.places
+        .ask_ahead(field, share(body.places.planes_about()));
+    let list = &body.distance[component];
+    let some = share(list.len());
+    prefetch_ahead(list, some.start, some.len());
+}
+
+/// What one grain adds to the tendency of a component.
 struct Pushes<'a, 'b, R> {
     rows: &'a [PushRow],
     push: &'a [f64],
-    slab: &'a mut TendencySlab<'b, R>,
+    prediction: &'a mut Prediction<'b, R>,
 }
 
 impl<R: Real> Kernel for Pushes<'_, '_, R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let part = self.slab.range();
+        let part = self.prediction.range().clone();
         for row in self.rows.iter().filter(|row| part.contains(&row.at)) {
-            for n in (0..row.count).step_by(V::WIDTH) {
-                let push = V::load(&self.push[row.first + n..]);
-                self.slab.add(row.at + n, row.count - n, push);
-            }
+            let push = &self.push[row.first..];
+            self.prediction.push::<V>(row.at, row.count, push);
         }
     }
 }
@@ -169,10 +209,10 @@ impl<R: Real> Kernel for Pushes<'_, '_, R> {
 struct Links<'a, R> {
     band: f64,
     mesh: &'a Mesh,
-    grain: &'a Grain,
+    stand: &'a Stand,
     body: &'a Body,
     velocity: View<'a, R>,
-    next: Option<Next<'a, R>>,
+    ahead: Ahead<'a, R>,
     planes: &'a mut Planes,
     push: &'a mut Push,
 }
@@ -184,17 +224,17 @@ impl<R: Real> Kernel for Links<'_, R> {
         let Links {
             band,
             mesh,
-            grain,
+            stand,
             body,
             velocity,
-            next,
+            ahead,
             planes,
             push,
         } = self;
         for (component, push) in push.iter_mut().enumerate() {
             push.resize(body.distance[component].len(), 0.0);
-            Lines::new(band, mesh, grain, body, &velocity, component)
-                .push::<V>(&next, planes, push);
+            Lines::new(band, mesh, stand, body, &velocity, component)
+                .push::<V>(&ahead, planes, push);
         }
     }
 }
@@ -203,9 +243,10 @@ impl<R: Real> Kernel for Links<'_, R> {
 mod tests {
     use std::sync::Arc;
 
-    use glam::{DQuat, DVec3};
+    use glam::DQuat;
     use grainwake_shape::Shape;
 
+    use super::*;
     use crate::coupling::{Coupling, Scheme};
     use crate::dem::{Dof, Grain};
     use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
@@ -253,7 +294,8 @@ mod tests {
             let mut coupling = Coupling::new(&flow, Scheme::Aperture, 1.0, 0.01, &grains);
             flow.predict(0.01);
             let before: Vec<f64> = flow.predicted.component(0).to_vec();
-            coupling.correct_advection(&mut flow, &grains);
+            coupling.remember(&grains);
+            coupling.correct_advection(&mut flow);
             assert!(flow.predicted.component(0) != before);
             let all = (0..3).flat_map(|axis| flow.predicted.component(axis).to_vec());
             all.map(f64::to_bits).collect::<Vec<_>>()

@@ -87,33 +87,27 @@ pub trait Vector:
             to[..Self::WIDTH][i] = R::of(lanes[i].wide());
         }
     }
-    /// The `WIDTH` numbers of a list from `at` on, zeros where it has ended.
+    /// As many of other numbers as there are, no more than `WIDTH`, then zeros.
     #[inline(always)]
-    fn load_within<R: Real>(list: &[R], at: usize) -> Self {
-        match list.get(at..at.wrapping_add(Self::WIDTH)) {
-            Some(all) => Self::load_from(all),
-            None => Self::load(&end_of(list, at)),
+    fn load_some<R: Real>(from: &[R]) -> Self {
+        let mut lanes = [Self::Number::default(); MOST];
+        for (lane, entry) in lanes[..Self::WIDTH].iter_mut().zip(from) {
+            *lane = Self::Number::of(entry.wide());
         }
+        Self::load(&lanes)
     }
-    /// Adds the first `count` lanes to the numbers of a list from `at` on; it may end with these.
+    /// Adds the lanes to as many of other numbers as there are, no more than `WIDTH`.
     #[inline(always)]
-    fn add_some<R: Real>(self, count: usize, list: &mut [R], at: usize) {
-        let Some(all) = list.get_mut(at..at + Self::WIDTH) else {
-            return self.add_at_end(count, list, at);
-        };
-        let before = Self::load_from(all);
-        Self::ramp()
-            .where_below(Self::constant(count as f64), before + self, before)
-            .store_to(all);
+    fn add_some<R: Real>(self, to: &mut [R]) {
+        (Self::load_some(to) + self).store_some(to);
     }
-    /// The same one by one.
-    #[cold]
-    #[inline(never)]
-    fn add_at_end<R: Real>(self, count: usize, list: &mut [R], at: usize) {
+    /// Overwrites as many of other numbers as there are, no more than `WIDTH`.
+    #[inline(always)]
+    fn store_some<R: Real>(self, to: &mut [R]) {
         let mut lanes = [Self::Number::default(); MOST];
         self.store(&mut lanes);
-        for (entry, lane) in list[at..].iter_mut().zip(&lanes[..count.min(Self::WIDTH)]) {
-            *entry = R::of(entry.wide() + lane.wide());
+        for (entry, lane) in to.iter_mut().zip(&lanes[..Self::WIDTH]) {
+            *entry = R::of(lane.wide());
         }
     }
     /// The numbers of the lanes.
@@ -281,18 +275,6 @@ pub const RAMP: [f64; MOST] = {
     ramp
 };
 
-/// What is left of a list from `at` on, then zeros.
-#[cold]
-#[inline(never)]
-fn end_of<R: Real, N: Real>(list: &[R], at: usize) -> [N; MOST] {
-    let mut lanes = [N::default(); MOST];
-    let left = list.get(at..).unwrap_or(&[]);
-    for (lane, entry) in lanes.iter_mut().zip(left) {
-        *lane = N::of(entry.wide());
-    }
-    lanes
-}
-
 /// Asks for the entries of a list from `at` to `at + count` to be brought near: short rows end before the
 /// processor guesses that they are read. Nothing happens where there are none.
 #[inline(always)]
@@ -317,12 +299,17 @@ pub fn prefetch_ahead<T>(list: &[T], at: usize, count: usize) {
 fn prefetch_to<const HINT: i32, T>(list: &[T], at: usize, count: usize) {
     use std::arch::x86_64::_mm_prefetch;
     let per_line = (64 / size_of::<T>()).max(1);
-    for at in (at..at.wrapping_add(count + per_line)).step_by(per_line) {
+    let ask = |at: usize| {
         if let Some(entry) = list.get(at) {
             // SAFETY: the entry exists, and a prefetch changes nothing.
             unsafe { _mm_prefetch::<HINT>(std::ptr::from_ref(entry).cast()) };
         }
+    };
+    let end = at.wrapping_add(count);
+    for at in (at..end).step_by(per_line) {
+        ask(at);
     }
+    ask(end.wrapping_sub(1));
 }
 
 /// Work compiled for every instruction set.

@@ -43,7 +43,8 @@ impl<const N: usize> Stencil<N> {
         }
         let mut found = [V::constant(0.0); N];
         for n in 0..N {
-            found[n] = V::load_within(list, at.wrapping_add_signed(self.offsets[n]));
+            let at = at.wrapping_add_signed(self.offsets[n]);
+            found[n] = V::load_some(list.get(at..).unwrap_or(&[]));
         }
         found
     }

@@ -196,29 +196,29 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
     }
 }
 
-/// Reads and adds at the end of a list.
-struct Ends;
+/// Reads and writes at the end of a list.
+struct Ends<R>(R);
 
-impl Kernel for Ends {
+impl<R: Real> Kernel for Ends<R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let list: Vec<f32> = (1..40).map(|n| n as f32).collect();
-        for at in [0, 3, 30, 38, 39, 60] {
-            let mut lanes = [0.0; MOST];
-            V::load_within(&list, at).store(&mut lanes);
+        let list: Vec<R> = (1..40).map(|n| R::of(f64::from(n))).collect();
+        for at in [0, 3, 30, 31, 36, 38, 39] {
+            let mut lanes = [9.0; MOST];
+            V::load_some(&list[at..]).store(&mut lanes);
             for n in 0..V::WIDTH {
-                let entry = list.get(at + n).copied().unwrap_or(0.0);
-                assert_eq!(lanes[n], f64::from(entry), "{at} {n}");
+                let entry = list.get(at + n).map_or(0.0, |entry| entry.wide());
+                assert_eq!(lanes[n], entry, "{at} {n}");
             }
-        }
-        for (at, count) in [(5, 1), (5, V::WIDTH), (39 - V::WIDTH, 2), (38, 1)] {
-            let mut sums = list.clone();
-            (V::ramp() + V::constant(1.0)).add_some(count, &mut sums, at);
-            for (n, (sum, entry)) in sums.iter().zip(&list).enumerate() {
-                let inside = (at..at + count.min(V::WIDTH)).contains(&n);
-                let more = if inside { (n - at + 1) as f32 } else { 0.0 };
-                assert_eq!(*sum, entry + more, "{at} {count} {n}");
+            for end in at..=list.len() {
+                let mut copy = list.clone();
+                V::constant(0.5).store_some(&mut copy[at..end]);
+                for (n, (new, old)) in copy.iter().zip(&list).enumerate() {
+                    let written = (at..end.min(at + V::WIDTH)).contains(&n);
+                    let expected = if written { 0.5 } else { old.wide() };
+                    assert_eq!(new.wide(), expected, "{at}..{end} {n}");
+                }
             }
         }
     }
@@ -226,9 +226,17 @@ impl Kernel for Ends {
 
 #[test]
 fn lists_may_end_within_a_vector() {
-    dispatch(Ends);
-    Ends.run::<<f64 as Registers>::Common>();
-    Ends.run::<One<f64>>();
+    fn ends<R: Real>() {
+        let ends = || Ends(R::default());
+        dispatch(ends());
+        if level() >= Level::Avx2 {
+            ends().run::<<f64 as Registers>::Avx2>();
+        }
+        ends().run::<<f64 as Registers>::Common>();
+        ends().run::<One<f64>>();
+    }
+    ends::<f64>();
+    ends::<f32>();
 }
 
 /// Reads about places of a list, at its ends too.

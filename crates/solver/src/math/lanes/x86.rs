@@ -10,6 +10,7 @@ use std::ops::{Add, Mul, Sub};
 
 use super::Vector;
 use super::x86_transpose as turn;
+use crate::math::Real;
 use crate::math::real::{INVERSE_ROOT_OF_ONE, INVERSE_ROOT_OF_ONE_SINGLE};
 
 /// Rounding to the whole number below.
@@ -165,6 +166,35 @@ vector! {
     _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_max_pd, _mm256_min_pd,
     choose256_pd, _mm256_fmadd_pd, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_stream_pd;
     #[inline(always)]
+    fn load_some<R: Real>(from: &[R]) -> Self {
+        let at = from.as_ptr();
+        // SAFETY: see the head of this file; no lane beyond the list is read. Singles and doubles are all
+        // there is.
+        unsafe {
+            if R::BYTES == size_of::<f64>() {
+                let lanes = _mm256_cmpgt_epi64(_mm256_set1_epi64x(from.len() as i64), ramp256());
+                Four(_mm256_maskload_pd(at.cast(), lanes))
+            } else {
+                let lanes = _mm_cmpgt_epi32(_mm_set1_epi32(up_to(from.len())), ramp128());
+                Four(_mm256_cvtps_pd(_mm_maskload_ps(at.cast(), lanes)))
+            }
+        }
+    }
+    #[inline(always)]
+    fn store_some<R: Real>(self, to: &mut [R]) {
+        let at = to.as_mut_ptr();
+        // SAFETY: as of `load_some`.
+        unsafe {
+            if R::BYTES == size_of::<f64>() {
+                let lanes = _mm256_cmpgt_epi64(_mm256_set1_epi64x(to.len() as i64), ramp256());
+                _mm256_maskstore_pd(at.cast(), lanes, self.0);
+            } else {
+                let lanes = _mm_cmpgt_epi32(_mm_set1_epi32(up_to(to.len())), ramp128());
+                _mm_maskstore_ps(at.cast(), lanes, _mm256_cvtpd_ps(self.0));
+            }
+        }
+    }
+    #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of this file.
         unsafe {
@@ -234,6 +264,31 @@ vector! {
     doubles Eight [0: same],
     _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_max_pd, _mm512_min_pd,
     choose512_pd, _mm512_fmadd_pd, _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_stream_pd;
+    #[inline(always)]
+    fn load_some<R: Real>(from: &[R]) -> Self {
+        let (at, lanes) = (from.as_ptr(), first_of_eight(from.len()));
+        // SAFETY: see the head of this file; no lane beyond the list is read. Singles and doubles are all
+        // there is.
+        unsafe {
+            if R::BYTES == size_of::<f64>() {
+                Eight(_mm512_maskz_loadu_pd(lanes, at.cast()))
+            } else {
+                Eight(_mm512_cvtps_pd(_mm256_maskz_loadu_ps(lanes, at.cast())))
+            }
+        }
+    }
+    #[inline(always)]
+    fn store_some<R: Real>(self, to: &mut [R]) {
+        let (at, lanes) = (to.as_mut_ptr(), first_of_eight(to.len()));
+        // SAFETY: as of `load_some`.
+        unsafe {
+            if R::BYTES == size_of::<f64>() {
+                _mm512_mask_storeu_pd(at.cast(), lanes, self.0);
+            } else {
+                _mm256_mask_storeu_ps(at.cast(), lanes, _mm512_cvtpd_ps(self.0));
+            }
+        }
+    }
     #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of this file.
@@ -441,6 +496,25 @@ vector! {
     }
 }
 
+/// The first `count` of eight lanes, as bits.
+#[inline(always)]
+fn first_of_eight(count: usize) -> u8 {
+    (0xff_u32 >> (8 - count.min(8))) as u8
+}
+/// A count of lanes, no more than four.
+#[inline(always)]
+fn up_to(count: usize) -> i32 {
+    count.min(4) as i32
+}
+/// The numbers of the lanes.
+#[inline(always)]
+unsafe fn ramp256() -> __m256i {
+    unsafe { _mm256_setr_epi64x(0, 1, 2, 3) }
+}
+#[inline(always)]
+unsafe fn ramp128() -> __m128i {
+    unsafe { _mm_setr_epi32(0, 1, 2, 3) }
+}
 /// What has doubles already.
 #[inline(always)]
 unsafe fn same<V>(v: V) -> V {
