@@ -1,10 +1,11 @@
 //! Samples of a field read for the lanes of vectors. Finding the samples and reading them are two steps, for
 //! a loop of its own each.
 
+use glam::DVec3;
 use grainwake_shape::SampledField;
 
 use super::near::FAR;
-use crate::math::lanes::Vector;
+use crate::math::lanes::{One, Vector};
 
 /// A vector from each list. (No closure in a kernel touches vectors: it would not be inlined.)
 #[inline(always)]
@@ -20,6 +21,49 @@ pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [Vec<V::Number>; 3],
     values[2].store(&mut z[at..]);
 }
 
+/// Signed distances on a grid, to a hundred thousandth or so of what they reach: those of a grain should stay near
+/// the processor.
+pub struct Samples {
+    lower: DVec3,
+    spacing: f64,
+    dims: [usize; 3],
+    /// What a level is [m].
+    quantum: f64,
+    /// Integer levels, x fastest.
+    levels: Vec<i16>,
+}
+
+impl Samples {
+    /// Those of a field; what is farther than `most` [m] inside or outside is given as so far.
+    pub fn of(field: &SampledField, most: f64) -> Samples {
+        let quantum = most / f64::from(i16::MAX);
+        let part = field.quantum() / quantum;
+        // Beyond the range it is cut off.
+        let level = |level: &f32| (f64::from(*level) * part).round() as i16;
+        Samples {
+            lower: field.lower(),
+            spacing: field.spacing(),
+            dims: field.dims(),
+            quantum,
+            levels: field.levels().iter().map(level).collect(),
+        }
+    }
+
+    /// Signed distance [m] and gradient at a point of the grid.
+    pub fn distance_and_gradient(&self, x: DVec3) -> Option<(f64, DVec3)> {
+        let grid = Grid::of(self);
+        let spot = grid.find([One(x.x), One(x.y), One(x.z)]);
+        let on_grid = spot.off.0 <= 0.0;
+        let (distance, [x, y, z]) = grid.read(spot);
+        on_grid.then_some((distance.0, DVec3::new(x.0, y.0, z.0)))
+    }
+
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        size_of::<i16>() * self.levels.capacity()
+    }
+}
+
 /// The grid of samples.
 pub struct Grid<'a, V> {
     lower: [V; 3],
@@ -31,7 +75,7 @@ pub struct Grid<'a, V> {
     /// What a level is [m], and that over the spacing.
     quantum: V,
     slope: V,
-    levels: &'a [f32],
+    levels: &'a [i16],
 }
 
 /// Where points are among the samples.
@@ -46,12 +90,12 @@ pub struct Spot<V> {
 
 impl<'a, V: Vector> Grid<'a, V> {
     #[inline(always)]
-    pub fn of(field: &'a SampledField) -> Grid<'a, V> {
-        let (dims, inverse) = (field.dims(), 1.0 / field.spacing());
+    pub fn of(samples: &'a Samples) -> Grid<'a, V> {
+        let (dims, inverse) = (samples.dims, 1.0 / samples.spacing);
         let mut lower = [V::constant(0.0); 3];
         let mut last = lower;
         for axis in 0..3 {
-            lower[axis] = V::constant(field.lower()[axis]);
+            lower[axis] = V::constant(samples.lower[axis]);
             last[axis] = V::constant(dims[axis] as f64 - 1.0);
         }
         let (row, plane) = (dims[0], dims[0] * dims[1]);
@@ -60,9 +104,9 @@ impl<'a, V: Vector> Grid<'a, V> {
             inverse: V::constant(inverse),
             last,
             strides: [V::constant(row as f64), V::constant(plane as f64)],
-            quantum: V::constant(field.quantum()),
-            slope: V::constant(field.quantum() * inverse),
-            levels: field.levels(),
+            quantum: V::constant(samples.quantum),
+            slope: V::constant(samples.quantum * inverse),
+            levels: &samples.levels,
         }
     }
 
@@ -115,7 +159,7 @@ impl<'a, V: Vector> Grid<'a, V> {
 
 /// Value between the samples at `at` and the next along x, and the slope from one to the other.
 #[inline(always)]
-fn edge<V: Vector>(levels: &[f32], at: V, x: V) -> [V; 2] {
+fn edge<V: Vector>(levels: &[i16], at: V, x: V) -> [V; 2] {
     let [low, high] = V::pairs(levels, at);
     let slope = high - low;
     [low + x * slope, slope]

@@ -210,7 +210,7 @@ pub trait Vector:
     }
     /// Of each lane of `at`, a whole number, the entry of `from` there and the next.
     #[inline(always)]
-    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+    fn pairs(from: &[i16], at: Self) -> [Self; 2] {
         let mut lanes = [[Self::Number::default(); MOST]; 2];
         at.store(&mut lanes[0]);
         for n in 0..Self::WIDTH {

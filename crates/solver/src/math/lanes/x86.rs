@@ -238,7 +238,7 @@ vector! {
         }
     }
     #[inline(always)]
-    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+    fn pairs(from: &[i16], at: Self) -> [Self; 2] {
         assert!(from.len() <= i32::MAX as usize);
         // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places fit
         // the indices.
@@ -248,12 +248,10 @@ vector! {
             let above = _mm256_cmp_pd::<_CMP_GE_OQ>(at.0, _mm256_setzero_pd());
             assert_eq!(_mm256_movemask_pd(_mm256_and_pd(below, above)), 0xf);
             let places = _mm256_cvttpd_epi32(at.0);
-            let pairs = _mm256_i32gather_epi64::<4>(from.as_ptr().cast(), places);
-            let apart = _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7);
-            let apart = _mm256_permutevar8x32_epi32(pairs, apart);
-            let low = _mm_castsi128_ps(_mm256_castsi256_si128(apart));
-            let high = _mm_castsi128_ps(_mm256_extracti128_si256::<1>(apart));
-            [Four(_mm256_cvtps_pd(low)), Four(_mm256_cvtps_pd(high))]
+            let pairs = _mm_i32gather_epi32::<2>(from.as_ptr().cast(), places);
+            let low = _mm_srai_epi32::<16>(_mm_slli_epi32::<16>(pairs));
+            let high = _mm_srai_epi32::<16>(pairs);
+            [Four(_mm256_cvtepi32_pd(low)), Four(_mm256_cvtepi32_pd(high))]
         }
     }
 }
@@ -328,7 +326,7 @@ vector! {
         }
     }
     #[inline(always)]
-    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+    fn pairs(from: &[i16], at: Self) -> [Self; 2] {
         assert!(from.len() <= i32::MAX as usize);
         // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places fit
         // the indices.
@@ -338,11 +336,10 @@ vector! {
             let above = _mm512_cmp_pd_mask::<_CMP_GE_OQ>(at.0, _mm512_setzero_pd());
             assert_eq!(below & above, 0xff);
             let places = _mm512_cvttpd_epi32(at.0);
-            let pairs = _mm512_i32gather_epi64::<4>(places, from.as_ptr().cast());
-            let low = _mm256_castsi256_ps(_mm512_cvtepi64_epi32(pairs));
-            let high = _mm512_cvtepi64_epi32(_mm512_srli_epi64::<32>(pairs));
-            let high = _mm256_castsi256_ps(high);
-            [Eight(_mm512_cvtps_pd(low)), Eight(_mm512_cvtps_pd(high))]
+            let pairs = _mm256_i32gather_epi32::<2>(from.as_ptr().cast(), places);
+            let low = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(pairs));
+            let high = _mm256_srai_epi32::<16>(pairs);
+            [Eight(_mm512_cvtepi32_pd(low)), Eight(_mm512_cvtepi32_pd(high))]
         }
     }
 }
@@ -402,7 +399,7 @@ vector! {
         }
     }
     #[inline(always)]
-    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+    fn pairs(from: &[i16], at: Self) -> [Self; 2] {
         assert!(from.len() <= super::MOST_PLACES);
         // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places singles hold.
         unsafe {
@@ -411,21 +408,12 @@ vector! {
             let above = _mm256_cmp_ps::<_CMP_GE_OQ>(at.0, _mm256_setzero_ps());
             assert_eq!(_mm256_movemask_ps(_mm256_and_ps(below, above)), 0xff);
             let places = _mm256_cvttps_epi32(at.0);
-            let [lower, upper] = [
-                _mm256_castsi256_si128(places),
-                _mm256_extracti128_si256::<1>(places),
-            ];
-            let lower = _mm256_i32gather_epi64::<4>(from.as_ptr().cast(), lower);
-            let upper = _mm256_i32gather_epi64::<4>(from.as_ptr().cast(), upper);
-            let [lower, upper] = [_mm256_castsi256_ps(lower), _mm256_castsi256_ps(upper)];
-            // Of each half register the firsts, then the seconds.
-            let first = _mm256_shuffle_ps::<0b10_00_10_00>(lower, upper);
-            let second = _mm256_shuffle_ps::<0b11_01_11_01>(lower, upper);
-            let first = _mm256_permute4x64_pd::<0b11_01_10_00>(_mm256_castps_pd(first));
-            let second = _mm256_permute4x64_pd::<0b11_01_10_00>(_mm256_castps_pd(second));
+            let pairs = _mm256_i32gather_epi32::<2>(from.as_ptr().cast(), places);
+            let low = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(pairs));
+            let high = _mm256_srai_epi32::<16>(pairs);
             [
-                EightSingles(_mm256_castpd_ps(first)),
-                EightSingles(_mm256_castpd_ps(second)),
+                EightSingles(_mm256_cvtepi32_ps(low)),
+                EightSingles(_mm256_cvtepi32_ps(high)),
             ]
         }
     }
@@ -467,7 +455,7 @@ vector! {
         }
     }
     #[inline(always)]
-    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+    fn pairs(from: &[i16], at: Self) -> [Self; 2] {
         assert!(from.len() <= super::MOST_PLACES);
         // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places singles hold.
         unsafe {
@@ -476,21 +464,12 @@ vector! {
             let above = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(at.0, _mm512_setzero_ps());
             assert_eq!(below & above, 0xffff);
             let places = _mm512_cvttps_epi32(at.0);
-            let [lower, upper] = [
-                _mm512_castsi512_si256(places),
-                _mm512_extracti64x4_epi64::<1>(places),
-            ];
-            let lower = _mm512_i32gather_epi64::<4>(lower, from.as_ptr().cast());
-            let upper = _mm512_i32gather_epi64::<4>(upper, from.as_ptr().cast());
-            let first = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-            let second = _mm512_add_epi32(first, _mm512_set1_epi32(1));
-            let [first, second] = [
-                _mm512_permutex2var_epi32(lower, first, upper),
-                _mm512_permutex2var_epi32(lower, second, upper),
-            ];
+            let pairs = _mm512_i32gather_epi32::<2>(places, from.as_ptr().cast());
+            let low = _mm512_srai_epi32::<16>(_mm512_slli_epi32::<16>(pairs));
+            let high = _mm512_srai_epi32::<16>(pairs);
             [
-                SixteenSingles(_mm512_castsi512_ps(first)),
-                SixteenSingles(_mm512_castsi512_ps(second)),
+                SixteenSingles(_mm512_cvtepi32_ps(low)),
+                SixteenSingles(_mm512_cvtepi32_ps(high)),
             ]
         }
     }
