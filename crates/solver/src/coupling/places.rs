@@ -166,11 +166,12 @@ impl Places {
         for k in planes {
             let w = off(k, z.len());
             for (j, line) in y.iter().enumerate() {
-                let v = off(j, y.len());
-                let part = (1.4 - v.max(w)).min(1.75 - v - w).min(1.0);
-                if v + w > 1.4 || part <= 0.0 {
+                // About what faces within a ball need, with three on each side in line.
+                let away = w + off(j, y.len());
+                if away > 1.2 {
                     continue;
                 }
+                let part = (1.02 - 0.6 * away).min(1.0);
                 let count = (part * x.len() as f32) as usize;
                 let first = x[0] + (x.len() - count) / 2 + line + z[k];
                 prefetch_ahead(field, first, count);

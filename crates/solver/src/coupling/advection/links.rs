@@ -341,17 +341,16 @@ impl<'a, R: Real> Lines<'a, R> {
         d: V,
     ) -> V {
         let (zero, half) = (V::constant(0.0), V::constant(0.5));
+        let (inside, outside) = (V::constant(-self.band), V::constant(2.0 * self.band));
+        if inside.mask_below(d) & d.mask_below(outside) == 0 {
+            return zero;
+        }
         let axis = &self.axes[along];
         let [q, c] = [self.component, along].map(|of| self.velocity.components[of]);
         let [from, to, below, above, far_below, far_above] = six.carried.load::<V, R>(q, at);
         let [first, second] = axis.carrying.load::<V, R>(c, at);
         let both = from + to;
         let (mean, carrier) = (half * both, half * (first + second));
-        // From the first link of the row on U changes evenly.
-        let by = &self.rigid[1];
-        let [own, along] = [2 * along, 2 * along + 1];
-        let mean = mean - count.mul_add(V::constant(by[own]), V::constant(rigid[own]));
-        let relative = carrier - count.mul_add(V::constant(by[along]), V::constant(rigid[along]));
         let outer = V::constant(-8.0).mul_add(below + above, far_below + far_above);
         let sixth = both.mul_add(V::constant(7.0), outer);
         let mut smoother = carrier * V::constant(1.0 / 60.0) * sixth;
@@ -360,11 +359,20 @@ impl<'a, R: Real> Lines<'a, R> {
             smoother = count.where_below(V::constant(six.end), smoother, zero);
             smoother = count.where_below(V::constant(six.start), zero, smoother);
         }
-        let surplus = surplus(d, self.band);
-        let flux = (mean * relative).mul_add(surplus, smoother);
+        let mut flux = smoother;
+        // Beyond the band links are open.
+        if d.mask_below(V::constant(self.band)) != 0 {
+            // From the first link of the row on U changes evenly.
+            let by = &self.rigid[1];
+            let [own, along] = [2 * along, 2 * along + 1];
+            let mean = mean - count.mul_add(V::constant(by[own]), V::constant(rigid[own]));
+            let relative =
+                carrier - count.mul_add(V::constant(by[along]), V::constant(rigid[along]));
+            flux = (mean * relative).mul_add(surplus(d, self.band), smoother);
+        }
         let flux = flux * V::constant(axis.inverse);
-        let flux = d.where_below(V::constant(2.0 * self.band), flux, zero);
-        V::constant(-self.band).where_below(d, flux, zero)
+        let flux = d.where_below(outside, flux, zero);
+        inside.where_below(d, flux, zero)
     }
 }
 
