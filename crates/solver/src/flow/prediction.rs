@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{Boundaries, Flow};
 use crate::grid::{Centre, FaceVector, Field, Mesh, Part, for_slabs};
 use crate::math::Real;
-use crate::math::lanes::{Vector, prefetch};
+use crate::math::lanes::{Vector, prefetch, prefetch_ahead};
 
 /// What the prediction was made of.
 pub struct Known<'a, R> {
@@ -138,9 +138,11 @@ impl<'a, R: Real> Prediction<'a, R> {
     /// Asks for u* of these faces, and for their tendency if it is pushed, to be brought near.
     #[inline(always)]
     pub fn ask(&self, at: usize, count: usize, pushed: bool) {
-        prefetch(self.velocity.row(at, count), 0, count);
         if pushed {
-            prefetch(self.tendency.row(at, count), 0, count);
+            prefetch_ahead(self.velocity.row(at, count), 0, count);
+            prefetch_ahead(self.tendency.row(at, count), 0, count);
+        } else {
+            prefetch(self.velocity.row(at, count), 0, count);
         }
     }
 }
