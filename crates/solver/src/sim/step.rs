@@ -66,6 +66,7 @@ impl Simulation {
                     fluid.set_body_acceleration(acceleration);
                 }
                 timed(&mut passes.predict, || fluid.predict(dt));
+                // The advection beside the grains is corrected when they are visited, for how they move now.
                 fluid.remember(grains);
                 timed(&mut passes.contact, || {
                     dynamics.remember(grains);
