@@ -181,9 +181,12 @@ pub fn ask<R: Real>(known: &Known<R>, body: &Body, component: usize, [k, of]: [i
     let field = known.velocity.component(component);
     body.places
         .ask_ahead(field, share(body.places.planes_about()));
-    let list = &body.distance[component];
-    let some = share(list.len());
-    prefetch_ahead(list, some.start, some.len());
+    let (spans, rows) = (&body.spans[component], &body.rows[component]);
+    let distances = &body.distance[component];
+    let [some_spans, some_rows, some] = [spans.len(), rows.len(), distances.len()].map(share);
+    prefetch_ahead(spans, some_spans.start, some_spans.len());
+    prefetch_ahead(rows, some_rows.start, some_rows.len());
+    prefetch_ahead(distances, some.start, some.len());
 }
 
 /// What one grain adds to the tendency of a component.
