@@ -157,7 +157,10 @@ impl Coupling {
         };
         // One that came across a periodic edge is elsewhere altogether.
         let near = |index: usize| travel(index) <= reach;
-        (self.locator).find_neighbours(grains, |i| if near(i) { travel(i) } else { 0.0 });
+        // Rows end where singles say; what no two grains may share must not hang on their rounding.
+        let spare = 0.01 * reach;
+        let about = |index: usize| spare + if near(index) { travel(index) } else { 0.0 };
+        self.locator.find_neighbours(grains, about);
         let alone: Vec<bool> = (0..grains.len())
             .map(|i| near(i) && contact[i] == Load::default() && self.locator.is_alone(i))
             .collect();
