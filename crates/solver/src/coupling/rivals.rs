@@ -190,6 +190,19 @@ mod tests {
         assert_eq!(found(&neighbours, 0), [(-along_x, tie)]);
         assert_eq!(found(&neighbours, 1), []);
         assert_eq!(found(&neighbours, 2), [(along_x, -tie)]);
+        assert_eq!(
+            [0, 1, 2].map(|index| neighbours.has_none(index)),
+            [false, true, false]
+        );
+        // The second is 3.4 from the third, both with balls of 1.1, and came from 1.25 away.
+        neighbours.find(&mesh, &unknowns, 0.6, &grains, |index| {
+            [0.0, 1.25, 0.0][index]
+        });
+        assert!(!neighbours.has_none(1));
+        let others = found(&neighbours, 1).into_iter();
+        let others = others.filter(|(shift, _)| *shift == DVec3::ZERO);
+        assert_eq!(others.count(), 1, "the others are images of its own");
+        assert_eq!(found(&neighbours, 0), [(-along_x, tie)]);
         // With a reach of more than half a period every grain meets its own images too.
         neighbours.find(&mesh, &unknowns, 1.6, &grains[1..2], |_| 0.0);
         let tie = 4.2 * TIE;
