@@ -176,13 +176,18 @@ impl Coupling {
         }
         let (known, _) = flow.prediction();
         let band = self.locator.band();
-        in_turn(&mut self.sites, |_, site, _, nearby: &mut Nearby<R>| {
+        in_turn(&mut self.sites, |_, site, next, nearby: &mut Nearby<R>| {
             if !site.alone {
                 let Site {
                     stand, body, push, ..
                 } = site;
+                let ahead = |component, share| {
+                    if let Some(next) = next.filter(|next| !next.alone) {
+                        advection::ask(&known, &next.body, component, share);
+                    }
+                };
                 let scratch = &mut nearby.advection;
-                advection::find(band, &known, stand, body, None, scratch, push);
+                advection::find(band, &known, stand, body, scratch, push, ahead);
             }
         });
         let (layout, sites) = (flow.mesh().layout(), &self.sites);

@@ -59,7 +59,7 @@ impl Motion {
         }
     }
 
-    /// How the grain answers contact within the step, so that it leaves its sub-steps as [`advance`] will
+    /// How the grain answers contact within the step, so that it leaves its sub-steps as [`velocities`] will
     /// have it. Its mass is at least its own with `added_density` of the fluid, most of which answers by
     /// the projection, one step late: what an impact gave beyond that the grain owes the fluid, and does not
     /// start with (`docs/decisions/0014-contact-and-fluid-at-once.md`).
@@ -97,9 +97,15 @@ impl Motion {
     }
 }
 
-/// Sets the velocities of the grain to what they are under its motion's equations and the mean `contact` load
-/// over `dt`.
-pub fn advance(grain: &mut Grain, past: &Past, motion: &Motion, contact: Load, dt: f64) {
+/// New velocity and angular velocity of the grain by its motion's equations, under the mean `contact` load over
+/// `dt` too.
+pub fn velocities(
+    grain: &Grain,
+    past: &Past,
+    motion: &Motion,
+    contact: Load,
+    dt: f64,
+) -> [DVec3; 2] {
     let [v, omega] = past.velocity;
     let mut right = motion.right;
     let free = [grain.translation, grain.rotation].map(|dof| dof == Dof::Free);
@@ -113,11 +119,10 @@ pub fn advance(grain: &mut Grain, past: &Past, motion: &Motion, contact: Load, d
     }
     // Positive definite whenever a face is forced; a grain without faces moves on as it was.
     let x = solve6(motion.matrix, right).unwrap_or([v.x, v.y, v.z, omega.x, omega.y, omega.z]);
-    grain.velocity = DVec3::new(x[0], x[1], x[2]);
-    grain.angular_velocity = DVec3::new(x[3], x[4], x[5]);
+    [DVec3::new(x[0], x[1], x[2]), DVec3::new(x[3], x[4], x[5])]
 }
 
-/// The hydrodynamic load on the grain, after [`advance`].
+/// The hydrodynamic load on the grain, once it has its new velocities.
 pub fn load(
     grain: &Grain,
     past: &Past,

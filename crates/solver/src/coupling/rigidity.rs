@@ -192,7 +192,7 @@ impl<R: Real> Kernel for Gather<'_, R> {
             let prediction = &self.predictions[axis];
             for (number, run) in runs.iter().enumerate() {
                 if let Some(run) = runs.get(number + AHEAD) {
-                    prediction.ask(run.at, run.count, false);
+                    prediction.ask(run.at, run.count);
                     prefetch(pressure, run.at, run.count);
                     prefetch(pressure, run.at + strides[2], run.count);
                 }

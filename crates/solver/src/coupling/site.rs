@@ -57,11 +57,15 @@ impl Site {
         fluid_density: f64,
         dt: f64,
     ) -> Load {
-        newton::advance(grain, past, &self.motion, contact, dt);
-        let now = [grain.velocity, grain.angular_velocity];
+        let untouched = contact == Load::default();
+        let now = match self.given {
+            Some(given) if untouched => given,
+            _ => newton::velocities(grain, past, &self.motion, contact, dt),
+        };
+        [grain.velocity, grain.angular_velocity] = now;
         self.due = match self.given.take() {
             None => Some([past.velocity, now]),
-            Some(_) if contact == Load::default() => None,
+            Some(_) if untouched => None,
             Some(given) => Some([
                 [DVec3::ZERO; 2],
                 [0, 1].map(|which| now[which] - given[which]),
@@ -149,16 +153,18 @@ impl<R: Real> Visit<'_, R> {
         let Site { body, stand, .. } = site;
         if self.corrects {
             let band = self.locator.band();
-            advection::find(band, &self.known, stand, body, Some(&own), scratch, push);
+            let ahead = |component, share| {
+                advection::ask_pushed(&self.known, &own, body, component, share);
+            };
+            advection::find(band, &self.known, stand, body, scratch, push, ahead);
             for (component, prediction) in own.iter_mut().enumerate() {
                 advection::add(body, push, component, prediction);
             }
         }
         self.find(index, Found { body, forced }, next, locate);
         (site.impulse, site.motion) = self.couple(index, &own, forced, past, other);
-        let mut grain = self.grains[index].clone();
-        newton::advance(&mut grain, past, &site.motion, Load::default(), self.dt);
-        let now = [grain.velocity, grain.angular_velocity];
+        let (grain, contact) = (&self.grains[index], Load::default());
+        let now = newton::velocities(grain, past, &site.motion, contact, self.dt);
         site.given = Some(now);
         let (motions, spacing) = ([past.velocity, now], self.known.mesh.spacing);
         for (axis, prediction) in own.iter_mut().enumerate() {

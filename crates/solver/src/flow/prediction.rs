@@ -135,14 +135,16 @@ impl<'a, R: Real> Prediction<'a, R> {
         }
     }
 
-    /// Asks for u* of these faces, and for their tendency if it is pushed, to be brought near.
+    /// Asks for u* of these faces, which is read next, to be brought near.
     #[inline(always)]
-    pub fn ask(&self, at: usize, count: usize, pushed: bool) {
-        if pushed {
-            prefetch_ahead(self.velocity.row(at, count), 0, count);
-            prefetch_ahead(self.tendency.row(at, count), 0, count);
-        } else {
-            prefetch(self.velocity.row(at, count), 0, count);
-        }
+    pub fn ask(&self, at: usize, count: usize) {
+        prefetch(self.velocity.row(at, count), 0, count);
+    }
+
+    /// The same for u* and tendency, which are pushed later.
+    #[inline(always)]
+    pub fn ask_pushed(&self, at: usize, count: usize) {
+        prefetch_ahead(self.velocity.row(at, count), 0, count);
+        prefetch_ahead(self.tendency.row(at, count), 0, count);
     }
 }

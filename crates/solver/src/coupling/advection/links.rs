@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::{Ahead, Stand, View};
+use super::{Stand, View};
 use crate::coupling::aperture::surplus;
 use crate::coupling::locate::Body;
 use crate::coupling::places::PAD;
@@ -167,7 +167,7 @@ impl<'a, R: Real> Lines<'a, R> {
     #[inline(always)]
     pub fn push<V: Vector<Number = f64>>(
         &self,
-        ahead: &Ahead<R>,
+        ahead: &impl Fn(usize, [i32; 2]),
         planes: &mut Planes,
         to: &mut [f64],
     ) {
@@ -185,7 +185,7 @@ impl<'a, R: Real> Lines<'a, R> {
         planes.rows.extend((0..size.z).map(rows));
         self.unfold::<V>(0, planes);
         for k in 0..size.z {
-            ahead.ask(self.component, k, size.z);
+            ahead(self.component, [k, size.z]);
             self.unfold::<V>(k + 1, planes);
             let (near, rows) = (planes.rows[k as usize].clone(), planes.about(k));
             planes.y[rows.clone()].fill(0.0);

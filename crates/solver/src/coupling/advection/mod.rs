@@ -12,6 +12,8 @@
 
 mod links;
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use super::locate::{Body, PushRow};
@@ -111,15 +113,15 @@ impl<R> View<'_, R> {
 pub type Push = [Vec<f64>; 3];
 
 /// Finds what the links of a grain bring, which was found at `body` and moves as it did there, in a band of
-/// half-width `band` [m].
+/// half-width `band` [m]. Calls `ahead` for every component and plane k of so many.
 pub fn find<R: Real>(
     band: f64,
     known: &Known<R>,
     stand: &Stand,
     body: &Body,
-    predictions: Option<&[Prediction<R>; 3]>,
     scratch: &mut Scratch<R>,
     push: &mut Push,
+    ahead: impl Fn(usize, [i32; 2]),
 ) {
     dispatch(Links {
         band,
@@ -127,11 +129,7 @@ pub fn find<R: Real>(
         stand,
         body,
         velocity: View::new(known, body, &mut scratch.velocity),
-        ahead: Ahead {
-            rows: &body.rows,
-            predictions,
-            pressure: known.pressure,
-        },
+        ahead,
         planes: &mut scratch.planes,
         push,
     });
@@ -146,44 +144,41 @@ pub fn add<R: Real>(body: &Body, push: &Push, component: usize, prediction: &mut
     });
 }
 
-/// What a grain pushes, asked for while its links are found.
-struct Ahead<'a, R> {
-    rows: &'a [Vec<PushRow>; 3],
-    predictions: Option<&'a [Prediction<'a, R>; 3]>,
-    pressure: &'a [R],
+/// The `k`th share of `count` entries, of as many shares as `of`.
+fn share([k, of]: [i32; 2], count: usize) -> Range<usize> {
+    let end = |k: i32| k as usize * count / of as usize;
+    end(k)..end(k + 1)
 }
 
-impl<R: Real> Ahead<'_, R> {
-    /// Asks for plane `k` of a component, out of `count`.
-    #[inline]
-    fn ask(&self, component: usize, k: i32, count: i32) {
-        let Some(predictions) = self.predictions else {
-            return;
-        };
-        let rows = &self.rows[component];
-        let share = rows.len().div_ceil(count as usize);
-        for row in rows.iter().skip(k as usize * share).take(share) {
-            predictions[component].ask(row.at, row.count, true);
-            if component == 0 {
-                prefetch_ahead(self.pressure, row.at - 1, row.count + 1);
-            }
+/// Asks for what the grain at `body` pushes of a component, and for the pressure there, which is read next: a share
+/// of it.
+#[inline]
+pub fn ask_pushed<R: Real>(
+    known: &Known<R>,
+    predictions: &[Prediction<R>; 3],
+    body: &Body,
+    component: usize,
+    part: [i32; 2],
+) {
+    let rows = &body.rows[component];
+    for row in &rows[share(part, rows.len())] {
+        predictions[component].ask_pushed(row.at, row.count);
+        if component == 0 {
+            prefetch_ahead(known.pressure, row.at - 1, row.count + 1);
         }
     }
 }
 
-/// Asks for what the links of the grain at `body` read of a component: the `k`th share of as many as `of`.
+/// Asks for what the links of the grain at `body` read of a component: a share of it.
 #[inline]
-pub fn ask<R: Real>(known: &Known<R>, body: &Body, component: usize, [k, of]: [i32; 2]) {
-    let share = |count: usize| {
-        let end = |k: i32| k as usize * count / of as usize;
-        end(k)..end(k + 1)
-    };
+pub fn ask<R: Real>(known: &Known<R>, body: &Body, component: usize, part: [i32; 2]) {
     let field = known.velocity.component(component);
     body.places
-        .ask_ahead(field, share(body.places.planes_about()));
+        .ask_ahead(field, share(part, body.places.planes_about()));
     let (spans, rows) = (&body.spans[component], &body.rows[component]);
     let distances = &body.distance[component];
-    let [some_spans, some_rows, some] = [spans.len(), rows.len(), distances.len()].map(share);
+    let [some_spans, some_rows, some] =
+        [spans.len(), rows.len(), distances.len()].map(|count| share(part, count));
     prefetch_ahead(spans, some_spans.start, some_spans.len());
     prefetch_ahead(rows, some_rows.start, some_rows.len());
     prefetch_ahead(distances, some.start, some.len());
@@ -209,18 +204,18 @@ impl<R: Real> Kernel for Pushes<'_, '_, R> {
 }
 
 /// The links of one grain.
-struct Links<'a, R> {
+struct Links<'a, R, A> {
     band: f64,
     mesh: &'a Mesh,
     stand: &'a Stand,
     body: &'a Body,
     velocity: View<'a, R>,
-    ahead: Ahead<'a, R>,
+    ahead: A,
     planes: &'a mut Planes,
     push: &'a mut Push,
 }
 
-impl<R: Real> Kernel for Links<'_, R> {
+impl<R: Real, A: Fn(usize, [i32; 2])> Kernel for Links<'_, R, A> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
