@@ -226,6 +226,7 @@ struct Contest<'a> {
 impl Contest<'_> {
     /// Gives the faces in `range`, at these distances, to the grain that is nearest; those of them that are
     /// `held` are in the list `faces` from `number` on.
+    #[inline(always)]
     fn settle(
         &self,
         range: Range<i32>,

@@ -93,7 +93,7 @@ impl NearShape {
 
     /// Signed distance [m] and its gradient at `x`, both in the frame of the grain; the distance may
     /// be infinite where it is more than the reach.
-    #[inline]
+    #[inline(always)]
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         let Some(samples) = &self.samples else {
             return self.shape.distance_and_gradient(x);

@@ -23,11 +23,13 @@ pub struct Rival<'a> {
 
 impl Rival<'_> {
     /// Distance of `x` from its surface [m] where that is at most `limit`, else that or infinity.
+    #[inline(always)]
     pub fn distance(&self, x: DVec3, limit: f64) -> f64 {
         self.distance_and_gradient(x, limit).0
     }
 
     /// The same with the gradient in its own frame.
+    #[inline(always)]
     pub fn distance_and_gradient(&self, x: DVec3, limit: f64) -> (f64, DVec3) {
         let (pose, x) = (&self.grain.pose, x - self.shift);
         let far = self.grain.shape.bounding_radius() + limit;

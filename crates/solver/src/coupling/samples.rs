@@ -50,6 +50,7 @@ impl Samples {
     }
 
     /// Signed distance [m] and gradient at a point of the grid.
+    #[inline(always)]
     pub fn distance_and_gradient(&self, x: DVec3) -> Option<(f64, DVec3)> {
         let grid = Grid::of(self);
         let spot = grid.find([One(x.x), One(x.y), One(x.z)]);
