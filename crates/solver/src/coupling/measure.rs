@@ -14,6 +14,7 @@ use super::rivals::Rival;
 use super::samples::{load_all, store_all};
 use crate::dem::Grain;
 use crate::grid::{FACE_OFFSET, Mesh};
+use crate::math::Aligned;
 use crate::math::lanes::{Kernel, MOST, Vector};
 
 /// What one thread needs to locate grains.
@@ -39,7 +40,7 @@ struct Part {
 /// frame, then the unit normals, in the space frame. Some entries more follow the last.
 #[derive(Default)]
 struct Points {
-    faces: [Vec<f32>; 3],
+    faces: [Aligned<f32>; 3],
     spare: Spare,
 }
 
@@ -47,19 +48,21 @@ impl Points {
     /// Makes room for `count` faces.
     fn reserve(&mut self, count: usize) {
         for list in &mut self.faces {
-            list.resize(list.len().max(count + MOST), 0.0);
+            list.make_room(count + MOST);
         }
     }
     /// Writes the faces of a `span`; the face 0 of the row is at `first`, the others follow by `step`.
     #[inline(always)]
-    fn place<V: Vector<Number = f32>>(&mut self, span: Span, [first, step]: [DVec3; 2]) {
+    fn place<V: Vector<Number = f32>>(&mut self, span: Span, first: [f32; 3], step: DVec3) {
+        let [x, y, z] = &mut self.faces;
+        let mut faces = [&mut x[..], &mut y[..], &mut z[..]];
         for i in (span.start..span.end).step_by(V::WIDTH) {
             let count = V::constant(f64::from(i)) + V::ramp();
-            let at = span.place(i);
+            let mut place = [V::constant(0.0); 3];
             for n in 0..3 {
-                let x = V::constant(first[n]) + count * V::constant(step[n]);
-                x.store(&mut self.faces[n][at..]);
+                place[n] = V::splat(first[n]) + count * V::constant(step[n]);
             }
+            store_all(place, &mut faces, span.place(i));
         }
     }
     /// Finds the distances of the first `count` faces and puts the normals in the place of the points.
@@ -72,9 +75,11 @@ impl Points {
         count: usize,
     ) {
         let columns = turn.to_cols_array_2d();
-        shape.measure::<V>(&mut self.faces, distances, count, &mut self.spare);
+        let [x, y, z] = &mut self.faces;
+        let mut faces = [&mut x[..], &mut y[..], &mut z[..]];
+        shape.measure::<V>(&mut faces, distances, count, &mut self.spare);
         for at in (0..count).step_by(V::WIDTH) {
-            let [x, y, z] = load_all::<V>(&self.faces, at);
+            let [x, y, z] = load_all::<V>(&faces, at);
             let inverse = (x * x + y * y + z * z).inverse_root();
             let unit = [x * inverse, y * inverse, z * inverse];
             let mut normal = unit;
@@ -83,7 +88,7 @@ impl Points {
                     + V::constant(columns[1][axis]) * unit[1]
                     + V::constant(columns[2][axis]) * unit[2];
             }
-            store_all(normal, &mut self.faces, at);
+            store_all(normal, &mut faces, at);
         }
     }
 }
@@ -149,7 +154,7 @@ impl<A: Fn(usize, [i32; 2])> Kernel for Measure<'_, A> {
                     let near = around.rows::<V>(arm, [from, k], size.x);
                     for n in 0..V::WIDTH.min((size.y - from) as usize) {
                         let (span, first) = near.of(n, count);
-                        points.place::<V>(span, [first, around.step]);
+                        points.place::<V>(span, first, around.step);
                         count = span.place(span.end);
                         spans.push(span);
                     }
@@ -263,23 +268,29 @@ impl Contest<'_> {
 #[inline(always)]
 fn within<V: Vector<Number = f32>>(distance: &[f32], all: Span, limits: [f64; 2]) -> [Span; 2] {
     let count = (all.end - all.start) as usize;
-    let mut parts = [[count, count]; 2];
+    let [far, close] = [V::constant(limits[0]), V::constant(limits[1])];
+    let (mut far_part, mut close_part) = ([count, count], [count, count]);
     for at in (0..count).step_by(V::WIDTH) {
         let d = V::load(&distance[all.first + at..]);
         let here = u32::MAX >> (32 - (count - at).min(V::WIDTH));
-        for (limit, [start, end]) in limits.iter().zip(&mut parts) {
-            let near = here & !V::constant(*limit).mask_below(d);
-            if near != 0 {
-                *start = (*start).min(at + near.trailing_zeros() as usize);
-                *end = at + 32 - near.leading_zeros() as usize;
-            }
-        }
+        widen(&mut far_part, at, here & !far.mask_below(d));
+        widen(&mut close_part, at, here & !close.mask_below(d));
     }
-    parts.map(|[start, end]| Span {
+    let span = |[start, end]: [usize; 2]| Span {
         start: all.start + start as i32,
         end: all.start + end as i32,
         first: all.first + start,
-    })
+    };
+    [span(far_part), span(close_part)]
+}
+
+/// Makes a part, from the first place to the one after the last, reach over those `near` of the places from `at` on.
+#[inline(always)]
+fn widen([start, end]: &mut [usize; 2], at: usize, near: u32) {
+    if near != 0 {
+        *start = (*start).min(at + near.trailing_zeros() as usize);
+        *end = at + 32 - near.leading_zeros() as usize;
+    }
 }
 
 /// What lies about a grain.
@@ -364,13 +375,11 @@ struct Rows {
 impl Rows {
     /// Of row `n` the faces, listed from place `first` on, and where face 0 is.
     #[inline(always)]
-    fn of(&self, n: usize, first: usize) -> (Span, DVec3) {
+    fn of(&self, n: usize, first: usize) -> (Span, [f32; 3]) {
         let [start, end] = [self.start[n] as i32, self.end[n] as i32];
         let span = Span { start, end, first };
-        (
-            span,
-            DVec3::from_array(self.first.map(|lanes| f64::from(lanes[n]))),
-        )
+        let [x, y, z] = &self.first;
+        (span, [x[n], y[n], z[n]])
     }
 }
 

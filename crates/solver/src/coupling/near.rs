@@ -12,6 +12,7 @@ use grainwake_shape::{Field, Shape};
 
 use super::samples::{Grid, Samples, Spot, load_all, store_all};
 use crate::dem::Grain;
+use crate::math::Aligned;
 use crate::math::lanes::{MOST, MOST_PLACES, Vector};
 
 /// Samples in half the band, and across a grain, as far as the shape has them: what counts more. No more than
@@ -108,14 +109,14 @@ impl NearShape {
     #[inline(always)]
     pub fn measure<V: Vector<Number = f32>>(
         &self,
-        points: &mut [Vec<f32>; 3],
+        points: &mut [&mut [f32]; 3],
         distances: &mut [f32],
         count: usize,
         spare: &mut Spare,
     ) {
         let Some(samples) = &self.samples else {
             for at in (0..count).step_by(V::WIDTH) {
-                let x = load_all::<V>(points, at);
+                let x: [V; 3] = load_all(points, at);
                 let (distance, slope) = match self.shape.field() {
                     Field::Sphere(radius) => about_sphere(*radius, x),
                     _ => self.one_by_one(x),
@@ -127,13 +128,13 @@ impl NearShape {
         };
         // Samples are far apart in memory. Little but their loads is in the second loop, so that the
         // processor has those of several vectors under way at once.
-        let grid = Grid::of(samples);
+        let grid = Grid::<V>::of(samples);
         let Spare { cell, off } = spare;
-        for list in [&mut *cell, &mut *off] {
-            list.resize(list.len().max(count + MOST), 0.0);
-        }
+        cell.make_room(count + MOST);
+        off.make_room(count + MOST);
+        let (cell, off) = (&mut cell[..], &mut off[..]);
         for at in (0..count).step_by(V::WIDTH) {
-            let spot = grid.find(load_all::<V>(points, at));
+            let spot = grid.find(load_all(points, at));
             spot.cell.store(&mut cell[at..]);
             spot.off.store(&mut off[at..]);
             store_all(spot.fraction, points, at);
@@ -142,7 +143,7 @@ impl NearShape {
             let (distance, slope) = grid.read(Spot {
                 cell: V::load(&cell[at..]),
                 off: V::load(&off[at..]),
-                fraction: load_all::<V>(points, at),
+                fraction: load_all(points, at),
             });
             distance.store(&mut distances[at..]);
             store_all(slope, points, at);
@@ -172,8 +173,8 @@ impl NearShape {
 /// Lists that [`NearShape::measure`] needs.
 #[derive(Default)]
 pub struct Spare {
-    cell: Vec<f32>,
-    off: Vec<f32>,
+    cell: Aligned<f32>,
+    off: Aligned<f32>,
 }
 
 /// Farther than anything [m].
@@ -266,8 +267,9 @@ mod tests {
                     (0..3).for_each(|axis| points[axis][n] = x[axis] as f32);
                 }
                 let (mut slopes, mut distance) = (points.clone(), [0.0_f32; 2 * MOST]);
+                let mut lists = slopes.each_mut().map(|list| &mut list[..]);
                 self.0
-                    .measure::<V>(&mut slopes, &mut distance, MOST, &mut spare);
+                    .measure::<V>(&mut lists, &mut distance, MOST, &mut spare);
                 for n in 0..MOST {
                     let of = |lists: &[Vec<f32>; 3]| {
                         DVec3::from_array(lists.each_ref().map(|list| f64::from(list[n])))

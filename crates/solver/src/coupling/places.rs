@@ -162,12 +162,12 @@ impl Places {
     pub fn ask_ahead<R>(&self, field: &[R], planes: Range<usize>) {
         let [x, y, z] = &self.lines;
         // From 0 in the middle to 1 at the end.
-        let off = |n: usize, of: usize| ((2 * n + 1) as f32 / of as f32 - 1.0).abs();
+        let [per_row, per_plane] = [y.len(), z.len()].map(|of| 1.0 / of as f32);
         for k in planes {
-            let w = off(k, z.len());
+            let w = ((2 * k + 1) as f32 * per_plane - 1.0).abs();
             for (j, line) in y.iter().enumerate() {
                 // About what faces within a ball need, with three on each side in line.
-                let away = w + off(j, y.len());
+                let away = w + ((2 * j + 1) as f32 * per_row - 1.0).abs();
                 if away > 1.2 {
                     continue;
                 }

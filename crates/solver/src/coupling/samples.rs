@@ -1,6 +1,8 @@
 //! Samples of a field read for the lanes of vectors. Finding the samples and reading them are two steps, for
 //! a loop of its own each.
 
+use std::ops::Deref;
+
 use glam::DVec3;
 use grainwake_shape::SampledField;
 
@@ -9,13 +11,13 @@ use crate::math::lanes::{One, Vector};
 
 /// A vector from each list. (No closure in a kernel touches vectors: it would not be inlined.)
 #[inline(always)]
-pub fn load_all<V: Vector>([x, y, z]: &[Vec<V::Number>; 3], at: usize) -> [V; 3] {
+pub fn load_all<V: Vector>([x, y, z]: &[impl Deref<Target = [V::Number]>; 3], at: usize) -> [V; 3] {
     [V::load(&x[at..]), V::load(&y[at..]), V::load(&z[at..])]
 }
 
 /// Stores vectors in as many lists.
 #[inline(always)]
-pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [Vec<V::Number>; 3], at: usize) {
+pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [&mut [V::Number]; 3], at: usize) {
     values[0].store(&mut x[at..]);
     values[1].store(&mut y[at..]);
     values[2].store(&mut z[at..]);

@@ -1,12 +1,13 @@
 //! Numbers that start on a cache line.
 
 use std::ops::{Deref, DerefMut};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::Real;
 
 /// A fixed number of numbers, one of which, the first unless said, lies at the start of a cache line. Nothing
 /// is touched when it is made: a page belongs to the thread that first writes to it.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Aligned<R> {
     values: Vec<R>,
     start: usize,
@@ -21,12 +22,32 @@ impl<R: Real> Aligned<R> {
     /// `len` zeros, of which entry `head` lies at the start of a cache line.
     pub fn with_head(head: usize, len: usize) -> Aligned<R> {
         assert!(head <= R::LANES);
-        let values: Vec<R> = zeros(len + 2 * R::LANES - 1);
+        let apart = R::LANES * lines_apart(R::BYTES * len);
+        let values: Vec<R> = zeros(len + 2 * R::LANES - 1 + apart);
         // The buffer is never reallocated, so the start stays where it is.
         let line = values.as_ptr().align_offset(R::LANES * R::BYTES);
-        let start = line + R::LANES - head;
+        let start = line + R::LANES - head + apart;
         Aligned { values, start, len }
     }
+    /// Makes it at least so long; what it held is lost where it was not.
+    pub fn make_room(&mut self, len: usize) {
+        if self.len < len {
+            *self = Aligned::zeros(len);
+        }
+    }
+}
+
+/// How many cache lines further than at the start of a page a list of so many bytes starts. Large ones start at
+/// different places in turn: a processor tells loads from stores before them by the place within the page, so
+/// without that it waits for what it has stored to one field before it loads from another at the same place.
+fn lines_apart(bytes: usize) -> usize {
+    const SMALL: usize = 1 << 16;
+    static LARGE: AtomicUsize = AtomicUsize::new(0);
+    if bytes < SMALL {
+        return 0;
+    }
+    // Seven places, nine of the 64 lines of a page apart.
+    9 * (LARGE.fetch_add(1, Ordering::Relaxed) % 7)
 }
 
 impl<R> Deref for Aligned<R> {
@@ -67,5 +88,32 @@ fn ask_for_large_pages<R>(values: &[R]) {
             let pages = values.as_ptr().byte_add(ahead).cast_mut().cast();
             libc::madvise(pages, bytes, libc::MADV_HUGEPAGE);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_lists_start_on_cache_lines_at_different_places_of_a_page() {
+        let fields = [0; 4].map(|_| Aligned::<f64>::with_head(1, 1 << 15));
+        let starts = fields.each_ref().map(|field| {
+            assert_eq!((field.len(), field[1 << 14]), (1 << 15, 0.0));
+            field[1..].as_ptr().addr()
+        });
+        let mut places = starts.map(|start| {
+            assert_eq!(start % 64, 0);
+            start % 4096
+        });
+        places.sort();
+        // Other tests take places too, at the same time.
+        assert!(places[0] != places[3], "{places:?}");
+        let mut short = Aligned::<f32>::zeros(20);
+        short[19] = 1.0;
+        short.make_room(20);
+        assert_eq!((short[19], short.as_ptr().addr() % 64), (1.0, 0));
+        short.make_room(21);
+        assert_eq!(short[..], [0.0; 21]);
     }
 }

@@ -6,63 +6,13 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use super::weights::{Planes, near, weigh};
 use super::{Stand, View};
-use crate::coupling::aperture::surplus;
 use crate::coupling::locate::Body;
 use crate::coupling::places::PAD;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Real;
-use crate::math::lanes::{MOST, Stencil, Vector};
-
-/// The plane of a component at hand, in rows without gaps; there is a row before the first and one after
-/// the last. What is written one row after the other is not read before a plane is done: the processor would
-/// wait for it, as rows begin anywhere.
-#[derive(Default)]
-pub struct Planes {
-    line: usize,
-    /// Which rows of each plane have faces near.
-    rows: Vec<Range<i32>>,
-    /// Signed distances [m] in this plane and the next, infinite where no link may end.
-    distance: [Vec<f64>; 2],
-    /// What the links along x bring, and what leaves along y, and along z from this plane and the one
-    /// before [m/s^2].
-    x: Vec<f64>,
-    y: Vec<f64>,
-    z: [Vec<f64>; 2],
-}
-
-impl Planes {
-    /// Makes room for a box, before the first plane; registers of `width` reach beyond its rows.
-    fn begin(&mut self, body: &Body, width: usize) {
-        self.line = body.size.x as usize + width;
-        let count = self.line * (body.size.y as usize + 2) + MOST;
-        let [here, next] = &mut self.distance;
-        let [z, before] = &mut self.z;
-        for list in [here, next, &mut self.x, &mut self.y, z, before] {
-            list.resize(count, 0.0);
-        }
-        // Nothing comes from before the first plane, and along x where there are no links.
-        before.fill(0.0);
-        self.x.fill(0.0);
-    }
-    /// Part of a list in which plane `k` and those beside it have links.
-    fn about(&self, k: i32) -> Range<usize> {
-        let from = (k - 1).max(0) as usize;
-        let to = (k + 2).min(self.rows.len() as i32) as usize;
-        let (mut first, mut last) = (i32::MAX, i32::MIN);
-        for rows in self.rows[from..to].iter().filter(|rows| !rows.is_empty()) {
-            (first, last) = (first.min(rows.start), last.max(rows.end));
-        }
-        if first > last {
-            return 0..0;
-        }
-        // One more row on each side.
-        first as usize * self.line..(last + 2) as usize * self.line
-    }
-    fn place(&self, i: i32, j: i32) -> usize {
-        i as usize + (j + 1) as usize * self.line
-    }
-}
+use crate::math::lanes::{Stencil, Vector};
 
 /// The links of one component.
 pub struct Lines<'a, R> {
@@ -89,22 +39,13 @@ struct Axis {
     /// of the carrying component that share it.
     carried: Stencil<6>,
     carrying: Stencil<2>,
+    /// From a face to the next along it, and along the component.
+    next: isize,
+    across: isize,
     /// The link's own two alone, three times.
     alone: Stencil<6>,
     /// 1/h along the link [1/m].
     inverse: f64,
-}
-
-/// A row of unknowns near the grain.
-#[derive(Clone, Copy)]
-struct Row {
-    /// Along x: the first in the box, and the one after the last.
-    start: i32,
-    end: i32,
-    j: i32,
-    k: i32,
-    /// Place of the first in the lists of [`Body`].
-    listed: usize,
 }
 
 /// Those links along an axis of a row that have six faces in line, and the faces to load.
@@ -139,6 +80,8 @@ impl<'a, R: Real> Lines<'a, R> {
             let [next, across] = [along, component].map(|axis| velocity.strides[axis] as isize);
             Axis {
                 exists: mesh.cells[along] > 1,
+                next,
+                across,
                 carried: Stencil::new([0, next, -next, 2 * next, -2 * next, 3 * next]),
                 carrying: match along == component {
                     true => Stencil::new([0, next]),
@@ -151,6 +94,7 @@ impl<'a, R: Real> Lines<'a, R> {
         let unknowns = [0, 1, 2].map(|axis| body.places.unknowns(component, axis));
         let size = body.size.to_array();
         let inner = (0..3).all(|axis| unknowns[axis] == (-PAD..size[axis] + PAD));
+        let inner = inner && velocity.reaches(body.size);
         Lines {
             body,
             velocity,
@@ -171,144 +115,106 @@ impl<'a, R: Real> Lines<'a, R> {
         planes: &mut Planes,
         to: &mut [f64],
     ) {
-        let size = self.body.size;
-        planes.begin(self.body, V::WIDTH);
-        let rows = |k| {
-            let near = |j: &i32| self.row(*j, k).is_some();
-            let first = (0..size.y).find(near);
-            let last = (0..size.y).rev().find(near);
-            first
-                .zip(last)
-                .map_or(0..0, |(first, last)| first..last + 1)
+        let count = self.body.size.z;
+        planes.begin(self.body);
+        let weigh = |k, planes: &mut Planes| {
+            weigh(
+                &self.unknowns,
+                self.body,
+                self.component,
+                self.band,
+                k,
+                planes,
+            );
         };
-        planes.rows.clear();
-        planes.rows.extend((0..size.z).map(rows));
-        self.unfold::<V>(0, planes);
-        for k in 0..size.z {
-            ahead(self.component, [k, size.z]);
-            self.unfold::<V>(k + 1, planes);
-            let (near, rows) = (planes.rows[k as usize].clone(), planes.about(k));
-            planes.y[rows.clone()].fill(0.0);
-            planes.z[(k % 2) as usize][rows].fill(0.0);
-            for row in near.clone().filter_map(|j| self.row(j, k)) {
+        weigh(-1, planes);
+        for k in 0..count {
+            ahead(self.component, [k, count]);
+            weigh(k, planes);
+            for j in planes.rows[(k % 2) as usize].clone() {
                 if self.inner {
-                    self.send::<V, true>(row, planes);
+                    self.row::<V, true>([j, k], planes, to);
                 } else {
-                    self.send::<V, false>(row, planes);
+                    self.row::<V, false>([j, k], planes, to);
                 }
             }
-            for row in near.clone().filter_map(|j| self.row(j, k)) {
-                self.receive::<V>(row, planes, to);
-            }
         }
     }
 
-    /// Row (j, k), if any unknown in it is near.
+    /// Finds the fluxes of the links whose lower faces are in row (j, k), and what they bring to its faces with those
+    /// of the row and the plane before; `INNER` where all have six in line.
     #[inline(always)]
-    fn row(&self, j: i32, k: i32) -> Option<Row> {
-        let [x, y, z] = &self.unknowns;
-        let span = &self.body.spans[self.component][(j + self.body.size.y * k) as usize];
-        let (start, end) = (span.start.max(x.start), span.end.min(x.end));
-        let known = start < end && y.contains(&j) && z.contains(&k);
-        let listed = span
-            .first
-            .wrapping_add_signed((start - span.start) as isize);
-        known.then_some(Row {
-            start,
-            end,
-            j,
-            k,
-            listed,
-        })
-    }
-
-    /// Takes the distances of a plane from the list.
-    #[inline(always)]
-    fn unfold<V: Vector<Number = f64>>(&self, k: i32, planes: &mut Planes) {
-        let which = (k % 2) as usize;
-        let rows = planes.about(k);
-        planes.distance[which][rows].fill(f64::INFINITY);
-        if k >= self.body.size.z {
+    fn row<V: Vector<Number = f64>, const INNER: bool>(
+        &self,
+        [j, k]: [i32; 2],
+        planes: &mut Planes,
+        to: &mut [f64],
+    ) {
+        let Some(near) = near(self.body, &self.unknowns, self.component, [j, k]) else {
             return;
-        }
-        let list = &self.body.distance[self.component];
-        for row in (0..self.body.size.y).filter_map(|j| self.row(j, k)) {
-            let (count, to) = (row.end - row.start, planes.place(row.start, row.j));
-            for n in (0..count).step_by(V::WIDTH) {
-                let left = V::constant(f64::from(count - n));
-                let n = n as usize;
-                V::ramp()
-                    .where_below(
-                        left,
-                        V::load_from(&list[row.listed + n..]),
-                        V::constant(f64::INFINITY),
-                    )
-                    .store(&mut planes.distance[which][to + n..]);
-            }
-        }
-    }
-
-    /// Finds the fluxes of the links whose lower faces are in a row; `INNER` where all have six in line.
-    #[inline(always)]
-    fn send<V: Vector<Number = f64>, const INNER: bool>(&self, row: Row, planes: &mut Planes) {
-        let at = self.velocity.row([row.j, row.k]);
-        let at = at.wrapping_add(row.start as usize);
-        let place = planes.place(row.start, row.j);
-        let [this, other] = [row.k, row.k + 1].map(|k| (k % 2) as usize);
+        };
+        let (at, place) = (self.velocity.row([j, k]), planes.place(j));
         let [a, b, c] = &self.axes;
         let six = if INNER {
             [Six::all(a), Six::all(b), Six::all(c)]
         } else {
-            [self.six(0, row), self.six(1, row), self.six(2, row)]
+            let place = [0, j, k];
+            [self.six(0, place), self.six(1, place), self.six(2, place)]
         };
-        let [x, y, z] = [row.start, row.j, row.k].map(f64::from);
-        let [first, by_x, by_y, by_z] = &self.rigid;
+        let [y, z] = [j, k].map(f64::from);
+        let [first, _, by_y, by_z] = &self.rigid;
         let mut rigid = [0.0; 8];
         for n in 0..8 {
-            rigid[n] = first[n] + x * by_x[n] + y * by_y[n] + z * by_z[n];
+            rigid[n] = first[n] + y * by_y[n] + z * by_z[n];
         }
-        let (half, mut before) = (V::constant(0.5), V::constant(0.0));
-        for n in (0..(row.end - row.start) as usize).step_by(V::WIDTH) {
-            let (at, place) = (at.wrapping_add(n), place + n);
-            let count = V::constant(n as f64) + V::ramp();
-            let here = V::load(&planes.distance[this][place..]);
-            if self.axes[0].exists {
-                let d = half * (here + V::load(&planes.distance[this][place + 1..]));
-                let flux = self.flux::<V, INNER>(0, six[0], &rigid, at, count, d);
-                (flux.behind(before) - flux).store(&mut planes.x[place..]);
+        let Planes {
+            line, weight, y, z, ..
+        } = planes;
+        let line = *line;
+        let [wx, wy, wz] = weight;
+        let (wx, wy, wz) = (
+            &wx[place..][..line],
+            &wy[place..][..line],
+            &wz[place..][..line],
+        );
+        let (fy, fz) = (&mut y[..line], &mut z[place..][..line]);
+        let zero = V::constant(0.0);
+        let (mut n, mut before, mut count) = (0, zero, V::ramp());
+        while n + V::WIDTH <= line {
+            let at = at.wrapping_add(n);
+            let mut brought = zero;
+            if a.exists {
+                let flux =
+                    self.flux::<V, INNER>(0, six[0], &rigid, at, count, V::load_from(&wx[n..]));
+                brought = flux.behind(before) - flux;
                 before = flux;
             }
-            if self.axes[1].exists {
-                let d = half * (here + V::load(&planes.distance[this][place + planes.line..]));
-                let flux = self.flux::<V, INNER>(1, six[1], &rigid, at, count, d);
-                flux.store(&mut planes.y[place..]);
+            if b.exists {
+                let flux =
+                    self.flux::<V, INNER>(1, six[1], &rigid, at, count, V::load_from(&wy[n..]));
+                brought = brought + (V::load(&fy[n..]) - flux);
+                flux.store(&mut fy[n..]);
             }
-            if self.axes[2].exists {
-                let d = half * (here + V::load(&planes.distance[other][place..]));
-                let flux = self.flux::<V, INNER>(2, six[2], &rigid, at, count, d);
-                flux.store(&mut planes.z[this][place..]);
+            if c.exists {
+                let flux =
+                    self.flux::<V, INNER>(2, six[2], &rigid, at, count, V::load_from(&wz[n..]));
+                brought = brought + (V::load(&fz[n..]) - flux);
+                flux.store(&mut fz[n..]);
             }
-        }
-    }
-
-    /// Sums what comes to a row and what leaves it.
-    #[inline(always)]
-    fn receive<V: Vector<Number = f64>>(&self, row: Row, planes: &Planes, to: &mut [f64]) {
-        let place = planes.place(row.start, row.j);
-        let [this, before] = [row.k, row.k + 1].map(|k| (k % 2) as usize);
-        for n in (0..(row.end - row.start) as usize).step_by(V::WIDTH) {
-            let place = place + n;
-            let y = V::load(&planes.y[place - planes.line..]) - V::load(&planes.y[place..]);
-            let z = V::load(&planes.z[before][place..]) - V::load(&planes.z[this][place..]);
-            // What is written beyond the row the next one overwrites.
-            (V::load(&planes.x[place..]) + y + z).store(&mut to[row.listed + n..]);
+            // The part of the row in these lanes.
+            let (start, end) = (near.start.max(n), near.end.min(n + V::WIDTH));
+            if start < end {
+                let listed = near.listed + (start - near.start);
+                brought.store_from(start - n, &mut to[listed..listed + (end - start)]);
+            }
+            n += V::WIDTH;
+            count = count + V::constant(V::WIDTH as f64);
         }
     }
 
     /// Near the ends of the grid there are no six faces.
-    fn six(&self, along: usize, row: Row) -> Six<'_> {
-        let (axis, range) = (&self.axes[along], &self.unknowns[along]);
-        let place = [row.start, row.j, row.k][along];
+    fn six(&self, along: usize, place: [i32; 3]) -> Six<'_> {
+        let (axis, range, place) = (&self.axes[along], &self.unknowns[along], place[along]);
         let (start, end) = (range.start + 2 - place, range.end - 3 - place);
         if along == 0 {
             return Six {
@@ -338,17 +244,39 @@ impl<'a, R: Real> Lines<'a, R> {
         rigid: &[f64; 8],
         at: usize,
         count: V,
-        d: V,
+        weight: V,
     ) -> V {
         let (zero, half) = (V::constant(0.0), V::constant(0.5));
-        let (inside, outside) = (V::constant(-self.band), V::constant(2.0 * self.band));
-        if inside.mask_below(d) & d.mask_below(outside) == 0 {
+        let none = V::constant(-0.5);
+        if none.mask_below(weight) == 0 {
             return zero;
         }
         let axis = &self.axes[along];
         let [q, c] = [self.component, along].map(|of| self.velocity.components[of]);
-        let [from, to, below, above, far_below, far_above] = six.carried.load::<V, R>(q, at);
-        let [first, second] = axis.carrying.load::<V, R>(c, at);
+        let [from, to, below, above, far_below, far_above];
+        let [first, second];
+        if INNER {
+            let next = if along == 0 { 1 } else { axis.next };
+            // SAFETY: `inner` says that vectors that begin in the box and near it are in the lists, and no link
+            // weighs beyond.
+            unsafe {
+                from = take(q, at, 0);
+                to = take(q, at, next);
+                below = take(q, at, -next);
+                above = take(q, at, 2 * next);
+                far_below = take(q, at, -2 * next);
+                far_above = take(q, at, 3 * next);
+                if along == self.component {
+                    [first, second] = [from, to];
+                } else {
+                    first = take(c, at, next);
+                    second = take(c, at, next - axis.across);
+                }
+            }
+        } else {
+            [from, to, below, above, far_below, far_above] = six.carried.load::<V, R>(q, at);
+            [first, second] = axis.carrying.load::<V, R>(c, at);
+        }
         let both = from + to;
         let (mean, carrier) = (half * both, half * (first + second));
         let outer = V::constant(-8.0).mul_add(below + above, far_below + far_above);
@@ -361,19 +289,29 @@ impl<'a, R: Real> Lines<'a, R> {
         }
         let mut flux = smoother;
         // Beyond the band links are open.
-        if d.mask_below(V::constant(self.band)) != 0 {
+        if zero.mask_below(weight) != 0 {
             // From the first link of the row on U changes evenly.
             let by = &self.rigid[1];
             let [own, along] = [2 * along, 2 * along + 1];
             let mean = mean - count.mul_add(V::constant(by[own]), V::constant(rigid[own]));
             let relative =
                 carrier - count.mul_add(V::constant(by[along]), V::constant(rigid[along]));
-            flux = (mean * relative).mul_add(surplus(d, self.band), smoother);
+            flux = (mean * relative).mul_add(weight, smoother);
         }
         let flux = flux * V::constant(axis.inverse);
-        let flux = d.where_below(outside, flux, zero);
-        inside.where_below(d, flux, zero)
+        none.where_below(weight, flux, zero)
     }
+}
+
+/// Vector of the entries of a list some way from a place.
+///
+/// # Safety
+/// They are in the list.
+#[inline(always)]
+unsafe fn take<V: Vector, R: Real>(list: &[R], at: usize, offset: isize) -> V {
+    let at = at.wrapping_add_signed(offset);
+    // SAFETY: as the caller has promised.
+    V::load_from(unsafe { list.get_unchecked(at..at + V::WIDTH) })
 }
 
 impl<'a> Six<'a> {

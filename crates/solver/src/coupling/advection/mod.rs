@@ -11,10 +11,11 @@
 //! (`docs/decisions/0003-advection-next-to-grains.md` has the measurements).
 
 mod links;
+mod weights;
 
 use std::ops::Range;
 
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 
 use super::locate::{Body, PushRow};
 use super::places::PAD;
@@ -23,7 +24,8 @@ use crate::flow::{Known, Prediction};
 use crate::grid::Mesh;
 use crate::math::Real;
 use crate::math::lanes::{Kernel, MOST, Vector, dispatch, prefetch_ahead};
-use links::{Lines, Planes};
+use links::Lines;
+use weights::Planes;
 
 /// What one thread needs: copies of the velocity in a box and about it, and a plane there.
 #[derive(Default)]
@@ -100,6 +102,17 @@ impl<'a, R: Real> View<'a, R> {
 }
 
 impl<R> View<'_, R> {
+    /// Whether all about a box of `size` cells is in memory, and what vectors reach that begin in it on multiples of
+    /// their width.
+    fn reaches(&self, size: IVec3) -> bool {
+        let [_, line, plane] = self.strides;
+        let ahead = (size.as_usizevec3() + PAD as usize - 1).to_array();
+        let last = (ahead[0] + MOST) + ahead[1] * line + ahead[2] * plane;
+        let before = PAD as usize * (1 + line + plane);
+        let [x, y, z] = self.components;
+        let entries = x.len().min(y.len()).min(z.len());
+        self.origin >= before && self.origin < entries && last < entries - self.origin
+    }
     /// Position of the first place of row (j, k).
     #[inline(always)]
     fn row(&self, [j, k]: [i32; 2]) -> usize {

@@ -110,6 +110,15 @@ pub trait Vector:
             *entry = R::of(lane.wide());
         }
     }
+    /// Overwrites as many numbers as there are, no more than there are such lanes, with the lanes from `skip` on.
+    #[inline(always)]
+    fn store_from(self, skip: usize, to: &mut [Self::Number]) {
+        let mut lanes = [Self::Number::default(); MOST];
+        self.store(&mut lanes);
+        for (entry, lane) in to.iter_mut().zip(&lanes[skip..Self::WIDTH]) {
+            *entry = *lane;
+        }
+    }
     /// The numbers of the lanes.
     #[inline(always)]
     fn ramp() -> Self {
@@ -298,18 +307,19 @@ pub fn prefetch_ahead<T>(list: &[T], at: usize, count: usize) {
 #[inline(always)]
 fn prefetch_to<const HINT: i32, T>(list: &[T], at: usize, count: usize) {
     use std::arch::x86_64::_mm_prefetch;
-    let per_line = (64 / size_of::<T>()).max(1);
-    let ask = |at: usize| {
-        if let Some(entry) = list.get(at) {
-            // SAFETY: the entry exists, and a prefetch changes nothing.
-            unsafe { _mm_prefetch::<HINT>(std::ptr::from_ref(entry).cast()) };
-        }
-    };
-    let end = at.wrapping_add(count);
-    for at in (at..end).step_by(per_line) {
-        ask(at);
+    const LINE: usize = 64;
+    let end = at.wrapping_add(count).min(list.len());
+    if at >= end {
+        return;
     }
-    ask(end.wrapping_sub(1));
+    let mut line = list.as_ptr().wrapping_add(at);
+    let end = list.as_ptr().wrapping_add(end);
+    line = line.wrapping_byte_sub(line.addr() % LINE);
+    while line < end {
+        // SAFETY: a prefetch changes nothing, wherever it is.
+        unsafe { _mm_prefetch::<HINT>(line.cast()) };
+        line = line.wrapping_byte_add(LINE);
+    }
 }
 
 /// Work compiled for every instruction set.

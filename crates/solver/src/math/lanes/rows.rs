@@ -36,6 +36,7 @@ pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number
 
 /// Partial results of a row in doubles: a sum or a maximum in an order that no width changes.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
 pub struct Partial([f64; MOST]);
 
 impl Partial {

@@ -220,6 +220,16 @@ impl<R: Real> Kernel for Ends<R> {
                     let expected = if written { 0.5 } else { old.wide() };
                     assert_eq!(new.wide(), expected, "{at}..{end} {n}");
                 }
+                for skip in 0..V::WIDTH {
+                    let mut numbers: Vec<f64> = list.iter().map(|entry| entry.wide()).collect();
+                    V::ramp().store_from(skip, &mut numbers[at..end]);
+                    for (n, (new, old)) in numbers.iter().zip(&list).enumerate() {
+                        let written = (at..end.min(at + V::WIDTH - skip)).contains(&n);
+                        let lane = || (n - at + skip) as f64;
+                        let expected = if written { lane() } else { old.wide() };
+                        assert_eq!(*new, expected, "{at}..{end} from {skip} {n}");
+                    }
+                }
             }
         }
     }

@@ -195,6 +195,16 @@ vector! {
         }
     }
     #[inline(always)]
+    fn store_from(self, skip: usize, to: &mut [f64]) {
+        // SAFETY: see the head of this file; lanes that the list has no place for are not written.
+        unsafe {
+            let before = _mm256_cmpgt_epi64(_mm256_set1_epi64x(skip as i64), ramp256());
+            let end = _mm256_set1_epi64x((skip + to.len()) as i64);
+            let lanes = _mm256_andnot_si256(before, _mm256_cmpgt_epi64(end, ramp256()));
+            _mm256_maskstore_pd(to.as_mut_ptr().wrapping_sub(skip), lanes, self.0);
+        }
+    }
+    #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of this file.
         unsafe {
@@ -286,6 +296,12 @@ vector! {
                 _mm256_mask_storeu_ps(at.cast(), lanes, _mm512_cvtpd_ps(self.0));
             }
         }
+    }
+    #[inline(always)]
+    fn store_from(self, skip: usize, to: &mut [f64]) {
+        let lanes = first_of_eight(skip + to.len()) & !first_of_eight(skip);
+        // SAFETY: see the head of this file; lanes that the list has no place for are not written.
+        unsafe { _mm512_mask_storeu_pd(to.as_mut_ptr().wrapping_sub(skip), lanes, self.0) };
     }
     #[inline(always)]
     fn is_zero(self) -> bool {
