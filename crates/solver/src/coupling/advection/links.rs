@@ -22,7 +22,8 @@ pub struct Lines<'a, R> {
     band: f64,
     /// Faces that are unknowns, along each axis.
     unknowns: [Range<i32>; 3],
-    /// Whether all faces about the box are, so that all links have six in line.
+    /// Whether all faces about the box are, so that all links have six in line, and vectors that begin in rows of
+    /// the box stay in the lists (`View::reaches`).
     inner: bool,
     axes: [Axis; 3],
     /// Of the links along each axis U of the component and U along the link, two by two (the last two entries are
@@ -257,8 +258,8 @@ impl<'a, R: Real> Lines<'a, R> {
         let [first, second];
         if INNER {
             let next = if along == 0 { 1 } else { axis.next };
-            // SAFETY: `inner` says that vectors that begin in the box and near it are in the lists, and no link
-            // weighs beyond.
+            // SAFETY: row and plane are in the box, and a vector ends with the line of `Planes`, which is no more than
+            // `MOST` longer than the box: up to three faces from there all is in the lists, says `inner`.
             unsafe {
                 from = take(q, at, 0);
                 to = take(q, at, next);

@@ -102,8 +102,7 @@ impl<'a, R: Real> View<'a, R> {
 }
 
 impl<R> View<'_, R> {
-    /// Whether all about a box of `size` cells is in memory, and what vectors reach that begin in it on multiples of
-    /// their width.
+    /// Whether all about a box of `size` cells is in memory, of rows that are up to `MOST` longer than the box.
     fn reaches(&self, size: IVec3) -> bool {
         let [_, line, plane] = self.strides;
         let ahead = (size.as_usizevec3() + PAD as usize - 1).to_array();

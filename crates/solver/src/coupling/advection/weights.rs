@@ -31,7 +31,7 @@ pub struct Planes {
 impl Planes {
     /// Makes room for a box, before the first plane.
     pub fn begin(&mut self, body: &Body) {
-        // One face more is no link's.
+        // One face more is no link's. `View::reaches` counts on no more than `MOST` beyond the box.
         self.line = (body.size.x as usize + 1).next_multiple_of(MOST);
         let count = self.line * (body.size.y as usize + 2);
         for list in self.distance.iter_mut().chain(&mut self.weight) {
@@ -183,7 +183,8 @@ impl Weigh<'_> {
                 let d = half * (own + next[axis]);
                 let mut found = zero;
                 if d.mask_below(V::constant(band)) != 0 {
-                    let surplus = surplus(d, self.band);
+                    // Open links have none, whatever others are in the vector: rounding leaves some at the end of the band.
+                    let surplus = d.where_below(V::constant(band), surplus(d, self.band), zero);
                     found = V::constant(inside).where_below(d, surplus, none);
                 }
                 d.where_below(V::constant(outside), found, none)
