@@ -5,9 +5,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::Real;
 
-/// Bytes of a page of memory.
-const PAGE: usize = 4096;
-
 /// A fixed number of numbers, one of which, the first unless said, lies at the start of a cache line. Nothing
 /// is touched when it is made: a page belongs to the thread that first writes to it.
 #[derive(Debug, Default)]
@@ -25,14 +22,11 @@ impl<R: Real> Aligned<R> {
     /// `len` zeros, of which entry `head` lies at the start of a cache line.
     pub fn with_head(head: usize, len: usize) -> Aligned<R> {
         assert!(head <= R::LANES);
-        let (boundary, apart) = match place_in_page(R::BYTES * len) {
-            None => (R::LANES, 0),
-            Some(lines) => (PAGE / R::BYTES, lines * R::LANES),
-        };
-        let values: Vec<R> = zeros(len + boundary + R::LANES - 1 + apart);
+        let apart = R::LANES * lines_apart(R::BYTES * len);
+        let values: Vec<R> = zeros(len + 2 * R::LANES - 1 + apart);
         // The buffer is never reallocated, so the start stays where it is.
-        let first = values.as_ptr().align_offset(boundary * R::BYTES);
-        let start = first + R::LANES - head + apart;
+        let line = values.as_ptr().align_offset(R::LANES * R::BYTES);
+        let start = line + R::LANES - head + apart;
         Aligned { values, start, len }
     }
     /// Makes it at least so long; what it held is lost where it was not.
@@ -43,14 +37,18 @@ impl<R: Real> Aligned<R> {
     }
 }
 
-/// How many cache lines after the start of a page a list of so many bytes starts, if it is large: at different places
-/// in turn. A processor tells loads from stores before them by the place within the page; it would wait for what
-/// it has stored to one field before it loads from another at the same place.
-fn place_in_page(bytes: usize) -> Option<usize> {
+/// How many cache lines after the first of its memory a list of so many bytes starts. The system maps large lists
+/// one by one, each at the start of a page; they start at different places in turn: a processor tells loads from
+/// stores before them by the place within the page, so without that it waits for what it has stored to one field
+/// before it loads from another at the same place.
+fn lines_apart(bytes: usize) -> usize {
     const SMALL: usize = 1 << 16;
     static LARGE: AtomicUsize = AtomicUsize::new(0);
+    if bytes < SMALL {
+        return 0;
+    }
     // Seven places, nine of the 64 lines of a page apart.
-    (bytes >= SMALL).then(|| 9 * (LARGE.fetch_add(1, Ordering::Relaxed) % 7))
+    9 * (LARGE.fetch_add(1, Ordering::Relaxed) % 7)
 }
 
 impl<R> Deref for Aligned<R> {
@@ -79,10 +77,11 @@ fn zeros<R: Real>(len: usize) -> Vec<R> {
 /// is on a page of its own for every row or two; the processor does not remember where so many small ones are.
 #[cfg(target_os = "linux")]
 fn ask_for_large_pages<R>(values: &[R]) {
+    const SMALL: usize = 4096;
     const LARGE: usize = 2 << 20;
     let first = values.as_ptr().addr();
-    let ahead = first.next_multiple_of(PAGE) - first;
-    let bytes = size_of_val(values).saturating_sub(ahead) / PAGE * PAGE;
+    let ahead = first.next_multiple_of(SMALL) - first;
+    let bytes = size_of_val(values).saturating_sub(ahead) / SMALL * SMALL;
     if bytes >= 2 * LARGE {
         // SAFETY: the pages lie within the list, and the advice changes no byte of it. Where it is not
         // taken the pages are small.
@@ -106,9 +105,7 @@ mod tests {
         });
         let mut places = starts.map(|start| {
             assert_eq!(start % 64, 0);
-            // The line before the first holds the head.
-            assert_eq!((start - 64) % PAGE % (9 * 64), 0);
-            start % PAGE
+            start % 4096
         });
         places.sort();
         // Other tests take places too, at the same time.
