@@ -97,8 +97,8 @@ pub fn aperture<V: Vector>(d: V, eps: f64) -> V {
     sine(s).mul_add(V::constant(0.5 / PI), half * (one + s))
 }
 
-/// 1 / A - 1 of the aperture A at distances `d` [m], or of 0.4 where A is smaller; within 3e-8, or 2e-6 in singles. Smaller
-/// ones to divide by are unstable on an impulsive start.
+/// 1 / A - 1 of the aperture A at distances `d` [m], or of 0.4 where A is smaller; within 3e-8, or 2e-6 in singles.
+/// Smaller ones to divide by are unstable on an impulsive start.
 #[inline(always)]
 pub fn surplus<V: Vector>(d: V, eps: f64) -> V {
     let closer = d.mul_add(V::constant(-1.0 / eps), V::constant(1.0));

@@ -183,7 +183,8 @@ impl Weigh<'_> {
                 let d = half * (own + next[axis]);
                 let mut found = zero;
                 if d.mask_below(V::constant(band)) != 0 {
-                    // Open links have none, whatever others are in the vector: rounding leaves some at the end of the band.
+                    // Open links have none, whatever others are in the vector: rounding would leave some at the
+                    // end of the band.
                     let surplus = d.where_below(V::constant(band), surplus(d, self.band), zero);
                     found = V::constant(inside).where_below(d, surplus, none);
                 }
