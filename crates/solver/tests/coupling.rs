@@ -6,10 +6,10 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
 use grainwake_shape::analytic::ellipsoid;
-use grainwake_solver::coupling::Scheme;
 use grainwake_solver::dem::{ContactParams, Dof, Grain};
 use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
+use grainwake_solver::immersed::Scheme;
 use grainwake_solver::math::{Formula, Pose, Precision};
 use grainwake_solver::sim::{Drive, Setup, Simulation, StepRule};
 

@@ -10,18 +10,18 @@ const ALLOWED: [(&str, &[&str]); 9] = [
     ("poisson", &["math", "grid"]),
     ("dem", &["math"]),
     ("flow", &["math", "grid", "poisson"]),
-    ("coupling", &["math", "grid", "dem", "flow"]),
+    ("immersed", &["math", "grid", "dem", "flow"]),
     (
         "sim",
-        &["math", "grid", "poisson", "dem", "flow", "coupling"],
+        &["math", "grid", "poisson", "dem", "flow", "immersed"],
     ),
     (
         "case",
-        &["math", "grid", "dem", "flow", "coupling", "sim", "output"],
+        &["math", "grid", "dem", "flow", "immersed", "sim", "output"],
     ),
     (
         "output",
-        &["math", "grid", "dem", "flow", "coupling", "sim"],
+        &["math", "grid", "dem", "flow", "immersed", "sim"],
     ),
 ];
 

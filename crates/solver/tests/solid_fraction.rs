@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, analytic};
-use grainwake_solver::coupling::Scheme;
 use grainwake_solver::dem::{ContactParams, Dof, Grain};
 use grainwake_solver::flow::{Boundaries, Boundary};
 use grainwake_solver::grid::Mesh;
+use grainwake_solver::immersed::Scheme;
 use grainwake_solver::math::{Pose, Precision};
 use grainwake_solver::sim::{Setup, Simulation, StepRule};
 

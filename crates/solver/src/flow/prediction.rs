@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{Boundaries, Flow};
 use crate::grid::{Centre, FaceVector, Field, Mesh, Part, for_slabs};
 use crate::math::Real;
-use crate::math::lanes::{Vector, prefetch, prefetch_ahead};
+use grainwake_simd::{Vector, prefetch, prefetch_ahead};
 
 /// What the prediction was made of.
 pub struct Known<'a, R> {

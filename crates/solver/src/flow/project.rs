@@ -9,8 +9,8 @@ use glam::DVec3;
 use super::FlowMeasures;
 use crate::grid::{FaceVector, Layout};
 use crate::math::Real;
-use crate::math::lanes::{Kernel, One, Partial, RowWork, Vector, along_row};
 use crate::poisson::{Plane, Solution};
+use grainwake_simd::{Kernel, One, Partial, RowWork, Vector, along_row};
 
 /// What one plane contributes to the measures.
 #[derive(Clone, Copy, Debug, Default)]

@@ -5,9 +5,9 @@
 use glam::DVec3;
 
 use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of, row_blocks};
-use crate::math::lanes::dispatch;
 use crate::math::{Real, last_cache};
 use crate::poisson::{Plane, Poisson, Stages};
+use grainwake_simd::dispatch;
 
 use super::project::{Correct, Divergence, PlaneMeasures};
 use super::tendency::{Coefficients, PLANES_AT_ONCE, PredictPlane, Weights};

@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout, Mesh};
 use crate::math::Real;
-use crate::math::lanes::{Kernel, One, Partial, RowWork, Vector, along_row};
+use grainwake_simd::{Kernel, One, Partial, RowWork, Vector, along_row};
 
 /// Constants of the tendency.
 #[derive(Clone, Copy)]

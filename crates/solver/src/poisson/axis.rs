@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use super::Ends;
 use super::chirp::Fourier;
 use crate::math::Real;
-use crate::math::lanes::{Complex, Kernel, Vector, as_complex};
+use grainwake_simd::{Complex, Kernel, Vector, as_complex};
 
 /// Transforms of one axis and the eigenvalues of minus the second difference.
 pub struct Axis<R> {

@@ -4,7 +4,7 @@
 //! over x_t - x_{r-t} they are e_k - i o_k and e_k + i o_k.
 
 use crate::math::Real;
-use crate::math::lanes::{Complex, Vector, turned};
+use grainwake_simd::{Complex, Vector, turned};
 
 /// A transform of fixed length `R`.
 pub trait Butterfly<const R: usize> {

@@ -3,7 +3,7 @@
 
 use super::fft::{Fft, LARGEST_PRIME, factors, root};
 use crate::math::Real;
-use crate::math::lanes::{Complex, Vector};
+use grainwake_simd::{Complex, Vector};
 
 /// A planned transform of any length.
 pub enum Fourier<R> {

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 use super::butterfly::{Butterfly, Eight, Five, Four, Seven, Three, Two};
 use crate::math::Real;
-use crate::math::lanes::{Complex, Vector, turned};
+use grainwake_simd::{Complex, Vector, turned};
 
 /// Largest prime factor that is transformed by its definition; measured, decision 0005.
 pub const LARGEST_PRIME: usize = 113;

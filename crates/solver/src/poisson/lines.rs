@@ -1,8 +1,8 @@
 //! Blocks of lines on their way into the transforms and out of them.
 
 use super::axis::{self, Axis};
-use crate::math::lanes::{Complex, MOST, Vector, as_complex, dispatch};
 use crate::math::{Aligned, Real};
+use grainwake_simd::{Complex, MOST, Vector, as_complex, dispatch};
 
 /// Both buffers of the transforms of one thread.
 pub struct Buffers<R>(Aligned<R>);

@@ -21,9 +21,9 @@ use std::time::{Duration, Instant};
 #[cfg(test)]
 use crate::grid::{Centre, Field};
 use crate::grid::{Mesh, Run, for_chunks, for_columns, for_runs};
-use crate::math::lanes::dispatch;
 use crate::math::{Aligned, Real};
 use axis::Axis;
+use grainwake_simd::dispatch;
 use lines::Buffers;
 use plane::{Forward, Inverse, Shape};
 use tridiagonal::{ColumnScratch, Solve, Tridiagonal, block_width};

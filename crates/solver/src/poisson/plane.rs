@@ -10,8 +10,8 @@
 
 use super::axis::Axis;
 use super::lines::{Buffers, Lines, Rows};
-use crate::math::lanes::{Kernel, Vector};
 use crate::math::{Aligned, Real};
+use grainwake_simd::{Kernel, Vector};
 
 /// Sizes of a plane of cells and of a plane of modes.
 #[derive(Clone, Copy, Debug)]

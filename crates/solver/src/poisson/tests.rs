@@ -1,8 +1,8 @@
 //! The solver against its definition: the residual of the seven-point Laplacian.
 
 use super::*;
-use crate::math::lanes::Vector;
 use glam::DVec3;
+use grainwake_simd::Vector;
 
 /// Small deterministic generator of values in (-1, 1).
 fn noise(state: &mut u64) -> f64 {
@@ -176,7 +176,7 @@ fn single_precision_solves_to_its_round_off_in_flat_boxes_too() {
 
 #[test]
 fn transforms_of_every_length_match_their_definition() {
-    use crate::math::lanes::{Complex, One};
+    use grainwake_simd::{Complex, One};
     for n in (1..=130).chain([143, 251]) {
         let given: Vec<[f64; 2]> = (0..n)
             .map(|t| [(1.3 * t as f64).sin(), (0.7 * (t * t) as f64).cos()])
@@ -225,7 +225,7 @@ fn bits<R: Real>(mesh: &Mesh, ends: [Ends; 3]) -> Vec<u64> {
 
 #[test]
 fn bits_do_not_depend_on_the_instruction_set() {
-    use crate::math::lanes::{Level, limit_level};
+    use grainwake_simd::{Level, limit_level};
     let mesh = Mesh {
         cells: [37, 39, 18],
         spacing: DVec3::new(0.5, 0.7, 0.6),

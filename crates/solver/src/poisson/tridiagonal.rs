@@ -11,8 +11,8 @@
 
 use super::Ends;
 use crate::grid::Columns;
-use crate::math::lanes::{Kernel, Vector};
 use crate::math::{Aligned, Real};
+use grainwake_simd::{Kernel, Vector};
 
 /// Bytes of cache that a block of columns may take.
 const CACHE: usize = 1 << 19;

@@ -6,9 +6,9 @@ use glam::DVec3;
 
 use super::Setup;
 use super::state::{Reader, Writer};
-use crate::coupling::{Coupling, Past};
 use crate::dem::{Grain, Response};
 use crate::flow::{Flow, FlowMeasures, FluidParams};
+use crate::immersed::{Coupling, Past};
 use crate::math::{Load, Precision, Real};
 use crate::poisson::Stages;
 

@@ -14,9 +14,9 @@ mod tests;
 
 use std::time::Duration;
 
-use crate::coupling::Past;
 use crate::dem::{Contact, Dynamics, Grain, State};
 use crate::grid::Mesh;
+use crate::immersed::Past;
 use crate::math::{Load, Pose};
 use crate::poisson::Stages;
 

@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-use crate::coupling::Scheme;
 use crate::dem::{ContactParams, Enclosure, Grain};
 use crate::flow::{Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
+use crate::immersed::Scheme;
 use crate::math::Precision;
 
 use super::Prescription;

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use super::Simulation;
-use crate::coupling::{Past, Scheme};
 use crate::dem::{Dof, Grain, State};
+use crate::immersed::{Past, Scheme};
 use crate::math::Load;
 
 /// Why a step could not be taken.

@@ -4,12 +4,12 @@ use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::{Setup, Simulation, StepRule};
-use crate::coupling::Scheme;
 use crate::dem::{ContactParams, Dof, Grain};
 use crate::flow::{Advection, Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
-use crate::math::lanes::{Level, limit_level};
+use crate::immersed::Scheme;
 use crate::math::{Pose, Precision};
+use grainwake_simd::{Level, limit_level};
 
 /// A turned ellipsoid beside a wall and a sphere across the edges of a periodic box, which move.
 fn two_grains(precision: Precision) -> Setup {

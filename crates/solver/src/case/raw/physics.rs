@@ -9,9 +9,9 @@ use crate::case::quantity::{
     Acceleration, Density, DynamicViscosity, KinematicViscosity, Length, Number, Quantity, Rate,
     Stiffness, Velocity,
 };
-use crate::coupling::Scheme;
 use crate::dem::ContactParams;
 use crate::flow::Advection;
+use crate::immersed::Scheme;
 
 /// The fluid.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]

@@ -426,7 +426,7 @@ fn outflow_keeps_the_mass_of_the_box() {
 
 #[test]
 fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
-    use crate::math::lanes::{Level, limit_level};
+    use grainwake_simd::{Level, limit_level};
     fn bits<R: Real>(boundaries: Boundaries, past_caches: bool) -> Vec<u64> {
         let mesh = Mesh {
             cells: [29, 11, 9],

@@ -7,7 +7,7 @@ use glam::DVec3;
 use grainwake_shape::SampledField;
 
 use super::near::FAR;
-use crate::math::lanes::{One, Vector};
+use grainwake_simd::{One, Vector};
 
 /// A vector from each list. (No closure in a kernel touches vectors: it would not be inlined.)
 #[inline(always)]

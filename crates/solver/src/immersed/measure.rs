@@ -15,7 +15,7 @@ use super::samples::{load_all, store_all};
 use crate::dem::Grain;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Aligned;
-use crate::math::lanes::{Kernel, MOST, Vector};
+use grainwake_simd::{Kernel, MOST, Vector};
 
 /// What one thread needs to locate grains.
 #[derive(Default)]

@@ -10,7 +10,7 @@
 use std::f64::consts::PI;
 
 use crate::math::Real;
-use crate::math::lanes::Vector;
+use grainwake_simd::Vector;
 
 /// sin(pi s) / (s (1 - s^2)) and cos(pi s / 2) / (1 - s^2) for |s| <= 1 as polynomials in s^2, by
 /// interpolation at Chebyshev's points. The factors make both exact where they vanish.
@@ -156,8 +156,8 @@ pub fn drag<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::lanes::One;
     use glam::DVec3;
+    use grainwake_simd::One;
 
     fn open_depth(d: f64, eps: f64) -> f64 {
         super::open_depth(One(d), eps).0

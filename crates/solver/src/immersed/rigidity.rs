@@ -11,8 +11,8 @@ use glam::DVec3;
 use super::Past;
 use super::forced::{Forced, Run};
 use crate::flow::{Known, Prediction};
-use crate::math::lanes::{Kernel, Partial, Stencil, Vector, dispatch, prefetch};
 use crate::math::{Matrix6, Real, Vector6};
+use grainwake_simd::{Kernel, Partial, Stencil, Vector, dispatch, prefetch};
 
 /// How many runs ahead memory is asked for.
 const AHEAD: usize = 8;

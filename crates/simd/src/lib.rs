@@ -10,10 +10,12 @@
 //! given to `map` of an array: where they are called more than once they are not inlined, and then every
 //! operation in them is a call. Write functions that are always inlined, or loops.
 
+mod aligned;
 mod complex;
 mod one;
 #[cfg(any(test, not(target_arch = "x86_64")))]
 mod plain;
+mod real;
 mod rows;
 mod stencil;
 #[cfg(test)]
@@ -26,9 +28,10 @@ mod x86_transpose;
 use std::ops::{Add, Mul, Sub};
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use super::Real;
+pub use aligned::Aligned;
 pub use complex::{Complex, turned};
 pub use one::One;
+pub use real::{Precision, Real};
 pub use rows::{Partial, RowWork, along_row};
 pub use stencil::Stencil;
 

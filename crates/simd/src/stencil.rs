@@ -12,6 +12,7 @@ pub struct Stencil<const N: usize> {
 }
 
 impl<const N: usize> Stencil<N> {
+    /// The stencil with the given offsets [entries].
     #[inline(always)]
     pub fn new(offsets: [isize; N]) -> Stencil<N> {
         let (mut low, mut high) = (offsets[0], offsets[0]);

@@ -13,7 +13,7 @@ use grainwake_shape::{Field, Shape};
 use super::samples::{Grid, Samples, Spot, load_all, store_all};
 use crate::dem::Grain;
 use crate::math::Aligned;
-use crate::math::lanes::{MOST, MOST_PLACES, Vector};
+use grainwake_simd::{MOST, MOST_PLACES, Vector};
 
 /// Samples in half the band, and across a grain, as far as the shape has them: what counts more. No more than
 /// `MOST_SAMPLES` in half the band: the flow does not tell a grain that thin from none.
@@ -191,8 +191,8 @@ fn about_sphere<V: Vector>(radius: f64, [x, y, z]: [V; 3]) -> (V, [V; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::lanes::{Kernel, One, Registers, dispatch};
     use grainwake_shape::{ShapeOptions, analytic};
+    use grainwake_simd::{Kernel, One, Registers, dispatch};
 
     /// An ellipsoid of half-axes 1, .8 and .7.
     fn ellipsoid() -> Arc<Shape> {

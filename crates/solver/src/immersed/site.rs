@@ -205,10 +205,10 @@ mod tests {
     use grainwake_shape::{ShapeOptions, analytic};
 
     use super::*;
-    use crate::coupling::{Coupling, Scheme};
     use crate::dem::Dof;
     use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
     use crate::grid::Mesh;
+    use crate::immersed::{Coupling, Scheme};
     use crate::math::Pose;
 
     const DT: f64 = 0.004;

@@ -23,7 +23,7 @@ use crate::dem::Grain;
 use crate::flow::{Known, Prediction};
 use crate::grid::Mesh;
 use crate::math::Real;
-use crate::math::lanes::{Kernel, MOST, Vector, dispatch, prefetch_ahead};
+use grainwake_simd::{Kernel, MOST, Vector, dispatch, prefetch_ahead};
 use links::Lines;
 use weights::Planes;
 
@@ -257,10 +257,10 @@ mod tests {
     use grainwake_shape::Shape;
 
     use super::*;
-    use crate::coupling::{Coupling, Scheme};
     use crate::dem::{Dof, Grain};
     use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
     use crate::grid::Mesh;
+    use crate::immersed::{Coupling, Scheme};
     use crate::math::Pose;
 
     #[test]

@@ -8,7 +8,7 @@ use super::Scheme;
 use super::aperture::{aperture, drag};
 use super::forced::Forced;
 use super::samples::load_all;
-use crate::math::lanes::{Kernel, MOST, One, Vector, dispatch};
+use grainwake_simd::{Kernel, MOST, One, Vector, dispatch};
 
 /// How surfaces hold a face.
 #[derive(Clone, Copy, Debug)]

@@ -10,8 +10,8 @@ use std::ops::{Add, Mul, Sub};
 
 use super::Vector;
 use super::x86_transpose as turn;
-use crate::math::Real;
-use crate::math::real::{INVERSE_ROOT_OF_ONE, INVERSE_ROOT_OF_ONE_SINGLE};
+use crate::Real;
+use crate::real::{INVERSE_ROOT_OF_ONE, INVERSE_ROOT_OF_ONE_SINGLE};
 
 /// Rounding to the whole number below.
 const DOWN: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;

@@ -144,13 +144,13 @@ mod tests {
     use grainwake_shape::{Shape, ShapeOptions, analytic};
 
     use super::*;
-    use crate::coupling::Scheme;
-    use crate::coupling::forced::Forced;
-    use crate::coupling::locate::{Body, Found, Locator};
-    use crate::coupling::measure::Scratch;
     use crate::dem::Dof;
     use crate::flow::{Boundaries, Boundary};
     use crate::grid::FACE_OFFSET;
+    use crate::immersed::Scheme;
+    use crate::immersed::forced::Forced;
+    use crate::immersed::locate::{Body, Found, Locator};
+    use crate::immersed::measure::Scratch;
     use crate::math::Pose;
 
     #[test]

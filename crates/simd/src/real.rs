@@ -5,7 +5,7 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use serde::{Deserialize, Serialize};
 
-use super::lanes::Registers;
+use super::Registers;
 
 /// Precision of the fields of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -51,7 +51,7 @@ impl Precision {
 
 /// A number of a field, `f64` or `f32`. Sums over the grid, and the motion of grains, are doubles
 /// whatever the fields are.
-pub(crate) trait Real:
+pub trait Real:
     Registers
     + Copy
     + Debug
@@ -84,9 +84,9 @@ pub(crate) trait Real:
 }
 
 /// Bits of a number near one, plus half of them.
-pub(crate) const INVERSE_ROOT_OF_ONE: u64 = 0x5fe6_eb50_c7b5_37a9;
+pub const INVERSE_ROOT_OF_ONE: u64 = 0x5fe6_eb50_c7b5_37a9;
 /// The same of a single.
-pub(crate) const INVERSE_ROOT_OF_ONE_SINGLE: u32 = 0x5f37_5a86;
+pub const INVERSE_ROOT_OF_ONE_SINGLE: u32 = 0x5f37_5a86;
 
 macro_rules! real {
     ($number:ident, $inverse_root_of_one:ident) => {

@@ -5,10 +5,10 @@
 
 use std::ops::Range;
 
-use crate::coupling::aperture::surplus;
-use crate::coupling::locate::Body;
+use crate::immersed::aperture::surplus;
+use crate::immersed::locate::Body;
 use crate::math::Aligned;
-use crate::math::lanes::{Kernel, MOST, Vector, dispatch};
+use grainwake_simd::{Kernel, MOST, Vector, dispatch};
 
 /// The plane of a component at hand and the next, in rows that begin on registers; there is a row before the first
 /// and one after the last.

@@ -8,11 +8,11 @@ use glam::DVec3;
 
 use super::weights::{Planes, near, weigh};
 use super::{Stand, View};
-use crate::coupling::locate::Body;
-use crate::coupling::places::PAD;
 use crate::grid::{FACE_OFFSET, Mesh};
+use crate::immersed::locate::Body;
+use crate::immersed::places::PAD;
 use crate::math::Real;
-use crate::math::lanes::{Stencil, Vector};
+use grainwake_simd::{Stencil, Vector};
 
 /// The links of one component.
 pub struct Lines<'a, R> {

@@ -7,7 +7,7 @@ use glam::IVec3;
 use crate::flow::Boundaries;
 use crate::grid::Mesh;
 use crate::math::Real;
-use crate::math::lanes::{prefetch, prefetch_ahead};
+use grainwake_simd::{prefetch, prefetch_ahead};
 
 /// Which faces and cells are unknowns, and where.
 #[derive(Clone, Copy)]

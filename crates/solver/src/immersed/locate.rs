@@ -15,7 +15,7 @@ use super::rivals::{Neighbours, Rival};
 use crate::dem::Grain;
 use crate::flow::Boundaries;
 use crate::grid::{Layout, Mesh};
-use crate::math::lanes::dispatch;
+use grainwake_simd::dispatch;
 
 /// The faces of a row along x that matter.
 #[derive(Clone, Copy, Debug, Default)]
