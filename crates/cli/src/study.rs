@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use comfy_table::{CellAlignment, Table, presets};
 use grainwake_study::{
-    Analysis, Options, Outcome, Plan, Row, Run, Selection, State, StudyError, carry_out, state,
-    table, write_table,
+    Analysis, Options, Outcome, Plan, Run, RunRecord, RunState, Selection, StudyError, execute,
+    records, run_state, write_tables,
 };
 
 use crate::args::StudyArgs;
@@ -69,10 +69,10 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         (all / jobs).max(1)
     };
     if args.list || args.dry_run {
-        plan.admit(&folder)?;
-        let states: Vec<(usize, State)> = chosen
+        plan.check_folder(&folder)?;
+        let states: Vec<(usize, RunState)> = chosen
             .iter()
-            .map(|i| (*i, state(&runs[*i], &folder)))
+            .map(|i| (*i, run_state(&runs[*i], &folder)))
             .collect();
         if args.json {
             return print(&serde_json::to_string_pretty(&listed(runs, &states))?);
@@ -82,7 +82,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         }
         return print(&intent(args, runs, &states, jobs, each));
     }
-    plan.settle(&folder)?;
+    plan.create_folder(&folder)?;
     let stop = Arc::new(AtomicBool::new(false));
     run::watch_for_interrupt(stop.clone());
     if !args.quiet {
@@ -103,11 +103,11 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         command: std::env::args().collect(),
     };
     let board = Board::new(runs, &chosen, jobs, args.quiet, stop.clone());
-    let ended = carry_out(runs, &chosen, &folder, &options, &board)?;
+    let ended = execute(runs, &chosen, &folder, &options, &board)?;
     board.clear();
-    let rows = table(&plan.manifest, &folder);
-    write_table(&rows, &folder)?;
-    let shown: Vec<&Row> = chosen.iter().map(|i| &rows[*i]).collect();
+    let rows = records(&plan.manifest, &folder);
+    write_tables(&rows, &folder)?;
+    let shown: Vec<&RunRecord> = chosen.iter().map(|i| &rows[*i]).collect();
     if args.json {
         print(&serde_json::to_string_pretty(&shown)?)?;
     } else {
@@ -171,9 +171,9 @@ pub fn first_line(text: &str) -> &str {
     text.lines().next().unwrap_or_default()
 }
 
-fn list(runs: &[Run], states: &[(usize, State)]) -> String {
+fn list(runs: &[Run], states: &[(usize, RunState)]) -> String {
     let width = runs.iter().map(|r| r.name.len()).max().unwrap_or(0);
-    let line = |(i, state): &(usize, State)| {
+    let line = |(i, state): &(usize, RunState)| {
         let run = &runs[*i];
         format!(
             "{:>4}  {:width$}  {:10}  {}",
@@ -186,8 +186,8 @@ fn list(runs: &[Run], states: &[(usize, State)]) -> String {
     states.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-fn listed(runs: &[Run], states: &[(usize, State)]) -> serde_json::Value {
-    let entry = |(i, state): &(usize, State)| {
+fn listed(runs: &[Run], states: &[(usize, RunState)]) -> serde_json::Value {
+    let entry = |(i, state): &(usize, RunState)| {
         let run = &runs[*i];
         serde_json::json!({
             "number": i + 1, "name": run.name, "model": run.model, "member": run.member,
@@ -202,7 +202,7 @@ fn listed(runs: &[Run], states: &[(usize, State)]) -> serde_json::Value {
 fn intent(
     args: &StudyArgs,
     runs: &[Run],
-    states: &[(usize, State)],
+    states: &[(usize, RunState)],
     jobs: usize,
     threads: usize,
 ) -> String {
@@ -210,15 +210,15 @@ fn intent(
     let (mut wall, mut to_do) = (0.0, 0);
     for (i, state) in states {
         let doing = match state {
-            State::Missing => "run".to_owned(),
-            State::Unfinished => "go on".to_owned(),
-            State::Finished => continue,
-            State::Failed(why) if args.retry => format!("start over, failed before: {why}"),
-            State::Failed(why) => {
+            RunState::Missing => "run".to_owned(),
+            RunState::Unfinished => "go on".to_owned(),
+            RunState::Finished => continue,
+            RunState::Failed(why) if args.retry => format!("start over, failed before: {why}"),
+            RunState::Failed(why) => {
                 lines.push(format!("{}: left alone, failed: {why}", runs[*i].name));
                 continue;
             }
-            State::Stale(why) => format!("start over: {why}"),
+            RunState::Stale(why) => format!("start over: {why}"),
         };
         wall += runs[*i].wall_s;
         to_do += 1;
@@ -239,7 +239,7 @@ fn intent(
     lines.join("\n")
 }
 
-fn pretty(rows: &[&Row]) -> Table {
+fn pretty(rows: &[&RunRecord]) -> Table {
     const PAIR: [(&str, &str); 8] = [
         ("kiss", "kiss_time"),
         ("contact", "contact_stage"),

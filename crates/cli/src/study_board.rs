@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use grainwake_solver::output::Progress;
 use grainwake_solver::sim::events::{Event, EventKind};
-use grainwake_study::{Outcome, Run, Watcher};
+use grainwake_study::{Outcome, Run, StudyObserver};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
 use crate::progress::clock;
@@ -147,7 +147,7 @@ impl Inner {
     }
 }
 
-impl Watcher for Board<'_> {
+impl StudyObserver for Board<'_> {
     fn started(&self, run: usize) {
         let name = &self.runs[run].name;
         let bar = self.bars.as_ref().map(|bars| {

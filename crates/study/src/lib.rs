@@ -1,49 +1,39 @@
-//! Studies: many runs of one case, and what they say together.
+//! Parameter studies: many runs of one case, their measured values and statistics over the runs.
 //!
-//! A study file expands a base case along axes into [`Model`]s ([`Study::read`]); [`Plan::of`]
-//! resolves each into a [`Run`] with a stable name and a hash of its case and of the program;
-//! [`carry_out`] runs what is missing, several at once, each from its last checkpoint. A study
-//! folder holds `study.json` (the plan), `runs/NAME/` (ordinary run folders), and what is made of
-//! them.
+//! The modules import downwards only, in this order from bottom to top:
+//!
+//! | module | job |
+//! |---|---|
+//! | [`format`] | text form of values |
+//! | [`plan`] | study file to models, models to runs with a stable name and hash |
+//! | [`run`] | state of a run, and the job queue that executes and resumes runs |
+//! | [`measure`] | one run folder to measured values, and the table of all runs |
+//! | [`analysis`] | statistics over runs, right-censored observations, verdicts on claims |
+//! | [`page`] | figures and report page |
+//!
+//! A study folder holds `study.json` (the plan), `runs/NAME/` (run folders), the tables and the
+//! report.
 
-mod claims;
-pub mod correlation;
+pub mod analysis;
 mod error;
-mod fall;
-pub mod figure;
-mod file;
-pub mod judge;
-mod measure;
-mod model;
-mod motion;
-mod offset;
-mod page;
-mod plan;
-mod raw;
-mod report;
-mod runner;
-mod select;
-mod settling;
-mod state;
-pub mod stats;
-mod table;
-pub mod words;
+pub mod format;
+pub mod measure;
+pub mod page;
+pub mod plan;
+pub mod run;
 
-pub use claims::{Analysis, Claim, Condition, Correlations, FigurePlan, Sign, Test};
+pub use analysis::{correlation, statistics, verdict};
 pub use error::StudyError;
-pub use file::{Ensemble, Study};
-pub use measure::{Measures, Pair, QUANTITIES};
-pub use model::{Model, Setting};
-pub use motion::{HISTORIES, Motion};
-pub use plan::{MEASURED, Manifest, Plan, Run};
-pub use report::{Rendered, render};
-pub use runner::{Options, Outcome, Watcher, carry_out};
-pub use select::Selection;
-pub use settling::{Fallen, SETTLING, Settling};
-pub use state::{State, state};
-pub use table::{GRAINS, Row, columns, csv_of, table, write_table};
-
-/// Subfolder of a study folder that holds the run folders.
-pub const RUNS: &str = "runs";
-/// The plan of a study, in its folder.
-pub const MANIFEST: &str = "study.json";
+pub use measure::pair::{PairHistory, PairMeasures};
+pub use measure::record::{RunRecord, records};
+pub use measure::settling::{GrainSettling, SettlingMeasures};
+pub use measure::table::{columns, to_csv, write_tables};
+pub use measure::trajectory::Trajectory;
+pub use page::{Rendered, render};
+pub use plan::claims::{Analysis, Claim, Condition, Correlations, FigureRequest, Sign, Test};
+pub use plan::expand::{Model, Setting};
+pub use plan::file::{Ensemble, Study};
+pub use plan::selection::Selection;
+pub use plan::{MANIFEST, Manifest, Plan, RUNS, Run};
+pub use run::state::{RunState, run_state};
+pub use run::{Options, Outcome, StudyObserver, execute};

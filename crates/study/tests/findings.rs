@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use grainwake_study::correlation::correlations;
-use grainwake_study::judge::{judge, samples};
-use grainwake_study::{Analysis, Measures, Model, Row};
+use grainwake_study::verdict::{evaluate, observations};
+use grainwake_study::{Analysis, Model, PairMeasures, RunRecord};
 
 /// 16 grains in four orientations and a sphere; `fill` gives what is measured.
-fn rows(fill: impl Fn(f64, f64, usize) -> Measures) -> Vec<Row> {
+fn rows(fill: impl Fn(f64, f64, usize) -> PairMeasures) -> Vec<RunRecord> {
     let mut out = Vec::new();
     for grain in 0..16 {
         let (s, r) = (
@@ -41,9 +41,9 @@ fn row(
     name: &str,
     levels: BTreeMap<String, String>,
     factors: BTreeMap<String, f64>,
-    pair: Measures,
-) -> Row {
-    Row {
+    pair: PairMeasures,
+) -> RunRecord {
+    RunRecord {
         name: name.into(),
         model: name.into(),
         member: 0,
@@ -70,22 +70,22 @@ fn noise(s: f64, r: f64, o: usize) -> f64 {
     (1e3 * s + 3.7e3 * r + 17.0 * o as f64).sin()
 }
 
-fn kiss(time: f64) -> Measures {
-    Measures {
+fn kiss(time: f64) -> PairMeasures {
+    PairMeasures {
         kiss_time: Some(time),
         landing_time: Some(60.0),
-        ..Measures::default()
+        ..PairMeasures::default()
     }
 }
 
 /// The paper's own picture: order 1 > 2 = 4 > 3, form matters in orientation 1 alone.
-fn as_in_the_paper(s: f64, r: f64, o: usize) -> Measures {
+fn as_in_the_paper(s: f64, r: f64, o: usize) -> PairMeasures {
     let base = [0.0, 20.0 - 6.0 * s - 2.0 * r, 14.0, 10.0, 14.0][o];
     kiss(base + 0.05 * noise(s, r, o))
 }
 
-fn models(rows: &[Row]) -> Vec<Model> {
-    let model = |row: &Row| Model {
+fn models(rows: &[RunRecord]) -> Vec<Model> {
+    let model = |row: &RunRecord| Model {
         name: row.model.clone(),
         base: "case.toml".into(),
         settings: Vec::new(),
@@ -95,10 +95,10 @@ fn models(rows: &[Row]) -> Vec<Model> {
     rows.iter().map(model).collect()
 }
 
-fn verdict(rows: &[Row], claim: &str) -> (String, String) {
+fn verdict(rows: &[RunRecord], claim: &str) -> (String, String) {
     let text = format!("[[claim]]\nsays = \"a claim\"\n{claim}\n");
     let analysis = Analysis::parse("analysis.toml", &text, &models(rows)).unwrap();
-    let found = judge(&analysis, rows).remove(0);
+    let found = evaluate(&analysis, rows).remove(0);
     (found.verdict.to_owned(), found.says)
 }
 
@@ -133,7 +133,7 @@ fn orders_hold_are_contradicted_or_stay_open() {
         verdict(&paper, &equal.replace("\"o4\"", "\"o3\"")).0,
         "contradicted"
     );
-    let few: Vec<Row> = paper
+    let few: Vec<RunRecord> = paper
         .iter()
         .filter(|r| r.levels.get("grain").is_none_or(|g| g == "g03"))
         .cloned()
@@ -229,12 +229,12 @@ fn what_did_not_happen_before_the_landing_is_a_bound() {
         says.contains("n = 12"),
         "ranges with a gap do not count: {says}"
     );
-    let parts = rows(|s, r, o| Measures {
+    let parts = rows(|s, r, o| PairMeasures {
         contact_stage: Some(5.0 * r),
         parted: Some(r < 0.7),
         ..as_in_the_paper(s, r, o)
     });
-    let bounds = samples(&parts, "contact_stage", &BTreeMap::new())
+    let bounds = observations(&parts, "contact_stage", &BTreeMap::new())
         .iter()
         .filter(|s| s.bound)
         .count();
@@ -246,7 +246,7 @@ fn what_did_not_happen_before_the_landing_is_a_bound() {
     let mut unfinished = parts.clone();
     unfinished[0].state = "unfinished".into();
     assert_eq!(
-        samples(&unfinished, "kiss_time", &BTreeMap::new()).len(),
+        observations(&unfinished, "kiss_time", &BTreeMap::new()).len(),
         64
     );
 }
@@ -262,7 +262,7 @@ fn members_count_as_one_model() {
         row.pair = Some(kiss(time + shift));
         all.push(row);
     }
-    let found = samples(&all, "kiss_time", &BTreeMap::new());
+    let found = observations(&all, "kiss_time", &BTreeMap::new());
     assert_eq!(found.len(), 65);
     assert_eq!(
         (found[0].value, found[0].range),

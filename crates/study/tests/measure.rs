@@ -3,7 +3,8 @@
 use glam::{DQuat, DVec3};
 use grainwake_report::run_folder::{Event, History, Kind};
 use grainwake_report::story::Scales;
-use grainwake_study::{Measures, Pair, QUANTITIES};
+use grainwake_study::plan::quantities::PAIR_QUANTITIES;
+use grainwake_study::{PairHistory, PairMeasures};
 
 /// d = 2 mm and g = 8 m/s2: the units are 1/63.2 s and 0.1265 m/s.
 const SCALES: Scales = Scales {
@@ -37,7 +38,7 @@ fn log(events: &[(f64, Kind)]) -> Vec<Event> {
     events.iter().map(event).collect()
 }
 
-fn measures(events: &[(f64, Kind)], oblong: bool) -> Measures {
+fn measures(events: &[(f64, Kind)], oblong: bool) -> PairMeasures {
     // The leading grain falls at 0.1 m/s; the trailing one, 10 mm above it, at 0.15 m/s until they touch at 0.16 s.
     let ahead = history(
         |t| DVec3::Z * -0.1 * t,
@@ -56,7 +57,7 @@ fn measures(events: &[(f64, Kind)], oblong: bool) -> Measures {
         1.0,
     );
     let events = log(events);
-    Measures::of_pair(&Pair {
+    PairMeasures::of_pair(&PairHistory {
         grains: [&behind, &ahead],
         up: DVec3::Z,
         scales: SCALES,
@@ -172,14 +173,14 @@ fn pairs_that_do_not_part_or_kiss_give_bounds_or_nothing() {
 
 #[test]
 fn every_quantity_has_a_column() {
-    let object = serde_json::to_value(Measures::default()).unwrap();
+    let object = serde_json::to_value(PairMeasures::default()).unwrap();
     let mut names: Vec<&str> = object
         .as_object()
         .unwrap()
         .keys()
         .map(String::as_str)
         .collect();
-    let mut listed = QUANTITIES.to_vec();
+    let mut listed = PAIR_QUANTITIES.to_vec();
     names.sort_unstable();
     listed.sort_unstable();
     assert_eq!(names, listed);

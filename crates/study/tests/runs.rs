@@ -8,16 +8,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use common::{STUDY, folder, plan};
 use grainwake_solver::output::Progress;
 use grainwake_study::{
-    Manifest, Options, Outcome, Plan, State, Study, Watcher, carry_out, csv_of, state, table,
-    write_table,
+    Manifest, Options, Outcome, Plan, RunState, Study, StudyObserver, execute, records, run_state,
+    to_csv, write_tables,
 };
 
 struct Quiet;
-impl Watcher for Quiet {}
+impl StudyObserver for Quiet {}
 
 /// Interrupts after so many steps of all runs together.
 struct After(AtomicU64, u64);
-impl Watcher for After {
+impl StudyObserver for After {
     fn progress(&self, _: usize, _: &Progress) {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
@@ -36,19 +36,23 @@ fn options(jobs: usize) -> Options {
     }
 }
 
-fn run(plan: &Plan, study: &Path, watcher: &dyn Watcher, options: &Options) -> Vec<Outcome> {
-    plan.settle(study).unwrap();
+fn run(plan: &Plan, study: &Path, watcher: &dyn StudyObserver, options: &Options) -> Vec<Outcome> {
+    plan.create_folder(study).unwrap();
     let runs = &plan.manifest.runs;
     let all: Vec<usize> = (0..runs.len()).collect();
-    carry_out(runs, &all, study, options, watcher)
+    execute(runs, &all, study, options, watcher)
         .unwrap()
         .into_iter()
         .map(|(_, o)| o)
         .collect()
 }
 
-fn states(plan: &Plan, study: &Path) -> Vec<State> {
-    plan.manifest.runs.iter().map(|r| state(r, study)).collect()
+fn states(plan: &Plan, study: &Path) -> Vec<RunState> {
+    plan.manifest
+        .runs
+        .iter()
+        .map(|r| run_state(r, study))
+        .collect()
 }
 
 fn results(plan: &Plan, study: &Path) -> Vec<Vec<u8>> {
@@ -72,7 +76,11 @@ fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
     let (folder, path) = folder(STUDY);
     let study = folder.path().join("out");
     let first = plan(&path).unwrap();
-    assert!(states(&first, &study).iter().all(|s| *s == State::Missing));
+    assert!(
+        states(&first, &study)
+            .iter()
+            .all(|s| *s == RunState::Missing)
+    );
     let ended = run(&first, &study, &Quiet, &options(2));
     assert!(
         ended.iter().all(|o| matches!(o, Outcome::Finished(_))),
@@ -97,7 +105,7 @@ fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
     // One model changes: it alone is stale, and is run again.
     std::fs::write(&path, STUDY.replace("friction = 0.6", "friction = 0.3")).unwrap();
     let second = plan(&path).unwrap();
-    let stale: Vec<&str> = states(&second, &study).iter().map(State::word).collect();
+    let stale: Vec<&str> = states(&second, &study).iter().map(RunState::word).collect();
     assert_eq!(
         stale,
         ["finished", "stale", "finished", "stale", "finished"]
@@ -113,7 +121,7 @@ fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
     assert!(
         states(&longer, &study)
             .iter()
-            .all(|s| matches!(s, State::Stale(_)))
+            .all(|s| matches!(s, RunState::Stale(_)))
     );
     // Another version of the program.
     let file = study.join("runs/alone/provenance.json");
@@ -123,7 +131,7 @@ fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
         text.replace("\"version\": \"", "\"version\": \"0.0."),
     )
     .unwrap();
-    assert!(matches!(states(&second, &study)[4], State::Stale(why) if why.contains("version")));
+    assert!(matches!(states(&second, &study)[4], RunState::Stale(why) if why.contains("version")));
 }
 
 #[test]
@@ -146,15 +154,15 @@ fn interrupted_studies_go_on_and_give_the_same_bits() {
             ended.contains(&Outcome::Interrupted) && rounds < 50,
             "{ended:?}"
         );
-        assert!(states(&plan, &broken).contains(&State::Unfinished) || rounds > 1);
+        assert!(states(&plan, &broken).contains(&RunState::Unfinished) || rounds > 1);
     }
     assert!(rounds > 3, "it was interrupted {rounds} times");
     assert_eq!(results(&plan, &whole), results(&plan, &broken));
     let (a, b) = (
-        table(&plan.manifest, &whole),
-        table(&plan.manifest, &broken),
+        records(&plan.manifest, &whole),
+        records(&plan.manifest, &broken),
     );
-    let measured = |rows: &[grainwake_study::Row]| {
+    let measured = |rows: &[grainwake_study::RunRecord]| {
         rows.iter()
             .map(|r| (r.pair.clone(), r.steps))
             .collect::<Vec<_>>()
@@ -215,11 +223,14 @@ fn a_failure_stays_alone() {
         "{\"time\":0.1,\"what\":\"it blew up\"}",
     )
     .unwrap();
-    assert_eq!(states(&plan, &study)[4], State::Failed("it blew up".into()));
+    assert_eq!(
+        states(&plan, &study)[4],
+        RunState::Failed("it blew up".into())
+    );
     let ended = run(&plan, &study, &Quiet, &options(1));
     assert!(matches!(&ended[4], Outcome::Failed(why, 3) if why.contains("it blew up")));
     assert_eq!(
-        table(&plan.manifest, &study)[4].remark.as_deref(),
+        records(&plan.manifest, &study)[4].remark.as_deref(),
         Some("it blew up")
     );
     let ended = run(
@@ -240,7 +251,7 @@ fn a_run_in_other_hands_is_left_alone() {
     let plan = plan(&path).unwrap();
     let study = folder.path().join("out");
     std::fs::create_dir_all(study.join("runs")).unwrap();
-    plan.settle(&study).unwrap();
+    plan.create_folder(&study).unwrap();
     std::fs::create_dir_all(study.join("locks")).unwrap();
     let lock = std::fs::File::create(study.join("locks/alone.lock")).unwrap();
     lock.lock().unwrap();
@@ -259,7 +270,7 @@ fn folders_of_others_are_refused() {
     let (folder, path) = folder(STUDY);
     let first = plan(&path).unwrap();
     let study = folder.path().join("out");
-    first.settle(&study).unwrap();
+    first.create_folder(&study).unwrap();
     let other = folder.path().join("other.toml");
     std::fs::write(
         &other,
@@ -267,14 +278,14 @@ fn folders_of_others_are_refused() {
     )
     .unwrap();
     let second = plan(&other).unwrap();
-    let error = second.settle(&study).unwrap_err().to_string();
+    let error = second.create_folder(&study).unwrap_err().to_string();
     assert!(error.contains("holds another study, \"test\""), "{error}");
     let foreign = folder.path().join("foreign");
     std::fs::create_dir_all(&foreign).unwrap();
     std::fs::write(foreign.join("thesis.tex"), "").unwrap();
     assert!(
         first
-            .settle(&foreign)
+            .create_folder(&foreign)
             .unwrap_err()
             .to_string()
             .contains("holds no study")
@@ -286,10 +297,10 @@ fn the_table_holds_every_run_and_outlives_the_run_folders() {
     let (folder, path) = folder(STUDY);
     let plan = plan(&path).unwrap();
     let study = folder.path().join("out");
-    plan.settle(&study).unwrap();
-    carry_out(&plan.manifest.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
-    let rows = table(&plan.manifest, &study);
-    write_table(&rows, &study).unwrap();
+    plan.create_folder(&study).unwrap();
+    execute(&plan.manifest.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
+    let rows = records(&plan.manifest, &study);
+    write_tables(&rows, &study).unwrap();
     let words: Vec<&str> = rows.iter().map(|r| r.state.as_str()).collect();
     assert_eq!(
         words,
@@ -303,23 +314,20 @@ fn the_table_holds_every_run_and_outlives_the_run_folders() {
             .position(|h| h == name)
             .unwrap_or_else(|| panic!("{name}"))
     };
-    let records: Vec<_> = csv.records().map(Result::unwrap).collect();
-    assert_eq!(records.len(), 5);
+    let lines: Vec<_> = csv.records().map(Result::unwrap).collect();
+    assert_eq!(lines.len(), 5);
     assert_eq!(
-        (
-            &records[0][column("weight")],
-            &records[0][column("density")]
-        ),
+        (&lines[0][column("weight")], &lines[0][column("density")]),
         ("light", "2000")
     );
-    let kiss: f64 = records[0][column("kiss_time")].parse().unwrap();
-    let seconds: f64 = records[0][column("kiss_time_s")].parse().unwrap();
+    let kiss: f64 = lines[0][column("kiss_time")].parse().unwrap();
+    let seconds: f64 = lines[0][column("kiss_time_s")].parse().unwrap();
     assert!(
         (kiss - seconds / (2e-3_f64 / 9.81).sqrt()).abs() < 1e-4 * kiss,
         "{kiss} {seconds}"
     );
-    assert_eq!(&records[1][column("kiss_time")], "");
-    assert_eq!(csv_of(&rows).lines().count(), 6);
+    assert_eq!(&lines[1][column("kiss_time")], "");
+    assert_eq!(to_csv(&rows).lines().count(), 6);
     std::fs::remove_dir_all(study.join("runs")).unwrap();
-    assert_eq!(table(&plan.manifest, &study), rows, "the table is kept");
+    assert_eq!(records(&plan.manifest, &study), rows, "the table is kept");
 }

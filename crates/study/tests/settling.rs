@@ -5,10 +5,12 @@ mod common;
 use std::path::{Path, PathBuf};
 
 use common::{DRY, plan};
-use grainwake_study::{Options, Outcome, Plan, Row, StudyError, Watcher, carry_out, render, table};
+use grainwake_study::{
+    Options, Outcome, Plan, RunRecord, StudyError, StudyObserver, execute, records, render,
+};
 
 struct Quiet;
-impl Watcher for Quiet {}
+impl StudyObserver for Quiet {}
 
 const STUDY: &str = r#"
 title = "falls"
@@ -43,7 +45,7 @@ fn carried_out(grains: usize) -> (tempfile::TempDir, PathBuf, Plan) {
     std::fs::write(&path, STUDY).unwrap();
     let plan = plan(&path).unwrap();
     let out = folder.path().join("out");
-    plan.settle(&out).unwrap();
+    plan.create_folder(&out).unwrap();
     let options = Options {
         jobs: 1,
         threads: 1,
@@ -51,13 +53,13 @@ fn carried_out(grains: usize) -> (tempfile::TempDir, PathBuf, Plan) {
         keep_checkpoints: false,
         command: vec!["test".into()],
     };
-    let ended = carry_out(&plan.manifest.runs, &[0, 1], &out, &options, &Quiet).unwrap();
+    let ended = execute(&plan.manifest.runs, &[0, 1], &out, &options, &Quiet).unwrap();
     assert!(ended.iter().all(|(_, o)| matches!(o, Outcome::Finished(_))));
     (folder, out, plan)
 }
 
-fn rows(plan: &Plan, out: &Path) -> Vec<Row> {
-    table(&plan.manifest, out)
+fn rows(plan: &Plan, out: &Path) -> Vec<RunRecord> {
+    records(&plan.manifest, out)
 }
 
 fn page(out: &Path) -> String {

@@ -1,7 +1,7 @@
 //! Rank statistics against textbooks and tables.
 
-use grainwake_study::stats::{
-    median, quartile, ranks, relative_spread, signed_rank, spearman, wider,
+use grainwake_study::statistics::{
+    coefficient_of_variation, median, quantile, ranks, relative_spread_test, signed_rank, spearman,
 };
 
 #[test]
@@ -99,16 +99,16 @@ fn intervals_cover_what_they_should() {
 fn quartiles_and_spreads() {
     let v = [4.0, 1.0, 3.0, 2.0];
     assert_eq!(
-        (quartile(&v, 0.0), median(&v), quartile(&v, 1.0)),
+        (quantile(&v, 0.0), median(&v), quantile(&v, 1.0)),
         (Some(1.0), Some(2.5), Some(4.0))
     );
-    assert_eq!(quartile(&v, 0.25), Some(1.75));
+    assert_eq!(quantile(&v, 0.25), Some(1.75));
     assert_eq!(median(&[]), None);
-    assert!((relative_spread(&[9.0, 11.0]).unwrap() - 2f64.sqrt() / 10.0).abs() < 1e-12);
+    assert!((coefficient_of_variation(&[9.0, 11.0]).unwrap() - 2f64.sqrt() / 10.0).abs() < 1e-12);
     let narrow: Vec<f64> = (0..12)
         .map(|i| 10.0 + 0.1 * f64::from(i * 5 % 12))
         .collect();
     let wide: Vec<f64> = (0..12).map(|i| 10.0 + f64::from(i * 7 % 12)).collect();
-    assert!(wider(&wide, &narrow).unwrap().low > 0.0);
-    assert!(wider(&narrow, &wide).unwrap().high < 0.0);
+    assert!(relative_spread_test(&wide, &narrow).unwrap().low > 0.0);
+    assert!(relative_spread_test(&narrow, &wide).unwrap().high < 0.0);
 }

@@ -4,10 +4,11 @@ use std::fmt::Write;
 
 use grainwake_report::figure::text::escape;
 
-use super::Content;
-use crate::settling::Settling;
-use crate::table::{GRAINS, Row};
-use crate::words::short;
+use super::html::Content;
+use crate::format::significant;
+use crate::measure::record::RunRecord;
+use crate::measure::settling::SettlingMeasures;
+use crate::measure::table::SETTLING_TABLE;
 
 /// Columns of the table: heading and quantity.
 pub(super) const COLUMNS: [(&str, &str); 12] = [
@@ -29,14 +30,14 @@ pub(super) const COLUMNS: [(&str, &str); 12] = [
 const STEADY: f64 = 0.02;
 
 /// Runs that are no pairs.
-fn settled(rows: &[Row]) -> Vec<(&Row, &Settling)> {
+fn settled(rows: &[RunRecord]) -> Vec<(&RunRecord, &SettlingMeasures)> {
     rows.iter()
         .filter_map(|row| Some((row, row.settling.as_ref()?)))
         .collect()
 }
 
 /// What came out, in half a sentence; none without such runs.
-pub(super) fn lead(rows: &[Row]) -> Option<String> {
+pub(super) fn lead(rows: &[RunRecord]) -> Option<String> {
     let all = settled(rows);
     if all.is_empty() {
         return None;
@@ -48,13 +49,13 @@ pub(super) fn lead(rows: &[Row]) -> Option<String> {
     } else {
         format!("; {landed} of their {grains} grains landed")
     };
-    let span = |pick: fn(&Settling) -> Option<f64>| {
+    let span = |pick: fn(&SettlingMeasures) -> Option<f64>| {
         let values = || all.iter().filter_map(|(_, s)| pick(s));
         let ends = (values().reduce(f64::min)?, values().reduce(f64::max)?);
         Some(if ends.0 == ends.1 {
-            short(ends.0)
+            significant(ends.0)
         } else {
-            format!("{} to {}", short(ends.0), short(ends.1))
+            format!("{} to {}", significant(ends.0), significant(ends.1))
         })
     };
     if let Some(speeds) = span(|s| s.final_speed_m_per_s) {
@@ -66,34 +67,37 @@ pub(super) fn lead(rows: &[Row]) -> Option<String> {
     Some(text)
 }
 
-/// Which settle fastest and land first, and how sure that is.
+/// Which create_folder fastest and land first, and how sure that is.
 pub(super) fn answers(content: &Content) -> String {
     let all = settled(content.rows);
     let mut out = String::new();
-    let mut list = |what: [&str; 2], unit: &str, pick: fn(&Settling) -> Option<f64>, up: bool| {
-        let mut sorted: Vec<(&Row, f64)> = all
-            .iter()
-            .filter_map(|(row, s)| Some((*row, pick(s)?)))
-            .collect();
-        sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
-        if up {
-            sorted.reverse();
-        }
-        let name = |(row, v): &(&Row, f64)| format!("{} ({} {unit})", escape(&row.name), short(*v));
-        let first: Vec<String> = sorted.iter().take(5).map(name).collect();
-        let last: Vec<String> = sorted.iter().skip(5).rev().take(3).map(name).collect();
-        if sorted.is_empty() {
-            let _ = writeln!(out, "<p>No finished run gives a {}.</p>", what[1]);
-        } else {
-            let last = if last.is_empty() {
-                String::new()
-            } else {
-                format!(" Last: {}.", last.join(", "))
+    let mut list =
+        |what: [&str; 2], unit: &str, pick: fn(&SettlingMeasures) -> Option<f64>, up: bool| {
+            let mut sorted: Vec<(&RunRecord, f64)> = all
+                .iter()
+                .filter_map(|(row, s)| Some((*row, pick(s)?)))
+                .collect();
+            sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
+            if up {
+                sorted.reverse();
+            }
+            let name = |(row, v): &(&RunRecord, f64)| {
+                format!("{} ({} {unit})", escape(&row.name), significant(*v))
             };
-            let first = first.join(", ");
-            let _ = writeln!(out, "<p><b>{}</b>: {first}.{last}</p>", what[0]);
-        }
-    };
+            let first: Vec<String> = sorted.iter().take(5).map(name).collect();
+            let last: Vec<String> = sorted.iter().skip(5).rev().take(3).map(name).collect();
+            if sorted.is_empty() {
+                let _ = writeln!(out, "<p>No finished run gives a {}.</p>", what[1]);
+            } else {
+                let last = if last.is_empty() {
+                    String::new()
+                } else {
+                    format!(" Last: {}.", last.join(", "))
+                };
+                let first = first.join(", ");
+                let _ = writeln!(out, "<p><b>{}</b>: {first}.{last}</p>", what[0]);
+            }
+        };
     list(
         ["Fastest at the end", "final settling speed"],
         "m/s",
@@ -140,6 +144,6 @@ pub(super) fn answers(content: &Content) -> String {
 /// Where the numbers of each grain are.
 pub(super) fn note() -> String {
     format!(
-        "<p>Final speeds are means over the last diameter fallen (of a grain that landed, the last but one); with several grains, means over them, and <i>lands</i> is the first of them. Each grain has its row in <code>{GRAINS}</code>.</p>\n"
+        "<p>Final speeds are means over the last diameter fallen (of a grain that landed, the last but one); with several grains, means over them, and <i>lands</i> is the first of them. Each grain has its row in <code>{SETTLING_TABLE}</code>.</p>\n"
     )
 }

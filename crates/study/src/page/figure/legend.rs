@@ -7,7 +7,7 @@ use grainwake_report::figure::style::{
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::Data;
+use super::FigureData;
 use crate::plan::Run;
 
 const COLOURS: [&str; 6] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY];
@@ -15,9 +15,9 @@ const DASHES: [Option<&str>; 4] = [None, Some("4 1.8"), Some("1.2 1.5"), Some("6
 /// Height of a row of the legend [pt].
 pub const ROW: f64 = 10.0;
 
-/// Looks of a run.
+/// Line style of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct LineStyle {
     /// Colour of its line and sign.
     pub colour: &'static str,
     /// Dashes of its line.
@@ -27,16 +27,16 @@ pub struct Look {
 }
 
 /// What colours and dashes stand for.
-pub enum Looks {
+pub enum LineStyles {
     /// Colours are models.
     Models(Vec<String>),
     /// Colours are the values of an axis, dashes those of another.
     Axes(Vec<(String, Vec<String>)>),
 }
 
-impl Looks {
+impl LineStyles {
     /// Models where they are few or on no axis, else up to two axes.
-    pub fn of(data: &Data) -> Looks {
+    pub fn of(data: &FigureData) -> LineStyles {
         let runs = &data.manifest.runs;
         let mut models: Vec<String> = Vec::new();
         for run in runs {
@@ -46,16 +46,16 @@ impl Looks {
         }
         let axes = axes(data);
         if models.len() <= COLOURS.len() || axes.is_empty() {
-            return Looks::Models(models);
+            return LineStyles::Models(models);
         }
-        Looks::Axes(axes.into_iter().take(2).collect())
+        LineStyles::Axes(axes.into_iter().take(2).collect())
     }
 
     /// Of a run.
-    pub fn look(&self, run: &Run) -> Look {
+    pub fn look(&self, run: &Run) -> LineStyle {
         let (colour, dash) = match self {
-            Looks::Models(models) => (models.iter().position(|m| *m == run.model), None),
-            Looks::Axes(axes) => {
+            LineStyles::Models(models) => (models.iter().position(|m| *m == run.model), None),
+            LineStyles::Axes(axes) => {
                 let place = |(axis, levels): &(String, Vec<String>)| {
                     let level = run.levels.get(axis)?;
                     levels.iter().position(|l| l == level)
@@ -65,34 +65,34 @@ impl Looks {
         };
         // A model that stands outside the axes.
         let Some(colour) = colour else {
-            return Look {
+            return LineStyle {
                 colour: INK,
                 dash: None,
                 sign: Sign::Circle,
             };
         };
-        Look {
+        LineStyle {
             colour: COLOURS[colour % COLOURS.len()],
             dash: DASHES[dash.unwrap_or(0) % DASHES.len()],
             sign: Sign::number(dash.unwrap_or(colour)),
         }
     }
 
-    fn entries(&self) -> Vec<(String, Look)> {
-        let look = |colour: &'static str, n: usize, sign: usize| Look {
+    fn entries(&self) -> Vec<(String, LineStyle)> {
+        let look = |colour: &'static str, n: usize, sign: usize| LineStyle {
             colour,
             dash: DASHES[n % DASHES.len()],
             sign: Sign::number(sign),
         };
         match self {
             // More models than that have no colours of their own.
-            Looks::Models(models) => models
+            LineStyles::Models(models) => models
                 .iter()
                 .take(4 * COLOURS.len())
                 .enumerate()
                 .map(|(i, m)| (m.clone(), look(COLOURS[i % COLOURS.len()], 0, i)))
                 .collect(),
-            Looks::Axes(axes) => {
+            LineStyles::Axes(axes) => {
                 let mut out = Vec::new();
                 for (n, (axis, levels)) in axes.iter().enumerate() {
                     for (i, level) in levels.iter().enumerate() {
@@ -135,7 +135,7 @@ impl Looks {
 }
 
 /// The axes with more than one value, with their values in the order of the runs.
-pub fn axes(data: &Data) -> Vec<(String, Vec<String>)> {
+pub fn axes(data: &FigureData) -> Vec<(String, Vec<String>)> {
     let mut names: Vec<String> = Vec::new();
     for run in &data.manifest.runs {
         for axis in run

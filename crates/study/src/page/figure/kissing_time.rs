@@ -10,10 +10,10 @@ use grainwake_report::figure::style::{
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::{Data, Drawn, symbol, value_text};
-use crate::judge::{Sample, samples};
-use crate::stats::quartile;
-use crate::words::short;
+use super::{FigureData, StudyFigure, symbol, value_text};
+use crate::analysis::statistics::quantile;
+use crate::analysis::verdict::{Observation, observations};
+use crate::format::significant;
 
 const COLOURS: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
 const SHADES: [&str; 2] = ["#e9e9ec", "#f6f6f8"];
@@ -22,18 +22,18 @@ const LABEL: &str = "kissing time  *t* √(*g*/*d*)  [–]";
 /// Kissing times by grain: where each grain stands, and its block.
 struct Layout {
     grains: Vec<String>,
-    reference: Option<Sample>,
-    all: Vec<Sample>,
+    reference: Option<Observation>,
+    all: Vec<Observation>,
     frame: Frame,
     /// First and last place, value of the row factor.
     blocks: Vec<(usize, usize, f64)>,
 }
 
-fn layout(data: &Data, height: f64, top: f64) -> Option<Layout> {
+fn layout(data: &FigureData, height: f64, top: f64) -> Option<Layout> {
     let plan = &data.manifest.analysis.figures;
     let axis = plan.grains.as_ref()?;
     let grains = data.levels(axis);
-    let all = samples(data.rows, "kiss_time", &BTreeMap::new());
+    let all = observations(data.rows, "kiss_time", &BTreeMap::new());
     let reference = plan
         .reference
         .as_ref()
@@ -124,7 +124,7 @@ impl Layout {
 }
 
 /// Kissing time of every model, with the spread of its members.
-pub fn by_model(data: &Data) -> Option<Drawn> {
+pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
     let plan = &data.manifest.analysis.figures;
     let layout = layout(data, 190.0, 20.0)?;
     let f = &layout.frame;
@@ -163,7 +163,7 @@ pub fn by_model(data: &Data) -> Option<Drawn> {
             false,
         );
     }
-    let mut draw = |sample: &Sample, at: f64, n: usize, colour: &str| {
+    let mut draw = |sample: &Observation, at: f64, n: usize, colour: &str| {
         let x = f.px(at);
         if sample.range.1 > sample.range.0 {
             drawing.line(
@@ -231,7 +231,7 @@ pub fn by_model(data: &Data) -> Option<Drawn> {
     if bounds > 0 {
         caption += &format!(" {bounds} pairs landed before they kissed.");
     }
-    Some(Drawn {
+    Some(StudyFigure {
         name: "fig14a-kissing-time".into(),
         number: "14a".into(),
         title: "Kissing time of all models".into(),
@@ -241,7 +241,7 @@ pub fn by_model(data: &Data) -> Option<Drawn> {
 }
 
 /// Spread of the kissing time over the orientations of each grain.
-pub fn boxes(data: &Data) -> Option<Drawn> {
+pub fn boxes(data: &FigureData) -> Option<StudyFigure> {
     let plan = &data.manifest.analysis.figures;
     let layout = layout(data, 160.0, 8.0)?;
     let f = &layout.frame;
@@ -257,7 +257,7 @@ pub fn boxes(data: &Data) -> Option<Drawn> {
             .filter(|s| s.levels.get(axis) == Some(grain))
             .map(|s| s.value)
             .collect();
-        let of = |part: f64| quartile(&values, part);
+        let of = |part: f64| quantile(&values, part);
         let (Some(low), Some(q1), Some(middle), Some(q3), Some(high)) =
             (of(0.0), of(0.25), of(0.5), of(0.75), of(1.0))
         else {
@@ -304,9 +304,9 @@ pub fn boxes(data: &Data) -> Option<Drawn> {
     let bounds = layout.all.iter().filter(|s| s.bound).count();
     let mut caption = match widest {
         Some((width, grain)) if drawn > 0 => format!(
-            "Kissing times of the orientations of each grain: smallest, lower quartile, median, upper quartile and largest. The orientation matters most for {}, whose kissing times span {}.",
+            "Kissing times of the orientations of each grain: smallest, lower quantile, median, upper quantile and largest. The orientation matters most for {}, whose kissing times span {}.",
             text::literal(grain),
-            short(width)
+            significant(width)
         ),
         _ => return None,
     };
@@ -315,7 +315,7 @@ pub fn boxes(data: &Data) -> Option<Drawn> {
             " The {bounds} pairs that landed before they kissed count with the time of the landing."
         );
     }
-    Some(Drawn {
+    Some(StudyFigure {
         name: "fig14b-kissing-time-spread".into(),
         number: "14b".into(),
         title: "Spread of the kissing time by grain".into(),

@@ -1,4 +1,4 @@
-//! Statistics of small samples by ranks: no assumption on how values are spread.
+//! Statistics of small observations by ranks: no assumption on how values are spread.
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
@@ -55,7 +55,7 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
         return None;
     }
     let r = pearson(&ranks(x), &ranks(y))?;
-    let reach = quantile(0.975) * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
+    let reach = normal_quantile(0.975) * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
     // A perfect order has no finite z; the next best possible one stands for it.
     let steps = (n * (n * n - 1)) as f64;
     let z = r.clamp(-1.0 + 6.0 / steps, 1.0 - 6.0 / steps).atanh();
@@ -144,11 +144,11 @@ fn critical(law: &[f64]) -> usize {
 
 /// Median; none of nothing.
 pub fn median(values: &[f64]) -> Option<f64> {
-    quartile(values, 0.5)
+    quantile(values, 0.5)
 }
 
 /// The value below which a part of the sorted values lies, between values in proportion.
-pub fn quartile(values: &[f64], part: f64) -> Option<f64> {
+pub fn quantile(values: &[f64], part: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len().checked_sub(1)?;
@@ -158,10 +158,10 @@ pub fn quartile(values: &[f64], part: f64) -> Option<f64> {
     Some(sorted[low] + (at - low as f64) * (sorted[high] - sorted[low]))
 }
 
-/// Of two paired samples of positive values: whether the first is spread more widely, relative to
+/// Of two paired observations of positive values: whether the first is spread more widely, relative to
 /// its size. The Pitman-Morgan test by ranks on logarithms: the spreads are equal if and only if
 /// sum and difference are uncorrelated.
-pub fn wider(first: &[f64], second: &[f64]) -> Option<Estimate> {
+pub fn relative_spread_test(first: &[f64], second: &[f64]) -> Option<Estimate> {
     if first.iter().chain(second).any(|v| *v <= 0.0) {
         return None;
     }
@@ -172,13 +172,13 @@ pub fn wider(first: &[f64], second: &[f64]) -> Option<Estimate> {
 }
 
 /// Standard deviation over mean.
-pub fn relative_spread(values: &[f64]) -> Option<f64> {
+pub fn coefficient_of_variation(values: &[f64]) -> Option<f64> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let square: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
     (values.len() > 1 && mean != 0.0).then(|| (square / (n - 1.0)).sqrt() / mean.abs())
 }
 
-fn quantile(p: f64) -> f64 {
+fn normal_quantile(p: f64) -> f64 {
     Normal::new(0.0, 1.0).map_or(1.96, |normal| normal.inverse_cdf(p))
 }

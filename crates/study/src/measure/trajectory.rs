@@ -7,8 +7,8 @@ use glam::DVec3;
 use grainwake_report::run_folder::{History, histories};
 
 use crate::error::{StudyError, write_whole};
+use crate::measure::record::RunRecord;
 use crate::plan::Run;
-use crate::table::Row;
 
 /// Folder of the thinned-out histories in a study folder.
 pub const HISTORIES: &str = "histories";
@@ -18,7 +18,7 @@ const HEADER: &str = "time,grain,x,y,z,vx,vy,vz,qw,qx,qy,qz,wx,wy,wz,contacts\n"
 
 /// The motion of a pair in dimensionless numbers, until the first landing.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Motion {
+pub struct Trajectory {
     /// Times [sqrt(d/g)].
     pub time: Vec<f64>,
     /// Distance of the centres [d].
@@ -27,9 +27,9 @@ pub struct Motion {
     pub velocity: [Vec<f64>; 2],
 }
 
-impl Motion {
+impl Trajectory {
     /// Of a finished run: from its run folder, else from the thinned-out copy.
-    pub fn read(run: &Run, row: &Row, study: &Path) -> Option<Motion> {
+    pub fn read(run: &Run, row: &RunRecord, study: &Path) -> Option<Trajectory> {
         let whole = run.folder(study).join("grains.csv");
         let thin = study.join(HISTORIES).join(format!("{}.csv", run.name));
         let found = [whole, thin]
@@ -40,7 +40,7 @@ impl Motion {
         };
         let (up, unit) = row.up_and_time()?;
         let landing = row.pair.as_ref()?.landing_time;
-        Motion::of(
+        Trajectory::of(
             [a, b],
             up,
             row.diameter_m?,
@@ -55,7 +55,7 @@ impl Motion {
         diameter: f64,
         unit: f64,
         until: f64,
-    ) -> Option<Motion> {
+    ) -> Option<Trajectory> {
         let height = |h: &History| Some(h.position.first()?.dot(up));
         let (behind, ahead) = if height(a)? >= height(b)? {
             (a, b)
@@ -69,7 +69,7 @@ impl Motion {
                 .map(|v| v.dot(up) * unit / diameter)
                 .collect()
         };
-        Some(Motion {
+        Some(Trajectory {
             time: behind.time[..rows].iter().map(|t| t / unit).collect(),
             distance: (0..rows)
                 .map(|i| behind.position[i].distance(ahead.position[i]) / diameter)
@@ -92,7 +92,7 @@ impl Motion {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn thin(run: &Run, row: &Row, study: &Path) -> Result<bool, StudyError> {
+pub fn write_thinned_history(run: &Run, row: &RunRecord, study: &Path) -> Result<bool, StudyError> {
     let Ok(all) = histories(&run.folder(study).join("grains.csv"), &mut Vec::new()) else {
         return Ok(false);
     };

@@ -6,10 +6,8 @@ use grainwake_solver::case::{Loc, Problem, Source, nearest};
 use serde::{Deserialize, Serialize};
 
 use crate::error::of_a_study;
-use crate::measure::QUANTITIES;
-use crate::model::Model;
-use crate::plan::MEASURED;
-use crate::settling::SETTLING;
+use crate::plan::expand::Model;
+use crate::plan::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES, SHAPE_FACTORS};
 
 /// What is asked of the results: claims, correlations, figures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -22,7 +20,7 @@ pub struct Analysis {
     pub correlations: Option<Correlations>,
     /// What the figures show.
     #[serde(default)]
-    pub figures: FigurePlan,
+    pub figures: FigureRequest,
 }
 
 /// A claim and how it is tested.
@@ -144,7 +142,7 @@ pub struct Correlations {
 /// What the figures show. What is not given is not drawn.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct FigurePlan {
+pub struct FigureRequest {
     /// Axis whose values are the grains.
     pub grains: Option<String>,
     /// Factors that place a grain in its row and its column.
@@ -171,7 +169,7 @@ pub(crate) struct RawAnalysis {
     #[serde(default)]
     claim: Vec<RawClaim>,
     correlations: Option<Loc<Correlations>>,
-    figures: Option<Loc<FigurePlan>>,
+    figures: Option<Loc<FigureRequest>>,
 }
 
 #[derive(Deserialize)]
@@ -190,7 +188,7 @@ struct RawClaim {
 
 /// What can be asked for: of a pair, of other grains.
 fn quantities() -> impl Iterator<Item = &'static str> + Clone {
-    QUANTITIES.into_iter().chain(SETTLING)
+    PAIR_QUANTITIES.into_iter().chain(SETTLING_QUANTITIES)
 }
 
 /// Checks names against the models of the study.
@@ -250,7 +248,7 @@ impl Names<'_> {
             .models
             .iter()
             .flat_map(|m| m.factors.keys().map(String::as_str));
-        self.check("factor", name, own.chain(MEASURED), span)
+        self.check("factor", name, own.chain(SHAPE_FACTORS), span)
     }
     fn model(&self, name: &str, span: Option<&std::ops::Range<usize>>) -> Result<(), Problem> {
         self.check(
@@ -295,7 +293,7 @@ impl Names<'_> {
 
     fn figures(
         &self,
-        plan: &FigurePlan,
+        plan: &FigureRequest,
         span: Option<&std::ops::Range<usize>>,
     ) -> Result<(), Problem> {
         let each = |name: &Option<String>, check: &dyn Fn(&str) -> Result<(), Problem>| {

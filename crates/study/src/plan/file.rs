@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use grainwake_solver::case::{Loc, Problem, Source, parse_length};
 
-use crate::claims::Analysis;
 use crate::error::{At, StudyError, of_a_study};
-use crate::model::{self, Model};
-use crate::raw::{Length, RawEnsemble, RawStudy};
+use crate::plan::claims::Analysis;
+use crate::plan::expand::{self, Model};
+use crate::plan::raw::{Length, RawEnsemble, RawStudy};
 
 /// A study: its models and what is asked of them.
 pub struct Study {
@@ -58,7 +58,7 @@ impl Study {
         let (source, raw): (Source, RawStudy) =
             Source::parse(&path.display().to_string(), text, &[]).map_err(of_a_study)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let models = model::expand(&source, &raw, folder).map_err(StudyError::Invalid)?;
+        let models = expand::expand(&source, &raw, folder).map_err(StudyError::Invalid)?;
         let ensemble = match &raw.ensemble {
             Some(given) => Some(ensemble(&source, given, &models)?),
             None => None,
@@ -139,7 +139,7 @@ fn ensemble(source: &Source, raw: &RawEnsemble, models: &[Model]) -> Result<Ense
     }
     let which = match &raw.models {
         None => (0..models.len()).collect(),
-        Some(Loc { value, span }) => model::matching(source, value, span.as_ref(), models)?,
+        Some(Loc { value, span }) => expand::matching(source, value, span.as_ref(), models)?,
     };
     Ok(Ensemble {
         members: raw.members.value,

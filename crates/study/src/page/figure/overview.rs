@@ -9,18 +9,19 @@ use grainwake_report::figure::style::{LINE, PAGE};
 use grainwake_report::figure::svg::Drawing;
 use grainwake_report::figure::text;
 
-use super::legend::{Looks, axes};
-use super::{Data, Drawn};
-use crate::claims::FigurePlan;
-use crate::fall::Fall;
-use crate::judge::{Sample, samples};
-use crate::motion::Motion;
-use crate::plan::{MEASURED, Run};
+use super::legend::{LineStyles, axes};
+use super::{FigureData, StudyFigure};
+use crate::analysis::verdict::{Observation, observations};
+use crate::measure::fall::SettlingCurve;
+use crate::measure::trajectory::Trajectory;
+use crate::plan::Run;
+use crate::plan::claims::FigureRequest;
+use crate::plan::quantities::SHAPE_FACTORS;
 
 const LEFT: f64 = 42.0;
 const GAP: f64 = 14.0;
 const HEIGHT: f64 = 150.0;
-/// More runs than that are drawn with thin lines.
+/// More runs than that are drawn with write_thinned_history lines.
 const FEW: usize = 12;
 /// Most panels of a figure.
 const PANELS: usize = 6;
@@ -35,8 +36,8 @@ struct Words {
 }
 
 /// What is drawn where the analysis asks for no figures.
-pub fn figures(data: &Data) -> Vec<Drawn> {
-    if data.manifest.analysis.figures != FigurePlan::default() {
+pub fn figures(data: &FigureData) -> Vec<StudyFigure> {
+    if data.manifest.analysis.figures != FigureRequest::default() {
         return Vec::new();
     }
     let settling = data.rows.iter().any(|row| row.settling.is_some());
@@ -65,15 +66,17 @@ pub fn figures(data: &Data) -> Vec<Drawn> {
     out
 }
 
-fn finished<'a>(data: &'a Data) -> impl Iterator<Item = (&'a Run, &'a crate::table::Row)> {
+fn finished<'a>(
+    data: &'a FigureData,
+) -> impl Iterator<Item = (&'a Run, &'a crate::measure::record::RunRecord)> {
     let both = data.manifest.runs.iter().zip(data.rows);
     both.filter(|(_, row)| row.finished())
 }
 
-fn speeds(data: &Data) -> Option<Drawn> {
+fn speeds(data: &FigureData) -> Option<StudyFigure> {
     let known = finished(data).filter(|(_, row)| row.settling.is_some());
     let curves: Vec<(&Run, Vec<(f64, f64)>)> = known
-        .filter_map(|(run, row)| Some((run, Fall::read(run, row, data.folder)?.points)))
+        .filter_map(|(run, row)| Some((run, SettlingCurve::read(run, row, data.folder)?.points)))
         .collect();
     let single = data
         .rows
@@ -93,10 +96,10 @@ fn speeds(data: &Data) -> Option<Drawn> {
     curves_against_time(data, &curves, words)
 }
 
-fn distances(data: &Data) -> Option<Drawn> {
-    let motions = finished(data).filter(|(_, row)| row.pair.is_some());
-    let curves: Vec<(&Run, Vec<(f64, f64)>)> = motions
-        .filter_map(|(run, row)| Some((run, Motion::read(run, row, data.folder)?)))
+fn distances(data: &FigureData) -> Option<StudyFigure> {
+    let trajectories = finished(data).filter(|(_, row)| row.pair.is_some());
+    let curves: Vec<(&Run, Vec<(f64, f64)>)> = trajectories
+        .filter_map(|(run, row)| Some((run, Trajectory::read(run, row, data.folder)?)))
         .map(|(run, motion)| (run, motion.points(&motion.distance)))
         .collect();
     let words = Words {
@@ -113,14 +116,14 @@ fn distances(data: &Data) -> Option<Drawn> {
 }
 
 fn curves_against_time(
-    data: &Data,
+    data: &FigureData,
     curves: &[(&Run, Vec<(f64, f64)>)],
     words: Words,
-) -> Option<Drawn> {
+) -> Option<StudyFigure> {
     let points = || curves.iter().flat_map(|(_, points)| points.iter().copied());
     let (_, end) = extent(points().map(|p| p.0))?;
     let (low, high) = extent(points().map(|p| p.1).chain([0.0]))?;
-    let looks = Looks::of(data);
+    let looks = LineStyles::of(data);
     let top = looks.legend(None, LEFT, false) + 4.0;
     let frame = Frame {
         x: LEFT,
@@ -147,7 +150,7 @@ fn curves_against_time(
         }
     }
     frame.outline(&mut drawing, (true, true));
-    Some(Drawn {
+    Some(StudyFigure {
         name: words.name.into(),
         number: String::new(),
         title: words.title.into(),
@@ -157,7 +160,7 @@ fn curves_against_time(
 }
 
 /// What was varied: where each model stands, and the ticks of names.
-struct Varied {
+struct Parameter {
     /// Name of the axis or the factor.
     name: String,
     /// Axis of the study that it stands for.
@@ -168,13 +171,13 @@ struct Varied {
 }
 
 /// The axes, as numbers where a factor goes with them; of a study without axes its factors, else its models.
-fn varied(data: &Data) -> Vec<Varied> {
+fn varied(data: &FigureData) -> Vec<Parameter> {
     let runs = &data.manifest.runs;
     let own = |run: &Run| -> Vec<String> {
         let names = run
             .factors
             .keys()
-            .filter(|f| !MEASURED.contains(&f.as_str()));
+            .filter(|f| !SHAPE_FACTORS.contains(&f.as_str()));
         names.cloned().collect()
     };
     let mut factors: Vec<String> = runs.iter().flat_map(own).collect();
@@ -204,13 +207,13 @@ fn varied(data: &Data) -> Vec<Varied> {
             known.collect()
         };
         out.push(match &numbers {
-            Some((factor, values)) => Varied {
+            Some((factor, values)) => Parameter {
                 name: factor.clone(),
                 place: place(&|i| values[i]),
                 names: None,
                 axis: Some(axis.clone()),
             },
-            None => Varied {
+            None => Parameter {
                 name: axis.clone(),
                 place: place(&|i| i as f64 + 0.5),
                 names: Some(levels.clone()),
@@ -227,7 +230,7 @@ fn varied(data: &Data) -> Vec<Varied> {
             .filter_map(|r| Some((r.model.clone(), *r.factors.get(&factor)?)));
         let place: BTreeMap<String, f64> = known.collect();
         if extent(place.values().copied()).is_some_and(|(a, b)| b > a) {
-            out.push(Varied {
+            out.push(Parameter {
                 name: factor,
                 axis: None,
                 place,
@@ -242,7 +245,7 @@ fn varied(data: &Data) -> Vec<Varied> {
             .iter()
             .enumerate()
             .map(|(i, m)| (m.clone(), i as f64 + 0.5));
-        out.push(Varied {
+        out.push(Parameter {
             name: "model".into(),
             axis: None,
             place: place.collect(),
@@ -252,13 +255,13 @@ fn varied(data: &Data) -> Vec<Varied> {
     out
 }
 
-fn against(data: &Data, quantity: &str, words: impl Fn() -> Words) -> Option<Drawn> {
-    let all = samples(data.rows, quantity, &BTreeMap::new());
+fn against(data: &FigureData, quantity: &str, words: impl Fn() -> Words) -> Option<StudyFigure> {
+    let all = observations(data.rows, quantity, &BTreeMap::new());
     let (low, high) = extent(all.iter().flat_map(|s| [s.range.0, s.range.1, 0.0]))?;
     let mut panels = varied(data);
     let left_out = panels.len().saturating_sub(PANELS);
     panels.truncate(PANELS);
-    let looks = Looks::of(data);
+    let looks = LineStyles::of(data);
     let words = words();
     let top = looks.legend(None, LEFT, true) + 4.0;
     let rows = panels.len().div_ceil(2);
@@ -304,7 +307,7 @@ fn against(data: &Data, quantity: &str, words: impl Fn() -> Words) -> Option<Dra
     if left_out > 0 {
         caption += &format!(" {left_out} more axes or factors are not shown.");
     }
-    Some(Drawn {
+    Some(StudyFigure {
         name: words.name.into(),
         number: String::new(),
         title: words.title.into(),
@@ -316,12 +319,12 @@ fn against(data: &Data, quantity: &str, words: impl Fn() -> Words) -> Option<Dra
 fn draw_panel(
     drawing: &mut Drawing,
     frame: &Frame,
-    panel: &Varied,
-    all: &[Sample],
-    data: &Data,
-    looks: &Looks,
+    panel: &Parameter,
+    all: &[Observation],
+    data: &FigureData,
+    looks: &LineStyles,
 ) {
-    let at = |s: &Sample| Some((frame.px(*panel.place.get(&s.model)?), frame.py(s.value)));
+    let at = |s: &Observation| Some((frame.px(*panel.place.get(&s.model)?), frame.py(s.value)));
     // Models that differ along this axis alone are joined.
     let mut lines: BTreeMap<BTreeMap<String, String>, Vec<(f64, f64)>> = BTreeMap::new();
     for sample in all {

@@ -1,5 +1,13 @@
 //! The plan of a study: every run with its case resolved, its name and its hash.
 
+pub mod claims;
+pub mod expand;
+pub mod file;
+mod offset;
+pub mod quantities;
+mod raw;
+pub mod selection;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -10,15 +18,17 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::claims::Analysis;
+use self::claims::Analysis;
+use self::expand::Model;
+use self::file::Study;
+use self::offset::offset_override;
+use self::quantities::SHAPE_FACTORS;
 use crate::error::{At, StudyError, write_whole};
-use crate::file::Study;
-use crate::model::Model;
-use crate::offset::offset;
-use crate::{MANIFEST, RUNS};
 
-/// Factors that every run has: Krumbein sphericity and, if known, Wadell roundness of its first grain.
-pub const MEASURED: [&str; 2] = ["krumbein_sphericity", "wadell_roundness"];
+/// Subfolder of a study folder that holds the run folders.
+pub const RUNS: &str = "runs";
+/// File of a study folder that holds its plan.
+pub const MANIFEST: &str = "study.json";
 
 /// One run of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -126,8 +136,8 @@ impl Plan {
     ///
     /// # Errors
     /// [`StudyError::Occupied`] if it belongs to another study or holds something else.
-    pub fn settle(&self, folder: &Path) -> Result<(), StudyError> {
-        self.admit(folder)?;
+    pub fn create_folder(&self, folder: &Path) -> Result<(), StudyError> {
+        self.check_folder(folder)?;
         std::fs::create_dir_all(folder.join(RUNS)).at("create", folder)?;
         self.manifest.write(folder)
     }
@@ -136,7 +146,7 @@ impl Plan {
     ///
     /// # Errors
     /// [`StudyError::Occupied`] if it belongs to another study or holds something else.
-    pub fn admit(&self, folder: &Path) -> Result<(), StudyError> {
+    pub fn check_folder(&self, folder: &Path) -> Result<(), StudyError> {
         let occupied = |what: String| {
             Err(StudyError::Occupied {
                 folder: folder.into(),
@@ -214,7 +224,9 @@ fn runs_of(study: &Study, index: usize, sets: &[String]) -> Result<Vec<Run>, Stu
     };
     for member in 1..ensemble.members {
         let mut set = set.clone();
-        set.push(offset(study, model, ensemble, member, &case, &set)?);
+        set.push(offset_override(
+            study, model, ensemble, member, &case, &set,
+        )?);
         let case = Case::load(&model.base, &set).map_err(|e| placed(study, model, e))?;
         runs.push(run(model, member, set, &case));
     }
@@ -223,7 +235,7 @@ fn runs_of(study: &Study, index: usize, sets: &[String]) -> Result<Vec<Run>, Stu
 
 fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
     let estimate = Estimate::of(case, 1);
-    let ending = ending(&case.resolved);
+    let ending = end_condition(&case.resolved);
     let own = Provenance::new(&case.digest);
     let mut hash = Sha256::new();
     for part in [
@@ -267,15 +279,18 @@ fn factors(model: &Model, case: &Case) -> BTreeMap<String, f64> {
     let mut factors = BTreeMap::new();
     if let Some(grain) = case.setup.grains.first() {
         let form = grain.shape.morphology();
-        factors.insert(MEASURED[0].to_owned(), form.krumbein_sphericity);
-        factors.extend(form.wadell_roundness.map(|r| (MEASURED[1].to_owned(), r)));
+        factors.insert(SHAPE_FACTORS[0].to_owned(), form.krumbein_sphericity);
+        factors.extend(
+            form.wadell_roundness
+                .map(|r| (SHAPE_FACTORS[1].to_owned(), r)),
+        );
     }
     factors.extend(model.factors.clone());
     factors
 }
 
 /// The end of a resolved case and what stops it before, in one line.
-pub(crate) fn ending(resolved: &str) -> String {
+pub(crate) fn end_condition(resolved: &str) -> String {
     let table: toml::Table = resolved.parse().unwrap_or_default();
     let time = table.get("time").and_then(toml::Value::as_table);
     let part = |name: &str| {

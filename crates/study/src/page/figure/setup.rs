@@ -9,10 +9,10 @@ use grainwake_solver::case::Case;
 use grainwake_solver::dem::Grain;
 
 use super::grains::arrow;
-use super::{Data, Drawn, value_text};
+use super::{FigureData, StudyFigure, value_text};
 
 /// The set-up of a model.
-pub fn figure(data: &Data, notes: &mut Vec<String>) -> Option<Drawn> {
+pub fn figure(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure> {
     let name = data.manifest.analysis.figures.setup.as_ref()?;
     let Some(case) = data.run(name).and_then(|run| data.case(run)) else {
         notes.push(format!(
@@ -23,7 +23,7 @@ pub fn figure(data: &Data, notes: &mut Vec<String>) -> Option<Drawn> {
     draw(name, &case)
 }
 
-fn draw(name: &str, case: &Case) -> Option<Drawn> {
+fn draw(name: &str, case: &Case) -> Option<StudyFigure> {
     let mesh = &case.setup.mesh;
     let (low, high) = (mesh.origin, mesh.upper());
     let [first, second] = case.setup.grains.as_slice() else {
@@ -171,7 +171,7 @@ fn draw(name: &str, case: &Case) -> Option<Drawn> {
         1e3 * (bottom - top),
         (bottom - top) / d
     );
-    Some(Drawn {
+    Some(StudyFigure {
         name: "fig07-setup".into(),
         number: "7".into(),
         title: "The set-up".into(),

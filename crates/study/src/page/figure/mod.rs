@@ -1,12 +1,12 @@
 //! Figures of a study, each a drawing with its caption.
 
-mod compare;
-mod default;
 mod grains;
-mod kiss;
+mod histories;
+mod kissing_time;
 mod legend;
+mod overview;
 mod setup;
-mod stories;
+mod snapshots;
 mod trends;
 
 use std::collections::BTreeMap;
@@ -17,13 +17,13 @@ use grainwake_report::figure::text;
 use grainwake_solver::case::Case;
 use grainwake_solver::output::RESOLVED;
 
-use crate::correlation::Correlation;
-use crate::motion::Motion;
+use crate::analysis::correlation::Correlation;
+use crate::measure::record::RunRecord;
+use crate::measure::trajectory::Trajectory;
 use crate::plan::{Manifest, Run};
-use crate::table::Row;
 
 /// A figure ready to be written.
-pub struct Drawn {
+pub struct StudyFigure {
     /// File name without its extension.
     pub name: String,
     /// Number of its counterpart in the paper, if it has one.
@@ -36,7 +36,7 @@ pub struct Drawn {
     pub drawing: Drawing,
 }
 
-impl Drawn {
+impl StudyFigure {
     /// As an SVG document that can also stand inside a page.
     pub fn svg(&self) -> String {
         self.drawing.to_svg(
@@ -48,20 +48,20 @@ impl Drawn {
 }
 
 /// What the figures are drawn from.
-pub struct Data<'a> {
+pub struct FigureData<'a> {
     /// The plan.
     pub manifest: &'a Manifest,
     /// The table.
-    pub rows: &'a [Row],
+    pub rows: &'a [RunRecord],
     /// The study folder.
     pub folder: &'a Path,
     /// Correlations to be drawn.
     pub correlations: &'a [Correlation],
     /// Motions of the finished runs that are compared, by run.
-    pub motions: BTreeMap<String, Motion>,
+    pub trajectories: BTreeMap<String, Trajectory>,
 }
 
-impl Data<'_> {
+impl FigureData<'_> {
     /// The first run of a model.
     pub fn run(&self, model: &str) -> Option<&Run> {
         self.manifest.runs.iter().find(|run| run.model == model)
@@ -97,16 +97,16 @@ impl Data<'_> {
 }
 
 /// Draws all figures that the study has data for; what had to be left out is added to `notes`.
-pub fn all(data: &Data, notes: &mut Vec<String>) -> Vec<Drawn> {
+pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
     let mut out = Vec::new();
     out.extend(grains::family(data, notes));
     out.extend(grains::orientations(data, notes));
     out.extend(setup::figure(data, notes));
-    out.extend(stories::figures(data, notes));
-    out.extend(kiss::by_model(data));
-    out.extend(kiss::boxes(data));
-    out.extend(compare::figures(data, notes));
-    out.extend(default::figures(data));
+    out.extend(snapshots::figures(data, notes));
+    out.extend(kissing_time::by_model(data));
+    out.extend(kissing_time::boxes(data));
+    out.extend(histories::figures(data, notes));
+    out.extend(overview::figures(data));
     out.extend(trends::figure(data));
     if !as_in_the_paper(data) {
         renumber(&mut out);
@@ -115,13 +115,13 @@ pub fn all(data: &Data, notes: &mut Vec<String>) -> Vec<Drawn> {
 }
 
 /// Whether the study shows the grains, set-ups and orientations that the paper's first figures do.
-fn as_in_the_paper(data: &Data) -> bool {
+fn as_in_the_paper(data: &FigureData) -> bool {
     let plan = &data.manifest.analysis.figures;
     plan.grains.is_some() && plan.orientations.is_some() && plan.setup.is_some()
 }
 
 /// Counts figures from 1, in their names too.
-fn renumber(figures: &mut [Drawn]) {
+fn renumber(figures: &mut [StudyFigure]) {
     for (i, figure) in figures.iter_mut().enumerate() {
         figure.number = (i + 1).to_string();
         let plain = |name: &str| -> Option<String> {
@@ -143,7 +143,7 @@ pub fn symbol(factor: &str) -> String {
     }
 }
 
-/// A factor's value, short.
+/// A factor's value, significant.
 pub fn value_text(value: f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

@@ -1,5 +1,7 @@
 //! Runs what is missing, several runs at once, each alone in what befalls it.
 
+pub mod state;
+
 use std::collections::VecDeque;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
@@ -13,7 +15,7 @@ use grainwake_solver::sim::events::Event;
 
 use crate::error::{At, StudyError};
 use crate::plan::Run;
-use crate::state::{State, state};
+use crate::run::state::{RunState, run_state};
 
 /// How a study is run.
 #[derive(Clone, Debug)]
@@ -46,7 +48,7 @@ pub enum Outcome {
 }
 
 /// Is told how the runs of a study go on; the number is that of the run in the plan.
-pub trait Watcher: Sync {
+pub trait StudyObserver: Sync {
     /// A run begins or goes on.
     fn started(&self, _run: usize) {}
     /// After every step of a run.
@@ -70,12 +72,12 @@ pub trait Watcher: Sync {
 ///
 /// # Errors
 /// If threads cannot be started.
-pub fn carry_out(
+pub fn execute(
     runs: &[Run],
     chosen: &[usize],
     study: &Path,
     options: &Options,
-    watcher: &dyn Watcher,
+    watcher: &dyn StudyObserver,
 ) -> Result<Vec<(usize, Outcome)>, StudyError> {
     let queue: Mutex<VecDeque<usize>> = Mutex::new(chosen.iter().copied().collect());
     let ended: Mutex<Vec<(usize, Outcome)>> = Mutex::new(Vec::new());
@@ -129,7 +131,7 @@ fn one(
     index: usize,
     study: &Path,
     options: &Options,
-    watcher: &dyn Watcher,
+    watcher: &dyn StudyObserver,
     full: &AtomicBool,
 ) -> Outcome {
     match attempt(run, index, study, options, watcher) {
@@ -152,24 +154,24 @@ fn attempt(
     index: usize,
     study: &Path,
     options: &Options,
-    watcher: &dyn Watcher,
+    watcher: &dyn StudyObserver,
 ) -> Result<Outcome, RunError> {
     let Asked::Taken(_lock) = lock(run, study)? else {
         return Ok(Outcome::Elsewhere);
     };
     let folder = run.folder(study);
-    let existing = match state(run, study) {
-        State::Finished => {
+    let existing = match run_state(run, study) {
+        RunState::Finished => {
             tidy(&folder, options);
             return Ok(Outcome::Before);
         }
-        State::Failed(why) if !options.retry => {
+        RunState::Failed(why) if !options.retry => {
             return Ok(Outcome::Failed(format!("failed before: {why}"), 3));
         }
-        State::Missing => Existing::Refuse,
-        State::Unfinished => Existing::Resume,
-        State::Failed(_) => Existing::Replace,
-        State::Stale(why) => {
+        RunState::Missing => Existing::Refuse,
+        RunState::Unfinished => Existing::Resume,
+        RunState::Failed(_) => Existing::Replace,
+        RunState::Stale(why) => {
             watcher.note(index, &format!("starting over: {why}"));
             Existing::Replace
         }
@@ -230,7 +232,7 @@ fn tidy(folder: &Path, options: &Options) {
 
 struct Told<'a> {
     index: usize,
-    watcher: &'a dyn Watcher,
+    watcher: &'a dyn StudyObserver,
 }
 
 impl Observer for Told<'_> {

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::claims::{Analysis, Condition};
-use crate::judge::{Sample, samples};
-use crate::stats;
-use crate::table::Row;
+use crate::analysis::statistics;
+use crate::analysis::verdict::{Observation, observations};
+use crate::measure::record::RunRecord;
+use crate::plan::claims::{Analysis, Condition};
 
 /// A rank correlation. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -31,7 +31,7 @@ pub struct Correlation {
 }
 
 /// The rank correlations of an analysis.
-pub fn correlations(analysis: &Analysis, rows: &[Row]) -> Vec<Correlation> {
+pub fn correlations(analysis: &Analysis, rows: &[RunRecord]) -> Vec<Correlation> {
     let Some(wanted) = &analysis.correlations else {
         return Vec::new();
     };
@@ -46,14 +46,14 @@ pub fn correlations(analysis: &Analysis, rows: &[Row]) -> Vec<Correlation> {
         for factor in &wanted.factors {
             for level in &levels {
                 let when = BTreeMap::from([(wanted.by.clone(), Condition::Is((*level).clone()))]);
-                let all = samples(rows, quantity, &when);
-                let known: Vec<(&Sample, f64)> = all
+                let all = observations(rows, quantity, &when);
+                let known: Vec<(&Observation, f64)> = all
                     .iter()
                     .filter_map(|s| Some((s, *s.factors.get(factor)?)))
                     .collect();
                 let (x, y): (Vec<f64>, Vec<f64>) =
                     known.iter().map(|(s, f)| (*f, s.latest())).unzip();
-                let found = stats::spearman(&x, &y);
+                let found = statistics::spearman(&x, &y);
                 out.push(Correlation {
                     quantity: quantity.clone(),
                     factor: factor.clone(),

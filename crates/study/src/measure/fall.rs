@@ -4,20 +4,20 @@ use std::path::Path;
 
 use grainwake_report::run_folder::{History, histories};
 
-use crate::motion::HISTORIES;
+use crate::measure::record::RunRecord;
+use crate::measure::trajectory::HISTORIES;
 use crate::plan::Run;
-use crate::table::Row;
 
 /// Settling speed against time, mean over the grains; until all have landed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fall {
+pub struct SettlingCurve {
     /// Times [s] and speeds along gravity [m/s].
     pub points: Vec<(f64, f64)>,
 }
 
-impl Fall {
+impl SettlingCurve {
     /// Of a finished run: from its run folder, else from the thinned-out copy.
-    pub fn read(run: &Run, row: &Row, study: &Path) -> Option<Fall> {
+    pub fn read(run: &Run, row: &RunRecord, study: &Path) -> Option<SettlingCurve> {
         let whole = run.folder(study).join("grains.csv");
         let thin = study.join(HISTORIES).join(format!("{}.csv", run.name));
         let grains = [whole, thin]
@@ -37,6 +37,6 @@ impl Fall {
             .map(|row| (grains[0].time[row], mean(row)))
             .take_while(|(time, _)| *time < until)
             .collect();
-        Some(Fall { points })
+        Some(SettlingCurve { points })
     }
 }

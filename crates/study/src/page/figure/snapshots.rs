@@ -7,13 +7,13 @@ use grainwake_report::figure::text;
 use grainwake_report::story::Subject;
 use grainwake_report::{Told, tell};
 
-use super::{Data, Drawn};
+use super::{FigureData, StudyFigure};
 
 /// Number of the first of these figures in the paper.
 const FIRST: usize = 8;
 
 /// Paths with slices of the speed, then slices of the vorticity.
-pub fn figures(data: &Data, notes: &mut Vec<String>) -> Vec<Drawn> {
+pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
     let stories = &data.manifest.analysis.figures.stories;
     let (mut paths, mut whirls) = (Vec::new(), Vec::new());
     for (n, name) in stories.iter().enumerate() {
@@ -56,7 +56,7 @@ fn state(told: &Told) -> &'static str {
     }
 }
 
-fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<Drawn> {
+fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<StudyFigure> {
     let path = find(told, "trajectories")?;
     let beside: Vec<&Figure> = ["gap", "velocity"]
         .iter()
@@ -98,7 +98,7 @@ fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<Drawn> {
     } else {
         caption += " The run has no slices of the flow.";
     }
-    Some(Drawn {
+    Some(StudyFigure {
         name: format!("fig{number:02}-{name}"),
         number: number.to_string(),
         title: if pair {
@@ -111,9 +111,9 @@ fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<Drawn> {
     })
 }
 
-fn vorticity(name: &str, number: usize, told: &Told) -> Option<Drawn> {
+fn vorticity(name: &str, number: usize, told: &Told) -> Option<StudyFigure> {
     let figure = find(told, "vorticity")?;
-    Some(Drawn {
+    Some(StudyFigure {
         name: format!("fig{number:02}-vorticity-{name}"),
         number: number.to_string(),
         title: format!("Vorticity about {}", text::literal(name)),

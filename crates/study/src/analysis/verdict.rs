@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::claims::{Analysis, Claim, Condition, Sign, Test};
-use crate::stats::{self, Estimate, median};
-use crate::table::Row;
-use crate::words::{p_text, percent, plain, short};
+use crate::analysis::statistics::{self, Estimate, median};
+use crate::format::{p_value, percent, plain, significant};
+use crate::measure::record::RunRecord;
+use crate::plan::claims::{Analysis, Claim, Condition, Sign, Test};
 
 /// What came out for a model: medians over its members.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sample {
+pub struct Observation {
     /// Name of the model.
     pub model: String,
     /// Name of its value on each axis.
@@ -26,7 +26,7 @@ pub struct Sample {
     pub bound: bool,
 }
 
-impl Sample {
+impl Observation {
     /// The value for a test by ranks: what had not happened by the landing comes last.
     pub fn latest(&self) -> f64 {
         if self.bound {
@@ -63,7 +63,7 @@ pub struct Finding {
 }
 
 /// A quantity of a row; of a pair that landed before it happened, the landing as a lower bound.
-pub fn value(row: &Row, quantity: &str) -> Option<(f64, bool)> {
+pub fn value(row: &RunRecord, quantity: &str) -> Option<(f64, bool)> {
     if !row.finished() {
         return None;
     }
@@ -81,8 +81,12 @@ pub fn value(row: &Row, quantity: &str) -> Option<(f64, bool)> {
 }
 
 /// A quantity of every model that has it, medians over the members.
-pub fn samples(rows: &[Row], quantity: &str, when: &BTreeMap<String, Condition>) -> Vec<Sample> {
-    let mut members: BTreeMap<&str, Vec<(&Row, f64, bool)>> = BTreeMap::new();
+pub fn observations(
+    rows: &[RunRecord],
+    quantity: &str,
+    when: &BTreeMap<String, Condition>,
+) -> Vec<Observation> {
+    let mut members: BTreeMap<&str, Vec<(&RunRecord, f64, bool)>> = BTreeMap::new();
     let mut order: Vec<&str> = Vec::new();
     for row in rows.iter().filter(|row| meets(row, when)) {
         if let Some((v, bound)) = value(row, quantity) {
@@ -97,7 +101,7 @@ pub fn samples(rows: &[Row], quantity: &str, when: &BTreeMap<String, Condition>)
         let list = &members[name];
         let values: Vec<f64> = list.iter().map(|(_, v, _)| *v).collect();
         let row = list[0].0;
-        Sample {
+        Observation {
             model: name.to_owned(),
             levels: row.levels.clone(),
             factors: row.factors.clone(),
@@ -113,7 +117,7 @@ pub fn samples(rows: &[Row], quantity: &str, when: &BTreeMap<String, Condition>)
     order.into_iter().map(sample).collect()
 }
 
-fn meets(row: &Row, when: &BTreeMap<String, Condition>) -> bool {
+fn meets(row: &RunRecord, when: &BTreeMap<String, Condition>) -> bool {
     when.iter().all(|(name, condition)| match condition {
         Condition::Is(level) => row.levels.get(name) == Some(level),
         Condition::In(levels) => row.levels.get(name).is_some_and(|l| levels.contains(l)),
@@ -124,7 +128,7 @@ fn meets(row: &Row, when: &BTreeMap<String, Condition>) -> bool {
 }
 
 /// The claims of an analysis, tested.
-pub fn judge(analysis: &Analysis, rows: &[Row]) -> Vec<Finding> {
+pub fn evaluate(analysis: &Analysis, rows: &[RunRecord]) -> Vec<Finding> {
     analysis
         .claims
         .iter()
@@ -132,10 +136,10 @@ pub fn judge(analysis: &Analysis, rows: &[Row]) -> Vec<Finding> {
         .collect()
 }
 
-fn one(claim: &Claim, rows: &[Row]) -> Finding {
-    let every = samples(rows, &claim.quantity, &claim.when);
-    let seen = |all: Vec<Sample>| -> Vec<Sample> {
-        let counts = |s: &Sample| !(claim.observed && s.bound);
+fn one(claim: &Claim, rows: &[RunRecord]) -> Finding {
+    let every = observations(rows, &claim.quantity, &claim.when);
+    let seen = |all: Vec<Observation>| -> Vec<Observation> {
+        let counts = |s: &Observation| !(claim.observed && s.bound);
         all.into_iter().filter(counts).collect()
     };
     let ranges = |over: &str| seen(ranges(&every, over));
@@ -146,17 +150,17 @@ fn one(claim: &Claim, rows: &[Row]) -> Finding {
         Test::Order { axis, more, less } => {
             let pairs = pairs(&all, axis, more, less);
             let differences: Vec<f64> = pairs.iter().map(|(a, b)| a.value - b.value).collect();
-            let found = stats::signed_rank(&differences);
+            let found = statistics::signed_rank(&differences);
             let larger = differences.iter().filter(|d| **d > 0.0).count();
             let says = |e: Estimate| {
                 format!(
                     "{} is larger in {more} than in {less} for {larger} of {} grains; difference {} (95 % interval {} to {}), p = {}",
                     plain(&claim.quantity),
                     e.n,
-                    short(e.value),
-                    short(e.low),
-                    short(e.high),
-                    p_text(e.p)
+                    significant(e.value),
+                    significant(e.low),
+                    significant(e.high),
+                    p_value(e.p)
                 )
             };
             finding(claim, pairs.len(), bounds(&pairs), found, says, |e| {
@@ -183,17 +187,19 @@ fn one(claim: &Claim, rows: &[Row]) -> Finding {
                     e.n
                 )
             };
-            let found = stats::signed_rank(&relative);
+            let found = statistics::signed_rank(&relative);
             finding(claim, pairs.len(), bounds(&pairs), found, says, |e| {
                 inside(e, *within)
             })
         }
         Test::Spread { axis, more, less } => {
             let pairs = pairs(&all, axis, more, less);
-            let side =
-                |pick: fn(&(&Sample, &Sample)) -> f64| pairs.iter().map(pick).collect::<Vec<f64>>();
+            let side = |pick: fn(&(&Observation, &Observation)) -> f64| {
+                pairs.iter().map(pick).collect::<Vec<f64>>()
+            };
             let (first, second) = (side(|p| p.0.value), side(|p| p.1.value));
-            let spread = |v: &[f64]| stats::relative_spread(v).map_or("?".into(), percent);
+            let spread =
+                |v: &[f64]| statistics::coefficient_of_variation(v).map_or("?".into(), percent);
             let says = |e: Estimate| {
                 format!(
                     "{} varies over the grains by {} in {more} and by {} in {less} (standard deviation over mean, n = {}; p of equal spreads = {})",
@@ -201,10 +207,10 @@ fn one(claim: &Claim, rows: &[Row]) -> Finding {
                     spread(&first),
                     spread(&second),
                     e.n,
-                    p_text(e.p)
+                    p_value(e.p)
                 )
             };
-            let found = stats::wider(&first, &second);
+            let found = statistics::relative_spread_test(&first, &second);
             finding(claim, pairs.len(), bounds(&pairs), found, says, |e| {
                 verdict(e.low > 0.0, e.high < 0.0)
             })
@@ -214,15 +220,15 @@ fn one(claim: &Claim, rows: &[Row]) -> Finding {
 }
 
 /// The range over an axis, of models that differ on it alone.
-fn ranges(all: &[Sample], axis: &str) -> Vec<Sample> {
-    let mut groups: BTreeMap<BTreeMap<String, String>, Vec<&Sample>> = BTreeMap::new();
+fn ranges(all: &[Observation], axis: &str) -> Vec<Observation> {
+    let mut groups: BTreeMap<BTreeMap<String, String>, Vec<&Observation>> = BTreeMap::new();
     for sample in all.iter().filter(|s| s.levels.contains_key(axis)) {
         let mut rest = sample.levels.clone();
         rest.remove(axis);
         groups.entry(rest).or_default().push(sample);
     }
     let whole = groups.values().map(Vec::len).max().unwrap_or(0);
-    let range = |group: &Vec<&Sample>| {
+    let range = |group: &Vec<&Observation>| {
         let of =
             |start: f64, pick: fn(f64, f64) -> f64| group.iter().map(|s| s.value).fold(start, pick);
         let mut sample = group[0].clone();
@@ -237,22 +243,22 @@ fn ranges(all: &[Sample], axis: &str) -> Vec<Sample> {
         .collect()
 }
 
-fn trend(claim: &Claim, all: &[Sample], with: &str, sign: Sign, of: &str) -> Finding {
-    let known: Vec<(&Sample, f64)> = all
+fn trend(claim: &Claim, all: &[Observation], with: &str, sign: Sign, of: &str) -> Finding {
+    let known: Vec<(&Observation, f64)> = all
         .iter()
         .filter_map(|s| Some((s, *s.factors.get(with)?)))
         .collect();
     let (x, y): (Vec<f64>, Vec<f64>) = known.iter().map(|(s, f)| (*f, s.latest())).unzip();
-    let found = stats::spearman(&x, &y);
+    let found = statistics::spearman(&x, &y);
     let says = |e: Estimate| {
         format!(
             "rank correlation of {of}{} with {with}: {} (95 % interval {} to {}, n = {}, p = {})",
             plain(&claim.quantity),
-            short(e.value),
-            short(e.low),
-            short(e.high),
+            significant(e.value),
+            significant(e.low),
+            significant(e.high),
             e.n,
-            p_text(e.p)
+            p_value(e.p)
         )
     };
     let bounds = known.iter().filter(|(s, _)| s.bound).count();
@@ -266,13 +272,19 @@ fn trend(claim: &Claim, all: &[Sample], with: &str, sign: Sign, of: &str) -> Fin
     })
 }
 
-fn near(claim: &Claim, rows: &[Row], all: &[Sample], model: &str, within: f64) -> Finding {
-    let own = samples(rows, &claim.quantity, &BTreeMap::new());
-    let usable = |s: &&Sample| s.model == model && !(claim.observed && s.bound);
+fn near(
+    claim: &Claim,
+    rows: &[RunRecord],
+    all: &[Observation],
+    model: &str,
+    within: f64,
+) -> Finding {
+    let own = observations(rows, &claim.quantity, &BTreeMap::new());
+    let usable = |s: &&Observation| s.model == model && !(claim.observed && s.bound);
     let Some(reference) = own.iter().find(usable) else {
         return finding(claim, 0, 0, None, |_| String::new(), |_| "open");
     };
-    let others: Vec<&Sample> = all.iter().filter(|s| s.model != model).collect();
+    let others: Vec<&Observation> = all.iter().filter(|s| s.model != model).collect();
     let relative: Vec<f64> = others
         .iter()
         .map(|s| s.value / reference.value - 1.0)
@@ -284,7 +296,7 @@ fn near(claim: &Claim, rows: &[Row], all: &[Sample], model: &str, within: f64) -
         format!(
             "{} against that of {model}, {}: {} (95 % interval {} to {}, n = {}); the furthest differs by {}",
             plain(&claim.quantity),
-            short(reference.value),
+            significant(reference.value),
             percent(e.value),
             percent(e.low),
             percent(e.high),
@@ -297,7 +309,7 @@ fn near(claim: &Claim, rows: &[Row], all: &[Sample], model: &str, within: f64) -
         claim,
         others.len(),
         bounds,
-        stats::signed_rank(&relative),
+        statistics::signed_rank(&relative),
         says,
         |e| inside(e, within),
     )
@@ -305,26 +317,26 @@ fn near(claim: &Claim, rows: &[Row], all: &[Sample], model: &str, within: f64) -
 
 /// Models that differ on one axis alone: at `more`, at `less`.
 fn pairs<'a>(
-    all: &'a [Sample],
+    all: &'a [Observation],
     axis: &str,
     more: &str,
     less: &str,
-) -> Vec<(&'a Sample, &'a Sample)> {
-    let rest = |s: &Sample| {
+) -> Vec<(&'a Observation, &'a Observation)> {
+    let rest = |s: &Observation| {
         let mut levels = s.levels.clone();
         levels.remove(axis);
         levels
     };
-    let at = |level: &str| -> Vec<&'a Sample> {
-        let here = |s: &&Sample| s.levels.get(axis).is_some_and(|l| l == level);
+    let at = |level: &str| -> Vec<&'a Observation> {
+        let here = |s: &&Observation| s.levels.get(axis).is_some_and(|l| l == level);
         all.iter().filter(here).collect()
     };
     let others = at(less);
-    let pair = |a: &'a Sample| Some((a, *others.iter().find(|b| rest(a) == rest(b))?));
+    let pair = |a: &'a Observation| Some((a, *others.iter().find(|b| rest(a) == rest(b))?));
     at(more).into_iter().filter_map(pair).collect()
 }
 
-fn bounds(pairs: &[(&Sample, &Sample)]) -> usize {
+fn bounds(pairs: &[(&Observation, &Observation)]) -> usize {
     pairs.iter().filter(|(a, b)| a.bound || b.bound).count()
 }
 

@@ -9,7 +9,7 @@ use grainwake_shape::Shape;
 use grainwake_shape::picture::{Picture, View};
 use grainwake_solver::dem::Grain;
 
-use super::{Data, Drawn, symbol, value_text};
+use super::{FigureData, StudyFigure, symbol, value_text};
 
 /// Pixels of a picture for each point of the paper.
 const PIXELS: f64 = 2.5;
@@ -19,7 +19,7 @@ const STONE: [f64; 3] = [222.0, 200.0, 165.0];
 const RIM: f64 = 0.4;
 
 /// The grains of an axis, each seen from the same side at the same scale.
-pub fn family(data: &Data, notes: &mut Vec<String>) -> Option<Drawn> {
+pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure> {
     let plan = &data.manifest.analysis.figures;
     let (axis, rows, columns) = (
         plan.grains.as_ref()?,
@@ -111,7 +111,7 @@ pub fn family(data: &Data, notes: &mut Vec<String>) -> Option<Drawn> {
         cell / window,
         diameter,
     );
-    Some(Drawn {
+    Some(StudyFigure {
         name: "fig04-grains".into(),
         number: "4".into(),
         title: "The grains".into(),
@@ -125,7 +125,7 @@ pub fn family(data: &Data, notes: &mut Vec<String>) -> Option<Drawn> {
 }
 
 /// One grain in all orientations, seen along y with gravity down.
-pub fn orientations(data: &Data, notes: &mut Vec<String>) -> Option<Drawn> {
+pub fn orientations(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure> {
     let plan = &data.manifest.analysis.figures;
     let (grains, axis, oriented) = (
         plan.grains.as_ref()?,
@@ -192,7 +192,7 @@ pub fn orientations(data: &Data, notes: &mut Vec<String>) -> Option<Drawn> {
             false,
         );
     }
-    (drawn > 0).then(|| Drawn {
+    (drawn > 0).then(|| StudyFigure {
         name: "fig05-orientations".into(),
         number: "5".into(),
         title: "The initial orientations".into(),

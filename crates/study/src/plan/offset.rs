@@ -5,11 +5,11 @@ use grainwake_solver::case::{Case, Problem};
 use sha2::{Digest, Sha256};
 
 use crate::error::StudyError;
-use crate::file::{Ensemble, Study};
-use crate::model::Model;
+use crate::plan::expand::Model;
+use crate::plan::file::{Ensemble, Study};
 
 /// The override that offsets a member of an ensemble in the plane normal to gravity.
-pub(crate) fn offset(
+pub(crate) fn offset_override(
     study: &Study,
     model: &Model,
     ensemble: &Ensemble,

@@ -6,15 +6,15 @@ use grainwake_report::figure::style::{BLUE, GREEN, INK, ORANGE, PAGE, SMALL, TEX
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::{Data, Drawn};
-use crate::correlation::Correlation;
-use crate::words::plain;
+use super::{FigureData, StudyFigure};
+use crate::analysis::correlation::Correlation;
+use crate::format::plain;
 
 const COLOURS: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
 const STEP: f64 = 9.0;
 
 /// A panel for each factor, a row for each quantity and value of the axis.
-pub fn figure(data: &Data) -> Option<Drawn> {
+pub fn figure(data: &FigureData) -> Option<StudyFigure> {
     let wanted = data.manifest.analysis.correlations.as_ref()?;
     let known: Vec<&Correlation> = data
         .correlations
@@ -111,7 +111,7 @@ pub fn figure(data: &Data) -> Option<Drawn> {
         x += 26.0 + text::width(level, TEXT);
     }
     let n = known.iter().map(|c| c.n).max().unwrap_or(0);
-    Some(Drawn {
+    Some(StudyFigure {
         name: "correlations".into(),
         number: String::new(),
         title: "Rank correlations with form".into(),

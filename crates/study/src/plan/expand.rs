@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use grainwake_solver::case::{Problem, Source, nearest};
 use toml::Value;
 
-use crate::raw::{Keys, RawAdjust, RawAxis, RawModel, RawSet, RawStudy};
+use crate::plan::raw::{Keys, RawAdjust, RawAxis, RawModel, RawSet, RawStudy};
 
 /// A case key and what it is set to.
 #[derive(Clone, Debug, PartialEq)]
@@ -177,7 +177,7 @@ fn along(model: &Model, axis: &RawAxis) -> Vec<Model> {
         Some(Keys::One(key)) => vec![key.clone()],
         Some(Keys::Several(keys)) => keys.clone(),
     };
-    let at = |value: &crate::raw::RawValue| {
+    let at = |value: &crate::plan::raw::RawValue| {
         let mut model = model.clone();
         if !model.name.is_empty() {
             model.name.push('-');

@@ -6,7 +6,7 @@ pub fn plain(quantity: &str) -> String {
 }
 
 /// Three significant digits.
-pub fn short(value: f64) -> String {
+pub fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".into() } else { "?".into() };
     }
@@ -22,7 +22,7 @@ pub fn number(quantity: &str, value: f64) -> String {
     if COUNTS.contains(&quantity) && value.fract() == 0.0 {
         return format!("{value:.0}");
     }
-    short(value)
+    significant(value)
 }
 
 /// In hundredths.
@@ -31,7 +31,7 @@ pub fn percent(value: f64) -> String {
 }
 
 /// A p value in words.
-pub fn p_text(p: f64) -> String {
+pub fn p_value(p: f64) -> String {
     if p < 1e-4 {
         "below 0.0001".into()
     } else {

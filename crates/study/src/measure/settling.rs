@@ -1,4 +1,4 @@
-//! How grains settle that are not a pair: a single grain, or three and more.
+//! How grains create_folder that are not a pair: a single grain, or three and more.
 //!
 //! Speeds are along gravity, down positive; a grain that rises has negative ones. What a grain does
 //! after it has landed does not count.
@@ -11,9 +11,9 @@ use grainwake_report::run_folder::{History, Kind, RunFolder};
 use grainwake_report::story::{Scales, Story};
 use serde::{Deserialize, Serialize};
 
-/// What is measured on grains that settle. The JSON names are stable.
+/// What is measured on grains that create_folder. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Settling {
+pub struct SettlingMeasures {
     /// Number of grains.
     pub grains: usize,
     /// Those that landed.
@@ -47,32 +47,12 @@ pub struct Settling {
     /// Of a single grain: largest angle by which it has turned from the start [deg].
     pub turned: Option<f64>,
     /// Each grain, in SI units.
-    pub each: Vec<Fallen>,
+    pub each: Vec<GrainSettling>,
 }
-
-/// Names of the quantities, in the order of the table.
-pub const SETTLING: [&str; 16] = [
-    "grains",
-    "landed",
-    "peak_speed",
-    "final_speed",
-    "mean_speed",
-    "speed_change",
-    "peak_speed_m_per_s",
-    "final_speed_m_per_s",
-    "peak_reynolds",
-    "final_reynolds",
-    "landing_time",
-    "last_landing",
-    "landing_time_s",
-    "drift",
-    "long_axis",
-    "turned",
-];
 
 /// How one grain settled. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Fallen {
+pub struct GrainSettling {
     /// Number of the grain in the case.
     pub grain: usize,
     /// Equal-volume diameter [m].
@@ -100,29 +80,29 @@ pub struct Fallen {
     pub turned_deg: f64,
 }
 
-impl Settling {
+impl SettlingMeasures {
     /// Of a run folder; none of a pair, without gravity, or if nothing moves.
-    pub fn of(run: &RunFolder) -> Option<Settling> {
+    pub fn of(run: &RunFolder) -> Option<SettlingMeasures> {
         let story = Story::of(run);
         let scales = story.scales?;
         if story.pair.is_some() || !story.travels {
             return None;
         }
         let bodies = bodies(run, &mut Vec::new());
-        let each: Vec<Fallen> = (0..run.grains.len())
+        let each: Vec<GrainSettling> = (0..run.grains.len())
             .filter(|grain| !run.grains[*grain].is_empty())
-            .map(|grain| Fallen::of(run, grain, story.up, scales, &bodies))
+            .map(|grain| GrainSettling::of(run, grain, story.up, scales, &bodies))
             .collect();
-        Some(Settling::together(each, scales))
+        Some(SettlingMeasures::together(each, scales))
     }
 
     /// What grains have in common.
-    fn together(each: Vec<Fallen>, scales: Scales) -> Settling {
-        let mean = |pick: fn(&Fallen) -> Option<f64>| {
+    fn together(each: Vec<GrainSettling>, scales: Scales) -> SettlingMeasures {
+        let mean = |pick: fn(&GrainSettling) -> Option<f64>| {
             let values: Vec<f64> = each.iter().filter_map(pick).collect();
             (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
         };
-        let largest = |pick: fn(&Fallen) -> Option<f64>| {
+        let largest = |pick: fn(&GrainSettling) -> Option<f64>| {
             let values = each.iter().filter_map(pick);
             values.max_by(|a, b| a.abs().total_cmp(&b.abs()))
         };
@@ -137,7 +117,7 @@ impl Settling {
         );
         let of_v = |v: f64| v / scales.velocity();
         let of_t = |t: f64| t / scales.time();
-        Settling {
+        SettlingMeasures {
             grains: each.len(),
             landed: landings.len(),
             peak_speed: peak.map(of_v),
@@ -186,14 +166,14 @@ struct Stretch {
     fallen: f64,
 }
 
-impl Fallen {
+impl GrainSettling {
     fn of(
         run: &RunFolder,
         grain: usize,
         up: DVec3,
         scales: Scales,
         bodies: &BTreeMap<usize, Body>,
-    ) -> Fallen {
+    ) -> GrainSettling {
         let history = &run.grains[grain];
         let facts = run.facts.grains.get(grain);
         let diameter = facts.and_then(|f| f.diameter).unwrap_or(scales.diameter);
@@ -234,7 +214,7 @@ impl Fallen {
             (!angles.is_empty()).then(|| angles.iter().sum::<f64>() / angles.len() as f64)
         };
         let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-        Fallen {
+        GrainSettling {
             grain,
             diameter_m: diameter,
             peak_speed_m_per_s: peak,
@@ -327,7 +307,7 @@ mod tests {
     fn a_grain_that_settles_has_its_terminal_speed() {
         // v = 0.1 (1 - exp(-t/0.05)): terminal long before the end.
         let run = run_of(vec![falling(|t| 0.1 * (1.0 - (-t / 0.05).exp()), 1.0)]);
-        let found = Settling::of(&run).unwrap();
+        let found = SettlingMeasures::of(&run).unwrap();
         let close = |a: Option<f64>, b: f64| (a.unwrap() / b - 1.0).abs() < 1e-3;
         assert!(close(found.final_speed_m_per_s, 0.1), "{found:?}");
         assert!(close(found.peak_speed_m_per_s, 0.1));
@@ -349,7 +329,7 @@ mod tests {
         };
         let mut run = run_of(vec![falling(v, 2.0)]);
         land(&mut run, 0, 1.0);
-        let found = Settling::of(&run).unwrap();
+        let found = SettlingMeasures::of(&run).unwrap();
         assert!((found.final_speed_m_per_s.unwrap() - 0.1).abs() < 1e-6);
         assert_eq!((found.landed, found.landing_time_s), (1, Some(1.0)));
         assert!((found.landing_time.unwrap() - 1.0 / 1e-3_f64.sqrt()).abs() < 1e-9);
@@ -358,7 +338,7 @@ mod tests {
 
     #[test]
     fn a_grain_that_rises_has_a_negative_speed() {
-        let found = Settling::of(&run_of(vec![falling(|_| -0.04, 1.0)])).unwrap();
+        let found = SettlingMeasures::of(&run_of(vec![falling(|_| -0.04, 1.0)])).unwrap();
         assert!((found.final_speed_m_per_s.unwrap() + 0.04).abs() < 1e-6);
         assert!((found.peak_speed_m_per_s.unwrap() + 0.04).abs() < 1e-9);
         assert!((found.final_reynolds.unwrap() - 400.0).abs() < 1e-2);
@@ -366,7 +346,7 @@ mod tests {
 
     #[test]
     fn what_has_hardly_fallen_has_no_final_speed() {
-        let found = Settling::of(&run_of(vec![falling(|_| 0.1, 0.1)])).unwrap();
+        let found = SettlingMeasures::of(&run_of(vec![falling(|_| 0.1, 0.1)])).unwrap();
         assert_eq!(found.final_speed_m_per_s, None);
         assert!(found.peak_speed_m_per_s.is_some());
     }
@@ -375,20 +355,24 @@ mod tests {
     fn many_grains_have_means_and_each_its_landing() {
         let fall = |v: f64| falling(move |_| v, 1.0);
         let mut run = run_of(vec![fall(0.1), fall(0.2), fall(0.3)]);
-        let found = Settling::of(&run).unwrap();
+        let found = SettlingMeasures::of(&run).unwrap();
         assert!((found.final_speed_m_per_s.unwrap() - 0.2).abs() < 1e-6);
         assert!((found.peak_speed_m_per_s.unwrap() - 0.3).abs() < 1e-9);
         assert_eq!((found.turned, found.last_landing), (None, None));
         for (grain, time) in [(2, 0.5), (1, 0.7), (0, 0.9)] {
             land(&mut run, grain, time);
         }
-        let found = Settling::of(&run).unwrap();
+        let found = SettlingMeasures::of(&run).unwrap();
         assert_eq!((found.grains, found.landed), (3, 3));
         assert_eq!(found.landing_time_s, Some(0.5));
         assert!((found.last_landing.unwrap() - 0.9 / 1e-3_f64.sqrt()).abs() < 1e-9);
         let landings: Vec<_> = found.each.iter().map(|g| g.landing_time_s).collect();
         assert_eq!(landings, [Some(0.9), Some(0.7), Some(0.5)]);
         run.grains.pop();
-        assert_eq!(Settling::of(&run), None, "a pair has measures of its own");
+        assert_eq!(
+            SettlingMeasures::of(&run),
+            None,
+            "a pair has measures of its own"
+        );
     }
 }

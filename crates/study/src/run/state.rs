@@ -5,11 +5,11 @@ use std::path::Path;
 use grainwake_solver::output::provenance::Provenance;
 use grainwake_solver::output::{RESOLVED, SUMMARY};
 
-use crate::plan::{Run, ending};
+use crate::plan::{Run, end_condition};
 
 /// How far a run is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum State {
+pub enum RunState {
     /// Nothing is there.
     Missing,
     /// It was begun, and can go on.
@@ -22,48 +22,53 @@ pub enum State {
     Stale(&'static str),
 }
 
-impl State {
+impl RunState {
     /// One word.
     pub fn word(&self) -> &'static str {
         match self {
-            State::Missing => "missing",
-            State::Unfinished => "unfinished",
-            State::Finished => "finished",
-            State::Failed(_) => "failed",
-            State::Stale(_) => "stale",
+            RunState::Missing => "missing",
+            RunState::Unfinished => "unfinished",
+            RunState::Finished => "finished",
+            RunState::Failed(_) => "failed",
+            RunState::Stale(_) => "stale",
         }
     }
 }
 
 /// Looks into the run folder of a run, for this program.
-pub fn state(run: &Run, study: &Path) -> State {
+pub fn run_state(run: &Run, study: &Path) -> RunState {
     let own = Provenance::new("");
-    state_for(run, study, &own.version, own.commit.as_deref())
+    state_of_version(run, study, &own.version, own.commit.as_deref())
 }
 
 /// The same for a version and commit of the program.
-pub(crate) fn state_for(run: &Run, study: &Path, version: &str, commit: Option<&str>) -> State {
+pub(crate) fn state_of_version(
+    run: &Run,
+    study: &Path,
+    version: &str,
+    commit: Option<&str>,
+) -> RunState {
     let folder = run.folder(study);
     let Some(there) = Provenance::read(&folder) else {
-        return State::Missing;
+        return RunState::Missing;
     };
     if there.case_sha256 != run.case_sha256 {
-        return State::Stale("its case is another one now");
+        return RunState::Stale("its case is another one now");
     }
     if (there.version.as_str(), there.commit.as_deref()) != (version, commit) {
-        return State::Stale("it was made by another version of the program");
+        return RunState::Stale("it was made by another version of the program");
     }
     if folder.join(SUMMARY).is_file() {
         let resolved = std::fs::read_to_string(folder.join(RESOLVED)).unwrap_or_default();
-        return if ending(&resolved) == run.ending {
-            State::Finished
+        return if end_condition(&resolved) == run.ending {
+            RunState::Finished
         } else {
-            State::Stale("it ends at another time now")
+            RunState::Stale("it ends at another time now")
         };
     }
     match std::fs::read_to_string(folder.join("failure.json")) {
-        Ok(text) => State::Failed(why(&text)),
-        Err(_) => State::Unfinished,
+        Ok(text) => RunState::Failed(why(&text)),
+        Err(_) => RunState::Unfinished,
     }
 }
 

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// What is measured on a pair. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Measures {
+pub struct PairMeasures {
     /// First contact.
     pub kiss_time: Option<f64>,
     /// From the first contact until the line of centres stands at 45 degrees (or the pair parts, or lands).
@@ -59,34 +59,8 @@ pub struct Measures {
     pub long_axis_trailing: Option<f64>,
 }
 
-/// Names of the quantities, in the order of the table.
-pub const QUANTITIES: [&str; 22] = [
-    "kiss_time",
-    "kissing_stage",
-    "contact_stage",
-    "parted",
-    "tumble_time",
-    "pass_time",
-    "separation_time",
-    "landing_time",
-    "kisses",
-    "repeated",
-    "role_changes",
-    "closest",
-    "closest_gap",
-    "final_distance",
-    "mean_speed_leading",
-    "mean_speed_trailing",
-    "peak_speed_leading",
-    "peak_speed_trailing",
-    "draft_speed_leading",
-    "draft_speed_trailing",
-    "long_axis_leading",
-    "long_axis_trailing",
-];
-
 /// A pair and its scales, as the measures need them.
-pub struct Pair<'a> {
+pub struct PairHistory<'a> {
     /// The grain that trails at the start, and the one that leads.
     pub grains: [&'a History; 2],
     /// Against gravity.
@@ -99,9 +73,9 @@ pub struct Pair<'a> {
     pub oblong: bool,
 }
 
-impl Measures {
+impl PairMeasures {
     /// Of a run folder; none if it holds no pair.
-    pub fn of(run: &RunFolder) -> Option<Measures> {
+    pub fn of(run: &RunFolder) -> Option<PairMeasures> {
         let story = Story::of(run);
         let [behind, ahead] = story.pair?;
         let oblong = [behind, ahead].iter().all(|g| {
@@ -109,7 +83,7 @@ impl Measures {
             facts.is_none_or(|f| f.shape.as_deref() != Some("sphere"))
         });
         let scales = story.scales?;
-        let mut found = Measures::of_pair(&Pair {
+        let mut found = PairMeasures::of_pair(&PairHistory {
             grains: [&run.grains[behind], &run.grains[ahead]],
             up: story.up,
             scales,
@@ -123,7 +97,7 @@ impl Measures {
     }
 
     /// Of a pair.
-    pub fn of_pair(pair: &Pair) -> Measures {
+    pub fn of_pair(pair: &PairHistory) -> PairMeasures {
         let end = pair
             .grains
             .iter()
@@ -154,7 +128,7 @@ impl Measures {
                 .and_then(|(from, to)| pair.long_axis(g, from, to))
         };
         let (closest, last) = pair.distances(until);
-        Measures {
+        PairMeasures {
             kiss_time: scaled(kiss),
             kissing_stage: scaled(kiss.map(|k| tumble.unwrap_or(contact_end).min(contact_end) - k)),
             contact_stage: scaled(kiss.map(|k| contact_end - k)),
@@ -199,7 +173,7 @@ fn closest_gap(run: &RunFolder, until: f64) -> Option<f64> {
         .reduce(f64::min)
 }
 
-impl Pair<'_> {
+impl PairHistory<'_> {
     fn first(&self, kind: &Kind, from: f64) -> Option<f64> {
         let found = self
             .events

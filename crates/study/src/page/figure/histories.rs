@@ -8,8 +8,8 @@ use grainwake_report::figure::style::{
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::{Data, Drawn, symbol, value_text};
-use crate::motion::Motion;
+use super::{FigureData, StudyFigure, symbol, value_text};
+use crate::measure::trajectory::Trajectory;
 use crate::plan::Run;
 
 const COLOURS: [&str; 4] = [BLUE, GREEN, ORANGE, VERMILION];
@@ -31,7 +31,7 @@ enum What {
 }
 
 /// Figures 15, 16, 17 and 18.
-pub fn figures(data: &Data, notes: &mut Vec<String>) -> Vec<Drawn> {
+pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
     let plan = &data.manifest.analysis.figures;
     let (Some(rows), Some(columns), Some(axis), Some(level)) =
         (&plan.rows, &plan.columns, &plan.orientations, &plan.compare)
@@ -46,7 +46,7 @@ pub fn figures(data: &Data, notes: &mut Vec<String>) -> Vec<Drawn> {
         .collect();
     let missing: Vec<&str> = wanted
         .iter()
-        .filter(|r| !data.motions.contains_key(&r.name))
+        .filter(|r| !data.trajectories.contains_key(&r.name))
         .map(|r| r.name.as_str())
         .collect();
     if !missing.is_empty() {
@@ -68,30 +68,31 @@ pub fn figures(data: &Data, notes: &mut Vec<String>) -> Vec<Drawn> {
 }
 
 fn figure(
-    data: &Data,
+    data: &FigureData,
     wanted: &[&Run],
     number: &str,
     what: What,
     by: &str,
     within: &str,
     level: &str,
-) -> Option<Drawn> {
+) -> Option<StudyFigure> {
     let reference = data.manifest.analysis.figures.reference.as_ref();
-    let sphere = reference.and_then(|name| Some((name, data.motions.get(&data.run(name)?.name)?)));
-    let shown: Vec<(&Run, &Motion)> = wanted
+    let sphere =
+        reference.and_then(|name| Some((name, data.trajectories.get(&data.run(name)?.name)?)));
+    let shown: Vec<(&Run, &Trajectory)> = wanted
         .iter()
-        .filter_map(|r| Some((*r, data.motions.get(&r.name)?)))
+        .filter_map(|r| Some((*r, data.trajectories.get(&r.name)?)))
         .collect();
     if shown.is_empty() {
         return None;
     }
-    let motions = || shown.iter().map(|(_, m)| *m).chain(sphere.map(|(_, m)| m));
-    let end = motions()
+    let trajectories = || shown.iter().map(|(_, m)| *m).chain(sphere.map(|(_, m)| m));
+    let end = trajectories()
         .filter_map(|m| m.time.last().copied())
         .fold(0.0, f64::max);
     let (low, high) = match what {
-        What::Gap => extent(motions().flat_map(|m| m.distance.iter().copied())),
-        What::Velocity => extent(motions().flat_map(|m| m.velocity.iter().flatten().copied())),
+        What::Gap => extent(trajectories().flat_map(|m| m.distance.iter().copied())),
+        What::Velocity => extent(trajectories().flat_map(|m| m.velocity.iter().flatten().copied())),
     }?;
     let label = match what {
         What::Gap => "*D*_{r}/*d*  [–]",
@@ -132,7 +133,7 @@ fn figure(
             &title,
             false,
         );
-        let mut curve = |motion: &Motion, colour: &str, name: &str| match what {
+        let mut curve = |motion: &Trajectory, colour: &str, name: &str| match what {
             What::Gap => frame.curve(
                 &mut drawing,
                 &motion.points(&motion.distance),
@@ -217,7 +218,7 @@ fn figure(
     if shown.len() < wanted.len() {
         caption += &format!(" {} of {} runs are finished.", shown.len(), wanted.len());
     }
-    Some(Drawn {
+    Some(StudyFigure {
         name: format!("fig{number}-{file}-by-{way}"),
         number: number.into(),
         title: format!("{quantity} by {by}"),

@@ -1,0 +1,5 @@
+//! Statistics over runs: right-censored observations, rank tests and verdicts on claims.
+
+pub mod correlation;
+pub mod statistics;
+pub mod verdict;

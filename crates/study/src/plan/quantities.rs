@@ -1,0 +1,50 @@
+//! Names of the measured quantities and shape factors, which an analysis file may refer to.
+
+/// Quantities measured on a pair, in table order.
+pub const PAIR_QUANTITIES: [&str; 22] = [
+    "kiss_time",
+    "kissing_stage",
+    "contact_stage",
+    "parted",
+    "tumble_time",
+    "pass_time",
+    "separation_time",
+    "landing_time",
+    "kisses",
+    "repeated",
+    "role_changes",
+    "closest",
+    "closest_gap",
+    "final_distance",
+    "mean_speed_leading",
+    "mean_speed_trailing",
+    "peak_speed_leading",
+    "peak_speed_trailing",
+    "draft_speed_leading",
+    "draft_speed_trailing",
+    "long_axis_leading",
+    "long_axis_trailing",
+];
+
+/// Quantities measured on a single grain or on three and more, in table order.
+pub const SETTLING_QUANTITIES: [&str; 16] = [
+    "grains",
+    "landed",
+    "peak_speed",
+    "final_speed",
+    "mean_speed",
+    "speed_change",
+    "peak_speed_m_per_s",
+    "final_speed_m_per_s",
+    "peak_reynolds",
+    "final_reynolds",
+    "landing_time",
+    "last_landing",
+    "landing_time_s",
+    "drift",
+    "long_axis",
+    "turned",
+];
+
+/// Factors that every run has: Krumbein sphericity and, if known, Wadell roundness of grain 0.
+pub const SHAPE_FACTORS: [&str; 2] = ["krumbein_sphericity", "wadell_roundness"];
