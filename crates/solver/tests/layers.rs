@@ -1,5 +1,6 @@
 //! Imports point downwards only (ARCHITECTURE.md): this test reads the `use` lines.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -92,7 +93,12 @@ fn libraries_depend_downwards() {
             &["grainwake-solver", "grainwake-report", "grainwake ="][..],
         ),
         ("solver", &["grainwake-report", "grainwake ="][..]),
-        ("report", &["grainwake ="][..]),
+        (
+            "report",
+            &["grainwake-study", "grainwake-validation", "grainwake ="][..],
+        ),
+        ("study", &["grainwake-validation", "grainwake ="][..]),
+        ("validation", &["grainwake-study", "grainwake ="][..]),
     ] {
         let text = fs::read_to_string(crates.join(name).join("Cargo.toml")).expect("a manifest");
         let dependencies = text.split("dependencies]").nth(1).unwrap_or("");
@@ -103,4 +109,223 @@ fn libraries_depend_downwards() {
             );
         }
     }
+}
+
+/// Groups of top-level modules that import each other in a circle, directly or through others.
+///
+/// The list may only shrink: a new or larger group fails `modules_form_no_circles`, and so does an
+/// entry whose group no longer exists. Remove or shorten an entry when its circle is broken.
+const KNOWN_CIRCLES: &[(&str, &[&str])] = &[
+    // `Exit` prints with `tell!`; `print` returns an `Exit`.
+    ("cli", &["exit", "out"]),
+    // The progress display uses `study::first_line`.
+    ("cli", &["study", "study_board"]),
+    // `story` formats numbers with `figure::minus`; the figures use `story::short`.
+    ("report", &["figure", "story"]),
+    (
+        "shape",
+        &[
+            "assemble",
+            "grain_file",
+            "mass",
+            "mesh",
+            "morphology",
+            "nodes",
+            "quality",
+            "roundness",
+            "scan",
+            "shape",
+            "surface",
+        ],
+    ),
+    ("validation", &["figure", "measure", "suite"]),
+];
+
+/// Paths of a use tree: `a::{b, c::d}` gives `a::b` and `a::c::d`.
+fn paths(tree: &str, prefix: &str, found: &mut Vec<String>) {
+    let tree = tree.trim();
+    let Some((head, rest)) = tree.split_once('{') else {
+        found.push(format!("{prefix}{tree}"));
+        return;
+    };
+    let inner = rest.trim_end().strip_suffix('}').unwrap_or(rest);
+    let (mut depth, mut start) = (0, 0);
+    for (at, c) in inner.char_indices().chain([(inner.len(), ',')]) {
+        match c {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            ',' if depth == 0 => {
+                if !inner[start..at].trim().is_empty() {
+                    paths(&inner[start..at], &format!("{prefix}{head}"), found);
+                }
+                start = at + 1;
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Code of a source file: no comments, no unit tests at its end.
+fn code(file: &Path) -> String {
+    let text = fs::read_to_string(file).expect("a readable source");
+    let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or("");
+    let lines = text
+        .lines()
+        .map(|line| line.split("//").next().unwrap_or(""));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// End of the path or use tree at the start of `code`.
+fn path_end(code: &str) -> usize {
+    let mut depth = 0;
+    for (at, c) in code.char_indices() {
+        match c {
+            '{' if at == 0 || code[..at].ends_with("::") || depth > 0 => depth += 1,
+            '}' if depth == 1 => return at + 1,
+            '}' if depth > 0 => depth -= 1,
+            ':' | '_' => {}
+            c if depth > 0 || c.is_alphanumeric() => {}
+            _ => return at,
+        }
+    }
+    code.len()
+}
+
+/// First segments of the paths below `crate::` in `code`.
+fn roots(code: &str) -> BTreeSet<String> {
+    let mut found = Vec::new();
+    for (at, word) in code.match_indices("crate::") {
+        if !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_') {
+            let tree = &code[at + word.len()..];
+            paths(&tree[..path_end(tree)], "", &mut found);
+        }
+    }
+    let first = |path: &String| path.split("::").next().unwrap_or("").trim().to_owned();
+    found.iter().map(first).collect()
+}
+
+/// Top-level module that the crate root re-exports each name from.
+fn exports(root: &str) -> BTreeMap<String, String> {
+    let mut found = Vec::new();
+    for statement in root.split(';') {
+        if let Some((_, tree)) = statement.split_once("use ") {
+            paths(tree.trim().trim_start_matches("crate::"), "", &mut found);
+        }
+    }
+    let pair = |path: &String| {
+        let name = path.rsplit("::").next()?.rsplit(" as ").next()?.trim();
+        Some((name.to_owned(), path.split("::").next()?.trim().to_owned()))
+    };
+    found.iter().filter_map(pair).collect()
+}
+
+/// Top-level modules of a crate, each with the modules it imports.
+fn imports(src: &Path) -> BTreeMap<String, BTreeSet<String>> {
+    let module = |path: &Path| -> String {
+        let first = path.strip_prefix(src).ok().and_then(|p| p.iter().next());
+        let first = first.unwrap_or_default().to_string_lossy();
+        first.trim_end_matches(".rs").to_owned()
+    };
+    let mut files = Vec::new();
+    sources(src, &mut files);
+    let roots_of = |file: &PathBuf| (module(file), roots(&code(file)));
+    let of_root = |name: &str| name == "lib" || name == "main" || name == "bin";
+    let root: String = files
+        .iter()
+        .filter(|f| of_root(&module(f)))
+        .map(|f| code(f))
+        .collect();
+    let exports = exports(&root);
+    let named: Vec<_> = files
+        .iter()
+        .map(roots_of)
+        .filter(|(m, _)| !of_root(m))
+        .collect();
+    let modules: BTreeSet<String> = named.iter().map(|(module, _)| module.clone()).collect();
+    let mut out: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (module, names) in named {
+        let own = out.entry(module.clone()).or_default();
+        for name in names {
+            let target = exports
+                .get(&name)
+                .filter(|_| !modules.contains(&name))
+                .unwrap_or(&name);
+            if modules.contains(target) && *target != module {
+                own.insert(target.clone());
+            }
+        }
+    }
+    out
+}
+
+/// Groups of modules that reach each other, each in order of name.
+fn circles(imports: &BTreeMap<String, BTreeSet<String>>) -> BTreeSet<Vec<String>> {
+    let reached = |start: &String| {
+        let (mut seen, mut open) = (BTreeSet::new(), vec![start]);
+        while let Some(module) = open.pop() {
+            open.extend(
+                imports[module]
+                    .iter()
+                    .filter(|next| seen.insert((*next).clone())),
+            );
+        }
+        seen
+    };
+    let reach: BTreeMap<&String, BTreeSet<String>> = imports
+        .keys()
+        .map(|module| (module, reached(module)))
+        .collect();
+    let group = |module: &String| -> Vec<String> {
+        let both =
+            |other: &&String| reach[module].contains(*other) && reach[other].contains(module);
+        imports.keys().filter(both).cloned().collect()
+    };
+    imports
+        .keys()
+        .map(group)
+        .filter(|group| group.len() > 1)
+        .collect()
+}
+
+#[test]
+fn modules_form_no_circles() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("the folder of crates");
+    let mut seen = 0;
+    let mut found = BTreeSet::new();
+    for entry in fs::read_dir(crates).expect("the crates").flatten() {
+        let imports = imports(&entry.path().join("src"));
+        seen += imports.values().map(BTreeSet::len).sum::<usize>();
+        let name = entry.file_name().to_string_lossy().into_owned();
+        found.extend(
+            circles(&imports)
+                .into_iter()
+                .map(|group| (name.clone(), group)),
+        );
+    }
+    assert!(
+        seen > 100,
+        "only {seen} imports found: has the layout changed?"
+    );
+    let owned = |group: &[&str]| group.iter().map(|m| (*m).to_owned()).collect::<Vec<_>>();
+    let known: BTreeSet<(String, Vec<String>)> = KNOWN_CIRCLES
+        .iter()
+        .map(|(name, group)| ((*name).to_owned(), owned(group)))
+        .collect();
+    let new: Vec<_> = found.difference(&known).collect();
+    let gone: Vec<_> = known.difference(&found).collect();
+    assert!(
+        new.is_empty() && gone.is_empty(),
+        "circles of modules changed; new or larger: {new:?}; no longer there, shorten \
+         KNOWN_CIRCLES: {gone:?}"
+    );
+}
+
+#[test]
+fn use_trees_are_read_whole() {
+    let code = "use crate::{a, b::{c, d}};\nfn f() { crate::e::g(); grainwake_crate::h(); }";
+    assert_eq!(roots(code).into_iter().collect::<Vec<_>>(), ["a", "b", "e"]);
+    let exports = exports("pub use x::{Y, z::W as V};\nmod x;");
+    assert_eq!((exports["Y"].as_str(), exports["V"].as_str()), ("x", "x"));
 }
