@@ -1,7 +1,7 @@
 //! `grainwake report`.
 
 use grainwake_report::{ReportError, render};
-use grainwake_study::{Analysis, Manifest};
+use grainwake_study::{Analysis, Plan};
 
 use crate::args::ReportArgs;
 use crate::exit::{BAD_INPUT, Exit, IO};
@@ -9,12 +9,12 @@ use crate::{print, tell};
 
 /// Draws the figures and the page of a run folder, or of a study folder.
 pub fn report(args: &ReportArgs) -> Result<(), Exit> {
-    if Manifest::is_in(&args.run) {
+    if Plan::exists_in(&args.run) {
         let done = grainwake_study::render(&args.run)?;
         for note in &done.notes {
             tell!("note: {note}");
         }
-        if done.png.is_empty() && Manifest::read(&args.run)?.analysis == Analysis::default() {
+        if done.png.is_empty() && Plan::read(&args.run)?.analysis == Analysis::default() {
             tell!("note: no figures: no run has results to draw");
         }
         let (finished, all) = done.runs;

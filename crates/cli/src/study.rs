@@ -52,8 +52,8 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         .as_deref()
         .map_or(Ok(Selection::All), Selection::parse);
     let selection = selection.map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
-    let plan = Plan::of(&study, &args.set)?;
-    let runs = &plan.manifest.runs;
+    let plan = Plan::resolve(&study, &args.set)?;
+    let runs = &plan.runs;
     let chosen = selection
         .choose(runs)
         .map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
@@ -105,7 +105,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let board = Board::new(runs, &chosen, jobs, args.quiet, stop.clone());
     let ended = execute(runs, &chosen, &folder, &options, &board)?;
     board.clear();
-    let rows = records(&plan.manifest, &folder);
+    let rows = records(&plan, &folder);
     write_tables(&rows, &folder)?;
     let shown: Vec<&RunRecord> = chosen.iter().map(|i| &rows[*i]).collect();
     if args.json {
@@ -144,7 +144,7 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
             "go on with the same command",
         ));
     }
-    if ended.iter().any(|(_, o)| *o == Outcome::Elsewhere) {
+    if ended.iter().any(|(_, o)| *o == Outcome::Locked) {
         tell!("note: some runs are in the hands of another program");
     }
     let Some(code) = failed.iter().map(|(.., code)| *code).max() else {
@@ -179,7 +179,7 @@ fn list(runs: &[Run], states: &[(usize, RunState)]) -> String {
             "{:>4}  {:width$}  {:10}  {}",
             i + 1,
             run.name,
-            state.word(),
+            state.name(),
             run.id
         )
     };
@@ -191,7 +191,7 @@ fn listed(runs: &[Run], states: &[(usize, RunState)]) -> serde_json::Value {
         let run = &runs[*i];
         serde_json::json!({
             "number": i + 1, "name": run.name, "model": run.model, "member": run.member,
-            "state": state.word(), "id": run.id, "set": run.set, "base": run.base,
+            "state": state.name(), "id": run.id, "set": run.set, "base": run.base,
             "memory_bytes": run.memory_bytes, "wall_s": run.wall_s,
         })
     };

@@ -236,10 +236,7 @@ impl StudyObserver for Board<'_> {
     fn ended(&self, run: usize, outcome: &Outcome) {
         let text = self.with(|inner| {
             inner.waiting.remove(&run);
-            inner.ended += usize::from(!matches!(
-                outcome,
-                Outcome::Interrupted | Outcome::Elsewhere
-            ));
+            inner.ended += usize::from(!matches!(outcome, Outcome::Interrupted | Outcome::Locked));
             if let Some(active) = inner.active.remove(&run) {
                 if let (Some(bar), Some(bars)) = (&active.bar, &self.bars) {
                     bar.finish_and_clear();
@@ -268,10 +265,10 @@ impl StudyObserver for Board<'_> {
                 s.ended_by,
                 clock(s.wall_s)
             ),
-            Outcome::Before => "had finished before".into(),
+            Outcome::AlreadyFinished => "had finished before".into(),
             Outcome::Failed(why, _) => format!("FAILED: {}", crate::study::first_line(why)),
             Outcome::Interrupted => "interrupted".into(),
-            Outcome::Elsewhere => "in the hands of another program".into(),
+            Outcome::Locked => "in the hands of another program".into(),
         };
         self.line(&format!(
             "{}: {how} {}",

@@ -1,10 +1,10 @@
-//! What can go wrong with a study.
+//! Errors of a study, and writing of files in one piece.
 
 use std::path::{Path, PathBuf};
 
 use grainwake_solver::case::{CaseError, Problem};
 
-/// Why a study could not be read, planned or kept.
+/// Reason why a study cannot be read, planned or stored.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// A file could not be read or written.
@@ -14,21 +14,21 @@ pub enum StudyError {
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The contents of the study file are wrong.
     #[error("{}", list(.0))]
     Invalid(Vec<Problem>),
-    /// A case is wrong without regard to the study.
+    /// A case is wrong independently of the study.
     #[error(transparent)]
     Case(#[from] CaseError),
-    /// The folder belongs to something else.
+    /// The folder holds another study or other files.
     #[error("{} {what}", folder.display())]
     Occupied {
         /// The folder.
         folder: PathBuf,
-        /// What is there.
+        /// Its contents.
         what: String,
     },
     /// A file of the study folder is damaged.
@@ -36,7 +36,7 @@ pub enum StudyError {
     Damaged {
         /// The file.
         file: PathBuf,
-        /// What is wrong with it.
+        /// The error in it.
         what: String,
     },
 }
@@ -52,7 +52,7 @@ impl From<Problem> for StudyError {
     }
 }
 
-/// Names the file and the action of a system error.
+/// Adds the action and the file to an error of the operating system.
 pub(crate) trait At<T> {
     fn at(self, action: &'static str, path: &Path) -> Result<T, StudyError>;
 }
@@ -67,8 +67,10 @@ impl<T> At<T> for std::io::Result<T> {
     }
 }
 
-/// Writes a file whole or not at all; programs that share the folder do not meet in it.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
+/// Writes a file through a temporary name, so that readers never see a part of it.
+///
+/// The temporary name holds the process id: several programs may share the folder.
+pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".{}.tmp", std::process::id()));
     let temporary = path.with_file_name(name);
@@ -77,8 +79,14 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
         .at("write", path)
 }
 
-/// Points to the page that has the keys of studies: `grainwake schema` has those of cases.
-pub(crate) fn of_a_study(mut problem: Problem) -> Problem {
+/// Writes a value as indented JSON.
+pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), StudyError> {
+    let text = serde_json::to_string_pretty(value).map_err(std::io::Error::from);
+    write_atomically(path, text.at("write", path)?.as_bytes())
+}
+
+/// Refers to the page with the keys of studies; `grainwake schema` lists the keys of cases.
+pub(crate) fn refer_to_study_keys(mut problem: Problem) -> Problem {
     let here = "docs/study.md lists the keys of study and analysis files";
     problem.help = problem
         .help

@@ -1,36 +1,39 @@
-//! Numbers and names in words.
+//! Text form of values and names, for the report page and the tables.
 
-/// The name of a quantity for readers.
-pub fn plain(quantity: &str) -> String {
+/// Name of a quantity with blanks.
+pub fn title(quantity: &str) -> String {
     quantity.replace('_', " ")
 }
 
-/// Three significant digits.
+/// Value with three significant digits; "?" if it is not finite.
 pub fn significant(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return if value == 0.0 { "0".into() } else { "?".into() };
+    if value == 0.0 {
+        return "0".into();
+    }
+    if !value.is_finite() {
+        return "?".into();
     }
     let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
     format!("{value:.digits$}").replace('-', "−")
 }
 
-/// Quantities that are counted.
+/// Quantities that are counts.
 const COUNTS: [&str; 4] = ["kisses", "role_changes", "grains", "landed"];
 
-/// The value of a quantity: a count as a whole number where it is one, else three significant digits.
-pub fn number(quantity: &str, value: f64) -> String {
+/// Value of a quantity: whole counts without decimals, else three significant digits.
+pub fn quantity_value(quantity: &str, value: f64) -> String {
     if COUNTS.contains(&quantity) && value.fract() == 0.0 {
         return format!("{value:.0}");
     }
     significant(value)
 }
 
-/// In hundredths.
+/// Percentage with one decimal.
 pub fn percent(value: f64) -> String {
     format!("{:.1} %", 100.0 * value).replace('-', "−")
 }
 
-/// A p value in words.
+/// Probability with four decimals.
 pub fn p_value(p: f64) -> String {
     if p < 1e-4 {
         "below 0.0001".into()
@@ -39,14 +42,19 @@ pub fn p_value(p: f64) -> String {
     }
 }
 
+/// Value rounded to six significant digits, for tables.
+pub fn rounded(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::number;
+    use super::quantity_value;
 
     #[test]
     fn counts_are_whole_numbers() {
-        assert_eq!(number("kisses", 1.0), "1");
-        assert_eq!(number("kiss_time", 1.0), "1.00");
-        assert_eq!(number("kisses", 1.5), "1.50");
+        assert_eq!(quantity_value("kisses", 1.0), "1");
+        assert_eq!(quantity_value("kiss_time", 1.0), "1.00");
+        assert_eq!(quantity_value("kisses", 1.5), "1.50");
     }
 }

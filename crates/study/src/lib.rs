@@ -22,7 +22,7 @@ pub mod page;
 pub mod plan;
 pub mod run;
 
-pub use analysis::{correlation, statistics, verdict};
+pub use analysis::{correlation, observation, statistics, verdict};
 pub use error::StudyError;
 pub use measure::pair::{PairHistory, PairMeasures};
 pub use measure::record::{RunRecord, records};
@@ -34,6 +34,6 @@ pub use plan::claims::{Analysis, Claim, Condition, Correlations, FigureRequest, 
 pub use plan::expand::{Model, Setting};
 pub use plan::file::{Ensemble, Study};
 pub use plan::selection::Selection;
-pub use plan::{MANIFEST, Manifest, Plan, RUNS, Run};
+pub use plan::{MANIFEST, Plan, RUNS, Run};
 pub use run::state::{RunState, run_state};
 pub use run::{Options, Outcome, StudyObserver, execute};

@@ -9,7 +9,6 @@ fn names(study: &str) -> Vec<String> {
     let (_folder, path) = folder(study);
     plan(&path)
         .unwrap()
-        .manifest
         .runs
         .into_iter()
         .map(|r| r.name)
@@ -27,7 +26,7 @@ fn axes_multiply_and_models_follow() {
     ];
     assert_eq!(names(STUDY), expected);
     let (_folder, path) = folder(STUDY);
-    let runs = plan(&path).unwrap().manifest.runs;
+    let runs = plan(&path).unwrap().runs;
     let case = |i: usize| runs[i].case().unwrap();
     let heavy = case(3);
     assert_eq!(
@@ -65,7 +64,7 @@ fn a_model_may_replace_all_grains() {
         "set.grain = [\n { shape = { kind = \"ellipsoid\", size = [\"3 mm\", \"2 mm\", \"1 mm\"] }, nodes = 300, density = 2500, position = [\"5 mm\", \"5 mm\", \"9 mm\"] },\n]",
     );
     let (_folder, path) = folder(&text);
-    let runs = plan(&path).unwrap().manifest.runs;
+    let runs = plan(&path).unwrap().runs;
     let case = runs[4].case().unwrap();
     assert_eq!(case.setup.grains.len(), 1);
     assert!((case.setup.grains[0].shape.equivalent_diameter() - 6e-9_f64.cbrt()).abs() < 1e-5);
@@ -76,9 +75,8 @@ fn hashes_follow_what_decides_the_results() {
     let ids = |study: &str, sets: &[&str]| {
         let (_folder, path) = folder(study);
         let sets: Vec<String> = sets.iter().map(|s| (*s).to_string()).collect();
-        let runs = grainwake_study::Plan::of(&Study::read(&path).unwrap(), &sets)
+        let runs = grainwake_study::Plan::resolve(&Study::read(&path).unwrap(), &sets)
             .unwrap()
-            .manifest
             .runs;
         runs.into_iter().map(|r| r.id).collect::<Vec<_>>()
     };
@@ -111,7 +109,7 @@ fn an_ensemble_offsets_all_but_the_first_member() {
         "{STUDY}\n[ensemble]\nmembers = 4\noffset = \"0.05 mm\"\nmodels = [\"light-*\"]\nseed = 7\n"
     );
     let (_folder, path) = folder(&text);
-    let runs = plan(&path).unwrap().manifest.runs;
+    let runs = plan(&path).unwrap().runs;
     let named: Vec<&str> = runs.iter().map(|r| r.name.as_str()).collect();
     assert_eq!(
         named[..5],
@@ -136,15 +134,11 @@ fn an_ensemble_offsets_all_but_the_first_member() {
         );
     }
     assert!(offsets[0].distance(offsets[1]) > 1e-7);
-    assert_eq!(
-        plan(&path).unwrap().manifest.runs,
-        runs,
-        "the same every time"
-    );
+    assert_eq!(plan(&path).unwrap().runs, runs, "the same every time");
     // A grain that has a height of its own keeps it.
     let first = text.replace("[ensemble]", "[ensemble]\ngrain = 0");
     let (_folder, path) = folder(&first);
-    let runs = plan(&path).unwrap().manifest.runs;
+    let runs = plan(&path).unwrap().runs;
     let moved = runs[1].case().unwrap().setup.grains[0].pose.position;
     assert!(moved.z == 5e-3 && moved.x != 5e-3);
 }
@@ -216,7 +210,7 @@ fn a_wrong_case_is_placed_where_the_study_set_it() {
 #[test]
 fn only_takes_patterns_and_shares() {
     let (_folder, path) = folder(STUDY);
-    let runs = plan(&path).unwrap().manifest.runs;
+    let runs = plan(&path).unwrap().runs;
     let chosen = |text: &str| Selection::parse(text).unwrap().choose(&runs);
     assert_eq!(chosen("light-*,alone").unwrap(), [0, 1, 4]);
     assert_eq!(chosen("*-rough").unwrap(), [1, 3]);

@@ -57,7 +57,7 @@ fn measures(events: &[(f64, Kind)], oblong: bool) -> PairMeasures {
         1.0,
     );
     let events = log(events);
-    PairMeasures::of_pair(&PairHistory {
+    PairMeasures::from_history(&PairHistory {
         grains: [&behind, &ahead],
         up: DVec3::Z,
         scales: SCALES,

@@ -7,20 +7,18 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use grainwake_study::{Manifest, Plan, RUNS, Rendered, Run, Study, render};
+use grainwake_study::{Plan, RUNS, Rendered, Run, Study, render};
 
 /// The 65 models of the repository, planned as if the made-up folders were theirs.
-fn manifest() -> Manifest {
+fn synthetic_plan() -> Plan {
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/dkt-morphology/study.toml");
-    let mut manifest = Plan::of(&Study::read(&path).unwrap(), &[])
-        .unwrap()
-        .manifest;
-    (manifest.version, manifest.commit) = ("0.1.0".into(), Some("0123abc".into()));
-    for run in &mut manifest.runs {
+    let mut plan = Plan::resolve(&Study::read(&path).unwrap(), &[]).unwrap();
+    (plan.version, plan.commit) = ("0.1.0".into(), Some("0123abc".into()));
+    for run in &mut plan.runs {
         (run.case_sha256, run.ending) = ("00ff".into(), "end -, stop -".into());
     }
-    manifest
+    plan
 }
 
 /// How long things take in a run, relative to the made-up pair: as the paper has it.
@@ -77,13 +75,13 @@ fn stretch(from: &Path, to: &Path, factor: f64) {
 /// A study folder in which the runs that `wanted` names are finished, and the stories have slices.
 fn study(root: &Path, wanted: impl Fn(&Run) -> bool) -> PathBuf {
     let folder = root.join("study");
-    let manifest = manifest();
+    let plan = synthetic_plan();
     let original = root.join("pair");
     std::fs::create_dir_all(&original).unwrap();
     synthetic::pair(&original, 0.9, 0.5e-3);
-    for run in manifest.runs.iter().filter(|r| wanted(r)) {
+    for run in plan.runs.iter().filter(|r| wanted(r)) {
         let to = run.folder(&folder);
-        let story = manifest.analysis.figures.stories.contains(&run.name);
+        let story = plan.analysis.figures.stories.contains(&run.name);
         stretch(&original, &to, if story { 1.0 } else { pace(run) });
         if story {
             for part in ["slices", "grains"] {
@@ -100,7 +98,7 @@ fn study(root: &Path, wanted: impl Fn(&Run) -> bool) -> PathBuf {
     std::fs::create_dir_all(folder.join(RUNS)).unwrap();
     std::fs::write(
         folder.join("study.json"),
-        serde_json::to_string(&manifest).unwrap(),
+        serde_json::to_string(&plan).unwrap(),
     )
     .unwrap();
     folder
@@ -297,7 +295,7 @@ fn a_part_of_a_study_is_drawn_and_what_is_missing_is_said() {
         "unfinished: g06-o3",
         "g01-o1: it blew up",
         "there is no run sphere",
-        "too few to say anything",
+        "too few for a test",
     ] {
         assert!(page.contains(part), "{part}");
     }

@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use common::{STUDY, folder, plan};
 use grainwake_solver::output::Progress;
 use grainwake_study::{
-    Manifest, Options, Outcome, Plan, RunState, Study, StudyObserver, execute, records, run_state,
-    to_csv, write_tables,
+    Options, Outcome, Plan, RunState, Study, StudyObserver, execute, records, run_state, to_csv,
+    write_tables,
 };
 
 struct Quiet;
@@ -38,7 +38,7 @@ fn options(jobs: usize) -> Options {
 
 fn run(plan: &Plan, study: &Path, watcher: &dyn StudyObserver, options: &Options) -> Vec<Outcome> {
     plan.create_folder(study).unwrap();
-    let runs = &plan.manifest.runs;
+    let runs = &plan.runs;
     let all: Vec<usize> = (0..runs.len()).collect();
     execute(runs, &all, study, options, watcher)
         .unwrap()
@@ -48,17 +48,12 @@ fn run(plan: &Plan, study: &Path, watcher: &dyn StudyObserver, options: &Options
 }
 
 fn states(plan: &Plan, study: &Path) -> Vec<RunState> {
-    plan.manifest
-        .runs
-        .iter()
-        .map(|r| run_state(r, study))
-        .collect()
+    plan.runs.iter().map(|r| run_state(r, study)).collect()
 }
 
 fn results(plan: &Plan, study: &Path) -> Vec<Vec<u8>> {
     let file = |name: &str| {
-        plan.manifest
-            .runs
+        plan.runs
             .iter()
             .map(|r| std::fs::read(r.folder(study).join(name)).unwrap())
             .collect::<Vec<_>>()
@@ -90,12 +85,12 @@ fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
         !study.join("runs/alone/checkpoint").exists(),
         "checkpoints of finished runs go"
     );
-    assert_eq!(Manifest::read(&study).unwrap(), first.manifest);
+    assert_eq!(Plan::read(&study).unwrap(), first);
     let kept = std::fs::read(study.join("runs/alone/provenance.json")).unwrap();
     assert!(
         run(&first, &study, &Quiet, &options(1))
             .iter()
-            .all(|o| *o == Outcome::Before)
+            .all(|o| *o == Outcome::AlreadyFinished)
     );
     assert_eq!(
         std::fs::read(study.join("runs/alone/provenance.json")).unwrap(),
@@ -105,7 +100,7 @@ fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
     // One model changes: it alone is stale, and is run again.
     std::fs::write(&path, STUDY.replace("friction = 0.6", "friction = 0.3")).unwrap();
     let second = plan(&path).unwrap();
-    let stale: Vec<&str> = states(&second, &study).iter().map(RunState::word).collect();
+    let stale: Vec<&str> = states(&second, &study).iter().map(RunState::name).collect();
     assert_eq!(
         stale,
         ["finished", "stale", "finished", "stale", "finished"]
@@ -117,7 +112,7 @@ fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
         .collect();
     assert_eq!(again, [false, true, false, true, false]);
     // Another end is stale too, though the case hash of a run folder does not know it.
-    let longer = Plan::of(&Study::read(&path).unwrap(), &["time.end=0.07".into()]).unwrap();
+    let longer = Plan::resolve(&Study::read(&path).unwrap(), &["time.end=0.07".into()]).unwrap();
     assert!(
         states(&longer, &study)
             .iter()
@@ -146,7 +141,7 @@ fn interrupted_studies_go_on_and_give_the_same_bits() {
         rounds += 1;
         if ended
             .iter()
-            .all(|o| matches!(o, Outcome::Finished(_) | Outcome::Before))
+            .all(|o| matches!(o, Outcome::Finished(_) | Outcome::AlreadyFinished))
         {
             break;
         }
@@ -158,10 +153,7 @@ fn interrupted_studies_go_on_and_give_the_same_bits() {
     }
     assert!(rounds > 3, "it was interrupted {rounds} times");
     assert_eq!(results(&plan, &whole), results(&plan, &broken));
-    let (a, b) = (
-        records(&plan.manifest, &whole),
-        records(&plan.manifest, &broken),
-    );
+    let (a, b) = (records(&plan, &whole), records(&plan, &broken));
     let measured = |rows: &[grainwake_study::RunRecord]| {
         rows.iter()
             .map(|r| (r.pair.clone(), r.steps))
@@ -230,7 +222,7 @@ fn a_failure_stays_alone() {
     let ended = run(&plan, &study, &Quiet, &options(1));
     assert!(matches!(&ended[4], Outcome::Failed(why, 3) if why.contains("it blew up")));
     assert_eq!(
-        records(&plan.manifest, &study)[4].remark.as_deref(),
+        records(&plan, &study)[4].remark.as_deref(),
         Some("it blew up")
     );
     let ended = run(
@@ -256,7 +248,7 @@ fn a_run_in_other_hands_is_left_alone() {
     let lock = std::fs::File::create(study.join("locks/alone.lock")).unwrap();
     lock.lock().unwrap();
     let ended = run(&plan, &study, &Quiet, &options(1));
-    assert_eq!(ended[4], Outcome::Elsewhere);
+    assert_eq!(ended[4], Outcome::Locked);
     assert!(matches!(ended[0], Outcome::Finished(_)));
     drop(lock);
     assert!(matches!(
@@ -298,8 +290,8 @@ fn the_table_holds_every_run_and_outlives_the_run_folders() {
     let plan = plan(&path).unwrap();
     let study = folder.path().join("out");
     plan.create_folder(&study).unwrap();
-    execute(&plan.manifest.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
-    let rows = records(&plan.manifest, &study);
+    execute(&plan.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
+    let rows = records(&plan, &study);
     write_tables(&rows, &study).unwrap();
     let words: Vec<&str> = rows.iter().map(|r| r.state.as_str()).collect();
     assert_eq!(
@@ -329,5 +321,5 @@ fn the_table_holds_every_run_and_outlives_the_run_folders() {
     assert_eq!(&lines[1][column("kiss_time")], "");
     assert_eq!(to_csv(&rows).lines().count(), 6);
     std::fs::remove_dir_all(study.join("runs")).unwrap();
-    assert_eq!(records(&plan.manifest, &study), rows, "the table is kept");
+    assert_eq!(records(&plan, &study), rows, "the table is kept");
 }

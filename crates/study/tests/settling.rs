@@ -53,13 +53,13 @@ fn carried_out(grains: usize) -> (tempfile::TempDir, PathBuf, Plan) {
         keep_checkpoints: false,
         command: vec!["test".into()],
     };
-    let ended = execute(&plan.manifest.runs, &[0, 1], &out, &options, &Quiet).unwrap();
+    let ended = execute(&plan.runs, &[0, 1], &out, &options, &Quiet).unwrap();
     assert!(ended.iter().all(|(_, o)| matches!(o, Outcome::Finished(_))));
     (folder, out, plan)
 }
 
 fn rows(plan: &Plan, out: &Path) -> Vec<RunRecord> {
-    records(&plan.manifest, out)
+    records(&plan, out)
 }
 
 fn page(out: &Path) -> String {
@@ -165,7 +165,7 @@ fn three_grains_have_means_and_each_its_landing() {
     }
     assert_eq!(full.landing_time_s, full.each[0].landing_time_s);
     render(&out).unwrap();
-    assert!(page(&out).contains("6 of their 6 grains landed"));
+    assert!(page(&out).contains("6 of 6 grains landed"));
     assert_eq!(
         std::fs::read_to_string(out.join("settling.csv"))
             .unwrap()

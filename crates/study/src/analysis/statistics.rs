@@ -1,8 +1,8 @@
-//! Statistics of small observations by ranks: no assumption on how values are spread.
+//! Rank statistics of small samples; no assumption about the distribution of the values.
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-/// An estimate with its 95 % confidence interval and two-sided p value.
+/// Estimate with its 95 % confidence interval and two-sided p value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// Number of values or pairs.
@@ -13,11 +13,11 @@ pub struct Estimate {
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,
-    /// Probability of a result at least as far from zero if there were no effect.
+    /// Two-sided p value of the null hypothesis that there is no effect.
     pub p: f64,
 }
 
-/// Ranks from 1; equal values share the mean of their ranks.
+/// Returns ranks from 1; equal values share their mean rank.
 pub fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -35,7 +35,7 @@ pub fn ranks(values: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Product-moment correlation; none if a side does not vary.
+/// Returns the product-moment correlation; none if a sample does not vary.
 fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
     let n = x.len() as f64;
     let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
@@ -46,17 +46,18 @@ fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
     (xx > 0.0 && yy > 0.0).then(|| (xy / (xx * yy).sqrt()).clamp(-1.0, 1.0))
 }
 
-/// Spearman's rank correlation. The interval is Fisher's z with the standard error of Bonett and
-/// Wright (2000), the p value that of Student's t with n - 2 degrees of freedom. None below four
-/// pairs, or if a side does not vary.
+/// Computes Spearman's rank correlation; none below four pairs, or if a sample does not vary.
+///
+/// The interval is Fisher's z with the standard error of Bonett and Wright (2000); the p value is
+/// that of Student's t with n - 2 degrees of freedom.
 pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
     let n = x.len();
     if n < 4 || y.len() != n {
         return None;
     }
     let r = pearson(&ranks(x), &ranks(y))?;
-    let reach = normal_quantile(0.975) * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
-    // A perfect order has no finite z; the next best possible one stands for it.
+    let half_width = normal_quantile(0.975) * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
+    // A perfect correlation has no finite z; the next smaller possible value replaces it.
     let steps = (n * (n * n - 1)) as f64;
     let z = r.clamp(-1.0 + 6.0 / steps, 1.0 - 6.0 / steps).atanh();
     let freedom = n as f64 - 2.0;
@@ -67,52 +68,50 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
     Some(Estimate {
         n,
         value: r,
-        low: (z - reach).tanh(),
-        high: (z + reach).tanh(),
+        low: (z - half_width).tanh(),
+        high: (z + half_width).tanh(),
         p,
     })
 }
 
-/// Wilcoxon's signed-rank test of paired differences: their Hodges-Lehmann estimate (the median of
-/// all means of two), its interval, and the exact p value given the ties. None below six
-/// differences: no interval of fewer reaches 95 %.
+/// Performs Wilcoxon's signed-rank test of paired differences.
+///
+/// The value is the Hodges-Lehmann estimate, the median of all Walsh averages (pairwise means).
+/// The p value is exact given the ties. None below six differences, because no interval of fewer
+/// reaches 95 %.
 pub fn signed_rank(differences: &[f64]) -> Option<Estimate> {
     let n = differences.len();
     if n < 6 {
         return None;
     }
-    let mut means: Vec<f64> = Vec::with_capacity(n * (n + 1) / 2);
-    for i in 0..n {
-        means.extend(differences[i..].iter().map(|d| 0.5 * (d + differences[i])));
+    let mut averages: Vec<f64> = Vec::with_capacity(n * (n + 1) / 2);
+    for (i, a) in differences.iter().enumerate() {
+        averages.extend(differences[i..].iter().map(|b| 0.5 * (b + a)));
     }
-    means.sort_by(f64::total_cmp);
-    let plain: Vec<f64> = (1..=n).map(|i| i as f64).collect();
-    let cut = critical(&distribution(&plain));
-    let other: Vec<f64> = differences.iter().copied().filter(|d| *d != 0.0).collect();
-    let sizes: Vec<f64> = other.iter().map(|d| d.abs()).collect();
-    let ranked = ranks(&sizes);
-    let positive: f64 = other
-        .iter()
-        .zip(&ranked)
-        .filter(|(d, _)| **d > 0.0)
-        .map(|(_, r)| r)
-        .sum();
-    let law = distribution(&ranked);
-    let at = (2.0 * positive).round() as usize;
-    let total: f64 = law.iter().sum();
-    let below: f64 = law[..=at.min(law.len() - 1)].iter().sum::<f64>() / total;
-    let above: f64 = law[at.min(law.len())..].iter().sum::<f64>() / total;
+    averages.sort_by(f64::total_cmp);
+    let untied: Vec<f64> = (1..=n).map(|i| i as f64).collect();
+    let cut = critical_value(&rank_sum_counts(&untied));
+    let nonzero: Vec<f64> = differences.iter().copied().filter(|d| *d != 0.0).collect();
+    let sizes: Vec<f64> = nonzero.iter().map(|d| d.abs()).collect();
+    let ranks = ranks(&sizes);
+    let positive = nonzero.iter().zip(&ranks).filter(|(d, _)| **d > 0.0);
+    let statistic: f64 = positive.map(|(_, rank)| rank).sum();
+    let counts = rank_sum_counts(&ranks);
+    let at = (2.0 * statistic).round() as usize;
+    let total: f64 = counts.iter().sum();
+    let lower: f64 = counts[..=at.min(counts.len() - 1)].iter().sum::<f64>() / total;
+    let upper: f64 = counts[at.min(counts.len())..].iter().sum::<f64>() / total;
     Some(Estimate {
         n,
-        value: median(&means)?,
-        low: means[cut],
-        high: means[means.len() - 1 - cut],
-        p: (2.0 * below.min(above)).min(1.0),
+        value: median(&averages)?,
+        low: averages[cut],
+        high: averages[averages.len() - 1 - cut],
+        p: (2.0 * lower.min(upper)).min(1.0),
     })
 }
 
-/// How many of all signs give each sum of positive ranks, by twice the sum.
-fn distribution(ranks: &[f64]) -> Vec<f64> {
+/// Counts the sign combinations with each sum of positive ranks, indexed by twice the sum.
+fn rank_sum_counts(ranks: &[f64]) -> Vec<f64> {
     let mut counts = vec![1.0];
     for rank in ranks {
         let step = (2.0 * rank).round() as usize;
@@ -126,13 +125,13 @@ fn distribution(ranks: &[f64]) -> Vec<f64> {
     counts
 }
 
-/// Number of means of two to leave out at each end for 95 %: the tables' critical value.
-fn critical(law: &[f64]) -> usize {
-    let total: f64 = law.iter().sum();
+/// Number of Walsh averages outside the 95 % interval at each end: the tabulated critical value.
+fn critical_value(counts: &[f64]) -> usize {
+    let total: f64 = counts.iter().sum();
     let mut sum = 0.0;
     let mut cut = 0;
-    // Sums of whole ranks stand at even places.
-    for (i, count) in law.iter().enumerate().step_by(2) {
+    // Sums of whole ranks have even indices.
+    for (i, count) in counts.iter().enumerate().step_by(2) {
         sum += count;
         if sum / total > 0.025 {
             break;
@@ -142,12 +141,12 @@ fn critical(law: &[f64]) -> usize {
     cut
 }
 
-/// Median; none of nothing.
+/// Returns the median; none of an empty sample.
 pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// The value below which a part of the sorted values lies, between values in proportion.
+/// Returns the quantile of a sample, linearly interpolated; none of an empty sample.
 pub fn quantile(values: &[f64], part: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -158,20 +157,20 @@ pub fn quantile(values: &[f64], part: f64) -> Option<f64> {
     Some(sorted[low] + (at - low as f64) * (sorted[high] - sorted[low]))
 }
 
-/// Of two paired observations of positive values: whether the first is spread more widely, relative to
-/// its size. The Pitman-Morgan test by ranks on logarithms: the spreads are equal if and only if
+/// Tests whether the first of two paired positive samples has the larger relative spread.
+///
+/// This is the Pitman-Morgan test by ranks on logarithms: the variances are equal if and only if
 /// sum and difference are uncorrelated.
 pub fn relative_spread_test(first: &[f64], second: &[f64]) -> Option<Estimate> {
     if first.iter().chain(second).any(|v| *v <= 0.0) {
         return None;
     }
-    let pairs = || first.iter().zip(second).map(|(a, b)| (a.ln(), b.ln()));
-    let sums: Vec<f64> = pairs().map(|(a, b)| a + b).collect();
-    let differences: Vec<f64> = pairs().map(|(a, b)| a - b).collect();
+    let pairs = first.iter().zip(second).map(|(a, b)| (a.ln(), b.ln()));
+    let (sums, differences): (Vec<f64>, Vec<f64>) = pairs.map(|(a, b)| (a + b, a - b)).unzip();
     spearman(&sums, &differences)
 }
 
-/// Standard deviation over mean.
+/// Returns the standard deviation divided by the mean.
 pub fn coefficient_of_variation(values: &[f64]) -> Option<f64> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

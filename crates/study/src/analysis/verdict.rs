@@ -1,343 +1,271 @@
-//! What the rows of a study say: claims tested, correlations, by ranks.
+//! Verdicts on claims, from rank tests on the observations.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::analysis::statistics::{self, Estimate, median};
-use crate::format::{p_value, percent, plain, significant};
+use super::observation::{Observation, matched, observations, ranges, with_factor};
+use super::statistics::{
+    Estimate, coefficient_of_variation, relative_spread_test, signed_rank, spearman,
+};
+use crate::format::{p_value, percent, significant, title};
 use crate::measure::record::RunRecord;
-use crate::plan::claims::{Analysis, Claim, Condition, Sign, Test};
+use crate::plan::claims::{Analysis, Claim, Sign, Test};
+use crate::plan::quantities::KISS_DEPENDENT;
 
-/// What came out for a model: medians over its members.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Observation {
-    /// Name of the model.
-    pub model: String,
-    /// Name of its value on each axis.
-    pub levels: BTreeMap<String, String>,
-    /// Numbers that belong to it.
-    pub factors: BTreeMap<String, f64>,
-    /// The value.
-    pub value: f64,
-    /// Smallest and largest over the members.
-    pub range: (f64, f64),
-    /// Whether it is only a lower bound: the pair landed before it happened.
-    pub bound: bool,
-}
+/// Reservation about claims on quantities that depend on whether pairs kiss.
+pub const KISS_RESERVATION: &str = "depends on which pairs kiss: the share of kissing pairs is \
+                                    not converged at 8 cells per diameter";
 
-impl Observation {
-    /// The value for a test by ranks: what had not happened by the landing comes last.
-    pub fn latest(&self) -> f64 {
-        if self.bound {
-            f64::INFINITY
-        } else {
-            self.value
-        }
-    }
-}
-
-/// A claim and what the runs say about it. The JSON names are stable.
+/// Claim and the result of its test. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// The claim in words.
+    /// Statement of the claim.
     pub claim: String,
-    /// Where it is made.
+    /// Section of the publication that makes the claim.
     pub part: String,
-    /// The quantity.
+    /// Quantity.
     pub quantity: String,
     /// "holds", "contradicted" or "open".
     pub verdict: &'static str,
-    /// The numbers in words.
+    /// Result of the test in words.
     pub says: String,
-    /// Models or pairs of models.
+    /// Number of models or pairs of models.
     pub n: usize,
-    /// Those that are lower bounds.
-    pub bounds: usize,
-    /// What was estimated: a rank correlation or a difference.
+    /// Number of right-censored observations.
+    #[serde(rename = "bounds")]
+    pub censored: usize,
+    /// Estimated rank correlation or difference.
     pub value: Option<f64>,
-    /// 95 % interval.
+    /// 95 % confidence interval.
     pub interval: Option<[f64; 2]>,
     /// Two-sided p value.
     pub p: Option<f64>,
 }
 
-/// A quantity of a row; of a pair that landed before it happened, the landing as a lower bound.
-pub fn value(row: &RunRecord, quantity: &str) -> Option<(f64, bool)> {
-    if !row.finished() {
-        return None;
-    }
-    if let Some(value) = row.get(quantity) {
-        let together = row.pair.as_ref().is_some_and(|p| p.parted == Some(false));
-        return Some((value, quantity == "contact_stage" && together));
-    }
-    let pair = row.pair.as_ref()?;
-    let landing = pair.landing_time.map(|time| (time, true));
-    match quantity {
-        "kiss_time" => landing,
-        "tumble_time" | "pass_time" | "separation_time" if pair.kiss_time.is_some() => landing,
-        _ => None,
-    }
-}
-
-/// A quantity of every model that has it, medians over the members.
-pub fn observations(
-    rows: &[RunRecord],
-    quantity: &str,
-    when: &BTreeMap<String, Condition>,
-) -> Vec<Observation> {
-    let mut members: BTreeMap<&str, Vec<(&RunRecord, f64, bool)>> = BTreeMap::new();
-    let mut order: Vec<&str> = Vec::new();
-    for row in rows.iter().filter(|row| meets(row, when)) {
-        if let Some((v, bound)) = value(row, quantity) {
-            let list = members.entry(&row.model).or_default();
-            if list.is_empty() {
-                order.push(&row.model);
-            }
-            list.push((row, v, bound));
-        }
-    }
-    let sample = |name: &str| {
-        let list = &members[name];
-        let values: Vec<f64> = list.iter().map(|(_, v, _)| *v).collect();
-        let row = list[0].0;
-        Observation {
-            model: name.to_owned(),
-            levels: row.levels.clone(),
-            factors: row.factors.clone(),
-            value: median(&values).unwrap_or(f64::NAN),
-            range: values
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-                    (a.min(*v), b.max(*v))
-                }),
-            bound: 2 * list.iter().filter(|(.., bound)| *bound).count() >= list.len(),
-        }
-    };
-    order.into_iter().map(sample).collect()
-}
-
-fn meets(row: &RunRecord, when: &BTreeMap<String, Condition>) -> bool {
-    when.iter().all(|(name, condition)| match condition {
-        Condition::Is(level) => row.levels.get(name) == Some(level),
-        Condition::In(levels) => row.levels.get(name).is_some_and(|l| levels.contains(l)),
-        Condition::Range { at_least, at_most } => row.factors.get(name).is_some_and(|v| {
-            at_least.is_none_or(|low| *v >= low) && at_most.is_none_or(|high| *v <= high)
-        }),
-    })
-}
-
-/// The claims of an analysis, tested.
-pub fn evaluate(analysis: &Analysis, rows: &[RunRecord]) -> Vec<Finding> {
+/// Tests the claims of an analysis.
+pub fn evaluate(analysis: &Analysis, records: &[RunRecord]) -> Vec<Finding> {
     analysis
         .claims
         .iter()
-        .map(|claim| one(claim, rows))
+        .map(|claim| test(claim, records))
         .collect()
 }
 
-fn one(claim: &Claim, rows: &[RunRecord]) -> Finding {
-    let every = observations(rows, &claim.quantity, &claim.when);
-    let seen = |all: Vec<Observation>| -> Vec<Observation> {
-        let counts = |s: &Observation| !(claim.observed && s.bound);
-        all.into_iter().filter(counts).collect()
-    };
-    let ranges = |over: &str| seen(ranges(&every, over));
-    let all = seen(every.clone());
-    match &claim.test {
-        Test::Trend { with, sign } => trend(claim, &all, with, *sign, ""),
-        Test::Range { over, with, sign } => trend(claim, &ranges(over), with, *sign, "range of "),
-        Test::Order { axis, more, less } => {
-            let pairs = pairs(&all, axis, more, less);
-            let differences: Vec<f64> = pairs.iter().map(|(a, b)| a.value - b.value).collect();
-            let found = statistics::signed_rank(&differences);
-            let larger = differences.iter().filter(|d| **d > 0.0).count();
-            let says = |e: Estimate| {
-                format!(
-                    "{} is larger in {more} than in {less} for {larger} of {} grains; difference {} (95 % interval {} to {}), p = {}",
-                    plain(&claim.quantity),
-                    e.n,
-                    significant(e.value),
-                    significant(e.low),
-                    significant(e.high),
-                    p_value(e.p)
-                )
-            };
-            finding(claim, pairs.len(), bounds(&pairs), found, says, |e| {
-                verdict(e.low > 0.0, e.high < 0.0)
-            })
+/// Result of a test before it is worded.
+struct Outcome {
+    n: usize,
+    censored: usize,
+    estimate: Option<Estimate>,
+    /// Result in words; without meaning if there is no estimate.
+    says: String,
+    verdict: &'static str,
+}
+
+impl Outcome {
+    fn new(
+        n: usize,
+        censored: usize,
+        estimate: Option<Estimate>,
+        says: impl FnOnce(&Estimate) -> String,
+        verdict: impl FnOnce(&Estimate) -> &'static str,
+    ) -> Outcome {
+        Outcome {
+            n,
+            censored,
+            says: estimate.as_ref().map_or(String::new(), says),
+            verdict: estimate.as_ref().map_or("open", verdict),
+            estimate,
         }
+    }
+}
+
+fn test(claim: &Claim, records: &[RunRecord]) -> Finding {
+    let all = observations(records, &claim.quantity, &claim.when);
+    let included = |all: Vec<Observation>| -> Vec<Observation> {
+        let excluded = |o: &Observation| claim.observed && o.censored;
+        all.into_iter().filter(|o| !excluded(o)).collect()
+    };
+    let name = title(&claim.quantity);
+    let outcome = match &claim.test {
+        Test::Trend { with, sign } => trend(&included(all), with, *sign, &name),
+        Test::Range { over, with, sign } => {
+            let all = included(ranges(&all, over));
+            trend(&all, with, *sign, &format!("range of {name}"))
+        }
+        Test::Order { axis, more, less } => order(&included(all), axis, [more, less], &name),
         Test::Equal {
             axis,
             values: [a, b],
             within,
-        } => {
-            let pairs = pairs(&all, axis, a, b);
-            let relative: Vec<f64> = pairs
-                .iter()
-                .map(|(a, b)| 2.0 * (a.value - b.value) / (a.value + b.value))
-                .collect();
-            let says = |e: Estimate| {
-                format!(
-                    "{} in {a} against {b}: relative difference {} (95 % interval {} to {}, n = {})",
-                    plain(&claim.quantity),
-                    percent(e.value),
-                    percent(e.low),
-                    percent(e.high),
-                    e.n
-                )
-            };
-            let found = statistics::signed_rank(&relative);
-            finding(claim, pairs.len(), bounds(&pairs), found, says, |e| {
-                inside(e, *within)
-            })
+        } => equal(&included(all), axis, [a, b], *within, &name),
+        Test::Spread { axis, more, less } => spread(&included(all), axis, [more, less], &name),
+        Test::Near { model, within } => {
+            let everywhere = observations(records, &claim.quantity, &BTreeMap::new());
+            let reference = included(everywhere).into_iter().find(|o| o.model == *model);
+            near(&included(all), model, reference, *within, &name)
         }
-        Test::Spread { axis, more, less } => {
-            let pairs = pairs(&all, axis, more, less);
-            let side = |pick: fn(&(&Observation, &Observation)) -> f64| {
-                pairs.iter().map(pick).collect::<Vec<f64>>()
-            };
-            let (first, second) = (side(|p| p.0.value), side(|p| p.1.value));
-            let spread =
-                |v: &[f64]| statistics::coefficient_of_variation(v).map_or("?".into(), percent);
-            let says = |e: Estimate| {
-                format!(
-                    "{} varies over the grains by {} in {more} and by {} in {less} (standard deviation over mean, n = {}; p of equal spreads = {})",
-                    plain(&claim.quantity),
-                    spread(&first),
-                    spread(&second),
-                    e.n,
-                    p_value(e.p)
-                )
-            };
-            let found = statistics::relative_spread_test(&first, &second);
-            finding(claim, pairs.len(), bounds(&pairs), found, says, |e| {
-                verdict(e.low > 0.0, e.high < 0.0)
-            })
-        }
-        Test::Near { model, within } => near(claim, rows, &all, model, *within),
-    }
-}
-
-/// The range over an axis, of models that differ on it alone.
-fn ranges(all: &[Observation], axis: &str) -> Vec<Observation> {
-    let mut groups: BTreeMap<BTreeMap<String, String>, Vec<&Observation>> = BTreeMap::new();
-    for sample in all.iter().filter(|s| s.levels.contains_key(axis)) {
-        let mut rest = sample.levels.clone();
-        rest.remove(axis);
-        groups.entry(rest).or_default().push(sample);
-    }
-    let whole = groups.values().map(Vec::len).max().unwrap_or(0);
-    let range = |group: &Vec<&Observation>| {
-        let of =
-            |start: f64, pick: fn(f64, f64) -> f64| group.iter().map(|s| s.value).fold(start, pick);
-        let mut sample = group[0].clone();
-        sample.value = of(f64::NEG_INFINITY, f64::max) - of(f64::INFINITY, f64::min);
-        sample.bound = group.iter().any(|s| s.bound);
-        sample
     };
-    groups
-        .values()
-        .filter(|g| g.len() == whole && whole > 1)
-        .map(range)
-        .collect()
+    word(claim, outcome)
 }
 
-fn trend(claim: &Claim, all: &[Observation], with: &str, sign: Sign, of: &str) -> Finding {
-    let known: Vec<(&Observation, f64)> = all
-        .iter()
-        .filter_map(|s| Some((s, *s.factors.get(with)?)))
-        .collect();
-    let (x, y): (Vec<f64>, Vec<f64>) = known.iter().map(|(s, f)| (*f, s.latest())).unzip();
-    let found = statistics::spearman(&x, &y);
-    let says = |e: Estimate| {
+/// Adds the claim and the treatment of censored observations to the outcome of a test.
+fn word(claim: &Claim, outcome: Outcome) -> Finding {
+    let Outcome { n, censored, .. } = outcome;
+    let mut says = outcome.says;
+    if outcome.estimate.is_none() {
+        says = format!("{n} models or pairs of models have finished: too few for a test");
+    }
+    if claim.observed {
+        says += "; pairs that landed before the event are left out";
+    }
+    if censored > 0 {
+        says += &match claim.test {
+            Test::Trend { .. } | Test::Range { .. } => {
+                format!("; {censored} right-censored at the landing, ranked last with equal ranks")
+            }
+            _ => format!("; {censored} right-censored: lower bounds, as the pair landed before"),
+        };
+    }
+    if KISS_DEPENDENT.contains(&claim.quantity.as_str()) {
+        says += &format!("; {KISS_RESERVATION}");
+    }
+    Finding {
+        claim: claim.says.clone(),
+        part: claim.part.clone(),
+        quantity: claim.quantity.clone(),
+        verdict: outcome.verdict,
+        says,
+        n,
+        censored,
+        value: outcome.estimate.map(|e| e.value),
+        interval: outcome.estimate.map(|e| [e.low, e.high]),
+        p: outcome.estimate.map(|e| e.p),
+    }
+}
+
+fn order(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -> Outcome {
+    let pairs = matched(all, axis, more, less);
+    let differences: Vec<f64> = pairs.iter().map(|(a, b)| a.value - b.value).collect();
+    let larger = differences.iter().filter(|d| **d > 0.0).count();
+    let says = |e: &Estimate| {
         format!(
-            "rank correlation of {of}{} with {with}: {} (95 % interval {} to {}, n = {}, p = {})",
-            plain(&claim.quantity),
+            "{name} is larger in {more} than in {less} for {larger} of {} grains; difference {} \
+             ({}), p = {}",
+            e.n,
             significant(e.value),
-            significant(e.low),
-            significant(e.high),
+            interval(e, significant),
+            p_value(e.p)
+        )
+    };
+    let estimate = signed_rank(&differences);
+    Outcome::new(pairs.len(), censored(&pairs), estimate, says, |e| {
+        verdict(e.low > 0.0, e.high < 0.0)
+    })
+}
+
+fn equal(all: &[Observation], axis: &str, [a, b]: [&str; 2], within: f64, name: &str) -> Outcome {
+    let pairs = matched(all, axis, a, b);
+    let relative =
+        |(a, b): &(&Observation, &Observation)| 2.0 * (a.value - b.value) / (a.value + b.value);
+    let relative: Vec<f64> = pairs.iter().map(relative).collect();
+    let says = |e: &Estimate| {
+        format!(
+            "{name} in {a} against {b}: relative difference {} ({}, n = {})",
+            percent(e.value),
+            interval(e, percent),
+            e.n
+        )
+    };
+    let estimate = signed_rank(&relative);
+    Outcome::new(pairs.len(), censored(&pairs), estimate, says, |e| {
+        inside(e, within)
+    })
+}
+
+fn spread(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -> Outcome {
+    let pairs = matched(all, axis, more, less);
+    let (first, second): (Vec<f64>, Vec<f64>) =
+        pairs.iter().map(|(a, b)| (a.value, b.value)).unzip();
+    let variation = |v: &[f64]| coefficient_of_variation(v).map_or("?".into(), percent);
+    let says = |e: &Estimate| {
+        format!(
+            "coefficient of variation of {name} over the grains: {} in {more}, {} in {less} \
+             (n = {}; p of equal variation = {})",
+            variation(&first),
+            variation(&second),
             e.n,
             p_value(e.p)
         )
     };
-    let bounds = known.iter().filter(|(s, _)| s.bound).count();
-    finding(claim, known.len(), bounds, found, says, |e| {
-        let (up, down) = (e.low > 0.0, e.high < 0.0);
+    let estimate = relative_spread_test(&first, &second);
+    Outcome::new(pairs.len(), censored(&pairs), estimate, says, |e| {
+        verdict(e.low > 0.0, e.high < 0.0)
+    })
+}
+
+fn trend(all: &[Observation], with: &str, sign: Sign, name: &str) -> Outcome {
+    let (x, y, censored) = with_factor(all, with);
+    let says = |e: &Estimate| {
+        format!(
+            "rank correlation of {name} with {with}: {} ({}, n = {}, p = {})",
+            significant(e.value),
+            interval(e, significant),
+            e.n,
+            p_value(e.p)
+        )
+    };
+    Outcome::new(x.len(), censored, spearman(&x, &y), says, |e| {
+        let (rises, falls) = (e.low > 0.0, e.high < 0.0);
         match sign {
-            Sign::Rises => verdict(up, down),
-            Sign::Falls => verdict(down, up),
-            Sign::None => verdict(false, up || down),
+            Sign::Rises => verdict(rises, falls),
+            Sign::Falls => verdict(falls, rises),
+            Sign::None => verdict(false, rises || falls),
         }
     })
 }
 
 fn near(
-    claim: &Claim,
-    rows: &[RunRecord],
     all: &[Observation],
     model: &str,
+    reference: Option<Observation>,
     within: f64,
-) -> Finding {
-    let own = observations(rows, &claim.quantity, &BTreeMap::new());
-    let usable = |s: &&Observation| s.model == model && !(claim.observed && s.bound);
-    let Some(reference) = own.iter().find(usable) else {
-        return finding(claim, 0, 0, None, |_| String::new(), |_| "open");
+    name: &str,
+) -> Outcome {
+    let Some(reference) = reference else {
+        return Outcome::new(0, 0, None, |_| String::new(), |_| "open");
     };
-    let others: Vec<&Observation> = all.iter().filter(|s| s.model != model).collect();
-    let relative: Vec<f64> = others
-        .iter()
-        .map(|s| s.value / reference.value - 1.0)
-        .collect();
-    let furthest = relative
-        .iter()
-        .fold(0.0, |a: f64, b| if b.abs() > a.abs() { *b } else { a });
-    let says = |e: Estimate| {
+    let others: Vec<&Observation> = all.iter().filter(|o| o.model != model).collect();
+    let relative = |o: &&Observation| o.value / reference.value - 1.0;
+    let relative: Vec<f64> = others.iter().map(relative).collect();
+    let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
+    let largest = relative.iter().fold(0.0, larger);
+    let says = |e: &Estimate| {
         format!(
-            "{} against that of {model}, {}: {} (95 % interval {} to {}, n = {}); the furthest differs by {}",
-            plain(&claim.quantity),
+            "{name} against {model} ({}): {} ({}, n = {}); largest difference {}",
             significant(reference.value),
             percent(e.value),
-            percent(e.low),
-            percent(e.high),
+            interval(e, percent),
             e.n,
-            percent(furthest)
+            percent(largest)
         )
     };
-    let bounds = others.iter().filter(|s| s.bound).count();
-    finding(
-        claim,
-        others.len(),
-        bounds,
-        statistics::signed_rank(&relative),
-        says,
-        |e| inside(e, within),
-    )
+    let censored = others.iter().filter(|o| o.censored).count();
+    let estimate = signed_rank(&relative);
+    Outcome::new(others.len(), censored, estimate, says, |e| {
+        inside(e, within)
+    })
 }
 
-/// Models that differ on one axis alone: at `more`, at `less`.
-fn pairs<'a>(
-    all: &'a [Observation],
-    axis: &str,
-    more: &str,
-    less: &str,
-) -> Vec<(&'a Observation, &'a Observation)> {
-    let rest = |s: &Observation| {
-        let mut levels = s.levels.clone();
-        levels.remove(axis);
-        levels
-    };
-    let at = |level: &str| -> Vec<&'a Observation> {
-        let here = |s: &&Observation| s.levels.get(axis).is_some_and(|l| l == level);
-        all.iter().filter(here).collect()
-    };
-    let others = at(less);
-    let pair = |a: &'a Observation| Some((a, *others.iter().find(|b| rest(a) == rest(b))?));
-    at(more).into_iter().filter_map(pair).collect()
+fn censored(pairs: &[(&Observation, &Observation)]) -> usize {
+    pairs
+        .iter()
+        .filter(|(a, b)| a.censored || b.censored)
+        .count()
 }
 
-fn bounds(pairs: &[(&Observation, &Observation)]) -> usize {
-    pairs.iter().filter(|(a, b)| a.bound || b.bound).count()
+fn interval(e: &Estimate, form: fn(f64) -> String) -> String {
+    format!("95 % interval {} to {}", form(e.low), form(e.high))
 }
 
 fn verdict(holds: bool, contradicted: bool) -> &'static str {
@@ -348,47 +276,8 @@ fn verdict(holds: bool, contradicted: bool) -> &'static str {
     }
 }
 
-/// Whether an interval lies within a bound of zero, or beyond it.
+/// Verdict on equality: whether the interval lies inside or outside of ± `within`.
 fn inside(e: &Estimate, within: f64) -> &'static str {
-    verdict(
-        e.low >= -within && e.high <= within,
-        e.low > within || e.high < -within,
-    )
-}
-
-fn finding(
-    claim: &Claim,
-    n: usize,
-    bounds: usize,
-    found: Option<Estimate>,
-    says: impl Fn(Estimate) -> String,
-    verdict: impl Fn(&Estimate) -> &'static str,
-) -> Finding {
-    let mut text = match found {
-        Some(e) => says(e),
-        None => format!("{n} models or pairs of models are finished: too few to say anything"),
-    };
-    if claim.observed {
-        text += "; what landed before is left out";
-    }
-    if bounds > 0 {
-        text += &match claim.test {
-            Test::Trend { .. } | Test::Range { .. } => {
-                format!("; {bounds} of them landed before and count as latest, alike")
-            }
-            _ => format!("; {bounds} of them are lower bounds, as the pair landed before"),
-        };
-    }
-    Finding {
-        claim: claim.says.clone(),
-        part: claim.part.clone(),
-        quantity: claim.quantity.clone(),
-        verdict: found.as_ref().map_or("open", verdict),
-        says: text,
-        n,
-        bounds,
-        value: found.map(|e| e.value),
-        interval: found.map(|e| [e.low, e.high]),
-        p: found.map(|e| e.p),
-    }
+    let equal = e.low >= -within && e.high <= within;
+    verdict(equal, e.low > within || e.high < -within)
 }

@@ -1,6 +1,5 @@
 //! Measured values of one run folder, and the table of all runs.
 
-pub mod fall;
 pub mod pair;
 pub mod record;
 pub mod settling;

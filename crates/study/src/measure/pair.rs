@@ -1,141 +1,139 @@
-//! The quantities of a settling pair, taken from a run folder.
+//! Measured values of a settling pair.
 //!
-//! Lengths are in equal-volume diameters d, times in sqrt(d/g), speeds in sqrt(d g), down
-//! positive. *Leading* and *trailing* are the grains as they lie at the start. What happens after
-//! the first grain has landed does not count.
+//! Lengths are in equal-volume diameters d, times in sqrt(d/g), speeds in sqrt(d g), down positive.
+//! *Leading* is the lower grain at the start, *trailing* the upper one. All values end with the
+//! first landing of a grain.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use grainwake_report::run_folder::{Event, History, Kind, RunFolder};
 use grainwake_report::story::{Scales, Story};
 use serde::{Deserialize, Serialize};
 
-/// What is measured on a pair. The JSON names are stable.
+/// Measured values of a pair. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PairMeasures {
     /// First contact.
     pub kiss_time: Option<f64>,
-    /// From the first contact until the line of centres stands at 45 degrees (or the pair parts, or lands).
+    /// From the first contact until the line of centres is at 45 degrees, or the first contact ends.
     pub kissing_stage: Option<f64>,
-    /// From the first contact until the pair parts (or lands): the flat part of the gap.
+    /// From the first contact until the pair separates or lands.
     pub contact_stage: Option<f64>,
-    /// Whether it parted before it landed; if not, `contact_stage` is a lower bound.
+    /// Whether the pair separated before landing; if not, `contact_stage` is a lower bound.
     pub parted: Option<bool>,
-    /// The line of centres stands at 45 degrees, after the first contact.
+    /// Line of centres at 45 degrees, after the first contact.
     pub tumble_time: Option<f64>,
-    /// The trailing grain passes the leading one, after the first contact.
+    /// Trailing grain passes the leading one, after the first contact.
     pub pass_time: Option<f64>,
     /// End of the first contact.
     pub separation_time: Option<f64>,
     /// First landing.
     pub landing_time: Option<f64>,
-    /// How often the pair came into contact, having been apart.
+    /// Number of contacts after a separation, and the first one.
     pub kisses: Option<f64>,
-    /// Whether it kissed again after it had parted.
+    /// Whether the pair came into contact more than once.
     pub repeated: Option<bool>,
-    /// How often the upper grain passed the lower one.
+    /// Number of times the upper grain passed the lower one.
     pub role_changes: Option<f64>,
     /// Smallest distance of the centres.
     pub closest: Option<f64>,
-    /// Smallest distance of the surfaces; negative where they overlap.
+    /// Smallest distance of the surfaces; negative for an overlap.
     pub closest_gap: Option<f64>,
-    /// Distance of the centres at the first landing, or the end.
+    /// Distance of the centres at the first landing or the end.
     pub final_distance: Option<f64>,
-    /// Mean speed until the first landing.
+    /// Mean speed of the leading grain until the first landing.
     pub mean_speed_leading: Option<f64>,
-    /// Mean speed until the first landing.
+    /// Mean speed of the trailing grain until the first landing.
     pub mean_speed_trailing: Option<f64>,
-    /// Largest speed.
+    /// Largest speed of the leading grain.
     pub peak_speed_leading: Option<f64>,
-    /// Largest speed.
+    /// Largest speed of the trailing grain.
     pub peak_speed_trailing: Option<f64>,
-    /// Mean speed over the second half of the drafting.
+    /// Mean speed of the leading grain over the second half of the drafting.
     pub draft_speed_leading: Option<f64>,
-    /// Mean speed over the second half of the drafting.
+    /// Mean speed of the trailing grain over the second half of the drafting.
     pub draft_speed_trailing: Option<f64>,
-    /// Angle of the long axis with the vertical [deg], mean over the second half of the drafting;
-    /// 90 is broad side across the stream.
+    /// Mean angle of the leading grain's long axis with the vertical over the second half of the
+    /// drafting [deg]; 90 is broad side on.
     pub long_axis_leading: Option<f64>,
-    /// The same of the trailing grain.
+    /// Mean angle of the trailing grain's long axis with the vertical over the second half of the
+    /// drafting [deg]; 90 is broad side on.
     pub long_axis_trailing: Option<f64>,
 }
 
-/// A pair and its scales, as the measures need them.
+/// Histories and events of a pair, with its scales.
 pub struct PairHistory<'a> {
-    /// The grain that trails at the start, and the one that leads.
+    /// Trailing and leading grain.
     pub grains: [&'a History; 2],
-    /// Against gravity.
+    /// Unit vector against gravity.
     pub up: DVec3,
-    /// d and g.
+    /// Scales d and g.
     pub scales: Scales,
-    /// Log.
+    /// Events of the run.
     pub events: &'a [Event],
-    /// Whether its grains have a long axis.
+    /// Whether the grains have a long axis.
     pub oblong: bool,
 }
 
 impl PairMeasures {
-    /// Of a run folder; none if it holds no pair.
-    pub fn of(run: &RunFolder) -> Option<PairMeasures> {
+    /// Measures the pair of a run folder; none if the run is not a pair.
+    pub fn from_run(run: &RunFolder) -> Option<PairMeasures> {
         let story = Story::of(run);
-        let [behind, ahead] = story.pair?;
-        let oblong = [behind, ahead].iter().all(|g| {
+        let [trailing, leading] = story.pair?;
+        let oblong = [trailing, leading].iter().all(|g| {
             let facts = run.facts.grains.get(*g);
             facts.is_none_or(|f| f.shape.as_deref() != Some("sphere"))
         });
         let scales = story.scales?;
-        let mut found = PairMeasures::of_pair(&PairHistory {
-            grains: [&run.grains[behind], &run.grains[ahead]],
+        let mut measures = PairMeasures::from_history(&PairHistory {
+            grains: [&run.grains[trailing], &run.grains[leading]],
             up: story.up,
             scales,
             events: &run.events,
             oblong,
         });
-        let until = found.landing_time.map(|t| t * scales.time());
-        found.closest_gap = closest_gap(run, until.unwrap_or(f64::INFINITY));
-        found.closest_gap = found.closest_gap.map(|gap| gap / scales.diameter);
-        Some(found)
+        let landing = measures.landing_time.map(|t| t * scales.time());
+        let gap = closest_gap(run, landing.unwrap_or(f64::INFINITY));
+        measures.closest_gap = gap.map(|gap| gap / scales.diameter);
+        Some(measures)
     }
 
-    /// Of a pair.
-    pub fn of_pair(pair: &PairHistory) -> PairMeasures {
-        let end = pair
-            .grains
-            .iter()
-            .filter_map(|h| h.time.last())
-            .fold(f64::INFINITY, |a, b| a.min(*b));
+    /// Measures a pair.
+    pub fn from_history(pair: &PairHistory) -> PairMeasures {
+        let ends = pair.grains.iter().filter_map(|h| h.time.last());
+        let end = ends.fold(f64::INFINITY, |a, b| a.min(*b));
         let landing = pair.first(&Kind::Landing, 0.0);
         let until = landing.unwrap_or(end);
         let before = |time: &f64| *time <= until;
         let count = |kind: &Kind| {
-            let of = pair
+            let counted = pair
                 .events
                 .iter()
                 .filter(|e| e.kind == *kind && e.time <= until);
-            Some(of.count() as f64)
+            Some(counted.count() as f64)
         };
         let kiss = pair.first(&Kind::Kiss, 0.0).filter(before);
-        let after = |kind: &Kind| pair.first(kind, kiss?).filter(before);
-        let (tumble, pass) = (after(&Kind::Tumble), after(&Kind::RoleChange));
-        let parting = after(&Kind::Separation);
-        let contact_end = parting.unwrap_or(until);
-        let t = 1.0 / pair.scales.time();
-        let scaled = |time: Option<f64>| time.map(|s| s * t);
+        let after_kiss = |kind: &Kind| pair.first(kind, kiss?).filter(before);
+        let (tumble, pass) = (after_kiss(&Kind::Tumble), after_kiss(&Kind::RoleChange));
+        let separation = after_kiss(&Kind::Separation);
+        let contact_end = separation.unwrap_or(until);
+        let per_second = 1.0 / pair.scales.time();
+        let scaled = |time: Option<f64>| time.map(|s| s * per_second);
         let kisses = count(&Kind::Kiss);
-        let half = kiss.map(|k| (0.5 * k, k));
-        let draft = |g: usize| half.and_then(|(from, to)| pair.mean_speed(g, from, to));
+        let late_drafting = kiss.map(|k| (0.5 * k, k));
+        let draft = |g: usize| late_drafting.and_then(|(from, to)| pair.mean_speed(g, from, to));
         let angle = |g: usize| {
-            half.filter(|_| pair.oblong)
-                .and_then(|(from, to)| pair.long_axis(g, from, to))
+            let window = late_drafting.filter(|_| pair.oblong);
+            window.and_then(|(from, to)| pair.long_axis(g, from, to))
         };
         let (closest, last) = pair.distances(until);
         PairMeasures {
             kiss_time: scaled(kiss),
             kissing_stage: scaled(kiss.map(|k| tumble.unwrap_or(contact_end).min(contact_end) - k)),
             contact_stage: scaled(kiss.map(|k| contact_end - k)),
-            parted: kiss.map(|_| parting.is_some()),
+            parted: kiss.map(|_| separation.is_some()),
             tumble_time: scaled(tumble),
             pass_time: scaled(pass),
-            separation_time: scaled(parting),
+            separation_time: scaled(separation),
             landing_time: scaled(landing),
             repeated: kisses.map(|n| n > 1.0),
             kisses,
@@ -154,7 +152,7 @@ impl PairMeasures {
         }
     }
 
-    /// A quantity by name; true and false are 1 and 0.
+    /// Returns a quantity by name; true and false are 1 and 0.
     pub fn get(&self, name: &str) -> Option<f64> {
         let value = serde_json::to_value(self).ok()?;
         match value.get(name)? {
@@ -164,25 +162,22 @@ impl PairMeasures {
     }
 }
 
-/// Smallest gap of the diagnostics before a time [m].
+/// Smallest gap in the diagnostics before a time [m].
 fn closest_gap(run: &RunFolder, until: f64) -> Option<f64> {
     let table = run.diagnostics.as_ref()?;
     let rows = table.column("time")?.iter().zip(table.column("gap")?);
-    rows.filter(|(time, gap)| **time < until && gap.is_finite())
-        .map(|(_, gap)| *gap)
-        .reduce(f64::min)
+    let before = rows.filter(|(time, gap)| **time < until && gap.is_finite());
+    before.map(|(_, gap)| *gap).reduce(f64::min)
 }
 
 impl PairHistory<'_> {
+    /// Time of the first event of a kind from a time on [s].
     fn first(&self, kind: &Kind, from: f64) -> Option<f64> {
-        let found = self
-            .events
-            .iter()
-            .find(|e| e.kind == *kind && e.time >= from);
-        found.map(|e| e.time)
+        let mut events = self.events.iter();
+        Some(events.find(|e| e.kind == *kind && e.time >= from)?.time)
     }
 
-    /// Smallest distance of the centres, and the last one, up to a time [d].
+    /// Smallest and last distance of the centres up to a time [d].
     fn distances(&self, until: f64) -> (Option<f64>, Option<f64>) {
         let [a, b] = self.grains;
         let rows = a.time.partition_point(|t| *t <= until).min(b.len());
@@ -192,40 +187,42 @@ impl PairHistory<'_> {
         (closest, rows.checked_sub(1).map(distance))
     }
 
-    /// Distance fallen over time between two moments.
+    /// Mean settling speed between two times [sqrt(d g)].
     fn mean_speed(&self, grain: usize, from: f64, to: f64) -> Option<f64> {
         let h = self.grains[grain];
-        let (a, b) = (
-            h.pose(from)?.0,
-            h.pose(to)
-                .or_else(|| Some((*h.position.last()?, glam::DQuat::IDENTITY)))?
-                .0,
-        );
-        (to > from).then(|| (a - b).dot(self.up) / (to - from) / self.scales.velocity())
+        let last = || Some((*h.position.last()?, DQuat::IDENTITY));
+        let (start, end) = (h.pose(from)?.0, h.pose(to).or_else(last)?.0);
+        let fallen = (start - end).dot(self.up);
+        (to > from).then(|| fallen / (to - from) / self.scales.velocity())
     }
 
+    /// Largest settling speed up to a time [sqrt(d g)].
     fn peak_speed(&self, grain: usize, until: f64) -> Option<f64> {
         let h = self.grains[grain];
         let rows = h.time.partition_point(|t| *t <= until);
-        let speeds = h.velocity[..rows]
-            .iter()
-            .map(|v| -v.dot(self.up) / self.scales.velocity());
-        speeds.reduce(f64::max)
+        let speed = |v: &DVec3| -v.dot(self.up) / self.scales.velocity();
+        h.velocity[..rows].iter().map(speed).reduce(f64::max)
     }
 
-    /// Mean angle of the long axis (x of the body) with the vertical [deg].
+    /// Mean angle of the long axis (x of the body) with the vertical between two times [deg].
     fn long_axis(&self, grain: usize, from: f64, to: f64) -> Option<f64> {
         let h = self.grains[grain];
         let rows = (0..h.len()).filter(|i| (from..=to).contains(&h.time[*i]));
-        let angle = |i: usize| {
-            (h.orientation[i] * DVec3::X)
-                .dot(self.up)
-                .abs()
-                .min(1.0)
-                .acos()
-                .to_degrees()
-        };
-        let (sum, n) = rows.fold((0.0, 0usize), |(sum, n), i| (sum + angle(i), n + 1));
-        (n > 0).then(|| sum / n as f64)
+        mean_tilt(h, rows, DVec3::X, self.up)
     }
+}
+
+/// Mean angle of a body axis with the vertical over the given rows [deg]; none without rows.
+pub(super) fn mean_tilt(
+    history: &History,
+    rows: impl Iterator<Item = usize>,
+    axis: DVec3,
+    up: DVec3,
+) -> Option<f64> {
+    let angle = |i: usize| {
+        let cosine = (history.orientation[i] * axis).dot(up).abs().min(1.0);
+        cosine.acos().to_degrees()
+    };
+    let (sum, n) = rows.fold((0.0, 0usize), |(sum, n), i| (sum + angle(i), n + 1));
+    (n > 0).then(|| sum / n as f64)
 }

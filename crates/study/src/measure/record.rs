@@ -1,4 +1,4 @@
-//! The table of a study: one row for each run.
+//! The record of a run: its state, its factors and its measured values.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,116 +7,104 @@ use glam::DVec3;
 use grainwake_report::run_folder::RunFolder;
 use grainwake_solver::output::provenance::Provenance;
 use grainwake_solver::output::read_summary;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::measure::pair::PairMeasures;
-use crate::measure::settling::SettlingMeasures;
-use crate::plan::{Manifest, Run};
-use crate::run::state::{RunState, state_of_version};
+use super::pair::PairMeasures;
+use super::settling::SettlingMeasures;
+use crate::plan::{Plan, Run};
+use crate::run::state::{RunState, run_state_for};
 
-/// A run and what came out of it. The JSON names are stable.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A run and its measured values. The JSON names are stable.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunRecord {
     /// Name of the run.
     pub name: String,
-    /// Name of its model.
+    /// Name of the model.
     pub model: String,
-    /// Number in the ensemble.
+    /// Index in the ensemble.
     pub member: usize,
-    /// Name of its value on each axis.
+    /// Level on each axis.
     pub levels: BTreeMap<String, String>,
-    /// Numbers that belong to it.
+    /// Numerical factors.
     pub factors: BTreeMap<String, f64>,
     /// "finished", "unfinished", "missing", "failed" or "stale".
     pub state: String,
-    /// Why it failed or is stale.
+    /// Reason of a failed or stale run.
     pub remark: Option<String>,
-    /// Hash of its case, its end and the program.
+    /// Hash of the case, the end condition and the program.
     pub id: String,
-    /// Equal-volume diameter d [m].
+    /// Mean equal-volume diameter d of the grains [m].
     pub diameter_m: Option<f64>,
     /// Gravity [m/s2].
     #[serde(default)]
     pub gravity_m_per_s2: Option<[f64; 3]>,
     /// First contact [s].
     pub kiss_time_s: Option<f64>,
-    /// Steps taken.
+    /// Number of time steps.
     pub steps: Option<u64>,
     /// Simulated time [s].
     pub end_time_s: Option<f64>,
     /// Wall-clock time [s].
     pub wall_s: Option<f64>,
-    /// Threads of its last session.
+    /// Threads of the last session.
     pub threads: Option<usize>,
-    /// Largest |div u| after any step [1/s].
+    /// Largest |div u| after any time step [1/s].
     pub max_divergence: Option<f64>,
-    /// What was measured on the pair; only of a finished run.
+    /// Measured values of a pair; of finished runs only.
     pub pair: Option<PairMeasures>,
-    /// What was measured on a single grain, or on three and more; only of a finished run.
+    /// Measured values of a single grain, or of three and more; of finished runs only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub settling: Option<SettlingMeasures>,
 }
 
 impl RunRecord {
-    /// Looks at a run in a study folder, as its plan has it.
-    pub fn of(run: &Run, manifest: &Manifest, study: &Path) -> RunRecord {
-        let found = state_of_version(run, study, &manifest.version, manifest.commit.as_deref());
-        let folder = run.folder(study);
-        let mut row = RunRecord {
+    /// Reads the record of a run from its folder.
+    pub fn read(run: &Run, plan: &Plan, study: &Path) -> RunRecord {
+        let state = run_state_for(run, study, &plan.version, plan.commit.as_deref());
+        let mut record = RunRecord {
             name: run.name.clone(),
             model: run.model.clone(),
             member: run.member,
             levels: run.levels.clone(),
             factors: run.factors.clone(),
-            state: found.word().into(),
-            remark: None,
+            state: state.name().into(),
             id: run.id.clone(),
-            diameter_m: None,
-            gravity_m_per_s2: None,
-            kiss_time_s: None,
-            steps: None,
-            end_time_s: None,
-            wall_s: None,
-            threads: None,
-            max_divergence: None,
-            pair: None,
-            settling: None,
+            ..RunRecord::default()
         };
-        match &found {
-            RunState::Failed(why) => row.remark = Some(why.clone()),
-            RunState::Stale(why) => row.remark = Some((*why).into()),
-            _ => {}
+        match state {
+            RunState::Failed(why) => record.remark = Some(why),
+            RunState::Stale(why) => record.remark = Some(why.into()),
+            RunState::Finished => record.measure(&run.folder(study)),
+            RunState::Missing | RunState::Unfinished => {}
         }
-        if found != RunState::Finished {
-            return row;
-        }
-        if let Ok(summary) = read_summary(&folder) {
-            let mean = summary
-                .grains
-                .iter()
-                .map(|g| g.equivalent_diameter_m)
-                .sum::<f64>();
-            row.diameter_m =
-                (!summary.grains.is_empty()).then(|| mean / summary.grains.len() as f64);
-            row.kiss_time_s = summary.pair.as_ref().and_then(|p| p.kiss_time_s);
-            row.steps = Some(summary.steps);
-            row.end_time_s = Some(summary.end_time_s);
-            row.wall_s = Some(summary.wall_s);
-            row.max_divergence = Some(summary.max_divergence);
-        }
-        row.threads = Provenance::read(&folder).and_then(|p| Some(p.sessions.last()?.threads));
-        match RunFolder::open(&folder) {
-            Ok(run) => {
-                row.gravity_m_per_s2 = run.facts.gravity.map(|g| g.to_array());
-                row.pair = PairMeasures::of(&run);
-                row.settling = SettlingMeasures::of(&run);
-            }
-            Err(error) => row.remark = Some(error.to_string()),
-        }
-        row
+        record
     }
 
-    /// Against gravity, and sqrt(d/g) [s].
+    /// Fills in the measured values of a finished run.
+    fn measure(&mut self, folder: &Path) {
+        if let Ok(summary) = read_summary(folder) {
+            let count = summary.grains.len();
+            let sum: f64 = summary.grains.iter().map(|g| g.equivalent_diameter_m).sum();
+            self.diameter_m = (count > 0).then(|| sum / count as f64);
+            self.kiss_time_s = summary.pair.as_ref().and_then(|p| p.kiss_time_s);
+            self.steps = Some(summary.steps);
+            self.end_time_s = Some(summary.end_time_s);
+            self.wall_s = Some(summary.wall_s);
+            self.max_divergence = Some(summary.max_divergence);
+        }
+        self.threads = Provenance::read(folder).and_then(|p| Some(p.sessions.last()?.threads));
+        match RunFolder::open(folder) {
+            Ok(run) => {
+                self.gravity_m_per_s2 = run.facts.gravity.map(|g| g.to_array());
+                self.pair = PairMeasures::from_run(&run);
+                self.settling = SettlingMeasures::from_run(&run);
+            }
+            Err(error) => self.remark = Some(error.to_string()),
+        }
+    }
+
+    /// Returns the unit vector against gravity, and sqrt(d/g) [s].
     pub fn up_and_time(&self) -> Option<(DVec3, f64)> {
         let gravity = DVec3::from_array(self.gravity_m_per_s2?);
         let size = gravity.length();
@@ -124,49 +112,42 @@ impl RunRecord {
         (size > 0.0).then(|| (-gravity / size, (diameter / size).sqrt()))
     }
 
-    /// Whether the run came to its end.
+    /// Returns whether the run reached its end.
     pub fn finished(&self) -> bool {
-        self.state == RunState::Finished.word()
+        self.state == RunState::Finished.name()
     }
 
-    /// A quantity, a factor or a number of the run by name.
+    /// Returns a measured quantity or a factor by name.
     pub fn get(&self, name: &str) -> Option<f64> {
         self.measured(name)
             .or_else(|| self.factors.get(name).copied())
     }
 
-    /// A measured quantity by name.
+    /// Returns a measured quantity by name.
     pub fn measured(&self, name: &str) -> Option<f64> {
         let of_pair = self.pair.as_ref().and_then(|pair| pair.get(name));
         of_pair.or_else(|| self.settling.as_ref()?.get(name))
     }
+
+    /// Returns whether a quantity is only a lower bound: the pair landed while still in contact.
+    pub fn is_lower_bound(&self, quantity: &str) -> bool {
+        let in_contact = self.pair.as_ref().is_some_and(|p| p.parted == Some(false));
+        quantity == "contact_stage" && in_contact
+    }
 }
 
-/// The table of all runs.
-pub fn records(manifest: &Manifest, study: &Path) -> Vec<RunRecord> {
-    use rayon::prelude::*;
-    let rows: Vec<RunRecord> = manifest
-        .runs
-        .par_iter()
-        .map(|run| RunRecord::of(run, manifest, study))
-        .collect();
-    let kept: BTreeMap<String, RunRecord> = kept(study)
-        .into_iter()
-        .map(|r| (r.name.clone(), r))
-        .collect();
-    // A study folder that was thinned out keeps its results in the table.
-    let known = |row: RunRecord| match kept.get(&row.name) {
-        Some(old)
-            if row.state == RunState::Missing.word() && old.id == row.id && old.finished() =>
-        {
-            old.clone()
-        }
-        _ => row,
-    };
-    rows.into_iter().map(known).collect()
-}
-
-fn kept(study: &Path) -> Vec<RunRecord> {
+/// Reads the records of all runs of a study.
+///
+/// A run without a folder keeps its record in `table.json`, so that run folders may be removed.
+pub fn records(plan: &Plan, study: &Path) -> Vec<RunRecord> {
     let text = std::fs::read_to_string(study.join("table.json")).unwrap_or_default();
-    serde_json::from_str(&text).unwrap_or_default()
+    let kept: Vec<RunRecord> = serde_json::from_str(&text).unwrap_or_default();
+    let read = |run: &Run| {
+        let record = RunRecord::read(run, plan, study);
+        let same = |old: &RunRecord| old.name == record.name && old.id == record.id;
+        let old = kept.iter().find(|old| same(old) && old.finished());
+        let missing = record.state == RunState::Missing.name();
+        old.filter(|_| missing).cloned().unwrap_or(record)
+    };
+    plan.runs.par_iter().map(read).collect()
 }

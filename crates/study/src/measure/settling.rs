@@ -1,7 +1,6 @@
-//! How grains create_folder that are not a pair: a single grain, or three and more.
+//! Measured values of settling grains other than a pair: a single grain, or three and more.
 //!
-//! Speeds are along gravity, down positive; a grain that rises has negative ones. What a grain does
-//! after it has landed does not count.
+//! Speeds are along gravity, down positive. All values of a grain end with its landing.
 
 use std::collections::BTreeMap;
 
@@ -11,24 +10,26 @@ use grainwake_report::run_folder::{History, Kind, RunFolder};
 use grainwake_report::story::{Scales, Story};
 use serde::{Deserialize, Serialize};
 
-/// What is measured on grains that create_folder. The JSON names are stable.
+use super::pair::mean_tilt;
+
+/// Measured values of settling grains. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SettlingMeasures {
     /// Number of grains.
     pub grains: usize,
-    /// Those that landed.
+    /// Number of grains that landed.
     pub landed: usize,
-    /// Largest settling speed of any grain [sqrt(d g)].
+    /// Settling speed of largest magnitude of any grain [sqrt(d g)].
     pub peak_speed: Option<f64>,
     /// Final settling speed, mean over the grains [sqrt(d g)].
     pub final_speed: Option<f64>,
     /// Mean settling speed until the landing, mean over the grains [sqrt(d g)].
     pub mean_speed: Option<f64>,
-    /// Change of the speed while the final speed is measured, relative to it; mean over the grains.
+    /// Relative change of the speed over the final window, mean over the grains.
     pub speed_change: Option<f64>,
-    /// Largest settling speed [m/s].
+    /// Settling speed of largest magnitude of any grain [m/s].
     pub peak_speed_m_per_s: Option<f64>,
-    /// Final settling speed [m/s].
+    /// Final settling speed, mean over the grains [m/s].
     pub final_speed_m_per_s: Option<f64>,
     /// Largest Reynolds number of any grain, with its own diameter.
     pub peak_reynolds: Option<f64>,
@@ -36,53 +37,53 @@ pub struct SettlingMeasures {
     pub final_reynolds: Option<f64>,
     /// First landing [sqrt(d/g)].
     pub landing_time: Option<f64>,
-    /// Last landing, once all have landed [sqrt(d/g)].
+    /// Last landing, if all grains landed [sqrt(d/g)].
     pub last_landing: Option<f64>,
     /// First landing [s].
     pub landing_time_s: Option<f64>,
-    /// Largest sideways drift of any grain [d].
+    /// Largest horizontal displacement of any grain [d].
     pub drift: Option<f64>,
-    /// Of a single grain: angle of its long axis with the vertical at the final speed [deg].
+    /// Angle of the long axis with the vertical in the final window; of a single grain [deg].
     pub long_axis: Option<f64>,
-    /// Of a single grain: largest angle by which it has turned from the start [deg].
+    /// Largest rotation from the initial orientation; of a single grain [deg].
     pub turned: Option<f64>,
-    /// Each grain, in SI units.
+    /// Measured values of each grain, in SI units.
     pub each: Vec<GrainSettling>,
 }
 
-/// How one grain settled. The JSON names are stable.
+/// Measured values of one settling grain. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GrainSettling {
-    /// Number of the grain in the case.
+    /// Index of the grain in the case.
     pub grain: usize,
     /// Equal-volume diameter [m].
     pub diameter_m: f64,
-    /// Settling speed of largest size [m/s].
+    /// Settling speed of largest magnitude [m/s].
     pub peak_speed_m_per_s: f64,
-    /// Its Reynolds number.
+    /// Reynolds number of the largest speed.
     pub peak_reynolds: Option<f64>,
-    /// Mean speed over the last diameter fallen; of a grain that landed, over the last but one, as
-    /// the floor slows the last [m/s].
+    /// Mean speed over the final window [m/s]: the last diameter fallen, or the last but one of a
+    /// grain that landed, because the floor slows it down.
     pub final_speed_m_per_s: Option<f64>,
-    /// Its Reynolds number.
+    /// Reynolds number of the final speed.
     pub final_reynolds: Option<f64>,
-    /// Change of the speed over that diameter, relative to its mean.
+    /// Change of the speed over the final window, relative to its mean.
     pub speed_change: Option<f64>,
-    /// Distance fallen over time, until the landing or the end [m/s].
+    /// Mean speed until the landing or the end [m/s].
     pub mean_speed_m_per_s: Option<f64>,
     /// First contact with the floor [s].
     pub landing_time_s: Option<f64>,
-    /// Largest distance sideways from the start [m].
+    /// Largest horizontal displacement [m].
     pub drift_m: f64,
-    /// Mean angle of the long axis with the vertical where the final speed is measured [deg].
+    /// Mean angle of the long axis with the vertical in the final window [deg].
     pub long_axis_deg: Option<f64>,
-    /// Largest angle by which it has turned from the start [deg].
+    /// Largest rotation from the initial orientation [deg].
     pub turned_deg: f64,
 }
 
 impl SettlingMeasures {
-    /// Of a run folder; none of a pair, without gravity, or if nothing moves.
-    pub fn of(run: &RunFolder) -> Option<SettlingMeasures> {
+    /// Measures the grains of a run; none for a pair, without gravity, or if no grain moves.
+    pub fn from_run(run: &RunFolder) -> Option<SettlingMeasures> {
         let story = Story::of(run);
         let scales = story.scales?;
         if story.pair.is_some() || !story.travels {
@@ -91,13 +92,13 @@ impl SettlingMeasures {
         let bodies = bodies(run, &mut Vec::new());
         let each: Vec<GrainSettling> = (0..run.grains.len())
             .filter(|grain| !run.grains[*grain].is_empty())
-            .map(|grain| GrainSettling::of(run, grain, story.up, scales, &bodies))
+            .map(|grain| GrainSettling::from_run(run, grain, story.up, scales, &bodies))
             .collect();
-        Some(SettlingMeasures::together(each, scales))
+        Some(SettlingMeasures::summarise(each, scales))
     }
 
-    /// What grains have in common.
-    fn together(each: Vec<GrainSettling>, scales: Scales) -> SettlingMeasures {
+    /// Summarises the measured values of all grains.
+    fn summarise(each: Vec<GrainSettling>, scales: Scales) -> SettlingMeasures {
         let mean = |pick: fn(&GrainSettling) -> Option<f64>| {
             let values: Vec<f64> = each.iter().filter_map(pick).collect();
             (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
@@ -109,44 +110,42 @@ impl SettlingMeasures {
         let landings: Vec<f64> = each.iter().filter_map(|g| g.landing_time_s).collect();
         let first = landings.iter().copied().reduce(f64::min);
         let last = landings.iter().copied().reduce(f64::max);
-        let all = landings.len() == each.len();
-        let alone = each.len() == 1;
-        let (peak, settled) = (
-            largest(|g| Some(g.peak_speed_m_per_s)),
-            mean(|g| g.final_speed_m_per_s),
-        );
-        let of_v = |v: f64| v / scales.velocity();
-        let of_t = |t: f64| t / scales.time();
+        let all_landed = landings.len() == each.len();
+        let single = each.len() == 1;
+        let peak = largest(|g| Some(g.peak_speed_m_per_s));
+        let terminal = mean(|g| g.final_speed_m_per_s);
+        let speed = |v: f64| v / scales.velocity();
+        let time = |t: f64| t / scales.time();
         SettlingMeasures {
             grains: each.len(),
             landed: landings.len(),
-            peak_speed: peak.map(of_v),
-            final_speed: settled.map(of_v),
-            mean_speed: mean(|g| g.mean_speed_m_per_s).map(of_v),
+            peak_speed: peak.map(speed),
+            final_speed: terminal.map(speed),
+            mean_speed: mean(|g| g.mean_speed_m_per_s).map(speed),
             speed_change: mean(|g| g.speed_change),
             peak_speed_m_per_s: peak,
-            final_speed_m_per_s: settled,
+            final_speed_m_per_s: terminal,
             peak_reynolds: largest(|g| g.peak_reynolds),
             final_reynolds: mean(|g| g.final_reynolds),
-            landing_time: first.map(of_t),
-            last_landing: last.filter(|_| all).map(of_t),
+            landing_time: first.map(time),
+            last_landing: last.filter(|_| all_landed).map(time),
             landing_time_s: first,
             drift: largest(|g| Some(g.drift_m)).map(|x| x / scales.diameter),
-            long_axis: mean(|g| g.long_axis_deg).filter(|_| alone),
-            turned: mean(|g| Some(g.turned_deg)).filter(|_| alone),
+            long_axis: mean(|g| g.long_axis_deg).filter(|_| single),
+            turned: mean(|g| Some(g.turned_deg)).filter(|_| single),
             each,
         }
     }
 
-    /// A quantity by name.
+    /// Returns a quantity by name.
     pub fn get(&self, name: &str) -> Option<f64> {
         let value = serde_json::to_value(self).ok()?;
         value.get(name)?.as_f64()
     }
 }
 
-/// Settling speed at a time [m/s], between rows in proportion.
-fn speed(history: &History, up: DVec3, time: f64) -> Option<f64> {
+/// Returns the settling speed at a time, linearly interpolated between rows [m/s].
+fn speed_at(history: &History, up: DVec3, time: f64) -> Option<f64> {
     let after = history.time.partition_point(|t| *t < time);
     let row = |row: usize| Some((*history.time.get(row)?, -history.velocity.get(row)?.dot(up)));
     let Some((end, v)) = row(after) else {
@@ -158,16 +157,8 @@ fn speed(history: &History, up: DVec3, time: f64) -> Option<f64> {
     Some(before + (time - start) / (end - start) * (v - before))
 }
 
-/// Where the final speed of a grain is measured.
-struct Stretch {
-    /// Begin and end [s].
-    time: (f64, f64),
-    /// Distance fallen between them [m].
-    fallen: f64,
-}
-
 impl GrainSettling {
-    fn of(
+    fn from_run(
         run: &RunFolder,
         grain: usize,
         up: DVec3,
@@ -177,41 +168,34 @@ impl GrainSettling {
         let history = &run.grains[grain];
         let facts = run.facts.grains.get(grain);
         let diameter = facts.and_then(|f| f.diameter).unwrap_or(scales.diameter);
-        let landing = run
-            .events
-            .iter()
-            .find(|e| e.kind == Kind::Landing && e.grains.contains(&grain))
-            .map(|e| e.time);
+        let mut landings = run.events.iter().filter(|e| e.kind == Kind::Landing);
+        let landing = landings.find(|e| e.grains.contains(&grain)).map(|e| e.time);
         let last = *history.time.last().unwrap_or(&0.0);
         let until = landing.unwrap_or(last).min(last);
         let rows = history.time.partition_point(|t| *t <= until).max(1);
-        let speeds = || history.velocity[..rows].iter().map(|v| -v.dot(up));
-        let peak = speeds().max_by(|a, b| a.abs().total_cmp(&b.abs()));
-        let peak = peak.unwrap_or(0.0);
+        let speeds = history.velocity[..rows].iter().map(|v| -v.dot(up));
+        let peak = speeds
+            .max_by(|a, b| a.abs().total_cmp(&b.abs()))
+            .unwrap_or(0.0);
         let reynolds = |v: f64| Some(v.abs() * diameter / run.facts.viscosity?);
-        let stretch = Stretch::of(history, up, rows, diameter, landing.is_some());
-        let settled = stretch.as_ref().map(|s| s.fallen / (s.time.1 - s.time.0));
-        let change = stretch.as_ref().and_then(|s| {
-            Some((speed(history, up, s.time.1)? - speed(history, up, s.time.0)?) / settled?)
+        let window = FinalWindow::find(history, up, rows, diameter, landing.is_some());
+        let terminal = window.as_ref().map(|w| w.fallen / (w.to - w.from));
+        let change = window.as_ref().and_then(|w| {
+            Some((speed_at(history, up, w.to)? - speed_at(history, up, w.from)?) / terminal?)
         });
         let start = history.position[0];
         let fallen = (start - history.position[rows - 1]).dot(up);
         let elapsed = history.time[rows - 1] - history.time[0];
-        let sideways = |p: &DVec3| (*p - start).reject_from_normalized(up).length();
-        let turn = |q: &DQuat| history.orientation[0].angle_between(*q).to_degrees();
-        let long = bodies
+        let drift = |p: &DVec3| (*p - start).reject_from_normalized(up).length();
+        let rotation = |q: &DQuat| history.orientation[0].angle_between(*q).to_degrees();
+        let long_axis = bodies
             .get(&grain)
             .and_then(Body::axes)
             .map(|axes| axes.long);
         let tilt = |axis: DVec3| {
-            let within = stretch.as_ref()?;
-            let rows =
-                (0..rows).filter(|i| (within.time.0..=within.time.1).contains(&history.time[*i]));
-            let angles: Vec<f64> = rows
-                .map(|i| (history.orientation[i] * axis).dot(up).abs().min(1.0))
-                .map(|cosine| cosine.acos().to_degrees())
-                .collect();
-            (!angles.is_empty()).then(|| angles.iter().sum::<f64>() / angles.len() as f64)
+            let w = window.as_ref()?;
+            let inside = (0..rows).filter(|i| (w.from..=w.to).contains(&history.time[*i]));
+            mean_tilt(history, inside, axis, up)
         };
         let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
         GrainSettling {
@@ -219,47 +203,59 @@ impl GrainSettling {
             diameter_m: diameter,
             peak_speed_m_per_s: peak,
             peak_reynolds: reynolds(peak),
-            final_speed_m_per_s: settled,
-            final_reynolds: settled.and_then(reynolds),
+            final_speed_m_per_s: terminal,
+            final_reynolds: terminal.and_then(reynolds),
             speed_change: change,
             mean_speed_m_per_s: (elapsed > 0.0).then(|| fallen / elapsed),
             landing_time_s: landing,
-            drift_m: largest(&mut history.position[..rows].iter().map(sideways)),
-            long_axis_deg: long.and_then(tilt),
-            turned_deg: largest(&mut history.orientation[..rows].iter().map(turn)),
+            drift_m: largest(&mut history.position[..rows].iter().map(drift)),
+            long_axis_deg: long_axis.and_then(tilt),
+            turned_deg: largest(&mut history.orientation[..rows].iter().map(rotation)),
         }
     }
 }
 
-impl Stretch {
-    /// The last diameter fallen, or the last but one of a grain that landed; none of a grain that has
-    /// not fallen that far and half a diameter before.
-    fn of(
+/// Time window in which the final speed of a grain is measured.
+struct FinalWindow {
+    /// Begin [s].
+    from: f64,
+    /// End [s].
+    to: f64,
+    /// Distance fallen in the window [m]; negative for a rising grain.
+    fallen: f64,
+}
+
+impl FinalWindow {
+    /// Finds the last diameter fallen, or the last but one of a grain that landed.
+    ///
+    /// None if the grain has fallen less than half a diameter before the window.
+    fn find(
         history: &History,
         up: DVec3,
         rows: usize,
         diameter: f64,
         landed: bool,
-    ) -> Option<Stretch> {
-        let whole = (history.position[0] - history.position[rows - 1]).dot(up);
-        let sign = whole.signum();
+    ) -> Option<FinalWindow> {
+        let total = (history.position[0] - history.position[rows - 1]).dot(up);
+        let sign = total.signum();
         let fallen = |row: usize| sign * (history.position[0] - history.position[row]).dot(up);
-        let end = whole.abs() - if landed { diameter } else { 0.0 };
+        let end = total.abs() - if landed { diameter } else { 0.0 };
         let begin = end - diameter;
         if begin < 0.5 * diameter {
             return None;
         }
-        // When a distance has been fallen, between rows in proportion.
-        let when = |distance: f64| {
+        // Time at which a distance has been fallen, linearly interpolated between rows.
+        let time_of = |distance: f64| {
             let after = (1..rows).find(|row| fallen(*row) >= distance * (1.0 - 1e-12))?;
             let (a, b) = (fallen(after - 1), fallen(after));
             let part = ((distance - a) / (b - a)).clamp(0.0, 1.0);
             let (from, to) = (history.time[after - 1], history.time[after]);
             Some(from + part * (to - from))
         };
-        let time = (when(begin)?, when(end)?);
-        (time.1 > time.0).then_some(Stretch {
-            time,
+        let (from, to) = (time_of(begin)?, time_of(end)?);
+        (to > from).then_some(FinalWindow {
+            from,
+            to,
             fallen: sign * diameter,
         })
     }
@@ -269,7 +265,7 @@ impl Stretch {
 mod tests {
     use super::*;
 
-    /// A grain that falls along z with v(t), a row every millisecond, down positive.
+    /// History of a grain that falls along z with speed v(t), one row per millisecond.
     fn falling(v: impl Fn(f64) -> f64, end: f64) -> History {
         let mut h = History::default();
         let (dt, mut z, mut t) = (1e-3, 0.5, 0.0);
@@ -305,9 +301,9 @@ mod tests {
 
     #[test]
     fn a_grain_that_settles_has_its_terminal_speed() {
-        // v = 0.1 (1 - exp(-t/0.05)): terminal long before the end.
+        // v = 0.1 (1 - exp(-t/0.05)) is terminal long before the end.
         let run = run_of(vec![falling(|t| 0.1 * (1.0 - (-t / 0.05).exp()), 1.0)]);
-        let found = SettlingMeasures::of(&run).unwrap();
+        let found = SettlingMeasures::from_run(&run).unwrap();
         let close = |a: Option<f64>, b: f64| (a.unwrap() / b - 1.0).abs() < 1e-3;
         assert!(close(found.final_speed_m_per_s, 0.1), "{found:?}");
         assert!(close(found.peak_speed_m_per_s, 0.1));
@@ -320,8 +316,8 @@ mod tests {
     }
 
     #[test]
-    fn the_floor_does_not_count() {
-        // It slows down over its last diameter, lands at 1 s, and lies still.
+    fn values_end_with_the_landing() {
+        // The grain slows down over its last diameter, lands at 1 s and comes to rest.
         let v = |t: f64| match t {
             t if t < 0.9 => 0.1,
             t if t < 1.0 => 0.05,
@@ -329,7 +325,7 @@ mod tests {
         };
         let mut run = run_of(vec![falling(v, 2.0)]);
         land(&mut run, 0, 1.0);
-        let found = SettlingMeasures::of(&run).unwrap();
+        let found = SettlingMeasures::from_run(&run).unwrap();
         assert!((found.final_speed_m_per_s.unwrap() - 0.1).abs() < 1e-6);
         assert_eq!((found.landed, found.landing_time_s), (1, Some(1.0)));
         assert!((found.landing_time.unwrap() - 1.0 / 1e-3_f64.sqrt()).abs() < 1e-9);
@@ -338,31 +334,31 @@ mod tests {
 
     #[test]
     fn a_grain_that_rises_has_a_negative_speed() {
-        let found = SettlingMeasures::of(&run_of(vec![falling(|_| -0.04, 1.0)])).unwrap();
+        let found = SettlingMeasures::from_run(&run_of(vec![falling(|_| -0.04, 1.0)])).unwrap();
         assert!((found.final_speed_m_per_s.unwrap() + 0.04).abs() < 1e-6);
         assert!((found.peak_speed_m_per_s.unwrap() + 0.04).abs() < 1e-9);
         assert!((found.final_reynolds.unwrap() - 400.0).abs() < 1e-2);
     }
 
     #[test]
-    fn what_has_hardly_fallen_has_no_final_speed() {
-        let found = SettlingMeasures::of(&run_of(vec![falling(|_| 0.1, 0.1)])).unwrap();
+    fn a_short_fall_has_no_final_speed() {
+        let found = SettlingMeasures::from_run(&run_of(vec![falling(|_| 0.1, 0.1)])).unwrap();
         assert_eq!(found.final_speed_m_per_s, None);
         assert!(found.peak_speed_m_per_s.is_some());
     }
 
     #[test]
-    fn many_grains_have_means_and_each_its_landing() {
+    fn several_grains_have_means_and_individual_landings() {
         let fall = |v: f64| falling(move |_| v, 1.0);
         let mut run = run_of(vec![fall(0.1), fall(0.2), fall(0.3)]);
-        let found = SettlingMeasures::of(&run).unwrap();
+        let found = SettlingMeasures::from_run(&run).unwrap();
         assert!((found.final_speed_m_per_s.unwrap() - 0.2).abs() < 1e-6);
         assert!((found.peak_speed_m_per_s.unwrap() - 0.3).abs() < 1e-9);
         assert_eq!((found.turned, found.last_landing), (None, None));
         for (grain, time) in [(2, 0.5), (1, 0.7), (0, 0.9)] {
             land(&mut run, grain, time);
         }
-        let found = SettlingMeasures::of(&run).unwrap();
+        let found = SettlingMeasures::from_run(&run).unwrap();
         assert_eq!((found.grains, found.landed), (3, 3));
         assert_eq!(found.landing_time_s, Some(0.5));
         assert!((found.last_landing.unwrap() - 0.9 / 1e-3_f64.sqrt()).abs() < 1e-9);
@@ -370,7 +366,7 @@ mod tests {
         assert_eq!(landings, [Some(0.9), Some(0.7), Some(0.5)]);
         run.grains.pop();
         assert_eq!(
-            SettlingMeasures::of(&run),
+            SettlingMeasures::from_run(&run),
             None,
             "a pair has measures of its own"
         );

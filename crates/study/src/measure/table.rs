@@ -3,179 +3,141 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use crate::error::{StudyError, write_whole};
-use crate::measure::record::RunRecord;
-use crate::measure::settling::GrainSettling;
+use super::record::RunRecord;
+use super::settling::GrainSettling;
+use crate::error::{At, StudyError, write_atomically, write_json};
+use crate::format::rounded;
 use crate::plan::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES};
 
 /// Table of the grains of all runs that are not pairs, in the study folder.
 pub const SETTLING_TABLE: &str = "settling.csv";
 
-/// Writes `table.json` and `table.csv` into a study folder.
+/// Columns of [`SETTLING_TABLE`]; from the fifth on they are fields of [`GrainSettling`].
+const SETTLING_HEADER: [&str; 15] = [
+    "run",
+    "model",
+    "member",
+    "grain",
+    "diameter_m",
+    "peak_speed_m_per_s",
+    "peak_reynolds",
+    "final_speed_m_per_s",
+    "final_reynolds",
+    "speed_change",
+    "mean_speed_m_per_s",
+    "landing_time_s",
+    "drift_m",
+    "long_axis_deg",
+    "turned_deg",
+];
+
+/// Writes `table.json`, `table.csv` and, if a run is not a pair, `settling.csv`.
 ///
 /// # Errors
-/// If they cannot be written.
-pub fn write_tables(rows: &[RunRecord], study: &Path) -> Result<(), StudyError> {
-    let json = study.join("table.json");
-    let text = serde_json::to_string_pretty(rows).map_err(|error| StudyError::Io {
-        action: "write",
-        path: json.clone(),
-        source: error.into(),
-    })?;
-    write_whole(&json, text.as_bytes())?;
-    if rows.iter().any(|row| row.settling.is_some()) {
-        write_whole(&study.join(SETTLING_TABLE), grains_csv(rows).as_bytes())?;
+/// If a file cannot be written.
+pub fn write_tables(records: &[RunRecord], study: &Path) -> Result<(), StudyError> {
+    write_json(&study.join("table.json"), &records)?;
+    if records.iter().any(|record| record.settling.is_some()) {
+        write_csv(&study.join(SETTLING_TABLE), settling_rows(records))?;
     }
-    write_whole(&study.join("table.csv"), to_csv(rows).as_bytes())
+    write_csv(&study.join("table.csv"), rows(records))
 }
 
-/// Names of the measured quantities that runs of these kinds have, in order.
-pub fn columns(rows: &[RunRecord]) -> Vec<&'static str> {
-    let settling = rows.iter().any(|row| row.settling.is_some());
-    let pairs = !settling || rows.iter().any(|row| row.pair.is_some());
-    let mut out: Vec<&str> = Vec::new();
-    if pairs {
-        out.extend(PAIR_QUANTITIES);
-    }
-    if settling {
-        let more = SETTLING_QUANTITIES
-            .into_iter()
-            .filter(|q| !PAIR_QUANTITIES.contains(q) || !pairs);
-        out.extend(more);
-    }
-    out
+/// Writes rows of cells as comma-separated values.
+pub(crate) fn write_csv(
+    file: &Path,
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> Result<(), StudyError> {
+    write_atomically(file, csv_text(rows).at("write", file)?.as_bytes())
 }
 
-/// A row for each grain of the runs that are no pairs, SI units.
-fn grains_csv(rows: &[RunRecord]) -> String {
+fn csv_text(rows: impl IntoIterator<Item = Vec<String>>) -> std::io::Result<String> {
     let mut out = csv::Writer::from_writer(Vec::new());
-    // Writing to memory does not fail.
-    let _ = out.write_record([
-        "run",
-        "model",
-        "member",
-        "grain",
-        "diameter_m",
-        "peak_speed_m_per_s",
-        "peak_reynolds",
-        "final_speed_m_per_s",
-        "final_reynolds",
-        "speed_change",
-        "mean_speed_m_per_s",
-        "landing_time_s",
-        "drift_m",
-        "long_axis_deg",
-        "turned_deg",
-    ]);
-    let each = |row: &RunRecord| row.settling.as_ref().map(|s| s.each.clone());
     for row in rows {
-        for GrainSettling {
-            grain,
-            diameter_m,
-            peak_speed_m_per_s,
-            peak_reynolds,
-            final_speed_m_per_s,
-            final_reynolds,
-            speed_change,
-            mean_speed_m_per_s,
-            landing_time_s,
-            drift_m,
-            long_axis_deg,
-            turned_deg,
-        } in each(row).unwrap_or_default()
-        {
-            let numbers = [
-                Some(diameter_m),
-                Some(peak_speed_m_per_s),
-                peak_reynolds,
-                final_speed_m_per_s,
-                final_reynolds,
-                speed_change,
-                mean_speed_m_per_s,
-                landing_time_s,
-                Some(drift_m),
-                long_axis_deg,
-                Some(turned_deg),
-            ];
-            let names = [row.name.clone(), row.model.clone()];
-            let counts = [row.member, grain].map(|n| n.to_string());
-            let cells = names.into_iter().chain(counts);
-            let _ = out.write_record(cells.chain(numbers.map(number)));
-        }
+        out.write_record(row)?;
     }
-    String::from_utf8(out.into_inner().unwrap_or_default()).unwrap_or_default()
+    let bytes = out.into_inner().map_err(csv::IntoInnerError::into_error)?;
+    String::from_utf8(bytes).map_err(std::io::Error::other)
 }
 
-/// The table as comma-separated text; what is not known is empty.
-pub fn to_csv(rows: &[RunRecord]) -> String {
-    let union = |names: fn(&RunRecord) -> Vec<String>| -> BTreeSet<String> {
-        rows.iter().flat_map(names).collect()
+/// Returns the measured quantities that runs of these kinds have, in table order.
+pub fn columns(records: &[RunRecord]) -> Vec<&'static str> {
+    let settling = records.iter().any(|record| record.settling.is_some());
+    let pairs = !settling || records.iter().any(|record| record.pair.is_some());
+    let of_pairs = PAIR_QUANTITIES.into_iter().filter(|_| pairs);
+    let new = |q: &&str| settling && !(pairs && PAIR_QUANTITIES.contains(q));
+    of_pairs
+        .chain(SETTLING_QUANTITIES.into_iter().filter(new))
+        .collect()
+}
+
+/// Header and one row per grain of the runs that are not pairs, in SI units.
+fn settling_rows(records: &[RunRecord]) -> Vec<Vec<String>> {
+    let mut rows = vec![SETTLING_HEADER.map(str::to_owned).to_vec()];
+    let row = |record: &RunRecord, grain: &GrainSettling| {
+        let values = serde_json::to_value(grain).unwrap_or_default();
+        let value = |name: &&str| number(values.get(*name).and_then(serde_json::Value::as_f64));
+        let indices = [record.member, grain.grain].map(|n| n.to_string());
+        let names = [record.name.clone(), record.model.clone()];
+        let cells = names.into_iter().chain(indices);
+        cells
+            .chain(SETTLING_HEADER[4..].iter().map(value))
+            .collect()
     };
-    let axes = union(|r| r.levels.keys().cloned().collect());
-    let factors = union(|r| r.factors.keys().cloned().collect());
-    let quantities = columns(rows);
+    for record in records {
+        let grains = record.settling.iter().flat_map(|s| &s.each);
+        rows.extend(grains.map(|grain| row(record, grain)));
+    }
+    rows
+}
+
+/// Returns `table.csv`: one row per run; unknown values are empty.
+pub fn to_csv(records: &[RunRecord]) -> String {
+    csv_text(rows(records)).unwrap_or_default()
+}
+
+fn rows(records: &[RunRecord]) -> Vec<Vec<String>> {
+    let axes: BTreeSet<&String> = records.iter().flat_map(|r| r.levels.keys()).collect();
+    let factors: BTreeSet<&String> = records.iter().flat_map(|r| r.factors.keys()).collect();
+    let quantities = columns(records);
     let pairs = quantities.contains(&"kiss_time");
-    let plain = [
-        "diameter_m",
-        "kiss_time_s",
-        "steps",
-        "end_time_s",
-        "wall_s",
-        "threads",
-        "max_divergence",
-        "id",
-        "remark",
-    ];
-    let plain = plain
-        .into_iter()
-        .filter(|name| pairs || *name != "kiss_time_s");
-    let mut out = csv::Writer::from_writer(Vec::new());
-    // Writing to memory does not fail; a row of another length cannot come about.
-    let header = ["run", "model", "member", "state"]
-        .map(str::to_owned)
-        .into_iter();
-    let header = header
-        .chain(axes.iter().cloned())
-        .chain(factors.iter().cloned());
-    let header = header
-        .chain(quantities.iter().map(|q| (*q).to_owned()))
-        .chain(plain.map(str::to_owned));
-    let _ = out.write_record(header);
-    for row in rows {
-        let mut cells = vec![
-            row.name.clone(),
-            row.model.clone(),
-            row.member.to_string(),
-            row.state.clone(),
-        ];
+    let kiss = pairs.then_some("kiss_time_s");
+    let mut header: Vec<&str> = vec!["run", "model", "member", "state"];
+    header.extend(axes.iter().chain(&factors).map(|name| name.as_str()));
+    header.extend(&quantities);
+    header.push("diameter_m");
+    header.extend(kiss);
+    header.extend(["steps", "end_time_s", "wall_s", "threads"]);
+    header.extend(["max_divergence", "id", "remark"]);
+    let row = |r: &RunRecord| {
+        let member = r.member.to_string();
+        let mut cells = vec![r.name.clone(), r.model.clone(), member, r.state.clone()];
         cells.extend(
             axes.iter()
-                .map(|a| row.levels.get(a).cloned().unwrap_or_default()),
+                .map(|a| r.levels.get(*a).cloned().unwrap_or_default()),
         );
-        cells.extend(factors.iter().map(|f| number(row.factors.get(f).copied())));
-        cells.extend(quantities.iter().map(|q| number(row.measured(q))));
-        cells.push(row.diameter_m.map_or(String::new(), |v| format!("{v:e}")));
-        cells.extend(pairs.then(|| number(row.kiss_time_s)));
-        cells.extend([
-            row.steps.map_or(String::new(), |v| v.to_string()),
-            number(row.end_time_s),
-            row.wall_s.map_or(String::new(), |v| format!("{v:.1}")),
-            row.threads.map_or(String::new(), |v| v.to_string()),
-            row.max_divergence
-                .map_or(String::new(), |v| format!("{v:.1e}")),
-            row.id.clone(),
-            row.remark.clone().unwrap_or_default(),
-        ]);
-        let _ = out.write_record(&cells);
-    }
-    String::from_utf8(out.into_inner().unwrap_or_default()).unwrap_or_default()
+        cells.extend(factors.iter().map(|f| number(r.factors.get(*f).copied())));
+        cells.extend(quantities.iter().map(|q| number(r.measured(q))));
+        cells.push(text(r.diameter_m, |v| format!("{v:e}")));
+        cells.extend(kiss.map(|_| number(r.kiss_time_s)));
+        cells.push(text(r.steps, |v| v.to_string()));
+        cells.push(number(r.end_time_s));
+        cells.push(text(r.wall_s, |v| format!("{v:.1}")));
+        cells.push(text(r.threads, |v| v.to_string()));
+        cells.push(text(r.max_divergence, |v| format!("{v:.1e}")));
+        cells.extend([r.id.clone(), r.remark.clone().unwrap_or_default()]);
+        cells
+    };
+    let header = header.into_iter().map(str::to_owned).collect();
+    std::iter::once(header)
+        .chain(records.iter().map(row))
+        .collect()
 }
 
-/// Six significant digits, without trailing zeros.
+fn text<T>(value: Option<T>, form: impl Fn(T) -> String) -> String {
+    value.map_or(String::new(), form)
+}
+
 fn number(value: Option<f64>) -> String {
-    let Some(value) = value else {
-        return String::new();
-    };
-    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
-    rounded.to_string()
+    text(value, |v| rounded(v).to_string())
 }

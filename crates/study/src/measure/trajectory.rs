@@ -1,84 +1,79 @@
-//! Motions of a pair for the figures, and their thinned-out copies in `histories/`.
+//! Trajectories of the grains of a run for the figures, and their thinned copies in `histories/`.
 
-use std::fmt::Write;
 use std::path::Path;
 
 use glam::DVec3;
 use grainwake_report::run_folder::{History, histories};
 
-use crate::error::{StudyError, write_whole};
-use crate::measure::record::RunRecord;
+use super::record::RunRecord;
+use super::table::write_csv;
+use crate::error::{At, StudyError};
+use crate::format::rounded;
 use crate::plan::Run;
 
-/// Folder of the thinned-out histories in a study folder.
+/// Subfolder of a study folder that holds the thinned histories.
 pub const HISTORIES: &str = "histories";
-/// Time between rows of a thinned-out history, in sqrt(d/g).
+/// Time between rows of a thinned history [sqrt(d/g)].
 const INTERVAL: f64 = 0.25;
-const HEADER: &str = "time,grain,x,y,z,vx,vy,vz,qw,qx,qy,qz,wx,wy,wz,contacts\n";
+const HEADER: [&str; 16] = [
+    "time", "grain", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "wx", "wy", "wz",
+    "contacts",
+];
 
-/// The motion of a pair in dimensionless numbers, until the first landing.
+/// Reads the histories of the grains from the run folder, or else from the thinned copy.
+fn read_histories(run: &Run, study: &Path) -> Option<Vec<History>> {
+    let full = run.folder(study).join("grains.csv");
+    let thinned = study.join(HISTORIES).join(format!("{}.csv", run.name));
+    [full, thinned]
+        .iter()
+        .find_map(|file| histories(file, &mut Vec::new()).ok())
+}
+
+/// Relative motion of a pair until the first landing, dimensionless.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
     /// Times [sqrt(d/g)].
     pub time: Vec<f64>,
     /// Distance of the centres [d].
     pub distance: Vec<f64>,
-    /// Vertical velocity of the grain that trails at the start and of the one that leads, up positive [sqrt(d g)].
+    /// Vertical velocity of the trailing and of the leading grain, up positive [sqrt(d g)].
     pub velocity: [Vec<f64>; 2],
 }
 
 impl Trajectory {
-    /// Of a finished run: from its run folder, else from the thinned-out copy.
-    pub fn read(run: &Run, row: &RunRecord, study: &Path) -> Option<Trajectory> {
-        let whole = run.folder(study).join("grains.csv");
-        let thin = study.join(HISTORIES).join(format!("{}.csv", run.name));
-        let found = [whole, thin]
-            .iter()
-            .find_map(|file| histories(file, &mut Vec::new()).ok())?;
-        let [a, b] = found.as_slice() else {
+    /// Reads the trajectory of a finished run; none if the run is not a pair.
+    pub fn read(run: &Run, record: &RunRecord, study: &Path) -> Option<Trajectory> {
+        let grains = read_histories(run, study)?;
+        let [a, b] = grains.as_slice() else {
             return None;
         };
-        let (up, unit) = row.up_and_time()?;
-        let landing = row.pair.as_ref()?.landing_time;
-        Trajectory::of(
-            [a, b],
-            up,
-            row.diameter_m?,
-            unit,
-            landing.map_or(f64::INFINITY, |t| t * unit),
-        )
-    }
-
-    fn of(
-        [a, b]: [&History; 2],
-        up: DVec3,
-        diameter: f64,
-        unit: f64,
-        until: f64,
-    ) -> Option<Trajectory> {
+        let (up, unit) = record.up_and_time()?;
+        let diameter = record.diameter_m?;
+        let landing = record.pair.as_ref()?.landing_time;
+        let until = landing.map_or(f64::INFINITY, |t| t * unit);
         let height = |h: &History| Some(h.position.first()?.dot(up));
-        let (behind, ahead) = if height(a)? >= height(b)? {
+        let (trailing, leading) = if height(a)? >= height(b)? {
             (a, b)
         } else {
             (b, a)
         };
-        let rows = behind.time.partition_point(|t| *t < until).min(ahead.len());
+        let rows = trailing
+            .time
+            .partition_point(|t| *t < until)
+            .min(leading.len());
         let velocity = |h: &History| {
-            h.velocity[..rows]
-                .iter()
-                .map(|v| v.dot(up) * unit / diameter)
-                .collect()
+            let vertical = |v: &DVec3| v.dot(up) * unit / diameter;
+            h.velocity[..rows].iter().map(vertical).collect()
         };
+        let distance = |i: usize| trailing.position[i].distance(leading.position[i]) / diameter;
         Some(Trajectory {
-            time: behind.time[..rows].iter().map(|t| t / unit).collect(),
-            distance: (0..rows)
-                .map(|i| behind.position[i].distance(ahead.position[i]) / diameter)
-                .collect(),
-            velocity: [velocity(behind), velocity(ahead)],
+            time: trailing.time[..rows].iter().map(|t| t / unit).collect(),
+            distance: (0..rows).map(distance).collect(),
+            velocity: [velocity(trailing), velocity(leading)],
         })
     }
 
-    /// Points of a curve.
+    /// Returns the points of a curve of `values` against time.
     pub fn points(&self, values: &[f64]) -> Vec<(f64, f64)> {
         self.time
             .iter()
@@ -88,58 +83,68 @@ impl Trajectory {
     }
 }
 
-/// Writes the thinned-out history of a finished run, if its run folder is there.
+/// Reads the settling speed [m/s] against time [s], averaged over the grains, until all landed.
+pub fn settling_curve(run: &Run, record: &RunRecord, study: &Path) -> Option<Vec<(f64, f64)>> {
+    let grains = read_histories(run, study)?;
+    let (up, unit) = record.up_and_time()?;
+    let grains: Vec<&History> = grains.iter().filter(|h| !h.is_empty()).collect();
+    let landed = record.settling.as_ref().and_then(|s| s.last_landing);
+    // The row at the landing holds the speed of the rebound.
+    let until = landed.map_or(f64::INFINITY, |t| t * unit * (1.0 - 1e-6));
+    let rows = grains.iter().map(|h| h.len()).min()?;
+    let mean = |row: usize| {
+        let sum: f64 = grains.iter().map(|h| -h.velocity[row].dot(up)).sum();
+        sum / grains.len() as f64
+    };
+    let points = (0..rows).map(|row| (grains[0].time[row], mean(row)));
+    Some(points.take_while(|(time, _)| *time < until).collect())
+}
+
+/// Writes the thinned history of a finished run; returns whether its run folder exists.
 ///
 /// # Errors
-/// If it cannot be written.
-pub fn write_thinned_history(run: &Run, row: &RunRecord, study: &Path) -> Result<bool, StudyError> {
-    let Ok(all) = histories(&run.folder(study).join("grains.csv"), &mut Vec::new()) else {
+/// If the file cannot be written.
+pub fn write_thinned_history(
+    run: &Run,
+    record: &RunRecord,
+    study: &Path,
+) -> Result<bool, StudyError> {
+    let Ok(grains) = histories(&run.folder(study).join("grains.csv"), &mut Vec::new()) else {
         return Ok(false);
     };
-    let unit = row.up_and_time().map_or(0.0, |(_, unit)| unit);
-    let mut out = String::from(HEADER);
-    let rows = all.iter().map(History::len).min().unwrap_or(0);
+    let interval = record
+        .up_and_time()
+        .map_or(0.0, |(_, unit)| INTERVAL * unit);
+    let mut out = vec![HEADER.map(str::to_owned).to_vec()];
+    let rows = grains.iter().map(History::len).min().unwrap_or(0);
     let mut next = f64::NEG_INFINITY;
     for i in 0..rows {
-        let time = all[0].time[i];
+        let time = grains[0].time[i];
         if time < next && i + 1 < rows {
             continue;
         }
-        next = time + (INTERVAL * unit) * (1.0 - 1e-6);
-        for (grain, h) in all.iter().enumerate() {
-            let (x, v, q, w) = (
-                h.position[i],
-                h.velocity[i],
-                h.orientation[i],
-                h.angular_velocity[i],
-            );
-            let numbers = [
+        next = time + interval * (1.0 - 1e-6);
+        for (grain, h) in grains.iter().enumerate() {
+            let (x, v, w) = (h.position[i], h.velocity[i], h.angular_velocity[i]);
+            let q = h.orientation[i];
+            let values = [
                 x.x, x.y, x.z, v.x, v.y, v.z, q.w, q.x, q.y, q.z, w.x, w.y, w.z,
             ];
-            let cells: Vec<String> = numbers.iter().map(|n| digits(*n)).collect();
-            // Writing to a text does not fail.
-            let _ = writeln!(
-                out,
-                "{},{grain},{},{}",
-                digits(time),
-                cells.join(","),
-                h.contacts[i]
-            );
+            let mut row = vec![cell(time), grain.to_string()];
+            row.extend(values.map(cell));
+            row.push(h.contacts[i].to_string());
+            out.push(row);
         }
     }
     let folder = study.join(HISTORIES);
-    std::fs::create_dir_all(&folder).map_err(|source| StudyError::Io {
-        action: "create",
-        path: folder.clone(),
-        source,
-    })?;
-    write_whole(&folder.join(format!("{}.csv", run.name)), out.as_bytes())?;
+    std::fs::create_dir_all(&folder).at("create", &folder)?;
+    write_csv(&folder.join(format!("{}.csv", run.name)), out)?;
     Ok(true)
 }
 
-/// Six significant digits.
-fn digits(value: f64) -> String {
-    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+/// Six significant digits, with an exponent for very small and very large values.
+fn cell(value: f64) -> String {
+    let rounded = rounded(value);
     if rounded == 0.0 {
         "0".into()
     } else if (1e-3..1e6).contains(&rounded.abs()) {

@@ -1,136 +1,123 @@
-//! The report of a study: figures, analysis, table, and one page.
+//! The report of a study: tables, analysis, figures and one HTML page.
 
 pub mod figure;
 mod html;
 mod settling;
+mod tables;
 
 use std::path::{Path, PathBuf};
 
 use grainwake_solver::case::Problem;
 use rayon::prelude::*;
 
+use self::figure::{FigureData, StudyFigure};
+use self::html::Content;
 use crate::analysis::correlation::correlations;
 use crate::analysis::verdict::evaluate;
-use crate::error::{At, StudyError, write_whole};
+use crate::error::{At, StudyError, write_atomically, write_json};
 use crate::measure::record::{RunRecord, records};
 use crate::measure::table::write_tables;
 use crate::measure::trajectory::{Trajectory, write_thinned_history};
-use crate::page::figure::{FigureData, StudyFigure};
-use crate::page::html::Content;
 use crate::plan::file::Study;
-use crate::plan::{Manifest, Run};
+use crate::plan::{Plan, Run};
 
-/// What was written.
+/// Files of a report.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Rendered {
-    /// The page.
+    /// HTML page.
     pub page: PathBuf,
-    /// The figures as PNG, in the order of the page; an SVG of the same name lies beside each.
+    /// Figures as PNG, in page order; each has an SVG file of the same name.
     pub png: Vec<PathBuf>,
-    /// What was missing or had to be left out; also on the page.
+    /// Missing or omitted parts; also listed on the page.
     pub notes: Vec<String>,
-    /// Finished runs, and all runs.
+    /// Number of finished runs, and of all runs.
     pub runs: (usize, usize),
 }
 
-/// Draws the figures, tests the claims and writes the page of a study folder, whatever part of its
-/// runs is finished.
+/// Writes tables, analysis, figures and page of a study folder from its finished runs.
 ///
-/// The analysis is that of the study file as it is now, if it is still where it was.
+/// The analysis is read again from the study file, if that still exists.
 ///
 /// # Errors
-/// If the folder holds no study, its analysis has become wrong, or a file cannot be written.
+/// If the folder holds no study, the analysis file is wrong, or a file cannot be written.
 pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
-    let mut manifest = Manifest::read(folder)?;
-    let stale = refresh(&mut manifest, folder)?;
-    let manifest = manifest;
-    let rows = records(&manifest, folder);
-    write_tables(&rows, folder)?;
-    let done: Vec<(&Run, &RunRecord)> = manifest
-        .runs
-        .iter()
-        .zip(&rows)
-        .filter(|(_, row)| row.finished())
-        .collect();
-    done.par_iter()
-        .try_for_each(|(run, row)| write_thinned_history(run, row, folder).map(|_| ()))?;
-    let plan = &manifest.analysis.figures;
-    let compared = |run: &Run| {
-        let here = plan
-            .orientations
-            .as_ref()
-            .zip(plan.compare.as_ref())
-            .is_some_and(|(axis, level)| run.levels.get(axis) == Some(level));
-        run.member == 0 && (here || plan.reference.as_ref() == Some(&run.model))
-    };
-    let trajectories = done
+    let mut plan = Plan::read(folder)?;
+    let mut notes: Vec<String> = refresh_analysis(&mut plan, folder)?.into_iter().collect();
+    let plan = plan;
+    let records = records(&plan, folder);
+    write_tables(&records, folder)?;
+    let all = plan.runs.iter().zip(&records);
+    let finished: Vec<(&Run, &RunRecord)> = all.filter(|(_, r)| r.finished()).collect();
+    finished
         .par_iter()
-        .filter(|(run, _)| compared(run))
-        .filter_map(|(run, row)| Some((run.name.clone(), Trajectory::read(run, row, folder)?)))
-        .collect();
-    let findings = evaluate(&manifest.analysis, &rows);
-    let correlations = correlations(&manifest.analysis, &rows);
-    let text = serde_json::to_string_pretty(
-        &serde_json::json!({ "claims": findings, "correlations": correlations }),
-    );
-    let file = folder.join("analysis.json");
-    write_whole(
-        &file,
-        text.map_err(std::io::Error::from)
-            .at("write", &file)?
-            .as_bytes(),
-    )?;
-    let mut notes: Vec<String> = stale.into_iter().collect();
+        .try_for_each(|(run, record)| write_thinned_history(run, record, folder).map(|_| ()))?;
+    let request = &plan.analysis.figures;
+    let compared = |run: &Run| {
+        let orientation = request.orientations.as_ref().zip(request.compare.as_ref());
+        let matches = orientation.is_some_and(|(axis, l)| run.levels.get(axis) == Some(l));
+        run.member == 0 && (matches || request.reference.as_ref() == Some(&run.model))
+    };
+    let trajectory = |(run, record): &(&Run, &RunRecord)| {
+        Some((run.name.clone(), Trajectory::read(run, record, folder)?))
+    };
+    let shown = finished.par_iter().filter(|(run, _)| compared(run));
+    let trajectories = shown.filter_map(trajectory).collect();
+    let findings = evaluate(&plan.analysis, &records);
+    let correlations = correlations(&plan.analysis, &records);
+    let analysis = serde_json::json!({ "claims": findings, "correlations": correlations });
+    write_json(&folder.join("analysis.json"), &analysis)?;
     let data = FigureData {
-        manifest: &manifest,
-        rows: &rows,
+        plan: &plan,
+        records: &records,
         folder,
         correlations: &correlations,
         trajectories,
     };
     let figures = figure::all(&data, &mut notes);
     let (png, figures) = write_figures(folder, figures)?;
-    let out = Rendered {
-        page: folder.join("report.html"),
-        png,
-        runs: (done.len(), rows.len()),
-        notes,
-    };
     let content = Content {
-        manifest: &manifest,
-        rows: &rows,
+        plan: &plan,
+        records: &records,
         findings: &findings,
         correlations: &correlations,
         figures: &figures,
-        notes: &out.notes,
+        notes: &notes,
     };
-    write_whole(&out.page, content.html().as_bytes())?;
-    Ok(out)
+    let page = folder.join("report.html");
+    write_atomically(&page, content.html().as_bytes())?;
+    Ok(Rendered {
+        page,
+        png,
+        runs: (finished.len(), records.len()),
+        notes,
+    })
 }
 
-/// Takes the analysis from the study file, which may have been changed since the study was run. A wrong
-/// analysis is an error; a study file that is wrong otherwise, or whose cases are gone, leaves the analysis
-/// as it was, which is returned as a note.
-fn refresh(manifest: &mut Manifest, folder: &Path) -> Result<Option<String>, StudyError> {
-    if !manifest.study.is_file() {
+/// Replaces the analysis of the plan by that of the study file, which may have changed.
+///
+/// A wrong analysis file is an error. If the study file is wrong otherwise, or its cases no longer
+/// exist, the analysis stays as it is, and a note is returned.
+fn refresh_analysis(plan: &mut Plan, folder: &Path) -> Result<Option<String>, StudyError> {
+    if !plan.study.is_file() {
         return Ok(None);
     }
-    let elsewhere = |problem: &Problem| {
-        let file = manifest.study.display().to_string();
+    let in_analysis_file = |problem: &Problem| {
+        let file = plan.study.display().to_string();
         problem.place().is_some_and(|(name, ..)| name != file)
     };
-    match Study::read(&manifest.study) {
-        Ok(now) if now.title == manifest.title && now.analysis != manifest.analysis => {
-            manifest.analysis = now.analysis;
-            manifest.write(folder)?;
+    match Study::read(&plan.study) {
+        Ok(study) if study.title == plan.title && study.analysis != plan.analysis => {
+            plan.analysis = study.analysis;
+            plan.write(folder)?;
             Ok(None)
         }
         Ok(_) => Ok(None),
-        Err(StudyError::Invalid(problems)) if problems.iter().any(elsewhere) => {
+        Err(StudyError::Invalid(problems)) if problems.iter().any(in_analysis_file) => {
             Err(StudyError::Invalid(problems))
         }
         Err(error) => Ok(Some(format!(
-            "the analysis is that of the last `grainwake study`, as the study file cannot be used now: {}",
+            "the analysis is that of the last `grainwake study`, because the study file cannot be \
+             read: {}",
             error.to_string().lines().next().unwrap_or_default()
         ))),
     }
@@ -138,28 +125,21 @@ fn refresh(manifest: &mut Manifest, folder: &Path) -> Result<Option<String>, Stu
 
 type Written = (Vec<PathBuf>, Vec<(StudyFigure, String)>);
 
+/// Writes all figures as PNG and SVG; returns the PNG files and the figures with their SVG text.
 fn write_figures(folder: &Path, figures: Vec<StudyFigure>) -> Result<Written, StudyError> {
-    let place = folder.join("figures");
-    std::fs::create_dir_all(&place).at("create", &place)?;
-    let one = |figure: StudyFigure| -> Result<(PathBuf, (StudyFigure, String)), StudyError> {
-        let file = place.join(format!("{}.png", figure.name));
-        let png = figure
-            .drawing
-            .to_png()
-            .map_err(std::io::Error::other)
-            .at("draw", &file)?;
-        write_whole(&file, &png)?;
+    let folder = folder.join("figures");
+    std::fs::create_dir_all(&folder).at("create", &folder)?;
+    let write = |figure: StudyFigure| -> Result<(PathBuf, (StudyFigure, String)), StudyError> {
+        let file = folder.join(format!("{}.png", figure.name));
+        let png = figure.drawing.to_png().map_err(std::io::Error::other);
+        write_atomically(&file, &png.at("draw", &file)?)?;
         let svg = figure.svg();
-        write_whole(&place.join(format!("{}.svg", figure.name)), svg.as_bytes())?;
+        write_atomically(&folder.join(format!("{}.svg", figure.name)), svg.as_bytes())?;
         Ok((file, (figure, svg)))
     };
-    let written: Vec<_> = figures.into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let written: Vec<_> = figures
+        .into_par_iter()
+        .map(write)
+        .collect::<Result<_, _>>()?;
     Ok(written.into_iter().unzip())
-}
-
-impl html::Content<'_> {
-    /// Finished runs.
-    pub(crate) fn done(&self) -> usize {
-        self.rows.iter().filter(|row| row.finished()).count()
-    }
 }

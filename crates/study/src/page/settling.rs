@@ -1,4 +1,4 @@
-//! The parts of the page that speak of grains that are no pairs.
+//! Parts of the report page about runs other than pairs.
 
 use std::fmt::Write;
 
@@ -23,39 +23,36 @@ pub(super) const COLUMNS: [(&str, &str); 12] = [
     ("lands at [s]", "landing_time_s"),
     ("drift / d", "drift"),
     ("long axis [°]", "long_axis"),
-    ("turned [°]", "turned"),
+    ("rotation [°]", "turned"),
 ];
 
-/// Speeds that still change by more than this are no terminal speeds.
+/// Largest relative change of the speed in the final window of a terminal speed.
 const STEADY: f64 = 0.02;
 
-/// Runs that are no pairs.
-fn settled(rows: &[RunRecord]) -> Vec<(&RunRecord, &SettlingMeasures)> {
-    rows.iter()
-        .filter_map(|row| Some((row, row.settling.as_ref()?)))
-        .collect()
+fn settling_runs(records: &[RunRecord]) -> Vec<(&RunRecord, &SettlingMeasures)> {
+    let known = records
+        .iter()
+        .filter_map(|r| Some((r, r.settling.as_ref()?)));
+    known.collect()
 }
 
-/// What came out, in half a sentence; none without such runs.
-pub(super) fn lead(rows: &[RunRecord]) -> Option<String> {
-    let all = settled(rows);
+/// Returns the landings, speeds and Reynolds numbers as half a sentence; none without such runs.
+pub(super) fn lead(records: &[RunRecord]) -> Option<String> {
+    let all = settling_runs(records);
     if all.is_empty() {
         return None;
     }
     let grains: usize = all.iter().map(|(_, s)| s.grains).sum();
     let landed: usize = all.iter().map(|(_, s)| s.landed).sum();
-    let mut text = if grains == all.len() {
-        format!("; {landed} of {grains} grains landed")
-    } else {
-        format!("; {landed} of their {grains} grains landed")
-    };
+    let mut text = format!("; {landed} of {grains} grains landed");
     let span = |pick: fn(&SettlingMeasures) -> Option<f64>| {
         let values = || all.iter().filter_map(|(_, s)| pick(s));
-        let ends = (values().reduce(f64::min)?, values().reduce(f64::max)?);
-        Some(if ends.0 == ends.1 {
-            significant(ends.0)
+        let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
+        let (low_text, high_text) = (significant(low), significant(high));
+        Some(if low == high {
+            low_text
         } else {
-            format!("{} to {}", significant(ends.0), significant(ends.1))
+            format!("{low_text} to {high_text}")
         })
     };
     if let Some(speeds) = span(|s| s.final_speed_m_per_s) {
@@ -67,83 +64,83 @@ pub(super) fn lead(rows: &[RunRecord]) -> Option<String> {
     Some(text)
 }
 
-/// Which create_folder fastest and land first, and how sure that is.
-pub(super) fn answers(content: &Content) -> String {
-    let all = settled(content.rows);
-    let mut out = String::new();
-    let mut list =
-        |what: [&str; 2], unit: &str, pick: fn(&SettlingMeasures) -> Option<f64>, up: bool| {
-            let mut sorted: Vec<(&RunRecord, f64)> = all
-                .iter()
-                .filter_map(|(row, s)| Some((*row, pick(s)?)))
-                .collect();
-            sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
-            if up {
-                sorted.reverse();
-            }
-            let name = |(row, v): &(&RunRecord, f64)| {
-                format!("{} ({} {unit})", escape(&row.name), significant(*v))
-            };
-            let first: Vec<String> = sorted.iter().take(5).map(name).collect();
-            let last: Vec<String> = sorted.iter().skip(5).rev().take(3).map(name).collect();
-            if sorted.is_empty() {
-                let _ = writeln!(out, "<p>No finished run gives a {}.</p>", what[1]);
-            } else {
-                let last = if last.is_empty() {
-                    String::new()
-                } else {
-                    format!(" Last: {}.", last.join(", "))
-                };
-                let first = first.join(", ");
-                let _ = writeln!(out, "<p><b>{}</b>: {first}.{last}</p>", what[0]);
-            }
+/// Fastest grains, first landings, and the uncertainty of both.
+pub(super) fn summary(content: &Content) -> String {
+    let all = settling_runs(content.records);
+    let list = |title: &str, what: &str, unit: &str, values: Vec<(&RunRecord, f64)>| {
+        let name = |(record, v): &(&RunRecord, f64)| {
+            format!("{} ({} {unit})", escape(&record.name), significant(*v))
         };
-    list(
-        ["Fastest at the end", "final settling speed"],
-        "m/s",
-        |s| s.final_speed_m_per_s,
-        true,
-    );
-    list(
-        ["First to land", "landing"],
+        let first: Vec<String> = values.iter().take(5).map(name).collect();
+        let last: Vec<String> = values.iter().skip(5).rev().take(3).map(name).collect();
+        let last = match last.is_empty() {
+            true => String::new(),
+            false => format!(" Last: {}.", last.join(", ")),
+        };
+        match values.is_empty() {
+            true => format!("<p>No finished run has a {what}.</p>\n"),
+            false => format!("<p><b>{title}</b>: {}.{last}</p>\n", first.join(", ")),
+        }
+    };
+    let sorted = |pick: fn(&SettlingMeasures) -> Option<f64>| {
+        let known = all
+            .iter()
+            .filter_map(|(record, s)| Some((*record, pick(s)?)));
+        let mut values: Vec<(&RunRecord, f64)> = known.collect();
+        values.sort_by(|a, b| a.1.total_cmp(&b.1));
+        values
+    };
+    let mut speeds = sorted(|s| s.final_speed_m_per_s);
+    speeds.reverse();
+    let mut out = list("Largest final speed", "final settling speed", "m/s", speeds);
+    out += &list(
+        "First landing",
+        "landing",
         "s",
-        |s| s.landing_time_s,
-        false,
+        sorted(|s| s.landing_time_s),
     );
-    let changing: Vec<String> = all
+    let unsteady = |s: &SettlingMeasures| s.speed_change.is_some_and(|c| c.abs() > STEADY);
+    let unsteady: Vec<String> = all
         .iter()
-        .filter(|(_, s)| s.speed_change.is_some_and(|c| c.abs() > STEADY))
-        .map(|(row, _)| escape(&row.name))
+        .filter(|(_, s)| unsteady(s))
+        .map(|(r, _)| escape(&r.name))
         .collect();
+    if !unsteady.is_empty() {
+        let _ = writeln!(
+            out,
+            "<p><b>Not steady</b>: the speed changes by more than {:.0} % over the diameter in \
+             which it is measured: {}. Use a taller box to reach the terminal speed.</p>",
+            100.0 * STEADY,
+            unsteady.join(", ")
+        );
+    }
     let without = all
         .iter()
         .filter(|(_, s)| s.final_speed_m_per_s.is_none())
         .count();
-    if !changing.is_empty() {
-        let _ = writeln!(
-            out,
-            "<p><b>Not yet steady</b>: the speed still changes by more than {:.0} % over the diameter where it is measured: {}. A taller box shows whether it settles.</p>",
-            100.0 * STEADY,
-            changing.join(", ")
-        );
-    }
     if without > 0 {
         let _ = writeln!(
             out,
-            "<p>{without} runs have no final settling speed: their grains fell less than two diameters before the floor slowed them or the run ended.</p>"
+            "<p>{without} runs have no final settling speed: their grains fell less than two \
+             diameters before the floor slowed them or the run ended.</p>"
         );
     }
-    if content.rows.iter().all(|r| r.member == 0) {
-        out += "<p><b>How sure</b>: every model was run once. An <code>[ensemble]</code> of repetitions with small offsets tells how far the results hang on the start, and a finer grid how far on the cells.</p>\n";
+    out += if content.without_ensemble() {
+        "<p><b>Uncertainty</b>: every model was run once. An <code>[ensemble]</code> of \
+         repetitions with small offsets shows the sensitivity to the initial position, a finer \
+         mesh the discretisation error.</p>\n"
     } else {
-        out += "<p><b>How sure</b>: models were repeated with small random offsets of the start; the ranges of the repetitions are bars in the figures.</p>\n";
-    }
+        "<p><b>Uncertainty</b>: models were repeated with small random offsets of the initial \
+         position; bars in the figures are the ranges of the repetitions.</p>\n"
+    };
     out
 }
 
-/// Where the numbers of each grain are.
-pub(super) fn note() -> String {
+/// Definition of the final speed, and the file with the values of each grain.
+pub(super) fn table_note() -> String {
     format!(
-        "<p>Final speeds are means over the last diameter fallen (of a grain that landed, the last but one); with several grains, means over them, and <i>lands</i> is the first of them. Each grain has its row in <code>{SETTLING_TABLE}</code>.</p>\n"
+        "<p>Final speeds are means over the last diameter fallen; for a grain that landed, over \
+         the last but one. With several grains they are averaged, and <i>lands at</i> is the first \
+         landing. Values of each grain: <code>{SETTLING_TABLE}</code>.</p>\n"
     )
 }

@@ -1,133 +1,134 @@
-//! Claims about the results, and what the runs say about them.
+//! The analysis file: claims to be tested, correlations and figures.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use grainwake_solver::case::{Loc, Problem, Source, nearest};
 use serde::{Deserialize, Serialize};
 
-use crate::error::of_a_study;
-use crate::plan::expand::Model;
-use crate::plan::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES, SHAPE_FACTORS};
+use super::expand::Model;
+use super::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES, SHAPE_FACTORS};
+use crate::error::refer_to_study_keys;
 
-/// What is asked of the results: claims, correlations, figures.
+/// Requested analysis of the results: claims, correlations, figures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Analysis {
     /// Claims to be tested.
     #[serde(default)]
     pub claims: Vec<Claim>,
-    /// Rank correlations to be listed.
+    /// Rank correlations to be computed.
     #[serde(default)]
     pub correlations: Option<Correlations>,
-    /// What the figures show.
+    /// Contents of the figures.
     #[serde(default)]
     pub figures: FigureRequest,
 }
 
-/// A claim and how it is tested.
+/// Claim about a quantity, with its statistical test.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Claim {
-    /// In words.
+    /// Statement in words.
     pub says: String,
-    /// Where it is made.
+    /// Section of the publication that makes the claim.
     pub part: String,
-    /// The quantity that it is about.
+    /// Quantity that the claim is about.
     pub quantity: String,
-    /// How it is tested.
+    /// Statistical test.
     pub test: Test,
-    /// Which models count.
+    /// Conditions that a model must meet to be included.
     #[serde(default)]
     pub when: BTreeMap<String, Condition>,
-    /// Whether pairs that landed before it happened are left out, not lower bounds.
+    /// Whether right-censored observations are excluded; otherwise they count as lower bounds.
     #[serde(default)]
     pub observed: bool,
 }
 
-/// A test of a quantity.
+/// Statistical test of a quantity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Test {
-    /// It rises or falls with a factor.
+    /// Monotonic trend with a factor.
     Trend {
-        /// Which factor.
+        /// Factor.
         with: String,
-        /// How.
+        /// Direction.
         sign: Sign,
     },
-    /// It is larger at one value of an axis than at another, all else equal.
+    /// Larger at one level of an axis than at another, all else equal.
     Order {
-        /// Which axis.
+        /// Axis.
         axis: String,
-        /// Where it is larger.
+        /// Level with the larger values.
         more: String,
-        /// Where it is smaller.
+        /// Level with the smaller values.
         less: String,
     },
-    /// It is the same at two values of an axis, all else equal.
+    /// Equal at two levels of an axis, all else equal.
     Equal {
-        /// Which axis.
+        /// Axis.
         axis: String,
-        /// The two values.
+        /// The two levels.
         values: [String; 2],
-        /// Relative difference that counts as none.
+        /// Relative difference that counts as equal.
         within: f64,
     },
-    /// It is spread more widely, relative to its size, at one value of an axis than at another.
+    /// Larger coefficient of variation at one level of an axis than at another.
     Spread {
-        /// Which axis.
+        /// Axis.
         axis: String,
-        /// Where it is spread more.
+        /// Level with the larger variation.
         more: String,
-        /// Where it is spread less.
+        /// Level with the smaller variation.
         less: String,
     },
-    /// Its range over the values of an axis rises or falls with a factor.
+    /// Trend of the range over the levels of an axis with a factor.
     Range {
-        /// Which axis.
+        /// Axis.
         over: String,
-        /// Which factor.
+        /// Factor.
         with: String,
-        /// How.
+        /// Direction.
         sign: Sign,
     },
-    /// It is that of a certain model.
+    /// Equal to the value of a reference model.
     Near {
-        /// Which model.
+        /// Reference model.
         model: String,
-        /// Relative difference that counts as none.
+        /// Relative difference that counts as equal.
         within: f64,
     },
 }
 
-/// Which way a trend goes.
+/// Direction of a trend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sign {
-    /// It rises.
+    /// Increasing.
     Rises,
-    /// It falls.
+    /// Decreasing.
     Falls,
-    /// It does neither.
+    /// Neither.
     None,
 }
 
-/// What a model must be to count.
+/// Condition that a model must meet to be included.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Condition {
-    /// This value of the axis.
+    /// Level of the axis.
     Is(String),
-    /// One of these values of the axis.
+    /// One of several levels of the axis.
     In(Vec<String>),
-    /// A factor in this range.
+    /// Range of a factor; both ends are included.
     Range {
-        /// Not smaller.
+        /// Lower end.
         at_least: Option<f64>,
-        /// Not larger.
+        /// Upper end.
         at_most: Option<f64>,
     },
 }
 
-/// Rank correlations of quantities with factors, apart for each value of an axis.
+/// Rank correlations of quantities with factors, separately for each level of an axis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Correlations {
@@ -139,33 +140,33 @@ pub struct Correlations {
     pub by: String,
 }
 
-/// What the figures show. What is not given is not drawn.
+/// Requested figures; a figure whose keys are missing is not drawn.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FigureRequest {
-    /// Axis whose values are the grains.
+    /// Axis whose levels are the grains.
     pub grains: Option<String>,
-    /// Factors that place a grain in its row and its column.
+    /// Factor that is constant along a row of grains.
     pub rows: Option<String>,
-    /// Its column.
+    /// Factor that is constant along a column of grains.
     pub columns: Option<String>,
-    /// Axis whose values are the orientations.
+    /// Axis whose levels are the initial orientations.
     pub orientations: Option<String>,
     /// Grain whose orientations are shown.
     pub oriented: Option<String>,
-    /// Model whose set-up is shown.
+    /// Model whose initial state is shown.
     pub setup: Option<String>,
-    /// Models that are shown at instants, in slices.
+    /// Models shown at several instants, in slices.
     pub stories: Vec<String>,
-    /// Orientation in which curves are compared.
+    /// Orientation in which the histories of all grains are compared.
     pub compare: Option<String>,
-    /// Model that stands beside all others.
+    /// Model that all others are compared with.
     pub reference: Option<String>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct RawAnalysis {
+struct RawAnalysis {
     #[serde(default)]
     claim: Vec<RawClaim>,
     correlations: Option<Loc<Correlations>>,
@@ -186,174 +187,158 @@ struct RawClaim {
     observed: bool,
 }
 
-/// What can be asked for: of a pair, of other grains.
-fn quantities() -> impl Iterator<Item = &'static str> + Clone {
-    PAIR_QUANTITIES.into_iter().chain(SETTLING_QUANTITIES)
-}
+type Span<'a> = Option<&'a Range<usize>>;
 
-/// Checks names against the models of the study.
-struct Names<'a> {
+/// Check of the names in an analysis file against the models of the study.
+struct NameCheck<'a> {
     source: &'a Source,
     models: &'a [Model],
+    problems: Vec<Problem>,
 }
 
-impl Names<'_> {
-    fn check<'b>(
-        &self,
+impl NameCheck<'_> {
+    /// Reports a name that is not among the known ones; returns whether it is known.
+    fn require<'b>(
+        &mut self,
         kind: &str,
         name: &str,
-        known: impl Iterator<Item = &'b str> + Clone,
-        span: Option<&std::ops::Range<usize>>,
-    ) -> Result<(), Problem> {
-        if known.clone().any(|k| k == name) {
-            return Ok(());
+        known: impl Iterator<Item = &'b str>,
+        span: Span,
+    ) -> bool {
+        let mut known: Vec<&str> = known.collect();
+        known.sort_unstable();
+        known.dedup();
+        if known.contains(&name) {
+            return true;
         }
-        let mut all: Vec<&str> = known.collect();
-        all.sort_unstable();
-        all.dedup();
-        let hint = nearest(name, all.iter().copied())
+        let hint = nearest(name, known.iter().copied())
             .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
         let problem = Problem::new(format!("there is no {kind} \"{name}\""))
-            .help(format!("{hint}There are: {}", all.join(", ")));
-        Err(self.source.locate(problem, span, "here"))
-    }
-    fn quantity(&self, name: &Loc<String>) -> Result<(), Problem> {
-        self.check("quantity", &name.value, quantities(), name.span.as_ref())
-    }
-    fn axis(&self, name: &str, span: Option<&std::ops::Range<usize>>) -> Result<(), Problem> {
-        self.check(
-            "axis",
-            name,
-            self.models
-                .iter()
-                .flat_map(|m| m.levels.keys().map(String::as_str)),
-            span,
-        )
-    }
-    fn level(
-        &self,
-        axis: &str,
-        name: &str,
-        span: Option<&std::ops::Range<usize>>,
-    ) -> Result<(), Problem> {
-        self.axis(axis, span)?;
-        let known = self
-            .models
-            .iter()
-            .filter_map(|m| m.levels.get(axis).map(String::as_str));
-        self.check(&format!("value of \"{axis}\" called"), name, known, span)
-    }
-    fn factor(&self, name: &str, span: Option<&std::ops::Range<usize>>) -> Result<(), Problem> {
-        let own = self
-            .models
-            .iter()
-            .flat_map(|m| m.factors.keys().map(String::as_str));
-        self.check("factor", name, own.chain(SHAPE_FACTORS), span)
-    }
-    fn model(&self, name: &str, span: Option<&std::ops::Range<usize>>) -> Result<(), Problem> {
-        self.check(
-            "model",
-            name,
-            self.models.iter().map(|m| m.name.as_str()),
-            span,
-        )
+            .help(format!("{hint}known names: {}", known.join(", ")));
+        self.problems
+            .push(self.source.locate(problem, span, "here"));
+        false
     }
 
-    fn test(&self, test: &Loc<Test>) -> Result<(), Problem> {
+    fn quantity(&mut self, name: &str, span: Span) {
+        let known = PAIR_QUANTITIES.into_iter().chain(SETTLING_QUANTITIES);
+        self.require("quantity", name, known, span);
+    }
+
+    fn axis(&mut self, name: &str, span: Span) -> bool {
+        let known = self.models.iter().flat_map(|m| m.levels.keys());
+        self.require("axis", name, known.map(String::as_str), span)
+    }
+
+    fn levels<'b>(&mut self, axis: &str, names: impl IntoIterator<Item = &'b String>, span: Span) {
+        if self.axis(axis, span) {
+            let kind = format!("value of \"{axis}\" called");
+            for name in names {
+                let known = self.models.iter().filter_map(|m| m.levels.get(axis));
+                self.require(&kind, name, known.map(String::as_str), span);
+            }
+        }
+    }
+
+    fn factor(&mut self, name: &str, span: Span) {
+        let own = self.models.iter().flat_map(|m| m.factors.keys());
+        self.require(
+            "factor",
+            name,
+            own.map(String::as_str).chain(SHAPE_FACTORS),
+            span,
+        );
+    }
+
+    fn model(&mut self, name: &str, span: Span) {
+        let known = self.models.iter().map(|m| m.name.as_str());
+        self.require("model", name, known, span);
+    }
+
+    fn test(&mut self, test: &Loc<Test>) {
         let span = test.span.as_ref();
         match &test.value {
             Test::Trend { with, .. } => self.factor(with, span),
-            Test::Order { axis, more, less } | Test::Spread { axis, more, less } => self
-                .level(axis, more, span)
-                .and_then(|()| self.level(axis, less, span)),
-            Test::Equal {
-                axis,
-                values: [a, b],
-                ..
-            } => self
-                .level(axis, a, span)
-                .and_then(|()| self.level(axis, b, span)),
+            Test::Order { axis, more, less } | Test::Spread { axis, more, less } => {
+                self.levels(axis, [more, less], span);
+            }
+            Test::Equal { axis, values, .. } => self.levels(axis, values, span),
             Test::Range { over, with, .. } => {
-                self.axis(over, span).and_then(|()| self.factor(with, span))
+                self.axis(over, span);
+                self.factor(with, span);
             }
             Test::Near { model, .. } => self.model(model, span),
         }
     }
 
-    fn condition(&self, name: &str, condition: &Loc<Condition>) -> Result<(), Problem> {
+    fn condition(&mut self, name: &str, condition: &Loc<Condition>) {
         let span = condition.span.as_ref();
         match &condition.value {
-            Condition::Is(level) => self.level(name, level, span),
-            Condition::In(levels) => levels
-                .iter()
-                .try_for_each(|level| self.level(name, level, span)),
+            Condition::Is(level) => self.levels(name, [level], span),
+            Condition::In(levels) => self.levels(name, levels, span),
             Condition::Range { .. } => self.factor(name, span),
         }
     }
 
-    fn figures(
-        &self,
-        plan: &FigureRequest,
-        span: Option<&std::ops::Range<usize>>,
-    ) -> Result<(), Problem> {
-        let each = |name: &Option<String>, check: &dyn Fn(&str) -> Result<(), Problem>| {
-            name.as_deref().map_or(Ok(()), check)
-        };
-        each(&plan.grains, &|n| self.axis(n, span))?;
-        each(&plan.orientations, &|n| self.axis(n, span))?;
-        each(&plan.rows, &|n| self.factor(n, span))?;
-        each(&plan.columns, &|n| self.factor(n, span))?;
-        each(&plan.setup, &|n| self.model(n, span))?;
-        each(&plan.reference, &|n| self.model(n, span))?;
-        plan.stories.iter().try_for_each(|n| self.model(n, span))?;
-        if let Some(axis) = &plan.grains {
-            each(&plan.oriented, &|n| self.level(axis, n, span))?;
+    fn figures(&mut self, figures: &FigureRequest, span: Span) {
+        for axis in [&figures.grains, &figures.orientations]
+            .into_iter()
+            .flatten()
+        {
+            self.axis(axis, span);
         }
-        if let Some(axis) = &plan.orientations {
-            each(&plan.compare, &|n| self.level(axis, n, span))?;
+        for factor in [&figures.rows, &figures.columns].into_iter().flatten() {
+            self.factor(factor, span);
         }
-        Ok(())
+        let models = [&figures.setup, &figures.reference].into_iter().flatten();
+        for model in models.chain(&figures.stories) {
+            self.model(model, span);
+        }
+        for (axis, level) in [
+            (&figures.grains, &figures.oriented),
+            (&figures.orientations, &figures.compare),
+        ] {
+            if let Some(axis) = axis {
+                self.levels(axis, level, span);
+            }
+        }
     }
 }
 
 impl Analysis {
-    /// Reads an analysis file for these models.
+    /// Reads an analysis file and checks its names against the models.
     ///
     /// # Errors
-    /// What is wrong, with its place.
+    /// All problems found, with their location in the file.
     pub fn parse(name: &str, text: &str, models: &[Model]) -> Result<Analysis, Vec<Problem>> {
         let (source, raw): (Source, RawAnalysis) =
-            Source::parse(name, text, &[]).map_err(|p| vec![of_a_study(p)])?;
-        let names = Names {
+            Source::parse(name, text, &[]).map_err(|p| vec![refer_to_study_keys(p)])?;
+        let mut check = NameCheck {
             source: &source,
             models,
+            problems: Vec::new(),
         };
-        let mut problems = Vec::new();
-        let mut note = |found: Result<(), Problem>| problems.extend(found.err());
         for claim in &raw.claim {
-            note(names.quantity(&claim.quantity));
-            note(names.test(&claim.test));
-            claim
-                .when
-                .iter()
-                .for_each(|(name, c)| note(names.condition(name, c)));
+            check.quantity(&claim.quantity, claim.quantity.span.as_ref());
+            check.test(&claim.test);
+            for (name, condition) in &claim.when {
+                check.condition(name, condition);
+            }
         }
         if let Some(Loc { value, span }) = &raw.correlations {
             let span = span.as_ref();
-            value.quantities.iter().for_each(|q| {
-                note(names.check("quantity", q, quantities(), span));
-            });
             value
-                .factors
+                .quantities
                 .iter()
-                .for_each(|f| note(names.factor(f, span)));
-            note(names.axis(&value.by, span));
+                .for_each(|q| check.quantity(q, span));
+            value.factors.iter().for_each(|f| check.factor(f, span));
+            check.axis(&value.by, span);
         }
-        if let Some(Loc { value, span }) = &raw.figures {
-            note(names.figures(value, span.as_ref()));
+        if let Some(figures) = &raw.figures {
+            check.figures(&figures.value, figures.span.as_ref());
         }
-        if !problems.is_empty() {
-            return Err(problems);
+        if !check.problems.is_empty() {
+            return Err(check.problems);
         }
         let claim = |raw: RawClaim| Claim {
             says: raw.says,

@@ -1,55 +1,61 @@
-//! Models: what a study file expands to before its cases are read.
+//! Expansion of a study file into models: every combination of the axes, then single models.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::case::{Problem, Source, nearest};
+use grainwake_solver::case::{Loc, Problem, Source, nearest};
 use toml::Value;
 
-use crate::plan::raw::{Keys, RawAdjust, RawAxis, RawModel, RawSet, RawStudy};
+use super::raw::{Keys, RawAxis, RawModel, RawSet, RawStudy, RawValue};
 
-/// A case key and what it is set to.
+/// Override of one case key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Dotted key of the case, "grain.0.file".
     pub key: String,
     /// Value in TOML, on one line.
     pub value: String,
-    /// Where the study file says so.
+    /// Location in the study file.
     pub span: Option<Range<usize>>,
 }
 
 impl Setting {
-    /// As `--set` takes it.
+    /// Returns the override in the syntax of `--set`.
     pub fn text(&self) -> String {
         format!("{}={}", self.key, self.value)
     }
 }
 
-/// One point of a study: a case and where it lies on the axes.
+/// One point of the parameter space: a base case with overrides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
-    /// Names of its values joined, "g04-o1", or its own.
+    /// Names of its levels joined by "-", as in "g04-o1", or the name of a single model.
     pub name: String,
     /// Base case.
     pub base: PathBuf,
-    /// What is set in it, later settings last.
+    /// Overrides of the base case; later ones take precedence.
     pub settings: Vec<Setting>,
-    /// Name of its value on each axis; none of a model that stands alone.
+    /// Level on each axis; empty for a model outside the axes.
     pub levels: BTreeMap<String, String>,
-    /// Numbers that belong to it, for the analysis.
+    /// Numerical factors for the analysis.
     pub factors: BTreeMap<String, f64>,
 }
 
-/// Expands a study file: every combination of the axes' values, then the models that stand alone.
+/// Expands a study file into models.
+///
+/// # Errors
+/// All problems found, with their location.
 pub(crate) fn expand(
     source: &Source,
     raw: &RawStudy,
     folder: &Path,
 ) -> Result<Vec<Model>, Vec<Problem>> {
-    let mut problems = Vec::new();
-    let base = base(source, raw, folder, &mut problems);
+    let mut problems = Problems {
+        source,
+        found: Vec::new(),
+    };
+    let base = problems.case_file(folder, raw.base.as_ref());
     let common = settings(&raw.set);
     let mut models = Vec::new();
     if !raw.axis.is_empty() {
@@ -61,123 +67,204 @@ pub(crate) fn expand(
             factors: BTreeMap::new(),
         });
         for axis in &raw.axis {
-            check_axis(source, axis, &raw.axis, &mut problems);
-            models = models.iter().flat_map(|model| along(model, axis)).collect();
+            problems.check_axis(axis, &raw.axis);
+            models = models.iter().flat_map(|model| cross(model, axis)).collect();
         }
-        if base.is_none() && problems.is_empty() {
-            problems.push(
-                Problem::new("the axes have no base case")
-                    .help("add base = \"case.toml\": the case that the axes vary"),
-            );
+        if base.is_none() && problems.found.is_empty() {
+            let help = "add base = \"case.toml\": the case that the axes vary";
+            problems.add("the axes have no base case", help, None, "");
         }
     }
     for own in &raw.model {
-        models.extend(alone(
-            source,
-            own,
-            base.as_deref(),
-            &common,
-            folder,
-            &mut problems,
-        ));
+        models.extend(single(own, base.as_deref(), &common, folder, &mut problems));
     }
-    if models.is_empty() && problems.is_empty() {
-        problems.push(
-            Problem::new("the study has no models")
-                .help("add an [[axis]] with values, or a [[model]]"),
-        );
+    if models.is_empty() && problems.found.is_empty() {
+        let help = "add an [[axis]] with values, or a [[model]]";
+        problems.add("the study has no models", help, None, "");
     }
-    adjust(source, &raw.adjust, &mut models, &mut problems);
-    unique(source, raw, &models, &mut problems);
-    if problems.is_empty() {
+    for rule in &raw.adjust {
+        match matching(source, &rule.models, &models) {
+            Ok(indices) => {
+                let extra = settings(&rule.set);
+                for i in indices {
+                    models[i].settings.extend(extra.clone());
+                }
+            }
+            Err(problem) => problems.found.push(problem),
+        }
+    }
+    problems.check_unique(raw, &models);
+    if problems.found.is_empty() {
         Ok(models)
     } else {
-        Err(problems)
+        Err(problems.found)
     }
 }
 
-fn base(
-    source: &Source,
-    raw: &RawStudy,
-    folder: &Path,
-    problems: &mut Vec<Problem>,
-) -> Option<PathBuf> {
-    let given = raw.base.as_ref()?;
-    let path = folder.join(&given.value);
-    if !path.is_file() {
-        let problem = Problem::new(format!("there is no case file {}", path.display()))
-            .help("paths are relative to the study file");
-        problems.push(source.locate(problem, given.span.as_ref(), "not found"));
-    }
-    Some(path)
+/// Problems of a study file, collected while it is expanded.
+struct Problems<'a> {
+    source: &'a Source,
+    found: Vec<Problem>,
 }
 
-/// The settings of a table, in order of the keys. A dotted key replaces what it names; a section of the
-/// case with a table sets the keys of that table.
+impl Problems<'_> {
+    fn add(
+        &mut self,
+        message: impl Into<String>,
+        help: &str,
+        span: Option<&Range<usize>>,
+        label: &str,
+    ) {
+        let problem = Problem::new(message).help(help);
+        self.found.push(self.source.locate(problem, span, label));
+    }
+
+    /// Returns the path of a case file, and reports it if the file does not exist.
+    fn case_file(&mut self, folder: &Path, given: Option<&Loc<PathBuf>>) -> Option<PathBuf> {
+        let given = given?;
+        let path = folder.join(&given.value);
+        if !path.is_file() {
+            let message = format!("there is no case file {}", path.display());
+            let help = "paths are relative to the study file";
+            self.add(message, help, given.span.as_ref(), "not found");
+        }
+        Some(path)
+    }
+
+    fn check_axis(&mut self, axis: &RawAxis, all: &[RawAxis]) {
+        let name = &axis.name.value;
+        if all.iter().filter(|a| a.name.value == *name).count() > 1 {
+            let message = format!("there are two axes called \"{name}\"");
+            let help = "give each axis a unique name";
+            self.add(message, help, axis.name.span.as_ref(), "this one");
+        }
+        if axis.values.value.is_empty() {
+            let message = format!("the axis \"{name}\" has no values");
+            let help = "values = [{ name = \"a\", value = ... }, ...]";
+            self.add(message, help, axis.values.span.as_ref(), "empty");
+        }
+        for value in &axis.values.value {
+            self.check_name(&value.name);
+            match (&value.value, &axis.key) {
+                (Some(given), None) => {
+                    let message = format!("the axis \"{name}\" has no key to set this value to");
+                    let help = "add key = \"fluid.viscosity\" (or a list of keys) to the axis, \
+                                or use set = { ... }";
+                    self.add(message, help, given.span.as_ref(), "without a key");
+                }
+                (None, Some(_)) if value.set.is_empty() => {
+                    let message = format!("\"{}\" sets nothing", value.name.value);
+                    let help = "add value = ..., or remove the axis";
+                    self.add(message, help, value.name.span.as_ref(), "no value");
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Checks a name, which becomes the name of a folder.
+    fn check_name(&mut self, name: &Loc<String>) {
+        let allowed = |c: char| c.is_ascii_alphanumeric() || "._+-".contains(c);
+        let text = &name.value;
+        if text.is_empty() || text.starts_with('.') || !text.chars().all(allowed) {
+            let help = "names become folders: use letters, digits, `.`, `_`, `+` and `-`, and no \
+                        dot at the beginning";
+            let message = format!("\"{text}\" cannot be a name");
+            self.add(message, help, name.span.as_ref(), "not a name");
+        }
+    }
+
+    fn check_unique(&mut self, raw: &RawStudy, models: &[Model]) {
+        let mut seen = BTreeSet::new();
+        let Some(model) = models.iter().find(|model| !seen.insert(&model.name)) else {
+            return;
+        };
+        let values = raw.axis.iter().flat_map(|a| &a.values.value);
+        let names = values
+            .map(|v| &v.name)
+            .chain(raw.model.iter().map(|m| &m.name));
+        let part_of = |name: &&Loc<String>| {
+            model.name == name.value || model.name.split('-').any(|part| part == name.value)
+        };
+        let span = names.rev().find(part_of).and_then(|name| name.span.clone());
+        let message = format!("there are two models called \"{}\"", model.name);
+        let help = "give every value of an axis and every model a unique name";
+        self.add(message, help, span.as_ref(), "again");
+    }
+}
+
+/// Converts a table to settings, in order of the keys.
+///
+/// A dotted key replaces the value it names. A section of the case given as a table sets the keys
+/// of that table one by one.
 fn settings(set: &RawSet) -> Vec<Setting> {
     let mut found = Vec::new();
     for (key, value) in set {
-        let nested = !key.contains('.');
-        spread(key.clone(), &value.value, nested, &mut |key, text| {
-            found.push(Setting {
-                key,
-                value: text,
-                span: value.span.clone(),
-            });
-        });
+        flatten(
+            key.clone(),
+            &value.value,
+            !key.contains('.'),
+            &mut |key, text| {
+                found.push(Setting {
+                    key,
+                    value: text,
+                    span: value.span.clone(),
+                });
+            },
+        );
     }
     found
 }
 
-/// Keys of tables that stand for one value.
-const ONE_VALUE: [&str; 2] = ["kind", "formula"];
+/// Keys that mark a table as a single value: a shape or a formula.
+const SINGLE_VALUE: [&str; 2] = ["kind", "formula"];
 
 /// Calls `found` with the dotted key and the text of a value, or of all values in a `nested` table.
-fn spread(key: String, value: &Value, nested: bool, found: &mut dyn FnMut(String, String)) {
+fn flatten(key: String, value: &Value, nested: bool, found: &mut dyn FnMut(String, String)) {
     match value {
-        // A shape or a formula is one value.
-        Value::Table(table) if nested && !ONE_VALUE.iter().any(|key| table.contains_key(*key)) => {
+        Value::Table(table) if nested && !SINGLE_VALUE.iter().any(|k| table.contains_key(*k)) => {
             for (inner, value) in table {
-                let nested = !inner.contains('.');
-                spread(format!("{key}.{inner}"), value, nested, found);
+                flatten(format!("{key}.{inner}"), value, !inner.contains('.'), found);
             }
         }
         value => found(key, inline(value)),
     }
 }
 
-/// A value on one line.
+/// Writes a TOML value on one line.
 fn inline(value: &Value) -> String {
     match value {
         Value::Table(table) => {
-            let entries: Vec<String> = table
-                .iter()
-                .map(|(key, value)| format!("{} = {}", Value::String(key.clone()), inline(value)))
-                .collect();
-            format!("{{ {} }}", entries.join(", "))
+            let entry = |(key, value): (&String, &Value)| {
+                format!("{} = {}", Value::String(key.clone()), inline(value))
+            };
+            format!(
+                "{{ {} }}",
+                table.iter().map(entry).collect::<Vec<_>>().join(", ")
+            )
         }
         Value::Array(items) => {
-            let items: Vec<String> = items.iter().map(inline).collect();
-            format!("[{}]", items.join(", "))
+            format!(
+                "[{}]",
+                items.iter().map(inline).collect::<Vec<_>>().join(", ")
+            )
         }
         Value::String(text) if text.contains(['\n', '\'']) => {
-            let plain = text
-                .replace('\\', "\\\\")
-                .replace('"', "\\\"")
-                .replace('\n', "\\n");
-            format!("\"{plain}\"")
+            let escaped = text.replace('\\', "\\\\").replace('"', "\\\"");
+            format!("\"{}\"", escaped.replace('\n', "\\n"))
         }
-        plain => plain.to_string(),
+        scalar => scalar.to_string(),
     }
 }
 
-fn along(model: &Model, axis: &RawAxis) -> Vec<Model> {
-    let keys = match axis.key.as_ref().map(|k| &k.value) {
-        None => Vec::new(),
-        Some(Keys::One(key)) => vec![key.clone()],
-        Some(Keys::Several(keys)) => keys.clone(),
+/// Combines a model with every value of an axis.
+fn cross(model: &Model, axis: &RawAxis) -> Vec<Model> {
+    let keys: &[String] = match axis.key.as_ref().map(|k| &k.value) {
+        None => &[],
+        Some(Keys::One(key)) => std::slice::from_ref(key),
+        Some(Keys::Several(keys)) => keys,
     };
-    let at = |value: &crate::plan::raw::RawValue| {
+    let at = |value: &RawValue| {
         let mut model = model.clone();
         if !model.name.is_empty() {
             model.name.push('-');
@@ -200,95 +287,20 @@ fn along(model: &Model, axis: &RawAxis) -> Vec<Model> {
     axis.values.value.iter().map(at).collect()
 }
 
-fn check_axis(source: &Source, axis: &RawAxis, all: &[RawAxis], problems: &mut Vec<Problem>) {
-    let mut fail = |text: String, help: &str, span: Option<&Range<usize>>, label: &str| {
-        problems.push(source.locate(Problem::new(text).help(help), span, label));
-    };
-    let name = &axis.name.value;
-    if all.iter().filter(|a| a.name.value == *name).count() > 1 {
-        let text = format!("there are two axes called \"{name}\"");
-        fail(
-            text,
-            "give each axis a name of its own",
-            axis.name.span.as_ref(),
-            "this one",
-        );
-    }
-    if axis.values.value.is_empty() {
-        let text = format!("the axis \"{name}\" has no values");
-        fail(
-            text,
-            "values = [{ name = \"a\", value = ... }, ...]",
-            axis.values.span.as_ref(),
-            "empty",
-        );
-    }
-    for value in &axis.values.value {
-        check_name(
-            source,
-            &value.name.value,
-            value.name.span.as_ref(),
-            &mut *problems,
-        );
-        if let (Some(given), None) = (&value.value, &axis.key) {
-            let text = format!("the axis \"{name}\" has no key to set this value to");
-            let help = "add key = \"fluid.viscosity\" (or a list of keys) to the axis, or use set = { ... }";
-            problems.push(source.locate(
-                Problem::new(text).help(help),
-                given.span.as_ref(),
-                "of what?",
-            ));
-        }
-        if value.value.is_none() && axis.key.is_some() && value.set.is_empty() {
-            let text = format!("\"{}\" sets nothing", value.name.value);
-            let help = "add value = ..., or leave out the axis";
-            problems.push(source.locate(
-                Problem::new(text).help(help),
-                value.name.span.as_ref(),
-                "no value",
-            ));
-        }
-    }
-}
-
-/// Names become folders: letters, digits, `.`, `_`, `+` and `-`.
-fn check_name(
-    source: &Source,
-    name: &str,
-    span: Option<&Range<usize>>,
-    problems: &mut Vec<Problem>,
-) {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "._+-".contains(c);
-    if !name.is_empty() && !name.starts_with('.') && name.chars().all(plain) {
-        return;
-    }
-    let problem = Problem::new(format!("\"{name}\" cannot be a name")).help(
-        "names become folders: letters, digits, `.`, `_`, `+` and `-`, not beginning with a dot",
-    );
-    problems.push(source.locate(problem, span, "not a name"));
-}
-
-fn alone(
-    source: &Source,
+/// Builds a model outside the axes.
+fn single(
     own: &RawModel,
     base: Option<&Path>,
     common: &[Setting],
     folder: &Path,
-    problems: &mut Vec<Problem>,
+    problems: &mut Problems,
 ) -> Option<Model> {
-    check_name(source, &own.name.value, own.name.span.as_ref(), problems);
-    let path = own.base.as_ref().map(|b| folder.join(&b.value));
-    if let (Some(path), Some(given)) = (&path, &own.base)
-        && !path.is_file()
-    {
-        let problem = Problem::new(format!("there is no case file {}", path.display()))
-            .help("paths are relative to the study file");
-        problems.push(source.locate(problem, given.span.as_ref(), "not found"));
-    }
+    problems.check_name(&own.name);
+    let path = problems.case_file(folder, own.base.as_ref());
     let Some(path) = path.or_else(|| base.map(Path::to_owned)) else {
-        let problem = Problem::new(format!("the model \"{}\" has no base case", own.name.value))
-            .help("add base = \"case.toml\" to it, or to the study");
-        problems.push(source.locate(problem, own.name.span.as_ref(), "without a case"));
+        let message = format!("the model \"{}\" has no base case", own.name.value);
+        let help = "add base = \"case.toml\" to it, or to the study";
+        problems.add(message, help, own.name.span.as_ref(), "without a case");
         return None;
     };
     Some(Model {
@@ -300,77 +312,35 @@ fn alone(
     })
 }
 
-fn adjust(source: &Source, rules: &[RawAdjust], models: &mut [Model], problems: &mut Vec<Problem>) {
-    for rule in rules {
-        let found = matching(
-            source,
-            &rule.models.value,
-            rule.models.span.as_ref(),
-            models,
-        );
-        match found {
-            Ok(which) => {
-                let extra = settings(&rule.set);
-                which
-                    .into_iter()
-                    .for_each(|i| models[i].settings.extend(extra.clone()));
-            }
-            Err(problem) => problems.push(problem),
-        }
-    }
-}
-
-/// Indices of the models whose names match any of the patterns; every pattern must match one.
+/// Returns the indices of the models whose names match any of the patterns.
+///
+/// # Errors
+/// If a pattern is invalid or matches no model.
 pub(crate) fn matching(
     source: &Source,
-    patterns: &[String],
-    span: Option<&Range<usize>>,
+    patterns: &Loc<Vec<String>>,
     models: &[Model],
 ) -> Result<Vec<usize>, Problem> {
-    let mut which: Vec<usize> = Vec::new();
-    for text in patterns {
+    let span = patterns.span.as_ref();
+    let mut indices = BTreeSet::new();
+    for text in &patterns.value {
         let pattern = glob::Pattern::new(text).map_err(|error| {
-            let problem = Problem::new(format!("\"{text}\" is not a pattern: {error}")).help(
-                "a pattern is a name with * (any text), ? (one character) and [13] (one of them)",
-            );
+            let problem = Problem::new(format!("\"{text}\" is not a pattern: {error}"))
+                .help("a pattern is a name with * (any text), ? (one character) and [13] (1 or 3)");
             source.locate(problem, span, "here")
         })?;
-        let before = which.len();
-        which.extend((0..models.len()).filter(|i| pattern.matches(&models[*i].name)));
-        if which.len() == before {
+        let found = (0..models.len()).filter(|i| pattern.matches(&models[*i].name));
+        let found: Vec<usize> = found.collect();
+        indices.extend(&found);
+        if found.is_empty() {
             let names = models.iter().map(|m| m.name.as_str());
             let hint =
                 nearest(text, names).map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
             let problem = Problem::new(format!("no model is called \"{text}\"")).help(format!(
-                "{hint}the names are those of the axes' values, joined by -"
+                "{hint}the name of a model consists of the names of its values, joined by -"
             ));
             return Err(source.locate(problem, span, "matches nothing"));
         }
     }
-    which.sort_unstable();
-    which.dedup();
-    Ok(which)
-}
-
-fn unique(source: &Source, raw: &RawStudy, models: &[Model], problems: &mut Vec<Problem>) {
-    let mut seen = std::collections::BTreeSet::new();
-    for model in models {
-        if !seen.insert(&model.name) {
-            let values = raw
-                .axis
-                .iter()
-                .flat_map(|a| a.values.value.iter().map(|v| &v.name));
-            let names = values.chain(raw.model.iter().map(|m| &m.name));
-            let place = names
-                .rev()
-                .find(|n| {
-                    model.name.split('-').any(|part| part == n.value) || model.name == n.value
-                })
-                .and_then(|n| n.span.clone());
-            let problem = Problem::new(format!("there are two models called \"{}\"", model.name))
-                .help("give every value of an axis and every model a name of its own");
-            problems.push(source.locate(problem, place.as_ref(), "again"));
-            return;
-        }
-    }
+    Ok(indices.into_iter().collect())
 }

@@ -1,83 +1,79 @@
-//! The study file, validated.
+//! The validated study file.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use grainwake_solver::case::{Loc, Problem, Source, parse_length};
 
-use crate::error::{At, StudyError, of_a_study};
-use crate::plan::claims::Analysis;
-use crate::plan::expand::{self, Model};
-use crate::plan::raw::{Length, RawEnsemble, RawStudy};
+use super::claims::Analysis;
+use super::expand::{self, Model};
+use super::raw::{Length, RawEnsemble, RawStudy};
+use crate::error::{At, StudyError, refer_to_study_keys};
 
-/// A study: its models and what is asked of them.
+/// A study: its models, repetitions and requested analysis.
 pub struct Study {
-    /// The study file.
+    /// Path of the study file.
     pub path: PathBuf,
-    /// One line that says what it is.
+    /// Title, one line.
     pub title: String,
-    /// What is run.
+    /// Models in the order of the file.
     pub models: Vec<Model>,
-    /// Repetitions with small random offsets.
+    /// Repetitions with random offsets of the initial position.
     pub ensemble: Option<Ensemble>,
-    /// What is asked of the results.
+    /// Requested analysis.
     pub analysis: Analysis,
     source: Source,
 }
 
-/// Repetitions of models with small random offsets of the start.
+/// Repetitions of models with random offsets of the initial position of one grain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ensemble {
-    /// Runs of each model; the first one is not offset.
+    /// Runs of each model; the first one has no offset.
     pub members: usize,
-    /// Radius of the disc, normal to gravity, from which the offsets are drawn evenly [m].
+    /// Radius of the disc normal to gravity from which offsets are drawn uniformly [m].
     pub offset: f64,
-    /// The grain that is offset; the last one if none is named.
+    /// Grain that is offset; the last one by default.
     pub grain: Option<usize>,
-    /// Other seeds give other offsets.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// Which models are repeated, by index.
+    /// Indices of the repeated models.
     pub models: Vec<usize>,
 }
 
 impl Study {
-    /// Reads a study file and expands it.
+    /// Reads and expands a study file.
     ///
     /// # Errors
-    /// [`StudyError`] with every problem found and its place.
+    /// [`StudyError`] with all problems found and their location.
     pub fn read(path: &Path) -> Result<Study, StudyError> {
         let text = std::fs::read_to_string(path).at("read", path)?;
         Study::parse(&text, path)
     }
 
-    /// The same from text; paths are relative to the folder of `path`.
+    /// Expands the text of a study file; paths are relative to the folder of `path`.
     ///
     /// # Errors
-    /// [`StudyError`] with every problem found and its place.
+    /// [`StudyError`] with all problems found and their location.
     pub fn parse(text: &str, path: &Path) -> Result<Study, StudyError> {
         let (source, raw): (Source, RawStudy) =
-            Source::parse(&path.display().to_string(), text, &[]).map_err(of_a_study)?;
+            Source::parse(&path.display().to_string(), text, &[]).map_err(refer_to_study_keys)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let models = expand::expand(&source, &raw, folder).map_err(StudyError::Invalid)?;
-        let ensemble = match &raw.ensemble {
-            Some(given) => Some(ensemble(&source, given, &models)?),
-            None => None,
-        };
-        let analysis = match &raw.analysis {
-            Some(given) => analysis(&source, given, folder, &models)?,
-            None => Analysis::default(),
-        };
+        let ensemble = raw.ensemble.as_ref();
+        let ensemble = ensemble.map(|given| read_ensemble(&source, given, &models));
+        let analysis = raw.analysis.as_ref();
+        let analysis = analysis.map(|given| read_analysis(&source, given, folder, &models));
         Ok(Study {
             path: path.into(),
             title: raw.title,
+            ensemble: ensemble.transpose()?,
+            analysis: analysis.transpose()?.unwrap_or_default(),
             models,
-            ensemble,
-            analysis,
             source,
         })
     }
 
-    /// `runs/NAME`, NAME being that of the study's folder, with the file's name if it is not `study.toml`.
+    /// Returns `runs/FOLDER`, or `runs/FOLDER-FILE` if the file is not called `study.toml`.
     pub fn default_folder(&self) -> PathBuf {
         let absolute = std::path::absolute(&self.path).unwrap_or_else(|_| self.path.clone());
         let name = |part: Option<&std::ffi::OsStr>| part.map(|p| p.to_string_lossy().into_owned());
@@ -91,7 +87,7 @@ impl Study {
         Path::new("runs").join(name)
     }
 
-    /// A problem with its place in the study file.
+    /// Adds the location in the study file to a problem.
     pub(crate) fn locate(
         &self,
         problem: Problem,
@@ -102,7 +98,7 @@ impl Study {
     }
 }
 
-fn analysis(
+fn read_analysis(
     source: &Source,
     given: &Loc<PathBuf>,
     folder: &Path,
@@ -117,15 +113,18 @@ fn analysis(
     Analysis::parse(&path.display().to_string(), &text, models).map_err(StudyError::Invalid)
 }
 
-fn ensemble(source: &Source, raw: &RawEnsemble, models: &[Model]) -> Result<Ensemble, Problem> {
+fn read_ensemble(
+    source: &Source,
+    raw: &RawEnsemble,
+    models: &[Model],
+) -> Result<Ensemble, StudyError> {
     let offset = match &raw.offset.value {
         Length::Metres(metres) => Ok(*metres),
         Length::Text(text) => parse_length(text),
     };
-    let offset = offset.and_then(|metres| {
-        let good = metres.is_finite() && metres > 0.0;
-        good.then_some(metres)
-            .ok_or_else(|| "an offset is a positive length".into())
+    let offset = offset.and_then(|metres| match metres.is_finite() && metres > 0.0 {
+        true => Ok(metres),
+        false => Err("an offset must be a positive length".into()),
     });
     let offset = offset.map_err(|message| {
         let problem = Problem::new(message)
@@ -134,18 +133,19 @@ fn ensemble(source: &Source, raw: &RawEnsemble, models: &[Model]) -> Result<Ense
     })?;
     if !(1..=1000).contains(&raw.members.value) {
         let problem = Problem::new("an ensemble has 1 to 1000 members")
-            .help("members counts the run that is not offset too");
-        return Err(source.locate(problem, raw.members.span.as_ref(), "here"));
+            .help("members includes the run without offset");
+        return Err(source
+            .locate(problem, raw.members.span.as_ref(), "here")
+            .into());
     }
-    let which = match &raw.models {
-        None => (0..models.len()).collect(),
-        Some(Loc { value, span }) => expand::matching(source, value, span.as_ref(), models)?,
-    };
     Ok(Ensemble {
         members: raw.members.value,
         offset,
         grain: raw.grain,
         seed: raw.seed,
-        models: which,
+        models: match &raw.models {
+            None => (0..models.len()).collect(),
+            Some(patterns) => expand::matching(source, patterns, models)?,
+        },
     })
 }

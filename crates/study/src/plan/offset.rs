@@ -1,14 +1,16 @@
-//! Offsets of the members of an ensemble.
+//! Random offsets of the members of an ensemble.
 
-use glam::DVec3;
 use grainwake_solver::case::{Case, Problem};
 use sha2::{Digest, Sha256};
 
+use super::expand::Model;
+use super::file::{Ensemble, Study};
 use crate::error::StudyError;
-use crate::plan::expand::Model;
-use crate::plan::file::{Ensemble, Study};
 
-/// The override that offsets a member of an ensemble in the plane normal to gravity.
+/// Returns the override that offsets a grain of an ensemble member in the plane normal to gravity.
+///
+/// # Errors
+/// If the case has no grain of that index.
 pub(crate) fn offset_override(
     study: &Study,
     model: &Model,
@@ -25,36 +27,35 @@ pub(crate) fn offset_override(
             model.name,
             grains.len()
         ));
-        return Err(study
-            .locate(problem.help("grains count from 0"), None, "")
-            .into());
+        let problem = problem.help("grains are numbered from 0");
+        return Err(study.locate(problem, None, "").into());
     };
-    let up = case.setup.gravity.abs();
-    let axis = if up.max_element() == 0.0 {
+    let gravity = case.setup.gravity.abs();
+    let vertical = if gravity.max_element() == 0.0 {
         2
     } else {
-        (0..3).max_by(|i, j| up[*i].total_cmp(&up[*j])).unwrap_or(2)
+        (0..3)
+            .max_by(|i, j| gravity[*i].total_cmp(&gravity[*j]))
+            .unwrap_or(2)
     };
-    let flat: Vec<usize> = (0..3).filter(|a| *a != axis).collect();
-    let (radius, angle) = disc(ensemble.seed, &model.name, member);
-    let mut at: DVec3 = grain.pose.position;
-    at[flat[0]] += ensemble.offset * radius * angle.cos();
-    at[flat[1]] += ensemble.offset * radius * angle.sin();
-    Ok(if stands_on_a_gap(model, set, index) {
-        format!(
-            "grain.{index}.position=[{:e}, {:e}]",
-            at[flat[0]], at[flat[1]]
-        )
-    } else {
-        format!(
-            "grain.{index}.position=[{:e}, {:e}, {:e}]",
-            at.x, at.y, at.z
-        )
-    })
+    let horizontal: Vec<usize> = (0..3).filter(|axis| *axis != vertical).collect();
+    let (radius, angle) = uniform_on_disc(ensemble.seed, &model.name, member);
+    let mut position = grain.pose.position;
+    position[horizontal[0]] += ensemble.offset * radius * angle.cos();
+    position[horizontal[1]] += ensemble.offset * radius * angle.sin();
+    // A grain placed with `gap_above` has two coordinates; its height follows from the gap.
+    let coordinates: Vec<String> = (0..3)
+        .filter(|axis| *axis != vertical || !has_gap_above(model, set, index))
+        .map(|axis| format!("{:e}", position[axis]))
+        .collect();
+    Ok(format!(
+        "grain.{index}.position=[{}]",
+        coordinates.join(", ")
+    ))
 }
 
-/// An even draw from the unit disc, the same for the same arguments everywhere.
-fn disc(seed: u64, model: &str, member: usize) -> (f64, f64) {
+/// Draws polar coordinates uniformly from the unit disc; equal arguments give equal results.
+fn uniform_on_disc(seed: u64, model: &str, member: usize) -> (f64, f64) {
     let mut hash = Sha256::new();
     hash.update(seed.to_le_bytes());
     hash.update((member as u64).to_le_bytes());
@@ -68,24 +69,21 @@ fn disc(seed: u64, model: &str, member: usize) -> (f64, f64) {
     (unit(0).sqrt(), std::f64::consts::TAU * unit(8))
 }
 
-/// Whether the height of a grain follows from `gap_above`.
-fn stands_on_a_gap(model: &Model, set: &[String], grain: usize) -> bool {
+/// Returns whether the height of a grain follows from `gap_above`.
+fn has_gap_above(model: &Model, set: &[String], grain: usize) -> bool {
     let text = std::fs::read_to_string(&model.base).unwrap_or_default();
     let table: toml::Table = text.parse().unwrap_or_default();
-    let of = |table: &toml::Table| {
-        let list = table.get("grain")?.as_array()?;
-        Some(list.get(grain)?.get("gap_above").is_some())
+    let in_table = |table: &toml::Table| {
+        let grains = table.get("grain")?.as_array()?;
+        Some(grains.get(grain)?.get("gap_above").is_some())
     };
-    let mut gap = of(&table).unwrap_or(false);
-    for item in set {
-        let Some((key, value)) = item.split_once('=') else {
-            continue;
-        };
+    let mut gap = in_table(&table).unwrap_or(false);
+    for (key, value) in set.iter().filter_map(|item| item.split_once('=')) {
         if key.trim().starts_with(&format!("grain.{grain}.gap_above")) {
             gap = true;
         } else if key.trim() == "grain" {
             let whole: Option<toml::Table> = format!("grain = {value}").parse().ok();
-            gap = whole.as_ref().and_then(of).unwrap_or(gap);
+            gap = whole.as_ref().and_then(in_table).unwrap_or(gap);
         }
     }
     gap

@@ -1,4 +1,4 @@
-//! Names of the measured quantities and shape factors, which an analysis file may refer to.
+//! Names of the measured quantities and shape factors that an analysis file may refer to.
 
 /// Quantities measured on a pair, in table order.
 pub const PAIR_QUANTITIES: [&str; 22] = [
@@ -46,5 +46,22 @@ pub const SETTLING_QUANTITIES: [&str; 16] = [
     "turned",
 ];
 
-/// Factors that every run has: Krumbein sphericity and, if known, Wadell roundness of grain 0.
+/// Quantities of a pair that are missing, censored or different if the pair does not kiss.
+pub const KISS_DEPENDENT: [&str; 13] = [
+    "kiss_time",
+    "kissing_stage",
+    "contact_stage",
+    "parted",
+    "tumble_time",
+    "pass_time",
+    "separation_time",
+    "kisses",
+    "repeated",
+    "draft_speed_leading",
+    "draft_speed_trailing",
+    "long_axis_leading",
+    "long_axis_trailing",
+];
+
+/// Factors of every run: Krumbein sphericity and, if known, Wadell roundness of its first grain.
 pub const SHAPE_FACTORS: [&str; 2] = ["krumbein_sphericity", "wadell_roundness"];

@@ -1,4 +1,4 @@
-//! The study file as written.
+//! The study file as written, before validation.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -84,7 +84,7 @@ pub(crate) struct RawEnsemble {
     pub models: Option<Loc<Vec<String>>>,
 }
 
-/// A length: metres, or a text with its unit.
+/// Length in metres, or as text with a unit.
 #[derive(Clone, Deserialize)]
 #[serde(untagged)]
 pub(crate) enum Length {

@@ -1,22 +1,22 @@
-//! Which runs of a study are meant: `--only`.
+//! Selection of runs: `--only`.
 
 use grainwake_solver::case::{Problem, nearest};
 
-use crate::plan::Run;
+use super::Run;
 
-/// A choice of runs.
+/// Selection of runs of a study.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Selection {
-    /// All of them.
+    /// All runs.
     #[default]
     All,
-    /// Those whose names match one of these.
+    /// Runs whose names match any of the patterns.
     Patterns(Vec<glob::Pattern>),
-    /// Every `of`-th, from number `part` on; both count from 1.
+    /// Every `of`-th run, starting with number `part`; both count from 1.
     Share {
-        /// Which share.
+        /// Number of the first run.
         part: usize,
-        /// Of how many.
+        /// Number of shares.
         of: usize,
     },
 }
@@ -25,11 +25,12 @@ impl Selection {
     /// Reads "g04-*,sphere" or "3/65".
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// If the text is neither a list of patterns nor a valid share.
     pub fn parse(text: &str) -> Result<Selection, Problem> {
         let wrong = |what: String| {
             Problem::new(format!("--only {text}: {what}")).help(
-                "write names with * and ?, separated by commas (--only 'g04-*,sphere'), or a share i/N (--only 3/65)",
+                "write names with * and ?, separated by commas (--only 'g04-*,sphere'), or a \
+                 share i/N (--only 3/65)",
             )
         };
         if let Some((part, of)) = text.split_once('/') {
@@ -38,27 +39,27 @@ impl Selection {
                 (Some(part), Some(of)) if (1..=of).contains(&part) => {
                     Ok(Selection::Share { part, of })
                 }
-                (Some(_), Some(_)) => Err(wrong("in a share i/N, i goes from 1 to N".into())),
-                _ => Err(wrong("not a share of two whole numbers".into())),
+                (Some(_), Some(_)) => {
+                    Err(wrong("in a share i/N, i must be between 1 and N".into()))
+                }
+                _ => Err(wrong("a share consists of two whole numbers".into())),
             };
         }
-        let patterns: Result<Vec<_>, _> = text
+        let names = text
             .split(',')
             .map(str::trim)
-            .filter(|part| !part.is_empty())
-            .map(glob::Pattern::new)
-            .collect();
-        match patterns {
-            Ok(patterns) if patterns.is_empty() => Err(wrong("nothing is named".into())),
+            .filter(|part| !part.is_empty());
+        match names.map(glob::Pattern::new).collect::<Result<Vec<_>, _>>() {
+            Ok(patterns) if patterns.is_empty() => Err(wrong("no name is given".into())),
             Ok(patterns) => Ok(Selection::Patterns(patterns)),
             Err(error) => Err(wrong(error.to_string())),
         }
     }
 
-    /// Indices of the chosen runs.
+    /// Returns the indices of the selected runs.
     ///
     /// # Errors
-    /// If a pattern matches none; a share may be empty.
+    /// If a pattern matches no run; a share may be empty.
     pub fn choose(&self, runs: &[Run]) -> Result<Vec<usize>, Problem> {
         let all = 0..runs.len();
         let patterns = match self {
@@ -73,14 +74,11 @@ impl Selection {
                 let names = runs.iter().map(|run| run.name.as_str());
                 let hint = nearest(pattern.as_str(), names)
                     .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
-                return Err(
-                    Problem::new(format!("--only: no run is called \"{pattern}\""))
-                        .help(format!("{hint}--list shows all of them")),
-                );
+                let problem = Problem::new(format!("--only: no run is called \"{pattern}\""));
+                return Err(problem.help(format!("{hint}--list shows all names")));
             }
         }
-        Ok(all
-            .filter(|i| patterns.iter().any(|p| p.matches(&runs[*i].name)))
-            .collect())
+        let matches = |i: &usize| patterns.iter().any(|p| p.matches(&runs[*i].name));
+        Ok(all.filter(matches).collect())
     }
 }

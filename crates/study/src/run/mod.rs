@@ -1,4 +1,4 @@
-//! Runs what is missing, several runs at once, each alone in what befalls it.
+//! Execution of the runs of a study: several at once, each resumed from its last checkpoint.
 
 pub mod state;
 
@@ -13,62 +13,62 @@ use grainwake_solver::output::lock::{self, Asked};
 use grainwake_solver::output::{self, Ending, Existing, Observer, Progress, RunError, Summary};
 use grainwake_solver::sim::events::Event;
 
+use self::state::{RunState, run_state};
 use crate::error::{At, StudyError};
 use crate::plan::Run;
-use crate::run::state::{RunState, run_state};
 
-/// How a study is run.
+/// Options of the execution.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Runs at once.
+    /// Number of concurrent runs.
     pub jobs: usize,
-    /// Threads of each.
+    /// Threads per run.
     pub threads: usize,
-    /// Start failed runs over.
+    /// Whether failed runs are restarted.
     pub retry: bool,
-    /// Keep the checkpoints of finished runs.
+    /// Whether checkpoints of finished runs are kept.
     pub keep_checkpoints: bool,
-    /// Command, for the provenance.
+    /// Command line, for the provenance.
     pub command: Vec<String>,
 }
 
-/// How a run ended.
+/// Result of one run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// It came to its end now.
+    /// The run reached its end in this session.
     Finished(Box<Summary>),
-    /// It had been finished before.
-    Before,
-    /// It could not be carried out; why, and the exit code that stands for it.
+    /// The run had finished in an earlier session.
+    AlreadyFinished,
+    /// The run failed: reason and exit code.
     Failed(String, u8),
-    /// It was interrupted, or not begun because the study was.
+    /// The run was interrupted, or not started because the study was interrupted.
     Interrupted,
-    /// Another program has it in hand.
-    Elsewhere,
+    /// Another program holds the lock of the run.
+    Locked,
 }
 
-/// Is told how the runs of a study go on; the number is that of the run in the plan.
+/// Callbacks during the execution; `run` is the index of the run in the plan.
 pub trait StudyObserver: Sync {
-    /// A run begins or goes on.
+    /// A run starts or resumes.
     fn started(&self, _run: usize) {}
-    /// After every step of a run.
+    /// A run has completed a time step.
     fn progress(&self, _run: usize, _: &Progress) {}
-    /// Something happened in a run.
+    /// An event occurred in a run.
     fn event(&self, _run: usize, _: &Event) {}
-    /// Something worth knowing about a run.
+    /// A run emits a note or a warning.
     fn note(&self, _run: usize, _: &str) {}
     /// A run has ended.
     fn ended(&self, _run: usize, _: &Outcome) {}
-    /// Whether to write checkpoints and stop.
+    /// Returns whether to write checkpoints and stop.
     fn interrupted(&self) -> bool {
         false
     }
 }
 
-/// Carries out the chosen runs in a study folder, in order; returns how each ended.
+/// Executes the chosen runs in a study folder and returns their outcomes, sorted by index.
 ///
-/// A run that fails or panics does not stop the others; a full disk does. Killed at any moment
-/// and called again, it goes on from the last checkpoints and repeats nothing that is finished.
+/// A run that fails or panics does not stop the others; a full disk does. Finished runs are not
+/// repeated, and interrupted ones resume from their last checkpoints.
 ///
 /// # Errors
 /// If threads cannot be started.
@@ -77,48 +77,49 @@ pub fn execute(
     chosen: &[usize],
     study: &Path,
     options: &Options,
-    watcher: &dyn StudyObserver,
+    observer: &dyn StudyObserver,
 ) -> Result<Vec<(usize, Outcome)>, StudyError> {
-    let queue: Mutex<VecDeque<usize>> = Mutex::new(chosen.iter().copied().collect());
-    let ended: Mutex<Vec<(usize, Outcome)>> = Mutex::new(Vec::new());
-    let full = AtomicBool::new(false);
     let jobs = options.jobs.clamp(1, chosen.len().max(1));
+    let pool = || {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(options.threads)
+            .build()
+    };
     let pools: Vec<rayon::ThreadPool> = (0..jobs)
-        .map(|_| {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(options.threads)
-                .build()
-        })
+        .map(|_| pool())
         .collect::<Result<_, _>>()
         .map_err(std::io::Error::other)
         .at("start threads for", study)?;
+    let queue: Mutex<VecDeque<usize>> = Mutex::new(chosen.iter().copied().collect());
+    let ended: Mutex<Vec<(usize, Outcome)>> = Mutex::new(Vec::new());
+    let disk_full = AtomicBool::new(false);
+    let work = |pool: &rayon::ThreadPool| {
+        while let Some(index) = queue.lock().ok().and_then(|mut queue| queue.pop_front()) {
+            let job = Job {
+                run: &runs[index],
+                index,
+                study,
+                options,
+                observer,
+            };
+            let outcome = if observer.interrupted() || disk_full.load(Ordering::Relaxed) {
+                Outcome::Interrupted
+            } else {
+                let guarded = AssertUnwindSafe(|| pool.install(|| job.outcome(&disk_full)));
+                std::panic::catch_unwind(guarded).unwrap_or_else(|_| {
+                    let what = "internal error of the program: please report it with the case";
+                    Outcome::Failed(what.into(), 3)
+                })
+            };
+            observer.ended(index, &outcome);
+            if let Ok(mut ended) = ended.lock() {
+                ended.push((index, outcome));
+            }
+        }
+    };
     std::thread::scope(|scope| {
         for pool in &pools {
-            scope.spawn(|| {
-                loop {
-                    let next = queue.lock().ok().and_then(|mut q| q.pop_front());
-                    let Some(index) = next else { return };
-                    let outcome = if watcher.interrupted() || full.load(Ordering::Relaxed) {
-                        Outcome::Interrupted
-                    } else {
-                        let whole = || {
-                            pool.install(|| {
-                                one(&runs[index], index, study, options, watcher, &full)
-                            })
-                        };
-                        std::panic::catch_unwind(AssertUnwindSafe(whole)).unwrap_or_else(|_| {
-                            Outcome::Failed(
-                                "a fault of the program: please report it with the case".into(),
-                                3,
-                            )
-                        })
-                    };
-                    watcher.ended(index, &outcome);
-                    if let Ok(mut ended) = ended.lock() {
-                        ended.push((index, outcome));
-                    }
-                }
-            });
+            scope.spawn(|| work(pool));
         }
     });
     let mut ended = ended.into_inner().unwrap_or_default();
@@ -126,126 +127,127 @@ pub fn execute(
     Ok(ended)
 }
 
-fn one(
-    run: &Run,
+/// One run in the queue.
+struct Job<'a> {
+    run: &'a Run,
     index: usize,
-    study: &Path,
-    options: &Options,
-    watcher: &dyn StudyObserver,
-    full: &AtomicBool,
-) -> Outcome {
-    match attempt(run, index, study, options, watcher) {
-        Ok(outcome) => outcome,
-        // `grainwake run` has it.
-        Err(RunError::InUse { .. }) => Outcome::Elsewhere,
-        Err(error) => {
-            if let RunError::Io { source, .. } = &error
-                && source.kind() == std::io::ErrorKind::StorageFull
-            {
-                full.store(true, Ordering::Relaxed);
+    study: &'a Path,
+    options: &'a Options,
+    observer: &'a dyn StudyObserver,
+}
+
+impl Job<'_> {
+    fn outcome(&self, disk_full: &AtomicBool) -> Outcome {
+        match self.execute() {
+            Ok(outcome) => outcome,
+            // `grainwake run` uses the run folder.
+            Err(RunError::InUse { .. }) => Outcome::Locked,
+            Err(error) => {
+                if let RunError::Io { source, .. } = &error
+                    && source.kind() == std::io::ErrorKind::StorageFull
+                {
+                    disk_full.store(true, Ordering::Relaxed);
+                }
+                Outcome::Failed(error.to_string(), error.exit_code())
             }
-            Outcome::Failed(error.to_string(), error.exit_code())
         }
     }
-}
 
-fn attempt(
-    run: &Run,
-    index: usize,
-    study: &Path,
-    options: &Options,
-    watcher: &dyn StudyObserver,
-) -> Result<Outcome, RunError> {
-    let Asked::Taken(_lock) = lock(run, study)? else {
-        return Ok(Outcome::Elsewhere);
-    };
-    let folder = run.folder(study);
-    let existing = match run_state(run, study) {
-        RunState::Finished => {
-            tidy(&folder, options);
-            return Ok(Outcome::Before);
-        }
-        RunState::Failed(why) if !options.retry => {
-            return Ok(Outcome::Failed(format!("failed before: {why}"), 3));
-        }
-        RunState::Missing => Existing::Refuse,
-        RunState::Unfinished => Existing::Resume,
-        RunState::Failed(_) => Existing::Replace,
-        RunState::Stale(why) => {
-            watcher.note(index, &format!("starting over: {why}"));
-            Existing::Replace
-        }
-    };
-    let case = match run.case() {
-        Ok(case) => case,
-        Err(error) => return Ok(Outcome::Failed(error.to_string(), 2)),
-    };
-    if case.digest != run.case_sha256 {
-        let what = "its files have changed since the study was started; start it again";
-        return Ok(Outcome::Failed(what.into(), 2));
-    }
-    watcher.started(index);
-    let go = |existing: Existing| {
-        let options = output::Options {
-            existing,
-            command: options.command.clone(),
-            threads: options.threads,
+    fn execute(&self) -> Result<Outcome, RunError> {
+        let Asked::Taken(_lock) = self.lock()? else {
+            return Ok(Outcome::Locked);
         };
-        output::run(case.job(), &folder, &options, &mut Told { index, watcher })
-    };
-    let ending = match go(existing) {
-        Err(error @ RunError::NoCheckpoint { .. }) => {
-            watcher.note(index, &format!("starting over: {error}"));
-            go(Existing::Replace)
+        let folder = self.run.folder(self.study);
+        let existing = match run_state(self.run, self.study) {
+            RunState::Finished => {
+                self.remove_checkpoints(&folder);
+                return Ok(Outcome::AlreadyFinished);
+            }
+            RunState::Failed(why) if !self.options.retry => {
+                return Ok(Outcome::Failed(format!("failed before: {why}"), 3));
+            }
+            RunState::Missing => Existing::Refuse,
+            RunState::Unfinished => Existing::Resume,
+            RunState::Failed(_) => Existing::Replace,
+            RunState::Stale(why) => {
+                self.note(&format!("restarting: {why}"));
+                Existing::Replace
+            }
+        };
+        let case = match self.run.case() {
+            Ok(case) => case,
+            Err(error) => return Ok(Outcome::Failed(error.to_string(), 2)),
+        };
+        if case.digest != self.run.case_sha256 {
+            let what = "the files of the case have changed since the study was started; \
+                        start the study again";
+            return Ok(Outcome::Failed(what.into(), 2));
         }
-        other => other,
-    }?;
-    Ok(match ending {
-        Ending::Finished(summary) => {
-            tidy(&folder, options);
-            Outcome::Finished(Box::new(summary))
+        self.observer.started(self.index);
+        let simulate = |existing: Existing| {
+            let options = output::Options {
+                existing,
+                command: self.options.command.clone(),
+                threads: self.options.threads,
+            };
+            output::run(case.job(), &folder, &options, &mut Forward(self))
+        };
+        let ending = match simulate(existing) {
+            Err(error @ RunError::NoCheckpoint { .. }) => {
+                self.note(&format!("restarting: {error}"));
+                simulate(Existing::Replace)
+            }
+            other => other,
+        }?;
+        Ok(match ending {
+            Ending::Finished(summary) => {
+                self.remove_checkpoints(&folder);
+                Outcome::Finished(Box::new(summary))
+            }
+            Ending::AlreadyFinished(_) => Outcome::AlreadyFinished,
+            Ending::Interrupted(_) => Outcome::Interrupted,
+        })
+    }
+
+    fn note(&self, text: &str) {
+        self.observer.note(self.index, text);
+    }
+
+    /// Locks the run for this program; the lock ends with the process at the latest.
+    fn lock(&self) -> Result<Asked, RunError> {
+        let folder = self.study.join("locks");
+        let path = folder.join(format!("{}.lock", self.run.name));
+        let taken = std::fs::create_dir_all(&folder).and_then(|()| lock::take(&path));
+        taken.map_err(|source| RunError::Io {
+            action: "lock",
+            path,
+            source,
+        })
+    }
+
+    /// Removes the checkpoints of a finished run, its largest files, unless they are to be kept.
+    fn remove_checkpoints(&self, folder: &Path) {
+        if !self.options.keep_checkpoints {
+            // A failure costs disk space only.
+            let _ = std::fs::remove_dir_all(folder.join(checkpoint::FOLDER));
         }
-        Ending::AlreadyFinished(_) => Outcome::Before,
-        Ending::Interrupted(_) => Outcome::Interrupted,
-    })
-}
-
-/// Takes a run for this program; the lock goes with it, however it ends.
-fn lock(run: &Run, study: &Path) -> Result<Asked, RunError> {
-    let folder = study.join("locks");
-    let path = folder.join(format!("{}.lock", run.name));
-    let taken = std::fs::create_dir_all(&folder).and_then(|()| lock::take(&path));
-    taken.map_err(|source| RunError::Io {
-        action: "lock",
-        path,
-        source,
-    })
-}
-
-/// Removes the checkpoints of a finished run: they are by far the largest of its files.
-fn tidy(folder: &Path, options: &Options) {
-    if !options.keep_checkpoints {
-        // What cannot be removed costs room, not results.
-        let _ = std::fs::remove_dir_all(folder.join(checkpoint::FOLDER));
     }
 }
 
-struct Told<'a> {
-    index: usize,
-    watcher: &'a dyn StudyObserver,
-}
+/// Forwards the callbacks of a run to the observer of the study.
+struct Forward<'a>(&'a Job<'a>);
 
-impl Observer for Told<'_> {
-    fn progress(&mut self, p: &Progress) {
-        self.watcher.progress(self.index, p);
+impl Observer for Forward<'_> {
+    fn progress(&mut self, progress: &Progress) {
+        self.0.observer.progress(self.0.index, progress);
     }
     fn event(&mut self, event: &Event) {
-        self.watcher.event(self.index, event);
+        self.0.observer.event(self.0.index, event);
     }
     fn note(&mut self, text: &str) {
-        self.watcher.note(self.index, text);
+        self.0.note(text);
     }
     fn interrupted(&self) -> bool {
-        self.watcher.interrupted()
+        self.0.observer.interrupted()
     }
 }

@@ -1,4 +1,4 @@
-//! How far a run of a study is.
+//! State of a run in a study folder.
 
 use std::path::Path;
 
@@ -7,24 +7,24 @@ use grainwake_solver::output::{RESOLVED, SUMMARY};
 
 use crate::plan::{Run, end_condition};
 
-/// How far a run is.
+/// State of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RunState {
-    /// Nothing is there.
+    /// The run folder does not exist.
     Missing,
-    /// It was begun, and can go on.
+    /// The run was started and can be resumed.
     Unfinished,
-    /// It came to its end.
+    /// The run reached its end.
     Finished,
-    /// It became unstable; the same case and program would again.
+    /// The numerics failed, with the reason; the same case and program would fail again.
     Failed(String),
-    /// What is there is of another case or program, as said.
+    /// The run folder belongs to another case or program, with the reason.
     Stale(&'static str),
 }
 
 impl RunState {
-    /// One word.
-    pub fn word(&self) -> &'static str {
+    /// Returns the name of the state as in the tables.
+    pub fn name(&self) -> &'static str {
         match self {
             RunState::Missing => "missing",
             RunState::Unfinished => "unfinished",
@@ -35,44 +35,44 @@ impl RunState {
     }
 }
 
-/// Looks into the run folder of a run, for this program.
+/// Determines the state of a run for this program.
 pub fn run_state(run: &Run, study: &Path) -> RunState {
-    let own = Provenance::new("");
-    state_of_version(run, study, &own.version, own.commit.as_deref())
+    let program = Provenance::new("");
+    run_state_for(run, study, &program.version, program.commit.as_deref())
 }
 
-/// The same for a version and commit of the program.
-pub(crate) fn state_of_version(
+/// Determines the state of a run for a given version and commit of the program.
+pub(crate) fn run_state_for(
     run: &Run,
     study: &Path,
     version: &str,
     commit: Option<&str>,
 ) -> RunState {
     let folder = run.folder(study);
-    let Some(there) = Provenance::read(&folder) else {
+    let Some(found) = Provenance::read(&folder) else {
         return RunState::Missing;
     };
-    if there.case_sha256 != run.case_sha256 {
-        return RunState::Stale("its case is another one now");
+    if found.case_sha256 != run.case_sha256 {
+        return RunState::Stale("its case has changed");
     }
-    if (there.version.as_str(), there.commit.as_deref()) != (version, commit) {
-        return RunState::Stale("it was made by another version of the program");
+    if (found.version.as_str(), found.commit.as_deref()) != (version, commit) {
+        return RunState::Stale("another version of the program produced it");
     }
     if folder.join(SUMMARY).is_file() {
         let resolved = std::fs::read_to_string(folder.join(RESOLVED)).unwrap_or_default();
         return if end_condition(&resolved) == run.ending {
             RunState::Finished
         } else {
-            RunState::Stale("it ends at another time now")
+            RunState::Stale("its end time has changed")
         };
     }
     match std::fs::read_to_string(folder.join("failure.json")) {
-        Ok(text) => RunState::Failed(why(&text)),
+        Ok(text) => RunState::Failed(failure_reason(&text)),
         Err(_) => RunState::Unfinished,
     }
 }
 
-fn why(failure: &str) -> String {
+fn failure_reason(failure: &str) -> String {
     let value: serde_json::Value = serde_json::from_str(failure).unwrap_or_default();
     let what = value.get("what").and_then(serde_json::Value::as_str);
     what.unwrap_or("the numerics failed").to_owned()

@@ -69,7 +69,7 @@ pub fn folder(study: &str) -> (tempfile::TempDir, PathBuf) {
 
 /// The plan of a study file.
 pub fn plan(path: &Path) -> Result<Plan, StudyError> {
-    Plan::of(&Study::read(path)?, &[])
+    Plan::resolve(&Study::read(path)?, &[])
 }
 
 /// The problems of a study that is wrong.

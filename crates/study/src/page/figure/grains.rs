@@ -20,7 +20,7 @@ const RIM: f64 = 0.4;
 
 /// The grains of an axis, each seen from the same side at the same scale.
 pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure> {
-    let plan = &data.manifest.analysis.figures;
+    let plan = &data.plan.analysis.figures;
     let (axis, rows, columns) = (
         plan.grains.as_ref()?,
         plan.rows.as_ref()?,
@@ -30,7 +30,7 @@ pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure>
     let mut found: Vec<(String, usize, usize, Grain)> = Vec::new();
     for name in data.levels(axis) {
         let run = data
-            .manifest
+            .plan
             .runs
             .iter()
             .find(|r| r.levels.get(axis) == Some(&name))?;
@@ -126,7 +126,7 @@ pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure>
 
 /// One grain in all orientations, seen along y with gravity down.
 pub fn orientations(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure> {
-    let plan = &data.manifest.analysis.figures;
+    let plan = &data.plan.analysis.figures;
     let (grains, axis, oriented) = (
         plan.grains.as_ref()?,
         plan.orientations.as_ref()?,
@@ -138,7 +138,7 @@ pub fn orientations(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyF
     let mut drawn = 0;
     for (n, name) in names.iter().enumerate() {
         let run =
-            data.manifest.runs.iter().find(|r| {
+            data.plan.runs.iter().find(|r| {
                 r.levels.get(grains) == Some(oriented) && r.levels.get(axis) == Some(name)
             });
         let Some(grain) = run

@@ -32,14 +32,14 @@ enum What {
 
 /// Figures 15, 16, 17 and 18.
 pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
-    let plan = &data.manifest.analysis.figures;
+    let plan = &data.plan.analysis.figures;
     let (Some(rows), Some(columns), Some(axis), Some(level)) =
         (&plan.rows, &plan.columns, &plan.orientations, &plan.compare)
     else {
         return Vec::new();
     };
     let wanted: Vec<&Run> = data
-        .manifest
+        .plan
         .runs
         .iter()
         .filter(|r| r.member == 0 && r.levels.get(axis) == Some(level))
@@ -76,7 +76,7 @@ fn figure(
     within: &str,
     level: &str,
 ) -> Option<StudyFigure> {
-    let reference = data.manifest.analysis.figures.reference.as_ref();
+    let reference = data.plan.analysis.figures.reference.as_ref();
     let sphere =
         reference.and_then(|name| Some((name, data.trajectories.get(&data.run(name)?.name)?)));
     let shown: Vec<(&Run, &Trajectory)> = wanted

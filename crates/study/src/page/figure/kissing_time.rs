@@ -11,8 +11,8 @@ use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
 use super::{FigureData, StudyFigure, symbol, value_text};
+use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::quantile;
-use crate::analysis::verdict::{Observation, observations};
 use crate::format::significant;
 
 const COLOURS: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
@@ -30,10 +30,10 @@ struct Layout {
 }
 
 fn layout(data: &FigureData, height: f64, top: f64) -> Option<Layout> {
-    let plan = &data.manifest.analysis.figures;
+    let plan = &data.plan.analysis.figures;
     let axis = plan.grains.as_ref()?;
     let grains = data.levels(axis);
-    let all = observations(data.rows, "kiss_time", &BTreeMap::new());
+    let all = observations(data.records, "kiss_time", &BTreeMap::new());
     let reference = plan
         .reference
         .as_ref()
@@ -70,7 +70,7 @@ fn layout(data: &FigureData, height: f64, top: f64) -> Option<Layout> {
     let mut blocks: Vec<(usize, usize, f64)> = Vec::new();
     for (i, grain) in grains.iter().enumerate() {
         let run = data
-            .manifest
+            .plan
             .runs
             .iter()
             .find(|r| r.levels.get(axis) == Some(grain))?;
@@ -125,7 +125,7 @@ impl Layout {
 
 /// Kissing time of every model, with the spread of its members.
 pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
-    let plan = &data.manifest.analysis.figures;
+    let plan = &data.plan.analysis.figures;
     let layout = layout(data, 190.0, 20.0)?;
     let f = &layout.frame;
     let mut drawing = Drawing::new(PAGE, f.y + f.height + 26.0);
@@ -150,7 +150,7 @@ pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
         );
         x += 24.0 + text::width(&label, SMALL);
     }
-    let bounds = layout.all.iter().filter(|s| s.bound).count();
+    let bounds = layout.all.iter().filter(|s| s.censored).count();
     if bounds > 0 {
         Sign::Circle.draw(&mut drawing, (x + 4.0, 9.0), 3.0, INK, true);
         drawing.label(
@@ -178,7 +178,7 @@ pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
             (x, f.py(sample.value)),
             2.9,
             colour,
-            sample.bound,
+            sample.censored,
         );
     };
     let grain_axis = plan.grains.as_deref().unwrap_or_default();
@@ -205,7 +205,7 @@ pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
         draw(reference, layout.grains.len() as f64 + 0.5, 0, INK);
     }
     f.outline(&mut drawing, (true, true));
-    let members = data.rows.iter().map(|r| r.member).max().unwrap_or(0);
+    let members = data.records.iter().map(|r| r.member).max().unwrap_or(0);
     let mut caption = format!(
         "First contact of {} models, by grain and initial orientation.",
         layout.all.len()
@@ -242,7 +242,7 @@ pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
 
 /// Spread of the kissing time over the orientations of each grain.
 pub fn boxes(data: &FigureData) -> Option<StudyFigure> {
-    let plan = &data.manifest.analysis.figures;
+    let plan = &data.plan.analysis.figures;
     let layout = layout(data, 160.0, 8.0)?;
     let f = &layout.frame;
     let axis = plan.grains.as_ref()?;
@@ -297,11 +297,11 @@ pub fn boxes(data: &FigureData) -> Option<StudyFigure> {
             ),
             2.9,
             INK,
-            reference.bound,
+            reference.censored,
         );
     }
     f.outline(&mut drawing, (true, true));
-    let bounds = layout.all.iter().filter(|s| s.bound).count();
+    let bounds = layout.all.iter().filter(|s| s.censored).count();
     let mut caption = match widest {
         Some((width, grain)) if drawn > 0 => format!(
             "Kissing times of the orientations of each grain: smallest, lower quantile, median, upper quantile and largest. The orientation matters most for {}, whose kissing times span {}.",

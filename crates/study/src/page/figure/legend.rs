@@ -37,7 +37,7 @@ pub enum LineStyles {
 impl LineStyles {
     /// Models where they are few or on no axis, else up to two axes.
     pub fn of(data: &FigureData) -> LineStyles {
-        let runs = &data.manifest.runs;
+        let runs = &data.plan.runs;
         let mut models: Vec<String> = Vec::new();
         for run in runs {
             if !models.contains(&run.model) {
@@ -137,7 +137,7 @@ impl LineStyles {
 /// The axes with more than one value, with their values in the order of the runs.
 pub fn axes(data: &FigureData) -> Vec<(String, Vec<String>)> {
     let mut names: Vec<String> = Vec::new();
-    for run in &data.manifest.runs {
+    for run in &data.plan.runs {
         for axis in run
             .levels
             .keys()

@@ -20,7 +20,7 @@ use grainwake_solver::output::RESOLVED;
 use crate::analysis::correlation::Correlation;
 use crate::measure::record::RunRecord;
 use crate::measure::trajectory::Trajectory;
-use crate::plan::{Manifest, Run};
+use crate::plan::{Plan, Run};
 
 /// A figure ready to be written.
 pub struct StudyFigure {
@@ -50,9 +50,9 @@ impl StudyFigure {
 /// What the figures are drawn from.
 pub struct FigureData<'a> {
     /// The plan.
-    pub manifest: &'a Manifest,
+    pub plan: &'a Plan,
     /// The table.
-    pub rows: &'a [RunRecord],
+    pub records: &'a [RunRecord],
     /// The study folder.
     pub folder: &'a Path,
     /// Correlations to be drawn.
@@ -64,7 +64,7 @@ pub struct FigureData<'a> {
 impl FigureData<'_> {
     /// The first run of a model.
     pub fn run(&self, model: &str) -> Option<&Run> {
-        self.manifest.runs.iter().find(|run| run.model == model)
+        self.plan.runs.iter().find(|run| run.model == model)
     }
 
     /// The case of a run: as it was run, else as it is planned.
@@ -76,7 +76,7 @@ impl FigureData<'_> {
     /// Names of the values of an axis, in the order of the runs.
     pub fn levels(&self, axis: &str) -> Vec<String> {
         let mut out: Vec<String> = Vec::new();
-        for level in self.manifest.runs.iter().filter_map(|r| r.levels.get(axis)) {
+        for level in self.plan.runs.iter().filter_map(|r| r.levels.get(axis)) {
             if !out.contains(level) {
                 out.push(level.clone());
             }
@@ -86,7 +86,7 @@ impl FigureData<'_> {
 
     /// The different values of a factor among the models on the axes, in order.
     pub fn factor_values(&self, factor: &str) -> Vec<f64> {
-        let on_axes = self.manifest.runs.iter().filter(|r| !r.levels.is_empty());
+        let on_axes = self.plan.runs.iter().filter(|r| !r.levels.is_empty());
         let mut out: Vec<f64> = on_axes
             .filter_map(|r| r.factors.get(factor).copied())
             .collect();
@@ -116,7 +116,7 @@ pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
 
 /// Whether the study shows the grains, set-ups and orientations that the paper's first figures do.
 fn as_in_the_paper(data: &FigureData) -> bool {
-    let plan = &data.manifest.analysis.figures;
+    let plan = &data.plan.analysis.figures;
     plan.grains.is_some() && plan.orientations.is_some() && plan.setup.is_some()
 }
 

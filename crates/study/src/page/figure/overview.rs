@@ -11,9 +11,9 @@ use grainwake_report::figure::text;
 
 use super::legend::{LineStyles, axes};
 use super::{FigureData, StudyFigure};
-use crate::analysis::verdict::{Observation, observations};
-use crate::measure::fall::SettlingCurve;
+use crate::analysis::observation::{Observation, observations};
 use crate::measure::trajectory::Trajectory;
+use crate::measure::trajectory::settling_curve;
 use crate::plan::Run;
 use crate::plan::claims::FigureRequest;
 use crate::plan::quantities::SHAPE_FACTORS;
@@ -37,11 +37,11 @@ struct Words {
 
 /// What is drawn where the analysis asks for no figures.
 pub fn figures(data: &FigureData) -> Vec<StudyFigure> {
-    if data.manifest.analysis.figures != FigureRequest::default() {
+    if data.plan.analysis.figures != FigureRequest::default() {
         return Vec::new();
     }
-    let settling = data.rows.iter().any(|row| row.settling.is_some());
-    let pairs = data.rows.iter().any(|row| row.pair.is_some());
+    let settling = data.records.iter().any(|row| row.settling.is_some());
+    let pairs = data.records.iter().any(|row| row.pair.is_some());
     let mut out = Vec::new();
     if settling {
         out.extend(speeds(data));
@@ -69,17 +69,17 @@ pub fn figures(data: &FigureData) -> Vec<StudyFigure> {
 fn finished<'a>(
     data: &'a FigureData,
 ) -> impl Iterator<Item = (&'a Run, &'a crate::measure::record::RunRecord)> {
-    let both = data.manifest.runs.iter().zip(data.rows);
+    let both = data.plan.runs.iter().zip(data.records);
     both.filter(|(_, row)| row.finished())
 }
 
 fn speeds(data: &FigureData) -> Option<StudyFigure> {
     let known = finished(data).filter(|(_, row)| row.settling.is_some());
     let curves: Vec<(&Run, Vec<(f64, f64)>)> = known
-        .filter_map(|(run, row)| Some((run, SettlingCurve::read(run, row, data.folder)?.points)))
+        .filter_map(|(run, row)| Some((run, settling_curve(run, row, data.folder)?)))
         .collect();
     let single = data
-        .rows
+        .records
         .iter()
         .all(|r| r.settling.as_ref().is_none_or(|s| s.grains == 1));
     let words = Words {
@@ -172,7 +172,7 @@ struct Parameter {
 
 /// The axes, as numbers where a factor goes with them; of a study without axes its factors, else its models.
 fn varied(data: &FigureData) -> Vec<Parameter> {
-    let runs = &data.manifest.runs;
+    let runs = &data.plan.runs;
     let own = |run: &Run| -> Vec<String> {
         let names = run
             .factors
@@ -256,7 +256,7 @@ fn varied(data: &FigureData) -> Vec<Parameter> {
 }
 
 fn against(data: &FigureData, quantity: &str, words: impl Fn() -> Words) -> Option<StudyFigure> {
-    let all = observations(data.rows, quantity, &BTreeMap::new());
+    let all = observations(data.records, quantity, &BTreeMap::new());
     let (low, high) = extent(all.iter().flat_map(|s| [s.range.0, s.range.1, 0.0]))?;
     let mut panels = varied(data);
     let left_out = panels.len().saturating_sub(PANELS);
@@ -297,11 +297,11 @@ fn against(data: &FigureData, quantity: &str, words: impl Fn() -> Words) -> Opti
         frame.outline(&mut drawing, (true, i % 2 == 0));
     }
     let mut caption = words.caption;
-    let models = data.manifest.runs.iter().filter(|r| r.member == 0).count();
+    let models = data.plan.runs.iter().filter(|r| r.member == 0).count();
     if all.len() < models {
         caption += &format!(" {} of {models} models have a value.", all.len());
     }
-    if data.manifest.runs.iter().any(|r| r.member > 0) {
+    if data.plan.runs.iter().any(|r| r.member > 0) {
         caption += " Signs are medians and bars the range of the runs of an ensemble.";
     }
     if left_out > 0 {
@@ -354,6 +354,6 @@ fn draw_panel(
             );
         }
         look.sign
-            .draw(drawing, (x, y), 3.0, look.colour, sample.bound);
+            .draw(drawing, (x, y), 3.0, look.colour, sample.censored);
     }
 }

@@ -13,7 +13,7 @@ use super::{FigureData, StudyFigure, value_text};
 
 /// The set-up of a model.
 pub fn figure(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure> {
-    let name = data.manifest.analysis.figures.setup.as_ref()?;
+    let name = data.plan.analysis.figures.setup.as_ref()?;
     let Some(case) = data.run(name).and_then(|run| data.case(run)) else {
         notes.push(format!(
             "figure 7 is left out: the case of {name} cannot be read"

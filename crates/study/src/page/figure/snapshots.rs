@@ -14,12 +14,12 @@ const FIRST: usize = 8;
 
 /// Paths with slices of the speed, then slices of the vorticity.
 pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
-    let stories = &data.manifest.analysis.figures.stories;
+    let stories = &data.plan.analysis.figures.stories;
     let (mut paths, mut whirls) = (Vec::new(), Vec::new());
     for (n, name) in stories.iter().enumerate() {
         let numbers = (FIRST + n, FIRST + stories.len() + n);
         let run = data.run(name).filter(|run| {
-            data.rows
+            data.records
                 .iter()
                 .any(|r| r.name == run.name && r.state != "stale" && r.state != "missing")
         });

@@ -8,14 +8,14 @@ use grainwake_report::figure::text;
 
 use super::{FigureData, StudyFigure};
 use crate::analysis::correlation::Correlation;
-use crate::format::plain;
+use crate::format::title;
 
 const COLOURS: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
 const STEP: f64 = 9.0;
 
 /// A panel for each factor, a row for each quantity and value of the axis.
 pub fn figure(data: &FigureData) -> Option<StudyFigure> {
-    let wanted = data.manifest.analysis.correlations.as_ref()?;
+    let wanted = data.plan.analysis.correlations.as_ref()?;
     let known: Vec<&Correlation> = data
         .correlations
         .iter()
@@ -67,7 +67,7 @@ pub fn figure(data: &FigureData) -> Option<StudyFigure> {
                     Anchor::End,
                     SMALL,
                     INK,
-                    &text::literal(&plain(quantity)),
+                    &text::literal(&title(quantity)),
                     false,
                 );
             }

@@ -1,0 +1,165 @@
+//! Observations of a quantity, one per model, with right-censoring by the landing.
+
+use std::collections::BTreeMap;
+
+use super::statistics::median;
+use crate::measure::record::RunRecord;
+use crate::plan::claims::Condition;
+
+/// Observed value of a quantity for one model: the median over the ensemble.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Observation {
+    /// Name of the model.
+    pub model: String,
+    /// Level on each axis.
+    pub levels: BTreeMap<String, String>,
+    /// Numerical factors.
+    pub factors: BTreeMap<String, f64>,
+    /// Value; the lower bound of a censored observation.
+    pub value: f64,
+    /// Smallest and largest value over the ensemble.
+    pub range: (f64, f64),
+    /// Whether the observation is right-censored: the pair landed before the event.
+    pub censored: bool,
+}
+
+impl Observation {
+    /// Returns the value for rank tests; censored observations rank last, all equal.
+    pub fn rank_value(&self) -> f64 {
+        if self.censored {
+            f64::INFINITY
+        } else {
+            self.value
+        }
+    }
+
+    /// Returns the levels on all axes but one.
+    pub fn other_levels(&self, axis: &str) -> BTreeMap<String, String> {
+        let mut levels = self.levels.clone();
+        levels.remove(axis);
+        levels
+    }
+}
+
+/// Returns a quantity of a run and whether it is right-censored.
+///
+/// The times of events that did not occur before the landing are censored at the landing.
+pub fn observe(record: &RunRecord, quantity: &str) -> Option<(f64, bool)> {
+    if !record.finished() {
+        return None;
+    }
+    if let Some(value) = record.get(quantity) {
+        return Some((value, record.is_lower_bound(quantity)));
+    }
+    let pair = record.pair.as_ref()?;
+    let landing = pair.landing_time.map(|time| (time, true));
+    match quantity {
+        "kiss_time" => landing,
+        "tumble_time" | "pass_time" | "separation_time" if pair.kiss_time.is_some() => landing,
+        _ => None,
+    }
+}
+
+/// Returns the observations of a quantity for all models that meet the conditions.
+pub fn observations(
+    records: &[RunRecord],
+    quantity: &str,
+    when: &BTreeMap<String, Condition>,
+) -> Vec<Observation> {
+    let mut models: Vec<Vec<(&RunRecord, f64, bool)>> = Vec::new();
+    for record in records.iter().filter(|record| meets(record, when)) {
+        if let Some((value, censored)) = observe(record, quantity) {
+            let member = (record, value, censored);
+            match models
+                .iter_mut()
+                .find(|members| members[0].0.model == record.model)
+            {
+                Some(members) => members.push(member),
+                None => models.push(vec![member]),
+            }
+        }
+    }
+    let observation = |members: Vec<(&RunRecord, f64, bool)>| {
+        let values: Vec<f64> = members.iter().map(|(_, v, _)| *v).collect();
+        let first = members[0].0;
+        Observation {
+            model: first.model.clone(),
+            levels: first.levels.clone(),
+            factors: first.factors.clone(),
+            value: median(&values).unwrap_or(f64::NAN),
+            range: (
+                values.iter().copied().fold(f64::INFINITY, f64::min),
+                values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            ),
+            censored: 2 * members.iter().filter(|(.., c)| *c).count() >= members.len(),
+        }
+    };
+    models.into_iter().map(observation).collect()
+}
+
+fn meets(record: &RunRecord, when: &BTreeMap<String, Condition>) -> bool {
+    when.iter().all(|(name, condition)| match condition {
+        Condition::Is(level) => record.levels.get(name) == Some(level),
+        Condition::In(levels) => record.levels.get(name).is_some_and(|l| levels.contains(l)),
+        Condition::Range { at_least, at_most } => record.factors.get(name).is_some_and(|v| {
+            at_least.is_none_or(|low| *v >= low) && at_most.is_none_or(|high| *v <= high)
+        }),
+    })
+}
+
+/// Pairs the observations at two levels of an axis that are equal on all other axes.
+pub fn matched<'a>(
+    all: &'a [Observation],
+    axis: &str,
+    first: &str,
+    second: &str,
+) -> Vec<(&'a Observation, &'a Observation)> {
+    let on = |o: &&Observation, level: &str| o.levels.get(axis).is_some_and(|l| l == level);
+    let partner = |a: &'a Observation| {
+        let same = |b: &&Observation| on(b, second) && b.other_levels(axis) == a.other_levels(axis);
+        Some((a, all.iter().find(same)?))
+    };
+    all.iter()
+        .filter(|a| on(a, first))
+        .filter_map(partner)
+        .collect()
+}
+
+/// Returns the range of the values over an axis, for every combination of the other axes.
+///
+/// Combinations with missing levels are left out. A range is censored if one of its values is.
+pub fn ranges(all: &[Observation], axis: &str) -> Vec<Observation> {
+    let mut groups: BTreeMap<BTreeMap<String, String>, Vec<&Observation>> = BTreeMap::new();
+    for observation in all.iter().filter(|o| o.levels.contains_key(axis)) {
+        groups
+            .entry(observation.other_levels(axis))
+            .or_default()
+            .push(observation);
+    }
+    let complete = groups.values().map(Vec::len).max().unwrap_or(0);
+    let range = |group: &Vec<&Observation>| {
+        let values = || group.iter().map(|o| o.value);
+        let high = values().fold(f64::NEG_INFINITY, f64::max);
+        let low = values().fold(f64::INFINITY, f64::min);
+        Observation {
+            value: high - low,
+            censored: group.iter().any(|o| o.censored),
+            ..group[0].clone()
+        }
+    };
+    let whole = groups
+        .values()
+        .filter(|g| g.len() == complete && complete > 1);
+    whole.map(range).collect()
+}
+
+/// Returns the factor and the rank value of all observations that have the factor, and the number
+/// of censored ones among them.
+pub(super) fn with_factor(all: &[Observation], factor: &str) -> (Vec<f64>, Vec<f64>, usize) {
+    let known = all
+        .iter()
+        .filter_map(|o| Some((o, *o.factors.get(factor)?)));
+    let known: Vec<(&Observation, f64)> = known.collect();
+    let (x, y) = known.iter().map(|(o, f)| (*f, o.rank_value())).unzip();
+    (x, y, known.iter().filter(|(o, _)| o.censored).count())
+}

@@ -1,0 +1,162 @@
+//! Resolution of models into runs: cases with all overrides, ensemble members and hashes.
+
+use std::collections::BTreeMap;
+
+use grainwake_solver::case::estimate::Estimate;
+use grainwake_solver::case::{Case, CaseError, Problem};
+use grainwake_solver::output::provenance::Provenance;
+use rayon::prelude::*;
+use sha2::{Digest, Sha256};
+
+use super::expand::Model;
+use super::file::Study;
+use super::offset::offset_override;
+use super::quantities::SHAPE_FACTORS;
+use super::{Plan, Run};
+use crate::error::StudyError;
+
+impl Plan {
+    /// Resolves every model of a study; `sets` are overrides of all models with highest precedence.
+    ///
+    /// # Errors
+    /// [`StudyError::Invalid`] with the problems of the first invalid model, located in the study
+    /// file where it sets the key.
+    pub fn resolve(study: &Study, sets: &[String]) -> Result<Plan, StudyError> {
+        let resolved: Vec<Result<Vec<Run>, StudyError>> = (0..study.models.len())
+            .into_par_iter()
+            .map(|i| runs_of(study, i, sets))
+            .collect();
+        let mut runs = Vec::new();
+        for found in resolved {
+            runs.extend(found?);
+        }
+        let program = Provenance::new("");
+        Ok(Plan {
+            grainwake_study: 1,
+            study: std::path::absolute(&study.path).unwrap_or_else(|_| study.path.clone()),
+            title: study.title.clone(),
+            version: program.version,
+            commit: program.commit,
+            analysis: study.analysis.clone(),
+            runs,
+        })
+    }
+}
+
+/// Returns the runs of a model: one, or the members of its ensemble.
+fn runs_of(study: &Study, index: usize, sets: &[String]) -> Result<Vec<Run>, StudyError> {
+    let model = &study.models[index];
+    let own = model.settings.iter().map(|s| s.text());
+    let set: Vec<String> = own.chain(sets.iter().cloned()).collect();
+    let load = |set: &[String]| {
+        Case::load(&model.base, set).map_err(|error| locate_in_study(study, model, error))
+    };
+    let case = load(&set)?;
+    let mut runs = vec![run(model, 0, set.clone(), &case)];
+    let ensemble = study
+        .ensemble
+        .as_ref()
+        .filter(|e| e.models.contains(&index));
+    if let Some(ensemble) = ensemble {
+        for member in 1..ensemble.members {
+            let mut set = set.clone();
+            set.push(offset_override(
+                study, model, ensemble, member, &case, &set,
+            )?);
+            let case = load(&set)?;
+            runs.push(run(model, member, set, &case));
+        }
+    }
+    Ok(runs)
+}
+
+fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
+    let estimate = Estimate::of(case, 1);
+    let ending = end_condition(&case.resolved);
+    let program = Provenance::new(&case.digest);
+    let commit = program.commit.unwrap_or_default();
+    let mut hash = Sha256::new();
+    for part in [&program.case_sha256, &ending, &program.version, &commit] {
+        hash.update(part);
+        hash.update([0]);
+    }
+    let id = hash
+        .finalize()
+        .iter()
+        .take(6)
+        .map(|b| format!("{b:02x}"))
+        .collect();
+    Run {
+        name: match member {
+            0 => model.name.clone(),
+            _ => format!("{}-m{member}", model.name),
+        },
+        model: model.name.clone(),
+        member,
+        levels: model.levels.clone(),
+        factors: factors(model, case),
+        base: std::path::absolute(&model.base).unwrap_or_else(|_| model.base.clone()),
+        set,
+        id,
+        case_sha256: case.digest.clone(),
+        ending,
+        end_s: case.plan.end,
+        memory_bytes: estimate.memory_bytes,
+        wall_s: estimate.wall_s,
+    }
+}
+
+/// Returns the shape factors of the first grain and the factors of the model, which override them.
+fn factors(model: &Model, case: &Case) -> BTreeMap<String, f64> {
+    let mut factors = BTreeMap::new();
+    if let Some(grain) = case.setup.grains.first() {
+        let shape = grain.shape.morphology();
+        let values = [Some(shape.krumbein_sphericity), shape.wadell_roundness];
+        let known = SHAPE_FACTORS.into_iter().zip(values);
+        factors.extend(known.filter_map(|(name, value)| Some((name.to_owned(), value?))));
+    }
+    factors.extend(model.factors.clone());
+    factors
+}
+
+/// Returns the end time and the stop condition of a resolved case on one line.
+pub(crate) fn end_condition(resolved: &str) -> String {
+    let table: toml::Table = resolved.parse().unwrap_or_default();
+    let time = table.get("time").and_then(toml::Value::as_table);
+    let part = |name: &str| {
+        let value = time.and_then(|t| t.get(name));
+        value.map_or("-".into(), toml::Value::to_string)
+    };
+    format!("end {}, stop {}", part("end"), part("stop"))
+}
+
+/// Locates the problems of a model's case in the study file where it sets the key.
+fn locate_in_study(study: &Study, model: &Model, error: CaseError) -> StudyError {
+    let CaseError::Invalid(problems) = error else {
+        return StudyError::Case(error);
+    };
+    // Whether one dotted key is the other, or lies below it.
+    let below = |long: &str, short: &str| {
+        let rest = long.strip_prefix(short);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    let moved = problems.into_iter().map(|mut problem| {
+        let from_set = problem.place().is_none_or(|(name, ..)| name == "--set");
+        let key = problem.key.clone().unwrap_or_default();
+        let sets = |set: &str| !key.is_empty() && (below(&key, set) || below(set, &key));
+        let setting = model.settings.iter().rev().find(|s| sets(&s.key));
+        let message = format!("model \"{}\": {}", model.name, problem.message);
+        match setting.filter(|_| from_set) {
+            Some(setting) => {
+                let mut moved = Problem::new(message).key(key);
+                moved.help = problem.help.take();
+                study.locate(moved, setting.span.as_ref(), "set here")
+            }
+            None => {
+                problem.message = message;
+                problem
+            }
+        }
+    });
+    StudyError::Invalid(moved.collect())
+}
