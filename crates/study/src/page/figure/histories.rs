@@ -1,14 +1,12 @@
-//! Figs 15 to 18: gap and vertical velocity in one orientation, by row and by column.
+//! Figs 15 to 18: gap and vertical velocity in one orientation, by row and by column of grains.
 
 use grainwake_report::figure::axis::{Axis, extent};
 use grainwake_report::figure::frame::Frame;
-use grainwake_report::figure::style::{
-    BLUE, GREEN, INK, LINE, ORANGE, PAGE, SMALL, TEXT, VERMILION,
-};
+use grainwake_report::figure::style::{BLUE, GREEN, INK, LINE, ORANGE, PAGE, SMALL, VERMILION};
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::{FigureData, StudyFigure, symbol, value_text};
+use super::{FigureData, StudyFigure, factor_label, heading};
 use crate::measure::trajectory::Trajectory;
 use crate::plan::Run;
 
@@ -18,66 +16,76 @@ const LEFT: f64 = 40.0;
 const GAP: f64 = 20.0;
 const WIDTH: f64 = (PAGE - LEFT - GAP - 8.0) / 2.0;
 const HEIGHT: f64 = 128.0;
-/// Above a panel, for its title.
-const HEAD: f64 = 20.0;
-/// Above all, for the legend.
+/// Height of the title above a panel [pt].
+const TITLE: f64 = 20.0;
+/// Height of the legend above the panels [pt].
 const LEGEND: f64 = 16.0;
+/// Dashes of the trailing grain.
+const DASHED: Option<&str> = Some("3.5 1.8");
 
-/// What is drawn of each run.
+/// Quantity of the curves.
 #[derive(Clone, Copy, PartialEq)]
-enum What {
+enum Curve {
     Gap,
     Velocity,
 }
 
-/// Figures 15, 16, 17 and 18.
-pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
-    let plan = &data.plan.analysis.figures;
-    let (Some(rows), Some(columns), Some(axis), Some(level)) =
-        (&plan.rows, &plan.columns, &plan.orientations, &plan.compare)
-    else {
-        return Vec::new();
-    };
-    let wanted: Vec<&Run> = data
-        .plan
-        .runs
-        .iter()
-        .filter(|r| r.member == 0 && r.levels.get(axis) == Some(level))
-        .collect();
-    let missing: Vec<&str> = wanted
-        .iter()
-        .filter(|r| !data.trajectories.contains_key(&r.name))
-        .map(|r| r.name.as_str())
-        .collect();
-    if !missing.is_empty() {
-        notes.push(format!(
-            "figures 15 to 18 lack runs that are not finished: {}",
-            missing.join(", ")
-        ));
-    }
-    let mut out = Vec::new();
-    for (number, what, by, within) in [
-        ("15", What::Gap, rows, columns),
-        ("16", What::Gap, columns, rows),
-        ("17", What::Velocity, rows, columns),
-        ("18", What::Velocity, columns, rows),
-    ] {
-        out.extend(figure(data, &wanted, number, what, by, within, level));
-    }
-    out
+/// One of the figures: number in the paper, factor of the panels, factor of the colours.
+struct Layout<'a> {
+    number: &'a str,
+    curve: Curve,
+    by: &'a str,
+    within: &'a str,
 }
 
-fn figure(
-    data: &FigureData,
-    wanted: &[&Run],
-    number: &str,
-    what: What,
-    by: &str,
-    within: &str,
-    level: &str,
-) -> Option<StudyFigure> {
+/// Draws figures 15, 16, 17 and 18.
+pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
+    let request = &data.plan.analysis.figures;
+    let (Some(rows), Some(columns), Some(axis), Some(level)) = (
+        &request.rows,
+        &request.columns,
+        &request.orientations,
+        &request.compare,
+    ) else {
+        return Vec::new();
+    };
+    let wanted = |run: &&Run| run.member == 0 && run.levels.get(axis) == Some(level);
+    let wanted: Vec<&Run> = data.plan.runs.iter().filter(wanted).collect();
+    let missing = wanted
+        .iter()
+        .filter(|r| !data.trajectories.contains_key(&r.name));
+    let missing: Vec<&str> = missing.map(|r| r.name.as_str()).collect();
+    if !missing.is_empty() {
+        let names = missing.join(", ");
+        notes.push(format!("figures 15 to 18 lack unfinished runs: {names}"));
+    }
+    let layouts = [
+        ("15", Curve::Gap, rows, columns),
+        ("16", Curve::Gap, columns, rows),
+        ("17", Curve::Velocity, rows, columns),
+        ("18", Curve::Velocity, columns, rows),
+    ];
+    let draw = |(number, curve, by, within): (&str, Curve, &String, &String)| {
+        let layout = Layout {
+            number,
+            curve,
+            by,
+            within,
+        };
+        figure(data, &wanted, &layout, level)
+    };
+    layouts.into_iter().filter_map(draw).collect()
+}
+
+fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> Option<StudyFigure> {
+    let Layout {
+        number,
+        curve,
+        by,
+        within,
+    } = *layout;
     let reference = data.plan.analysis.figures.reference.as_ref();
-    let sphere =
+    let reference =
         reference.and_then(|name| Some((name, data.trajectories.get(&data.run(name)?.name)?)));
     let shown: Vec<(&Run, &Trajectory)> = wanted
         .iter()
@@ -86,160 +94,125 @@ fn figure(
     if shown.is_empty() {
         return None;
     }
-    let trajectories = || shown.iter().map(|(_, m)| *m).chain(sphere.map(|(_, m)| m));
-    let end = trajectories()
-        .filter_map(|m| m.time.last().copied())
+    let all = || {
+        shown
+            .iter()
+            .map(|(_, t)| *t)
+            .chain(reference.map(|(_, t)| t))
+    };
+    let end = all()
+        .filter_map(|t| t.time.last().copied())
         .fold(0.0, f64::max);
-    let (low, high) = match what {
-        What::Gap => extent(trajectories().flat_map(|m| m.distance.iter().copied())),
-        What::Velocity => extent(trajectories().flat_map(|m| m.velocity.iter().flatten().copied())),
-    }?;
-    let label = match what {
-        What::Gap => "*D*_{r}/*d*  [–]",
-        What::Velocity => "*v*_{z} / √(*d* *g*)  [–]",
+    let (label, low, high) = match curve {
+        Curve::Gap => {
+            let (_, high) = extent(all().flat_map(|t| t.distance.iter().copied()))?;
+            ("*D*_{r}/*d*  [–]", 0.0, high)
+        }
+        Curve::Velocity => {
+            let values = all().flat_map(|t| t.velocity.iter().flatten().copied());
+            let (low, high) = extent(values)?;
+            ("*v*_{z} / √(*d* *g*)  [–]", low, high)
+        }
     };
     let panels = data.factor_values(by);
     let lines = data.factor_values(within);
-    let high_rows = panels.len().div_ceil(2);
-    let mut drawing = Drawing::new(
-        PAGE,
-        LEGEND + high_rows as f64 * (HEIGHT + HEAD) + 26.0 + 8.0,
-    );
+    let rows = panels.len().div_ceil(2);
+    let height = LEGEND + rows as f64 * (HEIGHT + TITLE) + 26.0 + 8.0;
+    let mut drawing = Drawing::new(PAGE, height);
     for (i, value) in panels.iter().enumerate() {
         let (column, row) = (i % 2, i / 2);
         let frame = Frame {
             x: LEFT + column as f64 * (WIDTH + GAP),
-            y: LEGEND + HEAD + row as f64 * (HEIGHT + HEAD),
+            y: LEGEND + TITLE + row as f64 * (HEIGHT + TITLE),
             width: WIDTH,
             height: HEIGHT,
             across: Axis::linear(TIME, 0.0, end, 6, true),
-            up: Axis::linear(
-                label,
-                if what == What::Gap { 0.0 } else { low },
-                high.max(0.0),
-                5,
-                false,
-            ),
+            up: Axis::linear(label, low, high.max(0.0), 5, false),
         };
         frame.grid(&mut drawing);
         let letter = char::from(b'a' + (i % 26) as u8);
-        let title = format!("({letter})  {} = {}", symbol(by), value_text(*value));
-        drawing.label(
-            frame.x,
-            frame.y - 4.0,
+        let title = format!("({letter})  {}", factor_label(by, *value));
+        heading(
+            &mut drawing,
+            (frame.x, frame.y - 4.0),
             Anchor::Start,
-            TEXT,
-            INK,
             &title,
-            false,
         );
-        let mut curve = |motion: &Trajectory, colour: &str, name: &str| match what {
-            What::Gap => frame.curve(
-                &mut drawing,
-                &motion.points(&motion.distance),
-                colour,
-                None,
-                &format!("clip-{i}-{name}"),
-            ),
-            What::Velocity => {
-                frame.curve(
-                    &mut drawing,
-                    &motion.points(&motion.velocity[1]),
-                    colour,
-                    None,
-                    &format!("clip-{i}-{name}-l"),
-                );
-                frame.curve(
-                    &mut drawing,
-                    &motion.points(&motion.velocity[0]),
-                    colour,
-                    Some("3.5 1.8"),
-                    &format!("clip-{i}-{name}-t"),
-                );
+        let mut draw = |t: &Trajectory, colour: &str, name: &str| {
+            let clip = format!("clip-{i}-{name}");
+            let mut line = |values: &[f64], dash, clip: &str| {
+                frame.curve(&mut drawing, &t.points(values), colour, dash, clip);
+            };
+            match curve {
+                Curve::Gap => line(&t.distance, None, &clip),
+                Curve::Velocity => {
+                    line(&t.velocity[1], None, &format!("{clip}-l"));
+                    line(&t.velocity[0], DASHED, &format!("{clip}-t"));
+                }
             }
         };
-        if let Some((_, motion)) = sphere.filter(|_| what == What::Gap) {
-            curve(motion, INK, "sphere");
+        if let Some((_, trajectory)) = reference.filter(|_| curve == Curve::Gap) {
+            draw(trajectory, INK, "sphere");
         }
-        for (run, motion) in shown
+        for (run, trajectory) in shown
             .iter()
             .filter(|(r, _)| r.factors.get(by) == Some(value))
         {
-            let n = lines
-                .iter()
-                .position(|v| run.factors.get(within) == Some(v))
-                .unwrap_or(0);
-            curve(motion, COLOURS[n % 4], &run.name);
+            let own = run.factors.get(within);
+            let n = lines.iter().position(|v| own == Some(v)).unwrap_or(0);
+            draw(trajectory, COLOURS[n % 4], &run.name);
         }
-        frame.outline(&mut drawing, (row + 1 == high_rows, column == 0));
+        frame.outline(&mut drawing, (row + 1 == rows, column == 0));
     }
     let mut entries: Vec<(String, &str, Option<&str>)> = lines
         .iter()
         .enumerate()
-        .map(|(n, v)| {
-            let name = format!("{} = {}", symbol(within), value_text(*v));
-            (name, COLOURS[n % 4], None)
-        })
+        .map(|(n, v)| (factor_label(within, *v), COLOURS[n % 4], None))
         .collect();
-    match what {
-        What::Velocity => entries.extend([
-            ("leading".to_owned(), INK, None),
-            ("trailing".to_owned(), INK, Some("3.5 1.8")),
-        ]),
-        What::Gap if sphere.is_some() => {
-            let name = reference.map_or("", String::as_str);
-            entries.push((text::literal(name), INK, None));
+    match (curve, reference) {
+        (Curve::Velocity, _) => {
+            entries.push(("leading".to_owned(), INK, None));
+            entries.push(("trailing".to_owned(), INK, DASHED));
         }
-        What::Gap => {}
+        (Curve::Gap, Some((name, _))) => entries.push((text::literal(name), INK, None)),
+        (Curve::Gap, None) => {}
     }
-    legend(
-        &mut drawing,
-        &entries,
-        LEFT + 2.0 * WIDTH + GAP,
-        LEGEND - 6.0,
-    );
-    let (quantity, file) = match what {
-        What::Gap => ("Distance of the centres", "gap"),
-        What::Velocity => ("Vertical velocity", "velocity"),
+    legend(&mut drawing, &entries);
+    let (quantity, file) = match curve {
+        Curve::Gap => ("Distance of the centres", "gap"),
+        Curve::Velocity => ("Vertical velocity", "velocity"),
     };
+    let mut caption = format!(
+        "{quantity} in orientation {} until the first landing. Panels: grains of equal {by}; \
+         colours: {within}.",
+        text::literal(level)
+    );
+    if curve == Curve::Velocity {
+        caption += " Negative is downwards. The leading grain is the lower one at the start.";
+    }
+    if shown.len() < wanted.len() {
+        caption += &format!(" {} of {} runs are finished.", shown.len(), wanted.len());
+    }
     let way = if matches!(number, "15" | "17") {
         "row"
     } else {
         "column"
     };
-    let mut caption = format!(
-        "{quantity} in orientation {} until the first grain lands; a panel holds the grains of one {by}, colours are {within}.",
-        text::literal(level)
-    );
-    if what == What::Velocity {
-        caption +=
-            " Down is negative; leading and trailing are the grains as they lie at the start.";
-    }
-    if shown.len() < wanted.len() {
-        caption += &format!(" {} of {} runs are finished.", shown.len(), wanted.len());
-    }
-    Some(StudyFigure {
-        name: format!("fig{number}-{file}-by-{way}"),
-        number: number.into(),
-        title: format!("{quantity} by {by}"),
-        caption,
-        drawing,
-    })
+    let name = format!("fig{number}-{file}-by-{way}");
+    let title = format!("{quantity} by {by}");
+    Some(StudyFigure::new(name, number, title, caption, drawing))
 }
 
-/// Entries of a legend in a line that ends at `right`.
-fn legend(drawing: &mut Drawing, entries: &[(String, &str, Option<&str>)], right: f64, base: f64) {
-    let mut x = right;
+/// Draws a legend of lines, aligned with the right edge of the panels.
+fn legend(drawing: &mut Drawing, entries: &[(String, &str, Option<&str>)]) {
+    let base = LEGEND - 6.0;
+    let mut x = LEFT + 2.0 * WIDTH + GAP;
     for (name, colour, dash) in entries.iter().rev() {
         x -= text::width(name, SMALL);
         drawing.label(x, base, Anchor::Start, SMALL, INK, name, false);
         x -= 15.0;
-        drawing.line(
-            &[(x, base - 0.36 * SMALL), (x + 12.0, base - 0.36 * SMALL)],
-            colour,
-            LINE,
-            *dash,
-        );
+        let y = base - 0.36 * SMALL;
+        drawing.line(&[(x, y), (x + 12.0, y)], colour, LINE, *dash);
         x -= 8.0;
     }
 }

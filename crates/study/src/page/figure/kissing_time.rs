@@ -1,16 +1,14 @@
-//! Fig. 14: kissing times of all models, and their spread by grain.
+//! Fig. 14: kissing times of all models, and their spread over the orientations of each grain.
 
 use std::collections::BTreeMap;
 
 use grainwake_report::figure::axis::{Axis, extent};
 use grainwake_report::figure::frame::{Frame, Sign};
-use grainwake_report::figure::style::{
-    BLUE, GREEN, HAIR, INK, ORANGE, PAGE, SMALL, TEXT, VERMILION,
-};
+use grainwake_report::figure::style::{BLUE, GREEN, HAIR, INK, ORANGE, PAGE, TEXT, VERMILION};
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::{FigureData, StudyFigure, symbol, value_text};
+use super::{FigureData, StudyFigure, factor_label, heading, sign_entry};
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::quantile;
 use crate::format::significant;
@@ -18,308 +16,263 @@ use crate::format::significant;
 const COLOURS: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
 const SHADES: [&str; 2] = ["#e9e9ec", "#f6f6f8"];
 const LABEL: &str = "kissing time  *t* √(*g*/*d*)  [–]";
+const LEFT: f64 = 38.0;
+/// Height of the legend of the first figure [pt].
+const LEGEND: f64 = 9.0;
 
-/// Kissing times by grain: where each grain stands, and its block.
-struct Layout {
+/// Frame with one position per grain, grouped into blocks of equal row factor.
+struct Layout<'a> {
+    axis: &'a str,
     grains: Vec<String>,
     reference: Option<Observation>,
     all: Vec<Observation>,
     frame: Frame,
-    /// First and last place, value of the row factor.
+    /// First and last position of a block, and the value of its row factor.
     blocks: Vec<(usize, usize, f64)>,
 }
 
-fn layout(data: &FigureData, height: f64, top: f64) -> Option<Layout> {
-    let plan = &data.plan.analysis.figures;
-    let axis = plan.grains.as_ref()?;
+fn layout<'a>(data: &'a FigureData, height: f64, top: f64) -> Option<Layout<'a>> {
+    let request = &data.plan.analysis.figures;
+    let axis = request.grains.as_ref()?;
     let grains = data.levels(axis);
     let all = observations(data.records, "kiss_time", &BTreeMap::new());
-    let reference = plan
-        .reference
-        .as_ref()
-        .and_then(|name| all.iter().find(|s| s.model == *name))
+    let reference = request.reference.as_ref();
+    let found = reference
+        .and_then(|name| all.iter().find(|o| o.model == *name))
         .cloned();
-    let values = all.iter().flat_map(|s| [s.range.0, s.range.1, s.value]);
-    let (_, high) = extent(values)?;
-    let places = grains.len() + usize::from(plan.reference.is_some());
-    let mut across = Axis::linear("grain", 0.0, places as f64, 4, true);
-    let number = |name: &String| {
-        name.trim_start_matches(|c: char| !c.is_ascii_digit())
-            .trim_start_matches('0')
-            .to_owned()
+    let (_, high) = extent(all.iter().flat_map(|o| [o.range.0, o.range.1, o.value]))?;
+    let count = grains.len() + usize::from(reference.is_some());
+    let mut across = Axis::linear("grain", 0.0, count as f64, 4, true);
+    let number = |name: &str| {
+        let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
+        digits.trim_start_matches('0').to_owned()
     };
-    across.ticks = grains
-        .iter()
+    let ticks = grains.iter().map(|grain| number(grain));
+    let ticks = ticks.chain(reference.map(|name| text::literal(name)));
+    across.ticks = ticks
         .enumerate()
-        .map(|(i, g)| (i as f64 + 0.5, number(g)))
+        .map(|(i, label)| (i as f64 + 0.5, label))
         .collect();
-    if let Some(name) = &plan.reference {
-        across
-            .ticks
-            .push((places as f64 - 0.5, text::literal(name)));
-    }
-    let frame = Frame {
-        x: 38.0,
-        y: top,
-        width: PAGE - 38.0 - 8.0,
-        height,
-        across,
-        // Room for the labels of the blocks.
-        up: Axis::linear(LABEL, 0.0, 1.12 * high, 5, false),
-    };
     let mut blocks: Vec<(usize, usize, f64)> = Vec::new();
     for (i, grain) in grains.iter().enumerate() {
-        let run = data
-            .plan
-            .runs
-            .iter()
-            .find(|r| r.levels.get(axis) == Some(grain))?;
-        let value = plan
-            .rows
-            .as_ref()
-            .and_then(|f| run.factors.get(f))
-            .copied()
-            .unwrap_or(f64::NAN);
+        let run = data.run_at(axis, grain)?;
+        let value = request.rows.as_ref().and_then(|f| run.factors.get(f));
+        let value = value.copied().unwrap_or(f64::NAN);
         match blocks.last_mut() {
             Some((_, last, v)) if *v == value => *last = i,
             _ => blocks.push((i, i, value)),
         }
     }
     Some(Layout {
+        axis,
         grains,
-        reference,
+        reference: found,
         all,
-        frame,
+        frame: Frame {
+            x: LEFT,
+            y: top,
+            width: PAGE - LEFT - 8.0,
+            height,
+            across,
+            // Room for the labels of the blocks.
+            up: Axis::linear(LABEL, 0.0, 1.12 * high, 5, false),
+        },
         blocks,
     })
 }
 
-impl Layout {
-    fn ground(&self, drawing: &mut Drawing, rows: Option<&str>) {
+impl Layout<'_> {
+    /// Starts a drawing with blocks, grid and the level of the reference.
+    fn drawing(&self, rows: Option<&str>) -> Drawing {
         let f = &self.frame;
+        let mut drawing = Drawing::new(PAGE, f.y + f.height + 26.0);
         let blocks = || {
-            let each = self.blocks.iter().enumerate();
-            each.map(|(n, (first, last, value))| {
-                let (left, right) = (f.px(*first as f64), f.px(*last as f64 + 1.0));
-                (left, right, format!("fill=\"{}\"", SHADES[n % 2]), *value)
-            })
+            self.blocks
+                .iter()
+                .enumerate()
+                .map(|(n, (first, last, value))| {
+                    let (left, right) = (f.px(*first as f64), f.px(*last as f64 + 1.0));
+                    (left, right, format!("fill=\"{}\"", SHADES[n % 2]), *value)
+                })
         };
         for (left, right, shade, _) in blocks() {
             drawing.rectangle(left, f.y, right - left, f.height, &shade);
         }
-        f.grid(drawing);
+        f.grid(&mut drawing);
         for (left, right, shade, value) in blocks() {
             if let Some(factor) = rows.filter(|_| value.is_finite()) {
-                let label = format!("{} = {}", symbol(factor), value_text(value));
+                let label = factor_label(factor, value);
                 let (middle, width) = (0.5 * (left + right), text::width(&label, TEXT) + 4.0);
-                // No line of the grid runs through the letters.
+                // Hides the grid behind the letters.
                 drawing.rectangle(middle - 0.5 * width, f.y + 1.0, width, 11.0, &shade);
-                drawing.label(middle, f.y + 9.0, Anchor::Middle, TEXT, INK, &label, false);
+                heading(&mut drawing, (middle, f.y + 9.0), Anchor::Middle, &label);
             }
         }
         if let Some(reference) = &self.reference {
-            f.level(drawing, reference.value);
+            f.level(&mut drawing, reference.value);
         }
+        drawing
+    }
+
+    /// Horizontal coordinate of the reference, to the right of all grains.
+    fn reference_position(&self) -> f64 {
+        self.grains.len() as f64 + 0.5
+    }
+
+    /// Draws the symbol of an observation and the bar of its range.
+    fn mark(&self, drawing: &mut Drawing, at: f64, o: &Observation, sign: Sign, colour: &str) {
+        let f = &self.frame;
+        let x = f.px(at);
+        if o.range.1 > o.range.0 {
+            let bar = [(x, f.py(o.range.0)), (x, f.py(o.range.1))];
+            drawing.line(&bar, colour, 0.9, None);
+        }
+        sign.draw(drawing, (x, f.py(o.value)), 2.9, colour, o.censored);
+    }
+
+    fn censored(&self) -> usize {
+        self.all.iter().filter(|o| o.censored).count()
     }
 }
 
-/// Kissing time of every model, with the spread of its members.
+/// Draws the kissing time of every model, with its range over the ensemble.
 pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
-    let plan = &data.plan.analysis.figures;
+    let request = &data.plan.analysis.figures;
     let layout = layout(data, 190.0, 20.0)?;
-    let f = &layout.frame;
-    let mut drawing = Drawing::new(PAGE, f.y + f.height + 26.0);
-    layout.ground(&mut drawing, plan.rows.as_deref());
-    let orientations = plan
-        .orientations
-        .as_ref()
+    let mut drawing = layout.drawing(request.rows.as_deref());
+    let orientations = request.orientations.as_ref();
+    let levels = orientations
         .map(|axis| data.levels(axis))
         .unwrap_or_default();
-    let mut x = f.x;
-    for (n, name) in orientations.iter().enumerate() {
-        Sign::number(n).draw(&mut drawing, (x + 4.0, 9.0), 3.0, COLOURS[n % 4], false);
-        let label = text::literal(name);
-        drawing.label(
-            x + 10.0,
-            9.0 + 0.36 * SMALL,
-            Anchor::Start,
-            SMALL,
-            INK,
-            &label,
-            false,
-        );
-        x += 24.0 + text::width(&label, SMALL);
+    let mut x = LEFT;
+    for (n, name) in levels.iter().enumerate() {
+        let sign = (Sign::number(n), COLOURS[n % 4], false);
+        x = sign_entry(&mut drawing, (x, LEGEND), sign, &text::literal(name));
     }
-    let bounds = layout.all.iter().filter(|s| s.censored).count();
-    if bounds > 0 {
-        Sign::Circle.draw(&mut drawing, (x + 4.0, 9.0), 3.0, INK, true);
-        drawing.label(
-            x + 10.0,
-            9.0 + 0.36 * SMALL,
-            Anchor::Start,
-            SMALL,
-            INK,
-            "hollow: no kiss before landing, which is shown",
-            false,
-        );
+    let censored = layout.censored();
+    if censored > 0 {
+        let label = "hollow: landed before kissing; the landing is shown";
+        sign_entry(&mut drawing, (x, LEGEND), (Sign::Circle, INK, true), label);
     }
-    let mut draw = |sample: &Observation, at: f64, n: usize, colour: &str| {
-        let x = f.px(at);
-        if sample.range.1 > sample.range.0 {
-            drawing.line(
-                &[(x, f.py(sample.range.0)), (x, f.py(sample.range.1))],
-                colour,
-                0.9,
-                None,
-            );
-        }
-        Sign::number(n).draw(
-            &mut drawing,
-            (x, f.py(sample.value)),
-            2.9,
-            colour,
-            sample.censored,
-        );
-    };
-    let grain_axis = plan.grains.as_deref().unwrap_or_default();
-    for sample in &layout.all {
-        let grain = sample.levels.get(grain_axis);
-        let Some(place) = grain.and_then(|g| layout.grains.iter().position(|o| o == g)) else {
+    for observation in &layout.all {
+        let grain = observation.levels.get(layout.axis);
+        let Some(i) = grain.and_then(|g| layout.grains.iter().position(|o| o == g)) else {
             continue;
         };
-        let level = plan
-            .orientations
-            .as_ref()
-            .and_then(|axis| sample.levels.get(axis));
+        let level = orientations.and_then(|axis| observation.levels.get(axis));
         let n = level
-            .and_then(|l| orientations.iter().position(|o| o == l))
+            .and_then(|l| levels.iter().position(|o| o == l))
             .unwrap_or(0);
-        let shift = if orientations.len() > 1 {
-            0.6 * n as f64 / (orientations.len() - 1) as f64 - 0.3
-        } else {
-            0.0
+        let shift = match levels.len() {
+            0 | 1 => 0.0,
+            count => 0.6 * n as f64 / (count - 1) as f64 - 0.3,
         };
-        draw(sample, place as f64 + 0.5 + shift, n, COLOURS[n % 4]);
+        let at = i as f64 + 0.5 + shift;
+        layout.mark(
+            &mut drawing,
+            at,
+            observation,
+            Sign::number(n),
+            COLOURS[n % 4],
+        );
     }
     if let Some(reference) = &layout.reference {
-        draw(reference, layout.grains.len() as f64 + 0.5, 0, INK);
+        let at = layout.reference_position();
+        layout.mark(&mut drawing, at, reference, Sign::number(0), INK);
     }
-    f.outline(&mut drawing, (true, true));
-    let members = data.records.iter().map(|r| r.member).max().unwrap_or(0);
-    let mut caption = format!(
-        "First contact of {} models, by grain and initial orientation.",
-        layout.all.len()
-    );
-    if let Some(rows) = &plan.rows {
-        caption += &format!(" A block holds the grains of one {rows}.");
+    layout.frame.outline(&mut drawing, (true, true));
+    let count = layout.all.len();
+    let mut caption = format!("First contact of {count} models, by grain and initial orientation.");
+    if let Some(rows) = &request.rows {
+        caption += &format!(" Blocks: grains of equal {rows}.");
     }
-    if let Some(name) = plan
-        .reference
-        .as_ref()
-        .filter(|_| layout.reference.is_some())
-    {
-        caption += &format!(" The dashed line is {}.", text::literal(name));
+    if let Some(reference) = &layout.reference {
+        caption += &format!(" Dashed line: {}.", text::literal(&reference.model));
     }
-    caption += &if members > 0 {
-        format!(
-            " Signs are medians and bars the range of up to {} runs with small random offsets of the start.",
+    caption += &match data.records.iter().map(|r| r.member).max() {
+        None | Some(0) => " Each symbol is one run.".to_owned(),
+        Some(members) => format!(
+            " Symbols are medians and bars the range of up to {} runs with small random offsets \
+             of the initial position.",
             members + 1
-        )
-    } else {
-        " Each sign is one run.".to_owned()
+        ),
     };
-    if bounds > 0 {
-        caption += &format!(" {bounds} pairs landed before they kissed.");
+    if censored > 0 {
+        caption += &format!(" {censored} pairs landed before they kissed.");
     }
-    Some(StudyFigure {
-        name: "fig14a-kissing-time".into(),
-        number: "14a".into(),
-        title: "Kissing time of all models".into(),
+    Some(StudyFigure::new(
+        "fig14a-kissing-time",
+        "14a",
+        "Kissing time of all models",
         caption,
         drawing,
-    })
+    ))
 }
 
-/// Spread of the kissing time over the orientations of each grain.
-pub fn boxes(data: &FigureData) -> Option<StudyFigure> {
-    let plan = &data.plan.analysis.figures;
+/// Draws a box plot of the kissing times over the orientations of each grain.
+pub fn box_plot(data: &FigureData) -> Option<StudyFigure> {
     let layout = layout(data, 160.0, 8.0)?;
     let f = &layout.frame;
-    let axis = plan.grains.as_ref()?;
-    let mut drawing = Drawing::new(PAGE, f.y + f.height + 26.0);
-    layout.ground(&mut drawing, plan.rows.as_deref());
+    let mut drawing = layout.drawing(data.plan.analysis.figures.rows.as_deref());
+    let box_style =
+        format!("fill=\"{BLUE}\" fill-opacity=\"0.35\" stroke=\"{INK}\" stroke-width=\"{HAIR}\"");
     let mut widest: Option<(f64, &String)> = None;
-    let mut drawn = 0;
     for (i, grain) in layout.grains.iter().enumerate() {
-        let values: Vec<f64> = layout
+        let own = layout
             .all
             .iter()
-            .filter(|s| s.levels.get(axis) == Some(grain))
-            .map(|s| s.value)
-            .collect();
-        let of = |part: f64| quantile(&values, part);
-        let (Some(low), Some(q1), Some(middle), Some(q3), Some(high)) =
-            (of(0.0), of(0.25), of(0.5), of(0.75), of(1.0))
-        else {
+            .filter(|o| o.levels.get(layout.axis) == Some(grain));
+        let values: Vec<f64> = own.map(|o| o.value).collect();
+        if values.is_empty() {
             continue;
-        };
-        drawn += 1;
-        if widest.is_none_or(|(w, _)| high - low > w) {
+        }
+        let [low, q1, middle, q3, high] =
+            [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| quantile(&values, part).unwrap_or(f64::NAN));
+        if widest.is_none_or(|(width, _)| high - low > width) {
             widest = Some((high - low, grain));
         }
         let (x, half) = (f.px(i as f64 + 0.5), 7.0);
-        for (from, end) in [(q1, low), (q3, high)] {
-            drawing.line(&[(x, f.py(from)), (x, f.py(end))], INK, HAIR, None);
+        let mut bar = |from: (f64, f64), to: (f64, f64), width: f64| {
             drawing.line(
-                &[(x - 3.5, f.py(end)), (x + 3.5, f.py(end))],
+                &[(from.0, f.py(from.1)), (to.0, f.py(to.1))],
                 INK,
-                HAIR,
+                width,
                 None,
             );
+        };
+        for (from, end) in [(q1, low), (q3, high)] {
+            bar((x, from), (x, end), HAIR);
+            bar((x - 3.5, end), (x + 3.5, end), HAIR);
         }
-        let style = format!(
-            "fill=\"{BLUE}\" fill-opacity=\"0.35\" stroke=\"{INK}\" stroke-width=\"{HAIR}\""
-        );
-        drawing.rectangle(x - half, f.py(q3), 2.0 * half, f.py(q1) - f.py(q3), &style);
-        drawing.line(
-            &[(x - half, f.py(middle)), (x + half, f.py(middle))],
-            INK,
-            1.4,
-            None,
-        );
+        let height = f.py(q1) - f.py(q3);
+        drawing.rectangle(x - half, f.py(q3), 2.0 * half, height, &box_style);
+        let median = [(x - half, f.py(middle)), (x + half, f.py(middle))];
+        drawing.line(&median, INK, 1.4, None);
     }
     if let Some(reference) = &layout.reference {
-        Sign::Circle.draw(
-            &mut drawing,
-            (
-                f.px(layout.grains.len() as f64 + 0.5),
-                f.py(reference.value),
-            ),
-            2.9,
-            INK,
-            reference.censored,
-        );
+        let place = (f.px(layout.reference_position()), f.py(reference.value));
+        Sign::Circle.draw(&mut drawing, place, 2.9, INK, reference.censored);
     }
     f.outline(&mut drawing, (true, true));
-    let bounds = layout.all.iter().filter(|s| s.censored).count();
-    let mut caption = match widest {
-        Some((width, grain)) if drawn > 0 => format!(
-            "Kissing times of the orientations of each grain: smallest, lower quantile, median, upper quantile and largest. The orientation matters most for {}, whose kissing times span {}.",
-            text::literal(grain),
-            significant(width)
-        ),
-        _ => return None,
-    };
-    if bounds > 0 {
+    let (width, grain) = widest?;
+    let mut caption = format!(
+        "Kissing times over the orientations of each grain: minimum, lower quartile, median, upper \
+         quartile and maximum. The range is largest for {}: {}.",
+        text::literal(grain),
+        significant(width)
+    );
+    let censored = layout.censored();
+    if censored > 0 {
         caption += &format!(
-            " The {bounds} pairs that landed before they kissed count with the time of the landing."
+            " The {censored} pairs that landed before they kissed are included with the time of \
+             landing."
         );
     }
-    Some(StudyFigure {
-        name: "fig14b-kissing-time-spread".into(),
-        number: "14b".into(),
-        title: "Spread of the kissing time by grain".into(),
+    Some(StudyFigure::new(
+        "fig14b-kissing-time-spread",
+        "14b",
+        "Spread of the kissing time by grain",
         caption,
         drawing,
-    })
+    ))
 }

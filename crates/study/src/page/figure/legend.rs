@@ -1,4 +1,4 @@
-//! How runs are told apart in the figures that a study has without being asked, and the legend.
+//! Line styles of runs in the overview figures, and their legend.
 
 use grainwake_report::figure::frame::Sign;
 use grainwake_report::figure::style::{
@@ -7,43 +7,47 @@ use grainwake_report::figure::style::{
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::FigureData;
+use super::{FigureData, note, unique};
 use crate::plan::Run;
 
 const COLOURS: [&str; 6] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY];
 const DASHES: [Option<&str>; 4] = [None, Some("4 1.8"), Some("1.2 1.5"), Some("6 1.6 1.2 1.6")];
 /// Height of a row of the legend [pt].
-pub const ROW: f64 = 10.0;
+const ROW: f64 = 10.0;
 
 /// Line style of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineStyle {
-    /// Colour of its line and sign.
+    /// Colour of the line and the symbols.
     pub colour: &'static str,
-    /// Dashes of its line.
+    /// Dash pattern of the line.
     pub dash: Option<&'static str>,
-    /// Sign of its points.
+    /// Symbol of the points.
     pub sign: Sign,
 }
 
-/// What colours and dashes stand for.
+impl LineStyle {
+    fn numbered(colour: usize, dash: usize, sign: usize) -> LineStyle {
+        LineStyle {
+            colour: COLOURS[colour % COLOURS.len()],
+            dash: DASHES[dash % DASHES.len()],
+            sign: Sign::number(sign),
+        }
+    }
+}
+
+/// Assignment of line styles to runs.
 pub enum LineStyles {
-    /// Colours are models.
+    /// One colour per model.
     Models(Vec<String>),
-    /// Colours are the values of an axis, dashes those of another.
+    /// One colour per level of the first axis, one dash pattern per level of the second.
     Axes(Vec<(String, Vec<String>)>),
 }
 
 impl LineStyles {
-    /// Models where they are few or on no axis, else up to two axes.
+    /// Assigns by model if there are few models or no axes, else by up to two axes.
     pub fn of(data: &FigureData) -> LineStyles {
-        let runs = &data.plan.runs;
-        let mut models: Vec<String> = Vec::new();
-        for run in runs {
-            if !models.contains(&run.model) {
-                models.push(run.model.clone());
-            }
-        }
+        let models = unique(data.plan.runs.iter().map(|run| &run.model));
         let axes = axes(data);
         if models.len() <= COLOURS.len() || axes.is_empty() {
             return LineStyles::Models(models);
@@ -51,57 +55,50 @@ impl LineStyles {
         LineStyles::Axes(axes.into_iter().take(2).collect())
     }
 
-    /// Of a run.
-    pub fn look(&self, run: &Run) -> LineStyle {
+    /// Returns the style of a run; black for a model outside the axes.
+    pub fn style(&self, run: &Run) -> LineStyle {
         let (colour, dash) = match self {
             LineStyles::Models(models) => (models.iter().position(|m| *m == run.model), None),
             LineStyles::Axes(axes) => {
-                let place = |(axis, levels): &(String, Vec<String>)| {
+                let index = |(axis, levels): &(String, Vec<String>)| {
                     let level = run.levels.get(axis)?;
                     levels.iter().position(|l| l == level)
                 };
-                (axes.first().and_then(place), axes.get(1).and_then(place))
+                (axes.first().and_then(index), axes.get(1).and_then(index))
             }
         };
-        // A model that stands outside the axes.
-        let Some(colour) = colour else {
-            return LineStyle {
+        match colour {
+            Some(colour) => LineStyle::numbered(colour, dash.unwrap_or(0), dash.unwrap_or(colour)),
+            None => LineStyle {
                 colour: INK,
                 dash: None,
                 sign: Sign::Circle,
-            };
-        };
-        LineStyle {
-            colour: COLOURS[colour % COLOURS.len()],
-            dash: DASHES[dash.unwrap_or(0) % DASHES.len()],
-            sign: Sign::number(dash.unwrap_or(colour)),
+            },
         }
     }
 
     fn entries(&self) -> Vec<(String, LineStyle)> {
-        let look = |colour: &'static str, n: usize, sign: usize| LineStyle {
-            colour,
-            dash: DASHES[n % DASHES.len()],
-            sign: Sign::number(sign),
-        };
         match self {
-            // More models than that have no colours of their own.
+            // Colours repeat, so a longer legend would be ambiguous.
             LineStyles::Models(models) => models
                 .iter()
                 .take(4 * COLOURS.len())
                 .enumerate()
-                .map(|(i, m)| (m.clone(), look(COLOURS[i % COLOURS.len()], 0, i)))
+                .map(|(i, model)| (model.clone(), LineStyle::numbered(i, 0, i)))
                 .collect(),
             LineStyles::Axes(axes) => {
                 let mut out = Vec::new();
                 for (n, (axis, levels)) in axes.iter().enumerate() {
                     for (i, level) in levels.iter().enumerate() {
-                        let look = match (n, axes.len()) {
-                            (0, 1) => look(COLOURS[i % COLOURS.len()], 0, i),
-                            (0, _) => look(COLOURS[i % COLOURS.len()], 0, 0),
-                            _ => look(INK, i, i),
+                        let mut style = match (n, axes.len()) {
+                            (0, 1) => LineStyle::numbered(i, 0, i),
+                            (0, _) => LineStyle::numbered(i, 0, 0),
+                            _ => LineStyle::numbered(0, i, i),
                         };
-                        out.push((format!("{axis} {level}"), look));
+                        if n > 0 {
+                            style.colour = INK;
+                        }
+                        out.push((format!("{axis} {level}"), style));
                     }
                 }
                 out
@@ -109,10 +106,10 @@ impl LineStyles {
         }
     }
 
-    /// Draws the legend from the left in rows, or only measures it; returns its height [pt].
+    /// Draws the legend in rows from `left`, or only measures it; returns its height [pt].
     pub fn legend(&self, mut drawing: Option<&mut Drawing>, left: f64, signs: bool) -> f64 {
         let (mut x, mut y) = (left, 0.5 * ROW);
-        for (name, look) in self.entries() {
+        for (name, style) in self.entries() {
             let label = text::literal(&name);
             let width = 17.0 + text::width(&label, SMALL) + 12.0;
             if x + width > PAGE && x > left {
@@ -120,13 +117,13 @@ impl LineStyles {
             }
             if let Some(drawing) = drawing.as_deref_mut() {
                 if signs {
-                    look.sign
-                        .draw(drawing, (x + 7.0, y), 2.7, look.colour, false);
+                    style
+                        .sign
+                        .draw(drawing, (x + 7.0, y), 2.7, style.colour, false);
                 } else {
-                    drawing.line(&[(x, y), (x + 14.0, y)], look.colour, LINE, look.dash);
+                    drawing.line(&[(x, y), (x + 14.0, y)], style.colour, LINE, style.dash);
                 }
-                let base = y + 0.36 * SMALL;
-                drawing.label(x + 17.0, base, Anchor::Start, SMALL, INK, &label, false);
+                note(drawing, (x + 17.0, y), Anchor::Start, &label);
             }
             x += width;
         }
@@ -134,23 +131,12 @@ impl LineStyles {
     }
 }
 
-/// The axes with more than one value, with their values in the order of the runs.
+/// Returns the axes with more than one level, and their levels in the order of the runs.
 pub fn axes(data: &FigureData) -> Vec<(String, Vec<String>)> {
-    let mut names: Vec<String> = Vec::new();
-    for run in &data.plan.runs {
-        for axis in run
-            .levels
-            .keys()
-            .filter(|a| !names.contains(a))
-            .cloned()
-            .collect::<Vec<_>>()
-        {
-            names.push(axis);
-        }
-    }
-    let all = names.into_iter().map(|axis| {
+    let names = unique(data.plan.runs.iter().flat_map(|run| run.levels.keys()));
+    let axes = names.into_iter().map(|axis| {
         let levels = data.levels(&axis);
         (axis, levels)
     });
-    all.filter(|(_, levels)| levels.len() > 1).collect()
+    axes.filter(|(_, levels)| levels.len() > 1).collect()
 }

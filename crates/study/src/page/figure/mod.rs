@@ -5,6 +5,7 @@ mod histories;
 mod kissing_time;
 mod legend;
 mod overview;
+mod panels;
 mod setup;
 mod snapshots;
 mod trends;
@@ -12,7 +13,9 @@ mod trends;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_report::figure::svg::Drawing;
+use grainwake_report::figure::frame::Sign;
+use grainwake_report::figure::style::{INK, SMALL, TEXT};
+use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 use grainwake_solver::case::Case;
 use grainwake_solver::output::RESOLVED;
@@ -22,81 +25,106 @@ use crate::measure::record::RunRecord;
 use crate::measure::trajectory::Trajectory;
 use crate::plan::{Plan, Run};
 
-/// A figure ready to be written.
+/// A figure of the report.
 pub struct StudyFigure {
-    /// File name without its extension.
+    /// File name without extension.
     pub name: String,
-    /// Number of its counterpart in the paper, if it has one.
+    /// Number of its counterpart in the paper; empty if there is none.
     pub number: String,
     /// Title.
     pub title: String,
-    /// What is to be seen, in label markup.
+    /// Caption, in label markup.
     pub caption: String,
-    /// The drawing.
+    /// Drawing.
     pub drawing: Drawing,
 }
 
 impl StudyFigure {
-    /// As an SVG document that can also stand inside a page.
+    fn new(
+        name: impl Into<String>,
+        number: impl Into<String>,
+        title: impl Into<String>,
+        caption: impl Into<String>,
+        drawing: Drawing,
+    ) -> StudyFigure {
+        StudyFigure {
+            name: name.into(),
+            number: number.into(),
+            title: title.into(),
+            caption: caption.into(),
+            drawing,
+        }
+    }
+
+    /// Returns the SVG document, which can also be embedded in a page.
     pub fn svg(&self) -> String {
-        self.drawing.to_svg(
-            &self.name,
-            &text::plain(&self.title),
-            &text::plain(&self.caption),
-        )
+        let (title, caption) = (text::plain(&self.title), text::plain(&self.caption));
+        self.drawing.to_svg(&self.name, &title, &caption)
     }
 }
 
-/// What the figures are drawn from.
+/// Data of the figures.
 pub struct FigureData<'a> {
-    /// The plan.
+    /// Plan.
     pub plan: &'a Plan,
-    /// The table.
+    /// Records of the runs, in the order of the plan.
     pub records: &'a [RunRecord],
-    /// The study folder.
+    /// Study folder.
     pub folder: &'a Path,
-    /// Correlations to be drawn.
+    /// Correlations.
     pub correlations: &'a [Correlation],
-    /// Motions of the finished runs that are compared, by run.
+    /// Trajectories of the finished runs that are compared, by name of the run.
     pub trajectories: BTreeMap<String, Trajectory>,
 }
 
 impl FigureData<'_> {
-    /// The first run of a model.
+    /// Returns the first run of a model.
     pub fn run(&self, model: &str) -> Option<&Run> {
         self.plan.runs.iter().find(|run| run.model == model)
     }
 
-    /// The case of a run: as it was run, else as it is planned.
+    /// Returns the first run at a level of an axis.
+    pub fn run_at(&self, axis: &str, level: &String) -> Option<&Run> {
+        self.plan
+            .runs
+            .iter()
+            .find(|run| run.levels.get(axis) == Some(level))
+    }
+
+    /// Reads the case of a run from its run folder, or else as planned.
     pub fn case(&self, run: &Run) -> Option<Case> {
         let resolved = run.folder(self.folder).join(RESOLVED);
         Case::load(&resolved, &[]).or_else(|_| run.case()).ok()
     }
 
-    /// Names of the values of an axis, in the order of the runs.
+    /// Returns the levels of an axis, in the order of the runs.
     pub fn levels(&self, axis: &str) -> Vec<String> {
-        let mut out: Vec<String> = Vec::new();
-        for level in self.plan.runs.iter().filter_map(|r| r.levels.get(axis)) {
-            if !out.contains(level) {
-                out.push(level.clone());
-            }
-        }
-        out
+        unique(self.plan.runs.iter().filter_map(|run| run.levels.get(axis)))
     }
 
-    /// The different values of a factor among the models on the axes, in order.
+    /// Returns the distinct values of a factor among the models on the axes, in ascending order.
     pub fn factor_values(&self, factor: &str) -> Vec<f64> {
-        let on_axes = self.plan.runs.iter().filter(|r| !r.levels.is_empty());
-        let mut out: Vec<f64> = on_axes
-            .filter_map(|r| r.factors.get(factor).copied())
-            .collect();
+        let on_axes = self.plan.runs.iter().filter(|run| !run.levels.is_empty());
+        let known = on_axes.filter_map(|run| run.factors.get(factor).copied());
+        let mut out: Vec<f64> = known.collect();
         out.sort_by(f64::total_cmp);
         out.dedup();
         out
     }
 }
 
-/// Draws all figures that the study has data for; what had to be left out is added to `notes`.
+/// Returns the distinct names, in order of first appearance.
+fn unique<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for name in names {
+        if !out.contains(name) {
+            out.push(name.clone());
+        }
+    }
+    out
+}
+
+/// Draws all figures that the study has data for; omitted ones are added to `notes`.
 pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
     let mut out = Vec::new();
     out.extend(grains::family(data, notes));
@@ -104,47 +132,44 @@ pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
     out.extend(setup::figure(data, notes));
     out.extend(snapshots::figures(data, notes));
     out.extend(kissing_time::by_model(data));
-    out.extend(kissing_time::boxes(data));
+    out.extend(kissing_time::box_plot(data));
     out.extend(histories::figures(data, notes));
     out.extend(overview::figures(data));
     out.extend(trends::figure(data));
-    if !as_in_the_paper(data) {
+    if !numbered_as_in_paper(data) {
         renumber(&mut out);
     }
     out
 }
 
-/// Whether the study shows the grains, set-ups and orientations that the paper's first figures do.
-fn as_in_the_paper(data: &FigureData) -> bool {
-    let plan = &data.plan.analysis.figures;
-    plan.grains.is_some() && plan.orientations.is_some() && plan.setup.is_some()
+/// Returns whether the study shows grains, orientations and set-up as the paper's first figures.
+fn numbered_as_in_paper(data: &FigureData) -> bool {
+    let request = &data.plan.analysis.figures;
+    request.grains.is_some() && request.orientations.is_some() && request.setup.is_some()
 }
 
-/// Counts figures from 1, in their names too.
+/// Numbers the figures from 1, also in their file names.
 fn renumber(figures: &mut [StudyFigure]) {
     for (i, figure) in figures.iter_mut().enumerate() {
         figure.number = (i + 1).to_string();
-        let plain = |name: &str| -> Option<String> {
-            let (number, rest) = name.strip_prefix("fig")?.split_once('-')?;
-            number
-                .starts_with(|c: char| c.is_ascii_digit())
-                .then(|| rest.to_owned())
-        };
-        let name = plain(&figure.name).unwrap_or_else(|| figure.name.clone());
+        let numbered = figure
+            .name
+            .strip_prefix("fig")
+            .and_then(|rest| rest.split_once('-'));
+        let numbered = numbered.filter(|(n, _)| n.starts_with(|c: char| c.is_ascii_digit()));
+        let name = numbered.map_or(figure.name.as_str(), |(_, name)| name);
         figure.name = format!("fig{:02}-{name}", i + 1);
     }
 }
 
-/// A factor as axis labels have it: its first letter in italics.
-pub fn symbol(factor: &str) -> String {
-    match factor.chars().next() {
-        Some(first) => format!("*{}*", first.to_uppercase()),
-        None => String::new(),
-    }
+/// Symbol of a factor in labels: its first letter in italics.
+fn symbol(factor: &str) -> String {
+    let first = factor.chars().next();
+    first.map_or(String::new(), |c| format!("*{}*", c.to_uppercase()))
 }
 
-/// A factor's value, significant.
-pub fn value_text(value: f64) -> String {
+/// Value with at most three decimals, without trailing zeros, but "0.40" with two.
+fn value_text(value: f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text.contains('.') && text.len() == 3 {
@@ -152,4 +177,31 @@ pub fn value_text(value: f64) -> String {
     } else {
         text.to_owned()
     }
+}
+
+/// Label "S = 0.45" of a factor's value.
+fn factor_label(factor: &str, value: f64) -> String {
+    format!("{} = {}", symbol(factor), value_text(value))
+}
+
+/// Writes a small label, vertically centred at `y`.
+fn note(drawing: &mut Drawing, (x, y): (f64, f64), anchor: Anchor, label: &str) {
+    drawing.label(x, y + 0.36 * SMALL, anchor, SMALL, INK, label, false);
+}
+
+/// Writes a label of normal size with its baseline at `y`.
+fn heading(drawing: &mut Drawing, (x, y): (f64, f64), anchor: Anchor, label: &str) {
+    drawing.label(x, y, anchor, TEXT, INK, label, false);
+}
+
+/// Draws an entry of a legend, symbol and name, at the height `y`; returns the end of the entry.
+fn sign_entry(
+    drawing: &mut Drawing,
+    (x, y): (f64, f64),
+    (sign, colour, hollow): (Sign, &str, bool),
+    label: &str,
+) -> f64 {
+    sign.draw(drawing, (x + 4.0, y), 3.0, colour, hollow);
+    note(drawing, (x + 10.0, y), Anchor::Start, label);
+    x + 24.0 + text::width(label, SMALL)
 }

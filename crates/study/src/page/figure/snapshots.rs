@@ -1,4 +1,4 @@
-//! Figs 8 to 13: some pairs at instants: paths, speed of the fluid and vorticity in slices.
+//! Figs 8 to 13: selected models at several instants, with paths, fluid speed and vorticity.
 
 use grainwake_report::figure::Figure;
 use grainwake_report::figure::style::{COLUMN, PAGE};
@@ -12,34 +12,33 @@ use super::{FigureData, StudyFigure};
 /// Number of the first of these figures in the paper.
 const FIRST: usize = 8;
 
-/// Paths with slices of the speed, then slices of the vorticity.
+/// Draws paths with slices of the speed, then slices of the vorticity.
 pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
-    let stories = &data.plan.analysis.figures.stories;
-    let (mut paths, mut whirls) = (Vec::new(), Vec::new());
-    for (n, name) in stories.iter().enumerate() {
-        let numbers = (FIRST + n, FIRST + stories.len() + n);
-        let run = data.run(name).filter(|run| {
-            data.records
-                .iter()
-                .any(|r| r.name == run.name && r.state != "stale" && r.state != "missing")
-        });
-        let told = run.map(|run| tell(&run.folder(data.folder)));
-        let which = if super::as_in_the_paper(data) {
+    let models = &data.plan.analysis.figures.stories;
+    let (mut paths, mut vorticities) = (Vec::new(), Vec::new());
+    for (n, name) in models.iter().enumerate() {
+        let numbers = (FIRST + n, FIRST + models.len() + n);
+        let usable = |run: &str| {
+            let mut records = data.records.iter().filter(|r| r.name == run);
+            records.any(|r| r.state != "stale" && r.state != "missing")
+        };
+        let run = data.run(name).filter(|run| usable(&run.name));
+        let which = if super::numbered_as_in_paper(data) {
             format!("figures {} and {}", numbers.0, numbers.1)
         } else {
             format!("the pictures of {name}")
         };
-        match told {
+        match run.map(|run| tell(&run.folder(data.folder))) {
             None => notes.push(format!("{which} are left out: there is no run {name}")),
             Some(Err(error)) => notes.push(format!("{which} are left out: {error}")),
             Some(Ok(told)) => {
                 paths.extend(path_and_speed(name, numbers.0, &told));
-                whirls.extend(vorticity(name, numbers.1, &told));
+                vorticities.extend(vorticity(name, numbers.1, &told));
                 notes.extend(told.notes.iter().map(|note| format!("{name}: {note}")));
             }
         }
     }
-    paths.extend(whirls);
+    paths.extend(vorticities);
     paths
 }
 
@@ -47,8 +46,8 @@ fn find<'a>(told: &'a Told, name: &str) -> Option<&'a Figure> {
     told.figures.iter().find(|f| f.name == name)
 }
 
-/// Whether the run came to its end, for the caption.
-fn state(told: &Told) -> &'static str {
+/// Sentence of the caption about an unfinished run.
+fn unfinished(told: &Told) -> &'static str {
     if told.run.finished() {
         ""
     } else {
@@ -58,66 +57,61 @@ fn state(told: &Told) -> &'static str {
 
 fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<StudyFigure> {
     let path = find(told, "trajectories")?;
-    let beside: Vec<&Figure> = ["gap", "velocity"]
-        .iter()
-        .filter_map(|n| find(told, n))
-        .collect();
-    let speed = find(told, "speed");
+    // The curves that fit beside the paths, at least the first.
     let mut column = 0.0;
-    let mut room: f64 = path.drawing.height();
     let mut placed = Vec::new();
-    // As many of the curves as the height of the paths has room for, at least the gap.
-    for figure in beside {
-        if placed.is_empty() || column + figure.drawing.height() <= 1.15 * room {
+    for figure in ["gap", "velocity"].iter().filter_map(|n| find(told, n)) {
+        if placed.is_empty() || column + figure.drawing.height() <= 1.15 * path.drawing.height() {
             placed.push((figure, column));
             column += figure.drawing.height() + 4.0;
         }
     }
-    room = room.max(column);
+    let height = path.drawing.height().max(column);
+    let speed = find(told, "speed");
     let below = speed.map_or(0.0, |f| f.drawing.height() + 8.0);
-    let mut drawing = Drawing::new(PAGE, room + below);
+    let mut drawing = Drawing::new(PAGE, height + below);
     drawing.inset(&path.drawing, 0.0, 0.0, "path");
     for (figure, y) in placed {
         drawing.inset(&figure.drawing, PAGE - COLUMN, y, figure.name);
     }
-    let pair = told.story.subject == Subject::Pair;
-    let beside = if pair {
-        "gap of the centres and tilt of their line"
-    } else {
-        "velocity against time"
+    let model = text::literal(name);
+    let (beside, title) = match told.story.subject == Subject::Pair {
+        true => (
+            "gap of the centres and tilt of their line",
+            format!("Drafting, kissing and tumbling of {model}"),
+        ),
+        false => ("velocity against time", format!("Path of {model}")),
     };
     let mut caption = format!("Left: {} Right: {beside}.", path.caption);
     if let Some(speed) = speed {
-        drawing.inset(
-            &speed.drawing,
-            0.5 * (PAGE - speed.drawing.width()),
-            room + 8.0,
-            "speed",
-        );
+        let left = 0.5 * (PAGE - speed.drawing.width());
+        drawing.inset(&speed.drawing, left, height + 8.0, "speed");
         caption += &format!(" Below: {}", speed.caption);
     } else {
         caption += " The run has no slices of the flow.";
     }
-    Some(StudyFigure {
-        name: format!("fig{number:02}-{name}"),
-        number: number.to_string(),
-        title: if pair {
-            format!("Drafting, kissing and tumbling of {}", text::literal(name))
-        } else {
-            format!("Path of {}", text::literal(name))
-        },
-        caption: caption + state(told),
+    caption += unfinished(told);
+    let file = format!("fig{number:02}-{name}");
+    Some(StudyFigure::new(
+        file,
+        number.to_string(),
+        title,
+        caption,
         drawing,
-    })
+    ))
 }
 
 fn vorticity(name: &str, number: usize, told: &Told) -> Option<StudyFigure> {
     let figure = find(told, "vorticity")?;
-    Some(StudyFigure {
-        name: format!("fig{number:02}-vorticity-{name}"),
-        number: number.to_string(),
-        title: format!("Vorticity about {}", text::literal(name)),
-        caption: figure.caption.clone() + state(told),
-        drawing: figure.drawing.clone(),
-    })
+    let file = format!("fig{number:02}-vorticity-{name}");
+    let title = format!("Vorticity around {}", text::literal(name));
+    let caption = figure.caption.clone() + unfinished(told);
+    let drawing = figure.drawing.clone();
+    Some(StudyFigure::new(
+        file,
+        number.to_string(),
+        title,
+        caption,
+        drawing,
+    ))
 }

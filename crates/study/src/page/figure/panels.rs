@@ -1,0 +1,211 @@
+//! A result against each varied parameter, one panel per parameter.
+
+use std::collections::BTreeMap;
+
+use grainwake_report::figure::axis::{Axis, extent};
+use grainwake_report::figure::frame::Frame;
+use grainwake_report::figure::style::PAGE;
+use grainwake_report::figure::svg::Drawing;
+use grainwake_report::figure::text;
+
+use super::legend::{LineStyles, axes};
+use super::overview::{LEFT, Texts};
+use super::{FigureData, StudyFigure, unique};
+use crate::analysis::observation::{Observation, observations};
+use crate::format::title;
+use crate::plan::quantities::SHAPE_FACTORS;
+
+const GAP: f64 = 14.0;
+const HEIGHT: f64 = 150.0;
+/// Largest number of panels in a figure.
+const PANELS: usize = 6;
+
+/// A varied parameter.
+struct Parameter {
+    /// Name of the axis or the factor.
+    name: String,
+    /// Axis that the parameter belongs to.
+    axis: Option<String>,
+    /// Coordinate of each model.
+    coordinates: BTreeMap<String, f64>,
+    /// Names at the coordinates 0.5, 1.5 ...; none for a numerical parameter.
+    names: Option<Vec<String>>,
+}
+
+/// Returns the varied parameters: the axes; without axes the factors; without factors the models.
+///
+/// An axis is numerical if a factor has one value per level, distinct between the levels.
+fn parameters(data: &FigureData) -> Vec<Parameter> {
+    let runs = &data.plan.runs;
+    let mut factors = unique(runs.iter().flat_map(|run| run.factors.keys()));
+    factors.retain(|factor| !SHAPE_FACTORS.contains(&factor.as_str()));
+    factors.sort();
+    let of_axis = |(axis, levels): (String, Vec<String>)| {
+        let value = |factor: &String, level: &String| -> Option<f64> {
+            let here = runs.iter().filter(|r| r.levels.get(&axis) == Some(level));
+            let mut values = here.map(|r| r.factors.get(factor).copied());
+            let first = values.next()??;
+            values.all(|v| v == Some(first)).then_some(first)
+        };
+        let numerical = factors.iter().find_map(|factor| {
+            let values: Option<Vec<f64>> = levels.iter().map(|l| value(factor, l)).collect();
+            let mut sorted = values.clone()?;
+            sorted.sort_by(f64::total_cmp);
+            sorted.dedup();
+            (sorted.len() == levels.len()).then_some((factor.clone(), values?))
+        });
+        let (name, values) = numerical.unzip();
+        let known = runs.iter().filter_map(|run| {
+            let level = run.levels.get(&axis)?;
+            let i = levels.iter().position(|l| l == level)?;
+            let at = values
+                .as_ref()
+                .map_or(i as f64 + 0.5, |values: &Vec<f64>| values[i]);
+            Some((run.model.clone(), at))
+        });
+        Parameter {
+            name: name.unwrap_or(axis.clone()),
+            coordinates: known.collect(),
+            names: values.is_none().then_some(levels.clone()),
+            axis: Some(axis.clone()),
+        }
+    };
+    let mut out: Vec<Parameter> = axes(data).into_iter().map(of_axis).collect();
+    if out.is_empty() {
+        let of_factor = |factor: &String| {
+            let known = runs.iter();
+            let known = known.filter_map(|r| Some((r.model.clone(), *r.factors.get(factor)?)));
+            Parameter {
+                name: factor.clone(),
+                axis: None,
+                coordinates: known.collect(),
+                names: None,
+            }
+        };
+        let varies = |p: &Parameter| {
+            extent(p.coordinates.values().copied()).is_some_and(|(low, high)| high > low)
+        };
+        out.extend(factors.iter().map(of_factor).filter(varies));
+    }
+    if out.is_empty() {
+        let models = unique(runs.iter().map(|run| &run.model));
+        let at = models
+            .iter()
+            .enumerate()
+            .map(|(i, m)| (m.clone(), i as f64 + 0.5));
+        out.push(Parameter {
+            name: "model".into(),
+            axis: None,
+            coordinates: at.collect(),
+            names: Some(models),
+        });
+    }
+    out
+}
+
+/// Draws a quantity against every varied parameter; none if no run has a value.
+pub(super) fn against_parameters(
+    data: &FigureData,
+    quantity: &str,
+    texts: Texts,
+) -> Option<StudyFigure> {
+    let all = observations(data.records, quantity, &BTreeMap::new());
+    let (low, high) = extent(all.iter().flat_map(|o| [o.range.0, o.range.1, 0.0]))?;
+    let mut parameters = parameters(data);
+    let left_out = parameters.len().saturating_sub(PANELS);
+    parameters.truncate(PANELS);
+    let styles = LineStyles::of(data);
+    let top = styles.legend(None, LEFT, true) + 4.0;
+    let row = HEIGHT + 30.0;
+    let rows = parameters.len().div_ceil(2);
+    let mut drawing = Drawing::new(PAGE, top + rows as f64 * row);
+    styles.legend(Some(&mut drawing), LEFT, true);
+    let width = (PAGE - LEFT - 8.0 - GAP) / 2.0;
+    for (i, parameter) in parameters.iter().enumerate() {
+        let label = text::literal(&title(&parameter.name));
+        let across = match &parameter.names {
+            Some(names) => {
+                let mut axis = Axis::linear(&label, 0.0, names.len() as f64, 4, true);
+                let tick = |(i, name): (usize, &String)| (i as f64 + 0.5, text::literal(name));
+                axis.ticks = names.iter().enumerate().map(tick).collect();
+                axis
+            }
+            None => {
+                let (a, b) = extent(parameter.coordinates.values().copied())?;
+                let margin = 0.06 * (b - a);
+                Axis::linear(&label, a - margin, b + margin, 5, true)
+            }
+        };
+        let frame = Frame {
+            x: LEFT + (i % 2) as f64 * (width + GAP),
+            y: top + (i / 2) as f64 * row,
+            width,
+            height: HEIGHT,
+            across,
+            up: Axis::linear(texts.up, low, high, 5, false),
+        };
+        frame.grid(&mut drawing);
+        draw_panel(&mut drawing, &frame, parameter, &all, data, &styles);
+        frame.outline(&mut drawing, (true, i % 2 == 0));
+    }
+    let mut caption = texts.caption;
+    let models = data.plan.runs.iter().filter(|r| r.member == 0).count();
+    if all.len() < models {
+        caption += &format!(" {} of {models} models have a value.", all.len());
+    }
+    if data.plan.runs.iter().any(|r| r.member > 0) {
+        caption += " Symbols are medians and bars the range over an ensemble.";
+    }
+    if left_out > 0 {
+        caption += &format!(" {left_out} more axes or factors are not shown.");
+    }
+    Some(StudyFigure::new(
+        texts.name,
+        "",
+        texts.title,
+        caption,
+        drawing,
+    ))
+}
+
+fn draw_panel(
+    drawing: &mut Drawing,
+    frame: &Frame,
+    parameter: &Parameter,
+    all: &[Observation],
+    data: &FigureData,
+    styles: &LineStyles,
+) {
+    let at = |o: &Observation| {
+        let x = *parameter.coordinates.get(&o.model)?;
+        Some((frame.px(x), frame.py(o.value)))
+    };
+    // Models that differ only on this axis are joined.
+    let mut lines: BTreeMap<BTreeMap<String, String>, Vec<(f64, f64)>> = BTreeMap::new();
+    for observation in all {
+        if let (Some(axis), Some(point)) = (&parameter.axis, at(observation)) {
+            lines
+                .entry(observation.other_levels(axis))
+                .or_default()
+                .push(point);
+        }
+    }
+    for line in lines.values_mut() {
+        line.sort_by(|a, b| a.0.total_cmp(&b.0));
+        drawing.line(line, "#b4b4b8", 0.7, None);
+    }
+    for observation in all {
+        let (Some((x, y)), Some(run)) = (at(observation), data.run(&observation.model)) else {
+            continue;
+        };
+        let style = styles.style(run);
+        let (low, high) = observation.range;
+        if high > low {
+            let bar = [(x, frame.py(low)), (x, frame.py(high))];
+            drawing.line(&bar, style.colour, 0.9, None);
+        }
+        style
+            .sign
+            .draw(drawing, (x, y), 3.0, style.colour, observation.censored);
+    }
+}
