@@ -138,7 +138,6 @@ const KNOWN_CIRCLES: &[(&str, &[&str])] = &[
             "surface",
         ],
     ),
-    ("validation", &["figure", "measure", "suite"]),
 ];
 
 /// Paths of a use tree: `a::{b, c::d}` gives `a::b` and `a::c::d`.

@@ -1,19 +1,22 @@
-//! Validation: cases with reference data and bounds.
+//! Validation: cases with references and bounds.
 //!
 //! A [`Suite`] is a folder with `validation.toml`: runs of case files, and for each run checks of
-//! numbers taken from its tables ([`Take`]) against references. [`Suite::judge`] measures the run
-//! folders that the ordinary runner left and gives [`Verdict`]s; each [`Figure`] draws them beside
-//! the reference data. The file's keys are described in
-//! `validation/README.md`.
+//! values measured in its tables ([`Measure`]) against references and bounds. [`Suite::evaluate`]
+//! measures a run folder and returns [`Verdict`]s; each [`Figure`] shows results beside the
+//! reference data. `validation/README.md` describes the keys of the file.
 
+mod check;
+mod columns;
+mod expression;
 mod figure;
-mod judge;
-mod measure;
+mod measurement;
 mod signal;
 mod suite;
-mod table;
+mod verdict;
 
-pub use figure::{Drawn, Figure};
-pub use judge::Verdict;
-pub use measure::{Take, Window};
-pub use suite::{Check, Level, Reference, Run, Suite, SuiteError};
+pub use check::{Bounds, Check, Level, Reference, Run};
+pub use columns::TableSource;
+pub use figure::{DrawnFigure, Figure};
+pub use measurement::{Measure, Sampling};
+pub use suite::{Suite, SuiteError};
+pub use verdict::Verdict;

@@ -1,6 +1,6 @@
-//! Numbers from a sampled function of one variable.
+//! Statistics of a sampled function y(x).
 
-/// Mean over the interval, by trapezoids; of a single sample its value.
+/// Returns the mean over the interval by the trapezoidal rule; a single sample is its own mean.
 pub fn mean(x: &[f64], y: &[f64]) -> Option<f64> {
     match (x.first(), x.last()) {
         (Some(a), Some(b)) if b > a => Some(integral(x, y) / (b - a)),
@@ -8,16 +8,17 @@ pub fn mean(x: &[f64], y: &[f64]) -> Option<f64> {
     }
 }
 
-/// Integral by trapezoids.
-pub fn integral(x: &[f64], y: &[f64]) -> f64 {
+/// Returns the integral by the trapezoidal rule.
+fn integral(x: &[f64], y: &[f64]) -> f64 {
     let pairs = x.windows(2).zip(y.windows(2));
     pairs
         .map(|(x, y)| 0.5 * (x[1] - x[0]) * (y[0] + y[1]))
         .sum()
 }
 
-/// Derivative dy/dx at the samples: of the parabola through each and its neighbours, one-sided at
-/// the ends; none below two of them.
+/// Returns dy/dx at the samples: parabolas through three neighbours, one-sided at the ends.
+///
+/// None below two samples.
 pub fn derivative(x: &[f64], y: &[f64]) -> Option<Vec<f64>> {
     let n = x.len().min(y.len());
     if n < 2 {
@@ -36,7 +37,7 @@ pub fn derivative(x: &[f64], y: &[f64]) -> Option<Vec<f64>> {
     Some((0..n).map(at).collect())
 }
 
-/// Value at `at` between the samples; none outside them.
+/// Returns the linearly interpolated value at `at`; none outside the samples.
 pub fn interpolate(x: &[f64], y: &[f64], at: f64) -> Option<f64> {
     let after = x.partition_point(|v| *v < at);
     if x.get(after) == Some(&at) {
@@ -48,7 +49,7 @@ pub fn interpolate(x: &[f64], y: &[f64], at: f64) -> Option<f64> {
     Some(y0 + (y1 - y0) * (at - x0) / (x1 - x0))
 }
 
-/// Value at `at` of the cubic through the four samples about it; none outside the samples.
+/// Returns the value at `at` of the cubic through four neighbours; none outside the samples.
 pub fn interpolate_smooth(x: &[f64], y: &[f64], at: f64) -> Option<f64> {
     let straight = interpolate(x, y, at)?;
     if x.len() < 4 {
@@ -56,15 +57,15 @@ pub fn interpolate_smooth(x: &[f64], y: &[f64], at: f64) -> Option<f64> {
     }
     let after = x.partition_point(|v| *v < at);
     let first = after.saturating_sub(2).min(x.len() - 4);
-    let near = first..first + 4;
+    let stencil = first..first + 4;
     let weight = |j: usize| -> f64 {
-        let others = near.clone().filter(|k| *k != j);
+        let others = stencil.clone().filter(|k| *k != j);
         others.map(|k| (at - x[k]) / (x[j] - x[k])).product()
     };
-    Some(near.clone().map(|j| weight(j) * y[j]).sum())
+    Some(stencil.clone().map(|j| weight(j) * y[j]).sum())
 }
 
-/// Places where the function goes through zero, upwards and downwards.
+/// Returns the zero crossings, and whether each is upwards.
 pub fn crossings(x: &[f64], y: &[f64]) -> Vec<(f64, bool)> {
     let mut found = Vec::new();
     for i in 1..x.len().min(y.len()) {
@@ -76,7 +77,7 @@ pub fn crossings(x: &[f64], y: &[f64]) -> Vec<(f64, bool)> {
     found
 }
 
-/// Oscillations about the mean in a unit of x, from upward crossings; none below two of them.
+/// Returns the frequency of oscillations about the mean, from upward crossings; none below two.
 pub fn frequency(x: &[f64], y: &[f64]) -> Option<f64> {
     let middle = mean(x, y)?;
     let shifted: Vec<f64> = y.iter().map(|v| v - middle).collect();
@@ -88,7 +89,7 @@ pub fn frequency(x: &[f64], y: &[f64]) -> Option<f64> {
     (ups.len() > 1).then(|| (ups.len() - 1) as f64 / span)
 }
 
-/// Slope of the straight line through the samples, least squares, and the rms distance from it.
+/// Returns the slope of the least-squares line and the root-mean-square residual.
 pub fn line_fit(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     let n = x.len().min(y.len()) as f64;
     if n < 2.0 {
@@ -98,12 +99,12 @@ pub fn line_fit(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     let sxx: f64 = x.iter().map(|v| (v - mx).powi(2)).sum();
     let sxy: f64 = x.iter().zip(y).map(|(a, b)| (a - mx) * (b - my)).sum();
     let slope = sxy / sxx;
-    let rest: f64 = x
+    let residual: f64 = x
         .iter()
         .zip(y)
         .map(|(a, b)| (b - my - slope * (a - mx)).powi(2))
         .sum();
-    sxx.gt(&0.0).then(|| (slope, (rest / n).sqrt()))
+    sxx.gt(&0.0).then(|| (slope, (residual / n).sqrt()))
 }
 
 #[cfg(test)]
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sine_is_measured() {
+    fn frequency_and_mean_of_a_sine() {
         let (x, y) = sine();
         let f = frequency(&x, &y).unwrap();
         assert!((f * std::f64::consts::TAU / 1.7 - 1.0).abs() < 2e-3, "{f}");
@@ -134,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cubic_is_met_between_its_samples() {
+    fn cubic_interpolation_is_exact_for_a_cubic() {
         let x: Vec<f64> = [0.0, 0.7, 1.1, 2.0, 2.5, 3.6].to_vec();
         let f = |x: f64| 2.0 - x + 0.5 * x * x - 0.3 * x * x * x;
         let y: Vec<f64> = x.iter().map(|x| f(*x)).collect();
@@ -146,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_with_noise_is_fitted() {
+    fn a_noisy_line_is_fitted() {
         let x: Vec<f64> = (0..1000).map(f64::from).collect();
         let sign = |x: f64| if x % 2.0 == 0.0 { 0.1 } else { -0.1 };
         let y: Vec<f64> = x.iter().map(|x| 1.0 + 2.0 * x + sign(*x)).collect();
@@ -156,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn uneven_samples_weigh_by_their_interval() {
+    fn uneven_samples_are_weighted_by_their_interval() {
         assert_eq!(
             mean(&[0.0, 1.0, 4.0], &[2.0, 2.0, 4.0]),
             Some((2.0 + 9.0) / 4.0)

@@ -1,103 +1,55 @@
-//! `validation.toml`: what is run, what is measured, and what it should be.
+//! The file `validation.toml`: runs, checks and figures of a suite.
 
 use std::collections::{BTreeMap, HashSet};
-
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use grainwake_solver::case::{Loc, Problem, Source, nearest};
 use serde::Deserialize;
 
+use crate::check::{Bounds, Check, Level, Reference, Run};
+use crate::columns::TableSource;
 use crate::figure::{self, Figure, RawFigure};
-use crate::measure::{Take, Window};
-use crate::table::From;
+use crate::measurement::{Measure, Sampling};
 
-/// How much of a validation is run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Level {
-    /// Small enough for every commit.
-    #[default]
-    Ci,
-    /// Published resolutions.
-    Full,
-}
+/// File of a suite in its folder.
+const FILE: &str = "validation.toml";
 
-/// A validation: its folder, runs and checks.
+/// A suite: its runs, checks and figures.
 #[derive(Clone, Debug)]
 pub struct Suite {
-    /// Name of its folder.
+    /// Name of the folder.
     pub name: String,
-    /// Its folder.
+    /// Folder.
     pub folder: PathBuf,
-    /// One line that says what it is.
+    /// Title, one line.
     pub title: String,
-    /// What is run.
+    /// Runs with their checks.
     pub runs: Vec<Run>,
-    /// What is drawn from the runs.
+    /// Figures of the results.
     pub figures: Vec<Figure>,
 }
 
-/// A run of a case.
-#[derive(Clone, Debug)]
-pub struct Run {
-    /// Name within the suite.
-    pub name: String,
-    /// Case file.
-    pub case: PathBuf,
-    /// Overrides, "key=value".
-    pub set: Vec<String>,
-    /// From which level on it is run.
-    pub level: Level,
-    /// What is measured.
-    pub checks: Vec<Check>,
-    /// Named numbers of the expressions.
-    pub constants: BTreeMap<String, f64>,
-}
-
-/// A number and what it should be.
-#[derive(Clone, Debug)]
-pub struct Check {
-    /// What it is called.
-    pub quantity: String,
-    /// How it is measured.
-    pub take: Take,
-    /// Where in the tables.
-    pub window: Window,
-    /// Named numbers of the expressions.
-    pub constants: BTreeMap<String, f64>,
-    /// What it should be.
-    pub reference: Option<Reference>,
-    /// Accepted distance from the reference, absolute.
-    pub absolute: Option<f64>,
-    /// Accepted distance from the reference, relative to it.
-    pub relative: Option<f64>,
-    /// Accepted range.
-    pub range: [Option<f64>; 2],
-}
-
-/// What a number is compared with.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Reference {
-    /// A known number.
-    Number(f64),
-    /// The same quantity of another run of the suite.
-    Run(String),
-}
-
-/// Why a suite could not be read.
+/// Reason why a suite cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum SuiteError {
-    /// The file could not be read.
+    /// A file or folder cannot be read.
     #[error("cannot read {}: {source}", path.display())]
     Unreadable {
-        /// The file.
+        /// File or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The contents are wrong.
     #[error("{0}")]
     Invalid(Box<Problem>),
+}
+
+impl From<Problem> for SuiteError {
+    fn from(problem: Problem) -> SuiteError {
+        SuiteError::Invalid(Box::new(problem))
+    }
 }
 
 #[derive(Deserialize)]
@@ -134,26 +86,29 @@ fn default_case() -> Loc<PathBuf> {
 #[serde(deny_unknown_fields)]
 struct RawCheck {
     quantity: Loc<String>,
-    take: Loc<Take>,
-    of: Option<String>,
+    take: Loc<Measure>,
+    #[serde(default)]
+    of: String,
     #[serde(default)]
     grain: usize,
     #[serde(default)]
-    table: From,
+    table: TableSource,
     against: Option<String>,
     from: Option<f64>,
     to: Option<f64>,
     at: Option<f64>,
     data: Option<PathBuf>,
-    x: Option<String>,
-    y: Option<String>,
+    #[serde(default)]
+    x: String,
+    #[serde(default)]
+    y: String,
     reference: Option<Loc<RawReference>>,
     tolerance: Option<Loc<Tolerance>>,
     at_least: Option<f64>,
     at_most: Option<f64>,
-    /// Where the reference is from; for readers of the file.
-    #[allow(dead_code)]
-    source: Option<String>,
+    /// Publication of the reference, for readers of the file.
+    #[serde(rename = "source")]
+    _source: Option<String>,
 }
 
 #[derive(Clone, Deserialize)]
@@ -171,181 +126,211 @@ enum Tolerance {
 }
 
 impl Suite {
-    /// Reads `validation.toml` in `folder`.
+    /// Reads `validation.toml` in a folder.
     ///
     /// # Errors
     /// [`SuiteError`] with file, line, key and remedy.
     pub fn read(folder: &Path) -> Result<Suite, SuiteError> {
-        let path = folder.join("validation.toml");
+        let path = folder.join(FILE);
         let text = std::fs::read_to_string(&path).map_err(|source| SuiteError::Unreadable {
             path: path.clone(),
             source,
         })?;
-        let (source, raw): (Source, RawSuite) =
-            Source::parse(&path.display().to_string(), &text, &[])
-                .map_err(|p| SuiteError::Invalid(Box::new(p)))?;
-        let name = folder
-            .file_name()
-            .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        build(&source, raw, folder, name).map_err(|p| SuiteError::Invalid(Box::new(p)))
+        let (source, raw) = Source::parse(&path.display().to_string(), &text, &[])?;
+        let builder = Builder {
+            source: &source,
+            folder,
+        };
+        Ok(builder.suite(raw)?)
     }
 
-    /// The suite with the runs whose names are `wanted`, those that their checks compare with, and so
-    /// on.
-    pub fn only(mut self, wanted: impl Fn(&str) -> bool) -> Suite {
-        // A run compares with earlier ones.
+    /// Keeps the wanted runs and, recursively, the runs that their checks refer to.
+    pub fn restricted_to(mut self, wanted: impl Fn(&str) -> bool) -> Suite {
         let mut needed = HashSet::new();
+        // References are to earlier runs.
         for run in self.runs.iter().rev() {
             if wanted(&run.name) || needed.contains(&run.name) {
                 needed.insert(run.name.clone());
-                needed.extend(
-                    run.checks
-                        .iter()
-                        .filter_map(|check| match &check.reference {
-                            Some(Reference::Run(name)) => Some(name.clone()),
-                            _ => None,
-                        }),
-                );
+                let references = run
+                    .checks
+                    .iter()
+                    .filter_map(|check| check.reference.as_ref());
+                needed.extend(references.filter_map(|reference| match reference {
+                    Reference::Run(name) => Some(name.clone()),
+                    Reference::Number(_) => None,
+                }));
             }
         }
         self.runs.retain(|run| needed.contains(&run.name));
         self
     }
 
-    /// The validations below `root`, in order of name.
+    /// Reads all suites below `root`, in order of name.
     ///
     /// # Errors
-    /// An unreadable folder, or the first wrong suite.
-    pub fn all(root: &Path) -> Result<Vec<Suite>, SuiteError> {
+    /// An unreadable folder, or the first invalid suite.
+    pub fn read_all(root: &Path) -> Result<Vec<Suite>, SuiteError> {
         let entries = std::fs::read_dir(root).map_err(|source| SuiteError::Unreadable {
             path: root.into(),
             source,
         })?;
-        let mut folders: Vec<PathBuf> = entries
-            .flatten()
-            .map(|entry| entry.path())
-            .filter(|path| path.join("validation.toml").is_file())
-            .collect();
+        let folders = entries.flatten().map(|entry| entry.path());
+        let mut folders: Vec<PathBuf> = folders.filter(|path| path.join(FILE).is_file()).collect();
         folders.sort();
         folders.iter().map(|folder| Suite::read(folder)).collect()
     }
 }
 
-fn build(source: &Source, raw: RawSuite, folder: &Path, name: String) -> Result<Suite, Problem> {
-    let mut runs: Vec<Run> = Vec::new();
-    for run in raw.run {
-        if runs.iter().any(|other| other.name == run.name.value) {
-            let problem = Problem::new(format!("there are two runs called \"{}\"", run.name.value))
-                .help("give each run a name of its own");
-            return Err(source.locate(problem, run.name.span.as_ref(), "again"));
+/// Converts the raw file to a suite.
+struct Builder<'a> {
+    source: &'a Source,
+    folder: &'a Path,
+}
+
+impl Builder<'_> {
+    fn problem(
+        &self,
+        message: impl Into<String>,
+        help: &str,
+        span: Option<&Range<usize>>,
+        label: &str,
+    ) -> Problem {
+        self.source
+            .locate(Problem::new(message).help(help), span, label)
+    }
+
+    fn suite(&self, raw: RawSuite) -> Result<Suite, Problem> {
+        let mut runs: Vec<Run> = Vec::new();
+        for run in raw.run {
+            let run = self.run(run, &raw.constants, &runs)?;
+            runs.push(run);
         }
-        let case = folder.join(&run.case.value);
+        let figures = figure::build(self.source, raw.figure, &runs, self.folder, &raw.constants)?;
+        let name = self.folder.file_name();
+        let suite = Suite {
+            name: name.map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+            folder: self.folder.into(),
+            title: raw.title,
+            runs,
+            figures,
+        };
+        check_references(&suite)?;
+        Ok(suite)
+    }
+
+    fn run(
+        &self,
+        raw: RawRun,
+        constants: &BTreeMap<String, f64>,
+        earlier: &[Run],
+    ) -> Result<Run, Problem> {
+        let name = raw.name.value;
+        if earlier.iter().any(|other| other.name == name) {
+            let message = format!("there are two runs called \"{name}\"");
+            let help = "give each run a unique name";
+            return Err(self.problem(message, help, raw.name.span.as_ref(), "again"));
+        }
+        let case = self.folder.join(&raw.case.value);
         if !case.is_file() {
-            let problem = Problem::new(format!("there is no case file {}", case.display()))
-                .help("paths are relative to validation.toml");
-            return Err(source.locate(problem, run.case.span.as_ref(), "not found"));
+            let message = format!("there is no case file {}", case.display());
+            let help = "paths are relative to validation.toml";
+            return Err(self.problem(message, help, raw.case.span.as_ref(), "not found"));
         }
-        let mut constants = raw.constants.clone();
-        constants.extend(run.constants.clone());
-        let checks = run
+        let mut constants = constants.clone();
+        constants.extend(raw.constants);
+        let checks = raw
             .check
             .into_iter()
-            .map(|check| build_check(source, check, folder, &constants))
-            .collect::<Result<_, _>>()?;
-        runs.push(Run {
-            name: run.name.value,
+            .map(|check| self.check(check, &constants));
+        Ok(Run {
+            name,
             case,
-            set: run.set,
-            level: run.level,
-            checks,
+            set: raw.set,
+            level: raw.level,
+            checks: checks.collect::<Result<_, _>>()?,
             constants,
-        });
+        })
     }
-    let figures = figure::build(source, raw.figure, &runs, folder, &raw.constants)?;
-    let suite = Suite {
-        name,
-        folder: folder.into(),
-        title: raw.title,
-        runs,
-        figures,
-    };
+
+    fn check(&self, raw: RawCheck, constants: &BTreeMap<String, f64>) -> Result<Check, Problem> {
+        let sampling = Sampling {
+            of: raw.of,
+            grain: raw.grain,
+            table: raw.table,
+            against: raw.against,
+            from: raw.from,
+            to: raw.to,
+            at: raw.at,
+            data: raw.data.map(|file| self.folder.join(file)),
+            x: raw.x,
+            y: raw.y,
+        };
+        let quantity = raw.quantity.value;
+        sampling.validate(raw.take.value).map_err(|message| {
+            let help = "validation/README.md lists the keys that each `take` needs";
+            let message = format!("\"{quantity}\": {message}");
+            self.problem(message, help, raw.take.span.as_ref(), "this measure")
+        })?;
+        let mut bounds = Bounds {
+            range: [raw.at_least, raw.at_most],
+            ..Bounds::default()
+        };
+        if let Some(tolerance) = &raw.tolerance {
+            let span = tolerance.span.as_ref();
+            match &tolerance.value {
+                Tolerance::Absolute(value) => bounds.absolute = Some(*value),
+                Tolerance::Relative(text) => {
+                    let number = text
+                        .strip_suffix('%')
+                        .and_then(|n| n.trim().parse::<f64>().ok());
+                    let percent = number.ok_or_else(|| {
+                        let message = format!("tolerance \"{text}\" is not a percentage");
+                        let help = "write a number, or a percentage such as \"2 %\"";
+                        self.problem(message, help, span, "here")
+                    })?;
+                    bounds.relative = Some(percent / 100.0);
+                }
+            }
+            if raw.reference.is_none() {
+                let help = "add `reference = ...`, or use `at_least` and `at_most`";
+                let message = "a tolerance needs a reference";
+                return Err(self.problem(message, help, span, "without a reference"));
+            }
+        }
+        Ok(Check {
+            quantity,
+            measure: raw.take.value,
+            sampling,
+            constants: constants.clone(),
+            reference: raw.reference.map(|r| match r.value {
+                RawReference::Number(value) => Reference::Number(value),
+                RawReference::Run { run } => Reference::Run(run),
+            }),
+            bounds,
+        })
+    }
+}
+
+/// Checks that every reference is to an earlier run that measures the same quantity.
+fn check_references(suite: &Suite) -> Result<(), Problem> {
     for (i, run) in suite.runs.iter().enumerate() {
+        let earlier = &suite.runs[..i];
         for check in &run.checks {
             let Some(Reference::Run(other)) = &check.reference else {
                 continue;
             };
-            let known = suite.runs[..i].iter().find(|r| r.name == *other);
-            if !known.is_some_and(|r| r.checks.iter().any(|c| c.quantity == check.quantity)) {
-                let names = suite.runs[..i].iter().map(|r| r.name.as_str());
-                let hint = nearest(other, names)
-                    .map_or(String::new(), |n| format!("; did you mean \"{n}\"?"));
-                return Err(Problem::new(format!(
+            let mut known = earlier.iter().filter(|r| r.name == *other);
+            if !known.any(|r| r.checks.iter().any(|c| c.quantity == check.quantity)) {
+                let hint = nearest(other, earlier.iter().map(|r| r.name.as_str()));
+                let hint = hint.map_or(String::new(), |n| format!("; did you mean \"{n}\"?"));
+                let message = format!(
                     "{}: run \"{}\" compares \"{}\" with that of \"{other}\", which has none",
                     suite.name, run.name, check.quantity
-                ))
-                .help(format!(
-                    "name an earlier run that measures the same quantity{hint}"
-                )));
+                );
+                let help = format!("name an earlier run that measures the same quantity{hint}");
+                return Err(Problem::new(message).help(help));
             }
         }
     }
-    Ok(suite)
-}
-
-fn build_check(
-    source: &Source,
-    raw: RawCheck,
-    folder: &Path,
-    constants: &BTreeMap<String, f64>,
-) -> Result<Check, Problem> {
-    let window = Window {
-        of: raw.of.unwrap_or_default(),
-        grain: raw.grain,
-        table: raw.table,
-        against: raw.against,
-        from: raw.from,
-        to: raw.to,
-        at: raw.at,
-        data: raw.data.map(|file| folder.join(file)),
-        x: raw.x.unwrap_or_default(),
-        y: raw.y.unwrap_or_default(),
-    };
-    window.validate(raw.take.value).map_err(|message| {
-        let problem = Problem::new(format!("\"{}\": {message}", raw.quantity.value))
-            .help("validation/README.md lists what each `take` needs");
-        source.locate(problem, raw.take.span.as_ref(), "this measure")
-    })?;
-    let (mut absolute, mut relative) = (None, None);
-    if let Some(tolerance) = &raw.tolerance {
-        match &tolerance.value {
-            Tolerance::Absolute(value) => absolute = Some(*value),
-            Tolerance::Relative(text) => {
-                let number = text.strip_suffix('%').map(str::trim);
-                let Some(Ok(percent)) = number.map(str::parse::<f64>) else {
-                    let problem = Problem::new(format!("tolerance \"{text}\" is not a percentage"))
-                        .help("write a number, or a percentage such as \"2 %\"");
-                    return Err(source.locate(problem, tolerance.span.as_ref(), "here"));
-                };
-                relative = Some(percent / 100.0);
-            }
-        }
-        if raw.reference.is_none() {
-            let problem = Problem::new("a tolerance needs a reference")
-                .help("add `reference = ...`, or use `at_least` and `at_most`");
-            return Err(source.locate(problem, tolerance.span.as_ref(), "of what?"));
-        }
-    }
-    Ok(Check {
-        quantity: raw.quantity.value,
-        take: raw.take.value,
-        window,
-        constants: constants.clone(),
-        reference: raw.reference.map(|r| match r.value {
-            RawReference::Number(value) => Reference::Number(value),
-            RawReference::Run { run } => Reference::Run(run),
-        }),
-        absolute,
-        relative,
-        range: [raw.at_least, raw.at_most],
-    })
+    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_validation::{Drawn, Suite, SuiteError};
+use grainwake_validation::{DrawnFigure, Suite, SuiteError};
 
 #[path = "../../report/tests/synthetic/mod.rs"]
 mod synthetic;
@@ -131,7 +131,7 @@ fn fill(runs: &Path) {
     ends_at(&runs.join("fine"), 2.02);
 }
 
-fn svg(drawn: &Drawn) -> String {
+fn svg(drawn: &DrawnFigure) -> String {
     let drawing = drawn.drawing.as_ref().unwrap();
     assert!(drawing.to_png().unwrap().starts_with(b"\x89PNG"));
     drawing.to_svg("figure", "title", "text")
@@ -142,7 +142,7 @@ fn all_kinds_are_drawn() {
     let (runs, suite) = suite(SUITE);
     let suite = suite.unwrap();
     fill(&runs);
-    let drawn: Vec<Drawn> = suite
+    let drawn: Vec<DrawnFigure> = suite
         .figures
         .iter()
         .map(|f| f.draw(&runs, |_, _| None))

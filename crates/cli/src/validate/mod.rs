@@ -39,7 +39,7 @@ impl From<SuiteError> for Exit {
 
 /// Runs validations and prints how far each number is from its reference.
 pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
-    let mut suites = chosen(Suite::all(&args.suites)?, &args.names)?;
+    let mut suites = chosen(Suite::read_all(&args.suites)?, &args.names)?;
     for run in suites.iter_mut().flat_map(|suite| &mut suite.runs) {
         run.set.extend(args.set.iter().cloned());
     }
@@ -67,8 +67,8 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
                 one(args, suite, run, &folder, stop.clone())?
             };
             let found = match ending {
-                Ok(()) => suite.judge(run, &folder, &mut known),
-                Err(why) => suite.failed(run, &why),
+                Ok(()) => suite.evaluate(run, &folder, &mut known),
+                Err(why) => suite.verdicts_of_failed_run(run, &why),
             };
             if !args.quiet {
                 found.iter().for_each(|v| tell!("  {}", line(v)));
@@ -92,7 +92,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         print(&table(&verdicts).to_string())?;
     }
     if let Some(folder) = &args.save {
-        let all = Suite::all(&args.suites)?;
+        let all = Suite::read_all(&args.suites)?;
         let saved = saved::add(folder, &args.level, &verdicts, &args.output, &all)?;
         let drawn = pictures::add(folder, &suites, &args.output, &saved)?;
         pictures::list(folder, &all)?;
@@ -160,7 +160,7 @@ fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
     for mut suite in all {
         if !names.is_empty() && !names.contains(&suite.name) {
             let name = suite.name.clone();
-            suite = suite.only(|run| names.contains(&format!("{name}/{run}")));
+            suite = suite.restricted_to(|run| names.contains(&format!("{name}/{run}")));
         }
         if !suite.runs.is_empty() {
             chosen.push(suite);

@@ -1,4 +1,4 @@
-//! From the description of a figure to its drawing.
+//! Drawing of figures from run folders and reference data.
 
 use std::path::{Path, PathBuf};
 
@@ -10,46 +10,45 @@ use grainwake_report::figure::{minus, plain};
 use grainwake_solver::output::SUMMARY;
 use grainwake_solver::output::vti::Image;
 
-use super::plot::{self, Shown};
+use super::plot::{self, DataSet};
 use super::{Content, Data, Figure, Picture, Point, Series};
-use crate::measure;
-use crate::signal;
-use crate::table::{Columns, last_slice};
+use crate::columns::{Columns, last_slice};
+use crate::{expression, signal};
 
-/// Part of the finest error at which a guide line passes, so that the data do not hide it.
-const BESIDE: f64 = 0.7;
+/// Ratio of the guide line to the finest error, so that the data do not hide the line.
+const GUIDE_RATIO: f64 = 0.7;
 
-/// What came of a figure.
+/// Drawing of a figure, and its omissions.
 #[derive(Debug)]
-pub struct Drawn {
-    /// The drawing; none if no run has data for it.
+pub struct DrawnFigure {
+    /// Drawing; none if no run has data for it.
     pub drawing: Option<Drawing>,
-    /// What was left out, and why.
+    /// Omitted parts, with the reason.
     pub notes: Vec<String>,
 }
 
-/// Why something is left out.
-enum Gap {
-    /// The run is not there or has not come to its end.
+/// Reason of an omission.
+enum Omission {
+    /// The run is missing or unfinished.
     Run(String),
-    /// Anything else, in words.
+    /// Another reason.
     Other(String),
 }
 
-impl From<String> for Gap {
-    fn from(what: String) -> Gap {
-        Gap::Other(what)
+impl From<String> for Omission {
+    fn from(what: String) -> Omission {
+        Omission::Other(what)
     }
 }
 
-/// The gaps in words, all runs together.
-fn notes(gaps: Vec<Gap>) -> Vec<String> {
+/// Words the omissions; all missing runs are combined in one note.
+fn notes(omissions: Vec<Omission>) -> Vec<String> {
     let (mut runs, mut notes): (Vec<String>, Vec<String>) = Default::default();
-    for gap in gaps {
-        match gap {
-            Gap::Run(name) if runs.contains(&name) => {}
-            Gap::Run(name) => runs.push(name),
-            Gap::Other(what) => notes.push(what),
+    for omission in omissions {
+        match omission {
+            Omission::Run(name) if runs.contains(&name) => {}
+            Omission::Run(name) => runs.push(name),
+            Omission::Other(what) => notes.push(what),
         }
     }
     if !runs.is_empty() {
@@ -59,22 +58,23 @@ fn notes(gaps: Vec<Gap>) -> Vec<String> {
 }
 
 impl Figure {
-    /// Draws what there are data for; `runs` holds the run folders of the suite. The numbers (run,
-    /// quantity) of runs that are not there may have been `saved`.
-    pub fn draw(&self, runs: &Path, saved: impl Fn(&str, &str) -> Option<f64>) -> Drawn {
-        let mut gaps = Vec::new();
+    /// Draws the data sets that exist in the run folders below `runs`.
+    ///
+    /// `saved` returns stored values, by run and quantity, of runs whose folders do not exist.
+    pub fn draw(&self, runs: &Path, saved: impl Fn(&str, &str) -> Option<f64>) -> DrawnFigure {
+        let mut omissions = Vec::new();
         let drawing = match &self.content {
             Content::Plot { across, up, series } => {
                 let mut shown = Vec::new();
                 let mut measured = false;
                 for one in series {
-                    match one.shown(runs, &saved, &mut gaps) {
+                    match one.data_sets(runs, &saved, &mut omissions) {
                         Ok(found) => {
                             let reference = matches!(one.data, Data::Reference { .. });
                             measured |= !reference && !found.is_empty();
                             shown.extend(found);
                         }
-                        Err(gap) => gaps.push(one.named(gap)),
+                        Err(omission) => omissions.push(one.named(omission)),
                     }
                 }
                 measured.then(|| plot::draw(across, up, &shown))
@@ -88,7 +88,7 @@ impl Figure {
                 for picture in pictures {
                     match picture.image(runs) {
                         Ok((folder, image)) => images.push((picture, folder, image)),
-                        Err(gap) => gaps.push(gap),
+                        Err(omission) => omissions.push(omission),
                     }
                 }
                 let panels: Vec<Panel> = images
@@ -104,18 +104,18 @@ impl Figure {
                     None
                 } else {
                     field::draw(&panels, *quantity, style)
-                        .map_err(|why| gaps.push(Gap::Other(why)))
+                        .map_err(|why| omissions.push(Omission::Other(why)))
                         .ok()
                 }
             }
         };
-        Drawn {
+        DrawnFigure {
             drawing,
-            notes: notes(gaps),
+            notes: notes(omissions),
         }
     }
 
-    /// Title, caption and sources of the reference data, in label markup.
+    /// Returns the caption and the sources of the reference data, in label markup.
     pub fn description(&self) -> String {
         let mut text = self.caption.clone();
         if !self.sources.is_empty() {
@@ -125,44 +125,44 @@ impl Figure {
     }
 }
 
-/// The folder of a run that came to its end.
-fn finished(runs: &Path, name: &str) -> Result<PathBuf, Gap> {
+/// Returns the folder of a finished run.
+fn finished(runs: &Path, name: &str) -> Result<PathBuf, Omission> {
     let folder = runs.join(name);
     if folder.join(SUMMARY).is_file() {
         Ok(folder)
     } else {
-        Err(Gap::Run(name.to_owned()))
+        Err(Omission::Run(name.to_owned()))
     }
 }
 
 impl Picture {
-    fn image(&self, runs: &Path) -> Result<(PathBuf, Image), Gap> {
+    fn image(&self, runs: &Path) -> Result<(PathBuf, Image), Omission> {
         let folder = finished(runs, &self.run)?;
         let image = last_slice(&folder, &self.plane);
-        let image = image.map_err(|why| Gap::Other(format!("{}: {why}", self.run)))?;
+        let image = image.map_err(|why| Omission::Other(format!("{}: {why}", self.run)))?;
         Ok((folder, image))
     }
 }
 
 impl Series {
-    /// What happened to this series.
-    fn named(&self, gap: Gap) -> Gap {
-        match gap {
-            Gap::Other(what) if !self.label.is_empty() => {
-                Gap::Other(format!("\"{}\": {what}", plain(&self.label)))
+    /// Adds the label of the series to the reason of an omission.
+    fn named(&self, omission: Omission) -> Omission {
+        match omission {
+            Omission::Other(what) if !self.label.is_empty() => {
+                Omission::Other(format!("\"{}\": {what}", plain(&self.label)))
             }
-            gap => gap,
+            omission => omission,
         }
     }
 
-    /// The points, and what else is drawn with them.
-    fn shown(
+    /// Returns the data set of the series, and its guide line.
+    fn data_sets(
         &self,
         runs: &Path,
         saved: impl Fn(&str, &str) -> Option<f64>,
-        gaps: &mut Vec<Gap>,
-    ) -> Result<Vec<Shown>, Gap> {
-        let mut shown = Shown {
+        omissions: &mut Vec<Omission>,
+    ) -> Result<Vec<DataSet>, Omission> {
+        let mut shown = DataSet {
             label: self.label.clone(),
             colour: self.colour,
             sign: Some(self.sign),
@@ -177,23 +177,23 @@ impl Series {
                 y,
                 constants,
             } => {
-                let columns = Columns::of_data(file)?;
-                let x = measure::evaluate(x, &columns, constants)?;
-                let y = measure::evaluate(y, &columns, constants)?;
+                let columns = Columns::read_reference(file)?;
+                let x = expression::evaluate(x, &columns, constants)?;
+                let y = expression::evaluate(y, &columns, constants)?;
                 shown.points = x.into_iter().zip(y).collect();
                 shown.sign = self.line.is_none().then_some(self.sign);
                 shown.hollow = true;
             }
             Data::History {
                 run,
-                window,
+                sampling,
                 constants,
                 derivative,
             } => {
-                let (x, mut y) = window.samples(&finished(runs, run)?, constants)?;
+                let (x, mut y) = sampling.samples(&finished(runs, run)?, constants)?;
                 if *derivative {
                     y = signal::derivative(&x, &y)
-                        .ok_or_else(|| "one row has no derivative".to_owned())?;
+                        .ok_or_else(|| "a single row has no derivative".to_owned())?;
                 }
                 shown.points = x.into_iter().zip(y).collect();
                 shown.sign = None;
@@ -206,7 +206,7 @@ impl Series {
                 for point in points {
                     match point.value(runs, &saved, *error) {
                         Ok(y) => shown.points.push((point.x, y)),
-                        Err(gap) => gaps.push(self.named(gap)),
+                        Err(omission) => omissions.push(self.named(omission)),
                     }
                 }
                 shown.points.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -216,7 +216,7 @@ impl Series {
                 if let Some(slope) = slope {
                     let guide = guide(&shown.points, *slope);
                     if let Some(order) = observed_order(&shown.points, *slope) {
-                        // Not "-0.00".
+                        // Avoids "-0.00".
                         let order = (100.0 * order).round() / 100.0 + 0.0;
                         shown.label += &minus(&format!(" (order {order:.2})"));
                     }
@@ -234,10 +234,10 @@ impl Point {
         runs: &Path,
         saved: impl Fn(&str, &str) -> Option<f64>,
         error: bool,
-    ) -> Result<f64, Gap> {
+    ) -> Result<f64, Omission> {
         let value = match finished(runs, &self.run) {
             Ok(folder) => self.check.measure(&folder)?,
-            Err(gap) => saved(&self.run, &self.check.quantity).ok_or(gap)?,
+            Err(omission) => saved(&self.run, &self.check.quantity).ok_or(omission)?,
         };
         Ok(match self.reference {
             Some(reference) if error => ((value - reference) / reference).abs(),
@@ -246,7 +246,7 @@ impl Point {
     }
 }
 
-/// The two points of the finest runs, the finest last: largest x where the error falls with x.
+/// Returns the points of the two finest runs, the finest last: largest x for a negative slope.
 fn finest(points: &[(f64, f64)], slope: f64) -> Option<[(f64, f64); 2]> {
     let n = points.len();
     match (n >= 2, slope < 0.0) {
@@ -256,19 +256,20 @@ fn finest(points: &[(f64, f64)], slope: f64) -> Option<[(f64, f64); 2]> {
     }
 }
 
-/// Power with which the error falls between the two finest of `points`, which are sorted by x;
-/// positive where it falls as `slope` does.
+/// Returns the observed order between the two finest of `points`, which are sorted by x.
+///
+/// Positive if the error falls in the direction of `slope`.
 fn observed_order(points: &[(f64, f64)], slope: f64) -> Option<f64> {
     let [coarse, fine] = finest(points, slope)?;
     let order = (fine.1 / coarse.1).ln() / (fine.0 / coarse.0).ln() * slope.signum();
     order.is_finite().then_some(order)
 }
 
-/// A line of the given power, a little below the point of the finest run.
-fn guide(points: &[(f64, f64)], slope: f64) -> Option<Shown> {
+/// Returns a line of the given exponent, slightly below the point of the finest run.
+fn guide(points: &[(f64, f64)], slope: f64) -> Option<DataSet> {
     let [_, (x0, y0)] = finest(points, slope)?;
-    let along = |x: f64| (x, BESIDE * y0 * (x / x0).powf(slope));
-    Some(Shown {
+    let along = |x: f64| (x, GUIDE_RATIO * y0 * (x / x0).powf(slope));
+    Some(DataSet {
         label: minus(&format!("slope {slope}")),
         colour: FAINT,
         sign: None,
@@ -283,8 +284,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_order_is_that_of_the_two_finest() {
-        // Error 0.3 h^2 with h = 1/n, spoiled on the coarsest.
+    fn order_follows_from_the_two_finest_runs() {
+        // Error 0.3 h^2 with h = 1/n, except on the coarsest mesh.
         let error = |n: f64| 0.3 / (n * n);
         let points = [(8.0, 0.5), (16.0, error(16.0)), (24.0, error(24.0))];
         assert!((observed_order(&points, -2.0).unwrap() - 2.0).abs() < 1e-12);
@@ -299,7 +300,7 @@ mod tests {
         assert_eq!(observed_order(&points[..1], -2.0), None);
         let line = guide(&points, -2.0).unwrap();
         for (point, n) in line.points.iter().zip([8.0, 16.0, 24.0]) {
-            assert!((point.1 - BESIDE * error(n)).abs() < 1e-12);
+            assert!((point.1 - GUIDE_RATIO * error(n)).abs() < 1e-12);
         }
         assert_eq!(line.label, "slope −2");
     }

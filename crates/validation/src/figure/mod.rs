@@ -1,7 +1,7 @@
-//! Figures of a suite: curves, points and pictures from run folders beside reference data.
+//! Figures of a suite: curves, points and fields from run folders beside reference data.
 
+mod build;
 mod draw;
-mod file;
 mod plot;
 mod raw;
 
@@ -11,23 +11,23 @@ use std::path::PathBuf;
 use grainwake_report::figure::field::{Quantity, Style};
 use grainwake_report::figure::plan;
 
-pub use draw::Drawn;
-pub(crate) use file::build;
+pub(crate) use build::build;
+pub use draw::DrawnFigure;
 pub(crate) use raw::RawFigure;
 
-use crate::measure::Window;
-use crate::suite::Check;
+use crate::check::Check;
+use crate::measurement::Sampling;
 
-/// A figure as `validation.toml` describes it.
+/// Figure as described in `validation.toml`.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// File name without its extension; one of its kind within the suite.
+    /// File name without extension, unique within the suite.
     pub name: String,
     /// Title, in label markup.
     pub title: String,
-    /// What is to be seen, in label markup.
+    /// Caption, in label markup.
     pub caption: String,
-    /// Where the reference data are from.
+    /// Publications of the reference data.
     pub sources: Vec<String>,
     content: Content,
 }
@@ -35,8 +35,8 @@ pub struct Figure {
 #[derive(Clone, Debug)]
 enum Content {
     Plot {
-        across: AxisPlan,
-        up: AxisPlan,
+        across: AxisSpec,
+        up: AxisSpec,
         series: Vec<Series>,
     },
     Pictures {
@@ -46,25 +46,25 @@ enum Content {
     },
 }
 
-/// An axis before the data are known.
+/// Axis, before the data are known.
 #[derive(Clone, Debug)]
-struct AxisPlan {
+struct AxisSpec {
     label: String,
     log: bool,
-    /// Ends; none to take them from the data.
+    /// Ends; none for those of the data.
     ends: [Option<f64>; 2],
-    /// Places of the ticks; none for round values.
+    /// Positions of the ticks; none for round values.
     ticks: Option<Vec<f64>>,
 }
 
-/// One set of data and how it is drawn.
+/// Data set and its style.
 #[derive(Clone, Debug)]
 struct Series {
     label: String,
     colour: &'static str,
-    /// Number of its sign.
+    /// Number of its symbol.
     sign: usize,
-    /// SVG dash pattern of its line ("" for a full line); none for points alone.
+    /// SVG dash pattern of its line ("" for a solid line); none for points only.
     line: Option<&'static str>,
     data: Data,
 }
@@ -78,35 +78,35 @@ enum Data {
         y: String,
         constants: BTreeMap<String, f64>,
     },
-    /// A table of a run.
+    /// Table of a run.
     History {
         run: String,
-        window: Window,
+        sampling: Sampling,
         constants: BTreeMap<String, f64>,
         /// Whether the derivative is drawn.
         derivative: bool,
     },
-    /// One number of each of several runs.
+    /// One value of each of several runs.
     Results {
         points: Vec<Point>,
-        /// Whether the distance from the reference is drawn.
+        /// Whether the relative error is drawn.
         error: bool,
-        /// Power of x that the guide line follows.
+        /// Exponent of the guide line.
         slope: Option<f64>,
     },
 }
 
-/// The number of a run.
+/// Value of a run.
 #[derive(Clone, Debug)]
 struct Point {
     run: String,
     x: f64,
     check: Check,
-    /// What the number should be.
+    /// Expected value.
     reference: Option<f64>,
 }
 
-/// A slice of a run.
+/// Slice of a run.
 #[derive(Clone, Debug)]
 struct Picture {
     run: String,

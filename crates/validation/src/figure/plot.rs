@@ -1,4 +1,4 @@
-//! Points and curves in one frame, with their names above it.
+//! Plots of points and curves with a legend.
 
 use grainwake_report::figure::COLUMN;
 use grainwake_report::figure::axis::{Axis, extent};
@@ -7,35 +7,35 @@ use grainwake_report::figure::style::{INK, LINE, SMALL};
 use grainwake_report::figure::svg::{Anchor, Drawing};
 use grainwake_report::figure::text;
 
-use super::AxisPlan;
+use super::AxisSpec;
 
 const LEFT: f64 = 42.0;
 const RIGHT: f64 = 9.0;
 const HEIGHT: f64 = 150.0;
 const ROW: f64 = 10.0;
-/// Width of the sample of a line in the legend [pt].
+/// Width of a line in the legend [pt].
 const SAMPLE: f64 = 16.0;
-/// Half the size of a sign [pt].
+/// Half the size of a symbol [pt].
 const SIGN: f64 = 2.4;
 
-/// Points ready to be drawn.
+/// Data set with its style.
 #[derive(Clone, Debug)]
-pub struct Shown {
-    /// Name in the legend, in label markup; empty keeps it out.
+pub struct DataSet {
+    /// Name in the legend, in label markup; empty for no entry.
     pub label: String,
     /// Colour.
     pub colour: &'static str,
-    /// Number of the sign at its points, if they have one.
+    /// Number of the symbol of its points, if any.
     pub sign: Option<usize>,
-    /// Whether the signs are hollow.
+    /// Whether the symbols are hollow.
     pub hollow: bool,
-    /// SVG dash pattern of the line through its points ("" for a full line), if they have one.
+    /// SVG dash pattern of the line through its points ("" for a solid line), if any.
     pub line: Option<&'static str>,
-    /// The points.
+    /// Points.
     pub points: Vec<(f64, f64)>,
 }
 
-impl Shown {
+impl DataSet {
     fn dash(&self) -> Option<&'static str> {
         self.line.filter(|dash| !dash.is_empty())
     }
@@ -46,7 +46,7 @@ impl Shown {
         }
     }
 
-    /// Width of the sample before its name [pt].
+    /// Width of the line or symbol in the legend [pt].
     fn sample(&self) -> f64 {
         if self.line.is_some() { SAMPLE } else { 6.0 }
     }
@@ -56,12 +56,12 @@ impl Shown {
     }
 }
 
-/// Draws the sets in their order in a column-wide drawing.
-pub fn draw(across: &AxisPlan, up: &AxisPlan, shown: &[Shown]) -> Drawing {
-    let known = |plan: &AxisPlan, v: f64| v.is_finite() && (!plan.log || v > 0.0);
+/// Draws the data sets, in their order, at column width.
+pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
+    let valid = |axis: &AxisSpec, v: f64| v.is_finite() && (!axis.log || v > 0.0);
     let points = || {
-        let all = shown.iter().flat_map(|s| s.points.iter().copied());
-        all.filter(|(x, y)| known(across, *x) && known(up, *y))
+        let all = sets.iter().flat_map(|s| s.points.iter().copied());
+        all.filter(|(x, y)| valid(across, *x) && valid(up, *y))
     };
     let across = axis(across, points().map(|p| p.0), 6);
     let inside = |x: f64| {
@@ -71,7 +71,7 @@ pub fn draw(across: &AxisPlan, up: &AxisPlan, shown: &[Shown]) -> Drawing {
     };
     let up = axis(up, points().filter(|p| inside(p.0)).map(|p| p.1), 5);
 
-    let rows = legend(shown);
+    let rows = legend(sets);
     let top = 6.0 + ROW * rows.len() as f64;
     let mut drawing = Drawing::new(COLUMN, top + HEIGHT + 26.0);
     for (r, row) in rows.iter().enumerate() {
@@ -97,7 +97,7 @@ pub fn draw(across: &AxisPlan, up: &AxisPlan, shown: &[Shown]) -> Drawing {
         up,
     };
     frame.grid(&mut drawing);
-    for (i, one) in shown
+    for (i, one) in sets
         .iter()
         .enumerate()
         .filter(|(_, one)| one.line.is_some())
@@ -108,7 +108,7 @@ pub fn draw(across: &AxisPlan, up: &AxisPlan, shown: &[Shown]) -> Drawing {
         }
     }
     frame.outline(&mut drawing, (true, true));
-    for one in shown {
+    for one in sets {
         for (x, y) in &one.points {
             let places = frame.across.place(*x).zip(frame.up.place(*y));
             let inside = |p: f64| (-1e-6..=1.0 + 1e-6).contains(&p);
@@ -120,7 +120,7 @@ pub fn draw(across: &AxisPlan, up: &AxisPlan, shown: &[Shown]) -> Drawing {
     drawing
 }
 
-fn axis(plan: &AxisPlan, values: impl Iterator<Item = f64>, count: usize) -> Axis {
+fn axis(plan: &AxisSpec, values: impl Iterator<Item = f64>, count: usize) -> Axis {
     let (low, high) = extent(values).unwrap_or((1.0, 10.0));
     let (low, high) = (plan.ends[0].unwrap_or(low), plan.ends[1].unwrap_or(high));
     let tight = plan.ends.iter().all(Option::is_some);
@@ -135,12 +135,12 @@ fn axis(plan: &AxisPlan, values: impl Iterator<Item = f64>, count: usize) -> Axi
     }
 }
 
-/// Names that stand in one row each.
-fn legend(shown: &[Shown]) -> Vec<Vec<&Shown>> {
+/// Distributes the entries of the legend over rows.
+fn legend(sets: &[DataSet]) -> Vec<Vec<&DataSet>> {
     let width = COLUMN - LEFT;
-    let mut rows: Vec<Vec<&Shown>> = Vec::new();
+    let mut rows: Vec<Vec<&DataSet>> = Vec::new();
     let mut used = f64::INFINITY;
-    for one in shown.iter().filter(|one| !one.label.is_empty()) {
+    for one in sets.iter().filter(|one| !one.label.is_empty()) {
         if used + one.entry() - 9.0 > width {
             rows.push(Vec::new());
             used = 0.0;
@@ -153,7 +153,7 @@ fn legend(shown: &[Shown]) -> Vec<Vec<&Shown>> {
     rows
 }
 
-/// Stretches of points that all have a place.
+/// Splits a curve at points that cannot be drawn.
 fn parts(frame: &Frame, points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     let placed = |p: &(f64, f64)| {
         p.0.is_finite()
@@ -173,14 +173,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_set_outside_a_logarithmic_axis_leaves_the_rest() {
-        let plan = |log| AxisPlan {
+    fn a_data_set_outside_a_logarithmic_axis_is_left_out() {
+        let plan = |log| AxisSpec {
             label: "x".into(),
             log,
             ends: [None, None],
             ticks: None,
         };
-        let shown = |label: &str, points: &[(f64, f64)]| Shown {
+        let shown = |label: &str, points: &[(f64, f64)]| DataSet {
             label: label.into(),
             colour: INK,
             sign: Some(1),

@@ -1,4 +1,4 @@
-//! `[[figure]]` as it stands in `validation.toml`.
+//! The table `[[figure]]` of `validation.toml`, before validation.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use grainwake_report::figure::style;
 use grainwake_solver::case::Loc;
 use serde::Deserialize;
 
-use crate::table::From;
+use crate::columns::TableSource;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -60,7 +60,7 @@ pub enum Colour {
     Grey,
 }
 
-/// A sign at the points, in the order of `frame::Sign::number`.
+/// Symbol of the points, in the order of `frame::Sign::number`.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mark {
@@ -102,7 +102,7 @@ pub struct RawHistory {
     #[serde(default)]
     pub grain: usize,
     #[serde(default)]
-    pub table: From,
+    pub table: TableSource,
     pub against: Option<Loc<String>>,
     pub from: Option<f64>,
     pub to: Option<f64>,
@@ -118,7 +118,7 @@ pub struct RawResults {
     pub label: String,
     pub runs: Vec<Loc<String>>,
     pub quantity: Loc<String>,
-    pub x: Loc<Places>,
+    pub x: Loc<Coordinates>,
     #[serde(default)]
     pub error: Loc<bool>,
     pub reference: Option<f64>,
@@ -130,7 +130,7 @@ pub struct RawResults {
 
 #[derive(Clone, Deserialize)]
 #[serde(untagged)]
-pub enum Places {
+pub enum Coordinates {
     List(Vec<f64>),
     Expression(String),
 }
@@ -166,7 +166,7 @@ pub struct RawPicture {
 }
 
 impl Colour {
-    /// The colour as SVG has it.
+    /// Returns the colour in SVG notation.
     pub fn hex(self) -> &'static str {
         match self {
             Colour::Blue => style::BLUE,
@@ -182,7 +182,7 @@ impl Colour {
 }
 
 impl Line {
-    /// Its SVG dash pattern, empty for a full line.
+    /// Returns the SVG dash pattern, empty for a solid line.
     pub fn dash(self) -> &'static str {
         match self {
             Line::Full => "",

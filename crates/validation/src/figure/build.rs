@@ -1,4 +1,4 @@
-//! Figures from the keys of `validation.toml`.
+//! Validation of the figures in `validation.toml`.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -9,15 +9,16 @@ use grainwake_report::figure::{plan, style};
 use grainwake_solver::case::{Loc, Problem, Source, nearest};
 
 use super::raw::{
-    Colour, FieldQuantity, Line, Mark, Places, RawAxis, RawFigure, RawHistory, RawPicture,
+    Colour, Coordinates, FieldQuantity, Line, Mark, RawAxis, RawFigure, RawHistory, RawPicture,
     RawReference, RawResults, Scale,
 };
-use super::{AxisPlan, Content, Data, Figure, Picture, Point, Series};
-use crate::measure::{self, Window};
-use crate::suite::{Reference, Run};
-use crate::table::Columns;
+use super::{AxisSpec, Content, Data, Figure, Picture, Point, Series};
+use crate::check::{Check, Reference, Run};
+use crate::columns::Columns;
+use crate::expression;
+use crate::measurement::Sampling;
 
-/// What surrounds the figures.
+/// File, runs and constants that the figures refer to.
 struct Context<'a> {
     source: &'a Source,
     runs: &'a [Run],
@@ -25,10 +26,10 @@ struct Context<'a> {
     constants: &'a BTreeMap<String, f64>,
 }
 
-/// Makes the figures of a suite from what its file says.
+/// Builds the figures of a suite.
 ///
 /// # Errors
-/// What is wrong, with its place.
+/// The first problem, with its location.
 pub fn build(
     source: &Source,
     raw: Vec<RawFigure>,
@@ -47,8 +48,8 @@ pub fn build(
         let name = figure.name.value.clone();
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if name.is_empty() || !name.chars().all(plain) {
-            let problem = Problem::new(format!("\"{name}\" is no file name"))
-                .help("use letters, digits, - and _; the extension is added");
+            let problem = Problem::new(format!("\"{name}\" is not a file name"))
+                .help("use letters, digits, - and _, without extension");
             return Err(context.at(problem, figure.name.span.as_ref(), "here"));
         }
         if out.iter().any(|other| other.name == name) {
@@ -113,7 +114,7 @@ impl Context<'_> {
         })
     }
 
-    fn axis(&self, raw: RawAxis) -> Result<AxisPlan, Problem> {
+    fn axis(&self, raw: RawAxis) -> Result<AxisSpec, Problem> {
         let log = raw.scale == Scale::Log;
         for end in [&raw.from, &raw.to].into_iter().flatten() {
             if !end.value.is_finite() || (log && end.value <= 0.0) {
@@ -122,7 +123,7 @@ impl Context<'_> {
                 return Err(self.at(problem, end.span.as_ref(), "this end"));
             }
         }
-        Ok(AxisPlan {
+        Ok(AxisSpec {
             label: raw.label,
             log,
             ends: [raw.from.map(|v| v.value), raw.to.map(|v| v.value)],
@@ -130,7 +131,7 @@ impl Context<'_> {
         })
     }
 
-    /// References first, then histories, then results; colours and signs count through them.
+    /// Orders references, histories and results; default colours and symbols follow this order.
     fn series(
         &self,
         references: Vec<RawReference>,
@@ -169,10 +170,10 @@ impl Context<'_> {
         let file = self.folder.join(&raw.data);
         for text in [&raw.x, &raw.y] {
             self.parse(text)?;
-            // A file that is missing leaves the series out; a wrong column is a mistake.
-            if let Ok(columns) = Columns::of_data(&file) {
-                measure::evaluate(text, &columns, self.constants)
-                    .map_err(|what| self.expression(text, what))?;
+            // A missing file leaves the series out; a wrong column is an error.
+            if let Ok(columns) = Columns::read_reference(&file) {
+                expression::evaluate(text, &columns, self.constants)
+                    .map_err(|what| self.wrong_expression(text, what))?;
             }
         }
         Ok(Data::Reference {
@@ -192,20 +193,20 @@ impl Context<'_> {
             run: run.name.clone(),
             constants: run.constants.clone(),
             derivative: raw.derivative,
-            window: Window {
+            sampling: Sampling {
                 of: raw.of.value,
                 grain: raw.grain,
                 table: raw.table,
                 against: raw.against.map(|text| text.value),
                 from: raw.from,
                 to: raw.to,
-                ..Window::default()
+                ..Sampling::default()
             },
         })
     }
 
     fn results(&self, raw: &RawResults) -> Result<Data, Problem> {
-        if let Places::List(places) = &raw.x.value
+        if let Coordinates::List(places) = &raw.x.value
             && places.len() != raw.runs.len()
         {
             let found = format!("{} numbers for {} runs", places.len(), raw.runs.len());
@@ -216,7 +217,7 @@ impl Context<'_> {
         let mut points = Vec::new();
         for (i, name) in raw.runs.iter().enumerate() {
             let run = self.run(name)?;
-            let wanted = |check: &&crate::Check| check.quantity == raw.quantity.value;
+            let wanted = |check: &&Check| check.quantity == raw.quantity.value;
             let Some(check) = run.checks.iter().find(wanted) else {
                 let known: Vec<&str> = run.checks.iter().map(|c| c.quantity.as_str()).collect();
                 let problem = Problem::new(format!(
@@ -227,15 +228,14 @@ impl Context<'_> {
                 return Err(self.at(problem, raw.quantity.span.as_ref(), "not measured"));
             };
             let x = match &raw.x.value {
-                Places::List(places) => places[i],
-                Places::Expression(text) => {
-                    measure::constant(text, &run.constants).map_err(|what| {
+                Coordinates::List(places) => places[i],
+                Coordinates::Expression(text) => expression::constant(text, &run.constants)
+                    .map_err(|what| {
                         let names: Vec<&str> = run.constants.keys().map(String::as_str).collect();
                         let problem = Problem::new(format!("run \"{}\": {what}", run.name))
                             .help(format!("constants of this run: {}", names.join(", ")));
                         self.at(problem, raw.x.span.as_ref(), "here")
-                    })?
-                }
+                    })?,
             };
             let reference = raw.reference.or(match check.reference {
                 Some(Reference::Number(number)) => Some(number),
@@ -247,7 +247,7 @@ impl Context<'_> {
                     check.quantity, run.name
                 ))
                 .help("add `reference = ...` other than 0 to this series");
-                return Err(self.at(problem, raw.error.span.as_ref(), "of what?"));
+                return Err(self.at(problem, raw.error.span.as_ref(), "without a reference"));
             }
             points.push(Point {
                 run: run.name.clone(),
@@ -303,13 +303,10 @@ impl Context<'_> {
     }
 
     fn parse(&self, text: &Loc<String>) -> Result<(), Problem> {
-        let parsed = exmex::parse::<f64>(text);
-        parsed
-            .map(|_| ())
-            .map_err(|e| self.expression(text, format!("'{}': {e}", text.value)))
+        expression::check(text).map_err(|what| self.wrong_expression(text, what))
     }
 
-    fn expression(&self, text: &Loc<String>, what: String) -> Problem {
+    fn wrong_expression(&self, text: &Loc<String>, what: String) -> Problem {
         let problem = Problem::new(what)
             .help("write an expression of columns and constants, such as \"sqrt(vx^2+vy^2)\"");
         self.at(problem, text.span.as_ref(), "this expression")

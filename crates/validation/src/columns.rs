@@ -1,4 +1,4 @@
-//! Columns of numbers from a run folder: its tables, or a line through a slice.
+//! Named columns of values: tables of a run, lines through its slices, reference data.
 
 use std::path::Path;
 
@@ -7,12 +7,12 @@ use grainwake_report::Table;
 use grainwake_solver::output::vti::{self, Image};
 use serde::Deserialize;
 
-/// Which table a number is taken from.
+/// Table that a value is taken from.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum From {
-    /// `grains.csv`: the columns of the chosen grain under their own names, those of grain i with
-    /// the number behind them ("z1").
+pub enum TableSource {
+    /// `grains.csv`: columns of the chosen grain under their names, of grain i with the suffix i
+    /// ("z1").
     #[default]
     Grains,
     /// `diagnostics.csv`.
@@ -21,19 +21,19 @@ pub enum From {
     Slice(Line),
 }
 
-/// A line along an axis through the last slice of a plane.
+/// Line along an axis through the last slice of a plane.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
     /// Name of the plane, as in `slices/PLANE_000000.vti`.
     pub plane: String,
-    /// Axis along which it goes.
+    /// Direction of the line.
     pub along: Axis,
-    /// A point on it [m].
+    /// Point on the line [m].
     pub through: [f64; 3],
 }
 
-/// An axis of space.
+/// Coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Axis {
@@ -45,22 +45,24 @@ pub enum Axis {
     Z,
 }
 
+const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// Named columns of equal length.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
     /// Names.
     pub names: Vec<String>,
-    /// Values.
+    /// Values, one vector per column.
     pub values: Vec<Vec<f64>>,
 }
 
 impl Columns {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.values.first().map_or(0, Vec::len)
     }
 
-    /// A column by name.
+    /// Returns a column by name.
     pub fn get(&self, name: &str) -> Option<&[f64]> {
         let i = self.names.iter().position(|n| n == name)?;
         Some(&self.values[i])
@@ -71,88 +73,94 @@ impl Columns {
         self.values.push(values);
     }
 
-    /// Reads the table of a run folder.
-    pub fn of_run(folder: &Path, from: &From, grain: usize) -> Result<Columns, String> {
+    /// Reads a table of a run folder.
+    pub fn read_run(folder: &Path, source: &TableSource, grain: usize) -> Result<Columns, String> {
         let read = |name: &str| {
             Table::read(&folder.join(name), &mut Vec::new()).map_err(|e| e.to_string())
         };
-        match from {
-            From::Grains => by_grain(&read("grains.csv")?, grain),
-            From::Diagnostics => Ok(whole(&read("diagnostics.csv")?)),
-            From::Slice(line) => along(folder, line),
+        match source {
+            TableSource::Grains => split_by_grain(&read("grains.csv")?, grain),
+            TableSource::Diagnostics => {
+                let table = read("diagnostics.csv")?;
+                let column = |name: &String| table.column(name).unwrap_or_default().to_vec();
+                Ok(Columns {
+                    names: table.names().to_vec(),
+                    values: table.names().iter().map(column).collect(),
+                })
+            }
+            TableSource::Slice(line) => sample_line(folder, line),
         }
     }
 
-    /// Reads reference data: comma-separated, names in the first line, comments behind `#`.
-    pub fn of_data(file: &Path) -> Result<Columns, String> {
+    /// Reads reference data: comma-separated, names in the first line, comments after `#`.
+    pub fn read_reference(file: &Path) -> Result<Columns, String> {
         let problem = |what: String| format!("{}: {what}", file.display());
         let text = std::fs::read_to_string(file).map_err(|e| problem(e.to_string()))?;
-        let mut lines = text
-            .lines()
-            .zip(1..)
-            .map(|(line, number)| (line.trim(), number))
-            .filter(|(line, _)| !line.is_empty() && !line.starts_with('#'));
-        let mut columns = Columns::default();
-        let (header, _) = lines.next().ok_or_else(|| problem("no header".into()))?;
-        for name in header.split(',') {
-            columns.push(name.trim(), Vec::new());
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .from_reader(text.as_bytes());
+        let header = reader.headers().map_err(|e| problem(e.to_string()))?;
+        if header.is_empty() {
+            return Err(problem("no header".into()));
         }
-        for (line, number) in lines {
-            let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-            if fields.len() != columns.names.len() {
-                let found = format!(
-                    "{} values under {} names",
-                    fields.len(),
-                    columns.names.len()
-                );
-                return Err(problem(format!("line {number}: {found}")));
+        let mut columns = Columns::default();
+        for name in header {
+            columns.push(name, Vec::new());
+        }
+        let mut record = csv::StringRecord::new();
+        while reader
+            .read_record(&mut record)
+            .map_err(|e| problem(e.to_string()))?
+        {
+            // The position of the record itself is that of the comments before it.
+            let end = reader.position().byte() as usize;
+            let line = || text.get(..end).unwrap_or(&text).trim_end().lines().count();
+            let wrong = |what: String| problem(format!("line {}: {what}", line()));
+            if record.len() != columns.names.len() {
+                let (values, names) = (record.len(), columns.names.len());
+                return Err(wrong(format!("{values} values under {names} names")));
             }
-            for (field, column) in fields.iter().zip(&mut columns.values) {
+            for (field, column) in record.iter().zip(&mut columns.values) {
                 let value = field
                     .parse()
-                    .map_err(|_| problem(format!("line {number}: '{field}' is not a number")))?;
-                column.push(value);
+                    .map_err(|_| wrong(format!("'{field}' is not a number")));
+                column.push(value?);
             }
         }
         Ok(columns)
     }
 }
 
-fn whole(table: &Table) -> Columns {
-    let mut columns = Columns::default();
-    for name in table.names() {
-        columns.push(name, table.column(name).unwrap_or_default().to_vec());
-    }
-    columns
-}
-
-fn by_grain(table: &Table, chosen: usize) -> Result<Columns, String> {
-    let missing = || "grains.csv has no column \"grain\"".to_string();
-    let number = table.column("grain").ok_or_else(missing)?;
-    let count = number.iter().fold(0.0, |a: f64, b| a.max(*b)) as usize + 1;
-    if chosen >= count || number.is_empty() {
-        return Err(format!("there is no grain {chosen} in grains.csv"));
+/// Separates the rows of the grains into columns, and repeats those of the chosen grain unnumbered.
+fn split_by_grain(table: &Table, chosen: usize) -> Result<Columns, String> {
+    let index = table
+        .column("grain")
+        .ok_or("grains.csv has no column \"grain\"")?;
+    let count = index.iter().fold(0.0, |a: f64, b| a.max(*b)) as usize + 1;
+    if chosen >= count || index.is_empty() {
+        return Err(format!("grains.csv has no grain {chosen}"));
     }
     let mut columns = Columns::default();
     for name in table.names().iter().filter(|name| *name != "grain") {
         let values = table.column(name).unwrap_or_default();
         for grain in 0..count {
-            let of_grain = || -> Vec<f64> {
-                let rows = values.iter().zip(number);
-                rows.filter(|(_, n)| **n == grain as f64)
-                    .map(|(v, _)| *v)
-                    .collect()
-            };
+            let rows = values
+                .iter()
+                .zip(index)
+                .filter(|(_, i)| **i == grain as f64);
+            let own: Vec<f64> = rows.map(|(value, _)| *value).collect();
             if grain == chosen {
-                columns.push(name, of_grain());
+                columns.push(name, own.clone());
             }
-            columns.push(format!("{name}{grain}"), of_grain());
+            columns.push(format!("{name}{grain}"), own);
         }
     }
     Ok(columns)
 }
 
-/// The last slice of a plane: the frame at the end, else the one with the highest number.
+/// Reads the slice of a plane with the latest time.
 pub(crate) fn last_slice(folder: &Path, plane: &str) -> Result<Image, String> {
     let slices = folder.join("slices");
     let entries = std::fs::read_dir(&slices).map_err(|e| format!("{}: {e}", slices.display()))?;
@@ -170,11 +178,12 @@ pub(crate) fn last_slice(folder: &Path, plane: &str) -> Result<Image, String> {
     latest.ok_or_else(|| format!("there is no slice of the plane \"{plane}\""))
 }
 
-/// Values along a line, interpolated across it between the cell centres of the slice.
-fn along(folder: &Path, line: &Line) -> Result<Columns, String> {
+/// Samples a slice along a line, at the cell centres along it and linearly interpolated across it.
+fn sample_line(folder: &Path, line: &Line) -> Result<Columns, String> {
     let image = last_slice(folder, &line.plane)?;
     let axis = line.along as usize;
     let through = DVec3::from(line.through);
+    // Offsets and weights of the cells around the line.
     let mut weights = vec![(0usize, 1.0f64)];
     let strides = [1, image.cells[0], image.cells[0] * image.cells[1]];
     for other in (0..3).filter(|a| *a != axis && image.cells[*a] > 1) {
@@ -189,22 +198,16 @@ fn along(folder: &Path, line: &Line) -> Result<Columns, String> {
         let low = s.clamp(0.0, n as f64 - 1.0).floor() as usize;
         let high = (low + 1).min(n - 1);
         let part = (s - low as f64).clamp(0.0, 1.0);
-        weights = weights
-            .iter()
-            .flat_map(|(at, w)| {
-                [
-                    (at + low * strides[other], w * (1.0 - part)),
-                    (at + high * strides[other], w * part),
-                ]
-            })
-            .collect();
+        let split = |(at, w): (usize, f64)| {
+            let (below, above) = (at + low * strides[other], at + high * strides[other]);
+            [(below, w * (1.0 - part)), (above, w * part)]
+        };
+        weights = weights.into_iter().flat_map(split).collect();
     }
     let mut columns = Columns::default();
     let n = image.cells[axis];
-    let name = ["x", "y", "z"][axis];
-    let start = image.origin[axis];
-    let centre = |i: usize| start + (i as f64 + 0.5) * image.spacing[axis];
-    columns.push(name, (0..n).map(centre).collect());
+    let centre = |i: usize| image.origin[axis] + (i as f64 + 0.5) * image.spacing[axis];
+    columns.push(AXES[axis], (0..n).map(centre).collect());
     for array in &image.arrays {
         for c in 0..array.components {
             let value = |i: usize| -> f64 {
@@ -215,8 +218,8 @@ fn along(folder: &Path, line: &Line) -> Result<Columns, String> {
             };
             let label = match (array.components, array.name.as_str()) {
                 (1, name) => name.to_string(),
-                (_, "velocity") => format!("v{}", ["x", "y", "z"][c]),
-                (_, name) => format!("{name}_{}", ["x", "y", "z"][c]),
+                (_, "velocity") => format!("v{}", AXES[c]),
+                (_, name) => format!("{name}_{}", AXES[c]),
             };
             columns.push(label, (0..n).map(value).collect());
         }
@@ -235,23 +238,23 @@ mod tests {
     }
 
     #[test]
-    fn grains_stand_side_by_side() {
+    fn grain_columns_are_side_by_side() {
         let text = "time,grain,z\n0,0,1\n0,1,2\n1,0,3\n1,1,4\n";
         let folder = folder_with("grains.csv", text);
-        let columns = Columns::of_run(folder.path(), &From::Grains, 1).unwrap();
+        let columns = Columns::read_run(folder.path(), &TableSource::Grains, 1).unwrap();
         assert_eq!(columns.get("z0").unwrap(), [1.0, 3.0]);
         assert_eq!(columns.get("z").unwrap(), [2.0, 4.0]);
         assert_eq!(columns.get("time").unwrap(), [0.0, 1.0]);
-        assert!(Columns::of_run(folder.path(), &From::Grains, 2).is_err());
+        assert!(Columns::read_run(folder.path(), &TableSource::Grains, 2).is_err());
     }
 
     #[test]
-    fn data_may_carry_comments_and_errors_name_the_line() {
+    fn comments_are_skipped_and_errors_name_the_line() {
         let folder = folder_with("d.csv", "# source\nt, u\n0, 1\n# more\n1, x\n");
-        let error = Columns::of_data(&folder.path().join("d.csv")).unwrap_err();
+        let error = Columns::read_reference(&folder.path().join("d.csv")).unwrap_err();
         assert!(error.contains("line 5: 'x'"), "{error}");
         let folder = folder_with("d.csv", "# source\nt, u\n0, 1\n1, 2\n");
-        let data = Columns::of_data(&folder.path().join("d.csv")).unwrap();
+        let data = Columns::read_reference(&folder.path().join("d.csv")).unwrap();
         assert_eq!(data.get("u").unwrap(), [1.0, 2.0]);
     }
 }
