@@ -110,7 +110,7 @@ pub fn render(run_dir: &Path) -> Result<Rendered, ReportError> {
             svg.as_bytes(),
         )?);
     }
-    let page = page::html(&run, &story, &figures, &notes);
+    let page = page::page(&run, &story, &figures, &notes);
     out.page = write(out.page, page.as_bytes())?;
     out.notes = notes;
     Ok(out)

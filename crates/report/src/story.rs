@@ -242,12 +242,12 @@ pub fn short(value: f64) -> String {
         let mantissa = value / 10f64.powi(power);
         return format!(
             "{mantissa:.2}×10^{{{}}}",
-            crate::figure::minus(&power.to_string())
+            grainwake_plot::minus(&power.to_string())
         )
         .replacen('-', "−", 1);
     }
     let decimals = (2 - power).clamp(0, 6) as usize;
-    crate::figure::minus(&format!("{value:.decimals$}"))
+    grainwake_plot::minus(&format!("{value:.decimals$}"))
 }
 
 #[cfg(test)]

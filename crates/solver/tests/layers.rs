@@ -92,7 +92,11 @@ fn libraries_depend_downwards() {
             "shape",
             &["grainwake-solver", "grainwake-report", "grainwake ="][..],
         ),
-        ("solver", &["grainwake-report", "grainwake ="][..]),
+        (
+            "solver",
+            &["grainwake-plot", "grainwake-report", "grainwake ="][..],
+        ),
+        ("plot", &["grainwake-", "grainwake ="][..]),
         (
             "report",
             &["grainwake-study", "grainwake-validation", "grainwake ="][..],
@@ -120,8 +124,6 @@ const KNOWN_CIRCLES: &[(&str, &[&str])] = &[
     ("cli", &["exit", "out"]),
     // The progress display uses `study::first_line`.
     ("cli", &["study", "study_board"]),
-    // `story` formats numbers with `figure::minus`; the figures use `story::short`.
-    ("report", &["figure", "story"]),
     (
         "shape",
         &[

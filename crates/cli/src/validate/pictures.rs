@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use grainwake_report::figure::plain;
+use grainwake_plot::plain;
 use grainwake_validation::Suite;
 
 use super::saved::Saved;

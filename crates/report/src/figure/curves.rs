@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use super::axis::{Axis, extent};
-use super::lines::{Mark, Panel, Series, stack};
-use super::style::{self, grain_colour};
 use super::{Figure, Scene};
 use crate::run_folder::{History, Kind};
 use crate::story::{galileo, short};
+use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::lines::{Mark, Panel, Series, stack};
+use grainwake_plot::style::{self, grain_colour};
 
 /// Points of a curve.
 pub type Points = Vec<(f64, f64)>;

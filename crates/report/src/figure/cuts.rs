@@ -4,7 +4,7 @@ use super::Scene;
 use super::section::{Section, View};
 use super::sheet::Column;
 use super::silhouette::{self, Outline};
-use super::style::{INK, grain_colour};
+use grainwake_plot::style::{INK, grain_colour};
 
 /// Outlines of the grains in each of the column's sections, in the colours of the grains.
 pub fn of_column(scene: &Scene, column: &Column) -> Vec<Vec<(&'static str, Outline)>> {

@@ -4,17 +4,17 @@ use std::path::Path;
 
 use grainwake_solver::output::vti::Image;
 
-use super::axis::Axis;
-use super::colormap::ColorMap;
-use super::plan::Window;
 use super::section::Section;
 use super::sheet::{self, Cells, Column, Look};
 use super::silhouette::Outline;
-use super::style::INK;
-use super::svg::Drawing;
 use super::{AXES, Scene, cuts};
 use crate::run_folder::RunFolder;
 use crate::story::Story;
+use grainwake_plot::axis::Axis;
+use grainwake_plot::colormap::ColorMap;
+use grainwake_plot::plan::Window;
+use grainwake_plot::style::INK;
+use grainwake_plot::svg::Drawing;
 
 /// What is shown of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

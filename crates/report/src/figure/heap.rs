@@ -1,12 +1,12 @@
 //! Where many grains lie, from the side and from above.
 
-use super::axis::{Axis, extent};
-use super::colormap::{hex, ordered};
-use super::plan::{Plan, Window, colour_bar, length_unit};
-use super::style::PAGE;
-use super::svg::Drawing;
 use super::{AXES, Figure, Scene};
 use crate::story::short;
+use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::colormap::{hex, ordered};
+use grainwake_plot::plan::{Plan, Window, colour_bar, length_unit};
+use grainwake_plot::style::PAGE;
+use grainwake_plot::svg::Drawing;
 
 /// The grains at the end of the run, coloured by height.
 pub fn positions(scene: &Scene) -> Option<Figure> {

@@ -1,11 +1,11 @@
 //! Curves of the run as a whole: many grains coming to rest, diagnostics.
 
 use super::curves::{Points, log_panel, panel, series};
-use super::lines::{Series, stack};
-use super::style;
 use super::{AXES, Figure, Scene};
 use crate::run_folder::History;
 use crate::story::short;
+use grainwake_plot::lines::{Series, stack};
+use grainwake_plot::style;
 
 /// Mean height, speed and contacts of many grains.
 pub fn many(scene: &Scene) -> Option<Figure> {

@@ -1,38 +1,26 @@
 //! Figures of a run: each a drawing with its caption, written as SVG and PNG.
 
-pub mod axis;
-pub mod colormap;
-mod contour;
 mod curves;
 mod cuts;
 pub mod field;
-pub mod frame;
 mod heap;
 mod history;
-pub mod lines;
 mod orientation;
-pub mod plan;
-pub mod raster;
 pub mod section;
 mod sheet;
 pub mod silhouette;
 mod slices;
-pub mod style;
-pub mod svg;
-pub mod text;
 mod trajectory;
 
 use std::collections::BTreeMap;
+
+use grainwake_plot::{Drawing, plain};
 
 use crate::phases::{self, Instant};
 use crate::run_folder::RunFolder;
 use crate::story::{Story, Subject};
 
-pub use axis::minus;
 pub use silhouette::{Body, bodies};
-pub use style::COLUMN;
-pub use svg::Drawing;
-pub use text::{escape, html, literal, plain};
 
 /// Names of the coordinate axes.
 const AXES: [&str; 3] = ["x", "y", "z"];

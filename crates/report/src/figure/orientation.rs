@@ -2,13 +2,13 @@
 
 use glam::DVec3;
 
-use super::axis::Axis;
 use super::curves::panel;
-use super::lines::{Series, stack};
 use super::silhouette::Axes;
 use super::{Figure, Scene};
 use crate::run_folder::History;
 use crate::story::short;
+use grainwake_plot::axis::Axis;
+use grainwake_plot::lines::{Series, stack};
 
 /// A grain that turns by less than this in all does not turn but for round-off [rad].
 const TURNED: f64 = 1e-4;

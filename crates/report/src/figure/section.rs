@@ -3,10 +3,10 @@
 use glam::DVec3;
 use grainwake_solver::output::vti::Image;
 
-use super::contour;
-use super::plan::Window;
-use super::raster::Raster;
 use super::sheet::Cells;
+use grainwake_plot::contour;
+use grainwake_plot::plan::Window;
+use grainwake_plot::raster::Raster;
 
 /// How a plane is looked at: axes 0, 1, 2 are x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

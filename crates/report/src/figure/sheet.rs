@@ -1,13 +1,14 @@
 //! A sheet of slices: instants across, planes down, one colour scale.
 
-use super::axis::Axis;
-use super::colormap::ColorMap;
-use super::plan::{Plan, Window, colour_bar, length_unit};
+use super::AXES;
 use super::section::Section;
 use super::silhouette::Outline;
-use super::style::{self, HAIR, INK, PAGE, SMALL, TEXT};
-use super::svg::{Anchor, Drawing, path_data};
-use super::{AXES, text};
+use grainwake_plot::axis::Axis;
+use grainwake_plot::colormap::ColorMap;
+use grainwake_plot::plan::{Plan, Window, colour_bar, length_unit};
+use grainwake_plot::style::{self, HAIR, INK, PAGE, SMALL, TEXT};
+use grainwake_plot::svg::{Anchor, Drawing, path_data};
+use grainwake_plot::text;
 
 /// Pixels of a slice for each point of the paper.
 const PIXELS: f64 = 3.0;

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use glam::{DQuat, DVec3};
 
-use super::contour;
 use super::section::View;
 use crate::run_folder::{History, RunFolder, Surface};
+use grainwake_plot::contour;
 
 /// A closed line in two of the three coordinates [m].
 pub type Outline = Vec<(f64, f64)>;
@@ -193,7 +193,8 @@ pub fn circle(centre: (f64, f64), radius: f64) -> Outline {
 
 /// Outline of the union of projected triangles: painted on a grid, smoothed, and traced.
 fn largest_outline(points: &[(f64, f64)], triangles: &[[usize; 3]]) -> Outline {
-    let range = |pick: fn(&(f64, f64)) -> f64| super::axis::extent(points.iter().map(pick));
+    let range =
+        |pick: fn(&(f64, f64)) -> f64| grainwake_plot::axis::extent(points.iter().map(pick));
     let (Some((x0, x1)), Some((y0, y1))) = (range(|p| p.0), range(|p| p.1)) else {
         return Outline::new();
     };

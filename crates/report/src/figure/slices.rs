@@ -1,14 +1,14 @@
 //! Slices of the flow at the key instants: speed with arrows, and vorticity across the plane.
 
-use super::axis::Axis;
-use super::colormap::ColorMap;
-use super::plan::{Window, length_unit};
 use super::section::{Section, View};
 use super::sheet::{self, Cells, Column, Look};
-use super::style::grain_colour;
 use super::{AXES, Figure, Scene, cuts, letter};
 use crate::run_folder::{FrameFile, History};
 use crate::story::{Subject, short};
+use grainwake_plot::axis::Axis;
+use grainwake_plot::colormap::ColorMap;
+use grainwake_plot::plan::{Window, length_unit};
+use grainwake_plot::style::grain_colour;
 
 /// Speed and vorticity slices; what cannot be read is added to `notes`.
 pub fn figures(scene: &Scene, notes: &mut Vec<String>) -> Vec<Figure> {
@@ -145,7 +145,8 @@ fn crop(scene: &Scene, columns: &mut [Column]) {
         return;
     }
     let span = |column: &Column, pick: fn(&(f64, f64)) -> f64| {
-        super::axis::extent(column.centres.iter().map(|(_, p)| pick(p))).unwrap_or((0.0, 0.0))
+        grainwake_plot::axis::extent(column.centres.iter().map(|(_, p)| pick(p)))
+            .unwrap_or((0.0, 0.0))
     };
     let widest = |pick: fn(&(f64, f64)) -> f64| {
         columns

@@ -1,11 +1,11 @@
 //! Paths of the grains seen from two sides, with the grains drawn at the key instants.
 
-use super::axis::extent;
-use super::plan::{Plan, Window, grain_style, length_unit};
-use super::style::{self, COLUMN, INK, SMALL, grain_colour};
-use super::svg::{Anchor, Drawing};
 use super::{AXES, Figure, Scene, letter, silhouette};
 use crate::story::short;
+use grainwake_plot::axis::extent;
+use grainwake_plot::plan::{Plan, Window, grain_style, length_unit};
+use grainwake_plot::style::{self, COLUMN, INK, SMALL, grain_colour};
+use grainwake_plot::svg::{Anchor, Drawing};
 
 impl Scene<'_> {
     /// Outline of a grain at a row of its history, seen along the axis that is neither.

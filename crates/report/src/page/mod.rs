@@ -2,7 +2,9 @@
 
 mod tables;
 
-use crate::figure::{self, Figure};
+use grainwake_plot::{COLUMN, escape, html, literal, plain};
+
+use crate::figure::Figure;
 use crate::phases::{Phase, PhaseKind};
 use crate::run_folder::RunFolder;
 use crate::story::{Story, Subject, short};
@@ -11,7 +13,7 @@ use crate::story::{Story, Subject, short};
 pub const STYLE: &str = include_str!("style.css");
 
 /// The whole page; `figures` come with their SVG documents.
-pub fn html(
+pub fn page(
     run: &RunFolder,
     story: &Story,
     figures: &[(Figure, String)],
@@ -23,11 +25,11 @@ pub fn html(
     out.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
     out.push_str(&format!(
         "<title>{}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n",
-        figure::escape(&title)
+        escape(&title)
     ));
     out.push_str(&format!(
         "<header>\n<h1>{}</h1>\n<p class=\"lead\">{}</p>\n</header>\n",
-        figure::escape(&title),
+        escape(&title),
         lead(run, story)
     ));
     out.push_str(&notices(run, story, notes));
@@ -100,9 +102,9 @@ fn lead(run: &RunFolder, story: &Story) -> String {
         .and_then(serde_json::Value::as_str);
     let ended = ended.filter(|reason| *reason != "end");
     let ended = ended.map_or(String::new(), |reason| {
-        format!("; it ended by {}", figure::literal(reason))
+        format!("; it ended by {}", literal(reason))
     });
-    figure::html(&format!("{first}{end}{wall}{ended}."))
+    html(&format!("{first}{end}{wall}{ended}."))
 }
 
 fn pair_sentence(story: &Story) -> String {
@@ -142,7 +144,7 @@ fn single_sentence(run: &RunFolder, story: &Story) -> String {
 
 fn notices(run: &RunFolder, story: &Story, notes: &[String]) -> String {
     let mut out = String::new();
-    let up_to = figure::html(&short(story.end));
+    let up_to = html(&short(story.end));
     if let Some(failure) = &run.failure {
         let say = |name: &str| {
             failure
@@ -152,8 +154,8 @@ fn notices(run: &RunFolder, story: &Story, notes: &[String]) -> String {
         };
         out.push_str(&format!(
             "<div class=\"notice\" role=\"alert\"><b>This run failed</b>: {}. To try: {}. What follows goes up to <i>t</i> = {up_to} s.</div>\n",
-            figure::escape(say("what")),
-            figure::escape(say("remedy"))
+            escape(say("what")),
+            escape(say("remedy"))
         ));
     } else if !run.finished() {
         out.push_str(&format!(
@@ -163,7 +165,7 @@ fn notices(run: &RunFolder, story: &Story, notes: &[String]) -> String {
     if !notes.is_empty() {
         let items: Vec<String> = notes
             .iter()
-            .map(|note| format!("<li>{}</li>", figure::escape(note)))
+            .map(|note| format!("<li>{}</li>", escape(note)))
             .collect();
         out.push_str(&format!(
             "<div class=\"notice\" role=\"note\"><b>Missing or left out</b><ul>{}</ul></div>\n",
@@ -207,7 +209,7 @@ fn phase_bar(story: &Story) -> String {
         bar.push_str(&format!(
             "<div style=\"width:{share:.3}%;background:{colour}\">{shown}</div>"
         ));
-        let scaled = |time: f64| figure::html(&short(time * factor));
+        let scaled = |time: f64| html(&short(time * factor));
         let scaled = if dimensionless {
             format!(
                 "<td class=\"number\">{}</td><td class=\"number\">{}</td>",
@@ -219,37 +221,37 @@ fn phase_bar(story: &Story) -> String {
         };
         rows.push_str(&format!(
             "<tr><td class=\"name\"><span class=\"swatch\" style=\"background:{colour}\"></span>{name}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>{scaled}</tr>\n",
-            figure::html(&short(phase.start)),
-            figure::html(&short(phase.end))
+            html(&short(phase.start)),
+            html(&short(phase.end))
         ));
         spoken.push(format!(
             "{name} from {} s to {} s",
-            figure::plain(&short(phase.start)),
-            figure::plain(&short(phase.end))
+            plain(&short(phase.start)),
+            plain(&short(phase.end))
         ));
     }
     let scaled = if dimensionless {
-        let label = figure::html(label.split("  ").next().unwrap_or(label));
+        let label = html(label.split("  ").next().unwrap_or(label));
         format!("<th class=\"number\">from, {label}</th><th class=\"number\">to, {label}</th>")
     } else {
         String::new()
     };
     format!(
         "<div class=\"bar\" role=\"img\" aria-label=\"Phases: {}\">{bar}</div>\n<div class=\"scroll\"><table><thead><tr><th>phase</th><th class=\"number\">from [s]</th><th class=\"number\">to [s]</th>{scaled}</tr></thead><tbody>\n{rows}</tbody></table></div>\n",
-        figure::escape(&spoken.join("; "))
+        escape(&spoken.join("; "))
     )
 }
 
 fn figure_block(number: usize, figure: &Figure, svg: &str) -> String {
-    let class = if figure.drawing.width() <= figure::COLUMN + 30.0 {
+    let class = if figure.drawing.width() <= COLUMN + 30.0 {
         " class=\"column\""
     } else {
         ""
     };
     format!(
         "<figure{class} id=\"{name}\">\n<div class=\"paper\">{svg}</div>\n<figcaption><b>Figure {number}. {}.</b> {} <span>(<a href=\"figures/{name}.png\">PNG</a>, <a href=\"figures/{name}.svg\">SVG</a>)</span></figcaption>\n</figure>\n",
-        figure::html(&figure.title),
-        figure::html(&figure.caption),
+        html(&figure.title),
+        html(&figure.caption),
         name = figure.name,
     )
 }

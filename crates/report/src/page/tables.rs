@@ -2,9 +2,9 @@
 
 use serde_json::Value;
 
-use crate::figure::{escape, html, literal};
 use crate::run_folder::RunFolder;
 use crate::story::{Story, galileo, short};
+use grainwake_plot::{escape, html, literal};
 
 /// Most events that are listed.
 const EVENTS: usize = 100;

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use grainwake_plot::text::{escape, html};
 use grainwake_report::STYLE;
-use grainwake_report::figure::text::{escape, html};
 
 use super::figure::StudyFigure;
 use super::{settling, tables};

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use grainwake_report::figure::text::escape;
+use grainwake_plot::text::escape;
 
 use super::html::Content;
 use crate::format::significant;

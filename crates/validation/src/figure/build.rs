@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
+use grainwake_plot::{plan, style};
 use grainwake_report::figure::field::{Quantity, Style};
-use grainwake_report::figure::{plan, style};
 use grainwake_solver::case::{Loc, Problem, Source, nearest};
 
 use super::raw::{

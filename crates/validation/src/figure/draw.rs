@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use grainwake_plot::style::FAINT;
+use grainwake_plot::svg::Drawing;
+use grainwake_plot::{minus, plain};
 use grainwake_report::figure::field::{self, Panel};
-use grainwake_report::figure::style::FAINT;
-use grainwake_report::figure::svg::Drawing;
-use grainwake_report::figure::{minus, plain};
 
 use grainwake_solver::output::SUMMARY;
 use grainwake_solver::output::vti::Image;

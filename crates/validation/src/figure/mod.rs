@@ -8,8 +8,8 @@ mod raw;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use grainwake_plot::plan;
 use grainwake_report::figure::field::{Quantity, Style};
-use grainwake_report::figure::plan;
 
 pub(crate) use build::build;
 pub use draw::DrawnFigure;

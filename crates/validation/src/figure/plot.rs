@@ -1,11 +1,11 @@
 //! Plots of points and curves with a legend.
 
-use grainwake_report::figure::COLUMN;
-use grainwake_report::figure::axis::{Axis, extent};
-use grainwake_report::figure::frame::{Frame, Sign};
-use grainwake_report::figure::style::{INK, LINE, SMALL};
-use grainwake_report::figure::svg::{Anchor, Drawing};
-use grainwake_report::figure::text;
+use grainwake_plot::COLUMN;
+use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::frame::{Frame, Sign};
+use grainwake_plot::style::{INK, LINE, SMALL};
+use grainwake_plot::svg::{Anchor, Drawing};
+use grainwake_plot::text;
 
 use super::AxisSpec;
 

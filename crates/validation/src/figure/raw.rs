@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use grainwake_report::figure::style;
+use grainwake_plot::style;
 use grainwake_solver::case::Loc;
 use serde::Deserialize;
 

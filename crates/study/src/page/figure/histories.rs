@@ -1,10 +1,10 @@
 //! Figs 15 to 18: gap and vertical velocity in one orientation, by row and by column of grains.
 
-use grainwake_report::figure::axis::{Axis, extent};
-use grainwake_report::figure::frame::Frame;
-use grainwake_report::figure::style::{BLUE, GREEN, INK, LINE, ORANGE, PAGE, SMALL, VERMILION};
-use grainwake_report::figure::svg::{Anchor, Drawing};
-use grainwake_report::figure::text;
+use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::frame::Frame;
+use grainwake_plot::style::{BLUE, GREEN, INK, LINE, ORANGE, PAGE, SMALL, VERMILION};
+use grainwake_plot::svg::{Anchor, Drawing};
+use grainwake_plot::text;
 
 use super::{FigureData, StudyFigure, factor_label, heading};
 use crate::measure::trajectory::Trajectory;

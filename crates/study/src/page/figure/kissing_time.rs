@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use grainwake_report::figure::axis::{Axis, extent};
-use grainwake_report::figure::frame::{Frame, Sign};
-use grainwake_report::figure::style::{BLUE, GREEN, HAIR, INK, ORANGE, PAGE, TEXT, VERMILION};
-use grainwake_report::figure::svg::{Anchor, Drawing};
-use grainwake_report::figure::text;
+use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::frame::{Frame, Sign};
+use grainwake_plot::style::{BLUE, GREEN, HAIR, INK, ORANGE, PAGE, TEXT, VERMILION};
+use grainwake_plot::svg::{Anchor, Drawing};
+use grainwake_plot::text;
 
 use super::{FigureData, StudyFigure, factor_label, heading, sign_entry};
 use crate::analysis::observation::{Observation, observations};

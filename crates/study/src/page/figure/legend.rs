@@ -1,11 +1,9 @@
 //! Line styles of runs in the overview figures, and their legend.
 
-use grainwake_report::figure::frame::Sign;
-use grainwake_report::figure::style::{
-    BLUE, GREEN, INK, LINE, ORANGE, PAGE, PURPLE, SKY, SMALL, VERMILION,
-};
-use grainwake_report::figure::svg::{Anchor, Drawing};
-use grainwake_report::figure::text;
+use grainwake_plot::frame::Sign;
+use grainwake_plot::style::{BLUE, GREEN, INK, LINE, ORANGE, PAGE, PURPLE, SKY, SMALL, VERMILION};
+use grainwake_plot::svg::{Anchor, Drawing};
+use grainwake_plot::text;
 
 use super::{FigureData, note, unique};
 use crate::plan::Run;

@@ -13,10 +13,10 @@ mod trends;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_report::figure::frame::Sign;
-use grainwake_report::figure::style::{INK, SMALL, TEXT};
-use grainwake_report::figure::svg::{Anchor, Drawing};
-use grainwake_report::figure::text;
+use grainwake_plot::frame::Sign;
+use grainwake_plot::style::{INK, SMALL, TEXT};
+use grainwake_plot::svg::{Anchor, Drawing};
+use grainwake_plot::text;
 use grainwake_solver::case::Case;
 use grainwake_solver::output::RESOLVED;
 

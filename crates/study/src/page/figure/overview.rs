@@ -1,10 +1,10 @@
 //! Figures of a study that requests none: curves of all runs against time, and results against the
 //! varied parameters.
 
-use grainwake_report::figure::axis::{Axis, extent};
-use grainwake_report::figure::frame::Frame;
-use grainwake_report::figure::style::{LINE, PAGE};
-use grainwake_report::figure::svg::Drawing;
+use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::frame::Frame;
+use grainwake_plot::style::{LINE, PAGE};
+use grainwake_plot::svg::Drawing;
 
 use super::legend::LineStyles;
 use super::panels::against_parameters;

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use grainwake_report::figure::axis::{Axis, extent};
-use grainwake_report::figure::frame::Frame;
-use grainwake_report::figure::style::PAGE;
-use grainwake_report::figure::svg::Drawing;
-use grainwake_report::figure::text;
+use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::frame::Frame;
+use grainwake_plot::style::PAGE;
+use grainwake_plot::svg::Drawing;
+use grainwake_plot::text;
 
 use super::legend::{LineStyles, axes};
 use super::overview::{LEFT, Texts};

@@ -1,10 +1,10 @@
 //! Fig. 7: the box with the pair at the start, to scale, and the pair enlarged.
 
-use grainwake_report::figure::plan::{Plan, Window, grain_style, length_unit};
+use grainwake_plot::plan::{Plan, Window, grain_style, length_unit};
+use grainwake_plot::style::{BLUE, COLUMN, FAINT, HAIR, INK, SMALL, VERMILION};
+use grainwake_plot::svg::{Anchor, Drawing};
+use grainwake_plot::text;
 use grainwake_report::figure::silhouette::{Body, Outline};
-use grainwake_report::figure::style::{BLUE, COLUMN, FAINT, HAIR, INK, SMALL, VERMILION};
-use grainwake_report::figure::svg::{Anchor, Drawing};
-use grainwake_report::figure::text;
 use grainwake_solver::case::Case;
 use grainwake_solver::dem::Grain;
 

@@ -1,10 +1,10 @@
 //! Rank correlations with their confidence intervals.
 
-use grainwake_report::figure::axis::Axis;
-use grainwake_report::figure::frame::{Frame, Sign};
-use grainwake_report::figure::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
-use grainwake_report::figure::svg::{Anchor, Drawing};
-use grainwake_report::figure::text;
+use grainwake_plot::axis::Axis;
+use grainwake_plot::frame::{Frame, Sign};
+use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
+use grainwake_plot::svg::{Anchor, Drawing};
+use grainwake_plot::text;
 
 use super::{FigureData, StudyFigure, note, sign_entry};
 use crate::analysis::correlation::Correlation;

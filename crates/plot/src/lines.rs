@@ -1,9 +1,9 @@
 //! Curves over a shared horizontal axis, one panel above the other, with marked instants.
 
-use super::axis::Axis;
-use super::style::{self, COLUMN, HAIR, INK, LINE, SMALL, TEXT, TICK};
-use super::svg::{Anchor, Drawing};
-use super::text;
+use crate::axis::Axis;
+use crate::style::{self, COLUMN, HAIR, INK, LINE, SMALL, TEXT, TICK};
+use crate::svg::{Anchor, Drawing};
+use crate::text;
 
 /// A curve.
 #[derive(Clone, Debug)]

@@ -1,9 +1,9 @@
 //! A frame with axes for points, boxes and curves.
 
-use super::axis::Axis;
-use super::style::{FAINT, GRID, HAIR, INK, LINE, SMALL, TEXT, TICK};
-use super::svg::{Anchor, Drawing, path_data};
-use super::text;
+use crate::axis::Axis;
+use crate::style::{FAINT, GRID, HAIR, INK, LINE, SMALL, TEXT, TICK};
+use crate::svg::{Anchor, Drawing, path_data};
+use crate::text;
 
 /// A frame on the paper with its axes.
 pub struct Frame {

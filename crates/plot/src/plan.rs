@@ -1,8 +1,8 @@
 //! A frame of equal scale along both axes: maps, side views, sections.
 
-use super::axis::Axis;
-use super::style::{self, HAIR, INK, SMALL, TEXT, TICK};
-use super::svg::{Anchor, Drawing, path_data};
+use crate::axis::Axis;
+use crate::style::{self, HAIR, INK, SMALL, TEXT, TICK};
+use crate::svg::{Anchor, Drawing, path_data};
 
 /// A window on two of the three coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,7 +128,7 @@ impl Plan {
             let at = y + height * (1.0 - place);
             drawing.line(&[(x - TICK, at), (x, at)], INK, HAIR, None);
             if names.1.is_some() {
-                widest = widest.max(super::text::width(name, SMALL));
+                widest = widest.max(crate::text::width(name, SMALL));
                 drawing.label(
                     x - TICK - 2.0,
                     at + 0.36 * SMALL,
@@ -183,7 +183,7 @@ pub fn colour_bar(
 ) {
     const HEIGHT: f64 = 6.0;
     let (x, y) = corner;
-    let raster = super::raster::Raster {
+    let raster = crate::raster::Raster {
         width: palette.len(),
         height: 1,
         pixels: (0..palette.len()).map(|i| i.min(255) as u8).collect(),
@@ -194,7 +194,7 @@ pub fn colour_bar(
         let triangle = [(at, y), (at + out, y + 0.5 * HEIGHT), (at, y + HEIGHT)];
         let style = format!(
             "fill=\"{}\" stroke=\"{INK}\" stroke-width=\"{HAIR}\"",
-            super::colormap::hex(colour)
+            crate::colormap::hex(colour)
         );
         drawing.path(&path_data(&triangle, true), &style);
     };

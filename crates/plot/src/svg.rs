@@ -5,9 +5,9 @@ use std::sync::{Arc, OnceLock};
 use base64::Engine;
 use resvg::{tiny_skia, usvg};
 
-use super::raster::{Raster, encode};
-use super::style;
-use super::text;
+use crate::raster::{Raster, encode};
+use crate::style;
+use crate::text;
 
 /// Where a text is held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
