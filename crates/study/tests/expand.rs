@@ -1,4 +1,4 @@
-//! What a study file expands to, and what is said about a wrong one.
+//! Expansion of study files, and messages about invalid ones.
 
 mod common;
 
@@ -71,7 +71,7 @@ fn a_model_may_replace_all_grains() {
 }
 
 #[test]
-fn hashes_follow_what_decides_the_results() {
+fn hashes_depend_on_everything_that_affects_the_results() {
     let ids = |study: &str, sets: &[&str]| {
         let (_folder, path) = folder(study);
         let sets: Vec<String> = sets.iter().map(|s| (*s).to_string()).collect();
@@ -135,7 +135,7 @@ fn an_ensemble_offsets_all_but_the_first_member() {
     }
     assert!(offsets[0].distance(offsets[1]) > 1e-7);
     assert_eq!(plan(&path).unwrap().runs, runs, "the same every time");
-    // A grain that has a height of its own keeps it.
+    // A grain with a given height keeps it.
     let first = text.replace("[ensemble]", "[ensemble]\ngrain = 0");
     let (_folder, path) = folder(&first);
     let runs = plan(&path).unwrap().runs;
@@ -144,7 +144,7 @@ fn an_ensemble_offsets_all_but_the_first_member() {
 }
 
 #[test]
-fn wrong_studies_are_located() {
+fn problems_are_located() {
     let one = |study: &str| {
         let found = problems(study);
         let p = found.first().unwrap().clone();
@@ -193,7 +193,7 @@ fn wrong_studies_are_located() {
 }
 
 #[test]
-fn a_wrong_case_is_placed_where_the_study_set_it() {
+fn case_problems_are_located_in_the_study_file() {
     let found = problems(&STUDY.replace("\"contact.friction\" = 0 ", "\"contact.fricton\" = 0 "));
     let p = &found[0];
     assert!(
@@ -208,7 +208,7 @@ fn a_wrong_case_is_placed_where_the_study_set_it() {
 }
 
 #[test]
-fn only_takes_patterns_and_shares() {
+fn selection_accepts_patterns_and_shares() {
     let (_folder, path) = folder(STUDY);
     let runs = plan(&path).unwrap().runs;
     let chosen = |text: &str| Selection::parse(text).unwrap().choose(&runs);

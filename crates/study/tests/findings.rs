@@ -1,4 +1,4 @@
-//! Claims tested on made-up tables whose answers are known.
+//! Claims tested on synthetic tables with known results.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use grainwake_study::observation::observations;
 use grainwake_study::verdict::{KISS_RESERVATION, evaluate};
 use grainwake_study::{Analysis, Model, PairMeasures, RunRecord};
 
-/// 16 grains in four orientations and a sphere; `fill` gives what is measured.
+/// 16 grains in four orientations and a sphere; `fill` returns the measured values.
 fn rows(fill: impl Fn(f64, f64, usize) -> PairMeasures) -> Vec<RunRecord> {
     let mut out = Vec::new();
     for grain in 0..16 {
@@ -57,7 +57,7 @@ fn row(
     }
 }
 
-/// Something that looks random and is the same every time.
+/// Reproducible noise.
 fn noise(s: f64, r: f64, o: usize) -> f64 {
     (1e3 * s + 3.7e3 * r + 17.0 * o as f64).sin()
 }
@@ -70,7 +70,7 @@ fn kiss(time: f64) -> PairMeasures {
     }
 }
 
-/// The paper's own picture: order 1 > 2 = 4 > 3, form matters in orientation 1 alone.
+/// Kissing times as in the paper: order 1 > 2 = 4 > 3, with an effect of shape in 1 only.
 fn as_in_the_paper(s: f64, r: f64, o: usize) -> PairMeasures {
     let base = [0.0, 20.0 - 6.0 * s - 2.0 * r, 14.0, 10.0, 14.0][o];
     kiss(base + 0.05 * noise(s, r, o))
@@ -96,7 +96,7 @@ fn verdict(rows: &[RunRecord], claim: &str) -> (String, String) {
 
 const ORDER: &str = "quantity = \"kiss_time\"\ntest.order = { axis = \"orientation\", more = \"o1\", less = \"o3\" }";
 
-/// A claim that the kissing time goes with a factor in an orientation.
+/// Claim of a trend of the kissing time with a factor in an orientation.
 fn trend(factor: &str, sign: &str, o: &str) -> String {
     format!(
         "quantity = \"kiss_time\"\ntest.trend = {{ with = \"{factor}\", sign = \"{sign}\" }}\nwhere = {{ orientation = \"{o}\" }}"
@@ -180,7 +180,7 @@ fn trends_and_ranges_follow_the_factors() {
 }
 
 #[test]
-fn what_did_not_happen_before_the_landing_is_a_bound() {
+fn events_after_the_landing_are_right_censored() {
     let late = rows(|s, r, o| {
         let mut m = as_in_the_paper(s, r, o);
         if o == 1 && s < 0.5 {
@@ -201,7 +201,7 @@ fn what_did_not_happen_before_the_landing_is_a_bound() {
         found == "holds" && says.contains("for 12 of 12") && says.contains("are left out"),
         "{says}"
     );
-    // The landing of a pair that never kissed is no early kiss.
+    // An early landing without a kiss must not rank as an early kiss.
     let early = rows(|s, r, o| {
         let mut m = as_in_the_paper(s, r, o);
         if o == 1 && s < 0.5 {

@@ -1,4 +1,4 @@
-//! The quantities of a pair on histories whose answers are known.
+//! Quantities of a pair on histories with known results.
 
 use glam::{DQuat, DVec3};
 use grainwake_report::run_folder::{Event, History, Kind};
@@ -39,7 +39,8 @@ fn log(events: &[(f64, Kind)]) -> Vec<Event> {
 }
 
 fn measures(events: &[(f64, Kind)], oblong: bool) -> PairMeasures {
-    // The leading grain falls at 0.1 m/s; the trailing one, 10 mm above it, at 0.15 m/s until they touch at 0.16 s.
+    // The leading grain falls at 0.1 m/s; the trailing one, 10 mm above it, at 0.15 m/s until
+    // they touch at 0.16 s.
     let ahead = history(
         |t| DVec3::Z * -0.1 * t,
         |_| DQuat::from_rotation_y(-1.0),
@@ -113,7 +114,7 @@ fn times_speeds_and_angles_are_those_of_the_history() {
 }
 
 #[test]
-fn pairs_that_do_not_part_or_kiss_give_bounds_or_nothing() {
+fn pairs_that_do_not_separate_or_kiss_give_bounds_or_nothing() {
     let t = (2e-3_f64 / 8.0).sqrt();
     let m = measures(
         &[
@@ -159,7 +160,7 @@ fn pairs_that_do_not_part_or_kiss_give_bounds_or_nothing() {
         (m.separation_time.unwrap() - 0.2 / t).abs() < 1e-9,
         "the first one"
     );
-    // The line of centres may reach 45 degrees after the last touch: then the kissing ends with the touch.
+    // If the line of centres reaches 45 degrees after the contact, kissing ends with the contact.
     let m = measures(
         &[
             (0.1, Kind::Kiss),

@@ -1,4 +1,4 @@
-//! The report of a study on made-up run folders: all figures, a part of the runs, damage.
+//! Report of a study from synthetic run folders: all figures, missing runs, damaged files.
 
 #[path = "../../report/tests/synthetic/mod.rs"]
 mod synthetic;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use grainwake_study::{Plan, RUNS, Rendered, Run, Study, render};
 
-/// The 65 models of the repository, planned as if the made-up folders were theirs.
+/// Plan of the 65 models of the repository, with the hashes of the synthetic run folders.
 fn synthetic_plan() -> Plan {
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/dkt-morphology/study.toml");
@@ -21,7 +21,7 @@ fn synthetic_plan() -> Plan {
     plan
 }
 
-/// How long things take in a run, relative to the made-up pair: as the paper has it.
+/// Time scale of a run relative to the synthetic pair, with the trends of the paper.
 fn pace(run: &Run) -> f64 {
     let (s, r) = (run.factors["sphericity"], run.factors["roundness"]);
     match run.levels.get("orientation").map(String::as_str) {
@@ -31,7 +31,7 @@ fn pace(run: &Run) -> f64 {
     }
 }
 
-/// Stretches the times of the made-up pair in `from` into `to`.
+/// Copies the synthetic pair in `from` to `to` with stretched times.
 fn stretch(from: &Path, to: &Path, factor: f64) {
     std::fs::create_dir_all(to).unwrap();
     let read = |name: &str| std::fs::read_to_string(from.join(name)).unwrap();
@@ -72,7 +72,7 @@ fn stretch(from: &Path, to: &Path, factor: f64) {
     std::fs::write(to.join("summary.json"), summary.to_string()).unwrap();
 }
 
-/// A study folder in which the runs that `wanted` names are finished, and the stories have slices.
+/// Creates a study folder in which the wanted runs are finished; runs of the stories have slices.
 fn study(root: &Path, wanted: impl Fn(&Run) -> bool) -> PathBuf {
     let folder = root.join("study");
     let plan = synthetic_plan();
@@ -109,7 +109,7 @@ fn names(rendered: &Rendered) -> Vec<String> {
     rendered.png.iter().map(stem).collect()
 }
 
-/// Smallest gap of the surfaces of every run, from the table.
+/// Reads the smallest gap of every run from the table.
 fn closest_gaps(folder: &Path) -> BTreeMap<String, Option<f64>> {
     let text = std::fs::read_to_string(folder.join("table.json")).unwrap();
     let value: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -134,7 +134,7 @@ fn findings(folder: &Path) -> Vec<(String, String)> {
 }
 
 #[test]
-fn a_whole_study_gets_all_figures() {
+fn a_complete_study_has_all_figures() {
     let root = tempfile::tempdir().unwrap();
     let root = std::env::var("GRAINWAKE_GALLERY").map_or(root.path().to_owned(), PathBuf::from);
     let folder = study(&root, |_| true);
@@ -208,7 +208,7 @@ fn a_whole_study_gets_all_figures() {
         verdict("orientation 3 sphericity does not change the drafting"),
         "contradicted"
     );
-    // What is thinned out is small, and enough to draw the curves again without the run folders.
+    // The thinned histories are small, and sufficient to draw the curves without the run folders.
     let size: u64 = std::fs::read_dir(folder.join("histories"))
         .unwrap()
         .flatten()
@@ -228,7 +228,7 @@ fn a_whole_study_gets_all_figures() {
     assert!(drawn.contains(&"fig15-gap-by-row".into()) && !drawn.contains(&"fig08-g04-o1".into()));
 }
 
-/// Leaves of the analysis what `figures` says, in a folder whose study file is gone.
+/// Reduces the analysis to the given figures, in a folder without its study file.
 fn ask_only(folder: &Path, figures: serde_json::Value) {
     let file = folder.join("study.json");
     let mut plan: serde_json::Value =
@@ -239,7 +239,7 @@ fn ask_only(folder: &Path, figures: serde_json::Value) {
 }
 
 #[test]
-fn figures_of_a_study_of_ones_own_count_from_one() {
+fn figures_of_other_studies_are_numbered_from_one() {
     let root = tempfile::tempdir().unwrap();
     let folder = study(root.path(), |run| run.name.starts_with("g04"));
     ask_only(
@@ -251,7 +251,7 @@ fn figures_of_a_study_of_ones_own_count_from_one() {
     let page = std::fs::read_to_string(&rendered.page).unwrap();
     assert!(page.contains("<b>Figure 1. Drafting") && !page.contains("Figure 8"));
     assert!(page.contains("the pictures of g05-o1 are left out"));
-    // Without any wish: all pairs together, against what was varied.
+    // Without a request: all pairs in one figure, and results against the varied parameters.
     ask_only(&folder, serde_json::json!({}));
     let rendered = render(&folder).unwrap();
     assert_eq!(names(&rendered), ["fig01-gap", "fig02-kissing-time"]);
@@ -265,7 +265,7 @@ fn figures_of_a_study_of_ones_own_count_from_one() {
 }
 
 #[test]
-fn a_part_of_a_study_is_drawn_and_what_is_missing_is_said() {
+fn an_incomplete_study_is_drawn_and_missing_runs_are_listed() {
     let root = tempfile::tempdir().unwrap();
     let some = |run: &Run| {
         ["g01", "g06"]
@@ -273,7 +273,7 @@ fn a_part_of_a_study_is_drawn_and_what_is_missing_is_said() {
             .any(|g| run.levels.get("grain").is_some_and(|l| l == g))
     };
     let folder = study(root.path(), some);
-    // One of them has failed, one has lost its end.
+    // One run has failed, one is unfinished.
     let place = |name: &str| folder.join(RUNS).join(name);
     std::fs::remove_file(place("g06-o3").join("summary.json")).unwrap();
     std::fs::remove_file(place("g01-o1").join("summary.json")).unwrap();
@@ -302,7 +302,7 @@ fn a_part_of_a_study_is_drawn_and_what_is_missing_is_said() {
 }
 
 #[test]
-fn an_empty_study_has_a_page_and_a_damaged_one_an_error() {
+fn an_empty_study_has_a_page_and_a_damaged_one_is_an_error() {
     let root = tempfile::tempdir().unwrap();
     let folder = study(root.path(), |_| false);
     let rendered = render(&folder).unwrap();

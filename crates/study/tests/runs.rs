@@ -1,4 +1,4 @@
-//! Runs of a study: nothing is repeated, what is stale is, and kills and failures stay small.
+//! Execution of runs: resume, repetition of stale runs, locks and failures.
 
 mod common;
 
@@ -15,7 +15,7 @@ use grainwake_study::{
 struct Quiet;
 impl StudyObserver for Quiet {}
 
-/// Interrupts after so many steps of all runs together.
+/// Interrupts after a total number of steps of all runs.
 struct After(AtomicU64, u64);
 impl StudyObserver for After {
     fn progress(&self, _: usize, _: &Progress) {
@@ -67,7 +67,7 @@ fn results(plan: &Plan, study: &Path) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
+fn finished_runs_are_kept_and_stale_ones_repeated() {
     let (folder, path) = folder(STUDY);
     let study = folder.path().join("out");
     let first = plan(&path).unwrap();
@@ -97,7 +97,7 @@ fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
         kept,
         "untouched"
     );
-    // One model changes: it alone is stale, and is run again.
+    // One model changes: only this one is stale and repeated.
     std::fs::write(&path, STUDY.replace("friction = 0.6", "friction = 0.3")).unwrap();
     let second = plan(&path).unwrap();
     let stale: Vec<&str> = states(&second, &study).iter().map(RunState::name).collect();
@@ -111,7 +111,7 @@ fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
         .map(|o| matches!(o, Outcome::Finished(_)))
         .collect();
     assert_eq!(again, [false, true, false, true, false]);
-    // Another end is stale too, though the case hash of a run folder does not know it.
+    // A changed end time is stale too, although the case hash does not include it.
     let longer = Plan::resolve(&Study::read(&path).unwrap(), &["time.end=0.07".into()]).unwrap();
     assert!(
         states(&longer, &study)
@@ -130,7 +130,7 @@ fn what_is_finished_is_not_repeated_and_what_is_stale_is() {
 }
 
 #[test]
-fn interrupted_studies_go_on_and_give_the_same_bits() {
+fn resumed_studies_give_identical_bits() {
     let (folder, path) = folder(STUDY);
     let plan = plan(&path).unwrap();
     let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
@@ -168,7 +168,7 @@ fn interrupted_studies_go_on_and_give_the_same_bits() {
 }
 
 #[test]
-fn a_run_without_a_usable_checkpoint_starts_over() {
+fn a_run_without_a_usable_checkpoint_restarts() {
     let (folder, path) = folder(STUDY);
     let plan = plan(&path).unwrap();
     let (whole, broken) = (folder.path().join("whole"), folder.path().join("broken"));
@@ -187,7 +187,7 @@ fn a_run_without_a_usable_checkpoint_starts_over() {
 }
 
 #[test]
-fn a_failure_stays_alone() {
+fn a_failed_run_does_not_stop_the_others() {
     let (folder, path) = folder(STUDY);
     let plan = plan(&path).unwrap();
     let study = folder.path().join("out");
@@ -207,7 +207,7 @@ fn a_failure_stays_alone() {
         std::fs::read_to_string(study.join("runs/light-rough/mine.txt")).unwrap(),
         "not a run"
     );
-    // A run that became unstable is left alone until it is asked for.
+    // An unstable run is not repeated unless requested.
     let alone = study.join("runs/alone");
     std::fs::remove_file(alone.join("summary.json")).unwrap();
     std::fs::write(
@@ -238,7 +238,7 @@ fn a_failure_stays_alone() {
 }
 
 #[test]
-fn a_run_in_other_hands_is_left_alone() {
+fn a_locked_run_is_skipped() {
     let (folder, path) = folder(STUDY);
     let plan = plan(&path).unwrap();
     let study = folder.path().join("out");
@@ -258,7 +258,7 @@ fn a_run_in_other_hands_is_left_alone() {
 }
 
 #[test]
-fn folders_of_others_are_refused() {
+fn folders_with_other_contents_are_refused() {
     let (folder, path) = folder(STUDY);
     let first = plan(&path).unwrap();
     let study = folder.path().join("out");
@@ -285,7 +285,7 @@ fn folders_of_others_are_refused() {
 }
 
 #[test]
-fn the_table_holds_every_run_and_outlives_the_run_folders() {
+fn the_table_has_every_run_and_survives_removal_of_the_run_folders() {
     let (folder, path) = folder(STUDY);
     let plan = plan(&path).unwrap();
     let study = folder.path().join("out");

@@ -1,4 +1,4 @@
-//! Studies of single grains and of three: their results, figures and words.
+//! Studies of one and of three grains: results, figures and text.
 
 mod common;
 
@@ -24,7 +24,7 @@ values = [
 ]
 "#;
 
-/// So many spheres of 2 mm side by side in a dry box, their centres 21 mm (and 1 mm more each) above the floor.
+/// Case of 2 mm spheres side by side without fluid, centres at 21 mm, 22 mm ... above the floor.
 fn case(grains: usize) -> String {
     let (head, _) = DRY.split_once("[[grain]]").unwrap();
     let mut out = head.replace("60 ms", "100 ms");
@@ -73,7 +73,7 @@ fn page(out: &Path) -> String {
 }
 
 #[test]
-fn single_grains_have_results_figures_and_words_of_their_own() {
+fn single_grains_have_results_figures_and_text() {
     let (_folder, out, plan) = carried_out(1);
     let rows = rows(&plan, &out);
     for (row, g) in rows.iter().zip([5.0_f64, 10.0]) {
@@ -96,7 +96,7 @@ fn single_grains_have_results_figures_and_words_of_their_own() {
             value("final_speed_m_per_s") / (2e-3 * g).sqrt(),
         );
         close("mean_speed", 0.5 * speed(0.02) / (2e-3 * g).sqrt());
-        // A difference of speeds between rows 1 ms apart.
+        // Difference of speeds from rows at intervals of 1 ms.
         within(
             0.03,
             "speed_change",
@@ -133,7 +133,7 @@ fn single_grains_have_results_figures_and_words_of_their_own() {
             .count(),
         3
     );
-    // What is kept without the runs gives the same figures.
+    // Without the run folders the figures are the same.
     let before = std::fs::read(&done.png[0]).unwrap();
     std::fs::remove_dir_all(out.join("runs")).unwrap();
     let again = render(&out).unwrap();
@@ -150,7 +150,7 @@ fn rows_of(out: &Path) -> usize {
 }
 
 #[test]
-fn three_grains_have_means_and_each_its_landing() {
+fn three_grains_have_means_and_individual_landings() {
     let (_folder, out, plan) = carried_out(3);
     let rows = rows(&plan, &out);
     let full = rows[1].settling.as_ref().unwrap();
@@ -176,7 +176,7 @@ fn three_grains_have_means_and_each_its_landing() {
 }
 
 #[test]
-fn a_changed_analysis_is_taken_and_a_wrong_one_is_an_error() {
+fn a_changed_analysis_is_used_and_a_wrong_one_is_an_error() {
     let (folder, out, _) = carried_out(1);
     render(&out).unwrap();
     let file = folder.path().join("analysis.toml");
@@ -199,7 +199,7 @@ fn a_changed_analysis_is_taken_and_a_wrong_one_is_an_error() {
     let text = problems[0].to_string();
     assert!(text.contains("final_sped_m_per_s"), "{text}");
     assert_eq!(problems[0].place().map(|(_, line, _)| line), Some(3));
-    // With a study file whose case is gone the folder keeps the analysis that it has, and says so.
+    // If the case of the study file is missing, the stored analysis is used, with a note.
     std::fs::write(&file, claim("final_speed_m_per_s")).unwrap();
     let case = folder.path().join("case.toml");
     std::fs::rename(&case, folder.path().join("gone")).unwrap();
@@ -209,7 +209,7 @@ fn a_changed_analysis_is_taken_and_a_wrong_one_is_an_error() {
         "{:?}",
         done.notes
     );
-    // Without its study file the folder keeps the analysis that it has.
+    // Without the study file, the stored analysis is used.
     std::fs::remove_file(folder.path().join("study.toml")).unwrap();
     render(&out).unwrap();
     assert!(page(&out).contains("Gravity pulls"));

@@ -1,11 +1,11 @@
-//! Rank statistics against textbooks and tables.
+//! Rank statistics compared with textbook examples and tables.
 
 use grainwake_study::statistics::{
     coefficient_of_variation, median, quantile, ranks, relative_spread_test, signed_rank, spearman,
 };
 
 #[test]
-fn ties_share_their_ranks() {
+fn ties_share_their_mean_rank() {
     assert_eq!(ranks(&[3.0, 1.0, 3.0, 2.0]), [3.5, 1.0, 3.5, 2.0]);
     assert!(ranks(&[]).is_empty());
 }
@@ -20,7 +20,7 @@ fn spearman_of_known_samples() {
     let found = spearman(&iq, &hours).unwrap();
     assert!((found.value + 29.0 / 165.0).abs() < 1e-12);
     assert!((found.p - 0.627_188).abs() < 1e-5, "{}", found.p);
-    // Fisher: atanh(-.17576) -+ 1.96 sqrt((1 + .0154) / 7)
+    // Fisher: atanh(-0.17576) -+ 1.96 sqrt((1 + 0.0154) / 7)
     assert!(
         (found.low + 0.729).abs() < 2e-3 && (found.high - 0.513).abs() < 2e-3,
         "{found:?}"
@@ -36,7 +36,7 @@ fn spearman_of_known_samples() {
 #[test]
 fn signed_ranks_of_known_samples() {
     // Exact tables: for n = 8 the sum 3 has a two-sided p of 2 * 5/256, and the 95 % interval
-    // leaves out three means of two at each end.
+    // excludes three Walsh averages at each end.
     let d = [1.1, 2.2, 3.3, 4.4, 5.5, 6.6, -0.4, 7.7];
     let found = signed_rank(&d).unwrap();
     assert!(
@@ -67,14 +67,14 @@ fn signed_ranks_of_known_samples() {
     let found = signed_rank(&d).unwrap();
     assert_eq!((found.low, found.high), (means[29], means[136 - 30]));
     assert!(signed_rank(&[0.0; 8]).unwrap().p == 1.0);
-    // Of five differences no interval reaches 95 %.
+    // No interval of five differences reaches 95 %.
     assert!(signed_rank(&[1.0, 2.0, 3.0, 4.0, 5.0]).is_none());
     assert!(signed_rank(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).is_some());
 }
 
 #[test]
-fn intervals_cover_what_they_should() {
-    // Differences spread evenly about 0.3: about 95 of 100 intervals hold it.
+fn intervals_have_the_nominal_coverage() {
+    // Differences distributed about 0.3: about 95 of 100 intervals contain it.
     let mut state = 1u64;
     let mut random = || {
         state = state

@@ -1,4 +1,4 @@
-//! Figures of a suite, drawn from made-up run folders.
+//! Figures of a suite, drawn from synthetic run folders.
 
 use std::path::{Path, PathBuf};
 
@@ -96,7 +96,7 @@ from = [0, 0.5]
 to = [1, 1]
 "##;
 
-/// A suite of this text and an empty folder for its runs.
+/// Returns a suite with this text, and an empty folder for its runs.
 fn suite(text: &str) -> (PathBuf, Result<Suite, SuiteError>) {
     let folder = synthetic::folder("suite");
     std::fs::write(folder.join("case.toml"), "").unwrap();
@@ -111,7 +111,7 @@ fn suite(text: &str) -> (PathBuf, Result<Suite, SuiteError>) {
     (runs, Suite::read(&folder))
 }
 
-/// A finished run of a grain that ends at the height `z`.
+/// Writes a finished run of a grain that ends at the height `z`.
 fn ends_at(folder: &Path, z: f64) {
     std::fs::create_dir_all(folder).unwrap();
     let table = format!("time,grain,z\n0,0,3\n1,0,{z}\n");
@@ -125,7 +125,7 @@ fn fill(runs: &Path) {
     }
     synthetic::single(&runs.join("sphere"));
     synthetic::cavity(&runs.join("cavity"));
-    // Second order between the two finest, not from the coarsest.
+    // Second order between the two finest runs, not from the coarsest.
     ends_at(&runs.join("coarse"), 2.5);
     ends_at(&runs.join("middle"), 1.92);
     ends_at(&runs.join("fine"), 2.02);
@@ -138,7 +138,7 @@ fn svg(drawn: &DrawnFigure) -> String {
 }
 
 #[test]
-fn all_kinds_are_drawn() {
+fn all_kinds_of_series_are_drawn() {
     let (runs, suite) = suite(SUITE);
     let suite = suite.unwrap();
     fill(&runs);
@@ -164,7 +164,7 @@ fn all_kinds_are_drawn() {
 }
 
 #[test]
-fn what_is_missing_is_left_out_and_named() {
+fn missing_data_are_left_out_and_listed() {
     let (runs, suite) = suite(&SUITE.replace("speed.csv", "lost.csv"));
     let suite = suite.unwrap();
     for figure in &suite.figures {
@@ -180,7 +180,7 @@ fn what_is_missing_is_left_out_and_named() {
     let drawn = suite.figures[1].draw(&runs, |_, _| None);
     assert_eq!(drawn.notes, ["no finished run coarse"]);
     assert!(svg(&drawn).contains("order 2.00"));
-    // Its number may have been kept though the run was not.
+    // A stored value replaces a missing run.
     let kept = |run: &str, quantity: &str| (run == "coarse" && quantity == "z").then_some(2.5);
     let with = suite.figures[1].draw(&runs, kept);
     assert!(with.notes.is_empty(), "{:?}", with.notes);
@@ -191,7 +191,7 @@ fn what_is_missing_is_left_out_and_named() {
 }
 
 #[test]
-fn wrong_keys_are_located() {
+fn problems_are_located() {
     let line = |text: &str, key: &str| 1 + text[..text.find(key).unwrap()].matches('\n').count();
     for (from, to, at, word) in [
         (

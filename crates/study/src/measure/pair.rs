@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 pub struct PairMeasures {
     /// First contact.
     pub kiss_time: Option<f64>,
-    /// From the first contact until the line of centres is at 45 degrees, or the first contact ends.
+    /// From the first contact until the line of centres is at 45 degrees or the contact ends.
     pub kissing_stage: Option<f64>,
     /// From the first contact until the pair separates or lands.
     pub contact_stage: Option<f64>,

@@ -1,11 +1,11 @@
-//! Help for the tests: a small dry pair and studies of it.
+//! Fixtures: a small pair without fluid, and studies of it.
 #![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
 
 use grainwake_study::{Plan, Study, StudyError};
 
-/// Two spheres that fall on a floor, the upper one on the lower one; no fluid, a moment to run.
+/// Two spheres that fall onto the floor and each other, without fluid; runs in milliseconds.
 pub const DRY: &str = r#"
 title = "dry pair"
 [domain]
@@ -33,7 +33,7 @@ velocity = [0, 0, "-0.2 m/s"]
 gap_above = { grain = 0, gap = "1 mm" }
 "#;
 
-/// Two axes and a model of its own.
+/// Two axes and a model outside the axes.
 pub const STUDY: &str = r#"
 title = "test"
 base = "case.toml"
@@ -58,7 +58,7 @@ models = ["heavy-*"]
 set = { "time.end" = "50 ms" }
 "#;
 
-/// A folder with `case.toml` and `study.toml`.
+/// Creates a folder with `case.toml` and `study.toml`.
 pub fn folder(study: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("case.toml"), DRY).unwrap();
@@ -67,12 +67,12 @@ pub fn folder(study: &str) -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// The plan of a study file.
+/// Resolves a study file.
 pub fn plan(path: &Path) -> Result<Plan, StudyError> {
     Plan::resolve(&Study::read(path)?, &[])
 }
 
-/// The problems of a study that is wrong.
+/// Returns the problems of an invalid study.
 pub fn problems(study: &str) -> Vec<grainwake_solver::case::Problem> {
     let (_folder, path) = folder(study);
     match plan(&path) {
