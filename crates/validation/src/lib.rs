@@ -10,6 +10,7 @@ mod columns;
 mod expression;
 mod figure;
 mod measurement;
+mod problem;
 mod signal;
 mod suite;
 mod verdict;

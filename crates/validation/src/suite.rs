@@ -1,16 +1,16 @@
 //! The file `validation.toml`: runs, checks and figures of a suite.
 
 use std::collections::{BTreeMap, HashSet};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::case::{Loc, Problem, Source, nearest};
+use grainwake_solver::case::{Loc, Problem, Source};
 use serde::Deserialize;
 
 use crate::check::{Bounds, Check, Level, Reference, Run};
 use crate::columns::TableSource;
 use crate::figure::{self, Figure, RawFigure};
 use crate::measurement::{Measure, Sampling};
+use crate::problem;
 
 /// File of a suite in its folder.
 const FILE: &str = "validation.toml";
@@ -188,17 +188,6 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn problem(
-        &self,
-        message: impl Into<String>,
-        help: &str,
-        span: Option<&Range<usize>>,
-        label: &str,
-    ) -> Problem {
-        self.source
-            .locate(Problem::new(message).help(help), span, label)
-    }
-
     fn suite(&self, raw: RawSuite) -> Result<Suite, Problem> {
         let mut runs: Vec<Run> = Vec::new();
         for run in raw.run {
@@ -224,17 +213,23 @@ impl Builder<'_> {
         constants: &BTreeMap<String, f64>,
         earlier: &[Run],
     ) -> Result<Run, Problem> {
-        let name = raw.name.value;
+        let name = raw.name.value.clone();
         if earlier.iter().any(|other| other.name == name) {
             let message = format!("there are two runs called \"{name}\"");
             let help = "give each run a unique name";
-            return Err(self.problem(message, help, raw.name.span.as_ref(), "again"));
+            return Err(problem::at(self.source, &raw.name, message, help, "again"));
         }
         let case = self.folder.join(&raw.case.value);
         if !case.is_file() {
             let message = format!("there is no case file {}", case.display());
             let help = "paths are relative to validation.toml";
-            return Err(self.problem(message, help, raw.case.span.as_ref(), "not found"));
+            return Err(problem::at(
+                self.source,
+                &raw.case,
+                message,
+                help,
+                "not found",
+            ));
         }
         let mut constants = constants.clone();
         constants.extend(raw.constants);
@@ -269,14 +264,13 @@ impl Builder<'_> {
         sampling.validate(raw.take.value).map_err(|message| {
             let help = "validation/README.md lists the keys that each `take` needs";
             let message = format!("\"{quantity}\": {message}");
-            self.problem(message, help, raw.take.span.as_ref(), "this measure")
+            problem::at(self.source, &raw.take, message, help, "this measure")
         })?;
         let mut bounds = Bounds {
             range: [raw.at_least, raw.at_most],
             ..Bounds::default()
         };
         if let Some(tolerance) = &raw.tolerance {
-            let span = tolerance.span.as_ref();
             match &tolerance.value {
                 Tolerance::Absolute(value) => bounds.absolute = Some(*value),
                 Tolerance::Relative(text) => {
@@ -286,7 +280,7 @@ impl Builder<'_> {
                     let percent = number.ok_or_else(|| {
                         let message = format!("tolerance \"{text}\" is not a percentage");
                         let help = "write a number, or a percentage such as \"2 %\"";
-                        self.problem(message, help, span, "here")
+                        problem::at(self.source, tolerance, message, help, "here")
                     })?;
                     bounds.relative = Some(percent / 100.0);
                 }
@@ -294,7 +288,8 @@ impl Builder<'_> {
             if raw.reference.is_none() {
                 let help = "add `reference = ...`, or use `at_least` and `at_most`";
                 let message = "a tolerance needs a reference";
-                return Err(self.problem(message, help, span, "without a reference"));
+                let label = "without a reference";
+                return Err(problem::at(self.source, tolerance, message, help, label));
             }
         }
         Ok(Check {
@@ -321,13 +316,13 @@ fn check_references(suite: &Suite) -> Result<(), Problem> {
             };
             let mut known = earlier.iter().filter(|r| r.name == *other);
             if !known.any(|r| r.checks.iter().any(|c| c.quantity == check.quantity)) {
-                let hint = nearest(other, earlier.iter().map(|r| r.name.as_str()));
-                let hint = hint.map_or(String::new(), |n| format!("; did you mean \"{n}\"?"));
+                let names = earlier.iter().map(|r| r.name.as_str());
+                let hint = problem::did_you_mean(other, names);
                 let message = format!(
                     "{}: run \"{}\" compares \"{}\" with that of \"{other}\", which has none",
                     suite.name, run.name, check.quantity
                 );
-                let help = format!("name an earlier run that measures the same quantity{hint}");
+                let help = format!("{hint}name an earlier run that measures this quantity");
                 return Err(Problem::new(message).help(help));
             }
         }

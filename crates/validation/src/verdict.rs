@@ -34,7 +34,7 @@ pub struct Verdict {
 impl Suite {
     /// Evaluates the checks of a run in its folder.
     ///
-    /// `known` holds the values of earlier runs by run and quantity, and receives those of this run.
+    /// `known` holds the values of earlier runs, by run and quantity; those of this run are added.
     pub fn evaluate(
         &self,
         run: &Run,

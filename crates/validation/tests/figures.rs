@@ -269,6 +269,6 @@ fn problems_are_located() {
     assert!(
         read.unwrap_err()
             .to_string()
-            .contains("no reference to be relative to")
+            .contains("no nonzero reference")
     );
 }

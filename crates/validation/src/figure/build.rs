@@ -1,22 +1,21 @@
 //! Validation of the figures in `validation.toml`.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::Path;
 
 use grainwake_plot::{plan, style};
 use grainwake_report::figure::field::{Quantity, Style};
-use grainwake_solver::case::{Loc, Problem, Source, nearest};
+use grainwake_solver::case::{Loc, Problem, Source};
 
 use super::raw::{
-    Colour, Coordinates, FieldQuantity, Line, Mark, RawAxis, RawFigure, RawHistory, RawPicture,
-    RawReference, RawResults, Scale,
+    Colour, Coordinates, FieldQuantity, Line, Mark, RawAxis, RawField, RawFigure, RawHistory,
+    RawPicture, RawReference, RawResults, Scale,
 };
 use super::{AxisSpec, Content, Data, Figure, Picture, Point, Series};
 use crate::check::{Check, Reference, Run};
 use crate::columns::Columns;
-use crate::expression;
 use crate::measurement::Sampling;
+use crate::{expression, problem};
 
 /// File, runs and constants that the figures refer to.
 struct Context<'a> {
@@ -45,17 +44,16 @@ pub fn build(
     };
     let mut out: Vec<Figure> = Vec::new();
     for figure in raw {
-        let name = figure.name.value.clone();
-        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        if name.is_empty() || !name.chars().all(plain) {
-            let problem = Problem::new(format!("\"{name}\" is not a file name"))
-                .help("use letters, digits, - and _, without extension");
-            return Err(context.at(problem, figure.name.span.as_ref(), "here"));
+        let name = &figure.name;
+        let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if name.value.is_empty() || !name.value.chars().all(allowed) {
+            let message = format!("\"{}\" is not a file name", name.value);
+            let help = "use letters, digits, - and _, without extension";
+            return Err(context.at(name, message, help, "here"));
         }
-        if out.iter().any(|other| other.name == name) {
-            let problem = Problem::new(format!("there are two figures called \"{name}\""))
-                .help("give each figure a name of its own");
-            return Err(context.at(problem, figure.name.span.as_ref(), "again"));
+        if out.iter().any(|other| other.name == name.value) {
+            let message = format!("there are two figures called \"{}\"", name.value);
+            return Err(context.at(name, message, "give each figure a name of its own", "again"));
         }
         out.push(context.figure(figure)?);
     }
@@ -63,35 +61,26 @@ pub fn build(
 }
 
 impl Context<'_> {
-    fn at(&self, problem: Problem, span: Option<&Range<usize>>, label: &str) -> Problem {
-        self.source.locate(problem, span, label)
+    fn at<T>(
+        &self,
+        value: &Loc<T>,
+        message: impl Into<String>,
+        help: impl Into<String>,
+        label: &str,
+    ) -> Problem {
+        problem::at(self.source, value, message, help, label)
     }
 
     fn figure(&self, raw: RawFigure) -> Result<Figure, Problem> {
         let curves = raw.reference.len() + raw.history.len() + raw.results.len();
-        let sources = raw.reference.iter().filter_map(|r| r.source.clone());
-        let sources = sources.collect();
-        let wrong = |what: &str, help: &str| {
-            let problem = Problem::new(format!("figure \"{}\" {what}", raw.name.value)).help(help);
-            self.at(problem, raw.name.span.as_ref(), "this figure")
-        };
+        let sources = raw
+            .reference
+            .iter()
+            .filter_map(|r| r.source.clone())
+            .collect();
         let content = match (raw.field, raw.x, raw.y) {
             (Some(field), None, None) if curves == 0 && !raw.picture.is_empty() => {
-                let pictures = raw.picture.into_iter().map(|p| self.picture(p));
-                Content::Pictures {
-                    quantity: match field.quantity {
-                        FieldQuantity::Speed => Quantity::Speed,
-                        FieldQuantity::Vorticity => Quantity::Vorticity,
-                        FieldQuantity::SolidFraction => Quantity::SolidFraction,
-                    },
-                    style: Style {
-                        label: field.label,
-                        limit: field.limit,
-                        length: field.length,
-                        arrows: field.arrows,
-                    },
-                    pictures: pictures.collect::<Result<_, _>>()?,
-                }
+                self.fields(field, raw.picture)?
             }
             (None, Some(x), Some(y)) if curves > 0 && raw.picture.is_empty() => Content::Plot {
                 across: self.axis(x)?,
@@ -99,10 +88,11 @@ impl Context<'_> {
                 series: self.series(raw.reference, raw.history, raw.results)?,
             },
             _ => {
-                return Err(wrong(
-                    "is neither curves nor pictures",
-                    "curves have `x`, `y` and any of `reference`, `history`, `results`; pictures have `field` and `picture`",
-                ));
+                let name = &raw.name.value;
+                let message = format!("figure \"{name}\" is neither curves nor pictures");
+                let help = "curves have `x`, `y` and any of `reference`, `history`, `results`; \
+                            pictures have `field` and `picture`";
+                return Err(self.at(&raw.name, message, help, "this figure"));
             }
         };
         Ok(Figure {
@@ -114,13 +104,31 @@ impl Context<'_> {
         })
     }
 
+    fn fields(&self, field: RawField, pictures: Vec<RawPicture>) -> Result<Content, Problem> {
+        let pictures = pictures.into_iter().map(|picture| self.picture(picture));
+        Ok(Content::Pictures {
+            quantity: match field.quantity {
+                FieldQuantity::Speed => Quantity::Speed,
+                FieldQuantity::Vorticity => Quantity::Vorticity,
+                FieldQuantity::SolidFraction => Quantity::SolidFraction,
+            },
+            style: Style {
+                label: field.label,
+                limit: field.limit,
+                length: field.length,
+                arrows: field.arrows,
+            },
+            pictures: pictures.collect::<Result<_, _>>()?,
+        })
+    }
+
     fn axis(&self, raw: RawAxis) -> Result<AxisSpec, Problem> {
         let log = raw.scale == Scale::Log;
         for end in [&raw.from, &raw.to].into_iter().flatten() {
             if !end.value.is_finite() || (log && end.value <= 0.0) {
-                let problem = Problem::new(format!("an axis cannot end at {}", end.value))
-                    .help("a logarithmic axis has positive ends");
-                return Err(self.at(problem, end.span.as_ref(), "this end"));
+                let message = format!("an axis cannot end at {}", end.value);
+                let help = "a logarithmic axis has positive ends";
+                return Err(self.at(end, message, help, "this end"));
             }
         }
         Ok(AxisSpec {
@@ -169,7 +177,7 @@ impl Context<'_> {
     fn reference(&self, raw: &RawReference) -> Result<Data, Problem> {
         let file = self.folder.join(&raw.data);
         for text in [&raw.x, &raw.y] {
-            self.parse(text)?;
+            self.check_syntax(text)?;
             // A missing file leaves the series out; a wrong column is an error.
             if let Ok(columns) = Columns::read_reference(&file) {
                 expression::evaluate(text, &columns, self.constants)
@@ -187,7 +195,7 @@ impl Context<'_> {
     fn history(&self, raw: RawHistory) -> Result<Data, Problem> {
         let run = self.run(&raw.run)?;
         for text in [Some(&raw.of), raw.against.as_ref()].into_iter().flatten() {
-            self.parse(text)?;
+            self.check_syntax(text)?;
         }
         Ok(Data::History {
             run: run.name.clone(),
@@ -206,87 +214,96 @@ impl Context<'_> {
     }
 
     fn results(&self, raw: &RawResults) -> Result<Data, Problem> {
-        if let Coordinates::List(places) = &raw.x.value
-            && places.len() != raw.runs.len()
+        let count = raw.runs.len();
+        if let Coordinates::List(list) = &raw.x.value
+            && list.len() != count
         {
-            let found = format!("{} numbers for {} runs", places.len(), raw.runs.len());
-            let problem = Problem::new(found)
-                .help("give one number for each run, or an expression of their constants");
-            return Err(self.at(problem, raw.x.span.as_ref(), "as many as `runs`"));
+            let message = format!("{} values for {count} runs", list.len());
+            let help = "give one number for each run, or an expression of their constants";
+            return Err(self.at(&raw.x, message, help, "as many as `runs`"));
         }
-        let mut points = Vec::new();
-        for (i, name) in raw.runs.iter().enumerate() {
-            let run = self.run(name)?;
-            let wanted = |check: &&Check| check.quantity == raw.quantity.value;
-            let Some(check) = run.checks.iter().find(wanted) else {
-                let known: Vec<&str> = run.checks.iter().map(|c| c.quantity.as_str()).collect();
-                let problem = Problem::new(format!(
-                    "run \"{}\" measures no \"{}\"",
-                    run.name, raw.quantity.value
-                ))
-                .help(format!("it measures: {}", known.join(", ")));
-                return Err(self.at(problem, raw.quantity.span.as_ref(), "not measured"));
-            };
-            let x = match &raw.x.value {
-                Coordinates::List(places) => places[i],
-                Coordinates::Expression(text) => expression::constant(text, &run.constants)
-                    .map_err(|what| {
-                        let names: Vec<&str> = run.constants.keys().map(String::as_str).collect();
-                        let problem = Problem::new(format!("run \"{}\": {what}", run.name))
-                            .help(format!("constants of this run: {}", names.join(", ")));
-                        self.at(problem, raw.x.span.as_ref(), "here")
-                    })?,
-            };
-            let reference = raw.reference.or(match check.reference {
-                Some(Reference::Number(number)) => Some(number),
-                _ => None,
-            });
-            if raw.error.value && reference.is_none_or(|r| r == 0.0) {
-                let problem = Problem::new(format!(
-                    "\"{}\" of run \"{}\" has no reference to be relative to",
-                    check.quantity, run.name
-                ))
-                .help("add `reference = ...` other than 0 to this series");
-                return Err(self.at(problem, raw.error.span.as_ref(), "without a reference"));
-            }
-            points.push(Point {
-                run: run.name.clone(),
-                x,
-                check: check.clone(),
-                reference,
-            });
-        }
+        let points = raw
+            .runs
+            .iter()
+            .enumerate()
+            .map(|(i, name)| self.point(raw, i, name));
         Ok(Data::Results {
-            points,
+            points: points.collect::<Result<_, _>>()?,
             error: raw.error.value,
             slope: raw.slope,
         })
     }
 
-    fn picture(&self, raw: RawPicture) -> Result<Picture, Problem> {
-        let run = self.run(&raw.run)?.name.clone();
-        let window = match (&raw.from, &raw.to) {
-            (None, None) => None,
-            (low, high) => {
-                let low = low.as_ref().map_or([f64::NEG_INFINITY; 2], |v| v.value);
-                let high_at = high.as_ref().map_or([f64::INFINITY; 2], |v| v.value);
-                if !(low[0] < high_at[0] && low[1] < high_at[1]) {
-                    let problem = Problem::new("the part that is shown is empty")
-                        .help("`from` is the lower left corner, `to` the upper right one");
-                    let span = high.as_ref().and_then(|v| v.span.as_ref());
-                    return Err(self.at(problem, span, "not above `from`"));
-                }
-                Some(plan::Window {
-                    low: low.into(),
-                    high: high_at.into(),
-                })
+    /// Builds the point of the `i`-th run of a series.
+    fn point(&self, raw: &RawResults, i: usize, name: &Loc<String>) -> Result<Point, Problem> {
+        let run = self.run(name)?;
+        let wanted = |check: &&Check| check.quantity == raw.quantity.value;
+        let check = run.checks.iter().find(wanted).ok_or_else(|| {
+            let known: Vec<&str> = run.checks.iter().map(|c| c.quantity.as_str()).collect();
+            let message = format!(
+                "run \"{}\" measures no \"{}\"",
+                run.name, raw.quantity.value
+            );
+            let help = format!("it measures: {}", known.join(", "));
+            self.at(&raw.quantity, message, help, "not measured")
+        })?;
+        let x = match &raw.x.value {
+            Coordinates::List(list) => list[i],
+            Coordinates::Expression(text) => {
+                expression::constant(text, &run.constants).map_err(|what| {
+                    let names: Vec<&str> = run.constants.keys().map(String::as_str).collect();
+                    let help = format!("constants of this run: {}", names.join(", "));
+                    self.at(
+                        &raw.x,
+                        format!("run \"{}\": {what}", run.name),
+                        help,
+                        "here",
+                    )
+                })?
             }
         };
+        let reference = raw.reference.or(match check.reference {
+            Some(Reference::Number(number)) => Some(number),
+            _ => None,
+        });
+        if raw.error.value && reference.is_none_or(|r| r == 0.0) {
+            let quantity = &check.quantity;
+            let message = format!(
+                "\"{quantity}\" of run \"{}\" has no nonzero reference",
+                run.name
+            );
+            let help = "a relative error needs `reference = ...`, other than 0, in this series";
+            return Err(self.at(&raw.error, message, help, "relative error"));
+        }
+        Ok(Point {
+            run: run.name.clone(),
+            x,
+            check: check.clone(),
+            reference,
+        })
+    }
+
+    fn picture(&self, raw: RawPicture) -> Result<Picture, Problem> {
+        let value = |corner: &Option<Loc<[f64; 2]>>, default: f64| {
+            corner.as_ref().map_or([default; 2], |v| v.value)
+        };
+        let low = value(&raw.from, f64::NEG_INFINITY);
+        let high = value(&raw.to, f64::INFINITY);
+        if !(low[0] < high[0] && low[1] < high[1]) {
+            let help = "`from` is the lower left corner, `to` the upper right one";
+            let problem = Problem::new("the window is empty").help(help);
+            let span = raw.to.as_ref().and_then(|to| to.span.as_ref());
+            return Err(self.source.locate(problem, span, "not above `from`"));
+        }
+        let given = raw.from.is_some() || raw.to.is_some();
         Ok(Picture {
-            run,
+            run: self.run(&raw.run)?.name.clone(),
             plane: raw.plane,
             title: raw.title,
-            window,
+            window: given.then_some(plan::Window {
+                low: low.into(),
+                high: high.into(),
+            }),
         })
     }
 
@@ -294,21 +311,19 @@ impl Context<'_> {
         let found = self.runs.iter().find(|run| run.name == name.value);
         found.ok_or_else(|| {
             let names: Vec<&str> = self.runs.iter().map(|run| run.name.as_str()).collect();
-            let hint = nearest(name, names.iter().copied())
-                .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
-            let problem = Problem::new(format!("there is no run \"{}\"", name.value))
-                .help(format!("{hint}There are: {}", names.join(", ")));
-            self.at(problem, name.span.as_ref(), "not a run of this suite")
+            let hint = problem::did_you_mean(name, names.iter().copied());
+            let message = format!("there is no run \"{}\"", name.value);
+            let help = format!("{hint}Known runs: {}", names.join(", "));
+            self.at(name, message, help, "not a run of this suite")
         })
     }
 
-    fn parse(&self, text: &Loc<String>) -> Result<(), Problem> {
+    fn check_syntax(&self, text: &Loc<String>) -> Result<(), Problem> {
         expression::check(text).map_err(|what| self.wrong_expression(text, what))
     }
 
     fn wrong_expression(&self, text: &Loc<String>, what: String) -> Problem {
-        let problem = Problem::new(what)
-            .help("write an expression of columns and constants, such as \"sqrt(vx^2+vy^2)\"");
-        self.at(problem, text.span.as_ref(), "this expression")
+        let help = "write an expression of columns and constants, such as \"sqrt(vx^2+vy^2)\"";
+        self.at(text, what, help, "this expression")
     }
 }
