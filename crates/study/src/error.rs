@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::case::{CaseError, Problem};
+use grainwake_solver::case::{CaseError, Problem, nearest};
 
 /// Reason why a study cannot be read, planned or stored.
 #[derive(Debug, thiserror::Error)]
@@ -92,4 +92,9 @@ pub(crate) fn refer_to_study_keys(mut problem: Problem) -> Problem {
         .help
         .map(|help| help.replace("`grainwake schema` lists every key", here));
     problem
+}
+
+/// Returns the question after the nearest known name; empty if none is near.
+pub(crate) fn did_you_mean<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
+    nearest(name, known).map_or(String::new(), |n| format!("did you mean \"{n}\"? "))
 }

@@ -33,10 +33,10 @@ pub fn percent(value: f64) -> String {
     format!("{:.1} %", 100.0 * value).replace('-', "−")
 }
 
-/// Probability with four decimals.
+/// Probability with four decimals, as in "0.0152" and "< 0.0001".
 pub fn p_value(p: f64) -> String {
     if p < 1e-4 {
-        "below 0.0001".into()
+        "< 0.0001".into()
     } else {
         format!("{p:.4}")
     }

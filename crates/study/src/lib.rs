@@ -4,7 +4,7 @@
 //!
 //! | module | job |
 //! |---|---|
-//! | [`format`] | text form of values |
+//! | [`mod@format`] | text form of values |
 //! | [`plan`] | study file to models, models to runs with a stable name and hash |
 //! | [`run`] | state of a run, and the job queue that executes and resumes runs |
 //! | [`measure`] | one run folder to measured values, and the table of all runs |

@@ -109,7 +109,7 @@ fn orders_hold_are_contradicted_or_stay_open() {
     let (found, says) = verdict(&paper, ORDER);
     assert_eq!(found, "holds");
     assert!(
-        says.contains("for 16 of 16 grains") && says.contains("below 0.0001"),
+        says.contains("for 16 of 16 grains") && says.contains("p < 0.0001"),
         "{says}"
     );
     let reversed = ORDER

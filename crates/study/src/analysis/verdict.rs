@@ -14,8 +14,8 @@ use crate::plan::claims::{Analysis, Claim, Sign, Test};
 use crate::plan::quantities::KISS_DEPENDENT;
 
 /// Reservation about claims on quantities that depend on whether pairs kiss.
-pub const KISS_RESERVATION: &str = "depends on which pairs kiss: the share of kissing pairs is \
-                                    not converged at 8 cells per diameter";
+pub const KISS_RESERVATION: &str = "reservation: the share of kissing pairs is not converged at 8 \
+                                    cells per diameter";
 
 /// Claim and the result of its test. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -151,11 +151,11 @@ fn order(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -
     let says = |e: &Estimate| {
         format!(
             "{name} is larger in {more} than in {less} for {larger} of {} grains; difference {} \
-             ({}), p = {}",
+             ({}), {}",
             e.n,
             significant(e.value),
             interval(e, significant),
-            p_value(e.p)
+            probability(e)
         )
     };
     let estimate = signed_rank(&differences);
@@ -191,11 +191,11 @@ fn spread(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) 
     let says = |e: &Estimate| {
         format!(
             "coefficient of variation of {name} over the grains: {} in {more}, {} in {less} \
-             (n = {}; p of equal variation = {})",
+             (n = {}; equal variation: {})",
             variation(&first),
             variation(&second),
             e.n,
-            p_value(e.p)
+            probability(e)
         )
     };
     let estimate = relative_spread_test(&first, &second);
@@ -208,11 +208,11 @@ fn trend(all: &[Observation], with: &str, sign: Sign, name: &str) -> Outcome {
     let (x, y, censored) = with_factor(all, with);
     let says = |e: &Estimate| {
         format!(
-            "rank correlation of {name} with {with}: {} ({}, n = {}, p = {})",
+            "rank correlation of {name} with {with}: {} ({}, n = {}, {})",
             significant(e.value),
             interval(e, significant),
             e.n,
-            p_value(e.p)
+            probability(e)
         )
     };
     Outcome::new(x.len(), censored, spearman(&x, &y), says, |e| {
@@ -262,6 +262,13 @@ fn censored(pairs: &[(&Observation, &Observation)]) -> usize {
         .iter()
         .filter(|(a, b)| a.censored || b.censored)
         .count()
+}
+
+fn probability(e: &Estimate) -> String {
+    match p_value(e.p) {
+        bound if bound.starts_with('<') => format!("p {bound}"),
+        value => format!("p = {value}"),
+    }
 }
 
 fn interval(e: &Estimate, form: fn(f64) -> String) -> String {

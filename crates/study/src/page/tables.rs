@@ -118,7 +118,7 @@ pub(super) fn correlations(correlations: &[Correlation]) -> String {
             interval,
             c.p.map_or("–".into(), p_value),
         ];
-        let cells: String = cells.iter().map(|cell| number(cell)).collect();
+        let cells: String = cells.iter().map(|cell| number(&escape(cell))).collect();
         let (factor, level) = (escape(&c.factor), escape(&c.level));
         let quantity = escape(&title(&c.quantity));
         let _ = writeln!(

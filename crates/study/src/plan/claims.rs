@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use grainwake_solver::case::{Loc, Problem, Source, nearest};
+use grainwake_solver::case::{Loc, Problem, Source};
 use serde::{Deserialize, Serialize};
 
 use super::expand::Model;
 use super::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES, SHAPE_FACTORS};
-use crate::error::refer_to_study_keys;
+use crate::error::{did_you_mean, refer_to_study_keys};
 
 /// Requested analysis of the results: claims, correlations, figures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -211,8 +211,7 @@ impl NameCheck<'_> {
         if known.contains(&name) {
             return true;
         }
-        let hint = nearest(name, known.iter().copied())
-            .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
+        let hint = did_you_mean(name, known.iter().copied());
         let problem = Problem::new(format!("there is no {kind} \"{name}\""))
             .help(format!("{hint}known names: {}", known.join(", ")));
         self.problems

@@ -4,10 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::case::{Loc, Problem, Source, nearest};
+use grainwake_solver::case::{Loc, Problem, Source};
 use toml::Value;
 
 use super::raw::{Keys, RawAxis, RawModel, RawSet, RawStudy, RawValue};
+use crate::error::did_you_mean;
 
 /// Override of one case key.
 #[derive(Clone, Debug, PartialEq)]
@@ -333,9 +334,7 @@ pub(crate) fn matching(
         let found: Vec<usize> = found.collect();
         indices.extend(&found);
         if found.is_empty() {
-            let names = models.iter().map(|m| m.name.as_str());
-            let hint =
-                nearest(text, names).map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
+            let hint = did_you_mean(text, models.iter().map(|m| m.name.as_str()));
             let problem = Problem::new(format!("no model is called \"{text}\"")).help(format!(
                 "{hint}the name of a model consists of the names of its values, joined by -"
             ));

@@ -1,8 +1,9 @@
 //! Selection of runs: `--only`.
 
-use grainwake_solver::case::{Problem, nearest};
+use grainwake_solver::case::Problem;
 
 use super::Run;
+use crate::error::did_you_mean;
 
 /// Selection of runs of a study.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -72,8 +73,7 @@ impl Selection {
         for pattern in patterns {
             if !runs.iter().any(|run| pattern.matches(&run.name)) {
                 let names = runs.iter().map(|run| run.name.as_str());
-                let hint = nearest(pattern.as_str(), names)
-                    .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
+                let hint = did_you_mean(pattern.as_str(), names);
                 let problem = Problem::new(format!("--only: no run is called \"{pattern}\""));
                 return Err(problem.help(format!("{hint}--list shows all names")));
             }
