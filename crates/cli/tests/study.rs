@@ -209,7 +209,7 @@ fn wrong_studies_end_with_2_and_a_place() {
         .stderr(contains("study.toml:").and(contains("did you mean `density`?")));
     run(&STUDY.replace("values =", "value ="), &[]).stderr(contains("unknown key `value`"));
     run(STUDY, &["--only", "haevy"]).stderr(contains("did you mean \"heavy\"?"));
-    run(STUDY, &["--only", "3/2"]).stderr(contains("from 1 to N"));
+    run(STUDY, &["--only", "3/2"]).stderr(contains("between 1 and N"));
     run(STUDY, &["--set", "time.end=1 mm"]).stderr(contains("--set"));
     grainwake()
         .args(["study", "nowhere.toml"])
