@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use grainwake_study::correlation::correlations;
 use grainwake_study::observation::observations;
-use grainwake_study::verdict::{KISS_RESERVATION, evaluate};
+use grainwake_study::verdict::evaluate;
 use grainwake_study::{Analysis, Model, PairMeasures, RunRecord};
 
 /// 16 grains in four orientations and a sphere; `fill` returns the measured values.
@@ -321,9 +321,16 @@ fn wrong_names_are_located() {
 }
 
 #[test]
-fn verdicts_that_depend_on_kissing_carry_the_reservation() {
+fn claims_about_unconverged_quantities_are_never_contradicted() {
     let paper = rows(as_in_the_paper);
-    assert!(verdict(&paper, ORDER).1.contains(KISS_RESERVATION));
-    let speed = ORDER.replace("kiss_time", "mean_speed_leading");
-    assert!(!verdict(&paper, &speed).1.contains(KISS_RESERVATION));
+    let claim = trend("sphericity", "rises", "o1");
+    assert_eq!(verdict(&paper, &claim).0, "contradicted");
+    let resolution = |quantity: &str| {
+        format!("\n[resolution]\nunconverged = [\"{quantity}\"]\nnote = \"why\"\n")
+    };
+    let (found, says) = verdict(&paper, &(claim.clone() + &resolution("kiss_time")));
+    assert_eq!(found, "open");
+    assert!(says.ends_with("not converged with the grid"), "{says}");
+    let other = verdict(&paper, &(claim + &resolution("contact_stage")));
+    assert_eq!(other.0, "contradicted");
 }

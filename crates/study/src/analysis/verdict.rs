@@ -11,11 +11,6 @@ use super::statistics::{
 use crate::format::{p_value, percent, significant, title};
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Claim, Sign, Test};
-use crate::plan::quantities::KISS_DEPENDENT;
-
-/// Reservation about claims on quantities that depend on whether pairs kiss.
-pub const KISS_RESERVATION: &str = "reservation: the share of kissing pairs is not converged at 8 \
-                                    cells per diameter";
 
 /// Claim and the result of its test. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -43,13 +38,24 @@ pub struct Finding {
     pub p: Option<f64>,
 }
 
-/// Tests the claims of an analysis.
+/// Tests the claims of an analysis. A claim about a quantity that is not converged with the grid is
+/// never called contradicted.
 pub fn evaluate(analysis: &Analysis, records: &[RunRecord]) -> Vec<Finding> {
-    analysis
-        .claims
-        .iter()
-        .map(|claim| test(claim, records))
-        .collect()
+    let unconverged = |claim: &Claim| {
+        let resolution = analysis.resolution.as_ref();
+        resolution.is_some_and(|r| r.unconverged.contains(&claim.quantity))
+    };
+    let test = |claim: &Claim| {
+        let mut finding = test(claim, records);
+        if unconverged(claim) {
+            finding.says += "; not converged with the grid";
+            if finding.verdict == "contradicted" {
+                finding.verdict = "open";
+            }
+        }
+        finding
+    };
+    analysis.claims.iter().map(test).collect()
 }
 
 /// Result of a test before it is worded.
@@ -126,9 +132,6 @@ fn word(claim: &Claim, outcome: Outcome) -> Finding {
             }
             _ => format!("; {censored} right-censored: lower bounds, as the pair landed before"),
         };
-    }
-    if KISS_DEPENDENT.contains(&claim.quantity.as_str()) {
-        says += &format!("; {KISS_RESERVATION}");
     }
     Finding {
         claim: claim.says.clone(),

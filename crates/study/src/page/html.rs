@@ -45,6 +45,7 @@ impl Content<'_> {
              <main>\n<header>\n<h1>{title}</h1>\n<p class=\"lead\">{}</p>\n</header>\n",
             self.lead()
         );
+        out += &self.resolution();
         out += &self.notices();
         let mut section = |title: &str, shown: bool, body: &dyn Fn() -> String| {
             if shown {
@@ -80,6 +81,18 @@ impl Content<'_> {
                 <code>figures/</code>; values: <code>table.csv</code>, <code>table.json</code> and \
                 <code>analysis.json</code>.</footer>\n</main>\n</body>\n</html>\n";
         out
+    }
+
+    /// Returns the warning that quantities are not converged with the grid, with the evidence.
+    fn resolution(&self) -> String {
+        let resolution = self.plan.analysis.resolution.as_ref();
+        resolution.map_or(String::new(), |resolution| {
+            format!(
+                "<div class=\"notice\" role=\"note\"><b>Not converged with the grid</b>\
+                 <p>{}</p></div>\n",
+                escape(&resolution.note)
+            )
+        })
     }
 
     /// Returns whether any run has measured values of settling grains.

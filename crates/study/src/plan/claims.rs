@@ -22,6 +22,19 @@ pub struct Analysis {
     /// Contents of the figures.
     #[serde(default)]
     pub figures: FigureRequest,
+    /// Quantities that are not converged on the study's grid.
+    #[serde(default)]
+    pub resolution: Option<Resolution>,
+}
+
+/// Quantities that are not converged on the study's grid.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Resolution {
+    /// Quantities that still change with the grid: no claim about them is called contradicted.
+    pub unconverged: Vec<String>,
+    /// Evidence, printed at the head of the report: what a finer grid gives.
+    pub note: String,
 }
 
 /// Claim about a quantity, with its statistical test.
@@ -171,6 +184,7 @@ struct RawAnalysis {
     claim: Vec<RawClaim>,
     correlations: Option<Loc<Correlations>>,
     figures: Option<Loc<FigureRequest>>,
+    resolution: Option<Loc<Resolution>>,
 }
 
 #[derive(Deserialize)]
@@ -333,6 +347,12 @@ impl Analysis {
             value.factors.iter().for_each(|f| check.factor(f, span));
             check.axis(&value.by, span);
         }
+        if let Some(Loc { value, span }) = &raw.resolution {
+            let quantities = &value.unconverged;
+            quantities
+                .iter()
+                .for_each(|q| check.quantity(q, span.as_ref()));
+        }
         if let Some(figures) = &raw.figures {
             check.figures(&figures.value, figures.span.as_ref());
         }
@@ -355,6 +375,7 @@ impl Analysis {
             claims: raw.claim.into_iter().map(claim).collect(),
             correlations: raw.correlations.map(|c| c.value),
             figures: raw.figures.map(|f| f.value).unwrap_or_default(),
+            resolution: raw.resolution.map(|r| r.value),
         })
     }
 }

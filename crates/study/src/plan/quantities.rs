@@ -46,22 +46,5 @@ pub const SETTLING_QUANTITIES: [&str; 16] = [
     "turned",
 ];
 
-/// Quantities of a pair that are missing, censored or different if the pair does not kiss.
-pub const KISS_DEPENDENT: [&str; 13] = [
-    "kiss_time",
-    "kissing_stage",
-    "contact_stage",
-    "parted",
-    "tumble_time",
-    "pass_time",
-    "separation_time",
-    "kisses",
-    "repeated",
-    "draft_speed_leading",
-    "draft_speed_trailing",
-    "long_axis_leading",
-    "long_axis_trailing",
-];
-
 /// Factors of every run: Krumbein sphericity and, if known, Wadell roundness of its first grain.
 pub const SHAPE_FACTORS: [&str; 2] = ["krumbein_sphericity", "wadell_roundness"];
