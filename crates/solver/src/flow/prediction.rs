@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{Boundaries, Flow};
 use crate::grid::{Centre, FaceVector, Field, Mesh, Part, for_slabs};
 use crate::math::Real;
-use grainwake_simd::{Vector, prefetch, prefetch_ahead};
+use grainwake_simd::Vector;
 
 /// What the prediction was made of.
 pub struct Known<'a, R> {
@@ -133,18 +133,5 @@ impl<'a, R: Real> Prediction<'a, R> {
             extra.add_some(&mut tendency[n..]);
             (weight * extra).add_some(&mut velocity[n..]);
         }
-    }
-
-    /// Asks for u* of these faces, which is read next, to be brought near.
-    #[inline(always)]
-    pub fn ask(&self, at: usize, count: usize) {
-        prefetch(self.velocity.row(at, count), 0, count);
-    }
-
-    /// The same for u* and tendency, which are pushed later.
-    #[inline(always)]
-    pub fn ask_pushed(&self, at: usize, count: usize) {
-        prefetch_ahead(self.velocity.row(at, count), 0, count);
-        prefetch_ahead(self.tendency.row(at, count), 0, count);
     }
 }

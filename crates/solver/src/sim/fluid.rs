@@ -1,4 +1,4 @@
-//! The fluid side of a simulation: what the time step asks of it, in whichever precision.
+//! Fluid side of a simulation, behind one interface for both precisions.
 
 use std::io;
 
@@ -6,60 +6,40 @@ use glam::DVec3;
 
 use super::Setup;
 use super::state::{Reader, Writer};
-use crate::dem::{Grain, Response};
+use crate::dem::Grain;
 use crate::flow::{Flow, FlowMeasures, FluidParams};
-use crate::immersed::{Coupling, Past};
-use crate::math::{Load, Precision, Real};
+use crate::immersed::{CoupledGrains, ImmersedGrains, RigidStep, StepInput};
+use crate::math::{Precision, Real};
 use crate::poisson::Stages;
 
-/// Flow and coupling. Every step has its place in `step.rs`; what each does is said where it lies.
+/// Flow and coupling in either precision; the stages of a step (`stages.rs`) call it in order.
 pub(super) trait Fluid: Send + Sync {
     fn set_body_acceleration(&mut self, acceleration: DVec3);
     fn predict(&mut self, dt: f64);
-    fn remember(&mut self, grains: &[Grain]);
-    /// Finds the faces near restored grains; in a step [`Fluid::couple`] does.
-    fn locate(&mut self, grains: &[Grain], dt: f64);
+    /// First projection of the paper's scheme.
     fn project_prediction(&mut self, dt: f64);
-    fn couple(
-        &mut self,
-        grains: &[Grain],
-        before: &[Past],
-        contact: &[Load],
-        other: &[Load],
-        dt: f64,
-    );
-    fn responses(
-        &self,
-        grains: &[Grain],
-        before: &[Past],
-        added_density: f64,
-        dt: f64,
-    ) -> Vec<Response>;
-    fn impose_rigidity(
-        &mut self,
-        grains: &mut [Grain],
-        before: &[Past],
-        contact: &[Load],
-        dt: f64,
-        loads: &mut [Load],
-    );
+    fn couple(&mut self, input: StepInput) -> CoupledGrains;
+    fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidStep);
     fn project(&mut self, dt: f64);
-    /// Of the last projection.
+    /// Finds the faces near restored grains.
+    fn locate(&mut self, grains: &[Grain]);
+    /// Measures of the last projection.
     fn measures(&self) -> &FlowMeasures;
+    /// Momentum per density gained through the boundaries in a step of `dt` [s] [m^4/s].
     fn boundary_impulse(&self, dt: f64) -> DVec3;
-    /// Velocity component of the face at a place in memory [m/s].
+    /// Velocity component of the face at a position in memory [m/s].
     fn velocity(&self, component: usize, at: usize) -> f64;
-    /// Dynamic pressure over density of the cell at a place in memory [m^2/s^2].
+    /// Dynamic pressure over density of the cell at a position in memory [m^2/s^2].
     fn pressure(&self, at: usize) -> f64;
     fn poisson_stages(&self) -> Stages;
     /// Memory held [bytes].
     fn bytes(&self) -> usize;
     fn save(&self, out: &mut Writer) -> io::Result<()>;
-    /// Reads what `save` wrote; `last_step` [s] is the length of the step before.
+    /// Reads what `save` wrote; `last_step` [s] is the length of the last step.
     fn restore(&mut self, input: &mut Reader, last_step: f64) -> io::Result<()>;
 }
 
-/// The fluid of a set-up at t = 0.
+/// Builds the fluid of a set-up at t = 0.
 pub(super) fn start(setup: &Setup, params: &FluidParams) -> Box<dyn Fluid> {
     match setup.precision {
         Precision::Single => Box::new(FluidOf::<f32>::start(setup, params)),
@@ -69,7 +49,7 @@ pub(super) fn start(setup: &Setup, params: &FluidParams) -> Box<dyn Fluid> {
 
 struct FluidOf<R> {
     flow: Flow<R>,
-    coupling: Coupling,
+    grains: ImmersedGrains<R>,
     measures: FlowMeasures,
 }
 
@@ -80,11 +60,11 @@ impl<R: Real> FluidOf<R> {
             flow.start_from(|axis, at| velocity.component(axis, &at.to_array()));
         }
         let (density, nu) = (params.density, params.kinematic_viscosity);
-        let mut coupling = Coupling::new(&flow, setup.scheme, density, nu, &setup.grains);
-        let measures = coupling.start(&mut flow, &setup.grains);
+        let mut grains = ImmersedGrains::new(&flow, setup.scheme, density, nu, &setup.grains);
+        let measures = grains.initialise(&mut flow, &setup.grains);
         FluidOf {
             flow,
-            coupling,
+            grains,
             measures,
         }
     }
@@ -97,47 +77,17 @@ impl<R: Real> Fluid for FluidOf<R> {
     fn predict(&mut self, dt: f64) {
         self.flow.predict(dt);
     }
-    fn remember(&mut self, grains: &[Grain]) {
-        self.coupling.remember(grains);
-    }
-    fn locate(&mut self, grains: &[Grain], dt: f64) {
-        self.coupling.locate(grains, dt);
-    }
     fn project_prediction(&mut self, dt: f64) {
         self.flow.project_prediction(dt);
     }
-    fn couple(
-        &mut self,
-        grains: &[Grain],
-        before: &[Past],
-        contact: &[Load],
-        other: &[Load],
-        dt: f64,
-    ) {
-        let flow = &mut self.flow;
-        self.coupling
-            .couple(flow, grains, before, contact, other, dt);
+    fn couple(&mut self, input: StepInput) -> CoupledGrains {
+        self.grains.couple(&mut self.flow, input)
     }
-    fn responses(
-        &self,
-        grains: &[Grain],
-        before: &[Past],
-        added_density: f64,
-        dt: f64,
-    ) -> Vec<Response> {
-        self.coupling.responses(grains, before, added_density, dt)
+    fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidStep) {
+        self.grains.impose_rigidity(&mut self.flow, coupled, step);
     }
-    fn impose_rigidity(
-        &mut self,
-        grains: &mut [Grain],
-        before: &[Past],
-        contact: &[Load],
-        dt: f64,
-        loads: &mut [Load],
-    ) {
-        let flow = &mut self.flow;
-        self.coupling
-            .impose_rigidity(flow, grains, before, contact, dt, loads);
+    fn locate(&mut self, grains: &[Grain]) {
+        self.grains.locate(grains);
     }
     fn project(&mut self, dt: f64) {
         self.measures = self.flow.project(dt);
@@ -158,7 +108,7 @@ impl<R: Real> Fluid for FluidOf<R> {
         self.flow.poisson_stages()
     }
     fn bytes(&self) -> usize {
-        self.flow.bytes() + self.coupling.bytes()
+        self.flow.bytes() + self.grains.bytes()
     }
     fn save(&self, out: &mut Writer) -> io::Result<()> {
         out.count(R::BYTES as u64)?;

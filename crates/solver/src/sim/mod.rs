@@ -1,4 +1,4 @@
-//! The coupled simulation: set-up, the time step, the clock and diagnostics.
+//! The coupled simulation: set-up, clock, time step, events, diagnostics and state.
 
 mod clock;
 mod diagnostics;
@@ -7,26 +7,28 @@ mod fluid;
 mod prescription;
 mod probe;
 mod setup;
+mod stability;
+mod stages;
 mod state;
 mod step;
 #[cfg(test)]
 mod tests;
+mod timing;
 
-use std::time::Duration;
-
-use crate::dem::{Contact, Dynamics, Grain, State};
+use crate::dem::{Contact, Dynamics, Grain, Response, State};
 use crate::grid::Mesh;
-use crate::immersed::Past;
+use crate::immersed::{GrainKinematics, PreviousStep};
 use crate::math::{Load, Pose};
 use crate::poisson::Stages;
 
 use fluid::Fluid;
+use timing::PassTimes;
 
 pub use clock::Clock;
 pub use diagnostics::Diagnostics;
 pub use prescription::{Drive, Prescription};
 pub use setup::{Setup, SetupError, StepRule};
-pub use step::StepError;
+pub use stability::StepError;
 
 /// A running simulation.
 pub struct Simulation {
@@ -36,32 +38,46 @@ pub struct Simulation {
     dynamics: Dynamics,
     /// Hydrodynamic load on each grain over the last step.
     loads: Vec<Load>,
-    /// Momentum of the fluid that the last step cannot account for [kg m/s].
+    /// Change of momentum in the last step not explained by forces [kg m/s].
     momentum_residual: glam::DVec3,
-    work: Work,
-    passes: Passes,
+    data: GrainData,
+    times: PassTimes,
 }
 
-/// Per-grain scratch of a step.
-struct Work {
-    before: Vec<Past>,
+/// Data of a step, one entry per grain.
+struct GrainData {
+    previous: Vec<PreviousStep>,
+    kinematics: Vec<GrainKinematics>,
+    /// Weight less buoyancy.
+    applied: Vec<Load>,
+    /// Applied load and the hydrodynamic load of the last step.
     driving: Vec<Load>,
+    /// Mean contact loads.
     contact: Vec<Load>,
-    /// Where the sub-steps of contact leave the grains.
+    responses: Vec<Response>,
+    /// Whether contact was resolved with the fluid's response.
+    resolved: bool,
+    /// States at the end of the sub-steps that were repeated.
     ends: Vec<State>,
-    /// Where the faces near the grains were last found.
+    /// Poses at which the faces near the grains were found.
     located: Vec<Pose>,
 }
 
-/// Time spent in each stage since the start.
-#[derive(Clone, Copy, Debug, Default)]
-struct Passes {
-    predict: Duration,
-    contact: Duration,
-    coupling: Duration,
-    project: Duration,
-    /// What the Poisson solver had spent before the first step.
-    initial: Stages,
+impl GrainData {
+    fn new(grains: &[Grain]) -> GrainData {
+        let count = grains.len();
+        GrainData {
+            previous: vec![PreviousStep::default(); count],
+            kinematics: vec![GrainKinematics::default(); count],
+            applied: vec![Load::default(); count],
+            driving: vec![Load::default(); count],
+            contact: vec![Load::default(); count],
+            responses: Vec::with_capacity(count),
+            resolved: false,
+            ends: grains.iter().map(State::of).collect(),
+            located: grains.iter().map(|grain| grain.pose).collect(),
+        }
+    }
 }
 
 impl Simulation {
@@ -70,24 +86,18 @@ impl Simulation {
         setup.validate()?;
         let enclosure = setup.enclosure();
         let fluid = setup.fluid.map(|params| fluid::start(&setup, &params));
-        let count = setup.grains.len();
+        let initial = fluid
+            .as_ref()
+            .map_or(Stages::default(), |fluid| fluid.poisson_stages());
         Ok(Simulation {
             dynamics: Dynamics::new(setup.contact, enclosure),
             clock: Clock::new(&setup),
-            loads: vec![Load::default(); count],
+            loads: vec![Load::default(); setup.grains.len()],
             momentum_residual: glam::DVec3::ZERO,
-            work: Work {
-                before: vec![Default::default(); count],
-                driving: vec![Load::default(); count],
-                contact: vec![Load::default(); count],
-                ends: setup.grains.iter().map(State::of).collect(),
-                located: setup.grains.iter().map(|grain| grain.pose).collect(),
-            },
-            passes: Passes {
-                initial: fluid
-                    .as_ref()
-                    .map_or(Stages::default(), |fluid| fluid.poisson_stages()),
-                ..Passes::default()
+            data: GrainData::new(&setup.grains),
+            times: PassTimes {
+                initial,
+                ..PassTimes::default()
             },
             fluid,
             setup,
@@ -109,7 +119,7 @@ impl Simulation {
     pub fn mesh(&self) -> &Mesh {
         &self.setup.mesh
     }
-    /// The set-up it was built from (grains as they are now).
+    /// The set-up, with the grains in their present state.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
@@ -124,34 +134,6 @@ impl Simulation {
     /// Pairs that touched during the last step.
     pub fn contacts(&self) -> &[Contact] {
         self.dynamics.contacts()
-    }
-    /// Seconds spent since the start in each pass of the step. The projection is split into the
-    /// right-hand side with its transforms, the tridiagonal columns, the transforms back with the
-    /// correction, and the ghosts and sums that remain.
-    pub fn pass_times(&self) -> [(&'static str, f64); 7] {
-        let p = &self.passes;
-        let stages = self
-            .fluid
-            .as_ref()
-            .map_or(p.initial, |fluid| fluid.poisson_stages());
-        let [forward, columns, inverse] = [
-            stages.forward - p.initial.forward,
-            stages.columns - p.initial.columns,
-            stages.inverse - p.initial.inverse,
-        ];
-        [
-            ("predict", p.predict),
-            ("contact", p.contact),
-            ("coupling", p.coupling),
-            ("divergence", forward),
-            ("columns", columns),
-            ("correct", inverse),
-            (
-                "ghosts",
-                p.project.saturating_sub(forward + columns + inverse),
-            ),
-        ]
-        .map(|(name, time)| (name, time.as_secs_f64()))
     }
     /// Memory held by fields, solver and grains on the grid [bytes].
     pub fn bytes(&self) -> usize {

@@ -15,7 +15,7 @@ impl Simulation {
         out.numbers(&[self.clock.time, self.clock.last_step])?;
         out.count(self.setup.grains.len() as u64)?;
         let grains = self.setup.grains.iter();
-        for ((grain, load), before) in grains.zip(&self.loads).zip(&self.work.before) {
+        for ((grain, load), previous) in grains.zip(&self.loads).zip(&self.data.previous) {
             out.numbers(&grain.pose.position.to_array())?;
             out.numbers(&grain.pose.orientation.to_array())?;
             for v in [
@@ -23,17 +23,17 @@ impl Simulation {
                 grain.angular_velocity,
                 load.force,
                 load.torque,
-                before.acceleration[0],
-                before.acceleration[1],
-                before.owed[0],
-                before.owed[1],
+                previous.acceleration.linear,
+                previous.acceleration.angular,
+                previous.pending_added_mass_velocity.linear,
+                previous.pending_added_mass_velocity.angular,
             ] {
                 out.numbers(&v.to_array())?;
             }
         }
         if let Some(fluid) = &self.fluid {
             out.numbers(&self.momentum_residual.to_array())?;
-            for pose in &self.work.located {
+            for pose in &self.data.located {
                 out.numbers(&pose.position.to_array())?;
                 out.numbers(&pose.orientation.to_array())?;
             }
@@ -52,7 +52,7 @@ impl Simulation {
         [self.clock.time, self.clock.last_step] = input.numbers()?;
         input.expect(self.setup.grains.len(), "grains")?;
         let grains = self.setup.grains.iter_mut();
-        for ((grain, load), before) in grains.zip(&mut self.loads).zip(&mut self.work.before) {
+        for ((grain, load), previous) in grains.zip(&mut self.loads).zip(&mut self.data.previous) {
             grain.pose.position = DVec3::from_array(input.numbers()?);
             grain.pose.orientation = DQuat::from_array(input.numbers()?);
             grain.velocity = DVec3::from_array(input.numbers()?);
@@ -61,21 +61,23 @@ impl Simulation {
                 force: DVec3::from_array(input.numbers()?),
                 torque: DVec3::from_array(input.numbers()?),
             };
-            for change in before.acceleration.iter_mut().chain(&mut before.owed) {
-                *change = DVec3::from_array(input.numbers()?);
+            let pending = &mut previous.pending_added_mass_velocity;
+            for rates in [&mut previous.acceleration, pending] {
+                rates.linear = DVec3::from_array(input.numbers()?);
+                rates.angular = DVec3::from_array(input.numbers()?);
             }
         }
         if let Some(fluid) = &mut self.fluid {
             self.momentum_residual = DVec3::from_array(input.numbers()?);
-            // The faces are those of where the grains were last located, which contact may have changed.
+            // The faces belong to the poses at which the grains were located, before contact was resolved.
             let mut grains = self.setup.grains.clone();
-            for (grain, pose) in grains.iter_mut().zip(&mut self.work.located) {
+            for (grain, pose) in grains.iter_mut().zip(&mut self.data.located) {
                 pose.position = DVec3::from_array(input.numbers()?);
                 pose.orientation = DQuat::from_array(input.numbers()?);
                 grain.pose = *pose;
             }
             fluid.restore(&mut input, self.clock.last_step)?;
-            fluid.locate(&grains, self.clock.last_step);
+            fluid.locate(&grains);
         }
         self.dynamics.restore(input.0)
     }

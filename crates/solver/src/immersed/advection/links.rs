@@ -1,327 +1,273 @@
-//! The links next to one grain: fluxes between neighbouring faces of a component, plane by plane.
+//! Fluxes through the links next to one grain, plane by plane.
 //!
-//! Legend: q component carried, c velocity that carries it, d signed distance of a link, U rigid velocity.
+//! A link joins two neighbouring faces of the same component. Its flux changes by
+//!
+//! excess (q_mean - U_q)(c - U_c) / h + c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60 h),
+//!
+//! the second term being the sixth-order mean of six faces less the mean of two.
+//!
+//! Legend: q component carried, c velocity that carries it, U rigid velocity in the middle of the
+//! link, excess 1 / A - 1 of the link's aperture A, h spacing along the link.
 
 use std::ops::Range;
 
 use glam::DVec3;
 
-use super::weights::{Planes, near, weigh};
-use super::{Stand, View};
+use super::box_velocity::BoxVelocity;
+use super::weights::{LinkPlanes, near_faces, weigh_links};
 use crate::grid::{FACE_OFFSET, Mesh};
-use crate::immersed::locate::Body;
-use crate::immersed::places::PAD;
+use crate::immersed::geometry::LocatedBody;
+use crate::immersed::kinematics::GrainKinematics;
 use crate::math::Real;
 use grainwake_simd::{Stencil, Vector};
 
-/// The links of one component.
-pub struct Lines<'a, R> {
-    body: &'a Body,
-    velocity: &'a View<'a, R>,
+/// Links of one component.
+pub struct ComponentLinks<'a, R> {
+    body: &'a LocatedBody,
+    velocity: &'a BoxVelocity<'a, R>,
     component: usize,
-    band: f64,
-    /// Faces that are unknowns, along each axis.
-    unknowns: [Range<i32>; 3],
-    /// Whether all faces about the box are, so that all links have six in line, and vectors that begin in rows of
-    /// the box stay in the lists (`View::reaches`).
-    inner: bool,
-    axes: [Axis; 3],
-    /// Of the links along each axis U of the component and U along the link, two by two (the last two entries are
-    /// of no meaning): in the middle of link (0, 0, 0), and the change from a link to the next along each axis
-    /// [m/s].
+    /// Half-width of the band [m].
+    eps: f64,
+    /// Indices of the unknown faces along each axis.
+    dofs: [Range<i32>; 3],
+    axes: [LinkAxis; 3],
+    /// Rigid velocity [m/s] in the middle of link (0, 0, 0), then its change from a link to the next
+    /// along each axis. Entries 2 a and 2 a + 1 are U_q and U_c of the links along axis a; the last
+    /// two are unused.
     rigid: [[f64; 8]; 4],
 }
 
-/// The links along one axis.
-struct Axis {
-    /// Whether there are any.
+/// Links along one axis.
+struct LinkAxis {
+    /// Whether the grid has more than one cell along the axis.
     exists: bool,
-    /// From the lower face of a link: the six faces along it, the two of the link first, and the two faces
-    /// of the carrying component that share it.
+    /// The six faces in line with a link, relative to its lower face, q_0 and q_1 first.
     carried: Stencil<6>,
+    /// The two faces of the carrying component, relative to the lower face.
     carrying: Stencil<2>,
-    /// From a face to the next along it, and along the component.
-    next: isize,
-    across: isize,
-    /// The link's own two alone, three times.
-    alone: Stencil<6>,
-    /// 1/h along the link [1/m].
+    /// q_0 and q_1 three times, for links without six faces in line.
+    two_faces: Stencil<6>,
+    /// 1/h [1/m].
     inverse: f64,
 }
 
-/// Those links along an axis of a row that have six faces in line, and the faces to load.
+/// Links of a row along one axis that have six faces in line.
 #[derive(Clone, Copy)]
-struct Six<'a> {
+struct SixFaces<'a> {
+    /// First index along x, and the index after the last.
     start: f64,
     end: f64,
+    /// Faces to load.
     carried: &'a Stencil<6>,
 }
 
-impl<'a, R: Real> Lines<'a, R> {
+impl<'a, R: Real> ComponentLinks<'a, R> {
     pub fn new(
-        band: f64,
+        eps: f64,
         mesh: &Mesh,
-        stand: &Stand,
-        body: &'a Body,
-        velocity: &'a View<'a, R>,
+        kinematics: &GrainKinematics,
+        body: &'a LocatedBody,
+        velocity: &'a BoxVelocity<'a, R>,
         component: usize,
-    ) -> Lines<'a, R> {
+    ) -> ComponentLinks<'a, R> {
         let mut rigid = [[0.0; 8]; 4];
         for along in 0..3 {
             let middle = DVec3::from_array(FACE_OFFSET[component]) - 1.0;
             let middle = body.first.as_dvec3() + middle + 0.5 * DVec3::AXES[along];
-            let first = stand.velocity_at(mesh.origin + mesh.spacing * middle);
-            let change = DVec3::AXES.map(|axis| stand.angular_velocity.cross(axis * mesh.spacing));
-            for (of, place) in [component, along].into_iter().zip(2 * along..) {
-                rigid[0][place] = first[of];
-                (0..3).for_each(|axis| rigid[1 + axis][place] = change[axis][of]);
+            let first = kinematics.velocity_at(mesh.origin + mesh.spacing * middle);
+            let omega = kinematics.velocity.angular;
+            let change = DVec3::AXES.map(|axis| omega.cross(axis * mesh.spacing));
+            for (of, entry) in [component, along].into_iter().zip(2 * along..) {
+                rigid[0][entry] = first[of];
+                (0..3).for_each(|axis| rigid[1 + axis][entry] = change[axis][of]);
             }
         }
         let axes = [0, 1, 2].map(|along| {
             let [next, across] = [along, component].map(|axis| velocity.strides[axis] as isize);
-            Axis {
+            LinkAxis {
                 exists: mesh.cells[along] > 1,
-                next,
-                across,
                 carried: Stencil::new([0, next, -next, 2 * next, -2 * next, 3 * next]),
                 carrying: match along == component {
                     true => Stencil::new([0, next]),
                     false => Stencil::new([next, next - across]),
                 },
-                alone: Stencil::new([0, next, 0, next, 0, next]),
+                two_faces: Stencil::new([0, next, 0, next, 0, next]),
                 inverse: 1.0 / mesh.spacing[along],
             }
         });
-        let unknowns = [0, 1, 2].map(|axis| body.places.unknowns(component, axis));
-        let size = body.size.to_array();
-        let inner = (0..3).all(|axis| unknowns[axis] == (-PAD..size[axis] + PAD));
-        let inner = inner && velocity.reaches(body.size);
-        Lines {
+        ComponentLinks {
             body,
             velocity,
             component,
-            band,
-            unknowns,
-            inner,
+            eps,
+            dofs: [0, 1, 2].map(|axis| body.index_map.dof_range(component, axis)),
             axes,
             rigid,
         }
     }
 
-    /// Writes what the links bring to the list `to` of all faces of the component.
+    /// Writes the correction of all faces of the component.
     #[inline(always)]
-    pub fn push<V: Vector<Number = f64>>(
+    pub fn correct<V: Vector<Number = f64>>(
         &self,
-        ahead: &impl Fn(usize, [i32; 2]),
-        planes: &mut Planes,
-        to: &mut [f64],
+        planes: &mut LinkPlanes,
+        correction: &mut [f64],
     ) {
-        let count = self.body.size.z;
-        planes.begin(self.body);
-        let weigh = |k, planes: &mut Planes| {
-            weigh(
-                &self.unknowns,
-                self.body,
-                self.component,
-                self.band,
-                k,
-                planes,
-            );
+        planes.reset(self.body);
+        let weigh = |k, planes: &mut LinkPlanes| {
+            weigh_links(&self.dofs, self.body, self.component, self.eps, k, planes);
         };
         weigh(-1, planes);
-        for k in 0..count {
-            ahead(self.component, [k, count]);
+        for k in 0..self.body.size.z {
             weigh(k, planes);
             for j in planes.rows[(k % 2) as usize].clone() {
-                if self.inner {
-                    self.row::<V, true>([j, k], planes, to);
-                } else {
-                    self.row::<V, false>([j, k], planes, to);
-                }
+                self.correct_row::<V>([j, k], planes, correction);
             }
         }
     }
 
-    /// Finds the fluxes of the links whose lower faces are in row (j, k), and what they bring to its faces with those
-    /// of the row and the plane before; `INNER` where all have six in line.
+    /// Computes the fluxes of the links whose lower faces are in row (j, k). Writes the correction of
+    /// these faces: fluxes in from the row and the plane before less fluxes out.
     #[inline(always)]
-    fn row<V: Vector<Number = f64>, const INNER: bool>(
+    fn correct_row<V: Vector<Number = f64>>(
         &self,
         [j, k]: [i32; 2],
-        planes: &mut Planes,
-        to: &mut [f64],
+        planes: &mut LinkPlanes,
+        correction: &mut [f64],
     ) {
-        let Some(near) = near(self.body, &self.unknowns, self.component, [j, k]) else {
+        let Some(near) = near_faces(self.body, &self.dofs, self.component, [j, k]) else {
             return;
         };
-        let (at, place) = (self.velocity.row([j, k]), planes.place(j));
+        let (at, first) = (self.velocity.row([j, k]), planes.first_entry(j));
         let [a, b, c] = &self.axes;
-        let six = if INNER {
-            [Six::all(a), Six::all(b), Six::all(c)]
-        } else {
-            let place = [0, j, k];
-            [self.six(0, place), self.six(1, place), self.six(2, place)]
-        };
+        let index = [0, j, k];
+        let six = [self.six(0, index), self.six(1, index), self.six(2, index)];
         let [y, z] = [j, k].map(f64::from);
-        let [first, _, by_y, by_z] = &self.rigid;
+        let [rigid_0, _, by_y, by_z] = &self.rigid;
         let mut rigid = [0.0; 8];
         for n in 0..8 {
-            rigid[n] = first[n] + y * by_y[n] + z * by_z[n];
+            rigid[n] = rigid_0[n] + y * by_y[n] + z * by_z[n];
         }
-        let Planes {
-            line, weight, y, z, ..
+        let LinkPlanes {
+            row_length,
+            weight,
+            flux_y,
+            flux_z,
+            ..
         } = planes;
-        let line = *line;
+        let row_length = *row_length;
         let [wx, wy, wz] = weight;
         let (wx, wy, wz) = (
-            &wx[place..][..line],
-            &wy[place..][..line],
-            &wz[place..][..line],
+            &wx[first..][..row_length],
+            &wy[first..][..row_length],
+            &wz[first..][..row_length],
         );
-        let (fy, fz) = (&mut y[..line], &mut z[place..][..line]);
+        let (fy, fz) = (
+            &mut flux_y[..row_length],
+            &mut flux_z[first..][..row_length],
+        );
         let zero = V::constant(0.0);
-        let (mut n, mut before, mut count) = (0, zero, V::ramp());
-        while n + V::WIDTH <= line {
+        let (mut n, mut before, mut index) = (0, zero, V::ramp());
+        while n + V::WIDTH <= row_length {
             let at = at.wrapping_add(n);
-            let mut brought = zero;
+            let mut sum = zero;
             if a.exists {
-                let flux =
-                    self.flux::<V, INNER>(0, six[0], &rigid, at, count, V::load_from(&wx[n..]));
-                brought = flux.behind(before) - flux;
+                let weight = V::load_from(&wx[n..]);
+                let flux = self.flux::<V>(0, six[0], &rigid, at, index, weight);
+                sum = flux.behind(before) - flux;
                 before = flux;
             }
             if b.exists {
-                let flux =
-                    self.flux::<V, INNER>(1, six[1], &rigid, at, count, V::load_from(&wy[n..]));
-                brought = brought + (V::load(&fy[n..]) - flux);
+                let weight = V::load_from(&wy[n..]);
+                let flux = self.flux::<V>(1, six[1], &rigid, at, index, weight);
+                sum = sum + (V::load(&fy[n..]) - flux);
                 flux.store(&mut fy[n..]);
             }
             if c.exists {
-                let flux =
-                    self.flux::<V, INNER>(2, six[2], &rigid, at, count, V::load_from(&wz[n..]));
-                brought = brought + (V::load(&fz[n..]) - flux);
+                let weight = V::load_from(&wz[n..]);
+                let flux = self.flux::<V>(2, six[2], &rigid, at, index, weight);
+                sum = sum + (V::load(&fz[n..]) - flux);
                 flux.store(&mut fz[n..]);
             }
-            // The part of the row in these lanes.
+            // Lanes whose faces are listed.
             let (start, end) = (near.start.max(n), near.end.min(n + V::WIDTH));
             if start < end {
-                let listed = near.listed + (start - near.start);
-                brought.store_from(start - n, &mut to[listed..listed + (end - start)]);
+                let entry = near.first + (start - near.start);
+                sum.store_from(start - n, &mut correction[entry..entry + (end - start)]);
             }
             n += V::WIDTH;
-            count = count + V::constant(V::WIDTH as f64);
+            index = index + V::constant(V::WIDTH as f64);
         }
     }
 
-    /// Near the ends of the grid there are no six faces.
-    fn six(&self, along: usize, place: [i32; 3]) -> Six<'_> {
-        let (axis, range, place) = (&self.axes[along], &self.unknowns[along], place[along]);
-        let (start, end) = (range.start + 2 - place, range.end - 3 - place);
+    /// Links along an axis of the row with `index` that have six faces in line; none at the ends of
+    /// the grid.
+    fn six(&self, along: usize, index: [i32; 3]) -> SixFaces<'_> {
+        let (axis, range, index) = (&self.axes[along], &self.dofs[along], index[along]);
+        let (start, end) = (range.start + 2 - index, range.end - 3 - index);
         if along == 0 {
-            return Six {
+            return SixFaces {
                 start: f64::from(start),
                 end: f64::from(end),
                 carried: &axis.carried,
             };
         }
         if start <= 0 && 0 < end {
-            return Six::all(axis);
+            return SixFaces {
+                start: f64::NEG_INFINITY,
+                end: f64::INFINITY,
+                carried: &axis.carried,
+            };
         }
-        Six {
+        SixFaces {
             start: 0.0,
             end: 0.0,
-            carried: &axis.alone,
+            carried: &axis.two_faces,
         }
     }
 
-    /// Flux through links along an axis over their length [m/s^2]; zero where they are not near the surface.
-    /// They are number `count` of the row, and their lower faces are from `at` on in the fields; `rigid` is U
-    /// at the first.
+    /// Change of the flux through links along an axis, over their length [m/s^2]; zero away from the
+    /// surface. The links have the indices `index` in their row, their lower faces lie from position
+    /// `at` on; `rigid` holds U of the first link of the row.
     #[inline(always)]
-    fn flux<V: Vector<Number = f64>, const INNER: bool>(
+    fn flux<V: Vector<Number = f64>>(
         &self,
         along: usize,
-        six: Six,
+        six: SixFaces,
         rigid: &[f64; 8],
         at: usize,
-        count: V,
+        index: V,
         weight: V,
     ) -> V {
         let (zero, half) = (V::constant(0.0), V::constant(0.5));
+        // Weights are -1 away from the surface, else the excess.
         let none = V::constant(-0.5);
         if none.mask_below(weight) == 0 {
             return zero;
         }
         let axis = &self.axes[along];
         let [q, c] = [self.component, along].map(|of| self.velocity.components[of]);
-        let [from, to, below, above, far_below, far_above];
-        let [first, second];
-        if INNER {
-            let next = if along == 0 { 1 } else { axis.next };
-            // SAFETY: row and plane are in the box, and a vector ends with the line of `Planes`, which is no more than
-            // `MOST` longer than the box: up to three faces from there all is in the lists, says `inner`.
-            unsafe {
-                from = take(q, at, 0);
-                to = take(q, at, next);
-                below = take(q, at, -next);
-                above = take(q, at, 2 * next);
-                far_below = take(q, at, -2 * next);
-                far_above = take(q, at, 3 * next);
-                if along == self.component {
-                    [first, second] = [from, to];
-                } else {
-                    first = take(c, at, next);
-                    second = take(c, at, next - axis.across);
-                }
-            }
-        } else {
-            [from, to, below, above, far_below, far_above] = six.carried.load::<V, R>(q, at);
-            [first, second] = axis.carrying.load::<V, R>(c, at);
-        }
-        let both = from + to;
-        let (mean, carrier) = (half * both, half * (first + second));
+        let [q_0, q_1, below, above, far_below, far_above] = six.carried.load::<V, R>(q, at);
+        let [c_0, c_1] = axis.carrying.load::<V, R>(c, at);
+        let both = q_0 + q_1;
+        let (mean, carrier) = (half * both, half * (c_0 + c_1));
         let outer = V::constant(-8.0).mul_add(below + above, far_below + far_above);
         let sixth = both.mul_add(V::constant(7.0), outer);
-        let mut smoother = carrier * V::constant(1.0 / 60.0) * sixth;
-        if !INNER {
-            // What was read beyond the ends may be anything.
-            smoother = count.where_below(V::constant(six.end), smoother, zero);
-            smoother = count.where_below(V::constant(six.start), zero, smoother);
-        }
-        let mut flux = smoother;
-        // Beyond the band links are open.
+        let higher_order = carrier * V::constant(1.0 / 60.0) * sixth;
+        // Values read beyond the ends of the grid are arbitrary.
+        let higher_order = index.where_below(V::constant(six.end), higher_order, zero);
+        let higher_order = index.where_below(V::constant(six.start), zero, higher_order);
+        let mut flux = higher_order;
+        // Links outside the band are open: no excess.
         if zero.mask_below(weight) != 0 {
-            // From the first link of the row on U changes evenly.
-            let by = &self.rigid[1];
-            let [own, along] = [2 * along, 2 * along + 1];
-            let mean = mean - count.mul_add(V::constant(by[own]), V::constant(rigid[own]));
-            let relative =
-                carrier - count.mul_add(V::constant(by[along]), V::constant(rigid[along]));
-            flux = (mean * relative).mul_add(weight, smoother);
+            let by_x = &self.rigid[1];
+            let [own, other] = [2 * along, 2 * along + 1];
+            let mean = mean - index.mul_add(V::constant(by_x[own]), V::constant(rigid[own]));
+            let carrier =
+                carrier - index.mul_add(V::constant(by_x[other]), V::constant(rigid[other]));
+            flux = (mean * carrier).mul_add(weight, higher_order);
         }
         let flux = flux * V::constant(axis.inverse);
         none.where_below(weight, flux, zero)
-    }
-}
-
-/// Vector of the entries of a list some way from a place.
-///
-/// # Safety
-/// They are in the list.
-#[inline(always)]
-unsafe fn take<V: Vector, R: Real>(list: &[R], at: usize, offset: isize) -> V {
-    let at = at.wrapping_add_signed(offset);
-    // SAFETY: as the caller has promised.
-    V::load_from(unsafe { list.get_unchecked(at..at + V::WIDTH) })
-}
-
-impl<'a> Six<'a> {
-    #[inline(always)]
-    fn all(axis: &'a Axis) -> Six<'a> {
-        Six {
-            start: f64::NEG_INFINITY,
-            end: f64::INFINITY,
-            carried: &axis.carried,
-        }
     }
 }

@@ -1,132 +1,135 @@
-//! What each link next to a grain weighs, plane by plane: how far from the surface it is, taken from the distances of
-//! its two faces. In singles, as they are.
+//! Weights of the links next to a grain, plane by plane, in single precision like the distances.
 //!
-//! Legend: d signed distance of a link.
+//! The distance d of a link is the mean of those of its two faces. The weight is the inverse-aperture
+//! excess for |d| < eps, 0 for eps <= d < 2 eps, and -1 elsewhere.
 
 use std::ops::Range;
 
-use crate::immersed::aperture::surplus;
-use crate::immersed::locate::Body;
+use crate::immersed::geometry::LocatedBody;
+use crate::immersed::geometry::aperture::inverse_aperture_excess;
 use crate::math::Aligned;
 use grainwake_simd::{Kernel, MOST, Vector, dispatch};
 
-/// The plane of a component at hand and the next, in rows that begin on registers; there is a row before the first
-/// and one after the last.
+/// The current plane of a component and the next, in rows aligned to registers. One row precedes the
+/// first, and one follows the last.
 #[derive(Default)]
-pub struct Planes {
-    /// From one row to the next.
-    pub line: usize,
-    /// Which rows have faces near, in this plane and the next.
+pub struct LinkPlanes {
+    /// Entries from one row to the next.
+    pub row_length: usize,
+    /// Rows with faces near the grain, in even and in odd planes.
     pub rows: [Range<i32>; 2],
-    /// Their signed distances [m], infinite where no link may end.
+    /// Signed distances of the faces [m] in even and in odd planes, infinite where no link may end.
     distance: [Aligned<f32>; 2],
-    /// Weights of the links along each axis: [`surplus`], negative where a link is not near the surface.
+    /// Weights of the links of the current plane, by axis.
     pub weight: [Aligned<f32>; 3],
-    /// What left the row before along y, and the plane before along z [m/s^2]. None of it reaches rows that have no
-    /// faces near.
-    pub y: Aligned<f64>,
-    pub z: Aligned<f64>,
+    /// Fluxes along y out of the row before [m/s^2]. Fluxes never enter rows without faces near.
+    pub flux_y: Aligned<f64>,
+    /// Fluxes along z out of the plane before [m/s^2].
+    pub flux_z: Aligned<f64>,
 }
 
-impl Planes {
-    /// Makes room for a box, before the first plane.
-    pub fn begin(&mut self, body: &Body) {
-        // One face more is no link's. `View::reaches` counts on no more than `MOST` beyond the box.
-        self.line = (body.size.x as usize + 1).next_multiple_of(MOST);
-        let count = self.line * (body.size.y as usize + 2);
+impl LinkPlanes {
+    /// Makes room for the box of a grain and clears the fluxes.
+    pub fn reset(&mut self, body: &LocatedBody) {
+        // The face after the last of the box ends the last link.
+        self.row_length = (body.size.x as usize + 1).next_multiple_of(MOST);
+        let count = self.row_length * (body.size.y as usize + 2);
         for list in self.distance.iter_mut().chain(&mut self.weight) {
             list.make_room(count + MOST);
         }
-        for (list, count) in [(&mut self.y, self.line), (&mut self.z, count)] {
+        for (list, count) in [
+            (&mut self.flux_y, self.row_length),
+            (&mut self.flux_z, count),
+        ] {
             list.make_room(count);
             list[..count].fill(0.0);
         }
     }
-    /// Place of the first face of row `j`.
+    /// Entry of the first face of row `j`.
     #[inline(always)]
-    pub fn place(&self, j: i32) -> usize {
-        (j + 1) as usize * self.line
+    pub fn first_entry(&self, j: i32) -> usize {
+        (j + 1) as usize * self.row_length
     }
 }
 
-/// Faces of a row that are near.
-pub struct Near {
-    /// Along x: the first in the box, and the one after the last.
+/// Unknown faces of a row within reach of the grain.
+pub struct NearFaces {
+    /// First index along x, and the index after the last.
     pub start: usize,
     pub end: usize,
-    /// Place of the first in the lists of [`Body`].
-    pub listed: usize,
+    /// Entry of the first in [`LocatedBody::distance`].
+    pub first: usize,
 }
 
-/// The unknowns of row (j, k) that are near, if any.
+/// Unknown faces of row (j, k) within reach, if any; `x`, `y` and `z` are the unknowns along each axis.
 #[inline(always)]
-pub fn near(
-    body: &Body,
+pub fn near_faces(
+    body: &LocatedBody,
     [x, y, z]: &[Range<i32>; 3],
     component: usize,
     [j, k]: [i32; 2],
-) -> Option<Near> {
+) -> Option<NearFaces> {
     let span = &body.spans[component][(j + body.size.y * k) as usize];
     let (start, end) = (span.start.max(x.start), span.end.min(x.end));
     if start >= end || j < y.start || j >= y.end || k < z.start || k >= z.end {
         return None;
     }
-    Some(Near {
+    Some(NearFaces {
         start: start as usize,
         end: end as usize,
-        listed: span.place(start),
+        first: span.entry(start),
     })
 }
 
-/// Weighs the links of a component whose lower faces are in plane `k`, after those of the plane before; plane -1 comes
-/// first.
-pub fn weigh(
-    unknowns: &[Range<i32>; 3],
-    body: &Body,
+/// Weighs the links whose lower faces are in plane `k`. To be called for plane -1 first, then for one
+/// plane after the other; `dofs` are the unknowns along each axis.
+pub fn weigh_links(
+    dofs: &[Range<i32>; 3],
+    body: &LocatedBody,
     component: usize,
-    band: f64,
+    eps: f64,
     k: i32,
-    planes: &mut Planes,
+    planes: &mut LinkPlanes,
 ) {
-    dispatch(Weigh {
-        unknowns,
+    dispatch(WeighLinks {
+        dofs,
         body,
         component,
-        band,
+        eps,
         k,
         planes,
     });
 }
 
-/// The weights of a plane.
-struct Weigh<'a> {
-    unknowns: &'a [Range<i32>; 3],
-    body: &'a Body,
+struct WeighLinks<'a> {
+    dofs: &'a [Range<i32>; 3],
+    body: &'a LocatedBody,
     component: usize,
-    band: f64,
+    eps: f64,
     k: i32,
-    planes: &'a mut Planes,
+    planes: &'a mut LinkPlanes,
 }
 
-impl Kernel for Weigh<'_> {
+impl Kernel for WeighLinks<'_> {
     type Number = f32;
     #[inline(always)]
     fn run<V: Vector<Number = f32>>(mut self) {
-        self.unfold::<V>();
+        self.read_next_plane::<V>();
         if self.k >= 0 {
             self.weigh::<V>();
         }
     }
 }
 
-impl Weigh<'_> {
-    /// Takes the distances of the next plane from the list.
+impl WeighLinks<'_> {
+    /// Copies the distances of the next plane from the list.
     #[inline(always)]
-    fn unfold<V: Vector<Number = f32>>(&mut self) {
+    fn read_next_plane<V: Vector<Number = f32>>(&mut self) {
         let (body, k) = (self.body, self.k + 1);
         let which = (k % 2) as usize;
-        let line = self.planes.line;
-        let distance = &mut self.planes.distance[which][..line * (body.size.y as usize + 2) + MOST];
+        let row_length = self.planes.row_length;
+        let distance =
+            &mut self.planes.distance[which][..row_length * (body.size.y as usize + 2) + MOST];
         let far = V::constant(f64::INFINITY);
         for n in (0..distance.len()).step_by(V::WIDTH) {
             far.store(&mut distance[n..]);
@@ -135,19 +138,22 @@ impl Weigh<'_> {
         let list = &body.distance[self.component][..];
         let rows = if k < body.size.z { body.size.y } else { 0 };
         for j in 0..rows {
-            let Some(near) = near(body, self.unknowns, self.component, [j, k]) else {
+            let Some(near) = near_faces(body, self.dofs, self.component, [j, k]) else {
                 continue;
             };
             if last == 0 {
                 first = j;
             }
             last = j + 1;
-            let (count, to) = (near.end - near.start, (j + 1) as usize * line + near.start);
+            let (count, to) = (
+                near.end - near.start,
+                (j + 1) as usize * row_length + near.start,
+            );
             for n in (0..count).step_by(V::WIDTH) {
                 let left = V::constant((count - n) as f64);
-                // What is written beyond the row the next one overwrites.
+                // Entries beyond the row are overwritten by the next.
                 V::ramp()
-                    .where_below(left, V::load(&list[near.listed + n..]), far)
+                    .where_below(left, V::load(&list[near.first + n..]), far)
                     .store(&mut distance[to + n..]);
             }
         }
@@ -157,8 +163,8 @@ impl Weigh<'_> {
     /// Weighs the links of this plane.
     #[inline(always)]
     fn weigh<V: Vector<Number = f32>>(&mut self) {
-        let Planes {
-            line,
+        let LinkPlanes {
+            row_length,
             rows,
             distance,
             weight,
@@ -169,27 +175,28 @@ impl Weigh<'_> {
         let [x, y, z] = weight;
         let weight = [&mut x[..], &mut y[..], &mut z[..]];
         let (half, zero, none) = (V::constant(0.5), V::constant(0.0), V::constant(-1.0));
-        let [inside, band, outside] = [-1.0, 1.0, 2.0].map(|of| of * self.band);
+        let [inside, band, outside] = [-1.0, 1.0, 2.0].map(|half_widths| half_widths * self.eps);
         let rows = &rows[this];
         let (first, last) = (rows.start + 1, rows.end + 1);
-        for place in (first as usize * *line..last as usize * *line).step_by(V::WIDTH) {
-            let own = V::load(&here[place..]);
+        let row_length = *row_length;
+        for entry in (first as usize * row_length..last as usize * row_length).step_by(V::WIDTH) {
+            let own = V::load(&here[entry..]);
             let next = [
-                V::load(&here[place + 1..]),
-                V::load(&here[place + *line..]),
-                V::load(&above[place..]),
+                V::load(&here[entry + 1..]),
+                V::load(&here[entry + row_length..]),
+                V::load(&above[entry..]),
             ];
             for axis in 0..3 {
                 let d = half * (own + next[axis]);
-                let mut found = zero;
+                let mut of_near = zero;
                 if d.mask_below(V::constant(band)) != 0 {
-                    // Open links have none, whatever others are in the vector: rounding would leave some at the
-                    // end of the band.
-                    let surplus = d.where_below(V::constant(band), surplus(d, self.band), zero);
-                    found = V::constant(inside).where_below(d, surplus, none);
+                    // Zero for open links, where the series would leave round-off.
+                    let excess = inverse_aperture_excess(d, self.eps);
+                    let excess = d.where_below(V::constant(band), excess, zero);
+                    of_near = V::constant(inside).where_below(d, excess, none);
                 }
-                d.where_below(V::constant(outside), found, none)
-                    .store(&mut weight[axis][place..]);
+                d.where_below(V::constant(outside), of_near, none)
+                    .store(&mut weight[axis][entry..]);
             }
         }
     }

@@ -1,21 +1,23 @@
-//! Samples of a field read for the lanes of vectors. Finding the samples and reading them are two steps, for
-//! a loop of its own each.
+//! Trilinear interpolation in a grid of distance samples, several points at a time. Locating the points
+//! and reading the samples are separate steps, so that each can run in a loop of its own.
 
 use std::ops::Deref;
 
 use glam::DVec3;
 use grainwake_shape::SampledField;
 
-use super::near::FAR;
 use grainwake_simd::{One, Vector};
 
-/// A vector from each list. (No closure in a kernel touches vectors: it would not be inlined.)
+/// Stands for infinity in single precision [m].
+pub const FAR: f64 = 1e30;
+
+/// Loads a vector from each list. (Kernels use no closures on vectors: these would not be inlined.)
 #[inline(always)]
 pub fn load_all<V: Vector>([x, y, z]: &[impl Deref<Target = [V::Number]>; 3], at: usize) -> [V; 3] {
     [V::load(&x[at..]), V::load(&y[at..]), V::load(&z[at..])]
 }
 
-/// Stores vectors in as many lists.
+/// Stores a vector in each list.
 #[inline(always)]
 pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [&mut [V::Number]; 3], at: usize) {
     values[0].store(&mut x[at..]);
@@ -23,26 +25,25 @@ pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [&mut [V::Number]; 3
     values[2].store(&mut z[at..]);
 }
 
-/// Signed distances on a grid, to a hundred thousandth or so of what they reach: those of a grain should stay near
-/// the processor.
-pub struct Samples {
+/// Signed distances on a uniform grid as 16-bit levels, so that those of a grain fit the cache.
+pub struct DistanceSamples {
     lower: DVec3,
     spacing: f64,
     dims: [usize; 3],
-    /// What a level is [m].
+    /// Distance per level [m].
     quantum: f64,
-    /// Integer levels, x fastest.
+    /// Distances in levels, x fastest.
     levels: Vec<i16>,
 }
 
-impl Samples {
-    /// Those of a field; what is farther than `most` [m] inside or outside is given as so far.
-    pub fn of(field: &SampledField, most: f64) -> Samples {
+impl DistanceSamples {
+    /// Converts a sampled field; distances are limited to `most` [m] on both sides.
+    pub fn new(field: &SampledField, most: f64) -> DistanceSamples {
         let quantum = most / f64::from(i16::MAX);
-        let part = field.quantum() / quantum;
-        // Beyond the range it is cut off.
-        let level = |level: &f32| (f64::from(*level) * part).round() as i16;
-        Samples {
+        let ratio = field.quantum() / quantum;
+        // The conversion saturates.
+        let level = |level: &f32| (f64::from(*level) * ratio).round() as i16;
+        DistanceSamples {
             lower: field.lower(),
             spacing: field.spacing(),
             dims: field.dims(),
@@ -51,13 +52,13 @@ impl Samples {
         }
     }
 
-    /// Signed distance [m] and gradient at a point of the grid.
+    /// Signed distance [m] and gradient at a point; `None` off the grid.
     #[inline(always)]
     pub fn distance_and_gradient(&self, x: DVec3) -> Option<(f64, DVec3)> {
-        let grid = Grid::of(self);
-        let spot = grid.find([One(x.x), One(x.y), One(x.z)]);
-        let on_grid = spot.off.0 <= 0.0;
-        let (distance, [x, y, z]) = grid.read(spot);
+        let grid = SampleGrid::new(self);
+        let location = grid.locate([One(x.x), One(x.y), One(x.z)]);
+        let on_grid = location.off_grid.0 <= 0.0;
+        let (distance, [x, y, z]) = grid.interpolate(location);
         on_grid.then_some((distance.0, DVec3::new(x.0, y.0, z.0)))
     }
 
@@ -67,33 +68,34 @@ impl Samples {
     }
 }
 
-/// The grid of samples.
-pub struct Grid<'a, V> {
+/// Constants of a sample grid in vector registers.
+pub struct SampleGrid<'a, V> {
     lower: [V; 3],
     inverse: V,
-    /// Number of the last sample along each axis.
+    /// Index of the last sample along each axis.
     last: [V; 3],
-    /// From one row and one plane of samples to the next in the list of levels.
+    /// Positions from one row and one plane of samples to the next.
     strides: [V; 2],
-    /// What a level is [m], and that over the spacing.
+    /// Distance per level [m].
     quantum: V,
+    /// Gradient per level and spacing.
     slope: V,
     levels: &'a [i16],
 }
 
-/// Where points are among the samples.
-pub struct Spot<V> {
-    /// Place of the first corner of the cell in the list of levels.
+/// Location of points in the sample grid.
+pub struct SampleLocation<V> {
+    /// Position of the lowest corner of the cell in the list of levels.
     pub cell: V,
-    /// Of the cell, along each axis.
+    /// Position within the cell along each axis, 0 to 1.
     pub fraction: [V; 3],
-    /// How far off the grid, in spacings.
-    pub off: V,
+    /// Distance off the grid, in spacings (sum over the axes).
+    pub off_grid: V,
 }
 
-impl<'a, V: Vector> Grid<'a, V> {
+impl<'a, V: Vector> SampleGrid<'a, V> {
     #[inline(always)]
-    pub fn of(samples: &'a Samples) -> Grid<'a, V> {
+    pub fn new(samples: &'a DistanceSamples) -> SampleGrid<'a, V> {
         let (dims, inverse) = (samples.dims, 1.0 / samples.spacing);
         let mut lower = [V::constant(0.0); 3];
         let mut last = lower;
@@ -102,7 +104,7 @@ impl<'a, V: Vector> Grid<'a, V> {
             last[axis] = V::constant(dims[axis] as f64 - 1.0);
         }
         let (row, plane) = (dims[0], dims[0] * dims[1]);
-        Grid {
+        SampleGrid {
             lower,
             inverse: V::constant(inverse),
             last,
@@ -113,35 +115,35 @@ impl<'a, V: Vector> Grid<'a, V> {
         }
     }
 
-    /// Where points are; those off the grid, at the nearest point on it.
+    /// Locates points; those off the grid at the nearest point on it.
     #[inline(always)]
-    pub fn find(&self, x: [V; 3]) -> Spot<V> {
+    pub fn locate(&self, x: [V; 3]) -> SampleLocation<V> {
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
         let mut cell = [zero; 3];
         let mut fraction = [zero; 3];
-        let mut off = zero;
+        let mut off_grid = zero;
         for axis in 0..3 {
             let s = (x[axis] - self.lower[axis]) * self.inverse;
-            let place = s.larger(zero).smaller(self.last[axis]);
-            off = off + (s - place).magnitude();
-            cell[axis] = place.floor().smaller(self.last[axis] - one);
-            fraction[axis] = place - cell[axis];
+            let nearest = s.larger(zero).smaller(self.last[axis]);
+            off_grid = off_grid + (s - nearest).magnitude();
+            cell[axis] = nearest.floor().smaller(self.last[axis] - one);
+            fraction[axis] = nearest - cell[axis];
         }
         let [row, plane] = self.strides;
-        Spot {
+        SampleLocation {
             cell: cell[0] + row * cell[1] + plane * cell[2],
             fraction,
-            off,
+            off_grid,
         }
     }
 
-    /// Distance and gradient.
+    /// Interpolates distance [m] and gradient.
     #[inline(always)]
-    pub fn read(&self, spot: Spot<V>) -> (V, [V; 3]) {
-        let [fx, fy, fz] = spot.fraction;
+    pub fn interpolate(&self, location: SampleLocation<V>) -> (V, [V; 3]) {
+        let [fx, fy, fz] = location.fraction;
         let [row, plane] = self.strides;
         // Value and slope on the four edges along x.
-        let (at, levels) = (spot.cell, self.levels);
+        let (at, levels) = (location.cell, self.levels);
         let [a, s] = edge(levels, at, fx);
         let [b, t] = edge(levels, at + row, fx);
         let [c, u] = edge(levels, at + plane, fx);
@@ -153,14 +155,14 @@ impl<'a, V: Vector> Grid<'a, V> {
             self.slope * ((b - a) + fz * ((d - c) - (b - a))),
             self.slope * (high - low),
         ];
-        // Whatever is off the grid is so by more than a rounding.
+        // Points off the grid are so by more than rounding.
         let distance = self.quantum * (low + fz * (high - low));
-        let distance = V::constant(0.0).where_below(spot.off, V::constant(FAR), distance);
+        let distance = V::constant(0.0).where_below(location.off_grid, V::constant(FAR), distance);
         (distance, gradient)
     }
 }
 
-/// Value between the samples at `at` and the next along x, and the slope from one to the other.
+/// Value between the sample `at` and the next along x, and their difference.
 #[inline(always)]
 fn edge<V: Vector>(levels: &[i16], at: V, x: V) -> [V; 2] {
     let [low, high] = V::pairs(levels, at);

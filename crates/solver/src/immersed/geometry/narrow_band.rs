@@ -1,8 +1,8 @@
-//! Distances from a grain near it, at a few nanoseconds each wherever the point lies.
+//! Distances in a narrow band around a grain, a few nanoseconds each.
 //!
-//! The grid of a sampled shape ends closer to the surface than the flow asks for, and distances off
-//! it are searched for; where the grain is a few cells across it is also finer than the flow can tell, and
-//! what is read from it would not stay near the processor. Here a wider and, if so, coarser grid holds them.
+//! The sampled field of a shape ends closer to the surface than the band of the flow, and distances
+//! beyond it are searched for. It may also be finer than the flow resolves and so too large for the
+//! cache. Here a wider and, where possible, coarser grid of 16-bit samples replaces it.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -10,53 +10,58 @@ use std::sync::Arc;
 use glam::DVec3;
 use grainwake_shape::{Field, Shape};
 
-use super::samples::{Grid, Samples, Spot, load_all, store_all};
+use super::samples::{DistanceSamples, FAR, SampleGrid, SampleLocation, load_all, store_all};
 use crate::dem::Grain;
 use crate::math::Aligned;
 use grainwake_simd::{MOST, MOST_PLACES, Vector};
 
-/// Samples in half the band, and across a grain, as far as the shape has them: what counts more. No more than
-/// `MOST_SAMPLES` in half the band: the flow does not tell a grain that thin from none.
-const SAMPLES: f64 = 4.0;
-const ACROSS: f64 = 12.0;
-const MOST_SAMPLES: f64 = 16.0;
+/// Samples per half-width of the band.
+const SAMPLES_PER_BAND: f64 = 4.0;
+/// Samples across the thinnest side of a grain, if that needs more of them.
+const SAMPLES_ACROSS: f64 = 12.0;
+/// Upper limit of samples per half-width of the band: the flow does not resolve a thinner grain.
+const MOST_SAMPLES_PER_BAND: f64 = 16.0;
 
-/// The shapes of all grains with what lies about them.
-pub struct NearShapes {
-    /// Of each grain.
-    shapes: Vec<NearShape>,
+/// Narrow-band shapes of all grains; equal shapes share their samples.
+pub struct NarrowBandShapes {
+    /// One per grain.
+    shapes: Vec<NarrowBandShape>,
 }
 
-/// A shape and the distances about it.
+/// A shape with distances sampled in a band around its surface.
 #[derive(Clone)]
-pub struct NearShape {
+pub struct NarrowBandShape {
     shape: Arc<Shape>,
-    /// None where the shape answers by itself: a sphere, or one for which there would be too many.
-    samples: Option<Arc<Samples>>,
+    /// `None` if the shape itself is evaluated: a sphere, or one that would need too many samples.
+    samples: Option<Arc<DistanceSamples>>,
 }
 
-impl NearShapes {
-    /// For distances up to `reach` [m] about the grains, in a flow with the band `eps` [m].
-    pub fn new(grains: &[Grain], eps: f64, reach: f64) -> NearShapes {
-        let mut known: HashMap<*const Shape, NearShape> = HashMap::new();
-        let of = |grain: &Grain| {
-            let near = known.entry(Arc::as_ptr(&grain.shape));
-            near.or_insert_with(|| NearShape::new(&grain.shape, eps, reach))
+impl NarrowBandShapes {
+    /// Samples distances up to `reach` [m] for a flow with the band half-width `eps` [m].
+    pub fn new(grains: &[Grain], eps: f64, reach: f64) -> NarrowBandShapes {
+        let mut known: HashMap<*const Shape, NarrowBandShape> = HashMap::new();
+        let sampled = |grain: &Grain| {
+            let shape = known.entry(Arc::as_ptr(&grain.shape));
+            shape
+                .or_insert_with(|| NarrowBandShape::new(&grain.shape, eps, reach))
                 .clone()
         };
-        NearShapes {
-            shapes: grains.iter().map(of).collect(),
+        NarrowBandShapes {
+            shapes: grains.iter().map(sampled).collect(),
         }
     }
 
-    /// That of grain `index`.
-    pub fn of(&self, index: usize) -> &NearShape {
+    /// Shape of grain `index`.
+    pub fn of(&self, index: usize) -> &NarrowBandShape {
         &self.shapes[index]
     }
 
-    /// Memory held beside the shapes [bytes].
+    /// Memory held in addition to the shapes [bytes].
     pub fn bytes(&self) -> usize {
-        let samples = self.shapes.iter().filter_map(|near| near.samples.as_ref());
+        let samples = self
+            .shapes
+            .iter()
+            .filter_map(|shape| shape.samples.as_ref());
         let mut samples: Vec<_> = samples.collect();
         samples.sort_by_key(|samples| Arc::as_ptr(samples));
         samples.dedup_by_key(|samples| Arc::as_ptr(samples));
@@ -64,36 +69,36 @@ impl NearShapes {
     }
 }
 
-impl NearShape {
-    fn new(shape: &Arc<Shape>, eps: f64, reach: f64) -> NearShape {
+impl NarrowBandShape {
+    fn new(shape: &Arc<Shape>, eps: f64, reach: f64) -> NarrowBandShape {
         let samples = match shape.field() {
             Field::Sampled(_) => {
                 let thickness = (shape.upper() - shape.lower()).min_element();
-                let spacing = (eps / SAMPLES)
-                    .min(thickness / ACROSS)
-                    .max(eps / MOST_SAMPLES);
-                // Coarser where that would be too many samples.
-                let mut coarser = (0..20).map(|n| spacing * f64::from(1 << n));
-                let field = coarser.find_map(|fine| {
-                    let field = shape.distances(fine, reach + fine).ok()?;
+                let spacing = (eps / SAMPLES_PER_BAND)
+                    .min(thickness / SAMPLES_ACROSS)
+                    .max(eps / MOST_SAMPLES_PER_BAND);
+                // Doubled until positions fit single precision.
+                let mut spacings = (0..20).map(|n| spacing * f64::from(1 << n));
+                let field = spacings.find_map(|spacing| {
+                    let field = shape.distances(spacing, reach + spacing).ok()?;
                     (field.levels().len() <= MOST_PLACES).then_some(field)
                 });
-                // Interpolated distances up to the reach are true.
+                // With this margin interpolated distances are exact up to `reach`.
                 field.map(|field| {
                     let most = reach + 2.0 * field.spacing();
-                    Arc::new(Samples::of(&field, most))
+                    Arc::new(DistanceSamples::new(&field, most))
                 })
             }
             _ => None,
         };
-        NearShape {
+        NarrowBandShape {
             shape: shape.clone(),
             samples,
         }
     }
 
-    /// Signed distance [m] and its gradient at `x`, both in the frame of the grain; the distance may
-    /// be infinite where it is more than the reach.
+    /// Signed distance [m] and its gradient at `x`, both in the frame of the grain. The distance may
+    /// be infinite where it exceeds the reach.
     #[inline(always)]
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         let Some(samples) = &self.samples else {
@@ -103,56 +108,55 @@ impl NearShape {
         found.unwrap_or((f64::INFINITY, DVec3::ZERO))
     }
 
-    /// The same at the first `count` points of lists of coordinates, in single precision; what is infinite there
-    /// may be merely farther than anything here. The gradients come in the place of the points. More entries
-    /// must follow, which are overwritten.
+    /// Fills the distances at the first `count` of `points`, in single precision, and replaces the
+    /// points by the gradients. Infinite distances are at least [`FAR`] here. The lists must be
+    /// `MOST` entries longer than `count`; these are overwritten.
     #[inline(always)]
-    pub fn measure<V: Vector<Number = f32>>(
+    pub fn fill_distances<V: Vector<Number = f32>>(
         &self,
         points: &mut [&mut [f32]; 3],
         distances: &mut [f32],
         count: usize,
-        spare: &mut Spare,
+        scratch: &mut SampleScratch,
     ) {
         let Some(samples) = &self.samples else {
             for at in (0..count).step_by(V::WIDTH) {
                 let x: [V; 3] = load_all(points, at);
-                let (distance, slope) = match self.shape.field() {
-                    Field::Sphere(radius) => about_sphere(*radius, x),
-                    _ => self.one_by_one(x),
+                let (distance, gradient) = match self.shape.field() {
+                    Field::Sphere(radius) => sphere_distance(*radius, x),
+                    _ => self.lane_by_lane(x),
                 };
                 distance.store(&mut distances[at..]);
-                store_all(slope, points, at);
+                store_all(gradient, points, at);
             }
             return;
         };
-        // Samples are far apart in memory. Little but their loads is in the second loop, so that the
-        // processor has those of several vectors under way at once.
-        let grid = Grid::<V>::of(samples);
-        let Spare { cell, off } = spare;
+        // Two loops: the second contains little but loads, so that those of several vectors overlap.
+        let grid = SampleGrid::<V>::new(samples);
+        let SampleScratch { cell, off_grid } = scratch;
         cell.make_room(count + MOST);
-        off.make_room(count + MOST);
-        let (cell, off) = (&mut cell[..], &mut off[..]);
+        off_grid.make_room(count + MOST);
+        let (cell, off_grid) = (&mut cell[..], &mut off_grid[..]);
         for at in (0..count).step_by(V::WIDTH) {
-            let spot = grid.find(load_all(points, at));
-            spot.cell.store(&mut cell[at..]);
-            spot.off.store(&mut off[at..]);
-            store_all(spot.fraction, points, at);
+            let location = grid.locate(load_all(points, at));
+            location.cell.store(&mut cell[at..]);
+            location.off_grid.store(&mut off_grid[at..]);
+            store_all(location.fraction, points, at);
         }
         for at in (0..count).step_by(V::WIDTH) {
-            let (distance, slope) = grid.read(Spot {
+            let (distance, gradient) = grid.interpolate(SampleLocation {
                 cell: V::load(&cell[at..]),
-                off: V::load(&off[at..]),
+                off_grid: V::load(&off_grid[at..]),
                 fraction: load_all(points, at),
             });
             distance.store(&mut distances[at..]);
-            store_all(slope, points, at);
+            store_all(gradient, points, at);
         }
     }
 
-    /// The same for any other kind of field.
+    /// Evaluates the shape for one lane after the other.
     #[cold]
-    fn one_by_one<V: Vector<Number = f32>>(&self, x: [V; 3]) -> (V, [V; 3]) {
+    fn lane_by_lane<V: Vector<Number = f32>>(&self, x: [V; 3]) -> (V, [V; 3]) {
         let mut points = [[0.0; MOST]; 3];
         x.iter()
             .zip(&mut points)
@@ -160,28 +164,26 @@ impl NearShape {
         let mut distances = [0.0; MOST];
         for n in 0..V::WIDTH {
             let x = DVec3::from_array(points.map(|lanes| f64::from(lanes[n])));
-            let (d, slope) = self.distance_and_gradient(x);
+            let (d, gradient) = self.distance_and_gradient(x);
             distances[n] = d.min(FAR) as f32;
             for axis in 0..3 {
-                points[axis][n] = slope[axis] as f32;
+                points[axis][n] = gradient[axis] as f32;
             }
         }
         (V::load(&distances), points.map(|lanes| V::load(&lanes)))
     }
 }
 
-/// Lists that [`NearShape::measure`] needs.
+/// Buffers of [`NarrowBandShape::fill_distances`].
 #[derive(Default)]
-pub struct Spare {
+pub struct SampleScratch {
     cell: Aligned<f32>,
-    off: Aligned<f32>,
+    off_grid: Aligned<f32>,
 }
 
-/// Farther than anything [m].
-pub const FAR: f64 = 1e30;
-
+/// Distance from a sphere around the origin, and its gradient.
 #[inline(always)]
-fn about_sphere<V: Vector>(radius: f64, [x, y, z]: [V; 3]) -> (V, [V; 3]) {
+fn sphere_distance<V: Vector>(radius: f64, [x, y, z]: [V; 3]) -> (V, [V; 3]) {
     let length = (x * x + y * y + z * z).root();
     let divisor = length.larger(V::constant(1.0 / FAR));
     let normal = [x.over(divisor), y.over(divisor), z.over(divisor)];
@@ -194,18 +196,19 @@ mod tests {
     use grainwake_shape::{ShapeOptions, analytic};
     use grainwake_simd::{Kernel, One, Registers, dispatch};
 
-    /// An ellipsoid of half-axes 1, .8 and .7.
+    /// Ellipsoid with the half-axes 1, 0.8 and 0.7.
     fn ellipsoid() -> Arc<Shape> {
         Arc::new(analytic::ellipsoid(1.0, 0.8, 0.7, &ShapeOptions::default()).unwrap())
     }
 
     #[test]
-    fn distances_about_a_shape_are_those_of_the_shape_and_go_on_where_its_grid_ends() {
+    fn sampled_distances_match_the_shape_and_extend_beyond_its_grid() {
         let edges = analytic::rounded_box(0.7, 0.6, 0.5, 0.02, &ShapeOptions::default());
         let edges = Arc::new(edges.unwrap());
-        // 17, 8 and 3 cells of the flow across, 10, 5 and 3 of the box, whose edges are rounded by less than two
-        // of its own samples. Errors: the most and their mean near the surface, and the most beyond.
-        for (shape, eps, most, mean, about) in [
+        // The ellipsoid is 17, 8 and 3 flow cells across, the box 10, 5 and 3; its edges are rounded by
+        // less than two of its own samples. Bounds: largest and mean error near the surface, largest
+        // error beyond the grid of the shape.
+        for (shape, eps, most, mean, most_beyond) in [
             (ellipsoid(), 0.12, 7e-6, 1e-7, 0.001),
             (ellipsoid(), 0.25, 0.0015, 0.00003, 0.003),
             (ellipsoid(), 0.67, 0.01, 0.0001, 0.02),
@@ -214,10 +217,10 @@ mod tests {
             (edges, 0.2, 0.013, 0.001, 0.03),
         ] {
             let Field::Sampled(field) = shape.field() else {
-                unreachable!("they are sampled")
+                unreachable!("the shapes are sampled")
             };
             let reach = 2.5 * eps;
-            let near = NearShape::new(&shape, eps, reach);
+            let near = NarrowBandShape::new(&shape, eps, reach);
             let (mut beyond, mut errors) = (0, Vec::new());
             for i in 0..20_000 {
                 let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
@@ -236,7 +239,7 @@ mod tests {
                     }
                 } else {
                     beyond += 1;
-                    assert!(error.abs() < about, "{error} at {x}, eps {eps}");
+                    assert!(error.abs() < most_beyond, "{error} at {x}, eps {eps}");
                     assert!(slope.normalize().dot(gradient) > 0.99, "at {x}");
                 }
             }
@@ -250,14 +253,14 @@ mod tests {
         }
     }
 
-    /// Compares lanes with single points in double precision.
-    struct Alike<'a>(&'a NearShape);
-    impl Kernel for Alike<'_> {
+    /// Compares lanes with scalar evaluation in double precision.
+    struct CompareLanes<'a>(&'a NarrowBandShape);
+    impl Kernel for CompareLanes<'_> {
         type Number = f32;
         #[inline(always)]
         fn run<V: Vector<Number = f32>>(self) {
             let mut far = 0;
-            let mut spare = Spare::default();
+            let mut scratch = SampleScratch::default();
             for i in 0..2000 {
                 let mut points = [0; 3].map(|_| vec![0.0_f32; 2 * MOST]);
                 for n in 0..MOST {
@@ -269,7 +272,7 @@ mod tests {
                 let (mut slopes, mut distance) = (points.clone(), [0.0_f32; 2 * MOST]);
                 let mut lists = slopes.each_mut().map(|list| &mut list[..]);
                 self.0
-                    .measure::<V>(&mut lists, &mut distance, MOST, &mut spare);
+                    .fill_distances::<V>(&mut lists, &mut distance, MOST, &mut scratch);
                 for n in 0..MOST {
                     let of = |lists: &[Vec<f32>; 3]| {
                         DVec3::from_array(lists.each_ref().map(|list| f64::from(list[n])))
@@ -282,7 +285,7 @@ mod tests {
                         continue;
                     }
                     assert!((found - d).abs() < 1e-6, "{found} for {d} at {x}");
-                    // Slopes jump from cell to cell of the samples.
+                    // Gradients jump from one cell of the samples to the next.
                     let step = DVec3::splat(1e-6);
                     let sides = [x - step, x + step].map(|x| self.0.distance_and_gradient(x).1);
                     let mut sides = sides.into_iter().chain([slope]);
@@ -296,13 +299,13 @@ mod tests {
     }
 
     #[test]
-    fn lanes_are_the_single_points() {
+    fn lanes_match_scalar_evaluation() {
         let sphere = Arc::new(Shape::sphere(0.8, 100));
         for (shape, eps) in [(ellipsoid(), 0.25), (ellipsoid(), 0.05), (sphere, 0.25)] {
-            let near = NearShape::new(&shape, eps, 2.5 * eps);
-            dispatch(Alike(&near));
-            Alike(&near).run::<<f32 as Registers>::Common>();
-            Alike(&near).run::<One<f32>>();
+            let near = NarrowBandShape::new(&shape, eps, 2.5 * eps);
+            dispatch(CompareLanes(&near));
+            CompareLanes(&near).run::<<f32 as Registers>::Common>();
+            CompareLanes(&near).run::<One<f32>>();
         }
     }
 }

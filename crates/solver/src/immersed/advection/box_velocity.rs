@@ -1,0 +1,61 @@
+//! Velocity in the box around a grain, contiguous across periodic edges.
+
+use crate::flow::Known;
+use crate::immersed::geometry::{LocatedBody, PAD};
+use crate::math::Real;
+use grainwake_simd::MOST;
+
+/// Velocity in the padded box around a grain, either in the fields or copied.
+pub struct BoxVelocity<'a, R> {
+    pub components: [&'a [R]; 3],
+    pub strides: [usize; 3],
+    /// Position of cell (0, 0, 0) of the box, modulo the range of `usize` if it is not in memory.
+    origin: usize,
+}
+
+impl<'a, R: Real> BoxVelocity<'a, R> {
+    /// Refers to the fields where all links read unknowns or ghost cells in memory order, else fills
+    /// `copies`.
+    pub fn new(
+        known: &Known<'a, R>,
+        body: &LocatedBody,
+        copies: &'a mut [Vec<R>; 3],
+    ) -> BoxVelocity<'a, R> {
+        let (layout, velocity) = (known.mesh.layout(), known.velocity);
+        let walled = known.boundaries.walled();
+        // Links end at walls, so only periodic edges need a copy, and rows shorter than a register.
+        let direct = layout.cells[0] >= MOST
+            && (0..3).all(|axis| {
+                let high = body.first[axis] + body.size[axis] + PAD - 1;
+                walled[axis] || body.first[axis] >= PAD && high <= layout.cells[axis] as i32 + 1
+            });
+        if direct {
+            let strides = layout.strides();
+            let along = |axis: usize| (body.first[axis] as usize).wrapping_mul(strides[axis]);
+            return BoxVelocity {
+                components: [0, 1, 2].map(|axis| velocity.component(axis)),
+                strides,
+                origin: along(0).wrapping_add(along(1)).wrapping_add(along(2)),
+            };
+        }
+        for (axis, copy) in copies.iter_mut().enumerate() {
+            body.index_map.copy(velocity.component(axis), copy);
+            copy.resize(copy.len() + MOST, R::default());
+        }
+        let wide = (body.size + 2 * PAD).to_array().map(|n| n as usize);
+        let strides = [1, wide[0], wide[0] * wide[1]];
+        BoxVelocity {
+            components: copies.each_ref().map(|copy| &copy[..]),
+            strides,
+            origin: PAD as usize * strides.iter().sum::<usize>(),
+        }
+    }
+
+    /// Position of the first face of row (j, k).
+    #[inline(always)]
+    pub fn row(&self, [j, k]: [i32; 2]) -> usize {
+        let [_, line, plane] = self.strides;
+        self.origin
+            .wrapping_add(j as usize * line + k as usize * plane)
+    }
+}

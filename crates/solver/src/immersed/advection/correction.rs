@@ -1,0 +1,128 @@
+//! Correction of the central advection scheme next to a grain, link by link.
+//!
+//! 1. A face value near the surface represents its open part only, q = A u, so a link's product of two
+//!    such values carries A^2 u u where the flux is A u u: the flux relative to the grain is divided
+//!    by the aperture of the link.
+//! 2. The boundary layer is about one cell thick and moves with the grain. Second-order central
+//!    differences carry such a profile at about two thirds of its speed; within two cells of the
+//!    surface the sixth-order mean of six faces replaces the mean of two.
+//!
+//! Both are fluxes between two faces, so momentum is conserved
+//! (`docs/decisions/0003-advection-next-to-grains.md`). `reference::correction` is the scalar form.
+
+use super::box_velocity::BoxVelocity;
+use super::links::ComponentLinks;
+use super::weights::LinkPlanes;
+use crate::flow::{Known, Prediction};
+use crate::grid::Mesh;
+use crate::immersed::geometry::{FaceRow, LocatedBody};
+use crate::immersed::kinematics::GrainKinematics;
+use crate::math::Real;
+use grainwake_simd::{Kernel, Vector, dispatch, prefetch_ahead};
+
+/// Change of the tendency of each face near a grain [m/s^2], by component, in the order of
+/// [`LocatedBody::distance`].
+pub type AdvectionCorrection = [Vec<f64>; 3];
+
+/// Buffers of one thread.
+#[derive(Default)]
+pub struct AdvectionScratch<R> {
+    copies: [Vec<R>; 3],
+    planes: LinkPlanes,
+}
+
+/// Fills the `correction` of a grain that was located at `body` and moves by `kinematics`; `eps` [m] is
+/// the half-width of the band.
+pub fn find_correction<R: Real>(
+    eps: f64,
+    known: &Known<R>,
+    kinematics: &GrainKinematics,
+    body: &LocatedBody,
+    scratch: &mut AdvectionScratch<R>,
+    correction: &mut AdvectionCorrection,
+) {
+    dispatch(FindCorrection {
+        eps,
+        mesh: known.mesh,
+        kinematics,
+        body,
+        velocity: BoxVelocity::new(known, body, &mut scratch.copies),
+        planes: &mut scratch.planes,
+        correction,
+    });
+}
+
+/// Adds a component of the correction to the prediction, as far as it lies there.
+pub fn add_correction<R: Real>(
+    body: &LocatedBody,
+    correction: &AdvectionCorrection,
+    component: usize,
+    prediction: &mut Prediction<R>,
+) {
+    dispatch(AddCorrection {
+        rows: &body.rows[component],
+        correction: &correction[component],
+        prediction,
+    });
+}
+
+/// Prefetches what [`find_correction`] reads for the grain at `body`.
+pub fn prefetch_velocity<R: Real>(known: &Known<R>, body: &LocatedBody) {
+    for component in 0..3 {
+        (body.index_map).prefetch(known.velocity.component(component));
+        let (spans, rows) = (&body.spans[component], &body.rows[component]);
+        let distances = &body.distance[component];
+        prefetch_ahead(spans, 0, spans.len());
+        prefetch_ahead(rows, 0, rows.len());
+        prefetch_ahead(distances, 0, distances.len());
+    }
+}
+
+struct AddCorrection<'a, 'b, R> {
+    rows: &'a [FaceRow],
+    correction: &'a [f64],
+    prediction: &'a mut Prediction<'b, R>,
+}
+
+impl<R: Real> Kernel for AddCorrection<'_, '_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let part = self.prediction.range().clone();
+        for row in self.rows.iter().filter(|row| part.contains(&row.at)) {
+            let correction = &self.correction[row.first..];
+            self.prediction.push::<V>(row.at, row.count, correction);
+        }
+    }
+}
+
+struct FindCorrection<'a, R> {
+    eps: f64,
+    mesh: &'a Mesh,
+    kinematics: &'a GrainKinematics,
+    body: &'a LocatedBody,
+    velocity: BoxVelocity<'a, R>,
+    planes: &'a mut LinkPlanes,
+    correction: &'a mut AdvectionCorrection,
+}
+
+impl<R: Real> Kernel for FindCorrection<'_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let FindCorrection {
+            eps,
+            mesh,
+            kinematics,
+            body,
+            velocity,
+            planes,
+            correction,
+        } = self;
+        for (component, correction) in correction.iter_mut().enumerate() {
+            correction.resize(body.distance[component].len(), 0.0);
+            ComponentLinks::new(eps, mesh, kinematics, body, &velocity, component)
+                .correct::<V>(planes, correction);
+        }
+    }
+}

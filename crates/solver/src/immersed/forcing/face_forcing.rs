@@ -1,0 +1,133 @@
+//! Forcing of a single face: drag, and closed fraction.
+
+use std::ops::Add;
+
+use glam::DVec3;
+
+use super::drag::drag;
+use crate::immersed::geometry::aperture::aperture;
+use crate::immersed::scheme::Scheme;
+use grainwake_simd::{Kernel, One, Vector, dispatch};
+
+/// Forcing of a face by one grain, or by several together.
+#[derive(Clone, Copy, Debug)]
+pub struct FaceForcing {
+    /// Drag coefficient times the step; a face takes strength / (1 + strength) of the rigid velocity.
+    pub strength: f64,
+    /// Fraction of the face closed to the pressure gradient.
+    pub closed: f64,
+}
+
+impl FaceForcing {
+    /// Weight of the grain's rigid velocity on a face that all grains together force by `all`.
+    pub fn weight(self, all: FaceForcing) -> f64 {
+        if self.strength.is_finite() {
+            self.strength / (1.0 + all.strength)
+        } else {
+            1.0
+        }
+    }
+}
+
+impl Add for FaceForcing {
+    type Output = FaceForcing;
+    fn add(self, other: FaceForcing) -> FaceForcing {
+        FaceForcing {
+            strength: self.strength + other.strength,
+            closed: self.closed + other.closed,
+        }
+    }
+}
+
+/// Parameters of the forcing in one step.
+#[derive(Clone, Copy, Debug)]
+pub struct ForcingParams {
+    pub scheme: Scheme,
+    /// Half-width of the band [m].
+    pub eps: f64,
+    pub spacing: DVec3,
+    /// Kinematic viscosity times the step [m^2].
+    diffusion: f64,
+}
+
+impl ForcingParams {
+    /// Parameters for a step of length `dt` [s].
+    pub fn new(
+        scheme: Scheme,
+        eps: f64,
+        spacing: DVec3,
+        kinematic_viscosity: f64,
+        dt: f64,
+    ) -> ForcingParams {
+        ForcingParams {
+            scheme,
+            eps,
+            spacing,
+            // Limited so that products with it fit single precision.
+            diffusion: (dt * kinematic_viscosity).min(1e20 * eps * eps),
+        }
+    }
+
+    /// Forcing of one face at the distance `d` [m] from a surface with unit `normal`.
+    pub fn of(&self, d: f64, normal: DVec3) -> FaceForcing {
+        match self.scheme {
+            Scheme::Aperture => {
+                let mut forcing = FaceForcing {
+                    strength: 0.0,
+                    closed: 0.0,
+                };
+                dispatch(OneFace {
+                    params: self,
+                    d,
+                    normal,
+                    forcing: &mut forcing,
+                });
+                forcing
+            }
+            Scheme::Paper => self.blend(d, normal),
+        }
+    }
+
+    /// Strength of the drag as numerator and denominator, and closed fraction.
+    #[inline(always)]
+    pub fn aperture_forcing<V: Vector>(&self, d: V, normal: [V; 3]) -> ([V; 2], V) {
+        let [drag, depth] = drag(d, normal, self.spacing.to_array(), self.eps);
+        let strength = V::constant(self.diffusion) * drag;
+        // Zero outside the band: a concave grain may enclose such faces.
+        let outside = V::constant(2.0 * self.eps);
+        let strength = d.where_below(outside, strength, V::constant(0.0));
+        let closed = V::constant(1.0) - aperture(d, self.eps);
+        ([strength, depth], closed)
+    }
+
+    /// Forcing of the paper's scheme: the weight of the rigid velocity is the solid fraction.
+    fn blend(&self, d: f64, normal: DVec3) -> FaceForcing {
+        let width = normal.abs().dot(self.spacing);
+        let solid_fraction = (0.5 - d / width).clamp(0.0, 1.0);
+        FaceForcing {
+            strength: solid_fraction / (1.0 - solid_fraction),
+            closed: 0.0,
+        }
+    }
+}
+
+/// Evaluates one face with the instruction set in use: without it fused products are library calls.
+struct OneFace<'a> {
+    params: &'a ForcingParams,
+    d: f64,
+    normal: DVec3,
+    forcing: &'a mut FaceForcing,
+}
+
+impl Kernel for OneFace<'_> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let normal = self.normal.to_array().map(One);
+        let ([strength, depth], closed) = self.params.aperture_forcing(One(self.d), normal);
+        *self.forcing = FaceForcing {
+            strength: strength.0 / depth.0,
+            closed: closed.0,
+        };
+    }
+}

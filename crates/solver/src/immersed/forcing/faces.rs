@@ -1,0 +1,149 @@
+//! Weights of the faces that a grain forces.
+
+use crate::immersed::geometry::{BandFaces, FaceRun, NarrowBandShapes, NeighbourGrain, load_all};
+use crate::immersed::scheme::Scheme;
+use grainwake_simd::{Kernel, MOST, Vector, dispatch};
+
+use super::face_forcing::ForcingParams;
+
+/// Forced faces of one grain. All lists but `runs` have one entry per face, in the order of the runs,
+/// and `MOST` zeros more at the end.
+#[derive(Clone, Debug, Default)]
+pub struct ForcedFaces {
+    /// Positions of the faces, by component.
+    pub runs: [Vec<FaceRun>; 3],
+    /// Weight of the rigid velocity, 0 to 1.
+    pub weight: Vec<f32>,
+    /// Fraction of a face that the grain closes to the pressure gradient, 0 to 1.
+    pub closed: Vec<f32>,
+    /// Fraction that all grains together close; empty unless another grain is near.
+    closed_by_all: Vec<f32>,
+    /// Velocity that a face gains next to a grain at rest [m/s]; filled by [`super::sum_impulse`].
+    pub rest_gain: Vec<f64>,
+}
+
+impl ForcedFaces {
+    /// Computes the weights of the faces in `band`, which `neighbours` may force as well.
+    pub fn weigh(
+        &mut self,
+        params: &ForcingParams,
+        band: &mut BandFaces,
+        neighbours: &[NeighbourGrain],
+        shapes: &NarrowBandShapes,
+    ) {
+        let count = band.count();
+        let padded = band.pad(params.eps);
+        self.weight.resize(padded, 0.0);
+        self.closed.resize(padded, 0.0);
+        match params.scheme {
+            Scheme::Aperture => dispatch(WeighFaces {
+                params,
+                band,
+                forced: self,
+            }),
+            Scheme::Paper => {
+                for entry in 0..count {
+                    let (d, normal) = band.face(entry);
+                    let own = params.of(d, normal);
+                    self.weight[entry] = own.weight(own) as f32;
+                    self.closed[entry] = own.closed as f32;
+                }
+            }
+        }
+        for list in [&mut self.weight, &mut self.closed] {
+            list.truncate(count);
+            list.resize(count + MOST, 0.0);
+        }
+        self.closed_by_all.clear();
+        if !band.contested.is_empty() {
+            self.closed_by_all.extend_from_slice(&self.closed);
+            self.share_contested(params, band, neighbours, shapes);
+        }
+    }
+
+    /// Divides the forcing of contested faces among the grains.
+    fn share_contested(
+        &mut self,
+        params: &ForcingParams,
+        band: &BandFaces,
+        neighbours: &[NeighbourGrain],
+        shapes: &NarrowBandShapes,
+    ) {
+        let limit = 2.0 * params.eps;
+        for &(entry, x) in &band.contested {
+            let (d, normal) = band.face(entry);
+            if params.scheme == Scheme::Aperture && d <= -params.eps {
+                // Deep inside, the face belongs to this grain alone.
+                continue;
+            }
+            let own = params.of(d, normal);
+            let mut all = own;
+            for other in neighbours {
+                let (d, gradient) = other.distance_and_gradient(shapes, x, limit);
+                if d < limit {
+                    let normal = other.pose.orientation * gradient.normalize_or_zero();
+                    all = all + params.of(d, normal);
+                }
+            }
+            self.weight[entry] = own.weight(all) as f32;
+            self.closed[entry] = (own.closed / all.closed.max(1.0)) as f32;
+            self.closed_by_all[entry] = all.closed.min(1.0) as f32;
+        }
+    }
+
+    /// Fraction of each face that all grains together close, 0 to 1.
+    pub fn closed_by_all(&self) -> &[f32] {
+        if self.closed_by_all.is_empty() {
+            &self.closed
+        } else {
+            &self.closed_by_all
+        }
+    }
+
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        let lists = [&self.weight, &self.closed, &self.closed_by_all];
+        let runs: usize = self.runs.iter().map(Vec::capacity).sum();
+        let values: usize = lists.iter().map(|list| list.capacity()).sum();
+        size_of::<FaceRun>() * runs
+            + size_of::<f32>() * values
+            + size_of::<f64>() * self.rest_gain.capacity()
+    }
+}
+
+/// Weights of the faces of a grain without neighbours, aperture scheme.
+struct WeighFaces<'a> {
+    params: &'a ForcingParams,
+    band: &'a BandFaces,
+    forced: &'a mut ForcedFaces,
+}
+
+impl Kernel for WeighFaces<'_> {
+    type Number = f32;
+    #[inline(always)]
+    fn run<V: Vector<Number = f32>>(self) {
+        let BandFaces {
+            distance, normal, ..
+        } = self.band;
+        let ForcedFaces { weight, closed, .. } = self.forced;
+        let one = V::constant(1.0);
+        let inside = V::constant(-self.params.eps);
+        for at in (0..weight.len()).step_by(V::WIDTH) {
+            let d = V::load(&distance[at..]);
+            // Faces deep inside take the rigid velocity as it is.
+            let shallow = inside.is_below(d);
+            if shallow.is_zero() {
+                one.store(&mut weight[at..]);
+                one.store(&mut closed[at..]);
+                continue;
+            }
+            let ([strength, depth], part) = self.params.aperture_forcing(d, load_all(normal, at));
+            // strength / (1 + strength) with a single division.
+            let fraction = strength.over(depth + strength);
+            inside
+                .where_below(d, fraction, one)
+                .store(&mut weight[at..]);
+            inside.where_below(d, part, one).store(&mut closed[at..]);
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Rigid velocity along a run of faces, and lane indices.
+
+use glam::DVec3;
+
+use crate::immersed::kinematics::RigidVelocity;
+use grainwake_simd::Vector;
+
+/// Rigid velocity V + Omega x r along a run of faces: linear in the index of the face.
+#[derive(Clone, Copy)]
+pub struct RigidRun {
+    /// Velocity at the first face [m/s].
+    first: DVec3,
+    /// Change from a face to the next [m/s].
+    change: DVec3,
+}
+
+impl RigidRun {
+    /// Velocity along the run of faces that begins at `arm` from the centroid [m].
+    #[inline(always)]
+    pub fn new(velocity: RigidVelocity, arm: DVec3, spacing: DVec3) -> RigidRun {
+        RigidRun {
+            first: velocity.at(arm),
+            change: velocity.angular.cross(DVec3::X * spacing.x),
+        }
+    }
+    /// Velocity along a parallel line, on which it differs by `offset` [m/s].
+    #[inline(always)]
+    pub fn shifted(self, offset: DVec3) -> RigidRun {
+        RigidRun {
+            first: self.first + offset,
+            ..self
+        }
+    }
+    /// Component `axis` at the faces `index` of the run.
+    #[inline(always)]
+    pub fn component<V: Vector<Number = f64>>(&self, axis: usize, index: V) -> V {
+        let [first, change] = [self.first, self.change].map(|u| V::constant(u[axis]));
+        index.mul_add(change, first)
+    }
+}
+
+/// Indices of the faces in the lanes of a register that begins at face `n` of a run.
+#[inline(always)]
+pub fn lane_indices<V: Vector<Number = f64>>(n: usize) -> V {
+    V::constant(n as f64) + V::ramp()
+}
+
+/// Fraction (1 - weight) closed by which a face follows the grain's change of velocity, in addition to
+/// the weight of the velocity itself; zero unless `closure_dt` is positive.
+#[inline(always)]
+pub fn follow<V: Vector<Number = f64>>(weight: V, closed: V, closure_dt: f64) -> V {
+    let switch = if closure_dt > 0.0 { 1.0 } else { 0.0 };
+    V::constant(switch) * (V::constant(1.0) - weight) * closed
+}

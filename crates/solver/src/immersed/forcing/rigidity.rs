@@ -1,0 +1,71 @@
+//! Rigid velocity imposed on the forced faces (Eqs 4b, 4c).
+//!
+//! A face gains `rest_gain + s U + f (U - U_old)`, see [`super::impulse`] for the symbols.
+//! `reference::impose_rigidity` is the scalar form.
+
+use glam::DVec3;
+
+use super::faces::ForcedFaces;
+use super::rigid_run::{RigidRun, follow, lane_indices};
+use crate::flow::Prediction;
+use crate::immersed::kinematics::RigidVelocity;
+use crate::math::Real;
+use grainwake_simd::{Kernel, Vector, dispatch};
+
+/// Adds to component `axis` of the prediction, as far as it holds forced faces, the gain for a grain
+/// with the new velocity `now` that changed by `change` in the step. [`super::sum_impulse`] has filled
+/// the lists of `forced`; `closure_dt` [s] is the one passed there.
+pub fn impose_rigidity<R: Real>(
+    axis: usize,
+    spacing: DVec3,
+    forced: &ForcedFaces,
+    now: RigidVelocity,
+    change: RigidVelocity,
+    closure_dt: f64,
+    prediction: &mut Prediction<R>,
+) {
+    dispatch(ImposeRigidity {
+        axis,
+        spacing,
+        forced,
+        now,
+        change,
+        closure_dt,
+        prediction,
+    });
+}
+
+struct ImposeRigidity<'a, 'b, R> {
+    axis: usize,
+    spacing: DVec3,
+    forced: &'a ForcedFaces,
+    now: RigidVelocity,
+    change: RigidVelocity,
+    closure_dt: f64,
+    prediction: &'a mut Prediction<'b, R>,
+}
+
+impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let (axis, forced) = (self.axis, self.forced);
+        let part = self.prediction.range().clone();
+        let runs = forced.runs[axis].iter();
+        for run in runs.filter(|run| part.contains(&run.at)) {
+            let now = RigidRun::new(self.now, run.arm, self.spacing);
+            let change = RigidRun::new(self.change, run.arm, self.spacing);
+            let predicted = self.prediction.velocity_mut(run.at, run.count);
+            for n in (0..run.count).step_by(V::WIDTH) {
+                let entry = run.first + n;
+                let weight = V::load_from(&forced.weight[entry..]);
+                let closed = V::load_from(&forced.closed[entry..]);
+                let index = lane_indices(n);
+                let gain = V::load(&forced.rest_gain[entry..])
+                    + weight * now.component(axis, index)
+                    + follow(weight, closed, self.closure_dt) * change.component(axis, index);
+                gain.add_some(&mut predicted[n..]);
+            }
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! Initial state of the fluid in and next to the grains.
+
+use super::forcing::sum_impulse;
+use super::grains::ImmersedGrains;
+use super::kinematics::RigidVelocity;
+use super::update::{GrainUpdate, PendingRigidity};
+use crate::dem::Grain;
+use crate::flow::{Flow, FlowMeasures};
+use crate::math::Real;
+
+impl<R: Real> ImmersedGrains<R> {
+    /// Gives the fluid inside and next to the grains their rigid velocity, and makes it solenoidal.
+    pub fn initialise(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> FlowMeasures {
+        for axis in 0..3 {
+            let velocity = flow.velocity.component(axis);
+            flow.predicted.component_mut(axis).copy_from_slice(velocity);
+        }
+        // A step this long gives every face of the band its full weight.
+        self.locate_with_forcing(grains, f64::MAX.sqrt());
+        let (known, predictions) = flow.prediction();
+        let (rest, density) = (RigidVelocity::default(), self.fluid_density);
+        let mut updates = std::mem::take(&mut self.updates);
+        updates.clear();
+        for (immersed, grain) in self.grains.iter_mut().zip(grains) {
+            sum_impulse(
+                &known,
+                &predictions,
+                density,
+                &mut immersed.forced,
+                rest,
+                0.0,
+            );
+            let velocity = RigidVelocity::of(grain);
+            updates.push(GrainUpdate {
+                pending: Some(PendingRigidity {
+                    velocity,
+                    change: velocity,
+                }),
+                ..Default::default()
+            });
+        }
+        self.impose_pending(flow, &updates, 0.0);
+        self.updates = updates;
+        self.release_forcing();
+        for axis in 0..3 {
+            let predicted = flow.predicted.component(axis);
+            flow.velocity.component_mut(axis).copy_from_slice(predicted);
+        }
+        flow.make_solenoidal()
+    }
+}

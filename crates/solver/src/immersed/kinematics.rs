@@ -1,0 +1,99 @@
+//! Velocities of a rigid grain.
+
+use std::ops::{Div, Sub};
+
+use glam::DVec3;
+
+use crate::dem::Grain;
+use crate::math::Vector6;
+
+/// Velocity and angular velocity of a grain, space frame; also changes and rates of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RigidVelocity {
+    /// Velocity of the centroid [m/s].
+    pub linear: DVec3,
+    /// Angular velocity [rad/s].
+    pub angular: DVec3,
+}
+
+impl RigidVelocity {
+    /// Velocities of a grain at present.
+    pub fn of(grain: &Grain) -> RigidVelocity {
+        RigidVelocity {
+            linear: grain.velocity,
+            angular: grain.angular_velocity,
+        }
+    }
+    /// Velocity V + Omega x r at `arm` r from the centroid [m/s].
+    #[inline(always)]
+    pub fn at(self, arm: DVec3) -> DVec3 {
+        self.linear + self.angular.cross(arm)
+    }
+    /// Components as the unknowns of a 6 x 6 system.
+    pub fn to_vector(self) -> Vector6 {
+        let ([a, b, c], [d, e, f]) = (self.linear.to_array(), self.angular.to_array());
+        [a, b, c, d, e, f]
+    }
+    /// Inverse of [`Self::to_vector`].
+    pub fn from_vector(x: &Vector6) -> RigidVelocity {
+        RigidVelocity {
+            linear: DVec3::from_slice(&x[..3]),
+            angular: DVec3::from_slice(&x[3..]),
+        }
+    }
+}
+
+impl Sub for RigidVelocity {
+    type Output = RigidVelocity;
+    fn sub(self, other: RigidVelocity) -> RigidVelocity {
+        RigidVelocity {
+            linear: self.linear - other.linear,
+            angular: self.angular - other.angular,
+        }
+    }
+}
+
+impl Div<f64> for RigidVelocity {
+    type Output = RigidVelocity;
+    fn div(self, dt: f64) -> RigidVelocity {
+        RigidVelocity {
+            linear: self.linear / dt,
+            angular: self.angular / dt,
+        }
+    }
+}
+
+/// Position and velocities of a grain when the flow was predicted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GrainKinematics {
+    /// Centroid [m].
+    pub position: DVec3,
+    /// Velocities during the step.
+    pub velocity: RigidVelocity,
+}
+
+impl GrainKinematics {
+    /// Kinematics of a grain at present.
+    pub fn of(grain: &Grain) -> GrainKinematics {
+        GrainKinematics {
+            position: grain.pose.position,
+            velocity: RigidVelocity::of(grain),
+        }
+    }
+    /// Velocity of the material point at `x` [m/s].
+    pub fn velocity_at(&self, x: DVec3) -> DVec3 {
+        self.velocity.at(x - self.position)
+    }
+}
+
+/// State that a grain carries over from the previous step.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PreviousStep {
+    /// Velocities at the start of the step.
+    pub velocity: RigidVelocity,
+    /// Mean acceleration over the previous step [m/s^2, rad/s^2]; zero after contact.
+    pub acceleration: RigidVelocity,
+    /// Part of `velocity` that came from contact in the previous step and that the fluid around the
+    /// grain takes up in this one (decision 0014).
+    pub pending_added_mass_velocity: RigidVelocity,
+}

@@ -1,0 +1,172 @@
+//! Newton's and Euler's equations of a grain with the impulse of the fluid (Eqs 4b, 4c, 5).
+//!
+//! The impulse is affine in the six new velocities, so the equations form a 6 x 6 system that is
+//! stable at any density ratio. The hydrodynamic load is Eq. 5 in the form that also holds for the
+//! torque (Eq. 5b as printed can lose a third of it).
+//!
+//! Legend: a and b matrix and right-hand side, x new velocities, J impulse on the fluid.
+
+use glam::DVec3;
+
+use super::virtual_mass::VirtualMass;
+use crate::dem::{Dof, Grain, Response};
+use crate::immersed::forcing::Impulse;
+use crate::immersed::kinematics::{PreviousStep, RigidVelocity};
+use crate::math::{Load, Matrix6, Vector6, solve6};
+
+/// Equations of one grain for its new velocities after a step.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RigidBodySystem {
+    matrix: Matrix6,
+    right: Vector6,
+    virtual_mass: VirtualMass,
+    impulse: Impulse,
+}
+
+impl RigidBodySystem {
+    /// Assembles the equations under the `applied` load (weight less buoyancy) over `dt` [s], without
+    /// contact.
+    pub fn new(
+        grain: &Grain,
+        previous: &PreviousStep,
+        impulse: Impulse,
+        fluid_density: f64,
+        applied: Load,
+        dt: f64,
+    ) -> RigidBodySystem {
+        let ratio = 1.0 - fluid_density / grain.density;
+        let (mass, inertia) = (grain.mass() * ratio, grain.inertia() * ratio);
+        let RigidVelocity {
+            linear: v,
+            angular: omega,
+        } = previous.velocity;
+        let gyroscopic = omega.cross(inertia * omega);
+        let momentum = mass * v + dt * applied.force;
+        let angular_momentum = inertia * omega + dt * (applied.torque - gyroscopic);
+        let virtual_mass = VirtualMass::new(grain, previous, fluid_density, dt);
+        let mut a = impulse.slope;
+        let mut b = [0.0; 6];
+        for row in 0..3 {
+            a[row][row] += mass + virtual_mass.mass;
+            b[row] = momentum[row] + virtual_mass.momentum[row] - impulse.constant[row];
+            b[3 + row] = angular_momentum[row] + virtual_mass.angular_momentum[row]
+                - impulse.constant[3 + row];
+            for column in 0..3 {
+                a[3 + row][3 + column] += (inertia + virtual_mass.inertia).col(column)[row];
+            }
+        }
+        prescribe(&mut a, &mut b, 0, grain.translation);
+        prescribe(&mut a, &mut b, 3, grain.rotation);
+        RigidBodySystem {
+            matrix: a,
+            right: b,
+            virtual_mass,
+            impulse,
+        }
+    }
+
+    /// New velocities under the mean `contact` load over `dt` [s].
+    pub fn velocities(
+        &self,
+        grain: &Grain,
+        previous: &PreviousStep,
+        contact: Load,
+        dt: f64,
+    ) -> RigidVelocity {
+        let mut right = self.right;
+        for axis in 0..3 {
+            if grain.translation == Dof::Free {
+                right[axis] += dt * contact.force[axis];
+            }
+            if grain.rotation == Dof::Free {
+                right[3 + axis] += dt * contact.torque[axis];
+            }
+        }
+        // Singular only if no face is forced; such a grain keeps its velocities.
+        let x = solve6(self.matrix, right);
+        x.map_or(previous.velocity, |x| RigidVelocity::from_vector(&x))
+    }
+
+    /// Hydrodynamic load (Eq. 5) on the grain, which has its new velocities.
+    pub fn hydrodynamic_load(
+        &self,
+        grain: &Grain,
+        previous: &PreviousStep,
+        fluid_density: f64,
+        dt: f64,
+    ) -> Load {
+        let now = RigidVelocity::of(grain);
+        let x = now.to_vector();
+        let Impulse { constant, slope } = &self.impulse;
+        let j: Vector6 = std::array::from_fn(|row| {
+            constant[row] + slope[row].iter().zip(x).map(|(m, x)| m * x).sum::<f64>()
+        });
+        let added = &self.virtual_mass;
+        let force = DVec3::from_slice(&j[..3]) + added.mass * now.linear - added.momentum;
+        let torque =
+            DVec3::from_slice(&j[3..]) + added.inertia * now.angular - added.angular_momentum;
+        let change = now - previous.velocity;
+        let omega = previous.velocity.angular;
+        let displaced = fluid_density / grain.density;
+        let fluid_inertia = grain.inertia() * displaced;
+        Load {
+            force: (displaced * grain.mass() * change.linear - force) / dt,
+            torque: (fluid_inertia * change.angular - torque) / dt
+                + omega.cross(fluid_inertia * omega),
+        }
+    }
+
+    /// Response of the grain to contact within the step, such that without further contact it leaves
+    /// the sub-steps with [`Self::velocities`] (`docs/decisions/0014-contact-and-fluid-at-once.md`).
+    ///
+    /// The mass is at least that of the grain with `added_density` [kg/m^3] of fluid in its volume:
+    /// most of the added mass responds by the projection, one step late. The velocity that it takes
+    /// up from the last impact is not part of the initial velocities.
+    pub fn response(
+        &self,
+        grain: &Grain,
+        previous: &PreviousStep,
+        added_density: f64,
+        dt: f64,
+    ) -> Response {
+        let start = previous.velocity - previous.pending_added_mass_velocity;
+        let x = start.to_vector();
+        // Impulse over dt that changes the initial velocities, with the matrix before mass is added.
+        let mut drive: Vector6 = std::array::from_fn(|row| {
+            let momentum: f64 = (0..6).map(|n| self.matrix[row][n] * x[n]).sum();
+            (self.right[row] - momentum) / dt
+        });
+        let mut a = self.matrix;
+        let least = grain.mass() + added_density * grain.shape.volume();
+        let mean = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
+        let free = [grain.translation, grain.rotation].map(|dof| dof == Dof::Free);
+        if free[0] {
+            for (axis, row) in a.iter_mut().take(3).enumerate() {
+                row[axis] += (least - mean).max(0.0);
+            }
+        }
+        let column = |n: usize| {
+            let mut unit = [0.0; 6];
+            unit[n] = if free[n / 3] { 1.0 } else { 0.0 };
+            solve6(a, unit).unwrap_or([0.0; 6])
+        };
+        let columns: [Vector6; 6] = std::array::from_fn(column);
+        for (n, free) in free.into_iter().enumerate() {
+            if !free {
+                drive[3 * n..3 * n + 3].fill(0.0);
+            }
+        }
+        Response::new([start.linear, start.angular], drive, columns)
+    }
+}
+
+/// Replaces three equations by prescribed velocities.
+fn prescribe(a: &mut Matrix6, b: &mut Vector6, first: usize, dof: Dof) {
+    if let Dof::Prescribed(velocity) = dof {
+        for i in 0..3 {
+            a[first + i] = [0.0; 6];
+            a[first + i][first + i] = 1.0;
+            b[first + i] = velocity[i];
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! Buffers of threads that are kept from one step to the next.
+
+use std::ops::{Deref, DerefMut};
+use std::sync::Mutex;
+
+/// Buffers not in use; as many as threads have worked at once.
+#[derive(Default)]
+pub struct ScratchPool<T>(Mutex<Vec<T>>);
+
+impl<T: Default> ScratchPool<T> {
+    /// Borrows a buffer, a new one if all are in use.
+    pub fn borrow(&self) -> Scratch<'_, T> {
+        let buffer = self.0.lock().expect("no thread panicked").pop();
+        Scratch {
+            pool: self,
+            buffer: buffer.unwrap_or_default(),
+        }
+    }
+}
+
+/// A borrowed buffer, returned when dropped.
+pub struct Scratch<'a, T: Default> {
+    pool: &'a ScratchPool<T>,
+    buffer: T,
+}
+
+impl<T: Default> Deref for Scratch<'_, T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        &self.buffer
+    }
+}
+impl<T: Default> DerefMut for Scratch<'_, T> {
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.buffer
+    }
+}
+impl<T: Default> Drop for Scratch<'_, T> {
+    fn drop(&mut self) {
+        if let Ok(mut buffers) = self.pool.0.lock() {
+            buffers.push(std::mem::take(&mut self.buffer));
+        }
+    }
+}

@@ -1,0 +1,202 @@
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+use grainwake_shape::{Shape, ShapeOptions, analytic};
+
+use super::*;
+use crate::dem::{Dof, Grain};
+use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
+use crate::grid::Mesh;
+use crate::math::{Load, Pose, Real};
+
+const DT: f64 = 0.004;
+
+/// Two isolated grains in a shear flow, one of them across a periodic edge.
+fn grains() -> [Grain; 2] {
+    let options = ShapeOptions::default();
+    let shape = Arc::new(analytic::ellipsoid(0.5, 0.4, 0.35, &options).unwrap());
+    [DVec3::new(1.55, 2.02, 1.97), DVec3::new(5.1, 3.9, 3.1)].map(|position| Grain {
+        shape: shape.clone(),
+        density: 2.0,
+        pose: Pose {
+            position,
+            orientation: DQuat::from_scaled_axis(position),
+        },
+        velocity: DVec3::new(0.3, -0.1, 0.2),
+        angular_velocity: DVec3::new(0.5, 0.2, -0.7),
+        translation: Dof::Free,
+        rotation: Dof::Free,
+    })
+}
+
+/// Predicted velocity and motion of the grains after a step with the contact loads `first`, then
+/// `resolved`; and which grains were isolated.
+fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<f64>, Vec<bool>) {
+    let mesh = Mesh {
+        cells: [48, 32, 32],
+        spacing: DVec3::splat(0.125),
+        origin: DVec3::ZERO,
+    };
+    let params = FluidParams {
+        density: 1.0,
+        kinematic_viscosity: 0.01,
+        body_acceleration: DVec3::new(0.0, 0.3, 0.0),
+        initial_velocity: DVec3::ZERO,
+        advection: Advection::Central,
+    };
+    let mut boundaries = Boundaries([[Boundary::WALL; 2]; 3]);
+    boundaries.0[1] = [Boundary::Periodic; 2];
+    let mut flow = Flow::<R>::new(&mesh, boundaries, &params);
+    flow.start_from(|axis, x| (1.5 * x).to_array()[(axis + 1) % 3].sin());
+    let mut grains = grains();
+    let mut immersed = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &grains);
+    immersed.initialise(&mut flow, &grains);
+    let previous = grains.each_ref().map(|grain| PreviousStep {
+        velocity: RigidVelocity::of(grain),
+        ..Default::default()
+    });
+    let kinematics = grains.each_ref().map(GrainKinematics::of);
+    flow.predict(DT);
+    for grain in &mut grains {
+        grain.pose.position += DT * grain.velocity;
+    }
+    let applied = [Load {
+        force: DVec3::new(0.0, 0.0, -0.4),
+        torque: DVec3::ZERO,
+    }; 2];
+    let input = StepInput {
+        grains: &grains,
+        kinematics: &kinematics,
+        previous: &previous,
+        contact: &first,
+        applied: &applied,
+        dt: DT,
+    };
+    let coupled = immersed.couple(&mut flow, input);
+    let isolated = coupled.isolated();
+    let mut loads = [Load::default(); 2];
+    let rigid = RigidStep {
+        grains: &mut grains,
+        previous: &previous,
+        contact: &resolved,
+        dt: DT,
+        loads: &mut loads,
+    };
+    immersed.impose_rigidity(&mut flow, coupled, rigid);
+    let mut all: Vec<f64> = Vec::new();
+    for axis in 0..3 {
+        all.extend(flow.predicted.component(axis).iter().map(|u| u.wide()));
+    }
+    for (grain, load) in grains.iter().zip(&loads) {
+        let vectors = [
+            grain.velocity,
+            grain.angular_velocity,
+            load.force,
+            load.torque,
+        ];
+        all.extend(vectors.iter().flat_map(|v| v.to_array()));
+    }
+    (all, isolated)
+}
+
+fn impact() -> Load {
+    Load {
+        force: DVec3::new(0.2, -0.1, 0.3),
+        torque: DVec3::new(0.02, 0.01, -0.03),
+    }
+}
+
+#[test]
+fn isolated_updates_have_the_bits_of_passes() {
+    fn check<R: Real>(scheme: Scheme) {
+        // Grains with a contact load are processed in passes; here it vanishes when resolved.
+        let none = [Load::default(); 2];
+        let (passes, isolated) = step::<R>(scheme, [impact(); 2], none);
+        assert_eq!(isolated, [false; 2]);
+        let (at_once, isolated) = step::<R>(scheme, none, none);
+        assert_eq!(isolated, [true; 2]);
+        assert!(at_once == passes, "{scheme:?}");
+        let (mixed, isolated) = step::<R>(scheme, [impact(), Load::default()], none);
+        assert_eq!(isolated, [false, true]);
+        assert!(mixed == passes, "{scheme:?}");
+    }
+    check::<f64>(Scheme::Aperture);
+    check::<f32>(Scheme::Aperture);
+    check::<f64>(Scheme::Paper);
+}
+
+#[test]
+fn an_isolated_grain_that_contact_reaches_after_all_is_completed() {
+    for scheme in [Scheme::Aperture, Scheme::Paper] {
+        let (known, none) = ([impact(); 2], [Load::default(); 2]);
+        let (expected, _) = step::<f64>(scheme, known, known);
+        let (found, isolated) = step::<f64>(scheme, none, known);
+        let (without, _) = step::<f64>(scheme, none, none);
+        assert_eq!(isolated, [true; 2]);
+        let differs = |other: &[f64]| {
+            let pairs = expected.iter().zip(other);
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        assert!(differs(&without) > 1e-4, "{}", differs(&without));
+        assert!(differs(&found) < 1e-13, "{}", differs(&found));
+    }
+}
+
+#[test]
+fn padding_of_rows_affects_no_link() {
+    let mesh = Mesh {
+        cells: [24; 3],
+        spacing: DVec3::splat(0.25),
+        origin: DVec3::ZERO,
+    };
+    let params = FluidParams {
+        density: 1.0,
+        kinematic_viscosity: 0.01,
+        body_acceleration: DVec3::ZERO,
+        initial_velocity: DVec3::ZERO,
+        advection: Advection::Central,
+    };
+    // Close to corners of the box, where links have fewer than six faces in line.
+    let grain = |place: f64| Grain {
+        shape: Arc::new(Shape::sphere(1.0, 100)),
+        density: 2.0,
+        pose: Pose {
+            position: DVec3::splat(place),
+            orientation: DQuat::IDENTITY,
+        },
+        velocity: DVec3::ONE,
+        angular_velocity: DVec3::ZERO,
+        translation: Dof::Free,
+        rotation: Dof::Free,
+    };
+    let grains = [grain(1.1), grain(4.9)];
+    let predicted = |filling: f64| {
+        let boundaries = Boundaries([[Boundary::WALL; 2]; 3]);
+        let mut flow = Flow::<f64>::new(&mesh, boundaries, &params);
+        flow.start_from(|axis, x| (3.0 * x).to_array()[(axis + 1) % 3].sin());
+        let (row, entries) = (mesh.layout().row(), mesh.cells[0] + 2);
+        assert!(row > entries);
+        for axis in 0..3 {
+            let rows = flow.velocity.component_mut(axis).chunks_exact_mut(row);
+            rows.for_each(|row| row[entries..].fill(filling));
+        }
+        let mut immersed = ImmersedGrains::new(&flow, Scheme::Aperture, 1.0, 0.01, &grains);
+        flow.predict(0.01);
+        let before: Vec<f64> = flow.predicted.component(0).to_vec();
+        immersed.couple(
+            &mut flow,
+            StepInput {
+                grains: &grains,
+                kinematics: &grains.each_ref().map(GrainKinematics::of),
+                previous: &[PreviousStep::default(); 2],
+                contact: &[impact(), Load::default()],
+                applied: &[Load::default(); 2],
+                dt: 0.01,
+            },
+        );
+        assert!(flow.predicted.component(0) != before);
+        let all = (0..3).flat_map(|axis| flow.predicted.component(axis).to_vec());
+        all.map(f64::to_bits).collect::<Vec<_>>()
+    };
+    assert!(predicted(0.0) == predicted(f64::NAN));
+}

@@ -1,0 +1,52 @@
+//! Wall time of the passes of a step.
+
+use std::time::{Duration, Instant};
+
+use crate::poisson::Stages;
+
+use super::Simulation;
+
+/// Time spent in each pass since the start.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PassTimes {
+    pub predict: Duration,
+    pub contact: Duration,
+    pub coupling: Duration,
+    pub project: Duration,
+    /// Time that the Poisson solver had spent before the first step.
+    pub initial: Stages,
+}
+
+/// Runs `work` and adds its wall time to `total`.
+pub(super) fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = work();
+    *total += start.elapsed();
+    result
+}
+
+impl Simulation {
+    /// Seconds spent since the start in each pass of the step. The projection is split into the
+    /// right-hand side with its transforms, the tridiagonal columns, the transforms back with the
+    /// correction, and the remaining ghost cells and sums.
+    pub fn pass_times(&self) -> [(&'static str, f64); 7] {
+        let times = &self.times;
+        let stages = (self.fluid.as_ref()).map_or(times.initial, |fluid| fluid.poisson_stages());
+        let [forward, columns, inverse] = [
+            stages.forward - times.initial.forward,
+            stages.columns - times.initial.columns,
+            stages.inverse - times.initial.inverse,
+        ];
+        let solve = forward + columns + inverse;
+        [
+            ("predict", times.predict),
+            ("contact", times.contact),
+            ("coupling", times.coupling),
+            ("divergence", forward),
+            ("columns", columns),
+            ("correct", inverse),
+            ("ghosts", times.project.saturating_sub(solve)),
+        ]
+        .map(|(name, time)| (name, time.as_secs_f64()))
+    }
+}
