@@ -15,6 +15,8 @@ mod grains;
 mod initial;
 mod kinematics;
 mod ownership;
+#[cfg(test)]
+mod reference;
 mod rigid_body;
 mod schedule;
 mod scheme;

@@ -8,7 +8,7 @@
 //!    surface the sixth-order mean of six faces replaces the mean of two.
 //!
 //! Both are fluxes between two faces, so momentum is conserved
-//! (`docs/decisions/0003-advection-next-to-grains.md`). `reference::correction` is the scalar form.
+//! (`docs/decisions/0003-advection-next-to-grains.md`). `immersed::reference` has the scalar form.
 
 use super::box_velocity::BoxVelocity;
 use super::links::ComponentLinks;

@@ -11,7 +11,7 @@
 //! would make the drag of a moving grain first order in the step
 //! (`docs/decisions/0011-pressure-moves-with-the-grain.md`). The sum of w gain over the faces is the
 //! impulse J = constant + slope (V, Omega). What the fluid gains the grain loses
-//! ([`crate::immersed::rigid_body`]). `reference::sum_impulse` is the scalar form.
+//! ([`crate::immersed::rigid_body`]). `immersed::reference` has the scalar form.
 //!
 //! Legend: s weight, c closed fraction, C closed fraction of all grains together, w fluid mass of a
 //! face, h spacing along the component, l and m levers of the face about the two other axes.

@@ -1,7 +1,7 @@
 //! Rigid velocity imposed on the forced faces (Eqs 4b, 4c).
 //!
 //! A face gains `rest_gain + s U + f (U - U_old)`, see [`super::impulse`] for the symbols.
-//! `reference::impose_rigidity` is the scalar form.
+//! `immersed::reference` has the scalar form.
 
 use glam::DVec3;
 

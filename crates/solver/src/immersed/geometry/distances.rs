@@ -1,7 +1,7 @@
 //! Signed distances at the faces in a box around a grain, and the list of those it may force.
 //!
 //! Plane by plane: bound the candidate faces of each row, evaluate the distance of all of them in
-//! full registers, then keep the faces within reach. `reference::distances` is the scalar form.
+//! full registers, then keep the faces within reach. `immersed::reference` has the scalar form.
 
 use std::ops::Range;
 
