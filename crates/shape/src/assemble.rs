@@ -1,4 +1,4 @@
-//! From a distance function in the principal frame to a finished shape.
+//! Assembly of a shape from a distance function in the principal frame.
 
 use crate::distance::Distance;
 use crate::error::{Result, ShapeError, positive};
@@ -17,13 +17,13 @@ use glam::DVec3;
 pub struct ShapeOptions {
     /// Grid cells across the longest extent.
     pub cells: usize,
-    /// Grid cells across the shortest extent, at least; refines the grid of flat grains.
+    /// Minimum number of grid cells across the shortest extent; refines the grid of flat grains.
     pub least_cells: usize,
-    /// Surface nodes; none for about one in every (equivalent diameter / 20)^2 of surface.
+    /// Number of surface nodes; `None` for about one per (equivalent diameter / 20)^2 of surface.
     pub nodes: Option<usize>,
-    /// Measure the inscribed sphere and the roundness, which takes about as long as all the rest.
+    /// Whether to measure the inscribed sphere and the roundness, which doubles the build time.
     pub roundness: bool,
-    /// Quality gate.
+    /// Bounds of the quality check.
     pub bounds: QualityBounds,
 }
 
@@ -39,24 +39,25 @@ impl Default for ShapeOptions {
     }
 }
 
-/// Share of the longest extent by which the grid reaches beyond the surface, at least.
+/// Minimum margin of the grid around the surface, relative to the longest extent.
 const MARGIN: f64 = 0.125;
-/// The same in cells.
+/// Minimum margin of the grid around the surface [cells].
 const MARGIN_CELLS: f64 = 4.0;
 
-/// A body in (nearly) its principal frame.
+/// A solid body in (nearly) its principal frame.
 pub(crate) struct Body<D> {
     /// Signed distance [m].
     pub distance: D,
-    /// Bounding box [m].
+    /// Lower corner of the bounding box [m].
     pub lower: DVec3,
-    /// Bounding box [m].
+    /// Upper corner of the bounding box [m].
     pub upper: DVec3,
-    /// Exact volume [m^3] where known.
+    /// Exact volume [m^3] if known.
     pub volume: Option<f64>,
-    /// Area [m^2] where known: sampling cuts edges off, more than the noise of a scan adds.
+    /// Surface area [m^2] if known. Sampling truncates edges, which biases the area more than scan
+    /// noise.
     pub area: Option<f64>,
-    /// What the distance comes from.
+    /// Origin of the surface.
     pub surface: roundness::Surface,
 }
 
@@ -87,8 +88,8 @@ impl ShapeOptions {
     }
 }
 
-/// Samples the body, centres the field on its own centroid, measures it, spreads the nodes and
-/// passes the quality gate.
+/// Samples the body, centres the field on its own centroid, measures it, distributes the surface
+/// nodes and applies the quality check.
 pub(crate) fn assemble<D: Distance>(
     body: &Body<D>,
     mut provenance: Provenance,
@@ -132,7 +133,7 @@ pub(crate) fn assemble<D: Distance>(
     let (lower, upper, radius) = bounds(&field, &mesh, &nodes);
     let mut morphology = Morphology::measure(&mesh, upper - lower, mass.volume, area);
     if options.roundness {
-        // Scans have meshes of many small faces, which are slow to ask.
+        // Scans have meshes of small faces, on which distance queries are slow.
         let about = |x: DVec3, hint: &mut u32| match body.surface {
             roundness::Surface::Scanned { .. } => field.distance(x - off),
             _ => body.distance.near(x, hint),
@@ -170,7 +171,7 @@ pub(crate) fn assemble<D: Distance>(
     })
 }
 
-/// Closed surface of a field.
+/// Extracts the closed surface of a field.
 pub(crate) fn surface_of(field: &SampledField) -> TriangleMesh {
     surface::extract(&Samples {
         dims: field.dims(),
@@ -180,8 +181,8 @@ pub(crate) fn surface_of(field: &SampledField) -> TriangleMesh {
     })
 }
 
-/// Bounding box and bounding radius of the surface. Its vertices lie on the grid lines; the
-/// middles of its faces, brought onto the surface, catch the bulge between them.
+/// Returns the bounding box and the bounding radius of the surface. Mesh vertices lie on grid
+/// lines; face centres projected onto the surface account for the curvature between them.
 fn bounds(field: &SampledField, mesh: &TriangleMesh, nodes: &[SurfaceNode]) -> (DVec3, DVec3, f64) {
     let middles = (0..mesh.triangles.len()).map(|f| {
         let middle = mesh.corners(f).iter().sum::<DVec3>() / 3.0;
@@ -197,6 +198,6 @@ fn bounds(field: &SampledField, mesh: &TriangleMesh, nodes: &[SurfaceNode]) -> (
     let (lower, upper, squared) = on_surface.fold(start, |(lower, upper, squared), x| {
         (lower.min(x), upper.max(x), squared.max(x.length_squared()))
     });
-    // What the sampling of the bulge may miss, a fraction of a percent of a cell.
+    // Margin for extrema between the samples, a fraction of a percent of a cell.
     (lower, upper, squared.sqrt() + 2e-3 * field.spacing())
 }

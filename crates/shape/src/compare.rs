@@ -1,27 +1,26 @@
-//! How far two shapes are from each other.
+//! Distance between the surfaces of two shapes.
 
 use crate::Shape;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// The surfaces of two shapes laid upon each other: centroids together, principal axes along
-/// each other, in the one of the 24 ways that leaves them nearest.
+/// Surface distances of two shapes with coinciding centroids and principal axes, in the one of the
+/// 24 axis permutations that minimises them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// From the frame of the first shape to that of the second, columns.
+    /// Rotation from the frame of the first shape to that of the second, as columns.
     pub turn: DMat3,
-    /// Mean of the distances between the surfaces [m]: positive where the first lies outside the
-    /// second.
+    /// Mean distance between the surfaces [m]; positive where the first lies outside the second.
     pub mean_distance_m: f64,
-    /// Their root mean square [m].
+    /// Root-mean-square distance between the surfaces [m].
     pub rms_distance_m: f64,
-    /// Largest of them [m] (Hausdorff's distance of the surface nodes).
+    /// Largest distance between the surfaces [m] (Hausdorff distance of the surface nodes).
     pub largest_distance_m: f64,
 }
 
 impl Comparison {
-    /// Compares two shapes by the distance of each one's surface nodes from the other.
+    /// Compares two shapes by the distances of the surface nodes of each from the other.
     pub fn of(first: &Shape, second: &Shape) -> Comparison {
         turns()
             .into_par_iter()
@@ -40,7 +39,7 @@ impl Comparison {
             .nodes()
             .iter()
             .map(|n| -first.distance(back * n.position));
-        // Half the weight to each shape, however many nodes it has.
+        // Both shapes have half the weight, regardless of their node counts.
         let [mut mean, mut square, mut largest] = [0.0; 3];
         for (distances, count) in [
             (there.collect::<Vec<_>>(), first.nodes().len()),
@@ -61,7 +60,7 @@ impl Comparison {
     }
 }
 
-/// The 24 turns of a cube onto itself.
+/// Returns the 24 rotations of a cube onto itself.
 fn turns() -> Vec<DMat3> {
     let axes = [
         DVec3::X,
@@ -116,7 +115,7 @@ mod tests {
         );
         let rounder = ellipsoid(1e-3, 1e-3, 1e-3, &ShapeOptions::default()).unwrap();
         let found = Comparison::of(&body, &rounder);
-        // The poles stand 0.5 mm out, the short axis 0.5 mm in.
+        // The poles protrude by 0.5 mm; the short axis recedes by 0.5 mm.
         assert!((found.largest_distance_m - 5e-4).abs() < 2e-5, "{found:?}");
     }
 }

@@ -1,18 +1,18 @@
-//! What shapes are sampled from: a signed distance [m], negative inside.
+//! Signed-distance functions from which shapes are sampled [m]; negative inside.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Least and most of the distances that are needed: all of them.
+/// Range of required distances that includes all of them.
 pub(crate) const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-/// A signed distance [m] that can be asked anywhere.
+/// A signed distance [m] defined everywhere.
 pub(crate) trait Distance: Sync {
-    /// Distance at `x`; the hint, left by a query nearby or 0, may speed a search.
+    /// Returns the distance at `x`. The hint (from a query nearby, or 0) may accelerate the search.
     fn near(&self, x: DVec3, hint: &mut u32) -> f64;
 
-    /// Tells distance and gradient at places that draw together, by differences over `step` [m] unless
-    /// known better.
+    /// Returns a function for the distance and its gradient at a converging sequence of points. The
+    /// default differentiates numerically with `step` [m].
     fn closing_in(&self, step: f64) -> impl FnMut(DVec3) -> (f64, DVec3) {
         move |x| {
             let value = |x: DVec3| self.near(x, &mut 0);
@@ -21,9 +21,9 @@ pub(crate) trait Distance: Sync {
         }
     }
 
-    /// Distances at the samples of a grid, x fastest; the first lies at `first`. Farther than `band`
-    /// [samples] from the surface they may be found by a way that is not exact everywhere, and what is
-    /// not between the least and the most that are `needed` [m] may be NaN.
+    /// Returns the distances at the samples of a grid, x fastest, with the first sample at `first`.
+    /// Farther than `band` [cells] from the surface an approximation may be used, and values
+    /// outside the range `needed` [m] may be NaN.
     fn on_grid(
         &self,
         first: DVec3,

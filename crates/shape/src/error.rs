@@ -1,10 +1,11 @@
-//! What can go wrong when a shape is read, built or saved.
+//! Errors of reading, building and saving shapes.
 
 use glam::DVec3;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Why a shape was refused. Every message names the place and, where there is one, the remedy.
+/// Reason why a shape was refused. Every message names the location and, if there is one, the
+/// remedy.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ShapeError {
@@ -13,59 +14,59 @@ pub enum ShapeError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The file name ends in something no reader knows.
+    /// No reader supports the extension of the file.
     #[error("{path}: unknown file type; known here: {known}")]
     UnknownFormat {
         /// The file.
         path: PathBuf,
-        /// Extensions that are read.
+        /// Supported extensions.
         known: &'static str,
     },
-    /// The file claims more than the reader is allowed to hold.
+    /// The file declares more data than the reader may hold.
     #[error("{path}: claims {claimed}, the limit is {limit} {unit}; crop or coarsen the data")]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// What it claims.
+        /// Declared size.
         claimed: String,
-        /// What is allowed.
+        /// Limit.
         limit: u64,
-        /// Of what.
+        /// Unit of the limit.
         unit: &'static str,
     },
-    /// The file ends early or contradicts itself.
+    /// The file ends early or is inconsistent.
     #[error("{path}: damaged or not what its name says: {reason}")]
     Malformed {
         /// The file.
         path: PathBuf,
-        /// What does not fit.
+        /// The inconsistency.
         reason: String,
     },
-    /// The file is sound but of a kind that is not read.
+    /// The file is valid, but its variant is not supported.
     #[error("{path}: {reason}")]
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// Which kind, and what to do.
+        /// The variant, and the remedy.
         reason: String,
     },
     /// A coordinate or grey value is NaN or infinite.
     #[error("{what} is not a finite number")]
     NotFinite {
-        /// Which one.
+        /// The value concerned.
         what: String,
     },
-    /// A parameter is out of its range.
+    /// A parameter is out of range.
     #[error("{name} = {value}: {reason}")]
     BadParameter {
-        /// Parameter.
+        /// Parameter name.
         name: &'static str,
-        /// Value given.
+        /// Given value.
         value: f64,
-        /// What it must be.
+        /// Requirement.
         reason: &'static str,
     },
     /// The volume holds no solid voxel.
@@ -76,12 +77,12 @@ pub enum ShapeError {
     /// The volume holds no background voxel.
     #[error("the volume is solid throughout: it has no background voxel, so no surface")]
     SolidVolume,
-    /// The label asked for does not occur.
+    /// The requested label does not occur.
     #[error("label {label} does not occur; labels present: {present}")]
     NoSuchLabel {
-        /// Label asked for.
+        /// Requested label.
         label: u32,
-        /// The labels there are (the first few).
+        /// Labels that occur (the first few).
         present: String,
     },
     /// The grain reaches the edge of the field of view.
@@ -95,33 +96,33 @@ pub enum ShapeError {
     CutByBorder {
         /// Label.
         label: u32,
-        /// Which faces of the image.
+        /// Faces of the image.
         faces: String,
     },
-    /// One label, several separate bodies.
+    /// A label consists of several separate bodies.
     #[error("label {label} consists of {count} separate pieces of {sizes} voxels")]
     SeveralPieces {
         /// Label.
         label: u32,
-        /// How many.
+        /// Number of pieces.
         count: usize,
         /// Voxel counts, largest first.
         sizes: String,
     },
-    /// Too few voxels to carry a shape.
+    /// The grain has too few voxels to define a shape.
     #[error("label {label} has {voxels} voxels; at least {needed} are needed for a usable surface")]
     TooFewVoxels {
         /// Label.
         label: u32,
-        /// Voxels it has.
+        /// Number of voxels.
         voxels: u64,
-        /// Voxels needed.
+        /// Required number of voxels.
         needed: u64,
     },
     /// The mesh has no faces.
     #[error("the mesh has no faces")]
     EmptyMesh,
-    /// A face has no area.
+    /// A face has zero area.
     #[error(
         "face {face} near {} has no area; remove degenerate faces (in MeshLab: Remove Zero Area Faces)",
         point(at)
@@ -129,32 +130,32 @@ pub enum ShapeError {
     ZeroAreaFace {
         /// Index of the face in the file.
         face: usize,
-        /// A corner of it, in file units.
+        /// One of its corners, in file units.
         at: DVec3,
     },
-    /// An edge with one face only.
+    /// An edge belongs to one face only.
     #[error(
         "the mesh is open: {edges} edges belong to one face only, the first near {}; close the hole (in MeshLab: Close Holes; in Blender: Fill Holes)",
         point(at)
     )]
     Hole {
-        /// Middle of an open edge, in file units.
+        /// Midpoint of an open edge, in file units.
         at: DVec3,
         /// Number of open edges.
         edges: usize,
     },
-    /// An edge with more than two faces.
+    /// An edge belongs to more than two faces.
     #[error(
         "{faces} faces share the edge near {}; a closed surface has two at every edge (in MeshLab: Repair Non Manifold Edges)",
         point(at)
     )]
     NonManifoldEdge {
-        /// Middle of the edge, in file units.
+        /// Midpoint of the edge, in file units.
         at: DVec3,
-        /// Number of faces at it.
+        /// Number of faces at the edge.
         faces: usize,
     },
-    /// Two neighbours wound in opposite senses.
+    /// Two neighbouring faces have opposite orientations.
     #[error(
         "faces {face} and {neighbour} near {} are wound in opposite senses; make the orientation coherent (in MeshLab: Re-Orient All Faces Coherently)",
         point(at)
@@ -162,12 +163,12 @@ pub enum ShapeError {
     FlippedFace {
         /// Index of a face.
         face: usize,
-        /// Index of its neighbour.
+        /// Index of the neighbouring face.
         neighbour: usize,
-        /// Middle of the shared edge, in file units.
+        /// Midpoint of the shared edge, in file units.
         at: DVec3,
     },
-    /// The surface runs through itself.
+    /// The surface intersects itself.
     #[error(
         "faces {face} and {other} cross near {} ({pairs} pairs cross in all), so inside and outside are not told apart there; repair the mesh (in MeshLab: Select Self Intersecting Faces; in Blender: Remesh)",
         point(at)
@@ -175,33 +176,33 @@ pub enum ShapeError {
     SelfIntersection {
         /// Index of a face.
         face: usize,
-        /// Index of the face that it crosses.
+        /// Index of the intersecting face.
         other: usize,
-        /// Pairs of faces that cross.
+        /// Number of intersecting pairs of faces.
         pairs: usize,
-        /// A point that they share, in the mesh's units.
+        /// A common point, in the units of the mesh.
         at: DVec3,
     },
-    /// Normals point inwards everywhere.
+    /// All normals point inwards.
     #[error("the mesh is inside out (its volume is {volume:.6e})")]
     InsideOut {
         /// Signed volume, in file units cubed.
         volume: f64,
     },
-    /// Several closed surfaces in one mesh.
+    /// The mesh consists of several closed surfaces.
     #[error(
         "the mesh consists of {count} separate surfaces of {sizes} faces; export one grain at a time"
     )]
     SeveralSurfaces {
-        /// How many.
+        /// Number of surfaces.
         count: usize,
-        /// Faces in each, largest first.
+        /// Faces of each surface, largest first.
         sizes: String,
     },
-    /// The finished shape failed the quality gate.
+    /// The finished shape failed the quality check.
     #[error("the shape fails its quality gate: {reason}")]
     Quality {
-        /// Which bound, and by how much.
+        /// The bound, and the value that exceeds it.
         reason: String,
     },
     /// Not a `.grain` file.
@@ -210,16 +211,16 @@ pub enum ShapeError {
         /// The file.
         path: PathBuf,
     },
-    /// Written by a newer program.
+    /// The file was written by a newer program.
     #[error(
         "{path}: grain file of version {found}, this program reads up to {supported}; update the program"
     )]
     FutureVersion {
         /// The file.
         path: PathBuf,
-        /// Its version.
+        /// Version of the file.
         found: u32,
-        /// The newest version known here.
+        /// Newest supported version.
         supported: u32,
     },
     /// The checksum does not match.
@@ -245,13 +246,13 @@ impl ShapeError {
     }
 }
 
-/// A point as a person writes it.
+/// Formats a point for messages.
 fn point(at: &DVec3) -> String {
     let round = |x: f64| (1e6 * x).round() / 1e6 + 0.0;
     format!("({}, {}, {})", round(at.x), round(at.y), round(at.z))
 }
 
-/// Short alias used throughout the crate.
+/// Result of this crate's functions.
 pub type Result<T> = std::result::Result<T, ShapeError>;
 
 /// Refuses a length that is not finite and positive.

@@ -1,14 +1,14 @@
-//! Caliper lengths of a body, from points of its surface.
+//! Feret (caliper) diameters of a point set.
 
 use glam::DVec3;
 
-/// Directions tried for the longest length.
+/// Directions sampled for the longest diameter.
 const DIRECTIONS: usize = 400;
-/// Directions tried across it.
+/// Directions sampled in the plane normal to the longest diameter.
 const ACROSS: usize = 90;
 
-/// The longest caliper length, the longest at right angles to it, and the one at right angles to
-/// both, in the unit of the points.
+/// Returns the longest Feret diameter, the longest perpendicular to it, and the one perpendicular
+/// to both, in the unit of the points.
 pub(crate) fn lengths(points: &[DVec3]) -> [f64; 3] {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     let spiral = (0..DIRECTIONS).map(|n| {
@@ -30,7 +30,7 @@ pub(crate) fn lengths(points: &[DVec3]) -> [f64; 3] {
     })
 }
 
-/// First and last of the points along `u`.
+/// Returns the first and the last point along `u`.
 fn ends(points: &[DVec3], u: DVec3) -> (DVec3, DVec3) {
     let start = (f64::INFINITY, DVec3::ZERO, f64::NEG_INFINITY, DVec3::ZERO);
     let (_, low, _, high) = points.iter().fold(start, |mut best, p| {
@@ -46,8 +46,8 @@ fn ends(points: &[DVec3], u: DVec3) -> (DVec3, DVec3) {
     (low, high)
 }
 
-/// The direction of the longest length: the best of those given, then that of the line between
-/// the two points which it touches, as long as that is longer.
+/// Returns the direction of the longest diameter: the best of `directions`, then refined along the
+/// line between its two extreme points while that increases the diameter.
 fn longest(
     points: &[DVec3],
     directions: impl Iterator<Item = DVec3>,
@@ -93,8 +93,7 @@ mod tests {
             .collect();
         let [long, middle, short] = lengths(&corners);
         assert!((long - 21f64.sqrt()).abs() < 1e-12);
-        // Across the diagonal d, the longest width is that of the best of all directions in its
-        // plane, here found by brute force.
+        // Reference for the largest width perpendicular to the diagonal d, by exhaustive search.
         let d = turn * DVec3::new(4.0, 2.0, 1.0).normalize();
         let (e, f) = (
             d.any_orthonormal_vector(),
@@ -104,7 +103,7 @@ mod tests {
             let (low, high) = ends(&corners, u);
             (high - low).dot(u)
         };
-        // The diagonal is one of four: any of them may have been taken.
+        // The body has four equivalent diagonals; any of them may be found.
         let brute = (0..20_000).map(|n| {
             let (s, c) = (std::f64::consts::PI * f64::from(n) / 20_000.0).sin_cos();
             width(c * e + s * f)

@@ -5,34 +5,34 @@ use crate::error::{Result, ShapeError};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Most samples that one field may hold.
+/// Maximum number of samples of a field.
 pub(crate) const MAX_SAMPLES: u64 = 1 << 26;
 
-/// Distance from the surface up to which a mesh is asked face by face [cells]: the surface, the volume
-/// and the normals of the field are made from what lies nearer.
+/// Distance from the surface up to which mesh distances are exact [cells]: the surface, the volume
+/// and the normals depend on samples in this band only.
 const BAND: f64 = 2.5;
 
-/// Levels between zero and the largest magnitude; a power of two below f32's 2^24, so that every
-/// stored level is exact.
+/// Levels between zero and the largest magnitude: a power of two below 2^24, so that single
+/// precision represents every level exactly.
 const LEVELS: f64 = (1u32 << 17) as f64;
 
-/// Signed distance on a regular grid in the principal frame, read by trilinear interpolation.
+/// Signed distance on a regular grid in the principal frame, interpolated trilinearly.
 ///
-/// Values are integer levels times `quantum` (a few millionths of the shape's size), which makes
-/// the file exact and lets a scaled copy share the levels.
+/// Values are integer levels times `quantum` (a few millionths of the size of the shape). Files are
+/// therefore exact, and a scaled copy has the same levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampledField {
     lower: DVec3,
     spacing: f64,
     inverse_spacing: f64,
     dims: [usize; 3],
-    /// Number of the last sample along each axis.
+    /// Index of the last sample along each axis.
     last: DVec3,
     quantum: f64,
     levels: Vec<f32>,
 }
 
-/// An error where that many samples are too many.
+/// Refuses a number of samples above the maximum.
 fn affordable(samples: f64) -> Result<()> {
     if samples.is_nan() || samples > MAX_SAMPLES as f64 {
         return Err(ShapeError::BadParameter {
@@ -44,7 +44,7 @@ fn affordable(samples: f64) -> Result<()> {
     Ok(())
 }
 
-/// The cell that holds a point, with the point's place in it.
+/// The cell that contains a point, with the position of the point in it.
 struct Place {
     cell: [usize; 3],
     index: usize,
@@ -52,7 +52,7 @@ struct Place {
 }
 
 impl SampledField {
-    /// Samples `distance` on a grid that covers the box with `margin` [m] to spare on every side.
+    /// Samples `distance` on a grid that covers the box with a margin of `margin` [m] on all sides.
     pub(crate) fn sample(
         distance: &impl Distance,
         lower: DVec3,
@@ -63,7 +63,7 @@ impl SampledField {
         let size = upper - lower + DVec3::splat(2.0 * margin);
         let cells = (size / spacing).ceil().max(DVec3::splat(2.0));
         affordable((cells.x + 1.0) * (cells.y + 1.0) * (cells.z + 1.0))?;
-        // One layer more on every side, for the second differences.
+        // One additional layer on all sides for the second differences.
         let wide = [cells.x, cells.y, cells.z].map(|n| n as usize + 3);
         let dims = wide.map(|n| n - 2);
         let origin = 0.5 * (lower + upper) - 0.5 * spacing * cells;
@@ -73,8 +73,8 @@ impl SampledField {
         Self::quantise(origin, spacing, dims, &values)
     }
 
-    /// The same samples with more about them, by `distance`, so that the box is covered with `margin` [m] to
-    /// spare on every side.
+    /// Returns a larger field with the same samples, extended by `distance` so that it covers the
+    /// box with a margin of `margin` [m] on all sides.
     pub(crate) fn extended(
         &self,
         distance: impl Fn(DVec3) -> f64 + Sync,
@@ -170,7 +170,7 @@ impl SampledField {
     pub fn upper(&self) -> DVec3 {
         self.lower + self.spacing * self.last
     }
-    /// Step of the stored values [m].
+    /// Increment of the stored values [m].
     pub fn quantum(&self) -> f64 {
         self.quantum
     }
@@ -202,7 +202,7 @@ impl SampledField {
         )
     }
 
-    /// Signed distance [m] at `x`.
+    /// Returns the signed distance [m] at `x`.
     #[inline]
     pub fn distance(&self, x: DVec3) -> f64 {
         match self.locate(x) {
@@ -211,15 +211,15 @@ impl SampledField {
         }
     }
 
-    /// Signed distance [m] and its gradient at `x`, none off the grid.
+    /// Returns signed distance [m] and gradient at `x`, or `None` off the grid.
     #[inline]
     pub fn distance_and_gradient_on_grid(&self, x: DVec3) -> Option<(f64, DVec3)> {
         let place = self.locate(x)?;
         Some(self.interpolate_with_gradient(&place))
     }
 
-    /// Signed distance [m] at `x` where that is at most `limit`, else infinity or the distance: what
-    /// is clearly farther costs little off the grid.
+    /// Returns the signed distance [m] at `x` if it is at most `limit`; a larger distance may be
+    /// returned as infinity. Points clearly farther than `limit` are rejected cheaply off the grid.
     #[inline]
     pub fn distance_within(&self, x: DVec3, limit: f64) -> f64 {
         match self.locate(x) {
@@ -229,9 +229,9 @@ impl SampledField {
         }
     }
 
-    /// Whether `x`, off the grid, is farther than `limit` by the distance at the nearest point of the
-    /// border: the body lies on the other side of the plane through that point, normal to the
-    /// line to `x`. May miss some.
+    /// Returns whether `x`, off the grid, is farther than `limit`, by the distance at the nearest
+    /// border point: the body lies beyond the plane through that point normal to the line to `x`. A
+    /// conservative test: `false` does not imply that `x` is nearer.
     fn is_farther(&self, x: DVec3, limit: f64) -> bool {
         let border = x.clamp(self.lower, self.upper());
         let away = (x - border).length_squared();
@@ -240,12 +240,12 @@ impl SampledField {
             return true;
         }
         let place = self.place((border - self.lower) * self.inverse_spacing);
-        // A spacing less, for the error of the interpolation.
+        // One spacing less, as a bound of the interpolation error.
         let from_border = (self.interpolate(&place) - self.spacing).max(0.0);
         away + from_border * from_border > limit
     }
 
-    /// Signed distance [m] and its gradient at `x`.
+    /// Returns signed distance [m] and gradient at `x`.
     #[inline]
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         match self.locate(x) {
@@ -254,7 +254,7 @@ impl SampledField {
         }
     }
 
-    /// The cell around `x`, or none where `x` lies off the grid (or is NaN).
+    /// Returns the cell around `x`, or `None` if `x` lies off the grid (or is NaN).
     #[inline(always)]
     fn locate(&self, x: DVec3) -> Option<Place> {
         let s = (x - self.lower) * self.inverse_spacing;
@@ -265,11 +265,11 @@ impl SampledField {
         }
     }
 
-    /// The cell at `s`, given in spacings from the first sample and on the grid.
+    /// Returns the cell at `s`, a position on the grid in spacings from the first sample.
     #[inline(always)]
     fn place(&self, s: DVec3) -> Place {
-        // Through i32, which converts in one instruction each way; a grid has no more samples
-        // along an axis than that holds.
+        // Conversion via i32 takes one instruction each way; the number of samples along an axis
+        // fits.
         let cell = |axis: usize| (s[axis] as i32).clamp(0, self.dims[axis] as i32 - 2);
         let [i, j, k] = [cell(0), cell(1), cell(2)];
         let fraction = s - DVec3::new(f64::from(i), f64::from(j), f64::from(k));
@@ -281,7 +281,7 @@ impl SampledField {
         }
     }
 
-    /// The two levels along x at each of the four edges of the cell.
+    /// Returns the two levels along x at each of the four cell edges parallel to x.
     #[inline(always)]
     fn corners(&self, index: usize) -> [[f64; 2]; 4] {
         let nx = self.dims[0];
@@ -327,10 +327,11 @@ impl SampledField {
         (distance, gradient * (self.quantum * self.inverse_spacing))
     }
 
-    /// Distance and direction off the grid: the distance to the surface point under the place
-    /// where the straight line from that point to `x` leaves the grid, found in three steps.
-    /// Continuous, equal to the sampled value on the grid's border, and never less than the true
-    /// distance but for the interpolation error; too large by less than 1 percent.
+    /// Returns distance and direction off the grid. The distance refers to the surface point below
+    /// the point where the straight line from that surface point to `x` leaves the grid, found in
+    /// three iterations. It is continuous, equals the sampled value on the border of the grid, is
+    /// never below the true distance except for the interpolation error, and exceeds it by less
+    /// than 1 percent.
     #[cold]
     fn beyond(&self, x: DVec3) -> (f64, DVec3) {
         let (lower, upper) = (self.lower, self.upper());
@@ -343,14 +344,14 @@ impl SampledField {
         (distance, reach / distance)
     }
 
-    /// Surface point nearest to `x`, a point of the border of the grid.
+    /// Returns the surface point nearest to `x`, a point on the border of the grid.
     fn foot(&self, x: DVec3) -> DVec3 {
         let place = self.place((x - self.lower) * self.inverse_spacing);
         x - self.interpolate(&place) * self.smooth_normal(&place)
     }
 
-    /// Normal interpolated from central differences at the samples: continuous, unlike the
-    /// gradient of the trilinear value.
+    /// Interpolates the normal from central differences at the samples; unlike the gradient of the
+    /// trilinear interpolant it is continuous.
     fn smooth_normal(&self, place: &Place) -> DVec3 {
         let f = place.fraction;
         let low = DVec3::ONE - f;
@@ -374,11 +375,10 @@ impl SampledField {
     }
 }
 
-/// Samples whose trilinear interpolation is right on average. Interpolating the samples
-/// themselves overestimates by h^2/12 times the Laplacian, which shrinks convex bodies by a
-/// tenth of a percent or more; that much is taken off, and the outermost layer dropped.
-/// It fades where the field bends within a few cells: near a crease second differences say
-/// nothing.
+/// Returns samples with an unbiased trilinear interpolant; drops the outermost layer. Interpolating
+/// the original samples overestimates by h^2/12 times the Laplacian, which shrinks convex bodies by
+/// 0.1 percent or more. The correction is reduced where the field bends within a few cells: second
+/// differences near a crease are meaningless.
 fn unbiased(values: &[f64], wide: [usize; 3], spacing: f64) -> Vec<f64> {
     let [nx, ny, nz] = wide;
     let strides = [1, nx, nx * ny];
@@ -400,7 +400,7 @@ fn unbiased(values: &[f64], wide: [usize; 3], spacing: f64) -> Vec<f64> {
     out
 }
 
-/// Where the line from `inside` towards `x` leaves the box.
+/// Returns the point where the line from `inside` towards `x` leaves the box.
 fn leave(inside: DVec3, x: DVec3, lower: DVec3, upper: DVec3) -> DVec3 {
     let reach = x - inside;
     let mut t: f64 = 1.0;
@@ -429,7 +429,7 @@ mod tests {
         .unwrap()
     }
 
-    /// Points spread by a low-discrepancy sequence over the cube of half-width `half`.
+    /// Points of a low-discrepancy sequence in the cube of half-width `half`.
     fn points(half: f64, count: usize) -> impl Iterator<Item = DVec3> {
         (1..=count).map(move |i| {
             let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * i as f64;
@@ -469,7 +469,7 @@ mod tests {
 
     #[test]
     fn off_the_grid_the_distance_stays_close_and_the_direction_points_away() {
-        // A ball, and a rod eight times as long as thick.
+        // A ball, and a rod of aspect ratio eight.
         for half in [0.0, 0.875] {
             let radius = 1.0 - half;
             let exact = |x: DVec3| {

@@ -1,11 +1,11 @@
-//! Samples of a regular grid by their index, x fastest.
+//! Index arithmetic of regular grids, x fastest.
 
-/// Number of sample `n` along x, y and z.
+/// Returns the indices (i, j, k) of sample `n`.
 pub(crate) fn place(dims: [usize; 3], n: usize) -> [usize; 3] {
     [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]]
 }
 
-/// The samples beside sample `n` along the axes, six but on the border.
+/// Iterates over the neighbours of sample `n` along the axes; six, fewer on the border.
 pub(crate) fn beside(dims: [usize; 3], n: usize) -> impl Iterator<Item = usize> {
     let strides = [1, dims[0], dims[0] * dims[1]];
     let place = place(dims, n);

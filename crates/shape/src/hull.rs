@@ -4,17 +4,17 @@ use glam::DVec3;
 
 struct Facet {
     corners: [u32; 3],
-    /// Facet across the edge from corner i to corner i + 1.
+    /// Neighbouring facet across the edge from corner i to corner i + 1.
     across: [u32; 3],
     normal: DVec3,
     offset: f64,
-    /// Points seen by this facet and given to it.
+    /// Points above this facet that are assigned to it.
     outside: Vec<u32>,
     alive: bool,
 }
 
-/// Volume [m^3] of the convex hull and its corners, or none where the points are flat or the
-/// construction is defeated by rounding.
+/// Returns volume [m^3] and corners of the convex hull, or `None` if the points are coplanar or
+/// rounding errors make the construction fail.
 pub(crate) fn measure(points: &[DVec3]) -> Option<(f64, Vec<DVec3>)> {
     let hull = Hull::build(points)?;
     Some((hull.volume()?, hull.corners()))
@@ -78,7 +78,8 @@ impl<'a> Hull<'a> {
         (self.facets.len() - 1) as u32
     }
 
-    /// First tetrahedron: far apart along an axis, then from the line, then from the plane.
+    /// Builds the first tetrahedron: the farthest points along an axis, from the line, and from the
+    /// plane.
     fn start(&mut self) -> Option<()> {
         let p = self.points;
         let all = 0..p.len() as u32;
@@ -101,7 +102,7 @@ impl<'a> Hull<'a> {
             return None;
         }
         let (b, c) = if height < 0.0 { (b, c) } else { (c, b) };
-        // Now d lies under the facet a b c.
+        // Point d lies below the facet a b c.
         for corners in [[a, b, c], [a, d, b], [b, d, c], [c, d, a]] {
             self.push(corners);
         }
@@ -122,7 +123,7 @@ impl<'a> Hull<'a> {
         (c[i], c[(i + 1) % 3])
     }
 
-    /// Gives every point to the facet that it lies farthest above; points above none are inside.
+    /// Assigns every point to the facet that it lies farthest above; points above none are inside.
     fn share_out(&mut self, points: Vec<u32>, facets: &[u32]) {
         for point in points {
             let mut best = (self.tolerance, None);
@@ -138,7 +139,7 @@ impl<'a> Hull<'a> {
         }
     }
 
-    /// Replaces the facets that see `eye` by a cone from their horizon; returns the new ones.
+    /// Replaces the facets visible from `eye` by a cone over their horizon; returns the new facets.
     fn add(&mut self, first: u32, eye: u32) -> Option<Vec<u32>> {
         let mut visible = vec![first];
         let mut horizon: Vec<(u32, u32, u32)> = Vec::new();
@@ -174,7 +175,7 @@ impl<'a> Hull<'a> {
             self.facets[new as usize].across[0] = other;
             let back = (0..3).find(|j| self.edge(other, *j) == (to, from))?;
             self.facets[other as usize].across[back] = new;
-            // A vertex met twice means a pinched horizon, a failure of the tolerance.
+            // A repeated vertex indicates a pinched horizon, a failure of the tolerance.
             if starting.insert(from, new).is_some() {
                 return None;
             }
@@ -195,7 +196,7 @@ impl<'a> Hull<'a> {
         Some(fresh)
     }
 
-    /// Its corners, each once.
+    /// Returns the corners without duplicates.
     fn corners(&self) -> Vec<DVec3> {
         let alive = self.facets.iter().filter(|f| f.alive);
         let mut corners: Vec<u32> = alive.flat_map(|f| f.corners).collect();
@@ -204,7 +205,8 @@ impl<'a> Hull<'a> {
         corners.iter().map(|i| self.points[*i as usize]).collect()
     }
 
-    /// Volume; of few points checked: none may lie above a facet by more than rounding explains.
+    /// Returns the volume. For small point sets it also verifies that no point lies above a facet
+    /// by more than the rounding error.
     fn volume(&self) -> Option<f64> {
         let reference = self.points[0];
         let mut six = 0.0;
@@ -242,7 +244,7 @@ mod tests {
         }
         let (volume, corners) = measure(&points).unwrap();
         assert!((volume - 1.0).abs() < 1e-12);
-        // Points on its edges and faces may count as corners, inner ones may not.
+        // Points on edges and faces may count as corners, interior points may not.
         for corner in
             (0..8).map(|c| DVec3::new(f64::from(c & 1), f64::from(c >> 1 & 1), f64::from(c >> 2)))
         {
@@ -260,7 +262,7 @@ mod tests {
         let cloud: Vec<DVec3> = (0..200)
             .map(|i| (DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i)).fract())
             .collect();
-        // The check inside fails if any point is left outside.
+        // The internal check fails if any point lies outside the hull.
         assert!(volume(&cloud).unwrap() < 1.0);
     }
 

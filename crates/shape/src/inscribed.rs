@@ -1,18 +1,18 @@
-//! The largest sphere inside a body.
+//! The largest inscribed sphere of a body.
 
 use crate::distance::Distance;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Samples across the shortest extent for the first guess.
+/// Samples across the shortest extent for the initial guess.
 const ACROSS: f64 = 12.0;
-/// Local maxima of the samples that are followed up.
+/// Number of local maxima of the samples that are refined.
 const CANDIDATES: usize = 4;
 
-/// Place and value of the maximum of a concave function in a ball of radius `reach` about
-/// `start`, by the ellipsoid method (Shor; Yudin and Nemirovski 1976); `depth` gives value and
-/// uphill direction. The place is known to `reach` times 0.945 to the power of `rounds`; where it
-/// cannot `beat` this value, the search ends early.
+/// Returns position and value of the maximum of a concave function in a ball of radius `reach`
+/// about `start`, by the ellipsoid method (Shor; Yudin and Nemirovski 1976). `depth` returns value
+/// and ascent direction. The position error is at most `reach` times 0.945 to the power of
+/// `rounds`; the search ends early if it cannot exceed `beat`.
 pub(crate) fn deepest(
     mut depth: impl FnMut(DVec3) -> (f64, DVec3),
     start: DVec3,
@@ -30,13 +30,13 @@ pub(crate) fn deepest(
         }
         let stretched = shape * uphill;
         let squared = uphill.dot(stretched);
-        // A concave function rises no further than this in the ellipsoid.
+        // Upper bound of the increase of a concave function in the ellipsoid.
         let rise = squared.sqrt();
         if rise.is_nan() || rise <= 0.0 || value + rise < beat {
             break;
         }
         let step = stretched / rise;
-        // The smallest ellipsoid around the half that may hold the maximum.
+        // The smallest ellipsoid around the half that may contain the maximum.
         x += step / 4.0;
         let outer = DMat3::from_cols(step * step.x, step * step.y, step * step.z);
         shape = (shape - outer * 0.5) * (9.0 / 8.0);
@@ -44,9 +44,9 @@ pub(crate) fn deepest(
     best
 }
 
-/// Centre and radius [m] of the largest sphere in the body within the box, to about a millionth
-/// of the box where the depth is concave around its deepest place. The search starts from where
-/// `about`, a rough distance, is lowest.
+/// Returns centre and radius [m] of the largest sphere in the body within the box, accurate to
+/// about a millionth of the box if the depth is concave around its maximum. The search starts from
+/// the minima of `about`, an approximate distance.
 pub(crate) fn sphere(
     distance: &impl Distance,
     about: &impl Distance,
@@ -106,8 +106,8 @@ mod tests {
         };
         let (_, radius) = sphere(&boxed, &boxed, DVec3::splat(-2.2), DVec3::splat(2.2));
         assert!((radius - 0.5).abs() < 1e-6, "{radius}");
-        // A needle that thickens slowly and ends in a flat base: the ridge of the depth rises
-        // slowly and crosses the grid askew.
+        // A slowly widening needle with a flat base: the ridge of the depth rises slowly and is
+        // oblique to the grid.
         let half = 0.08f64;
         let cone = |x: DVec3, _: &mut u32| {
             let y = turn * x;

@@ -1,34 +1,34 @@
-//! How much a reader may hold.
+//! Limits on the size of input files and on memory.
 
 use crate::error::{Result, ShapeError};
 use sha2::{Digest, Sha256};
 use std::io::Read;
 use std::path::Path;
 
-/// Bounds on what a reader takes on; exceeded, the file is refused before memory is asked for.
+/// Limits on the size of input. Files that exceed them are refused before memory is allocated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReadLimits {
-    /// Largest file [bytes].
+    /// Maximum file size [bytes].
     pub file_bytes: u64,
-    /// Largest volume [voxels].
+    /// Maximum volume size [voxels].
     pub voxels: u64,
-    /// Largest mesh [faces or vertices].
+    /// Maximum mesh size [faces or vertices].
     pub mesh_elements: u64,
-    /// Memory that a volume has to fit in, where that is known.
+    /// Memory available for a volume, if known.
     pub memory: Option<Memory>,
 }
 
-/// Memory at hand, and what work on a volume takes of it.
+/// Available memory, and the requirement of volume processing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
-    /// Free to be taken [bytes].
+    /// Available memory [bytes].
     pub available: u64,
-    /// Taken by one voxel [bytes].
+    /// Memory per voxel [bytes].
     pub per_voxel: u64,
 }
 
 impl Memory {
-    /// What so many voxels take [bytes], if it is more than there is.
+    /// Returns the memory for this number of voxels [bytes] if it exceeds the available memory.
     fn lacking(&self, voxels: u64) -> Option<u64> {
         let needed = voxels.saturating_mul(self.per_voxel);
         (needed > self.available).then_some(needed)
@@ -47,10 +47,10 @@ impl Default for ReadLimits {
 }
 
 impl ReadLimits {
-    /// Volumes up to what this machine has memory for, if one voxel takes so many bytes; the
-    /// default where the system does not tell.
+    /// Returns limits for volumes that fit in the available memory at `per_voxel` [bytes]; the
+    /// default if the available memory is unknown.
     pub fn of_this_machine(per_voxel: u64) -> ReadLimits {
-        // Linux alone says what can be had without swapping.
+        // Only Linux reports the memory available without swapping.
         let told = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
         ReadLimits::default().within(mem_available(&told), per_voxel)
     }
@@ -61,7 +61,7 @@ impl ReadLimits {
         };
         ReadLimits {
             file_bytes: self.file_bytes.min(available),
-            // Indices of voxels share 32 bits with a mark.
+            // Voxel indices share 32 bits with a flag.
             voxels: (1 << 31) - 1,
             memory: Some(Memory {
                 available,
@@ -71,7 +71,7 @@ impl ReadLimits {
         }
     }
 
-    /// Refuses dimensions that are over the limits; returns the number of voxels.
+    /// Refuses dimensions that exceed the limits; returns the number of voxels.
     pub(crate) fn admit(&self, path: &Path, dims: [u64; 3]) -> Result<u64> {
         let too_large = |more: String, limit, unit| ShapeError::TooLarge {
             path: path.to_owned(),
@@ -96,14 +96,14 @@ impl ReadLimits {
     }
 }
 
-/// Available memory [bytes] by the text of /proc/meminfo.
+/// Parses the available memory [bytes] from the text of /proc/meminfo.
 fn mem_available(told: &str) -> Option<u64> {
     let line = told.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
     let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kib.checked_mul(1024)
 }
 
-/// A file's name (without its folder) and the SHA-256 of its bytes, for provenance.
+/// Name of a file (without its folder) and the SHA-256 of its content, for provenance.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SourceFile {
     /// File name without the folder.
@@ -112,7 +112,7 @@ pub struct SourceFile {
     pub sha256: String,
 }
 
-/// The whole file, if it is not over the limit, and its identity.
+/// Reads a whole file within the size limit; returns content and identity.
 pub(crate) fn read_bytes(path: &Path, limits: &ReadLimits) -> Result<(Vec<u8>, SourceFile)> {
     let file = std::fs::File::open(path).map_err(|e| ShapeError::io(path, e))?;
     let claimed = file.metadata().map_err(|e| ShapeError::io(path, e))?.len();
@@ -126,7 +126,8 @@ pub(crate) fn read_bytes(path: &Path, limits: &ReadLimits) -> Result<(Vec<u8>, S
         return Err(too_large(claimed));
     }
     let mut bytes = Vec::new();
-    // The size is asked again while reading: a pipe or a growing file states none in advance.
+    // The size is checked again while reading: that of a pipe or a growing file is not known
+    // before.
     file.take(limits.file_bytes + 1)
         .read_to_end(&mut bytes)
         .map_err(|e| ShapeError::io(path, e))?;
@@ -141,7 +142,7 @@ pub(crate) fn read_bytes(path: &Path, limits: &ReadLimits) -> Result<(Vec<u8>, S
     Ok((bytes, SourceFile { name, sha256 }))
 }
 
-/// Lower-case extension of a file name.
+/// Returns the lower-case extension of a file name.
 pub(crate) fn extension(path: &Path) -> String {
     path.extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase())
@@ -167,16 +168,16 @@ mod tests {
             let limits = ReadLimits::default().within(available, 20);
             limits.admit(path, [edge; 3]).map_err(|e| e.to_string())
         };
-        // Unknown memory: the fixed limit, 2^29 voxels.
+        // Unknown memory: the fixed limit of 2^29 voxels applies.
         assert_eq!(read(None, 812), Ok(812 * 812 * 812));
         assert!(read(None, 813).is_err());
-        // 400^3 voxels take 1.28 GB.
+        // 400^3 voxels need 1.28 GB.
         assert_eq!(read(Some(1_280_000_000), 400), Ok(64_000_000));
         let said = read(Some(1_279_999_999), 400).unwrap_err();
         for word in ["a.npy", "400 x 400 x 400", "1280 MB", "1279 MB", "crop"] {
             assert!(said.contains(word), "`{word}` is missing in: {said}");
         }
-        // Much memory: up to what indices can count.
+        // Ample memory: the range of the indices is the limit.
         assert!(read(Some(1 << 40), 1290).is_ok());
         assert!(read(Some(1 << 40), 1291).is_err());
         assert!(read(Some(1 << 40), 1 << 40).is_err());

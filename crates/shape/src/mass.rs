@@ -16,7 +16,7 @@ pub(crate) struct Mass {
     pub second: DMat3,
 }
 
-/// Raw integrals of 1, x and x xᵀ (xx, yy, zz, xy, yz, zx) about some reference.
+/// Integrals of 1, x and x xᵀ (xx, yy, zz, xy, yz, zx) about a reference point.
 #[derive(Clone, Copy, Default)]
 struct Raw {
     one: f64,
@@ -38,7 +38,7 @@ impl std::ops::Add for Raw {
 }
 
 impl Raw {
-    /// Moves the second moments to the centroid and scales lengths by `unit`.
+    /// Translates the second moments to the centroid and scales lengths by `unit`.
     fn finish(self, reference: DVec3, unit: f64) -> Mass {
         let c = self.first / self.one;
         let d = self.square - self.one * c * c;
@@ -56,8 +56,8 @@ impl Raw {
     }
 }
 
-/// Exact mass properties of a closed mesh: a signed sum over the tetrahedra between a reference
-/// point and the faces.
+/// Returns the exact mass properties of a closed mesh: a signed sum over the tetrahedra between a
+/// reference point and the faces.
 pub(crate) fn of_mesh(mesh: &TriangleMesh) -> Mass {
     let (lower, upper) = mesh.bounds();
     let reference = 0.5 * (lower + upper);
@@ -80,15 +80,15 @@ pub(crate) fn of_mesh(mesh: &TriangleMesh) -> Mass {
     raw.finish(reference, 1.0)
 }
 
-/// Third moments along the axes about `origin`, the integrals of (x . axis)^3 [m^6]: they tell
-/// the two ends of an axis apart.
+/// Returns the third moments about `origin`, the integrals of (x . axis)^3 [m^6], which distinguish
+/// the two ends of an axis.
 pub(crate) fn third_moments(mesh: &TriangleMesh, origin: DVec3, axes: DMat3) -> DVec3 {
     let to_frame = axes.transpose();
     let mut sum = DVec3::ZERO;
     for face in 0..mesh.triangles.len() {
         let [a, b, c] = mesh.corners(face).map(|p| to_frame * (p - origin));
         let volume = a.dot(b.cross(c)) / 6.0;
-        // Complete homogeneous symmetric polynomial of degree 3 in the corners' coordinates.
+        // Complete homogeneous symmetric polynomial of degree 3 in the coordinates of the corners.
         let h3 =
             a * a * (a + b + c) + b * b * (b + c) + c * c * c + a * b * (b + c) + (a + b) * c * c;
         sum += volume / 20.0 * h3;
@@ -104,9 +104,9 @@ const GAUSS: [(f64, f64); 4] = [
     (0.930_568_155_797_026_3, 0.173_927_422_568_726_9),
 ];
 
-/// Mass properties of the inside of a field. Cells wholly inside count exactly; in a cell that
-/// the surface cuts, the trilinear value is linear along any grid direction, so lines along the
-/// steepest one are cut exactly and summed by Gauss quadrature.
+/// Returns the mass properties of the interior of a field. Interior cells are exact. In a cut cell
+/// the trilinear interpolant is linear along any grid direction: lines along the steepest one are
+/// cut exactly and summed by Gauss quadrature.
 pub(crate) fn of_field(field: &SampledField) -> Mass {
     let [nx, ny, nz] = field.dims();
     let middle = 0.5 * DVec3::new((nx - 1) as f64, (ny - 1) as f64, (nz - 1) as f64);
@@ -129,7 +129,7 @@ pub(crate) fn of_field(field: &SampledField) -> Mass {
     raw.finish(field.lower() + field.spacing() * middle, field.spacing())
 }
 
-/// Levels at the corners of a cell; bit 0 of the corner number is its x, bit 1 y, bit 2 z.
+/// Returns the levels at the corners of a cell; bits 0, 1 and 2 of the corner index are x, y and z.
 fn corner_values(field: &SampledField, i: usize, j: usize, k: usize) -> [f64; 8] {
     std::array::from_fn(|c| {
         let at = field.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2 & 1));
@@ -137,7 +137,7 @@ fn corner_values(field: &SampledField, i: usize, j: usize, k: usize) -> [f64; 8]
     })
 }
 
-/// Integrals over the inside of one unit cell whose lower corner is `corner`.
+/// Integrates over the interior of one unit cell with lower corner `corner`.
 fn cell(v: &[f64; 8], corner: DVec3) -> Raw {
     let inside = v.iter().filter(|v| **v < 0.0).count();
     if inside == 0 {
@@ -192,7 +192,7 @@ fn cell(v: &[f64; 8], corner: DVec3) -> Raw {
             first[along] = m1;
             let mut square = m0 * at * at;
             square[along] = m2;
-            // The coordinates are constant across the line but for the one along it.
+            // Only the coordinate along the line varies.
             let product = |i: usize, j: usize| {
                 if i == along {
                     m1 * at[j]
@@ -267,7 +267,7 @@ mod tests {
         assert!((third - DVec3::splat(1.0 / 120.0)).length() < 1e-15);
     }
 
-    /// An oblique plane cuts a half out of a box: exact for a linear field.
+    /// An oblique plane bisects a box: exact for a linear field.
     #[test]
     fn a_linear_field_is_integrated_exactly() {
         let normal = DVec3::new(0.2, 0.3, 0.9).normalize();

@@ -1,4 +1,4 @@
-//! The measured form of a grain.
+//! Morphology of a grain.
 
 use crate::mesh::TriangleMesh;
 use crate::{feret, hull};
@@ -6,11 +6,11 @@ use glam::DVec3;
 use serde::Serialize;
 use std::f64::consts::PI;
 
-/// Morphology, all from the shape's own surface.
+/// Morphology, measured on the surface of the shape.
 ///
-/// Reading used: a, b and c are the full extents of the body along its principal axes of
-/// inertia, sorted so that a >= b >= c. (Calipers read [`feret`](Self::feret), which differs by up
-/// to a few percent, most for near-equant grains, whose inertia axes are ill-defined.)
+/// The lengths a >= b >= c are the full extents along the principal axes of inertia, sorted. The
+/// Feret diameters ([`feret`](Self::feret)) differ by up to a few percent, most for near-equant
+/// grains with ill-defined inertia axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Morphology {
     /// Longest extent [m].
@@ -23,17 +23,17 @@ pub struct Morphology {
     pub area: f64,
     /// Krumbein sphericity, the cube root of b c / a^2 (Eq. 38).
     pub krumbein_sphericity: f64,
-    /// Wadell's true sphericity: area of the sphere of equal volume over the area.
+    /// Wadell's true sphericity: area of the sphere of equal volume divided by the surface area.
     pub wadell_sphericity: f64,
-    /// Wadell roundness (Eq. 39); none where the body is too slender to measure it, and in files
-    /// of version 1.
+    /// Wadell roundness (Eq. 39); `None` if the body is too slender to measure it, and in files of
+    /// version 1.
     pub wadell_roundness: Option<f64>,
-    /// Radius of the largest inscribed sphere [m]; none in files of version 1.
+    /// Radius of the largest inscribed sphere [m]; `None` in files of version 1.
     pub inscribed_radius: Option<f64>,
-    /// Caliper lengths [m]: the longest, the longest across it, and the one across both; none in
-    /// files of version 1.
+    /// Feret diameters [m]: the longest, the longest perpendicular to it, and the one perpendicular
+    /// to both; `None` in files of version 1.
     pub feret: Option<[f64; 3]>,
-    /// Volume over that of the convex hull.
+    /// Volume divided by that of the convex hull.
     pub convexity: Option<f64>,
 }
 
@@ -44,12 +44,12 @@ impl Morphology {
         volume: f64,
         area: f64,
     ) -> Morphology {
-        // The mesh is inscribed where the surface is convex: compare like with like.
+        // The mesh is inscribed where the surface is convex: use mesh volumes for the ratio.
         let own = mesh.signed_volume();
         let hull = hull::measure(&mesh.vertices);
         let convexity = hull.as_ref().map(|(hull, _)| (own / hull).min(1.0));
         let mut morphology = Self::new(extents, area, volume, convexity);
-        // Calipers touch the hull alone.
+        // Feret diameters depend on the hull only.
         let touched = hull.map_or_else(|| mesh.vertices.clone(), |(_, corners)| corners);
         morphology.feret = Some(feret::lengths(&touched));
         morphology
@@ -100,7 +100,7 @@ impl Morphology {
     }
 }
 
-/// The record that `grain info --json` prints.
+/// Morphology record, printed by `grain info --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Record {
     /// Volume [m^3].
@@ -117,27 +117,28 @@ pub struct Record {
     pub elongation: f64,
     /// Flatness c / b.
     pub flatness: f64,
-    /// Caliper lengths [m]: the longest, the longest across it, the one across both.
+    /// Feret diameters [m]: the longest, the longest perpendicular to it, the one perpendicular to
+    /// both.
     pub feret_m: Option<[f64; 3]>,
     /// Krumbein sphericity (Eq. 38).
     pub krumbein_sphericity: f64,
-    /// The same from the caliper lengths.
+    /// Krumbein sphericity (Eq. 38) from the Feret diameters.
     pub krumbein_sphericity_feret: Option<f64>,
     /// Wadell's true sphericity.
     pub wadell_sphericity: f64,
-    /// Wadell roundness (Eq. 39), null where not measured.
+    /// Wadell roundness (Eq. 39); null if not measured.
     pub wadell_roundness: Option<f64>,
-    /// Detail finer than this is not seen by the roundness [m].
+    /// Size of the smallest detail that the roundness resolves [m].
     pub roundness_cutoff_m: Option<f64>,
     /// Radius of the largest inscribed sphere [m].
     pub inscribed_radius_m: Option<f64>,
-    /// Volume over that of the convex hull, null where not measured.
+    /// Volume divided by that of the convex hull; null if not measured.
     pub convexity: Option<f64>,
     /// Surface area [m^2].
     pub surface_area_m2: f64,
     /// Principal second moments per unit density [m^5].
     pub inertia_m5: [f64; 3],
-    /// Radius of the smallest sphere about the centroid that holds the grain [m].
+    /// Radius of the smallest sphere about the centroid that contains the grain [m].
     pub bounding_radius_m: f64,
     /// Number of surface nodes.
     pub surface_nodes: usize,
@@ -147,19 +148,19 @@ pub struct Record {
     pub field_spacing_m: Option<f64>,
     /// 0.9 quantile of | |grad phi| - 1 | at the surface; null for an exact sphere.
     pub gradient_error: Option<f64>,
-    /// Relative difference of volume from the source; null where there is none.
+    /// Relative difference of the volume from that of the source; null without a source volume.
     pub volume_error: Option<f64>,
-    /// How the shape was made.
+    /// Origin of the shape: `analytic`, `mesh` or `scan`.
     pub method: String,
     /// Source file.
     pub source: String,
     /// SHA-256 of the source file.
     pub source_sha256: String,
-    /// Content hash of the shape.
+    /// Hash of the geometry.
     pub digest: String,
 }
 
-/// Area of the sphere of this volume [m^3] over this area [m^2].
+/// Returns the area of the sphere of this volume [m^3] divided by this area [m^2].
 fn wadell_sphericity(area: f64, volume: f64) -> f64 {
     PI.cbrt() * (6.0 * volume).powf(2.0 / 3.0) / area
 }

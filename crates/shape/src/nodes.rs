@@ -1,8 +1,8 @@
-//! Surface nodes: evenly spread, with the area that each stands for.
+//! Evenly distributed surface nodes with their areas.
 //!
-//! The surface is cut into many small samples. A Poisson-disc choice among them starts the
-//! nodes, a few rounds of Lloyd's relaxation (each node to the centroid of the samples nearest
-//! to it, then back onto the surface) even them out. A node's area is that of its samples.
+//! The surface is split into small samples. A Poisson-disc selection of samples initialises the
+//! nodes; a few iterations of Lloyd's relaxation (each node moves to the centroid of its nearest
+//! samples, then back onto the surface) even them out. The area of a node is that of its samples.
 
 use crate::field::SampledField;
 use crate::mesh::TriangleMesh;
@@ -10,9 +10,9 @@ use crate::shape::SurfaceNode;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Samples per node, about.
+/// Approximate number of samples per node.
 const SAMPLES_PER_NODE: f64 = 16.0;
-/// Rounds of relaxation.
+/// Number of relaxation iterations.
 const ROUNDS: usize = 8;
 
 /// A small piece of the surface.
@@ -22,13 +22,14 @@ struct Sample {
     area: f64,
 }
 
-/// About `count` nodes on the zero set of `field`, whose triangulation is `mesh`.
+/// Distributes about `count` nodes on the zero set of `field`, the triangulation of which is
+/// `mesh`.
 pub(crate) fn spread(field: &SampledField, mesh: &TriangleMesh, count: usize) -> Vec<SurfaceNode> {
     let samples = samples(mesh, mesh.area() / (SAMPLES_PER_NODE * count as f64));
     let area: f64 = samples.iter().map(|s| s.area).sum();
     let spacing = (area / count as f64).sqrt();
     let (lower, upper) = mesh.bounds();
-    // The nodes lie on the field's surface, which bulges a little beyond the mesh.
+    // The surface of the field bulges slightly beyond the mesh.
     let slack = DVec3::splat(field.spacing());
     let bounds = (lower - slack, upper + slack);
     let chosen = choose(&samples, bounds, spacing, count);
@@ -62,7 +63,7 @@ pub(crate) fn spread(field: &SampledField, mesh: &TriangleMesh, count: usize) ->
         .collect()
 }
 
-/// The point brought onto the zero set along the gradient.
+/// Projects the point onto the zero set along the gradient.
 pub(crate) fn project(field: &SampledField, mut x: DVec3) -> DVec3 {
     for _ in 0..30 {
         let (value, gradient) = field.distance_and_gradient(x);
@@ -70,14 +71,14 @@ pub(crate) fn project(field: &SampledField, mut x: DVec3) -> DVec3 {
         if value.abs() <= 1e-9 * field.spacing() || slope == 0.0 {
             break;
         }
-        // A step no longer than a cell: the gradient is only good nearby.
+        // The step is limited to one cell, the range in which the gradient is accurate.
         let step = (value / slope).clamp(-field.spacing(), field.spacing());
         x -= step / slope * gradient;
     }
     x
 }
 
-/// The triangles, cut in four until none is larger than `largest`.
+/// Subdivides the triangles into four until none is larger than `largest`.
 fn samples(mesh: &TriangleMesh, largest: f64) -> Vec<Sample> {
     let mut samples = Vec::new();
     for face in 0..mesh.triangles.len() {
@@ -116,7 +117,7 @@ fn samples(mesh: &TriangleMesh, largest: f64) -> Vec<Sample> {
     samples
 }
 
-/// Poisson-disc choice of about `count` samples: the disc is adjusted until the number fits.
+/// Selects about `count` Poisson-disc samples; the disc radius is adjusted until the number fits.
 fn choose(samples: &[Sample], bounds: (DVec3, DVec3), spacing: f64, count: usize) -> Vec<u32> {
     let order = shuffled(samples.len());
     let (mut low, mut high) = (0.55 * spacing, 0.95 * spacing);
@@ -137,7 +138,7 @@ fn choose(samples: &[Sample], bounds: (DVec3, DVec3), spacing: f64, count: usize
     best.unwrap_or_default()
 }
 
-/// Samples in shuffled order, each kept if none kept before is nearer than `radius`.
+/// Selects samples in shuffled order, each at least `radius` from all selected before.
 fn discs(samples: &[Sample], order: &[u32], bounds: (DVec3, DVec3), radius: f64) -> Vec<u32> {
     let mut grid = Buckets::new(bounds, radius);
     let mut kept = Vec::new();
@@ -156,7 +157,7 @@ fn discs(samples: &[Sample], order: &[u32], bounds: (DVec3, DVec3), radius: f64)
     kept
 }
 
-/// 0..n in an arbitrary but fixed order.
+/// Returns 0..n in an arbitrary but fixed order.
 fn shuffled(n: usize) -> Vec<u32> {
     let mut order: Vec<u32> = (0..n as u32).collect();
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
@@ -170,7 +171,7 @@ fn shuffled(n: usize) -> Vec<u32> {
     order
 }
 
-/// The node nearest to each sample, of those on the same side of the body.
+/// Assigns each sample to the nearest node on its side of the body.
 fn assign(
     field: &SampledField,
     samples: &[Sample],
@@ -189,8 +190,8 @@ fn assign(
     samples
         .par_iter()
         .map(|sample| {
-            // The least of (behind, squared distance, number): a node behind the sample, on the far
-            // side of a thin plate, comes last.
+            // Minimum of (behind, squared distance, index): a node behind the sample, on the far
+            // side of a thin plate, ranks last.
             let least = |best: (bool, f64, u32), n: u32| {
                 let squared = positions[n as usize].distance_squared(sample.position);
                 if !best.0 && squared > best.1 {
@@ -213,18 +214,18 @@ fn assign(
         .collect()
 }
 
-/// Points by cubic bucket, over a box that holds the body.
+/// Points in cubic buckets over a box that contains the body.
 struct Buckets {
     lower: DVec3,
     size: f64,
     dims: [usize; 3],
-    /// The last point of each bucket, a place in `chain`, or [`NONE`].
+    /// Last point of each bucket as an index into `chain`, or [`NONE`].
     heads: Vec<u32>,
-    /// Every point, with the one before it in its bucket.
+    /// All points, each with the preceding point of its bucket.
     chain: Vec<(u32, u32)>,
 }
 
-/// Stands for no point.
+/// Index of no point.
 const NONE: u32 = u32::MAX;
 
 impl Buckets {
@@ -243,7 +244,7 @@ impl Buckets {
 
     fn key(&self, x: DVec3) -> [usize; 3] {
         let s = ((x - self.lower) / self.size).to_array();
-        // Kept off the outermost layer, so that every bucket has all its neighbours.
+        // The outermost layer stays empty, so that every occupied bucket has all its neighbours.
         std::array::from_fn(|axis| (s[axis] as usize).clamp(1, self.dims[axis] - 2))
     }
 
@@ -258,7 +259,8 @@ impl Buckets {
         *head = (self.chain.len() - 1) as u32;
     }
 
-    /// Is it so of any item in the bucket of `x` and its 26 neighbours? Asked in a fixed order.
+    /// Returns whether `is_so` holds for any item in the bucket of `x` and its 26 neighbours,
+    /// tested in a fixed order.
     fn any_around(&self, x: DVec3, mut is_so: impl FnMut(u32) -> bool) -> bool {
         let [i, j, k] = self.key(x);
         for k in k - 1..=k + 1 {

@@ -1,4 +1,4 @@
-//! Pictures of grains.
+//! Rendered images of grains.
 
 use crate::Shape;
 use crate::error::{Result, ShapeError};
@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// An RGB picture, rows from the top.
+/// An RGB image, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Pixels along a row.
@@ -19,15 +19,15 @@ pub struct Picture {
 
 /// Background.
 const PAPER: [u8; 3] = [255, 255, 255];
-/// Colour of a grain in full light.
+/// Colour of a fully lit grain.
 const STONE: DVec3 = DVec3::new(222.0, 200.0, 165.0);
 /// Colour of a surface node.
 const NODE: [u8; 3] = [150, 30, 30];
-/// Colour of numbers.
+/// Colour of labels.
 const INK: [u8; 3] = [60, 60, 60];
-/// Pixels along the edge of a node or a dot of a digit.
+/// Edge length of a node marker and of a dot of a digit [pixels].
 const DOT: usize = 2;
-/// Rows of the digits, three dots each.
+/// Bitmaps of the digits, five rows of three dots.
 const DIGITS: [[u8; 5]; 10] = [
     [7, 5, 5, 5, 7],
     [2, 6, 2, 2, 7],
@@ -43,27 +43,27 @@ const DIGITS: [[u8; 5]; 10] = [
 /// Rays along the edge of a pixel.
 const RAYS: usize = 2;
 
-/// A direction of view: what points right and up in the picture, in the grain's frame.
+/// A viewing direction, given by the right and up directions of the image in the grain's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// Points right in the picture.
+    /// Direction to the right in the image.
     pub right: DVec3,
-    /// Points up in the picture.
+    /// Upward direction in the image.
     pub up: DVec3,
 }
 
 impl View {
-    /// Down the short axis: the broadest side, long axis to the right.
+    /// View along the short axis: the broadest side, long axis to the right.
     pub const BROAD: View = View {
         right: DVec3::X,
         up: DVec3::Y,
     };
-    /// Along the intermediate axis: long axis to the right, short axis up.
+    /// View along the intermediate axis: long axis to the right, short axis up.
     pub const SIDE: View = View {
         right: DVec3::X,
         up: DVec3::Z,
     };
-    /// Along the long axis.
+    /// View along the long axis.
     pub const END: View = View {
         right: DVec3::Y,
         up: DVec3::Z,
@@ -71,7 +71,7 @@ impl View {
 }
 
 impl Picture {
-    /// An empty picture.
+    /// Returns an empty image.
     pub fn blank(width: usize, height: usize) -> Picture {
         Picture {
             width,
@@ -80,7 +80,7 @@ impl Picture {
         }
     }
 
-    /// Puts another picture on this one, its upper left corner at column `x`, row `y`.
+    /// Copies another image into this one, with its upper left corner at column `x`, row `y`.
     pub fn paste(&mut self, other: &Picture, x: usize, y: usize) {
         let width = other.width.min(self.width.saturating_sub(x));
         for row in 0..other.height.min(self.height.saturating_sub(y)) {
@@ -104,8 +104,8 @@ impl Picture {
         written.map_err(|e| io(std::io::Error::other(e)))
     }
 
-    /// A grain seen along a direction, without perspective, lit from the upper left. The picture
-    /// is `pixels` wide and high and shows `width` [m]; with `nodes` the surface nodes are dots.
+    /// Renders a grain in orthographic projection, lit from the upper left. The image is `pixels`
+    /// wide and high and shows `width` [m]; with `nodes` the surface nodes are drawn as dots.
     pub fn of(shape: &Shape, view: View, pixels: usize, width: f64, nodes: bool) -> Picture {
         let towards_eye = view.right.cross(view.up);
         let light = (0.55 * towards_eye + 0.6 * view.up - 0.5 * view.right).normalize();
@@ -135,13 +135,14 @@ impl Picture {
         picture
     }
 
-    /// The three sides of a grain in a row: broad side, long side, end.
+    /// Renders three sides of a grain in a row: broad side, long side, end.
     pub fn three_sides(shape: &Shape, pixels: usize, nodes: bool) -> Picture {
         let width = 2.1 * shape.bounding_radius();
         Picture::sides(shape, DMat3::IDENTITY, pixels, width, nodes)
     }
 
-    /// The same of a grain in a frame that `turn` takes to its own; each side shows `width` [m].
+    /// Renders three sides in a frame that `turn` maps to the grain's own; each side shows `width`
+    /// [m].
     pub fn sides(shape: &Shape, turn: DMat3, pixels: usize, width: f64, nodes: bool) -> Picture {
         let mut picture = Picture::blank(3 * pixels, pixels);
         for (n, view) in [View::BROAD, View::SIDE, View::END].into_iter().enumerate() {
@@ -155,7 +156,7 @@ impl Picture {
         picture
     }
 
-    /// Pictures of equal size in rows of `columns`.
+    /// Arranges images of equal size in rows of `columns`.
     pub fn sheet(pictures: &[Picture], columns: usize) -> Picture {
         let columns = columns.clamp(1, pictures.len().max(1));
         let (width, height) = pictures.first().map_or((1, 1), |p| (p.width, p.height));
@@ -167,7 +168,7 @@ impl Picture {
         sheet
     }
 
-    /// The same with a number in its upper left corner.
+    /// Returns the image with a number in its upper left corner.
     pub fn numbered(mut self, number: u32) -> Picture {
         for (place, digit) in number.to_string().bytes().enumerate() {
             let rows = DIGITS[usize::from(digit - b'0')];
@@ -181,7 +182,7 @@ impl Picture {
         self
     }
 
-    /// A square of `DOT` pixels with this upper left corner.
+    /// Draws a square of `DOT` pixels with this upper left corner.
     fn dot(&mut self, x: usize, y: usize, colour: [u8; 3]) {
         for y in y..(y + DOT).min(self.height) {
             for x in x..(x + DOT).min(self.width) {
@@ -210,7 +211,7 @@ impl Picture {
     }
 }
 
-/// Normal where a ray meets the surface.
+/// Returns the normal at the point where a ray meets the surface.
 fn trace(shape: &Shape, from: DVec3, along: DVec3, reach: f64) -> Option<DVec3> {
     let close = 1e-4 * shape.bounding_radius();
     let mut t = 0.0;
@@ -219,7 +220,7 @@ fn trace(shape: &Shape, from: DVec3, along: DVec3, reach: f64) -> Option<DVec3> 
         if distance < close {
             return Some(gradient.normalize_or_zero());
         }
-        // A little less than the distance, which trilinear values may overestimate.
+        // Reduced step: trilinear values may overestimate the distance.
         t += 0.9 * distance;
         if t > reach {
             return None;
@@ -228,7 +229,7 @@ fn trace(shape: &Shape, from: DVec3, along: DVec3, reach: f64) -> Option<DVec3> 
     None
 }
 
-/// Diffuse light with a dark rim, so that light faces stand out against the paper.
+/// Diffuse light with a dark rim, so that light faces contrast with the background.
 fn shade(normal: DVec3, light: DVec3, towards_eye: DVec3) -> DVec3 {
     let lit = normal.dot(light).max(0.0);
     let rim = normal.dot(towards_eye).clamp(0.0, 1.0);
@@ -259,7 +260,7 @@ mod tests {
             ".........",
         ];
         assert_eq!(shown, wanted);
-        // What does not fit is left out.
+        // Digits that do not fit are omitted.
         Picture::blank(5, 5).numbered(12345);
     }
 }

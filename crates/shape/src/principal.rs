@@ -1,16 +1,16 @@
-//! Principal axes: deterministic order and signs.
+//! Principal axes with deterministic order and signs.
 
 use glam::{DMat3, DVec3};
 
-/// Eigenvalues (largest first) and unit eigenvectors (columns) of a symmetric matrix, by Jacobi
-/// rotations. Equal eigenvalues keep the axes they came with.
+/// Returns eigenvalues (largest first) and unit eigenvectors (columns) of a symmetric matrix, by
+/// Jacobi rotations. For equal eigenvalues the original axes are kept.
 pub(crate) fn symmetric_eigen(matrix: DMat3) -> (DVec3, DMat3) {
     let mut a = matrix.to_cols_array_2d();
     let mut v = DMat3::IDENTITY.to_cols_array_2d();
     for _ in 0..50 {
         let off = a[0][1].powi(2) + a[1][2].powi(2) + a[0][2].powi(2);
         let scale = a[0][0].powi(2) + a[1][1].powi(2) + a[2][2].powi(2);
-        // Below rounding noise, so that a symmetric body keeps the axes it was given.
+        // Threshold below rounding noise, so that a symmetric body keeps its given axes.
         if off <= 1e-24 * scale {
             break;
         }
@@ -25,7 +25,7 @@ pub(crate) fn symmetric_eigen(matrix: DMat3) -> (DVec3, DMat3) {
     (values, DMat3::from_cols(axes[0], axes[1], axes[2]))
 }
 
-/// One Jacobi rotation that clears entry (p, q); `v` holds the eigenvectors as rows.
+/// Applies one Jacobi rotation that zeroes entry (p, q); `v` holds the eigenvectors as rows.
 fn rotate(a: &mut [[f64; 3]; 3], v: &mut [[f64; 3]; 3], p: usize, q: usize) {
     if a[p][q] == 0.0 {
         return;
@@ -43,10 +43,10 @@ fn rotate(a: &mut [[f64; 3]; 3], v: &mut [[f64; 3]; 3], p: usize, q: usize) {
     }
 }
 
-/// Axes (columns) of the principal frame: x along the largest second moment (smallest moment of
-/// inertia), z along the smallest, right-handed. Of the two ends of x and of y, the positive one
-/// is that with the longer tail (positive third moment); where the body is symmetric, that with
-/// the larger source coordinate.
+/// Returns the axes (columns) of the principal frame: x along the largest second moment (smallest
+/// moment of inertia), z along the smallest, right-handed. The positive ends of x and y are those
+/// with the longer tail (positive third moment) or, for a symmetric body, with the larger source
+/// coordinate.
 pub(crate) fn axes(second: DMat3, volume: f64, third: impl Fn(DMat3) -> DVec3) -> DMat3 {
     let (values, eigen) = symmetric_eigen(second);
     let tails = third(eigen);

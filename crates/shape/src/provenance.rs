@@ -1,8 +1,8 @@
-//! Where a shape comes from.
+//! Provenance of a shape.
 
 use glam::{DQuat, DVec3};
 
-/// How a shape came to be. Holds no date, so that equal sources give equal files.
+/// Origin of a shape. It holds no date, so that equal sources give equal files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Provenance {
     /// `analytic`, `mesh` or `scan`.
@@ -11,15 +11,15 @@ pub struct Provenance {
     pub source: String,
     /// SHA-256 of the source file in hexadecimal, empty for analytic shapes.
     pub source_sha256: String,
-    /// Parameters by name, in the order they were applied.
+    /// Parameters by name, in order of application.
     pub parameters: Vec<(String, String)>,
     /// Version of the program that built the shape.
     pub program_version: String,
-    /// Place of the shape's centroid in the source's frame [m].
+    /// Position of the shape's centroid in the source's frame [m].
     pub centroid: DVec3,
     /// Rotation from the principal frame to the source's frame.
     pub rotation: DQuat,
-    /// Enlargement since it was built: x_source = centroid + rotation * x / scale.
+    /// Scale factor since construction: x_source = centroid + rotation * x / scale.
     pub scale: f64,
 }
 

@@ -1,22 +1,21 @@
-//! The gate that every sampled shape passes.
+//! Quality check of sampled shapes.
 
 use crate::error::{Result, ShapeError};
 use crate::field::SampledField;
 use crate::shape::SurfaceNode;
 use glam::{DMat3, DVec3};
 
-/// How good a sampled shape is.
+/// Measured quality of a sampled shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// Nine tenths of the surface have a gradient whose length differs from 1 by no more than
-    /// this.
+    /// 0.9 quantile of the deviation of the gradient length from 1 at the surface.
     pub gradient_error: f64,
-    /// Volume of the field against that of its source, relative; none where the source has no
-    /// exact volume.
+    /// Relative difference between the volumes of the field and of its source; `None` if the exact
+    /// source volume is unknown.
     pub volume_error: Option<f64>,
 }
 
-/// Bounds of the quality gate.
+/// Bounds of the quality check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QualityBounds {
     /// Largest [`Quality::gradient_error`].
@@ -60,7 +59,7 @@ impl QualityBounds {
     }
 }
 
-/// Measures the gradient one cell either side of the surface.
+/// Measures the gradient error at the nodes and one cell to either side of the surface.
 pub(crate) fn gradient_error(field: &SampledField, nodes: &[SurfaceNode]) -> f64 {
     let mut errors: Vec<f64> = nodes
         .iter()
@@ -82,7 +81,7 @@ pub(crate) fn gradient_error(field: &SampledField, nodes: &[SurfaceNode]) -> f64
         .unwrap_or(f64::NAN)
 }
 
-/// Refuses a frame that is not the principal one: off-diagonal second moments.
+/// Refuses a frame with off-diagonal second moments, hence not the principal frame.
 pub(crate) fn check_axes(second: &DMat3) -> Result<()> {
     let off = second
         .y_axis

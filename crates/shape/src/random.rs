@@ -1,12 +1,13 @@
-//! Random numbers that are the same on every machine for ever.
+//! Reproducible pseudo-random numbers.
 
 use glam::DVec3;
 
-/// SplitMix64 (Steele, Lea and Flood 2014).
+/// SplitMix64 (Steele, Lea and Flood 2014), kept instead of a crate because committed grains depend
+/// on its sequence bit for bit.
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// From a seed.
+    /// Creates a generator from a seed.
     pub(crate) fn new(seed: u64) -> Random {
         Random(seed)
     }
@@ -19,12 +20,13 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Evenly in 0..1.
+    /// Returns a uniformly distributed number in 0..1.
     pub(crate) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Evenly over all directions: a point of the unit ball by rejection, brought to length 1.
+    /// Returns a uniformly distributed direction: a point of the unit ball by rejection,
+    /// normalised.
     pub(crate) fn direction(&mut self) -> DVec3 {
         loop {
             let x = 2.0 * DVec3::new(self.unit(), self.unit(), self.unit()) - DVec3::ONE;

@@ -1,4 +1,4 @@
-//! The shape itself.
+//! The grain shape.
 
 use crate::error::{Result, positive};
 use crate::field::SampledField;
@@ -9,16 +9,16 @@ use crate::quality::Quality;
 use crate::{assemble, grain_file, roundness};
 use glam::DVec3;
 
-/// A point of the surface with the area it stands for.
+/// A surface point with the area that it represents.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceNode {
     /// Position in the principal frame [m].
     pub position: DVec3,
-    /// Share of the surface [m^2]; the shares add up to the surface area.
+    /// Area represented by the node [m^2]; the areas add up to the surface area.
     pub area: f64,
 }
 
-/// How the distance is represented.
+/// Representation of the distance.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Field {
@@ -44,8 +44,8 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Sphere of `radius` [m] with about `nodes` evenly spread surface nodes; its distance is
-    /// exact. [`analytic::sphere`](crate::analytic::sphere) refuses bad arguments.
+    /// Builds a sphere of `radius` [m] with about `nodes` evenly spread surface nodes and exact
+    /// distances. [`analytic::sphere`](crate::analytic::sphere) checks its arguments.
     pub fn sphere(radius: f64, nodes: usize) -> Shape {
         let volume = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
         let area = 4.0 * std::f64::consts::PI * radius * radius;
@@ -83,7 +83,7 @@ impl Shape {
         }
     }
 
-    /// Signed distance [m] at `x` (principal frame), negative inside.
+    /// Returns the signed distance [m] at `x` (principal frame), negative inside.
     #[inline]
     pub fn distance(&self, x: DVec3) -> f64 {
         match &self.field {
@@ -92,7 +92,8 @@ impl Shape {
         }
     }
 
-    /// Signed distance [m] at `x` where that is at most `limit`; a larger one may be infinite.
+    /// Returns the signed distance [m] at `x` if it is at most `limit`; a larger one may be
+    /// infinite.
     #[inline]
     pub fn distance_within(&self, x: DVec3, limit: f64) -> f64 {
         match &self.field {
@@ -101,9 +102,9 @@ impl Shape {
         }
     }
 
-    /// Signed distance [m] and its gradient (outward normal where |gradient| = 1) at `x`. On the
-    /// grid of a sampled field the gradient is that of the trilinear value, so its length is 1
-    /// only to the field's accuracy; off the grid it is a unit vector.
+    /// Returns signed distance [m] and gradient (outward normal where |gradient| = 1) at `x`. On
+    /// the grid of a sampled field the gradient is that of the trilinear interpolant and its length
+    /// is 1 to the accuracy of the field; off the grid it is a unit vector.
     #[inline]
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         match &self.field {
@@ -120,8 +121,9 @@ impl Shape {
         }
     }
 
-    /// The distances on a grid that is `margin` [m] wider than the bounding box, and `spacing` [m] fine or as the
-    /// shape's own, whose samples it then has, where that is not much finer (a tenth).
+    /// Samples the distance on a grid that exceeds the bounding box by `margin` [m]. The grid has
+    /// the spacing `spacing` [m], or the shape's own samples unless those are finer by more than a
+    /// tenth.
     pub fn distances(&self, spacing: f64, margin: f64) -> Result<SampledField> {
         match &self.field {
             Field::Sampled(own) if own.spacing() >= 0.9 * spacing => {
@@ -134,7 +136,7 @@ impl Shape {
         }
     }
 
-    /// How the distance is represented.
+    /// Representation of the distance.
     pub fn field(&self) -> &Field {
         &self.field
     }
@@ -158,7 +160,7 @@ impl Shape {
     pub fn upper(&self) -> DVec3 {
         self.upper
     }
-    /// Radius of the smallest sphere about the centroid that holds the shape [m].
+    /// Radius of the smallest sphere about the centroid that contains the shape [m].
     pub fn bounding_radius(&self) -> f64 {
         self.bounding_radius
     }
@@ -170,21 +172,21 @@ impl Shape {
     pub fn surface_area(&self) -> f64 {
         self.morphology.area
     }
-    /// Measured form.
+    /// Morphology.
     pub fn morphology(&self) -> &Morphology {
         &self.morphology
     }
-    /// What the quality gate measured; none for the exact sphere.
+    /// Measured quality; `None` for the exact sphere.
     pub fn quality(&self) -> Option<&Quality> {
         self.quality.as_ref()
     }
-    /// Where the shape comes from.
+    /// Origin of the shape.
     pub fn provenance(&self) -> &Provenance {
         &self.provenance
     }
 
-    /// The surface as a closed mesh in the principal frame [m]: positions and outward-facing
-    /// triangles.
+    /// Returns the surface as a closed mesh in the principal frame [m]: positions and
+    /// outward-facing triangles.
     pub fn surface_mesh(&self) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         let mesh = match &self.field {
             Field::Sphere(radius) => cube_sphere(24, |u| *radius * u),
@@ -193,7 +195,7 @@ impl Shape {
         (mesh.vertices, mesh.triangles)
     }
 
-    /// The shape enlarged by `factor`.
+    /// Returns the shape scaled by `factor`.
     pub fn scaled(&self, factor: f64) -> Result<Shape> {
         positive("factor", factor)?;
         let field = match &self.field {
@@ -220,19 +222,19 @@ impl Shape {
         })
     }
 
-    /// The shape enlarged so that its equivalent diameter is `diameter` [m].
+    /// Returns the shape scaled to the equivalent diameter `diameter` [m].
     pub fn scaled_to_equivalent_diameter(&self, diameter: f64) -> Result<Shape> {
         positive("equivalent diameter", diameter)?;
         self.scaled(diameter / self.equivalent_diameter())
     }
 
-    /// Hash of the geometry (field, nodes, mass properties) in hexadecimal: equal for equal
-    /// shapes, whatever their provenance.
+    /// Returns the hash of the geometry (field, nodes, mass properties) in hexadecimal: equal for
+    /// equal shapes, independent of their provenance.
     pub fn digest(&self) -> String {
         grain_file::digest(self)
     }
 
-    /// The record that the command line prints.
+    /// Returns the morphology record printed by the command line.
     pub fn record(&self) -> Record {
         let m = &self.morphology;
         let field = match &self.field {

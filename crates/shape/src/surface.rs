@@ -1,8 +1,8 @@
 //! The zero set of sampled values as a closed triangle mesh (marching cubes).
 //!
-//! The polygons of a cell are found by walking its faces rather than from a table: on every face
-//! the inside corners are kept apart, a rule that depends on the face alone, so that neighbours
-//! agree and the surface is a closed manifold wherever the border of the grid is outside.
+//! The polygons of a cell are found by traversing its faces instead of a table. Inside corners on a
+//! face are always separated; this rule depends on the face only, so that adjacent cells agree and
+//! the surface is a closed manifold if the border of the grid is outside.
 
 use crate::mesh::TriangleMesh;
 use glam::DVec3;
@@ -16,8 +16,8 @@ pub(crate) struct Samples<'a> {
     pub values: &'a [f32],
 }
 
-/// Corner numbers of the six faces, anticlockwise seen from outside the cell; bit 0 of a corner
-/// is its x, bit 1 its y, bit 2 its z.
+/// Corner indices of the six faces, counter-clockwise seen from outside the cell; bits 0, 1 and 2
+/// of a corner are its x, y and z.
 const FACES: [[u8; 4]; 6] = [
     [0, 4, 6, 2],
     [1, 3, 7, 5],
@@ -27,7 +27,7 @@ const FACES: [[u8; 4]; 6] = [
     [4, 5, 7, 6],
 ];
 
-/// Number of the cell edge between two neighbouring corners: axis * 4 + place.
+/// Returns the index of the cell edge between two adjacent corners: 4 * axis + position.
 fn edge(a: u8, b: u8) -> usize {
     let (low, axis) = (a.min(b), (a ^ b).trailing_zeros() as u8);
     let place = match axis {
@@ -38,7 +38,7 @@ fn edge(a: u8, b: u8) -> usize {
     usize::from(axis * 4 + place)
 }
 
-/// Lower corner and axis of a cell edge.
+/// Returns lower corner and axis of a cell edge.
 fn edge_ends(edge: usize) -> (u8, usize) {
     let (axis, place) = (edge / 4, (edge % 4) as u8);
     let low = match axis {
@@ -49,8 +49,8 @@ fn edge_ends(edge: usize) -> (u8, usize) {
     (low, axis)
 }
 
-/// Follows the crossings round the cell: after which edge comes which. `mask` has the bit of
-/// every inside corner set.
+/// Returns the successor of each crossed edge around the cell. `mask` has the bits of the inside
+/// corners set.
 fn walk(mask: u8) -> [Option<u8>; 12] {
     let mut next = [None; 12];
     let inside = |corner: u8| mask >> corner & 1 == 1;
@@ -70,10 +70,10 @@ fn walk(mask: u8) -> [Option<u8>; 12] {
     next
 }
 
-/// [`walk`] of every pattern of signs.
+/// Results of [`walk`] for all sign patterns.
 static WALKS: LazyLock<Vec<[Option<u8>; 12]>> = LazyLock::new(|| (0..=255).map(walk).collect());
 
-/// Closed surface where the values change sign; normals point to positive values.
+/// Extracts the closed surface where the values change sign; normals point to positive values.
 pub(crate) fn extract(samples: &Samples) -> TriangleMesh {
     let [nx, ny, nz] = samples.dims;
     let strides = [1, nx, nx * ny];
@@ -96,7 +96,7 @@ pub(crate) fn extract(samples: &Samples) -> TriangleMesh {
                 if mask == 0 || mask == 255 {
                     continue;
                 }
-                // The polygons of the cell, one after the other, and where each ends.
+                // The polygons of the cell, concatenated, and the end of each.
                 let (mut corners, mut ends) = ([0u32; 12], [0usize; 12]);
                 let (mut count, mut polygons) = (0, 0);
                 let mut next = WALKS[usize::from(mask)];
@@ -129,9 +129,9 @@ pub(crate) fn extract(samples: &Samples) -> TriangleMesh {
     mesh
 }
 
-/// The vertices on the edges that leave the samples of two neighbouring planes.
+/// Vertices on the edges from the samples of two adjacent planes.
 struct OnEdges {
-    /// Of the lower and of the upper plane, three a sample.
+    /// Vertices of the lower and of the upper plane, three per sample.
     planes: [Vec<Option<u32>>; 2],
     /// First sample of the lower plane.
     first: usize,
@@ -145,13 +145,13 @@ impl OnEdges {
         }
     }
 
-    /// The vertex on the edge from sample `low` along `axis`.
+    /// Returns the vertex on the edge from sample `low` along `axis`.
     fn entry(&mut self, low: usize, axis: usize) -> &mut Option<u32> {
         let (at, plane) = (3 * (low - self.first) + axis, self.planes[0].len());
         &mut self.planes[at / plane][at % plane]
     }
 
-    /// One plane up.
+    /// Advances by one plane.
     fn rise(&mut self) {
         self.planes.swap(0, 1);
         self.planes[1].fill(None);
@@ -159,8 +159,8 @@ impl OnEdges {
     }
 }
 
-/// Where the value crosses zero between a sample and the next along `axis`. Kept a hair off the
-/// samples, so that no triangle loses its area.
+/// Returns the zero crossing between a sample and the next along `axis`, kept slightly off the
+/// samples so that no triangle is degenerate.
 fn crossing(samples: &Samples, low: usize, axis: usize, strides: [usize; 3]) -> DVec3 {
     let a = f64::from(samples.values[low]);
     let b = f64::from(samples.values[low + strides[axis]]);
@@ -174,8 +174,8 @@ fn crossing(samples: &Samples, low: usize, axis: usize, strides: [usize; 3]) -> 
     samples.lower + samples.spacing * s
 }
 
-/// Triangles and quadrilaterals as they are, larger polygons from their centre: a diagonal of
-/// those could lie in a cell face and coincide with the neighbour's.
+/// Adds triangles and quadrilaterals as they are, and larger polygons as fans about their centre: a
+/// diagonal could lie in a cell face and coincide with that of the adjacent cell.
 fn fill(mesh: &mut TriangleMesh, polygon: &[u32]) {
     match *polygon {
         [a, b, c] => mesh.triangles.push([a, b, c]),
@@ -235,7 +235,7 @@ mod tests {
         );
     }
 
-    /// Every pattern of signs, ambiguous ones included.
+    /// All sign patterns, including ambiguous ones.
     #[test]
     fn noise_gives_a_closed_manifold() {
         let n = 14;

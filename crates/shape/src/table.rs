@@ -1,10 +1,10 @@
-//! Tables of grains (CSV, SI units).
+//! Tables of grain measures (CSV, SI units).
 
 use crate::Record;
 use crate::error::{Result, ShapeError};
 use std::path::Path;
 
-/// Columns after the name of the grain.
+/// Columns after the grain name.
 const COLUMNS: [&str; 19] = [
     "volume_m3",
     "equivalent_diameter_m",
@@ -27,8 +27,8 @@ const COLUMNS: [&str; 19] = [
     "inertia_z_m5",
 ];
 
-/// Writes one row for each grain: its name, its measures, and `more` columns of that many numbers; what is not
-/// measured stays empty.
+/// Writes one row per grain: its name, its measures, and the columns `more` (name and one value per
+/// grain). Values that were not measured are left empty.
 pub fn write_table(
     path: &Path,
     rows: &[(String, Record)],

@@ -1,4 +1,4 @@
-//! Ellipsoid, by its true distance.
+//! Ellipsoid with its exact Euclidean distance.
 
 use super::sorted;
 use crate::assemble::{Body, assemble};
@@ -8,7 +8,7 @@ use crate::roundness::Surface;
 use crate::{Shape, ShapeOptions};
 use glam::DVec3;
 
-/// Ellipsoid with the given semi-axes [m], in any order.
+/// Builds an ellipsoid with the given semi-axes [m], in any order.
 pub fn ellipsoid(a: f64, b: f64, c: f64, options: &ShapeOptions) -> Result<Shape> {
     let [a, b, c] = sorted(["a", "b", "c"], [a, b, c])?;
     let axes = DVec3::new(a, b, c);
@@ -28,9 +28,9 @@ pub fn ellipsoid(a: f64, b: f64, c: f64, options: &ShapeOptions) -> Result<Shape
     assemble(&body, provenance, options)
 }
 
-/// Signed distance from `x` to the ellipsoid with semi-axes `axes`, sorted a >= b >= c: the
-/// nearest point is the root of a monotone function of one variable (Eberly, Distance from a
-/// Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid, 2013), here bracketed and bisected.
+/// Returns the signed distance from `x` to the ellipsoid with semi-axes `axes`, sorted a >= b >= c.
+/// The nearest point is the root of a monotone function of one variable (Eberly, Distance from a
+/// Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid, 2013), bracketed and bisected.
 pub(crate) fn distance(axes: DVec3, x: DVec3) -> f64 {
     let y = x.abs();
     let c = axes.z;
@@ -50,7 +50,7 @@ pub(crate) fn distance(axes: DVec3, x: DVec3) -> f64 {
     sign * nearest.distance(y)
 }
 
-/// Foot of the normal from a point with y.z > 0.
+/// Returns the foot of the normal from a point with y.z > 0.
 fn foot(axes: DVec3, y: DVec3, r: DVec3, z: DVec3) -> DVec3 {
     let value = |s: f64| (r * z / (DVec3::splat(s) + r)).length_squared() - 1.0;
     let (mut low, mut high) = (z.z - 1.0, (r * z).length() - 1.0);
@@ -70,7 +70,7 @@ fn foot(axes: DVec3, y: DVec3, r: DVec3, z: DVec3) -> DVec3 {
         }
     }
     let nearest = r * y / (DVec3::splat(s) + r);
-    // Scaled back onto the surface: bisection ends a rounding step away.
+    // Rescale onto the surface: bisection stops one rounding step away from it.
     let length = (nearest / axes).length();
     if length > 0.0 {
         nearest / length
@@ -79,8 +79,8 @@ fn foot(axes: DVec3, y: DVec3, r: DVec3, z: DVec3) -> DVec3 {
     }
 }
 
-/// Foot from a point in the plane of the two longer axes, z = 0. Within the focal region the
-/// foot leaves the plane.
+/// Returns the foot of a point in the plane of the two longer axes, z = 0. Within the focal region
+/// the foot leaves that plane.
 fn foot_in_plane(axes: DVec3, y: DVec3) -> DVec3 {
     let squares = axes * axes;
     let mut unit = DVec3::ZERO;
@@ -132,8 +132,8 @@ fn foot_in_plane(axes: DVec3, y: DVec3) -> DVec3 {
 mod tests {
     use super::*;
 
-    /// The nearest of many surface points bounds the distance from above, and the foot's normal
-    /// must point at the query.
+    /// The nearest of densely sampled surface points bounds the distance from above, and the normal
+    /// at the foot points at the query point.
     #[test]
     fn distance_agrees_with_brute_force() {
         let axes = DVec3::new(1.5, 1.0, 0.6);

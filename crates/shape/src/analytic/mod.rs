@@ -1,5 +1,5 @@
-//! Shapes in closed form: exact distances (the superquadric's to a fine mesh), sampled in the
-//! principal frame; the sphere stays exact.
+//! Closed-form shapes. Distances are exact (for the superquadric: exact to a fine mesh) and sampled
+//! in the principal frame; the sphere stays analytic.
 
 mod ellipsoid;
 mod solids;
@@ -12,10 +12,10 @@ pub use solids::{capsule, cylinder, rounded_box, superquadric};
 use crate::error::{Result, ShapeError, positive};
 use crate::{Shape, ShapeOptions};
 
-/// Nodes of a sphere where none are asked for: one in every (diameter / 20)^2 of surface.
+/// Default node count of a sphere: one node per (diameter / 20)^2 of surface.
 const SPHERE_NODES: usize = 1257;
 
-/// Sphere of `radius` [m].
+/// Builds a sphere of `radius` [m].
 pub fn sphere(radius: f64, options: &ShapeOptions) -> Result<Shape> {
     positive("radius", radius)?;
     let nodes = options.nodes.unwrap_or(SPHERE_NODES);
@@ -30,7 +30,7 @@ pub fn sphere(radius: f64, options: &ShapeOptions) -> Result<Shape> {
     Ok(Shape::sphere(radius, nodes))
 }
 
-/// Three lengths, longest first, so that x, y, z are the principal axes in their order.
+/// Sorts three lengths in descending order, so that x, y and z are the principal axes in order.
 fn sorted(names: [&'static str; 3], lengths: [f64; 3]) -> Result<[f64; 3]> {
     for (name, length) in names.into_iter().zip(lengths) {
         positive(name, length)?;

@@ -10,8 +10,8 @@ use crate::{Shape, ShapeOptions};
 use glam::{DVec2, DVec3, Vec3Swizzles};
 use std::f64::consts::PI;
 
-/// Box with the given full edge lengths [m], in any order, its edges and corners rounded to
-/// `radius` [m] (0 for a sharp box); the outer dimensions are the lengths given.
+/// Builds a box with the given full edge lengths [m], in any order. Edges and corners are rounded
+/// to `radius` [m] (0 for a sharp box); rounding keeps the outer dimensions.
 pub fn rounded_box(
     length: f64,
     width: f64,
@@ -31,7 +31,7 @@ pub fn rounded_box(
     let half = 0.5 * DVec3::from_array(lengths);
     let core = half - DVec3::splat(radius);
     let edges = 2.0 * core;
-    // Steiner's formula for the box grown by a ball.
+    // Steiner's formula for the inner box dilated by a ball.
     let faces = 2.0 * (edges.x * edges.y + edges.y * edges.z + edges.z * edges.x);
     let volume = edges.element_product()
         + radius * faces
@@ -58,8 +58,8 @@ pub fn rounded_box(
     assemble(&body, provenance, options)
 }
 
-/// Circular cylinder of `radius` and `length` [m]; its axis is x where it is long, z where it is
-/// a disc (length under sqrt(3) radii), as the order of the principal moments demands.
+/// Builds a circular cylinder of `radius` and `length` [m]. Its axis is x for a rod and z for a
+/// disc (length below sqrt(3) radii), following the order of the principal moments.
 pub fn cylinder(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shape> {
     positive("radius", radius)?;
     positive("length", length)?;
@@ -89,8 +89,8 @@ pub fn cylinder(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shap
     assemble(&body, provenance, options)
 }
 
-/// Cylinder of `radius` and `length` [m] with a hemisphere on either end (total length
-/// `length` + 2 `radius`), along x.
+/// Builds a cylinder of `radius` and `length` [m] along x with a hemisphere at either end (total
+/// length `length` + 2 `radius`).
 pub fn capsule(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shape> {
     positive("radius", radius)?;
     positive("length", length)?;
@@ -116,10 +116,10 @@ pub fn capsule(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shape
 /// Quadrilaterals along each edge of the cube from which a superquadric is meshed.
 const FACETS: usize = 72;
 
-/// Superquadric (Barr 1981)
-/// ((|x/a|^(2/e2) + |y/b|^(2/e2))^(e2/e1) + |z/c|^(2/e1) = 1 with semi-axes a, b, c [m]:
-/// e1 = e2 = 1 is the ellipsoid, small exponents approach a box, 2 an octahedron. Distances are
-/// those to a fine mesh of it, whose corners are exact.
+/// Builds the superquadric (Barr 1981) (|x/a|^(2/e2) + |y/b|^(2/e2))^(e2/e1) + |z/c|^(2/e1) = 1
+/// with semi-axes a, b, c [m]. Exponents e1 = e2 = 1 give the ellipsoid, small ones approach a box,
+/// and 2 gives an octahedron. Distances refer to a fine mesh with its vertices on the exact
+/// surface.
 pub fn superquadric(
     semi_axes: [f64; 3],
     e1: f64,
@@ -205,14 +205,14 @@ mod tests {
         assert!((pill.distance(DVec3::new(2.5, 0.0, 0.0)) - 0.5).abs() < 5e-3);
         let ball = superquadric([1.0, 1.0, 1.0], 1.0, 1.0, &options()).unwrap();
         close(ball.volume(), 4.0 / 3.0 * PI, 4e-3);
-        // Exponents of 0.1 come close to the cube; b is the longest axis and becomes x.
+        // Exponents of 0.1 approximate a cube; b is the longest axis and becomes x.
         let brick = superquadric([1.0, 2.0, 0.9], 0.1, 0.1, &options()).unwrap();
         assert!(brick.volume() > 0.97 * 8.0 * 1.8 && brick.volume() < 8.0 * 1.8);
         close(brick.upper().x, 2.0, 3e-3);
         assert!(matches!(brick.field(), Field::Sampled(_)));
     }
 
-    /// Edges along the grid of the field, which cuts them off, and of the roundness.
+    /// Edges aligned with the grids of the field (which truncates them) and of the roundness.
     #[test]
     fn sharp_bodies_have_their_area_and_no_roundness() {
         let bodies = [

@@ -1,13 +1,13 @@
 //! A convex body with curved faces: the intersection of balls.
 //!
-//! The nearest point of the intersection is the foot on one ball, on the circle where two meet,
-//! or the point where three meet, so its distance is exact. Eroding the body by r takes r off
-//! every radius; growing it by a ball of radius r puts r between the distance and the surface.
+//! The nearest point of the intersection is the foot on one ball, on the circle where two meet, or
+//! the point where three meet; its distance is exact. Eroding the body by r subtracts r from every
+//! radius; dilating it by a ball of radius r subtracts r from the distance.
 
 use crate::inscribed::deepest;
 use glam::DVec3;
 
-/// Points that violate a ball by less than this share of the largest radius still count as in it.
+/// Tolerance for containment in a ball, relative to the largest radius.
 const TOLERANCE: f64 = 1e-10;
 
 /// One face of the body: part of the surface of this ball.
@@ -17,7 +17,7 @@ pub(super) struct Ball {
     pub radius: f64,
 }
 
-/// The circle in which two balls meet.
+/// The circle in which the surfaces of two balls meet.
 #[derive(Clone, Copy, Debug)]
 struct Circle {
     centre: DVec3,
@@ -26,7 +26,7 @@ struct Circle {
     balls: [usize; 2],
 }
 
-/// Intersection of balls, with the edges and corners that lie on its surface.
+/// Intersection of balls, with the edges and corners on its surface.
 #[derive(Clone, Debug)]
 pub(super) struct Core {
     balls: Vec<Ball>,
@@ -53,20 +53,20 @@ impl Circle {
         })
     }
 
-    /// Point of the circle nearest to `x`.
+    /// Returns the point of the circle nearest to `x`.
     fn foot(&self, x: DVec3) -> DVec3 {
         let reach = x - self.centre;
         self.towards(reach)
     }
 
-    /// Point of the circle farthest along `u`.
+    /// Returns the point of the circle farthest along `u`.
     fn towards(&self, u: DVec3) -> DVec3 {
         let across = u - self.axis * self.axis.dot(u);
         let across = across.try_normalize();
         self.centre + self.radius * across.unwrap_or_else(|| self.axis.any_orthonormal_vector())
     }
 
-    /// The two points that lie on a third ball too.
+    /// Returns the two points of the circle that also lie on a third ball.
     fn meet(&self, ball: Ball) -> Option<[DVec3; 2]> {
         let e = self.axis.any_orthonormal_vector();
         let f = self.axis.cross(e);
@@ -112,7 +112,7 @@ impl Core {
                         }
                     }
                 }
-                // A whole circle has no corner: any of its points will tell.
+                // A complete circle has no corner: any of its points is representative.
                 if on_surface || core.holds(circle.towards(DVec3::X), &[i, j]) {
                     core.edges.push(circle);
                 }
@@ -121,7 +121,7 @@ impl Core {
         core
     }
 
-    /// Do all balls but those named hold the point?
+    /// Returns whether all balls except `but` contain the point.
     fn holds(&self, x: DVec3, but: &[usize]) -> bool {
         self.balls.iter().enumerate().all(|(n, ball)| {
             let reach = ball.radius + self.slack;
@@ -129,7 +129,7 @@ impl Core {
         })
     }
 
-    /// Signed distance [m] of the intersection, and the outward direction there.
+    /// Returns the signed distance [m] of the intersection and its outward unit gradient.
     pub(super) fn distance(&self, x: DVec3) -> (f64, DVec3) {
         let mut depth = (f64::NEG_INFINITY, DVec3::ZERO);
         for ball in &self.balls {
@@ -148,7 +148,7 @@ impl Core {
             let length = reach.length();
             if length > ball.radius {
                 let foot = ball.centre + reach * (ball.radius / length);
-                // The nearest point of a ball that holds the body, if in the body, is the body's.
+                // If the nearest point of a ball lies in the body, it is the body's nearest point.
                 if self.holds(foot, &[n]) {
                     return (length - ball.radius, reach / length);
                 }
@@ -171,7 +171,7 @@ impl Core {
         (distance, (x - best.1) / distance)
     }
 
-    /// How far the body reaches along the unit vector `u` [m].
+    /// Returns the support function of the body along the unit vector `u` [m].
     pub(super) fn support(&self, u: DVec3) -> f64 {
         let mut reach = f64::NEG_INFINITY;
         let mut offer = |x: DVec3, balls: &[usize]| {
@@ -192,7 +192,7 @@ impl Core {
     }
 }
 
-/// Centre and radius of the largest ball in an intersection of balls.
+/// Returns centre and radius of the largest ball in an intersection of balls.
 pub(super) fn inscribed(balls: &[Ball], start: DVec3, reach: f64) -> (DVec3, f64) {
     let depth = |x: DVec3| {
         balls
@@ -224,7 +224,7 @@ mod tests {
             .collect()
     }
 
-    /// Against the slow truth: alternating projections with Dykstra's correction.
+    /// Compares with a slow reference: alternating projections with Dykstra's correction.
     #[test]
     fn the_distance_is_that_of_the_nearest_point() {
         let balls = stone();
@@ -268,7 +268,7 @@ mod tests {
             .collect();
         depths.sort_by(f64::total_cmp);
         assert!(depths[2] - radius < 1e-7, "{depths:?}");
-        // No place nearby is deeper.
+        // No random point nearby is deeper.
         let mut random = Random::new(2);
         for _ in 0..300 {
             assert!(core.distance(centre + 0.05 * random.direction()).0 >= -radius);

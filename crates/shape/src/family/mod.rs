@@ -1,10 +1,10 @@
-//! Grains of given sphericity and roundness.
+//! Generated grains of given sphericity and roundness.
 //!
-//! A stone is a random convex polytope with gently bulging faces (an intersection of balls),
-//! eroded by r and grown again by a ball of radius r: every edge and corner then has the radius
-//! r, and the largest inscribed sphere keeps its radius R_in, so that Wadell's roundness (Eq. 39)
-//! is r / R_in by construction. Its proportions are adjusted until the extents along its own
-//! principal axes have the ratios asked for, which sets Krumbein's sphericity (Eq. 38). The
+//! A generated grain (`Stone`) is a random convex polytope with slightly bulging faces (an
+//! intersection of balls), eroded by r and dilated by a ball of radius r. Every edge and corner
+//! then has the radius r, and the largest inscribed sphere keeps its radius R_in, so that Wadell's
+//! roundness (Eq. 39) is r / R_in by construction. The proportions are iterated until the extents
+//! along the principal axes have the target ratios, which set Krumbein's sphericity (Eq. 38). The
 //! distance is exact.
 
 mod core;
@@ -18,22 +18,22 @@ use crate::roundness::Surface;
 use crate::{Shape, ShapeOptions};
 use glam::{DMat3, DQuat, DVec3};
 
-/// What a grain of a family is to be.
+/// Target measures of a generated grain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FamilyTarget {
     /// Krumbein sphericity S (Eq. 38), 0.3 to 0.97.
     pub sphericity: f64,
     /// Wadell roundness R (Eq. 39), 0.05 to 0.95.
     pub roundness: f64,
-    /// Flatness c / b: 1 for rods and balls, small for plates, but no less than S^3.
+    /// Flatness c / b: 1 for rods and balls, small for plates, and at least S^3.
     pub flatness: f64,
     /// Diameter of the sphere of equal volume [m].
     pub equivalent_diameter: f64,
 }
 
 impl FamilyTarget {
-    /// A grain of this sphericity, roundness and equivalent diameter [m], with c / b = 0.8, or more
-    /// where the sphericity demands it.
+    /// Returns a target of this sphericity, roundness and equivalent diameter [m] with c / b = 0.8,
+    /// or more if the sphericity requires it.
     pub fn new(sphericity: f64, roundness: f64, equivalent_diameter: f64) -> FamilyTarget {
         FamilyTarget {
             sphericity,
@@ -76,7 +76,7 @@ impl FamilyTarget {
                 });
             }
         }
-        // S^3 = (b/a) (c/a), and b is no longer than a. The slack is for decimals.
+        // S^3 = (b/a) (c/a) with b <= a; the tolerance admits decimal rounding.
         if self.flatness < self.sphericity.powi(3) - 1e-6 {
             return Err(ShapeError::BadParameter {
                 name: "flatness",
@@ -88,7 +88,7 @@ impl FamilyTarget {
     }
 }
 
-/// Resolution that shows the edges of a grain of low roundness: 22 cells across the shortest
+/// Returns the resolution that resolves edges of low roundness: 22 cells across the shortest
 /// extent.
 pub fn family_options() -> ShapeOptions {
     ShapeOptions {
@@ -98,22 +98,21 @@ pub fn family_options() -> ShapeOptions {
     }
 }
 
-/// The initial orientation `number` (1 to 4) of the morphology study: body to space, z up.
+/// Returns the initial orientation `number` (1 to 4) of the morphology study: body to space, z up.
 ///
-/// Number 1 has the long axis along z and the short axis along x; the others follow by turns of
-/// 45 degrees about y, so that number 3 has the long axis along x and the broad side, that seen
-/// down the short axis, across z (the paper's Fig. 5).
+/// Number 1 has the long axis along z and the short axis along x. The others follow by rotations of
+/// 45 degrees about y: number 3 has the long axis along x and the broad side, seen along the short
+/// axis, normal to z (Fig. 5 of the paper).
 pub fn study_orientation(number: u32) -> DQuat {
     let upright = DMat3::from_cols(DVec3::Z, DVec3::NEG_Y, DVec3::X);
     let angle = f64::from(number.saturating_sub(1)) * std::f64::consts::FRAC_PI_4;
     DQuat::from_rotation_y(angle) * DQuat::from_mat3(&upright)
 }
 
-/// Attempts with other random faces before giving up.
+/// Attempts with other random faces before the search fails.
 const ATTEMPTS: u64 = 50;
 
-/// One grain of a family. The same target and seed give the same grain, whatever else a family
-/// holds.
+/// Generates one grain. Equal targets and seeds give equal grains.
 pub fn family_grain(target: &FamilyTarget, seed: u64, options: &ShapeOptions) -> Result<Shape> {
     target.check()?;
     let cube = target.sphericity.powi(3);

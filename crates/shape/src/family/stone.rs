@@ -6,24 +6,24 @@ use crate::principal;
 use crate::random::Random;
 use glam::{DMat3, DVec3};
 
-/// Faces of a stone, fewest and most.
+/// Minimum and maximum number of faces.
 const FACES: (u64, u64) = (13, 20);
-/// Rounds of repulsion that spread the faces: few, so that large and small ones remain.
+/// Repulsion iterations that spread the faces; few, so that face sizes vary.
 const ROUNDS: usize = 4;
-/// Offsets of the faces vary by this share.
+/// Relative variation of the face offsets.
 const UNEVEN: f64 = 0.16;
-/// Radius of a face over its own reach: the higher, the flatter.
+/// Radius of a face relative to its own extent; larger is flatter.
 const FLATNESS: f64 = 4.0;
-/// Twice the height of a face's bulge over the depth of the stone, at most.
+/// Upper bound of twice the bulge height of a face relative to the depth of the stone.
 const BULGE: f64 = 0.6;
-/// Least radius of a face over the reach of the stone: its ball must hold the far end too. So
-/// no face counts as a corner either, for its radius is well above the inscribed sphere's.
+/// Minimum radius of a face relative to the extent of the stone: its ball must contain the opposite
+/// end. The radius exceeds that of the inscribed sphere, so that no face counts as a corner.
 const LEAST: f64 = 2.0;
-/// Relative error of the proportions at which the search ends.
+/// Relative tolerance of the proportions.
 const CLOSE: f64 = 2e-4;
-/// Power of the correction: less than 1, for the faces' bulges follow their size.
+/// Exponent of the correction; below 1 because the bulges scale with the faces.
 const CAUTION: f64 = 0.7;
-/// Rounds of the search.
+/// Maximum number of iterations.
 const SEARCH: usize = 60;
 
 /// Half-space n . x <= h.
@@ -46,8 +46,8 @@ pub(super) struct Stone {
     pub faces: usize,
 }
 
-/// A stone whose extents along its principal axes have the ratios `shape` = (1, b/a, c/a), or
-/// none where the search does not settle.
+/// Generates a stone whose extents along its principal axes have the ratios `shape` = (1, b/a,
+/// c/a), or `None` if the iteration does not converge.
 pub(super) fn stone(shape: DVec3, roundness: f64, random: &mut Random) -> Option<Stone> {
     let mut planes = faces(random);
     for plane in &mut planes {
@@ -68,7 +68,7 @@ pub(super) fn stone(shape: DVec3, roundness: f64, random: &mut Random) -> Option
         let extent = upper - lower;
         let wrong = extent.x * shape / extent;
         if fine && (wrong - DVec3::ONE).abs().max_element() < CLOSE {
-            // The frame of the planes is the principal one to this accuracy: move there.
+            // The principal frame is known to this accuracy: transform the planes to it.
             let planes: Vec<Plane> = planes
                 .iter()
                 .map(|p| p.mapped(mass.centroid, axes, DVec3::ONE))
@@ -91,7 +91,7 @@ pub(super) fn stone(shape: DVec3, roundness: f64, random: &mut Random) -> Option
     None
 }
 
-/// Planes around the origin: directions at random, pushed apart a little, at uneven distances.
+/// Returns planes around the origin with random, slightly repelled directions and varied distances.
 fn faces(random: &mut Random) -> Vec<Plane> {
     let count = FACES.0 + random.next() % (FACES.1 - FACES.0 + 1);
     let mut normals: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
@@ -114,7 +114,8 @@ fn faces(random: &mut Random) -> Vec<Plane> {
 }
 
 impl Plane {
-    /// The plane in the frame with this origin and axes, then stretched along its axes.
+    /// Transforms the plane to the frame with this origin and axes, then stretches it along the
+    /// axes.
     fn mapped(self, origin: DVec3, axes: DMat3, stretch: DVec3) -> Plane {
         let normal = (axes.transpose() * self.normal) / stretch;
         let length = normal.length();
@@ -190,8 +191,8 @@ impl Built {
         })
     }
 
-    /// Distances of the surface from the inscribed sphere's centre along `count` directions
-    /// spread evenly over the sphere (a golden spiral).
+    /// Returns the distances of the surface from the centre of the inscribed sphere along `count`
+    /// evenly spread directions (a golden spiral).
     fn radii(&self, count: usize) -> impl Iterator<Item = (DVec3, f64)> + '_ {
         let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
         (0..count).map(move |n| {
@@ -199,7 +200,8 @@ impl Built {
             let (s, c) = (golden * n as f64).sin_cos();
             let ring = (1.0 - z * z).sqrt();
             let u = DVec3::new(ring * c, ring * s, z);
-            // Newton from outside: the distance is convex, so it never passes the surface.
+            // Newton's method from outside: the distance is convex, so the iteration never
+            // overshoots.
             let mut t = self.reach;
             for _ in 0..40 {
                 let (distance, outward) = self.core.distance(self.centre + t * u);
@@ -230,7 +232,8 @@ impl Built {
         }
     }
 
-    /// Integrals of (x . axis)^3 about `origin`; coarse, for they only tell two ends apart.
+    /// Returns the integrals of (x . axis)^3 about `origin`. Low accuracy suffices to distinguish
+    /// the ends of an axis.
     fn third_moments(&self, origin: DVec3, axes: DMat3) -> DVec3 {
         let count = 2_000;
         let share = 4.0 * std::f64::consts::PI / count as f64;
@@ -249,7 +252,7 @@ impl Built {
     }
 }
 
-/// Corners of the polytope, each with the three planes that meet in it.
+/// Returns the corners of the polytope, each with the three planes that meet in it.
 fn corners(planes: &[Plane]) -> Vec<(DVec3, [usize; 3])> {
     let mut found = Vec::new();
     for i in 0..planes.len() {

@@ -1,4 +1,5 @@
-//! Little-endian encoding of the few types that the file needs.
+//! Little-endian encoding primitives: scalars, length-prefixed byte strings and bounds-checked
+//! reads. Independent of shapes, except for the vector type.
 
 use glam::DVec3;
 
@@ -24,7 +25,7 @@ impl Encoder {
         self.u8(u8::from(v.is_some()));
         self.f64(v.unwrap_or(0.0));
     }
-    /// Length, then the bytes.
+    /// Appends the length as u64, then the bytes.
     pub(super) fn bytes(&mut self, v: &[u8]) {
         self.0.extend_from_slice(&(v.len() as u64).to_le_bytes());
         self.0.extend_from_slice(v);
@@ -37,7 +38,8 @@ impl Encoder {
     }
 }
 
-/// Reads what [`Encoder`] wrote; none where the bytes run out or make no sense.
+/// Bounds-checked reader of the output of [`Encoder`]. Methods return `None` at the end of the data
+/// and for invalid values.
 pub(super) struct Decoder<'a>(&'a [u8]);
 
 impl<'a> Decoder<'a> {

@@ -1,16 +1,16 @@
-//! The levels of a field, packed: differences against the Lorenzo predictor (exact where the
-//! field is a sum of functions of two coordinates each, so small where it is smooth), as
-//! variable-length integers, deflated.
+//! Compression of the integer levels of a field: differences from the Lorenzo predictor (exact for
+//! sums of functions of two coordinates each, hence small in smooth fields), as variable-length
+//! integers, deflated.
 
 use flate2::Compression;
 use flate2::read::ZlibDecoder;
 use flate2::write::ZlibEncoder;
 use std::io::{Read, Write};
 
-/// Largest level: what f32 holds exactly.
+/// Largest level that single precision represents exactly.
 const LARGEST: i64 = 1 << 24;
 
-/// Prediction for sample (i, j, k) from its seven predecessors; those off the grid count as 0.
+/// Predicts sample (i, j, k) from its seven predecessors; samples off the grid count as 0.
 fn predict(values: &[i64], dims: [usize; 3], i: usize, j: usize, k: usize) -> i64 {
     let at = |di: usize, dj: usize, dk: usize| {
         if i < di || j < dj || k < dk {
@@ -40,16 +40,16 @@ pub(super) fn pack(levels: &[f32], dims: [usize; 3]) -> Vec<u8> {
         bytes.push(rest as u8);
     }
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
-    // Writing to memory does not fail.
+    // Writing to memory cannot fail.
     let packed = encoder.write_all(&bytes).and_then(|()| encoder.finish());
     packed.unwrap_or_default()
 }
 
-/// The levels, or none where the bytes are not what [`pack`] writes for these dimensions.
+/// Returns the levels, or `None` if the bytes are not the output of [`pack`] for these dimensions.
 pub(super) fn unpack(packed: &[u8], dims: [usize; 3]) -> Option<Vec<f32>> {
     let count = dims.iter().product::<usize>();
     let mut bytes = Vec::new();
-    // Five bytes hold any admissible difference; one more shows an overlong stream.
+    // Five bytes hold any admissible difference; one more detects an overlong stream.
     ZlibDecoder::new(packed)
         .take(5 * count as u64 + 1)
         .read_to_end(&mut bytes)

@@ -1,9 +1,9 @@
 //! `.grain` files: one shape with its provenance, versioned and checksummed.
 //!
-//! Layout, little-endian: 8 bytes signature, u32 version, u64 length of the body, the body, and
-//! the SHA-256 of everything before it. The body holds provenance, mass properties, morphology,
-//! quality, nodes and the field; the field's levels are differences against a predictor,
-//! deflated. No date is kept: equal shapes give equal files.
+//! Layout, little-endian: 8 bytes signature, u32 version, u64 length of the body, the body, and the
+//! SHA-256 of all preceding bytes. The body holds provenance, mass properties, morphology, quality,
+//! nodes and the field; the levels of the field are deflated differences from a predictor. Files
+//! hold no date: equal shapes give equal files.
 
 mod bytes;
 mod levels;
@@ -21,19 +21,18 @@ use sha2::{Digest, Sha256};
 use std::io::Write;
 use std::path::Path;
 
-/// Not text (first byte), with both line ends, so that a transfer in text mode shows.
+/// A non-text byte and both line endings make damage by text-mode transfers detectable.
 const SIGNATURE: &[u8; 8] = b"\x8fGRAIN\r\n";
-/// Version written; files of this version and older are read. Version 2 added the inscribed sphere
-/// and the caliper lengths.
+/// Version of written files; files of this and older versions are read. Version 2 added the
+/// inscribed sphere and the Feret diameters.
 const VERSION: u32 = 2;
 const HEAD: usize = 8 + 4 + 8;
 const CHECKSUM: usize = 32;
-/// Largest file that is read [bytes].
+/// Largest file size that is read [bytes].
 const LARGEST: u64 = 1 << 30;
 
 impl Shape {
-    /// Writes the shape to `path`: first to a temporary name beside it, then renamed, so that a
-    /// file is whole or absent.
+    /// Writes the shape to `path` atomically: to a temporary file in the same folder, then renamed.
     pub fn save(&self, path: &Path) -> Result<()> {
         let io = |e| ShapeError::io(path, e);
         let mut name = path.file_name().unwrap_or_default().to_owned();
@@ -46,13 +45,13 @@ impl Shape {
             std::fs::rename(&temporary, path)
         };
         write().map_err(|e| {
-            // Best effort: the error that matters is the first one.
+            // Best-effort clean-up; the first error is reported.
             let _ = std::fs::remove_file(&temporary);
             io(e)
         })
     }
 
-    /// Reads a shape back, bit for bit.
+    /// Reads a shape, bit for bit as saved.
     pub fn load(path: &Path) -> Result<Shape> {
         let limits = crate::ReadLimits {
             file_bytes: LARGEST,
@@ -62,7 +61,7 @@ impl Shape {
         Shape::from_bytes(&bytes, path)
     }
 
-    /// The content of a `.grain` file.
+    /// Returns the content of a `.grain` file.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut body = Encoder::default();
         encode_provenance(&mut body, &self.provenance);
@@ -89,7 +88,7 @@ impl Shape {
         out
     }
 
-    /// A shape from the content of a `.grain` file; `path` is for messages only.
+    /// Decodes the content of a `.grain` file; `path` is used in messages only.
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Shape> {
         if !bytes.starts_with(SIGNATURE) {
             return Err(ShapeError::NotAGrainFile {
@@ -99,7 +98,7 @@ impl Shape {
         let early = || ShapeError::malformed(path, "the grain file ends early");
         let mut head = Decoder::new(bytes.get(8..HEAD).ok_or_else(early)?);
         let version = head.u32().ok_or_else(early)?;
-        // Before the checksum: a newer version may place it elsewhere.
+        // Checked before the checksum, the position of which may differ in a newer version.
         if version > VERSION {
             let path = path.to_owned();
             return Err(ShapeError::FutureVersion {
@@ -123,7 +122,7 @@ impl Shape {
     }
 }
 
-/// Hash of the geometry in hexadecimal.
+/// Returns the SHA-256 of the geometry in hexadecimal.
 pub(crate) fn digest(shape: &Shape) -> String {
     let mut content = Encoder::default();
     encode_mass(&mut content, shape);
@@ -176,7 +175,7 @@ fn decode_provenance(from: &mut Decoder) -> Option<Provenance> {
     })
 }
 
-/// Volume, inertia, bounds and nodes.
+/// Encodes volume, inertia, bounds and nodes.
 fn encode_mass(out: &mut Encoder, shape: &Shape) {
     out.f64(shape.volume);
     for v in [shape.inertia, shape.lower, shape.upper] {
@@ -378,7 +377,7 @@ mod tests {
         assert!(matches!(missing, ShapeError::Io { .. }), "{missing}");
     }
 
-    /// Content that a valid checksum covers but that makes no sense must not panic.
+    /// Invalid content with a valid checksum must not panic.
     #[test]
     fn forged_content_is_refused() {
         let good = egg().to_bytes();

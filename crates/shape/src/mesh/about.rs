@@ -1,25 +1,26 @@
-//! Nearest places of a mesh for places that draw together.
+//! Nearest-point queries on a mesh for a converging sequence of query points.
 //!
-//! From the middle of a grain most of its surface is about equally far, and a hierarchy has to look at
-//! most of it. Where one face is nearest from, another that is farther by more than twice the way is not
-//! nearest from so far away: few faces are left once the places hardly move.
+//! From the centre of a grain most of its surface is about equally far, so that a hierarchy visits
+//! most of it. If a face is nearest to one point, a face farther away by more than twice the
+//! displacement cannot be nearest to a displaced point: the set of candidates shrinks as the
+//! sequence converges.
 
 use super::MeshDistance;
 use super::bvh::Nearest;
 use glam::DVec3;
 
-/// Faces that are kept.
+/// Maximum number of cached faces.
 const KEPT: usize = 4096;
-/// Searches of all faces before those about the last place are collected.
+/// Full searches before the cache is rebuilt around the last query point.
 const PATIENCE: usize = 16;
 
-/// Finds the nearest of all faces among those nearest to a place, where it is one of them.
+/// Nearest-point search among cached faces, with a full search as fallback.
 pub(super) struct About<'a> {
     mesh: &'a MeshDistance,
     centre: DVec3,
-    /// The faces nearest to the centre, with their distances [m] from it, nearest first.
+    /// Faces nearest to the centre with their distances from it [m], nearest first.
     faces: Vec<(f64, u32)>,
-    /// Searches of all faces since they were collected.
+    /// Full searches since the cache was built.
     missed: usize,
 }
 
@@ -33,7 +34,7 @@ impl<'a> About<'a> {
         }
     }
 
-    /// The nearest place of the mesh to `x`.
+    /// Returns the nearest point of the mesh to `x`.
     pub(super) fn nearest(&mut self, x: DVec3) -> Nearest {
         if let Some(nearest) = self.among_kept(x) {
             return nearest;
@@ -45,12 +46,12 @@ impl<'a> About<'a> {
         self.mesh.nearest(x, &mut 0)
     }
 
-    /// The nearest place if one of the faces that are kept must have it.
+    /// Returns the nearest point if it must lie on a cached face.
     fn among_kept(&self, x: DVec3) -> Option<Nearest> {
         let away = x.distance(self.centre);
         let mut best: Option<(f64, Nearest)> = None;
         for (distance, face) in &self.faces {
-            // This face, and those after it, are at least so far from `x`.
+            // Lower bound of the distance of this and all later faces from `x`.
             if let Some((nearest, place)) = best
                 && distance - away >= nearest
             {
@@ -84,7 +85,7 @@ mod tests {
     use super::*;
     use crate::mesh::cube_sphere;
 
-    /// Towards a place in a lumpy ball, by steps that become shorter.
+    /// Convergence to a point in a lumpy ball with decreasing steps.
     #[test]
     fn the_kept_faces_agree_with_all() {
         let lump = |u: DVec3| u * (1.0 + 0.05 * (5.0 * u.x).sin() * u.y);

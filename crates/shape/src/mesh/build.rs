@@ -1,4 +1,4 @@
-//! A shape from a closed mesh.
+//! Construction of a shape from a closed mesh.
 
 use super::{MeshDistance, TriangleMesh};
 use crate::assemble::{Body, ShapeOptions, assemble};
@@ -9,17 +9,17 @@ use crate::roundness::Surface;
 use crate::{Shape, mass, principal};
 use glam::DQuat;
 
-/// How a mesh is turned into a shape.
+/// Options for converting a mesh to a shape.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshOptions {
-    /// Resolution, nodes and bounds.
+    /// Resolution, nodes and quality bounds.
     pub shape: ShapeOptions,
-    /// Turn a mesh whose faces all point inwards.
+    /// Whether to invert a mesh with inward normals.
     pub flip: bool,
 }
 
-/// Shape of a closed mesh in metres: exact mass properties give the principal frame, and the
-/// distances to the triangles are sampled in it, the exact ones near the surface.
+/// Builds the shape of a closed mesh [m]. Exact mass properties define the principal frame, in
+/// which the distances to the triangles are sampled, exactly near the surface.
 pub fn shape_from_mesh(
     mesh: &TriangleMesh,
     source: &SourceFile,
@@ -44,7 +44,7 @@ pub fn shape_from_mesh(
     from_closed(closed, Surface::Exact, provenance, &options.shape)
 }
 
-/// Shape of a mesh; its frame and bounds are found here, `provenance` tells the rest.
+/// Builds the shape of a mesh; determines its frame and bounds and completes `provenance`.
 pub(crate) fn from_closed(
     mesh: &TriangleMesh,
     mut surface: Surface,

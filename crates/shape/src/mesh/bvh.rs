@@ -1,23 +1,23 @@
-//! Bounding-volume hierarchy over triangles: which triangle is nearest to a point.
+//! Bounding-volume hierarchy of triangles for nearest-point queries.
 
 use glam::DVec3;
 
-/// Most triangles in a leaf.
+/// Maximum number of triangles in a leaf.
 const LEAF: usize = 4;
 
 struct Node {
     lower: DVec3,
     upper: DVec3,
-    /// Leaf: first triangle; branch: number of the right child (the left one follows the node).
+    /// Leaf: first triangle; branch: index of the right child (the left child follows the node).
     first: u32,
-    /// Triangles in a leaf, 0 for a branch.
+    /// Number of triangles in a leaf, 0 for a branch.
     count: u32,
 }
 
-/// Which part of a triangle a point is nearest to.
+/// Part of a triangle that contains the nearest point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Feature {
-    /// Its inside.
+    /// The interior.
     Face,
     /// The edge between corners i and i + 1.
     Edge(u8),
@@ -33,7 +33,7 @@ pub(crate) struct Nearest {
     pub feature: Feature,
 }
 
-/// Hierarchy with its own copy of the triangles in leaf order.
+/// Hierarchy with a copy of the triangles in leaf order.
 pub(crate) struct Bvh {
     nodes: Vec<Node>,
     corners: Vec<[DVec3; 3]>,
@@ -41,7 +41,7 @@ pub(crate) struct Bvh {
 }
 
 impl Bvh {
-    /// Of the triangles with these corners.
+    /// Builds the hierarchy of the triangles with these corners.
     pub(crate) fn new(triangles: &[[DVec3; 3]]) -> Bvh {
         let mut faces: Vec<u32> = (0..triangles.len() as u32).collect();
         let middle = |corners: &[DVec3; 3]| corners.iter().sum::<DVec3>() / 3.0;
@@ -55,7 +55,7 @@ impl Bvh {
         }
     }
 
-    /// Nearest point to `x` of the triangle that is number `n` in leaf order.
+    /// Returns the nearest point to `x` on triangle `n` in leaf order.
     fn on_leaf(&self, x: DVec3, n: u32) -> Nearest {
         let (point, feature) = nearest_on_triangle(x, &self.corners[n as usize]);
         Nearest {
@@ -65,7 +65,8 @@ impl Bvh {
         }
     }
 
-    /// Calls `found` with the number of every face whose box overlaps that of a triangle.
+    /// Calls `found` with the index of every face with a bounding box that overlaps that of a
+    /// triangle.
     pub(crate) fn overlapping(&self, triangle: &[DVec3; 3], mut found: impl FnMut(u32)) {
         let lower = triangle[0].min(triangle[1]).min(triangle[2]);
         let upper = triangle[0].max(triangle[1]).max(triangle[2]);
@@ -84,12 +85,12 @@ impl Bvh {
         }
     }
 
-    /// Nearest point of the mesh to `x`. The search starts from triangle `hint` (in leaf order),
-    /// which is left at the nearest one: a good start for a query nearby.
+    /// Returns the nearest point of the mesh to `x`. The search starts from triangle `hint` (in
+    /// leaf order) and sets it to the nearest triangle, a good start for a query nearby.
     pub(crate) fn nearest(&self, x: DVec3, hint: &mut u32) -> Nearest {
         let mut best = self.on_leaf(x, *hint);
         let mut bound = best.point.distance_squared(x);
-        // Depth is at most about log2 of the triangle count: the split halves the list.
+        // The depth is about log2 of the triangle count: every split halves the list.
         let mut stack = [(0u32, 0.0f64); 64];
         stack[0] = (0, self.nodes[0].squared_distance(x));
         let mut top = 1;
@@ -138,7 +139,7 @@ impl Node {
     }
 }
 
-/// Builds the subtree of `faces` (which start at `first` in the whole list), halving it along the
+/// Builds the subtree of `faces` (starting at `first` in the complete list), halved along the
 /// longest extent of the triangle centres.
 fn split(
     triangles: &[[DVec3; 3]],
@@ -187,7 +188,7 @@ fn split(
     split(triangles, centres, right, first + half, nodes);
 }
 
-/// Nearest point of a triangle (Ericson, Real-Time Collision Detection, section 5.1.5).
+/// Returns the nearest point of a triangle (Ericson, Real-Time Collision Detection, section 5.1.5).
 pub(super) fn nearest_on_triangle(x: DVec3, [a, b, c]: &[DVec3; 3]) -> (DVec3, Feature) {
     let (ab, ac, ax) = (*b - *a, *c - *a, x - *a);
     let (d1, d2) = (ab.dot(ax), ac.dot(ax));

@@ -1,17 +1,17 @@
-//! Is the mesh one closed, coherently wound surface? If not, where not.
+//! Checks that a mesh is one closed surface of consistent orientation, with located errors.
 
 use super::TriangleMesh;
 use crate::error::{Result, ShapeError};
 
-/// For every face, the face across each of its edges (edge i joins corners i and i + 1).
+/// For every face, the neighbouring faces across its edges (edge i joins corners i and i + 1).
 pub(crate) type Neighbours = Vec<[u32; 3]>;
 
-/// Faces flatter than this (height over longest edge) count as having no area.
+/// Faces with a lower ratio of height to longest edge count as degenerate.
 const FLAT: f64 = 1e-10;
 
 impl TriangleMesh {
-    /// Refuses anything but one closed, outward-facing surface; errors name the place in the
-    /// mesh's own units.
+    /// Refuses any mesh except one closed, outward-facing surface. Errors report positions in the
+    /// units of the mesh.
     pub fn check_closed(&self) -> Result<()> {
         self.neighbours().map(|_| ())
     }
@@ -27,7 +27,7 @@ impl TriangleMesh {
         Ok(neighbours)
     }
 
-    /// Finite corners, valid numbers, no face without area.
+    /// Checks that coordinates are finite, indices valid and faces not degenerate.
     pub(crate) fn check_faces(&self) -> Result<()> {
         if self.triangles.is_empty() {
             return Err(ShapeError::EmptyMesh);
@@ -61,10 +61,10 @@ impl TriangleMesh {
         Ok(())
     }
 
-    /// Two faces at every edge, wound in opposite senses along it.
+    /// Checks that every edge has two faces with opposite directions along it.
     pub(crate) fn check_edges(&self) -> Result<Neighbours> {
-        // (low vertex, high vertex, face, edge of the face, runs from low to high), in order: put
-        // to their low vertex by counting, the few of a vertex sorted.
+        // (low vertex, high vertex, face, edge of the face, runs from low to high), in this order:
+        // grouped by low vertex by counting sort, then sorted within each group.
         let each = |visit: &mut dyn FnMut((u32, u32, u32, u8, bool))| {
             for (face, t) in self.triangles.iter().enumerate() {
                 for i in 0..3 {
@@ -139,8 +139,8 @@ impl TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// The piece with the most faces, or none where the others together have more than the share
-    /// `crumbs` of all faces, or the edges do not match.
+    /// Returns the piece with the most faces, or `None` if the others together exceed the fraction
+    /// `crumbs` of all faces, or if the edges do not match.
     pub(crate) fn largest_piece(self, crumbs: f64) -> Option<TriangleMesh> {
         let neighbours = self.check_edges().ok()?;
         let (number, sizes) = pieces(&neighbours);
@@ -171,14 +171,14 @@ impl TriangleMesh {
     }
 }
 
-/// Faces in each connected piece, largest first.
+/// Returns the number of faces of each connected piece, largest first.
 fn piece_sizes(neighbours: &Neighbours) -> Vec<usize> {
     let (_, mut sizes) = pieces(neighbours);
     sizes.sort_unstable_by(|a, b| b.cmp(a));
     sizes
 }
 
-/// Number of the connected piece that each face belongs to, and the faces in each piece.
+/// Returns the piece index of each face, and the number of faces of each piece.
 fn pieces(neighbours: &Neighbours) -> (Vec<usize>, Vec<usize>) {
     let mut number = vec![usize::MAX; neighbours.len()];
     let mut sizes = Vec::new();

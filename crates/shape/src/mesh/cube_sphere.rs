@@ -1,12 +1,12 @@
-//! A sphere meshed from the six faces of a cube, mapped to other bodies.
+//! Meshes of bodies mapped from a sphere with the topology of a cube.
 
 use super::TriangleMesh;
 use glam::DVec3;
 use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_4;
 
-/// Closed mesh of `map` applied to unit vectors: `n` by `n` quadrilaterals on each cube face, at
-/// equal angles, each cut along its shorter diagonal.
+/// Returns the closed mesh of `map` applied to unit vectors: `n` by `n` quadrilaterals of equal
+/// angles on each cube face, each split along its shorter diagonal.
 pub(crate) fn cube_sphere(n: usize, map: impl Fn(DVec3) -> DVec3) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let mut known: HashMap<[usize; 3], u32> = HashMap::new();

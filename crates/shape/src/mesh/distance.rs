@@ -10,14 +10,14 @@ use crate::error::Result;
 use glam::DVec3;
 use std::sync::OnceLock;
 
-/// Answers signed distances to a closed mesh: the exact distance to its triangles, the sign by
+/// Signed distance to a closed mesh: the exact distance to its triangles with the sign by
 /// angle-weighted pseudo-normals (Baerentzen and Aanaes 2005).
 pub(crate) struct MeshDistance {
-    /// Built when first asked.
+    /// Built on first use.
     bvh: OnceLock<Bvh>,
     corners: Vec<[DVec3; 3]>,
     triangles: Vec<[u32; 3]>,
-    /// Faces across the edges of each face.
+    /// Neighbouring faces across the edges of each face.
     neighbours: Neighbours,
     spokes: Spokes,
     face_normals: Vec<DVec3>,
@@ -63,29 +63,29 @@ impl MeshDistance {
         }
     }
 
-    /// Number of faces.
+    /// Returns the number of faces.
     pub(super) fn faces(&self) -> u32 {
         self.triangles.len() as u32
     }
 
-    /// Square root of the mean area of a face [m].
+    /// Returns the square root of the mean face area [m].
     pub(super) fn face_size(&self) -> f64 {
         let twice = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a).length();
         let area: f64 = self.corners.iter().map(twice).sum();
         (0.5 * area / self.corners.len() as f64).sqrt()
     }
 
-    /// Corners of face `face`.
+    /// Returns the corners of face `face`.
     pub(super) fn corners(&self, face: u32) -> &[DVec3; 3] {
         &self.corners[face as usize]
     }
 
-    /// Unit normal of face `face`; 0 where that has no area.
+    /// Returns the unit normal of face `face`; 0 for a degenerate face.
     pub(super) fn normal(&self, face: u32) -> DVec3 {
         self.face_normals[face as usize]
     }
 
-    /// Place of face `face` nearest to `x`.
+    /// Returns the point of face `face` nearest to `x`.
     pub(super) fn on_face(&self, x: DVec3, face: u32) -> Nearest {
         let (point, feature) = nearest_on_triangle(x, self.corners(face));
         Nearest {
@@ -95,8 +95,7 @@ impl MeshDistance {
         }
     }
 
-    /// Place of the mesh whose distance to `x` is least among all places around it, downhill from
-    /// face `face`.
+    /// Returns a local minimum of the distance to `x`, by descent from face `face`.
     pub(super) fn downhill(&self, x: DVec3, face: u32) -> Nearest {
         let mut best = self.on_face(x, face);
         let mut distance = best.point.distance_squared(x);
@@ -117,7 +116,7 @@ impl MeshDistance {
                 Feature::Corner(i) => {
                     let corner = self.triangles[number][usize::from(i)];
                     let spokes = self.spokes.of(corner);
-                    // Of a face with no edge that leads downhill from the corner it is the nearest place.
+                    // If no edge of the corner leads downhill, the corner is a local minimum.
                     let reach = x - best.point;
                     let falls = |spoke: &&Spoke| spoke.edges.iter().any(|e| e.dot(reach) > 0.0);
                     spokes.iter().filter(falls).for_each(|s| try_face(s.face));
@@ -130,13 +129,14 @@ impl MeshDistance {
         }
     }
 
-    /// The nearest place of all.
+    /// Returns the globally nearest point.
     pub(super) fn nearest(&self, x: DVec3, hint: &mut u32) -> Nearest {
         let bvh = self.bvh.get_or_init(|| Bvh::new(&self.corners));
         bvh.nearest(x, hint)
     }
 
-    /// Signed distance [m] of `x`, negative inside, whose nearest place on the mesh is known.
+    /// Returns the signed distance [m] of `x`, negative inside, given its nearest point on the
+    /// mesh.
     pub(super) fn signed(&self, x: DVec3, nearest: &Nearest) -> f64 {
         let face = nearest.face as usize;
         let normal = match nearest.feature {
@@ -151,17 +151,17 @@ impl MeshDistance {
     }
 }
 
-/// The edges of a face that leave a corner.
+/// The two edges of a face that meet at a corner.
 #[derive(Clone, Copy, Default)]
 struct Spoke {
     edges: [DVec3; 2],
     face: u32,
 }
 
-/// The spokes of every corner of a closed mesh, corner by corner.
+/// Face corners grouped by vertex, for a closed mesh.
 struct Spokes {
     all: Vec<Spoke>,
-    /// Where the spokes of each corner begin, and the end of the last.
+    /// First entry of every vertex, and the total number at the end.
     starts: Vec<u32>,
 }
 

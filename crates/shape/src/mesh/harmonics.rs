@@ -1,9 +1,9 @@
-//! Spherical-harmonic coefficients of a grain: lines "n m Re Im" of a_nm in
-//! r(theta, phi) = sum of a_nm Y_nm, with orthonormal Y_nm and the Condon-Shortley phase, as the
-//! collections of the National Institute of Standards and Technology keep them. Only grains that
-//! every ray from the origin leaves once can be written so.
+//! Spherical-harmonic coefficients of a grain: lines "n m Re Im" of a_nm in r(theta, phi) = sum of
+//! a_nm Y_nm, with orthonormal Y_nm and the Condon-Shortley phase, the format of the collections of
+//! the National Institute of Standards and Technology. Only star-shaped grains (every ray from the
+//! origin leaves once) have this representation.
 //!
-//! The terms are weighted by Lanczos factors, sin(x) / x at x = pi n / (N + 1), against ringing.
+//! Lanczos factors, sin(x) / x at x = pi n / (N + 1), suppress ringing.
 
 use super::{TriangleMesh, cube_sphere};
 use crate::error::{Result, ShapeError};
@@ -17,7 +17,7 @@ const FACETS: usize = 56;
 /// Highest degree that is read.
 const HIGHEST: usize = 100;
 
-/// Coefficients of m >= 0, by degree, then order; those of m < 0 follow for a real radius.
+/// Coefficients of m >= 0, by degree, then order; those of m < 0 follow because the radius is real.
 struct Series {
     coefficients: Vec<Vec<(f64, f64)>>,
 }
@@ -30,7 +30,7 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, _: &ReadLimits) -> Result<Triang
     for v in &mesh.vertices {
         lowest = lowest.min(v.length());
     }
-    // A negative radius turns its vertex to the other side.
+    // A negative radius moves its vertex to the opposite side.
     let turned = |v: &DVec3| radius(v.normalize_or_zero()) <= 0.0;
     if lowest.is_nan() || lowest <= 0.0 || mesh.vertices.iter().any(turned) {
         let reason = "the radius is not positive in every direction";
@@ -86,7 +86,7 @@ impl Series {
         Ok(Series { coefficients })
     }
 
-    /// Radius along the unit vector `u`.
+    /// Returns the radius along the unit vector `u`.
     fn radius(&self, u: DVec3) -> f64 {
         let (cos, sin) = (u.z, u.truncate().length());
         let (c1, s1) = if sin > 0.0 {
@@ -96,7 +96,7 @@ impl Series {
         };
         let top = self.coefficients.len();
         let mut sum = 0.0;
-        // Normalised Legendre functions by their stable recurrence in n, one m after another.
+        // Normalised Legendre functions by their stable recurrence in n, for one m at a time.
         let mut diagonal = (0.25 / PI).sqrt();
         let (mut cm, mut sm) = (1.0, 0.0);
         for m in 0..top {

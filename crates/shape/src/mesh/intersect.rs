@@ -1,4 +1,4 @@
-//! Does a surface run through itself?
+//! Detection of self-intersections of a mesh.
 
 use super::TriangleMesh;
 use super::bvh::Bvh;
@@ -7,8 +7,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 impl TriangleMesh {
-    /// Refuses a surface with faces that cross each other; faces may touch. Two that share an edge
-    /// are not looked at. The error names the first two in the order of the file.
+    /// Refuses a surface with intersecting faces. Touching faces are allowed, and pairs with a
+    /// common edge are not tested. The error names the first pair in file order.
     pub fn check_crossings(&self) -> Result<()> {
         let bvh = Bvh::new(&self.faces());
         let mut found: Vec<(u32, u32, DVec3)> = (0..self.triangles.len() as u32)
@@ -37,7 +37,8 @@ impl TriangleMesh {
         }
     }
 
-    /// A point where the inside of an edge of one face passes through the inside of the other.
+    /// Returns a point where the interior of an edge of one face crosses the interior of the other
+    /// face.
     fn crossing(&self, face: u32, other: u32) -> Option<DVec3> {
         let (t, o) = (
             self.triangles[face as usize],
@@ -65,7 +66,7 @@ impl TriangleMesh {
     }
 }
 
-/// Where the segment from `p` to `q` passes through the inside of a triangle.
+/// Returns the point where the segment from `p` to `q` crosses the interior of a triangle.
 fn passes(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> Option<DVec3> {
     let volume = |w: DVec3, x: DVec3, y: DVec3, z: DVec3| (x - w).cross(y - w).dot(z - w);
     let (before, after) = (volume(a, b, c, p), volume(a, b, c, q));
@@ -92,7 +93,7 @@ mod tests {
 
     #[test]
     fn a_ball_pushed_through_itself_is_located() {
-        // The cap at +x comes out on the other side.
+        // The cap at +x emerges on the opposite side.
         let mesh = cube_sphere(12, |u| {
             u - DVec3::X * 2.5 * (-20.0 * u.distance_squared(DVec3::X)).exp()
         });

@@ -1,4 +1,4 @@
-//! Closed triangle meshes: reading, checking, exact distances, and shapes from them.
+//! Closed triangle meshes: readers, checks, exact distances, and shapes built from them.
 
 mod about;
 mod build;
@@ -23,27 +23,27 @@ pub use read::read_mesh;
 
 use glam::{DMat3, DVec3};
 
-/// Triangles over shared vertices, anticlockwise seen from outside.
+/// Triangles with shared vertices, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Corners [m].
+    /// Vertex positions [m].
     pub vertices: Vec<DVec3>,
-    /// Vertex numbers of each face.
+    /// Vertex indices of each face.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl TriangleMesh {
-    /// The three corners of face `face`.
+    /// Returns the three corners of face `face`.
     pub(crate) fn corners(&self, face: usize) -> [DVec3; 3] {
         self.triangles[face].map(|v| self.vertices[v as usize])
     }
 
-    /// The corners of every face.
+    /// Returns the corners of every face.
     pub(crate) fn faces(&self) -> Vec<[DVec3; 3]> {
         (0..self.triangles.len()).map(|f| self.corners(f)).collect()
     }
 
-    /// Volume [m^3] by the divergence theorem; negative where the faces point inwards.
+    /// Returns the volume [m^3] by the divergence theorem; negative for inward normals.
     pub fn signed_volume(&self) -> f64 {
         let reference = self.vertices.first().copied().unwrap_or(DVec3::ZERO);
         let six: f64 = (0..self.triangles.len())
@@ -55,7 +55,7 @@ impl TriangleMesh {
         six / 6.0
     }
 
-    /// Surface area [m^2].
+    /// Returns the surface area [m^2].
     pub fn area(&self) -> f64 {
         let twice: f64 = (0..self.triangles.len())
             .map(|f| {
@@ -66,7 +66,7 @@ impl TriangleMesh {
         0.5 * twice
     }
 
-    /// Lower and upper corner of the bounding box [m].
+    /// Returns the lower and upper corner of the bounding box [m].
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.vertices
@@ -74,7 +74,7 @@ impl TriangleMesh {
             .fold(start, |(lo, hi), v| (lo.min(*v), hi.max(*v)))
     }
 
-    /// The mesh enlarged by `factor`.
+    /// Returns the mesh scaled by `factor`.
     pub(crate) fn scaled(mut self, factor: f64) -> TriangleMesh {
         for v in &mut self.vertices {
             *v *= factor;
@@ -82,7 +82,7 @@ impl TriangleMesh {
         self
     }
 
-    /// The mesh seen from a frame with this origin and these axes (columns).
+    /// Returns the mesh in the frame with this origin and these axes (columns).
     pub(crate) fn in_frame(&self, origin: DVec3, axes: DMat3) -> TriangleMesh {
         let to_frame = axes.transpose();
         TriangleMesh {

@@ -1,4 +1,4 @@
-//! Wavefront OBJ: positions and faces; polygons are cut into fans, materials ignored.
+//! Wavefront OBJ: positions and faces. Polygons are split into fans; materials are ignored.
 
 use super::TriangleMesh;
 use crate::error::{Result, ShapeError};

@@ -1,4 +1,4 @@
-//! PLY, text and binary, both byte orders.
+//! PLY, text and binary, in both byte orders.
 
 use super::TriangleMesh;
 use crate::error::{Result, ShapeError};
@@ -12,7 +12,7 @@ use ply_rs_bw::ply::{
 use std::io::Cursor;
 use std::path::Path;
 
-/// What is kept of a vertex or a face; other properties are read over.
+/// Properties read from a vertex or a face; others are skipped.
 #[derive(Default)]
 struct Element {
     position: DVec3,
@@ -103,7 +103,7 @@ fn push_fan(path: &Path, out: &mut Vec<[u32; 3]>, face: usize, corners: &[i64]) 
     Ok(())
 }
 
-/// The header must name vertices and faces, and claim no more than the file can hold.
+/// Checks that the header declares vertices and faces, and no more than the file can hold.
 fn check_header(path: &Path, header: &Header, size: u64, limits: &ReadLimits) -> Result<()> {
     for needed in ["vertex", "face"] {
         if !header.elements.contains_key(needed) {
@@ -147,7 +147,7 @@ fn check_header(path: &Path, header: &Header, size: u64, limits: &ReadLimits) ->
     Ok(())
 }
 
-/// Fewest bytes that one such element can take.
+/// Returns the minimum number of bytes of an element.
 fn least_bytes(element: &ElementDef, header: &Header) -> u64 {
     let text = matches!(header.encoding, Encoding::Ascii);
     let width = |scalar: &ScalarType| match scalar {
@@ -164,7 +164,7 @@ fn least_bytes(element: &ElementDef, header: &Header) -> u64 {
             PropertyType::Scalar(scalar) | PropertyType::List(scalar, _) => width(scalar),
         })
         .sum();
-    // The last line of a text file may lack its line end.
+    // The last line of a text file may lack its line ending.
     if text {
         sum.saturating_sub(1).max(1)
     } else {

@@ -1,22 +1,22 @@
-//! Distances at all samples of a grid: exact near the mesh, spread from there.
+//! Signed distances of a mesh at all samples of a grid: exact near the mesh, propagated from there.
 //!
-//! Near the mesh every face is tried at the samples that its box, widened, holds: what comes out nearer
-//! than the widening is the nearest of all faces. Away from it, where many faces are about as near, a
-//! sample starts from the nearest places of the samples beside it that are nearer, and walks downhill
-//! from the best. That is the exact distance but where the nearest place of a sample is nobody's
-//! around it, which is rare and far from the surface, and cost less than a tenth of a cell in the tests.
+//! Near the mesh every face is tested against the samples in its dilated bounding box: a distance
+//! below the dilation is exact. Farther away, a sample starts from the nearest points of its closer
+//! neighbours and descends on the mesh from the best of them. The result is exact unless the
+//! nearest point of a sample is not adjacent to that of any neighbour, which is rare and far from
+//! the surface; the error was below a tenth of a cell in the tests.
 
 use super::MeshDistance;
 use super::bvh::Nearest;
 use glam::{DVec3, Vec3};
 
-/// Width of a bucket of the front [cells]: within one, samples are taken in any order.
+/// Width of a bucket of the front [cells]; samples within one bucket are processed in any order.
 const BUCKET: f64 = 0.25;
-/// Size of the faces below which one of their points stands for them [cells].
+/// Face size below which a face is represented by one of its points [cells].
 const FINE: f64 = 0.7;
 
-/// Signed distances [m] at the samples of a grid, x fastest; the first lies at `first`. Up to `band`
-/// [cells] from the mesh every face is tried. What is not between the least and the most that are `needed` [m]
+/// Returns the signed distances [m] at the samples of a grid, x fastest, with the first at `first`.
+/// Up to `band` [cells] from the mesh every face is tested. Values outside the range `needed` [m]
 /// may be NaN.
 pub(super) fn on_grid(
     mesh: &MeshDistance,
@@ -33,7 +33,7 @@ pub(super) fn on_grid(
     };
     let mut front = Front::new(mesh, &grid);
     front.settle_band(band);
-    // From what is not needed nothing nearer is reached.
+    // No required sample is reached from one that is not required.
     let needed = |value: f64| least <= value && value <= most;
     for n in grid.samples() {
         if front.open[n] == SETTLED && needed(front.values[n]) {
@@ -63,7 +63,7 @@ pub(super) fn on_grid(
     grid.samples().map(value).collect()
 }
 
-/// The samples, in a layer of others that spares looking for the border.
+/// The samples with one layer of padding, which avoids border checks.
 struct Grid {
     first: DVec3,
     spacing: f64,
@@ -80,12 +80,12 @@ impl Grid {
     }
 
     fn at(&self, place: [usize; 3]) -> DVec3 {
-        // By way of u32, which converts in one instruction.
+        // Conversion via u32 takes one instruction.
         let place = place.map(|i| f64::from(i as u32));
         self.first + self.spacing * DVec3::from_array(place)
     }
 
-    /// The samples without the layer.
+    /// Iterates over the samples without the padding.
     fn samples(&self) -> impl Iterator<Item = usize> {
         let [nx, ny, nz] = self.dims;
         let row = move |j, k| self.index([1, j, k])..self.index([nx - 1, j, k]);
@@ -93,8 +93,8 @@ impl Grid {
     }
 }
 
-/// The nearest place of the mesh that a sample knows of. In single precision: it only chooses where
-/// the search for the nearest begins.
+/// Nearest known mesh point of a sample, in single precision: it only selects the start of the
+/// search for the nearest point.
 #[derive(Clone, Copy, Default)]
 struct Origin {
     point: Vec3,
@@ -104,15 +104,15 @@ struct Origin {
 /// Marks a settled sample in [`Front::open`].
 const SETTLED: f32 = -1.0;
 
-/// Samples to be settled, nearest first, so that what one starts from is final.
+/// Samples to be settled in order of distance, so that every sample starts from final values.
 struct Front<'a> {
     mesh: &'a MeshDistance,
     grid: &'a Grid,
-    /// The faces are finer than the grid.
+    /// Whether the faces are finer than the grid.
     fine: bool,
-    /// Signed distance of each sample [m]; of one that is not settled, the sign counts.
+    /// Signed distance of each sample [m]; for unsettled samples only the sign is meaningful.
     values: Vec<f64>,
-    /// Distance so far of each sample [m], infinite while none is known, or [`SETTLED`].
+    /// Tentative distance of each sample [m]: infinite if unknown, or [`SETTLED`].
     open: Vec<f32>,
     origins: Vec<Origin>,
     buckets: Vec<Vec<u32>>,
@@ -120,7 +120,7 @@ struct Front<'a> {
 }
 
 impl<'a> Front<'a> {
-    /// Nothing is known of any sample; those of the layer about all count as settled.
+    /// Creates a front with all samples unknown and the padding settled.
     fn new(mesh: &'a MeshDistance, grid: &'a Grid) -> Front<'a> {
         let count = grid.dims.iter().product();
         let mut open = vec![SETTLED; count];
@@ -146,7 +146,8 @@ impl<'a> Front<'a> {
         };
     }
 
-    /// Settles the samples less than `band` [cells] from the mesh: tries every face at those about it.
+    /// Settles the samples within `band` [cells] of the mesh: every face is tested against the
+    /// samples around it.
     fn settle_band(&mut self, band: f64) {
         let (mesh, grid) = (self.mesh, self.grid);
         let per_cell = 1.0 / grid.spacing;
@@ -166,7 +167,7 @@ impl<'a> Front<'a> {
             let [along, across, up] = [0, 1, 2].map(range);
             for k in up {
                 for j in across.clone() {
-                    // The part of the row in the ball.
+                    // Part of the row inside the ball.
                     let row = grid.at([0, j, k]);
                     let first = row - middle;
                     let half = reach - first.y * first.y - first.z * first.z;
@@ -179,7 +180,8 @@ impl<'a> Front<'a> {
                         let n = grid.index([i, j, k]);
                         let x = row.with_x(row.x + grid.spacing * f64::from(i as u32));
                         let best = self.values[n].min(band * grid.spacing);
-                        // No place in the ball about the face is nearer, or none in its circle in the plane.
+                        // No point in the ball around the face is nearer, or none in its circle in
+                        // the plane.
                         let from = x - middle;
                         let squared = from.length_squared();
                         if squared >= (best + radius).powi(2) {
@@ -207,7 +209,7 @@ impl<'a> Front<'a> {
         }
     }
 
-    /// The nearest sample; may have been settled since.
+    /// Returns the next sample in order of distance; it may be settled already.
     fn next(&mut self) -> Option<usize> {
         while self.now < self.buckets.len() {
             if let Some(n) = self.buckets[self.now].pop() {
@@ -218,7 +220,7 @@ impl<'a> Front<'a> {
         None
     }
 
-    /// Tries the nearest place of sample `n`, which is settled, at those beside it that are not.
+    /// Propagates the nearest point of the settled sample `n` to its unsettled neighbours.
     fn reach(&mut self, n: usize) {
         let (mesh, grid) = (self.mesh, self.grid);
         let (at, from, value) = (grid.position(n), self.origins[n], self.values[n]);
@@ -285,7 +287,7 @@ mod tests {
                 assert!(same || left_out, "{some} for {all}");
             }
             assert!(needed.iter().filter(|v| v.is_nan()).count() > needed.len() / 4);
-            // In the band and beyond.
+            // In the band and beyond it.
             let mut worst = [0.0f64; 2];
             for (n, value) in spread.iter().enumerate() {
                 let x = first + spacing * DVec3::from_array(place(dims, n).map(|i| i as f64));

@@ -7,7 +7,7 @@ use glam::DVec3;
 use std::io::Cursor;
 use std::path::Path;
 
-/// Bytes before the first triangle of a binary file, and bytes of a triangle.
+/// Size of the header of a binary file [bytes].
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
@@ -28,7 +28,7 @@ pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Resu
         fits
     };
     if binary {
-        // Many programs begin binary files with the word by which text files are known.
+        // Binary files often begin with the keyword that identifies text files.
         bytes[0] = b' ';
     } else if !bytes.starts_with(b"solid") {
         return Err(ShapeError::malformed(path, "too short for an STL file"));

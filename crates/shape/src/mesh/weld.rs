@@ -1,15 +1,15 @@
-//! Joining vertices that several faces list separately.
+//! Merging of duplicated vertices.
 
 use super::TriangleMesh;
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Vertices closer than this share of the bounding-box diagonal are one vertex: a few rounding
-/// steps of the single-precision coordinates that mesh files carry.
+/// Merge distance relative to the bounding-box diagonal: a few rounding steps of the
+/// single-precision coordinates in mesh files.
 const TOLERANCE: f64 = 1e-6;
 
-/// The mesh with coincident vertices joined, unused ones dropped, and faces dropped that
-/// collapsed in joining (their number is returned).
+/// Merges coincident vertices and drops unused vertices and collapsed faces; returns the mesh and
+/// the number of dropped faces.
 pub(crate) fn weld(mesh: &TriangleMesh) -> (TriangleMesh, usize) {
     let (lower, upper) = mesh.bounds();
     let tolerance = TOLERANCE * lower.distance(upper);
@@ -70,7 +70,7 @@ mod tests {
             .enumerate()
         {
             let first = soup.vertices.len() as u32;
-            // The copies differ by rounding, as they do in text files.
+            // The copies differ by rounding, as in text files.
             soup.vertices
                 .extend(face.map(|v: usize| p[v] + DVec3::splat(1e-8 * n as f64)));
             soup.triangles.push([first, first + 1, first + 2]);

@@ -1,4 +1,4 @@
-//! Distances around a level set, and its curvatures.
+//! Samples of the distance around a level set, and curvatures from them.
 
 use crate::distance::{Distance, EVERYWHERE};
 use crate::grid::place;
@@ -6,15 +6,16 @@ use crate::scan::refine;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Distance from the surface within which a mesh is asked face by face [samples]; the Gaussians blur
-/// what is beyond. More than 1: beside a sample that lies on the surface, those on either side count too.
+/// Distance from the surface within which mesh distances are exact [cells]; the Gaussians smooth
+/// the errors beyond. Greater than 1, so that both neighbours of a sample on the surface are
+/// included.
 const EXACT: f64 = 1.1;
-/// Samples from one to the next that is asked for far from the level set.
+/// Stride of the samples evaluated far from the level set.
 const APART: usize = 4;
-/// Most samples of a grid.
+/// Maximum number of samples of a grid.
 const LARGEST: f64 = 5e7;
 
-/// Distance less the level on a grid around the level set; farther off it is only a bound.
+/// Distance minus the level on a grid around the level set; away from it only a bound.
 pub(super) struct Band {
     pub dims: [usize; 3],
     pub lower: DVec3,
@@ -23,9 +24,9 @@ pub(super) struct Band {
 }
 
 impl Band {
-    /// All around the body, to `reach` [m] beyond the level set. Farther than `near` [m] outside of it most
-    /// samples are interpolated between others: the distance bends little there, but for where a concave body
-    /// has two nearest places.
+    /// Samples the whole body to `reach` [m] beyond the level set. Farther than `near` [m] outside
+    /// of it most samples are interpolated: the distance is nearly linear there, except where a
+    /// concave body has two nearest points.
     pub(super) fn whole(
         distance: &impl Distance,
         lower: DVec3,
@@ -44,7 +45,7 @@ impl Band {
         let sparse: Vec<f32> = sparse.iter().map(|v| (v - level) as f32).collect();
         let (mut values, dims) = refine(&sparse, dims, APART);
         let needed = [f64::NEG_INFINITY, level + near];
-        // Without the layers that are farther off.
+        // Omit the layers farther away.
         let left_out = ((reach - near) / spacing).max(0.0) as usize;
         let inner = dims.map(|n| n - 2 * left_out);
         let corner = first + DVec3::splat(spacing * left_out as f64);
@@ -84,7 +85,7 @@ impl Band {
         let at = |i: usize, j: usize, k: usize| {
             first + spacing * DVec3::new(i as f64, j as f64, k as f64)
         };
-        // Values are needed where a Gaussian about the level set reaches, corners included.
+        // Values are needed in the support of a Gaussian about the level set, corners included.
         let needed = 3f64.sqrt() * (reach + 0.5 * BLOCK as f64) * spacing;
         let near: Vec<f64> = (0..blocks.iter().product())
             .into_par_iter()
@@ -126,15 +127,15 @@ impl Band {
         })
     }
 
-    /// Principal curvatures, the larger first, of the level set through `x`, where the field is
-    /// smoothed by a Gaussian of this width [samples] and this reach [widths].
+    /// Returns the principal curvatures at `x`, larger first, of the level set through `x` of the
+    /// field smoothed by a Gaussian of this width [samples] and this support [widths].
     pub(super) fn curvatures(&self, x: DVec3, width: f64, reach: f64) -> [f64; 2] {
         let (gradient, hessian) = self.derivatives(x, width, reach);
         principal(gradient, hessian)
     }
 
-    /// Gradient and second derivatives at `x` of the field smoothed by a Gaussian of this width
-    /// [samples] and this reach [widths].
+    /// Returns gradient and Hessian at `x` of the field smoothed by a Gaussian of this width
+    /// [samples] and this support [widths].
     pub(super) fn derivatives(&self, x: DVec3, width: f64, reach: f64) -> (DVec3, DMat3) {
         let s = (x - self.lower) / self.spacing;
         let reach = (reach * width).ceil() as i64;
@@ -142,7 +143,7 @@ impl Band {
             let centre = s[axis].round() as i64;
             (centre - reach..=centre + reach)
                 .map(|n| {
-                    // Derivatives of the Gaussian by the position of its centre.
+                    // Derivatives of the Gaussian with respect to the position of its centre.
                     let d = (n as f64 - s[axis]) / width;
                     let g = (-0.5 * d * d).exp();
                     [g, g * d / width, g * (d * d - 1.0) / (width * width)]
@@ -157,7 +158,7 @@ impl Band {
         let [mut gx, mut gy, mut gz] = [0.0; 3];
         let [mut xx, mut yy, mut zz, mut xy, mut yz, mut zx] = [0.0; 6];
         for (k, z) in taps[2].iter().enumerate() {
-            // Sums over x and y of the derivatives (by x, by y).
+            // Sums over x and y; the digits are the orders of the derivatives in x and in y.
             let [mut p00, mut p10, mut p20, mut p01, mut p11, mut p02] = [0.0; 6];
             for (j, y) in taps[1].iter().enumerate() {
                 let row =
@@ -198,7 +199,7 @@ impl Band {
     }
 }
 
-/// Principal curvatures of the level set of a function with this gradient and Hessian.
+/// Returns the principal curvatures of the level set of a function with this gradient and Hessian.
 pub(super) fn principal(gradient: DVec3, hessian: DMat3) -> [f64; 2] {
     let slope = gradient.length();
     if slope < 1e-3 {
@@ -218,7 +219,7 @@ mod tests {
     use super::*;
     use crate::mesh::{MeshDistance, cube_sphere};
 
-    /// A lumpy body, a cube and a waisted one, as large as they are in the measure of scans.
+    /// A lumpy body, a cube and a waisted body, at the resolution used for scans.
     #[test]
     fn what_is_interpolated_is_nearly_the_distance() {
         let lump =
@@ -234,7 +235,7 @@ mod tests {
             let (spacing, level, near) = (1.0 / 12.0, 0.4, 0.84);
             let band = Band::whole(&distance, lower, upper, spacing, [level, 1.9, near]).unwrap();
             let all = distance.on_grid(band.lower, spacing, band.dims, EXACT, EVERYWHERE);
-            // Errors [samples] near the level set and beyond, and how many lie beyond.
+            // Errors [samples] near the level set and beyond, and the number of samples beyond.
             let (mut worst, mut beyond) = ([0.0f64; 2], 0);
             for (n, (value, all)) in band.values.iter().zip(all).enumerate() {
                 // The interpolation is one-sided in the outermost cells.

@@ -1,73 +1,75 @@
-//! What a scan makes of an edge of known radius.
+//! Image of an edge of known radius: forward model of the measurement of scanned edges.
 //!
-//! In the normal section of an edge the body is a wedge with a rounded tip. The surface that a scan
-//! gives is where the shares of solid, after the scanner's blur and the smoothing of the image, are
-//! one half. Along that line curvature is a function of the arc; the level set outside stretches it,
-//! the Gaussian of the measurement widens it; what then exceeds the curvature of the inscribed
-//! sphere is taken for the corner. All lengths are shares of R_in.
+//! The normal section of an edge is a wedge with a rounded tip. The scanned surface is the contour
+//! at which the solid fraction, after the blur of the scanner and the smoothing of the image, is
+//! one half. The curvature along this contour is a function of the arc length. The exterior level
+//! set stretches the contour and the Gaussian of the measurement widens the curvature; the part
+//! above the curvature of the inscribed sphere counts as the corner. All lengths are relative to
+//! R_in.
 //!
-//! Symbols in the code: s standard deviation, u its multiples, z depth below the surface in them,
-//! x across the edge and y the height over it, k curvature.
+//! Symbols: s standard deviation, u multiples of s, z depth below the surface in multiples of s, x
+//! coordinate across the edge, y height above it, k curvature.
 
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 
-/// Weights, whose sum is 1, and standard deviations of the Gaussians that blur and smoothing of an
-/// image amount to.
+/// Weights (sum 1) and standard deviations of the Gaussians equivalent to blur and smoothing of an
+/// image.
 pub(crate) type Kernel = [(f64, f64); 2];
 
 /// A section through an edge in the image.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Section {
-    /// Where the level set turns on one side of the edge: arc length from its middle, and by how much.
+    /// Turning of the level set on one side of the edge: arc lengths from the middle and angles.
     turns: Vec<(f64, f64)>,
-    /// By how much the surface is shorter than that of the body.
+    /// Decrease of the length of the surface relative to the body.
     pub shorter: f64,
-    /// Area of the body's section that lies outside of it.
+    /// Area of the section of the body outside the surface.
     pub outside: f64,
 }
 
-/// Edges that would be measured as those of a body are.
+/// Edge parameters that reproduce the measurement of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Edges {
     pub radius: f64,
-    /// Angle by which the surface turns in them.
+    /// Angle by which the surface turns at the edges.
     pub angle: f64,
 }
 
-/// What a measurement does to an edge.
+/// Parameters of the measurement chain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chain {
-    /// What has gone over the shares of solid.
+    /// Kernel applied to the solid fractions.
     pub image: Kernel,
     /// Distance of the level set from the surface.
     pub level: f64,
-    /// Standard deviations of the Gaussians that the curvatures come from.
+    /// Standard deviations of the Gaussians used for the curvatures.
     pub widths: [f64; 2],
-    /// Largest radius of a corner.
+    /// Largest radius that counts as a corner.
     pub corner: f64,
 }
 
 /// Step along the section.
 const STEP: f64 = 0.01;
-/// Reach of the section on either side of the edge.
+/// Half-width of the section [steps].
 const HALF: usize = 160;
-/// Images are not taken for sharper than this: a step resolves it.
+/// Minimum standard deviation of the image kernel, resolved by one step.
 const FINEST: f64 = 0.01;
 /// Points of the surface on one side of the edge.
 const POINTS: usize = 64;
-/// Beyond the rounded tip and so many standard deviations the faces are flat.
+/// Distance from the rounded tip beyond which the faces are flat [standard deviations].
 const FLAT: f64 = 5.0;
-/// Points of a Gaussian on either side, and how many of them to a standard deviation.
+/// Points of a Gaussian on either side, and points per standard deviation.
 const BELL: (i32, f64) = (20, 4.0);
 
 impl Chain {
-    /// Section through such an edge.
+    /// Computes the section through an edge with these parameters.
     pub(super) fn section(&self, edges: Edges) -> Section {
         let Edges { radius, angle } = edges;
         let image = self.image.map(|(weight, s)| (weight, s.max(FINEST)));
         let (sine, cosine) = (0.5 * angle).sin_cos();
-        // Height of the body over the line across the edge, from where the faces would meet.
+        // Height of the body above the line across the edge, relative to the intersection of the
+        // faces.
         let body = |x: f64| {
             let x = x.abs();
             if x < radius * sine {
@@ -81,7 +83,7 @@ impl Chain {
             .map(|u| (u, bell(u) / (BELL.1 * (2.0 * PI).sqrt())))
             .collect();
         let widest = image.iter().fold(0.0, |s: f64, (_, t)| s.max(*t));
-        // Newton's method for the height at which half of the image is solid.
+        // Newton's method for the height at which the solid fraction is one half.
         let surface = |x: f64, from: f64| {
             let mut y = from;
             for _ in 0..12 {
@@ -112,7 +114,7 @@ impl Chain {
             let next = surface(step * n as f64, height - step * f64::tan(tilt));
             let steeper = f64::atan2(height - next, step);
             let turn = steeper - tilt;
-            // At the point before, where the two chords meet.
+            // At the preceding point, where the two chords meet.
             turns.push((place + 0.5 * self.level * turn, turn));
             let chord = step.hypot(height - next);
             place += self.level * turn + chord;
@@ -130,8 +132,8 @@ impl Chain {
         }
     }
 
-    /// Area of the corner and turning of the surface in it, both per length of an edge with this
-    /// section, as a Gaussian of this width sees it.
+    /// Returns area and turning of the corner region, both per length of an edge with this section,
+    /// as measured with a Gaussian of this width.
     pub(super) fn of_edge(&self, section: &Section, width: f64) -> (f64, f64) {
         let smoothed = |s: f64| {
             let turns = section.turns.iter();
@@ -149,7 +151,7 @@ impl Chain {
                 if n == 0 {
                     break;
                 }
-                // The corner ends between the middles of this step and the one before.
+                // The corner ends between the middle of the preceding step and that of this step.
                 part *= (before - bound) / (before - k) - 0.5;
             }
             area += part * (1.0 - self.level * k.max(bound));
@@ -162,8 +164,8 @@ impl Chain {
         (area, turn)
     }
 
-    /// What is measured with both widths of a body with edges like this, as long as those of a cube, and
-    /// corners like its, which are taken as they are.
+    /// Returns the values measured with both widths on a body with such edges, of the total length
+    /// of a cube's edges, and with a cube's corners, which are not blurred.
     fn of_body(&self, edges: Edges) -> [f64; 2] {
         let section = self.section(edges);
         let (length, corners) = body(edges.radius);
@@ -173,7 +175,8 @@ impl Chain {
         })
     }
 
-    /// Length of such edges of a body for whose corners the narrower Gaussian finds this turning.
+    /// Returns the length of such edges on a body for which the narrower Gaussian measures this
+    /// turning.
     pub(super) fn length(&self, edges: Edges, section: &Section, turning: f64) -> f64 {
         let (length, corners) = body(edges.radius);
         let (_, turn) = self.of_edge(section, self.widths[0]);
@@ -181,33 +184,34 @@ impl Chain {
     }
 }
 
-/// Length of the edges of a cube with edges of this radius, and the turning of the surface at its
+/// Returns the total edge length of a cube with edges of this radius, and the turning at its
 /// corners.
 fn body(radius: f64) -> (f64, f64) {
     (24.0 * (1.0 - radius), 4.0 * PI * radius)
 }
 
-/// Spread of what two measurements and this model agree to: about what it is off without noise.
+/// Standard deviation of the disagreement between measurement and model, about the model error
+/// without noise.
 const MISFIT: f64 = 0.01;
-/// Spread of the angles that edges turn by, about a right angle.
+/// Prior standard deviation of the turning angle about a right angle.
 const ANGLES: f64 = 0.4;
-/// Sharp edges of right angles.
+/// Sharp right-angled edges.
 const RIGHT: Edges = Edges {
     radius: 0.0,
     angle: FRAC_PI_2,
 };
-/// Angles for which the model is worked out, a right one among them: the first, and their steps.
+/// First turning angle of the model table and its increment; the table includes a right angle.
 const BLUNTEST: f64 = 0.25 * PI;
 const APART: f64 = 0.05 * PI;
 const TRIED: usize = 9;
-/// Steps of the radii for which it is worked out.
+/// Number of radius increments of the model table.
 const RADII: usize = 16;
-/// Parts that its steps of angle and radius are cut into.
+/// Subdivisions of the angle and radius increments for the interpolation.
 const FINER: [usize; 2] = [9, 30];
 
-/// The edges for which measurements of two widths found these values. The wider
-/// one tells at what angle the edges turn: blunt ones are rounded more. Where edges are round, the
-/// angle matters little, and is about a right one.
+/// Returns the edge parameters for values measured with two widths. The value from the wider
+/// Gaussian determines the angle, because blunt edges are rounded more. For round edges the angle
+/// has little influence and stays near a right angle.
 pub(super) fn edges_of(chain: &Chain, found: [f64; 2]) -> Edges {
     let table: Vec<[f64; 2]> = (0..=TRIED * (RADII + 1) + RADII)
         .into_par_iter()
@@ -243,7 +247,8 @@ pub(super) fn edges_of(chain: &Chain, found: [f64; 2]) -> Edges {
     edges
 }
 
-/// Step of the table, of `steps`, in which part `n` lies when each is cut into `parts`, and how far in.
+/// Returns the table interval, of `steps`, that contains subdivision `n` of `parts` per interval,
+/// and the fraction within it.
 fn between(n: usize, parts: usize, steps: usize) -> (usize, f64) {
     let step = (n / parts).min(steps - 1);
     (step, (n - step * parts) as f64 / parts as f64)
@@ -253,7 +258,8 @@ fn bell(x: f64) -> f64 {
     (-0.5 * x * x).exp()
 }
 
-/// To 1.5e-7 (Abramowitz and Stegun 1964, 7.1.26); `falling` is exp(-x^2), which whoever asks has anyway.
+/// Error function, accurate to 1.5e-7 (Abramowitz and Stegun 1964, 7.1.26); `falling` is exp(-x^2),
+/// which every caller has at hand.
 fn error_function(x: f64, falling: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
     let series = [
@@ -292,8 +298,9 @@ mod tests {
         }
     }
 
-    /// The same worked out in two dimensions: the quarter plane on a grid of steps of .01, blurred by a Gaussian,
-    /// exact distances from its half-way line, and their curvature after another Gaussian.
+    /// Two-dimensional reference: the quarter plane on a grid with steps of 0.01, blurred by a
+    /// Gaussian, exact distances from the contour at one half, and their curvature after another
+    /// Gaussian.
     #[test]
     fn the_section_is_what_two_dimensions_give() {
         for (image, radius, exact) in [
@@ -308,7 +315,7 @@ mod tests {
             for (width, exact) in chain.widths.into_iter().zip(exact) {
                 let (area, turn) = chain.of_edge(&section, width);
                 println!("{image} {radius} {width}: {:.4}, {exact}", area / turn);
-                // The wider Gaussian reaches through the body, which the section knows nothing of.
+                // The wider Gaussian extends through the body, which the section model ignores.
                 assert!((area / turn - exact).abs() < 0.008, "{}", area / turn);
             }
         }
@@ -322,7 +329,7 @@ mod tests {
                     let chain = chain(image);
                     let angle = degrees.to_radians();
                     let back = edges_of(&chain, chain.of_body(Edges { radius, angle })).radius;
-                    // The guess of a right angle draws a little, most where an edge is sharp.
+                    // The prior on the angle biases the result slightly, most for sharp edges.
                     let bound = if radius < 0.1 { 0.1 } else { 0.05 };
                     println!("{image} {degrees} {radius}: {back:.3}");
                     assert!((back - radius).abs() < bound, "{degrees} {radius}: {back}");
@@ -331,12 +338,12 @@ mod tests {
         }
     }
 
-    /// A quarter plane under a Gaussian is half where the product of two error functions is.
+    /// A blurred quarter plane is one half where the product of two error functions is one half.
     #[test]
     fn an_image_takes_length_and_area_off_an_edge() {
         let (s, step) = (0.05, 1e-4);
         let half = |x: f64| 0.5 * (1.0 + error_function(x / (SQRT_2 * s), bell(x / s)));
-        // Depth below the one face at each depth below the other, from the middle on.
+        // Depth below one face as a function of the depth below the other, from the bisector on.
         let other = |depth: f64| {
             let (mut low, mut high) = (0.0, 1.0);
             for _ in 0..40 {

@@ -1,16 +1,16 @@
 //! Wadell roundness in three dimensions (Eq. 39).
 //!
-//! The corners of a grain are the parts of its surface whose larger principal curvature k1 exceeds
-//! that of the largest inscribed sphere, 1 / R_in (by 1 percent: the side of a cylinder is no
-//! corner). Roundness is the mean of their radii 1 / k1
-//! over R_in, weighted by how much the surface turns there, k1 dA: the length of a rounded edge
-//! times its angle, whatever its radius, so that sharp edges, which have no area, keep their say.
+//! Corners of a grain are the parts of its surface with a larger principal curvature k1 above that
+//! of the largest inscribed sphere, 1 / R_in, by 1 percent (so that the side of a cylinder is no
+//! corner). Roundness is the mean of the corner radii 1 / k1 over R_in. The weight is the turning
+//! of the surface, k1 dA: the length of a rounded edge times its angle, independent of its radius.
+//! Sharp edges, which have no area, therefore keep their weight.
 //!
-//! Curvatures are those of the level set at the distance t outside, where even a sharp edge has
-//! the radius t: they come from derivatives of a Gaussian of the distance, at two widths, and the
-//! roundness is extrapolated to the width zero.
+//! Curvatures are evaluated on the exterior level set at distance t, where even a sharp edge has
+//! the radius t. They follow from Gaussian derivatives of the distance at two widths, and the
+//! roundness is extrapolated to zero width.
 //!
-//! Scans have their own rule: [`scan`].
+//! Scanned surfaces are measured by a separate method: [`scan`].
 
 mod band;
 mod edge;
@@ -26,29 +26,29 @@ use std::f64::consts::PI;
 
 /// Samples along the radius of the inscribed sphere.
 const CELLS: f64 = 10.0;
-/// Distance of the level set from the surface [samples].
+/// Distance of the level set from the surface [cells].
 const LEVEL: f64 = 4.0;
 /// Widths of the Gaussian (standard deviations) [samples].
 const WIDTHS: [f64; 2] = [1.0, 1.5];
-/// Radii below this share of R_in are corners.
+/// Upper bound of corner radii relative to R_in.
 const CORNER: f64 = 0.99;
-/// Reach of the Gaussian in widths.
+/// Support of the Gaussian [widths].
 const REACH: f64 = 4.5;
-/// What the surface comes from.
+/// Origin of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Surface {
     /// A closed form or a mesh.
     Exact,
-    /// A grain of a family, none of whose faces lie along its axes. Told apart so that the
-    /// committed grains of the study stay what the generator gives, to the bit.
+    /// A generated grain, whose faces are not aligned with its axes. A separate variant keeps the
+    /// committed grains of the study bit-identical to the generator's output.
     Family,
-    /// An image, which blur and smoothing [m] have gone over, and places [m] of the surface where the
-    /// grain was cut from its neighbours.
+    /// An image with the kernel of blur and smoothing [m], and the points [m] of the surface where
+    /// the grain was separated from its neighbours.
     Scanned { image: Kernel, cuts: Vec<DVec3> },
 }
 
-/// Detail finer than this share of R_in is smoothed away: the wider Gaussian. By the method of the
-/// provenance.
+/// Returns the smallest resolved detail relative to R_in, the width of the wider Gaussian, for the
+/// `method` of a provenance.
 pub(crate) fn cutoff(method: &str) -> f64 {
     if method == "scan" {
         scan::WIDTHS[1]
@@ -57,11 +57,11 @@ pub(crate) fn cutoff(method: &str) -> f64 {
     }
 }
 
-/// What is read off the corners of a body.
+/// Result of a roundness measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reading {
     pub roundness: f64,
-    /// What an image has taken off the edges.
+    /// Edge losses due to the image.
     pub lost: Option<Lost>,
 }
 
@@ -74,30 +74,30 @@ impl Reading {
     }
 }
 
-/// What an image takes off the edges of a body whose volume it keeps: a surface that rounds them is
-/// shorter, and lies a little farther out everywhere.
+/// Edge losses of a body whose image conserves its volume: rounding shortens the surface and moves
+/// the rest of it slightly outwards.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lost {
     /// Area [m^2].
     pub area: f64,
     /// Volume beside the edges [m^3].
     pub volume: f64,
-    /// Distance [m] of a level set outside, and its area [m^2].
+    /// Distance of an exterior level set [m], and its area [m^2].
     pub level: f64,
     pub area_there: f64,
 }
 
 impl Lost {
-    /// Area [m^2] of a body whose image has this one.
+    /// Returns the area [m^2] of a body whose image has the area `area`.
     pub(crate) fn restored(&self, area: f64) -> f64 {
-        // Steiner's formula for the growth of the area with the distance.
+        // Steiner's formula for the increase of the area with the distance.
         let growth = (self.area_there - area) / self.level - 4.0 * PI * self.level;
         area + self.area - self.volume / area * growth
     }
 }
 
-/// Roundness of the body in the box with the largest inscribed sphere of radius `inscribed`, or
-/// none where the grid would be too large.
+/// Returns the roundness of the body in the box with the largest inscribed sphere of radius
+/// `inscribed`, or `None` if the grid would be too large.
 pub(crate) fn measure(
     distance: &impl Distance,
     lower: DVec3,
@@ -107,12 +107,12 @@ pub(crate) fn measure(
 ) -> Option<Reading> {
     match surface {
         Surface::Exact => {
-            // Edges along the grid would have few and regular samples: it is turned.
+            // The grid is rotated: edges aligned with it would have few, regularly spaced samples.
             let turn = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(0.37, 0.81, -0.52)));
             let middle = 0.5 * (lower + upper);
             let turned =
                 |x: DVec3, hint: &mut u32| distance.near(middle + turn * (x - middle), hint);
-            // Of the box about the turned box.
+            // Bounding box of the rotated box.
             let half = turn.transpose().abs() * (0.5 * (upper - lower));
             of_exact(&turned, middle - half, middle + half, inscribed).map(Reading::of)
         }
@@ -141,7 +141,7 @@ fn of_exact(distance: &impl Distance, lower: DVec3, upper: DVec3, inscribed: f64
             areas[*v as usize] += (b - a).cross(c - a).length() / 6.0;
         }
     }
-    // Radius of the surface under a vertex from the larger curvature of the level set there.
+    // Surface radius below a vertex from the larger curvature of the level set.
     let radius = |k1: f64| {
         if k1 > 0.0 {
             1.0 / k1 - level
@@ -171,11 +171,11 @@ fn of_exact(distance: &impl Distance, lower: DVec3, upper: DVec3, inscribed: f64
         if weight > 0.0 {
             sum / weight
         } else {
-            // No corner at all: a sphere, or a rod with spherical ends.
+            // No corners: a sphere, or a rod with spherical ends.
             1.0
         }
     });
-    // The bands along the edges where the Gaussian sees face and edge are as wide as it is.
+    // The bands along the edges in which the Gaussian covers face and edge scale with its width.
     let slope = (wide - narrow) / (WIDTHS[1] - WIDTHS[0]);
     Some((narrow - slope * WIDTHS[0]).clamp(0.0, 1.0))
 }
@@ -196,8 +196,7 @@ mod tests {
         }
     }
 
-    /// The definition applied to a spheroid in closed form: semi-axes `a` along the axis and `b`
-    /// across it.
+    /// Reference for a spheroid in closed form: semi-axes `a` along the axis and `b` across it.
     fn of_spheroid(a: f64, b: f64) -> f64 {
         let inscribed = a.min(b);
         let (mut weight, mut sum) = (0.0, 0.0);

@@ -1,14 +1,15 @@
 //! Roundness of scanned grains.
 //!
-//! Noise bends the surface of a scan: where its radius is about R_in anyway (spheres, the sides of
-//! cylinders) half of it would pass for corners. There only what a much wider Gaussian sees as
-//! corners counts, and only as far as the surface bends in the direction in which that one sees it
-//! bend: beside the rim of a cylinder it sees the rim, and ripples around the cylinder are none of it.
-//! Corners that hardly turn the surface count in proportion.
+//! Noise perturbs the curvature of a scanned surface: where its radius is about R_in (spheres, the
+//! sides of cylinders), half of it would pass for corners. In this method only the parts that a
+//! much wider Gaussian classifies as corners count, and only by the curvature along the principal
+//! direction of that Gaussian: next to the rim of a cylinder this is the curvature of the rim,
+//! without the ripples around the cylinder. Corners that hardly turn the surface count in
+//! proportion.
 //!
-//! Blur, smoothing and the Gaussians widen the corners that are left: area and turning of the
-//! corners are measured with two Gaussians, and the radius is that of the edges which would be
-//! measured so ([`super::edge`]).
+//! Blur, smoothing and the Gaussians widen the remaining corners. Area and turning of the corners
+//! are therefore measured with two Gaussians, and the radius is that of the edges for which the
+//! forward model ([`super::edge`]) predicts the same values.
 
 use super::CORNER;
 use super::band::Band;
@@ -28,30 +29,31 @@ const CELLS: f64 = 12.0;
 const LEVEL: f64 = 0.4;
 /// Widths of the Gaussians [R_in].
 pub(super) const WIDTHS: [f64; 2] = [0.14, 0.21];
-/// Width of the Gaussian that tells corners from noise [R_in].
+/// Width of the Gaussian that separates corners from noise [R_in].
 const COARSE: f64 = 0.4;
-/// Radii below this share of R_in, seen by that Gaussian, are corners.
+/// Upper bound of corner radii at that width [R_in].
 const COARSE_CORNER: f64 = 0.98;
-/// Corners that turn the surface by less than this share of what a sphere turns count in proportion.
+/// Turning below which corners count in proportion, relative to the turning of a sphere.
 const LEAST_TURN: f64 = 0.05;
-/// Level set nearer to a cut than above a place of the surface so far from it is left out: so far does the
-/// wider Gaussian carry the edge of the cut [R_in].
+/// Clearance [R_in] from the cuts: parts of the level set closer to a cut than to a surface point
+/// at this distance from it are excluded, because the wider Gaussian blurs the edge of the cut that
+/// far.
 const CLEAR: f64 = 0.5;
-/// Part of the surface that must be left.
+/// Minimum fraction of the surface that must remain.
 const LEAST_LEFT: f64 = 0.25;
-/// Width of the last of the Gaussians, which gives the derivatives between the samples [samples].
+/// Width of the last Gaussian, which yields the derivatives between samples [samples].
 const LAST: f64 = 1.0;
-/// Its reach [widths].
+/// Support of the Gaussian [widths].
 const REACH: f64 = 4.0;
-/// Parts that an edge of a triangle is cut into for the sums.
+/// Subdivisions of a triangle edge for the sums.
 const PARTS: usize = 4;
 
-/// Unit normal and second derivatives, by the length of the gradient, of a smoothed distance.
+/// Unit normal and Hessian, divided by the gradient length, of a smoothed distance.
 type Bend = (DVec3, DMat3);
 
-/// Roundness of the body in the box with the largest inscribed sphere of radius `inscribed`, whose
-/// surface comes from an image that blur and smoothing [m] have gone over, away from the places
-/// `cuts` [m] where it was cut; none where hardly any surface is left, or the grid would be too
+/// Returns the roundness of a scanned body in the box with the largest inscribed sphere of radius
+/// `inscribed`; `image` is the kernel of blur and smoothing [m], and the surroundings of the points
+/// `cuts` [m] are excluded. Returns `None` if hardly any surface remains or the grid would be too
 /// large.
 pub(super) fn measure(
     distance: &impl Distance,
@@ -62,7 +64,7 @@ pub(super) fn measure(
 ) -> Option<Reading> {
     let spacing = inscribed / CELLS;
     let reach = spacing * (4.0 * COARSE * CELLS + REACH).ceil();
-    // Farther off hardly any but the coarse Gaussian reaches.
+    // Only the coarse Gaussian extends farther.
     let near = inscribed * REACH * WIDTHS[1];
     let band = Band::whole(
         distance,
@@ -98,7 +100,7 @@ pub(super) fn measure(
     };
     let coarse = bends(COARSE);
     let fine = WIDTHS.map(bends);
-    // Area and turning [R_in^2, R_in], by width.
+    // Area and turning [R_in^2, R_in] for each width.
     let mut found = [(0.0, 0.0); 2];
     for (face, triangle) in mesh.triangles.iter().enumerate() {
         if triangle.iter().any(|v| !natural[*v as usize]) {
@@ -127,7 +129,7 @@ pub(super) fn measure(
     if found.iter().any(|(_, turn)| *turn <= 0.0) {
         return Some(Reading::of(1.0));
     }
-    // Between the vertices the curvatures are interpolated, which widens them.
+    // Linear interpolation between the vertices widens the curvatures.
     let interpolated = spread(&mesh) / (inscribed * inscribed);
     let chain = Chain {
         image: image.map(|(weight, deviation)| (weight, deviation / inscribed)),
@@ -151,7 +153,8 @@ pub(super) fn measure(
     })
 }
 
-/// Which vertices of the level set lie clear of the cuts, and about the part of the surface that does.
+/// Returns which vertices of the level set are clear of the cuts, and the approximate fraction of
+/// the surface that is.
 fn natural(mesh: &TriangleMesh, inscribed: f64, cuts: &[DVec3]) -> (Vec<bool>, f64) {
     let near = inscribed * LEVEL.hypot(CLEAR);
     let clear: Vec<bool> = mesh
@@ -167,8 +170,8 @@ fn natural(mesh: &TriangleMesh, inscribed: f64, cuts: &[DVec3]) -> (Vec<bool>, f
     (clear, part)
 }
 
-/// Variance [m^2], along any one direction, that linear interpolation between the vertices adds to
-/// what they carry: in a triangle a 24th of the sum of its squared sides.
+/// Returns the variance [m^2], in any direction, that linear interpolation between the vertices
+/// adds: for a triangle 1/24 of the sum of its squared sides.
 fn spread(mesh: &TriangleMesh) -> f64 {
     let (mut sum, mut whole) = (0.0, 0.0);
     for face in 0..mesh.triangles.len() {
@@ -181,8 +184,8 @@ fn spread(mesh: &TriangleMesh) -> f64 {
     sum / whole
 }
 
-/// Unit normal and second derivatives at a place in a triangle. The tensor is interpolated, not
-/// its larger curvature: that has a kink where it changes direction.
+/// Returns unit normal and Hessian at a point in a triangle. The tensor is interpolated instead of
+/// its larger curvature, which has a kink where the principal direction changes.
 fn between(bends: &[Bend], triangle: &[u32; 3], weights: [f64; 3]) -> Bend {
     let (mut normal, mut hessian) = (DVec3::ZERO, DMat3::ZERO);
     for (v, weight) in triangle.iter().zip(weights) {
@@ -194,7 +197,7 @@ fn between(bends: &[Bend], triangle: &[u32; 3], weights: [f64; 3]) -> Bend {
     (normal / length, hessian * (1.0 / length))
 }
 
-/// The larger principal curvature [1/R_in] at a place in a triangle, and the direction it is along.
+/// Returns the larger principal curvature [1/R_in] at a point in a triangle, and its direction.
 fn sharpest(bends: &[Bend], triangle: &[u32; 3], weights: [f64; 3]) -> (f64, DVec3) {
     let (normal, hessian) = between(bends, triangle, weights);
     let e = normal.any_orthonormal_vector();
@@ -206,7 +209,7 @@ fn sharpest(bends: &[Bend], triangle: &[u32; 3], weights: [f64; 3]) -> (f64, DVe
     (mean + half.hypot(both), cosine * e + sine * f)
 }
 
-/// Curvatures [1/R_in] at a place in a triangle along this direction and across it.
+/// Returns the curvatures [1/R_in] at a point in a triangle along this direction and across it.
 fn along_and_across(
     bends: &[Bend],
     triangle: &[u32; 3],
@@ -219,7 +222,7 @@ fn along_and_across(
     [e.dot(hessian * e), f.dot(hessian * f)]
 }
 
-/// Weights of the corners at the middles of the equal parts of a triangle.
+/// Returns the barycentric coordinates of the centres of the equal parts of a triangle.
 fn parts() -> impl Iterator<Item = [f64; 3]> {
     let n = PARTS as f64;
     (0..PARTS).flat_map(move |i| {
@@ -243,7 +246,7 @@ mod tests {
         measure(&body, bounds, 1.0, SHARP, cuts).map(|reading| reading.roundness)
     }
 
-    /// Places on the unit sphere that are so far up.
+    /// Points on the unit sphere above this height.
     fn on_sphere(above: f64) -> Vec<DVec3> {
         let places = (0..2000).map(|n| {
             let (z, turn) = (f64::from(n) / 999.5 - 1.0, 2.4 * f64::from(n));
@@ -277,11 +280,12 @@ mod tests {
         );
         println!("with the cut {whole:.3}, without {own:.3}");
         assert!(whole < 0.7 && own > 0.98, "{whole}, {own}");
-        // Where hardly anything is left, nothing is said.
+        // Without enough remaining surface the result is `None`.
         assert_eq!(roundness(body, &on_sphere(-0.4)), None);
     }
 
-    /// The side of a cylinder is as round as the largest sphere in it, and its rim is curved.
+    /// The side of a cylinder has the curvature of the largest inscribed sphere; its rim is curved
+    /// more.
     #[test]
     fn rims_and_edges_have_their_radius() {
         let turn = glam::DQuat::from_scaled_axis(DVec3::new(0.37, 0.81, -0.52));

@@ -1,4 +1,4 @@
-//! Shapes from a volume.
+//! Construction of shapes from a volume.
 
 use super::field_of_view::FieldOfView;
 use super::grain::{self, Context};
@@ -18,38 +18,40 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How a volume is turned into shapes.
+/// Options for converting a volume to shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanOptions {
-    /// Edge of a voxel [m].
+    /// Edge length of a voxel [m].
     pub voxel: f64,
-    /// The one label wanted; none for every label. Of a labelled image that is to be split or
-    /// separated, the label of the solid phase: all grains are wanted.
+    /// Label of a single grain; `None` for all labels. If a labelled image is to be split or
+    /// separated, the label of the solid phase, and all grains are built.
     pub label: Option<u32>,
-    /// How solid is told from void; needed for grey images, none for labels.
+    /// Segmentation of solid and void; required for grey images, `None` for labels.
     pub threshold: Option<Threshold>,
-    /// Against noise, before the threshold.
+    /// Noise filter applied before the threshold.
     pub denoise: Denoise,
-    /// Number the connected pieces of all solid voxels and take each as a grain.
+    /// Whether to treat each connected piece of the solid voxels as a grain.
     pub split: bool,
-    /// Separate grains that touch: two hills of the distance from the void are two grains where the
-    /// neck between them is thinner than this share of the smaller (0.87 did best on rendered heaps).
+    /// Separates touching grains. Two maxima of the distance from the void are two grains if the
+    /// neck between them is narrower than this fraction of the smaller one (0.87 did best on
+    /// rendered packings).
     pub separate: Option<f64>,
-    /// Take surfaces from grey values, where there are such, not from the mask.
+    /// Whether to locate surfaces by grey values, if available, instead of the mask.
     pub sub_voxel: bool,
-    /// Take grains that touch the image border too, as cut there: for tight crops.
+    /// Whether to include grains at the image border, truncated there: for tight crops.
     pub pad: bool,
-    /// Of a label with several pieces, keep the largest.
+    /// Whether to keep the largest piece of a label with several pieces.
     pub largest_piece: bool,
-    /// Standard deviation of the smoothing [voxels]; none for 1.1 from grey values, 1.5 from a mask.
+    /// Standard deviation of the smoothing [voxels]; `None` for 1.1 with grey values and 1.5 with a
+    /// mask.
     pub smoothing: Option<f64>,
-    /// Resolution, nodes and bounds. Grains of few voxels get fewer cells: as many as 1.25 times
-    /// the voxels across them, but not under 24.
+    /// Resolution, nodes and bounds. Small grains get fewer cells: 1.25 times the number of voxels
+    /// across them, but at least 24.
     pub shape: ShapeOptions,
 }
 
 impl ScanOptions {
-    /// Defaults with this edge of a voxel [m].
+    /// Returns the default options for this voxel edge length [m].
     pub fn new(voxel: f64) -> ScanOptions {
         ScanOptions {
             voxel,
@@ -68,8 +70,8 @@ impl ScanOptions {
 }
 
 impl ScanOptions {
-    /// Memory that work on an image of many grains takes [bytes a voxel]: measured, file of 16 bits
-    /// included. Surfaces of a grain that fills the image take as much again.
+    /// Returns the memory for an image of many grains [bytes per voxel], as measured, including a
+    /// 16-bit file. Surfaces of a grain that fills the image need as much again.
     pub fn bytes_per_voxel(&self) -> u64 {
         match (self.threshold, self.separate) {
             (Some(_), _) => 22,
@@ -78,41 +80,41 @@ impl ScanOptions {
         }
     }
 
-    /// Are the labels of the grains to be found here?
+    /// Returns whether the labels of the grains are to be determined.
     fn divides(&self) -> bool {
         self.split || self.separate.is_some()
     }
 }
 
-/// What became of one label.
+/// Result for one label.
 #[derive(Debug)]
 pub struct ScannedGrain {
-    /// Label in the image (after splitting: number of the piece).
+    /// Label in the image (after splitting: index of the piece).
     pub label: u32,
-    /// Its voxels.
+    /// Number of voxels.
     pub voxels: u64,
-    /// Part of its voxels' faces that are another grain's too: where it was cut off, not its own surface.
+    /// Fraction of the voxel faces shared with another grain, where the surface is a cut.
     pub shared_surface: f64,
-    /// The shape, or why there is none.
+    /// The shape, or the reason why there is none.
     pub shape: Result<Shape>,
 }
 
-/// What a volume gave.
+/// Result for a volume.
 #[derive(Debug)]
 pub struct Scan {
-    /// The grains in the order of their labels.
+    /// The grains, ordered by label.
     pub grains: Vec<ScannedGrain>,
     /// The labels, 0 for background.
     pub labels: Volume,
-    /// Grey value of the threshold, where there was one.
+    /// Grey value of the threshold, if one was applied.
     pub threshold: Option<f64>,
 }
 
-/// Told what is being done, how far it is, and how far it goes.
+/// Callback for progress: stage, completed steps, total steps.
 pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) + Sync);
 
-/// Shapes of the grains in a volume, in the order of their labels. Errors that concern the
-/// volume as a whole are returned at once, those of one grain with that grain.
+/// Builds the shapes of the grains in a volume, ordered by label. Errors of the whole volume are
+/// returned directly, those of one grain with that grain.
 pub fn shapes_from_volume(
     volume: &Volume,
     source: &SourceFile,
@@ -121,7 +123,7 @@ pub fn shapes_from_volume(
     scan_volume(volume, source, options, &|_, _, _| {}).map(|scan| scan.grains)
 }
 
-/// The same with the label image, telling how far it is.
+/// Builds the shapes of the grains and the label image, and reports progress.
 pub fn scan_volume(
     volume: &Volume,
     source: &SourceFile,
@@ -130,7 +132,7 @@ pub fn scan_volume(
 ) -> Result<Scan> {
     check(options)?;
     let dims = volume.dims;
-    // Indices share their words with a mark.
+    // Voxel indices share 32 bits with a flag.
     let count = dims.iter().product::<usize>();
     if count >= 1 << 31 {
         return Err(ShapeError::BadParameter {
@@ -222,10 +224,10 @@ fn check(options: &ScanOptions) -> Result<()> {
     within("threshold", threshold, f64::MIN, f64::MAX, "must be finite")
 }
 
-/// Labels of the volume and what else was found on the way.
+/// Result of the segmentation.
 struct Segments {
     labels: Vec<u32>,
-    /// Where surfaces are to be taken from grey values.
+    /// Grey values, if surfaces are located by them.
     grey: Option<Grey>,
     threshold: Option<f64>,
     /// Labels at the edge of the field of view.
@@ -274,7 +276,7 @@ fn segment(
     let seen = clean.as_ref().unwrap_or(&values);
     let cut = options.threshold.and_then(|t| t.of(seen));
     let Some(cut) = cut else {
-        // All voxels alike: black is empty.
+        // All values are equal: black counts as empty.
         return Err(ShapeError::EmptyVolume);
     };
     let binary: Vec<u32> = seen
@@ -290,7 +292,7 @@ fn segment(
         grey: None,
         threshold: Some(cut),
     };
-    // A binary image has no grey to go by.
+    // A binary image has no intermediate grey values.
     let two = values
         .iter()
         .all(|v| *v == values[0] || *v == 0.0 || *v == 1.0 || *v == 255.0);
@@ -302,7 +304,7 @@ fn segment(
     Ok(segments)
 }
 
-/// Fills, splits and separates as asked.
+/// Fills cavities, splits and separates according to the options.
 fn divide(
     labels: &[u32],
     dims: [usize; 3],

@@ -1,28 +1,30 @@
-//! The field of view of a scan: reconstructions fill what lies outside their cylinder with one value,
-//! and grains that its edge cuts are not whole.
+//! Field of view of a scan. Reconstructions fill the exterior of their cylinder with one value, and
+//! grains cut by its edge are incomplete.
 
 use std::collections::BTreeSet;
 
-/// Least part of the image that is outside.
+/// Minimum fraction of the image outside the field of view.
 const OUTSIDE: f64 = 0.01;
-/// More voxels than this part have the value of the outside also inside: it is plain background.
+/// Fraction of interior voxels with the exterior value above which that value counts as background.
 const ALIKE: f64 = 0.02;
-/// Depth at which the edge is probed [voxels], and the part of it that may be solid: more, and it is the
-/// surface of a grain in a black image.
+/// Depth at which the edge is probed [voxels], and the maximum solid fraction there: a higher one
+/// indicates the surface of a grain in a black image.
 const DEPTH: usize = 4;
 const SOLID: f64 = 0.8;
-/// How near the edge a cut grain comes [voxels]; the median takes a voxel off it.
+/// Distance from the edge within which a grain counts as cut [voxels]; the median filter removes
+/// one voxel at the edge.
 const NEAR: usize = 2;
 
-/// Where the rows of an image lie within the field of view.
+/// Extent of the image rows within the field of view.
 pub(super) struct FieldOfView {
     dims: [usize; 3],
-    /// First voxel and the one after the last of each row.
+    /// First voxel of each row, and one past the last.
     rows: Vec<[usize; 2]>,
 }
 
 impl FieldOfView {
-    /// That of an image; none where it fills the image or cannot be told. Voxels from `cut` on are solid.
+    /// Detects the field of view of an image; `None` if it fills the image or cannot be determined.
+    /// Voxels with values of at least `cut` are solid.
     pub fn of(values: &[f32], dims: [usize; 3], cut: f64) -> Option<FieldOfView> {
         let [nx, ny, nz] = dims;
         let outside = values[0];
@@ -63,14 +65,14 @@ impl FieldOfView {
         is_one.then_some(FieldOfView { dims, rows })
     }
 
-    /// Labels that come to its edge.
+    /// Returns the labels at its edge.
     pub fn cuts(&self, labels: &[u32]) -> BTreeSet<u32> {
         let [nx, ny, nz] = self.dims;
         let mut found = BTreeSet::new();
         for (row, line) in labels.chunks(nx).enumerate() {
             let (j, k) = (row % ny, row / ny);
             let [from, to] = self.rows[row];
-            // Rows beside this one: what they leave out is as near.
+            // Voxels excluded by adjacent rows are equally close to the edge.
             let mut beside = Vec::new();
             if j >= NEAR && j + NEAR < ny {
                 beside.extend([row - NEAR, row + NEAR]);
@@ -105,8 +107,8 @@ mod tests {
 
     const N: usize = 40;
 
-    /// Three balls in a disc of noise, the last one on its edge; `noise` of the void and the value of what
-    /// lies outside.
+    /// Three balls in a noisy disc, the last one on its edge; `noise` is that of the void,
+    /// `outside` the exterior value.
     fn image(noise: f32, outside: f32, radius: f64) -> (Vec<f32>, Vec<u32>) {
         let balls = [[14.0, 20.0, 12.0], [26.0, 18.0, 26.0], [32.5, 28.0, 20.0]];
         let (mut values, mut labels) = (Vec::new(), Vec::new());
@@ -136,7 +138,7 @@ mod tests {
 
     #[test]
     fn plain_background_is_no_field_of_view() {
-        // The whole image in view; void without noise; a single grain in a black image.
+        // Complete image in view; void without noise; a single grain in a black image.
         let (values, _) = image(20.0, 0.0, 100.0);
         assert!(FieldOfView::of(&values, [N; 3], 125.0).is_none());
         let (values, _) = image(0.0, 50.0, 18.0);

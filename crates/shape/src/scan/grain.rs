@@ -14,16 +14,16 @@ use crate::surface::{Samples, extract};
 use glam::DVec3;
 use std::collections::BTreeSet;
 
-/// Fewest voxels of a grain: a ball of five voxels across.
+/// Minimum number of voxels of a grain: a ball of diameter 5 voxels.
 const FEWEST: u64 = 64;
-/// Cells across a grain below which the smoothed field is refined before its surface is taken,
-/// from grey values and from a mask.
+/// Number of cells across a grain below which the smoothed field is refined before surface
+/// extraction, for grey values and for a mask.
 const FINE: [usize; 2] = [40, 64];
-/// Share of the surface that pieces broken off by smoothing may have.
+/// Maximum surface fraction of pieces detached by smoothing.
 const CRUMBS: f64 = 0.02;
-/// Cells of the finished field over the voxels across a grain, and the fewest.
+/// Cells of the final field per voxel across a grain, and the minimum number of cells.
 const CELLS: (f64, usize) = (1.25, 24);
-/// Smoothing from grey values and from a mask [voxels].
+/// Smoothing for grey values and for a mask [voxels].
 const SMOOTHING: [f64; 2] = [1.1, 1.5];
 
 /// The segmented volume.
@@ -38,7 +38,7 @@ pub(super) struct Context<'a> {
     pub options: &'a ScanOptions,
 }
 
-/// Shape of the grain `label`, which lies in `region`.
+/// Builds the shape of the grain `label`, which lies in `region`.
 pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Shape> {
     let Context {
         dims,
@@ -106,7 +106,7 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
         }
     };
     let mut mesh = surface(&field, mask.dims, volume, factor)?;
-    // Voxel i spans i to i + 1 edges from the image's corner, its centre is at i + 1/2.
+    // Voxel i extends from i to i + 1 edge lengths from the image corner; its centre is at i + 1/2.
     let shift = DVec3::from_array(region.lower.map(|low| low as f64 - margin as f64 + 0.5));
     for v in &mut mesh.vertices {
         *v = options.voxel * (*v + shift);
@@ -124,7 +124,7 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
     from_closed(&mesh, surface, provenance, &finish)
 }
 
-/// Refuses, or on request drops, all but the largest piece; returns the voxels kept.
+/// Refuses, or on request drops, all but the largest piece; returns the number of voxels kept.
 fn one_piece(mask: &mut Mask, label: u32, largest: bool) -> Result<u64> {
     let (number, sizes) = pieces(mask.dims, |n| mask.solid[n]);
     let mut order: Vec<usize> = (0..sizes.len()).collect();
@@ -150,15 +150,15 @@ fn one_piece(mask: &mut Mask, label: u32, largest: bool) -> Result<u64> {
     Ok(sizes[kept])
 }
 
-/// Closed smooth surface in voxel units (voxel centres at whole numbers), enclosing `volume`
-/// voxels: a field that is about the signed distance, at the level that gives that volume, taken
-/// on a grid `factor` times as fine.
+/// Extracts a closed smooth surface in voxel units (voxel centres at integers) that encloses
+/// `volume` voxels. The field approximates the signed distance; its level is set to give that
+/// volume, on a grid refined by `factor`.
 fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Result<TriangleMesh> {
     let (field, dims, lower) = near_surface(field, dims);
     let (mut fine, dims) = smooth::refine(&field, dims, factor);
     let spacing = 1.0 / factor as f64;
     let mut mesh = TriangleMesh::default();
-    // Newton's method: the volume changes by the area for every unit of level.
+    // Newton's method: the derivative of the volume with respect to the level is the area.
     for _ in 0..5 {
         let samples = Samples {
             dims,
@@ -184,11 +184,11 @@ fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Resul
     Ok(mesh)
 }
 
-/// The box that the surface is taken from reaches so many samples beyond the inside of the field:
-/// more than its level moves and the interpolation reaches.
+/// Margin [samples] of the extraction box around the interior of the field; exceeds the range of
+/// the level and of the interpolation.
 const AROUND: usize = 4;
 
-/// The part of a field about the body, its dimensions, and where it begins.
+/// Returns the part of a field around the body, its dimensions, and its origin.
 fn near_surface(field: &[f32], dims: [usize; 3]) -> (Vec<f32>, [usize; 3], DVec3) {
     let [nx, ny, _] = dims;
     let (mut low, mut high) = (dims, [0; 3]);

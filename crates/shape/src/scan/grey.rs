@@ -1,11 +1,11 @@
-//! The surface of one grain from grey values: finer than the voxels.
+//! Sub-voxel surface of one grain from grey values.
 //!
-//! With the grey of void and solid known, a voxel's value tells how much of it is solid. The sum of
-//! these shares is the volume of the grain, whatever the blur of the scanner, which moves grey
-//! about but makes none. The surface is where the smoothed share is one half; smoothing and blur
-//! together would draw it in where it is curved, by their variance times the mean curvature, so
-//! the smoothing kernel is given the negative of the blur's second moment. What is left is taken
-//! out by setting the level so that the volume is that of the sum.
+//! Given the grey values of void and solid, the value of a voxel yields its solid fraction. The sum
+//! of the fractions is the volume of the grain for any blur of the scanner, because blur conserves
+//! grey. The surface is the contour at which the smoothed fraction is one half. Smoothing and blur
+//! would move it inwards where it is convex, by their variance times the mean curvature; the
+//! smoothing kernel therefore has the negative second moment of the blur. The remaining bias is
+//! removed by setting the level to match the volume.
 
 use super::Mask;
 use super::smooth::gaussian;
@@ -15,55 +15,56 @@ use crate::roundness::Kernel;
 use rayon::prelude::*;
 use std::f64::consts::SQRT_2;
 
-/// Grey values with the owner of each voxel: the label of its grain, with [`HALO`] the void
-/// around it, 0 elsewhere.
+/// Grey values with the owner of each voxel: the label of its grain, combined with [`HALO`] in the
+/// void around it, 0 elsewhere.
 pub(crate) struct Grey {
     pub dims: [usize; 3],
     pub values: Vec<f32>,
     pub owner: Vec<u32>,
-    /// Mean grey of void and of solid, far from surfaces.
+    /// Mean grey values of void and of solid, far from surfaces.
     pub void: f64,
     pub solid: f64,
 }
 
-/// Distance from the surface beyond which a voxel is wholly solid or void [voxels].
+/// Distance from the surface beyond which a voxel is entirely solid or void [voxels].
 const BAND: f32 = 2.7;
-/// Distance up to which it is asked for: beyond [`DEEPER`] the band [voxels].
+/// Range of the distance computation: the band plus [`DEEPER`] [voxels].
 const REACH: usize = 4;
-/// Beyond the band, where the grey of the grain is taken from [voxels].
+/// Additional distance from the band at which the grey of the grain is sampled [voxels].
 const DEEPER: f32 = 0.5;
-/// Layers of void that belong to a grain [voxels].
+/// Layers of void that are assigned to a grain [voxels].
 pub(crate) const LAYERS: usize = 4;
-/// Deep voxels from which a grain's own grey is taken; with fewer, that of all grains.
+/// Minimum number of deep voxels for a grain's own grey value; below it that of all grains is used.
 const DEEP: usize = 300;
 
-/// Voxels that give the mean grey of an image's phases well enough.
+/// Number of voxels sufficient for the mean grey values of an image.
 const ENOUGH: usize = 1 << 24;
-/// Fewer deep voxels are no measure of a phase's grey.
+/// Minimum number of deep voxels for the mean grey of a phase.
 const FEW_DEEP: u64 = 200;
-/// So many less deep ones are a better one than all voxels, which the blur of the surface darkens.
+/// Minimum number of less deep voxels; they are preferable to all voxels, which the blur of the
+/// surface darkens.
 const SOME_DEEP: u64 = 24;
 /// Steps along the axes without a voxel of the other phase that make a voxel deep.
 const CLEAR: usize = 4;
 
-/// A grain's share of each voxel of a crop, ready to be cut at zero.
+/// The solid fractions of one grain in a crop of the image, with the surface at zero.
 pub(crate) struct Cut {
-    /// About the signed distance near the surface [voxels].
+    /// Approximate signed distance near the surface [voxels].
     pub field: Vec<f32>,
     /// Volume [voxels].
     pub volume: f64,
-    /// Standard deviation of the scanner's blur [voxels].
+    /// Standard deviation of the blur of the scanner [voxels].
     pub blur: f64,
-    /// What blur and smoothing together have done to the shares [voxels].
+    /// Combined kernel of blur and smoothing [voxels].
     pub kernel: Kernel,
 }
 
 impl Grey {
-    /// Mean grey of the phases from voxels that have none of the other within `reach` along the
-    /// axes; from the deepest where there are hardly any such.
+    /// Computes the mean grey values of the phases from voxels without the other phase within
+    /// `reach` along the axes, or from the deepest voxels if there are hardly any.
     pub(crate) fn new(dims: [usize; 3], values: Vec<f32>, owner: Vec<u32>) -> Grey {
         let is_solid = |n: usize| owner[n] != 0 && owner[n] & HALO == 0;
-        // Of large images a share of the rows is enough, unless few voxels are deep.
+        // For large images a fraction of the rows suffices, unless few voxels are deep.
         let share = (values.len() / ENOUGH).max(1);
         let mut grey = mean_grey(dims, &values, is_solid, share);
         if share > 1 && grey.iter().any(|(_, deep)| *deep < FEW_DEEP) {
@@ -79,8 +80,8 @@ impl Grey {
         }
     }
 
-    /// The grain `label`, whose mask (with `low` the image's coordinate of its first voxel, which
-    /// may lie outside) holds its solid voxels, cavities filled.
+    /// Returns the grain `label`. Its mask contains its solid voxels with cavities filled; `low` is
+    /// the image coordinate of the first voxel of the mask, which may lie outside.
     pub(crate) fn cut(&self, mask: &Mask, low: [isize; 3], label: u32, sigma: f64) -> Cut {
         let dims = mask.dims;
         let distance = transform::signed_near(mask, REACH);
@@ -105,7 +106,7 @@ impl Grey {
                 Some(m) if distance[n] <= BAND && self.owner[m] & !HALO == label => {
                     (f64::from(self.values[m]) - self.void) / (solid - self.void)
                 }
-                // A filled cavity is the grain's whatever its grey.
+                // A filled cavity belongs to the grain for any grey value.
                 Some(m) if mask.solid[n] && self.owner[m] == 0 => 1.0,
                 _ => 0.0,
             }
@@ -135,7 +136,7 @@ impl Grey {
         }
     }
 
-    /// Mean grey of the grain's own deep voxels: grains differ.
+    /// Returns the mean grey of the grain's own deep voxels, since grains differ.
     fn own_grey(&self, distance: &[f32], place: &impl Fn(usize) -> Option<usize>) -> f64 {
         let deep: Vec<f64> = (0..distance.len())
             .filter(|n| distance[*n] < -BAND - DEEPER)
@@ -149,8 +150,8 @@ impl Grey {
     }
 }
 
-/// Steps along the axes, in all directions, that end on no voxel of the kind `other`; [`CLEAR`] at
-/// most.
+/// Returns the number of steps along the axes, in all directions, without a voxel of the kind
+/// `other`; at most [`CLEAR`].
 fn clear(dims: [usize; 3], n: usize, other: impl Fn(usize) -> bool) -> usize {
     let strides = [1, dims[0], dims[0] * dims[1]];
     let blocked = (1..=CLEAR).find(|s| {
@@ -163,8 +164,8 @@ fn clear(dims: [usize; 3], n: usize, other: impl Fn(usize) -> bool) -> usize {
     blocked.map_or(CLEAR, |s| s - 1)
 }
 
-/// Mean grey of void and of solid, each with the number of its deep voxels that were seen: from
-/// those, or from the deepest of which there are some. One in `share` rows is looked at.
+/// Returns the mean grey values of void and of solid, each with its number of sampled deep voxels,
+/// from those or from the deepest class with enough voxels. One in `share` rows is sampled.
 fn mean_grey(
     dims: [usize; 3],
     values: &[f32],
@@ -175,7 +176,7 @@ fn mean_grey(
         let start = dims[0] * (j + dims[1] * k);
         start..start + dims[0]
     };
-    // Sum and number of the voxels of both phases by their clear steps, slice by slice.
+    // Sum and number of the voxels of both phases by clear steps, for each slice.
     let slices: Vec<[[(f64, u64); CLEAR + 1]; 2]> = (0..dims[2])
         .into_par_iter()
         .map(|k| {
@@ -206,12 +207,12 @@ fn mean_grey(
     })
 }
 
-/// Median length of the gradient by central differences [per voxel] where a field of shares or its
-/// half minus it is close to its crossing.
+/// Returns the median gradient length by central differences [1/voxel] near the crossing of a
+/// fraction field or of a field centred on zero.
 fn steepness(field: &[f32], dims: [usize; 3]) -> f64 {
     let [nx, ny, nz] = dims;
     let strides = [1, nx, nx * ny];
-    // A field of shares crosses at one half, the other at zero: told by the far corner.
+    // Fraction fields cross at one half, the others at zero; the far corner distinguishes them.
     let crossing = if field[0].abs() < 0.25 { 0.5 } else { 0.0 };
     let mut slopes = Vec::new();
     for k in 1..nz - 1 {
@@ -235,9 +236,9 @@ fn steepness(field: &[f32], dims: [usize; 3]) -> f64 {
     *slopes.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Blur [voxels] of an edge that, smoothed by `sigma` more, has this central difference.
+/// Returns the blur [voxels] of an edge with this central difference after smoothing by `sigma`.
 fn blur(steepness: f64, sigma: f64) -> f64 {
-    // Half the rise of the error function of total width w over two voxels; falls with w.
+    // Half the rise of an error function of total width w over two voxels; decreases with w.
     let rise = |w: f64| {
         let n = 64;
         let density =
@@ -270,7 +271,7 @@ mod tests {
             let at = [n % 40, n / 40 % 40, n / 1600];
             at.iter().all(|i| (8..32).contains(i))
         };
-        // Solid 3, void 1, with a ripple, and the rim of the solid darker.
+        // Solid 3, void 1, with a ripple, and a darker rim of the solid.
         let value = |n: usize| {
             let at = [n % 40, n / 40 % 40, n / 1600];
             let rim = inside(n) && at.iter().any(|i| *i == 8 || *i == 31);
@@ -286,7 +287,7 @@ mod tests {
                 "deep voxels alone: {}",
                 solid.0
             );
-            // 16^3 are deep.
+            // 16^3 voxels are deep.
             assert_eq!(solid.1 as usize, 4096 / share);
         }
     }

@@ -1,5 +1,5 @@
-//! Volumes with a header of text: NRRD (`.nrrd`, `.nhdr`) and MetaImage (`.mha`, `.mhd`), the usual
-//! ways to describe raw files. Voxels raw or gzipped, in the header's file or one beside it.
+//! Volumes with a text header: NRRD (`.nrrd`, `.nhdr`) and MetaImage (`.mha`, `.mhd`). Voxels are
+//! raw or gzipped, in the header's file or in a separate one.
 
 use super::npy::Number;
 use super::volume::{Volume, count};
@@ -9,19 +9,19 @@ use flate2::read::{MultiGzDecoder, ZlibDecoder};
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-/// Longest header [bytes].
+/// Maximum header size [bytes].
 const LONGEST: usize = 1 << 16;
 
-/// What a header says.
+/// Content of a header.
 #[derive(Default)]
 struct Fields {
     sizes: Vec<u64>,
     number: Option<Number>,
     big: bool,
     packed: Packed,
-    /// File of the voxels, or none for the header's own.
+    /// File with the voxels; `None` if they follow the header.
     beside: Option<String>,
-    /// Bytes before the voxels; -1 for those that are too many.
+    /// Bytes before the voxels; -1 to read them from the end of the file.
     skip: i64,
 }
 
@@ -39,7 +39,7 @@ pub(super) fn read_nrrd(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
     if !bytes.starts_with(b"NRRD000") {
         return Err(malformed("it does not begin with the NRRD signature"));
     }
-    // The header ends at the first empty line; a detached one at its end.
+    // The header ends at the first empty line, or at the end of a detached header file.
     let head = &bytes[..bytes.len().min(LONGEST)];
     let end = head
         .windows(2)
@@ -87,7 +87,7 @@ pub(super) fn read_meta(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
     let malformed = |reason: &str| ShapeError::malformed(path, reason);
     let mut fields = Fields::default();
     let mut at = 0;
-    // The name of the data file is the last line of the header.
+    // The data file name is the last line of the header.
     while fields.beside.is_none() {
         let rest = &bytes[at..bytes.len().min(LONGEST).max(at)];
         let Some(end) = rest.iter().position(|b| *b == b'\n') else {
@@ -120,7 +120,7 @@ pub(super) fn read_meta(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
 }
 
 fn sizes(value: &str) -> Vec<u64> {
-    // What is no number becomes 0 and is refused as an empty axis.
+    // An unreadable number becomes 0 and is refused as an empty axis.
     value
         .split_whitespace()
         .map(|n| n.parse().unwrap_or(0))
@@ -218,7 +218,7 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
     let data = data
         .get(usize::try_from(skip).unwrap_or(usize::MAX)..)
         .unwrap_or(&[]);
-    // More than the header states: slices that nobody would miss.
+    // Surplus data indicates slices that would be lost without notice.
     if let Some(name) = fields.beside.filter(|_| raw && data.len() as u64 > needed) {
         return Err(unsupported(format!(
             "the header states {nx} x {ny} x {nz} voxels of {} bytes, {needed} bytes; {name:?} \
@@ -318,8 +318,8 @@ mod tests {
             .into_bytes();
         local.extend_from_slice(&little);
         assert_eq!(read_meta(&path, &local, &limits()).unwrap(), expect);
-        // Bytes in front of the voxels are skipped where the header says so; slices that it does
-        // not tell of are not dropped in silence.
+        // Bytes before the voxels are skipped only if the header declares them; undeclared slices
+        // are never dropped silently.
         let ending = apart.replace("skip: 5", "skip: -1");
         assert_eq!(
             read_nrrd(&path, ending.as_bytes(), &limits()).unwrap(),
@@ -343,7 +343,7 @@ mod tests {
             none.contains("a.nrrd") && none.contains("none.raw"),
             "{none}"
         );
-        // A file elsewhere is not fetched.
+        // Files in other folders are refused.
         let away = apart.replace("a.raw", "../a.raw");
         assert!(matches!(
             read_nrrd(&path, away.as_bytes(), &limits()),

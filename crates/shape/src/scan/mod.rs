@@ -1,18 +1,18 @@
 //! Shapes from 3-D images: labelled or binary volumes, or grey ones with a threshold.
 //!
-//! A grain's mask becomes a signed Euclidean distance (exact, both directions, the interface
-//! halfway between voxel centres), which is smoothed by a kernel that does not shrink curved
-//! surfaces; the level of the surface is set so that it encloses the volume of the voxels. From
-//! there on it is a closed mesh like any other.
+//! The mask of a grain is converted to a signed Euclidean distance (exact in both directions, with
+//! the interface halfway between voxel centres). The distance is smoothed by a kernel that does not
+//! shrink curved surfaces, and the level of the surface is set to enclose the volume of the voxels.
+//! The result is processed like any closed mesh.
 //!
-//! Where there are grey values, they place the surface between the voxels (module `grey`): the
-//! share of solid in each voxel gives the volume, and its smoothed half-way level the surface.
-//! Grains that touch are separated by a watershed (module `watershed`).
+//! Grey values, if available, locate the surface between the voxels (module `grey`): the solid
+//! fraction of each voxel yields the volume, and the contour of the smoothed fraction at one half
+//! the surface. Touching grains are separated by a watershed (module `watershed`).
 //!
-//! From a mask alone, the volume of the voxels is the best estimate of the grain's that a binary image allows: about
-//! 0.1 % (rms) for a sphere of 20 voxels at a place unrelated to the voxels. A synthetic sphere
-//! centred on a voxel is another matter: whole shells of voxels enter at once, and its mask may
-//! hold 3 % more or less than the sphere, which nothing computed from the mask can mend.
+//! From a mask alone, the volume of the voxels is the best estimate that a binary image allows:
+//! about 0.1 % (rms) for a sphere of diameter 20 voxels at a random position. A synthetic sphere
+//! centred on a voxel is a special case: entire shells of voxels enter at once, and its mask may
+//! differ from the sphere by 3 % of volume, which cannot be recovered from the mask.
 
 mod build;
 mod field_of_view;
@@ -36,10 +36,10 @@ pub use build::{Progress, Scan, ScanOptions, ScannedGrain, scan_volume, shapes_f
 pub use threshold::{Denoise, Threshold};
 pub use volume::{Volume, Voxels, read_volume};
 
-/// Solid voxels of one grain with background around them.
+/// Solid voxels of one grain in a box of background.
 pub(crate) struct Mask {
     /// Voxels along x, y and z.
     pub dims: [usize; 3],
-    /// Solid or not, x fastest.
+    /// Whether each voxel is solid, x fastest.
     pub solid: Vec<bool>,
 }

@@ -1,47 +1,47 @@
 //! NPY arrays of numbers (numpy.save), indexed [z][y][x].
 //!
-//! Read here rather than by a crate: the header is one line of text, and the crate at hand
-//! multiplies the claimed dimensions without a check and parses them recursively, so that a
-//! hostile header can bring the program down.
+//! The header is parsed here instead of by the crate `npyz`, which multiplies the declared
+//! dimensions unchecked and parses them recursively, so that a malicious header can abort the
+//! program.
 
 use super::volume::{Volume, Voxels, count};
 use crate::error::{Result, ShapeError};
 use crate::limits::ReadLimits;
 use std::path::Path;
 
-/// Longest header that is read [bytes].
+/// Maximum header size [bytes].
 const LONGEST_HEADER: usize = 1 << 16;
-/// What is needed of a file to know what it holds [bytes].
+/// Number of leading bytes that contain the complete header.
 pub(super) const HEAD: u64 = LONGEST_HEADER as u64 + 12;
 
 pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
     header(path, bytes, limits)?.volume(path, bytes)
 }
 
-/// What a header says.
+/// Content of a header.
 pub(super) struct Array {
     number: Number,
     dims: [usize; 3],
     fortran: bool,
-    /// Where the values begin.
+    /// Offset of the values [bytes].
     start: usize,
 }
 
 impl Array {
-    /// Length of the file [bytes].
+    /// Returns the size of the file [bytes].
     pub(super) fn bytes(&self) -> u64 {
         let values = self.dims.iter().product::<usize>() as u64;
         self.start as u64 + values * self.number.width as u64
     }
 
-    /// The volume in the whole file.
+    /// Decodes the volume from the whole file.
     pub(super) fn volume(&self, path: &Path, bytes: &[u8]) -> Result<Volume> {
         let data = bytes.get(self.start..).unwrap_or(&[]);
         self.number.volume(path, self.dims, self.fortran, data)
     }
 }
 
-/// What the head of a file, or all of it, says of the array.
+/// Parses the header from the beginning of a file.
 pub(super) fn header(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Array> {
     let malformed = |reason: &str| ShapeError::malformed(path, reason);
     if !bytes.starts_with(b"\x93NUMPY") {
@@ -90,7 +90,7 @@ pub(super) fn header(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<A
 }
 
 impl Number {
-    /// The volume whose voxels lie in `data`, x fastest, or z fastest in Fortran's order.
+    /// Decodes voxels in `data`, x fastest, or z fastest in Fortran order.
     pub(super) fn volume(
         &self,
         path: &Path,
@@ -110,7 +110,7 @@ impl Number {
             ));
         }
         let data = &data[..needed as usize];
-        // Where voxel n (x fastest) lies in the file.
+        // Index of voxel n (x fastest) in the file.
         let place = |n: usize| {
             let (i, j, k) = (n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]);
             if fortran {
@@ -143,7 +143,7 @@ struct Header {
 }
 
 impl Header {
-    /// A line such as {'descr': '<u2', 'fortran_order': False, 'shape': (4, 3, 2), }.
+    /// Parses a line such as {'descr': '<u2', 'fortran_order': False, 'shape': (4, 3, 2), }.
     fn parse(text: &str) -> Option<Header> {
         let after = |key: &str| {
             let at = text
@@ -202,7 +202,7 @@ impl Number {
         }
     }
 
-    /// The number at the head of `bytes`, which hold at least its width.
+    /// Decodes the number at the start of `bytes`, which contain at least its width.
     fn value(&self, bytes: &[u8]) -> f64 {
         let mut raw = [0u8; 8];
         for (n, byte) in bytes[..self.width].iter().enumerate() {

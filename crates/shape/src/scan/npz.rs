@@ -1,4 +1,4 @@
-//! NPZ archives (numpy.savez) that hold one array.
+//! NPZ archives (numpy.savez) with one array.
 
 use super::npy;
 use super::volume::Volume;
@@ -23,7 +23,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
     };
     let mut file = archive.by_name(name).map_err(|e| malformed(&e))?;
     let mut plain = Vec::new();
-    // The header alone at first: what it states is refused before it is unpacked.
+    // The header is decompressed first, so that an oversized array is refused before allocation.
     file.by_ref()
         .take(npy::HEAD)
         .read_to_end(&mut plain)
@@ -37,7 +37,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
             unit: "bytes",
         });
     }
-    // One byte more: the archive's checksum is compared at the end.
+    // One additional byte: the archive's checksum is compared at the end of the data.
     let rest = (array.bytes() + 1).saturating_sub(plain.len() as u64);
     file.take(rest)
         .read_to_end(&mut plain)
@@ -106,7 +106,7 @@ mod tests {
             let error = read(Path::new("a.npz"), &file, &limits).unwrap_err();
             assert!(error.to_string().contains(stated), "{error}");
         }
-        // Of what lies behind the array no more is unpacked than a byte.
+        // At most one byte after the array is decompressed.
         let file = packed(&["a.npy"], "(1, 2, 3)", &data);
         assert_eq!(
             read(Path::new("a.npz"), &file, &limits).unwrap().dims,

@@ -1,4 +1,4 @@
-//! Regions of a labelled volume: where they lie, whether they are whole.
+//! Regions of a labelled volume: extents, border contact, crops and shared faces.
 
 use super::Mask;
 use glam::DVec3;
@@ -13,7 +13,7 @@ pub(crate) struct Region {
 }
 
 impl Region {
-    /// Names of the image faces that the region touches; empty for none.
+    /// Returns the names of the image faces that the region touches; empty if none.
     pub(crate) fn faces(&self, dims: [usize; 3]) -> String {
         let mut names = Vec::new();
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
@@ -28,13 +28,13 @@ impl Region {
     }
 }
 
-/// The regions by label; background (0) is left out.
+/// Returns the regions by label, without the background (0).
 pub(crate) fn regions(dims: [usize; 3], labels: &[u32]) -> BTreeMap<u32, Region> {
     let mut found: BTreeMap<u32, Region> = BTreeMap::new();
     for (row, line) in labels.chunks(dims[0]).enumerate() {
         let (j, k) = (row % dims[1], row / dims[1]);
         let mut i = 0;
-        // Runs of equal labels keep the map out of the inner loop.
+        // Processing runs of equal labels keeps the map out of the inner loop.
         while i < line.len() {
             let label = line[i];
             let end = i + line[i..].iter().take_while(|l| **l == label).count();
@@ -56,7 +56,7 @@ pub(crate) fn regions(dims: [usize; 3], labels: &[u32]) -> BTreeMap<u32, Region>
     found
 }
 
-/// Mask of one label with `pad` voxels of background on every side.
+/// Returns the mask of one label with `pad` voxels of background on every side.
 pub(crate) fn crop(
     dims: [usize; 3],
     labels: &[u32],
@@ -80,8 +80,8 @@ pub(crate) fn crop(
     Mask { dims: out, solid }
 }
 
-/// Middles [voxels from the image's corner] of the faces of this label, which lies in this region,
-/// beyond which another label begins.
+/// Returns the centres [voxels from the image corner] of the voxel faces between this label, which
+/// lies in this region, and other labels.
 pub(crate) fn cuts(dims: [usize; 3], labels: &[u32], label: u32, region: &Region) -> Vec<DVec3> {
     let strides = [1, dims[0], dims[0] * dims[1]];
     let (low, high) = (region.lower, region.upper);
@@ -107,7 +107,7 @@ pub(crate) fn cuts(dims: [usize; 3], labels: &[u32], label: u32, region: &Region
     found
 }
 
-/// For each label the part of its faces beyond which another label begins.
+/// Returns for each label the fraction of its voxel faces shared with another label.
 pub(crate) fn shared_surfaces(dims: [usize; 3], labels: &[u32]) -> HashMap<u32, f64> {
     let strides = [1, dims[0], dims[0] * dims[1]];
     let mut faces: HashMap<u32, [u64; 2]> = HashMap::new();
@@ -172,8 +172,8 @@ mod tests {
 
     #[test]
     fn cut_faces_are_shared() {
-        // Two cubes of two voxels side by side along y, and one alone; on the image's own border there are
-        // no faces.
+        // Two adjacent cubes of two voxels along y, and a separate one; faces on the image border
+        // do not count.
         let dims = [6, 4, 2];
         let labels: Vec<u32> = (0..48)
             .map(|at| match (at % 6, at / 6 % 4) {
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(found[&7], 0.0);
         assert_eq!(found.len(), 3);
         let places = |label| cuts(dims, &labels, label, &regions(dims, &labels)[&label]);
-        // The plane between the two cubes, and nothing at the third.
+        // The plane between the two cubes, and none at the third.
         assert_eq!(places(1).len(), 4);
         assert!(places(1).iter().all(|x| x.y == 2.0));
         assert_eq!(places(1), places(2));

@@ -1,4 +1,4 @@
-//! Connected pieces of a volume, found by runs: stretches of equal voxels along x.
+//! Connected components of a volume, computed from runs: sequences of equal voxels along x.
 
 use super::Mask;
 use rayon::prelude::*;
@@ -6,19 +6,19 @@ use rayon::prelude::*;
 /// Voxels `begin..end` along x.
 type Run = [u32; 2];
 
-/// The runs of the voxels that were selected, and which of them hang together.
+/// Runs of the selected voxels, with a union-find forest of their connectivity.
 struct Runs {
     dims: [usize; 3],
     runs: Vec<Run>,
-    /// First run of every row, and the number of all at the end.
+    /// First run of every row, and the total number at the end.
     rows: Vec<usize>,
-    /// A run of the same piece, further up or itself.
+    /// Parent run in the same component; a root is its own parent.
     parent: Vec<u32>,
 }
 
 impl Runs {
-    /// Runs of the voxels that `chosen` selects; those of one piece share voxel faces, or, if
-    /// `corners`, faces, edges or corners.
+    /// Creates the runs of the voxels selected by `chosen`. Voxels are connected through faces, or
+    /// with `corners` through faces, edges and corners.
     fn new(dims: [usize; 3], corners: bool, chosen: impl Fn(usize) -> bool + Sync) -> Runs {
         let [nx, ny, nz] = dims;
         let found: Vec<Vec<Run>> = (0..ny * nz)
@@ -70,7 +70,7 @@ impl Runs {
         all
     }
 
-    /// First run of the piece of run `n`.
+    /// Returns the root of run `n`.
     fn root(&mut self, mut n: u32) -> u32 {
         while self.parent[n as usize] != n {
             let above = self.parent[self.parent[n as usize] as usize];
@@ -80,7 +80,7 @@ impl Runs {
         n
     }
 
-    /// Joins the runs of two rows side by side that touch.
+    /// Joins the connected runs of two adjacent rows.
     fn join(&mut self, row: usize, other: usize, corners: bool) {
         let slack = u32::from(corners);
         let (mut p, mut q) = (self.rows[row], self.rows[other]);
@@ -98,7 +98,7 @@ impl Runs {
         }
     }
 
-    /// Every run with the index of its first voxel.
+    /// Iterates over the runs with the index of their first voxel.
     fn each(&self) -> impl Iterator<Item = (usize, Run, usize)> {
         let row_of = |row: usize| self.rows[row]..self.rows[row + 1];
         (0..self.rows.len() - 1).flat_map(move |row| {
@@ -110,8 +110,8 @@ impl Runs {
     }
 }
 
-/// Numbers the connected pieces (sharing voxel faces) of the voxels that `solid` selects, from 1
-/// in the order of their first voxels; 0 elsewhere. Also their sizes.
+/// Labels the connected components (through voxel faces) of the voxels selected by `solid`, from 1
+/// in the order of their first voxels, and 0 elsewhere. Also returns their sizes.
 pub(super) fn pieces(
     dims: [usize; 3],
     solid: impl Fn(usize) -> bool + Sync,
@@ -133,8 +133,8 @@ pub(super) fn pieces(
     (number, sizes)
 }
 
-/// Makes cavities solid (background that cannot reach the mask's border, not even through
-/// voxel edges and corners); returns how many voxels that took.
+/// Fills cavities (background without connection to the border of the mask, even through voxel
+/// edges and corners); returns the number of filled voxels.
 pub(super) fn fill_cavities(mask: &mut Mask) -> u64 {
     let [nx, ny, nz] = mask.dims;
     let runs = Runs::new(mask.dims, true, |n| !mask.solid[n]);
@@ -173,7 +173,8 @@ mod tests {
         (0..count).map(|_| next()).collect()
     }
 
-    /// Pieces by flooding; neighbours differ by at most one along every axis, and along `axes` axes.
+    /// Reference by flood fill; neighbours differ by at most one along every axis, and along at
+    /// most `axes` axes.
     fn flood(dims: [usize; 3], chosen: &[bool], axes: usize) -> Vec<u32> {
         let at = |n: usize| place(dims, n);
         let near = |p: usize, q: usize| {

@@ -1,4 +1,4 @@
-//! A folder of slices: one TIFF a slice, in the order of the numbers in their names.
+//! A folder of slices: one TIFF per slice, ordered by the numbers in the file names.
 
 use super::tiff;
 use super::volume::{Volume, Voxels, count};
@@ -40,7 +40,7 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, Source
             return Err(ShapeError::malformed(path, reason));
         }
         dims = [slice.dims[0], slice.dims[1], dims[2] + 1];
-        // All of them are counted on the first: the rest is not read in vain.
+        // The total is checked at the first slice, before the others are read.
         let all = [dims[0], dims[1], files.len()];
         count(folder, all.map(|n| n as u64), limits)?;
         match (&mut numbers, slice.voxels) {
@@ -75,12 +75,12 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, Source
     Ok((volume, SourceFile { name, sha256 }))
 }
 
-/// Which numbers are missing among slices whose names differ by a number only, or are there twice.
-/// The numbers may count by twos or tens.
+/// Describes missing or duplicate numbers among slices whose names differ in one number only. The
+/// numbers may have a constant increment such as two or ten.
 fn gap(files: &[PathBuf]) -> Option<String> {
     let name = |n: usize| files[n].file_name().unwrap_or_default().to_string_lossy();
     let keys: Vec<_> = files.iter().map(|path| by_number(path)).collect();
-    // Neighbours with the numbers that tell them apart.
+    // Adjacent slices with the numbers that distinguish them.
     let beside = |(n, pair): (usize, &[Vec<(u128, String)>])| {
         let (one, next) = (&pair[0], &pair[1]);
         let alike = one.len() == next.len() && one.iter().zip(next).all(|(p, q)| p.1 == q.1);
@@ -120,7 +120,8 @@ fn gap(files: &[PathBuf]) -> Option<String> {
     ))
 }
 
-/// Key that puts slice 9 before slice 10: digits count by their number, the rest as text.
+/// Sort key that orders slice 9 before slice 10: digit sequences compare as numbers, the rest as
+/// text.
 fn by_number(path: &Path) -> Vec<(u128, String)> {
     let name = path
         .file_name()
@@ -194,7 +195,7 @@ mod tests {
             said.contains("5, 6, 7, 8, 9, 10, 11, 12, 13, 14, ...;"),
             "{said}"
         );
-        // By tens, with other numbers that stay, and with more than a number that differs.
+        // Increment of ten, with other constant numbers, and with several varying numbers.
         assert_eq!(gap(&some(|n| n % 10 == 0)), None);
         let said = gap(&some(|n| n % 4 == 0 && n != 8)).unwrap();
         assert!(said.contains("after s4.tif: numbers 8;"), "{said}");

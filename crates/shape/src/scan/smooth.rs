@@ -1,12 +1,12 @@
-//! Taking the staircase off a distance field, without shrinking the body.
+//! Smoothing of voxel staircases in a distance field without shrinkage.
 
 use super::transform::transpose;
 use crate::roundness::Kernel;
 use rayon::prelude::*;
 
-/// Gaussian smoothing by `sigma` [voxels], applied as 2 G - G G: the second moment of that
-/// kernel vanishes, so that curved surfaces stay where they are to fourth order, where a plain
-/// Gaussian would shrink them by sigma^2 times their mean curvature.
+/// Smooths by `sigma` [voxels] with the kernel 2 G - G G. Its second moment vanishes, so that
+/// curved surfaces keep their position to fourth order; a plain Gaussian would shrink them by
+/// sigma^2 times their mean curvature.
 pub(crate) fn unshrinking(field: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f32> {
     let once = gaussian(field, dims, sigma);
     let twice = gaussian(&once, dims, sigma);
@@ -16,12 +16,12 @@ pub(crate) fn unshrinking(field: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f3
         .collect()
 }
 
-/// The kernel of [`unshrinking`].
+/// Returns the kernel of [`unshrinking`].
 pub(crate) fn kernel(sigma: f64) -> Kernel {
     [(2.0, sigma), (-1.0, std::f64::consts::SQRT_2 * sigma)]
 }
 
-/// Plain Gaussian smoothing; beyond the border the outermost value continues.
+/// Smooths by a plain Gaussian; outermost values are continued beyond the border.
 pub(crate) fn gaussian(field: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f32> {
     let reach = (4.0 * sigma).ceil() as usize;
     let weight = |i: usize| (-0.5 * (i as f64 / sigma).powi(2)).exp();
@@ -56,8 +56,8 @@ fn convolve(line: &mut [f32], kernel: &[f32]) {
     }
 }
 
-/// The field on a grid `factor` times as fine, by cubic (Catmull-Rom) interpolation. The first
-/// and last samples stay where they are: n samples become factor (n - 1) + 1.
+/// Returns the field on a grid refined by `factor`, by cubic (Catmull-Rom) interpolation. First and
+/// last samples keep their positions: n samples become factor (n - 1) + 1.
 pub(crate) fn refine(field: &[f32], dims: [usize; 3], factor: usize) -> (Vec<f32>, [usize; 3]) {
     let mut field = field.to_vec();
     let mut dims = dims;

@@ -1,25 +1,25 @@
-//! From grey values to solid and void: thresholds and noise.
+//! Segmentation of grey values: thresholds and noise filters.
 
 use rayon::prelude::*;
 
-/// How solid is told from void in a grey image.
+/// Threshold between solid and void in a grey image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Threshold {
-    /// Solid from this grey value on.
+    /// Values of at least this grey value are solid.
     Value(f64),
     /// Otsu's threshold between two classes (Otsu 1979).
     Otsu,
-    /// The upper of Otsu's two thresholds between three classes (Liao and others 2001): for solid,
-    /// a middle phase such as resin, and void.
+    /// The upper of Otsu's two thresholds between three classes (Liao and others 2001): for images
+    /// of solid, an intermediate phase such as resin, and void.
     Otsu3,
 }
 
-/// What is done against noise before the threshold. Surfaces are taken from the image as it came.
+/// Noise filter applied before the threshold. Surfaces are located in the unfiltered image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Denoise {
-    /// Nothing.
+    /// No filter.
     None,
-    /// Median of the 27 voxels around each.
+    /// Median of the 27 voxels around each voxel.
     Median,
 }
 
@@ -27,7 +27,7 @@ const BINS: usize = 1024;
 const BINS3: usize = 256;
 
 impl Threshold {
-    /// The grey value for this image, or none where all its values are equal.
+    /// Returns the grey value of the threshold, or `None` if all values are equal.
     pub(crate) fn of(self, values: &[f32]) -> Option<f64> {
         match self {
             Threshold::Value(v) => Some(v),
@@ -37,7 +37,7 @@ impl Threshold {
     }
 }
 
-/// Counts by bin, lowest value and width of a bin.
+/// Returns counts by bin, the lowest value and the bin width.
 fn histogram(values: &[f32], bins: usize) -> Option<(Vec<f64>, f64, f64)> {
     let (low, high) = values
         .par_chunks(1 << 16)
@@ -63,7 +63,7 @@ fn histogram(values: &[f32], bins: usize) -> Option<(Vec<f64>, f64, f64)> {
     Some((counts, low, width))
 }
 
-/// Sums of counts and of counts times bin up to each bin.
+/// Returns cumulative sums of counts and of counts times bin index.
 fn sums(counts: &[f64]) -> Vec<(f64, f64)> {
     let mut sum = (0.0, 0.0);
     let mut out = vec![sum];
@@ -74,7 +74,7 @@ fn sums(counts: &[f64]) -> Vec<(f64, f64)> {
     out
 }
 
-/// Between-class variance (up to constants) of the bins from `a` to `b`.
+/// Returns the between-class variance (up to constants) of the bins from `a` to `b`.
 fn share(sums: &[(f64, f64)], a: usize, b: usize) -> f64 {
     let (count, moment) = (sums[b].0 - sums[a].0, sums[b].1 - sums[a].1);
     if count > 0.0 {
@@ -88,7 +88,8 @@ fn otsu(values: &[f32]) -> Option<f64> {
     let (counts, low, width) = histogram(values, BINS)?;
     let sums = sums(&counts);
     let score = |b: usize| share(&sums, 0, b) + share(&sums, b, BINS);
-    // Where no value lies between the classes, all thresholds there are as good: the middle one.
+    // All thresholds in an empty interval between the classes are equivalent; its middle is
+    // returned.
     let best = (1..BINS).map(score).fold(0.0, f64::max);
     let good: Vec<usize> = (1..BINS)
         .filter(|b| score(*b) >= best * (1.0 - 1e-12))
@@ -112,7 +113,8 @@ fn otsu3(values: &[f32]) -> Option<f64> {
     Some(low + width * best.1 as f64)
 }
 
-/// Median of the 3 x 3 x 3 voxels around each; the border continues outwards.
+/// Returns the median of the 3 x 3 x 3 voxels around each voxel; border values are continued
+/// outwards.
 pub(crate) fn median(values: &[f32], dims: [usize; 3]) -> Vec<f32> {
     let [nx, ny, nz] = dims;
     let mut out = vec![0.0f32; values.len()];
@@ -143,7 +145,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// Classes at these greys with normal noise, a fixed number of each.
+    /// Classes with these grey values and counts, with normal noise.
     fn classes(greys: &[(f32, usize)], noise: f64) -> Vec<f32> {
         let mut random = Random::new(3);
         let mut values = Vec::new();
@@ -164,7 +166,7 @@ mod tests {
         let three = classes(&[(10.0, 6000), (35.0, 3000), (80.0, 3000)], 4.0);
         let found = Threshold::Otsu3.of(&three).unwrap();
         assert!((47.0..68.0).contains(&found), "{found}");
-        // An image of two values only: half way.
+        // A binary image: midway.
         let binary = Threshold::Otsu.of(&[0.0, 0.0, 200.0, 200.0, 0.0]).unwrap();
         assert!((binary - 100.0).abs() < 1.0, "{binary}");
         assert_eq!(Threshold::Otsu.of(&[7.0; 50]), None);

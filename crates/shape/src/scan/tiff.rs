@@ -1,4 +1,4 @@
-//! Multi-page TIFF: one page a slice along z, greyscale.
+//! Multi-page TIFF, greyscale, one page per slice along z.
 
 use super::volume::{Volume, Voxels, count};
 use crate::error::{Result, ShapeError};
@@ -9,10 +9,10 @@ use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
-/// More than any compression that TIFF knows can gain; a page that claims more is a forgery.
+/// Upper bound of the compression ratio of all TIFF codecs; pages that declare more are refused.
 const BEST_RATIO: u64 = 5000;
 
-/// Values gathered over the pages.
+/// Values collected from the pages.
 enum Values {
     Labels(Vec<u32>),
     Numbers(Vec<f32>),
@@ -84,7 +84,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
     }
 }
 
-/// ImageJ writes stacks over 4 GiB as one page and the number of slices in the description.
+/// Refuses ImageJ stacks over 4 GiB, stored as one page with the slice count in the description.
 fn check_claimed_slices(
     path: &Path,
     decoder: &mut Decoder<Cursor<&[u8]>>,
@@ -121,7 +121,7 @@ impl Values {
     }
 }
 
-/// Adds a page; labels give way to plain numbers where a value is no label.
+/// Appends a page. Labels are converted to floating-point values if a value is not a valid label.
 fn append(values: Values, page: DecodingResult) -> Values {
     use DecodingResult as Page;
     fn whole<T: Copy + TryInto<u32>>(values: Values, page: &[T], f: fn(T) -> f32) -> Values {
@@ -229,8 +229,8 @@ mod tests {
         for length in 0..good.len() {
             assert!(open(&good[..length]).is_err(), "{length} bytes");
         }
-        // Width and height of 10^6 in the directory of the last page, and everywhere else any
-        // byte at all: refused or read, never a panic.
+        // Width and height of 10^6 in the directory of the last page, and arbitrary bytes
+        // elsewhere: an error or an image, never a panic.
         let mut state = 3u64;
         for at in 0..good.len() {
             for _ in 0..4 {
@@ -244,7 +244,7 @@ mod tests {
         }
     }
 
-    /// A header that claims a million voxels along every axis.
+    /// A header that declares a million voxels along every axis.
     #[test]
     fn a_million_cubed_is_refused_before_memory_is_asked_for() {
         for edge in [1_000_000u32, 20_000] {

@@ -3,12 +3,12 @@
 use super::Mask;
 use rayon::prelude::*;
 
-/// Stands for the square of the distance of "no such voxel on this line".
+/// Squared distance if the line has no target voxel.
 const FAR: f32 = 1e30;
 
-/// Signed distance [voxels] of every voxel centre from the interface of the mask, negative
-/// inside: the exact distance to the nearest voxel centre of the other phase, less the half
-/// voxel by which the interface lies before it.
+/// Returns the signed distance [voxels] of every voxel centre from the interface of the mask,
+/// negative inside: the exact distance to the nearest voxel centre of the other phase minus half a
+/// voxel.
 pub(crate) fn signed(mask: &Mask) -> Vec<f32> {
     let outside = squared(mask, true, lower_lines);
     let inside = squared(mask, false, lower_lines);
@@ -26,20 +26,22 @@ fn difference(to_solid: &[f32], to_void: &[f32]) -> Vec<f32> {
     to_solid.par_iter().zip(to_void).map(distance).collect()
 }
 
-/// The same up to `reach` - 1/2 voxels; beyond, farther than that.
+/// Returns the signed distance up to `reach` - 1/2 voxels; larger values are lower bounds beyond
+/// it.
 pub(crate) fn signed_near(mask: &Mask, reach: usize) -> Vec<f32> {
     let outside = squared(mask, true, |lines, n| lower_near(lines, n, reach));
     let inside = squared(mask, false, |lines, n| lower_near(lines, n, reach));
     difference(&outside, &inside)
 }
 
-/// Squared distance [voxels^2] of every voxel centre to the nearest void voxel's, 0 in the void.
+/// Returns the squared distance [voxels^2] of every voxel centre to the nearest void voxel; 0 in
+/// the void.
 pub(crate) fn to_void(mask: &Mask) -> Vec<f32> {
     squared(mask, false, lower_lines)
 }
 
-/// Squared distance of every voxel to the nearest voxel whose mask value is `target`; `lower` brings
-/// it down along all lines of a length.
+/// Returns the squared distance of every voxel to the nearest voxel with mask value `target`;
+/// `lower` applies the one-dimensional transform to all lines of a given length.
 fn squared(mask: &Mask, target: bool, lower: impl Fn(&mut [f32], usize)) -> Vec<f32> {
     let [nx, ny, nz] = mask.dims;
     let mut field: Vec<f32> = mask
@@ -58,9 +60,9 @@ fn squared(mask: &Mask, target: bool, lower: impl Fn(&mut [f32], usize)) -> Vec<
     scratch
 }
 
-/// (x, y, z) with x fastest to (y, z, x) with y fastest.
+/// Transposes (x, y, z) with x fastest to (y, z, x) with y fastest.
 pub(super) fn transpose(from: &[f32], to: &mut [f32], [nx, ny, nz]: [usize; 3]) {
-    // Some planes at once: a cache line of `from` is read whole.
+    // Several planes at once, so that complete cache lines of `from` are used.
     const WIDTH: usize = 16;
     let blocks = to.par_chunks_mut(WIDTH * ny * nz).enumerate();
     blocks.for_each(|(block, planes)| {
@@ -74,8 +76,8 @@ pub(super) fn transpose(from: &[f32], to: &mut [f32], [nx, ny, nz]: [usize; 3]) 
     });
 }
 
-/// A parabola of the lower envelope: where it stands, how high its foot is, and from where on it is
-/// the lowest.
+/// A parabola of the lower envelope: position, height of the vertex, and start of the interval in
+/// which it is lowest.
 #[derive(Clone, Copy)]
 struct Parabola {
     centre: f64,
@@ -83,11 +85,11 @@ struct Parabola {
     start: f64,
 }
 
-/// One dimension: min over q of (p - q)^2 + line[q], by the lower envelope of parabolas
-/// (Felzenszwalb and Huttenlocher 2012). `envelope` is room for it.
+/// One-dimensional transform: min over q of (p - q)^2 + line[q], by the lower envelope of parabolas
+/// (Felzenszwalb and Huttenlocher 2012). `envelope` is scratch space.
 fn lower(line: &mut [f32], envelope: &mut Vec<Parabola>) {
     envelope.clear();
-    // Parabolas without a foot are nowhere the lowest.
+    // Parabolas of infinite height are not part of the envelope.
     let feet = line.iter().enumerate().filter(|(_, v)| **v < FAR);
     for (q, foot) in feet {
         let (q, foot) = (q as f64, f64::from(*foot));
@@ -121,10 +123,10 @@ fn lower(line: &mut [f32], envelope: &mut Vec<Parabola>) {
     }
 }
 
-/// [`lower`] along every line of `length` values.
+/// Applies [`lower`] to every line of `length` values.
 fn lower_lines(field: &mut [f32], length: usize) {
     let lines = field.par_chunks_mut(length);
-    // Lines of nothing but feet, or of none, stay as they are.
+    // Uniform lines do not change.
     lines.for_each_init(Vec::new, |envelope, line| {
         if line.iter().any(|v| *v > 0.0) {
             lower(line, envelope);
@@ -132,7 +134,7 @@ fn lower_lines(field: &mut [f32], length: usize) {
     });
 }
 
-/// [`lower`] along every line of `length` values, by the parabolas up to `reach` away alone.
+/// Applies [`lower`] to every line of `length` values, restricted to parabolas up to `reach` away.
 fn lower_near(field: &mut [f32], length: usize, reach: usize) {
     let lines = field.par_chunks_mut(length);
     lines.for_each_init(Vec::new, |padded, line| {

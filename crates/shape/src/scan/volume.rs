@@ -9,9 +9,9 @@ use std::path::Path;
 /// Voxel values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Voxels {
-    /// Whole numbers: 0 is background, equal numbers belong together.
+    /// Labels: 0 is background, voxels of equal label belong together.
     Labels(Vec<u32>),
-    /// Grey values; a threshold tells solid from background.
+    /// Grey values, to be segmented by a threshold.
     Grey(Vec<f32>),
 }
 
@@ -20,12 +20,13 @@ pub enum Voxels {
 pub struct Volume {
     /// Voxels along x, y and z.
     pub dims: [usize; 3],
-    /// Their values.
+    /// Voxel values.
     pub voxels: Voxels,
 }
 
 impl Volume {
-    /// Labels with x fastest; refused where the number of values does not fit the dimensions.
+    /// Creates a volume of labels, x fastest; refuses a number of values that does not match the
+    /// dimensions.
     pub fn from_labels(dims: [usize; 3], labels: Vec<u32>) -> Result<Volume> {
         if dims.iter().try_fold(1usize, |n, d| n.checked_mul(*d)) != Some(labels.len()) {
             let value = labels.len() as f64;
@@ -42,7 +43,8 @@ impl Volume {
         })
     }
 
-    /// Decides between labels and grey values: whole non-negative numbers are labels.
+    /// Creates a volume of labels if all values are non-negative integers, and of grey values
+    /// otherwise.
     pub(super) fn from_numbers(path: &Path, dims: [usize; 3], values: Vec<f32>) -> Result<Volume> {
         if let Some(n) = values.iter().position(|v| !v.is_finite()) {
             let (i, j, k) = (n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]);
@@ -55,7 +57,7 @@ impl Volume {
                 ),
             });
         }
-        // Beyond this f32 skips whole numbers, so that labels could merge.
+        // Single precision does not represent all larger integers, so that labels could merge.
         let whole = |v: &f32| *v >= 0.0 && *v <= 16_777_216.0 && v.fract() == 0.0;
         let voxels = if values.iter().all(whole) {
             Voxels::Labels(values.iter().map(|v| *v as u32).collect())
@@ -66,9 +68,9 @@ impl Volume {
     }
 }
 
-/// Reads a 3-D image: a multi-page TIFF (8, 16 or 32 bits, whole or floating, BigTIFF too), a
-/// folder of TIFF slices, an NPY array indexed [z][y][x] or an NPZ archive of one, NRRD or
-/// MetaImage (with the voxels inside, or raw beside the header).
+/// Reads a 3-D image: a multi-page TIFF (8, 16 or 32 bits, integer or floating-point, including
+/// BigTIFF), a folder of TIFF slices, an NPY array indexed [z][y][x], an NPZ archive with one
+/// array, NRRD or MetaImage (with voxels inside, or raw in a separate file).
 pub fn read_volume(path: &Path, limits: &ReadLimits) -> Result<(Volume, SourceFile)> {
     if path.is_dir() {
         return super::slices::read(path, limits);
@@ -92,7 +94,7 @@ pub fn read_volume(path: &Path, limits: &ReadLimits) -> Result<(Volume, SourceFi
 }
 
 impl Volume {
-    /// Writes labels as a multi-page TIFF of 16 bits (32 where labels need them).
+    /// Writes labels as a multi-page TIFF of 16 bits (32 bits if labels need them).
     pub fn save_labels(&self, path: &Path) -> Result<()> {
         let Voxels::Labels(labels) = &self.voxels else {
             return Err(ShapeError::Unsupported {
@@ -123,7 +125,7 @@ impl Volume {
     }
 }
 
-/// Refuses dimensions that are empty or over the limit; returns the number of voxels.
+/// Refuses dimensions that are empty or exceed the limits; returns the number of voxels.
 pub(super) fn count(path: &Path, dims: [u64; 3], limits: &ReadLimits) -> Result<usize> {
     match limits.admit(path, dims)? {
         0 => Err(ShapeError::malformed(path, "the image has no voxels")),

@@ -1,14 +1,14 @@
-//! Separating grains that touch.
+//! Separation of touching grains by a watershed of the distance from the void.
 //!
-//! A watershed on the distance from the void: every grain is a hill whose top is the radius of
-//! its largest ball, and two hills meet at a saddle, the radius of the neck between them. They are
-//! two grains where the neck is narrow against the smaller of them, and one grain with two tops
-//! otherwise.
+//! Every grain is a basin of the inverted distance. The maximum distance is the radius of its
+//! largest ball, and two basins meet at a saddle, at the radius of the neck between them. They are
+//! two grains if the neck is narrow relative to the smaller grain, and otherwise one grain with two
+//! maxima.
 
 use crate::grid::{beside, place};
 use rayon::prelude::*;
 
-/// Hills that have been joined, with the height of the highest top.
+/// Union-find forest of merged basins with the highest maximum of each.
 struct Hills {
     parent: Vec<u32>,
     top: Vec<f32>,
@@ -24,7 +24,7 @@ impl Hills {
         n
     }
 
-    /// Joins two hills that meet at this height if the saddle is no neck.
+    /// Merges two basins that meet at this height if the saddle is not a neck.
     fn join(&mut self, p: u32, q: u32, height: f32, neck: f64) {
         if p == q {
             return;
@@ -41,9 +41,9 @@ impl Hills {
     }
 }
 
-/// Labels from 1 of the solid voxels (squared distance from the void above 0), numbered by their
-/// first voxels. Two hills are one grain if the saddle between them is at least `neck` times the
-/// lower top, or less than a voxel below it.
+/// Labels the solid voxels (squared distance from the void above 0) from 1, in the order of first
+/// voxels. Two basins are one grain if the saddle between them is at least `neck` times the lower
+/// maximum, or less than a voxel below it.
 pub(crate) fn separate(squared: &[f32], dims: [usize; 3], neck: f64) -> Vec<u32> {
     let (mut labels, top) = basins(squared, dims);
     let mut hills = Hills {
@@ -51,7 +51,7 @@ pub(crate) fn separate(squared: &[f32], dims: [usize; 3], neck: f64) -> Vec<u32>
         top,
     };
     let around = Around::new(dims);
-    // Where hills meet, from the highest place down.
+    // Voxels at which basins meet, in descending order of height.
     for at in borders(squared, dims, &labels) {
         let at = at as usize;
         let height = squared[at].sqrt();
@@ -83,7 +83,7 @@ pub(crate) fn separate(squared: &[f32], dims: [usize; 3], neck: f64) -> Vec<u32>
     labels
 }
 
-/// The neighbours of a voxel that is not on the border, in the order of their indices.
+/// Returns the offsets of the neighbours of an interior voxel, in index order.
 fn offsets([nx, ny, _]: [usize; 3]) -> [isize; 26] {
     let mut found = [0; 26];
     let steps = (0..27).filter(|n| *n != 13);
@@ -94,7 +94,7 @@ fn offsets([nx, ny, _]: [usize; 3]) -> [isize; 26] {
     found
 }
 
-/// The voxels around a voxel.
+/// The neighbourhood of a voxel.
 struct Around {
     dims: [usize; 3],
     offsets: [isize; 26],
@@ -108,7 +108,7 @@ impl Around {
         }
     }
 
-    /// Calls `see` for every voxel around voxel `at`, in the order of their indices.
+    /// Calls `see` for every neighbour of voxel `at`, in index order.
     #[inline]
     fn each(&self, at: usize, mut see: impl FnMut(usize)) {
         let [nx, ny, nz] = self.dims;
@@ -134,17 +134,17 @@ impl Around {
     }
 }
 
-/// Whether voxel `n` comes before voxel `at` when the highest come first, and of equals those with
-/// the lower index. The void never does.
+/// Returns whether voxel `n` precedes voxel `at` in descending order of height, then in ascending
+/// order of index. Void voxels never do.
 #[inline]
 fn earlier(squared: &[f32], n: usize, at: usize) -> bool {
     squared[n] > squared[at] || (squared[n] == squared[at] && n < at)
 }
 
-/// The hill (from 1) of every solid voxel: where the steepest way up from voxel to voxel ends. Also
-/// the height of each hill's top, and 0 for the void in front.
+/// Returns the basin (from 1) of every solid voxel, where the steepest ascent from voxel to voxel
+/// ends, and the maximum of each basin, with a leading 0 for the void.
 fn basins(squared: &[f32], dims: [usize; 3]) -> (Vec<u32>, Vec<f32>) {
-    /// Marks the index of the voxel uphill, until the hill is known.
+    /// Marks the index of the uphill neighbour until the basin is known.
     const UPHILL: u32 = 1 << 31;
     let around = Around::new(dims);
     let mut labels = vec![0u32; squared.len()];
@@ -153,7 +153,7 @@ fn basins(squared: &[f32], dims: [usize; 3]) -> (Vec<u32>, Vec<f32>) {
         for (i, label) in line.iter_mut().enumerate() {
             let at = row * dims[0] + i;
             if squared[at] > 0.0 {
-                // The first of the highest.
+                // The first of the highest neighbours.
                 let mut uphill = at;
                 around.each(at, |n| {
                     if squared[n] > squared[uphill] || (uphill == at && earlier(squared, n, at)) {
@@ -183,7 +183,7 @@ fn basins(squared: &[f32], dims: [usize; 3]) -> (Vec<u32>, Vec<f32>) {
     (labels, tops)
 }
 
-/// Voxels at which hills meet, the highest first.
+/// Returns the voxels at which basins meet, the highest first.
 fn borders(squared: &[f32], dims: [usize; 3], labels: &[u32]) -> Vec<u32> {
     let around = Around::new(dims);
     let meet = |at: &u32| {
@@ -207,10 +207,10 @@ fn borders(squared: &[f32], dims: [usize; 3], labels: &[u32]) -> Vec<u32> {
     found
 }
 
-/// Marks a void voxel that lies near a grain: the bit on top of the grain's label.
+/// Flag of a void voxel near a grain: the top bit of the grain's label.
 pub(crate) const HALO: u32 = 1 << 31;
 
-/// Gives every void voxel within `layers` voxels of a grain to the nearest one, as its label with
+/// Assigns every void voxel within `layers` voxels of a grain to the nearest one: its label with
 /// [`HALO`] set.
 pub(crate) fn add_halo(labels: &mut [u32], dims: [usize; 3], layers: usize) {
     let mut front: Vec<u32> = (0..labels.len() as u32)
@@ -268,7 +268,7 @@ mod tests {
             let labels = separate(&field, dims, 0.8);
             *labels.iter().max().unwrap()
         };
-        // Necks of half the radius and of nine tenths.
+        // Necks of half the radius and of 0.9 times the radius.
         assert_eq!(count(17.5), 2);
         assert_eq!(count(8.0), 1);
     }
