@@ -3,7 +3,7 @@
 //! `cargo run --release -p grainwake-shape --example study_grains -- studies/dkt-morphology/grains`
 
 use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
-use grainwake_shape::picture::Picture;
+use grainwake_shape::render::Picture;
 use grainwake_shape::{Result, Shape, write_table};
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! `grain compare`.
 
 use comfy_table::{CellAlignment, Table, presets};
-use grainwake_shape::picture::Picture;
+use grainwake_shape::render::Picture;
 use grainwake_shape::{Comparison, Record, Shape};
 use serde_json::json;
 

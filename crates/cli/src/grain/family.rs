@@ -1,7 +1,7 @@
 //! `grain family`.
 
 use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
-use grainwake_shape::picture::Picture;
+use grainwake_shape::render::Picture;
 use grainwake_shape::{ShapeError, write_table};
 
 use super::{folder, length, may_write, show};

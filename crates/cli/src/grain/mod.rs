@@ -10,7 +10,7 @@ mod table;
 
 use std::path::Path;
 
-use grainwake_shape::picture::Picture;
+use grainwake_shape::render::Picture;
 use grainwake_shape::{Shape, ShapeOptions};
 use grainwake_solver::case::parse_length;
 use grainwake_solver::case::readable;

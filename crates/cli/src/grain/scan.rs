@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_shape::picture::{Picture, View};
+use grainwake_shape::render::{Picture, View};
 use grainwake_shape::scan::{
     Denoise, Scan, ScanOptions, ScannedGrain, Threshold, read_volume, scan_volume,
 };

@@ -7,7 +7,7 @@
 //! along the principal axes have the target ratios, which set Krumbein's sphericity (Eq. 38). The
 //! distance is exact.
 
-mod core;
+mod ball_intersection;
 mod stone;
 
 use crate::assemble::{Body, assemble};

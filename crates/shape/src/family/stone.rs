@@ -1,6 +1,6 @@
 //! A random stone of given proportions and roundness.
 
-use super::core::{Ball, Core, inscribed};
+use super::ball_intersection::{Ball, Core, inscribed};
 use crate::mass::Mass;
 use crate::principal;
 use crate::random::Random;

@@ -1,10 +1,10 @@
 //! Signed distance to a closed mesh.
 
 use super::TriangleMesh;
-use super::about::About;
 use super::bvh::{Bvh, Feature, Nearest, nearest_on_triangle};
 use super::check::Neighbours;
-use super::spread;
+use super::nearest_cache::About;
+use super::propagate;
 use crate::distance::Distance;
 use crate::error::Result;
 use glam::DVec3;
@@ -218,7 +218,7 @@ impl Distance for MeshDistance {
         band: f64,
         needed: [f64; 2],
     ) -> Vec<f64> {
-        spread::on_grid(self, first, spacing, dims, band, needed)
+        propagate::on_grid(self, first, spacing, dims, band, needed)
     }
 }
 

@@ -1,6 +1,5 @@
 //! Closed triangle meshes: readers, checks, exact distances, and shapes built from them.
 
-mod about;
 mod build;
 mod bvh;
 mod check;
@@ -8,10 +7,11 @@ mod cube_sphere;
 mod distance;
 mod harmonics;
 mod intersect;
+mod nearest_cache;
 mod obj;
 mod ply;
+mod propagate;
 mod read;
-mod spread;
 mod stl;
 mod weld;
 

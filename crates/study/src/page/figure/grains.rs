@@ -6,7 +6,7 @@ use grainwake_plot::style::{HAIR, INK, PAGE, SMALL, TEXT};
 use grainwake_plot::svg::{Anchor, Drawing, path_data};
 use grainwake_plot::text;
 use grainwake_shape::Shape;
-use grainwake_shape::picture::{Picture, View};
+use grainwake_shape::render::{Picture, View};
 use grainwake_solver::dem::Grain;
 
 use super::{FigureData, StudyFigure, factor_label, heading, note, value_text};
