@@ -1,11 +1,11 @@
-//! Axes: range, ticks and their labels.
+//! Axes: range, ticks and tick labels.
 
-/// How values are spread along an axis.
+/// Mapping of values to positions along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Evenly.
+    /// Linear.
     Linear,
-    /// By decades.
+    /// Logarithmic, base 10.
     Log,
 }
 
@@ -17,23 +17,23 @@ pub struct Axis {
     scale: Scale,
     low: f64,
     high: f64,
-    /// Values with a tick and the text beside it (empty: a minor tick).
+    /// Value and label of each tick; minor ticks have an empty label.
     pub ticks: Vec<(f64, String)>,
 }
 
 impl Axis {
-    /// An axis that covers `low` to `high` with about `count` round steps; the range grows to whole
-    /// steps unless `tight`.
+    /// Creates a linear axis from `low` to `high` with about `count` round steps; unless `tight`,
+    /// the range is extended towards whole steps.
     pub fn linear(label: &str, low: f64, high: f64, count: usize, tight: bool) -> Axis {
-        let (mut low, mut high) = sane(low, high);
+        let (mut low, mut high) = drawable_range(low, high);
         let mut step = round_step((high - low) / count.max(1) as f64);
-        // Round steps may miss a tight range but once, which gives no scale.
+        // A tight range needs at least two ticks to show its scale.
         let within = |step: f64| (high / step + 1e-6).floor() - (low / step - 1e-6).ceil();
         while tight && within(step) < 1.0 {
             step = round_step(0.4 * step);
         }
         if !tight {
-            // A value just beyond a round one does not cost a whole step.
+            // A value slightly beyond a tick extends the range by 0.2 steps only.
             let grow = |value: f64, out: f64| {
                 let inner = (value / step * out + 1e-6).floor() * out * step;
                 let beyond = (value - inner).abs() / step;
@@ -79,9 +79,10 @@ impl Axis {
         }
     }
 
-    /// An axis for angles in degrees, with ticks at multiples of 30 up to a right angle and of 45 beyond.
+    /// Creates an axis for angles [deg], with ticks every 30 up to 90, every 45 up to 360 and every
+    /// 90 beyond.
     pub fn degrees(label: &str, low: f64, high: f64) -> Axis {
-        let (low, high) = sane(low, high);
+        let (low, high) = drawable_range(low, high);
         let step = match high.abs().max(low.abs()) {
             size if size <= 90.0 + 1e-6 => 30.0,
             size if size <= 360.0 + 1e-6 => 45.0,
@@ -101,7 +102,7 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis that covers the positive values `low` to `high` in whole decades.
+    /// Creates a logarithmic axis that covers `low` to `high` (positive) in whole decades.
     pub fn log(label: &str, low: f64, high: f64) -> Axis {
         let positive = |v: f64| if v.is_finite() && v > 0.0 { v } else { 1.0 };
         let (low, high) = (
@@ -131,9 +132,10 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis that covers the positive values `low` to `high` out to the next of 1, 2, 5
-    /// times a power of ten, or no further if `tight`; these are labelled where there are few.
-    pub fn log_close(label: &str, low: f64, high: f64, tight: bool) -> Axis {
+    /// Creates a logarithmic axis that covers `low` to `high` (positive), extended to the next 1, 2
+    /// or 5 times a power of ten unless `tight`. Ranges up to about two decades have labels at
+    /// these values, longer ones at the decades.
+    pub fn log_rounded(label: &str, low: f64, high: f64, tight: bool) -> Axis {
         let whole = Axis::log(label, low, high);
         let leads = [1.0, 2.0, 5.0];
         let marks = |leads: &[f64]| -> Vec<f64> {
@@ -186,37 +188,38 @@ impl Axis {
         }
     }
 
-    /// Puts ticks at `values` and nowhere else.
+    /// Replaces the ticks by ticks at `values`.
     #[must_use]
     pub fn with_ticks(mut self, values: &[f64]) -> Axis {
         self.ticks = values.iter().map(|v| (*v, minus(&v.to_string()))).collect();
         self
     }
 
-    /// Lower end.
+    /// Lower end of the range.
     pub fn low(&self) -> f64 {
         self.low
     }
 
-    /// Upper end.
+    /// Upper end of the range.
     pub fn high(&self) -> f64 {
         self.high
     }
 
-    /// Place of `value` along the axis: 0 at the lower end, 1 at the upper; none where it has no place.
-    pub fn place(&self, value: f64) -> Option<f64> {
-        let place = match self.scale {
+    /// Returns the position of `value` along the axis, from 0 at the lower to 1 at the upper end;
+    /// `None` if the axis cannot represent it.
+    pub fn fraction(&self, value: f64) -> Option<f64> {
+        let fraction = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
             Scale::Log if value > 0.0 => {
                 (value / self.low).log10() / (self.high / self.low).log10()
             }
             Scale::Log => return None,
         };
-        place.is_finite().then_some(place)
+        fraction.is_finite().then_some(fraction)
     }
 }
 
-/// Smallest and largest finite value.
+/// Returns the smallest and largest finite value.
 pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values
         .into_iter()
@@ -227,8 +230,8 @@ pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
         })
 }
 
-/// A range that can be drawn: finite, ordered and not empty.
-fn sane(low: f64, high: f64) -> (f64, f64) {
+/// Returns a finite, ordered, non-empty range.
+fn drawable_range(low: f64, high: f64) -> (f64, f64) {
     if !low.is_finite() || !high.is_finite() {
         return (0.0, 1.0);
     }
@@ -243,7 +246,7 @@ fn sane(low: f64, high: f64) -> (f64, f64) {
     }
 }
 
-/// The next of 1, 2, 5 times a power of ten that is at least about `step`.
+/// Returns the next 1, 2 or 5 times a power of ten at or above about `step`.
 fn round_step(step: f64) -> f64 {
     let power = 10f64.powf(step.log10().floor());
     let lead = step / power;
@@ -259,7 +262,7 @@ fn round_step(step: f64) -> f64 {
     round * power
 }
 
-/// Power of ten to take out of very large or small values.
+/// Returns the power of ten to factor out of very large or small values, a multiple of 3.
 fn common_power(size: f64) -> i32 {
     if size > 0.0 && !(9e-3..2e4).contains(&size) {
         3 * (size.log10() / 3.0).floor() as i32
@@ -268,11 +271,12 @@ fn common_power(size: f64) -> i32 {
     }
 }
 
+/// Returns the number of decimals that resolves `step`.
 fn decimals(step: f64) -> usize {
     (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize
 }
 
-/// A label with a power of ten before its unit: "p [Pa]" becomes "p [10³ Pa]".
+/// Inserts a power of ten before the unit: "p [Pa]" becomes "p [10³ Pa]".
 fn scaled_label(label: &str, power: i32) -> String {
     let factor = format!("10^{{{}}}", minus(&power.to_string()));
     match label.split_once('[') {
@@ -281,7 +285,7 @@ fn scaled_label(label: &str, power: i32) -> String {
     }
 }
 
-/// The typographic minus.
+/// Replaces hyphens by the typographic minus sign.
 pub fn minus(text: &str) -> String {
     text.replace('-', "−")
 }

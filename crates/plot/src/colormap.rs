@@ -1,23 +1,23 @@
-//! Colour maps made to be read: straight lines of lightness in Oklab (B. Ottosson, 2020), so that
-//! equal steps of the value look equal, in grey print and to colour-blind readers too.
+//! Perceptually uniform colour maps: lightness is linear in Oklab (B. Ottosson, 2020), also legible
+//! in greyscale print and for colour-blind readers.
 
-/// Which map.
+/// A colour map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorMap {
-    /// White at zero through green to dark blue; for magnitudes.
+    /// White at 0 through green to dark blue, for magnitudes.
     Magnitude,
-    /// Blue, white at the middle, red; for signed values.
+    /// Blue through white to red, for signed values.
     Signed,
 }
 
 impl ColorMap {
-    /// Colour at `position`, 0 to 1 (clamped).
+    /// Returns the sRGB colour at `position`, clamped to 0 to 1.
     pub fn colour(self, position: f64) -> [u8; 3] {
         let s = position.clamp(0.0, 1.0);
         match self {
             ColorMap::Magnitude => {
                 let lightness = 0.985 - 0.715 * s;
-                // Chosen to stay inside what a screen can show, so that the colours have no kinks.
+                // The chroma stays inside the sRGB gamut: clipping would cause kinks.
                 let rise = 1.0 - (1.0 - (s / 0.3).min(1.0)).powi(2);
                 let fall = 1.0 - 0.45 * ((s - 0.35).max(0.0) / 0.65).powf(1.5);
                 let chroma = 0.104 * rise * fall;
@@ -35,7 +35,7 @@ impl ColorMap {
         }
     }
 
-    /// The map in 256 colours.
+    /// Returns 256 evenly spaced colours.
     pub fn palette(self) -> Vec<[u8; 3]> {
         (0..256)
             .map(|i| self.colour(f64::from(i) / 255.0))
@@ -43,18 +43,18 @@ impl ColorMap {
     }
 }
 
-/// A colour of viridis-like lightness for the fraction `s` (0 dark to 1 light), for lines and discs.
-pub fn ordered(s: f64) -> [u8; 3] {
+/// Returns a colour of viridis-like lightness for `s` from 0 (dark) to 1 (light), clamped.
+pub fn sequential(s: f64) -> [u8; 3] {
     let s = s.clamp(0.0, 1.0);
     from_oklch(0.36 + 0.5 * s, 0.092, 275.0 - 175.0 * s)
 }
 
-/// The colour as `#rrggbb`.
+/// Formats a colour as `#rrggbb`.
 pub fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// sRGB from Oklab lightness, chroma and hue [deg]; chroma is lowered to what can be shown.
+/// Converts Oklab lightness, chroma and hue [deg] to sRGB; reduces the chroma to the gamut.
 fn from_oklch(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     let shown = |chroma: f64| {
         linear_from_oklch(lightness, chroma, hue)
@@ -138,11 +138,11 @@ mod tests {
 
     #[test]
     fn no_map_has_kinks() {
-        let ordered: Vec<_> = (0..256).map(|i| ordered(f64::from(i) / 255.0)).collect();
+        let sequential: Vec<_> = (0..256).map(|i| sequential(f64::from(i) / 255.0)).collect();
         for palette in [
             ColorMap::Magnitude.palette(),
             ColorMap::Signed.palette(),
-            ordered,
+            sequential,
         ] {
             let step = |a: &[u8; 3], b: &[u8; 3]| (0..3).map(|c| a[c].abs_diff(b[c])).max();
             let steps: Vec<_> = palette

@@ -1,17 +1,17 @@
-//! Level lines of values on a grid (marching squares), joined into closed loops.
+//! Contour lines of values on a grid (marching squares), joined into closed loops.
 
 use std::collections::HashMap;
 
-/// Loops along which values on an `nx` by `ny` grid (x fastest) cross `level`, in grid coordinates
-/// (the first value lies at 0, 0). Everything beyond the edge counts as below the level, so that
-/// all loops close.
-pub fn loops(
+/// Returns the closed contours at `level` of values on an `nx` by `ny` grid, in grid coordinates
+/// (the first value lies at (0, 0)). Points outside the grid are below the level, so that all
+/// contours close.
+pub fn closed_contours(
     nx: usize,
     ny: usize,
     value: impl Fn(usize, usize) -> f64,
     level: f64,
 ) -> Vec<Vec<(f64, f64)>> {
-    // One ring of outside values around the grid.
+    // A layer of outside values surrounds the grid.
     let at = |i: usize, j: usize| {
         let inside = i > 0 && j > 0 && i <= nx && j <= ny;
         let v = if inside {
@@ -23,14 +23,14 @@ pub fn loops(
     };
     let cross = |a: f64, b: f64| {
         let t = (level - a) / (b - a);
-        // Towards the outside ring the line runs half a cell from the last value.
+        // Next to the outside layer the contour lies half a cell from the last value.
         if t.is_finite() && a.is_finite() && b.is_finite() {
             t.clamp(0.0, 1.0)
         } else {
             0.5
         }
     };
-    // An edge is named by its lower left node and direction; each is crossed at most once.
+    // Key of an edge: its lower left node, and whether it is vertical; crossed at most once.
     let mut next: HashMap<(usize, usize, bool), (usize, usize, bool)> = HashMap::new();
     let mut order = Vec::new();
     for j in 0..=ny {
@@ -81,7 +81,8 @@ pub fn loops(
     out
 }
 
-/// Directed segments of a cell, high values on the left; edges: 0 bottom, 1 right, 2 top, 3 left.
+/// Returns the segments of a cell, directed with high values on the left. Edges: 0 bottom,
+/// 1 right, 2 top, 3 left.
 fn segments(bits: usize, middle: bool) -> &'static [(usize, usize)] {
     match bits {
         1 => &[(0, 3)],
@@ -116,7 +117,7 @@ mod tests {
     #[test]
     fn a_disc_becomes_one_loop_of_its_area() {
         let value = |i: usize, j: usize| 8.0 - (i as f64 - 15.3).hypot(j as f64 - 14.8);
-        let got = loops(32, 30, value, 0.0);
+        let got = closed_contours(32, 30, value, 0.0);
         assert_eq!(got.len(), 1);
         let exact = std::f64::consts::PI * 64.0;
         assert!(
@@ -132,10 +133,10 @@ mod tests {
             let r = (i as f64 - 10.0).hypot(j as f64 - 10.0);
             2.0 - (r - 6.0).abs()
         };
-        let got = loops(21, 21, ring, 0.0);
+        let got = closed_contours(21, 21, ring, 0.0);
         assert_eq!(got.len(), 2);
         assert!(area(&got[0]) * area(&got[1]) < 0.0);
-        let full = loops(4, 3, |_, _| 1.0, 0.5);
+        let full = closed_contours(4, 3, |_, _| 1.0, 0.5);
         assert_eq!(full.len(), 1);
         assert!((area(&full[0]) - 11.5).abs() < 1e-9, "{}", area(&full[0]));
     }
@@ -143,8 +144,12 @@ mod tests {
     #[test]
     fn saddles_and_broken_values_do_not_break_loops() {
         let checker = |i: usize, j: usize| if (i + j).is_multiple_of(2) { 1.0 } else { 0.0 };
-        assert!(loops(6, 6, checker, 0.5).iter().all(|ring| ring.len() > 2));
-        assert!(loops(6, 6, |_, _| f64::NAN, 0.5).is_empty());
-        assert!(loops(0, 0, |_, _| 1.0, 0.5).is_empty());
+        assert!(
+            closed_contours(6, 6, checker, 0.5)
+                .iter()
+                .all(|ring| ring.len() > 2)
+        );
+        assert!(closed_contours(6, 6, |_, _| f64::NAN, 0.5).is_empty());
+        assert!(closed_contours(0, 0, |_, _| 1.0, 0.5).is_empty());
     }
 }

@@ -1,15 +1,15 @@
-//! A frame with axes for points, boxes and curves.
+//! A rectangular frame with two axes, for points, boxes and curves; markers of data points.
 
 use crate::axis::Axis;
-use crate::style::{FAINT, GRID, HAIR, INK, LINE, SMALL, TEXT, TICK};
-use crate::svg::{Anchor, Drawing, path_data};
-use crate::text;
+use crate::drawing::{Anchor, Drawing, path_data};
+use crate::style::{FAINT, GRID, INK, LINE, SMALL, TEXT, TICK};
+use crate::ticks;
 
-/// A frame on the paper with its axes.
+/// A rectangle on paper with a horizontal and a vertical axis.
 pub struct Frame {
-    /// Left end [pt].
+    /// Left edge [pt].
     pub x: f64,
-    /// Top [pt].
+    /// Top edge [pt].
     pub y: f64,
     /// Width [pt].
     pub width: f64,
@@ -22,16 +22,25 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Place of a horizontal value [pt].
+    /// Returns the horizontal position of a value [pt]; the left edge if it has none.
     pub fn px(&self, value: f64) -> f64 {
-        self.x + self.width * self.across.place(value).unwrap_or(0.0)
-    }
-    /// Place of a vertical value [pt].
-    pub fn py(&self, value: f64) -> f64 {
-        self.y + self.height * (1.0 - self.up.place(value).unwrap_or(0.0))
+        self.x + self.width * self.across.fraction(value).unwrap_or(0.0)
     }
 
-    /// Grid lines at the labelled ticks of the vertical axis, below the data.
+    /// Returns the vertical position of a value [pt]; the bottom edge if it has none.
+    pub fn py(&self, value: f64) -> f64 {
+        self.y + self.height * (1.0 - self.up.fraction(value).unwrap_or(0.0))
+    }
+
+    /// Returns the position of a data point [pt]; `None` if an axis cannot represent it.
+    pub fn position(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
+        Some((
+            self.x + self.width * self.across.fraction(x)?,
+            self.y + self.height * (1.0 - self.up.fraction(y)?),
+        ))
+    }
+
+    /// Draws grid lines at the labelled ticks of the vertical axis.
     pub fn grid(&self, drawing: &mut Drawing) {
         for (value, _) in self.up.ticks.iter().filter(|(_, name)| !name.is_empty()) {
             let y = self.py(*value);
@@ -41,70 +50,26 @@ impl Frame {
         }
     }
 
-    /// The frame, its ticks and labels; `names` says which axes are labelled.
-    pub fn outline(&self, drawing: &mut Drawing, names: (bool, bool)) {
-        let bottom = self.y + self.height;
-        for (value, name) in &self.across.ticks {
-            let x = self.px(*value);
-            drawing.line(&[(x, bottom), (x, bottom + TICK)], INK, HAIR, None);
-            if names.0 {
-                drawing.label(
-                    x,
-                    bottom + TICK + SMALL + 0.5,
-                    Anchor::Middle,
-                    SMALL,
-                    INK,
-                    name,
-                    false,
-                );
-            }
+    /// Draws the outline, the ticks and the labels; `labelled` selects the axes that have labels.
+    pub fn outline(&self, drawing: &mut Drawing, labelled: (bool, bool)) {
+        let (x, y, width, height) = (self.x, self.y, self.width, self.height);
+        let bottom = y + height;
+        ticks::horizontal(drawing, &self.across, (x, bottom), width, labelled.0);
+        let widest = ticks::vertical(drawing, &self.up, (x, y), height, labelled.1, None);
+        drawing.outline(x, y, width, height);
+        if labelled.0 {
+            let (middle, base) = (x + 0.5 * width, bottom + TICK + SMALL + 11.0);
+            let label = &self.across.label;
+            drawing.label(middle, base, Anchor::Middle, TEXT, INK, label, false);
         }
-        let mut widest: f64 = 0.0;
-        for (value, name) in &self.up.ticks {
-            let y = self.py(*value);
-            drawing.line(&[(self.x - TICK, y), (self.x, y)], INK, HAIR, None);
-            if names.1 {
-                widest = widest.max(text::width(name, SMALL));
-                drawing.label(
-                    self.x - TICK - 2.0,
-                    y + 0.36 * SMALL,
-                    Anchor::End,
-                    SMALL,
-                    INK,
-                    name,
-                    false,
-                );
-            }
-        }
-        let outline = format!("fill=\"none\" stroke=\"{INK}\" stroke-width=\"{HAIR}\"");
-        drawing.rectangle(self.x, self.y, self.width, self.height, &outline);
-        if names.0 {
-            let y = bottom + TICK + SMALL + 11.0;
-            drawing.label(
-                self.x + 0.5 * self.width,
-                y,
-                Anchor::Middle,
-                TEXT,
-                INK,
-                &self.across.label,
-                false,
-            );
-        }
-        if names.1 {
-            let x = self.x - TICK - widest - 7.0;
-            drawing.label(
-                x,
-                self.y + 0.5 * self.height,
-                Anchor::Middle,
-                TEXT,
-                INK,
-                &self.up.label,
-                true,
-            );
+        if labelled.1 {
+            let (left, middle) = (x - TICK - widest - 7.0, y + 0.5 * height);
+            let label = &self.up.label;
+            drawing.label(left, middle, Anchor::Middle, TEXT, INK, label, true);
         }
     }
 
-    /// A curve, clipped to the frame.
+    /// Draws a curve, clipped to the frame; `clip` is an identifier unique in the drawing.
     pub fn curve(
         &self,
         drawing: &mut Drawing,
@@ -113,28 +78,22 @@ impl Frame {
         dash: Option<&str>,
         clip: &str,
     ) {
-        let placed: Vec<(f64, f64)> = points
-            .iter()
-            .map(|(x, y)| (self.px(*x), self.py(*y)))
-            .collect();
+        let position = |(x, y): &(f64, f64)| (self.px(*x), self.py(*y));
+        let placed: Vec<(f64, f64)> = points.iter().map(position).collect();
         drawing.begin_clip(clip, self.x, self.y, self.width, self.height);
         drawing.line(&thin(&placed), colour, LINE, dash);
         drawing.end_clip();
     }
 
-    /// A horizontal line across the frame.
+    /// Draws a dashed reference line at a vertical value.
     pub fn level(&self, drawing: &mut Drawing, value: f64) {
         let y = self.py(value);
-        drawing.line(
-            &[(self.x, y), (self.x + self.width, y)],
-            FAINT,
-            0.8,
-            Some("4 2.5"),
-        );
+        let ends = [(self.x, y), (self.x + self.width, y)];
+        drawing.line(&ends, FAINT, 0.8, Some("4 2.5"));
     }
 }
 
-/// Leaves out points that lie nearer than a fifth of a point to the one before.
+/// Removes points within 0.2 pt of the previous one; the last point stays.
 fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut out: Vec<(f64, f64)> = Vec::with_capacity(points.len());
     for (i, p) in points.iter().enumerate() {
@@ -148,9 +107,9 @@ fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     out
 }
 
-/// Signs that can be told apart without colour.
+/// Shapes of data points that differ without colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sign {
+pub enum Marker {
     /// Circle.
     Circle,
     /// Square.
@@ -159,26 +118,26 @@ pub enum Sign {
     Triangle,
     /// Diamond.
     Diamond,
-    /// Triangle on its tip.
-    Down,
+    /// Triangle that points down.
+    TriangleDown,
     /// Pentagon.
     Pentagon,
 }
 
-impl Sign {
-    /// The n-th sign.
-    pub fn number(n: usize) -> Sign {
+impl Marker {
+    /// Returns the n-th shape, in a cycle of six.
+    pub fn nth(n: usize) -> Marker {
         [
-            Sign::Circle,
-            Sign::Square,
-            Sign::Triangle,
-            Sign::Diamond,
-            Sign::Down,
-            Sign::Pentagon,
+            Marker::Circle,
+            Marker::Square,
+            Marker::Triangle,
+            Marker::Diamond,
+            Marker::TriangleDown,
+            Marker::Pentagon,
         ][n % 6]
     }
 
-    /// Draws it; hollow for a bound.
+    /// Draws the marker around `(x, y)` [pt]; a hollow one usually stands for a bound.
     pub fn draw(
         self,
         drawing: &mut Drawing,
@@ -187,43 +146,32 @@ impl Sign {
         colour: &str,
         hollow: bool,
     ) {
-        let s = size;
-        let ring = |n: i32, s0: f64| -> Vec<(f64, f64)> {
+        let ring = |n: i32, radius: f64| -> Vec<(f64, f64)> {
             (0..n)
                 .map(|i| (std::f64::consts::TAU * f64::from(i) / f64::from(n)).sin_cos())
-                .map(|(sin, cos)| (x + s * s0 * sin, y - s * s0 * cos))
+                .map(|(sin, cos)| (x + size * radius * sin, y - size * radius * cos))
                 .collect()
         };
-        let corners: Vec<(f64, f64)> = match self {
-            Sign::Circle => ring(24, 1.0),
-            Sign::Pentagon => ring(5, 1.1),
-            Sign::Down => [(-1.1, -0.8), (1.1, -0.8), (0.0, 1.2)]
-                .iter()
-                .map(|(a, b)| (x + s * a, y + s * b))
-                .collect(),
-            Sign::Square => [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-                .iter()
-                .map(|(a, b)| (x + 0.88 * s * a, y + 0.88 * s * b))
-                .collect(),
-            Sign::Triangle => [(-1.1, 0.8), (1.1, 0.8), (0.0, -1.2)]
-                .iter()
-                .map(|(a, b)| (x + s * a, y + s * b))
-                .collect(),
-            Sign::Diamond => [(-1.2, 0.0), (0.0, -1.2), (1.2, 0.0), (0.0, 1.2)]
-                .iter()
-                .map(|(a, b)| (x + s * a, y + s * b))
-                .collect(),
+        let polygon = |scale: f64, corners: &[(f64, f64)]| -> Vec<(f64, f64)> {
+            let corner = |(a, b): &(f64, f64)| (x + scale * a, y + scale * b);
+            corners.iter().map(corner).collect()
         };
-        let fill = if hollow { "none" } else { colour };
-        let style = format!(
-            "fill=\"{fill}\" stroke=\"{}\" stroke-width=\"0.9\"",
-            if hollow { colour } else { "#ffffff" }
-        );
-        let style = if hollow {
-            style
-        } else {
-            style.replace("0.9", "0.5")
+        let corners = match self {
+            Marker::Circle => ring(24, 1.0),
+            Marker::Pentagon => ring(5, 1.1),
+            Marker::TriangleDown => polygon(size, &[(-1.1, -0.8), (1.1, -0.8), (0.0, 1.2)]),
+            Marker::Square => polygon(
+                0.88 * size,
+                &[(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)],
+            ),
+            Marker::Triangle => polygon(size, &[(-1.1, 0.8), (1.1, 0.8), (0.0, -1.2)]),
+            Marker::Diamond => polygon(size, &[(-1.2, 0.0), (0.0, -1.2), (1.2, 0.0), (0.0, 1.2)]),
         };
+        let (fill, stroke, width) = match hollow {
+            true => ("none", colour, "0.9"),
+            false => (colour, "#ffffff", "0.5"),
+        };
+        let style = format!("fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"{width}\"");
         drawing.path(&path_data(&corners, true), &style);
     }
 }

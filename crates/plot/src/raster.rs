@@ -1,22 +1,22 @@
-//! Pictures of pixels: palettes for the fields, PNG files for the figures.
+//! Rasters with a palette, and PNG encoding.
 
 use resvg::tiny_skia;
 
-/// Colours of a picture: indices into a palette, row by row from the top.
+/// An image as palette indices, row by row from the top.
 #[derive(Clone, Debug)]
 pub struct Raster {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// One palette index for each pixel.
+    /// Palette index of each pixel.
     pub pixels: Vec<u8>,
-    /// Up to 256 colours.
+    /// At most 256 sRGB colours.
     pub palette: Vec<[u8; 3]>,
 }
 
 impl Raster {
-    /// The raster in full colours.
+    /// Converts to full colours; `None` if there are no pixels or too few indices.
     pub fn to_pixmap(&self) -> Option<tiny_skia::Pixmap> {
         let size = tiny_skia::IntSize::from_wh(self.width as u32, self.height as u32)?;
         let colour = |index: &u8| {
@@ -34,7 +34,7 @@ impl Raster {
         tiny_skia::Pixmap::from_vec(data, size)
     }
 
-    /// The raster as a PNG file with a palette; empty if its sizes contradict each other.
+    /// Encodes a PNG file with a palette; empty if the sizes are inconsistent.
     pub fn to_png(&self) -> Vec<u8> {
         let mut out = Vec::new();
         let mut encoder = png::Encoder::new(&mut out, self.width as u32, self.height as u32);
@@ -53,8 +53,11 @@ impl Raster {
     }
 }
 
-/// An opaque pixmap as an RGB PNG that knows its resolution.
-pub fn encode(width: u32, height: u32, pixmap: &tiny_skia::Pixmap) -> Result<Vec<u8>, String> {
+/// Encodes an opaque pixmap as RGB PNG, marked as 300 dots per inch.
+///
+/// # Errors
+/// The reason, if the encoder refuses the image.
+pub fn encode_png(width: u32, height: u32, pixmap: &tiny_skia::Pixmap) -> Result<Vec<u8>, String> {
     let pixels: Vec<u8> = pixmap
         .data()
         .chunks_exact(4)

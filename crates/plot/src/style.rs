@@ -1,5 +1,5 @@
-//! What all figures share: sizes, lines and the Okabe-Ito colours, which colour-blind readers can
-//! tell apart (M. Okabe and K. Ito, 2008).
+//! Sizes, line widths and the Okabe-Ito colours, which remain distinct for colour-blind readers
+//! (M. Okabe and K. Ito, 2008).
 
 /// Width of one column of a journal page, 88 mm [pt].
 pub const COLUMN: f64 = 250.0;
@@ -17,12 +17,12 @@ pub const LINE: f64 = 1.2;
 pub const TICK: f64 = 2.5;
 /// Pixels per point of the PNG files: 300 dots per inch.
 pub const PIXELS_PER_POINT: f64 = 300.0 / 72.0;
-/// Families asked for; the first is embedded for the PNG files.
+/// Font families of the SVG files; PNG files use the first one, which is embedded.
 pub const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
 
 /// Colour of text, frames and outlines.
 pub const INK: &str = "#222222";
-/// Colour of marks that must stay behind the data.
+/// Colour of secondary lines and notes.
 pub const FAINT: &str = "#8a8a8a";
 /// Colour of grid lines.
 pub const GRID: &str = "#e4e4e4";
@@ -39,10 +39,10 @@ pub const ORANGE: &str = "#e69f00";
 /// Okabe-Ito sky blue.
 pub const SKY: &str = "#56b4e9";
 
-/// Number of colours that grains have.
-pub const GRAIN_COLOURS: usize = 6;
+/// Number of colours in the cycle of data series.
+pub const SERIES_COLOURS: usize = 6;
 
-/// Colour of the n-th grain.
-pub fn grain_colour(grain: usize) -> &'static str {
-    [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY][grain % GRAIN_COLOURS]
+/// Returns the colour of the n-th data series, in a cycle of [`SERIES_COLOURS`].
+pub fn series_colour(n: usize) -> &'static str {
+    [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY][n % SERIES_COLOURS]
 }

@@ -1,4 +1,4 @@
-//! Labels: a small markup (`*italic*`, `_{sub}`, `^{sup}`), measured with the embedded font.
+//! Labels in a small markup (`*italic*`, `_{sub}`, `^{sup}`), measured in the embedded font.
 
 use std::sync::OnceLock;
 
@@ -9,16 +9,16 @@ use skrifa::{FontRef, MetadataProvider};
 /// Size of a sub- or superscript relative to the text.
 const SMALL: f64 = 0.72;
 
-/// A stretch of text in one style.
+/// A part of a label with one style.
 #[derive(Clone, Debug, PartialEq)]
 struct Piece {
     text: String,
     italic: bool,
-    /// -1 subscript, 0 on the line, +1 superscript.
+    /// -1: subscript, 0: baseline, +1: superscript.
     level: i8,
 }
 
-/// Splits a label into pieces; `\` makes the next character plain.
+/// Splits a label by style; `\` escapes the next character.
 fn pieces(label: &str) -> Vec<Piece> {
     let mut out: Vec<Piece> = Vec::new();
     let mut italic = false;
@@ -51,12 +51,12 @@ fn pieces(label: &str) -> Vec<Piece> {
     out
 }
 
-/// The label as plain text, for titles and alternative texts.
+/// Returns the label without markup, for titles and alternative texts.
 pub fn plain(label: &str) -> String {
     pieces(label).into_iter().map(|piece| piece.text).collect()
 }
 
-/// Makes text that comes from a file safe to use as a label.
+/// Escapes the markup characters of arbitrary text, for use as a label.
 pub fn literal(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -68,7 +68,7 @@ pub fn literal(text: &str) -> String {
     out
 }
 
-/// Escapes the five characters that XML and HTML reserve, and drops control characters.
+/// Escapes the five reserved characters of XML and HTML; removes control characters.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -85,7 +85,7 @@ pub fn escape(text: &str) -> String {
     out
 }
 
-/// The label as SVG `tspan` elements for text of `size` [pt].
+/// Converts a label to SVG `tspan` elements for text of `size` [pt].
 pub fn spans(label: &str, size: f64) -> String {
     let mut out = String::new();
     let mut shift = 0.0;
@@ -116,7 +116,7 @@ pub fn spans(label: &str, size: f64) -> String {
     out
 }
 
-/// The label as HTML.
+/// Converts a label to HTML.
 pub fn html(label: &str) -> String {
     let mut out = String::new();
     for piece in pieces(label) {
@@ -133,19 +133,13 @@ pub fn html(label: &str) -> String {
     out
 }
 
-/// Width [pt] of a label set at `size` [pt].
+/// Returns the width of a label at font size `size` [pt].
 pub fn width(label: &str, size: f64) -> f64 {
     static FONT: OnceLock<Option<FontRef<'static>>> = OnceLock::new();
     let font = FONT.get_or_init(|| FontRef::new(dejavu::sans::regular()).ok());
-    let fallback = |pieces: Vec<Piece>| {
-        0.6 * size
-            * pieces
-                .iter()
-                .map(|p| p.text.chars().count() as f64)
-                .sum::<f64>()
-    };
     let Some(font) = font else {
-        return fallback(pieces(label));
+        let count = |piece: &Piece| piece.text.chars().count() as f64;
+        return 0.6 * size * pieces(label).iter().map(count).sum::<f64>();
     };
     let map = font.charmap();
     let metrics = GlyphMetrics::new(font, Size::new(1000.0), LocationRef::default());
@@ -158,12 +152,8 @@ pub fn width(label: &str, size: f64) -> f64 {
                     .and_then(|glyph| metrics.advance_width(glyph))
                     .unwrap_or(600.0)
             };
-            scale
-                * piece
-                    .text
-                    .chars()
-                    .map(|c| f64::from(advance(c)))
-                    .sum::<f64>()
+            let advances = piece.text.chars().map(|c| f64::from(advance(c)));
+            scale * advances.sum::<f64>()
         })
         .sum()
 }

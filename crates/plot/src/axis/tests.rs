@@ -79,26 +79,26 @@ fn a_power_of_ten_goes_to_the_unit() {
 fn log_axes_take_whole_decades() {
     let axis = Axis::log("div [1/s]", 3e-14, 2e-12);
     assert_eq!((axis.low(), axis.high()), (1e-14, 1e-11));
-    assert_eq!(axis.place(1e-14), Some(0.0));
-    assert!(axis.place(0.0).is_none());
+    assert_eq!(axis.fraction(1e-14), Some(0.0));
+    assert!(axis.fraction(0.0).is_none());
     assert!(texts(&axis).contains(&"10^{−14}"));
 }
 
 #[test]
 fn close_log_axes_end_and_are_labelled_between_decades() {
-    let axis = Axis::log_close("*Re*", 20.0, 350.0, false);
+    let axis = Axis::log_rounded("*Re*", 20.0, 350.0, false);
     assert!((axis.low() - 20.0).abs() < 1e-9 && (axis.high() - 500.0).abs() < 1e-9);
     let named: Vec<&str> = texts(&axis).into_iter().filter(|t| !t.is_empty()).collect();
     assert_eq!(named, ["20", "50", "100", "200", "500"]);
-    let fine = Axis::log_close("error", 0.0031, 0.04, true);
+    let fine = Axis::log_rounded("error", 0.0031, 0.04, true);
     assert_eq!((fine.low(), fine.high()), (0.0031, 0.04));
     let named: Vec<&str> = texts(&fine).into_iter().filter(|t| !t.is_empty()).collect();
     assert_eq!(named, ["0.005", "0.01", "0.02"]);
-    let wide = Axis::log_close("error", 3e-8, 0.4, false);
+    let wide = Axis::log_rounded("error", 3e-8, 0.4, false);
     assert!(texts(&wide).contains(&"10^{−4}"));
     assert!((wide.low() / 2e-8 - 1.0).abs() < 1e-9);
     for (low, high) in [(0.0, 1.0), (f64::NAN, 2.0), (3.0, 3.0)] {
-        let axis = Axis::log_close("x", low, high, false);
+        let axis = Axis::log_rounded("x", low, high, false);
         assert!(axis.high() > axis.low() && axis.low() > 0.0, "{low} {high}");
     }
     let cells = axis.with_ticks(&[8.0, 16.0]);

@@ -6,8 +6,8 @@ use super::{Figure, Scene};
 use crate::run_folder::{History, Kind};
 use crate::story::{galileo, short};
 use grainwake_plot::axis::{Axis, extent};
-use grainwake_plot::lines::{Mark, Panel, Series, stack};
-use grainwake_plot::style::{self, grain_colour};
+use grainwake_plot::stacked::{Panel, Series, VerticalMark, stacked_panels};
+use grainwake_plot::style::{self, series_colour};
 
 /// Points of a curve.
 pub type Points = Vec<(f64, f64)>;
@@ -58,12 +58,12 @@ impl Scene<'_> {
     }
 
     /// The events as marks on the time axis.
-    pub fn marks(&self) -> Vec<Mark> {
+    pub fn marks(&self) -> Vec<VerticalMark> {
         let (_, factor) = self.story.time_axis();
         let shown = |kind: &Kind| !matches!(kind, Kind::Other(_));
         let events = self.run.events.iter().filter(|event| shown(&event.kind));
         events
-            .map(|event| Mark {
+            .map(|event| VerticalMark {
                 at: event.time * factor,
                 name: event.kind.name().to_owned(),
             })
@@ -77,7 +77,7 @@ impl Scene<'_> {
         let points = (0..history.len())
             .map(|row| (history.time[row] * factor, value(history, row)))
             .collect();
-        let colour = grain_colour(self.story.grain_rank(grain));
+        let colour = series_colour(self.story.grain_rank(grain));
         series(Some(self.story.grain_name(grain)), points, colour)
     }
 
@@ -171,7 +171,7 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
         name: "gap",
         title: "Gap between the grains".to_owned(),
         caption,
-        drawing: stack(&scene.time(), &[distance, turn], &scene.marks()),
+        drawing: stacked_panels(&scene.time(), &[distance, turn], &scene.marks()),
     })
 }
 
@@ -232,7 +232,7 @@ pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
         name: "velocity",
         title: "Velocity of the grains".to_owned(),
         caption,
-        drawing: stack(&scene.time(), &panels, &scene.marks()),
+        drawing: stacked_panels(&scene.time(), &panels, &scene.marks()),
     })
 }
 
@@ -300,6 +300,6 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
         name: "velocity",
         title: "Velocity of the grain".to_owned(),
         caption,
-        drawing: stack(&scene.time(), &panels, &scene.marks()),
+        drawing: stacked_panels(&scene.time(), &panels, &scene.marks()),
     })
 }

@@ -4,12 +4,12 @@ use super::Scene;
 use super::section::{Section, View};
 use super::sheet::Column;
 use super::silhouette::{self, Outline};
-use grainwake_plot::style::{INK, grain_colour};
+use grainwake_plot::style::{INK, series_colour};
 
 /// Outlines of the grains in each of the column's sections, in the colours of the grains.
 pub fn of_column(scene: &Scene, column: &Column) -> Vec<Vec<(&'static str, Outline)>> {
     let coloured = |(grain, ring): (Option<usize>, Outline)| {
-        let colour = |grain| grain_colour(scene.story.grain_rank(grain));
+        let colour = |grain| series_colour(scene.story.grain_rank(grain));
         (grain.map_or(INK, colour), ring)
     };
     let of_section = |section: &Option<Section>| match section {

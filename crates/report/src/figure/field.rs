@@ -12,9 +12,9 @@ use crate::run_folder::RunFolder;
 use crate::story::Story;
 use grainwake_plot::axis::Axis;
 use grainwake_plot::colormap::ColorMap;
-use grainwake_plot::plan::Window;
+use grainwake_plot::drawing::Drawing;
+use grainwake_plot::equal_aspect::Window;
 use grainwake_plot::style::INK;
-use grainwake_plot::svg::Drawing;
 
 /// What is shown of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

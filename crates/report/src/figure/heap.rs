@@ -3,10 +3,10 @@
 use super::{AXES, Figure, Scene};
 use crate::story::short;
 use grainwake_plot::axis::{Axis, extent};
-use grainwake_plot::colormap::{hex, ordered};
-use grainwake_plot::plan::{Plan, Window, colour_bar, length_unit};
+use grainwake_plot::colormap::{hex, sequential};
+use grainwake_plot::drawing::Drawing;
+use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_unit};
 use grainwake_plot::style::PAGE;
-use grainwake_plot::svg::Drawing;
 
 /// The grains at the end of the run, coloured by height.
 pub fn positions(scene: &Scene) -> Option<Figure> {
@@ -86,12 +86,12 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
     };
     let total = total.max(240.0);
     let plans = [
-        Plan {
+        EqualAspectFrame {
             window: side,
             corner: (LEFT, 8.0),
             scale,
         },
-        Plan {
+        EqualAspectFrame {
             window: top,
             corner: (second.0, 8.0 + second.1),
             scale,
@@ -110,7 +110,7 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
         plan.clip(&mut drawing, &format!("clip-{i}"));
         for grain in order {
             let height = place(grain)[up];
-            let colour = hex(ordered((height - low) / (high - low).max(1e-12)));
+            let colour = hex(sequential((height - low) / (high - low).max(1e-12)));
             let style = format!(
                 "fill=\"{colour}\" stroke=\"#ffffff\" stroke-width=\"0.35\" stroke-linejoin=\"round\""
             );
@@ -124,7 +124,7 @@ pub fn positions(scene: &Scene) -> Option<Figure> {
         let below = (tall || i == 1).then_some(names[0].as_str());
         plan.frame(&mut drawing, (below, Some(&names[1])));
     }
-    let palette: Vec<[u8; 3]> = (0..256).map(|i| ordered(f64::from(i) / 255.0)).collect();
+    let palette: Vec<[u8; 3]> = (0..256).map(|i| sequential(f64::from(i) / 255.0)).collect();
     let axis = Axis::linear(
         &format!("height of the centre  [{unit}]"),
         low * factor,

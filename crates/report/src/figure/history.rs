@@ -4,7 +4,7 @@ use super::curves::{Points, log_panel, panel, series};
 use super::{AXES, Figure, Scene};
 use crate::run_folder::History;
 use crate::story::short;
-use grainwake_plot::lines::{Series, stack};
+use grainwake_plot::stacked::{Series, stacked_panels};
 use grainwake_plot::style;
 
 /// Mean height, speed and contacts of many grains.
@@ -63,7 +63,7 @@ pub fn many(scene: &Scene) -> Option<Figure> {
         name: "history",
         title: "Coming to rest".to_owned(),
         caption,
-        drawing: stack(&scene.time(), &panels, &[]),
+        drawing: stacked_panels(&scene.time(), &panels, &[]),
     })
 }
 
@@ -80,8 +80,8 @@ pub fn each(scene: &Scene) -> Option<Figure> {
     let up = scene.story.up;
     let curves = |value: &dyn Fn(&History, usize) -> f64| -> Vec<Series> {
         let one = |(n, grain): (usize, &usize)| Series {
-            dash: DASHED.filter(|_| n >= style::GRAIN_COLOURS),
-            colour: style::grain_colour(n),
+            dash: DASHED.filter(|_| n >= style::SERIES_COLOURS),
+            colour: style::series_colour(n),
             ..scene.curve(*grain, value)
         };
         moving.iter().enumerate().map(one).collect()
@@ -115,7 +115,7 @@ pub fn each(scene: &Scene) -> Option<Figure> {
             "(a) Height of the centre of each grain. (b) Vertical velocity (down is negative); the largest settling speeds [m/s] are {}.",
             named.join(", ")
         ),
-        drawing: stack(&scene.time(), &panels, &scene.marks()),
+        drawing: stacked_panels(&scene.time(), &panels, &scene.marks()),
     })
 }
 
@@ -151,7 +151,7 @@ pub fn force(scene: &Scene) -> Option<Figure> {
         name: "force",
         title: "Force of the fluid".to_owned(),
         caption,
-        drawing: stack(&scene.time(), &panels, &scene.marks()),
+        drawing: stacked_panels(&scene.time(), &panels, &scene.marks()),
     })
 }
 
@@ -250,6 +250,6 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
         name: "diagnostics",
         title: "Diagnostics".to_owned(),
         caption,
-        drawing: stack(&scene.time(), &panels, &[]),
+        drawing: stacked_panels(&scene.time(), &panels, &[]),
     })
 }

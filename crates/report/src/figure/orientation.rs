@@ -8,7 +8,7 @@ use super::{Figure, Scene};
 use crate::run_folder::History;
 use crate::story::short;
 use grainwake_plot::axis::Axis;
-use grainwake_plot::lines::{Series, stack};
+use grainwake_plot::stacked::{Series, stacked_panels};
 
 /// A grain that turns by less than this in all does not turn but for round-off [rad].
 const TURNED: f64 = 1e-4;
@@ -106,6 +106,6 @@ pub fn figure(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
         }
         .to_owned(),
         caption,
-        drawing: stack(&scene.time(), &panels, &scene.marks()),
+        drawing: stacked_panels(&scene.time(), &panels, &scene.marks()),
     })
 }

@@ -5,7 +5,7 @@ use grainwake_solver::output::vti::Image;
 
 use super::sheet::Cells;
 use grainwake_plot::contour;
-use grainwake_plot::plan::Window;
+use grainwake_plot::equal_aspect::Window;
 use grainwake_plot::raster::Raster;
 
 /// How a plane is looked at: axes 0, 1, 2 are x, y, z.
@@ -193,7 +193,7 @@ impl Section {
         let Some(solid) = &self.solid else {
             return Vec::new();
         };
-        let loops = contour::loops(self.nx, self.nz, |i, k| solid[i + self.nx * k], 0.5);
+        let loops = contour::closed_contours(self.nx, self.nz, |i, k| solid[i + self.nx * k], 0.5);
         let place = |(i, k): (f64, f64)| {
             (
                 self.lower.0 + (i + 0.5) * self.step.0,

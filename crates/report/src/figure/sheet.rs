@@ -5,9 +5,9 @@ use super::section::Section;
 use super::silhouette::Outline;
 use grainwake_plot::axis::Axis;
 use grainwake_plot::colormap::ColorMap;
-use grainwake_plot::plan::{Plan, Window, colour_bar, length_unit};
+use grainwake_plot::drawing::{Anchor, Drawing, path_data};
+use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_unit};
 use grainwake_plot::style::{self, HAIR, INK, PAGE, SMALL, TEXT};
-use grainwake_plot::svg::{Anchor, Drawing, path_data};
 use grainwake_plot::text;
 
 /// Pixels of a slice for each point of the paper.
@@ -116,7 +116,7 @@ pub fn draw(
         );
         for (r, section) in column.sections.iter().enumerate() {
             let y = top + r as f64 * (height + 12.0);
-            let plan = Plan {
+            let plan = EqualAspectFrame {
                 window: column.window,
                 corner: (x, y),
                 scale,
@@ -174,7 +174,7 @@ fn draw_section(
     drawing: &mut Drawing,
     section: &Section,
     cuts: &[(&'static str, Outline)],
-    plan: &Plan,
+    plan: &EqualAspectFrame,
     look: &Look,
     value: impl Fn(&Section) -> Option<Vec<f64>>,
     clip: &str,
@@ -214,7 +214,7 @@ fn draw_arrows(
     drawing: &mut Drawing,
     section: &Section,
     velocity: &[[f64; 3]],
-    plan: &Plan,
+    plan: &EqualAspectFrame,
     highest: f64,
 ) {
     let (columns, rows) = (

@@ -212,7 +212,7 @@ fn largest_outline(points: &[(f64, f64)], triangles: &[[usize; 3]]) -> Outline {
         paint(&mut mask, triangle.map(|i| local[i]));
     }
     let smooth = blur(&blur(&mask));
-    let loops = contour::loops(SAMPLES, SAMPLES, |i, j| smooth[i + SAMPLES * j], 0.5);
+    let loops = contour::closed_contours(SAMPLES, SAMPLES, |i, j| smooth[i + SAMPLES * j], 0.5);
     let longest = loops.into_iter().max_by_key(Vec::len).unwrap_or_default();
     longest
         .into_iter()

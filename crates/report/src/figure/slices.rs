@@ -7,8 +7,8 @@ use crate::run_folder::{FrameFile, History};
 use crate::story::{Subject, short};
 use grainwake_plot::axis::Axis;
 use grainwake_plot::colormap::ColorMap;
-use grainwake_plot::plan::{Window, length_unit};
-use grainwake_plot::style::grain_colour;
+use grainwake_plot::equal_aspect::{Window, length_unit};
+use grainwake_plot::style::series_colour;
 
 /// Speed and vorticity slices; what cannot be read is added to `notes`.
 pub fn figures(scene: &Scene, notes: &mut Vec<String>) -> Vec<Figure> {
@@ -101,7 +101,7 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
 /// The planes of a pair, by name and colour, where each has its row.
 fn row_names(scene: &Scene, rows: usize) -> Vec<(String, &'static str)> {
     let name = |grain: usize| {
-        let colour = grain_colour(scene.story.grain_rank(grain));
+        let colour = series_colour(scene.story.grain_rank(grain));
         (format!("plane of grain {grain}"), colour)
     };
     let pair = scene.story.pair.filter(|_| rows > 1);

@@ -3,9 +3,9 @@
 use super::{AXES, Figure, Scene, letter, silhouette};
 use crate::story::short;
 use grainwake_plot::axis::extent;
-use grainwake_plot::plan::{Plan, Window, grain_style, length_unit};
-use grainwake_plot::style::{self, COLUMN, INK, SMALL, grain_colour};
-use grainwake_plot::svg::{Anchor, Drawing};
+use grainwake_plot::drawing::{Anchor, Drawing};
+use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, length_unit, outline_style};
+use grainwake_plot::style::{self, COLUMN, INK, SMALL, series_colour};
 
 impl Scene<'_> {
     /// Outline of a grain at a row of its history, seen along the axis that is neither.
@@ -125,12 +125,12 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     let top = 8.0 + 10.0 * grains.len().div_ceil(columns) as f64;
     let free = room - scale * (first.width() + second.width());
     let plans = [
-        Plan {
+        EqualAspectFrame {
             window: first,
             corner: (LEFT + 0.5 * free, top),
             scale,
         },
-        Plan {
+        EqualAspectFrame {
             window: second,
             corner: (LEFT + 0.5 * free + MIDDLE + scale * first.width(), top),
             scale,
@@ -145,7 +145,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
             LEFT
         };
         let (x, y) = (left + column, 8.0 + 10.0 * (i / columns) as f64);
-        let colour = grain_colour(scene.story.grain_rank(*grain));
+        let colour = series_colour(scene.story.grain_rank(*grain));
         drawing.line(&[(x, y), (x + 14.0, y)], colour, style::LINE, dash(i));
         drawing.label(
             x + 17.0,
@@ -219,7 +219,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
 
 /// Dashes tell grains of one colour apart.
 fn dash(n: usize) -> Option<&'static str> {
-    (n >= style::GRAIN_COLOURS).then_some("3.5 1.6")
+    (n >= style::SERIES_COLOURS).then_some("3.5 1.6")
 }
 
 /// The box, or the part of it that the paths fill.
@@ -267,21 +267,21 @@ fn window(scene: &Scene, grains: &[usize], side: usize, up: usize) -> Option<Win
 fn draw_paths(
     scene: &Scene,
     grains: &[usize],
-    plan: &Plan,
+    plan: &EqualAspectFrame,
     side: usize,
     up: usize,
     drawing: &mut Drawing,
 ) {
     for (n, grain) in grains.iter().enumerate() {
         let history = &scene.run.grains[*grain];
-        let colour = grain_colour(scene.story.grain_rank(*grain));
+        let colour = series_colour(scene.story.grain_rank(*grain));
         let start = plan.path(&scene.outline(*grain, 0, side, up), true);
-        drawing.path(&start, &grain_style(colour, 0.35));
+        drawing.path(&start, &outline_style(colour, 0.35));
         for instant in &scene.instants {
             if let Some(row) = history.nearest(instant.time) {
                 drawing.path(
                     &plan.path(&scene.outline(*grain, row, side, up), true),
-                    &grain_style(colour, 1.0),
+                    &outline_style(colour, 1.0),
                 );
             }
         }
@@ -326,7 +326,13 @@ fn draw_paths(
 }
 
 /// Letters of the instants beside the frame, at the height of the grains, moved apart where needed.
-fn label_instants(scene: &Scene, grains: &[usize], plan: &Plan, up: usize, drawing: &mut Drawing) {
+fn label_instants(
+    scene: &Scene,
+    grains: &[usize],
+    plan: &EqualAspectFrame,
+    up: usize,
+    drawing: &mut Drawing,
+) {
     let mut places: Vec<(f64, String)> = Vec::new();
     for (i, instant) in scene.instants.iter().enumerate() {
         let heights: Vec<f64> = grains

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_plot::{plan, style};
+use grainwake_plot::{equal_aspect, style};
 use grainwake_report::figure::field::{Quantity, Style};
 use grainwake_solver::case::{Loc, Problem, Source};
 
@@ -152,7 +152,7 @@ impl Context<'_> {
                 let number = out.len();
                 out.push(Series {
                     label,
-                    colour: colour.map_or(style::grain_colour(number), Colour::hex),
+                    colour: colour.map_or(style::series_colour(number), Colour::hex),
                     sign: sign.map_or(number, |sign| sign as usize),
                     line: line.map(Line::dash),
                     data,
@@ -300,7 +300,7 @@ impl Context<'_> {
             run: self.run(&raw.run)?.name.clone(),
             plane: raw.plane,
             title: raw.title,
-            window: given.then_some(plan::Window {
+            window: given.then_some(equal_aspect::Window {
                 low: low.into(),
                 high: high.into(),
             }),

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use grainwake_plot::drawing::Drawing;
 use grainwake_plot::style::FAINT;
-use grainwake_plot::svg::Drawing;
 use grainwake_plot::{minus, plain};
 use grainwake_report::figure::field::{self, Panel};
 

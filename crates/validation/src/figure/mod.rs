@@ -8,7 +8,7 @@ mod raw;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use grainwake_plot::plan;
+use grainwake_plot::equal_aspect;
 use grainwake_report::figure::field::{Quantity, Style};
 
 pub(crate) use build::build;
@@ -112,5 +112,5 @@ struct Picture {
     run: String,
     plane: String,
     title: String,
-    window: Option<plan::Window>,
+    window: Option<equal_aspect::Window>,
 }

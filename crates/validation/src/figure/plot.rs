@@ -2,9 +2,9 @@
 
 use grainwake_plot::COLUMN;
 use grainwake_plot::axis::{Axis, extent};
-use grainwake_plot::frame::{Frame, Sign};
+use grainwake_plot::drawing::{Anchor, Drawing};
+use grainwake_plot::frame::{Frame, Marker};
 use grainwake_plot::style::{INK, LINE, SMALL};
-use grainwake_plot::svg::{Anchor, Drawing};
 use grainwake_plot::text;
 
 use super::AxisSpec;
@@ -42,7 +42,7 @@ impl DataSet {
 
     fn mark(&self, drawing: &mut Drawing, at: (f64, f64)) {
         if let Some(sign) = self.sign {
-            Sign::number(sign).draw(drawing, at, SIGN, self.colour, self.hollow);
+            Marker::nth(sign).draw(drawing, at, SIGN, self.colour, self.hollow);
         }
     }
 
@@ -66,7 +66,7 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
     let across = axis(across, points().map(|p| p.0), 6);
     let inside = |x: f64| {
         across
-            .place(x)
+            .fraction(x)
             .is_some_and(|p| (-1e-9..=1.0 + 1e-9).contains(&p))
     };
     let up = axis(up, points().filter(|p| inside(p.0)).map(|p| p.1), 5);
@@ -110,7 +110,7 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
     frame.outline(&mut drawing, (true, true));
     for one in sets {
         for (x, y) in &one.points {
-            let places = frame.across.place(*x).zip(frame.up.place(*y));
+            let places = frame.across.fraction(*x).zip(frame.up.fraction(*y));
             let inside = |p: f64| (-1e-6..=1.0 + 1e-6).contains(&p);
             if places.is_some_and(|(a, b)| inside(a) && inside(b)) {
                 one.mark(&mut drawing, (frame.px(*x), frame.py(*y)));
@@ -125,7 +125,7 @@ fn axis(plan: &AxisSpec, values: impl Iterator<Item = f64>, count: usize) -> Axi
     let (low, high) = (plan.ends[0].unwrap_or(low), plan.ends[1].unwrap_or(high));
     let tight = plan.ends.iter().all(Option::is_some);
     let axis = if plan.log {
-        Axis::log_close(&plan.label, low, high, tight)
+        Axis::log_rounded(&plan.label, low, high, tight)
     } else {
         Axis::linear(&plan.label, low, high, count, tight)
     };
@@ -158,8 +158,8 @@ fn parts(frame: &Frame, points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     let placed = |p: &(f64, f64)| {
         p.0.is_finite()
             && p.1.is_finite()
-            && frame.across.place(p.0).is_some()
-            && frame.up.place(p.1).is_some()
+            && frame.across.fraction(p.0).is_some()
+            && frame.up.fraction(p.1).is_some()
     };
     points
         .split(|p| !placed(p))

@@ -60,7 +60,7 @@ pub enum Colour {
     Grey,
 }
 
-/// Symbol of the points, in the order of `frame::Sign::number`.
+/// Symbol of the points, in the order of `frame::Marker::nth`.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mark {

@@ -1,9 +1,9 @@
 //! Fig. 4, the grains in rows and columns, and Fig. 5, the initial orientations.
 
 use glam::{DQuat, DVec3};
+use grainwake_plot::drawing::{Anchor, Drawing, path_data};
 use grainwake_plot::raster::Raster;
 use grainwake_plot::style::{HAIR, INK, PAGE, SMALL, TEXT};
-use grainwake_plot::svg::{Anchor, Drawing, path_data};
 use grainwake_plot::text;
 use grainwake_shape::Shape;
 use grainwake_shape::render::{Picture, View};

@@ -1,9 +1,9 @@
 //! Figs 15 to 18: gap and vertical velocity in one orientation, by row and by column of grains.
 
 use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::Frame;
 use grainwake_plot::style::{BLUE, GREEN, INK, LINE, ORANGE, PAGE, SMALL, VERMILION};
-use grainwake_plot::svg::{Anchor, Drawing};
 use grainwake_plot::text;
 
 use super::{FigureData, StudyFigure, factor_label, heading};

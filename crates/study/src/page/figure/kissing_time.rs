@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use grainwake_plot::axis::{Axis, extent};
-use grainwake_plot::frame::{Frame, Sign};
+use grainwake_plot::drawing::{Anchor, Drawing};
+use grainwake_plot::frame::{Frame, Marker};
 use grainwake_plot::style::{BLUE, GREEN, HAIR, INK, ORANGE, PAGE, TEXT, VERMILION};
-use grainwake_plot::svg::{Anchor, Drawing};
 use grainwake_plot::text;
 
 use super::{FigureData, StudyFigure, factor_label, heading, sign_entry};
@@ -120,7 +120,7 @@ impl Layout<'_> {
     }
 
     /// Draws the symbol of an observation and the bar of its range.
-    fn mark(&self, drawing: &mut Drawing, at: f64, o: &Observation, sign: Sign, colour: &str) {
+    fn mark(&self, drawing: &mut Drawing, at: f64, o: &Observation, sign: Marker, colour: &str) {
         let f = &self.frame;
         let x = f.px(at);
         if o.range.1 > o.range.0 {
@@ -146,13 +146,18 @@ pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
         .unwrap_or_default();
     let mut x = LEFT;
     for (n, name) in levels.iter().enumerate() {
-        let sign = (Sign::number(n), COLOURS[n % 4], false);
+        let sign = (Marker::nth(n), COLOURS[n % 4], false);
         x = sign_entry(&mut drawing, (x, LEGEND), sign, &text::literal(name));
     }
     let censored = layout.censored();
     if censored > 0 {
         let label = "hollow: landed before kissing; the landing is shown";
-        sign_entry(&mut drawing, (x, LEGEND), (Sign::Circle, INK, true), label);
+        sign_entry(
+            &mut drawing,
+            (x, LEGEND),
+            (Marker::Circle, INK, true),
+            label,
+        );
     }
     for observation in &layout.all {
         let grain = observation.levels.get(layout.axis);
@@ -172,13 +177,13 @@ pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
             &mut drawing,
             at,
             observation,
-            Sign::number(n),
+            Marker::nth(n),
             COLOURS[n % 4],
         );
     }
     if let Some(reference) = &layout.reference {
         let at = layout.reference_position();
-        layout.mark(&mut drawing, at, reference, Sign::number(0), INK);
+        layout.mark(&mut drawing, at, reference, Marker::nth(0), INK);
     }
     layout.frame.outline(&mut drawing, (true, true));
     let count = layout.all.len();
@@ -251,7 +256,7 @@ pub fn box_plot(data: &FigureData) -> Option<StudyFigure> {
     }
     if let Some(reference) = &layout.reference {
         let place = (f.px(layout.reference_position()), f.py(reference.value));
-        Sign::Circle.draw(&mut drawing, place, 2.9, INK, reference.censored);
+        Marker::Circle.draw(&mut drawing, place, 2.9, INK, reference.censored);
     }
     f.outline(&mut drawing, (true, true));
     let (width, grain) = widest?;

@@ -1,8 +1,8 @@
 //! Line styles of runs in the overview figures, and their legend.
 
-use grainwake_plot::frame::Sign;
+use grainwake_plot::drawing::{Anchor, Drawing};
+use grainwake_plot::frame::Marker;
 use grainwake_plot::style::{BLUE, GREEN, INK, LINE, ORANGE, PAGE, PURPLE, SKY, SMALL, VERMILION};
-use grainwake_plot::svg::{Anchor, Drawing};
 use grainwake_plot::text;
 
 use super::{FigureData, note, unique};
@@ -21,7 +21,7 @@ pub struct LineStyle {
     /// Dash pattern of the line.
     pub dash: Option<&'static str>,
     /// Symbol of the points.
-    pub sign: Sign,
+    pub sign: Marker,
 }
 
 impl LineStyle {
@@ -29,7 +29,7 @@ impl LineStyle {
         LineStyle {
             colour: COLOURS[colour % COLOURS.len()],
             dash: DASHES[dash % DASHES.len()],
-            sign: Sign::number(sign),
+            sign: Marker::nth(sign),
         }
     }
 }
@@ -70,7 +70,7 @@ impl LineStyles {
             None => LineStyle {
                 colour: INK,
                 dash: None,
-                sign: Sign::Circle,
+                sign: Marker::Circle,
             },
         }
     }

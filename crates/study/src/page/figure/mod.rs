@@ -13,9 +13,9 @@ mod trends;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_plot::frame::Sign;
+use grainwake_plot::drawing::{Anchor, Drawing};
+use grainwake_plot::frame::Marker;
 use grainwake_plot::style::{INK, SMALL, TEXT};
-use grainwake_plot::svg::{Anchor, Drawing};
 use grainwake_plot::text;
 use grainwake_solver::case::Case;
 use grainwake_solver::output::RESOLVED;
@@ -198,7 +198,7 @@ fn heading(drawing: &mut Drawing, (x, y): (f64, f64), anchor: Anchor, label: &st
 fn sign_entry(
     drawing: &mut Drawing,
     (x, y): (f64, f64),
-    (sign, colour, hollow): (Sign, &str, bool),
+    (sign, colour, hollow): (Marker, &str, bool),
     label: &str,
 ) -> f64 {
     sign.draw(drawing, (x + 4.0, y), 3.0, colour, hollow);

@@ -2,9 +2,9 @@
 //! varied parameters.
 
 use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::Frame;
 use grainwake_plot::style::{LINE, PAGE};
-use grainwake_plot::svg::Drawing;
 
 use super::legend::LineStyles;
 use super::panels::against_parameters;

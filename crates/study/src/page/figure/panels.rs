@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::Frame;
 use grainwake_plot::style::PAGE;
-use grainwake_plot::svg::Drawing;
 use grainwake_plot::text;
 
 use super::legend::{LineStyles, axes};

@@ -1,8 +1,8 @@
 //! Fig. 7: the box with the pair at the start, to scale, and the pair enlarged.
 
-use grainwake_plot::plan::{Plan, Window, grain_style, length_unit};
+use grainwake_plot::drawing::{Anchor, Drawing};
+use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, length_unit, outline_style};
 use grainwake_plot::style::{BLUE, COLUMN, FAINT, HAIR, INK, SMALL, VERMILION};
-use grainwake_plot::svg::{Anchor, Drawing};
 use grainwake_plot::text;
 use grainwake_report::figure::silhouette::{Body, Outline};
 use grainwake_solver::case::Case;
@@ -42,7 +42,7 @@ fn draw(name: &str, case: &Case) -> Option<StudyFigure> {
         high: (high.x, high.z),
     };
     let scale = (0.40 * COLUMN / whole.width()).min(300.0 / whole.height());
-    let overall = Plan {
+    let overall = EqualAspectFrame {
         window: whole,
         corner: (34.0, TOP),
         scale,
@@ -50,7 +50,7 @@ fn draw(name: &str, case: &Case) -> Option<StudyFigure> {
     let pair = pair_window(&outlines);
     let right = overall.corner.0 + overall.width() + 30.0;
     let zoom = ((COLUMN - right - 46.0) / pair.width()).min(overall.height() / pair.height());
-    let detail = Plan {
+    let detail = EqualAspectFrame {
         window: pair,
         corner: (right, TOP),
         scale: zoom,
@@ -65,7 +65,7 @@ fn draw(name: &str, case: &Case) -> Option<StudyFigure> {
     }
     for view in [&overall, &detail] {
         for (outline, colour) in outlines.iter().zip([BLUE, VERMILION]) {
-            drawing.path(&view.path(outline, true), &grain_style(colour, 1.0));
+            drawing.path(&view.path(outline, true), &outline_style(colour, 1.0));
         }
     }
     let (unit, _) = length_unit(whole.height());

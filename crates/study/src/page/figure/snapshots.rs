@@ -1,7 +1,7 @@
 //! Figs 8 to 13: selected models at several instants, with paths, fluid speed and vorticity.
 
+use grainwake_plot::drawing::Drawing;
 use grainwake_plot::style::{COLUMN, PAGE};
-use grainwake_plot::svg::Drawing;
 use grainwake_plot::text;
 use grainwake_report::figure::Figure;
 use grainwake_report::story::Subject;

@@ -1,9 +1,9 @@
 //! Rank correlations with their confidence intervals.
 
 use grainwake_plot::axis::Axis;
-use grainwake_plot::frame::{Frame, Sign};
+use grainwake_plot::drawing::{Anchor, Drawing};
+use grainwake_plot::frame::{Frame, Marker};
 use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
-use grainwake_plot::svg::{Anchor, Drawing};
 use grainwake_plot::text;
 
 use super::{FigureData, StudyFigure, note, sign_entry};
@@ -70,7 +70,7 @@ pub fn figure(data: &FigureData) -> Option<StudyFigure> {
                     1.2,
                     None,
                 );
-                Sign::number(l).draw(&mut drawing, (frame.px(rho), y), 2.7, colour, false);
+                Marker::nth(l).draw(&mut drawing, (frame.px(rho), y), 2.7, colour, false);
             }
         }
         let zero = frame.px(0.0);
@@ -80,7 +80,7 @@ pub fn figure(data: &FigureData) -> Option<StudyFigure> {
     }
     let mut x = LEFT;
     for (l, level) in levels.iter().enumerate() {
-        let sign = (Sign::number(l), COLOURS[l % 4], false);
+        let sign = (Marker::nth(l), COLOURS[l % 4], false);
         x = sign_entry(&mut drawing, (x, 12.0), sign, &text::literal(level));
     }
     let caption = format!(

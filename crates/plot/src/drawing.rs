@@ -1,26 +1,26 @@
-//! A drawing: rasters below, vectors above; written as SVG and as PNG from the same description.
+//! A drawing with rasters below vectors, written as SVG and PNG from one description.
 
 use std::sync::{Arc, OnceLock};
 
 use base64::Engine;
 use resvg::{tiny_skia, usvg};
 
-use crate::raster::{Raster, encode};
+use crate::raster::{Raster, encode_png};
 use crate::style;
 use crate::text;
 
-/// Where a text is held.
+/// Point of a label that lies at the given position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
-    /// At its left end.
+    /// Left end.
     Start,
-    /// At its middle.
+    /// Middle.
     Middle,
-    /// At its right end.
+    /// Right end.
     End,
 }
 
-/// A drawing of fixed size [pt], y downwards.
+/// A drawing of fixed size [pt], with y downwards.
 #[derive(Clone, Debug)]
 pub struct Drawing {
     width: f64,
@@ -29,7 +29,7 @@ pub struct Drawing {
     vectors: String,
 }
 
-/// A number for SVG, at most two decimals.
+/// Formats a value for SVG with at most two decimals.
 pub fn number(value: f64) -> String {
     let mut text = format!("{value:.2}");
     if text.contains('.') {
@@ -38,7 +38,7 @@ pub fn number(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text }
 }
 
-/// Path data through `points`, closed if asked.
+/// Returns SVG path data through `points` [pt].
 pub fn path_data(points: &[(f64, f64)], closed: bool) -> String {
     let mut data = String::with_capacity(12 * points.len());
     for (i, (x, y)) in points.iter().enumerate() {
@@ -54,7 +54,7 @@ pub fn path_data(points: &[(f64, f64)], closed: bool) -> String {
 }
 
 impl Drawing {
-    /// An empty drawing.
+    /// Creates an empty drawing of the given size [pt].
     pub fn new(width: f64, height: f64) -> Drawing {
         Drawing {
             width,
@@ -74,8 +74,8 @@ impl Drawing {
         self.height
     }
 
-    /// Places another drawing with its upper left corner at (x, y); `tag` keeps the names of its
-    /// clips apart from those of others.
+    /// Inserts another drawing with its upper left corner at `(x, y)` [pt]; the prefix `tag` keeps
+    /// the identifiers of its clip paths unique.
     pub fn inset(&mut self, other: &Drawing, x: f64, y: f64, tag: &str) {
         for (left, top, width, height, raster) in &other.rasters {
             let place = (x + left, y + top, *width, *height, raster.clone());
@@ -92,18 +92,18 @@ impl Drawing {
         ));
     }
 
-    /// Adds a raster that fills the rectangle; it lies below all vectors.
+    /// Adds a raster that fills the rectangle [pt], below all vectors.
     pub fn raster(&mut self, x: f64, y: f64, width: f64, height: f64, raster: Raster) {
         self.rasters.push((x, y, width, height, raster));
     }
 
-    /// Adds a path; `style` are SVG attributes.
+    /// Adds a path with SVG attributes `style`.
     pub fn path(&mut self, data: &str, style: &str) {
         self.vectors
             .push_str(&format!("<path d=\"{data}\" {style}/>\n"));
     }
 
-    /// A stroked line through `points`.
+    /// Adds a stroked line through `points` [pt]; `dash` is an SVG dash pattern.
     pub fn line(&mut self, points: &[(f64, f64)], colour: &str, width: f64, dash: Option<&str>) {
         let dash = dash
             .map(|dash| format!(" stroke-dasharray=\"{dash}\""))
@@ -123,7 +123,17 @@ impl Drawing {
         ));
     }
 
-    /// A label with its baseline at (x, y); `turned` runs upwards.
+    /// Adds the outline of a frame [pt].
+    pub fn outline(&mut self, x: f64, y: f64, width: f64, height: f64) {
+        let style = format!(
+            "fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"",
+            style::INK,
+            style::HAIR
+        );
+        self.rectangle(x, y, width, height, &style);
+    }
+
+    /// Adds a label with its baseline at `(x, y)` [pt]; a rotated one runs upwards.
     pub fn label(
         &mut self,
         x: f64,
@@ -132,7 +142,7 @@ impl Drawing {
         size: f64,
         colour: &str,
         label: &str,
-        turned: bool,
+        rotated: bool,
     ) {
         self.styled_label(
             x,
@@ -141,12 +151,12 @@ impl Drawing {
             size,
             &format!("fill=\"{colour}\""),
             label,
-            turned,
+            rotated,
         );
     }
 
-    /// A label with a white rim, for use over colours.
-    pub fn rimmed_label(
+    /// Adds a label with a white halo, legible over colours.
+    pub fn label_with_halo(
         &mut self,
         x: f64,
         y: f64,
@@ -155,8 +165,8 @@ impl Drawing {
         colour: &str,
         label: &str,
     ) {
-        let rim = "fill=\"none\" stroke=\"#ffffff\" stroke-width=\"1.8\" stroke-linejoin=\"round\" stroke-opacity=\"0.85\"";
-        self.styled_label(x, y, anchor, size, rim, label, false);
+        let halo = "fill=\"none\" stroke=\"#ffffff\" stroke-width=\"1.8\" stroke-linejoin=\"round\" stroke-opacity=\"0.85\"";
+        self.styled_label(x, y, anchor, size, halo, label, false);
         self.label(x, y, anchor, size, colour, label, false);
     }
 
@@ -168,20 +178,20 @@ impl Drawing {
         size: f64,
         style: &str,
         label: &str,
-        turned: bool,
+        rotated: bool,
     ) {
         let anchor = match anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
             Anchor::End => "end",
         };
-        let turn = if turned {
+        let rotation = if rotated {
             format!(" transform=\"rotate(-90 {} {})\"", number(x), number(y))
         } else {
             String::new()
         };
         self.vectors.push_str(&format!(
-            "<text x=\"{}\" y=\"{}\" font-size=\"{}\" text-anchor=\"{anchor}\" {style}{turn}>{}</text>\n",
+            "<text x=\"{}\" y=\"{}\" font-size=\"{}\" text-anchor=\"{anchor}\" {style}{rotation}>{}</text>\n",
             number(x),
             number(y),
             number(size),
@@ -189,7 +199,8 @@ impl Drawing {
         ));
     }
 
-    /// Opens a clip to a rectangle; close it with `end_clip`. `name` must be unique in the drawing.
+    /// Begins clipping to a rectangle [pt], up to `end_clip`; `name` must start with "clip-" and be
+    /// unique in the drawing.
     pub fn begin_clip(&mut self, name: &str, x: f64, y: f64, width: f64, height: f64) {
         let [x, y, width, height] = [x, y, width, height].map(number);
         self.vectors.push_str(&format!(
@@ -197,12 +208,12 @@ impl Drawing {
         ));
     }
 
-    /// Closes the last clip.
+    /// Ends the last clipping.
     pub fn end_clip(&mut self) {
         self.vectors.push_str("</g>\n");
     }
 
-    /// The drawing as an SVG document; `name` prefixes its ids, so that several can share a page.
+    /// Returns the SVG document; the prefix `name` keeps its identifiers unique on a page.
     pub fn to_svg(&self, name: &str, title: &str, description: &str) -> String {
         let (width, height) = (number(self.width), number(self.height));
         let mut out = format!(
@@ -232,17 +243,21 @@ impl Drawing {
         out
     }
 
-    /// The drawing as a PNG file at 300 dots per inch, set in the embedded font.
+    /// Renders a PNG file at 300 dots per inch, in the embedded font.
+    ///
+    /// # Errors
+    /// The reason, if the drawing has no pixels or cannot be rendered.
     pub fn to_png(&self) -> Result<Vec<u8>, String> {
         let scale = style::PIXELS_PER_POINT;
         let (width, height) = (
             (self.width * scale).round() as u32,
             (self.height * scale).round() as u32,
         );
-        let mut pixmap = tiny_skia::Pixmap::new(width, height).ok_or("a picture without pixels")?;
+        let mut pixmap =
+            tiny_skia::Pixmap::new(width, height).ok_or("the drawing has no pixels")?;
         pixmap.fill(tiny_skia::Color::WHITE);
         for (x, y, width, height, raster) in &self.rasters {
-            let picture = raster.to_pixmap().ok_or("a raster without pixels")?;
+            let picture = raster.to_pixmap().ok_or("a raster has no pixels")?;
             let transform = tiny_skia::Transform::from_row(
                 (scale * width / raster.width as f64) as f32,
                 0.0,
@@ -270,11 +285,11 @@ impl Drawing {
             tiny_skia::Transform::from_scale(scale as f32, scale as f32),
             &mut pixmap.as_mut(),
         );
-        encode(width, height, &pixmap)
+        encode_png(width, height, &pixmap)
     }
 }
 
-/// Rendering options with the embedded font and no other.
+/// Returns rendering options that contain the embedded fonts only.
 fn options() -> usvg::Options<'static> {
     static FONTS: OnceLock<Arc<usvg::fontdb::Database>> = OnceLock::new();
     let fonts = FONTS.get_or_init(|| {

@@ -1,0 +1,155 @@
+//! A frame with equal scale along both axes, for maps, side views and sections; colour bars.
+
+use crate::axis::Axis;
+use crate::drawing::{Anchor, Drawing, path_data};
+use crate::style::{self, HAIR, INK, SMALL, TEXT, TICK};
+use crate::ticks;
+
+/// The displayed range of two of the three coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Lower ends [m].
+    pub low: (f64, f64),
+    /// Upper ends [m].
+    pub high: (f64, f64),
+}
+
+impl Window {
+    /// Width [m].
+    pub fn width(&self) -> f64 {
+        self.high.0 - self.low.0
+    }
+    /// Height [m].
+    pub fn height(&self) -> f64 {
+        self.high.1 - self.low.1
+    }
+}
+
+/// Returns the unit suited to lengths of `size` [m]: its name, and the number of units per metre.
+pub fn length_unit(size: f64) -> (&'static str, f64) {
+    if size < 2e-4 {
+        ("µm", 1e6)
+    } else if size < 0.5 {
+        ("mm", 1e3)
+    } else {
+        ("m", 1.0)
+    }
+}
+
+/// A frame on paper that shows a window at equal scale.
+#[derive(Clone, Copy, Debug)]
+pub struct EqualAspectFrame {
+    /// Displayed range.
+    pub window: Window,
+    /// Upper left corner [pt].
+    pub corner: (f64, f64),
+    /// Scale [pt/m].
+    pub scale: f64,
+}
+
+impl EqualAspectFrame {
+    /// Width on paper [pt].
+    pub fn width(&self) -> f64 {
+        self.window.width() * self.scale
+    }
+    /// Height on paper [pt].
+    pub fn height(&self) -> f64 {
+        self.window.height() * self.scale
+    }
+    /// Returns the position on paper [pt] of a point [m].
+    pub fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        (
+            self.corner.0 + (x - self.window.low.0) * self.scale,
+            self.corner.1 + (self.window.high.1 - y) * self.scale,
+        )
+    }
+    /// Returns SVG path data through points [m].
+    pub fn path(&self, points: &[(f64, f64)], closed: bool) -> String {
+        path_data(
+            &points.iter().map(|p| self.at(*p)).collect::<Vec<_>>(),
+            closed,
+        )
+    }
+
+    /// Begins clipping to the frame.
+    pub fn clip(&self, drawing: &mut Drawing, name: &str) {
+        let (x, y) = self.corner;
+        drawing.begin_clip(name, x, y, self.width(), self.height());
+    }
+
+    /// Draws the outline, the ticks and the axis labels; `None` also omits the tick labels.
+    pub fn frame(&self, drawing: &mut Drawing, labels: (Option<&str>, Option<&str>)) {
+        let (x, y) = self.corner;
+        let (width, height) = (self.width(), self.height());
+        let (_, factor) = length_unit(self.window.width().max(self.window.height()));
+        let axis = |low: f64, high: f64, length: f64, spacing: f64| {
+            let count = ((length / spacing) as usize).clamp(2, 8);
+            Axis::linear("", low * factor, high * factor, count, true)
+        };
+        let Window { low, high } = self.window;
+        let across = axis(low.0, high.0, width, 18.0);
+        let bottom = y + height;
+        ticks::horizontal(drawing, &across, (x, bottom), width, labels.0.is_some());
+        let up = axis(low.1, high.1, height, 22.0);
+        let widest = ticks::vertical(drawing, &up, (x, y), height, labels.1.is_some(), None);
+        drawing.outline(x, y, width, height);
+        if let Some(label) = labels.0.filter(|label| !label.is_empty()) {
+            let (middle, base) = (x + 0.5 * width, bottom + TICK + SMALL + 10.5);
+            drawing.label(middle, base, Anchor::Middle, TEXT, INK, label, false);
+        }
+        if let Some(label) = labels.1.filter(|label| !label.is_empty()) {
+            let (left, middle) = (x - TICK - widest - 6.0, y + 0.5 * height);
+            drawing.label(left, middle, Anchor::Middle, TEXT, INK, label, true);
+        }
+    }
+}
+
+/// Draws a horizontal colour bar with its label below; an end is a triangle if values lie beyond
+/// it.
+pub fn colour_bar(
+    drawing: &mut Drawing,
+    corner: (f64, f64),
+    width: f64,
+    palette: &[[u8; 3]],
+    axis: &Axis,
+    beyond: (bool, bool),
+) {
+    const HEIGHT: f64 = 6.0;
+    let (x, y) = corner;
+    let raster = crate::raster::Raster {
+        width: palette.len(),
+        height: 1,
+        pixels: (0..palette.len()).map(|i| i.min(255) as u8).collect(),
+        palette: palette.to_vec(),
+    };
+    drawing.raster(x, y, width, HEIGHT, raster);
+    let tip = |drawing: &mut Drawing, at: f64, out: f64, colour: [u8; 3]| {
+        let triangle = [(at, y), (at + out, y + 0.5 * HEIGHT), (at, y + HEIGHT)];
+        let style = format!(
+            "fill=\"{}\" stroke=\"{INK}\" stroke-width=\"{HAIR}\"",
+            crate::colormap::hex(colour)
+        );
+        drawing.path(&path_data(&triangle, true), &style);
+    };
+    if let (true, Some(first)) = (beyond.0, palette.first()) {
+        tip(drawing, x, -5.0, *first);
+    }
+    if let (true, Some(last)) = (beyond.1, palette.last()) {
+        tip(drawing, x + width, 5.0, *last);
+    }
+    drawing.outline(x, y, width, HEIGHT);
+    ticks::horizontal(drawing, axis, (x, y + HEIGHT), width, true);
+    let (middle, base) = (x + 0.5 * width, y + HEIGHT + TICK + SMALL + 10.5);
+    drawing.label(middle, base, Anchor::Middle, TEXT, INK, &axis.label, false);
+}
+
+/// Returns SVG attributes of an outline with a light fill; `strength` from 0 to 1 sets opacity.
+pub fn outline_style(colour: &str, strength: f64) -> String {
+    format!(
+        "fill=\"{colour}\" fill-opacity=\"{:.2}\" stroke=\"{colour}\" stroke-opacity=\"{:.2}\" \
+         stroke-width=\"{}\" stroke-linejoin=\"round\"",
+        0.3 * strength,
+        strength,
+        style::HAIR + 0.1
+    )
+}

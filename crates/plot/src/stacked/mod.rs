@@ -1,0 +1,212 @@
+//! Curves in panels stacked over a shared horizontal axis, with marked instants.
+
+mod curve;
+mod legend;
+mod marks;
+
+use crate::axis::Axis;
+use crate::drawing::{Anchor, Drawing};
+use crate::frame::Frame;
+use crate::style::{COLUMN, FAINT, INK, LINE, SMALL, TEXT, TICK};
+use crate::text;
+use crate::ticks;
+
+/// A curve.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Name in the legend; `None` for a curve without an entry.
+    pub name: Option<String>,
+    /// Points in data units; values that are not finite interrupt the curve.
+    pub points: Vec<(f64, f64)>,
+    /// Colour.
+    pub colour: &'static str,
+    /// SVG dash pattern.
+    pub dash: Option<&'static str>,
+}
+
+/// A panel with its curves.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// Vertical axis.
+    pub y: Axis,
+    /// Curves.
+    pub series: Vec<Series>,
+    /// Value and note of each horizontal reference line.
+    pub levels: Vec<(f64, String)>,
+    /// Height of the frame [pt].
+    pub height: f64,
+}
+
+/// A vertical line across all panels.
+#[derive(Clone, Debug)]
+pub struct VerticalMark {
+    /// Value on the horizontal axis.
+    pub at: f64,
+    /// Name above the first panel; empty for none.
+    pub name: String,
+}
+
+const LEFT: f64 = 38.0;
+const RIGHT: f64 = 8.0;
+const ROW: f64 = 9.5;
+const LABEL_ROWS: usize = 5;
+
+/// Draws the panels over one horizontal axis, in a drawing of one column width.
+pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) -> Drawing {
+    let width = COLUMN - LEFT - RIGHT;
+    let names = marks::name_positions(x, verticals, width);
+    let rows = names.iter().map(|(row, _, _)| row + 1).max().unwrap_or(0);
+    let mut legends: Vec<Vec<Vec<&Series>>> = Vec::new();
+    let mut before: Vec<&str> = Vec::new();
+    for panel in panels {
+        let named: Vec<&Series> = panel.series.iter().filter(|s| s.name.is_some()).collect();
+        let these: Vec<&str> = named.iter().filter_map(|s| s.name.as_deref()).collect();
+        legends.push(if these == before {
+            Vec::new()
+        } else {
+            legend::rows(&named, width)
+        });
+        before = these;
+    }
+    let top = |i: usize| {
+        let marks = if i == 0 { ROW * rows as f64 } else { 0.0 };
+        let letter = if panels.len() > 1 { 5.0 } else { 0.0 };
+        7.0 + letter + ROW * legends[i].len() as f64 + marks
+    };
+    // A long label makes its panel taller.
+    let height = |panel: &Panel| panel.height.max(text::width(&panel.y.label, TEXT) + 4.0);
+    let heights: f64 = panels
+        .iter()
+        .enumerate()
+        .map(|(i, panel)| top(i) + height(panel))
+        .sum();
+    let mut drawing = Drawing::new(COLUMN, heights + 26.0);
+    let mut y = 0.0;
+    for (i, panel) in panels.iter().enumerate() {
+        legend::draw(&mut drawing, &legends[i], y + 7.0);
+        y += top(i);
+        let frame = Frame {
+            x: LEFT,
+            y,
+            width,
+            height: height(panel),
+            across: x.clone(),
+            up: panel.y.clone(),
+        };
+        let named = if i == 0 { names.as_slice() } else { &[] };
+        marks::draw(&mut drawing, &frame, verticals, named);
+        draw_panel(&mut drawing, &frame, panel, i);
+        y += frame.height;
+        let last = i + 1 == panels.len();
+        draw_x_axis(&mut drawing, &frame, last);
+        if panels.len() > 1 {
+            let letter = format!("({})", char::from(b'a' + (i % 26) as u8));
+            drawing.label(2.0, frame.y - 4.0, Anchor::Start, TEXT, INK, &letter, false);
+        }
+    }
+    drawing
+}
+
+fn draw_panel(drawing: &mut Drawing, frame: &Frame, panel: &Panel, index: usize) {
+    let (x, y, width, height) = (frame.x, frame.y, frame.width, frame.height);
+    ticks::vertical(drawing, &frame.up, (x, y), height, true, Some(width));
+    let clip = format!("clip-{index}");
+    drawing.begin_clip(&clip, x, y - 1.0, width, height + 2.0);
+    for (value, _) in &panel.levels {
+        let level = frame.py(*value);
+        drawing.line(&[(x, level), (x + width, level)], FAINT, 0.8, Some("5 2.5"));
+    }
+    for series in &panel.series {
+        for segment in curve::segments(&series.points, |p| frame.position(p)) {
+            let points = curve::simplified(&segment);
+            drawing.line(&points, series.colour, LINE, series.dash);
+        }
+    }
+    drawing.end_clip();
+    for (value, note) in &panel.levels {
+        let (left, base) = note_position(frame, panel, frame.py(*value), text::width(note, SMALL));
+        drawing.label_with_halo(left, base, Anchor::Start, SMALL, FAINT, note);
+    }
+    drawing.outline(x, y, width, height);
+    let middle = y + 0.5 * height;
+    drawing.label(9.0, middle, Anchor::Middle, TEXT, INK, &panel.y.label, true);
+}
+
+/// Returns the left end and baseline [pt] where the note of a reference line at height `y` covers
+/// the fewest points of the curves.
+fn note_position(frame: &Frame, panel: &Panel, y: f64, width: f64) -> (f64, f64) {
+    let points = panel.series.iter().flat_map(|series| &series.points);
+    let points: Vec<_> = points.filter_map(|p| frame.position(*p)).collect();
+    let covered = |left: f64, base: f64| {
+        let inside = |p: &&(f64, f64)| {
+            (left - 2.0..left + width + 2.0).contains(&p.0)
+                && (base - SMALL - 1.0..base + 3.0).contains(&p.1)
+        };
+        points.iter().filter(inside).count()
+    };
+    let room = frame.width - width - 6.0;
+    let ends = [1.0, 0.0, 0.75, 0.25, 0.5].map(|part| frame.x + 3.0 + part * room);
+    let bases = [y - 2.5, y + SMALL + 1.5];
+    let places = ends.iter().flat_map(|left| bases.map(|base| (*left, base)));
+    let inside =
+        |(_, base): &(f64, f64)| *base > frame.y + SMALL && *base < frame.y + frame.height - 1.0;
+    let best = places
+        .filter(inside)
+        .min_by_key(|(left, base)| covered(*left, *base));
+    best.unwrap_or((ends[0], bases[0]))
+}
+
+fn draw_x_axis(drawing: &mut Drawing, frame: &Frame, labelled: bool) {
+    let bottom = frame.y + frame.height;
+    ticks::horizontal(
+        drawing,
+        &frame.across,
+        (frame.x, bottom),
+        frame.width,
+        labelled,
+    );
+    if labelled {
+        let (middle, base) = (frame.x + 0.5 * frame.width, bottom + TICK + SMALL + 11.0);
+        let label = &frame.across.label;
+        drawing.label(middle, base, Anchor::Middle, TEXT, INK, label, false);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_keep_off_the_curves() {
+        let x = Axis::linear("t", 0.0, 10.0, 5, true);
+        let points = (0..=100)
+            .map(|i| (0.1 * f64::from(i), if i < 60 { 1.0 } else { 5.5 }))
+            .collect();
+        let series = Series {
+            name: None,
+            points,
+            colour: INK,
+            dash: None,
+        };
+        let y = Axis::linear("y", 0.0, 10.0, 5, true);
+        let panel = Panel {
+            y,
+            series: vec![series],
+            levels: Vec::new(),
+            height: 100.0,
+        };
+        let frame = Frame {
+            across: x,
+            up: panel.y.clone(),
+            x: 40.0,
+            y: 10.0,
+            width: 200.0,
+            height: 100.0,
+        };
+        let (left, base) = note_position(&frame, &panel, 60.0, 30.0);
+        assert!(
+            left > 200.0 && base > 60.0,
+            "to the right, below the line: {left} {base}"
+        );
+    }
+}
