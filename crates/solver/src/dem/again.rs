@@ -1,5 +1,5 @@
 //! The sub-steps of a step taken a second time, with what the fluid answers in that step
-//! (`docs/decisions/0014-contact-and-fluid-at-once.md`).
+//! (`docs/decisions/0014-contact-with-the-fluid-response.md`).
 
 use glam::DVec3;
 

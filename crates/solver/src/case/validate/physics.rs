@@ -19,7 +19,7 @@ const MAXIMUM_OVERLAP: f64 = 0.01;
 const ROUGHNESS: f64 = 3e-3;
 /// Added mass of a sphere in contact, over the mass of the fluid that it displaces: .5 far from a wall and .803
 /// at it in potential flow (Hicks 1879), .75 on the grid; undamped impacts give the speed back with .7
-/// (`docs/decisions/0014-contact-and-fluid-at-once.md`).
+/// (`docs/decisions/0014-contact-with-the-fluid-response.md`).
 const ADDED_MASS: f64 = 0.7;
 
 /// The fluid; the viscosity is kept as a kinematic one.

@@ -117,7 +117,8 @@ impl RigidBodySystem {
     }
 
     /// Response of the grain to contact within the step, such that without further contact it leaves
-    /// the sub-steps with [`Self::velocities`] (`docs/decisions/0014-contact-and-fluid-at-once.md`).
+    /// the sub-steps with [`Self::velocities`]
+    /// (`docs/decisions/0014-contact-with-the-fluid-response.md`).
     ///
     /// The mass is at least that of the grain with `added_density` [kg/m^3] of fluid in its volume:
     /// most of the added mass responds by the projection, one step late. The velocity that it takes
