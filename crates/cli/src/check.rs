@@ -1,8 +1,8 @@
 //! `grainwake check`.
 
-use grainwake_solver::case::Case;
-use grainwake_solver::case::estimate::Estimate;
-use grainwake_solver::case::readable::quantity;
+use grainwake_run::case::Case;
+use grainwake_run::case::estimate::Estimate;
+use grainwake_run::case::readable::quantity;
 use grainwake_solver::dem::Grain;
 
 use crate::args::CheckArgs;

@@ -2,9 +2,9 @@
 
 use std::process::ExitCode;
 
+use grainwake_run::RunError;
+use grainwake_run::case::{CaseError, Problem};
 use grainwake_shape::ShapeError;
-use grainwake_solver::case::{CaseError, Problem};
-use grainwake_solver::output::RunError;
 use miette::{GraphicalReportHandler, GraphicalTheme};
 
 use crate::tell;

@@ -1,7 +1,7 @@
 //! `[expect]` for people: what was expected, what the run gave, and whether it holds.
 
-use grainwake_solver::case::readable::quantity;
-use grainwake_solver::case::{Problem, Verdict};
+use grainwake_run::case::readable::quantity;
+use grainwake_run::case::{Problem, Verdict};
 
 /// A line that says how a quantity compares with what was expected of it.
 pub fn line(v: &Verdict) -> String {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use grainwake_solver::case::{Case, CaseError, Source};
+use grainwake_run::case::{Case, CaseError, Source};
 use grainwake_study::{Study, StudyError};
 use serde::Deserialize;
 use serde::de::IgnoredAny;

@@ -34,7 +34,7 @@ fn main() -> std::process::ExitCode {
         Command::Study(args) => study::study(args),
         Command::Report(args) => report::report(args),
         Command::Bench(args) => bench::bench(args),
-        Command::Schema => print(&format!("{:#}", grainwake_solver::case::schema())),
+        Command::Schema => print(&format!("{:#}", grainwake_run::case::schema())),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(*shell, &mut Cli::command(), "grainwake", &mut script);

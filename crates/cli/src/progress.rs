@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use grainwake_solver::output::{Observer, Progress};
-use grainwake_solver::sim::events::Event;
+use grainwake_formats::events::Event;
+use grainwake_run::{Observer, Progress};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::tell;
@@ -132,7 +132,7 @@ impl Observer for Shown {
             self.line(&format!(
                 "t {:.4} s  {} (grain {})",
                 event.time,
-                event.event.name(),
+                event.kind.name(),
                 grains.join(", ")
             ));
         }

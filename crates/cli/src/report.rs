@@ -1,5 +1,6 @@
 //! `grainwake report`.
 
+use grainwake_formats::FormatError;
 use grainwake_report::{ReportError, render};
 use grainwake_study::{Analysis, Plan};
 
@@ -26,7 +27,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
     }
     let done = render(&args.run).map_err(|error| {
         let code = match &error {
-            ReportError::NotARun(_) | ReportError::Line { .. } => BAD_INPUT,
+            ReportError::NotARun(_) | ReportError::Format(FormatError::Line { .. }) => BAD_INPUT,
             _ => IO,
         };
         Exit::new(code, error.to_string())

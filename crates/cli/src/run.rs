@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use grainwake_solver::case::estimate::Estimate;
-use grainwake_solver::case::{Case, Problem, Verdict};
-use grainwake_solver::output::{self, Ending, Existing, Options, RESOLVED, Summary};
+use grainwake_formats::summary::Summary;
+use grainwake_run::case::estimate::Estimate;
+use grainwake_run::case::{Case, Problem, Verdict};
+use grainwake_run::{Ending, Existing, Options, RESOLVED};
 
 use crate::args::RunArgs;
 use crate::exit::{Exit, INTERRUPTED, MISSED};
@@ -56,7 +57,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         .map(|g| g.shape.equivalent_diameter());
     let mut shown = Shown::new(args.quiet, stop, diameter);
     let ending = threads::on(threads, || {
-        let ending = output::run(case.job(), &out, &options, &mut shown);
+        let ending = grainwake_run::run(case.job(), &out, &options, &mut shown);
         shown.clear();
         ending
     })??;

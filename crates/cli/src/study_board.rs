@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use grainwake_solver::output::Progress;
-use grainwake_solver::sim::events::{Event, EventKind};
+use grainwake_formats::events::{Event, EventKind};
+use grainwake_run::Progress;
 use grainwake_study::{Outcome, Run, StudyObserver};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
@@ -217,12 +217,12 @@ impl StudyObserver for Board<'_> {
     }
 
     fn event(&self, run: usize, event: &Event) {
-        if !self.quiet && event.event != EventKind::Landing {
+        if !self.quiet && event.kind != EventKind::Landing {
             self.line(&format!(
                 "{}: t {:.4} s  {}",
                 self.runs[run].name,
                 event.time,
-                event.event.name()
+                event.kind.name()
             ));
         }
     }

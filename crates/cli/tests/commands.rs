@@ -75,7 +75,7 @@ fn a_run_folder_holds_what_the_reference_says() {
             "{row:?}"
         );
     }
-    let field = grainwake_solver::output::vti::read(&out.join("fields/fields_000001.vti")).unwrap();
+    let field = grainwake_formats::vti::read(&out.join("fields/fields_000001.vti")).unwrap();
     assert_eq!(field.cells, [8, 8, 24]);
     let array = |name: &str| field.arrays.iter().find(|a| a.name == name).unwrap();
     let solid: f64 = array("solid_fraction")
@@ -88,8 +88,7 @@ fn a_run_folder_holds_what_the_reference_says() {
     // Four cells across a sphere.
     assert!((solid / spheres - 1.0).abs() < 0.01, "{solid} {spheres}");
     assert!(array("velocity").data.iter().any(|v| *v < -1e-4));
-    let slice =
-        grainwake_solver::output::vti::read(&out.join("slices/y-grain0_000002.vti")).unwrap();
+    let slice = grainwake_formats::vti::read(&out.join("slices/y-grain0_000002.vti")).unwrap();
     assert_eq!((slice.cells, slice.arrays.len()), ([8, 1, 24], 4));
     assert!((slice.time - 0.02).abs() < 1e-12);
     // The slice is a layer of the field.
@@ -502,7 +501,7 @@ fn pictures_open_in_pyvista() {
         found["fields"]["arrays"]["velocity"],
         serde_json::json!([1536, 3])
     );
-    let ours = grainwake_solver::output::vti::read(&out.join("fields/fields_000001.vti")).unwrap();
+    let ours = grainwake_formats::vti::read(&out.join("fields/fields_000001.vti")).unwrap();
     let pressure = &ours
         .arrays
         .iter()

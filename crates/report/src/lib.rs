@@ -21,7 +21,6 @@ use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
 pub use page::STYLE;
-pub use run_folder::Table;
 
 use figure::Figure;
 use run_folder::RunFolder;

@@ -1,7 +1,7 @@
 //! The phases of a settling pair (drafting, kissing, tumbling, separated) and the instants at which
 //! the figures show it.
 
-use crate::run_folder::{Event, Kind};
+use grainwake_formats::events::{Event, EventKind};
 
 /// What a pair is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,9 +46,9 @@ pub struct Phase {
 /// the first role change in touch begins it. `end` [s] is the last time of the run.
 pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
     use PhaseKind::{Drafting, Kissing, Landed, Separated, Tumbling};
-    let mut turns: Vec<(f64, Option<&Kind>)> = events
+    let mut turns: Vec<(f64, Option<EventKind>)> = events
         .iter()
-        .map(|event| (event.time, Some(&event.kind)))
+        .map(|event| (event.time, Some(event.kind)))
         .collect();
     if let Some(tumble) = tumble {
         turns.push((tumble, None));
@@ -59,12 +59,12 @@ pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
     for (time, kind) in turns {
         let next = match (kind, state) {
             (_, Landed) => Landed,
-            (Some(Kind::Kiss), Drafting | Separated) => Kissing,
-            (Some(Kind::RoleChange | Kind::Tumble) | None, Kissing) => Tumbling,
+            (Some(EventKind::Kiss), Drafting | Separated) => Kissing,
+            (Some(EventKind::RoleChange | EventKind::Tumble) | None, Kissing) => Tumbling,
             // A pair may turn on after a touch that has ended, before the parting is certain.
-            (Some(Kind::Tumble) | None, Separated) => Tumbling,
-            (Some(Kind::Separation), Kissing | Tumbling) => Separated,
-            (Some(Kind::Landing), _) => Landed,
+            (Some(EventKind::Tumble) | None, Separated) => Tumbling,
+            (Some(EventKind::Separation), Kissing | Tumbling) => Separated,
+            (Some(EventKind::Landing), _) => Landed,
             (_, same) => same,
         };
         if next != state {
@@ -97,22 +97,22 @@ pub struct Moment {
 
 /// First contact of the pair.
 pub fn kiss(events: &[Event]) -> Option<Moment> {
-    let time = first(events, &Kind::Kiss)?;
-    let landed = first(events, &Kind::Landing).is_some_and(|landing| landing <= time);
+    let time = first(events, EventKind::Kiss)?;
+    let landed = first(events, EventKind::Landing).is_some_and(|landing| landing <= time);
     Some(Moment { time, landed })
 }
 
 /// The parting of a pair that has touched: its last separation before the first landing, unless it
 /// has met again by then; else its last separation of all, unless it has met again.
 pub fn parting(events: &[Event]) -> Option<Moment> {
-    let kiss = first(events, &Kind::Kiss)?;
-    let landing = first(events, &Kind::Landing).unwrap_or(f64::INFINITY);
+    let kiss = first(events, EventKind::Kiss)?;
+    let landing = first(events, EventKind::Landing).unwrap_or(f64::INFINITY);
     let before = |end: f64| {
-        let meets = |event: &&Event| matches!(event.kind, Kind::Kiss | Kind::Separation);
+        let meets = |event: &&Event| matches!(event.kind, EventKind::Kiss | EventKind::Separation);
         let last = events
             .iter()
             .rfind(|event| meets(event) && event.time < end)?;
-        (last.kind == Kind::Separation && last.time >= kiss).then_some(last.time)
+        (last.kind == EventKind::Separation && last.time >= kiss).then_some(last.time)
     };
     let time = before(landing).or_else(|| before(f64::INFINITY))?;
     Some(Moment {
@@ -122,10 +122,10 @@ pub fn parting(events: &[Event]) -> Option<Moment> {
 }
 
 /// Time of the first event of a kind [s].
-fn first(events: &[Event], kind: &Kind) -> Option<f64> {
+fn first(events: &[Event], kind: EventKind) -> Option<f64> {
     events
         .iter()
-        .find(|event| event.kind == *kind)
+        .find(|event| event.kind == kind)
         .map(|event| event.time)
 }
 
@@ -146,7 +146,9 @@ pub fn pair_instants(phases: &[Phase], events: &[Event], closest: f64, end: f64)
     let instant = |time, name| Instant { time, name };
     let landing = of(PhaseKind::Landed).map_or(end, |phase| phase.start);
     let role_after = |start: f64| {
-        let mut roles = events.iter().filter(|event| event.kind == Kind::RoleChange);
+        let mut roles = events
+            .iter()
+            .filter(|event| event.kind == EventKind::RoleChange);
         roles
             .find(|event| event.time >= start && event.time < landing)
             .map(|event| event.time)
@@ -223,13 +225,8 @@ mod tests {
     use super::*;
     use PhaseKind::*;
 
-    fn log(events: &[(f64, Kind)]) -> Vec<Event> {
-        let event = |(time, kind): &(f64, Kind)| Event {
-            time: *time,
-            kind: kind.clone(),
-            grains: vec![0, 1],
-            details: Vec::new(),
-        };
+    fn log(events: &[(f64, EventKind)]) -> Vec<Event> {
+        let event = |(time, kind): &(f64, EventKind)| Event::new(*kind, *time, &[0, 1]);
         events.iter().map(event).collect()
     }
 
@@ -240,10 +237,10 @@ mod tests {
     #[test]
     fn a_plain_pair() {
         let events = log(&[
-            (1.0, Kind::Kiss),
-            (2.0, Kind::RoleChange),
-            (3.0, Kind::Separation),
-            (5.0, Kind::Landing),
+            (1.0, EventKind::Kiss),
+            (2.0, EventKind::RoleChange),
+            (3.0, EventKind::Separation),
+            (5.0, EventKind::Landing),
         ]);
         let got = phases(&events, Some(1.5), 6.0);
         assert_eq!(
@@ -284,10 +281,10 @@ mod tests {
     #[test]
     fn a_second_catching_up_is_drafting_again() {
         let events = log(&[
-            (1.0, Kind::Kiss),
-            (2.0, Kind::Separation),
-            (3.0, Kind::Kiss),
-            (4.0, Kind::Separation),
+            (1.0, EventKind::Kiss),
+            (2.0, EventKind::Separation),
+            (3.0, EventKind::Kiss),
+            (4.0, EventKind::Separation),
         ]);
         let got: Vec<_> = phases(&events, None, 5.0).iter().map(|p| p.kind).collect();
         assert_eq!(got, [Drafting, Kissing, Drafting, Kissing, Separated]);
@@ -296,10 +293,10 @@ mod tests {
     #[test]
     fn tumbling_after_the_separation_is_kept() {
         let events = log(&[
-            (1.0, Kind::Kiss),
-            (2.0, Kind::Separation),
-            (2.5, Kind::Tumble),
-            (5.0, Kind::Landing),
+            (1.0, EventKind::Kiss),
+            (2.0, EventKind::Separation),
+            (2.5, EventKind::Tumble),
+            (5.0, EventKind::Landing),
         ]);
         let got = phases(&events, Some(2.5), 6.0);
         assert_eq!(
@@ -321,12 +318,12 @@ mod tests {
 
     #[test]
     fn kiss_and_parting_have_one_meaning() {
-        let of = |events: &[(f64, Kind)]| {
+        let of = |events: &[(f64, EventKind)]| {
             let events = log(events);
             let told = |moment: Moment| (moment.time, moment.landed);
             (kiss(&events).map(told), parting(&events).map(told))
         };
-        let (touch, part, land) = (Kind::Kiss, Kind::Separation, Kind::Landing);
+        let (touch, part, land) = (EventKind::Kiss, EventKind::Separation, EventKind::Landing);
         assert_eq!(of(&[(1.0, part.clone())]), (None, None));
         // A bounce is no parting.
         let bounce = [
@@ -358,13 +355,13 @@ mod tests {
     #[test]
     fn no_kiss_and_interrupted_runs() {
         assert_eq!(kinds(&phases(&[], None, 2.0)), [(Drafting, 0.0, 2.0)]);
-        let early = log(&[(1.0, Kind::RoleChange), (1.5, Kind::Separation)]);
+        let early = log(&[(1.0, EventKind::RoleChange), (1.5, EventKind::Separation)]);
         assert_eq!(
             kinds(&phases(&early, None, 2.0)),
             [(Drafting, 0.0, 2.0)],
             "nothing to tumble or part without a kiss"
         );
-        let events = log(&[(1.0, Kind::Kiss)]);
+        let events = log(&[(1.0, EventKind::Kiss)]);
         let got = phases(&events, None, 2.0);
         assert_eq!(kinds(&got), [(Drafting, 0.0, 1.0), (Kissing, 1.0, 2.0)]);
         let names: Vec<_> = pair_instants(&got, &events, 1.2, 2.0)
@@ -390,7 +387,7 @@ mod tests {
             instants.iter().map(|i| (i.name, i.time)).collect()
         };
         // Passing without a touch.
-        let events = log(&[(2.0, Kind::RoleChange), (8.0, Kind::Landing)]);
+        let events = log(&[(2.0, EventKind::RoleChange), (8.0, EventKind::Landing)]);
         assert_eq!(
             names(&events, 4.0, 9.0),
             [
@@ -405,18 +402,18 @@ mod tests {
             [("drafting", 3.0), ("closest", 5.0), ("apart", 7.0)]
         );
         // A pair that lands in touch, and lies there for long.
-        let events = log(&[(1.0, Kind::Kiss), (3.0, Kind::Landing)]);
+        let events = log(&[(1.0, EventKind::Kiss), (3.0, EventKind::Landing)]);
         assert_eq!(
             names(&events, 1.0, 9.0)[2..],
             [("in contact", 2.0), ("landing", 3.0)]
         );
         // Roles that change after the grains have parted.
         let events = log(&[
-            (1.0, Kind::Kiss),
-            (1.1, Kind::Tumble),
-            (1.5, Kind::Separation),
-            (2.0, Kind::RoleChange),
-            (4.0, Kind::Landing),
+            (1.0, EventKind::Kiss),
+            (1.1, EventKind::Tumble),
+            (1.5, EventKind::Separation),
+            (2.0, EventKind::RoleChange),
+            (4.0, EventKind::Landing),
         ]);
         assert_eq!(
             names(&events, 1.0, 5.0),

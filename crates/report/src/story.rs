@@ -4,7 +4,9 @@ use glam::DVec3;
 use serde_json::Value;
 
 use crate::phases::{self, Instant, Moment, Phase};
-use crate::run_folder::{Event, History, RunFolder};
+use grainwake_formats::events::Event;
+
+use crate::run_folder::{History, RunFolder};
 
 /// What was run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

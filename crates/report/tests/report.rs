@@ -4,6 +4,7 @@ mod synthetic;
 
 use std::path::Path;
 
+use grainwake_formats::FormatError;
 use grainwake_report::{Rendered, ReportError, render};
 
 fn names(rendered: &Rendered) -> Vec<String> {
@@ -315,7 +316,10 @@ fn pictures_may_be_missing_but_tables_may_not_be_damaged() {
     .unwrap();
     let error = render(&folder).unwrap_err();
     assert!(
-        matches!(&error, ReportError::Line { line: 2, .. }),
+        matches!(
+            &error,
+            ReportError::Format(FormatError::Line { line: 2, .. })
+        ),
         "{error}"
     );
     assert!(

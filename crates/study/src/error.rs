@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::case::{CaseError, Problem, nearest};
+use grainwake_run::case::{CaseError, Problem, nearest};
 
 /// Reason why a study cannot be read, planned or stored.
 #[derive(Debug, thiserror::Error)]

@@ -1,7 +1,8 @@
 //! Quantities of a pair on histories with known results.
 
 use glam::{DQuat, DVec3};
-use grainwake_report::run_folder::{Event, History, Kind};
+use grainwake_formats::events::{Event, EventKind};
+use grainwake_report::run_folder::History;
 use grainwake_report::story::Scales;
 use grainwake_study::plan::quantities::PAIR_QUANTITIES;
 use grainwake_study::{PairHistory, PairMeasures};
@@ -28,17 +29,12 @@ fn history(place: impl Fn(f64) -> DVec3, turn: impl Fn(f64) -> DQuat, end: f64) 
     h
 }
 
-fn log(events: &[(f64, Kind)]) -> Vec<Event> {
-    let event = |(time, kind): &(f64, Kind)| Event {
-        time: *time,
-        kind: kind.clone(),
-        grains: vec![0, 1],
-        details: Vec::new(),
-    };
+fn log(events: &[(f64, EventKind)]) -> Vec<Event> {
+    let event = |(time, kind): &(f64, EventKind)| Event::new(*kind, *time, &[0, 1]);
     events.iter().map(event).collect()
 }
 
-fn measures(events: &[(f64, Kind)], oblong: bool) -> PairMeasures {
+fn measures(events: &[(f64, EventKind)], oblong: bool) -> PairMeasures {
     // The leading grain falls at 0.1 m/s; the trailing one, 10 mm above it, at 0.15 m/s until
     // they touch at 0.16 s.
     let ahead = history(
@@ -71,13 +67,13 @@ fn measures(events: &[(f64, Kind)], oblong: bool) -> PairMeasures {
 fn times_speeds_and_angles_are_those_of_the_history() {
     let m = measures(
         &[
-            (0.16, Kind::Kiss),
-            (0.24, Kind::Tumble),
-            (0.30, Kind::RoleChange),
-            (0.32, Kind::Separation),
-            (0.8, Kind::Landing),
-            (0.85, Kind::RoleChange),
-            (0.9, Kind::Kiss),
+            (0.16, EventKind::Kiss),
+            (0.24, EventKind::Tumble),
+            (0.30, EventKind::RoleChange),
+            (0.32, EventKind::Separation),
+            (0.8, EventKind::Landing),
+            (0.85, EventKind::RoleChange),
+            (0.9, EventKind::Kiss),
         ],
         true,
     );
@@ -118,9 +114,9 @@ fn pairs_that_do_not_separate_or_kiss_give_bounds_or_nothing() {
     let t = (2e-3_f64 / 8.0).sqrt();
     let m = measures(
         &[
-            (0.16, Kind::Kiss),
-            (0.8, Kind::Landing),
-            (0.9, Kind::Separation),
+            (0.16, EventKind::Kiss),
+            (0.8, EventKind::Landing),
+            (0.9, EventKind::Separation),
         ],
         false,
     );
@@ -133,7 +129,7 @@ fn pairs_that_do_not_separate_or_kiss_give_bounds_or_nothing() {
         "a lower bound: until the landing"
     );
     assert_eq!(m.long_axis_leading, None, "a sphere has no long axis");
-    let m = measures(&[(0.05, Kind::RoleChange)], true);
+    let m = measures(&[(0.05, EventKind::RoleChange)], true);
     assert_eq!(
         (
             m.kiss_time,
@@ -148,10 +144,10 @@ fn pairs_that_do_not_separate_or_kiss_give_bounds_or_nothing() {
     assert!(m.mean_speed_leading.is_some());
     let m = measures(
         &[
-            (0.1, Kind::Kiss),
-            (0.2, Kind::Separation),
-            (0.3, Kind::Kiss),
-            (0.4, Kind::Separation),
+            (0.1, EventKind::Kiss),
+            (0.2, EventKind::Separation),
+            (0.3, EventKind::Kiss),
+            (0.4, EventKind::Separation),
         ],
         true,
     );
@@ -163,9 +159,9 @@ fn pairs_that_do_not_separate_or_kiss_give_bounds_or_nothing() {
     // If the line of centres reaches 45 degrees after the contact, kissing ends with the contact.
     let m = measures(
         &[
-            (0.1, Kind::Kiss),
-            (0.2, Kind::Separation),
-            (0.21, Kind::Tumble),
+            (0.1, EventKind::Kiss),
+            (0.2, EventKind::Separation),
+            (0.21, EventKind::Tumble),
         ],
         true,
     );

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use common::{STUDY, folder, plan};
-use grainwake_solver::output::Progress;
+use grainwake_run::Progress;
 use grainwake_study::{
     Options, Outcome, Plan, RunState, Study, StudyObserver, execute, records, run_state, to_csv,
     write_tables,

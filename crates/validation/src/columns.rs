@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use glam::DVec3;
-use grainwake_report::Table;
-use grainwake_solver::output::vti::{self, Image};
+use grainwake_formats::table::Table;
+use grainwake_formats::vti::{self, Image};
 use serde::Deserialize;
 
 /// Table that a value is taken from.
@@ -171,7 +171,10 @@ pub(crate) fn last_slice(folder: &Path, plane: &str) -> Result<Image, String> {
             continue;
         }
         let image = vti::read(&entry.path()).map_err(|e| format!("{name}: {e}"))?;
-        if latest.as_ref().is_none_or(|l| l.time < image.time) {
+        if latest
+            .as_ref()
+            .is_none_or(|l| l.frame.time < image.frame.time)
+        {
             latest = Some(image);
         }
     }
@@ -185,10 +188,14 @@ fn sample_line(folder: &Path, line: &Line) -> Result<Columns, String> {
     let through = DVec3::from(line.through);
     // Offsets and weights of the cells around the line.
     let mut weights = vec![(0usize, 1.0f64)];
-    let strides = [1, image.cells[0], image.cells[0] * image.cells[1]];
-    for other in (0..3).filter(|a| *a != axis && image.cells[*a] > 1) {
-        let n = image.cells[other];
-        let s = (through[other] - image.origin[other]) / image.spacing[other] - 0.5;
+    let strides = [
+        1,
+        image.frame.cells[0],
+        image.frame.cells[0] * image.frame.cells[1],
+    ];
+    for other in (0..3).filter(|a| *a != axis && image.frame.cells[*a] > 1) {
+        let n = image.frame.cells[other];
+        let s = (through[other] - image.frame.origin[other]) / image.frame.spacing[other] - 0.5;
         if s < -0.5 || s > n as f64 - 0.5 {
             return Err(format!(
                 "the line lies outside the slice \"{}\"",
@@ -205,8 +212,8 @@ fn sample_line(folder: &Path, line: &Line) -> Result<Columns, String> {
         weights = weights.into_iter().flat_map(split).collect();
     }
     let mut columns = Columns::default();
-    let n = image.cells[axis];
-    let centre = |i: usize| image.origin[axis] + (i as f64 + 0.5) * image.spacing[axis];
+    let n = image.frame.cells[axis];
+    let centre = |i: usize| image.frame.origin[axis] + (i as f64 + 0.5) * image.frame.spacing[axis];
     columns.push(AXES[axis], (0..n).map(centre).collect());
     for array in &image.arrays {
         for c in 0..array.components {

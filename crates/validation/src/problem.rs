@@ -1,6 +1,6 @@
 //! Problems of `validation.toml`, located in the file.
 
-use grainwake_solver::case::{Loc, Problem, Source, nearest};
+use grainwake_run::case::{Loc, Problem, Source, nearest};
 
 /// Returns a problem at a value of the file; `label` marks the value.
 pub(crate) fn at<T>(

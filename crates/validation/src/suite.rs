@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::case::{Loc, Problem, Source};
+use grainwake_run::case::{Loc, Problem, Source};
 use serde::Deserialize;
 
 use crate::check::{Bounds, Check, Level, Reference, Run};

@@ -10,10 +10,10 @@ mod table;
 
 use std::path::Path;
 
+use grainwake_run::case::parse_length;
+use grainwake_run::case::readable;
 use grainwake_shape::render::Picture;
 use grainwake_shape::{Shape, ShapeOptions};
-use grainwake_solver::case::parse_length;
-use grainwake_solver::case::readable;
 
 use crate::args::{GrainArgs, GrainCommand, InfoArgs, NewGrain};
 use crate::exit::{BAD_INPUT, Exit};

@@ -9,9 +9,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use grainwake_solver::case::{Case, nearest};
-use grainwake_solver::output::provenance::Provenance;
-use grainwake_solver::output::{self, Ending, Existing, Options, RunError};
+use grainwake_formats::summary::Summary;
+use grainwake_run::case::{Case, nearest};
+use grainwake_run::provenance::Provenance;
+use grainwake_run::{Ending, Existing, Options, RunError};
 use grainwake_validation::{Level, Run, Suite, SuiteError};
 use table::{line, table};
 
@@ -171,8 +172,7 @@ fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
 
 /// Whether `folder` holds a finished run of this very case.
 fn there(run: &Run, folder: &Path) -> Result<bool, Exit> {
-    let Some(provenance) =
-        Provenance::read(folder).filter(|_| output::read_summary(folder).is_ok())
+    let Some(provenance) = Provenance::read(folder).filter(|_| Summary::read(folder).is_ok())
     else {
         return Ok(false);
     };
@@ -220,7 +220,7 @@ fn one(
         .map(|g| g.shape.equivalent_diameter());
     let mut shown = Shown::new(args.quiet, stop.clone(), diameter);
     let ending = threads::on(threads, || {
-        let ending = output::run(case.job(), folder, &options, &mut shown);
+        let ending = grainwake_run::run(case.job(), folder, &options, &mut shown);
         shown.clear();
         ending
     })?;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use grainwake_solver::case::Case;
-use grainwake_solver::output::provenance::Provenance;
-use grainwake_solver::output::read_summary;
+use grainwake_formats::summary::Summary;
+use grainwake_run::case::Case;
+use grainwake_run::provenance::Provenance;
 use grainwake_validation::{Suite, Verdict};
 use serde::{Deserialize, Serialize};
 
@@ -84,7 +84,8 @@ pub fn add(
         }
         seen.push((name.clone(), run.clone()));
         let path = output.join(&name).join(&run);
-        let (Some(provenance), Ok(summary)) = (Provenance::read(&path), read_summary(&path)) else {
+        let (Some(provenance), Ok(summary)) = (Provenance::read(&path), Summary::read(&path))
+        else {
             continue;
         };
         let session = provenance.sessions.last();

@@ -3,7 +3,9 @@
 use glam::DVec3;
 
 use super::{Figure, Scene};
-use crate::run_folder::{History, Kind};
+use grainwake_formats::events::EventKind;
+
+use crate::run_folder::History;
 use crate::story::{galileo, short};
 use grainwake_plot::axis::{Axis, extent};
 use grainwake_plot::stacked::{Panel, Series, VerticalMark, stacked_panels};
@@ -60,12 +62,11 @@ impl Scene<'_> {
     /// The events as marks on the time axis.
     pub fn marks(&self) -> Vec<VerticalMark> {
         let (_, factor) = self.story.time_axis();
-        let shown = |kind: &Kind| !matches!(kind, Kind::Other(_));
-        let events = self.run.events.iter().filter(|event| shown(&event.kind));
+        let events = self.run.events.iter();
         events
             .map(|event| VerticalMark {
                 at: event.time * factor,
-                name: event.kind.name().to_owned(),
+                name: event.kind.label().to_owned(),
             })
             .collect()
     }
@@ -104,8 +105,8 @@ impl Scene<'_> {
     }
 
     /// The event's time in words, if it happened.
-    fn when(&self, kind: &Kind) -> Option<String> {
-        let event = self.run.events.iter().find(|event| event.kind == *kind)?;
+    fn when(&self, kind: EventKind) -> Option<String> {
+        let event = self.run.events.iter().find(|event| event.kind == kind)?;
         Some(self.story.time_text(event.time))
     }
 }
@@ -160,7 +161,7 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
     let told = |moment| scene.story.moment_text(moment);
     for (text, when) in [
         ("They touch first at", scene.story.kiss.map(told)),
-        ("The roles change at", scene.when(&Kind::RoleChange)),
+        ("The roles change at", scene.when(EventKind::RoleChange)),
         ("They part at", scene.story.parting.map(told)),
     ] {
         if let Some(when) = when {

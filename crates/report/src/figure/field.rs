@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use grainwake_solver::output::vti::Image;
+use grainwake_formats::vti::Image;
 
 use super::section::Section;
 use super::sheet::{self, Cells, Column, Look};
@@ -134,7 +134,7 @@ fn column(panel: &Panel) -> Result<Column, String> {
     let mut column = Column {
         title: panel.title.clone(),
         time: String::new(),
-        at: panel.image.time,
+        at: panel.image.frame.time,
         window,
         cuts: vec![rings.into_iter().map(|ring| (INK, ring)).collect()],
         centres: Vec::new(),
@@ -210,7 +210,7 @@ fn look(
 mod tests {
     use super::*;
     use glam::DVec3;
-    use grainwake_solver::output::vti::Array;
+    use grainwake_formats::vti::{Array, Frame};
 
     /// A disc in a uniform stream along x.
     fn image() -> Image {
@@ -224,10 +224,12 @@ mod tests {
             data,
         };
         Image {
-            cells: [20, 1, 10],
-            spacing: DVec3::ONE,
-            origin: DVec3::ZERO,
-            time: 1.0,
+            frame: Frame {
+                cells: [20, 1, 10],
+                spacing: DVec3::ONE,
+                origin: DVec3::ZERO,
+                time: 1.0,
+            },
             arrays: vec![
                 array("solid_fraction", 1, (0..200).map(inside).collect()),
                 array(

@@ -1,7 +1,7 @@
 //! A slice of the fields, ready to be drawn: values between cells, grain outlines.
 
 use glam::DVec3;
-use grainwake_solver::output::vti::Image;
+use grainwake_formats::vti::Image;
 
 use super::sheet::Cells;
 use grainwake_plot::contour;
@@ -66,8 +66,10 @@ pub struct Section {
 impl Section {
     /// Takes what is drawn from an image file one cell thick in y, else x, else z.
     pub fn of(image: &Image, vertical: usize) -> Result<Section, String> {
-        let [nx, ny, nz] = image.cells;
-        let thin = [1, 0, 2].into_iter().find(|axis| image.cells[*axis] == 1);
+        let [nx, ny, nz] = image.frame.cells;
+        let thin = [1, 0, 2]
+            .into_iter()
+            .find(|axis| image.frame.cells[*axis] == 1);
         let normal = thin.ok_or_else(|| {
             format!("{nx} x {ny} x {nz} cells are no slice, which is one cell thick")
         })?;
@@ -75,14 +77,14 @@ impl Section {
         let strides = [1, nx, nx * ny];
         let (across, up) = (view.across, view.up);
         let order = || {
-            let rows = (0..image.cells[up]).map(move |k| k * strides[up]);
+            let rows = (0..image.frame.cells[up]).map(move |k| k * strides[up]);
             rows.flat_map(move |row| {
-                (0..image.cells[across]).map(move |i| row + i * strides[across])
+                (0..image.frame.cells[across]).map(move |i| row + i * strides[across])
             })
         };
-        if !(image.spacing.min_element() > 0.0
-            && image.spacing.is_finite()
-            && image.origin.is_finite())
+        if !(image.frame.spacing.min_element() > 0.0
+            && image.frame.spacing.is_finite()
+            && image.frame.origin.is_finite())
         {
             return Err("its spacing or origin cannot be used".to_owned());
         }
@@ -109,11 +111,11 @@ impl Section {
             .map(|data| order().map(|cell| f64::from(data[cell])).collect());
         Ok(Section {
             view,
-            nx: image.cells[across],
-            nz: image.cells[up],
-            lower: view.seen(image.origin),
-            step: view.seen(image.spacing),
-            place: image.origin[normal] + 0.5 * image.spacing[normal],
+            nx: image.frame.cells[across],
+            nz: image.frame.cells[up],
+            lower: view.seen(image.frame.origin),
+            step: view.seen(image.frame.spacing),
+            place: image.frame.origin[normal] + 0.5 * image.frame.spacing[normal],
             velocity,
             vorticity,
             solid,
@@ -246,7 +248,7 @@ fn cubic([a, b, c, d]: [f64; 4], t: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use grainwake_solver::output::vti::Array;
+    use grainwake_formats::vti::{Array, Frame};
 
     fn image(ny: usize) -> Image {
         let centre = |i: usize| (i % 8) as f32 + 0.5;
@@ -258,10 +260,12 @@ mod tests {
             data,
         };
         Image {
-            cells: [8, ny, 6],
-            spacing: DVec3::ONE,
-            origin: DVec3::ZERO,
-            time: 0.0,
+            frame: Frame {
+                cells: [8, ny, 6],
+                spacing: DVec3::ONE,
+                origin: DVec3::ZERO,
+                time: 0.0,
+            },
             arrays: vec![
                 array(
                     "solid_fraction",
@@ -366,7 +370,7 @@ mod tests {
         );
         assert!(View::along(1, 2).clockwise() && !View::along(0, 2).clockwise());
         let mut turned = image(1);
-        turned.cells = [1, 8, 6];
+        turned.frame.cells = [1, 8, 6];
         let section = Section::of(&turned, 1).unwrap();
         assert_eq!((section.view.across, section.view.up), (2, 1));
         assert_eq!(section.whole().high, (6.0, 8.0));
@@ -377,7 +381,7 @@ mod tests {
     #[test]
     fn thick_images_are_no_slices() {
         let mut thick = image(1);
-        thick.cells[1] = 2;
+        thick.frame.cells[1] = 2;
         assert!(
             Section::of(&thick, 2)
                 .unwrap_err()

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use glam::{DQuat, DVec3};
 
 use super::section::View;
-use crate::run_folder::{History, RunFolder, Surface};
+use grainwake_formats::vtp::Surface;
+
+use crate::run_folder::{History, RunFolder};
 use grainwake_plot::contour;
 
 /// A closed line in two of the three coordinates [m].

@@ -2,6 +2,8 @@
 
 use serde_json::Value;
 
+use grainwake_formats::events::Event;
+
 use crate::run_folder::RunFolder;
 use crate::story::{Story, galileo, short};
 use grainwake_plot::{escape, html, literal};
@@ -245,11 +247,7 @@ pub fn events(run: &RunFolder, story: &Story) -> String {
             ));
         }
         let grains: Vec<String> = event.grains.iter().map(usize::to_string).collect();
-        let details = event
-            .details
-            .iter()
-            .map(|(name, value)| detail(name, value));
-        let details: Vec<String> = details.map(|text| html(&text)).collect();
+        let details: Vec<String> = details(event).iter().map(|text| html(text)).collect();
         out.push_str(&format!(
             "<td>{}</td><td>{}</td><td>{}</td></tr>\n",
             escape(event.kind.name()),
@@ -277,17 +275,12 @@ fn precise(value: f64) -> String {
 }
 
 /// A detail of an event with its unit, where that is known; else as it stands.
-fn detail(name: &str, value: &str) -> String {
-    let number = value.parse::<f64>().ok();
-    match (name, number) {
-        ("gap", Some(gap)) => format!("gap {} mm", short(1e3 * gap)),
-        ("tilt", Some(tilt)) => format!("pair {}° from the vertical", short(tilt.to_degrees())),
-        ("confirmed", Some(time)) => format!("certain at {} s", precise(time)),
-        (_, Some(number)) if value.contains(['.', 'e']) => {
-            format!("{} {}", literal(name), short(number))
-        }
-        _ => format!("{} {}", literal(name), literal(value)),
-    }
+fn details(event: &Event) -> Vec<String> {
+    let confirmed = format!("certain at {} s", precise(event.confirmed));
+    let gap = event.gap.map(|gap| format!("gap {} mm", short(1e3 * gap)));
+    let tilt =
+        (event.tilt).map(|tilt| format!("pair {}° from the vertical", short(tilt.to_degrees())));
+    [Some(confirmed), gap, tilt].into_iter().flatten().collect()
 }
 
 /// Who made this, with what.

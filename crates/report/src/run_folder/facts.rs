@@ -6,6 +6,8 @@ use glam::DVec3;
 use serde_json::Value as Json;
 use toml::{Table, Value};
 
+use grainwake_formats::{FormatError, read_text};
+
 use crate::error::ReportError;
 
 /// A grain as the case and the summary describe it.
@@ -85,16 +87,12 @@ impl Facts {
 
 /// Reads the case file as it was resolved: SI numbers, all defaults spelled out.
 pub fn read_case(file: &Path) -> Result<Facts, ReportError> {
-    let text = super::read_text(file)?;
+    let text = read_text(file)?;
     let table: Table = text.parse().map_err(|error: toml::de::Error| {
         let line = error.span().map_or(1, |span| {
             1 + text[..span.start.min(text.len())].matches('\n').count()
         });
-        ReportError::Line {
-            file: file.to_owned(),
-            line,
-            what: error.message().to_owned(),
-        }
+        FormatError::line(file, line, error.message())
     })?;
     Ok(facts_of(&table))
 }
@@ -208,12 +206,9 @@ fn grain_of(value: &Value) -> GrainFacts {
 
 /// Reads a JSON file; the line of a damage is named.
 pub fn read_json(file: &Path) -> Result<Json, ReportError> {
-    let text = super::read_text(file)?;
-    serde_json::from_str(&text).map_err(|error| ReportError::Line {
-        file: file.to_owned(),
-        line: error.line().max(1),
-        what: error.to_string(),
-    })
+    let text = read_text(file)?;
+    serde_json::from_str(&text)
+        .map_err(|error| FormatError::line(file, error.line().max(1), error.to_string()).into())
 }
 
 /// Fills in what the summary knows of the grains.

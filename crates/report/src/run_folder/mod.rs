@@ -1,10 +1,7 @@
 //! A run folder as it lies on disk: everything a report is made of.
 
-mod events;
 mod facts;
-mod pvd;
-mod surface;
-mod tables;
+mod history;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,14 +9,16 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use serde_json::Value;
 
-use grainwake_solver::output::vti::{self, Image};
+use grainwake_formats::events::Event;
+use grainwake_formats::table::Table;
+use grainwake_formats::vti::{self, Image};
+use grainwake_formats::vtp::{self, Surface};
+use grainwake_formats::{events, pvd};
 
 use crate::error::ReportError;
 
-pub use events::{Event, Kind};
 pub use facts::Facts;
-pub use surface::Surface;
-pub use tables::{History, Table, histories};
+pub use history::{History, histories};
 
 /// A picture file of the run: a slice of the fields or the surface of grains.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,7 +93,7 @@ impl RunFolder {
             run.provenance = Some(facts::read_json(&file)?);
         }
         match present("grains.csv") {
-            Some(file) => run.grains = tables::histories(&file, &mut run.notes)?,
+            Some(file) => run.grains = histories(&file, &mut run.notes)?,
             None if run.facts.grains.is_empty() => {}
             None => run
                 .notes
@@ -141,7 +140,7 @@ impl RunFolder {
 
     /// Reads a surface.
     pub fn surface(&self, frame: &FrameFile) -> Result<Surface, String> {
-        surface::read(&frame.file)
+        vtp::read(&frame.file)
     }
 
     /// A file's path inside the folder.
@@ -185,7 +184,7 @@ impl RunFolder {
             return BTreeMap::new();
         }
         pvd::read(&file)
-            .map(BTreeMap::from_iter)
+            .map(|entries| entries.into_iter().map(|e| (e.file, e.time)).collect())
             .unwrap_or_else(|what| {
                 self.notes
                     .push(format!("run.pvd could not be read ({what})"));
@@ -236,8 +235,8 @@ impl RunFolder {
 
 fn time_inside(file: &Path, extension: &str) -> Result<f64, String> {
     let time = match extension {
-        "vti" => Some(read_image(file)?.time),
-        _ => surface::read(file)?.time,
+        "vti" => Some(read_image(file)?.frame.time),
+        _ => vtp::read(file)?.time,
     };
     time.filter(|t| t.is_finite())
         .ok_or_else(|| "it does not tell its time".to_owned())
@@ -255,22 +254,6 @@ fn grain_of_name(name: &str) -> Option<usize> {
         .trim_start_matches(['_', '-', '.']);
     let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
     digits.parse().ok()
-}
-
-fn read_text(file: &Path) -> Result<String, ReportError> {
-    let bytes = std::fs::read(file).map_err(|source| ReportError::Read {
-        file: file.to_owned(),
-        source,
-    })?;
-    String::from_utf8(bytes).map_err(|error| {
-        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
-        ReportError::Line {
-            file: file.to_owned(),
-            line,
-            what: "not text (UTF-8)".to_owned(),
-        }
-    })
 }
 
 #[cfg(test)]

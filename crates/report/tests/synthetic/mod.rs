@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DQuat, DVec3};
-use grainwake_solver::output::vti;
+use grainwake_formats::vti;
 
 pub const D: f64 = 2e-3;
 pub const G: f64 = 9.81;
@@ -189,10 +189,12 @@ fn write_slice(
         }
     }
     let image = vti::Image {
-        cells: [nx, 1, nz],
-        spacing: DVec3::splat(h),
-        origin: DVec3::new(0.0, y - 0.5 * h, 0.0),
-        time,
+        frame: vti::Frame {
+            cells: [nx, 1, nz],
+            spacing: DVec3::splat(h),
+            origin: DVec3::new(0.0, y - 0.5 * h, 0.0),
+            time,
+        },
         arrays: arrays.to_vec(),
     };
     vti::write(file, &image).unwrap();

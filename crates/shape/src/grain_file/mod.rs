@@ -5,7 +5,6 @@
 //! nodes and the field; the levels of the field are deflated differences from a predictor. Files
 //! hold no date: equal shapes give equal files.
 
-mod bytes;
 mod levels;
 
 use crate::error::{Result, ShapeError};
@@ -15,10 +14,9 @@ use crate::morphology::Morphology;
 use crate::provenance::Provenance;
 use crate::quality::Quality;
 use crate::shape::{Field, Shape, SurfaceNode};
-use bytes::{Decoder, Encoder};
-use glam::DQuat;
+use grainwake_formats::codec::{Decoder, Encoder, encode, invalid};
 use sha2::{Digest, Sha256};
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
 /// A non-text byte and both line endings make damage by text-mode transfers detectable.
@@ -26,7 +24,6 @@ const SIGNATURE: &[u8; 8] = b"\x8fGRAIN\r\n";
 /// Version of written files; files of this and older versions are read. Version 2 added the
 /// inscribed sphere and the Feret diameters.
 const VERSION: u32 = 2;
-const HEAD: usize = 8 + 4 + 8;
 const CHECKSUM: usize = 32;
 /// Largest file size that is read [bytes].
 const LARGEST: u64 = 1 << 30;
@@ -63,41 +60,41 @@ impl Shape {
 
     /// Returns the content of a `.grain` file.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut body = Encoder::default();
-        encode_provenance(&mut body, &self.provenance);
-        encode_measures(&mut body, self);
-        match &self.field {
-            Field::Sphere(radius) => {
-                body.u8(0);
-                body.f64(*radius);
+        let body = in_memory(|out| {
+            encode_provenance(out, &self.provenance)?;
+            encode_measures(out, self)?;
+            match &self.field {
+                Field::Sphere(radius) => {
+                    out.u8(0)?;
+                    out.f64(*radius)
+                }
+                Field::Sampled(field) => {
+                    out.u8(1)?;
+                    encode_grid(out, field)?;
+                    out.bytes(&levels::pack(field.levels(), field.dims()))
+                }
             }
-            Field::Sampled(field) => {
-                body.u8(1);
-                encode_grid(&mut body, field);
-                body.bytes(&levels::pack(field.levels(), field.dims()));
-            }
-        }
-        let body = body.finish();
-        let mut out = Vec::with_capacity(HEAD + body.len() + CHECKSUM);
-        out.extend_from_slice(SIGNATURE);
-        out.extend_from_slice(&VERSION.to_le_bytes());
-        out.extend_from_slice(&(body.len() as u64).to_le_bytes());
-        out.extend_from_slice(&body);
-        let checksum = Sha256::digest(&out);
-        out.extend_from_slice(&checksum);
-        out
+        });
+        let mut bytes = in_memory(|out| {
+            out.raw(SIGNATURE)?;
+            out.u32(VERSION)?;
+            out.bytes(&body)
+        });
+        let checksum = Sha256::digest(&bytes);
+        bytes.extend_from_slice(&checksum);
+        bytes
     }
 
     /// Decodes the content of a `.grain` file; `path` is used in messages only.
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Shape> {
-        if !bytes.starts_with(SIGNATURE) {
+        let Some(mut rest) = bytes.strip_prefix(SIGNATURE) else {
             return Err(ShapeError::NotAGrainFile {
                 path: path.to_owned(),
             });
-        }
-        let early = || ShapeError::malformed(path, "the grain file ends early");
-        let mut head = Decoder::new(bytes.get(8..HEAD).ok_or_else(early)?);
-        let version = head.u32().ok_or_else(early)?;
+        };
+        let early = |_| ShapeError::malformed(path, "the grain file ends early");
+        let mut head = Decoder::new(&mut rest);
+        let version = head.u32().map_err(early)?;
         // Checked before the checksum, the position of which may differ in a newer version.
         if version > VERSION {
             let path = path.to_owned();
@@ -107,9 +104,9 @@ impl Shape {
                 supported: VERSION,
             });
         }
-        let length = head.u64().ok_or_else(early)?;
-        if (bytes.len() as u64) < length.saturating_add((HEAD + CHECKSUM) as u64) {
-            return Err(early());
+        let body = head.bytes().map_err(early)?;
+        if rest.len() < CHECKSUM {
+            return Err(early(io::ErrorKind::UnexpectedEof.into()));
         }
         let (content, checksum) = bytes.split_at(bytes.len() - CHECKSUM);
         if Sha256::digest(content).as_slice() != checksum {
@@ -117,116 +114,106 @@ impl Shape {
                 path: path.to_owned(),
             });
         }
-        decode(&content[HEAD..], version)
+        let mut body = &body[..];
+        let shape = decode(&mut Decoder::new(&mut body), version).ok();
+        shape
+            .filter(|_| body.is_empty())
             .ok_or_else(|| ShapeError::malformed(path, "the content of the grain file is invalid"))
     }
 }
 
+/// Encodes into memory, which cannot fail.
+fn in_memory(fill: impl FnOnce(&mut Encoder) -> io::Result<()>) -> Vec<u8> {
+    encode(fill).unwrap_or_default()
+}
+
 /// Returns the SHA-256 of the geometry in hexadecimal.
 pub(crate) fn digest(shape: &Shape) -> String {
-    let mut content = Encoder::default();
-    encode_mass(&mut content, shape);
-    match &shape.field {
-        Field::Sphere(radius) => content.f64(*radius),
-        Field::Sampled(field) => {
-            encode_grid(&mut content, field);
-            for level in field.levels() {
-                content.u32(level.to_bits());
+    let content = in_memory(|out| {
+        encode_mass(out, shape)?;
+        match &shape.field {
+            Field::Sphere(radius) => out.f64(*radius),
+            Field::Sampled(field) => {
+                encode_grid(out, field)?;
+                out.reals(field.levels())
             }
         }
-    }
-    hex(&Sha256::digest(content.finish()))
+    });
+    hex(&Sha256::digest(content))
 }
 
-fn encode_provenance(out: &mut Encoder, p: &Provenance) {
+fn encode_provenance(out: &mut Encoder, p: &Provenance) -> io::Result<()> {
     for text in [&p.method, &p.source, &p.source_sha256, &p.program_version] {
-        out.text(text);
+        out.text(text)?;
     }
-    out.u32(p.parameters.len() as u32);
+    out.u32(p.parameters.len() as u32)?;
     for (name, value) in &p.parameters {
-        out.text(name);
-        out.text(value);
+        out.text(name)?;
+        out.text(value)?;
     }
-    out.vec(p.centroid);
-    for part in p.rotation.to_array() {
-        out.f64(part);
-    }
-    out.f64(p.scale);
+    out.vector(p.centroid)?;
+    out.quaternion(p.rotation)?;
+    out.f64(p.scale)
 }
 
-fn decode_provenance(from: &mut Decoder) -> Option<Provenance> {
+fn decode_provenance(from: &mut Decoder) -> io::Result<Provenance> {
     let (method, source) = (from.text()?, from.text()?);
     let (source_sha256, program_version) = (from.text()?, from.text()?);
-    let count = from.u32()?;
-    let parameters = (0..count)
-        .map(|_| Some((from.text()?, from.text()?)))
-        .collect::<Option<_>>()?;
-    let centroid = from.vec()?;
-    let rotation = DQuat::from_xyzw(from.f64()?, from.f64()?, from.f64()?, from.f64()?);
-    Some(Provenance {
+    let count = from.u32()? as usize;
+    Ok(Provenance {
         method,
         source,
         source_sha256,
-        parameters,
+        parameters: from.list(count, |from| Ok((from.text()?, from.text()?)))?,
         program_version,
-        centroid,
-        rotation,
+        centroid: from.vector()?,
+        rotation: from.quaternion()?,
         scale: from.f64()?,
     })
 }
 
 /// Encodes volume, inertia, bounds and nodes.
-fn encode_mass(out: &mut Encoder, shape: &Shape) {
-    out.f64(shape.volume);
+fn encode_mass(out: &mut Encoder, shape: &Shape) -> io::Result<()> {
+    out.f64(shape.volume)?;
     for v in [shape.inertia, shape.lower, shape.upper] {
-        out.vec(v);
+        out.vector(v)?;
     }
-    out.f64(shape.bounding_radius);
-    out.u32(shape.nodes.len() as u32);
+    out.f64(shape.bounding_radius)?;
+    out.u32(shape.nodes.len() as u32)?;
     for node in &shape.nodes {
-        out.vec(node.position);
-        out.f64(node.area);
+        out.vector(node.position)?;
+        out.f64(node.area)?;
     }
+    Ok(())
 }
 
-fn encode_measures(out: &mut Encoder, shape: &Shape) {
-    encode_mass(out, shape);
+fn encode_measures(out: &mut Encoder, shape: &Shape) -> io::Result<()> {
+    encode_mass(out, shape)?;
     let m = &shape.morphology;
-    for value in [
-        m.a,
-        m.b,
-        m.c,
-        m.area,
-        m.krumbein_sphericity,
-        m.wadell_sphericity,
-    ] {
-        out.f64(value);
-    }
-    out.option(m.wadell_roundness);
-    out.option(m.convexity);
-    out.option(m.inscribed_radius);
+    out.reals(&[m.a, m.b, m.c, m.area])?;
+    out.reals(&[m.krumbein_sphericity, m.wadell_sphericity])?;
+    out.option(m.wadell_roundness)?;
+    out.option(m.convexity)?;
+    out.option(m.inscribed_radius)?;
     for n in 0..3 {
-        out.option(m.feret.map(|lengths| lengths[n]));
+        out.option(m.feret.map(|lengths| lengths[n]))?;
     }
-    out.option(shape.quality.map(|q| q.gradient_error));
-    out.option(shape.quality.and_then(|q| q.volume_error));
+    out.option(shape.quality.map(|q| q.gradient_error))?;
+    out.option(shape.quality.and_then(|q| q.volume_error))
 }
 
-fn decode(body: &[u8], version: u32) -> Option<Shape> {
-    let mut from = Decoder::new(body);
-    let provenance = decode_provenance(&mut from)?;
+fn decode(from: &mut Decoder, version: u32) -> io::Result<Shape> {
+    let provenance = decode_provenance(from)?;
     let volume = from.f64()?;
-    let (inertia, lower, upper) = (from.vec()?, from.vec()?, from.vec()?);
+    let (inertia, lower, upper) = (from.vector()?, from.vector()?, from.vector()?);
     let bounding_radius = from.f64()?;
-    let count = from.u32()?;
-    let nodes = (0..count)
-        .map(|_| {
-            Some(SurfaceNode {
-                position: from.vec()?,
-                area: from.f64()?,
-            })
+    let count = from.u32()? as usize;
+    let nodes = from.list(count, |from| {
+        Ok(SurfaceNode {
+            position: from.vector()?,
+            area: from.f64()?,
         })
-        .collect::<Option<Vec<_>>>()?;
+    })?;
     let mut morphology = Morphology {
         a: from.f64()?,
         b: from.f64()?,
@@ -249,59 +236,53 @@ fn decode(body: &[u8], version: u32) -> Option<Shape> {
     let volume_error = from.option()?;
     let field = match from.u8()? {
         0 => Field::Sphere(from.f64()?),
-        1 => Field::Sampled(decode_grid(&mut from)?),
-        _ => return None,
+        1 => Field::Sampled(decode_grid(from)?),
+        other => return Err(invalid(format!("field of kind {other}"))),
     };
     let finite = inertia.is_finite() && lower.is_finite() && upper.is_finite();
     let positive = [volume, bounding_radius, morphology.a, inertia.min_element()];
-    (from.is_empty() && finite && positive.iter().all(|v| v.is_finite() && *v > 0.0)).then(|| {
-        Shape {
-            field,
-            nodes,
-            volume,
-            inertia,
-            lower,
-            upper,
-            bounding_radius,
-            morphology,
-            quality: gradient_error.map(|gradient_error| Quality {
-                gradient_error,
-                volume_error,
-            }),
-            provenance,
-        }
+    if !finite || positive.iter().any(|v| !v.is_finite() || *v <= 0.0) {
+        return Err(invalid("a size is not positive"));
+    }
+    Ok(Shape {
+        field,
+        nodes,
+        volume,
+        inertia,
+        lower,
+        upper,
+        bounding_radius,
+        morphology,
+        quality: gradient_error.map(|gradient_error| Quality {
+            gradient_error,
+            volume_error,
+        }),
+        provenance,
     })
 }
 
-fn encode_grid(out: &mut Encoder, field: &SampledField) {
-    out.vec(field.lower());
-    out.f64(field.spacing());
-    out.f64(field.quantum());
-    for n in field.dims() {
-        out.u32(n as u32);
-    }
+fn encode_grid(out: &mut Encoder, field: &SampledField) -> io::Result<()> {
+    out.vector(field.lower())?;
+    out.f64(field.spacing())?;
+    out.f64(field.quantum())?;
+    (field.dims().into_iter()).try_for_each(|n| out.u32(n as u32))
 }
 
-fn decode_grid(from: &mut Decoder) -> Option<SampledField> {
-    let lower = from.vec()?;
+fn decode_grid(from: &mut Decoder) -> io::Result<SampledField> {
+    let lower = from.vector()?;
     let (spacing, quantum) = (from.f64()?, from.f64()?);
-    let dims = [
-        from.u32()? as usize,
-        from.u32()? as usize,
-        from.u32()? as usize,
-    ];
-    let samples = dims
-        .iter()
-        .try_fold(1u64, |n, d| n.checked_mul(*d as u64))?;
-    let sound = lower.is_finite()
+    let dims = [from.u32()?, from.u32()?, from.u32()?].map(|n| n as usize);
+    let samples = (dims.iter()).try_fold(1u64, |n, d| n.checked_mul(*d as u64));
+    let valid = lower.is_finite()
         && [spacing, quantum].iter().all(|v| v.is_finite() && *v > 0.0)
         && dims.iter().all(|n| *n >= 2)
-        && samples <= crate::field::MAX_SAMPLES;
-    if !sound {
-        return None;
-    }
-    let levels = levels::unpack(from.bytes()?, dims)?;
-    Some(SampledField::from_levels(
+        && samples.is_some_and(|n| n <= crate::field::MAX_SAMPLES);
+    let levels = match valid {
+        true => levels::unpack(&from.bytes()?, dims),
+        false => None,
+    };
+    let levels = levels.ok_or_else(|| invalid("the distance field"))?;
+    Ok(SampledField::from_levels(
         lower, spacing, dims, quantum, levels,
     ))
 }
@@ -310,6 +291,9 @@ fn decode_grid(from: &mut Decoder) -> Option<SampledField> {
 mod tests {
     use super::*;
     use crate::{ShapeOptions, analytic};
+
+    /// Length of signature, version and body length.
+    const HEAD: usize = 8 + 4 + 8;
 
     fn egg() -> Shape {
         let options = ShapeOptions {

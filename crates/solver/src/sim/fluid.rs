@@ -3,9 +3,9 @@
 use std::io;
 
 use glam::DVec3;
+use grainwake_formats::codec::{Decoder, Encoder};
 
 use super::Setup;
-use super::state::{Reader, Writer};
 use crate::dem::Grain;
 use crate::flow::{Flow, FlowMeasures, FluidParams};
 use crate::immersed::{CoupledGrains, ImmersedGrains, RigidStep, StepInput};
@@ -34,9 +34,9 @@ pub(super) trait Fluid: Send + Sync {
     fn poisson_stages(&self) -> Stages;
     /// Memory held [bytes].
     fn bytes(&self) -> usize;
-    fn save(&self, out: &mut Writer) -> io::Result<()>;
+    fn save(&self, out: &mut Encoder) -> io::Result<()>;
     /// Reads what `save` wrote; `last_step` [s] is the length of the last step.
-    fn restore(&mut self, input: &mut Reader, last_step: f64) -> io::Result<()>;
+    fn restore(&mut self, input: &mut Decoder, last_step: f64) -> io::Result<()>;
 }
 
 /// Builds the fluid of a set-up at t = 0.
@@ -110,28 +110,28 @@ impl<R: Real> Fluid for FluidOf<R> {
     fn bytes(&self) -> usize {
         self.flow.bytes() + self.grains.bytes()
     }
-    fn save(&self, out: &mut Writer) -> io::Result<()> {
-        out.count(R::BYTES as u64)?;
+    fn save(&self, out: &mut Encoder) -> io::Result<()> {
+        out.u64(R::BYTES as u64)?;
         let m = &self.measures;
-        out.numbers(&[
+        out.reals(&[
             m.max_divergence,
             m.max_rate,
             m.max_velocity,
             m.kinetic_energy,
         ])?;
-        out.numbers(&m.momentum.to_array())?;
+        out.vector(m.momentum)?;
         let (fields, sums) = self.flow.state();
         let layout = self.flow.mesh().layout();
         for values in fields {
-            out.count(layout.entries() as u64)?;
+            out.u64(layout.entries() as u64)?;
             for row in layout.rows(values) {
-                out.numbers(row)?;
+                out.reals(row)?;
             }
         }
-        out.count(sums.len() as u64)?;
-        out.numbers(sums)
+        out.u64(sums.len() as u64)?;
+        out.reals(sums)
     }
-    fn restore(&mut self, input: &mut Reader, last_step: f64) -> io::Result<()> {
+    fn restore(&mut self, input: &mut Decoder, last_step: f64) -> io::Result<()> {
         input.expect(R::BYTES, "bytes a number")?;
         let m = &mut self.measures;
         [
@@ -140,7 +140,7 @@ impl<R: Real> Fluid for FluidOf<R> {
             m.max_velocity,
             m.kinetic_energy,
         ] = input.numbers()?;
-        m.momentum = DVec3::from_array(input.numbers()?);
+        m.momentum = input.vector()?;
         let layout = self.flow.mesh().layout();
         let (fields, sums) = self.flow.state_mut(last_step);
         for values in fields {

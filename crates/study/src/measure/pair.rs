@@ -5,7 +5,8 @@
 //! first landing of a grain.
 
 use glam::{DQuat, DVec3};
-use grainwake_report::run_folder::{Event, History, Kind, RunFolder};
+use grainwake_formats::events::{Event, EventKind};
+use grainwake_report::run_folder::{History, RunFolder};
 use grainwake_report::story::{Scales, Story};
 use serde::{Deserialize, Serialize};
 
@@ -101,24 +102,27 @@ impl PairMeasures {
     pub fn from_history(pair: &PairHistory) -> PairMeasures {
         let ends = pair.grains.iter().filter_map(|h| h.time.last());
         let end = ends.fold(f64::INFINITY, |a, b| a.min(*b));
-        let landing = pair.first(&Kind::Landing, 0.0);
+        let landing = pair.first(EventKind::Landing, 0.0);
         let until = landing.unwrap_or(end);
         let before = |time: &f64| *time <= until;
-        let count = |kind: &Kind| {
+        let count = |kind: EventKind| {
             let counted = pair
                 .events
                 .iter()
-                .filter(|e| e.kind == *kind && e.time <= until);
+                .filter(|e| e.kind == kind && e.time <= until);
             Some(counted.count() as f64)
         };
-        let kiss = pair.first(&Kind::Kiss, 0.0).filter(before);
-        let after_kiss = |kind: &Kind| pair.first(kind, kiss?).filter(before);
-        let (tumble, pass) = (after_kiss(&Kind::Tumble), after_kiss(&Kind::RoleChange));
-        let separation = after_kiss(&Kind::Separation);
+        let kiss = pair.first(EventKind::Kiss, 0.0).filter(before);
+        let after_kiss = |kind: EventKind| pair.first(kind, kiss?).filter(before);
+        let (tumble, pass) = (
+            after_kiss(EventKind::Tumble),
+            after_kiss(EventKind::RoleChange),
+        );
+        let separation = after_kiss(EventKind::Separation);
         let contact_end = separation.unwrap_or(until);
         let per_second = 1.0 / pair.scales.time();
         let scaled = |time: Option<f64>| time.map(|s| s * per_second);
-        let kisses = count(&Kind::Kiss);
+        let kisses = count(EventKind::Kiss);
         let late_drafting = kiss.map(|k| (0.5 * k, k));
         let draft = |g: usize| late_drafting.and_then(|(from, to)| pair.mean_speed(g, from, to));
         let angle = |g: usize| {
@@ -137,7 +141,7 @@ impl PairMeasures {
             landing_time: scaled(landing),
             repeated: kisses.map(|n| n > 1.0),
             kisses,
-            role_changes: count(&Kind::RoleChange),
+            role_changes: count(EventKind::RoleChange),
             closest,
             closest_gap: None,
             final_distance: last,
@@ -172,9 +176,9 @@ fn closest_gap(run: &RunFolder, until: f64) -> Option<f64> {
 
 impl PairHistory<'_> {
     /// Time of the first event of a kind from a time on [s].
-    fn first(&self, kind: &Kind, from: f64) -> Option<f64> {
+    fn first(&self, kind: EventKind, from: f64) -> Option<f64> {
         let mut events = self.events.iter();
-        Some(events.find(|e| e.kind == *kind && e.time >= from)?.time)
+        Some(events.find(|e| e.kind == kind && e.time >= from)?.time)
     }
 
     /// Smallest and last distance of the centres up to a time [d].

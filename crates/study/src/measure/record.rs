@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
+use grainwake_formats::summary::Summary;
 use grainwake_report::run_folder::RunFolder;
-use grainwake_solver::output::provenance::Provenance;
-use grainwake_solver::output::read_summary;
+use grainwake_run::provenance::Provenance;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -83,7 +83,7 @@ impl RunRecord {
 
     /// Fills in the measured values of a finished run.
     fn measure(&mut self, folder: &Path) {
-        if let Ok(summary) = read_summary(folder) {
+        if let Ok(summary) = Summary::read(folder) {
             let count = summary.grains.len();
             let sum: f64 = summary.grains.iter().map(|g| g.equivalent_diameter_m).sum();
             self.diameter_m = (count > 0).then(|| sum / count as f64);

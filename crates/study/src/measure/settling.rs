@@ -5,8 +5,9 @@
 use std::collections::BTreeMap;
 
 use glam::{DQuat, DVec3};
+use grainwake_formats::events::EventKind;
 use grainwake_report::figure::{Body, bodies};
-use grainwake_report::run_folder::{History, Kind, RunFolder};
+use grainwake_report::run_folder::{History, RunFolder};
 use grainwake_report::story::{Scales, Story};
 use serde::{Deserialize, Serialize};
 
@@ -168,7 +169,7 @@ impl GrainSettling {
         let history = &run.grains[grain];
         let facts = run.facts.grains.get(grain);
         let diameter = facts.and_then(|f| f.diameter).unwrap_or(scales.diameter);
-        let mut landings = run.events.iter().filter(|e| e.kind == Kind::Landing);
+        let mut landings = run.events.iter().filter(|e| e.kind == EventKind::Landing);
         let landing = landings.find(|e| e.grains.contains(&grain)).map(|e| e.time);
         let last = *history.time.last().unwrap_or(&0.0);
         let until = landing.unwrap_or(last).min(last);
@@ -291,12 +292,8 @@ mod tests {
     }
 
     fn land(run: &mut RunFolder, grain: usize, time: f64) {
-        run.events.push(grainwake_report::run_folder::Event {
-            time,
-            kind: Kind::Landing,
-            grains: vec![grain],
-            details: Vec::new(),
-        });
+        let landing = grainwake_formats::events::Event::new(EventKind::Landing, time, &[grain]);
+        run.events.push(landing);
     }
 
     #[test]

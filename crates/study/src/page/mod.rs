@@ -7,7 +7,7 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::case::Problem;
+use grainwake_run::case::Problem;
 use rayon::prelude::*;
 
 use self::figure::{FigureData, StudyFigure};

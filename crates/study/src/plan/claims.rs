@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use grainwake_solver::case::{Loc, Problem, Source};
+use grainwake_run::case::{Loc, Problem, Source};
 use serde::{Deserialize, Serialize};
 
 use super::expand::Model;

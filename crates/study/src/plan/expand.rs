@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::case::{Loc, Problem, Source};
+use grainwake_run::case::{Loc, Problem, Source};
 use toml::Value;
 
 use super::raw::{Keys, RawAxis, RawModel, RawSet, RawStudy, RawValue};

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::case::{Loc, Problem, Source, parse_length};
+use grainwake_run::case::{Loc, Problem, Source, parse_length};
 
 use super::claims::Analysis;
 use super::expand::{self, Model};

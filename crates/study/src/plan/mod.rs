@@ -12,7 +12,7 @@ pub mod selection;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::case::{Case, CaseError};
+use grainwake_run::case::{Case, CaseError};
 use serde::{Deserialize, Serialize};
 
 use self::claims::Analysis;

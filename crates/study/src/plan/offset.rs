@@ -1,6 +1,6 @@
 //! Random offsets of the members of an ensemble.
 
-use grainwake_solver::case::{Case, Problem};
+use grainwake_run::case::{Case, Problem};
 use sha2::{Digest, Sha256};
 
 use super::expand::Model;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use grainwake_solver::case::Loc;
+use grainwake_run::case::Loc;
 use serde::Deserialize;
 use toml::Value;
 

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use grainwake_solver::case::estimate::Estimate;
-use grainwake_solver::case::{Case, CaseError, Problem};
-use grainwake_solver::output::provenance::Provenance;
+use grainwake_run::case::estimate::Estimate;
+use grainwake_run::case::{Case, CaseError, Problem};
+use grainwake_run::provenance::Provenance;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 

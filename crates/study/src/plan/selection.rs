@@ -1,6 +1,6 @@
 //! Selection of runs: `--only`.
 
-use grainwake_solver::case::Problem;
+use grainwake_run::case::Problem;
 
 use super::Run;
 use crate::error::did_you_mean;

@@ -8,10 +8,11 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use grainwake_solver::output::checkpoint;
-use grainwake_solver::output::lock::{self, Asked};
-use grainwake_solver::output::{self, Ending, Existing, Observer, Progress, RunError, Summary};
-use grainwake_solver::sim::events::Event;
+use grainwake_formats::events::Event;
+use grainwake_formats::summary::Summary;
+use grainwake_run::checkpoint;
+use grainwake_run::lock::{self, Attempt};
+use grainwake_run::{Ending, Existing, Observer, Progress, RunError};
 
 use self::state::{RunState, run_state};
 use crate::error::{At, StudyError};
@@ -154,7 +155,7 @@ impl Job<'_> {
     }
 
     fn execute(&self) -> Result<Outcome, RunError> {
-        let Asked::Taken(_lock) = self.lock()? else {
+        let Attempt::Acquired(_lock) = self.lock()? else {
             return Ok(Outcome::Locked);
         };
         let folder = self.run.folder(self.study);
@@ -185,12 +186,12 @@ impl Job<'_> {
         }
         self.observer.started(self.index);
         let simulate = |existing: Existing| {
-            let options = output::Options {
+            let options = grainwake_run::Options {
                 existing,
                 command: self.options.command.clone(),
                 threads: self.options.threads,
             };
-            output::run(case.job(), &folder, &options, &mut Forward(self))
+            grainwake_run::run(case.job(), &folder, &options, &mut Forward(self))
         };
         let ending = match simulate(existing) {
             Err(error @ RunError::NoCheckpoint { .. }) => {
@@ -214,10 +215,10 @@ impl Job<'_> {
     }
 
     /// Locks the run for this program; the lock ends with the process at the latest.
-    fn lock(&self) -> Result<Asked, RunError> {
+    fn lock(&self) -> Result<Attempt, RunError> {
         let folder = self.study.join("locks");
         let path = folder.join(format!("{}.lock", self.run.name));
-        let taken = std::fs::create_dir_all(&folder).and_then(|()| lock::take(&path));
+        let taken = std::fs::create_dir_all(&folder).and_then(|()| lock::acquire(&path));
         taken.map_err(|source| RunError::Io {
             action: "lock",
             path,

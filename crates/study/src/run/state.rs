@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use grainwake_solver::output::provenance::Provenance;
-use grainwake_solver::output::{RESOLVED, SUMMARY};
+use grainwake_formats::summary;
+use grainwake_run::RESOLVED;
+use grainwake_run::provenance::Provenance;
 
 use crate::plan::{Run, end_condition};
 
@@ -58,7 +59,7 @@ pub(crate) fn run_state_for(
     if (found.version.as_str(), found.commit.as_deref()) != (version, commit) {
         return RunState::Stale("another version of the program produced it");
     }
-    if folder.join(SUMMARY).is_file() {
+    if folder.join(summary::FILE).is_file() {
         let resolved = std::fs::read_to_string(folder.join(RESOLVED)).unwrap_or_default();
         return if end_condition(&resolved) == run.ending {
             RunState::Finished

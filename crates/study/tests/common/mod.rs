@@ -73,7 +73,7 @@ pub fn plan(path: &Path) -> Result<Plan, StudyError> {
 }
 
 /// Returns the problems of an invalid study.
-pub fn problems(study: &str) -> Vec<grainwake_solver::case::Problem> {
+pub fn problems(study: &str) -> Vec<grainwake_run::case::Problem> {
     let (_folder, path) = folder(study);
     match plan(&path) {
         Err(StudyError::Invalid(problems)) => problems,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use grainwake_plot::{equal_aspect, style};
 use grainwake_report::figure::field::{Quantity, Style};
-use grainwake_solver::case::{Loc, Problem, Source};
+use grainwake_run::case::{Loc, Problem, Source};
 
 use super::raw::{
     Colour, Coordinates, FieldQuantity, Line, Mark, RawAxis, RawField, RawFigure, RawHistory,

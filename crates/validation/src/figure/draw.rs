@@ -7,8 +7,8 @@ use grainwake_plot::style::FAINT;
 use grainwake_plot::{minus, plain};
 use grainwake_report::figure::field::{self, Panel};
 
-use grainwake_solver::output::SUMMARY;
-use grainwake_solver::output::vti::Image;
+use grainwake_formats::summary;
+use grainwake_formats::vti::Image;
 
 use super::plot::{self, DataSet};
 use super::{Content, Data, Figure, Picture, Point, Series};
@@ -128,7 +128,7 @@ impl Figure {
 /// Returns the folder of a finished run.
 fn finished(runs: &Path, name: &str) -> Result<PathBuf, Omission> {
     let folder = runs.join(name);
-    if folder.join(SUMMARY).is_file() {
+    if folder.join(summary::FILE).is_file() {
         Ok(folder)
     } else {
         Err(Omission::Run(name.to_owned()))

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use grainwake_plot::style;
-use grainwake_solver::case::Loc;
+use grainwake_run::case::Loc;
 use serde::Deserialize;
 
 use crate::columns::TableSource;

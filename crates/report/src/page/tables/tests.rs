@@ -1,3 +1,5 @@
+use grainwake_formats::events::EventKind;
+
 use super::*;
 
 #[test]
@@ -10,13 +12,16 @@ fn durations_and_times_read_well() {
         [0.0, 0.123_456_7, 12.345_678].map(precise),
         ["0", "0.12346", "12.346"]
     );
-    assert_eq!(detail("gap", "1.25e-5"), "gap 0.0125 mm");
-    assert_eq!(
-        detail("tilt", "0.7853981633974483"),
-        "pair 45.0° from the vertical"
-    );
-    assert_eq!(detail("confirmed", "0.25"), "certain at 0.25000 s");
-    assert_eq!(detail("my_key", "7"), "my\\_key 7");
+    let mut event = Event::new(EventKind::Separation, 0.2, &[0, 1]);
+    event.confirmed = 0.25;
+    event.gap = Some(1.25e-5);
+    event.tilt = Some(std::f64::consts::FRAC_PI_4);
+    let expected = [
+        "certain at 0.25000 s",
+        "gap 0.0125 mm",
+        "pair 45.0° from the vertical",
+    ];
+    assert_eq!(details(&event), expected);
 }
 
 #[test]

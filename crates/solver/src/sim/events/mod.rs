@@ -10,6 +10,8 @@ mod tracker;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+pub use grainwake_formats::events::{Event, EventKind};
+
 use crate::dem::{Dof, Grain};
 
 pub use tracker::{Tracker, TrackerState};
@@ -50,55 +52,6 @@ impl Phase {
             Phase::Separated => "separated",
         }
     }
-}
-
-/// Kind of event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum EventKind {
-    /// The pair comes into contact.
-    Kiss,
-    /// After a kiss, the line of centres has turned past `EventParams::tumble_angle`.
-    Tumble,
-    /// The upper grain has passed the lower one.
-    RoleChange,
-    /// The pair has parted.
-    Separation,
-    /// A grain touches the floor for the first time.
-    Landing,
-}
-
-impl EventKind {
-    /// Name as written in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            EventKind::Kiss => "kiss",
-            EventKind::Tumble => "tumble",
-            EventKind::RoleChange => "role-change",
-            EventKind::Separation => "separation",
-            EventKind::Landing => "landing",
-        }
-    }
-}
-
-/// Something that happened. One line of `events.jsonl`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Event {
-    /// When it happened [s]: for a separation the end of the contact, for a role change the
-    /// moment of equal height.
-    pub time: f64,
-    /// What happened.
-    pub event: EventKind,
-    /// To which grains.
-    pub grains: Vec<usize>,
-    /// When it was certain [s]; a separation and a role change need some distance first.
-    pub confirmed: f64,
-    /// Gap between the surfaces of the pair when confirmed [m].
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub gap: Option<f64>,
-    /// Angle of the line of centres from the vertical when confirmed [rad], 0 to pi/2.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub tilt: Option<f64>,
 }
 
 /// Thresholds. `for_grains` chooses them from the grains and gravity.

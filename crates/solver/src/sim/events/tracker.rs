@@ -156,9 +156,9 @@ impl Tracker {
         }
         self.state
             .events
-            .extend(happened.into_iter().map(|(event, at)| Event {
+            .extend(happened.into_iter().map(|(kind, at)| Event {
                 time: at,
-                event,
+                kind,
                 grains: vec![0, 1],
                 confirmed: time,
                 gap: Some(gap),
@@ -178,10 +178,10 @@ impl Tracker {
             {
                 *landed = Some(time);
                 let grains = vec![contact.grain];
-                let event = EventKind::Landing;
+                let kind = EventKind::Landing;
                 self.state.events.push(Event {
                     time,
-                    event,
+                    kind,
                     grains,
                     confirmed: time,
                     gap: None,
@@ -266,15 +266,15 @@ impl Tracker {
             .events
             .iter()
             .rev()
-            .find(|e| matches!(e.event, EventKind::Separation | EventKind::Kiss))?;
-        (last.event == EventKind::Separation).then_some(last.time)
+            .find(|e| matches!(e.kind, EventKind::Separation | EventKind::Kiss))?;
+        (last.kind == EventKind::Separation).then_some(last.time)
     }
     /// Number of role changes.
     pub fn role_changes(&self) -> usize {
         self.state
             .events
             .iter()
-            .filter(|e| e.event == EventKind::RoleChange)
+            .filter(|e| e.kind == EventKind::RoleChange)
             .count()
     }
     /// First contact of each grain with the floor [s].
@@ -289,7 +289,7 @@ impl Tracker {
         self.state
             .events
             .iter()
-            .find(|e| e.event == kind)
+            .find(|e| e.kind == kind)
             .map(|e| e.time)
     }
 
@@ -384,7 +384,7 @@ mod tests {
     #[test]
     fn phases_of_a_pair_come_in_order() {
         let tracker = follow(&dkt());
-        let kinds: Vec<EventKind> = tracker.events().iter().map(|e| e.event).collect();
+        let kinds: Vec<EventKind> = tracker.events().iter().map(|e| e.kind).collect();
         assert_eq!(
             kinds,
             [
@@ -449,7 +449,7 @@ mod tests {
             (5.0, 0.0, 0.999),
         ];
         let tracker = follow(&path);
-        let kinds: Vec<EventKind> = tracker.events().iter().map(|e| e.event).collect();
+        let kinds: Vec<EventKind> = tracker.events().iter().map(|e| e.kind).collect();
         assert_eq!(
             kinds,
             [EventKind::Kiss, EventKind::Separation, EventKind::Kiss]
@@ -494,7 +494,7 @@ mod tests {
             None,
         );
         assert_eq!(
-            (events.len(), events[0].event, events[0].grains.as_slice()),
+            (events.len(), events[0].kind, events[0].grains.as_slice()),
             (1, EventKind::Landing, &[0][..])
         );
         assert_eq!(tracker.holds_since(StopWhen::Landing, &grains), None);

@@ -17,8 +17,8 @@ use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::Marker;
 use grainwake_plot::style::{INK, SMALL, TEXT};
 use grainwake_plot::text;
-use grainwake_solver::case::Case;
-use grainwake_solver::output::RESOLVED;
+use grainwake_run::RESOLVED;
+use grainwake_run::case::Case;
 
 use crate::analysis::correlation::Correlation;
 use crate::measure::record::RunRecord;

@@ -5,7 +5,7 @@ use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, length_unit, outlin
 use grainwake_plot::style::{BLUE, COLUMN, FAINT, HAIR, INK, SMALL, VERMILION};
 use grainwake_plot::text;
 use grainwake_report::figure::silhouette::{Body, Outline};
-use grainwake_solver::case::Case;
+use grainwake_run::case::Case;
 use grainwake_solver::dem::Grain;
 
 use super::grains::arrow;

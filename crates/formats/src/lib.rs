@@ -1,0 +1,28 @@
+//! File formats of Grainwake. Each format has one type that is written and read here:
+//!
+//! | file | module |
+//! |---|---|
+//! | `slices/*.vti`, `fields/*.vti` (VTK image data) | [`vti`] |
+//! | `grains/*.vtp` (VTK polygonal data) | [`vtp`] |
+//! | `run.pvd` (ParaView collection) | [`pvd`] |
+//! | `grains.csv`, `diagnostics.csv` | [`grains`], [`diagnostics`], [`table`] |
+//! | `events.jsonl` | [`events`] |
+//! | `summary.json` | [`summary`] |
+//! | `.grain` files and checkpoints (binary encoding) | [`codec`] |
+//!
+//! The crate knows no shape, no solver and no case file.
+
+pub mod atomic_file;
+pub mod codec;
+pub mod diagnostics;
+mod error;
+pub mod events;
+pub mod grains;
+pub mod pvd;
+pub mod summary;
+pub mod table;
+pub mod vti;
+mod vtk_xml;
+pub mod vtp;
+
+pub use error::{FormatError, read_text};

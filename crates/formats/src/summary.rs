@@ -1,0 +1,96 @@
+//! Results of a run (`summary.json`).
+
+use std::io;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::atomic_file::write_atomically;
+use crate::events::Event;
+
+/// Name of the file in a run folder; it is written last.
+pub const FILE: &str = "summary.json";
+
+/// Results of a run. The JSON names are stable; the names of a pair's results are at the top level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Steps taken.
+    pub steps: u64,
+    /// Simulated time at the end [s].
+    pub end_time_s: f64,
+    /// Wall-clock time of all sessions [s].
+    pub wall_s: f64,
+    /// Events in the order of their confirmation.
+    pub events: Vec<Event>,
+    /// Largest |div u| after any step [1/s].
+    pub max_divergence: f64,
+    /// Largest CFL number of any step.
+    pub max_cfl: f64,
+    /// Reason of the end: "end", "landing", "rest" or "separation".
+    pub ended_by: String,
+    /// Results of a pair.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub pair: Option<PairSummary>,
+    /// Each grain.
+    pub grains: Vec<GrainSummary>,
+}
+
+/// Results of a pair.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PairSummary {
+    /// First contact [s].
+    pub kiss_time_s: Option<f64>,
+    /// Start of the tumbling: the line of centres passes 45 degrees after the kiss [s].
+    pub tumble_time_s: Option<f64>,
+    /// Last separation; none while the grains are together [s].
+    pub separation_time_s: Option<f64>,
+    /// Number of times the upper grain has passed the lower one.
+    pub role_changes: usize,
+    /// Phase at the end.
+    pub phase: String,
+}
+
+/// Results of one grain.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GrainSummary {
+    /// Diameter of the sphere of equal volume [m].
+    pub equivalent_diameter_m: f64,
+    /// Density [kg/m3].
+    pub density: f64,
+    /// Largest speed along gravity after any step [m/s].
+    pub peak_settling_speed_m_per_s: f64,
+    /// First contact with the floor [s].
+    pub landing_time_s: Option<f64>,
+    /// Centroid at the end [m].
+    pub position_m: [f64; 3],
+}
+
+impl Summary {
+    /// Reads the summary of a finished run from its folder.
+    ///
+    /// # Errors
+    /// `InvalidData` for a damaged file, or errors of the operating system.
+    pub fn read(run: &Path) -> io::Result<Summary> {
+        let text = std::fs::read_to_string(run.join(FILE))?;
+        serde_json::from_str(&text).map_err(io::Error::from)
+    }
+
+    /// Writes the summary into the folder of a run, durably.
+    ///
+    /// # Errors
+    /// Errors of the operating system.
+    pub fn write(&self, run: &Path) -> io::Result<()> {
+        write_json(&run.join(FILE), true, self)
+    }
+}
+
+/// Writes a value as indented JSON with a final line break; with `sync`, durably.
+///
+/// # Errors
+/// Errors of the operating system.
+pub fn write_json(path: &Path, sync: bool, value: &impl Serialize) -> io::Result<()> {
+    write_atomically(path, sync, |out| {
+        serde_json::to_writer_pretty(&mut *out, value)?;
+        writeln!(out)
+    })
+}

@@ -1,0 +1,87 @@
+//! CSV tables of numbers with named columns.
+
+use std::path::Path;
+
+use crate::error::{FormatError, file_name, read_text};
+
+/// Table of numbers; an empty cell is NaN.
+#[derive(Clone, Debug, Default)]
+pub struct Table {
+    names: Vec<String>,
+    columns: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// Reads a table. An unfinished last line is left out and noted.
+    ///
+    /// # Errors
+    /// [`FormatError`] with the first damaged line.
+    pub fn read(file: &Path, notes: &mut Vec<String>) -> Result<Table, FormatError> {
+        let mut text = read_text(file)?;
+        let complete = text.rfind('\n').map_or(0, |end| end + 1);
+        let unfinished = !text[complete..].trim().is_empty() && complete > 0;
+        if unfinished {
+            let lines = text.lines().count();
+            notes.push(format!(
+                "{}: the last line (line {lines}) is unfinished and was left out",
+                file_name(file)
+            ));
+            text.truncate(complete);
+        }
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let mut records = reader.records();
+        let damaged = |record: &csv::StringRecord, what: String| {
+            let line = record.position().map_or(1, csv::Position::line);
+            FormatError::line(file, line as usize, what)
+        };
+        let broken = |error: csv::Error| {
+            let line = error.position().map_or(1, csv::Position::line);
+            FormatError::line(file, line as usize, error.to_string())
+        };
+        let header = records
+            .next()
+            .ok_or_else(|| FormatError::line(file, 1, "no header"))?
+            .map_err(broken)?;
+        let names: Vec<String> = header.iter().map(str::to_owned).collect();
+        if names.iter().any(String::is_empty) {
+            return Err(damaged(&header, "a column without a name".to_owned()));
+        }
+        let mut columns = vec![Vec::new(); names.len()];
+        for record in records {
+            let record = record.map_err(broken)?;
+            if record.len() != names.len() {
+                let what = format!("{} values under {} columns", record.len(), names.len());
+                return Err(damaged(&record, what));
+            }
+            for ((cell, column), name) in record.iter().zip(&mut columns).zip(&names) {
+                column.push(match cell {
+                    "" => f64::NAN,
+                    number => number.parse().map_err(|_| {
+                        damaged(&record, format!("'{cell}' under '{name}' is not a number"))
+                    })?,
+                });
+            }
+        }
+        Ok(Table { names, columns })
+    }
+
+    /// Returns the names of the columns.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Returns the number of rows.
+    pub fn rows(&self) -> usize {
+        self.columns.first().map_or(0, Vec::len)
+    }
+
+    /// Returns a column by name.
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        let index = self.names.iter().position(|n| n == name)?;
+        self.columns.get(index).map(Vec::as_slice)
+    }
+}

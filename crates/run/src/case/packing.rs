@@ -1,0 +1,310 @@
+//! `[[packing]]` -> grains: positions on a jittered lattice or at random, orientations by seed.
+
+use glam::{DQuat, DVec3};
+
+use grainwake_solver::dem::Enclosure;
+
+/// SplitMix64: small, and the same on every machine for ever.
+pub(super) struct Random(u64);
+
+impl Random {
+    /// From a seed.
+    pub fn new(seed: u64) -> Random {
+        Random(seed)
+    }
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+    /// Evenly in 0..1.
+    pub fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+    fn point(&mut self) -> DVec3 {
+        DVec3::new(self.unit(), self.unit(), self.unit())
+    }
+    /// Evenly over all orientations (Shoemake 1992).
+    pub fn orientation(&mut self) -> DQuat {
+        let (u, a, b) = (
+            self.unit(),
+            std::f64::consts::TAU * self.unit(),
+            std::f64::consts::TAU * self.unit(),
+        );
+        let (low, high) = ((1.0 - u).sqrt(), u.sqrt());
+        DQuat::from_xyzw(low * a.sin(), low * a.cos(), high * b.sin(), high * b.cos()).normalize()
+    }
+}
+
+/// A ball that must keep clear of others.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ball {
+    /// Centre [m].
+    pub centre: DVec3,
+    /// Radius [m].
+    pub radius: f64,
+}
+
+/// Part of the box to be filled and what already stands there.
+pub(super) struct Space<'a> {
+    /// Lower corner [m].
+    pub lower: DVec3,
+    /// Upper corner [m].
+    pub upper: DVec3,
+    /// Smallest distance between balls and to the walls [m].
+    pub clearance: f64,
+    /// The box, for its periods.
+    pub enclosure: &'a Enclosure,
+    /// Balls that stand there.
+    pub taken: &'a [Ball],
+}
+
+impl Space<'_> {
+    fn free(&self, ball: Ball, placed: &[Ball]) -> bool {
+        self.taken.iter().chain(placed).all(|other| {
+            let mut arm = ball.centre - other.centre;
+            for axis in 0..3 {
+                if self.enclosure.periodic[axis] {
+                    let period = self.enclosure.size()[axis];
+                    arm[axis] -= period * (arm[axis] / period).round();
+                }
+            }
+            arm.length() >= ball.radius + other.radius + self.clearance
+        })
+    }
+
+    /// Margin that a ball of this radius keeps from the region's faces, axis by axis: none
+    /// where the region spans a periodic axis.
+    fn margin(&self, radius: f64) -> DVec3 {
+        let spans = |axis: usize| {
+            self.enclosure.periodic[axis]
+                && (self.upper - self.lower)[axis] >= self.enclosure.size()[axis] * (1.0 - 1e-9)
+        };
+        DVec3::from_array([0, 1, 2].map(|axis| {
+            if spans(axis) {
+                0.0
+            } else {
+                radius + self.clearance
+            }
+        }))
+    }
+
+    /// Random centres without overlap; the error says how many found a place.
+    pub fn random(&self, radii: &[f64], random: &mut Random) -> Result<Vec<DVec3>, usize> {
+        let mut placed: Vec<Ball> = Vec::new();
+        for &radius in radii {
+            let margin = self.margin(radius);
+            let room = self.upper - self.lower - 2.0 * margin;
+            if room.min_element() < 0.0 {
+                return Err(placed.len());
+            }
+            let found = (0..20_000).find_map(|_| {
+                let ball = Ball {
+                    centre: self.lower + margin + room * random.point(),
+                    radius,
+                };
+                self.free(ball, &placed).then_some(ball)
+            });
+            placed.push(found.ok_or(placed.len())?);
+        }
+        Ok(placed.iter().map(|ball| ball.centre).collect())
+    }
+
+    /// Centres on a cubic lattice filled layer by layer from below (along `up`), each shifted by
+    /// up to `jitter` of its free space; the error says how many sites there are.
+    pub fn lattice(
+        &self,
+        radii: &[f64],
+        jitter: f64,
+        up: (usize, f64),
+        random: &mut Random,
+    ) -> Result<Vec<DVec3>, usize> {
+        let largest = radii.iter().copied().fold(0.0, f64::max);
+        let margin = self.margin(largest);
+        let smallest_pitch = 2.0 * largest + self.clearance;
+        let room = self.upper - self.lower - 2.0 * margin;
+        if room.min_element() < 0.0 {
+            return Err(0);
+        }
+        let sites = room.to_array().map(|length| length / smallest_pitch);
+        let sites: [usize; 3] = std::array::from_fn(|axis| {
+            // A periodic axis has as many gaps as sites.
+            let whole = (sites[axis] * (1.0 + 1e-12)).floor() as usize;
+            if margin[axis] == 0.0 {
+                whole
+            } else {
+                whole + 1
+            }
+        });
+        let capacity: usize = sites.iter().product();
+        if capacity < radii.len() {
+            return Err(capacity);
+        }
+        let (axis, sign) = up;
+        let [across, along] = match axis {
+            0 => [1, 2],
+            1 => [0, 2],
+            _ => [0, 1],
+        };
+        let layer = sites[across] * sites[along];
+        let layers = radii.len().div_ceil(layer);
+        let mut pitch = DVec3::ZERO;
+        for a in 0..3 {
+            let gaps = if margin[a] == 0.0 {
+                sites[a]
+            } else {
+                sites[a] - 1
+            };
+            pitch[a] = if gaps == 0 {
+                0.0
+            } else {
+                room[a] / gaps as f64
+            };
+        }
+        // Stacked tightly along the vertical, spread evenly across.
+        pitch[axis] = if layers > 1 {
+            pitch[axis].min(1.2 * smallest_pitch)
+        } else {
+            0.0
+        };
+        let mut centres = Vec::with_capacity(radii.len());
+        for (n, &radius) in radii.iter().enumerate() {
+            let (level, rest) = (n / layer, n % layer);
+            let mut site = [0.0; 3];
+            (site[across], site[along], site[axis]) = (
+                (rest % sites[across]) as f64,
+                (rest / sites[across]) as f64,
+                level as f64,
+            );
+            let free = (pitch - smallest_pitch).max(DVec3::ZERO) + 2.0 * (largest - radius);
+            let offset = pitch * DVec3::from_array(site)
+                + jitter * 0.5 * free * (2.0 * random.point() - 1.0);
+            let corner = self.lower + margin;
+            let mut centre = corner + offset;
+            if sign < 0.0 {
+                centre[axis] = self.lower[axis] + self.upper[axis] - centre[axis];
+            }
+            // Jitter may not push a ball out of the region.
+            let inner = self.margin(radius);
+            centre = centre.max(self.lower + inner).min(self.upper - inner);
+            centres.push(centre);
+        }
+        Ok(centres)
+    }
+
+    /// Whether none of these balls meets another or one that stands there.
+    pub fn clear(&self, balls: &[Ball]) -> bool {
+        balls
+            .iter()
+            .enumerate()
+            .all(|(i, ball)| self.free(*ball, &balls[..i]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn space<'a>(enclosure: &'a Enclosure, taken: &'a [Ball]) -> Space<'a> {
+        Space {
+            lower: DVec3::ZERO,
+            upper: DVec3::new(1.0, 1.0, 3.0),
+            clearance: 0.01,
+            enclosure,
+            taken,
+        }
+    }
+
+    fn closed() -> Enclosure {
+        Enclosure {
+            lower: DVec3::ZERO,
+            upper: DVec3::new(1.0, 1.0, 3.0),
+            periodic: [false; 3],
+            solid: [[true; 2]; 3],
+        }
+    }
+
+    fn balls(centres: &[DVec3], radii: &[f64]) -> Vec<Ball> {
+        centres
+            .iter()
+            .zip(radii)
+            .map(|(centre, radius)| Ball {
+                centre: *centre,
+                radius: *radius,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn lattices_keep_clear_and_inside() {
+        for periodic in [false, true] {
+            let enclosure = Enclosure {
+                periodic: [periodic; 3],
+                ..closed()
+            };
+            let space = space(&enclosure, &[]);
+            let radii: Vec<f64> = (0..150).map(|i| 0.06 + 0.0002 * f64::from(i)).collect();
+            for jitter in [0.0, 0.5, 1.0] {
+                let centres = space
+                    .lattice(&radii, jitter, (2, 1.0), &mut Random::new(7))
+                    .unwrap();
+                assert!(
+                    space.clear(&balls(&centres, &radii)),
+                    "periodic {periodic}, jitter {jitter}"
+                );
+                if !periodic {
+                    assert!(
+                        centres
+                            .iter()
+                            .zip(&radii)
+                            .all(|(c, r)| (*c - r).min_element() >= 0.0
+                                && (*c + *r).cmple(space.upper).all())
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn random_places_are_clear_and_repeat() {
+        let (enclosure, taken) = (
+            closed(),
+            [Ball {
+                centre: DVec3::splat(0.5),
+                radius: 0.3,
+            }],
+        );
+        let space = space(&enclosure, &taken);
+        let radii = [0.1; 60];
+        let centres = space.random(&radii, &mut Random::new(3)).unwrap();
+        assert!(space.clear(&balls(&centres, &radii)));
+        assert_eq!(centres, space.random(&radii, &mut Random::new(3)).unwrap());
+        assert_ne!(centres, space.random(&radii, &mut Random::new(4)).unwrap());
+    }
+
+    #[test]
+    fn too_many_are_refused_with_the_capacity() {
+        let enclosure = closed();
+        let space = space(&enclosure, &[]);
+        assert_eq!(
+            space.lattice(&[0.4; 9], 0.0, (2, 1.0), &mut Random::new(0)),
+            Err(3)
+        );
+        let placed = space.random(&[0.4; 9], &mut Random::new(0)).unwrap_err();
+        assert!((1..4).contains(&placed));
+    }
+
+    #[test]
+    fn orientations_are_of_unit_length_and_even() {
+        let mut random = Random::new(1);
+        let mut mean = DVec3::ZERO;
+        for _ in 0..4000 {
+            let q = random.orientation();
+            assert!((q.length_squared() - 1.0).abs() < 1e-14);
+            mean += q * DVec3::Z / 4000.0;
+        }
+        assert!(mean.length() < 0.05, "{mean}");
+    }
+}

@@ -1,0 +1,108 @@
+//! `[fluid]`, `[coupling]` and `[contact]`. Defaults come from the modules that own the parameters.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+
+use super::given::{Given, OfPlace, OfTime};
+use crate::case::loc::Loc;
+use crate::case::quantity::{
+    Acceleration, Density, DynamicViscosity, KinematicViscosity, Length, Number, Quantity, Rate,
+    Stiffness, Velocity,
+};
+use grainwake_solver::dem::ContactParams;
+use grainwake_solver::flow::Advection;
+use grainwake_solver::immersed::Scheme;
+
+/// The fluid.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawFluid {
+    /// Density [kg/m3].
+    pub density: Loc<Quantity<Density>>,
+    /// Dynamic viscosity [Pa s]. Give either this or `kinematic_viscosity`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub viscosity: Option<Loc<Quantity<DynamicViscosity>>>,
+    /// Kinematic viscosity [m2/s].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kinematic_viscosity: Option<Loc<Quantity<KinematicViscosity>>>,
+    /// Uniform acceleration that drives the flow, a mean pressure gradient over density [m/s2].
+    #[serde(default)]
+    pub body_acceleration: Loc<Given<Acceleration, OfTime>>,
+    /// Velocity at the start [m/s]; it is made free of divergence.
+    #[serde(default)]
+    pub initial_velocity: Loc<Given<Velocity, OfPlace>>,
+    /// Advection scheme.
+    #[serde(default)]
+    #[schemars(schema_with = "advection_schema")]
+    pub advection: Loc<Advection>,
+}
+
+fn advection_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "enum": [Advection::Central] })
+}
+
+/// How the grains act on the grid.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawCoupling {
+    /// `aperture` (smoothed ghost-Dirichlet drag) or `paper` (Patankar 2000, as the paper does).
+    #[schemars(schema_with = "scheme_schema")]
+    pub scheme: Loc<Scheme>,
+}
+
+fn scheme_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "enum": [Scheme::Aperture, Scheme::Paper] })
+}
+
+/// Contact law (Eqs 9-18).
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawContact {
+    /// Normal stiffness k_n [N/m] (Eq. 9). Give either this or `maximum_overlap`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<Loc<Quantity<Stiffness>>>,
+    /// Derives the stiffness: largest overlap at impact, as a fraction of the smallest equal-volume
+    /// diameter. 0.01 where neither is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub maximum_overlap: Option<Loc<Quantity<Number>>>,
+    /// Tangential over normal stiffness (Eq. 14).
+    pub tangential_ratio: Loc<Quantity<Number>>,
+    /// Coulomb friction coefficient between grains (Eq. 15).
+    pub friction: Loc<Quantity<Number>>,
+    /// Coulomb friction coefficient at walls; that of the grains where it is not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wall_friction: Option<Loc<Quantity<Number>>>,
+    /// Coefficient of restitution; 1 has no dashpot.
+    pub restitution: Loc<Quantity<Number>>,
+    /// Tangential over normal dashpot, where `restitution` is below 1.
+    pub tangential_damping: Loc<Quantity<Number>>,
+    /// Global damping xi [1/s] (Eqs 6, 22, 24).
+    pub global_damping: Loc<Quantity<Rate>>,
+    /// Lubrication correction below this gap [m]; 0 turns it off.
+    pub lubrication_gap: Loc<Quantity<Length>>,
+    /// Height of the asperities: the lubrication film is never thinner [m]; three thousandths of
+    /// the smallest equal-volume radius where it is not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roughness: Option<Loc<Quantity<Length>>>,
+    /// Sub-steps per contact time.
+    pub substeps_per_contact: Loc<Quantity<Number>>,
+}
+
+impl Default for RawContact {
+    fn default() -> Self {
+        let params = ContactParams::default();
+        RawContact {
+            stiffness: None,
+            maximum_overlap: None,
+            tangential_ratio: Quantity::new(params.tangential_ratio).into(),
+            friction: Quantity::new(params.friction).into(),
+            wall_friction: None,
+            restitution: Quantity::new(params.restitution).into(),
+            tangential_damping: Quantity::new(params.tangential_damping).into(),
+            global_damping: Quantity::new(params.global_damping).into(),
+            lubrication_gap: Quantity::new(params.lubrication_gap).into(),
+            roughness: None,
+            substeps_per_contact: Quantity::new(params.substeps_per_contact).into(),
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Errors of a run.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use grainwake_solver::sim::{SetupError, StepError};
+
+/// Error of a run.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The set-up is inconsistent.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// The folder holds data that must not be overwritten.
+    #[error("{what}; {remedy}")]
+    Occupied {
+        /// Description of the folder.
+        what: String,
+        /// Advice.
+        remedy: String,
+    },
+    /// Another program is writing into the folder.
+    #[error("another run{} is writing into {}; wait for it or stop it, or give another folder with -o", process.map_or(String::new(), |p| format!(" (process {p})")), folder.display())]
+    InUse {
+        /// The run folder.
+        folder: PathBuf,
+        /// Process number, if known.
+        process: Option<u32>,
+    },
+    /// The numerics failed.
+    #[error("{source}\nThe last good checkpoint, at t = {time:.6e} s, is kept in {}", folder.display())]
+    Unstable {
+        /// Symptom.
+        source: StepError,
+        /// Time of the last good checkpoint [s].
+        time: f64,
+        /// Folder of the checkpoints.
+        folder: PathBuf,
+    },
+    /// Reading or writing failed.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// "write", "read", "create".
+        action: &'static str,
+        /// File.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: io::Error,
+    },
+    /// No checkpoint is valid.
+    #[error("no checkpoint in {} can be used:\n{}\nRun again without --resume (and with --force) to start over", folder.display(), reasons.join("\n"))]
+    NoCheckpoint {
+        /// Folder of the checkpoints.
+        folder: PathBuf,
+        /// Fault of each checkpoint.
+        reasons: Vec<String>,
+    },
+    /// The folder belongs to another case.
+    #[error("the run folder {} was made from another case ({what}); give another folder with -o, or start over with --force", folder.display())]
+    OtherCase {
+        /// The run folder.
+        folder: PathBuf,
+        /// Differences.
+        what: String,
+    },
+}
+
+impl RunError {
+    /// Returns the exit code of the command line: 2 bad input, 3 numerics, 4 input/output.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            RunError::Setup(_)
+            | RunError::Occupied { .. }
+            | RunError::InUse { .. }
+            | RunError::OtherCase { .. } => 2,
+            RunError::Unstable { .. } => 3,
+            RunError::Io { .. } | RunError::NoCheckpoint { .. } => 4,
+        }
+    }
+}
+
+/// Conversion of input/output errors, with the file and the action.
+pub(crate) trait Context<T> {
+    fn context(self, action: &'static str, path: &Path) -> Result<T, RunError>;
+}
+
+impl<T> Context<T> for io::Result<T> {
+    fn context(self, action: &'static str, path: &Path) -> Result<T, RunError> {
+        self.map_err(|source| RunError::Io {
+            action,
+            path: path.into(),
+            source,
+        })
+    }
+}

@@ -1,0 +1,21 @@
+//! Runs of Grainwake: case files, the run loop, and the run folder.
+//!
+//! [`case::Case`] reads and validates a case file; [`run()`] takes its [`Job`], steps the
+//! simulation and fills a folder with tables, VTK files, checkpoints and a summary.
+//! `docs/reference/run-folder.md` lists the files.
+//!
+//! Layers, downwards: `case` -> `run_loop` -> `recorder` -> `run_folder`, `contact_events` ->
+//! `plan`, `error`.
+
+pub mod case;
+mod contact_events;
+mod error;
+mod plan;
+mod recorder;
+mod run_folder;
+mod run_loop;
+
+pub use error::RunError;
+pub use plan::{Plane, PlanePosition, RunPlan, Stop};
+pub use run_folder::{Existing, RESOLVED, checkpoint, lock, provenance};
+pub use run_loop::{Ending, Job, Observer, Options, Progress, Silent, run};

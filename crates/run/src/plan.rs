@@ -1,0 +1,69 @@
+//! Outputs and end of a run. Times are simulated times unless stated otherwise.
+
+use grainwake_solver::sim::events::StopWhen;
+
+/// Validated plan of a run. An interval of zero turns an output off.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunPlan {
+    /// End of the run [s].
+    pub end: f64,
+    /// Condition of an earlier end.
+    pub stop: Option<Stop>,
+    /// Shortest plausible time step [s]: a shorter one, unless an output requires it, means
+    /// instability.
+    pub smallest_step: f64,
+    /// Interval of the rows of the tables [s].
+    pub tables: f64,
+    /// Interval of the slices [s].
+    pub slices: f64,
+    /// Interval of the full fields [s].
+    pub fields: f64,
+    /// Interval of the grain surfaces [s].
+    pub surfaces: f64,
+    /// Whether slices and surfaces are also written at events.
+    pub at_events: bool,
+    /// Slice planes.
+    pub planes: Vec<Plane>,
+    /// Wall-clock time between checkpoints [s].
+    pub checkpoint_interval: f64,
+    /// Steps between checkpoints.
+    pub checkpoint_steps: u64,
+}
+
+/// Stop condition: the run ends `hold` seconds after the condition became true for good.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    /// Condition.
+    pub when: StopWhen,
+    /// Time to continue [s].
+    pub hold: f64,
+}
+
+/// Slice plane, one cell thick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Axis of its normal.
+    pub axis: usize,
+    /// Position along that axis.
+    pub position: PlanePosition,
+}
+
+/// Position of a plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlanePosition {
+    /// Coordinate [m].
+    At(f64),
+    /// Centroid of a grain.
+    Grain(usize),
+}
+
+impl Plane {
+    /// Returns the name in file names, "y-grain0" or "y-plane1".
+    pub fn name(&self, index: usize) -> String {
+        let axis = ["x", "y", "z"][self.axis];
+        match self.position {
+            PlanePosition::Grain(grain) => format!("{axis}-grain{grain}"),
+            PlanePosition::At(_) => format!("{axis}-plane{index}"),
+        }
+    }
+}

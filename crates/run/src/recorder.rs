@@ -1,0 +1,316 @@
+//! Outputs after each step. Output times are multiples of their intervals, so that they do not
+//! depend on where a run was interrupted.
+
+use std::path::{Path, PathBuf};
+
+use grainwake_formats::events::{Event, EventKind};
+use grainwake_formats::pvd::{self, Entry};
+use grainwake_formats::summary::{GrainSummary, PairSummary, Summary};
+use grainwake_solver::dem::{Enclosure, surface_gap};
+use grainwake_solver::sim::Simulation;
+use grainwake_solver::sim::events::{EventParams, Tracker};
+
+use crate::contact_events::{ContactEvents, MAX_GRAINS};
+use crate::error::{Context, RunError};
+use crate::plan::RunPlan;
+use crate::run_folder::checkpoint::{self, Record};
+use crate::run_folder::{Tables, VtkOutput};
+
+/// Outputs closer than this fraction of a time step are written together.
+const SHORTEST_STEP: f64 = 0.1;
+/// Times that differ by less than this fraction of the interval are equal.
+const SAME_TIME: f64 = 1e-9;
+
+/// Series of outputs.
+#[derive(Clone, Copy, PartialEq)]
+enum Series {
+    Tables,
+    Slices,
+    Fields,
+    Surfaces,
+}
+
+/// All series, in the order of their indices.
+const SERIES: [Series; 4] = [
+    Series::Tables,
+    Series::Slices,
+    Series::Fields,
+    Series::Surfaces,
+];
+
+/// Recorder of a run: tables, VTK files, events, checkpoints.
+pub(crate) struct Recorder {
+    run: PathBuf,
+    digest: String,
+    intervals: [f64; 4],
+    end: f64,
+    at_events: bool,
+    enclosure: Enclosure,
+    tables: Tables,
+    vtk: VtkOutput,
+    tracker: Tracker,
+    contact_events: ContactEvents,
+    /// Time without contact after which grains are separated [s].
+    separation_hold: f64,
+    next: [u64; 4],
+    vtk_files: Vec<Entry>,
+    max_divergence: f64,
+    max_cfl: f64,
+    last_row: Option<f64>,
+}
+
+impl Recorder {
+    fn build(
+        run: &Path,
+        digest: &str,
+        plan: &RunPlan,
+        sim: &Simulation,
+        tables: Tables,
+    ) -> Recorder {
+        let setup = sim.setup();
+        let enclosure = setup.enclosure();
+        let period =
+            [0, 1, 2].map(|axis| enclosure.is_periodic(axis).then(|| enclosure.size()[axis]));
+        let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
+        let params = EventParams::for_grains(sim.grains(), setup.gravity, fluid_density, period);
+        let gap = pair_gap(sim, &enclosure);
+        Recorder {
+            run: run.into(),
+            digest: digest.into(),
+            intervals: [plan.tables, plan.slices, plan.fields, plan.surfaces],
+            end: plan.end,
+            at_events: plan.at_events && sim.grains().len() <= 2,
+            enclosure,
+            tables,
+            vtk: VtkOutput::new(&plan.planes, sim),
+            tracker: Tracker::new(params, sim.grains(), gap),
+            contact_events: ContactEvents::default(),
+            separation_hold: params.separation_hold,
+            next: [0; 4],
+            vtk_files: Vec::new(),
+            max_divergence: sim.max_divergence(),
+            max_cfl: 0.0,
+            last_row: None,
+        }
+    }
+
+    /// Starts the record of a run at t = 0 and writes the first outputs.
+    pub fn start(
+        run: &Path,
+        digest: &str,
+        plan: &RunPlan,
+        sim: &Simulation,
+    ) -> Result<Recorder, RunError> {
+        let mut recorder = Recorder::build(run, digest, plan, sim, Tables::create(run)?);
+        recorder.write_due(sim)?;
+        recorder.checkpoint(sim)?;
+        Ok(recorder)
+    }
+
+    /// Continues the record of a run from a checkpoint.
+    pub fn resume(
+        run: &Path,
+        record: Record,
+        plan: &RunPlan,
+        sim: &Simulation,
+    ) -> Result<Recorder, RunError> {
+        let mut recorder = Recorder::build(
+            run,
+            &record.digest,
+            plan,
+            sim,
+            Tables::reopen(run, record.lengths)?,
+        );
+        recorder.tracker.restore(record.tracker);
+        recorder.contact_events = record.contact_events;
+        recorder.next = record.next;
+        recorder.vtk_files = record.vtk_files;
+        recorder.max_divergence = record.max_divergence;
+        recorder.max_cfl = record.max_cfl;
+        recorder.last_row = record.last_row;
+        recorder.write_collection()?;
+        Ok(recorder)
+    }
+
+    /// Returns the time from `now` to the next output or the end [s].
+    ///
+    /// Outputs that are nearly due at the same time are written together at the last of them: a
+    /// time step much shorter than the usual `step` [s] disturbs the pressure.
+    pub fn until_next(&self, now: f64, step: f64) -> f64 {
+        let times = || {
+            let due = self.intervals.iter().zip(&self.next);
+            due.filter(|(interval, _)| **interval > 0.0)
+                .map(|(interval, k)| *k as f64 * interval)
+                .filter(|time| *time < self.end)
+                .chain([self.end])
+        };
+        let first = times().fold(f64::INFINITY, f64::min);
+        let together = first + SHORTEST_STEP * step;
+        times()
+            .filter(|time| *time <= together)
+            .fold(first, f64::max)
+            - now
+    }
+
+    /// Updates the record with the state after a step, writes the outputs that are due, and returns
+    /// the new events.
+    pub fn after_step(&mut self, sim: &Simulation) -> Result<Vec<Event>, RunError> {
+        self.max_divergence = self.max_divergence.max(sim.max_divergence());
+        self.max_cfl = self.max_cfl.max(sim.cfl());
+        let gap = pair_gap(sim, &self.enclosure);
+        let before = self.tracker.events().len();
+        let mut events = self
+            .tracker
+            .update(sim.time(), sim.grains(), sim.contacts(), gap);
+        if (3..=MAX_GRAINS).contains(&sim.grains().len()) {
+            let hold = self.separation_hold;
+            events.extend((self.contact_events).update(sim.time(), sim.contacts(), hold));
+        }
+        self.tables.append_events(&events)?;
+        self.write_due(sim)?;
+        if self.at_events {
+            for (index, event) in events.iter().enumerate() {
+                self.write_event(sim, event.kind, before + index)?;
+            }
+        }
+        Ok(events)
+    }
+
+    fn write_event(
+        &mut self,
+        sim: &Simulation,
+        kind: EventKind,
+        index: usize,
+    ) -> Result<(), RunError> {
+        let earlier = self.tracker.events()[..index]
+            .iter()
+            .filter(|e| e.kind == kind)
+            .count();
+        let tag = format!("{}-{}", kind.name(), earlier + 1);
+        let slices = self.vtk.slices(&self.run, sim, &tag)?;
+        let grains = self.vtk.grains(&self.run, sim, &tag)?;
+        self.add(slices.into_iter().chain(grains))
+    }
+
+    fn write_due(&mut self, sim: &Simulation) -> Result<(), RunError> {
+        let time = sim.time();
+        let mut files = Vec::new();
+        for (index, series) in SERIES.into_iter().enumerate() {
+            let interval = self.intervals[index];
+            if interval == 0.0 || time < self.next[index] as f64 * interval - SAME_TIME * interval {
+                continue;
+            }
+            let tag = format!("{:06}", self.next[index]);
+            match series {
+                Series::Tables => {
+                    self.tables.append_rows(sim, self.tracker.gap())?;
+                    self.last_row = Some(time);
+                }
+                Series::Slices => files.extend(self.vtk.slices(&self.run, sim, &tag)?),
+                Series::Fields => files.extend(self.vtk.fields(&self.run, sim, &tag)?),
+                Series::Surfaces => files.extend(self.vtk.grains(&self.run, sim, &tag)?),
+            }
+            self.next[index] += 1;
+        }
+        if files.is_empty() {
+            Ok(())
+        } else {
+            self.add(files)
+        }
+    }
+
+    fn add(&mut self, files: impl IntoIterator<Item = Entry>) -> Result<(), RunError> {
+        self.vtk_files.extend(files);
+        self.write_collection()
+    }
+
+    fn write_collection(&self) -> Result<(), RunError> {
+        let path = self.run.join("run.pvd");
+        pvd::write(&path, &self.vtk_files).context("write", &path)
+    }
+
+    /// Writes the outputs of the last state, unless they have been written.
+    pub fn finish(&mut self, sim: &Simulation) -> Result<(), RunError> {
+        if self.last_row != Some(sim.time()) {
+            self.tables.append_rows(sim, self.tracker.gap())?;
+            self.last_row = Some(sim.time());
+            let slices = self.vtk.slices(&self.run, sim, "end")?;
+            let grains = self.vtk.grains(&self.run, sim, "end")?;
+            self.add(slices.into_iter().chain(grains))?;
+        }
+        Ok(())
+    }
+
+    /// Writes a checkpoint.
+    pub fn checkpoint(&mut self, sim: &Simulation) -> Result<(), RunError> {
+        let record = Record {
+            digest: self.digest.clone(),
+            time: sim.time(),
+            steps: sim.steps(),
+            lengths: self.tables.sync()?,
+            next: self.next,
+            vtk_files: self.vtk_files.clone(),
+            max_divergence: self.max_divergence,
+            max_cfl: self.max_cfl,
+            last_row: self.last_row,
+            tracker: self.tracker.state().clone(),
+            contact_events: self.contact_events.clone(),
+        };
+        checkpoint::write(&self.run, &record, sim)
+    }
+
+    /// Returns the event tracker.
+    pub fn tracker(&self) -> &Tracker {
+        &self.tracker
+    }
+
+    /// Returns all events in the order of their confirmation.
+    fn events(&self) -> Vec<Event> {
+        let mut events = self.tracker.events().to_vec();
+        events.extend_from_slice(&self.contact_events.events);
+        // The sort is stable: events of one step keep the order of the log.
+        events.sort_by(|a, b| a.confirmed.total_cmp(&b.confirmed));
+        events
+    }
+
+    /// Returns the results so far.
+    pub fn summary(&self, sim: &Simulation, wall_s: f64, ended_by: &str) -> Summary {
+        let tracker = &self.tracker;
+        let grains = sim
+            .grains()
+            .iter()
+            .enumerate()
+            .map(|(i, grain)| GrainSummary {
+                equivalent_diameter_m: grain.shape.equivalent_diameter(),
+                density: grain.density,
+                peak_settling_speed_m_per_s: tracker.peak_settling_speeds()[i],
+                landing_time_s: tracker.landing_times()[i],
+                position_m: grain.pose.position.to_array(),
+            });
+        Summary {
+            steps: sim.steps(),
+            end_time_s: sim.time(),
+            wall_s,
+            events: self.events(),
+            max_divergence: self.max_divergence,
+            max_cfl: self.max_cfl,
+            ended_by: ended_by.into(),
+            pair: tracker.phase().map(|phase| PairSummary {
+                kiss_time_s: tracker.kiss_time(),
+                tumble_time_s: tracker.tumble_time(),
+                separation_time_s: tracker.separation_time(),
+                role_changes: tracker.role_changes(),
+                phase: phase.name().into(),
+            }),
+            grains: grains.collect(),
+        }
+    }
+}
+
+/// Returns the gap between the surfaces of a pair [m].
+fn pair_gap(sim: &Simulation, enclosure: &Enclosure) -> Option<f64> {
+    match sim.grains() {
+        [a, b] => Some(surface_gap(a, b, enclosure)),
+        _ => None,
+    }
+}

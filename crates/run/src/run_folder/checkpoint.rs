@@ -1,0 +1,207 @@
+//! Checkpoints: the whole state in one file, checksummed, synced, renamed. Two are kept during a
+//! run, and the last one after its end.
+//!
+//! Layout, little-endian: 8 bytes signature, u32 version, u64 length of the record, the record
+//! (JSON), the state of the simulation (`Simulation::save`), SHA-256 of all preceding bytes.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use grainwake_formats::atomic_file::{sync_folder, write_atomically};
+use grainwake_formats::codec::{Decoder, Encoder};
+use grainwake_formats::pvd::Entry;
+use grainwake_solver::sim::Simulation;
+use grainwake_solver::sim::events::TrackerState;
+
+use super::tables::Lengths;
+use crate::contact_events::ContactEvents;
+use crate::error::{Context, RunError};
+
+const SIGNATURE: &[u8; 8] = b"GWCKPT\r\n";
+const VERSION: u32 = 4;
+const CHECKSUM: u64 = 32;
+/// Folder of the checkpoints in a run folder.
+pub const FOLDER: &str = "checkpoint";
+
+/// State of a run besides the simulation. It holds no wall-clock time: two runs of a case write the
+/// same bits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Hash of the case.
+    pub digest: String,
+    /// Simulated time [s].
+    pub time: f64,
+    /// Steps taken.
+    pub steps: u64,
+    /// Lengths of the tables.
+    pub lengths: Lengths,
+    /// Index of the next output of each series.
+    pub next: [u64; 4],
+    /// VTK files written.
+    #[serde(rename = "pictures")]
+    pub vtk_files: Vec<Entry>,
+    /// Largest |div u| so far [1/s].
+    pub max_divergence: f64,
+    /// Largest CFL number so far.
+    pub max_cfl: f64,
+    /// Time of the last row of the tables [s].
+    pub last_row: Option<f64>,
+    /// State of the event tracker.
+    pub tracker: TrackerState,
+    /// Contacts between three and more grains.
+    #[serde(default, rename = "meetings")]
+    pub contact_events: ContactEvents,
+}
+
+/// Writer that hashes what it passes on.
+struct HashWriter<'a> {
+    out: &'a mut dyn Write,
+    hash: Sha256,
+}
+
+impl Write for HashWriter<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write_all(bytes)?;
+        self.hash.update(bytes);
+        Ok(bytes.len())
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+fn name(steps: u64) -> String {
+    format!("step-{steps:010}.ckpt")
+}
+
+/// Returns the checkpoints in a run folder, newest first.
+pub fn list(run: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(run.join(FOLDER))
+        .into_iter()
+        .flatten()
+        .flatten();
+    let mut paths: Vec<PathBuf> = entries
+        .map(|e| e.path())
+        .filter(|p| p.extension().is_some_and(|e| e == "ckpt"))
+        .collect();
+    paths.sort_by(|a, b| b.cmp(a));
+    paths
+}
+
+/// Writes a checkpoint and removes all but the one before it.
+pub(crate) fn write(run: &Path, record: &Record, sim: &Simulation) -> Result<(), RunError> {
+    let folder = run.join(FOLDER);
+    let path = folder.join(name(record.steps));
+    let json = serde_json::to_vec(record)
+        .map_err(io::Error::from)
+        .context("write", &path)?;
+    write_atomically(&path, true, |out| {
+        let mut hashed = HashWriter {
+            out,
+            hash: Sha256::new(),
+        };
+        let mut encoder = Encoder::new(&mut hashed);
+        encoder.raw(SIGNATURE)?;
+        encoder.u32(VERSION)?;
+        encoder.bytes(&json)?;
+        sim.save(&mut hashed)?;
+        let HashWriter { out, hash } = hashed;
+        out.write_all(&hash.finalize())
+    })
+    .and_then(|()| sync_folder(&folder))
+    .context("write", &path)?;
+    keep(run, 2)
+}
+
+/// Removes all checkpoints but the newest `count`.
+pub(crate) fn keep(run: &Path, count: usize) -> Result<(), RunError> {
+    for old in list(run).into_iter().skip(count) {
+        std::fs::remove_file(&old).context("remove", &old)?;
+    }
+    Ok(())
+}
+
+/// Verifies the checksum of a checkpoint, then reads it into `sim`.
+fn read(path: &Path, digest: &str, sim: &mut Simulation) -> Result<Record, String> {
+    let text = |e: io::Error| match e.kind() {
+        io::ErrorKind::UnexpectedEof => "it is cut off".to_owned(),
+        _ => e.to_string(),
+    };
+    let mut file = File::open(path).map_err(text)?;
+    let length = file.metadata().map_err(text)?.len();
+    let body = length.checked_sub(CHECKSUM).ok_or("it is cut off")?;
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; 1 << 18];
+    let mut left = body;
+    while left > 0 {
+        let part = buffer
+            .len()
+            .min(usize::try_from(left).unwrap_or(usize::MAX));
+        file.read_exact(&mut buffer[..part]).map_err(text)?;
+        hash.update(&buffer[..part]);
+        left -= part as u64;
+    }
+    let mut checksum = [0; CHECKSUM as usize];
+    file.read_exact(&mut checksum).map_err(text)?;
+    if hash.finalize().as_slice() != checksum {
+        return Err("its checksum does not match: it is damaged or cut off".into());
+    }
+    file.seek(SeekFrom::Start(0)).map_err(text)?;
+    let mut input = BufReader::with_capacity(1 << 18, file);
+    let mut signature = [0; 8];
+    input.read_exact(&mut signature).map_err(text)?;
+    let mut decoder = Decoder::new(&mut input);
+    if &signature != SIGNATURE || decoder.u32().map_err(text)? != VERSION {
+        return Err(format!("it is not a checkpoint of version {VERSION}"));
+    }
+    let json = decoder.bytes().map_err(text)?;
+    let record: Record = serde_json::from_slice(&json).map_err(|e| e.to_string())?;
+    if record.digest != digest {
+        return Err("it belongs to another case".into());
+    }
+    sim.restore(&mut input).map_err(text)?;
+    if sim.time().to_bits() != record.time.to_bits() || sim.steps() != record.steps {
+        return Err("its record and its state differ".into());
+    }
+    Ok(record)
+}
+
+/// Restores the newest valid checkpoint; `note` receives the faults of newer ones. None if the run
+/// has no checkpoint.
+///
+/// # Errors
+/// [`RunError::NoCheckpoint`] if there are checkpoints and none is valid.
+pub(crate) fn restore(
+    run: &Path,
+    digest: &str,
+    sim: &mut Simulation,
+    note: &mut dyn FnMut(&str),
+) -> Result<Option<Record>, RunError> {
+    let mut reasons = Vec::new();
+    for path in list(run) {
+        match read(&path, digest, sim) {
+            Ok(record) => {
+                for reason in &reasons {
+                    note(&format!(
+                        "warning: {reason}; continuing from the checkpoint before it (t = {:.6e} s)",
+                        record.time
+                    ));
+                }
+                return Ok(Some(record));
+            }
+            Err(reason) => reasons.push(format!("{}: {reason}", path.display())),
+        }
+    }
+    if reasons.is_empty() {
+        Ok(None)
+    } else {
+        Err(RunError::NoCheckpoint {
+            folder: run.join(FOLDER),
+            reasons,
+        })
+    }
+}

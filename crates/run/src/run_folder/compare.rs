@@ -1,0 +1,123 @@
+//! Differences between two resolved cases.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use toml::Value;
+
+use super::RESOLVED;
+
+/// Keys that do not affect the results up to a given time.
+const IGNORED: [&str; 6] = [
+    "title",
+    "expect",
+    "run.threads",
+    "time.end",
+    "time.stop",
+    "output.checkpoint",
+];
+/// Largest number of differences that are named.
+const MAX_NAMED: usize = 4;
+/// Longest value that is quoted [characters].
+const MAX_VALUE: usize = 40;
+
+/// Describes how the case of a run folder differs from a resolved case.
+pub fn differing(folder: &Path, resolved: &str) -> String {
+    let there = std::fs::read_to_string(folder.join(RESOLVED)).unwrap_or_default();
+    let (Ok(there), Ok(here)) = (
+        there.parse::<toml::Table>(),
+        resolved.parse::<toml::Table>(),
+    ) else {
+        return "its case.resolved.toml cannot be read".into();
+    };
+    let (there, here) = (flatten(there), flatten(here));
+    let mut keys: Vec<&String> = there.keys().chain(here.keys()).collect();
+    keys.sort();
+    keys.dedup();
+    let side = |table: &BTreeMap<String, String>, key: &String| {
+        table.get(key).map_or("not given".to_owned(), |value| {
+            if value.chars().count() <= MAX_VALUE {
+                value.clone()
+            } else {
+                "another value".to_owned()
+            }
+        })
+    };
+    let differ: Vec<String> = keys
+        .into_iter()
+        .filter(|key| !IGNORED.iter().any(|free| key.starts_with(free)))
+        .filter(|key| there.get(*key) != here.get(*key))
+        .map(|key| {
+            format!(
+                "{key}: {} there, {} here",
+                side(&there, key),
+                side(&here, key)
+            )
+        })
+        .collect();
+    match differ.len() {
+        0 => "a grain file has other contents, or another version of the program wrote it".into(),
+        n if n > MAX_NAMED => format!(
+            "{}; and {} more",
+            differ[..MAX_NAMED].join("; "),
+            n - MAX_NAMED
+        ),
+        _ => differ.join("; "),
+    }
+}
+
+/// Returns the dotted keys with their values.
+fn flatten(table: toml::Table) -> BTreeMap<String, String> {
+    fn walk(key: String, value: Value, out: &mut BTreeMap<String, String>) {
+        let inner = |name: &str| format!("{key}.{name}");
+        match value {
+            Value::Table(table) => {
+                for (name, value) in table {
+                    walk(inner(&name), value, out);
+                }
+            }
+            Value::Array(list) if list.iter().any(Value::is_table) => {
+                for (i, value) in list.into_iter().enumerate() {
+                    walk(inner(&i.to_string()), value, out);
+                }
+            }
+            plain => {
+                out.insert(key, plain.to_string());
+            }
+        }
+    }
+    let mut out = BTreeMap::new();
+    for (name, value) in table {
+        walk(name, value, &mut out);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_named_and_free_keys_are_not() {
+        let folder = std::env::temp_dir().join(format!("grainwake-differ-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let there = "title = \"a\"\n[fluid]\nviscosity = 0.001\n[time]\nend = 1.0\n[[grain]]\ndensity = 2500.0\n[grain.shape]\nkind = \"sphere\"\n";
+        std::fs::write(folder.join(RESOLVED), there).unwrap();
+        let same = there
+            .replace("end = 1.0", "end = 2.0")
+            .replace("\"a\"", "\"b\"");
+        assert!(differing(&folder, &same).contains("grain file"));
+        let other = same
+            .replace("0.001", "0.005")
+            .replace("\"sphere\"", "\"cube\"");
+        assert_eq!(
+            differing(&folder, &other),
+            "fluid.viscosity: 0.001 there, 0.005 here; grain.0.shape.kind: \"sphere\" there, \"cube\" here"
+        );
+        let less = other.replace("density = 2500.0\n", "");
+        assert!(
+            differing(&folder, &less).contains("grain.0.density: 2500.0 there, not given here")
+        );
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}

@@ -1,0 +1,192 @@
+//! The run folder: admission of a run, creation and removal of its files.
+
+use std::path::{Path, PathBuf};
+
+use grainwake_formats::summary;
+
+use super::checkpoint;
+use super::lock::{self, Attempt, Lock};
+use super::provenance::{self, Provenance};
+use super::tables;
+use super::vtk_output;
+use crate::error::{Context, RunError};
+
+/// Name of the case file with all defaults written out.
+pub const RESOLVED: &str = "case.resolved.toml";
+
+/// Treatment of an existing run in the folder.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Existing {
+    /// Keep the run and stop.
+    #[default]
+    Refuse,
+    /// Remove the run and start over.
+    Replace,
+    /// Continue from the last checkpoint.
+    Resume,
+    /// Keep or continue a run of the same case and program; otherwise start over.
+    Reuse,
+}
+
+impl Existing {
+    /// Resolves [`Existing::Reuse`] for this folder; other values are returned unchanged.
+    pub(crate) fn resolve(self, folder: &Path, digest: &str) -> Existing {
+        if self != Existing::Reuse {
+            return self;
+        }
+        let own = Provenance::new(digest);
+        let same = |there: &Provenance| {
+            (&there.case_sha256, &there.version, &there.commit)
+                == (&own.case_sha256, &own.version, &own.commit)
+        };
+        match Provenance::read(folder) {
+            None => Existing::Refuse,
+            Some(there) if same(&there) => Existing::Resume,
+            Some(_) => Existing::Replace,
+        }
+    }
+}
+
+/// Content of a folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Content {
+    /// Nothing.
+    Empty,
+    /// Finished run.
+    Finished,
+    /// Unfinished run.
+    Unfinished,
+    /// Other files.
+    Foreign,
+}
+
+fn content(folder: &Path) -> Result<Content, RunError> {
+    let entries = match std::fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Content::Empty),
+        Err(error) => return Err(error).context("read", folder),
+    };
+    if Provenance::read(folder).is_some() {
+        return Ok(if folder.join(summary::FILE).is_file() {
+            Content::Finished
+        } else {
+            Content::Unfinished
+        });
+    }
+    // A run killed right after its start leaves at most empty folders and temporary files.
+    let foreign = entries.flatten().any(|entry| {
+        let empty = std::fs::read_dir(entry.path()).is_ok_and(|mut inside| inside.next().is_none());
+        !empty && !is_temporary(&entry.path()) && entry.file_name() != lock::FILE
+    });
+    Ok(if foreign {
+        Content::Foreign
+    } else {
+        Content::Empty
+    })
+}
+
+/// Checks that a run may use the folder; writes nothing.
+pub(crate) fn admit(folder: &Path, existing: Existing) -> Result<Content, RunError> {
+    if folder.exists() && !folder.is_dir() {
+        return Err(RunError::Occupied {
+            what: format!("{} is a file, not a folder", folder.display()),
+            remedy: "give the folder of the run with -o".into(),
+        });
+    }
+    let present = content(folder)?;
+    let occupied = |what: &str, remedy: &str| {
+        Err(RunError::Occupied {
+            what: format!("{} {what}", folder.display()),
+            remedy: remedy.into(),
+        })
+    };
+    match (present, existing) {
+        (Content::Foreign, _) => occupied(
+            "is not empty and holds no run of this program",
+            "give another folder with -o",
+        ),
+        (Content::Finished, Existing::Refuse) => occupied(
+            "holds a finished run",
+            "give another folder with -o, or --force to replace it",
+        ),
+        (Content::Unfinished, Existing::Refuse) => occupied(
+            "holds a run that has not finished",
+            "continue it with --resume, give another folder with -o, or --force to start over",
+        ),
+        (Content::Empty, Existing::Resume) => occupied(
+            "holds no run to resume",
+            "leave out --resume, or give the run folder with -o",
+        ),
+        _ => Ok(present),
+    }
+}
+
+/// Creates the folder if absent, and locks it for this program.
+pub(crate) fn lock_folder(folder: &Path) -> Result<Lock, RunError> {
+    std::fs::create_dir_all(folder).context("create", folder)?;
+    let path = folder.join(lock::FILE);
+    match lock::acquire(&path).context("lock", &path)? {
+        Attempt::Acquired(lock) => Ok(lock),
+        Attempt::HeldByOther(process) => Err(RunError::InUse {
+            folder: folder.into(),
+            process,
+        }),
+    }
+}
+
+/// Removes the files of a run and nothing else; the lock is kept.
+pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
+    // The provenance marks a run folder. It is removed last, so that an interrupted removal can be
+    // repeated.
+    let files = [
+        summary::FILE,
+        "failure.json",
+        "run.pvd",
+        "report.html",
+        RESOLVED,
+        provenance::FILE,
+    ];
+    for name in vtk_output::FOLDERS
+        .iter()
+        .chain(&[checkpoint::FOLDER, "shapes", "figures"])
+    {
+        remove(&folder.join(name), |p| std::fs::remove_dir_all(p))?;
+    }
+    for name in tables::FILES.into_iter().chain(files) {
+        remove(&folder.join(name), |p| std::fs::remove_file(p))?;
+    }
+    Ok(())
+}
+
+fn remove(path: &Path, how: impl Fn(&Path) -> std::io::Result<()>) -> Result<(), RunError> {
+    match how(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).context("remove", path)
+        }
+        _ => Ok(()),
+    }
+}
+
+fn is_temporary(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "tmp")
+}
+
+/// Creates the folder and its subfolders, and removes temporary files of a killed run.
+pub(crate) fn create(folder: &Path) -> Result<(), RunError> {
+    let inner = vtk_output::FOLDERS
+        .iter()
+        .chain(&[checkpoint::FOLDER, "shapes"])
+        .map(|name| folder.join(name));
+    for path in std::iter::once(PathBuf::from(folder)).chain(inner) {
+        std::fs::create_dir_all(&path).context("create", &path)?;
+        let entries = std::fs::read_dir(&path).context("read", &path)?;
+        for file in entries
+            .flatten()
+            .map(|e| e.path())
+            .filter(|p| is_temporary(p))
+        {
+            std::fs::remove_file(&file).context("remove", &file)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,109 @@
+//! Provenance of a run (`provenance.json`): program, machine, command and time.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use grainwake_formats::summary::write_json;
+
+use crate::error::{Context, RunError};
+
+/// Provenance of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Name of the program; it marks a folder as a run folder.
+    pub program: String,
+    /// Version of the program.
+    pub version: String,
+    /// Commit of the program, if known at build time.
+    pub commit: Option<String>,
+    /// SHA-256 of everything that affects the results.
+    pub case_sha256: String,
+    /// Sessions: the first start and each resumption.
+    pub sessions: Vec<Session>,
+}
+
+/// Session of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Session {
+    /// Start, with the offset from UTC.
+    pub started: String,
+    /// Command line.
+    pub command: Vec<String>,
+    /// Processor.
+    pub cpu: String,
+    /// Operating system and architecture.
+    pub system: String,
+    /// Threads.
+    pub threads: usize,
+    /// First time step.
+    pub from_step: u64,
+    /// Wall-clock time up to the last checkpoint or the end [s].
+    pub wall_s: f64,
+}
+
+/// Name of the file in a run folder.
+pub const FILE: &str = "provenance.json";
+/// Value of `program`.
+pub const PROGRAM: &str = "grainwake";
+
+/// Returns the commit that the program was built from, if known.
+pub fn commit() -> Option<&'static str> {
+    option_env!("GRAINWAKE_COMMIT").filter(|c| !c.is_empty())
+}
+
+impl Provenance {
+    /// Returns the provenance of a new run.
+    pub fn new(digest: &str) -> Provenance {
+        Provenance {
+            program: PROGRAM.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            commit: commit().map(str::to_owned),
+            case_sha256: digest.into(),
+            sessions: Vec::new(),
+        }
+    }
+    /// Reads the provenance of a run folder; none if it is absent or damaged.
+    pub fn read(run: &Path) -> Option<Provenance> {
+        let text = std::fs::read_to_string(run.join(FILE)).ok()?;
+        serde_json::from_str(&text)
+            .ok()
+            .filter(|p: &Provenance| p.program == PROGRAM)
+    }
+    /// Writes the provenance into the folder of a run.
+    pub(crate) fn write(&self, run: &Path) -> Result<(), RunError> {
+        let path = run.join(FILE);
+        write_json(&path, false, self).context("write", &path)
+    }
+    /// Returns the wall-clock time of all sessions [s].
+    pub fn wall_s(&self) -> f64 {
+        self.sessions.iter().map(|s| s.wall_s).sum()
+    }
+}
+
+impl Session {
+    /// Returns a session that starts now.
+    pub fn now(command: &[String], threads: usize, from_step: u64) -> Session {
+        Session {
+            started: jiff::Zoned::now()
+                .strftime("%Y-%m-%dT%H:%M:%S%:z")
+                .to_string(),
+            command: command.to_vec(),
+            cpu: cpu(),
+            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            threads,
+            from_step,
+            wall_s: 0.0,
+        }
+    }
+}
+
+fn cpu() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = text.lines().find_map(|line| {
+        line.strip_prefix("model name")?
+            .split_once(':')
+            .map(|(_, n)| n.trim().to_string())
+    });
+    name.unwrap_or_else(|| "unknown".into())
+}

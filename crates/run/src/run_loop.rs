@@ -1,0 +1,339 @@
+//! The run loop: step, record, checkpoint.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use grainwake_formats::atomic_file::write_atomically;
+use grainwake_formats::events::Event;
+use grainwake_formats::summary::{self, Summary};
+use grainwake_solver::sim::events::{Phase, StopWhen};
+use grainwake_solver::sim::{Setup, Simulation, StepError, StepRule};
+
+use crate::error::{Context, RunError};
+use crate::plan::RunPlan;
+use crate::recorder::Recorder;
+use crate::run_folder::provenance::{Provenance, Session};
+use crate::run_folder::{self, Content, Existing, RESOLVED, checkpoint, differing};
+
+/// Simulation to run, with its outputs.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// Set-up of the simulation.
+    pub setup: Setup,
+    /// Outputs and end.
+    pub plan: RunPlan,
+    /// Text of `case.resolved.toml`.
+    pub resolved: String,
+    /// Hash of everything that affects the results.
+    pub digest: String,
+    /// Files of the resolved case: path in the run folder, and content.
+    pub files: Vec<(String, Arc<Vec<u8>>)>,
+}
+
+/// Options of [`run()`].
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Treatment of an existing run in the folder.
+    pub existing: Existing,
+    /// Command line, for the provenance.
+    pub command: Vec<String>,
+    /// Number of threads, for the provenance; the caller configures the thread pool.
+    pub threads: usize,
+}
+
+/// Progress of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Simulated time [s].
+    pub time: f64,
+    /// End of the run [s].
+    pub end: f64,
+    /// Time steps taken in all sessions.
+    pub steps: u64,
+    /// Time steps taken in this session.
+    pub session_steps: u64,
+    /// Wall-clock time of this session [s].
+    pub wall_s: f64,
+    /// Simulated time at the start of this session [s].
+    pub from: f64,
+    /// Length of the last time step [s].
+    pub dt: f64,
+    /// Gap between the surfaces of a pair [m].
+    pub gap: Option<f64>,
+    /// Phase of a pair.
+    pub phase: Option<Phase>,
+    /// Number of contacts.
+    pub contacts: usize,
+}
+
+/// Receiver of progress and events, which may interrupt a run.
+pub trait Observer {
+    /// Called after every time step.
+    fn progress(&mut self, _: &Progress) {}
+    /// Called for every event.
+    fn event(&mut self, _: &Event) {}
+    /// Called with messages: start of a resumed run, damaged checkpoints.
+    fn note(&mut self, _: &str) {}
+    /// Returns whether to write a checkpoint and stop; called after every time step.
+    fn interrupted(&self) -> bool {
+        false
+    }
+}
+
+/// Observer that does nothing.
+pub struct Silent;
+impl Observer for Silent {}
+
+/// End of a run.
+#[derive(Clone, Debug)]
+pub enum Ending {
+    /// The end time or a stop condition was reached.
+    Finished(Summary),
+    /// The run had finished before.
+    AlreadyFinished(Summary),
+    /// The observer interrupted the run; a checkpoint was written at this time [s].
+    Interrupted(f64),
+}
+
+/// Runs a job in the folder `out`.
+///
+/// Tables, VTK files and the final state have the same bits for any number of threads, and after any
+/// number of interruptions and resumptions.
+///
+/// # Errors
+/// [`RunError`]; if the numerics or the disk fail, the last valid checkpoint is kept.
+pub fn run(
+    job: Job,
+    out: &Path,
+    options: &Options,
+    observer: &mut dyn Observer,
+) -> Result<Ending, RunError> {
+    // The folder is checked before the lock file is created in it, and again under the lock.
+    run_folder::admit(out, options.existing.resolve(out, &job.digest))?;
+    let _lock = run_folder::lock_folder(out)?;
+    let existing = options.existing.resolve(out, &job.digest);
+    let content = run_folder::admit(out, existing)?;
+    let mut provenance = Provenance::new(&job.digest);
+    let resuming = existing == Existing::Resume;
+    if resuming {
+        provenance = Provenance::read(out).unwrap_or(provenance);
+        if provenance.case_sha256 != job.digest {
+            let what = differing(out, &job.resolved);
+            return Err(RunError::OtherCase {
+                folder: out.into(),
+                what,
+            });
+        }
+    }
+    if content == Content::Finished && resuming {
+        let summary = Summary::read(out).context("read", &out.join(summary::FILE))?;
+        if summary.end_time_s >= job.plan.end * (1.0 - 1e-9) || summary.ended_by != "end" {
+            return Ok(Ending::AlreadyFinished(summary));
+        }
+        observer.note(&format!(
+            "the run had ended at t = {:.6e} s; going on to {:.6e} s",
+            summary.end_time_s, job.plan.end
+        ));
+    }
+    let mut sim = Simulation::new(job.setup)?;
+    let record = if resuming {
+        checkpoint::restore(out, &job.digest, &mut sim, &mut |text| observer.note(text))?
+    } else {
+        None
+    };
+    match &record {
+        Some(record) => observer.note(&format!(
+            "resuming at t = {:.6e} s, step {}",
+            record.time, record.steps
+        )),
+        None if resuming => observer.note("there is no checkpoint: starting from the beginning"),
+        None => {}
+    }
+    if record.is_none() && content != Content::Empty {
+        run_folder::clear(out)?;
+    }
+    run_folder::create(out)?;
+    provenance
+        .sessions
+        .push(Session::now(&options.command, options.threads, sim.steps()));
+    provenance.write(out)?;
+    write(&out.join(RESOLVED), job.resolved.as_bytes())?;
+    for (name, bytes) in &job.files {
+        write(&out.join(name), bytes)?;
+    }
+    let summary_path = out.join(summary::FILE);
+    if summary_path.exists() {
+        std::fs::remove_file(&summary_path).context("remove", &summary_path)?;
+    }
+    let recorder = match record {
+        Some(record) => Recorder::resume(out, record, &job.plan, &sim)?,
+        None => Recorder::start(out, &job.digest, &job.plan, &sim)?,
+    };
+    Running {
+        out: out.into(),
+        plan: job.plan,
+        sim,
+        recorder,
+        provenance,
+        started: Instant::now(),
+    }
+    .advance(observer)
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
+    write_atomically(path, false, |out| out.write_all(bytes)).context("write", path)
+}
+
+/// Run in progress.
+struct Running {
+    out: PathBuf,
+    plan: RunPlan,
+    sim: Simulation,
+    recorder: Recorder,
+    provenance: Provenance,
+    started: Instant,
+}
+
+impl Running {
+    fn advance(mut self, observer: &mut dyn Observer) -> Result<Ending, RunError> {
+        let (from, first_step) = (self.sim.time(), self.sim.steps());
+        let mut saved = Instant::now();
+        let mut saved_time = self.sim.time();
+        loop {
+            if let Some(why) = self.ended() {
+                return self.finish(why);
+            }
+            let limit = self
+                .recorder
+                .until_next(self.sim.time(), self.sim.time_step());
+            let stepped = self.sim.step(limit).and_then(|()| self.collapsed(limit));
+            if let Err(source) = stepped {
+                return Err(self.failed(source, saved_time));
+            }
+            for event in self.recorder.after_step(&self.sim)? {
+                observer.event(&event);
+            }
+            let tracker = self.recorder.tracker();
+            observer.progress(&Progress {
+                time: self.sim.time(),
+                end: self.plan.end,
+                steps: self.sim.steps(),
+                session_steps: self.sim.steps() - first_step,
+                wall_s: self.started.elapsed().as_secs_f64(),
+                from,
+                dt: self.sim.time_step(),
+                gap: tracker.gap(),
+                phase: tracker.phase(),
+                contacts: self.sim.contacts().len(),
+            });
+            let (every, interval) = (self.plan.checkpoint_steps, self.plan.checkpoint_interval);
+            let by_steps = every > 0 && self.sim.steps().is_multiple_of(every);
+            let by_clock = interval > 0.0 && saved.elapsed().as_secs_f64() >= interval;
+            let interrupted = observer.interrupted();
+            if by_steps || by_clock || interrupted {
+                self.checkpoint()?;
+                (saved, saved_time) = (Instant::now(), self.sim.time());
+            }
+            if interrupted {
+                return Ok(Ending::Interrupted(saved_time));
+            }
+        }
+    }
+
+    /// Returns an error if the time step has collapsed although no output is near.
+    fn collapsed(&self, limit: f64) -> Result<(), StepError> {
+        let dt = self.sim.time_step();
+        if dt >= self.plan.smallest_step || 2.0 * dt > limit {
+            return Ok(());
+        }
+        Err(StepError::Unstable {
+            time: self.sim.time(),
+            step: self.sim.steps(),
+            what: format!(
+                "the time step has collapsed to {dt:.1e} s: somewhere the fluid is far faster than \
+                 any grain should settle"
+            ),
+            remedy: "a finer grid, a smaller [time] cfl, or a look at the last slices".into(),
+        })
+    }
+
+    /// Returns the reason of the end, if the run is at its end.
+    fn ended(&self) -> Option<&'static str> {
+        let time = self.sim.time();
+        if time >= self.plan.end * (1.0 - 1e-9) {
+            return Some("end");
+        }
+        let stop = self.plan.stop?;
+        let since = self
+            .recorder
+            .tracker()
+            .holds_since(stop.when, self.sim.grains())?;
+        (time - since >= stop.hold).then_some(match stop.when {
+            StopWhen::Landing => "landing",
+            StopWhen::Rest => "rest",
+            StopWhen::Separation => "separation",
+        })
+    }
+
+    fn write_wall_time(&mut self) -> Result<(), RunError> {
+        if let Some(session) = self.provenance.sessions.last_mut() {
+            session.wall_s = self.started.elapsed().as_secs_f64();
+        }
+        self.provenance.write(&self.out)
+    }
+
+    fn checkpoint(&mut self) -> Result<(), RunError> {
+        self.recorder.checkpoint(&self.sim)?;
+        self.write_wall_time()
+    }
+
+    fn finish(mut self, why: &str) -> Result<Ending, RunError> {
+        self.recorder.finish(&self.sim)?;
+        self.checkpoint()?;
+        let summary = self
+            .recorder
+            .summary(&self.sim, self.provenance.wall_s(), why);
+        (summary.write(&self.out)).context("write", &self.out.join(summary::FILE))?;
+        // One checkpoint suffices to continue to a later end.
+        checkpoint::keep(&self.out, 1)?;
+        Ok(Ending::Finished(summary))
+    }
+
+    /// Returns advice that names the key of the case for its time step.
+    fn advice(&self, remedy: &str) -> String {
+        let key = match self.sim.setup().step {
+            StepRule::Fixed(_) => "a smaller [time] step",
+            StepRule::Limits { .. } => "a smaller [time] cfl",
+        };
+        remedy
+            .replace("a smaller [time] cfl, a smaller fixed step", key)
+            .replace("a smaller [time] cfl", key)
+            .replace("a smaller time step", key)
+    }
+
+    /// Writes `failure.json`; the last valid checkpoint is kept.
+    fn failed(&mut self, mut source: StepError, time: f64) -> RunError {
+        let StepError::Unstable {
+            time: at,
+            step,
+            what,
+            remedy,
+        } = &mut source;
+        *remedy = self.advice(remedy);
+        let failure = serde_json::json!({
+            "time": at, "step": step, "what": what, "remedy": remedy, "checkpoint_time": time
+        });
+        let path = self.out.join("failure.json");
+        let kept =
+            write(&path, format!("{failure:#}\n").as_bytes()).and_then(|()| self.write_wall_time());
+        match kept {
+            Ok(()) => RunError::Unstable {
+                source,
+                time,
+                folder: self.out.join(checkpoint::FOLDER),
+            },
+            Err(error) => error,
+        }
+    }
+}

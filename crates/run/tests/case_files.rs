@@ -1,0 +1,845 @@
+//! Case files: what is read, what is refused, and where the message points.
+
+use std::path::Path;
+
+use glam::DVec3;
+use grainwake_run::case::estimate::Estimate;
+use grainwake_run::case::{Case, CaseError, Problem};
+use grainwake_run::{Plane, PlanePosition};
+use grainwake_solver::dem::{Dof, surface_gap};
+use grainwake_solver::flow::Boundary;
+use grainwake_solver::sim::StepRule;
+
+/// The paper's pair (section 3.2.2) with spheres.
+const PAIR: &str = r#"
+title = "pair"
+
+[fluid]
+density = 1000
+viscosity = "1 mPa s"
+
+[domain]
+size = ["25 mm", "25 mm", "97.5 mm"]
+cell_size = "0.25 mm"
+
+[time]
+end = "1 s"
+
+[[grain]]
+shape = { kind = "sphere", diameter = "2 mm" }
+density = "1500 kg/m3"
+position = ["12.5 mm", "12.5 mm", "80 mm"]
+
+[[grain]]
+shape = { kind = "sphere", diameter = "2 mm" }
+density = "1.5 g/cm3"
+gap_above = { grain = 0, gap = "3 mm" }
+"#;
+
+fn parse(text: &str) -> Result<Case, CaseError> {
+    Case::parse(text, "case.toml", Path::new("."), &[])
+}
+
+fn good(text: &str) -> Case {
+    parse(text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The problems of a case that must be refused.
+fn problems(text: &str) -> Vec<Problem> {
+    match parse(text) {
+        Ok(_) => panic!("accepted:\n{text}"),
+        Err(error) => error.problems().to_vec(),
+    }
+}
+
+/// One change to the pair must be refused on the line that was changed, and say these words.
+fn refused(from: &str, to: &str, key: &str, words: &[&str]) {
+    assert!(PAIR.contains(from), "{from}");
+    let text = PAIR.replacen(from, to, 1);
+    let found = problems(&text);
+    let line = PAIR[..PAIR.find(from).unwrap()].matches('\n').count() + 1;
+    let all: String = found
+        .iter()
+        .map(|p| format!("{p} | {}\n", p.help.clone().unwrap_or_default()))
+        .collect();
+    let hit = found
+        .iter()
+        .find(|p| p.key.as_deref().is_some_and(|k| k.starts_with(key)));
+    let hit = hit.unwrap_or_else(|| panic!("no problem of {key}:\n{all}"));
+    let (file, at, _) = hit.place().unwrap_or_else(|| panic!("no place:\n{all}"));
+    assert_eq!(file, "case.toml");
+    // What is missing is told of its table.
+    let line = if to.trim().is_empty() {
+        PAIR[..PAIR.find(from).unwrap()]
+            .rfind("[[")
+            .map(|i| PAIR[..i].matches('\n').count() + 1)
+            .unwrap()
+    } else {
+        line
+    };
+    assert!(
+        (line..=line + to.matches('\n').count()).contains(&at),
+        "line {at}, not {line}:\n{all}"
+    );
+    for word in words {
+        assert!(all.contains(word), "`{word}` is missing in:\n{all}");
+    }
+}
+
+#[test]
+fn the_papers_pair_is_understood() {
+    let case = good(PAIR);
+    assert_eq!(case.setup.mesh.cells, [100, 100, 390]);
+    assert_eq!(case.setup.mesh.spacing, DVec3::splat(0.25e-3));
+    let fluid = case.setup.fluid.unwrap();
+    assert_eq!((fluid.density, fluid.kinematic_viscosity), (1000.0, 1e-6));
+    let [a, b] = &case.setup.grains[..] else {
+        panic!()
+    };
+    assert_eq!(a.pose.position, DVec3::new(0.0125, 0.0125, 0.08));
+    assert_eq!((b.pose.position.x, b.density), (0.0125, 1500.0));
+    assert!(
+        (b.pose.position.z - 0.085).abs() < 1e-9,
+        "{}",
+        b.pose.position.z
+    );
+    let gap = surface_gap(a, b, &case.setup.enclosure());
+    assert!((gap - 3e-3).abs() < 1e-8, "{gap}");
+    assert_eq!((a.translation, a.rotation), (Dof::Free, Dof::Free));
+    assert_eq!(case.setup.boundaries.0, [[Boundary::WALL; 2]; 3]);
+    assert!(matches!(case.setup.step, StepRule::Limits { .. }));
+    assert_eq!(
+        case.plan.planes,
+        [
+            Plane {
+                axis: 1,
+                position: PlanePosition::Grain(0)
+            },
+            Plane {
+                axis: 1,
+                position: PlanePosition::Grain(1)
+            }
+        ]
+    );
+    let estimate = Estimate::of(&case, 2);
+    assert!((estimate.galileo.unwrap() - 198.1).abs() < 0.1);
+    assert!((estimate.cells_per_diameter.unwrap() - 8.0).abs() < 1e-9);
+    assert_eq!(estimate.cells, 3_900_000);
+}
+
+#[test]
+fn a_resolved_case_resolves_to_itself() {
+    let with_more = PAIR.replace("[time]", "[contact]\nmaximum_overlap = 0.02\n\n[time]").replace(
+        "density = \"1500 kg/m3\"",
+        "density = \"1500 kg/m3\"\nmotion = { velocity = [0, 0, \"-1 mm/s\"] }\norientation = { axis = [1, 2, 3], angle = \"33 deg\" }",
+    );
+    for text in [PAIR, &with_more] {
+        let first = good(text);
+        let second = good(&first.resolved);
+        assert_eq!(first.resolved, second.resolved);
+        assert_eq!(first.digest, second.digest);
+        for (a, b) in first.setup.grains.iter().zip(&second.setup.grains) {
+            assert_eq!(
+                (a.pose, a.velocity, a.translation),
+                (b.pose, b.velocity, b.translation)
+            );
+        }
+        assert_eq!(
+            (first.setup.contact, first.setup.step, first.plan),
+            (second.setup.contact, second.setup.step, second.plan)
+        );
+    }
+}
+
+#[test]
+fn an_override_replaces_what_its_key_names() {
+    let text = "[fluid]\ndensity = 1000\nviscosity = 1e-3\n[domain]\nsize = [0.01, 0.01, 0.01]\ncell_size = 5e-4\n\
+        [[grain]]\nshape = { kind = \"sphere\", diameter = 2e-3 }\ndensity = 1500\nposition = [5e-3, 5e-3, 5e-3]\n[time]\nend = 1\n";
+    let load = |set: &str| Case::parse(text, "ball.toml", Path::new(""), &[set.to_owned()]);
+    let case = load("grain.0.shape={ kind = \"ellipsoid\", size = [3e-3, 2e-3, 2e-3] }").unwrap();
+    let extent = case.setup.grains[0].shape.upper() - case.setup.grains[0].shape.lower();
+    assert!((extent.max_element() - 3e-3).abs() < 1e-5, "{extent}");
+    // A longer key changes only what it names.
+    let larger = load("grain.0.shape.diameter=3e-3").unwrap();
+    let diameter = larger.setup.grains[0].shape.equivalent_diameter();
+    assert!((diameter - 3e-3).abs() < 1e-12);
+    let lost = load("grain.0.shape={ diameter = 3e-3 }").unwrap_err();
+    assert!(lost.to_string().contains("kind"), "{lost}");
+}
+
+#[test]
+fn the_digest_follows_what_decides_the_results() {
+    let digest = |from: &str, to: &str| good(&PAIR.replacen(from, to, 1)).digest;
+    let original = good(PAIR).digest;
+    assert_eq!(digest("\"pair\"", "\"another title\""), original);
+    assert_eq!(digest("[time]", "[run]\nthreads = 3\n[time]"), original);
+    assert_eq!(
+        digest("[time]", "[output]\ncheckpoint_steps = 3\n[time]"),
+        original
+    );
+    assert_ne!(
+        digest("[time]", "[run]\nprecision = \"f32\"\n[time]"),
+        original
+    );
+    assert_ne!(digest("1500 kg/m3", "1501 kg/m3"), original);
+    assert_ne!(digest("1 mPa s", "1.1 mPa s"), original);
+    assert_ne!(
+        digest("[time]", "[output]\nslices = \"1 ms\"\n[time]"),
+        original
+    );
+}
+
+#[test]
+fn mistyped_keys_and_words_are_corrected() {
+    refused(
+        "viscosity =",
+        "visocsity =",
+        "fluid",
+        &["unknown key", "did you mean `viscosity`"],
+    );
+    refused(
+        "position =",
+        "positon =",
+        "grain.0",
+        &["did you mean `position`"],
+    );
+    refused("[time]\n", "[tme]\n", "tme", &["did you mean `time`"]);
+    refused(
+        "cell_size = \"0.25 mm\"",
+        "cell_size = \"0.25 mm\"\nboundaries = { x = \"periodc\" }",
+        "domain.boundaries",
+        &["did you mean \"periodic\"", "free-surface"],
+    );
+    refused(
+        "kind = \"sphere\"",
+        "kind = \"spere\"",
+        "grain.0.shape",
+        &["sphere"],
+    );
+    refused(
+        "gap = \"3 mm\"",
+        "gpa = \"3 mm\"",
+        "grain.1.gap_above",
+        &["did you mean `gap`"],
+    );
+}
+
+#[test]
+fn wrong_units_name_the_right_one() {
+    refused(
+        "\"1 mPa s\"",
+        "\"1 mm\"",
+        "fluid.viscosity",
+        &["is a length", "1 mPa s"],
+    );
+    refused(
+        "\"2 mm\"",
+        "\"2 mmm\"",
+        "grain.0.shape.diameter",
+        &["unknown unit", "did you mean `mm`"],
+    );
+    refused(
+        "\"1500 kg/m3\"",
+        "\"1500 kg\"",
+        "grain.0.density",
+        &["is a mass", "kg/m3"],
+    );
+    refused("\"1 s\"", "\"1 m\"", "time.end", &["is a length", "a time"]);
+    refused(
+        "\"1 mPa s\"",
+        "\"1 mPas\"",
+        "fluid.viscosity",
+        &["did you mean `mPa s`"],
+    );
+    refused(
+        "[\"12.5 mm\", \"12.5 mm\", \"80 mm\"]",
+        "[\"12.5 mm\", \"12.5 kg\", \"80 mm\"]",
+        "grain.0.position",
+        &["is a mass"],
+    );
+    refused(
+        "density = 1000",
+        "density = true",
+        "fluid.density",
+        &["density"],
+    );
+    refused("density = 1000", "density = nan", "fluid.density", &["NaN"]);
+}
+
+#[test]
+fn values_out_of_range_are_refused() {
+    refused(
+        "density = 1000",
+        "density = 0",
+        "fluid.density",
+        &["greater than zero"],
+    );
+    refused(
+        "\"1500 kg/m3\"",
+        "-1500",
+        "grain.0.density",
+        &["greater than zero"],
+    );
+    refused("\"1 s\"", "0", "time.end", &["greater than zero"]);
+    refused("\"2 mm\"", "\"-2 mm\"", "grain.0.shape", &["positive"]);
+    refused(
+        "[time]",
+        "[contact]\nrestitution = 1.5\n[time]",
+        "contact.restitution",
+        &["between"],
+    );
+    refused(
+        "[time]",
+        "[run]\nprecision = \"f16\"\n[time]",
+        "run.precision",
+        &["f16", "f32", "f64"],
+    );
+    refused(
+        "[time]",
+        "[output]\ntables = \"1 ns\"\n[time]",
+        "output.tables",
+        &["unit forgotten"],
+    );
+}
+
+#[test]
+fn boxes_that_do_not_fit_say_what_would() {
+    refused(
+        "\"0.25 mm\"",
+        "\"0.3 mm\"",
+        "domain.cell_size",
+        &["whole number of cells", "84 cells"],
+    );
+    refused(
+        "\"0.25 mm\"",
+        "\"0.25 nm\"",
+        "domain.cell_size",
+        &["unit forgotten"],
+    );
+    refused(
+        "cell_size = \"0.25 mm\"",
+        "cells = [0, 10, 10]",
+        "domain.cells",
+        &["1 to"],
+    );
+    refused(
+        "cell_size = \"0.25 mm\"",
+        "cell_size = \"0.25 mm\"\ncells = [100, 100, 100]",
+        "domain.cells",
+        &["two of"],
+    );
+    assert!(
+        problems(&PAIR.replace("cell_size = \"0.25 mm\"\n", ""))[0]
+            .help
+            .as_ref()
+            .unwrap()
+            .contains("two of size")
+    );
+}
+
+#[test]
+fn boundaries_must_belong_together() {
+    let with = |faces: &str, key: &str, words: &[&str]| {
+        let to = format!("cell_size = \"0.25 mm\"\nboundaries = {{ {faces} }}");
+        refused("cell_size = \"0.25 mm\"", &to, key, words);
+    };
+    with(
+        "x = [\"periodic\", \"wall\"]",
+        "domain.boundaries.x",
+        &["one side only"],
+    );
+    with(
+        "x = { lower = \"periodic\" }",
+        "domain.boundaries.x",
+        &["one side only"],
+    );
+    with(
+        "x = [{ kind = \"inflow\", velocity = [0.1, 0, 0] }, \"wall\"]",
+        "domain.boundaries.x",
+        &["outflow"],
+    );
+    with(
+        "x = [\"inflow\", \"outflow\"]",
+        "domain.boundaries.x",
+        &["velocity"],
+    );
+    with(
+        "x = [{ kind = \"inflow\", velocity = [-0.1, 0, 0] }, \"outflow\"]",
+        "domain.boundaries.x",
+        &["leaves the box"],
+    );
+    with(
+        "x = [{ kind = \"wall\", velocity = [0.1, 0, 0] }, \"wall\"]",
+        "domain.boundaries.x",
+        &["own plane"],
+    );
+    with(
+        "x = { kind = \"slip\", velocity = [0, 0.1, 0] }",
+        "domain.boundaries.x",
+        &["no velocity"],
+    );
+    let lid = PAIR.replace("cell_size = \"0.25 mm\"", "cell_size = \"0.25 mm\"\nboundaries = { x = \"periodic\", z = [\"wall\", { kind = \"wall\", velocity = [\"1 cm/s\", 0, 0] }] }");
+    let case = good(&lid);
+    assert_eq!(case.setup.boundaries.0[0], [Boundary::Periodic; 2]);
+    assert_eq!(
+        case.setup.boundaries.0[2][1],
+        Boundary::Wall {
+            velocity: DVec3::new(0.01, 0.0, 0.0)
+        }
+    );
+}
+
+#[test]
+fn grains_must_stand_clear_and_inside() {
+    refused(
+        "gap_above = { grain = 0, gap = \"3 mm\" }",
+        "gap_above = { grain = 0, gap = \"-1 mm\" }",
+        "grain.1",
+        &["overlap at the start by 1.0000 mm", "move them apart"],
+    );
+    refused(
+        "\"80 mm\"]",
+        "\"97 mm\"]",
+        "grain.0.position",
+        &["crosses a face", "0.5000 mm"],
+    );
+    refused(
+        "[\"12.5 mm\", \"12.5 mm\", \"80 mm\"]",
+        "[\"12.5 mm\", \"40 mm\", \"80 mm\"]",
+        "grain.0.position",
+        &["outside the box"],
+    );
+    refused(
+        "gap_above = { grain = 0",
+        "gap_above = { grain = 1",
+        "grain.1.gap_above",
+        &["does not stand before"],
+    );
+    refused(
+        "position = [\"12.5 mm\", \"12.5 mm\", \"80 mm\"]",
+        "position = [\"12.5 mm\", \"12.5 mm\"]",
+        "grain.0.position",
+        &["gap_above"],
+    );
+    refused(
+        "position = [\"12.5 mm\", \"12.5 mm\", \"80 mm\"]\n",
+        "\n",
+        "grain.0",
+        &["no position"],
+    );
+}
+
+#[test]
+fn grains_beyond_the_box_say_what_helps() {
+    let position = "[\"12.5 mm\", \"12.5 mm\", \"80 mm\"]";
+    refused(
+        position,
+        "[\"12.5 mm\", \"12.5 mm\", 80]",
+        "grain.0.position",
+        &[
+            "beyond the upper z face (at 97.5 mm)",
+            "unit forgotten? bare numbers are metres",
+        ],
+    );
+    let far = problems(&PAIR.replace("\"80 mm\"]", "\"80 m\"]"));
+    assert!(!far[0].help.as_ref().unwrap().contains("metres"), "{far:?}");
+    for (from, to, key, words) in [
+        (
+            "diameter = \"2 mm\" }",
+            "diameter = \"30 mm\" }",
+            "grain.0.shape",
+            [
+                "larger than the box: 30 mm along x, the box has 25 mm",
+                "equivalent_diameter",
+            ],
+        ),
+        (
+            "density = \"1500 kg/m3\"",
+            "equivalent_diameter = 2\ndensity = \"1500 kg/m3\"",
+            "grain.0.equivalent_diameter",
+            ["larger than the box: 2 m", "bare numbers are metres"],
+        ),
+    ] {
+        refused(from, to, key, &words);
+        let found = problems(&PAIR.replacen(from, to, 1));
+        let helps = found.iter().filter_map(|p| p.help.as_ref());
+        let moves = helps.filter(|help| help.contains("move it by")).count();
+        // The grain above it may still be told to move.
+        assert!(moves <= 1, "{found:?}");
+    }
+}
+
+#[test]
+fn grains_within_each_other_overlap_by_all_there_is() {
+    for (height, depth) in [("80 mm", "2.0000 mm"), ("80.5 mm", "1.5000 mm")] {
+        refused(
+            "gap_above = { grain = 0, gap = \"3 mm\" }",
+            &format!("position = [\"12.5 mm\", \"12.5 mm\", \"{height}\"]"),
+            "grain.1.position",
+            &[&format!("overlap at the start by {depth}")],
+        );
+    }
+}
+
+#[test]
+fn free_grains_lighter_than_the_coupling_bears_are_refused() {
+    let density = "density = \"1500 kg/m3\"";
+    refused(
+        density,
+        "density = \"0.005 g/cm3\"",
+        "grain.0.density",
+        &["0.005 times the density", "at least 0.01", "10 kg/m3"],
+    );
+    refused(
+        density,
+        "density = 2.5",
+        "grain.0.density",
+        &["kg/m3? was a unit such as g/cm3 forgotten"],
+    );
+    let with_unit = problems(&PAIR.replace(density, "density = \"2.5 kg/m3\""));
+    let help = with_unit[0].help.as_ref().unwrap();
+    assert!(!help.contains("forgotten"), "{help}");
+    let packed = PAIR.replace(
+        "[time]",
+        "[[packing]]\ncount = 3\nshapes = [{ kind = \"sphere\", diameter = \"2 mm\" }]\ndensity = 2\nregion = { lower = [0, 0, 0], upper = [\"25 mm\", \"25 mm\", \"20 mm\"] }\n[time]",
+    );
+    let found = problems(&packed);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].key.as_deref(), Some("packing.0.density"));
+    // Held grains may be as light as they like, and so may grains without a fluid.
+    good(&PAIR.replacen(density, "density = 2\nmotion = \"fixed\"", 1));
+    let fluid = "[fluid]\ndensity = 1000\nviscosity = \"1 mPa s\"\n";
+    assert!(PAIR.contains(fluid));
+    good(&PAIR.replace(fluid, "").replacen(density, "density = 2", 1));
+}
+
+#[test]
+fn light_grains_are_warned_of() {
+    let warnings = |densities: [&str; 2], stop: &str| {
+        let text = PAIR
+            .replace("\"1500 kg/m3\"", densities[0])
+            .replace("\"1.5 g/cm3\"", densities[1])
+            .replace("end = \"1 s\"", &format!("end = \"1 s\"\n{stop}"));
+        Estimate::of(&good(&text), 1).warnings.join("\n")
+    };
+    let landing = "stop = \"landing\"";
+    let light = warnings(["400", "2000"], "");
+    assert!(light.contains("1 of 2 free grains"), "{light}");
+    let rising = warnings(["600", "700"], landing);
+    assert!(rising.contains("they rise"), "{rising}");
+    assert!(
+        rising.contains("upwards") && !rising.contains("never"),
+        "{rising}"
+    );
+    assert!(warnings(["600", "2000"], landing).contains("may never be met"));
+    let heavy = warnings(["1500", "2000"], landing);
+    assert!(
+        !heavy.contains("rise") && !heavy.contains("landing"),
+        "{heavy}"
+    );
+}
+
+#[test]
+fn ways_out_are_warned_of() {
+    let warnings = |from: &str, to: &str| {
+        assert!(PAIR.contains(from), "{from}");
+        Estimate::of(&good(&PAIR.replacen(from, to, 1)), 1)
+            .warnings
+            .join("\n")
+    };
+    let walls = |z: &str| {
+        let cell = "cell_size = \"0.25 mm\"";
+        let walls =
+            format!("{cell}\nboundaries = {{ x = \"periodic\", y = \"periodic\", z = {z} }}");
+        warnings(cell, &walls)
+    };
+    let none = [
+        "leave through",
+        "faster and faster",
+        "given motion",
+        "one cell thick",
+    ];
+    let quiet = walls("\"wall\"");
+    assert!(none.iter().all(|text| !quiet.contains(text)), "{quiet}");
+    let open = walls("[\"outflow\", \"wall\"]");
+    assert!(open.contains("lower face of z"), "{open}");
+    let up = walls("[\"wall\", \"outflow\"]");
+    assert!(!up.contains("leave through"), "{up}");
+    // 2 x 500 kg/m^3 x 4.19 mm^3 g over 1000 kg/m^3 x 60.9 cm^3.
+    let fall = walls("\"periodic\"");
+    assert!(
+        fall.contains("body_acceleration = [0, 0, 6.7442e-4]"),
+        "{fall}"
+    );
+    let position = "position = [\"12.5 mm\", \"12.5 mm\", \"80 mm\"]";
+    let given = warnings(
+        position,
+        &format!("{position}\nmotion = {{ velocity = [0, 0, \"-0.1 m/s\"] }}"),
+    );
+    assert!(
+        given.contains("grain 0") && given.contains("lower wall of z at t = 790 ms"),
+        "{given}"
+    );
+}
+
+#[test]
+fn shapes_must_be_whole() {
+    refused(
+        "shape = { kind = \"sphere\", diameter = \"2 mm\" }",
+        "file = \"nowhere.grain\"",
+        "grain.0.file",
+        &["there is no grain file", "from-scan"],
+    );
+    refused(
+        "shape = { kind = \"sphere\", diameter = \"2 mm\" }",
+        "shape = { kind = \"sphere\", size = [1, 1, 1] }",
+        "grain.0.shape",
+        &["`diameter` is missing"],
+    );
+    refused(
+        "diameter = \"2 mm\" }",
+        "diameter = \"2 mm\", height = \"1 mm\" }",
+        "grain.0.shape",
+        &["does not belong"],
+    );
+    refused(
+        "shape = { kind = \"sphere\", diameter = \"2 mm\" }\n",
+        "\n",
+        "grain.0",
+        &["no shape"],
+    );
+}
+
+#[test]
+fn several_problems_are_told_at_once() {
+    let text = PAIR
+        .replace("density = 1000", "density = -1")
+        .replace("end = \"1 s\"", "end = -1")
+        .replace("cell_size = \"0.25 mm\"", "cell_size = \"0.3 mm\"");
+    assert!(problems(&text).len() >= 2);
+}
+
+#[test]
+fn motion_and_orientation_have_several_forms() {
+    let with = |more: &str| {
+        good(&PAIR.replacen(
+            "density = \"1500 kg/m3\"",
+            &format!("density = \"1500 kg/m3\"\n{more}"),
+            1,
+        ))
+        .setup
+        .grains[0]
+            .clone()
+    };
+    let fixed = with("motion = \"fixed\"");
+    assert_eq!(
+        (fixed.translation, fixed.rotation),
+        (Dof::Prescribed(DVec3::ZERO), Dof::Prescribed(DVec3::ZERO))
+    );
+    let spun = with("motion = { velocity = \"fixed\", angular_velocity = [0, 0, \"60 rpm\"] }");
+    assert_eq!(
+        spun.rotation,
+        Dof::Prescribed(DVec3::new(0.0, 0.0, std::f64::consts::TAU))
+    );
+    assert_eq!(
+        spun.angular_velocity,
+        DVec3::new(0.0, 0.0, std::f64::consts::TAU)
+    );
+    let pulled = with("motion = { velocity = [0, 0, \"-1 cm/s\"] }");
+    assert_eq!(
+        (pulled.translation, pulled.rotation),
+        (Dof::Prescribed(DVec3::new(0.0, 0.0, -0.01)), Dof::Free)
+    );
+    refused(
+        "density = \"1500 kg/m3\"",
+        "density = \"1500 kg/m3\"\nmotion = \"fixed\"\nvelocity = [0, 0, 1]",
+        "grain.0.velocity",
+        &["prescribe"],
+    );
+    let turned =
+        with("orientation = { long_axis = \"z\" }\nrotate = { axis = \"y\", angle = \"90 deg\" }");
+    assert!((turned.pose.orientation * DVec3::X - DVec3::X).length() < 1e-12);
+}
+
+#[test]
+fn vectors_may_be_formulas() {
+    let text = PAIR
+        .replacen(
+            "density = \"1500 kg/m3\"",
+            "density = \"1500 kg/m3\"\nmotion = { velocity = { formula = [0, \"0.1*t\", \"cos(3*t)\"] }, angular_velocity = \"fixed\" }",
+            1,
+        )
+        .replacen(
+            "[fluid]",
+            "[fluid]\ninitial_velocity = { formula = [\"z\", 0, \"2*x - y\"] }\nbody_acceleration = { formula = [\"exp(-t)\", 0, 0] }",
+            1,
+        );
+    let case = good(&text);
+    let setup = &case.setup;
+    assert_eq!(
+        setup.grains[0].translation,
+        Dof::Prescribed(DVec3::new(0.0, 0.0, 1.0))
+    );
+    assert_eq!(setup.grains[0].velocity, DVec3::new(0.0, 0.0, 1.0));
+    let start = setup.prescription.initial_velocity.as_ref().unwrap();
+    assert_eq!(start.at(&[1.0, 2.0, 3.0]), DVec3::new(3.0, 0.0, 0.0));
+    assert_eq!(
+        setup.prescription.body_acceleration(0.0),
+        Some(DVec3::new(1.0, 0.0, 0.0))
+    );
+    let again = good(&case.resolved);
+    assert_eq!(case.resolved, again.resolved);
+    let fluid = |to: &str, words: &[&str]| {
+        refused("[fluid]", &format!("[fluid]\n{to}"), "fluid", words);
+    };
+    fluid(
+        "initial_velocity = { formula = [\"t\", 0, 0] }",
+        &["unknown name \"t\"", "x, y, z"],
+    );
+    fluid(
+        "initial_velocity = { formula = [\"1/(x - 0.0125)\", 0, 0] }",
+        &["finite number"],
+    );
+    fluid("body_acceleration = { formula = [\"t\", 0] }", &["three"]);
+    for (formula, words) in [
+        ("2*(t", "its brackets do not match; a formula may use t,"),
+        ("2*t 3", "it cannot be read"),
+        ("", "it is empty"),
+    ] {
+        fluid(
+            &format!("body_acceleration = {{ formula = [\"{formula}\", 0, 0] }}"),
+            &["the x component", words],
+        );
+    }
+    fluid(
+        "body_acceleration = { formula = [\"sqrt(t - 1)\", 0, 0] }",
+        &["finite number"],
+    );
+    refused(
+        "density = \"1500 kg/m3\"",
+        "density = \"1500 kg/m3\"\nmotion = { velocity = { formula = [0, 0, \"x\"] } }",
+        "grain",
+        &["unknown name \"x\""],
+    );
+}
+
+#[test]
+fn packings_become_grains() {
+    let text = r#"
+        [domain]
+        size = [0.05, 0.05, 0.2]
+        [time]
+        end = 0.1
+        stop = { when = "rest", hold = "10 ms" }
+        [[packing]]
+        count = 60
+        shapes = [{ kind = "sphere", diameter = "2 mm" }, { kind = "sphere", diameter = "3 mm" }]
+        equivalent_diameter = { from = "2 mm", to = "4 mm" }
+        nodes = 200
+        density = 2650
+        region = { lower = ["10 mm", "10 mm", "10 mm"], upper = ["40 mm", "40 mm", "190 mm"] }
+        seed = 3
+    "#;
+    let case = good(text);
+    assert_eq!(case.setup.grains.len(), 60);
+    assert!(case.setup.fluid.is_none());
+    let resolved = good(&case.resolved);
+    assert_eq!(resolved.resolved, case.resolved);
+    for (a, b) in case.setup.grains.iter().zip(&resolved.setup.grains) {
+        assert_eq!((a.pose, a.shape.volume()), (b.pose, b.shape.volume()));
+    }
+    let d: Vec<f64> = case
+        .setup
+        .grains
+        .iter()
+        .map(|g| g.shape.equivalent_diameter())
+        .collect();
+    assert!(d.iter().all(|d| (2e-3..4e-3).contains(d)) && d[0] != d[1]);
+    let crowded = problems(&text.replace("count = 60", "count = 60000"));
+    assert!(
+        crowded[0].message.contains("of 60000 grains find a place"),
+        "{}",
+        crowded[0]
+    );
+    assert_eq!(crowded.len(), 1, "{crowded:?}");
+    let random = good(&text.replace("seed = 3", "seed = 3\narrangement = \"random\""));
+    assert_eq!(random.setup.grains.len(), 60);
+}
+
+#[test]
+fn expectations_need_a_meaning() {
+    let with = |text: &str| PAIR.replace("[time]", &format!("[expect]\n{text}\n[time]"));
+    assert_eq!(good(&with("kiss_time = { value = \"0.2 s\", tolerance = \"5 %\" }\npeak_settling_speed = [{ at_least = 0.1, grain = 0 }, { at_most = 0.2, grain = 1 }]")).expect.len(), 3);
+    assert!(
+        problems(&with("kiss_time = { value = 0.2 }"))[0]
+            .message
+            .contains("what is expected")
+    );
+    assert!(
+        problems(&with("kiss_tme = { value = 0.2 }"))[0]
+            .help
+            .as_ref()
+            .unwrap()
+            .contains("kiss_time")
+    );
+    assert!(
+        problems(&with("landing_time = { at_most = 1, grain = 7 }"))[0]
+            .message
+            .contains("no grain 7")
+    );
+}
+
+#[test]
+fn overrides_are_located_too() {
+    let case = Case::parse(
+        PAIR,
+        "case.toml",
+        Path::new("."),
+        &["time.end=2".into(), "grain.1.density=2 g/cm3".into()],
+    );
+    let case = case.unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((case.plan.end, case.setup.grains[1].density), (2.0, 2000.0));
+    let set = |item: &str| Case::parse(PAIR, "case.toml", Path::new("."), &[item.into()]);
+    let formula = set("domain.size={ formula = [0, 0, 0] }");
+    assert!(formula.is_err_and(|e| e.to_string().contains("three components")));
+    assert!(set("domain.size.0=30 mm").is_ok_and(|c| c.setup.mesh.cells[0] == 120));
+    let Err(error) = Case::parse(
+        PAIR,
+        "case.toml",
+        Path::new("."),
+        &["grain.1.density=2 kg".into()],
+    ) else {
+        panic!()
+    };
+    assert_eq!(
+        error.problems()[0]
+            .place()
+            .map(|(name, line, _)| (name, line)),
+        Some(("--set", 1))
+    );
+}
+
+#[test]
+fn what_an_override_broke_is_told_of_the_override() {
+    let inline = "gap_above = { grain = 0, gap = \"3 mm\" }";
+    let table = "[grain.gap_above]\ngrain = 0\ngap = \"3 mm\"";
+    let stop = "end = \"1 s\"\nstop = { when = \"rest\", hold = \"1 s\" }";
+    for text in [PAIR.to_string(), PAIR.replace(inline, table)] {
+        let text = text.replace("end = \"1 s\"", stop);
+        for (set, key) in [
+            ("time.stop.hold=-1", "time.stop.hold"),
+            ("grain.1.gap_above.gap=15 mm", "grain.1.gap_above"),
+            ("grain.1.gap_above.gap=-1 mm", "grain.1.gap_above"),
+            ("grain.0.position.2=0.5 mm", "grain.0.position"),
+            ("domain.size.0=-1", "domain.size"),
+            ("grain.1.density=2", "grain.1.density"),
+        ] {
+            let case = Case::parse(&text, "case.toml", Path::new("."), &[set.into()]);
+            let error = case.map(|_| ()).unwrap_err();
+            let first = &error.problems()[0];
+            assert_eq!(first.place().map(|(name, ..)| name), Some("--set"), "{set}");
+            let found = first.key.as_deref().unwrap();
+            assert!(found.starts_with(key), "{set}: {first}");
+        }
+    }
+}
