@@ -76,7 +76,7 @@ fn a_run_folder_holds_what_the_reference_says() {
         );
     }
     let field = grainwake_formats::vti::read(&out.join("fields/fields_000001.vti")).unwrap();
-    assert_eq!(field.cells, [8, 8, 24]);
+    assert_eq!(field.frame.cells, [8, 8, 24]);
     let array = |name: &str| field.arrays.iter().find(|a| a.name == name).unwrap();
     let solid: f64 = array("solid_fraction")
         .data
@@ -89,10 +89,10 @@ fn a_run_folder_holds_what_the_reference_says() {
     assert!((solid / spheres - 1.0).abs() < 0.01, "{solid} {spheres}");
     assert!(array("velocity").data.iter().any(|v| *v < -1e-4));
     let slice = grainwake_formats::vti::read(&out.join("slices/y-grain0_000002.vti")).unwrap();
-    assert_eq!((slice.cells, slice.arrays.len()), ([8, 1, 24], 4));
-    assert!((slice.time - 0.02).abs() < 1e-12);
+    assert_eq!((slice.frame.cells, slice.arrays.len()), ([8, 1, 24], 4));
+    assert!((slice.frame.time - 0.02).abs() < 1e-12);
     // The slice is a layer of the field.
-    let layer = (slice.origin.y / 0.5e-3).round() as usize;
+    let layer = (slice.frame.origin.y / 0.5e-3).round() as usize;
     let pressure = &slice
         .arrays
         .iter()
@@ -512,7 +512,7 @@ fn pictures_open_in_pyvista() {
         found["fields"]["pressure_at_5_3_7"].as_f64(),
         Some(f64::from(pressure[(7 * 8 + 3) * 8 + 5]))
     );
-    assert_eq!(found["fields"]["time"].as_f64(), Some(ours.time));
+    assert_eq!(found["fields"]["time"].as_f64(), Some(ours.frame.time));
     assert_eq!(found["grains"]["closed"], true);
     let volume = found["grains"]["volume_of_0"].as_f64().unwrap();
     assert!(
