@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""Checks the prose of all tracked files, as far as a script can.
+
+1. No line of Markdown and no comment of Rust or TOML exceeds 100 columns. Table rows, links and
+   fenced output are exempt: they cannot be broken.
+2. Every decimal number has a digit before its point.
+3. A doc comment is a sentence about its subject: it does not open with a phrase that lacks one.
+
+Prints each finding as `file:line: rule: text` and exits with 1 if there is any.
+"""
+
+import re
+import subprocess
+import sys
+
+WIDTH = 100
+# Files whose content is generated or quoted.
+EXEMPT = re.compile(r"^(results/.*\.(svg|html|json|csv)|LICENSE.*|Cargo\.lock)$")
+BARE_DECIMAL = re.compile(r"(?<![\w.)\]}'\"/*])\.\d+(?![\w.]*[a-zA-Z_/])")
+# Openings of doc comments without a subject of their own.
+OPENINGS = re.compile(
+    r"^(The same\b|Those\b|These\b|That\b|This is\b|What\b|Where\b|How\b|Why\b|When\b|Which\b|It\b|"
+    r"Its\b|They\b|Their\b|Of\b|As\b|Some\b|One more\b|And\b|Also\b|Likewise\b|Ditto\b)"
+)
+INLINE_CODE = re.compile(r"`[^`]*`")
+LINK = re.compile(r"\]\([^)]*\)|https?://\S+")
+
+
+def tracked(*patterns):
+    listing = subprocess.run(
+        ["git", "ls-files", "-z", "--", *patterns], check=True, capture_output=True
+    )
+    names = listing.stdout.decode().split("\0")
+    return [name for name in names if name and not EXEMPT.match(name)]
+
+
+def markdown(name, text):
+    fenced = False
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.lstrip().startswith("```"):
+            fenced = not fenced
+            continue
+        breakable = not (fenced or line.lstrip().startswith("|") or LINK.search(line))
+        if len(line) > WIDTH and breakable:
+            yield number, "longer than 100 columns", line
+        prose = INLINE_CODE.sub("", LINK.sub("", line))
+        if not fenced and BARE_DECIMAL.search(prose):
+            yield number, "number without leading zero", line
+
+
+def rust(name, text):
+    opening = True
+    for number, line in enumerate(text.split("\n"), 1):
+        code, mark, comment = line.partition("//")
+        doc = re.match(r"^\s*//[/!]", line)
+        if not mark or "://" in line and not code.strip() == "":
+            opening = True
+            continue
+        if len(line) > WIDTH and "http" not in line:
+            yield number, "longer than 100 columns", line
+        if BARE_DECIMAL.search(INLINE_CODE.sub("", comment)):
+            yield number, "number without leading zero", line
+        words = re.sub(r"^[/!]\s?", "", comment).strip()
+        if doc and opening and OPENINGS.match(words):
+            yield number, "doc comment without a subject", line
+        opening = not doc
+
+
+def toml(name, text):
+    for number, line in enumerate(text.split("\n"), 1):
+        if not line.lstrip().startswith("#"):
+            continue
+        if len(line) > WIDTH and "http" not in line:
+            yield number, "longer than 100 columns", line
+        if BARE_DECIMAL.search(INLINE_CODE.sub("", line)):
+            yield number, "number without leading zero", line
+
+
+def main():
+    findings = 0
+    for checker, patterns in [(markdown, ["*.md"]), (rust, ["*.rs"]), (toml, ["*.toml"])]:
+        for name in tracked(*patterns):
+            with open(name, encoding="utf-8") as file:
+                text = file.read()
+            for number, rule, line in checker(name, text):
+                findings += 1
+                print(f"{name}:{number}: {rule}: {line.strip()[:120]}")
+    print(f"{findings} findings", file=sys.stderr)
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
