@@ -351,7 +351,7 @@ fn damage_to_any_file_is_an_error_or_a_note() {
         (
             "events.jsonl",
             "{\"time\":\"now\",\"event\":\"kiss\"}\n",
-            "events.jsonl, line 1: 'time'",
+            "events.jsonl, line 1: invalid type",
         ),
     ];
     for (name, content, message) in damage {
@@ -527,7 +527,7 @@ fn write_log(folder: &Path, events: &[(f64, &str)]) {
     let unit = (synthetic::D / synthetic::G).sqrt();
     let line = |(s, name): &(f64, &str)| {
         let time = s * unit;
-        format!("{{\"time\":{time},\"event\":\"{name}\",\"grains\":[0,1]}}\n")
+        format!("{{\"time\":{time},\"event\":\"{name}\",\"grains\":[0,1],\"confirmed\":{time}}}\n")
     };
     let log: String = events.iter().map(line).collect();
     std::fs::write(folder.join("events.jsonl"), log).unwrap();
