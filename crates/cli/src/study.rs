@@ -20,6 +20,7 @@ impl From<StudyError> for Exit {
         match error {
             StudyError::Invalid(problems) => Exit::problems(BAD_INPUT, problems),
             StudyError::Case(error) => error.into(),
+            StudyError::Report(error) => error.into(),
             StudyError::Occupied { .. } => {
                 Exit::with_help(BAD_INPUT, error.to_string(), "give another folder with -o")
             }

@@ -2,7 +2,7 @@
 
 use crate::axis::Axis;
 use crate::drawing::{Anchor, Drawing, path_data};
-use crate::style::{FAINT, GRID, INK, LINE, SMALL, TEXT, TICK};
+use crate::style::{FAINT, GRID, LINE, SMALL, TICK};
 use crate::ticks;
 
 /// A rectangle on paper with a horizontal and a vertical axis.
@@ -53,20 +53,23 @@ impl Frame {
     /// Draws the outline, the ticks and the labels; `labelled` selects the axes that have labels.
     pub fn outline(&self, drawing: &mut Drawing, labelled: (bool, bool)) {
         let (x, y, width, height) = (self.x, self.y, self.width, self.height);
-        let bottom = y + height;
-        ticks::horizontal(drawing, &self.across, (x, bottom), width, labelled.0);
+        ticks::horizontal(drawing, &self.across, (x, y + height), width, labelled.0);
         let widest = ticks::vertical(drawing, &self.up, (x, y), height, labelled.1, None);
         drawing.outline(x, y, width, height);
         if labelled.0 {
-            let (middle, base) = (x + 0.5 * width, bottom + TICK + SMALL + 11.0);
-            let label = &self.across.label;
-            drawing.label(middle, base, Anchor::Middle, TEXT, INK, label, false);
+            self.horizontal_label(drawing);
         }
         if labelled.1 {
-            let (left, middle) = (x - TICK - widest - 7.0, y + 0.5 * height);
-            let label = &self.up.label;
-            drawing.label(left, middle, Anchor::Middle, TEXT, INK, label, true);
+            let middle = (x - TICK - widest - 7.0, y + 0.5 * height);
+            drawing.upward_text(middle, &self.up.label);
         }
+    }
+
+    /// Draws the label of the horizontal axis below its tick labels.
+    pub fn horizontal_label(&self, drawing: &mut Drawing) {
+        let base = self.y + self.height + TICK + SMALL + 11.0;
+        let middle = self.x + 0.5 * self.width;
+        drawing.text((middle, base), Anchor::Middle, &self.across.label);
     }
 
     /// Draws a curve, clipped to the frame; `clip` is an identifier unique in the drawing.

@@ -11,6 +11,7 @@ pub mod colormap;
 pub mod contour;
 pub mod drawing;
 pub mod equal_aspect;
+mod figure;
 pub mod frame;
 pub mod raster;
 pub mod stacked;
@@ -20,5 +21,6 @@ mod ticks;
 
 pub use axis::minus;
 pub use drawing::Drawing;
+pub use figure::Figure;
 pub use style::COLUMN;
-pub use text::{escape, html, literal, plain};
+pub use text::{letter, literal, plain};

@@ -1,25 +1,25 @@
-//! What a run tells: its scales, its pair, phases and instants, the numbers of a report.
+//! Features of a run derived from its tables: kind, scales, pair, phases and key instants.
 
 use glam::DVec3;
-use serde_json::Value;
+use grainwake_plot::minus;
 
 use crate::phases::{self, Instant, Moment, Phase};
 use crate::run_folder::{Event, History, RunFolder};
 
-/// What was run.
+/// Kind of a run by its number of grains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Subject {
-    /// Fluid alone.
+    /// Fluid only.
     Flow,
     /// One grain.
     Single,
     /// Two grains.
     Pair,
-    /// More than two.
+    /// Three or more grains.
     Many,
 }
 
-/// Lengths and times by which the paper makes numbers dimensionless.
+/// Scales of dimensionless quantities, as in the paper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scales {
     /// Mean equal-volume diameter d [m].
@@ -29,47 +29,45 @@ pub struct Scales {
 }
 
 impl Scales {
-    /// sqrt(d/g) [s].
+    /// Time scale sqrt(d/g) [s].
     pub fn time(&self) -> f64 {
         (self.diameter / self.gravity).sqrt()
     }
-    /// sqrt(d g) [m/s].
+    /// Velocity scale sqrt(d g) [m/s].
     pub fn velocity(&self) -> f64 {
         (self.diameter * self.gravity).sqrt()
     }
 }
 
-/// The run, understood.
+/// Features of a run.
 #[derive(Clone, Debug)]
 pub struct Story {
-    /// What was run.
+    /// Kind of the run.
     pub subject: Subject,
-    /// Scales, where diameter and gravity are known.
+    /// Scales; `None` without diameter or gravity.
     pub scales: Option<Scales>,
-    /// Direction against gravity; +z where gravity is not known or zero.
+    /// Unit vector against gravity; +z if gravity is unknown or zero.
     pub up: DVec3,
-    /// Of a pair: the grain behind (above) and the one ahead at the start.
+    /// Trailing (upper) and leading grain of a pair at the start.
     pub pair: Option<[usize; 2]>,
     /// Phases of a pair.
     pub phases: Vec<Phase>,
     /// First contact of a pair.
     pub kiss: Option<Moment>,
-    /// When a pair that had touched parted.
+    /// Separation of a pair after its contact.
     pub parting: Option<Moment>,
-    /// Instants that the pictures show.
+    /// Key instants, shown in the figures.
     pub instants: Vec<Instant>,
-    /// Whether any grain travels by a tenth of its diameter or more.
+    /// Whether any grain moves by a tenth of the mean diameter or more.
     pub travels: bool,
     /// Last time [s].
     pub end: f64,
 }
 
 impl Story {
-    /// Makes out what the run folder tells.
+    /// Derives the features from the tables of a run folder.
     pub fn of(run: &RunFolder) -> Story {
-        let moving: Vec<usize> = (0..run.grains.len())
-            .filter(|i| !run.grains[*i].is_empty())
-            .collect();
+        let moving = run.moving();
         let subject = match moving.len() {
             0 => Subject::Flow,
             1 => Subject::Single,
@@ -77,57 +75,40 @@ impl Story {
             _ => Subject::Many,
         };
         let gravity = run.facts.gravity.unwrap_or(DVec3::ZERO);
-        let up = if gravity.length() > 0.0 {
-            -gravity.normalize()
-        } else {
-            DVec3::Z
-        };
-        let scales = run.facts.diameter().filter(|_| gravity.length() > 0.0);
-        let scales = scales.map(|diameter| Scales {
+        let up = (-gravity).try_normalize().unwrap_or(DVec3::Z);
+        let diameter = run.facts.diameter().filter(|_| gravity.length() > 0.0);
+        let scales = diameter.map(|diameter| Scales {
             diameter,
             gravity: gravity.length(),
         });
         let end = run.end();
-        let pair = (subject == Subject::Pair).then(|| {
-            let height = |i: usize| run.grains[i].position[0].dot(up);
-            let [a, b] = [moving[0], moving[1]];
-            if height(a) >= height(b) {
-                [a, b]
-            } else {
-                [b, a]
-            }
+        let height = |i: usize| run.grains[i].position[0].dot(up);
+        let pair = match moving[..] {
+            [a, b] if height(a) >= height(b) => Some([a, b]),
+            [a, b] => Some([b, a]),
+            _ => None,
+        };
+        let phases = pair.map_or(Vec::new(), |_| {
+            phases::phases(&run.events, run.summary_number("tumble_time_s"), end)
         });
-        let tumble = run
-            .summary
-            .as_ref()
-            .and_then(|summary| summary.get("tumble_time_s"))
-            .and_then(Value::as_f64);
-        let phases = if pair.is_some() {
-            phases::phases(&run.events, tumble, end)
-        } else {
-            Vec::new()
+        let of_pair =
+            |moment: fn(&[Event]) -> Option<Moment>| pair.and_then(|_| moment(&run.events));
+        let least = 0.1 * run.facts.diameter().unwrap_or(0.0);
+        let moves = |history: &History| {
+            let mut positions = history.position.iter();
+            positions.any(|p| p.distance(history.position[0]) > least)
         };
-        let of_pair = |moment: fn(&[Event]) -> Option<Moment>| {
-            pair.is_some().then(|| moment(&run.events)).flatten()
+        let travels = run.grains.iter().any(moves);
+        let last = || {
+            vec![Instant {
+                time: end,
+                name: "",
+            }]
         };
-        let step = 0.1 * run.facts.diameter().unwrap_or(0.0);
-        let far = |history: &History| {
-            history
-                .position
-                .iter()
-                .any(|p| p.distance(history.position[0]) > step)
-        };
-        let travels = run.grains.iter().any(far);
         let instants = match subject {
-            Subject::Single if !travels => vec![Instant {
-                time: end,
-                name: "",
-            }],
+            Subject::Flow => last(),
+            Subject::Single if !travels => last(),
             Subject::Pair => phases::pair_instants(&phases, &run.events, closest(run, pair), end),
-            Subject::Flow => vec![Instant {
-                time: end,
-                name: "",
-            }],
             _ => phases::even_instants(end),
         };
         Story {
@@ -144,62 +125,60 @@ impl Story {
         }
     }
 
-    /// Name of a grain in legends.
+    /// Returns the name of a grain in legends.
     pub fn grain_name(&self, grain: usize) -> String {
-        match self.pair {
-            Some([behind, _]) if grain == behind => {
-                format!("grain {grain} (trailing at the start)")
-            }
-            Some([_, ahead]) if grain == ahead => format!("grain {grain} (leading at the start)"),
-            _ => format!("grain {grain}"),
-        }
+        let role = match self.pair {
+            Some([trailing, _]) if grain == trailing => " (trailing at the start)",
+            Some([_, leading]) if grain == leading => " (leading at the start)",
+            _ => "",
+        };
+        format!("grain {grain}{role}")
     }
 
-    /// Colour index of a grain: the one behind first.
+    /// Returns the number of a grain in the cycle of colours; the trailing grain of a pair is 0.
     pub fn grain_rank(&self, grain: usize) -> usize {
-        match self.pair {
-            Some([behind, _]) => usize::from(grain != behind),
-            None => grain,
-        }
+        let pair = self.pair;
+        pair.map_or(grain, |[trailing, _]| usize::from(grain != trailing))
     }
 
-    /// Label of the time axis and the factor that turns seconds into its numbers.
+    /// Returns the time scale of a pair; `None` for runs whose figures show seconds.
+    fn time_scale(&self) -> Option<f64> {
+        let scales = self.scales.filter(|_| self.subject == Subject::Pair);
+        scales.map(|scales| scales.time())
+    }
+
+    /// Returns the label of the time axis, and its value for one second.
     pub fn time_axis(&self) -> (&'static str, f64) {
-        match self.scales {
-            Some(scales) if self.subject == Subject::Pair => {
-                ("*t* √(*g*/*d*)  [–]", 1.0 / scales.time())
-            }
-            _ => ("*t*  [s]", 1.0),
+        match self.time_scale() {
+            Some(scale) => ("*t* √(*g*/*d*)  [–]", 1.0 / scale),
+            None => ("*t*  [s]", 1.0),
         }
     }
 
-    /// A time in words: dimensionless where the figures are.
+    /// Returns a time in label markup, in the unit of the figures.
     pub fn time_text(&self, time: f64) -> String {
-        match self.scales {
-            Some(scales) if self.subject == Subject::Pair => {
-                format!("*t* √(*g*/*d*) = {}", short(time / scales.time()))
-            }
-            _ => format!("*t* = {} s", short(time)),
+        match self.time_scale() {
+            Some(scale) => format!("*t* √(*g*/*d*) = {}", short(time / scale)),
+            None => format!("*t* = {} s", short(time)),
         }
     }
 
-    /// When a pair met or parted, in words.
+    /// Returns the time of a first contact or separation in label markup.
     pub fn moment_text(&self, moment: Moment) -> String {
-        let landed = if moment.landed {
-            ", after the first has landed"
-        } else {
-            ""
+        let landed = match moment.landed {
+            true => ", after the first has landed",
+            false => "",
         };
         format!("{}{landed}", self.time_text(moment.time))
     }
 }
 
-/// When the two grains were closest [s]: their surfaces, or their centres if nothing is known of
-/// the surfaces.
+/// Returns the time of the smallest gap between the surfaces or, if the gap is unknown, of the
+/// smallest distance of the centres [s].
 fn closest(run: &RunFolder, pair: Option<[usize; 2]>) -> f64 {
     let least = |points: &mut dyn Iterator<Item = (f64, f64)>| {
-        points
-            .filter(|(time, gap)| time.is_finite() && gap.is_finite())
+        let known = points.filter(|(time, gap)| time.is_finite() && gap.is_finite());
+        known
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .map(|(time, _)| time)
     };
@@ -208,23 +187,20 @@ fn closest(run: &RunFolder, pair: Option<[usize; 2]>) -> f64 {
         least(&mut time.iter().copied().zip(gap.iter().copied()))
     });
     let centres = || {
-        let [a, b] = pair.map(|pair| pair.map(|grain| &run.grains[grain]))?;
-        let line = a
-            .position
-            .iter()
-            .zip(&b.position)
-            .map(|(a, b)| run.nearest(*a - *b).length());
-        least(&mut a.time.iter().copied().zip(line))
+        let [a, b] = pair?.map(|grain| &run.grains[grain]);
+        let lines = a.position.iter().zip(&b.position).map(|(a, b)| *a - *b);
+        let distances = lines.map(|line| run.nearest(line).length());
+        least(&mut a.time.iter().copied().zip(distances))
     };
     surfaces.or_else(centres).unwrap_or(0.0)
 }
 
-/// The Galileo number sqrt(|s - 1| g d^3) / nu of density ratio s.
+/// Returns the Galileo number sqrt(|s - 1| g d^3) / nu for the density ratio s.
 pub fn galileo(scales: Scales, ratio: f64, viscosity: f64) -> f64 {
     ((ratio - 1.0).abs() * scales.gravity * scales.diameter.powi(3)).sqrt() / viscosity
 }
 
-/// A number in three significant digits.
+/// Returns a value with three significant digits, in label markup.
 pub fn short(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -232,22 +208,16 @@ pub fn short(value: f64) -> String {
     if !value.is_finite() {
         return "not known".to_owned();
     }
-    // The power of the rounded number: 0.9999 reads 1.00.
+    // The exponent of the rounded value: 0.9999 becomes 1.00.
     let rounded = format!("{value:.2e}");
-    let power: i32 = rounded
-        .split_once('e')
-        .and_then(|(_, power)| power.parse().ok())
-        .unwrap_or(0);
-    if !(-3..=5).contains(&power) {
-        let mantissa = value / 10f64.powi(power);
-        return format!(
-            "{mantissa:.2}×10^{{{}}}",
-            grainwake_plot::minus(&power.to_string())
-        )
-        .replacen('-', "−", 1);
+    let (mantissa, exponent) = rounded.split_once('e').unwrap_or((&rounded, "0"));
+    match exponent.parse::<i32>().unwrap_or(0) {
+        power @ -3..=5 => {
+            let decimals = (2 - power).clamp(0, 6) as usize;
+            minus(&format!("{value:.decimals$}"))
+        }
+        _ => minus(&format!("{mantissa}×10^{{{exponent}}}")),
     }
-    let decimals = (2 - power).clamp(0, 6) as usize;
-    grainwake_plot::minus(&format!("{value:.decimals$}"))
 }
 
 #[cfg(test)]

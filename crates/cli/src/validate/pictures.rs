@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use grainwake_plot::plain;
+use grainwake_plot::{Figure, plain};
+use grainwake_report::write_figure;
 use grainwake_validation::Suite;
 
 use super::saved::Saved;
@@ -38,13 +39,11 @@ pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Res
                 tell!("figure {name}: not drawn, no run has data for it");
                 continue;
             };
-            let failed = |what| Exit::new(IO, format!("figure {name}: {what}"));
-            let png = drawing.to_png().map_err(failed)?;
-            let svg = drawing.to_svg(&name, &plain(&figure.title), &plain(&figure.description()));
-            let written = |e: grainwake_report::ReportError| Exit::new(IO, e.to_string());
-            grainwake_report::write(place.join(format!("{name}.png")), &png).map_err(written)?;
-            grainwake_report::write(place.join(format!("{name}.svg")), svg.as_bytes())
-                .map_err(written)?;
+            let title = figure.title.as_str();
+            write_figure(
+                &place,
+                Figure::new(name, title, figure.description(), drawing),
+            )?;
             count += 1;
         }
     }

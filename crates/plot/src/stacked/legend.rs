@@ -2,7 +2,7 @@
 
 use super::{LEFT, ROW, Series};
 use crate::drawing::{Anchor, Drawing};
-use crate::style::{INK, LINE, SMALL};
+use crate::style::{LINE, SMALL};
 use crate::text;
 
 /// Distributes the entries over rows of at most `width` [pt].
@@ -36,8 +36,7 @@ pub fn draw(drawing: &mut Drawing, rows: &[Vec<&Series>], top: f64) {
         for series in row {
             drawing.line(&[(x, y), (x + 14.0, y)], series.colour, LINE, series.dash);
             let name = series.name.as_deref().unwrap_or("");
-            let base = y + 0.36 * SMALL;
-            drawing.label(x + 17.0, base, Anchor::Start, SMALL, INK, name, false);
+            drawing.note((x + 17.0, y), Anchor::Start, name);
             x += entry_width(series);
         }
     }

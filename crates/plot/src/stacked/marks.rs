@@ -31,7 +31,7 @@ pub fn draw(
     for (row, at, name) in names {
         let y = frame.y - 3.0 - ROW * *row as f64;
         let (centre, _) = centre_and_half_width(name, *at, frame.width);
-        drawing.label_with_halo(frame.x + centre, y, Anchor::Middle, SMALL, INK, name);
+        drawing.note_with_halo((frame.x + centre, y), Anchor::Middle, INK, name);
     }
 }
 

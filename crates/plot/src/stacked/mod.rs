@@ -4,10 +4,10 @@ mod curve;
 mod legend;
 mod marks;
 
-use crate::axis::Axis;
+use crate::axis::{Axis, extent};
 use crate::drawing::{Anchor, Drawing};
 use crate::frame::Frame;
-use crate::style::{COLUMN, FAINT, INK, LINE, SMALL, TEXT, TICK};
+use crate::style::{COLUMN, FAINT, LINE, SMALL, TEXT};
 use crate::text;
 use crate::ticks;
 
@@ -24,6 +24,37 @@ pub struct Series {
     pub dash: Option<&'static str>,
 }
 
+impl Series {
+    /// Creates a solid curve without an entry in the legend.
+    pub fn new(points: Vec<(f64, f64)>, colour: &'static str) -> Series {
+        Series {
+            name: None,
+            points,
+            colour,
+            dash: None,
+        }
+    }
+
+    /// Sets the name in the legend.
+    #[must_use]
+    pub fn named(mut self, name: impl Into<String>) -> Series {
+        self.name = Some(name.into());
+        self
+    }
+
+    /// Sets the SVG dash pattern.
+    #[must_use]
+    pub fn dashed(mut self, pattern: &'static str) -> Series {
+        self.dash = Some(pattern);
+        self
+    }
+
+    /// Returns the vertical values.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        self.points.iter().map(|point| point.1)
+    }
+}
+
 /// A panel with its curves.
 #[derive(Clone, Debug)]
 pub struct Panel {
@@ -35,6 +66,37 @@ pub struct Panel {
     pub levels: Vec<(f64, String)>,
     /// Height of the frame [pt].
     pub height: f64,
+}
+
+impl Panel {
+    /// Creates a panel of the given height [pt] with an axis that covers the curves and the values
+    /// `also`.
+    pub fn linear(label: &str, series: Vec<Series>, also: &[f64], height: f64) -> Panel {
+        let values = series.iter().flat_map(Series::values);
+        let (low, high) = extent(values.chain(also.iter().copied())).unwrap_or((0.0, 1.0));
+        Panel::with_axis(Axis::linear(label, low, high, 5, false), series, height)
+    }
+
+    /// Creates a panel with a logarithmic axis; `None` if no value is positive.
+    pub fn log(label: &str, series: Vec<Series>, height: f64) -> Option<Panel> {
+        let values = series.iter().flat_map(Series::values);
+        let (low, high) = extent(values.filter(|v| *v > 0.0))?;
+        Some(Panel::with_axis(
+            Axis::log(label, low, high),
+            series,
+            height,
+        ))
+    }
+
+    /// Creates a panel with a given vertical axis.
+    pub fn with_axis(y: Axis, series: Vec<Series>, height: f64) -> Panel {
+        Panel {
+            y,
+            series,
+            levels: Vec::new(),
+            height,
+        }
+    }
 }
 
 /// A vertical line across all panels.
@@ -98,10 +160,12 @@ pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) ->
         draw_panel(&mut drawing, &frame, panel, i);
         y += frame.height;
         let last = i + 1 == panels.len();
-        draw_x_axis(&mut drawing, &frame, last);
+        ticks::horizontal(&mut drawing, x, (LEFT, y), width, last);
+        if last {
+            frame.horizontal_label(&mut drawing);
+        }
         if panels.len() > 1 {
-            let letter = format!("({})", char::from(b'a' + (i % 26) as u8));
-            drawing.label(2.0, frame.y - 4.0, Anchor::Start, TEXT, INK, &letter, false);
+            drawing.text((2.0, frame.y - 4.0), Anchor::Start, &text::letter(i));
         }
     }
     drawing
@@ -124,12 +188,11 @@ fn draw_panel(drawing: &mut Drawing, frame: &Frame, panel: &Panel, index: usize)
     }
     drawing.end_clip();
     for (value, note) in &panel.levels {
-        let (left, base) = note_position(frame, panel, frame.py(*value), text::width(note, SMALL));
-        drawing.label_with_halo(left, base, Anchor::Start, SMALL, FAINT, note);
+        let place = note_position(frame, panel, frame.py(*value), text::width(note, SMALL));
+        drawing.note_with_halo(place, Anchor::Start, FAINT, note);
     }
     drawing.outline(x, y, width, height);
-    let middle = y + 0.5 * height;
-    drawing.label(9.0, middle, Anchor::Middle, TEXT, INK, &panel.y.label, true);
+    drawing.upward_text((9.0, y + 0.5 * height), &panel.y.label);
 }
 
 /// Returns the left end and baseline [pt] where the note of a reference line at height `y` covers
@@ -156,22 +219,6 @@ fn note_position(frame: &Frame, panel: &Panel, y: f64, width: f64) -> (f64, f64)
     best.unwrap_or((ends[0], bases[0]))
 }
 
-fn draw_x_axis(drawing: &mut Drawing, frame: &Frame, labelled: bool) {
-    let bottom = frame.y + frame.height;
-    ticks::horizontal(
-        drawing,
-        &frame.across,
-        (frame.x, bottom),
-        frame.width,
-        labelled,
-    );
-    if labelled {
-        let (middle, base) = (frame.x + 0.5 * frame.width, bottom + TICK + SMALL + 11.0);
-        let label = &frame.across.label;
-        drawing.label(middle, base, Anchor::Middle, TEXT, INK, label, false);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -182,19 +229,8 @@ mod tests {
         let points = (0..=100)
             .map(|i| (0.1 * f64::from(i), if i < 60 { 1.0 } else { 5.5 }))
             .collect();
-        let series = Series {
-            name: None,
-            points,
-            colour: INK,
-            dash: None,
-        };
         let y = Axis::linear("y", 0.0, 10.0, 5, true);
-        let panel = Panel {
-            y,
-            series: vec![series],
-            levels: Vec::new(),
-            height: 100.0,
-        };
+        let panel = Panel::with_axis(y, vec![Series::new(points, FAINT)], 100.0);
         let frame = Frame {
             across: x,
             up: panel.y.clone(),

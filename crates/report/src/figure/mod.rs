@@ -1,4 +1,4 @@
-//! Figures of a run: each a drawing with its caption, written as SVG and PNG.
+//! Figures of a run.
 
 mod curves;
 mod cuts;
@@ -14,7 +14,7 @@ mod trajectory;
 
 use std::collections::BTreeMap;
 
-use grainwake_plot::{Drawing, plain};
+use grainwake_plot::Figure;
 
 use crate::phases::{self, Instant};
 use crate::run_folder::RunFolder;
@@ -25,52 +25,30 @@ pub use silhouette::{Body, bodies};
 /// Names of the coordinate axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// A figure ready to be written.
-#[derive(Clone, Debug)]
-pub struct Figure {
-    /// File name without its extension.
-    pub name: &'static str,
-    /// Title.
-    pub title: String,
-    /// What is to be seen, in plain words with the numbers, in label markup.
-    pub caption: String,
-    /// The drawing.
-    pub drawing: Drawing,
-}
-
-impl Figure {
-    /// The figure as an SVG document that can also stand inside a page.
-    pub fn svg(&self) -> String {
-        self.drawing
-            .to_svg(self.name, &plain(&self.title), &plain(&self.caption))
-    }
-}
-
-/// What the figures are drawn from.
+/// Data of the figures.
 pub struct Scene<'a> {
-    /// The run folder.
+    /// Run folder.
     pub run: &'a RunFolder,
-    /// What it tells.
+    /// Features derived from the tables.
     pub story: &'a Story,
-    /// Surfaces of the grains in their own frames, as far as known.
+    /// Known surfaces of the grains, in the body frame.
     pub bodies: BTreeMap<usize, Body>,
-    /// Instants that the pictures show, at times that the folder has pictures of.
+    /// Key instants, moved to the nearest times with pictures.
     pub instants: Vec<Instant>,
 }
 
-/// Draws all figures that the run has data for; what had to be left out is added to `notes`.
+/// Draws all figures that the run has data for; omissions are added to `notes`.
 pub fn all(
     run: &RunFolder,
     story: &Story,
     bodies: BTreeMap<usize, Body>,
     notes: &mut Vec<String>,
 ) -> Vec<Figure> {
-    let instants = phases::snap(&story.instants, &picture_times(run));
     let scene = Scene {
         run,
         story,
         bodies,
-        instants,
+        instants: phases::snap(&story.instants, &picture_times(run)),
     };
     let mut out = Vec::new();
     match story.subject {
@@ -103,22 +81,13 @@ pub fn all(
     out
 }
 
-/// Times of the slices; without slices, of the table.
+/// Returns the times of the slices or, without slices, of the tables [s].
 fn picture_times(run: &RunFolder) -> Vec<f64> {
     let mut times: Vec<f64> = run.slices.iter().map(|frame| frame.time).collect();
     if times.is_empty() {
-        times = run
-            .grains
-            .iter()
-            .find(|history| !history.is_empty())
-            .map(|h| h.time.clone())
-            .unwrap_or_default();
+        let moving = run.grains.iter().find(|history| !history.is_empty());
+        times = moving.map(|h| h.time.clone()).unwrap_or_default();
     }
     times.dedup();
     times
-}
-
-/// The letter of the i-th instant: (a), (b), ...
-pub fn letter(i: usize) -> String {
-    format!("({})", char::from(b'a' + (i % 26) as u8))
 }

@@ -134,6 +134,17 @@ impl RunFolder {
             .fold(0.0, f64::max)
     }
 
+    /// Returns the grains that have a history.
+    pub fn moving(&self) -> Vec<usize> {
+        let grains = 0..self.grains.len();
+        grains.filter(|i| !self.grains[*i].is_empty()).collect()
+    }
+
+    /// Returns a number of the summary by its name.
+    pub fn summary_number(&self, name: &str) -> Option<f64> {
+        self.summary.as_ref()?.get(name)?.as_f64()
+    }
+
     /// Reads a slice.
     pub fn slice(&self, frame: &FrameFile) -> Result<Image, String> {
         read_image(&frame.file)

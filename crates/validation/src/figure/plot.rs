@@ -4,7 +4,7 @@ use grainwake_plot::COLUMN;
 use grainwake_plot::axis::{Axis, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::{Frame, Marker};
-use grainwake_plot::style::{INK, LINE, SMALL};
+use grainwake_plot::style::{LINE, SMALL};
 use grainwake_plot::text;
 
 use super::AxisSpec;
@@ -82,9 +82,7 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
                 drawing.line(&[(x, y), (x + SAMPLE, y)], one.colour, LINE, one.dash());
             }
             one.mark(&mut drawing, (x + 0.5 * one.sample(), y));
-            let left = x + one.sample() + 4.0;
-            let base = y + 0.36 * SMALL;
-            drawing.label(left, base, Anchor::Start, SMALL, INK, &one.label, false);
+            drawing.note((x + one.sample() + 4.0, y), Anchor::Start, &one.label);
             x += one.entry();
         }
     }
@@ -171,6 +169,7 @@ fn parts(frame: &Frame, points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use grainwake_plot::style::INK;
 
     #[test]
     fn a_data_set_outside_a_logarithmic_axis_is_left_out() {

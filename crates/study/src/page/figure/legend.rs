@@ -2,13 +2,12 @@
 
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::Marker;
-use grainwake_plot::style::{BLUE, GREEN, INK, LINE, ORANGE, PAGE, PURPLE, SKY, SMALL, VERMILION};
+use grainwake_plot::style::{INK, LINE, PAGE, SERIES_COLOURS, SMALL, series_colour};
 use grainwake_plot::text;
 
-use super::{FigureData, note, unique};
+use super::{FigureData, unique};
 use crate::plan::Run;
 
-const COLOURS: [&str; 6] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY];
 const DASHES: [Option<&str>; 4] = [None, Some("4 1.8"), Some("1.2 1.5"), Some("6 1.6 1.2 1.6")];
 /// Height of a row of the legend [pt].
 const ROW: f64 = 10.0;
@@ -27,7 +26,7 @@ pub struct LineStyle {
 impl LineStyle {
     fn numbered(colour: usize, dash: usize, sign: usize) -> LineStyle {
         LineStyle {
-            colour: COLOURS[colour % COLOURS.len()],
+            colour: series_colour(colour),
             dash: DASHES[dash % DASHES.len()],
             sign: Marker::nth(sign),
         }
@@ -47,7 +46,7 @@ impl LineStyles {
     pub fn of(data: &FigureData) -> LineStyles {
         let models = unique(data.plan.runs.iter().map(|run| &run.model));
         let axes = axes(data);
-        if models.len() <= COLOURS.len() || axes.is_empty() {
+        if models.len() <= SERIES_COLOURS || axes.is_empty() {
             return LineStyles::Models(models);
         }
         LineStyles::Axes(axes.into_iter().take(2).collect())
@@ -80,7 +79,7 @@ impl LineStyles {
             // Colours repeat, so a longer legend would be ambiguous.
             LineStyles::Models(models) => models
                 .iter()
-                .take(4 * COLOURS.len())
+                .take(4 * SERIES_COLOURS)
                 .enumerate()
                 .map(|(i, model)| (model.clone(), LineStyle::numbered(i, 0, i)))
                 .collect(),
@@ -121,7 +120,7 @@ impl LineStyles {
                 } else {
                     drawing.line(&[(x, y), (x + 14.0, y)], style.colour, LINE, style.dash);
                 }
-                note(drawing, (x + 17.0, y), Anchor::Start, &label);
+                drawing.note((x + 17.0, y), Anchor::Start, &label);
             }
             x += width;
         }

@@ -15,8 +15,8 @@ use std::path::Path;
 
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::Marker;
-use grainwake_plot::style::{INK, SMALL, TEXT};
-use grainwake_plot::text;
+use grainwake_plot::style::SMALL;
+use grainwake_plot::{Figure, text};
 use grainwake_solver::case::Case;
 use grainwake_solver::output::RESOLVED;
 
@@ -24,44 +24,6 @@ use crate::analysis::correlation::Correlation;
 use crate::measure::record::RunRecord;
 use crate::measure::trajectory::Trajectory;
 use crate::plan::{Plan, Run};
-
-/// A figure of the report.
-pub struct StudyFigure {
-    /// File name without extension.
-    pub name: String,
-    /// Number of its counterpart in the paper; empty if there is none.
-    pub number: String,
-    /// Title.
-    pub title: String,
-    /// Caption, in label markup.
-    pub caption: String,
-    /// Drawing.
-    pub drawing: Drawing,
-}
-
-impl StudyFigure {
-    fn new(
-        name: impl Into<String>,
-        number: impl Into<String>,
-        title: impl Into<String>,
-        caption: impl Into<String>,
-        drawing: Drawing,
-    ) -> StudyFigure {
-        StudyFigure {
-            name: name.into(),
-            number: number.into(),
-            title: title.into(),
-            caption: caption.into(),
-            drawing,
-        }
-    }
-
-    /// Returns the SVG document, which can also be embedded in a page.
-    pub fn svg(&self) -> String {
-        let (title, caption) = (text::plain(&self.title), text::plain(&self.caption));
-        self.drawing.to_svg(&self.name, &title, &caption)
-    }
-}
 
 /// Data of the figures.
 pub struct FigureData<'a> {
@@ -125,7 +87,7 @@ fn unique<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
 }
 
 /// Draws all figures that the study has data for; omitted ones are added to `notes`.
-pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
+pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     let mut out = Vec::new();
     out.extend(grains::family(data, notes));
     out.extend(grains::orientations(data, notes));
@@ -149,7 +111,7 @@ fn numbered_as_in_paper(data: &FigureData) -> bool {
 }
 
 /// Numbers the figures from 1, also in their file names.
-fn renumber(figures: &mut [StudyFigure]) {
+fn renumber(figures: &mut [Figure]) {
     for (i, figure) in figures.iter_mut().enumerate() {
         figure.number = (i + 1).to_string();
         let numbered = figure
@@ -184,16 +146,6 @@ fn factor_label(factor: &str, value: f64) -> String {
     format!("{} = {}", symbol(factor), value_text(value))
 }
 
-/// Writes a small label, vertically centred at `y`.
-fn note(drawing: &mut Drawing, (x, y): (f64, f64), anchor: Anchor, label: &str) {
-    drawing.label(x, y + 0.36 * SMALL, anchor, SMALL, INK, label, false);
-}
-
-/// Writes a label of normal size with its baseline at `y`.
-fn heading(drawing: &mut Drawing, (x, y): (f64, f64), anchor: Anchor, label: &str) {
-    drawing.label(x, y, anchor, TEXT, INK, label, false);
-}
-
 /// Draws an entry of a legend, symbol and name, at the height `y`; returns the end of the entry.
 fn sign_entry(
     drawing: &mut Drawing,
@@ -202,6 +154,6 @@ fn sign_entry(
     label: &str,
 ) -> f64 {
     sign.draw(drawing, (x + 4.0, y), 3.0, colour, hollow);
-    note(drawing, (x + 10.0, y), Anchor::Start, label);
+    drawing.note((x + 10.0, y), Anchor::Start, label);
     x + 24.0 + text::width(label, SMALL)
 }

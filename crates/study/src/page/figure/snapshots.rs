@@ -2,18 +2,17 @@
 
 use grainwake_plot::drawing::Drawing;
 use grainwake_plot::style::{COLUMN, PAGE};
-use grainwake_plot::text;
-use grainwake_report::figure::Figure;
+use grainwake_plot::{Figure, text};
 use grainwake_report::story::Subject;
 use grainwake_report::{Told, tell};
 
-use super::{FigureData, StudyFigure};
+use super::FigureData;
 
 /// Number of the first of these figures in the paper.
 const FIRST: usize = 8;
 
 /// Draws paths with slices of the speed, then slices of the vorticity.
-pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
+pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     let models = &data.plan.analysis.figures.stories;
     let (mut paths, mut vorticities) = (Vec::new(), Vec::new());
     for (n, name) in models.iter().enumerate() {
@@ -55,7 +54,7 @@ fn unfinished(told: &Told) -> &'static str {
     }
 }
 
-fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<StudyFigure> {
+fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<Figure> {
     let path = find(told, "trajectories")?;
     // The curves that fit beside the paths, at least the first.
     let mut column = 0.0;
@@ -72,7 +71,7 @@ fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<StudyFigure>
     let mut drawing = Drawing::new(PAGE, height + below);
     drawing.inset(&path.drawing, 0.0, 0.0, "path");
     for (figure, y) in placed {
-        drawing.inset(&figure.drawing, PAGE - COLUMN, y, figure.name);
+        drawing.inset(&figure.drawing, PAGE - COLUMN, y, &figure.name);
     }
     let model = text::literal(name);
     let (beside, title) = match told.story.subject == Subject::Pair {
@@ -92,26 +91,14 @@ fn path_and_speed(name: &str, number: usize, told: &Told) -> Option<StudyFigure>
     }
     caption += unfinished(told);
     let file = format!("fig{number:02}-{name}");
-    Some(StudyFigure::new(
-        file,
-        number.to_string(),
-        title,
-        caption,
-        drawing,
-    ))
+    Some(Figure::new(file, title, caption, drawing).numbered(number))
 }
 
-fn vorticity(name: &str, number: usize, told: &Told) -> Option<StudyFigure> {
+fn vorticity(name: &str, number: usize, told: &Told) -> Option<Figure> {
     let figure = find(told, "vorticity")?;
     let file = format!("fig{number:02}-vorticity-{name}");
     let title = format!("Vorticity around {}", text::literal(name));
     let caption = figure.caption.clone() + unfinished(told);
     let drawing = figure.drawing.clone();
-    Some(StudyFigure::new(
-        file,
-        number.to_string(),
-        title,
-        caption,
-        drawing,
-    ))
+    Some(Figure::new(file, title, caption, drawing).numbered(number))
 }
