@@ -1,6 +1,7 @@
 //! A rectangular frame with two axes, for points, boxes and curves; markers of data points.
 
 use crate::axis::Axis;
+use crate::curve;
 use crate::drawing::{Anchor, Drawing, path_data};
 use crate::style::{FAINT, GRID, LINE, SMALL, TICK};
 use crate::ticks;
@@ -72,7 +73,8 @@ impl Frame {
         drawing.text((middle, base), Anchor::Middle, &self.across.label);
     }
 
-    /// Draws a curve, clipped to the frame; `clip` is an identifier unique in the drawing.
+    /// Draws a curve, clipped to the frame and interrupted at points without a position; `clip` is an
+    /// identifier unique in the drawing.
     pub fn curve(
         &self,
         drawing: &mut Drawing,
@@ -81,10 +83,10 @@ impl Frame {
         dash: Option<&str>,
         clip: &str,
     ) {
-        let position = |(x, y): &(f64, f64)| (self.px(*x), self.py(*y));
-        let placed: Vec<(f64, f64)> = points.iter().map(position).collect();
         drawing.begin_clip(clip, self.x, self.y, self.width, self.height);
-        drawing.line(&thin(&placed), colour, LINE, dash);
+        for segment in curve::segments(points, |point| self.position(point)) {
+            drawing.line(&curve::thinned(&segment), colour, LINE, dash);
+        }
         drawing.end_clip();
     }
 
@@ -94,20 +96,6 @@ impl Frame {
         let ends = [(self.x, y), (self.x + self.width, y)];
         drawing.line(&ends, FAINT, 0.8, Some("4 2.5"));
     }
-}
-
-/// Removes points within 0.2 pt of the previous one; the last point stays.
-fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let mut out: Vec<(f64, f64)> = Vec::with_capacity(points.len());
-    for (i, p) in points.iter().enumerate() {
-        let far = out
-            .last()
-            .is_none_or(|last| (p.0 - last.0).hypot(p.1 - last.1) > 0.2);
-        if far || i + 1 == points.len() {
-            out.push(*p);
-        }
-    }
-    out
 }
 
 /// Shapes of data points that differ without colour.

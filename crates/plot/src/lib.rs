@@ -9,6 +9,7 @@
 pub mod axis;
 pub mod colormap;
 pub mod contour;
+mod curve;
 pub mod drawing;
 pub mod equal_aspect;
 mod figure;

@@ -1,10 +1,10 @@
 //! Curves in panels stacked over a shared horizontal axis, with marked instants.
 
-mod curve;
 mod legend;
 mod marks;
 
 use crate::axis::{Axis, extent};
+use crate::curve;
 use crate::drawing::{Anchor, Drawing};
 use crate::frame::Frame;
 use crate::style::{COLUMN, FAINT, LINE, SMALL, TEXT};

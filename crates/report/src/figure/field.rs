@@ -33,13 +33,13 @@ pub struct Panel<'a> {
 ///
 /// # Errors
 /// If there is no slice, or a slice cannot be drawn or does not hold the quantity.
-pub fn draw(panels: &[Panel], quantity: Quantity, style: &Style) -> Result<Drawing, String> {
+pub fn draw(panels: &[Panel], style: &Style) -> Result<Drawing, String> {
     let columns = panels.iter().map(column).collect::<Result<Vec<_>, _>>()?;
     let mut sections = columns.iter().flat_map(|c| c.sections.iter().flatten());
-    if sections.any(|section| quantity.values(section).is_none()) {
+    if sections.any(|section| style.quantity.values(section).is_none()) {
         return Err("a slice has no such quantity".to_owned());
     }
-    let scale = ColourScale::new(quantity, &columns, style);
+    let scale = ColourScale::new(style, &columns);
     let drawing = sheet::draw(&columns, &[], &scale, style.length.as_deref());
     drawing.ok_or_else(|| "there is no slice".to_owned())
 }
@@ -131,13 +131,14 @@ mod tests {
             low: (5.0, -1.0),
             high: (15.0, 10.0),
         };
-        let style = Style {
+        let style = |quantity| Style {
             length: Some("d".to_owned()),
-            ..Style::default()
+            arrows: false,
+            ..Style::new(quantity)
         };
         let both = [panel("whole", None), panel("part", Some(window))];
         for quantity in [Quantity::Speed, Quantity::SolidFraction] {
-            let drawing = draw(&both, quantity, &style).unwrap();
+            let drawing = draw(&both, &style(quantity)).unwrap();
             let svg = drawing.to_svg("f", "t", "d");
             assert!(svg.contains(">whole<") && svg.contains(">part<"));
             assert!(
@@ -145,12 +146,12 @@ mod tests {
                 "{svg}"
             );
         }
-        let problem = draw(&both, Quantity::Vorticity, &style).unwrap_err();
+        let problem = draw(&both, &style(Quantity::Vorticity)).unwrap_err();
         assert!(problem.contains("no such quantity"));
         let outside = Window {
             low: (30.0, 0.0),
             high: (40.0, 5.0),
         };
-        assert!(draw(&[panel("out", Some(outside))], Quantity::Speed, &style).is_err());
+        assert!(draw(&[panel("out", Some(outside))], &style(Quantity::Speed)).is_err());
     }
 }

@@ -7,6 +7,8 @@ use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_
 use grainwake_plot::style::{FAINT, HAIR, INK, PAGE, SMALL};
 use grainwake_plot::text;
 
+use serde::Deserialize;
+
 use super::AXES;
 use super::section::{Section, Shading};
 use super::silhouette::Outline;
@@ -19,7 +21,8 @@ const ARROWS: f64 = 8.5;
 const ROW_GAP: f64 = 12.0;
 
 /// Quantity shown in slices.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Quantity {
     /// Magnitude of the velocity.
     Speed,
@@ -43,9 +46,12 @@ impl Quantity {
     }
 }
 
-/// Options of the colour scale, the arrows and the axes.
-#[derive(Clone, Debug, Default)]
+/// Quantity with options of its colour scale, the arrows and the axes.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Style {
+    /// Quantity.
+    pub quantity: Quantity,
     /// Label of the colour scale, in label markup; `None` for the quantity in SI units.
     pub label: Option<String>,
     /// End of the colour scale; `None` to derive it from the values.
@@ -53,7 +59,21 @@ pub struct Style {
     /// Unit of lengths, such as "d"; `None` for metres and fractions of metres.
     pub length: Option<String>,
     /// Whether arrows show the velocity in the plane, over the speed.
+    #[serde(default)]
     pub arrows: bool,
+}
+
+impl Style {
+    /// Returns the default options for a quantity; only the speed has arrows.
+    pub fn new(quantity: Quantity) -> Style {
+        Style {
+            quantity,
+            label: None,
+            limit: None,
+            length: None,
+            arrows: quantity == Quantity::Speed,
+        }
+    }
 }
 
 /// Slices at one instant, one per row.
@@ -87,7 +107,8 @@ pub struct ColourScale {
 
 impl ColourScale {
     /// Creates the colour scale that covers the values of all columns, or ends at the given limit.
-    pub fn new(quantity: Quantity, columns: &[Column], style: &Style) -> ColourScale {
+    pub fn new(style: &Style, columns: &[Column]) -> ColourScale {
+        let quantity = style.quantity;
         let values = || shown_values(columns, quantity);
         let scale = |label: &str, low: f64, high: f64, steps: usize| {
             let label = style.label.as_deref().unwrap_or(label);

@@ -159,11 +159,7 @@ fn crop(scene: &Scene, columns: &mut [Column]) {
 }
 
 fn speed(scene: &Scene, columns: &[Column]) -> Option<Figure> {
-    let style = Style {
-        arrows: true,
-        ..Style::default()
-    };
-    let scale = ColourScale::new(Quantity::Speed, columns, &style);
+    let scale = ColourScale::new(&Style::new(Quantity::Speed), columns);
     if scale.largest <= 0.0 {
         return None;
     }
@@ -178,7 +174,7 @@ fn speed(scene: &Scene, columns: &[Column]) -> Option<Figure> {
 }
 
 fn vorticity(scene: &Scene, columns: &[Column]) -> Option<Figure> {
-    let scale = ColourScale::new(Quantity::Vorticity, columns, &Style::default());
+    let scale = ColourScale::new(&Style::new(Quantity::Vorticity), columns);
     if scale.largest <= 0.0 {
         return None;
     }

@@ -3,13 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_plot::{equal_aspect, style};
-use grainwake_report::figure::field::{Quantity, Style};
+use grainwake_plot::style;
 use grainwake_solver::case::{Loc, Problem, Source};
 
 use super::raw::{
-    Colour, Coordinates, FieldQuantity, Line, Mark, RawAxis, RawField, RawFigure, RawHistory,
-    RawPicture, RawReference, RawResults, Scale,
+    Colour, Coordinates, Line, Mark, RawFigure, RawHistory, RawReference, RawResults, Scale,
 };
 use super::{AxisSpec, Content, Data, Figure, Picture, Point, Series};
 use crate::check::{Check, Reference, Run};
@@ -80,13 +78,23 @@ impl Context<'_> {
             .collect();
         let content = match (raw.field, raw.x, raw.y) {
             (Some(field), None, None) if curves == 0 && !raw.picture.is_empty() => {
-                self.fields(field, raw.picture)?
+                for picture in &raw.picture {
+                    self.check_picture(picture)?;
+                }
+                Content::Pictures {
+                    style: field,
+                    pictures: raw.picture,
+                }
             }
-            (None, Some(x), Some(y)) if curves > 0 && raw.picture.is_empty() => Content::Plot {
-                across: self.axis(x)?,
-                up: self.axis(y)?,
-                series: self.series(raw.reference, raw.history, raw.results)?,
-            },
+            (None, Some(across), Some(up)) if curves > 0 && raw.picture.is_empty() => {
+                self.check_axis(&across)?;
+                self.check_axis(&up)?;
+                Content::Plot {
+                    across,
+                    up,
+                    series: self.series(raw.reference, raw.history, raw.results)?,
+                }
+            }
             _ => {
                 let name = &raw.name.value;
                 let message = format!("figure \"{name}\" is neither curves nor pictures");
@@ -104,39 +112,15 @@ impl Context<'_> {
         })
     }
 
-    fn fields(&self, field: RawField, pictures: Vec<RawPicture>) -> Result<Content, Problem> {
-        let pictures = pictures.into_iter().map(|picture| self.picture(picture));
-        Ok(Content::Pictures {
-            quantity: match field.quantity {
-                FieldQuantity::Speed => Quantity::Speed,
-                FieldQuantity::Vorticity => Quantity::Vorticity,
-                FieldQuantity::SolidFraction => Quantity::SolidFraction,
-            },
-            style: Style {
-                label: field.label,
-                limit: field.limit,
-                length: field.length,
-                arrows: field.arrows,
-            },
-            pictures: pictures.collect::<Result<_, _>>()?,
-        })
-    }
-
-    fn axis(&self, raw: RawAxis) -> Result<AxisSpec, Problem> {
-        let log = raw.scale == Scale::Log;
-        for end in [&raw.from, &raw.to].into_iter().flatten() {
-            if !end.value.is_finite() || (log && end.value <= 0.0) {
+    fn check_axis(&self, axis: &AxisSpec) -> Result<(), Problem> {
+        for end in [&axis.from, &axis.to].into_iter().flatten() {
+            if !end.value.is_finite() || (axis.scale == Scale::Log && end.value <= 0.0) {
                 let message = format!("an axis cannot end at {}", end.value);
                 let help = "a logarithmic axis has positive ends";
                 return Err(self.at(end, message, help, "this end"));
             }
         }
-        Ok(AxisSpec {
-            label: raw.label,
-            log,
-            ends: [raw.from.map(|v| v.value), raw.to.map(|v| v.value)],
-            ticks: raw.ticks,
-        })
+        Ok(())
     }
 
     /// Orders references, histories and results; default colours and symbols follow this order.
@@ -283,28 +267,16 @@ impl Context<'_> {
         })
     }
 
-    fn picture(&self, raw: RawPicture) -> Result<Picture, Problem> {
-        let value = |corner: &Option<Loc<[f64; 2]>>, default: f64| {
-            corner.as_ref().map_or([default; 2], |v| v.value)
-        };
-        let low = value(&raw.from, f64::NEG_INFINITY);
-        let high = value(&raw.to, f64::INFINITY);
-        if !(low[0] < high[0] && low[1] < high[1]) {
-            let help = "`from` is the lower left corner, `to` the upper right one";
-            let problem = Problem::new("the window is empty").help(help);
-            let span = raw.to.as_ref().and_then(|to| to.span.as_ref());
-            return Err(self.source.locate(problem, span, "not above `from`"));
+    fn check_picture(&self, picture: &Picture) -> Result<(), Problem> {
+        self.run(&picture.run)?;
+        let window = picture.window();
+        if window.width() > 0.0 && window.height() > 0.0 {
+            return Ok(());
         }
-        let given = raw.from.is_some() || raw.to.is_some();
-        Ok(Picture {
-            run: self.run(&raw.run)?.name.clone(),
-            plane: raw.plane,
-            title: raw.title,
-            window: given.then_some(equal_aspect::Window {
-                low: low.into(),
-                high: high.into(),
-            }),
-        })
+        let help = "`from` is the lower left corner, `to` the upper right one";
+        let problem = Problem::new("the window is empty").help(help);
+        let span = picture.to.as_ref().and_then(|to| to.span.as_ref());
+        Err(self.source.locate(problem, span, "not above `from`"))
     }
 
     fn run(&self, name: &Loc<String>) -> Result<&Run, Problem> {

@@ -79,11 +79,7 @@ impl Figure {
                 }
                 measured.then(|| plot::draw(across, up, &shown))
             }
-            Content::Pictures {
-                quantity,
-                style,
-                pictures,
-            } => {
+            Content::Pictures { style, pictures } => {
                 let mut images = Vec::new();
                 for picture in pictures {
                     match picture.image(runs) {
@@ -96,14 +92,14 @@ impl Figure {
                     .map(|(picture, folder, image)| Panel {
                         title: picture.title.clone(),
                         image,
-                        window: picture.window,
+                        window: Some(picture.window()),
                         run: Some(folder.as_path()),
                     })
                     .collect();
                 if panels.is_empty() {
                     None
                 } else {
-                    field::draw(&panels, *quantity, style)
+                    field::draw(&panels, style)
                         .map_err(|why| omissions.push(Omission::Other(why)))
                         .ok()
                 }
@@ -139,7 +135,7 @@ impl Picture {
     fn image(&self, runs: &Path) -> Result<(PathBuf, Image), Omission> {
         let folder = finished(runs, &self.run)?;
         let image = last_slice(&folder, &self.plane);
-        let image = image.map_err(|why| Omission::Other(format!("{}: {why}", self.run)))?;
+        let image = image.map_err(|why| Omission::Other(format!("{}: {why}", self.run.value)))?;
         Ok((folder, image))
     }
 }

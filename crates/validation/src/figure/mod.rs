@@ -8,12 +8,12 @@ mod raw;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use grainwake_plot::equal_aspect;
-use grainwake_report::figure::field::{Quantity, Style};
+use grainwake_report::figure::field::Style;
 
 pub(crate) use build::build;
 pub use draw::DrawnFigure;
 pub(crate) use raw::RawFigure;
+use raw::{AxisSpec, Picture};
 
 use crate::check::Check;
 use crate::measurement::Sampling;
@@ -40,21 +40,9 @@ enum Content {
         series: Vec<Series>,
     },
     Pictures {
-        quantity: Quantity,
         style: Style,
         pictures: Vec<Picture>,
     },
-}
-
-/// Axis, before the data are known.
-#[derive(Clone, Debug)]
-struct AxisSpec {
-    label: String,
-    log: bool,
-    /// Ends; none for those of the data.
-    ends: [Option<f64>; 2],
-    /// Positions of the ticks; none for round values.
-    ticks: Option<Vec<f64>>,
 }
 
 /// Data set and its style.
@@ -104,13 +92,4 @@ struct Point {
     check: Check,
     /// Expected value.
     reference: Option<f64>,
-}
-
-/// Slice of a run.
-#[derive(Clone, Debug)]
-struct Picture {
-    run: String,
-    plane: String,
-    title: String,
-    window: Option<equal_aspect::Window>,
 }

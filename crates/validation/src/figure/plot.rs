@@ -6,8 +6,9 @@ use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::{Frame, Marker};
 use grainwake_plot::style::{LINE, SMALL};
 use grainwake_plot::text;
+use grainwake_solver::case::Loc;
 
-use super::AxisSpec;
+use super::raw::{AxisSpec, Scale};
 
 const LEFT: f64 = 42.0;
 const RIGHT: f64 = 9.0;
@@ -58,7 +59,7 @@ impl DataSet {
 
 /// Draws the data sets, in their order, at column width.
 pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
-    let valid = |axis: &AxisSpec, v: f64| v.is_finite() && (!axis.log || v > 0.0);
+    let valid = |axis: &AxisSpec, v: f64| v.is_finite() && (axis.scale != Scale::Log || v > 0.0);
     let points = || {
         let all = sets.iter().flat_map(|s| s.points.iter().copied());
         all.filter(|(x, y)| valid(across, *x) && valid(up, *y))
@@ -95,14 +96,10 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
         up,
     };
     frame.grid(&mut drawing);
-    for (i, one) in sets
-        .iter()
-        .enumerate()
-        .filter(|(_, one)| one.line.is_some())
-    {
-        for (k, part) in parts(&frame, &one.points).iter().enumerate() {
-            let clip = format!("clip-{i}-{k}");
-            frame.curve(&mut drawing, part, one.colour, one.dash(), &clip);
+    for (i, one) in sets.iter().enumerate() {
+        if one.line.is_some() {
+            let clip = format!("clip-{i}-0");
+            frame.curve(&mut drawing, &one.points, one.colour, one.dash(), &clip);
         }
     }
     frame.outline(&mut drawing, (true, true));
@@ -120,9 +117,10 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
 
 fn axis(plan: &AxisSpec, values: impl Iterator<Item = f64>, count: usize) -> Axis {
     let (low, high) = extent(values).unwrap_or((1.0, 10.0));
-    let (low, high) = (plan.ends[0].unwrap_or(low), plan.ends[1].unwrap_or(high));
-    let tight = plan.ends.iter().all(Option::is_some);
-    let axis = if plan.log {
+    let end = |given: &Option<Loc<f64>>, default: f64| given.as_ref().map_or(default, |v| v.value);
+    let (low, high) = (end(&plan.from, low), end(&plan.to, high));
+    let tight = plan.from.is_some() && plan.to.is_some();
+    let axis = if plan.scale == Scale::Log {
         Axis::log_rounded(&plan.label, low, high, tight)
     } else {
         Axis::linear(&plan.label, low, high, count, tight)
@@ -151,21 +149,6 @@ fn legend(sets: &[DataSet]) -> Vec<Vec<&DataSet>> {
     rows
 }
 
-/// Splits a curve at points that cannot be drawn.
-fn parts(frame: &Frame, points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
-    let placed = |p: &(f64, f64)| {
-        p.0.is_finite()
-            && p.1.is_finite()
-            && frame.across.fraction(p.0).is_some()
-            && frame.up.fraction(p.1).is_some()
-    };
-    points
-        .split(|p| !placed(p))
-        .filter(|part| part.len() > 1)
-        .map(<[_]>::to_vec)
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,10 +156,11 @@ mod tests {
 
     #[test]
     fn a_data_set_outside_a_logarithmic_axis_is_left_out() {
-        let plan = |log| AxisSpec {
+        let plan = AxisSpec {
             label: "x".into(),
-            log,
-            ends: [None, None],
+            scale: Scale::Log,
+            from: None,
+            to: None,
             ticks: None,
         };
         let shown = |label: &str, points: &[(f64, f64)]| DataSet {
@@ -200,9 +184,14 @@ mod tests {
             ),
             shown("none", &[(-1.0, 0.0), (0.0, -1.0)]),
         ];
-        let svg = draw(&plan(true), &plan(true), &sets).to_svg("f", "t", "d");
+        let svg = draw(&plan, &plan, &sets).to_svg("f", "t", "d");
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
-        assert_eq!(svg.matches("<clipPath").count(), 2, "the curve breaks");
+        let curves = svg.matches("stroke-width=\"1.2\"").count();
+        assert_eq!(
+            curves,
+            2 + 2,
+            "two samples in the legend, and a curve in two parts"
+        );
         assert!(svg.contains(">good<") && svg.contains(">none<"));
     }
 }
