@@ -9,13 +9,13 @@
 //! cannot be read are omitted and listed on the page.
 
 mod error;
+pub mod features;
 pub mod figure;
 mod files;
 pub mod html;
 mod page;
 pub mod phases;
 pub mod run_folder;
-pub mod story;
 #[cfg(test)]
 mod testing;
 
@@ -26,12 +26,12 @@ pub use files::{WrittenFigure, write_atomically, write_figure};
 use grainwake_plot::Figure;
 pub use run_folder::Table;
 
+use features::RunFeatures;
 use run_folder::RunFolder;
-use story::Story;
 
 /// Files of a report.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Rendered {
+pub struct ReportFiles {
     /// HTML page.
     pub page: PathBuf,
     /// Figures as PNG, in page order.
@@ -45,11 +45,11 @@ pub struct Rendered {
 }
 
 /// A run folder with its derived features and its figures.
-pub struct Told {
+pub struct RunReport {
     /// Run folder.
     pub run: RunFolder,
     /// Features derived from the tables.
-    pub story: Story,
+    pub features: RunFeatures,
     /// Figures, in page order.
     pub figures: Vec<Figure>,
     /// Missing or omitted parts.
@@ -60,17 +60,19 @@ pub struct Told {
 ///
 /// # Errors
 /// If the folder holds no run, or a table or log cannot be read.
-pub fn tell(run_dir: &Path) -> Result<Told, ReportError> {
+pub fn read_report(run_dir: &Path) -> Result<RunReport, ReportError> {
     let mut run = RunFolder::open(run_dir)?;
     let mut notes = std::mem::take(&mut run.notes);
-    let bodies = figure::bodies(&run, &mut notes);
-    let diameter = |(grain, body): (&usize, &figure::Body)| Some((*grain, body.diameter()?));
-    run.facts.add_diameters(bodies.iter().filter_map(diameter));
-    let story = Story::of(&run);
-    let figures = figure::all(&run, &story, bodies, &mut notes);
-    Ok(Told {
+    let surfaces = figure::surfaces(&run, &mut notes);
+    let diameter =
+        |(grain, body): (&usize, &figure::GrainSurface)| Some((*grain, body.diameter()?));
+    run.facts
+        .add_diameters(surfaces.iter().filter_map(diameter));
+    let features = RunFeatures::of(&run);
+    let figures = figure::all(&run, &features, surfaces, &mut notes);
+    Ok(RunReport {
         run,
-        story,
+        features,
         figures,
         notes,
     })
@@ -80,13 +82,13 @@ pub fn tell(run_dir: &Path) -> Result<Told, ReportError> {
 ///
 /// # Errors
 /// If the folder holds no run, a table or log cannot be read, or a file cannot be written.
-pub fn render(run_dir: &Path) -> Result<Rendered, ReportError> {
-    let Told {
+pub fn render(run_dir: &Path) -> Result<ReportFiles, ReportError> {
+    let RunReport {
         run,
-        story,
+        features,
         figures,
         notes,
-    } = tell(run_dir)?;
+    } = read_report(run_dir)?;
     let folder = run_dir.join("figures");
     let failed = |file: &Path| {
         let file = file.to_owned();
@@ -98,9 +100,9 @@ pub fn render(run_dir: &Path) -> Result<Rendered, ReportError> {
         .map(|(figure, number)| write_figure(&folder, figure.numbered(number)))
         .collect::<Result<_, _>>()?;
     let page = run_dir.join("report.html");
-    let text = page::page(&run, &story, &figures, &notes);
+    let text = page::page(&run, &features, &figures, &notes);
     write_atomically(&page, text.as_bytes()).map_err(failed(&page))?;
-    Ok(Rendered {
+    Ok(ReportFiles {
         page,
         png: figures.iter().map(|f| f.png_file.clone()).collect(),
         svg: figures.iter().map(|f| f.svg_file.clone()).collect(),

@@ -61,7 +61,7 @@ pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
             (_, Landed) => Landed,
             (Some(Kind::Kiss), Drafting | Separated) => Kissing,
             (Some(Kind::RoleChange | Kind::Tumble) | None, Kissing) => Tumbling,
-            // A pair may turn on after a touch that has ended, before the parting is certain.
+            // A pair may turn on after a touch that has ended, before the separation is certain.
             (Some(Kind::Tumble) | None, Separated) => Tumbling,
             (Some(Kind::Separation), Kissing | Tumbling) => Separated,
             (Some(Kind::Landing), _) => Landed,
@@ -88,7 +88,7 @@ pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
 
 /// When a pair met or parted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment {
+pub struct PairEvent {
     /// Time [s].
     pub time: f64,
     /// Whether a grain had landed before.
@@ -96,15 +96,15 @@ pub struct Moment {
 }
 
 /// First contact of the pair.
-pub fn kiss(events: &[Event]) -> Option<Moment> {
+pub fn kiss(events: &[Event]) -> Option<PairEvent> {
     let time = first(events, &Kind::Kiss)?;
     let landed = first(events, &Kind::Landing).is_some_and(|landing| landing <= time);
-    Some(Moment { time, landed })
+    Some(PairEvent { time, landed })
 }
 
-/// The parting of a pair that has touched: its last separation before the first landing, unless it
+/// The separation of a pair that has touched: its last separation before the first landing, unless it
 /// has met again by then; else its last separation of all, unless it has met again.
-pub fn parting(events: &[Event]) -> Option<Moment> {
+pub fn separation(events: &[Event]) -> Option<PairEvent> {
     let kiss = first(events, &Kind::Kiss)?;
     let landing = first(events, &Kind::Landing).unwrap_or(f64::INFINITY);
     let before = |end: f64| {
@@ -115,7 +115,7 @@ pub fn parting(events: &[Event]) -> Option<Moment> {
         (last.kind == Kind::Separation && last.time >= kiss).then_some(last.time)
     };
     let time = before(landing).or_else(|| before(f64::INFINITY))?;
-    Some(Moment {
+    Some(PairEvent {
         time,
         landed: time >= landing,
     })
@@ -323,12 +323,12 @@ mod tests {
     fn kiss_and_parting_have_one_meaning() {
         let of = |events: &[(f64, Kind)]| {
             let events = log(events);
-            let told = |moment: Moment| (moment.time, moment.landed);
-            (kiss(&events).map(told), parting(&events).map(told))
+            let report = |moment: PairEvent| (moment.time, moment.landed);
+            (kiss(&events).map(report), separation(&events).map(report))
         };
         let (touch, part, land) = (Kind::Kiss, Kind::Separation, Kind::Landing);
         assert_eq!(of(&[(1.0, part.clone())]), (None, None));
-        // A bounce is no parting.
+        // A bounce is no separation.
         let bounce = [
             (1.0, touch.clone()),
             (1.1, part.clone()),

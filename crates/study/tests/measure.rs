@@ -1,8 +1,8 @@
 //! Quantities of a pair on histories with known results.
 
 use glam::{DQuat, DVec3};
+use grainwake_report::features::Scales;
 use grainwake_report::run_folder::{Event, History, Kind};
-use grainwake_report::story::Scales;
 use grainwake_study::plan::quantities::PAIR_QUANTITIES;
 use grainwake_study::{PairHistory, PairMeasures};
 

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use grainwake_solver::case::{Case, nearest};
 use grainwake_solver::output::provenance::Provenance;
 use grainwake_solver::output::{self, Ending, Existing, Options, RunError};
-use grainwake_validation::{Level, Run, Suite, SuiteError};
+use grainwake_validation::{Level, Suite, SuiteError, SuiteRun};
 use table::{line, table};
 
 use crate::args::ValidateArgs;
@@ -170,7 +170,7 @@ fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
 }
 
 /// Whether `folder` holds a finished run of this very case.
-fn there(run: &Run, folder: &Path) -> Result<bool, Exit> {
+fn there(run: &SuiteRun, folder: &Path) -> Result<bool, Exit> {
     let Some(provenance) =
         Provenance::read(folder).filter(|_| output::read_summary(folder).is_ok())
     else {
@@ -187,7 +187,7 @@ fn there(run: &Run, folder: &Path) -> Result<bool, Exit> {
 fn one(
     args: &ValidateArgs,
     suite: &Suite,
-    run: &Run,
+    run: &SuiteRun,
     folder: &Path,
     stop: Arc<AtomicBool>,
 ) -> Result<Result<(), String>, Exit> {

@@ -7,8 +7,8 @@ use grainwake_plot::style::{self, series_colour};
 use grainwake_plot::{Figure, letter};
 
 use super::Scene;
+use crate::features::{galileo, short};
 use crate::run_folder::{History, Kind};
-use crate::story::{galileo, short};
 
 /// Points of a curve.
 pub type Points = Vec<(f64, f64)>;
@@ -16,13 +16,13 @@ pub type Points = Vec<(f64, f64)>;
 impl Scene<'_> {
     /// Returns the time axis of all curves.
     fn time(&self) -> Axis {
-        let (label, factor) = self.story.time_axis();
-        Axis::linear(label, 0.0, self.story.end * factor, 6, true)
+        let (label, factor) = self.features.time_axis();
+        Axis::linear(label, 0.0, self.features.end * factor, 6, true)
     }
 
     /// Returns the events as marks on the time axis.
     fn marks(&self) -> Vec<VerticalMark> {
-        let (_, factor) = self.story.time_axis();
+        let (_, factor) = self.features.time_axis();
         let shown = |kind: &Kind| !matches!(kind, Kind::Other(_));
         let events = self.run.events.iter().filter(|event| shown(&event.kind));
         let mark = events.map(|event| VerticalMark {
@@ -62,18 +62,18 @@ impl Scene<'_> {
 
     /// Returns a curve of a grain against time.
     pub fn curve(&self, grain: usize, value: impl Fn(&History, usize) -> f64) -> Series {
-        let (_, factor) = self.story.time_axis();
+        let (_, factor) = self.features.time_axis();
         let history = &self.run.grains[grain];
         let point = |row: usize| (history.time[row] * factor, value(history, row));
-        let colour = series_colour(self.story.grain_rank(grain));
+        let colour = series_colour(self.features.grain_rank(grain));
         let points = (0..history.len()).map(point).collect();
-        Series::new(points, colour).named(self.story.grain_name(grain))
+        Series::new(points, colour).named(self.features.grain_name(grain))
     }
 
     /// Returns two columns of the diagnostics as points against time: the first column found.
     pub fn diagnostic(&self, names: &[&str]) -> Option<Points> {
         let table = self.run.diagnostics.as_ref()?;
-        let (_, factor) = self.story.time_axis();
+        let (_, factor) = self.features.time_axis();
         let column = names.iter().find_map(|name| table.column(name))?;
         let rows = table.column("time")?.iter().zip(column);
         Some(rows.map(|(time, value)| (time * factor, *value)).collect())
@@ -81,14 +81,14 @@ impl Scene<'_> {
 
     /// Returns the grains with a history; of a pair, the trailing one first.
     pub fn moving(&self) -> Vec<usize> {
-        let pair = self.story.pair;
+        let pair = self.features.pair;
         pair.map_or_else(|| self.run.moving(), |pair| pair.to_vec())
     }
 
     /// Returns a function of the line of centres of the pair against time.
     fn pair_curve(&self, value: impl Fn(DVec3) -> f64) -> Option<Points> {
-        let [a, b] = self.story.pair?.map(|grain| &self.run.grains[grain]);
-        let (_, factor) = self.story.time_axis();
+        let [a, b] = self.features.pair?.map(|grain| &self.run.grains[grain]);
+        let (_, factor) = self.features.time_axis();
         let rows = (0..a.len().min(b.len())).filter(|row| a.time[*row] == b.time[*row]);
         let line = |row: usize| self.run.nearest(a.position[row] - b.position[row]);
         let points = rows.map(|row| (a.time[row] * factor, value(line(row))));
@@ -98,11 +98,11 @@ impl Scene<'_> {
 
 /// Draws the distance of the pair against time, and the tilt of the line of centres.
 pub fn gap(scene: &Scene) -> Option<Figure> {
-    let story = scene.story;
-    let scaled = story.scales.is_some();
-    let unit = story.scales.map_or(1.0, |s| s.diameter);
+    let features = scene.features;
+    let scaled = features.scales.is_some();
+    let unit = features.scales.map_or(1.0, |s| s.diameter);
     let centres = scene.pair_curve(|r| r.length() / unit)?;
-    let tilt = scene.pair_curve(|r| r.angle_between(story.up).to_degrees())?;
+    let tilt = scene.pair_curve(|r| r.angle_between(features.up).to_degrees())?;
     let closest = centres.iter().map(|p| p.1).min_by(f64::total_cmp)?;
     let (first, last) = (centres.first()?.1, centres.last()?.1);
     let mut curves = vec![Series::new(centres, style::INK).named("centres, *D*_{r}")];
@@ -144,15 +144,17 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
     for (text, time) in [
         (
             "First contact at",
-            story.kiss.map(|kiss| story.moment_text(kiss)),
+            features.kiss.map(|kiss| features.pair_event_text(kiss)),
         ),
         (
             "Role change at",
-            role_change.map(|event| story.time_text(event.time)),
+            role_change.map(|event| features.time_text(event.time)),
         ),
         (
             "Separation at",
-            story.parting.map(|parting| story.moment_text(parting)),
+            features
+                .separation
+                .map(|separation| features.pair_event_text(separation)),
         ),
     ] {
         if let Some(time) = time {
@@ -164,9 +166,9 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
 
 /// Draws the vertical and the horizontal velocity of both grains of a pair.
 pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
-    let pair = scene.story.pair?;
-    let up = scene.story.up;
-    let unit = scene.story.scales.map_or(1.0, |s| s.velocity());
+    let pair = scene.features.pair?;
+    let up = scene.features.up;
+    let unit = scene.features.scales.map_or(1.0, |s| s.velocity());
     let vertical = pair.map(|grain| scene.curve(grain, |h, row| h.velocity[row].dot(up) / unit));
     let speed = |h: &History, row: usize| h.velocity[row].reject_from_normalized(up).length();
     let horizontal = pair.map(|grain| scene.curve(grain, |h, row| speed(h, row) / unit));
@@ -177,7 +179,7 @@ pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
         .iter()
         .flat_map(Series::values)
         .fold(0.0, f64::max);
-    let (v, h, unit) = match scene.story.scales {
+    let (v, h, unit) = match scene.features.scales {
         Some(_) => (
             "*v*_{z} / √(*d* *g*)  [–]",
             "|*v*_{h}| / √(*d* *g*)  [–]",
@@ -202,7 +204,7 @@ pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
 /// Draws the velocity of one grain in m/s, relative to sqrt(d g), and as a Reynolds number.
 pub fn single_velocity(scene: &Scene) -> Option<Figure> {
     let grain = *scene.moving().first()?;
-    let (up, facts) = (scene.story.up, &scene.run.facts);
+    let (up, facts) = (scene.features.up, &scene.run.facts);
     let curve = |value: &dyn Fn(&History, usize) -> f64| Series {
         name: None,
         ..scene.curve(grain, value)
@@ -221,7 +223,7 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
         &[0.0],
         100.0,
     )];
-    if let Some(scales) = scene.story.scales {
+    if let Some(scales) = scene.features.scales {
         let scaled = curve(&|h, row| h.velocity[row].dot(up) / scales.velocity());
         let label = "*v*_{z} / √(*d* *g*)  [–]";
         panels.push(Panel::linear(label, vec![scaled], &[0.0], 65.0));
@@ -233,7 +235,7 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
         caption += &format!(" {} Reynolds number, up to {highest}", letter(panels.len()));
         let label = "Re = |*v*| *d*/*ν*  [–]";
         panels.push(Panel::linear(label, vec![reynolds], &[0.0], 65.0));
-        caption += &match scene.story.scales.zip(facts.density_ratio()) {
+        caption += &match scene.features.scales.zip(facts.density_ratio()) {
             Some((scales, ratio)) => {
                 format!(
                     " (Galileo number {}).",

@@ -7,14 +7,14 @@ use grainwake_plot::equal_aspect::Window;
 use grainwake_plot::style::INK;
 use grainwake_solver::output::vti::Image;
 
+use super::grain_surface::Outline;
 use super::section::Section;
-use super::sheet::{self, ColourScale, Column};
-use super::silhouette::Outline;
-use super::{Scene, cuts};
+use super::slice_grid::{self, ColourScale, Column};
+use super::{Scene, slice_outlines};
+use crate::features::RunFeatures;
 use crate::run_folder::RunFolder;
-use crate::story::Story;
 
-pub use super::sheet::{Quantity, Style};
+pub use super::slice_grid::{Quantity, Style};
 
 /// A slice with its title.
 pub struct Panel<'a> {
@@ -40,7 +40,7 @@ pub fn draw(panels: &[Panel], style: &Style) -> Result<Drawing, String> {
         return Err("a slice has no such quantity".to_owned());
     }
     let scale = ColourScale::new(style, &columns);
-    let drawing = sheet::draw(&columns, &[], &scale, style.length.as_deref());
+    let drawing = slice_grid::draw(&columns, &[], &scale, style.length.as_deref());
     drawing.ok_or_else(|| "there is no slice".to_owned())
 }
 
@@ -59,13 +59,13 @@ fn column(panel: &Panel) -> Result<Column, String> {
         time: String::new(),
         at: panel.image.time,
         window,
-        cuts: Vec::new(),
+        outlines: Vec::new(),
         centres: Vec::new(),
         sections: vec![Some(section)],
     };
     let exact = panel.run.and_then(|run| exact_outlines(run, &mut column));
     let rings = exact.unwrap_or(rings);
-    column.cuts = vec![rings.into_iter().map(|ring| (INK, ring)).collect()];
+    column.outlines = vec![rings.into_iter().map(|ring| (INK, ring)).collect()];
     Ok(column)
 }
 
@@ -73,14 +73,14 @@ fn column(panel: &Panel) -> Result<Column, String> {
 fn exact_outlines(run: &Path, column: &mut Column) -> Option<Vec<Outline>> {
     let run = RunFolder::open(run).ok()?;
     let scene = Scene {
-        story: &Story::of(&run),
-        bodies: super::bodies(&run, &mut Vec::new()),
+        features: &RunFeatures::of(&run),
+        surfaces: super::surfaces(&run, &mut Vec::new()),
         instants: Vec::new(),
         run: &run,
     };
     let view = column.sections.iter().flatten().next()?.view;
     column.centres = scene.centres(column.at, view);
-    let outlines = cuts::of_column(&scene, column).concat();
+    let outlines = slice_outlines::of_column(&scene, column).concat();
     let known = !column.centres.is_empty();
     known.then(|| outlines.into_iter().map(|(_, ring)| ring).collect())
 }

@@ -5,15 +5,15 @@ use grainwake_plot::{Figure, letter, style};
 
 use super::curves::Points;
 use super::{AXES, Scene};
+use crate::features::short;
 use crate::run_folder::History;
-use crate::story::short;
 
 /// Draws the mean height, speed and number of contacts of many grains.
 pub fn many(scene: &Scene) -> Option<Figure> {
     let moving = scene.moving();
     let first = &scene.run.grains[*moving.first()?];
-    let (_, factor) = scene.story.time_axis();
-    let up = scene.story.up;
+    let (_, factor) = scene.features.time_axis();
+    let up = scene.features.up;
     let mean = |value: &dyn Fn(&History, usize) -> f64| -> Points {
         let at = |row: usize| {
             let histories = moving.iter().map(|g| &scene.run.grains[*g]);
@@ -58,10 +58,10 @@ pub const FEW: usize = 12;
 /// Draws the height and the vertical velocity of each of a few grains.
 pub fn each(scene: &Scene) -> Option<Figure> {
     let moving = scene.moving();
-    if moving.len() > FEW || !scene.story.travels {
+    if moving.len() > FEW || !scene.features.travels {
         return None;
     }
-    let up = scene.story.up;
+    let up = scene.features.up;
     let curves = |value: &dyn Fn(&History, usize) -> f64| -> Vec<Series> {
         let one = |(n, grain): (usize, &usize)| Series {
             dash: (n >= style::SERIES_COLOURS).then_some("3.5 1.6"),
@@ -93,7 +93,7 @@ pub fn each(scene: &Scene) -> Option<Figure> {
 
 /// Draws the force of the fluid on a held or driven grain.
 pub fn force(scene: &Scene) -> Option<Figure> {
-    let driven = !scene.story.travels || scene.story.scales.is_none();
+    let driven = !scene.features.travels || scene.features.scales.is_none();
     let grain = scene.moving().first().copied().filter(|_| driven)?;
     let history = &scene.run.grains[grain];
     let component = |(axis, colour): (usize, &'static str)| Series {

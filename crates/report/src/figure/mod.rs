@@ -1,14 +1,14 @@
 //! Figures of a run.
 
 mod curves;
-mod cuts;
 pub mod field;
-mod heap;
+pub mod grain_surface;
 mod history;
 mod orientation;
+mod positions;
 pub mod section;
-mod sheet;
-pub mod silhouette;
+mod slice_grid;
+mod slice_outlines;
 mod slices;
 mod trajectory;
 
@@ -16,11 +16,11 @@ use std::collections::BTreeMap;
 
 use grainwake_plot::Figure;
 
+use crate::features::{RunFeatures, RunKind};
 use crate::phases::{self, Instant};
 use crate::run_folder::RunFolder;
-use crate::story::{Story, Subject};
 
-pub use silhouette::{Body, bodies};
+pub use grain_surface::{GrainSurface, surfaces};
 
 /// Names of the coordinate axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -30,9 +30,9 @@ pub struct Scene<'a> {
     /// Run folder.
     pub run: &'a RunFolder,
     /// Features derived from the tables.
-    pub story: &'a Story,
+    pub features: &'a RunFeatures,
     /// Known surfaces of the grains, in the body frame.
-    pub bodies: BTreeMap<usize, Body>,
+    pub surfaces: BTreeMap<usize, GrainSurface>,
     /// Key instants, moved to the nearest times with pictures.
     pub instants: Vec<Instant>,
 }
@@ -40,41 +40,41 @@ pub struct Scene<'a> {
 /// Draws all figures that the run has data for; omissions are added to `notes`.
 pub fn all(
     run: &RunFolder,
-    story: &Story,
-    bodies: BTreeMap<usize, Body>,
+    features: &RunFeatures,
+    surfaces: BTreeMap<usize, GrainSurface>,
     notes: &mut Vec<String>,
 ) -> Vec<Figure> {
     let scene = Scene {
         run,
-        story,
-        bodies,
-        instants: phases::snap(&story.instants, &picture_times(run)),
+        features,
+        surfaces,
+        instants: phases::snap(&features.instants, &picture_times(run)),
     };
     let mut out = Vec::new();
-    match story.subject {
-        Subject::Pair => {
+    match features.kind {
+        RunKind::Pair => {
             out.extend(trajectory::figure(&scene));
             out.extend(curves::gap(&scene));
             out.extend(curves::pair_velocity(&scene));
             out.extend(orientation::figure(&scene, notes));
         }
-        Subject::Single => {
-            if story.travels {
+        RunKind::Single => {
+            if features.travels {
                 out.extend(trajectory::figure(&scene));
                 out.extend(curves::single_velocity(&scene));
             }
             out.extend(history::force(&scene));
             out.extend(orientation::figure(&scene, notes));
         }
-        Subject::Many => {
-            out.extend(heap::positions(&scene));
-            if story.travels && scene.moving().len() <= history::FEW {
+        RunKind::Many => {
+            out.extend(positions::figure(&scene));
+            if features.travels && scene.moving().len() <= history::FEW {
                 out.extend(trajectory::figure(&scene));
             }
             out.extend(history::each(&scene));
             out.extend(history::many(&scene));
         }
-        Subject::Flow => {}
+        RunKind::Flow => {}
     }
     out.extend(slices::figures(&scene, notes));
     out.extend(history::diagnostics(&scene));

@@ -6,9 +6,9 @@ use grainwake_plot::axis::Axis;
 use grainwake_plot::stacked::{Panel, Series};
 
 use super::Scene;
-use super::silhouette::Axes;
+use super::grain_surface::PrincipalAxes;
+use crate::features::short;
 use crate::run_folder::History;
-use crate::story::short;
 
 /// Smallest total rotation of a grain that is not round-off [rad].
 const SMALLEST_ROTATION: f64 = 1e-4;
@@ -25,17 +25,17 @@ fn total_rotation(history: &History) -> f64 {
 /// grain rotates.
 pub fn figure(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
     let moving = scene.moving();
-    let up = scene.story.up;
+    let up = scene.features.up;
     let angle = |axis: DVec3| axis.dot(up).abs().min(1.0).acos().to_degrees();
     let known = moving
         .iter()
-        .filter_map(|g| Some((*g, scene.bodies.get(g)?.axes()?)));
-    let axes: Vec<(usize, Axes)> = known.collect();
+        .filter_map(|g| Some((*g, scene.surfaces.get(g)?.axes()?)));
+    let axes: Vec<(usize, PrincipalAxes)> = known.collect();
     let mut panels = Vec::new();
     let mut caption = String::new();
     if !axes.is_empty() {
-        let panel = |label: &str, pick: fn(&Axes) -> DVec3| {
-            let curve = |(grain, axes): &(usize, Axes)| {
+        let panel = |label: &str, pick: fn(&PrincipalAxes) -> DVec3| {
+            let curve = |(grain, axes): &(usize, PrincipalAxes)| {
                 scene.curve(*grain, |h, row| angle(h.orientation[row] * pick(axes)))
             };
             let curves = axes.iter().map(curve).collect();
@@ -45,18 +45,18 @@ pub fn figure(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
         panels.push(panel("short axis  [°]", |axes| axes.short));
         caption += "(a) Angle of the longest axis with the vertical and (b) of the shortest axis, \
                     the normal of the broad side: 0° in (b) is a grain that falls broad side first.";
-    } else if scene.bodies.is_empty() && !moving.iter().all(|g| scene.run.facts.is_sphere(*g)) {
+    } else if scene.surfaces.is_empty() && !moving.iter().all(|g| scene.run.facts.is_sphere(*g)) {
         let note = "the axes of the grains are not drawn: there are no surfaces in grains/";
         notes.push(note.to_owned());
     }
     let rotates = |grain: &usize| total_rotation(&scene.run.grains[*grain]) > SMALLEST_ROTATION;
     let rotates = moving.iter().any(rotates);
     if rotates {
-        let (label, unit) = match scene.story.scales {
+        let (label, unit) = match scene.features.scales {
             Some(_) => ("|*ω*| √(*d*/*g*)  [–]", " √(g/d)"),
             None => ("|*ω*|  [rad/s]", " rad/s"),
         };
-        let scale = scene.story.scales.map_or(1.0, |s| 1.0 / s.time());
+        let scale = scene.features.scales.map_or(1.0, |s| 1.0 / s.time());
         let speed = |grain| scene.curve(grain, |h, row| h.angular_velocity[row].length() / scale);
         let speeds: Vec<Series> = moving.iter().map(|grain| speed(*grain)).collect();
         let fastest = short(speeds.iter().flat_map(Series::values).fold(0.0, f64::max));

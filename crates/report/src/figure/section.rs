@@ -17,7 +17,7 @@ pub enum Shading {
 
 /// Direction of view onto a plane; axes 0, 1, 2 are x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct View {
+pub struct SliceView {
     /// Axis across the plane.
     pub normal: usize,
     /// Axis to the right.
@@ -26,15 +26,15 @@ pub struct View {
     pub up: usize,
 }
 
-impl View {
+impl SliceView {
     /// Returns the view along a normal, with the axis `vertical` upwards if it lies in the plane.
-    pub fn along(normal: usize, vertical: usize) -> View {
+    pub fn along(normal: usize, vertical: usize) -> SliceView {
         let up = match (vertical == normal, normal) {
             (false, _) => vertical,
             (true, 2) => 1,
             (true, _) => 2,
         };
-        View {
+        SliceView {
             normal,
             across: 3 - normal - up,
             up,
@@ -56,7 +56,7 @@ impl View {
 #[derive(Clone, Debug)]
 pub struct Section {
     /// Direction of view.
-    pub view: View,
+    pub view: SliceView,
     nx: usize,
     nz: usize,
     lower: (f64, f64),
@@ -81,7 +81,7 @@ impl Section {
         let normal = thin.ok_or_else(|| {
             format!("{nx} x {ny} x {nz} cells are no slice, which is one cell thick")
         })?;
-        let view = View::along(normal, vertical);
+        let view = SliceView::along(normal, vertical);
         let strides = [1, nx, nx * ny];
         let (across, up) = (view.across, view.up);
         let order = || {
@@ -334,30 +334,30 @@ mod tests {
     #[test]
     fn every_normal_has_its_view() {
         assert_eq!(
-            View::along(1, 2),
-            View {
+            SliceView::along(1, 2),
+            SliceView {
                 normal: 1,
                 across: 0,
                 up: 2
             }
         );
         assert_eq!(
-            View::along(0, 1),
-            View {
+            SliceView::along(0, 1),
+            SliceView {
                 normal: 0,
                 across: 2,
                 up: 1
             }
         );
         assert_eq!(
-            View::along(2, 2),
-            View {
+            SliceView::along(2, 2),
+            SliceView {
                 normal: 2,
                 across: 0,
                 up: 1
             }
         );
-        assert!(View::along(1, 2).clockwise() && !View::along(0, 2).clockwise());
+        assert!(SliceView::along(1, 2).clockwise() && !SliceView::along(0, 2).clockwise());
         let mut turned = image(1);
         turned.cells = [1, 8, 6];
         let section = Section::of(&turned, 1).unwrap();

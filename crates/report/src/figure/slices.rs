@@ -5,11 +5,11 @@ use grainwake_plot::equal_aspect::{Window, length_unit};
 use grainwake_plot::style::series_colour;
 use grainwake_plot::{Figure, letter};
 
-use super::section::{Section, View};
-use super::sheet::{self, ColourScale, Column, Quantity, Style};
-use super::{AXES, Scene, cuts};
+use super::section::{Section, SliceView};
+use super::slice_grid::{self, ColourScale, Column, Quantity, Style};
+use super::{AXES, Scene, slice_outlines};
+use crate::features::{RunKind, short};
 use crate::run_folder::FrameFile;
-use crate::story::{Subject, short};
 
 /// Draws the speed and the vorticity; slices that cannot be read are added to `notes`.
 pub fn figures(scene: &Scene, notes: &mut Vec<String>) -> Vec<Figure> {
@@ -41,7 +41,7 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
         let frames = scene.run.slices.iter().filter(|f| f.time == instant.time);
         let frames: Vec<&FrameFile> = frames.collect();
         let through = |grain: usize| frames.iter().find(|frame| frame.grain == Some(grain));
-        let sections = match scene.story.pair {
+        let sections = match scene.features.pair {
             Some(pair) if through(pair[0]).is_some() => pair
                 .map(|grain| through(grain).and_then(|frame| read(frame)))
                 .to_vec(),
@@ -54,11 +54,11 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
         apart |= scene.out_of_plane(instant.time, view);
         out.push(Column {
             title: format!("{} {}", letter(i), instant.name),
-            time: scene.story.time_text(instant.time),
+            time: scene.features.time_text(instant.time),
             at: instant.time,
             window: first.whole(),
             centres: scene.centres(instant.time, view),
-            cuts: Vec::new(),
+            outlines: Vec::new(),
             sections,
         });
     }
@@ -73,7 +73,7 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
     }
     crop(scene, &mut out);
     for column in &mut out {
-        column.cuts = cuts::of_column(scene, column);
+        column.outlines = slice_outlines::of_column(scene, column);
     }
     out
 }
@@ -81,17 +81,17 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
 /// Returns the names and colours of the rows of a pair; empty for a single row.
 fn row_names(scene: &Scene, columns: &[Column]) -> Vec<(String, &'static str)> {
     let name = |grain: usize| {
-        let colour = series_colour(scene.story.grain_rank(grain));
+        let colour = series_colour(scene.features.grain_rank(grain));
         (format!("plane of grain {grain}"), colour)
     };
     let several = columns.iter().any(|column| column.sections.len() > 1);
-    let pair = scene.story.pair.filter(|_| several);
+    let pair = scene.features.pair.filter(|_| several);
     pair.map_or(Vec::new(), |pair| pair.map(name).to_vec())
 }
 
 impl Scene<'_> {
     /// Returns the centres of all grains at a time, projected to the plane of a view.
-    pub(super) fn centres(&self, time: f64, view: View) -> Vec<(usize, (f64, f64))> {
+    pub(super) fn centres(&self, time: f64, view: SliceView) -> Vec<(usize, (f64, f64))> {
         let histories = self.run.grains.iter().enumerate();
         let centre = histories.filter_map(|(grain, history)| {
             let (position, _) = history.pose(time)?;
@@ -102,10 +102,10 @@ impl Scene<'_> {
 
     /// Returns whether the grains of a pair lie more than a quarter of a diameter apart along the
     /// normal of a view.
-    fn out_of_plane(&self, time: f64, view: View) -> bool {
+    fn out_of_plane(&self, time: f64, view: SliceView) -> bool {
         let distance = || {
             let [a, b] = self
-                .story
+                .features
                 .pair?
                 .map(|grain| self.run.grains[grain].pose(time));
             Some(self.run.nearest(a?.0 - b?.0)[view.normal].abs())
@@ -118,9 +118,9 @@ impl Scene<'_> {
 /// Crops all windows to one size around settling grains: at least eight diameters wide, with the
 /// wake above the grains.
 fn crop(scene: &Scene, columns: &mut [Column]) {
-    let settling = matches!(scene.story.subject, Subject::Pair | Subject::Single);
+    let settling = matches!(scene.features.kind, RunKind::Pair | RunKind::Single);
     let diameter = scene.run.facts.diameter();
-    let Some(diameter) = diameter.filter(|_| settling && scene.story.travels) else {
+    let Some(diameter) = diameter.filter(|_| settling && scene.features.travels) else {
         return;
     };
     let span = |column: &Column, pick: fn(&(f64, f64)) -> f64| {
@@ -163,7 +163,7 @@ fn speed(scene: &Scene, columns: &[Column]) -> Option<Figure> {
     if scale.largest <= 0.0 {
         return None;
     }
-    let drawing = sheet::draw(columns, &row_names(scene, columns), &scale, None)?;
+    let drawing = slice_grid::draw(columns, &row_names(scene, columns), &scale, None)?;
     let caption = format!(
         "{} Colour is the speed of the fluid, at most {} m/s; arrows show the velocity in the \
          plane, their length in proportion.",
@@ -178,7 +178,7 @@ fn vorticity(scene: &Scene, columns: &[Column]) -> Option<Figure> {
     if scale.largest <= 0.0 {
         return None;
     }
-    let drawing = sheet::draw(columns, &row_names(scene, columns), &scale, None)?;
+    let drawing = slice_grid::draw(columns, &row_names(scene, columns), &scale, None)?;
     let view = columns
         .iter()
         .flat_map(|c| c.sections.iter().flatten())
@@ -222,22 +222,22 @@ fn planes(scene: &Scene, columns: &[Column]) -> String {
         return String::new();
     };
     let normal = AXES[first.view.normal];
-    let follows = if scene.story.travels {
+    let follows = if scene.features.travels {
         " The window follows the motion."
     } else {
         ""
     };
     let several = columns.iter().any(|column| column.sections.len() > 1);
-    match (scene.story.subject, scene.story.pair) {
+    match (scene.features.kind, scene.features.pair) {
         (_, Some(pair)) if several => {
-            let [trailing, leading] = pair.map(|grain| scene.story.grain_name(grain));
+            let [trailing, leading] = pair.map(|grain| scene.features.grain_name(grain));
             format!(
                 "Planes normal to {normal} through the centres of {trailing} (upper row) and of \
                  {leading} (lower row): {times}.{follows}"
             )
         }
         (_, Some(_)) => format!("Plane normal to {normal} through both grains: {times}.{follows}"),
-        (Subject::Single, _) => {
+        (RunKind::Single, _) => {
             format!("Plane normal to {normal} through the grain: {times}.{follows}")
         }
         _ => {

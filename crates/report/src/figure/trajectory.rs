@@ -7,9 +7,9 @@ use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, length_unit, outlin
 use grainwake_plot::style::{self, COLUMN, SMALL, series_colour};
 use grainwake_plot::{Figure, letter};
 
-use super::silhouette::{self, Outline};
+use super::grain_surface::{self, Outline};
 use super::{AXES, Scene};
-use crate::story::short;
+use crate::features::short;
 
 /// Left margin [pt].
 const LEFT: f64 = 36.0;
@@ -24,7 +24,7 @@ impl Scene<'_> {
     pub fn outline(&self, grain: usize, row: usize, across: usize, up: usize) -> Outline {
         let history = &self.run.grains[grain];
         let position = self.run.wrapped(history.position[row]);
-        let body = self.bodies.get(&grain);
+        let body = self.surfaces.get(&grain);
         let traced = body.map(|body| body.outline(position, history.orientation[row], across, up));
         traced
             .filter(|outline| !outline.is_empty())
@@ -36,7 +36,7 @@ impl Scene<'_> {
                     .get(grain)
                     .and_then(|facts| facts.diameter);
                 let diameter = own.or(self.run.facts.diameter()).unwrap_or(0.0);
-                silhouette::circle((position[across], position[up]), 0.5 * diameter)
+                grain_surface::circle((position[across], position[up]), 0.5 * diameter)
             })
     }
 
@@ -52,7 +52,8 @@ impl Scene<'_> {
 
     /// Returns the representation of the grains in words.
     pub fn drawn_as(&self, grains: &[usize]) -> &'static str {
-        let known = |g: &&usize| self.bodies.contains_key(g) || self.sphere_diameter(**g).is_some();
+        let known =
+            |g: &&usize| self.surfaces.contains_key(g) || self.sphere_diameter(**g).is_some();
         match grains.iter().filter(known).count() {
             n if n == grains.len() => "true outlines",
             0 => "circles of equal volume",
@@ -93,7 +94,7 @@ impl Scene<'_> {
 
     /// Returns the axis nearest to the vertical.
     pub fn vertical(&self) -> usize {
-        let up = self.story.up.abs();
+        let up = self.features.up.abs();
         match () {
             () if up.z >= up.x && up.z >= up.y => 2,
             () if up.y >= up.x => 1,
@@ -133,12 +134,12 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         let column = (i % columns) as f64 * (COLUMN - LEFT) / columns as f64;
         let x = column + if columns == 1 { left } else { LEFT };
         let y = 8.0 + 10.0 * (i / columns) as f64;
-        let colour = series_colour(scene.story.grain_rank(*grain));
+        let colour = series_colour(scene.features.grain_rank(*grain));
         drawing.line(&[(x, y), (x + 14.0, y)], colour, style::LINE, dash(i));
         drawing.note(
             (x + 17.0, y),
             Anchor::Start,
-            &scene.story.grain_name(*grain),
+            &scene.features.grain_name(*grain),
         );
     }
     let (unit, _) = length_unit(first.width().max(first.height()));
@@ -161,7 +162,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         format!(
             "{} {name}{}",
             letter(i),
-            scene.story.time_text(instant.time)
+            scene.features.time_text(instant.time)
         )
     };
     let named: Vec<String> = scene.instants.iter().enumerate().map(name).collect();
@@ -230,7 +231,7 @@ fn draw_path(
     drawing: &mut Drawing,
 ) {
     let history = &scene.run.grains[grain];
-    let colour = series_colour(scene.story.grain_rank(grain));
+    let colour = series_colour(scene.features.grain_rank(grain));
     let rows = scene
         .instants
         .iter()

@@ -6,47 +6,57 @@ use grainwake_plot::{literal, plain};
 use maud::{Markup, html};
 use serde_json::Value;
 
+use crate::features::{RunFeatures, RunKind, short};
 use crate::files::WrittenFigure;
 use crate::html::{self, label, name_column, notice, number_column, section};
 use crate::phases::{Phase, PhaseKind};
 use crate::run_folder::RunFolder;
-use crate::story::{Story, Subject, short};
 
 /// Returns the page.
-pub fn page(run: &RunFolder, story: &Story, figures: &[WrittenFigure], notes: &[String]) -> String {
+pub fn page(
+    run: &RunFolder,
+    features: &RunFeatures,
+    figures: &[WrittenFigure],
+    notes: &[String],
+) -> String {
     let content = html! {
-        (state(run, story))
+        (state(run, features))
         (html::omissions(notes))
-        @if !story.phases.is_empty() { (section("Phases", &phases(story))) }
+        @if !features.phases.is_empty() { (section("Phases", &phases(features))) }
         @if !figures.is_empty() { (section("Figures", &html::figures(figures))) }
-        (section("Set-up", &tables::parameters(run, story)))
-        @if !run.events.is_empty() { (section("Events", &tables::events(run, story))) }
+        (section("Set-up", &tables::parameters(run, features)))
+        @if !run.events.is_empty() { (section("Events", &tables::events(run, features))) }
         (section("Provenance", &tables::provenance(run)))
     };
     let footer = html! {
         "Produced by Grainwake from the tables of this run folder. Figures as PNG and SVG: "
         code { "figures/" } "."
     };
-    html::page(title(run, story), &lead(run, story), &content, &footer)
+    html::page(
+        title(run, features),
+        &lead(run, features),
+        &content,
+        &footer,
+    )
 }
 
-fn title<'a>(run: &'a RunFolder, story: &Story) -> &'a str {
-    let general = match story.subject {
-        Subject::Flow => "Flow without grains",
-        Subject::Single => "One grain",
-        Subject::Pair => "Settling pair",
-        Subject::Many => "Many grains",
+fn title<'a>(run: &'a RunFolder, features: &RunFeatures) -> &'a str {
+    let general = match features.kind {
+        RunKind::Flow => "Flow without grains",
+        RunKind::Single => "One grain",
+        RunKind::Pair => "Settling pair",
+        RunKind::Many => "Many grains",
     };
     run.facts.title.as_deref().unwrap_or(general)
 }
 
 /// Returns one or two sentences with the main result and the extent of the run.
-fn lead(run: &RunFolder, story: &Story) -> Markup {
-    let result = match story.subject {
-        Subject::Pair => pair_sentence(story),
-        Subject::Single => single_sentence(run, story),
-        Subject::Many => format!("{} grains. ", run.moving().len()),
-        Subject::Flow => String::new(),
+fn lead(run: &RunFolder, features: &RunFeatures) -> Markup {
+    let result = match features.kind {
+        RunKind::Pair => pair_sentence(features),
+        RunKind::Single => single_sentence(run, features),
+        RunKind::Many => format!("{} grains. ", run.moving().len()),
+        RunKind::Flow => String::new(),
     };
     let wall = run.summary_number("wall_s");
     let wall = wall.map_or(String::new(), |s| {
@@ -56,25 +66,28 @@ fn lead(run: &RunFolder, story: &Story) -> Markup {
     let reason = summary.and_then(|s| s.get("ended_by")?.as_str());
     let reason = reason.filter(|reason| *reason != "end");
     let reason = reason.map_or(String::new(), |r| format!("; it ended by {}", literal(r)));
-    let end = short(story.end);
+    let end = short(features.end);
     label(&format!(
         "{result}The run covers {end} s of simulated time{wall}{reason}."
     ))
 }
 
-fn pair_sentence(story: &Story) -> String {
-    let Some(kiss) = story.kiss else {
+fn pair_sentence(features: &RunFeatures) -> String {
+    let Some(kiss) = features.kiss else {
         return "The two grains did not touch. ".to_owned();
     };
-    let mut events = vec![(kiss.time, format!("kissed at {}", story.moment_text(kiss)))];
+    let mut events = vec![(
+        kiss.time,
+        format!("kissed at {}", features.pair_event_text(kiss)),
+    )];
     let tumbling = |phase: &&Phase| phase.kind == PhaseKind::Tumbling;
-    if let Some(phase) = story.phases.iter().find(tumbling) {
-        let text = format!("tumbled from {}", story.time_text(phase.start));
+    if let Some(phase) = features.phases.iter().find(tumbling) {
+        let text = format!("tumbled from {}", features.time_text(phase.start));
         events.push((phase.start, text));
     }
-    if let Some(parting) = story.parting {
-        let text = format!("separated at {}", story.moment_text(parting));
-        events.push((parting.time, text));
+    if let Some(separation) = features.separation {
+        let text = format!("separated at {}", features.pair_event_text(separation));
+        events.push((separation.time, text));
     }
     events.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut texts: Vec<String> = events.into_iter().map(|(_, text)| text).collect();
@@ -84,9 +97,9 @@ fn pair_sentence(story: &Story) -> String {
     format!("The two grains {}. ", texts.join(", "))
 }
 
-fn single_sentence(run: &RunFolder, story: &Story) -> String {
+fn single_sentence(run: &RunFolder, features: &RunFeatures) -> String {
     let velocities = run.grains.iter().flat_map(|h| &h.velocity);
-    let peak = velocities.map(|v| -v.dot(story.up)).fold(0.0, f64::max);
+    let peak = velocities.map(|v| -v.dot(features.up)).fold(0.0, f64::max);
     match peak > 0.0 {
         true => format!("The grain reached {} m/s downwards. ", short(peak)),
         false => String::new(),
@@ -94,8 +107,8 @@ fn single_sentence(run: &RunFolder, story: &Story) -> String {
 }
 
 /// Returns the notice of a failed or unfinished run; empty for a finished one.
-fn state(run: &RunFolder, story: &Story) -> Markup {
-    let extent = html! { "Results up to " i { "t" } " = " (label(&short(story.end))) " s." };
+fn state(run: &RunFolder, features: &RunFeatures) -> Markup {
+    let extent = html! { "Results up to " i { "t" } " = " (label(&short(features.end))) " s." };
     let failure = run.failure.as_ref();
     let text = |name| failure.and_then(|f| f.get(name)).and_then(Value::as_str);
     let text = |name| text(name).unwrap_or("not known");
@@ -125,16 +138,16 @@ fn phase_colour(kind: PhaseKind) -> &'static str {
 }
 
 /// Returns a bar with the share of each phase, and a table of their times.
-fn phases(story: &Story) -> Markup {
+fn phases(features: &RunFeatures) -> Markup {
     let duration = |phase: &Phase| phase.end - phase.start;
-    let total: f64 = story.phases.iter().map(duration).sum();
+    let total: f64 = features.phases.iter().map(duration).sum();
     let ends = |phase: &Phase| [phase.start, phase.end].map(short);
     let spoken = |phase: &Phase| {
         let [start, end] = ends(phase).map(|text| plain(&text));
         format!("{} from {start} s to {end} s", phase.kind.name())
     };
-    let spoken: Vec<String> = story.phases.iter().map(spoken).collect();
-    let scaled = tables::scaled_time(story);
+    let spoken: Vec<String> = features.phases.iter().map(spoken).collect();
+    let scaled = tables::scaled_time(features);
     let mut columns = vec![
         name_column("phase"),
         number_column("from [s]"),
@@ -154,7 +167,7 @@ fn phases(story: &Story) -> Markup {
     };
     html! {
         div.bar role="img" aria-label={ "Phases: " (spoken.join("; ")) } {
-            @for phase in &story.phases {
+            @for phase in &features.phases {
                 @let (name, share) = (phase.kind.name(), 100.0 * duration(phase) / total);
                 @let colour = phase_colour(phase.kind);
                 div style=(format!("width:{share:.3}%;background:{colour}")) {
@@ -163,6 +176,6 @@ fn phases(story: &Story) -> Markup {
                 }
             }
         }
-        (html::table(&columns, story.phases.iter().map(row)))
+        (html::table(&columns, features.phases.iter().map(row)))
     }
 }

@@ -4,9 +4,9 @@ use grainwake_plot::literal;
 use maud::{Markup, html};
 use serde_json::Value;
 
+use crate::features::{RunFeatures, galileo, short};
 use crate::html::{label, number_column, properties, table, text_column};
 use crate::run_folder::{Event, RunFolder};
-use crate::story::{Story, galileo, short};
 
 /// Largest number of events in the table.
 const EVENTS: usize = 100;
@@ -35,16 +35,16 @@ impl Rows {
 }
 
 /// Returns two tables side by side: physics and numerics.
-pub fn parameters(run: &RunFolder, story: &Story) -> Markup {
+pub fn parameters(run: &RunFolder, features: &RunFeatures) -> Markup {
     html! {
         div.pair {
-            div { (properties(&physics(run, story).0)) }
-            div { (properties(&numerics(run, story).0)) }
+            div { (properties(&physics(run, features).0)) }
+            div { (properties(&numerics(run, features).0)) }
         }
     }
 }
 
-fn physics(run: &RunFolder, story: &Story) -> Rows {
+fn physics(run: &RunFolder, features: &RunFeatures) -> Rows {
     let facts = &run.facts;
     let (diameter, viscosity) = (facts.diameter(), facts.viscosity);
     let mut rows = Rows::default();
@@ -73,7 +73,7 @@ fn physics(run: &RunFolder, story: &Story) -> Rows {
         ""
     };
     let name = format!("Galileo number √(|*ρ*_{{p}}/*ρ*_{{f}} − 1| *g* *d*^{{3}}) / *ν*{suffix}");
-    let known = story.scales.zip(ratio).zip(viscosity);
+    let known = features.scales.zip(ratio).zip(viscosity);
     rows.add(
         &name,
         known.map(|((scales, ratio), nu)| short(galileo(scales, ratio, nu))),
@@ -91,13 +91,13 @@ fn physics(run: &RunFolder, story: &Story) -> Rows {
         "Reynolds number at the largest speed, |*v*| *d* / *ν*",
         reynolds,
     );
-    let (time, velocity) = story.scales.map(|s| (s.time(), s.velocity())).unzip();
+    let (time, velocity) = features.scales.map(|s| (s.time(), s.velocity())).unzip();
     rows.add("time scale √(*d*/*g*)", time.map(with_unit("s")));
     rows.add("velocity scale √(*d* *g*)", velocity.map(with_unit("m/s")));
     rows
 }
 
-fn numerics(run: &RunFolder, story: &Story) -> Rows {
+fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
     let facts = &run.facts;
     let mut rows = Rows::default();
     let size = facts.size.map(|size| (1e3 * size).to_array().map(short));
@@ -127,8 +127,10 @@ fn numerics(run: &RunFolder, story: &Story) -> Rows {
         rows.add(&format!("faces in *{axis}*"), text);
     }
     rows.add("coupling", facts.scheme.as_deref().map(literal));
-    rows.add("simulated time", format!("{} s", short(story.end)));
-    let scaled = story.scales.map(|scales| short(story.end / scales.time()));
+    rows.add("simulated time", format!("{} s", short(features.end)));
+    let scaled = features
+        .scales
+        .map(|scales| short(features.end / scales.time()));
     rows.add("simulated time *t* √(*g*/*d*)", scaled);
     rows.add(
         "steps",
@@ -175,15 +177,15 @@ fn add_grains(rows: &mut Rows, run: &RunFolder) {
 
 /// Returns the label of the dimensionless time and its value for one second; none if the figures
 /// show seconds.
-pub fn scaled_time(story: &Story) -> Option<(&'static str, f64)> {
-    let (label, factor) = story.time_axis();
+pub fn scaled_time(features: &RunFeatures) -> Option<(&'static str, f64)> {
+    let (label, factor) = features.time_axis();
     let label = label.split("  ").next().unwrap_or(label);
     (factor != 1.0).then_some((label, factor))
 }
 
 /// Returns the table of events.
-pub fn events(run: &RunFolder, story: &Story) -> Markup {
-    let scaled = scaled_time(story);
+pub fn events(run: &RunFolder, features: &RunFeatures) -> Markup {
+    let scaled = scaled_time(features);
     let mut columns = vec![number_column("time [s]")];
     columns.extend(scaled.map(|(label, _)| number_column(label)));
     columns.extend(["event", "grains", "details"].map(text_column));

@@ -26,7 +26,7 @@ use crate::plan::{Plan, Run};
 
 /// Files of a report.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Rendered {
+pub struct StudyReportFiles {
     /// HTML page.
     pub page: PathBuf,
     /// Figures as PNG, in page order; each has an SVG file of the same name.
@@ -43,7 +43,7 @@ pub struct Rendered {
 ///
 /// # Errors
 /// If the folder holds no study, the analysis file is wrong, or a file cannot be written.
-pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
+pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     let mut plan = Plan::read(folder)?;
     let mut notes: Vec<String> = refresh_analysis(&mut plan, folder)?.into_iter().collect();
     let plan = plan;
@@ -93,7 +93,7 @@ pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
     };
     let page = folder.join("report.html");
     write_file(&page, content.html().as_bytes())?;
-    Ok(Rendered {
+    Ok(StudyReportFiles {
         page,
         png: figures.into_iter().map(|figure| figure.png_file).collect(),
         runs: (finished.len(), records.len()),

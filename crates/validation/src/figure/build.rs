@@ -7,10 +7,11 @@ use grainwake_plot::style;
 use grainwake_solver::case::{Loc, Problem, Source};
 
 use super::raw::{
-    Colour, Coordinates, Line, Mark, RawFigure, RawHistory, RawReference, RawResults, Scale,
+    Colour, Coordinates, LineKind, RawFigure, RawHistory, RawReferenceCurve, RawResults, Scale,
+    Symbol,
 };
-use super::{AxisSpec, Content, Data, Figure, Picture, Point, Series};
-use crate::check::{Check, Reference, Run};
+use super::{AxisSpec, Content, Data, FigureSpec, ResultPoint, SeriesSpec, SliceSpec};
+use crate::check::{Check, Reference, SuiteRun};
 use crate::columns::Columns;
 use crate::measurement::Sampling;
 use crate::{expression, problem};
@@ -18,7 +19,7 @@ use crate::{expression, problem};
 /// File, runs and constants that the figures refer to.
 struct Context<'a> {
     source: &'a Source,
-    runs: &'a [Run],
+    runs: &'a [SuiteRun],
     folder: &'a Path,
     constants: &'a BTreeMap<String, f64>,
 }
@@ -30,17 +31,17 @@ struct Context<'a> {
 pub fn build(
     source: &Source,
     raw: Vec<RawFigure>,
-    runs: &[Run],
+    runs: &[SuiteRun],
     folder: &Path,
     constants: &BTreeMap<String, f64>,
-) -> Result<Vec<Figure>, Problem> {
+) -> Result<Vec<FigureSpec>, Problem> {
     let context = Context {
         source,
         runs,
         folder,
         constants,
     };
-    let mut out: Vec<Figure> = Vec::new();
+    let mut out: Vec<FigureSpec> = Vec::new();
     for figure in raw {
         let name = &figure.name;
         let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
@@ -69,7 +70,7 @@ impl Context<'_> {
         problem::at(self.source, value, message, help, label)
     }
 
-    fn figure(&self, raw: RawFigure) -> Result<Figure, Problem> {
+    fn figure(&self, raw: RawFigure) -> Result<FigureSpec, Problem> {
         let curves = raw.reference.len() + raw.history.len() + raw.results.len();
         let sources = raw
             .reference
@@ -103,7 +104,7 @@ impl Context<'_> {
                 return Err(self.at(&raw.name, message, help, "this figure"));
             }
         };
-        Ok(Figure {
+        Ok(FigureSpec {
             name: raw.name.value,
             title: raw.title,
             caption: raw.caption,
@@ -126,19 +127,19 @@ impl Context<'_> {
     /// Orders references, histories and results; default colours and symbols follow this order.
     fn series(
         &self,
-        references: Vec<RawReference>,
+        references: Vec<RawReferenceCurve>,
         histories: Vec<RawHistory>,
         results: Vec<RawResults>,
-    ) -> Result<Vec<Series>, Problem> {
-        let mut out: Vec<Series> = Vec::new();
+    ) -> Result<Vec<SeriesSpec>, Problem> {
+        let mut out: Vec<SeriesSpec> = Vec::new();
         let mut push =
-            |label, colour: Option<Colour>, sign: Option<Mark>, line: Option<Line>, data| {
+            |label, colour: Option<Colour>, sign: Option<Symbol>, line: Option<LineKind>, data| {
                 let number = out.len();
-                out.push(Series {
+                out.push(SeriesSpec {
                     label,
                     colour: colour.map_or(style::series_colour(number), Colour::hex),
                     sign: sign.map_or(number, |sign| sign as usize),
-                    line: line.map(Line::dash),
+                    line: line.map(LineKind::dash),
                     data,
                 });
             };
@@ -148,7 +149,7 @@ impl Context<'_> {
         }
         for raw in histories {
             let (label, colour) = (raw.label.clone(), raw.colour);
-            let line = raw.line.unwrap_or(Line::Full);
+            let line = raw.line.unwrap_or(LineKind::Full);
             push(label, colour, None, Some(line), self.history(raw)?);
         }
         for raw in results {
@@ -158,7 +159,7 @@ impl Context<'_> {
         Ok(out)
     }
 
-    fn reference(&self, raw: &RawReference) -> Result<Data, Problem> {
+    fn reference(&self, raw: &RawReferenceCurve) -> Result<Data, Problem> {
         let file = self.folder.join(&raw.data);
         for text in [&raw.x, &raw.y] {
             self.check_syntax(text)?;
@@ -219,7 +220,12 @@ impl Context<'_> {
     }
 
     /// Builds the point of the `i`-th run of a series.
-    fn point(&self, raw: &RawResults, i: usize, name: &Loc<String>) -> Result<Point, Problem> {
+    fn point(
+        &self,
+        raw: &RawResults,
+        i: usize,
+        name: &Loc<String>,
+    ) -> Result<ResultPoint, Problem> {
         let run = self.run(name)?;
         let wanted = |check: &&Check| check.quantity == raw.quantity.value;
         let check = run.checks.iter().find(wanted).ok_or_else(|| {
@@ -259,7 +265,7 @@ impl Context<'_> {
             let help = "a relative error needs `reference = ...`, other than 0, in this series";
             return Err(self.at(&raw.error, message, help, "relative error"));
         }
-        Ok(Point {
+        Ok(ResultPoint {
             run: run.name.clone(),
             x,
             check: check.clone(),
@@ -267,7 +273,7 @@ impl Context<'_> {
         })
     }
 
-    fn check_picture(&self, picture: &Picture) -> Result<(), Problem> {
+    fn check_picture(&self, picture: &SliceSpec) -> Result<(), Problem> {
         self.run(&picture.run)?;
         let window = picture.window();
         if window.width() > 0.0 && window.height() > 0.0 {
@@ -279,7 +285,7 @@ impl Context<'_> {
         Err(self.source.locate(problem, span, "not above `from`"))
     }
 
-    fn run(&self, name: &Loc<String>) -> Result<&Run, Problem> {
+    fn run(&self, name: &Loc<String>) -> Result<&SuiteRun, Problem> {
         let found = self.runs.iter().find(|run| run.name == name.value);
         found.ok_or_else(|| {
             let names: Vec<&str> = self.runs.iter().map(|run| run.name.as_str()).collect();

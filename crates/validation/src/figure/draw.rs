@@ -11,7 +11,7 @@ use grainwake_solver::output::SUMMARY;
 use grainwake_solver::output::vti::Image;
 
 use super::plot::{self, DataSet};
-use super::{Content, Data, Figure, Picture, Point, Series};
+use super::{Content, Data, FigureSpec, ResultPoint, SeriesSpec, SliceSpec};
 use crate::columns::{Columns, last_slice};
 use crate::{expression, signal};
 
@@ -57,7 +57,7 @@ fn notes(omissions: Vec<Omission>) -> Vec<String> {
     notes
 }
 
-impl Figure {
+impl FigureSpec {
     /// Draws the data sets that exist in the run folders below `runs`.
     ///
     /// `saved` returns stored values, by run and quantity, of runs whose folders do not exist.
@@ -131,7 +131,7 @@ fn finished(runs: &Path, name: &str) -> Result<PathBuf, Omission> {
     }
 }
 
-impl Picture {
+impl SliceSpec {
     fn image(&self, runs: &Path) -> Result<(PathBuf, Image), Omission> {
         let folder = finished(runs, &self.run)?;
         let image = last_slice(&folder, &self.plane);
@@ -140,7 +140,7 @@ impl Picture {
     }
 }
 
-impl Series {
+impl SeriesSpec {
     /// Adds the label of the series to the reason of an omission.
     fn named(&self, omission: Omission) -> Omission {
         match omission {
@@ -224,7 +224,7 @@ impl Series {
     }
 }
 
-impl Point {
+impl ResultPoint {
     fn value(
         &self,
         runs: &Path,

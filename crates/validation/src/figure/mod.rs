@@ -13,14 +13,14 @@ use grainwake_report::figure::field::Style;
 pub(crate) use build::build;
 pub use draw::DrawnFigure;
 pub(crate) use raw::RawFigure;
-use raw::{AxisSpec, Picture};
+use raw::{AxisSpec, SliceSpec};
 
 use crate::check::Check;
 use crate::measurement::Sampling;
 
-/// Figure as described in `validation.toml`.
+/// FigureSpec as described in `validation.toml`.
 #[derive(Clone, Debug)]
-pub struct Figure {
+pub struct FigureSpec {
     /// File name without extension, unique within the suite.
     pub name: String,
     /// Title, in label markup.
@@ -37,17 +37,17 @@ enum Content {
     Plot {
         across: AxisSpec,
         up: AxisSpec,
-        series: Vec<Series>,
+        series: Vec<SeriesSpec>,
     },
     Pictures {
         style: Style,
-        pictures: Vec<Picture>,
+        pictures: Vec<SliceSpec>,
     },
 }
 
 /// Data set and its style.
 #[derive(Clone, Debug)]
-struct Series {
+struct SeriesSpec {
     label: String,
     colour: &'static str,
     /// Number of its symbol.
@@ -76,7 +76,7 @@ enum Data {
     },
     /// One value of each of several runs.
     Results {
-        points: Vec<Point>,
+        points: Vec<ResultPoint>,
         /// Whether the relative error is drawn.
         error: bool,
         /// Exponent of the guide line.
@@ -86,7 +86,7 @@ enum Data {
 
 /// Value of a run.
 #[derive(Clone, Debug)]
-struct Point {
+struct ResultPoint {
     run: String,
     x: f64,
     check: Check,

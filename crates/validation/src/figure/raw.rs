@@ -20,14 +20,14 @@ pub struct RawFigure {
     pub x: Option<AxisSpec>,
     pub y: Option<AxisSpec>,
     #[serde(default)]
-    pub reference: Vec<RawReference>,
+    pub reference: Vec<RawReferenceCurve>,
     #[serde(default)]
     pub history: Vec<RawHistory>,
     #[serde(default)]
     pub results: Vec<RawResults>,
     pub field: Option<Style>,
     #[serde(default)]
-    pub picture: Vec<Picture>,
+    pub picture: Vec<SliceSpec>,
 }
 
 /// Axis of a plot.
@@ -71,7 +71,7 @@ pub enum Colour {
 /// Symbol of the points, in the order of `frame::Marker::nth`.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Mark {
+pub enum Symbol {
     Circle,
     Square,
     Triangle,
@@ -82,7 +82,7 @@ pub enum Mark {
 
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Line {
+pub enum LineKind {
     Full,
     Dashed,
     Dotted,
@@ -90,15 +90,15 @@ pub enum Line {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RawReference {
+pub struct RawReferenceCurve {
     pub label: String,
     pub data: PathBuf,
     pub x: Loc<String>,
     pub y: Loc<String>,
     pub source: Option<String>,
     pub colour: Option<Colour>,
-    pub sign: Option<Mark>,
-    pub line: Option<Line>,
+    pub sign: Option<Symbol>,
+    pub line: Option<LineKind>,
 }
 
 #[derive(Deserialize)]
@@ -117,7 +117,7 @@ pub struct RawHistory {
     #[serde(default)]
     pub derivative: bool,
     pub colour: Option<Colour>,
-    pub line: Option<Line>,
+    pub line: Option<LineKind>,
 }
 
 #[derive(Deserialize)]
@@ -132,8 +132,8 @@ pub struct RawResults {
     pub reference: Option<f64>,
     pub slope: Option<f64>,
     pub colour: Option<Colour>,
-    pub sign: Option<Mark>,
-    pub line: Option<Line>,
+    pub sign: Option<Symbol>,
+    pub line: Option<LineKind>,
 }
 
 #[derive(Clone, Deserialize)]
@@ -146,7 +146,7 @@ pub enum Coordinates {
 /// Slice of a run.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Picture {
+pub struct SliceSpec {
     /// Name of the run.
     pub run: Loc<String>,
     /// Name of the plane.
@@ -160,7 +160,7 @@ pub struct Picture {
     pub to: Option<Loc<[f64; 2]>>,
 }
 
-impl Picture {
+impl SliceSpec {
     /// Returns the displayed range.
     pub fn window(&self) -> Window {
         let to = self.to.as_ref().map(|to| to.value);
@@ -187,13 +187,13 @@ impl Colour {
     }
 }
 
-impl Line {
+impl LineKind {
     /// Returns the SVG dash pattern, empty for a solid line.
     pub fn dash(self) -> &'static str {
         match self {
-            Line::Full => "",
-            Line::Dashed => "4.5 2",
-            Line::Dotted => "1.2 1.6",
+            LineKind::Full => "",
+            LineKind::Dashed => "4.5 2",
+            LineKind::Dotted => "1.2 1.6",
         }
     }
 }

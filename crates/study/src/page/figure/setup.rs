@@ -4,7 +4,7 @@ use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, length_unit, outline_style};
 use grainwake_plot::style::{BLUE, COLUMN, FAINT, HAIR, INK, SMALL, VERMILION};
 use grainwake_plot::{Figure, text};
-use grainwake_report::figure::silhouette::{Body, Outline};
+use grainwake_report::figure::grain_surface::{GrainSurface, Outline};
 use grainwake_solver::case::Case;
 use grainwake_solver::dem::Grain;
 
@@ -130,5 +130,5 @@ fn pair_window(outlines: &[Outline; 2]) -> Window {
 fn outline(grain: &Grain) -> Outline {
     let (points, triangles) = grain.shape.surface_mesh();
     let triangles = triangles.iter().map(|t| t.map(|i| i as usize)).collect();
-    Body::new(points, triangles).outline(grain.pose.position, grain.pose.orientation, 0, 2)
+    GrainSurface::new(points, triangles).outline(grain.pose.position, grain.pose.orientation, 0, 2)
 }

@@ -8,7 +8,7 @@ use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_
 use grainwake_plot::style::PAGE;
 
 use super::{AXES, Scene};
-use crate::story::short;
+use crate::features::short;
 
 /// Left margin [pt].
 const LEFT: f64 = 38.0;
@@ -18,7 +18,7 @@ const MIDDLE: f64 = 44.0;
 const TOP: f64 = 8.0;
 
 /// Draws the grains at the end of the run, coloured by height.
-pub fn positions(scene: &Scene) -> Option<Figure> {
+pub fn figure(scene: &Scene) -> Option<Figure> {
     let run = scene.run;
     let grains = run.moving();
     let last = |g: usize| run.grains[g].len() - 1;

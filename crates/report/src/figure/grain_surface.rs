@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 use grainwake_plot::axis::extent;
 use grainwake_plot::contour;
 
-use super::section::View;
+use super::section::SliceView;
 use crate::run_folder::{History, RunFolder, Surface};
 
 /// Closed polygon in two of the three coordinates [m].
@@ -18,24 +18,24 @@ const SAMPLES: usize = 72;
 
 /// Closed triangulated surface of a grain, in the body frame.
 #[derive(Clone, Debug)]
-pub struct Body {
+pub struct GrainSurface {
     points: Vec<DVec3>,
     triangles: Vec<[usize; 3]>,
 }
 
 /// Principal axes of a grain, in the body frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Axes {
+pub struct PrincipalAxes {
     /// Axis of the longest extent.
     pub long: DVec3,
     /// Axis of the shortest extent: normal of the broad side.
     pub short: DVec3,
 }
 
-impl Body {
+impl GrainSurface {
     /// Creates a body from its closed surface; points in the body frame [m].
-    pub fn new(points: Vec<DVec3>, triangles: Vec<[usize; 3]>) -> Body {
-        Body { points, triangles }
+    pub fn new(points: Vec<DVec3>, triangles: Vec<[usize; 3]>) -> GrainSurface {
+        GrainSurface { points, triangles }
     }
 
     /// Returns the outline of the body at a pose, projected to the axes `across` and `up`.
@@ -54,7 +54,7 @@ impl Body {
         &self,
         position: DVec3,
         rotation: DQuat,
-        view: View,
+        view: SliceView,
         place: f64,
     ) -> Vec<Outline> {
         let points = self.points.iter().map(|p| position + rotation * *p);
@@ -105,7 +105,7 @@ impl Body {
 
     /// Returns the axes of the largest and the smallest second moment of the volume; `None` if the
     /// moments differ by less than 4 %, as of a sphere or a cube.
-    pub fn axes(&self) -> Option<Axes> {
+    pub fn axes(&self) -> Option<PrincipalAxes> {
         let mut moments = DVec3::ZERO;
         for [a, b, c] in self.corners() {
             let six_volumes = a.dot(b.cross(c));
@@ -115,7 +115,7 @@ impl Body {
         let by_size = |i: &usize, j: &usize| moments[*i].total_cmp(&moments[*j]);
         let (long, short) = ((0..3).max_by(by_size)?, (0..3).min_by(by_size)?);
         let clear = moments[long] > 1.04 * moments[short];
-        clear.then_some(Axes {
+        clear.then_some(PrincipalAxes {
             long: DVec3::AXES[long],
             short: DVec3::AXES[short],
         })
@@ -124,7 +124,7 @@ impl Body {
 
 /// Reads the surfaces of the grains from the first surface file of each; unusable files are added to
 /// `notes`.
-pub fn bodies(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, Body> {
+pub fn surfaces(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, GrainSurface> {
     let mut out = BTreeMap::new();
     for frame in &run.surfaces {
         let known = match frame.grain {
@@ -135,7 +135,7 @@ pub fn bodies(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, Body>
             continue;
         }
         match run.surface(frame) {
-            Ok(surface) => add_bodies(&surface, frame.grain, frame.time, &run.grains, &mut out),
+            Ok(surface) => add_surfaces(&surface, frame.grain, frame.time, &run.grains, &mut out),
             Err(what) => {
                 let name = run.short_name(&frame.file);
                 notes.push(format!("{name} was left out: {what}"));
@@ -146,12 +146,12 @@ pub fn bodies(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, Body>
 }
 
 /// Splits a surface by grain and transforms each part to the body frame.
-fn add_bodies(
+fn add_surfaces(
     surface: &Surface,
     grain_of_file: Option<usize>,
     time: f64,
     histories: &[History],
-    out: &mut BTreeMap<usize, Body>,
+    out: &mut BTreeMap<usize, GrainSurface>,
 ) {
     let only = (histories.len() == 1).then_some(0);
     let mut parts: BTreeMap<usize, Vec<[usize; 3]>> = BTreeMap::new();
@@ -178,7 +178,8 @@ fn add_bodies(
             })
         };
         let triangles = triangles.into_iter().map(|t| t.map(&mut number)).collect();
-        out.entry(grain).or_insert(Body { points, triangles });
+        out.entry(grain)
+            .or_insert(GrainSurface { points, triangles });
     }
 }
 
@@ -255,7 +256,7 @@ mod tests {
     use super::*;
 
     /// A box with half edges a, b, c.
-    fn block(a: f64, b: f64, c: f64) -> Body {
+    fn block(a: f64, b: f64, c: f64) -> GrainSurface {
         let corner = |i: usize| {
             let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
             DVec3::new(a * sign(0), b * sign(1), c * sign(2))
@@ -272,7 +273,7 @@ mod tests {
             .iter()
             .flat_map(|[p, q, r, s]| [[*p, *q, *r], [*p, *r, *s]])
             .collect();
-        Body {
+        GrainSurface {
             points: (0..8).map(corner).collect(),
             triangles,
         }
@@ -312,7 +313,7 @@ mod tests {
     fn sections_are_loops_of_the_body() {
         let body = block(2e-3, 1e-3, 0.5e-3);
         let at = DVec3::new(0.1, 0.2, 0.3);
-        let view = View::along(1, 2);
+        let view = SliceView::along(1, 2);
         let cut = body.section(at, DQuat::IDENTITY, view, 0.2004);
         assert_eq!(cut.len(), 1);
         assert!((area(&cut[0]) - 4e-6).abs() < 1e-12, "{}", area(&cut[0]));
@@ -330,7 +331,7 @@ mod tests {
 
     #[test]
     fn flat_or_empty_bodies_have_no_outline() {
-        let body = Body {
+        let body = GrainSurface {
             points: vec![DVec3::ZERO; 3],
             triangles: vec![[0, 1, 2]],
         };

@@ -3,14 +3,14 @@
 use grainwake_plot::style::{INK, series_colour};
 
 use super::Scene;
-use super::section::{Section, View};
-use super::sheet::Column;
-use super::silhouette::{self, Outline};
+use super::grain_surface::{self, Outline};
+use super::section::{Section, SliceView};
+use super::slice_grid::Column;
 
 /// Returns the outlines of the grains in each section of a column, in the colours of the grains.
 pub fn of_column(scene: &Scene, column: &Column) -> Vec<Vec<(&'static str, Outline)>> {
     let coloured = |(grain, ring): (Option<usize>, Outline)| {
-        let colour = |grain| series_colour(scene.story.grain_rank(grain));
+        let colour = |grain| series_colour(scene.features.grain_rank(grain));
         (grain.map_or(INK, colour), ring)
     };
     let of_section = |section: &Option<Section>| {
@@ -33,13 +33,13 @@ fn rings(scene: &Scene, column: &Column, section: &Section) -> Vec<(Option<usize
         if let Some(period) = scene.run.period(normal) {
             position[normal] += period * ((section.place - position[normal]) / period).round();
         }
-        let loops = match scene.bodies.get(grain) {
+        let loops = match scene.surfaces.get(grain) {
             Some(body) => body.section(position, rotation, section.view, section.place),
             None => {
                 let radius = 0.5 * scene.sphere_diameter(*grain)?;
                 let square = radius * radius - (position[normal] - section.place).powi(2);
                 let centre = section.view.seen(position);
-                let ring = (square > 0.0).then(|| silhouette::circle(centre, square.sqrt()));
+                let ring = (square > 0.0).then(|| grain_surface::circle(centre, square.sqrt()));
                 ring.into_iter().collect()
             }
         };
@@ -63,7 +63,7 @@ fn rings(scene: &Scene, column: &Column, section: &Section) -> Vec<(Option<usize
 /// Returns the outlines with their images through periodic faces.
 fn with_images(
     scene: &Scene,
-    view: View,
+    view: SliceView,
     loops: &[(Option<usize>, Outline)],
 ) -> Vec<(Option<usize>, Outline)> {
     let shifts = |axis: usize| match scene.run.period(axis) {

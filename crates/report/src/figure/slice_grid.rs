@@ -10,8 +10,8 @@ use grainwake_plot::text;
 use serde::Deserialize;
 
 use super::AXES;
+use super::grain_surface::Outline;
 use super::section::{Section, Shading};
-use super::silhouette::Outline;
 
 /// Pixels of a slice per point of the page.
 const PIXELS: f64 = 3.0;
@@ -91,7 +91,7 @@ pub struct Column {
     /// Centres of the grains in the plane.
     pub centres: Vec<(usize, (f64, f64))>,
     /// Outlines of the grains in the plane of each row, with their colours.
-    pub cuts: Vec<Vec<(&'static str, Outline)>>,
+    pub outlines: Vec<Vec<(&'static str, Outline)>>,
 }
 
 /// Colour scale of a quantity.
@@ -205,9 +205,9 @@ pub fn draw(
             };
             match section {
                 Some(section) => {
-                    let cuts = column.cuts.get(r).map_or(&[][..], Vec::as_slice);
+                    let outlines = column.outlines.get(r).map_or(&[][..], Vec::as_slice);
                     let clip = format!("clip-{c}-{r}");
-                    draw_section(&mut drawing, section, cuts, &frame, scale, &clip);
+                    draw_section(&mut drawing, section, outlines, &frame, scale, &clip);
                 }
                 None => {
                     let centre = (middle, row_top(r) + 0.5 * height);
@@ -240,7 +240,7 @@ pub fn draw(
 fn draw_section(
     drawing: &mut Drawing,
     section: &Section,
-    cuts: &[(&'static str, Outline)],
+    outlines: &[(&'static str, Outline)],
     frame: &EqualAspectFrame,
     scale: &ColourScale,
     clip: &str,
@@ -263,7 +263,7 @@ fn draw_section(
     if let Some(velocity) = section.velocity.as_ref().filter(|_| scale.arrows) {
         draw_arrows(drawing, section, velocity, frame, scale.largest);
     }
-    for (colour, ring) in cuts {
+    for (colour, ring) in outlines {
         let style = format!(
             "fill=\"{fill}\" stroke=\"{colour}\" stroke-width=\"1.1\" stroke-linejoin=\"round\""
         );

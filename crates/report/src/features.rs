@@ -3,12 +3,12 @@
 use glam::DVec3;
 use grainwake_plot::minus;
 
-use crate::phases::{self, Instant, Moment, Phase};
+use crate::phases::{self, Instant, PairEvent, Phase};
 use crate::run_folder::{Event, History, RunFolder};
 
 /// Kind of a run by its number of grains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Subject {
+pub enum RunKind {
     /// Fluid only.
     Flow,
     /// One grain.
@@ -41,9 +41,9 @@ impl Scales {
 
 /// Features of a run.
 #[derive(Clone, Debug)]
-pub struct Story {
+pub struct RunFeatures {
     /// Kind of the run.
-    pub subject: Subject,
+    pub kind: RunKind,
     /// Scales; `None` without diameter or gravity.
     pub scales: Option<Scales>,
     /// Unit vector against gravity; +z if gravity is unknown or zero.
@@ -53,9 +53,9 @@ pub struct Story {
     /// Phases of a pair.
     pub phases: Vec<Phase>,
     /// First contact of a pair.
-    pub kiss: Option<Moment>,
+    pub kiss: Option<PairEvent>,
     /// Separation of a pair after its contact.
-    pub parting: Option<Moment>,
+    pub separation: Option<PairEvent>,
     /// Key instants, shown in the figures.
     pub instants: Vec<Instant>,
     /// Whether any grain moves by a tenth of the mean diameter or more.
@@ -64,15 +64,15 @@ pub struct Story {
     pub end: f64,
 }
 
-impl Story {
+impl RunFeatures {
     /// Derives the features from the tables of a run folder.
-    pub fn of(run: &RunFolder) -> Story {
+    pub fn of(run: &RunFolder) -> RunFeatures {
         let moving = run.moving();
-        let subject = match moving.len() {
-            0 => Subject::Flow,
-            1 => Subject::Single,
-            2 => Subject::Pair,
-            _ => Subject::Many,
+        let kind = match moving.len() {
+            0 => RunKind::Flow,
+            1 => RunKind::Single,
+            2 => RunKind::Pair,
+            _ => RunKind::Many,
         };
         let gravity = run.facts.gravity.unwrap_or(DVec3::ZERO);
         let up = (-gravity).try_normalize().unwrap_or(DVec3::Z);
@@ -92,7 +92,7 @@ impl Story {
             phases::phases(&run.events, run.summary_number("tumble_time_s"), end)
         });
         let of_pair =
-            |moment: fn(&[Event]) -> Option<Moment>| pair.and_then(|_| moment(&run.events));
+            |moment: fn(&[Event]) -> Option<PairEvent>| pair.and_then(|_| moment(&run.events));
         let least = 0.1 * run.facts.diameter().unwrap_or(0.0);
         let moves = |history: &History| {
             let mut positions = history.position.iter();
@@ -105,20 +105,20 @@ impl Story {
                 name: "",
             }]
         };
-        let instants = match subject {
-            Subject::Flow => last(),
-            Subject::Single if !travels => last(),
-            Subject::Pair => phases::pair_instants(&phases, &run.events, closest(run, pair), end),
+        let instants = match kind {
+            RunKind::Flow => last(),
+            RunKind::Single if !travels => last(),
+            RunKind::Pair => phases::pair_instants(&phases, &run.events, closest(run, pair), end),
             _ => phases::even_instants(end),
         };
-        Story {
-            subject,
+        RunFeatures {
+            kind,
             scales,
             up,
             pair,
             phases,
             kiss: of_pair(phases::kiss),
-            parting: of_pair(phases::parting),
+            separation: of_pair(phases::separation),
             instants,
             travels,
             end,
@@ -143,7 +143,7 @@ impl Story {
 
     /// Returns the time scale of a pair; `None` for runs whose figures show seconds.
     fn time_scale(&self) -> Option<f64> {
-        let scales = self.scales.filter(|_| self.subject == Subject::Pair);
+        let scales = self.scales.filter(|_| self.kind == RunKind::Pair);
         scales.map(|scales| scales.time())
     }
 
@@ -164,7 +164,7 @@ impl Story {
     }
 
     /// Returns the time of a first contact or separation in label markup.
-    pub fn moment_text(&self, moment: Moment) -> String {
+    pub fn pair_event_text(&self, moment: PairEvent) -> String {
         let landed = match moment.landed {
             true => ", after the first has landed",
             false => "",
@@ -262,10 +262,10 @@ mod tests {
                 ..History::default()
             });
         }
-        assert_eq!(Story::of(&run).pair, Some([1, 0]));
+        assert_eq!(RunFeatures::of(&run).pair, Some([1, 0]));
         run.facts.gravity = Some(DVec3::new(0.0, 0.0, 9.81));
         assert_eq!(
-            Story::of(&run).pair,
+            RunFeatures::of(&run).pair,
             Some([0, 1]),
             "down is where gravity points"
         );
