@@ -14,6 +14,7 @@ pub mod drawing;
 pub mod equal_aspect;
 mod figure;
 pub mod frame;
+pub mod legend;
 pub mod raster;
 pub mod stacked;
 pub mod style;

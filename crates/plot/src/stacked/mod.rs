@@ -1,12 +1,12 @@
 //! Curves in panels stacked over a shared horizontal axis, with marked instants.
 
-mod legend;
 mod marks;
 
 use crate::axis::{Axis, extent};
 use crate::curve;
 use crate::drawing::{Anchor, Drawing};
 use crate::frame::Frame;
+use crate::legend::{Entry, Legend};
 use crate::style::{COLUMN, FAINT, LINE, SMALL, TEXT};
 use crate::text;
 use crate::ticks;
@@ -47,6 +47,16 @@ impl Series {
     pub fn dashed(mut self, pattern: &'static str) -> Series {
         self.dash = Some(pattern);
         self
+    }
+
+    /// Returns the entry in the legend, if the curve has a name.
+    fn entry(&self) -> Option<Entry> {
+        Some(Entry {
+            name: self.name.clone()?,
+            colour: self.colour,
+            line: Some(self.dash.unwrap_or_default()),
+            symbol: None,
+        })
     }
 
     /// Returns the vertical values.
@@ -118,22 +128,20 @@ pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) ->
     let width = COLUMN - LEFT - RIGHT;
     let names = marks::name_positions(x, verticals, width);
     let rows = names.iter().map(|(row, _, _)| row + 1).max().unwrap_or(0);
-    let mut legends: Vec<Vec<Vec<&Series>>> = Vec::new();
-    let mut before: Vec<&str> = Vec::new();
-    for panel in panels {
-        let named: Vec<&Series> = panel.series.iter().filter(|s| s.name.is_some()).collect();
-        let these: Vec<&str> = named.iter().filter_map(|s| s.name.as_deref()).collect();
-        legends.push(if these == before {
-            Vec::new()
-        } else {
-            legend::rows(&named, width)
-        });
-        before = these;
-    }
+    let names_of = |panel: &Panel| -> Vec<Option<String>> {
+        panel.series.iter().map(|s| s.name.clone()).collect()
+    };
+    // A panel with the names of the previous panel has no legend of its own.
+    let legend = |i: usize| {
+        let repeated = i > 0 && names_of(&panels[i]) == names_of(&panels[i - 1]);
+        let series = panels[i].series.iter().filter(|_| !repeated);
+        Legend::new(series.filter_map(Series::entry), width)
+    };
+    let legends: Vec<Legend> = (0..panels.len()).map(legend).collect();
     let top = |i: usize| {
         let marks = if i == 0 { ROW * rows as f64 } else { 0.0 };
         let letter = if panels.len() > 1 { 5.0 } else { 0.0 };
-        7.0 + letter + ROW * legends[i].len() as f64 + marks
+        7.0 + letter + legends[i].height() + marks
     };
     // A long label makes its panel taller.
     let height = |panel: &Panel| panel.height.max(text::width(&panel.y.label, TEXT) + 4.0);
@@ -145,7 +153,7 @@ pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) ->
     let mut drawing = Drawing::new(COLUMN, heights + 26.0);
     let mut y = 0.0;
     for (i, panel) in panels.iter().enumerate() {
-        legend::draw(&mut drawing, &legends[i], y + 7.0);
+        legends[i].draw(&mut drawing, (LEFT, y + 7.0));
         y += top(i);
         let frame = Frame {
             x: LEFT,

@@ -2,10 +2,9 @@
 
 use grainwake_plot::COLUMN;
 use grainwake_plot::axis::{Axis, extent};
-use grainwake_plot::drawing::{Anchor, Drawing};
+use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::{Frame, Marker};
-use grainwake_plot::style::{LINE, SMALL};
-use grainwake_plot::text;
+use grainwake_plot::legend::{Entry, Legend};
 use grainwake_solver::case::Loc;
 
 use super::raw::{AxisSpec, Scale};
@@ -13,9 +12,6 @@ use super::raw::{AxisSpec, Scale};
 const LEFT: f64 = 42.0;
 const RIGHT: f64 = 9.0;
 const HEIGHT: f64 = 150.0;
-const ROW: f64 = 10.0;
-/// Width of a line in the legend [pt].
-const SAMPLE: f64 = 16.0;
 /// Half the size of a symbol [pt].
 const SIGN: f64 = 2.4;
 
@@ -47,13 +43,14 @@ impl DataSet {
         }
     }
 
-    /// Width of the line or symbol in the legend [pt].
-    fn sample(&self) -> f64 {
-        if self.line.is_some() { SAMPLE } else { 6.0 }
-    }
-
-    fn entry(&self) -> f64 {
-        self.sample() + 4.0 + text::width(&self.label, SMALL) + 9.0
+    /// Returns the entry in the legend, if the data set has a name.
+    fn entry(&self) -> Option<Entry> {
+        (!self.label.is_empty()).then(|| Entry {
+            name: self.label.clone(),
+            colour: self.colour,
+            line: self.line,
+            symbol: self.sign.map(|sign| (Marker::nth(sign), self.hollow)),
+        })
     }
 }
 
@@ -72,21 +69,10 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
     };
     let up = axis(up, points().filter(|p| inside(p.0)).map(|p| p.1), 5);
 
-    let rows = legend(sets);
-    let top = 6.0 + ROW * rows.len() as f64;
+    let legend = Legend::new(sets.iter().filter_map(DataSet::entry), COLUMN - LEFT);
+    let top = 6.0 + legend.height();
     let mut drawing = Drawing::new(COLUMN, top + HEIGHT + 26.0);
-    for (r, row) in rows.iter().enumerate() {
-        let y = 7.0 + ROW * r as f64;
-        let mut x = LEFT;
-        for one in row {
-            if one.line.is_some() {
-                drawing.line(&[(x, y), (x + SAMPLE, y)], one.colour, LINE, one.dash());
-            }
-            one.mark(&mut drawing, (x + 0.5 * one.sample(), y));
-            drawing.note((x + one.sample() + 4.0, y), Anchor::Start, &one.label);
-            x += one.entry();
-        }
-    }
+    legend.draw(&mut drawing, (LEFT, 7.0));
     let frame = Frame {
         x: LEFT,
         y: top,
@@ -129,24 +115,6 @@ fn axis(plan: &AxisSpec, values: impl Iterator<Item = f64>, count: usize) -> Axi
         Some(ticks) => axis.with_ticks(ticks),
         None => axis,
     }
-}
-
-/// Distributes the entries of the legend over rows.
-fn legend(sets: &[DataSet]) -> Vec<Vec<&DataSet>> {
-    let width = COLUMN - LEFT;
-    let mut rows: Vec<Vec<&DataSet>> = Vec::new();
-    let mut used = f64::INFINITY;
-    for one in sets.iter().filter(|one| !one.label.is_empty()) {
-        if used + one.entry() - 9.0 > width {
-            rows.push(Vec::new());
-            used = 0.0;
-        }
-        used += one.entry();
-        if let Some(row) = rows.last_mut() {
-            row.push(one);
-        }
-    }
-    rows
 }
 
 #[cfg(test)]

@@ -3,7 +3,8 @@
 use grainwake_plot::axis::{Axis, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::Frame;
-use grainwake_plot::style::{BLUE, GREEN, INK, LINE, ORANGE, PAGE, SMALL, VERMILION};
+use grainwake_plot::legend::{Entry, Legend};
+use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
 use grainwake_plot::{Figure, letter, text};
 
 use super::{FigureData, factor_label};
@@ -158,20 +159,26 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
         }
         frame.outline(&mut drawing, (row + 1 == rows, column == 0));
     }
-    let mut entries: Vec<(String, &str, Option<&str>)> = lines
+    let entry = |name: String, colour: &'static str, dash: Option<&'static str>| Entry {
+        name,
+        colour,
+        line: Some(dash.unwrap_or_default()),
+        symbol: None,
+    };
+    let mut entries: Vec<Entry> = lines
         .iter()
         .enumerate()
-        .map(|(n, v)| (factor_label(within, *v), COLOURS[n % 4], None))
+        .map(|(n, v)| entry(factor_label(within, *v), COLOURS[n % 4], None))
         .collect();
     match (curve, reference) {
         (Curve::Velocity, _) => {
-            entries.push(("leading".to_owned(), INK, None));
-            entries.push(("trailing".to_owned(), INK, DASHED));
+            entries.push(entry("leading".to_owned(), INK, None));
+            entries.push(entry("trailing".to_owned(), INK, DASHED));
         }
-        (Curve::Gap, Some((name, _))) => entries.push((text::literal(name), INK, None)),
+        (Curve::Gap, Some((name, _))) => entries.push(entry(text::literal(name), INK, None)),
         (Curve::Gap, None) => {}
     }
-    legend(&mut drawing, &entries);
+    Legend::new(entries, PAGE - LEFT).draw(&mut drawing, (LEFT, LEGEND - 8.0));
     let (quantity, file) = match curve {
         Curve::Gap => ("Distance of the centres", "gap"),
         Curve::Velocity => ("Vertical velocity", "velocity"),
@@ -195,17 +202,4 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
     let name = format!("fig{number}-{file}-by-{way}");
     let title = format!("{quantity} by {by}");
     Some(Figure::new(name, title, caption, drawing).numbered(number))
-}
-
-/// Draws a legend of lines, aligned with the right edge of the panels.
-fn legend(drawing: &mut Drawing, entries: &[(String, &str, Option<&str>)]) {
-    let y = LEGEND - 6.0 - 0.36 * SMALL;
-    let mut x = LEFT + 2.0 * WIDTH + GAP;
-    for (name, colour, dash) in entries.iter().rev() {
-        x -= text::width(name, SMALL);
-        drawing.note((x, y), Anchor::Start, name);
-        x -= 15.0;
-        drawing.line(&[(x, y), (x + 12.0, y)], colour, LINE, *dash);
-        x -= 8.0;
-    }
 }

@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use grainwake_plot::axis::{Axis, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::{Frame, Marker};
+use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::{BLUE, GREEN, HAIR, INK, ORANGE, PAGE, TEXT, VERMILION};
 use grainwake_plot::{Figure, text};
 
-use super::{FigureData, factor_label, sign_entry};
+use super::{FigureData, factor_label, symbol_entry};
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::quantile;
 use crate::format::significant;
@@ -144,17 +145,18 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
     let levels = orientations
         .map(|axis| data.levels(axis))
         .unwrap_or_default();
-    let mut x = LEFT;
-    for (n, name) in levels.iter().enumerate() {
-        let sign = (Marker::nth(n), COLOURS[n % 4], false);
-        x = sign_entry(&mut drawing, (x, LEGEND), sign, &text::literal(name));
-    }
+    let entry = |(n, name): (usize, &String)| symbol_entry(name, n, COLOURS[n % 4]);
+    let mut entries: Vec<Entry> = levels.iter().enumerate().map(entry).collect();
     let censored = layout.censored();
     if censored > 0 {
-        let label = "hollow: landed before kissing; the landing is shown";
-        let sign = (Marker::Circle, INK, true);
-        sign_entry(&mut drawing, (x, LEGEND), sign, label);
+        entries.push(Entry {
+            name: "hollow: landed before kissing; the landing is shown".into(),
+            colour: INK,
+            line: None,
+            symbol: Some((Marker::Circle, true)),
+        });
     }
+    Legend::new(entries, PAGE - LEFT).draw(&mut drawing, (LEFT, LEGEND));
     for observation in &layout.all {
         let grain = observation.levels.get(layout.axis);
         let Some(i) = grain.and_then(|g| layout.grains.iter().position(|o| o == g)) else {

@@ -1,16 +1,14 @@
 //! Line styles of runs in the overview figures, and their legend.
 
-use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::Marker;
-use grainwake_plot::style::{INK, LINE, PAGE, SERIES_COLOURS, SMALL, series_colour};
+use grainwake_plot::legend::{Entry, Legend};
+use grainwake_plot::style::{INK, PAGE, SERIES_COLOURS, series_colour};
 use grainwake_plot::text;
 
 use super::{FigureData, unique};
 use crate::plan::Run;
 
 const DASHES: [Option<&str>; 4] = [None, Some("4 1.8"), Some("1.2 1.5"), Some("6 1.6 1.2 1.6")];
-/// Height of a row of the legend [pt].
-const ROW: f64 = 10.0;
 
 /// Line style of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,28 +101,15 @@ impl LineStyles {
         }
     }
 
-    /// Draws the legend in rows from `left`, or only measures it; returns its height [pt].
-    pub fn legend(&self, mut drawing: Option<&mut Drawing>, left: f64, signs: bool) -> f64 {
-        let (mut x, mut y) = (left, 0.5 * ROW);
-        for (name, style) in self.entries() {
-            let label = text::literal(&name);
-            let width = 17.0 + text::width(&label, SMALL) + 12.0;
-            if x + width > PAGE && x > left {
-                (x, y) = (left, y + ROW);
-            }
-            if let Some(drawing) = drawing.as_deref_mut() {
-                if signs {
-                    style
-                        .sign
-                        .draw(drawing, (x + 7.0, y), 2.7, style.colour, false);
-                } else {
-                    drawing.line(&[(x, y), (x + 14.0, y)], style.colour, LINE, style.dash);
-                }
-                drawing.note((x + 17.0, y), Anchor::Start, &label);
-            }
-            x += width;
-        }
-        y + 0.5 * ROW
+    /// Returns the legend, with symbols or else with lines, for a frame with the given left edge [pt].
+    pub fn legend(&self, left: f64, symbols: bool) -> Legend {
+        let entry = |(name, style): (String, LineStyle)| Entry {
+            name: text::literal(&name),
+            colour: style.colour,
+            line: (!symbols).then_some(style.dash.unwrap_or_default()),
+            symbol: symbols.then_some((style.sign, false)),
+        };
+        Legend::new(self.entries().into_iter().map(entry), PAGE - left)
     }
 }
 

@@ -13,9 +13,8 @@ mod trends;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::Marker;
-use grainwake_plot::style::SMALL;
+use grainwake_plot::legend::Entry;
 use grainwake_plot::{Figure, text};
 use grainwake_solver::case::Case;
 use grainwake_solver::output::RESOLVED;
@@ -146,14 +145,12 @@ fn factor_label(factor: &str, value: f64) -> String {
     format!("{} = {}", symbol(factor), value_text(value))
 }
 
-/// Draws an entry of a legend, symbol and name, at the height `y`; returns the end of the entry.
-fn sign_entry(
-    drawing: &mut Drawing,
-    (x, y): (f64, f64),
-    (sign, colour, hollow): (Marker, &str, bool),
-    label: &str,
-) -> f64 {
-    sign.draw(drawing, (x + 4.0, y), 3.0, colour, hollow);
-    drawing.note((x + 10.0, y), Anchor::Start, label);
-    x + 24.0 + text::width(label, SMALL)
+/// Returns the entry of a legend with a symbol.
+fn symbol_entry(name: &str, n: usize, colour: &'static str) -> Entry {
+    Entry {
+        name: text::literal(name),
+        colour,
+        line: None,
+        symbol: Some((Marker::nth(n), false)),
+    }
 }

@@ -111,7 +111,8 @@ fn against_time(data: &FigureData, curves: &Curves, time: &str, texts: Texts) ->
     let (_, end) = extent(points().map(|p| p.0))?;
     let (low, high) = extent(points().map(|p| p.1).chain([0.0]))?;
     let styles = LineStyles::of(data);
-    let top = styles.legend(None, LEFT, false) + 4.0;
+    let legend = styles.legend(LEFT, false);
+    let top = legend.height() + 4.0;
     let frame = Frame {
         x: LEFT,
         y: top,
@@ -121,7 +122,7 @@ fn against_time(data: &FigureData, curves: &Curves, time: &str, texts: Texts) ->
         up: Axis::linear(texts.up, low, high, 6, false),
     };
     let mut drawing = Drawing::new(PAGE, top + frame.height + 26.0);
-    styles.legend(Some(&mut drawing), LEFT, false);
+    legend.draw(&mut drawing, (LEFT, 5.0));
     frame.grid(&mut drawing);
     for (run, points) in curves {
         let style = styles.style(run);

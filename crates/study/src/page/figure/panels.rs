@@ -135,11 +135,12 @@ pub(super) fn against_parameters(
     let left_out = parameters.len().saturating_sub(PANELS);
     parameters.truncate(PANELS);
     let styles = LineStyles::of(data);
-    let top = styles.legend(None, LEFT, true) + 4.0;
+    let legend = styles.legend(LEFT, true);
+    let top = legend.height() + 4.0;
     let row = HEIGHT + 30.0;
     let rows = parameters.len().div_ceil(2);
     let mut drawing = Drawing::new(PAGE, top + rows as f64 * row);
-    styles.legend(Some(&mut drawing), LEFT, true);
+    legend.draw(&mut drawing, (LEFT, 5.0));
     let width = (PAGE - LEFT - 8.0 - GAP) / 2.0;
     for (i, parameter) in parameters.iter().enumerate() {
         let label = text::literal(&title(&parameter.name));

@@ -3,10 +3,11 @@
 use grainwake_plot::axis::Axis;
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::{Frame, Marker};
+use grainwake_plot::legend::Legend;
 use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
 use grainwake_plot::{Figure, text};
 
-use super::{FigureData, sign_entry};
+use super::{FigureData, symbol_entry};
 use crate::analysis::correlation::Correlation;
 use crate::format::title;
 
@@ -69,11 +70,9 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
         drawing.line(&zero, INK, 0.6, Some("2 2"));
         frame.outline(&mut drawing, (true, false));
     }
-    let mut x = LEFT;
-    for (l, level) in levels.iter().enumerate() {
-        let sign = (Marker::nth(l), COLOURS[l % 4], false);
-        x = sign_entry(&mut drawing, (x, 12.0), sign, &text::literal(level));
-    }
+    let entry = |(l, level): (usize, &String)| symbol_entry(level, l, COLOURS[l % 4]);
+    let legend = Legend::new(levels.iter().enumerate().map(entry), PAGE - LEFT);
+    legend.draw(&mut drawing, (LEFT, 12.0));
     let caption = format!(
         "Spearman's rank correlation of each quantity with each factor, over up to {n} grains in \
          one orientation, with 95 % intervals. An interval that excludes zero indicates a trend."
