@@ -18,7 +18,7 @@ impl From<ReportError> for Exit {
     }
 }
 
-/// Draws the figures and the page of a run folder, or of a study folder.
+/// Writes the figures and the page of a run folder or a study folder.
 pub fn report(args: &ReportArgs) -> Result<(), Exit> {
     if Plan::exists_in(&args.run) {
         let done = grainwake_study::render(&args.run)?;

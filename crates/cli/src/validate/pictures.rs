@@ -1,4 +1,4 @@
-//! Figures that are kept: `figures/SUITE-NAME.png` and `.svg`, and a page that lists them.
+//! Saved figures: `figures/SUITE-NAME.png` and `.svg`, and a page that lists them.
 
 use std::path::Path;
 
@@ -10,9 +10,9 @@ use super::saved::Saved;
 use crate::exit::{Exit, IO};
 use crate::tell;
 
-/// Draws the figures of `suites` that have data below `output`, or numbers among the `saved` results,
-/// into `folder/figures`, and says on stderr what had to be left out, or that an earlier figure stays
-/// for that; gives their number.
+/// Draws the figures of `suites` into `folder/figures`, from the runs below `output` and the `saved`
+/// results, and returns their number. Omissions are listed on standard error; an incomplete figure
+/// does not replace an existing one.
 pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Result<usize, Exit> {
     let place = folder.join("figures");
     std::fs::create_dir_all(&place)
@@ -24,10 +24,9 @@ pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Res
             let drawn = figure.draw(&output.join(&suite.name), |run, quantity| {
                 saved.value(&suite.name, run, quantity)
             });
-            // A figure of more runs is not replaced by one of fewer.
             if !drawn.notes.is_empty() && place.join(format!("{name}.png")).is_file() {
                 tell!(
-                    "figure {name}: kept as it is, delete it to draw what is here: {}",
+                    "figure {name}: not replaced, because the new one would lack: {}; delete it to draw it again",
                     drawn.notes.join("; ")
                 );
                 continue;
@@ -50,7 +49,7 @@ pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Res
     Ok(count)
 }
 
-/// Writes `folder/figures/README.md` with the figures of `suites` that are there.
+/// Writes `folder/figures/README.md` with the existing figures of `suites`.
 pub fn list(folder: &Path, suites: &[Suite]) -> Result<(), Exit> {
     let place = folder.join("figures");
     let mut text = String::from("# Figures of the validations\n");

@@ -11,6 +11,9 @@ use crate::style::{COLUMN, FAINT, LINE, SMALL, TEXT};
 use crate::text;
 use crate::ticks;
 
+pub use marks::VerticalMark;
+use marks::{LEFT, RIGHT, ROW};
+
 /// A curve.
 #[derive(Clone, Debug)]
 pub struct Series {
@@ -108,20 +111,6 @@ impl Panel {
         }
     }
 }
-
-/// A vertical line across all panels.
-#[derive(Clone, Debug)]
-pub struct VerticalMark {
-    /// Value on the horizontal axis.
-    pub at: f64,
-    /// Name above the first panel; empty for none.
-    pub name: String,
-}
-
-const LEFT: f64 = 38.0;
-const RIGHT: f64 = 8.0;
-const ROW: f64 = 9.5;
-const LABEL_ROWS: usize = 5;
 
 /// Draws the panels over one horizontal axis, in a drawing of one column width.
 pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) -> Drawing {

@@ -1,100 +1,13 @@
 //! Curves against time: distance and velocities of a pair, velocity of a single grain.
 
-use glam::DVec3;
 use grainwake_plot::axis::Axis;
-use grainwake_plot::stacked::{Panel, Series, VerticalMark, stacked_panels};
-use grainwake_plot::style::{self, series_colour};
+use grainwake_plot::stacked::{Panel, Series};
+use grainwake_plot::style;
 use grainwake_plot::{Figure, letter};
 
-use super::Scene;
+use super::scene::Scene;
 use crate::features::{galileo, short};
 use crate::run_folder::{History, Kind};
-
-/// Points of a curve.
-pub type Points = Vec<(f64, f64)>;
-
-impl Scene<'_> {
-    /// Returns the time axis of all curves.
-    fn time(&self) -> Axis {
-        let (label, factor) = self.features.time_axis();
-        Axis::linear(label, 0.0, self.features.end * factor, 6, true)
-    }
-
-    /// Returns the events as marks on the time axis.
-    fn marks(&self) -> Vec<VerticalMark> {
-        let (_, factor) = self.features.time_axis();
-        let shown = |kind: &Kind| !matches!(kind, Kind::Other(_));
-        let events = self.run.events.iter().filter(|event| shown(&event.kind));
-        let mark = events.map(|event| VerticalMark {
-            at: event.time * factor,
-            name: event.kind.name().to_owned(),
-        });
-        mark.collect()
-    }
-
-    /// Draws panels against time with the events marked.
-    pub fn with_events(
-        &self,
-        name: &str,
-        title: &str,
-        caption: String,
-        panels: &[Panel],
-    ) -> Figure {
-        let drawing = stacked_panels(&self.time(), panels, &self.marks());
-        Figure::new(name, title, caption, drawing)
-    }
-
-    /// Draws panels against time.
-    pub fn without_events(
-        &self,
-        name: &str,
-        title: &str,
-        caption: String,
-        panels: &[Panel],
-    ) -> Figure {
-        Figure::new(
-            name,
-            title,
-            caption,
-            stacked_panels(&self.time(), panels, &[]),
-        )
-    }
-
-    /// Returns a curve of a grain against time.
-    pub fn curve(&self, grain: usize, value: impl Fn(&History, usize) -> f64) -> Series {
-        let (_, factor) = self.features.time_axis();
-        let history = &self.run.grains[grain];
-        let point = |row: usize| (history.time[row] * factor, value(history, row));
-        let colour = series_colour(self.features.grain_rank(grain));
-        let points = (0..history.len()).map(point).collect();
-        Series::new(points, colour).named(self.features.grain_name(grain))
-    }
-
-    /// Returns two columns of the diagnostics as points against time: the first column found.
-    pub fn diagnostic(&self, names: &[&str]) -> Option<Points> {
-        let table = self.run.diagnostics.as_ref()?;
-        let (_, factor) = self.features.time_axis();
-        let column = names.iter().find_map(|name| table.column(name))?;
-        let rows = table.column("time")?.iter().zip(column);
-        Some(rows.map(|(time, value)| (time * factor, *value)).collect())
-    }
-
-    /// Returns the grains with a history; of a pair, the trailing one first.
-    pub fn moving(&self) -> Vec<usize> {
-        let pair = self.features.pair;
-        pair.map_or_else(|| self.run.moving(), |pair| pair.to_vec())
-    }
-
-    /// Returns a function of the line of centres of the pair against time.
-    fn pair_curve(&self, value: impl Fn(DVec3) -> f64) -> Option<Points> {
-        let [a, b] = self.features.pair?.map(|grain| &self.run.grains[grain]);
-        let (_, factor) = self.features.time_axis();
-        let rows = (0..a.len().min(b.len())).filter(|row| a.time[*row] == b.time[*row]);
-        let line = |row: usize| self.run.nearest(a.position[row] - b.position[row]);
-        let points = rows.map(|row| (a.time[row] * factor, value(line(row))));
-        Some(points.collect())
-    }
-}
 
 /// Draws the distance of the pair against time, and the tilt of the line of centres.
 pub fn gap(scene: &Scene) -> Option<Figure> {

@@ -7,10 +7,11 @@ use grainwake_plot::equal_aspect::Window;
 use grainwake_plot::style::INK;
 use grainwake_solver::output::vti::Image;
 
-use super::grain_surface::Outline;
+use super::grain_surface::{self, Outline};
+use super::scene::Scene;
 use super::section::Section;
 use super::slice_grid::{self, ColourScale, Column};
-use super::{Scene, slice_outlines};
+use super::slice_outlines;
 use crate::features::RunFeatures;
 use crate::run_folder::RunFolder;
 
@@ -74,7 +75,7 @@ fn exact_outlines(run: &Path, column: &mut Column) -> Option<Vec<Outline>> {
     let run = RunFolder::open(run).ok()?;
     let scene = Scene {
         features: &RunFeatures::of(&run),
-        surfaces: super::surfaces(&run, &mut Vec::new()),
+        surfaces: grain_surface::surfaces(&run, &mut Vec::new()),
         instants: Vec::new(),
         run: &run,
     };

@@ -3,8 +3,7 @@
 use grainwake_plot::stacked::{Panel, Series};
 use grainwake_plot::{Figure, letter, style};
 
-use super::curves::Points;
-use super::{AXES, Scene};
+use super::scene::{AXES, Points, Scene};
 use crate::features::short;
 use crate::run_folder::History;
 

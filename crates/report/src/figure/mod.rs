@@ -6,6 +6,7 @@ pub mod grain_surface;
 mod history;
 mod orientation;
 mod positions;
+mod scene;
 pub mod section;
 mod slice_grid;
 mod slice_outlines;
@@ -17,25 +18,11 @@ use std::collections::BTreeMap;
 use grainwake_plot::Figure;
 
 use crate::features::{RunFeatures, RunKind};
-use crate::phases::{self, Instant};
+use crate::phases;
 use crate::run_folder::RunFolder;
 
 pub use grain_surface::{GrainSurface, surfaces};
-
-/// Names of the coordinate axes.
-const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// Data of the figures.
-pub struct Scene<'a> {
-    /// Run folder.
-    pub run: &'a RunFolder,
-    /// Features derived from the tables.
-    pub features: &'a RunFeatures,
-    /// Known surfaces of the grains, in the body frame.
-    pub surfaces: BTreeMap<usize, GrainSurface>,
-    /// Key instants, moved to the nearest times with pictures.
-    pub instants: Vec<Instant>,
-}
+use scene::Scene;
 
 /// Draws all figures that the run has data for; omissions are added to `notes`.
 pub fn all(

@@ -5,8 +5,8 @@ use grainwake_plot::Figure;
 use grainwake_plot::axis::Axis;
 use grainwake_plot::stacked::{Panel, Series};
 
-use super::Scene;
 use super::grain_surface::PrincipalAxes;
+use super::scene::Scene;
 use crate::features::short;
 use crate::run_folder::History;
 

@@ -7,7 +7,7 @@ use grainwake_plot::drawing::Drawing;
 use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_unit};
 use grainwake_plot::style::PAGE;
 
-use super::{AXES, Scene};
+use super::scene::{AXES, Scene};
 use crate::features::short;
 
 /// Left margin [pt].

@@ -9,8 +9,8 @@ use grainwake_plot::text;
 
 use serde::Deserialize;
 
-use super::AXES;
 use super::grain_surface::Outline;
+use super::scene::AXES;
 use super::section::{Section, Shading};
 
 /// Pixels of a slice per point of the page.

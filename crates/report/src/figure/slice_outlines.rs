@@ -2,8 +2,8 @@
 
 use grainwake_plot::style::{INK, series_colour};
 
-use super::Scene;
 use super::grain_surface::{self, Outline};
+use super::scene::Scene;
 use super::section::{Section, SliceView};
 use super::slice_grid::Column;
 

@@ -5,9 +5,10 @@ use grainwake_plot::equal_aspect::{Window, length_unit};
 use grainwake_plot::style::series_colour;
 use grainwake_plot::{Figure, letter};
 
-use super::section::{Section, SliceView};
+use super::scene::{AXES, Scene};
+use super::section::Section;
 use super::slice_grid::{self, ColourScale, Column, Quantity, Style};
-use super::{AXES, Scene, slice_outlines};
+use super::slice_outlines;
 use crate::features::{RunKind, short};
 use crate::run_folder::FrameFile;
 
@@ -87,32 +88,6 @@ fn row_names(scene: &Scene, columns: &[Column]) -> Vec<(String, &'static str)> {
     let several = columns.iter().any(|column| column.sections.len() > 1);
     let pair = scene.features.pair.filter(|_| several);
     pair.map_or(Vec::new(), |pair| pair.map(name).to_vec())
-}
-
-impl Scene<'_> {
-    /// Returns the centres of all grains at a time, projected to the plane of a view.
-    pub(super) fn centres(&self, time: f64, view: SliceView) -> Vec<(usize, (f64, f64))> {
-        let histories = self.run.grains.iter().enumerate();
-        let centre = histories.filter_map(|(grain, history)| {
-            let (position, _) = history.pose(time)?;
-            Some((grain, view.seen(self.run.wrapped(position))))
-        });
-        centre.collect()
-    }
-
-    /// Returns whether the grains of a pair lie more than a quarter of a diameter apart along the
-    /// normal of a view.
-    fn out_of_plane(&self, time: f64, view: SliceView) -> bool {
-        let distance = || {
-            let [a, b] = self
-                .features
-                .pair?
-                .map(|grain| self.run.grains[grain].pose(time));
-            Some(self.run.nearest(a?.0 - b?.0)[view.normal].abs())
-        };
-        let diameter = self.run.facts.diameter().unwrap_or(0.0);
-        distance().is_some_and(|distance| distance > 0.25 * diameter)
-    }
 }
 
 /// Crops all windows to one size around settling grains: at least eight diameters wide, with the

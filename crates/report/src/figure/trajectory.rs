@@ -7,8 +7,7 @@ use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, length_unit, outlin
 use grainwake_plot::style::{self, COLUMN, SMALL, series_colour};
 use grainwake_plot::{Figure, letter};
 
-use super::grain_surface::{self, Outline};
-use super::{AXES, Scene};
+use super::scene::{AXES, Scene};
 use crate::features::short;
 
 /// Left margin [pt].
@@ -17,96 +16,6 @@ const LEFT: f64 = 36.0;
 const MIDDLE: f64 = 14.0;
 /// Right margin [pt].
 const RIGHT: f64 = 18.0;
-
-impl Scene<'_> {
-    /// Returns the outline of a grain at a row of its history, projected to two axes: from its
-    /// surface if known, else a circle of equal volume.
-    pub fn outline(&self, grain: usize, row: usize, across: usize, up: usize) -> Outline {
-        let history = &self.run.grains[grain];
-        let position = self.run.wrapped(history.position[row]);
-        let body = self.surfaces.get(&grain);
-        let traced = body.map(|body| body.outline(position, history.orientation[row], across, up));
-        traced
-            .filter(|outline| !outline.is_empty())
-            .unwrap_or_else(|| {
-                let own = self
-                    .run
-                    .facts
-                    .grains
-                    .get(grain)
-                    .and_then(|facts| facts.diameter);
-                let diameter = own.or(self.run.facts.diameter()).unwrap_or(0.0);
-                grain_surface::circle((position[across], position[up]), 0.5 * diameter)
-            })
-    }
-
-    /// Returns the diameter of a grain that is a sphere [m].
-    pub fn sphere_diameter(&self, grain: usize) -> Option<f64> {
-        let facts = &self.run.facts;
-        facts
-            .grains
-            .get(grain)?
-            .diameter
-            .filter(|_| facts.is_sphere(grain))
-    }
-
-    /// Returns the representation of the grains in words.
-    pub fn drawn_as(&self, grains: &[usize]) -> &'static str {
-        let known =
-            |g: &&usize| self.surfaces.contains_key(g) || self.sphere_diameter(**g).is_some();
-        match grains.iter().filter(known).count() {
-            n if n == grains.len() => "true outlines",
-            0 => "circles of equal volume",
-            _ => "true outlines where their surfaces are known, else circles of equal volume",
-        }
-    }
-
-    /// Returns a sentence about grains whose centres are outside the box at the end; empty if there
-    /// are none.
-    pub fn left_out(&self, grains: &[usize]) -> String {
-        let Some(size) = self.run.facts.size else {
-            return String::new();
-        };
-        let (low, high) = (self.run.facts.lower, self.run.facts.lower + size);
-        let outside = |grain: &&usize| {
-            let last = self.run.grains[**grain].position.last();
-            let last = last.map(|x| self.run.wrapped(*x));
-            last.is_some_and(|x| x.cmplt(low).any() || x.cmpgt(high).any())
-        };
-        let names: Vec<String> = grains
-            .iter()
-            .filter(outside)
-            .map(usize::to_string)
-            .collect();
-        match names.as_slice() {
-            [] => String::new(),
-            [one] => format!(" Grain {one} has left the box and is not shown there."),
-            few if few.len() <= 6 => {
-                let names = few.join(", ");
-                format!(" Grains {names} have left the box and are not shown there.")
-            }
-            many => {
-                let count = many.len();
-                format!(" {count} grains have left the box and are not shown there.")
-            }
-        }
-    }
-
-    /// Returns the axis nearest to the vertical.
-    pub fn vertical(&self) -> usize {
-        let up = self.features.up.abs();
-        match () {
-            () if up.z >= up.x && up.z >= up.y => 2,
-            () if up.y >= up.x => 1,
-            () => 0,
-        }
-    }
-
-    /// Returns the two other axes.
-    pub fn horizontal(&self) -> [usize; 2] {
-        [[1, 2], [0, 2], [0, 1]][self.vertical()]
-    }
-}
 
 /// Draws the paths along both horizontal axes.
 pub fn figure(scene: &Scene) -> Option<Figure> {

@@ -6,11 +6,12 @@ use std::path::Path;
 use grainwake_plot::style;
 use grainwake_solver::case::{Loc, Problem, Source};
 
+use super::raw::{AxisSpec, SliceSpec};
 use super::raw::{
     Colour, Coordinates, LineKind, RawFigure, RawHistory, RawReferenceCurve, RawResults, Scale,
     Symbol,
 };
-use super::{AxisSpec, Content, Data, FigureSpec, ResultPoint, SeriesSpec, SliceSpec};
+use super::spec::{Content, Data, FigureSpec, ResultPoint, SeriesSpec};
 use crate::check::{Check, Reference, SuiteRun};
 use crate::columns::Columns;
 use crate::measurement::Sampling;

@@ -11,7 +11,8 @@ use grainwake_solver::output::SUMMARY;
 use grainwake_solver::output::vti::Image;
 
 use super::plot::{self, DataSet};
-use super::{Content, Data, FigureSpec, ResultPoint, SeriesSpec, SliceSpec};
+use super::raw::SliceSpec;
+use super::spec::{Content, Data, FigureSpec, ResultPoint, SeriesSpec};
 use crate::columns::{Columns, last_slice};
 use crate::{expression, signal};
 

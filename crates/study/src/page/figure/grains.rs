@@ -9,7 +9,7 @@ use grainwake_shape::Shape;
 use grainwake_shape::render::{Picture, View};
 use grainwake_solver::dem::Grain;
 
-use super::{FigureData, factor_label, value_text};
+use super::data::{FigureData, factor_label, value_text};
 use crate::plan::Run;
 
 /// Pixels of a picture per point of the page.

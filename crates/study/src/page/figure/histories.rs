@@ -7,7 +7,7 @@ use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
 use grainwake_plot::{Figure, letter, text};
 
-use super::{FigureData, factor_label};
+use super::data::{FigureData, factor_label};
 use crate::measure::trajectory::Trajectory;
 use crate::plan::Run;
 

@@ -9,7 +9,7 @@ use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::{BLUE, GREEN, HAIR, INK, ORANGE, PAGE, TEXT, VERMILION};
 use grainwake_plot::{Figure, text};
 
-use super::{FigureData, factor_label, symbol_entry};
+use super::data::{FigureData, factor_label, symbol_entry};
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::quantile;
 use crate::format::significant;

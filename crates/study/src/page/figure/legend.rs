@@ -5,7 +5,7 @@ use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::{INK, PAGE, SERIES_COLOURS, series_colour};
 use grainwake_plot::text;
 
-use super::{FigureData, unique};
+use super::data::{FigureData, unique};
 use crate::plan::Run;
 
 const DASHES: [Option<&str>; 4] = [None, Some("4 1.8"), Some("1.2 1.5"), Some("6 1.6 1.2 1.6")];

@@ -7,7 +7,7 @@ use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::Frame;
 use grainwake_plot::style::{LINE, PAGE};
 
-use super::FigureData;
+use super::data::FigureData;
 use super::legend::LineStyles;
 use super::panels::{LEFT, Texts, against_parameters};
 use crate::measure::record::RunRecord;

@@ -8,8 +8,8 @@ use grainwake_plot::frame::Frame;
 use grainwake_plot::style::PAGE;
 use grainwake_plot::{Figure, text};
 
+use super::data::{FigureData, unique};
 use super::legend::{LineStyles, axes};
-use super::{FigureData, unique};
 use crate::analysis::observation::{Observation, observations};
 use crate::format::title;
 use crate::plan::quantities::SHAPE_FACTORS;

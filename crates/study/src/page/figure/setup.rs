@@ -8,8 +8,8 @@ use grainwake_report::figure::grain_surface::{GrainSurface, Outline};
 use grainwake_solver::case::Case;
 use grainwake_solver::dem::Grain;
 
+use super::data::{FigureData, value_text};
 use super::grains::arrow;
-use super::{FigureData, value_text};
 
 /// Top of both views [pt].
 const TOP: f64 = 10.0;

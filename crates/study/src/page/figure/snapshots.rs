@@ -6,7 +6,7 @@ use grainwake_plot::{Figure, text};
 use grainwake_report::features::RunKind;
 use grainwake_report::{RunReport, read_report};
 
-use super::FigureData;
+use super::data::{FigureData, numbered_as_in_paper};
 
 /// Number of the first of these figures in the paper.
 const FIRST: usize = 8;
@@ -22,7 +22,7 @@ pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
             records.any(|r| r.state != "stale" && r.state != "missing")
         };
         let run = data.run(name).filter(|run| usable(&run.name));
-        let which = if super::numbered_as_in_paper(data) {
+        let which = if numbered_as_in_paper(data) {
             format!("figures {} and {}", numbers.0, numbers.1)
         } else {
             format!("the pictures of {name}")

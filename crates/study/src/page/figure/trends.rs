@@ -7,7 +7,7 @@ use grainwake_plot::legend::Legend;
 use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
 use grainwake_plot::{Figure, text};
 
-use super::{FigureData, symbol_entry};
+use super::data::{FigureData, symbol_entry};
 use crate::analysis::correlation::Correlation;
 use crate::format::title;
 
