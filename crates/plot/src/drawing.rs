@@ -131,7 +131,7 @@ impl Drawing {
         self.label(at, anchor, style::TEXT, style::INK, label);
     }
 
-    /// Adds a label of text size that runs upwards, with the middle of its baseline at `(x, y)` [pt].
+    /// Adds a label of text size that runs upwards; the middle of its baseline is at `(x, y)` [pt].
     pub fn upward_text(&mut self, at: (f64, f64), label: &str) {
         self.upward_label(at, style::TEXT, style::INK, label);
     }
@@ -155,7 +155,7 @@ impl Drawing {
         self.styled_label((x, y), Anchor::Middle, size, &style, label);
     }
 
-    /// Adds a small label with a white halo, legible over colours; its baseline is at `(x, y)` [pt].
+    /// Adds a small label with a white halo, legible over colours; baseline at `(x, y)` [pt].
     pub fn note_with_halo(&mut self, at: (f64, f64), anchor: Anchor, colour: &str, label: &str) {
         let halo = "fill=\"none\" stroke=\"#ffffff\" stroke-width=\"1.8\" \
                     stroke-linejoin=\"round\" stroke-opacity=\"0.85\"";
@@ -189,7 +189,8 @@ impl Drawing {
     pub fn begin_clip(&mut self, name: &str, x: f64, y: f64, width: f64, height: f64) {
         let [x, y, width, height] = [x, y, width, height].map(number);
         self.vectors.push_str(&format!(
-            "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>\n<g clip-path=\"url(#{name})\">\n"
+            "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" \
+             height=\"{height}\"/></clipPath>\n<g clip-path=\"url(#{name})\">\n"
         ));
     }
 
@@ -202,7 +203,8 @@ impl Drawing {
     pub fn to_svg(&self, name: &str, title: &str, description: &str) -> String {
         let (width, height) = (number(self.width), number(self.height));
         let mut out = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\" viewBox=\"0 0 {width} {height}\" \
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\" \
+             viewBox=\"0 0 {width} {height}\" \
              role=\"img\" aria-labelledby=\"{name}-title {name}-description\" font-family=\"{}\">\n\
              <title id=\"{name}-title\">{}</title>\n<desc id=\"{name}-description\">{}</desc>\n\
              <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n",
@@ -214,8 +216,8 @@ impl Drawing {
             let data = base64::engine::general_purpose::STANDARD.encode(raster.to_png());
             let [x, y, width, height] = [*x, *y, *width, *height].map(number);
             out.push_str(&format!(
-                "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" preserveAspectRatio=\"none\" \
-                 href=\"data:image/png;base64,{data}\"/>\n"
+                "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
+                 preserveAspectRatio=\"none\" href=\"data:image/png;base64,{data}\"/>\n"
             ));
         }
         out + &rename_clips(&self.vectors, &format!("{name}-clip-")) + "</svg>\n"
@@ -251,7 +253,8 @@ impl Drawing {
             pixmap.draw_pixmap(0, 0, picture.as_ref(), &paint, transform, None);
         }
         let document = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" font-family=\"DejaVu Sans\">{}</svg>",
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" \
+             viewBox=\"0 0 {w} {h}\" font-family=\"DejaVu Sans\">{}</svg>",
             self.vectors,
             w = number(self.width),
             h = number(self.height)

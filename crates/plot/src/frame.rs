@@ -73,8 +73,8 @@ impl Frame {
         drawing.text((middle, base), Anchor::Middle, &self.across.label);
     }
 
-    /// Draws a curve, clipped to the frame and interrupted at points without a position; `clip` is an
-    /// identifier unique in the drawing.
+    /// Draws a curve, clipped to the frame and interrupted at points without a position; `clip` is
+    /// an identifier unique in the drawing.
     pub fn curve(
         &self,
         drawing: &mut Drawing,
@@ -128,7 +128,7 @@ impl Marker {
         ][n % 6]
     }
 
-    /// Draws the marker around `(x, y)` [pt]; a hollow one usually stands for a bound.
+    /// Draws the marker around `(x, y)` [pt]; a hollow one usually marks a bound.
     pub fn draw(
         self,
         drawing: &mut Drawing,

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The folder holds no file of a run.
-    #[error("{} holds no run: none of case.resolved.toml, grains.csv, diagnostics.csv and summary.json is there", .0.display())]
+    #[error("{} holds no run: none of case.resolved.toml, grains.csv, diagnostics.csv and \
+             summary.json is there", .0.display())]
     NotARun(PathBuf),
     /// A file could not be read.
     #[error("cannot read {}: {source}", .file.display())]

@@ -60,7 +60,10 @@ pub fn notice(body: &Markup) -> Markup {
 pub fn omissions(notes: &[String]) -> Markup {
     html! {
         @if !notes.is_empty() {
-            (notice(&html! { b { "Missing or left out" } ul { @for note in notes { li { (note) } } } }))
+            (notice(&html! {
+                b { "Missing or left out" }
+                ul { @for note in notes { li { (note) } } }
+            }))
         }
     }
 }
@@ -116,7 +119,11 @@ pub fn table(columns: &[Column], rows: impl IntoIterator<Item = Vec<Markup>>) ->
                 thead { tr { @for (heading, class) in columns { th class=[class] { (heading) } } } }
                 tbody {
                     @for row in rows {
-                        tr { @for ((_, class), cell) in columns.iter().zip(row) { td class=[class] { (cell) } } }
+                        tr {
+                            @for ((_, class), cell) in columns.iter().zip(row) {
+                                td class=[class] { (cell) }
+                            }
+                        }
                     }
                 }
             }

@@ -1,5 +1,5 @@
-//! Phases of a settling pair (drafting, kissing, tumbling, separated) and the key instants, which the
-//! figures show.
+//! Phases of a settling pair (drafting, kissing, tumbling, separated), and the key instants, which
+//! the figures show.
 
 use crate::run_folder::{Event, Kind};
 

@@ -34,7 +34,8 @@ pub struct Verdict {
 impl Suite {
     /// Evaluates the checks of a run in its folder.
     ///
-    /// `known` holds the values of earlier runs, by run and quantity; those of this run are added.
+    /// `known` holds the values of earlier runs, by run and quantity; the values of this run are
+    /// added.
     pub fn evaluate(
         &self,
         run: &SuiteRun,

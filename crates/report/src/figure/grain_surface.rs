@@ -122,8 +122,7 @@ impl GrainSurface {
     }
 }
 
-/// Reads the surfaces of the grains from the first surface file of each; unusable files are added to
-/// `notes`.
+/// Reads the surface of each grain from its first surface file; unusable files are added to `notes`.
 pub fn surfaces(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, GrainSurface> {
     let mut out = BTreeMap::new();
     for frame in &run.surfaces {

@@ -33,7 +33,8 @@ pub fn many(scene: &Scene) -> Option<Figure> {
     let speed = curve(speed, style::VERMILION);
     panels.extend(Panel::log("rms speed  [m/s]", speed, 80.0));
     let mut caption = format!(
-        "(a) Mean height of the {} grains. (b) Root mean square of their speeds, {} m/s at the end.",
+        "(a) Mean height of the {} grains. (b) Root mean square of their speeds, {} m/s at the \
+         end.",
         moving.len(),
         short(last_speed)
     );

@@ -44,7 +44,8 @@ pub fn figure(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
         panels.push(panel("long axis  [°]", |axes| axes.long));
         panels.push(panel("short axis  [°]", |axes| axes.short));
         caption += "(a) Angle of the longest axis with the vertical and (b) of the shortest axis, \
-                    the normal of the broad side: 0° in (b) is a grain that falls broad side first.";
+                    the normal of the broad side: 0° in (b) is a grain that falls broad side \
+                    first.";
     } else if scene.surfaces.is_empty() && !moving.iter().all(|g| scene.run.facts.is_sphere(*g)) {
         let note = "the axes of the grains are not drawn: there are no surfaces in grains/";
         notes.push(note.to_owned());

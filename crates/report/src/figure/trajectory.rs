@@ -27,7 +27,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     };
     let room = COLUMN - LEFT - MIDDLE - RIGHT;
     let scale = (room / (first.width() + second.width())).min(330.0 / first.height());
-    // The long names of a pair stand one below the other, others side by side.
+    // The names of a pair are long: one per row; other names are in four columns.
     let columns = if grains.len() > 2 { 4 } else { 1 };
     let top = 8.0 + 10.0 * grains.len().div_ceil(columns) as f64;
     let free = room - scale * (first.width() + second.width());

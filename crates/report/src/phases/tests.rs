@@ -106,7 +106,7 @@ fn kiss_and_separation_before_and_after_the_landing() {
     };
     let (touch, part, land) = (Kind::Kiss, Kind::Separation, Kind::Landing);
     assert_eq!(of(&[(1.0, part.clone())]), (None, None));
-    // A bounce is no separation.
+    // A bounce is not the final separation.
     let bounce = [
         (1.0, touch.clone()),
         (1.1, part.clone()),
@@ -116,7 +116,7 @@ fn kiss_and_separation_before_and_after_the_landing() {
     ];
     assert_eq!(of(&bounce), (Some((1.0, false)), Some((3.0, false))));
     assert_eq!(of(&bounce[..3]), (Some((1.0, false)), None));
-    // What happens on the floor comes second.
+    // A separation before the landing takes precedence over later ones.
     let mut again = bounce.to_vec();
     again.extend([(6.0, touch.clone()), (7.0, part.clone())]);
     assert_eq!(of(&again).1, Some((3.0, false)));
@@ -167,7 +167,7 @@ fn instants_follow_events() {
         let instants = pair_instants(&phases(events, None, end), events, closest, end);
         instants.iter().map(|i| (i.name, i.time)).collect()
     };
-    // Passing without a touch.
+    // Passing without contact.
     let events = log(&[(2.0, Kind::RoleChange), (8.0, Kind::Landing)]);
     assert_eq!(
         names(&events, 4.0, 9.0),
@@ -182,13 +182,13 @@ fn instants_follow_events() {
         names(&[], 5.0, 9.0),
         [("drafting", 3.0), ("closest", 5.0), ("apart", 7.0)]
     );
-    // A pair that lands in touch, and lies there for long.
+    // A pair that lands in contact, long before the end.
     let events = log(&[(1.0, Kind::Kiss), (3.0, Kind::Landing)]);
     assert_eq!(
         names(&events, 1.0, 9.0)[2..],
         [("in contact", 2.0), ("landing", 3.0)]
     );
-    // Roles that change after the grains have parted.
+    // A role change after the separation.
     let events = log(&[
         (1.0, Kind::Kiss),
         (1.1, Kind::Tumble),

@@ -17,7 +17,8 @@ impl Content<'_> {
                 (section("Settling speeds and their uncertainty", &settling::summary(self)))
             }
             @if self.has_pairs() {
-                (section("Contact and separation times and their uncertainty", &pairs::summary(self)))
+                @let title = "Contact and separation times and their uncertainty";
+                (section(title, &pairs::summary(self)))
             }
             @if !self.findings.is_empty() {
                 (section("Claims and verdicts", &tables::claims(self.findings)))
@@ -30,8 +31,8 @@ impl Content<'_> {
             (section("Provenance", &tables::provenance(self)))
         };
         let footer = html! {
-            "Produced by Grainwake from the run folders of this study. Figures: " code { "figures/" }
-            "; values: " code { "table.csv" } ", " code { "table.json" } " and "
+            "Produced by Grainwake from the run folders of this study. Figures: "
+            code { "figures/" } "; values: " code { "table.csv" } ", " code { "table.json" } " and "
             code { "analysis.json" } "."
         };
         html::page(&self.plan.title, &self.lead(), &content, &footer)
@@ -41,7 +42,10 @@ impl Content<'_> {
     fn resolution(&self) -> Markup {
         html! {
             @if let Some(resolution) = &self.plan.analysis.resolution {
-                (html::notice(&html! { b { "Not converged with the grid" } p { (resolution.note) } }))
+                (html::notice(&html! {
+                    b { "Not converged with the grid" }
+                    p { (resolution.note) }
+                }))
             }
         }
     }

@@ -42,8 +42,8 @@ pub(super) fn claims(findings: &[Finding]) -> Markup {
     let columns = ["part", "claim", "verdict", "measured"].map(text_column);
     html! {
         p {
-            "A claim holds, or is contradicted, if the 95 % confidence interval shows it; otherwise \
-             it is open. Claims are tested independently: of twenty false claims, one appears to \
+            "A claim holds, or is contradicted, if the 95 % confidence interval shows it; \
+             otherwise it is open. Claims are tested independently: of twenty false claims, one appears to \
              hold by chance."
         }
         (table(&columns, findings.iter().map(row)))

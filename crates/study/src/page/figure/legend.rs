@@ -101,7 +101,7 @@ impl LineStyles {
         }
     }
 
-    /// Returns the legend, with symbols or else with lines, for a frame with the given left edge [pt].
+    /// Returns the legend, with symbols or else lines, for a frame with the given left edge [pt].
     pub fn legend(&self, left: f64, symbols: bool) -> Legend {
         let entry = |(name, style): (String, LineStyle)| Entry {
             name: text::literal(&name),
