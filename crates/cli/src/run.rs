@@ -93,7 +93,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
     }
 }
 
-/// Draws the report. The run is good without it, so trouble is told and no more.
+/// Writes the report. The run is valid without it, so an error is only noted.
 fn draw(args: &RunArgs, out: &Path) {
     match grainwake_report::render(out) {
         Ok(done) if !args.quiet => tell!("report: {}", done.page.display()),

@@ -5,18 +5,18 @@ mod synthetic;
 use std::path::Path;
 
 use grainwake_formats::FormatError;
-use grainwake_report::{Rendered, ReportError, render};
+use grainwake_report::{ReportError, ReportFiles, render};
 
-fn names(rendered: &Rendered) -> Vec<String> {
+fn names(rendered: &ReportFiles) -> Vec<String> {
     let stem = |file: &std::path::PathBuf| file.file_stem().unwrap().to_string_lossy().into_owned();
     rendered.png.iter().map(stem).collect()
 }
 
-fn page(rendered: &Rendered) -> String {
+fn page(rendered: &ReportFiles) -> String {
     std::fs::read_to_string(&rendered.page).unwrap()
 }
 
-fn svg(rendered: &Rendered, name: &str) -> String {
+fn svg(rendered: &ReportFiles, name: &str) -> String {
     let file = rendered
         .svg
         .iter()
@@ -220,7 +220,7 @@ fn the_page_stands_alone_and_can_be_read_aloud() {
 #[test]
 fn the_same_folder_gives_the_same_bytes() {
     let folder = small_pair(0.9);
-    let read = |rendered: &Rendered| -> Vec<Vec<u8>> {
+    let read = |rendered: &ReportFiles| -> Vec<Vec<u8>> {
         let files = rendered
             .png
             .iter()
@@ -534,7 +534,7 @@ fn write_log(folder: &Path, events: &[(f64, &str)]) {
 }
 
 /// What the page and the figure of the gap say of a pair with this log.
-fn told(events: &[(f64, &str)]) -> (String, String) {
+fn report(events: &[(f64, &str)]) -> (String, String) {
     let folder = small_pair(0.9);
     std::fs::remove_dir_all(folder.join("slices")).unwrap();
     let summary = folder.join("summary.json");
@@ -551,7 +551,7 @@ fn told(events: &[(f64, &str)]) -> (String, String) {
 
 #[test]
 fn headline_and_figures_agree_on_kiss_and_parting() {
-    let (page, gap) = told(&[(5.0, "landing"), (7.94, "kiss"), (8.1, "separation")]);
+    let (page, gap) = report(&[(5.0, "landing"), (7.94, "kiss"), (8.1, "separation")]);
     assert!(!page.contains("did not touch"));
     assert!(page.contains("The two grains kissed at"));
     let late = ", after the first has landed";
@@ -566,7 +566,7 @@ fn headline_and_figures_agree_on_kiss_and_parting() {
         (17.3, "separation"),
         (44.0, "landing"),
     ];
-    let (page, gap) = told(&bounce);
+    let (page, gap) = report(&bounce);
     assert!(gap.contains("They part at t √(g/d) = 17.3."), "{gap}");
     let parted = page.split(", and parted at ").nth(1).unwrap();
     assert!(parted.split(". ").next().unwrap().ends_with("= 17.3"));
@@ -575,7 +575,7 @@ fn headline_and_figures_agree_on_kiss_and_parting() {
 
 #[test]
 fn tumbling_after_the_separation_stays_in_the_table() {
-    let (page, _) = told(&[
+    let (page, _) = report(&[
         (13.2, "kiss"),
         (13.6, "separation"),
         (13.8, "tumble"),

@@ -19,6 +19,20 @@ pub fn segments(
     out
 }
 
+/// Removes points within 0.2 pt of the previous one; the last point stays.
+pub fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut out: Vec<(f64, f64)> = Vec::with_capacity(points.len());
+    for (i, p) in points.iter().enumerate() {
+        let far = out
+            .last()
+            .is_none_or(|last| (p.0 - last.0).hypot(p.1 - last.1) > 0.2);
+        if far || i + 1 == points.len() {
+            out.push(*p);
+        }
+    }
+    out
+}
+
 /// Reduces a long curve to its visible points: the first, lowest, highest and last one per 0.5 pt
 /// of width.
 pub fn simplified(points: &[(f64, f64)]) -> Vec<(f64, f64)> {

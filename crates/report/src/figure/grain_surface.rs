@@ -1,65 +1,72 @@
-//! Grains as they look from one side: the true outline where the surface is known, else a circle.
+//! Surfaces of the grains, with their projected outlines and plane sections.
 
 use std::collections::BTreeMap;
 
 use glam::{DQuat, DVec3};
 
-use super::section::View;
-use grainwake_formats::vtp::Surface;
-
-use crate::run_folder::{History, RunFolder};
+use grainwake_plot::axis::extent;
 use grainwake_plot::contour;
 
-/// A closed line in two of the three coordinates [m].
+use super::section::SliceView;
+use crate::run_folder::{History, RunFolder};
+use grainwake_formats::vtp::Surface;
+
+/// Closed polygon in two of the three coordinates [m].
 pub type Outline = Vec<(f64, f64)>;
 
-/// Samples across an outline.
+/// Resolution of the mask from which an outline is traced.
 const SAMPLES: usize = 72;
 
-/// The surface of a grain in its own frame.
+/// Closed triangulated surface of a grain, in the body frame.
 #[derive(Clone, Debug)]
-pub struct Body {
+pub struct GrainSurface {
     points: Vec<DVec3>,
     triangles: Vec<[usize; 3]>,
 }
 
-/// The principal axes that a reader can see.
+/// Principal axes of a grain, in the body frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Axes {
-    /// Longest extent, body frame.
+pub struct PrincipalAxes {
+    /// Axis of the longest extent.
     pub long: DVec3,
-    /// Shortest extent (normal of the broad side), body frame.
+    /// Axis of the shortest extent: normal of the broad side.
     pub short: DVec3,
 }
 
-impl Body {
-    /// A body from its closed surface, positions in its own frame [m].
-    pub fn new(points: Vec<DVec3>, triangles: Vec<[usize; 3]>) -> Body {
-        Body { points, triangles }
+impl GrainSurface {
+    /// Creates a body from its closed surface; points in the body frame [m].
+    pub fn new(points: Vec<DVec3>, triangles: Vec<[usize; 3]>) -> GrainSurface {
+        GrainSurface { points, triangles }
     }
 
-    /// Outline of the body at a pose, seen along the axis that is neither `across` nor `up`.
-    pub fn outline(&self, position: DVec3, turn: DQuat, across: usize, up: usize) -> Outline {
-        let place = |p: &DVec3| {
-            let x = position + turn * *p;
+    /// Returns the outline of the body at a pose, projected to the axes `across` and `up`.
+    pub fn outline(&self, position: DVec3, rotation: DQuat, across: usize, up: usize) -> Outline {
+        let project = |p: &DVec3| {
+            let x = position + rotation * *p;
             (x[across], x[up])
         };
-        largest_outline(
-            &self.points.iter().map(place).collect::<Vec<_>>(),
-            &self.triangles,
-        )
+        let points: Vec<(f64, f64)> = self.points.iter().map(project).collect();
+        largest_outline(&points, &self.triangles)
     }
 
-    /// Loops in which a plane across the view's normal at `place` cuts the body at a pose.
-    pub fn section(&self, position: DVec3, turn: DQuat, view: View, place: f64) -> Vec<Outline> {
-        let points: Vec<DVec3> = self.points.iter().map(|p| position + turn * *p).collect();
+    /// Returns the intersection of the body at a pose with the plane at `place` along the normal of
+    /// the view.
+    pub fn section(
+        &self,
+        position: DVec3,
+        rotation: DQuat,
+        view: SliceView,
+        place: f64,
+    ) -> Vec<Outline> {
+        let points = self.points.iter().map(|p| position + rotation * *p);
+        let points: Vec<DVec3> = points.collect();
         let above = |i: usize| points[i][view.normal] >= place;
         let cross = |a: usize, b: usize| {
             let (p, q) = (points[a], points[b]);
             let (from, to) = (p[view.normal], q[view.normal]);
             view.seen(p.lerp(q, (place - from) / (to - from)))
         };
-        // Each cut triangle joins two of its edges; both are shared with the next cut triangle.
+        // An intersected triangle connects two edges, which its neighbours share.
         let mut next: BTreeMap<(usize, usize), (usize, usize)> = BTreeMap::new();
         for triangle in &self.triangles {
             let [a, b, c] = *triangle;
@@ -86,13 +93,10 @@ impl Body {
         loops
     }
 
-    /// Diameter of the sphere of equal volume [m].
+    /// Returns the diameter of the sphere of equal volume [m].
     pub fn diameter(&self) -> Option<f64> {
-        let volume = self
-            .corners()
-            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
-            .sum::<f64>()
-            .abs();
+        let volumes = self.corners().map(|[a, b, c]| a.dot(b.cross(c)) / 6.0);
+        let volume = volumes.sum::<f64>().abs();
         Some((6.0 * volume / std::f64::consts::PI).cbrt()).filter(|d| d.is_finite() && *d > 0.0)
     }
 
@@ -100,9 +104,9 @@ impl Body {
         self.triangles.iter().map(|t| t.map(|i| self.points[i]))
     }
 
-    /// Long and short axis from the second moments of the volume about the body axes; none for a
-    /// body whose moments hardly differ (a sphere, a cube).
-    pub fn axes(&self) -> Option<Axes> {
+    /// Returns the axes of the largest and the smallest second moment of the volume; `None` if the
+    /// moments differ by less than 4 %, as of a sphere or a cube.
+    pub fn axes(&self) -> Option<PrincipalAxes> {
         let mut moments = DVec3::ZERO;
         for [a, b, c] in self.corners() {
             let six_volumes = a.dot(b.cross(c));
@@ -112,78 +116,74 @@ impl Body {
         let by_size = |i: &usize, j: &usize| moments[*i].total_cmp(&moments[*j]);
         let (long, short) = ((0..3).max_by(by_size)?, (0..3).min_by(by_size)?);
         let clear = moments[long] > 1.04 * moments[short];
-        clear.then_some(Axes {
+        clear.then_some(PrincipalAxes {
             long: DVec3::AXES[long],
             short: DVec3::AXES[short],
         })
     }
 }
 
-/// Surfaces of the grains in their own frames, from the first surface file of each; what cannot be
-/// used is added to `notes`.
-pub fn bodies(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, Body> {
+/// Reads the surface of each grain from its first surface file; unusable files are added to `notes`.
+pub fn surfaces(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, GrainSurface> {
     let mut out = BTreeMap::new();
     for frame in &run.surfaces {
-        let wanted = match frame.grain {
-            Some(grain) => !out.contains_key(&grain),
-            None => out.is_empty() || out.len() < run.grains.len(),
+        let known = match frame.grain {
+            Some(grain) => out.contains_key(&grain),
+            None => !out.is_empty(),
         };
-        if !wanted || (frame.grain.is_none() && !out.is_empty()) {
+        if known {
             continue;
         }
         match run.surface(frame) {
-            Ok(surface) => collect(&surface, frame.grain, frame.time, &run.grains, &mut out),
-            Err(what) => notes.push(format!(
-                "{} was left out: {what}",
-                run.short_name(&frame.file)
-            )),
+            Ok(surface) => add_surfaces(&surface, frame.grain, frame.time, &run.grains, &mut out),
+            Err(what) => {
+                let name = run.short_name(&frame.file);
+                notes.push(format!("{name} was left out: {what}"));
+            }
         }
     }
     out
 }
 
-fn collect(
+/// Splits a surface by grain and transforms each part to the body frame.
+fn add_surfaces(
     surface: &Surface,
-    file_grain: Option<usize>,
+    grain_of_file: Option<usize>,
     time: f64,
     histories: &[History],
-    out: &mut BTreeMap<usize, Body>,
+    out: &mut BTreeMap<usize, GrainSurface>,
 ) {
+    let only = (histories.len() == 1).then_some(0);
     let mut parts: BTreeMap<usize, Vec<[usize; 3]>> = BTreeMap::new();
     for (i, triangle) in surface.triangles.iter().enumerate() {
         let listed = surface
             .grains
             .as_ref()
             .and_then(|grains| grains.get(i).copied());
-        let grain = listed
-            .or(file_grain)
-            .or((histories.len() == 1).then_some(0));
-        if let Some(grain) = grain {
+        if let Some(grain) = listed.or(grain_of_file).or(only) {
             parts.entry(grain).or_default().push(*triangle);
         }
     }
     for (grain, triangles) in parts {
-        let Some(history) = histories.get(grain) else {
+        let Some((position, rotation)) = histories.get(grain).and_then(|h| h.pose(time)) else {
             continue;
         };
-        let Some((position, turn)) = history.pose(time) else {
-            continue;
-        };
-        let back = turn.conjugate();
+        let inverse = rotation.conjugate();
         let mut renumbered: BTreeMap<usize, usize> = BTreeMap::new();
         let mut points = Vec::new();
         let mut number = |i: usize| {
             *renumbered.entry(i).or_insert_with(|| {
-                points.push(back * (surface.points[i] - position));
+                points.push(inverse * (surface.points[i] - position));
                 points.len() - 1
             })
         };
         let triangles = triangles.into_iter().map(|t| t.map(&mut number)).collect();
-        out.entry(grain).or_insert(Body { points, triangles });
+        out.entry(grain)
+            .or_insert(GrainSurface { points, triangles });
     }
 }
 
-/// A circle as an outline.
+/// Returns a circle as a polygon of 48 points.
 pub fn circle(centre: (f64, f64), radius: f64) -> Outline {
     (0..48)
         .map(|i| {
@@ -193,10 +193,9 @@ pub fn circle(centre: (f64, f64), radius: f64) -> Outline {
         .collect()
 }
 
-/// Outline of the union of projected triangles: painted on a grid, smoothed, and traced.
+/// Returns the longest contour of the union of projected triangles, from a smoothed mask.
 fn largest_outline(points: &[(f64, f64)], triangles: &[[usize; 3]]) -> Outline {
-    let range =
-        |pick: fn(&(f64, f64)) -> f64| grainwake_plot::axis::extent(points.iter().map(pick));
+    let range = |pick: fn(&(f64, f64)) -> f64| extent(points.iter().map(pick));
     let (Some((x0, x1)), Some((y0, y1))) = (range(|p| p.0), range(|p| p.1)) else {
         return Outline::new();
     };
@@ -205,10 +204,10 @@ fn largest_outline(points: &[(f64, f64)], triangles: &[[usize; 3]]) -> Outline {
         return Outline::new();
     }
     let (x0, y0) = (x0 - 4.5 * step, y0 - 4.5 * step);
-    let local: Vec<(f64, f64)> = points
+    let local = points
         .iter()
-        .map(|(x, y)| ((x - x0) / step, (y - y0) / step))
-        .collect();
+        .map(|(x, y)| ((x - x0) / step, (y - y0) / step));
+    let local: Vec<(f64, f64)> = local.collect();
     let mut mask = vec![0.0; SAMPLES * SAMPLES];
     for triangle in triangles {
         paint(&mut mask, triangle.map(|i| local[i]));
@@ -216,12 +215,11 @@ fn largest_outline(points: &[(f64, f64)], triangles: &[[usize; 3]]) -> Outline {
     let smooth = blur(&blur(&mask));
     let loops = contour::closed_contours(SAMPLES, SAMPLES, |i, j| smooth[i + SAMPLES * j], 0.5);
     let longest = loops.into_iter().max_by_key(Vec::len).unwrap_or_default();
-    longest
-        .into_iter()
-        .map(|(i, j)| (x0 + i * step, y0 + j * step))
-        .collect()
+    let place = |(i, j): (f64, f64)| (x0 + i * step, y0 + j * step);
+    longest.into_iter().map(place).collect()
 }
 
+/// Sets the mask at the nodes inside a triangle.
 fn paint(mask: &mut [f64], [a, b, c]: [(f64, f64); 3]) {
     let side = |p: (f64, f64), q: (f64, f64), x: f64, y: f64| {
         (q.0 - p.0) * (y - p.1) - (q.1 - p.1) * (x - p.0)
@@ -239,17 +237,15 @@ fn paint(mask: &mut [f64], [a, b, c]: [(f64, f64); 3]) {
     }
 }
 
+/// Returns the mean over the 3 x 3 neighbours of each node; zero at the edge.
 fn blur(mask: &[f64]) -> Vec<f64> {
     let mut out = vec![0.0; mask.len()];
     for j in 1..SAMPLES - 1 {
         for i in 1..SAMPLES - 1 {
             let at = i + SAMPLES * j;
             let rows = [at - SAMPLES, at, at + SAMPLES];
-            out[at] = rows
-                .iter()
-                .map(|k| mask[k - 1] + mask[*k] + mask[k + 1])
-                .sum::<f64>()
-                / 9.0;
+            let sums = rows.iter().map(|k| mask[k - 1] + mask[*k] + mask[k + 1]);
+            out[at] = sums.sum::<f64>() / 9.0;
         }
     }
     out
@@ -260,7 +256,7 @@ mod tests {
     use super::*;
 
     /// A box with half edges a, b, c.
-    fn block(a: f64, b: f64, c: f64) -> Body {
+    fn block(a: f64, b: f64, c: f64) -> GrainSurface {
         let corner = |i: usize| {
             let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
             DVec3::new(a * sign(0), b * sign(1), c * sign(2))
@@ -277,7 +273,7 @@ mod tests {
             .iter()
             .flat_map(|[p, q, r, s]| [[*p, *q, *r], [*p, *r, *s]])
             .collect();
-        Body {
+        GrainSurface {
             points: (0..8).map(corner).collect(),
             triangles,
         }
@@ -317,7 +313,7 @@ mod tests {
     fn sections_are_loops_of_the_body() {
         let body = block(2e-3, 1e-3, 0.5e-3);
         let at = DVec3::new(0.1, 0.2, 0.3);
-        let view = View::along(1, 2);
+        let view = SliceView::along(1, 2);
         let cut = body.section(at, DQuat::IDENTITY, view, 0.2004);
         assert_eq!(cut.len(), 1);
         assert!((area(&cut[0]) - 4e-6).abs() < 1e-12, "{}", area(&cut[0]));
@@ -335,7 +331,7 @@ mod tests {
 
     #[test]
     fn flat_or_empty_bodies_have_no_outline() {
-        let body = Body {
+        let body = GrainSurface {
             points: vec![DVec3::ZERO; 3],
             triangles: vec![[0, 1, 2]],
         };
