@@ -4,7 +4,7 @@ mod common;
 
 use common::{close, shared};
 use grainwake_shape::mesh::{MeshOptions, read_mesh, shape_from_mesh};
-use grainwake_shape::scan::{Denoise, ScanOptions, Threshold, read_volume, shapes_from_volume};
+use grainwake_shape::scan::{ScanOptions, Threshold, read_volume, shapes_from_volume};
 use grainwake_shape::{ReadLimits, Shape, ShapeError};
 use std::path::{Path, PathBuf};
 
@@ -60,7 +60,7 @@ fn the_pair_of_the_scan_is_what_its_volume_gives() {
     let (volume, source) = read_volume(&volume, &ReadLimits::default()).unwrap();
     let options = ScanOptions {
         threshold: Some(Threshold::Otsu),
-        denoise: Denoise::Median,
+        median: true,
         separate: Some(0.87),
         ..ScanOptions::new(2e-6)
     };

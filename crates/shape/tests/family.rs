@@ -3,8 +3,8 @@
 mod common;
 
 use common::close;
-use glam::{DQuat, DVec3};
-use grainwake_shape::family::{FamilyTarget, family_grain, family_options, study_orientation};
+use glam::{DMat3, DQuat, DVec3};
+use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
 use grainwake_shape::{Shape, ShapeOptions};
 use std::f64::consts::FRAC_PI_4;
 use std::path::{Path, PathBuf};
@@ -138,6 +138,17 @@ fn targets_at_the_edge_of_the_chart_are_met_or_refused() {
     assert!(error.to_string().contains("flatness = 0.8"), "{error}");
     let target = FamilyTarget::new(0.5, 0.5, f64::NAN);
     assert!(family_grain(&target, 1, &family_options()).is_err());
+}
+
+/// Initial orientation `number` (1 to 4) of the morphology study: body to space, z up.
+///
+/// Number 1 has the long axis along z and the short axis along x. The others follow by rotations of
+/// 45 degrees about y: number 3 has the long axis along x and the broad side, seen along the short
+/// axis, normal to z (Fig. 5 of the paper).
+fn study_orientation(number: u32) -> DQuat {
+    let upright = DMat3::from_cols(DVec3::Z, DVec3::NEG_Y, DVec3::X);
+    let angle = f64::from(number.saturating_sub(1)) * FRAC_PI_4;
+    DQuat::from_rotation_y(angle) * DQuat::from_mat3(&upright)
 }
 
 /// Orientation 1 stands on its end, orientation 3 lies on its broad side, 2 and 4 lean between.

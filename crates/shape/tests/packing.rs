@@ -6,7 +6,7 @@ mod render;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::family::{FamilyTarget, family_grain};
-use grainwake_shape::scan::{Denoise, ScanOptions, Threshold, Volume, Voxels, scan_volume};
+use grainwake_shape::scan::{ScanOptions, Threshold, Volume, Voxels, scan_volume};
 use grainwake_shape::{Shape, ShapeOptions, SourceFile};
 use render::{Noise, Placed, blurred, greys, shares};
 use std::collections::HashMap;
@@ -187,7 +187,7 @@ fn separated(seed: u64, noise: f64) -> (usize, f64) {
     let volume = Volume::from_labels(dims, image).unwrap();
     let options = ScanOptions {
         threshold: Some(Threshold::Otsu),
-        denoise: Denoise::Median,
+        median: true,
         separate: Some(0.87),
         shape: ShapeOptions {
             cells: 16,
