@@ -26,7 +26,8 @@ pub struct ProgressDisplay {
 }
 
 impl ProgressDisplay {
-    /// Creates a display that stops the run when `stop` is set; `diameter` [m] scales the gap of a pair.
+    /// Creates a display that stops the run when `stop` is set; gaps are shown in units of
+    /// `diameter` [m].
     pub fn new(quiet: bool, stop: Arc<AtomicBool>, diameter: Option<f64>) -> ProgressDisplay {
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::new(TICKS);

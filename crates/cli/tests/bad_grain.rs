@@ -1,11 +1,11 @@
-//! Damaged meshes and images: exit code 2, no grain file, and a message that names place and remedy.
+//! Damaged meshes and images: exit code 2, no grain file, and a message with location and remedy.
 
 mod common;
 
 use common::grainwake;
 use std::path::Path;
 
-/// Runs `grain` with these words before `-o`; standard error must hold `words`.
+/// Runs `grain` with these arguments before `-o` and asserts that standard error contains `words`.
 fn refused(command: &[&str], input: &Path, words: &[&str]) {
     let out = input.with_extension("grain");
     let done = grainwake()

@@ -4,7 +4,7 @@ mod common;
 
 use common::{WET, folder_with, grainwake};
 
-/// Runs a changed case; standard error must hold these words.
+/// Runs a modified case and asserts that standard error contains these words.
 fn refused(from: &str, to: &str, words: &[&str]) {
     assert!(WET.contains(from), "{from}");
     let (folder, case) = folder_with(&WET.replacen(from, to, 1));

@@ -266,9 +266,9 @@ impl Buckets {
         *head = (self.chain.len() - 1) as u32;
     }
 
-    /// Returns whether `is_so` holds for any item in the bucket of `x` and its 26 neighbours,
+    /// Returns whether `matches` is true for any item in the bucket of `x` and its 26 neighbours,
     /// tested in a fixed order.
-    fn any_around(&self, x: DVec3, mut is_so: impl FnMut(u32) -> bool) -> bool {
+    fn any_around(&self, x: DVec3, mut matches: impl FnMut(u32) -> bool) -> bool {
         let [i, j, k] = self.key(x);
         for k in k - 1..=k + 1 {
             for j in j - 1..=j + 1 {
@@ -277,7 +277,7 @@ impl Buckets {
                     let mut at = *head;
                     while at != NONE {
                         let (item, next) = self.chain[at as usize];
-                        if is_so(item) {
+                        if matches(item) {
                             return true;
                         }
                         at = next;

@@ -1,4 +1,4 @@
-//! The grain files that the cases use: they load, and are what their sources give.
+//! Grain files of the cases: they load and agree with shapes built from their sources.
 
 mod common;
 
@@ -52,7 +52,8 @@ fn the_aggregate_is_what_its_mesh_gives() {
     assert_eq!(file.nodes().len(), made.nodes().len());
 }
 
-/// `cases/scan-pair`: of a volume with five grains that touch two are whole, and are the files kept.
+/// Two of the five grains in the volume of `cases/scan-pair` are complete and equal the committed
+/// files.
 #[test]
 fn the_pair_of_the_scan_is_what_its_volume_gives() {
     let volume = kept("../scan-pair/powder-crop.tif");

@@ -1,4 +1,4 @@
-//! Shapes from mesh files: formats, accuracy, and refusals that name the place.
+//! Shapes from mesh files: formats, accuracy and located errors.
 
 mod common;
 
@@ -370,7 +370,7 @@ fn absurd_headers_are_refused() {
     ));
 }
 
-/// Real meshes pass the gate, match their exact volume and the independent morphology table, lie
+/// Real meshes pass the quality check, match their exact volume and the independent morphology table, lie
 /// within a thousandth of the diameter of the mesh (but on the sharpest ridges), and their nodes
 /// lie on the surface.
 #[test]
@@ -545,7 +545,7 @@ fn nodes_and_surface_meshes_of_simple_bodies() {
     close(mesh.signed_volume(), 4.0 / 3.0 * PI, 5e-3);
 }
 
-/// The same bits for any number of threads, and shapes scale as they should.
+/// Shapes have equal bits for any number of threads, and scaling is exact.
 #[test]
 fn threads_do_not_matter_and_scaling_is_exact() {
     let build = |threads: usize| {

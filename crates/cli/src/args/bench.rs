@@ -24,7 +24,7 @@ pub struct BenchArgs {
     /// Floating-point type of the fields
     #[arg(long, value_name = "f64|f32", default_value_t = Precision::Double)]
     pub precision: Precision,
-    /// Measure cubes of 32 to 256 cells along an edge instead, including sizes with large prime factors
+    /// Measure cubes of 32 to 256 cells along an edge instead, some with large prime factors
     #[arg(long, conflicts_with = "size")]
     pub scaling: bool,
     /// Print a JSON object

@@ -86,8 +86,8 @@ pub struct FromScanArgs {
     /// Label of a single grain [default: all]
     #[arg(long, value_name = "N")]
     pub label: Option<u32>,
-    /// Threshold between void and solid in a grey image: a grey value, "otsu", or "otsu3" (the upper
-    /// of two thresholds)
+    /// Threshold between void and solid in a grey image: a grey value, "otsu", or "otsu3" (the
+    /// upper of two thresholds)
     #[arg(long, value_name = "VALUE|otsu|otsu3", allow_negative_numbers = true)]
     pub threshold: Option<String>,
     /// Apply a median filter of 27 voxels before the threshold
@@ -111,7 +111,8 @@ pub struct FromScanArgs {
     /// Keep the largest piece of a label with several pieces
     #[arg(long)]
     pub largest_piece: bool,
-    /// Standard deviation of the smoothing, in voxels [default: 1.1 with grey values, 1.5 with a mask]
+    /// Standard deviation of the smoothing, in voxels [default: 1.1 with grey values, 1.5 with a
+    /// mask]
     #[arg(long, value_name = "VOXELS")]
     pub smoothing: Option<f64>,
     /// Output and resolution.

@@ -17,8 +17,8 @@ pub struct ValidateArgs {
     /// Folder of the runs
     #[arg(short, long, value_name = "DIR", default_value = "runs/validation")]
     pub output: PathBuf,
-    /// Add the results with their provenance to LEVEL.json and LEVEL.md in this folder, and draw the
-    /// figures
+    /// Add the results with their provenance to LEVEL.json and LEVEL.md in this folder, and draw
+    /// the figures
     #[arg(long, value_name = "DIR")]
     pub save: Option<PathBuf>,
     /// Override a value of every case, for example run.precision="f32"

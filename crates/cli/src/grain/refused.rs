@@ -12,7 +12,7 @@ const FEW: usize = 3;
 const NAMED: usize = 12;
 /// Minimum number of rejected labels that indicates a grey image.
 const VALUES: usize = 16;
-/// Fraction of differing neighbours that indicates a grey image; grains ten voxels across have less.
+/// Fraction of differing neighbours that indicates a grey image; labels of grains have less.
 const DIFFERENT: f64 = 1.0 / 3.0;
 
 /// A rejected label.

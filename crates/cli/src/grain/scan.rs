@@ -117,8 +117,8 @@ fn earlier(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Writes every grain into a folder, with table, contact sheet and label image; lists rejected labels
-/// with the reason.
+/// Writes every grain into a folder, with table, contact sheet and label image, and lists rejected
+/// labels with the reason.
 fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     let Scan { grains, labels, .. } = scan;
     let place = &args.new.output;

@@ -102,7 +102,7 @@ fn foot_in_plane(axes: DVec3, y: DVec3) -> DVec3 {
     DVec3::new(axes.x, 0.0, 0.0)
 }
 
-/// Returns the root of a decreasing function between `low` and `high` to the last bit, by bisection.
+/// Returns the root of a decreasing function between `low` and `high`, by bisection.
 fn root(value: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let mut middle = 0.5 * (low + high);
     for _ in 0..200 {

@@ -28,7 +28,7 @@ impl Placed<'_> {
     }
 }
 
-/// Share of each voxel inside a body (by 4 x 4 x 4 points where the surface passes), x fastest.
+/// Returns the fraction of each voxel inside a body (by 4 x 4 x 4 points where the surface passes), x fastest.
 pub fn shares(
     dims: [usize; 3],
     bodies: &[&dyn Fn(DVec3) -> f64],
