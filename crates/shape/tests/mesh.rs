@@ -370,9 +370,9 @@ fn absurd_headers_are_refused() {
     ));
 }
 
-/// Real meshes pass the quality check, match their exact volume and the independent morphology table, lie
-/// within a thousandth of the diameter of the mesh (but on the sharpest ridges), and their nodes
-/// lie on the surface.
+/// Real meshes pass the quality check. They match their exact volume and the independent morphology
+/// table, lie within a thousandth of the diameter of the mesh (except on the sharpest ridges), and
+/// their nodes lie on the surface.
 #[test]
 fn real_grains_agree_with_the_table() {
     let (Some(folder), Some(table)) = (shared("grains/meshes"), shared("grains/table.csv")) else {

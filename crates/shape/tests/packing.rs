@@ -157,8 +157,8 @@ fn other_heaps_and_more_noise() {
     }
 }
 
-/// Returns how many of 200 grains in the heap `seed` are identified one to one, and the mean relative
-/// error of their volume.
+/// Returns how many of 200 grains in the heap `seed` are identified one to one, and the mean
+/// relative error of their volume.
 fn separated(seed: u64, noise: f64) -> (usize, f64) {
     let started = std::time::Instant::now();
     let shapes = grains();

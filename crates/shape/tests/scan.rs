@@ -43,8 +43,8 @@ fn only(volume: &Volume, options: &ScanOptions) -> Result<Shape, ShapeError> {
 }
 
 /// Compares several placements of a body with its closed form: volume within 0.5 %, inertia within
-/// 1 %, distances within half a voxel, normals within 0.12 rad (rms). No placement is symmetric about
-/// a voxel, where the mask itself misses the volume by up to 3 %.
+/// 1 %, distances within half a voxel, normals within 0.12 rad (rms). No placement is symmetric
+/// about a voxel, where the mask itself misses the volume by up to 3 %.
 fn check_ellipsoid(axes: DVec3) {
     for i in 1..=3 {
         let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);

@@ -19,8 +19,8 @@ pub struct Body {
     pub reach: f64,
     /// Roundness in closed form.
     pub roundness: f64,
-    /// Krumbein and Wadell sphericity and convexity in closed form; `None` for bodies without unique
-    /// principal axes, such as a cube.
+    /// Krumbein and Wadell sphericity and convexity in closed form; `None` for bodies without
+    /// unique principal axes, such as a cube.
     pub others: Option<[f64; 3]>,
     /// Accepted range of the measured roundness.
     bounds: [f64; 2],
