@@ -5,7 +5,7 @@ use grainwake_run::case::{Problem, Verdict};
 
 /// Returns the value, the expected range and the verdict on one line.
 pub fn line(v: &Verdict) -> String {
-    let verdict = if v.pass { "held" } else { "missed" };
+    let verdict = if v.pass { "met" } else { "missed" };
     let (value, error) = (value(v), error(v));
     format!(
         "{}: {value}{error}, expected {}: {verdict}",
@@ -109,7 +109,7 @@ mod tests {
             pass: true,
             ..verdict("role_changes", Some(3.0), [None, Some(10.0)])
         };
-        assert_eq!(line(&roles), "role_changes: 3, expected at most 10: held");
+        assert_eq!(line(&roles), "role_changes: 3, expected at most 10: met");
         let still = verdict("max_divergence", Some(2.5e-14), [None, Some(0.0)]);
         assert_eq!(
             line(&still),

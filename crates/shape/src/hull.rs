@@ -1,5 +1,6 @@
 //! Volume of the convex hull of points (Quickhull, Barber and others 1996).
 
+use crate::mesh::bounds;
 use glam::DVec3;
 
 struct Facet {
@@ -28,11 +29,7 @@ struct Hull<'a> {
 
 impl<'a> Hull<'a> {
     fn build(points: &'a [DVec3]) -> Option<Hull<'a>> {
-        let (lower, upper) = points
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), p| {
-                (l.min(*p), u.max(*p))
-            });
+        let (lower, upper) = bounds(points);
         let size = (upper - lower).max_element();
         if !(size.is_finite() && size > 0.0) {
             return None;

@@ -4,6 +4,7 @@ use crate::error::{Result, positive};
 use crate::field::SampledField;
 use crate::mesh::cube_sphere;
 use crate::morphology::{Morphology, Record};
+use crate::nodes::golden_spiral;
 use crate::provenance::Provenance;
 use crate::quality::Quality;
 use crate::{assemble, grain_file, roundness};
@@ -49,7 +50,6 @@ impl Shape {
     pub fn sphere(radius: f64, nodes: usize) -> Shape {
         let volume = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
         let area = 4.0 * std::f64::consts::PI * radius * radius;
-        let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
         let share = area / nodes as f64;
         let provenance = Provenance::new("analytic")
             .with("body", "sphere")
@@ -57,10 +57,8 @@ impl Shape {
         let nodes = (0..nodes)
             .map(|i| {
                 let z = 1.0 - (2.0 * i as f64 + 1.0) / nodes as f64;
-                let rho = (1.0 - z * z).sqrt();
-                let (s, c) = (golden * i as f64).sin_cos();
                 SurfaceNode {
-                    position: radius * DVec3::new(rho * c, rho * s, z),
+                    position: radius * golden_spiral(i, z),
                     area: share,
                 }
             })

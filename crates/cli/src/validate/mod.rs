@@ -18,7 +18,7 @@ use table::{line, table};
 
 use crate::args::ValidateArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, MISSED};
-use crate::progress::{Shown, clock};
+use crate::progress::{ProgressDisplay, clock};
 use crate::{print, run, tell, threads};
 
 impl From<SuiteError> for Exit {
@@ -218,7 +218,7 @@ fn execute(
         .grains
         .first()
         .map(|g| g.shape.equivalent_diameter());
-    let mut shown = Shown::new(args.quiet, stop.clone(), diameter);
+    let mut shown = ProgressDisplay::new(args.quiet, stop.clone(), diameter);
     let ending = threads::on(threads, || {
         let ending = grainwake_run::run(case.job(), folder, &options, &mut shown);
         shown.clear();

@@ -65,9 +65,9 @@ impl Bvh {
         }
     }
 
-    /// Calls `found` with the index of every face with a bounding box that overlaps that of a
+    /// Calls `visit` with the index of every face with a bounding box that overlaps that of a
     /// triangle.
-    pub(crate) fn overlapping(&self, triangle: &[DVec3; 3], mut found: impl FnMut(u32)) {
+    pub(crate) fn overlapping(&self, triangle: &[DVec3; 3], mut visit: impl FnMut(u32)) {
         let lower = triangle[0].min(triangle[1]).min(triangle[2]);
         let upper = triangle[0].max(triangle[1]).max(triangle[2]);
         let mut stack = vec![0u32];
@@ -81,7 +81,7 @@ impl Bvh {
                 continue;
             }
             let leaf = node.first as usize..(node.first + node.count) as usize;
-            self.faces[leaf].iter().for_each(|face| found(*face));
+            self.faces[leaf].iter().for_each(|face| visit(*face));
         }
     }
 
@@ -103,10 +103,10 @@ impl Bvh {
             let node = &self.nodes[number as usize];
             if node.count > 0 {
                 for n in node.first..node.first + node.count {
-                    let found = self.on_leaf(x, n);
-                    let distance = found.point.distance_squared(x);
+                    let candidate = self.on_leaf(x, n);
+                    let distance = candidate.point.distance_squared(x);
                     if distance < bound {
-                        (bound, *hint, best) = (distance, n, found);
+                        (bound, *hint, best) = (distance, n, candidate);
                     }
                 }
             } else {

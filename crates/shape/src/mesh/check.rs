@@ -1,7 +1,9 @@
 //! Checks that a mesh is one closed surface of consistent orientation, with located errors.
 
 use super::TriangleMesh;
-use crate::error::{Result, ShapeError};
+use crate::error::{Result, ShapeError, first_few};
+use glam::DVec3;
+use rayon::prelude::*;
 
 /// For every face, the neighbouring faces across its edges (edge i joins corners i and i + 1).
 pub(crate) type Neighbours = Vec<[u32; 3]>;
@@ -30,32 +32,30 @@ impl TriangleMesh {
     /// Checks that coordinates are finite, indices valid and faces not degenerate.
     pub(crate) fn check_faces(&self) -> Result<()> {
         if self.triangles.is_empty() {
-            return Err(ShapeError::EmptyMesh);
+            return Err(ShapeError::bad_mesh("the mesh has no faces"));
         }
         if let Some(n) = self.vertices.iter().position(|v| !v.is_finite()) {
-            return Err(ShapeError::NotFinite {
-                what: format!("a coordinate of vertex {n}"),
-            });
+            let defect = format!("a coordinate of vertex {n} is not a finite number");
+            return Err(ShapeError::bad_mesh(defect));
         }
         for (face, triangle) in self.triangles.iter().enumerate() {
-            if let Some(v) = triangle
-                .iter()
-                .find(|v| **v as usize >= self.vertices.len())
-            {
-                return Err(ShapeError::BadParameter {
-                    name: "vertex number of a face",
-                    value: f64::from(*v),
-                    reason: "there is no such vertex",
-                });
+            let count = self.vertices.len();
+            if let Some(v) = triangle.iter().find(|v| **v as usize >= count) {
+                let defect = format!("face {face} has vertex {v}, the mesh has {count} vertices");
+                return Err(ShapeError::bad_mesh(defect));
             }
             let [a, b, c] = self.corners(face);
             let longest = a
                 .distance_squared(b)
                 .max(b.distance_squared(c))
                 .max(c.distance_squared(a));
-            let twice_area = (b - a).cross(c - a).length();
+            let twice_area = self.twice_area(face).length();
             if twice_area.is_nan() || twice_area <= FLAT * longest {
-                return Err(ShapeError::ZeroAreaFace { face, at: a });
+                return Err(ShapeError::bad_mesh(format!(
+                    "face {face} near {} has no area; remove degenerate faces (in MeshLab: Remove \
+                     Zero Area Faces)",
+                    point(a)
+                )));
             }
         }
         Ok(())
@@ -63,31 +63,16 @@ impl TriangleMesh {
 
     /// Checks that every edge has two faces with opposite directions along it.
     pub(crate) fn check_edges(&self) -> Result<Neighbours> {
-        // (low vertex, high vertex, face, edge of the face, runs from low to high), in this order:
-        // grouped by low vertex by counting sort, then sorted within each group.
-        let each = |visit: &mut dyn FnMut((u32, u32, u32, u8, bool))| {
-            for (face, t) in self.triangles.iter().enumerate() {
-                for i in 0..3 {
-                    let (a, b) = (t[i], t[(i + 1) % 3]);
-                    visit((a.min(b), a.max(b), face as u32, i as u8, a < b));
-                }
-            }
+        // (low vertex, high vertex, face, edge of the face, runs from low to high), in this order.
+        let edge = |face: usize, i: usize| {
+            let (a, b) = (self.triangles[face][i], self.triangles[face][(i + 1) % 3]);
+            (a.min(b), a.max(b), face as u32, i as u8, a < b)
         };
-        let mut ends = vec![0usize; self.vertices.len() + 1];
-        each(&mut |edge| ends[edge.0 as usize + 1] += 1);
-        for v in 1..ends.len() {
-            ends[v] += ends[v - 1];
-        }
-        let mut edges = vec![(0, 0, 0, 0, false); 3 * self.triangles.len()];
-        each(&mut |edge| {
-            let place = &mut ends[edge.0 as usize];
-            edges[*place] = edge;
-            *place += 1;
-        });
-        for (v, end) in ends[..self.vertices.len()].iter().enumerate() {
-            let start = if v == 0 { 0 } else { ends[v - 1] };
-            edges[start..*end].sort_unstable();
-        }
+        let faces = 0..self.triangles.len();
+        let mut edges: Vec<_> = faces
+            .flat_map(|face| [0, 1, 2].map(|i| edge(face, i)))
+            .collect();
+        edges.par_sort_unstable();
         let mut neighbours = vec![[0u32; 3]; self.triangles.len()];
         let mut open = (0usize, None);
         let mut flipped = None;
@@ -101,40 +86,47 @@ impl TriangleMesh {
                 }
                 [p, q] => {
                     if p.4 == q.4 {
-                        flipped.get_or_insert(ShapeError::FlippedFace {
-                            face: p.2 as usize,
-                            neighbour: q.2 as usize,
-                            at,
-                        });
+                        flipped.get_or_insert((p.2, q.2, at));
                     }
                     neighbours[p.2 as usize][usize::from(p.3)] = q.2;
                     neighbours[q.2 as usize][usize::from(q.3)] = p.2;
                 }
                 _ => {
-                    return Err(ShapeError::NonManifoldEdge {
-                        at,
-                        faces: group.len(),
-                    });
+                    return Err(ShapeError::bad_mesh(format!(
+                        "{} faces share the edge near {}; a closed surface has two at every edge \
+                         (in MeshLab: Repair Non Manifold Edges)",
+                        group.len(),
+                        point(at)
+                    )));
                 }
             }
         }
         match (open, flipped) {
-            ((edges, Some(at)), _) => Err(ShapeError::Hole { at, edges }),
-            (_, Some(error)) => Err(error),
+            ((edges, Some(at)), _) => Err(ShapeError::bad_mesh(format!(
+                "the mesh is open: {edges} edges belong to one face only, the first near {}; close \
+                 the hole (in MeshLab: Close Holes; in Blender: Fill Holes)",
+                point(at)
+            ))),
+            (_, Some((face, neighbour, at))) => Err(ShapeError::bad_mesh(format!(
+                "faces {face} and {neighbour} near {} have opposite orientations; make the \
+                 orientation coherent (in MeshLab: Re-Orient All Faces Coherently)",
+                point(at)
+            ))),
             _ => Ok(neighbours),
         }
     }
 
     fn check_one_piece(&self, neighbours: &Neighbours) -> Result<()> {
-        let sizes = piece_sizes(neighbours);
+        let (_, mut sizes) = pieces(neighbours);
         if sizes.len() == 1 {
             return Ok(());
         }
-        let shown: Vec<String> = sizes.iter().take(5).map(usize::to_string).collect();
-        Err(ShapeError::SeveralSurfaces {
-            count: sizes.len(),
-            sizes: shown.join(", "),
-        })
+        sizes.sort_unstable_by(|a, b| b.cmp(a));
+        Err(ShapeError::bad_mesh(format!(
+            "the mesh consists of {} separate surfaces of {} faces; export one grain at a time",
+            sizes.len(),
+            first_few(&sizes, 5)
+        )))
     }
 }
 
@@ -171,11 +163,10 @@ impl TriangleMesh {
     }
 }
 
-/// Returns the number of faces of each connected piece, largest first.
-fn piece_sizes(neighbours: &Neighbours) -> Vec<usize> {
-    let (_, mut sizes) = pieces(neighbours);
-    sizes.sort_unstable_by(|a, b| b.cmp(a));
-    sizes
+/// Formats a position for messages, without rounding errors.
+pub(super) fn point(at: DVec3) -> String {
+    let [x, y, z] = at.to_array().map(|x| (1e6 * x).round() / 1e6 + 0.0);
+    format!("({x}, {y}, {z})")
 }
 
 /// Returns the piece index of each face, and the number of faces of each piece.
@@ -205,33 +196,14 @@ fn pieces(neighbours: &Neighbours) -> (Vec<usize>, Vec<usize>) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::unit_cube as cube;
     use super::*;
-    use glam::DVec3;
 
-    fn cube() -> TriangleMesh {
-        let vertices = (0..8)
-            .map(|c| {
-                DVec3::new(
-                    f64::from(c & 1),
-                    f64::from(c >> 1 & 1),
-                    f64::from(c >> 2 & 1),
-                )
-            })
-            .collect();
-        let quads: [[u32; 4]; 6] = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
-        TriangleMesh {
-            vertices,
-            triangles: triangles.collect(),
+    #[track_caller]
+    fn assert_refused(mesh: &TriangleMesh, words: &[&str]) {
+        let message = mesh.check_closed().unwrap_err().to_string();
+        for word in words {
+            assert!(message.contains(word), "`{word}` is missing in: {message}");
         }
     }
 
@@ -247,27 +219,14 @@ mod tests {
     fn a_hole_is_located() {
         let mut mesh = cube();
         mesh.triangles.remove(2);
-        match mesh.check_closed() {
-            Err(ShapeError::Hole { at, edges: 3 }) => assert!((at.x - 1.0).abs() < 1e-12, "{at}"),
-            other => panic!("{other:?}"),
-        }
+        assert_refused(&mesh, &["open: 3 edges", "near (1, "]);
     }
 
     #[test]
     fn a_flipped_face_is_located() {
         let mut mesh = cube();
         mesh.triangles[3].swap(0, 1);
-        match mesh.check_closed() {
-            Err(ShapeError::FlippedFace {
-                face,
-                neighbour,
-                at,
-            }) => {
-                assert!(face == 3 || neighbour == 3);
-                assert!((at.x - 1.0).abs() < 1e-12);
-            }
-            other => panic!("{other:?}"),
-        }
+        assert_refused(&mesh, &["and 3 near (1, ", "opposite orientations"]);
     }
 
     #[test]
@@ -275,12 +234,7 @@ mod tests {
         let mut mesh = cube();
         mesh.vertices.push(DVec3::new(0.5, 0.5, 3.0));
         mesh.triangles.push([0, 2, 8]);
-        match mesh.check_closed() {
-            Err(ShapeError::NonManifoldEdge { at, faces: 3 }) => {
-                assert_eq!(at, DVec3::new(0.0, 0.5, 0.0));
-            }
-            other => panic!("{other:?}"),
-        }
+        assert_refused(&mesh, &["3 faces share the edge near (0, 0.5, 0)"]);
     }
 
     #[test]
@@ -300,31 +254,19 @@ mod tests {
             .extend(second.vertices.iter().map(|v| *v + DVec3::splat(5.0)));
         mesh.triangles
             .extend(second.triangles.iter().map(|t| t.map(|v| v + 8)));
-        assert!(matches!(
-            mesh.check_closed(),
-            Err(ShapeError::SeveralSurfaces { count: 2, .. })
-        ));
+        assert_refused(&mesh, &["2 separate surfaces of 12, 12 faces"]);
 
         let mut mesh = cube();
         mesh.triangles.push([0, 1, 1]);
-        assert!(matches!(
-            mesh.check_closed(),
-            Err(ShapeError::ZeroAreaFace { face: 12, .. })
-        ));
+        assert_refused(&mesh, &["face 12 near (0, 0, 0) has no area"]);
 
         let mut mesh = cube();
         mesh.vertices[3].y = f64::NAN;
-        assert!(matches!(
-            mesh.check_closed(),
-            Err(ShapeError::NotFinite { .. })
-        ));
+        assert_refused(&mesh, &["vertex 3 is not a finite number"]);
 
         let mut mesh = cube();
         mesh.triangles[0][0] = 99;
-        assert!(mesh.check_closed().is_err());
-        assert!(matches!(
-            TriangleMesh::default().check_closed(),
-            Err(ShapeError::EmptyMesh)
-        ));
+        assert_refused(&mesh, &["face 0 has vertex 99"]);
+        assert_refused(&TriangleMesh::default(), &["no faces"]);
     }
 }

@@ -9,7 +9,7 @@ use std::f64::consts::FRAC_PI_4;
 /// angles on each cube face, each split along its shorter diagonal.
 pub(crate) fn cube_sphere(n: usize, map: impl Fn(DVec3) -> DVec3) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
-    let mut known: HashMap<[usize; 3], u32> = HashMap::new();
+    let mut indices: HashMap<[usize; 3], u32> = HashMap::new();
     let angle = |i: usize| ((2 * i) as f64 / n as f64 - 1.0) * FRAC_PI_4;
     for face in 0..6 {
         let (axis, side) = (face / 2, face % 2);
@@ -19,7 +19,7 @@ pub(crate) fn cube_sphere(n: usize, map: impl Fn(DVec3) -> DVec3) -> TriangleMes
             place[axis] = side * n;
             place[u] = i;
             place[v] = j;
-            *known.entry(place).or_insert_with(|| {
+            *indices.entry(place).or_insert_with(|| {
                 let direction = DVec3::from_array(place.map(|i| angle(i).tan())).normalize();
                 mesh.vertices.push(map(direction));
                 (mesh.vertices.len() - 1) as u32

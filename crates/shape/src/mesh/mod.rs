@@ -23,6 +23,27 @@ pub use read::read_mesh;
 
 use glam::{DMat3, DVec3};
 
+/// The unit cube with a corner at the origin, for tests.
+#[cfg(test)]
+pub(crate) fn unit_cube() -> TriangleMesh {
+    let corner = |c: usize| DVec3::from_array([c & 1, c >> 1 & 1, c >> 2].map(|n| n as f64));
+    let quads = crate::surface::FACES.map(|quad| quad.map(u32::from));
+    TriangleMesh {
+        vertices: (0..8).map(corner).collect(),
+        triangles: quads
+            .iter()
+            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+            .collect(),
+    }
+}
+
+/// Returns the lower and upper corner of the bounding box of points.
+pub(crate) fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
+    let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let extend = |(low, high): (DVec3, DVec3), x: &DVec3| (low.min(*x), high.max(*x));
+    points.iter().fold(start, extend)
+}
+
 /// Triangles with shared vertices, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
@@ -36,6 +57,12 @@ impl TriangleMesh {
     /// Returns the three corners of face `face`.
     pub(crate) fn corners(&self, face: usize) -> [DVec3; 3] {
         self.triangles[face].map(|v| self.vertices[v as usize])
+    }
+
+    /// Returns the outward normal of face `face` with a length of twice its area [m^2].
+    pub(crate) fn twice_area(&self, face: usize) -> DVec3 {
+        let [a, b, c] = self.corners(face);
+        (b - a).cross(c - a)
     }
 
     /// Returns the corners of every face.
@@ -58,20 +85,14 @@ impl TriangleMesh {
     /// Returns the surface area [m^2].
     pub fn area(&self) -> f64 {
         let twice: f64 = (0..self.triangles.len())
-            .map(|f| {
-                let [a, b, c] = self.corners(f);
-                (b - a).cross(c - a).length()
-            })
+            .map(|f| self.twice_area(f).length())
             .sum();
         0.5 * twice
     }
 
     /// Returns the lower and upper corner of the bounding box [m].
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        self.vertices
-            .iter()
-            .fold(start, |(lo, hi), v| (lo.min(*v), hi.max(*v)))
+        bounds(&self.vertices)
     }
 
     /// Returns the mesh scaled by `factor`.

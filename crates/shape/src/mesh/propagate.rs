@@ -225,14 +225,14 @@ impl<'a> Front<'a> {
         let (mesh, grid) = (self.mesh, self.grid);
         let (at, from, value) = (grid.position(n), self.origins[n], self.values[n]);
         let strides = [1, grid.dims[0], grid.dims[0] * grid.dims[1]];
-        let beside = (0..3).flat_map(|axis| {
+        let neighbours = (0..3).flat_map(|axis| {
             let step = grid.spacing * DVec3::AXES[axis];
             [
                 (n - strides[axis], at - step),
                 (n + strides[axis], at + step),
             ]
         });
-        for (m, x) in beside {
+        for (m, x) in neighbours {
             if self.open[m] == SETTLED {
                 continue;
             }

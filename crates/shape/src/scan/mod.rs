@@ -33,7 +33,7 @@ mod volume;
 mod watershed;
 
 pub use build::{Progress, Scan, ScanOptions, ScannedGrain, scan_volume, shapes_from_volume};
-pub use threshold::{Denoise, Threshold};
+pub use threshold::Threshold;
 pub use volume::{Volume, Voxels, read_volume};
 
 /// Solid voxels of one grain in a box of background.
