@@ -3,7 +3,7 @@
 use grainwake_run::case::Case;
 use grainwake_run::case::estimate::Estimate;
 use grainwake_run::case::readable::quantity;
-use grainwake_solver::dem::Grain;
+use grainwake_solver::dem::{ContactLawKind, Grain};
 
 use crate::args::CheckArgs;
 use crate::exit::Exit;
@@ -68,10 +68,13 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
         "mm/s (settling or rising)",
     ));
     rows.extend(number("blockage", e.blockage.map(|b| 100.0 * b), "%"));
-    rows.push((
-        "contact stiffness",
-        quantity(case.setup.contact.normal_stiffness, "N/m"),
-    ));
+    rows.push(match case.setup.contact.law {
+        ContactLawKind::Linear => (
+            "contact stiffness",
+            quantity(case.setup.contact.normal_stiffness, "N/m"),
+        ),
+        ContactLawKind::HertzMindlin => ("contact law", "Hertz-Mindlin".into()),
+    });
     if let (Some(time), Some(substeps)) = (e.contact_time_s, e.contact_substeps) {
         rows.push((
             "contact time",

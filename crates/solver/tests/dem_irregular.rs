@@ -8,7 +8,7 @@ use dem_support::{Random, floor, kinetic, open_box, smooth, step};
 use glam::{DQuat, DVec3};
 use grainwake_shape::mesh::{MeshOptions, TriangleMesh, shape_from_mesh};
 use grainwake_shape::{Shape, ShapeOptions, SourceFile, analytic};
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, surface_gap};
+use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, Material, surface_gap};
 use grainwake_solver::math::{Load, Pose};
 
 /// A rounded box of 40 x 30 x 20 mm with edges rounded to 4 mm.
@@ -56,6 +56,7 @@ fn grain(shape: &Arc<Shape>, position: DVec3, orientation: DQuat) -> Grain {
     Grain {
         shape: shape.clone(),
         density: 2500.0,
+        material: Material::default(),
         pose: Pose {
             position,
             orientation,
@@ -433,7 +434,8 @@ fn pairs_that_are_not_looked_at_do_not_miss_a_contact() {
         ..Default::default()
     };
     // A hundredth of the step is just one sub-step.
-    params.substeps_per_contact = 100.0 * params.contact_time(mass) / 1e-2 * 0.9999;
+    let contact_time = std::f64::consts::PI * (mass / params.normal_stiffness).sqrt();
+    params.substeps_per_contact = 100.0 * contact_time / 1e-2 * 0.9999;
     let run = |steps: u32| {
         let mut grains = start.clone();
         let mut dynamics = Dynamics::new(params, open_box(1.0));

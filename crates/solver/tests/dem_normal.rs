@@ -4,7 +4,7 @@ mod dem_support;
 
 use dem_support::{floor, open_box, smooth, sphere, step};
 use glam::DVec3;
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, Partner};
+use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, Material, Partner};
 use grainwake_solver::math::Load;
 
 const G: f64 = 9.80665;

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 use grainwake_solver::dem::rotation::{
-    Rotor, from_paper_quaternion, to_paper_quaternion, turn_by_cayley, turn_exactly,
+    Rotor, from_paper_quaternion, to_paper_quaternion, rotate_by_cayley, rotate_exactly,
 };
 
 /// Eq. 30 as printed, rows first.
@@ -90,7 +90,7 @@ fn printed_eq_32_is_the_rate_of_eq_30_for_body_frame_rates() {
     let rate = printed_rates(q, omega);
     let h = 1e-6;
     // Orientation turned exactly by omega (given in the body frame) for +-h.
-    let turned = |h: f64| to_paper_quaternion(turn_exactly(sample(), sample() * omega, h));
+    let turned = |h: f64| to_paper_quaternion(rotate_exactly(sample(), sample() * omega, h));
     let (ahead, behind) = (turned(h), turned(-h));
     for i in 0..4 {
         assert!(
@@ -107,13 +107,13 @@ fn eq_34_equals_the_cayley_turn() {
     let b = printed_b(omega, dt);
     let q = DVec4::from_array(to_paper_quaternion(sample()));
     let expected = b.inverse() * (b.transpose() * q);
-    let cayley = DVec4::from_array(to_paper_quaternion(turn_by_cayley(sample(), omega, dt)));
+    let cayley = DVec4::from_array(to_paper_quaternion(rotate_by_cayley(sample(), omega, dt)));
     assert!((expected - cayley).length() < 1e-15);
     assert!((expected.length() - 1.0).abs() < 1e-15);
     // The turn is by 4 atan(|omega| dt / 4) about omega.
     let angle = 4.0 * (0.25 * omega.length() * dt).atan();
     let exact = sample() * DQuat::from_axis_angle(omega.normalize(), angle);
-    assert!((exact - turn_by_cayley(sample(), omega, dt)).length() < 1e-15);
+    assert!((exact - rotate_by_cayley(sample(), omega, dt)).length() < 1e-15);
 }
 
 #[test]

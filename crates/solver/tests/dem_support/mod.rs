@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain};
+use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, Material};
 use grainwake_solver::math::{Load, Pose};
 
 /// A sphere at rest.
@@ -13,6 +13,7 @@ pub fn sphere(radius: f64, density: f64, nodes: usize, position: DVec3) -> Grain
     Grain {
         shape: Arc::new(Shape::sphere(radius, nodes)),
         density,
+        material: Material::default(),
         pose: Pose {
             position,
             // Turned so that no node points along an axis.
@@ -122,6 +123,7 @@ pub fn cloud(count: usize, half: f64, radius: f64, speed: f64, seed: u64) -> Vec
             grains.push(Grain {
                 shape: shape.clone(),
                 density: 1000.0 + 500.0 * random.next(),
+                material: Material::default(),
                 pose: Pose {
                     position,
                     orientation: DQuat::from_scaled_axis(random.vector() * 3.0),
