@@ -4,9 +4,7 @@ mod dem_support;
 
 use dem_support::{Random, bits, cloud, step};
 use glam::DVec3;
-use grainwake_solver::dem::{
-    ContactLawKind, ContactParams, Dynamics, Enclosure, Grain, Material,
-};
+use grainwake_solver::dem::{ContactLawKind, ContactParams, Dynamics, Enclosure, Grain, Material};
 
 fn params() -> ContactParams {
     ContactParams {
@@ -74,7 +72,9 @@ fn saved_and_restored_history_continues_with_the_same_bits() {
 
 fn continues_with_the_same_bits(params: ContactParams, material: Material) {
     let mut grains = cloud(60, 0.045, 0.007, 0.3, 5);
-    grains.iter_mut().for_each(|grain| grain.material = material);
+    grains
+        .iter_mut()
+        .for_each(|grain| grain.material = material);
     let mut dynamics = Dynamics::new(params, tank());
     settle(&mut dynamics, &mut grains, 120);
     for _ in 0..10 {

@@ -23,6 +23,4 @@ pub use grain::{Dof, Grain};
 pub use material::Material;
 pub use motion::{Dynamics, Response, RigidState, TrialStep, rotation};
 pub(crate) use search::{BoundingSphere, BroadPhase};
-pub use search::{
-    Outside, Overlap, Partner, initial_overlaps, outside, surface_gap, wall_gap,
-};
+pub use search::{Outside, Overlap, Partner, initial_overlaps, outside, surface_gap, wall_gap};

@@ -68,7 +68,10 @@ pub(super) fn materials(
         return Some(Material::RIGID);
     };
     let modulus = check.positive(modulus, "contact.wall_youngs_modulus", "Young's modulus");
-    let wall_ratio = (&contact.wall_poisson_ratio, "contact.wall_poisson_ratio".into());
+    let wall_ratio = (
+        &contact.wall_poisson_ratio,
+        "contact.wall_poisson_ratio".into(),
+    );
     let default_ratio = (&contact.poisson_ratio, "contact.poisson_ratio".into());
     let ratio = poisson_ratio(check, &[wall_ratio, default_ratio]);
     if ratio.is_none() && check.problems.len() == before {

@@ -87,7 +87,9 @@ impl Dynamics {
         w.write_all(&MAGIC)?;
         w.write_all(&[VERSION])?;
         put(w, self.last_positions.len() as u64)?;
-        self.last_positions.iter().try_for_each(|&x| put_vector(w, x))?;
+        self.last_positions
+            .iter()
+            .try_for_each(|&x| put_vector(w, x))?;
         let in_contact = || self.records.iter().filter(|record| record.in_contact);
         put(w, in_contact().count() as u64)?;
         for record in in_contact() {
@@ -135,7 +137,9 @@ impl Dynamics {
         r.read_exact(&mut start)?;
         let version = start[7];
         if start[..7] != MAGIC {
-            return Err(damaged("its first bytes are not those of a contact history"));
+            return Err(damaged(
+                "its first bytes are not those of a contact history",
+            ));
         }
         if !(1..=VERSION).contains(&version) {
             return Err(damaged(&format!(

@@ -4,9 +4,7 @@ use glam::{DVec3, IVec3};
 
 use super::contact_body::ContactBody;
 use super::trial_step::StateBefore;
-use crate::dem::contact::{
-    Contact, ContactMaterial, ContactModel, ContactParams, ContactRecord,
-};
+use crate::dem::contact::{Contact, ContactMaterial, ContactModel, ContactParams, ContactRecord};
 use crate::dem::enclosure::Enclosure;
 use crate::dem::grain::{Dof, Grain};
 use crate::dem::search::{BoundingSphere, BroadPhase, Partner};

@@ -120,7 +120,9 @@ pub(super) fn second_half_step(
                 );
                 grain.pose.orientation * omega
             }
-            EffectiveInertia::WithFluid(response) => (mid.angular_velocity + half * response.acceleration(load)[1]) / damping_factor,
+            EffectiveInertia::WithFluid(response) => {
+                (mid.angular_velocity + half * response.acceleration(load)[1]) / damping_factor
+            }
         };
     }
 }

@@ -60,7 +60,8 @@ impl CellGrid {
         loop {
             let count = (extent / size).floor();
             let dims = count.to_array().map(|c| c.min(1e9) as usize + 1);
-            if dims.iter().map(|&d| d as f64).product::<f64>() <= 8.0 * centres.len() as f64 + 64.0 {
+            if dims.iter().map(|&d| d as f64).product::<f64>() <= 8.0 * centres.len() as f64 + 64.0
+            {
                 return CellGrid {
                     lower,
                     inverse_size: 1.0 / size,
@@ -126,8 +127,8 @@ impl BroadPhase {
                 for other in &self.sorted[range.start as usize..range.end as usize] {
                     let image = other.image - own.image;
                     // Each pair is listed once; a grain may touch its own image.
-                    let listed = other.grain > grain
-                        || other.grain == grain && image.to_array() > [0, 0, 0];
+                    let listed =
+                        other.grain > grain || other.grain == grain && image.to_array() > [0, 0, 0];
                     let limit = radius + spheres[other.grain as usize].radius;
                     if listed && own.position.distance_squared(other.position) <= limit * limit {
                         self.pairs.push(PairKey {

@@ -4,9 +4,7 @@
 use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 
-use super::closest_point::{
-    DescentLimits, SurfacePoint, minimise_distance, project_to_surface,
-};
+use super::closest_point::{DescentLimits, SurfacePoint, minimise_distance, project_to_surface};
 use super::node_tree::NodeTree;
 use super::partner_field::PartnerField;
 

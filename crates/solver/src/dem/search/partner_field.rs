@@ -48,11 +48,13 @@ impl<'a> PartnerField<'a> {
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         match self {
             PartnerField::Shape {
-                shape, rotation,
+                shape,
+                rotation,
                 translation,
                 ..
             } => {
-                let (distance, gradient) = shape.distance_and_gradient(*rotation * x + *translation);
+                let (distance, gradient) =
+                    shape.distance_and_gradient(*rotation * x + *translation);
                 (distance, rotation.transpose() * gradient)
             }
             PartnerField::HalfSpace { normal, offset } => (normal.dot(x) + offset, *normal),
@@ -62,7 +64,8 @@ impl<'a> PartnerField<'a> {
     pub fn distance_within(&self, x: DVec3, reach: f64) -> Option<f64> {
         match self {
             PartnerField::Shape {
-                shape, rotation,
+                shape,
+                rotation,
                 translation,
                 ..
             } => {
@@ -77,7 +80,8 @@ impl<'a> PartnerField<'a> {
     pub fn distance(&self, x: DVec3) -> f64 {
         match self {
             PartnerField::Shape {
-                shape, rotation,
+                shape,
+                rotation,
                 translation,
                 ..
             } => shape.distance(*rotation * x + *translation),
@@ -104,7 +108,9 @@ impl<'a> PartnerField<'a> {
                 let outside = (shape.lower() - y).max(y - shape.upper()).max(DVec3::ZERO);
                 outside.length_squared() > far * far
             }
-            PartnerField::HalfSpace { normal, offset } => normal.dot(center) + offset > radius + reach,
+            PartnerField::HalfSpace { normal, offset } => {
+                normal.dot(center) + offset > radius + reach
+            }
         }
     }
     /// Radius of curvature for the first step of a descent [m].

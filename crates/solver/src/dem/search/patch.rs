@@ -134,7 +134,11 @@ impl ContactPatch {
     }
 
     /// Appends the points of the last scan, with lever arm and normal from `to_space`.
-    fn append_points(&mut self, grain_bit: u32, to_space: impl Fn(&SurfacePoint) -> (DVec3, DVec3)) {
+    fn append_points(
+        &mut self,
+        grain_bit: u32,
+        to_space: impl Fn(&SurfacePoint) -> (DVec3, DVec3),
+    ) {
         self.points.extend(self.found.iter().map(|found| {
             let (lever_arm, normal) = to_space(&found.point);
             ContactPoint {

@@ -89,10 +89,13 @@ impl NeighbourSearch {
             solid: [[false; 2]; 3],
         };
         self.balls.clear();
-        let balls = grains.iter().enumerate().map(|(index, grain)| BoundingSphere {
-            center: grain.pose.position,
-            radius: grain.shape.bounding_radius() + reach + travel(index),
-        });
+        let balls = grains
+            .iter()
+            .enumerate()
+            .map(|(index, grain)| BoundingSphere {
+                center: grain.pose.position,
+                radius: grain.shape.bounding_radius() + reach + travel(index),
+            });
         self.balls.extend(balls);
         self.search.search(&self.balls, &enclosure);
         self.pairs.clear();
