@@ -194,7 +194,8 @@ fn contact_across_a_periodic_face_equals_contact_in_the_interior() {
 
 #[test]
 fn a_grain_that_fills_a_periodic_box_presses_on_its_own_image() {
-    // Radius 0.5 in a box of width 0.98: overlap 0.02 along x with its own image, none along y and z.
+    // Radius 0.5 in a box of width 0.98: overlap 0.02 along x with its own image, none along y and
+    // z.
     let enclosure = periodic(DVec3::new(0.98, 3.0, 3.0));
     let mut grains = [sphere(0.5, 1000.0, 500, DVec3::new(0.1, 0.2, 0.3))];
     let mut dynamics = Dynamics::new(smooth(1e5), enclosure);

@@ -11,8 +11,8 @@ fn dem04_slip_becomes_rolling_at_two_sevenths() {
     let (radius, g, v0) = (5e-4, 9.80665, 0.1);
     for friction in [0.2, 0.5, 1.0] {
         let mut grain = sphere(radius, 2000.0, 4000, DVec3::ZERO);
-        // A stiff spring: the tangential spring is loaded when sliding ends and oscillates with a speed
-        // mu g / w0.
+        // A stiff spring: the tangential spring is loaded when sliding ends and oscillates with a
+        // speed mu g / w0.
         let k = 1e4;
         // At rest on the floor: the overlap carries the weight.
         grain.pose.position.z = radius - grain.mass() * g / k;
@@ -136,7 +136,7 @@ fn dem05_agrees_with_the_experiment_as_far_as_a_linear_spring_can() {
     for (angle, restitution, spin) in [(49.6, 0.8469, 452.9444), (59.9, 0.9019, 381.3185)] {
         let (_, e_t, omega) = kharaz(angle);
         println!(
-            "Kharaz {angle}: e_t {e_t:.4} (measured {restitution}), omega {omega:.1} (measured {spin})"
+            "{angle}: e_t {e_t:.4} (experiment {restitution}), omega {omega:.1} (experiment {spin})"
         );
         assert!((e_t - restitution).abs() < 0.02, "{angle}: {e_t}");
         assert!((omega / spin - 1.0).abs() < 0.2, "{angle}: {omega}");

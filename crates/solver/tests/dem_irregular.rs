@@ -165,7 +165,8 @@ fn colliding_irregular_grains_keep_momentum_and_angular_momentum() {
     );
     assert!(met > 50, "{met}");
     assert!((p - p0).length() <= 1e-14 * scale);
-    // The rotation scheme conserves L of a tumbling body to second order in the step, not to round-off.
+    // The rotation scheme conserves L of a tumbling body to second order in the step, not to
+    // round-off.
     assert!(
         (l - l0).length() <= 1e-5 * spins,
         "{}",
@@ -310,7 +311,8 @@ fn a_dropped_block_comes_to_rest_on_a_face() {
 
 #[test]
 fn a_spinning_top_on_its_face_is_stopped_by_the_friction_of_its_whole_face() {
-    // Only contact points off the axis brake the spin: mu m g times a lever arm of some millimetres.
+    // Only contact points off the axis brake the spin: mu m g times a lever arm of some
+    // millimetres.
     let params = ContactParams {
         normal_stiffness: 2e4,
         restitution: 0.5,

@@ -1,4 +1,5 @@
-//! Imports inside `dem` point downwards: motion, contact, search, then grains, materials and the box.
+//! Imports inside `dem` point downwards: motion, contact, search, then grains, materials and the
+//! box.
 
 use std::fs;
 use std::path::Path;

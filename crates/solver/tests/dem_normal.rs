@@ -28,7 +28,8 @@ fn dem01_free_fall_and_damped_contact() {
     let gravity = DVec3::new(0.0, 0.0, -G);
     let dt = 2e-5;
 
-    // Stage 1: free fall. Stage 2: damped oscillator about its equilibrium, until the force vanishes.
+    // Stage 1: free fall. Stage 2: damped oscillator about its equilibrium, until the force
+    // vanishes.
     let mass = grains[0].mass();
     let (zeta, w0) = (params.damping_ratio(), (k / mass).sqrt());
     let (wd, b) = (w0 * (1.0 - zeta * zeta).sqrt(), w0 * zeta);

@@ -7,8 +7,8 @@
 //! 3. `search`: broad phase, narrow phase, gaps between surfaces;
 //! 4. `grain`, `material`, `enclosure`: the bodies and the box.
 //!
-//! [`Dynamics::advance`] takes one step: list the pairs that may touch, find their penetrating points,
-//! evaluate the contact forces and integrate the motion, in sub-steps of the contact time.
+//! [`Dynamics::advance`] takes one step: list the pairs that may touch, find their penetrating
+//! points, evaluate the contact forces and integrate the motion, in sub-steps of the contact time.
 
 mod contact;
 mod enclosure;

@@ -27,8 +27,8 @@ impl FrictionStep {
     /// Tangential force [N] on the first grain as if this point carried the whole pair, and the
     /// tangential displacement [m] (Eqs 13-15).
     ///
-    /// Coulomb's bound and the stiffness scale alike with the share of the point in the pair, so the
-    /// bound on the displacement does not depend on the share.
+    /// Coulomb's bound and the stiffness scale alike with the share of the point in the pair, so
+    /// the bound on the displacement does not depend on the share.
     pub fn tangential_force(
         &self,
         point: &ContactPoint,

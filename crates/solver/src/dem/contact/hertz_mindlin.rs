@@ -6,7 +6,8 @@
 
 use super::law::{ContactCoefficients, ContactLaw, PairProperties};
 
-/// Duration of a Hertz impact over pi sqrt(m / S_n), with S_n at the largest overlap: the duration is
+/// Duration of a Hertz impact over pi sqrt(m / S_n), with S_n at the largest overlap: the duration
+/// is
 /// 2.9432 overlap / speed (Timoshenko & Goodier 1970, section 142), and pi sqrt(m / S_n) is
 /// pi sqrt(8/15) overlap / speed.
 const HERTZ_DURATION: f64 = 2.943_275 / (std::f64::consts::PI * 0.730_296_743_340_221_5);
@@ -16,12 +17,13 @@ const HERTZ_DURATION: f64 = 2.943_275 / (std::f64::consts::PI * 0.730_296_743_34
 pub(in crate::dem) struct HertzMindlin;
 
 impl ContactLaw for HertzMindlin {
-    /// With the contact radius a = sqrt(R* delta): normal force 4/3 E* a delta, tangential stiffness
-    /// 8 G* a (Mindlin 1949), dashpots 2 zeta sqrt(5/6) sqrt(S m*) with S = 2 E* a or 8 G* a.
+    /// With the contact radius a = sqrt(R* delta): normal force 4/3 E* a delta, tangential
+    /// stiffness 8 G* a (Mindlin 1949), dashpots 2 zeta sqrt(5/6) sqrt(S m*) with S = 2 E* a or 8
+    /// G* a.
     ///
-    /// The dashpot is Tsuji's (1992). In the variable delta^(5/4) the damped Hertz impact is a damped
-    /// linear oscillator (Antypov & Elliott 2011), with the same end of contact at zero force, so
-    /// the damping ratio of the linear law gives the restitution here as well.
+    /// The dashpot is Tsuji's (1992). In the variable delta^(5/4) the damped Hertz impact is a
+    /// damped linear oscillator (Antypov & Elliott 2011), with the same end of contact at zero
+    /// force, so the damping ratio of the linear law gives the restitution here as well.
     fn coefficients(&self, pair: &PairProperties, overlap: f64) -> ContactCoefficients {
         let contact_radius = (pair.reduced_radius * overlap).sqrt();
         let normal_force = 4.0 / 3.0 * pair.effective_youngs_modulus * contact_radius * overlap;
@@ -42,7 +44,8 @@ impl ContactLaw for HertzMindlin {
     }
 
     /// Hertz duration of the impact that reaches the overlap at which the kinetic energy and the
-    /// energy of the present overlap are stored; 2.87 (m^2 / (R* E*^2 speed))^(1/5) from zero overlap.
+    /// energy of the present overlap are stored; 2.87 (m^2 / (R* E*^2 speed))^(1/5) from zero
+    /// overlap.
     fn contact_time(&self, pair: &PairProperties, speed: f64, overlap: f64) -> f64 {
         let largest = (self.impact_overlap(pair, speed).powf(2.5) + overlap.powf(2.5)).powf(0.4);
         let contact_radius = (pair.reduced_radius * largest).sqrt();

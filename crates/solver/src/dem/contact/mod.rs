@@ -1,7 +1,7 @@
 //! Contact forces (Eqs 9-18): force laws, friction history and lubrication.
 //!
-//! A further force law is one file beside `linear.rs` that implements `ContactLaw`, and one variant of
-//! [`ContactLawKind`] and of `law::SelectedLaw`.
+//! A further force law is one file beside `linear.rs` that implements `ContactLaw`, and one variant
+//! of [`ContactLawKind`] and of `law::SelectedLaw`.
 
 mod friction;
 mod hertz_mindlin;

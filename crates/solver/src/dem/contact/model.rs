@@ -223,8 +223,8 @@ impl ContactModel {
 
 /// Updates the dashpot fraction and returns the part of the sub-step in contact [s].
 ///
-/// A new contact begins inside the sub-step. Its dashpot force does not start from zero, so only the
-/// part of the sub-step in contact counts.
+/// A new contact begins inside the sub-step. Its dashpot force does not start from zero, so only
+/// the part of the sub-step in contact counts.
 fn begin_or_continue(record: &mut ContactRecord, mean: &PatchMean, step: f64) -> f64 {
     let begins = !record.in_contact && mean.approach * step > mean.overlap;
     let time_in_contact = if begins {
@@ -244,8 +244,8 @@ fn begin_or_continue(record: &mut ContactRecord, mean: &PatchMean, step: f64) ->
 /// Factor on the tangential displacement after a change of the tangential stiffness (Thornton,
 /// Cummins & Cleary 2013).
 ///
-/// The force stays as it is when the stiffness grows (loading), and shrinks with the stiffness when it
-/// falls (unloading); otherwise a closed cycle could create energy.
+/// The force stays as it is when the stiffness grows (loading), and shrinks with the stiffness when
+/// it falls (unloading); otherwise a closed cycle could create energy.
 fn history_scale(before: f64, now: f64) -> f64 {
     if now > before && before > 0.0 {
         before / now

@@ -1,8 +1,8 @@
 //! Contact history as bytes, bit for bit.
 //!
-//! Layout, little-endian: magic with version; number of grains and their positions at the end of the
-//! last step; number of pairs in contact and each pair; number of contacts and each contact. Version 1
-//! has no tangential stiffness in its pairs; it is read as well.
+//! Layout, little-endian: magic with version; number of grains and their positions at the end of
+//! the last step; number of pairs in contact and each pair; number of contacts and each contact.
+//! Version 1 has no tangential stiffness in its pairs; it is read as well.
 
 use std::io::{self, Read, Write};
 
@@ -16,8 +16,8 @@ use crate::math::Load;
 const MAGIC: [u8; 7] = *b"GWDEM\0\0";
 const VERSION: u8 = 2;
 const WALL: u64 = 1 << 63;
-/// Largest number of entries that is reserved before they are read, so that a damaged count does not
-/// exhaust the memory.
+/// Largest number of entries that is reserved before they are read, so that a damaged count does
+/// not exhaust the memory.
 const RESERVE: u64 = 4096;
 
 fn damaged(what: &str) -> io::Error {

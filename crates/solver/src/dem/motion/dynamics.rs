@@ -70,7 +70,8 @@ impl Dynamics {
     /// about the centroids) and contact; returns the number of sub-steps.
     ///
     /// `mean_contact` receives the contact impulse on each grain divided by `dt`. A missing load
-    /// counts as zero. Positions are not wrapped into the box; a caller may wrap them between steps.
+    /// counts as zero. Positions are not wrapped into the box; a caller may wrap them between
+    /// steps.
     pub fn advance(
         &mut self,
         grains: &mut [Grain],
@@ -89,8 +90,8 @@ impl Dynamics {
         substeps
     }
 
-    /// Applies prescribed velocities, updates the contact bodies, and shifts the images of pairs whose
-    /// grains were wrapped by whole periods since the last step.
+    /// Applies prescribed velocities, updates the contact bodies, and shifts the images of pairs
+    /// whose grains were wrapped by whole periods since the last step.
     pub(super) fn begin_step(&mut self, grains: &mut [Grain]) {
         for grain in grains.iter_mut() {
             if let Dof::Prescribed(velocity) = grain.translation {

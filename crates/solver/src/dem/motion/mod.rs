@@ -1,5 +1,5 @@
-//! Motion of the grains (Eqs 19-37): contact sub-steps, integrator, rotation and the response of the
-//! fluid to contact.
+//! Motion of the grains (Eqs 19-37): contact sub-steps, integrator, rotation and the response of
+//! the fluid to contact.
 
 mod checkpoint;
 mod contact_body;

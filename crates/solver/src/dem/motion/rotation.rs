@@ -7,8 +7,8 @@
 //!
 //! Eqs 25-29 use half-integer velocities. The two half steps here are this scheme split at integer
 //! times: omega^n = omega^(n-1/2) + dt/2 f(omega^n) (implicit, Eqs 27-28 iterated) and
-//! omega^(n+1/2) = omega^n + dt/2 f(omega^n) (Eq. 29). Together they are the implicit midpoint rule,
-//! which conserves the energy and the length of the angular momentum of a free body.
+//! omega^(n+1/2) = omega^n + dt/2 f(omega^n) (Eq. 29). Together they are the implicit midpoint
+//! rule, which conserves the energy and the length of the angular momentum of a free body.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -33,8 +33,8 @@ pub fn half_step_explicit(
 
 /// Implicit half step: solves w = omega + half_step * f(w), body frame.
 ///
-/// Eqs 26-28 are iterated to round-off. If this iteration does not converge, as for a step of a good
-/// part of a revolution, Newton's method is used.
+/// Eqs 26-28 are iterated to round-off. If this iteration does not converge, as for a step of a
+/// good part of a revolution, Newton's method is used.
 pub fn half_step_implicit(
     inertia: DVec3,
     omega: DVec3,
@@ -116,7 +116,8 @@ pub fn from_paper_quaternion(q: [f64; 4]) -> DQuat {
     DQuat::from_xyzw(q[1], -q[0], q[2], q[3])
 }
 
-/// Rigid body that rotates about its centroid, without grain or contact, for tests and demonstrations.
+/// Rigid body that rotates about its centroid, without grain or contact, for tests and
+/// demonstrations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rotor {
     /// Principal moments of inertia [kg m^2].

@@ -31,8 +31,8 @@ impl Dynamics {
         if self.records.len() < PARALLEL_PAIRS {
             self.run_substeps(grains, loads, dt, mean_contact)
         } else {
-            // The thread pool is entered once per step. A caller outside the pool would otherwise wait
-            // for a worker thread at every sub-step.
+            // The thread pool is entered once per step. A caller outside the pool would otherwise
+            // wait for a worker thread at every sub-step.
             rayon::scope(|_| self.run_substeps(grains, loads, dt, mean_contact))
         }
     }

@@ -77,8 +77,8 @@ impl Dynamics {
 
     /// Repeats a trial step from its start, with the response of the fluid of this step to contact.
     ///
-    /// The grains keep the state of the trial step; `ends` receives the state after the repetition. A
-    /// grain without contact keeps the pose of the trial step. On entry `mean_contact` holds the
+    /// The grains keep the state of the trial step; `ends` receives the state after the repetition.
+    /// A grain without contact keeps the pose of the trial step. On entry `mean_contact` holds the
     /// contact loads of the trial step, on return the loads of the repetition.
     pub fn resolve_with_response(
         &mut self,

@@ -1,4 +1,5 @@
-//! Hierarchy of bounding spheres over the surface nodes of a shape, so that distant nodes are skipped.
+//! Hierarchy of bounding spheres over the surface nodes of a shape, so that distant nodes are
+//! skipped.
 
 use glam::DVec3;
 use grainwake_shape::{Shape, SurfaceNode};

@@ -105,7 +105,8 @@ impl ContactPatch {
     }
 
     /// Finds the penetrating points of a grain in a wall with the unit normal `inward`, at the
-    /// distance `offset` [m] from the centroid; returns the closest point if nearer than `reach` [m].
+    /// distance `offset` [m] from the centroid; returns the closest point if nearer than `reach`
+    /// [m].
     pub fn find_wall_contact(
         &mut self,
         a: &PosedShape,
