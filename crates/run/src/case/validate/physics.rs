@@ -18,9 +18,10 @@ use grainwake_solver::sim::Prescription;
 const MAXIMUM_OVERLAP: f64 = 0.01;
 /// Roughness over the smallest equal-volume radius, where none is given.
 const ROUGHNESS: f64 = 3e-3;
-/// Added mass of a sphere in contact, over the mass of the fluid that it displaces: .5 far from a wall and .803
-/// at it in potential flow (Hicks 1879), .75 on the grid; undamped impacts give the speed back with .7
-/// (`docs/decisions/0014-contact-with-the-fluid-response.md`).
+/// Added mass of a sphere in contact over the mass of the displaced fluid.
+///
+/// Potential flow gives 0.5 far from a wall and 0.803 at it (Hicks 1879), the grid 0.75. With 0.7,
+/// undamped impacts conserve the speed (`docs/decisions/0014-contact-with-the-fluid-response.md`).
 const ADDED_MASS: f64 = 0.7;
 
 /// The fluid; the viscosity is kept as a kinematic one.
