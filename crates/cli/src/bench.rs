@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::{DQuat, DVec3};
 use grainwake_shape::ShapeOptions;
 use grainwake_shape::analytic::ellipsoid;
-use grainwake_solver::dem::{ContactParams, Dof, Grain};
+use grainwake_solver::dem::{ContactParams, Dof, Grain, Material};
 use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
@@ -256,6 +256,7 @@ fn setup(load: &Load) -> Result<Setup, Exit> {
     let grain = |place: DVec3| Grain {
         shape: shape.clone(),
         density: 1500.0,
+        material: Material::default(),
         pose: Pose {
             position: mesh.extent() * place,
             // Each turned its own way.

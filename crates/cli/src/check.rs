@@ -3,7 +3,7 @@
 use grainwake_run::case::Case;
 use grainwake_run::case::estimate::Estimate;
 use grainwake_run::case::readable::{number, quantity};
-use grainwake_solver::dem::Grain;
+use grainwake_solver::dem::{ContactLawKind, Grain};
 
 use crate::args::CheckArgs;
 use crate::exit::Exit;
@@ -55,8 +55,14 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     let unit = "mm/s (settling or rising)";
     rows.extend(with_unit("expected speed", speed, unit));
     rows.extend(with_unit("blockage", e.blockage.map(|b| 100.0 * b), "%"));
-    let stiffness = case.setup.contact.normal_stiffness;
-    rows.push(("contact stiffness", quantity(stiffness, "N/m")));
+    let contact = &case.setup.contact;
+    rows.push(match contact.law {
+        ContactLawKind::Linear => (
+            "contact stiffness",
+            quantity(contact.normal_stiffness, "N/m"),
+        ),
+        ContactLawKind::HertzMindlin => ("contact law", "Hertz-Mindlin".into()),
+    });
     if let (Some(time), Some(substeps)) = (e.contact_time_s, e.contact_substeps) {
         let time = quantity(time, "s");
         rows.push((

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
 use grainwake_shape::analytic::ellipsoid;
-use grainwake_solver::dem::{ContactParams, Dof, Grain};
+use grainwake_solver::dem::{ContactParams, Dof, Grain, Material};
 use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
@@ -30,6 +30,7 @@ fn sphere(diameter: f64, position: DVec3, density: f64) -> Grain {
     Grain {
         shape: Arc::new(Shape::sphere(0.5 * diameter, 600)),
         density,
+        material: Material::default(),
         pose: Pose {
             position,
             orientation: DQuat::IDENTITY,

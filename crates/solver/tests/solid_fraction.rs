@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, analytic};
-use grainwake_solver::dem::{ContactParams, Dof, Grain};
+use grainwake_solver::dem::{ContactParams, Dof, Grain, Material};
 use grainwake_solver::flow::{Boundaries, Boundary};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
@@ -19,6 +19,7 @@ fn grain(shape: Shape, position: DVec3, orientation: DQuat) -> Grain {
     Grain {
         shape: Arc::new(shape),
         density: 2.0,
+        material: Material::default(),
         pose: Pose {
             position,
             orientation,

@@ -6,7 +6,7 @@ use super::Case;
 use super::estimate::{Estimate, terminal_speed, time_step};
 use super::readable::quantity;
 use crate::{Plane, PlanePosition, Stop};
-use grainwake_solver::dem::{Dof, Grain, outside};
+use grainwake_solver::dem::{ContactLawKind, Dof, Grain, outside};
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::events::StopWhen;
@@ -279,10 +279,23 @@ fn of_numbers(setup: &Setup, e: &Estimate) -> Vec<String> {
         ));
     }
     if let Some(substeps) = e.contact_substeps.filter(|n| wet && *n > 200.0) {
-        found.push(format!("contacts need {substeps:.0} sub-steps a step: a lower [contact] stiffness or a larger maximum_overlap is cheaper"));
+        let remedy = match setup.contact.law {
+            ContactLawKind::Linear => "a lower [contact] stiffness or a larger maximum_overlap",
+            ContactLawKind::HertzMindlin => "a lower youngs_modulus",
+        };
+        found.push(format!(
+            "contacts need {substeps:.0} sub-steps a step: {remedy} is cheaper"
+        ));
     }
     if let Some(overlap) = expected_overlap(setup).filter(|overlap| *overlap > 0.05) {
-        found.push(format!("a grain at its settling speed would overlap by {:.0} % of its diameter at impact: raise [contact] stiffness", 100.0 * overlap));
+        let remedy = match setup.contact.law {
+            ContactLawKind::Linear => "[contact] stiffness",
+            ContactLawKind::HertzMindlin => "youngs_modulus",
+        };
+        found.push(format!(
+            "a grain at its settling speed would overlap by {:.0} % of its diameter at impact: raise {remedy}",
+            100.0 * overlap
+        ));
     }
     if let StepRule::Fixed(step) = setup.step {
         let limits = Setup {
@@ -356,8 +369,7 @@ fn expected_overlap(setup: &Setup) -> Option<f64> {
     let g = setup.gravity.length();
     let of = |grain: &Grain| {
         let speed = terminal_speed(grain, fluid, g).max(grain.velocity.length());
-        speed * (grain.mass() / setup.contact.normal_stiffness).sqrt()
-            / grain.shape.equivalent_diameter()
+        setup.contact.impact_overlap(grain, speed) / grain.shape.equivalent_diameter()
     };
     setup.grains.iter().map(of).reduce(f64::max)
 }

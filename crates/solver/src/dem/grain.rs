@@ -1,4 +1,4 @@
-//! A grain: a shared shape, a density, and its state of motion.
+//! Grain: a shared shape, density, material, pose and velocities.
 
 use std::sync::Arc;
 
@@ -6,33 +6,36 @@ use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 use serde::{Deserialize, Serialize};
 
+use super::material::Material;
 use crate::math::Pose;
 
-/// Whether the three components of a velocity follow the dynamics or are given.
+/// Whether a velocity follows from the equation of motion or is prescribed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Dof {
-    /// Follows Newton's (Euler's) law.
+    /// Newton's or Euler's equation determines the velocity.
     Free,
-    /// Held at this velocity [m/s] or angular velocity [rad/s, space frame]; zero holds still.
+    /// Prescribed velocity [m/s] or angular velocity [rad/s, space frame]; zero fixes the grain.
     Prescribed(DVec3),
 }
 
-/// One grain. Velocities are at integer times and in the space frame.
+/// One grain. Velocities are at integer time levels, in the space frame.
 #[derive(Clone, Debug)]
 pub struct Grain {
-    /// Shape, shared between equal grains.
+    /// Shape, shared between grains of equal shape.
     pub shape: Arc<Shape>,
     /// Density [kg/m^3].
     pub density: f64,
+    /// Material, for contact laws with elastic constants.
+    pub material: Material,
     /// Position and orientation.
     pub pose: Pose,
     /// Velocity of the centroid [m/s].
     pub velocity: DVec3,
     /// Angular velocity, space frame [rad/s].
     pub angular_velocity: DVec3,
-    /// Law of the translation.
+    /// Translational degrees of freedom.
     pub translation: Dof,
-    /// Law of the rotation.
+    /// Rotational degrees of freedom.
     pub rotation: Dof,
 }
 
@@ -43,15 +46,15 @@ impl Grain {
     }
     /// Inertia tensor in the space frame [kg m^2].
     pub fn inertia(&self) -> DMat3 {
-        let turn = DMat3::from_quat(self.pose.orientation);
-        turn * DMat3::from_diagonal(self.shape.inertia() * self.density) * turn.transpose()
+        let rotation = DMat3::from_quat(self.pose.orientation);
+        rotation * DMat3::from_diagonal(self.shape.inertia() * self.density) * rotation.transpose()
     }
     /// Principal moments of inertia [kg m^2].
     pub fn principal_inertia(&self) -> DVec3 {
         self.shape.inertia() * self.density
     }
-    /// One over the mass that resists a force, with fluid of `added_density` [kg/m^3] dragged along;
-    /// zero where the translation is prescribed [1/kg].
+    /// Inverse of the mass and the added mass of fluid, `added_density` [kg/m^3] times the volume;
+    /// zero if the translation is prescribed [1/kg].
     pub(super) fn inverse_mass(&self, added_density: f64) -> f64 {
         match self.translation {
             Dof::Free => 1.0 / (self.mass() + added_density * self.shape.volume()),

@@ -8,7 +8,7 @@ use glam::{DVec3, USizeVec3};
 
 use super::geometry::aperture::reference::{aperture, inverse_aperture_excess, open_depth};
 use super::kinematics::{GrainKinematics, RigidVelocity};
-use crate::dem::Grain;
+use crate::dem::{Grain, Material};
 use crate::flow::Known;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Vector6;
@@ -235,6 +235,7 @@ mod tests {
             let grain = Grain {
                 shape: Arc::new(Shape::sphere(0.5, 100)),
                 density: 2.0,
+                material: Material::default(),
                 pose: Pose {
                     position: DVec3::new(1.63, 1.87, 2.02),
                     orientation: DQuat::from_scaled_axis(DVec3::new(0.3, 0.8, -0.4)),

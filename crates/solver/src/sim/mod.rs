@@ -15,7 +15,7 @@ mod step;
 mod tests;
 mod timing;
 
-use crate::dem::{Contact, Dynamics, Grain, Response, State};
+use crate::dem::{Contact, Dynamics, Grain, Response, RigidState};
 use crate::grid::Mesh;
 use crate::immersed::{GrainKinematics, PreviousStep};
 use crate::math::{Load, Pose};
@@ -58,7 +58,7 @@ struct GrainData {
     /// Whether contact was resolved with the fluid's response.
     resolved: bool,
     /// States at the end of the sub-steps that were repeated.
-    ends: Vec<State>,
+    ends: Vec<RigidState>,
     /// Poses at which the faces near the grains were found.
     located: Vec<Pose>,
 }
@@ -74,7 +74,7 @@ impl GrainData {
             contact: vec![Load::default(); count],
             responses: Vec::with_capacity(count),
             resolved: false,
-            ends: grains.iter().map(State::of).collect(),
+            ends: grains.iter().map(RigidState::of).collect(),
             located: grains.iter().map(|grain| grain.pose).collect(),
         }
     }

@@ -7,7 +7,7 @@ use super::fluid::Fluid;
 use super::prescription::Prescription;
 use super::timing::{PassTimes, timed};
 use super::{GrainData, Simulation};
-use crate::dem::{Dof, Dynamics, Grain, State};
+use crate::dem::{Dof, Dynamics, Grain, RigidState, TrialStep};
 use crate::immersed::{
     CoupledGrains, GrainKinematics, PreviousStep, RigidStep, RigidVelocity, Scheme, StepInput,
 };
@@ -35,10 +35,10 @@ struct Context<'a> {
 pub(super) struct Start<'a>(Context<'a>);
 /// Flow predicted without the grains.
 pub(super) struct Predicted<'a>(Context<'a>);
-/// Grains at their new poses.
-pub(super) struct Moved<'a>(Context<'a>);
+/// Grains at their new poses, by a trial step of contact.
+pub(super) struct Moved<'a>(Context<'a>, TrialStep);
 /// Grains located, with their equations of motion.
-pub(super) struct Coupled<'a>(Context<'a>, CoupledGrains);
+pub(super) struct Coupled<'a>(Context<'a>, CoupledGrains, TrialStep);
 /// Contact loads known.
 pub(super) struct Resolved<'a>(Context<'a>, CoupledGrains);
 /// Rigid velocities imposed on the prediction.
@@ -106,15 +106,14 @@ impl<'a> Predicted<'a> {
         for (i, driving) in data.driving.iter_mut().enumerate() {
             *driving = data.applied[i] + step.loads[i];
         }
-        timed(&mut step.times.contact, || {
-            step.dynamics.remember(grains);
-            (step.dynamics).advance(grains, &data.driving, step.dt, &mut data.contact)
+        let trial = timed(&mut step.times.contact, || {
+            (step.dynamics).trial_step(grains, &data.driving, step.dt, &mut data.contact)
         });
         step.prescription.drive(grains, step.time + step.dt);
         for (i, applied) in data.applied.iter_mut().enumerate() {
             *applied = data.driving[i] + step.loads[i] * -1.0;
         }
-        Moved(step)
+        Moved(step, trial)
     }
 }
 
@@ -122,7 +121,7 @@ impl<'a> Moved<'a> {
     /// Locates the grains and assembles their equations of motion with the impulse of the fluid. The
     /// paper's scheme projects the prediction first.
     pub fn couple(self) -> Coupled<'a> {
-        let Moved(step) = self;
+        let Moved(step, trial) = self;
         if step.scheme == Scheme::Paper {
             timed(&mut step.times.project, || {
                 step.fluid.project_prediction(step.dt)
@@ -137,14 +136,14 @@ impl<'a> Moved<'a> {
             dt: step.dt,
         };
         let coupled = timed(&mut step.times.coupling, || step.fluid.couple(input));
-        Coupled(step, coupled)
+        Coupled(step, coupled, trial)
     }
 }
 
 impl<'a> Coupled<'a> {
     /// Repeats the contact sub-steps with the fluid's response of this step if grains touch.
     pub fn resolve_contact(self) -> Resolved<'a> {
-        let Coupled(step, coupled) = self;
+        let Coupled(step, coupled, trial) = self;
         let (grains, data, dt) = (&mut *step.grains, &mut *step.data, step.dt);
         data.resolved = data.contact.iter().any(|load| *load != Load::default());
         if data.resolved {
@@ -159,9 +158,11 @@ impl<'a> Coupled<'a> {
             step.prescription.drive(grains, step.time + 0.5 * dt);
             timed(&mut step.times.contact, || {
                 let (contact, ends) = (&mut data.contact, &mut data.ends);
-                (step.dynamics).again(grains, &data.responses, dt, contact, ends)
+                (step.dynamics).resolve_with_response(trial, grains, &data.responses, contact, ends)
             });
             step.prescription.drive(grains, step.time + dt);
+        } else {
+            step.dynamics.accept(trial);
         }
         Resolved(step, coupled)
     }
@@ -232,7 +233,7 @@ impl Projected<'_> {
 }
 
 /// Velocities of a grain beyond those at the end of its sub-steps; zero where they are prescribed.
-fn beyond_substeps(grain: &Grain, end: &State) -> RigidVelocity {
+fn beyond_substeps(grain: &Grain, end: &RigidState) -> RigidVelocity {
     let [linear, angular] = end.velocities;
     let beyond = RigidVelocity::of(grain) - RigidVelocity { linear, angular };
     let free = |dof: Dof, velocity: DVec3| match dof {

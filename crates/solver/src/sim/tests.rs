@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::{Setup, Simulation, StepRule};
-use crate::dem::{ContactParams, Dof, Grain};
+use crate::dem::{ContactParams, Dof, Grain, Material};
 use crate::flow::{Advection, Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
 use crate::immersed::Scheme;
@@ -16,6 +16,7 @@ fn two_grains(precision: Precision) -> Setup {
     let grain = |shape, position, velocity| Grain {
         shape: Arc::new(shape),
         density: 2.0,
+        material: Material::default(),
         pose: Pose {
             position,
             orientation: DQuat::from_scaled_axis(DVec3::new(0.4, 0.7, -0.3)),

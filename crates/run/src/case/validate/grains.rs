@@ -14,7 +14,7 @@ use crate::case::quantity::{Density, Quantity, Triple};
 use crate::case::raw::{Law, Orientation, Position, RawGrain, Turns};
 use crate::case::readable::{number, quantity, vector};
 use crate::case::shapes::Library;
-use grainwake_solver::dem::{Dof, Grain};
+use grainwake_solver::dem::{Dof, Grain, Material};
 use grainwake_solver::math::Pose;
 use grainwake_solver::sim::Drive;
 
@@ -67,6 +67,8 @@ pub(super) fn grain(
     let mut grain = Grain {
         shape,
         density,
+        // `materials` sets it for the contact laws that use it.
+        material: Material::default(),
         pose: Pose {
             position: DVec3::ZERO,
             orientation,

@@ -4,6 +4,7 @@ mod arrangement;
 mod check;
 mod domain;
 mod grains;
+mod materials;
 mod packings;
 mod physics;
 mod plan;
@@ -136,11 +137,13 @@ pub(super) fn validate(
     }
 
     let fluid_params = fluid.as_ref().and_then(|f| f.as_ref());
+    let wall_material = materials::materials(&mut check, &raw.contact, &resolved, &mut grains);
     let contact = if fluid.is_some() == fluid_params.is_some() {
         physics::contact(
             &mut check,
             &mut raw.contact,
             &grains,
+            wall_material,
             fluid_params,
             gravity,
             &mesh,

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::index_map::DofMask;
 use super::narrow_band::NarrowBandShapes;
-use crate::dem::{Ball, BroadPhase, Enclosure, Grain, Partner};
+use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};
 use crate::grid::Mesh;
 use crate::math::Pose;
 
@@ -55,7 +55,7 @@ impl NeighbourGrain {
 #[derive(Default)]
 pub struct NeighbourSearch {
     search: BroadPhase,
-    balls: Vec<Ball>,
+    balls: Vec<BoundingSphere>,
     pairs: Vec<NeighbourPair>,
     /// Neighbours of grain 0, then of grain 1, ...
     neighbours: Vec<NeighbourGrain>,
@@ -89,10 +89,13 @@ impl NeighbourSearch {
             solid: [[false; 2]; 3],
         };
         self.balls.clear();
-        let balls = grains.iter().enumerate().map(|(index, grain)| Ball {
-            center: grain.pose.position,
-            radius: grain.shape.bounding_radius() + reach + travel(index),
-        });
+        let balls = grains
+            .iter()
+            .enumerate()
+            .map(|(index, grain)| BoundingSphere {
+                center: grain.pose.position,
+                radius: grain.shape.bounding_radius() + reach + travel(index),
+            });
         self.balls.extend(balls);
         self.search.search(&self.balls, &enclosure);
         self.pairs.clear();
@@ -174,6 +177,7 @@ mod tests {
         let at = |x: f64| Grain {
             shape: shape.clone(),
             density: 2.0,
+            material: crate::dem::Material::default(),
             pose: Pose {
                 position: DVec3::new(x, 2.0, 2.0),
                 orientation: DQuat::IDENTITY,

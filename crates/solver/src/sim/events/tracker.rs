@@ -317,6 +317,7 @@ mod tests {
         Grain {
             shape: Arc::new(Shape::sphere(0.5, 50)),
             density: 2.0,
+            material: crate::dem::Material::default(),
             pose: Pose {
                 position: DVec3::new(x, 0.0, z),
                 orientation: DQuat::IDENTITY,

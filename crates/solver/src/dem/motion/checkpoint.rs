@@ -1,20 +1,23 @@
-//! The memory of contact as bytes, bit for bit.
+//! Contact history as bytes, bit for bit.
 //!
-//! Layout, little-endian: magic, version, count of grains and their positions at the end of the last
-//! step; count of remembered pairs and each pair; count of contacts and each contact.
+//! Layout, little-endian: magic with version; number of grains and their positions at the end of
+//! the last step; number of pairs in contact and each pair; number of contacts and each contact.
+//! Version 1 has no tangential stiffness in its pairs; it is read as well.
 
 use std::io::{self, Read, Write};
 
 use glam::{DVec3, IVec3};
 
 use super::dynamics::Dynamics;
-use super::history::{Memory, PairKey, Slot};
-use super::{Contact, Partner};
+use crate::dem::contact::{Contact, ContactRecord, TangentialHistory};
+use crate::dem::search::{PairKey, Partner};
 use crate::math::Load;
 
-const MAGIC: [u8; 8] = *b"GWDEM\0\0\x01";
+const MAGIC: [u8; 7] = *b"GWDEM\0\0";
+const VERSION: u8 = 2;
 const WALL: u64 = 1 << 63;
-/// Damaged counts must not ask for memory: at most so much is reserved before the bytes are seen.
+/// Largest number of entries that is reserved before they are read, so that a damaged count does
+/// not exhaust the memory.
 const RESERVE: u64 = 4096;
 
 fn damaged(what: &str) -> io::Error {
@@ -82,25 +85,29 @@ impl Dynamics {
     pub fn save(&self, writer: &mut dyn Write) -> io::Result<()> {
         let w = writer;
         w.write_all(&MAGIC)?;
-        put(w, self.last.len() as u64)?;
-        self.last.iter().try_for_each(|&x| put_vector(w, x))?;
-        let touching = || self.slots.iter().filter(|slot| slot.touching);
-        put(w, touching().count() as u64)?;
-        for slot in touching() {
-            put(w, u64::from(slot.key.grain))?;
-            put_partner(w, slot.key.partner)?;
-            for periods in slot.key.image.to_array() {
+        w.write_all(&[VERSION])?;
+        put(w, self.last_positions.len() as u64)?;
+        self.last_positions
+            .iter()
+            .try_for_each(|&x| put_vector(w, x))?;
+        let in_contact = || self.records.iter().filter(|record| record.in_contact);
+        put(w, in_contact().count() as u64)?;
+        for record in in_contact() {
+            put(w, u64::from(record.key.grain))?;
+            put_partner(w, record.key.partner)?;
+            for periods in record.key.image.to_array() {
                 put(w, periods as i64 as u64)?;
             }
-            put_vector(w, slot.mean.normal)?;
-            put_vector(w, slot.mean.slip)?;
-            put_real(w, slot.onset)?;
-            put_real(w, slot.outcome.elastic_energy)?;
-            put(w, slot.memory.len() as u64)?;
-            for memory in &slot.memory {
-                put(w, u64::from(memory.code))?;
-                put_vector(w, memory.normal)?;
-                put_vector(w, memory.slip)?;
+            put_vector(w, record.mean_history.normal)?;
+            put_vector(w, record.mean_history.displacement)?;
+            put_real(w, record.dashpot_fraction)?;
+            put_real(w, record.tangential_stiffness)?;
+            put_real(w, record.loads.elastic_energy)?;
+            put(w, record.history.len() as u64)?;
+            for entry in &record.history {
+                put(w, u64::from(entry.id))?;
+                put_vector(w, entry.normal)?;
+                put_vector(w, entry.displacement)?;
             }
         }
         put(w, self.contacts.len() as u64)?;
@@ -120,32 +127,40 @@ impl Dynamics {
         Ok(())
     }
 
-    /// Restores what [`save`](Self::save) wrote; parameters and box stay as they are. On an error
-    /// nothing changes.
+    /// Restores the state that [`save`](Self::save) wrote; parameters and box do not change.
+    ///
+    /// # Errors
+    /// The bytes are no contact history of a known version, or are damaged. The state is unchanged.
     pub fn restore(&mut self, reader: &mut dyn Read) -> io::Result<()> {
         let r = reader;
-        let mut magic = [0; 8];
-        r.read_exact(&mut magic)?;
-        if magic != MAGIC {
+        let mut start = [0; 8];
+        r.read_exact(&mut start)?;
+        let version = start[7];
+        if start[..7] != MAGIC {
             return Err(damaged(
-                "it does not begin as one, or is of another version",
+                "its first bytes are not those of a contact history",
             ));
         }
-        let grains = get_count(r, u64::from(u32::MAX), "count of grains")?;
-        let mut last = list(grains);
-        for _ in 0..grains {
-            last.push(get_vector(r)?);
+        if !(1..=VERSION).contains(&version) {
+            return Err(damaged(&format!(
+                "version {version} is unknown; this program reads versions 1 to {VERSION}"
+            )));
         }
-        let pairs = get_count(r, u64::from(u32::MAX), "count of pairs")?;
-        let mut slots: Vec<Slot> = list(pairs);
+        let grains = get_count(r, u64::from(u32::MAX), "number of grains")?;
+        let mut last_positions = list(grains);
+        for _ in 0..grains {
+            last_positions.push(get_vector(r)?);
+        }
+        let pairs = get_count(r, u64::from(u32::MAX), "number of pairs")?;
+        let mut records: Vec<ContactRecord> = list(pairs);
         for _ in 0..pairs {
-            let slot = read_slot(r, grains)?;
-            if slots.last().is_some_and(|before| before.key >= slot.key) {
+            let record = read_record(r, grains, version)?;
+            if (records.last()).is_some_and(|before| before.key >= record.key) {
                 return Err(damaged("its pairs are out of order"));
             }
-            slots.push(slot);
+            records.push(record);
         }
-        let count = get_count(r, u64::from(u32::MAX), "count of contacts")?;
+        let count = get_count(r, u64::from(u32::MAX), "number of contacts")?;
         let mut contacts = list(count);
         for _ in 0..count {
             let grain = get_count(r, grains.saturating_sub(1), "grain of a contact")? as usize;
@@ -165,12 +180,12 @@ impl Dynamics {
                 normal,
             });
         }
-        (self.last, self.slots, self.contacts) = (last, slots, contacts);
+        (self.last_positions, self.records, self.contacts) = (last_positions, records, contacts);
         Ok(())
     }
 }
 
-fn read_slot(r: &mut dyn Read, grains: u64) -> io::Result<Slot> {
+fn read_record(r: &mut dyn Read, grains: u64, version: u8) -> io::Result<ContactRecord> {
     let grain = get(r)?;
     if grain >= grains {
         return Err(damaged("a pair names no grain"));
@@ -180,28 +195,31 @@ fn read_slot(r: &mut dyn Read, grains: u64) -> io::Result<Slot> {
     for axis in 0..3 {
         image[axis] = i32::try_from(get(r)? as i64).map_err(|_| damaged("image of a pair"))?;
     }
-    let mut slot = Slot::new(PairKey {
+    let mut record = ContactRecord::new(PairKey {
         grain: grain as u32,
         partner,
         image,
     });
-    slot.touching = true;
-    slot.mean.normal = get_vector(r)?;
-    slot.mean.slip = get_vector(r)?;
-    slot.onset = get_real(r)?;
-    slot.outcome.elastic_energy = get_real(r)?;
-    let nodes = get_count(r, u64::from(u32::MAX), "count of nodes")?;
-    slot.memory = list(nodes);
+    record.in_contact = true;
+    record.mean_history.normal = get_vector(r)?;
+    record.mean_history.displacement = get_vector(r)?;
+    record.dashpot_fraction = get_real(r)?;
+    if version > 1 {
+        record.tangential_stiffness = get_real(r)?;
+    }
+    record.loads.elastic_energy = get_real(r)?;
+    let nodes = get_count(r, u64::from(u32::MAX), "number of contact points")?;
+    record.history = list(nodes);
     for _ in 0..nodes {
-        let code = u32::try_from(get(r)?).map_err(|_| damaged("code of a node"))?;
-        if slot.memory.last().is_some_and(|before| before.code >= code) {
-            return Err(damaged("its nodes are out of order"));
+        let id = u32::try_from(get(r)?).map_err(|_| damaged("identifier of a contact point"))?;
+        if record.history.last().is_some_and(|before| before.id >= id) {
+            return Err(damaged("its contact points are out of order"));
         }
-        slot.memory.push(Memory {
-            code,
+        record.history.push(TangentialHistory {
+            id,
             normal: get_vector(r)?,
-            slip: get_vector(r)?,
+            displacement: get_vector(r)?,
         });
     }
-    Ok(slot)
+    Ok(record)
 }

@@ -1,51 +1,52 @@
-//! Surface nodes of a shape in blobs with bounding spheres, so that far nodes are never tested.
+//! Hierarchy of bounding spheres over the surface nodes of a shape, so that distant nodes are
+//! skipped.
 
 use glam::DVec3;
 use grainwake_shape::{Shape, SurfaceNode};
 
-/// Nodes of a blob that is not split further.
+/// Most nodes of a leaf.
 const LEAF: usize = 8;
 
-/// A ball that holds a run of nodes, stored in depth-first order.
+/// Bounding sphere of a range of nodes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Blob {
+pub(in crate::dem) struct NodeCluster {
     /// Centre, principal frame [m].
     pub center: DVec3,
     /// Radius [m].
     pub radius: f64,
-    /// First node of the run and the node behind its last.
+    /// Range of nodes: first, and one past the last.
     pub nodes: (u32, u32),
-    /// The blob to go on with when this one is skipped.
+    /// Index of the next cluster in depth-first order outside this subtree.
     pub skip: u32,
 }
 
-impl Blob {
-    /// Whether the nodes are to be tested one by one here.
+impl NodeCluster {
+    /// Whether this cluster, at `index`, has no sub-clusters.
     pub fn is_leaf(&self, index: usize) -> bool {
         self.skip as usize == index + 1
     }
 }
 
-/// Nodes in blob order.
+/// Nodes and clusters of one shape.
 #[derive(Clone, Debug)]
-pub(super) struct NodeTree {
-    /// The nodes, near ones together.
+pub(in crate::dem) struct NodeTree {
+    /// Nodes in the order of the leaves.
     pub nodes: Vec<SurfaceNode>,
-    /// Blobs in depth-first order.
-    pub blobs: Vec<Blob>,
-    /// Typical distance of neighbouring nodes: the root of the mean node area [m].
+    /// Clusters in depth-first order.
+    pub clusters: Vec<NodeCluster>,
+    /// Node spacing: square root of the mean node area [m].
     pub spacing: f64,
 }
 
 impl NodeTree {
-    /// Sorts the nodes of a shape.
+    /// Builds the hierarchy of a shape by halving along the longest extent.
     pub fn new(shape: &Shape) -> NodeTree {
         let nodes = shape.nodes().to_vec();
         let area: f64 = nodes.iter().map(|n| n.area).sum();
         let spacing = (area / nodes.len().max(1) as f64).sqrt();
         let mut tree = NodeTree {
             nodes,
-            blobs: Vec::new(),
+            clusters: Vec::new(),
             spacing,
         };
         if !tree.nodes.is_empty() {
@@ -55,18 +56,18 @@ impl NodeTree {
     }
 
     fn split(&mut self, from: usize, to: usize) {
-        let run = &mut self.nodes[from..to];
-        let start = run[0].position;
-        let (lower, upper) = run.iter().fold((start, start), |(lo, up), n| {
-            (lo.min(n.position), up.max(n.position))
+        let nodes = &mut self.nodes[from..to];
+        let start = nodes[0].position;
+        let (lower, upper) = nodes.iter().fold((start, start), |(lower, upper), n| {
+            (lower.min(n.position), upper.max(n.position))
         });
         let center = 0.5 * (lower + upper);
-        let radius = run
+        let radius = nodes
             .iter()
             .map(|n| n.position.distance(center))
             .fold(0.0, f64::max);
-        let index = self.blobs.len();
-        self.blobs.push(Blob {
+        let index = self.clusters.len();
+        self.clusters.push(NodeCluster {
             center,
             radius,
             nodes: (from as u32, to as u32),
@@ -81,12 +82,12 @@ impl NodeTree {
                     best
                 }
             });
-            run.sort_by(|a, b| a.position[axis].total_cmp(&b.position[axis]));
+            nodes.sort_by(|a, b| a.position[axis].total_cmp(&b.position[axis]));
             let middle = from + (to - from) / 2;
             self.split(from, middle);
             self.split(middle, to);
         }
-        self.blobs[index].skip = self.blobs.len() as u32;
+        self.clusters[index].skip = self.clusters.len() as u32;
     }
 }
 
@@ -95,19 +96,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blobs_hold_their_nodes_and_leaves_cover_all_of_them_once() {
+    fn clusters_bound_their_nodes_and_leaves_cover_each_node_once() {
         let shape = Shape::sphere(1.0, 1000);
         let tree = NodeTree::new(&shape);
         let mut seen = 0;
-        for (index, blob) in tree.blobs.iter().enumerate() {
-            let run = &tree.nodes[blob.nodes.0 as usize..blob.nodes.1 as usize];
+        for (index, cluster) in tree.clusters.iter().enumerate() {
+            let run = &tree.nodes[cluster.nodes.0 as usize..cluster.nodes.1 as usize];
             assert!(
                 run.iter()
-                    .all(|n| n.position.distance(blob.center) <= blob.radius * (1.0 + 1e-12))
+                    .all(|n| n.position.distance(cluster.center) <= cluster.radius * (1.0 + 1e-12))
             );
-            if blob.is_leaf(index) {
-                assert_eq!(blob.nodes.0, seen);
-                seen = blob.nodes.1;
+            if cluster.is_leaf(index) {
+                assert_eq!(cluster.nodes.0, seen);
+                seen = cluster.nodes.1;
             }
         }
         assert_eq!(seen as usize, shape.nodes().len());

@@ -1,75 +1,75 @@
-//! Distances between surfaces, and the input checks that follow from them.
+//! Gaps between surfaces, initial overlaps and grains outside the box.
 
 use glam::{DMat3, DVec3, IVec3};
 
-use super::Partner;
-use super::deepest::{Probe, slide};
-use super::enclosure::{Enclosure, Face};
-use super::grain::Grain;
-use super::target::Target;
+use super::closest_point::{DescentLimits, SurfacePoint, minimise_distance};
+use super::pair::Partner;
+use super::partner_field::PartnerField;
+use crate::dem::enclosure::{Enclosure, WallFace};
+use crate::dem::grain::Grain;
 
-/// Iterations of the search for the closest point; it converges in a few where surfaces are smooth.
+/// Most steps of the descent to the closest point; smooth surfaces need only a few.
 const ITERATIONS: usize = 40;
-/// The search ends when the closest point moves less than this part of the bounding radius.
+/// Tolerance of the closest point as a fraction of the bounding radius.
 const TOLERANCE: f64 = 1e-9;
 
-/// Two grains, or a grain and a wall, that share space.
+/// Overlap of two grains, or of a grain and a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overlap {
     /// First grain.
     pub grain: usize,
-    /// What it overlaps (its own periodic image: the same index).
+    /// Second body; the index of `grain` itself for its own periodic image.
     pub partner: Partner,
     /// Deepest overlap [m], positive.
     pub depth: f64,
 }
 
-/// A grain that sticks out of the box through a face that is not periodic, solid or open.
+/// Grain whose surface crosses a face of the box that is not periodic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outside {
-    /// The grain.
+    /// Index of the grain.
     pub grain: usize,
     /// Axis of the face's normal.
     pub axis: usize,
     /// 0 lower, 1 upper.
     pub side: usize,
-    /// How far the surface reaches beyond the face [m].
+    /// Largest distance of the surface beyond the face [m].
     pub by: f64,
-    /// Whether the centroid is outside as well.
+    /// Whether the centroid is outside.
     pub centroid: bool,
 }
 
-/// Point of the owner's surface with the smallest distance in `target`: the best node, then slid.
-fn closest(owner: &Grain, target: &Target) -> Option<Probe> {
+/// Point of the grain's surface with the smallest distance in `field`: descent from the closest
+/// node.
+fn closest_point(owner: &Grain, field: &PartnerField) -> Option<SurfacePoint> {
     let nodes = owner.shape.nodes();
     let mut best: Option<(f64, DVec3)> = None;
     for node in nodes {
-        let distance = target.distance(node.position);
+        let distance = field.distance(node.position);
         if best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, node.position));
         }
     }
     let radius = owner.shape.bounding_radius();
-    let start = Probe::at(target, best?.1)?;
-    Some(slide(
-        &owner.shape,
-        target,
-        start,
-        radius,
-        TOLERANCE * radius,
-        ITERATIONS,
-    ))
+    let start = SurfacePoint::at(field, best?.1)?;
+    let limits = DescentLimits {
+        stride: radius,
+        tolerance: TOLERANCE * radius,
+        iterations: ITERATIONS,
+    };
+    Some(minimise_distance(&owner.shape, field, start, limits))
 }
 
-/// Distance of the nodes of `owner` from `other`, whose centroid is `apart` from the owner's [m].
-fn one_way(owner: &Grain, other: &Grain, apart: DVec3) -> f64 {
+/// Smallest distance of the surface of `owner` in the field of `other` [m]; `branch` is the vector
+/// from the centroid of `owner` to that of `other` [m].
+fn one_way_gap(owner: &Grain, other: &Grain, branch: DVec3) -> f64 {
     let to_other = DMat3::from_quat(other.pose.orientation.conjugate());
-    let turn = to_other * DMat3::from_quat(owner.pose.orientation);
-    let target = Target::grain(&other.shape, turn, to_other * -apart);
-    closest(owner, &target).map_or(f64::INFINITY, |probe| probe.distance)
+    let rotation = to_other * DMat3::from_quat(owner.pose.orientation);
+    let field = PartnerField::grain(&other.shape, rotation, to_other * -branch);
+    closest_point(owner, &field).map_or(f64::INFINITY, |point| point.distance)
 }
 
-/// Smallest gap of `a` to the images of `b` other than `skip`, as far as it is under `limit` [m].
+/// Smallest gap of `a` to the images of `b` other than `skip` [m]; at most `limit` [m].
 fn gap_of_images(
     a: &Grain,
     b: &Grain,
@@ -78,11 +78,11 @@ fn gap_of_images(
     limit: f64,
 ) -> f64 {
     let period = enclosure.period();
-    let apart = b.pose.position - a.pose.position;
-    if !apart.is_finite() {
+    let branch = b.pose.position - a.pose.position;
+    if !branch.is_finite() {
         return f64::INFINITY;
     }
-    let near = enclosure.nearest_image(apart);
+    let nearest = enclosure.nearest_image(branch);
     let radii = a.shape.bounding_radius() + b.shape.bounding_radius();
     // Images beyond the nearest one matter for grains as large as the box.
     let most = [0, 1, 2].map(|axis| {
@@ -98,55 +98,53 @@ fn gap_of_images(
             for i in -most[0]..=most[0] {
                 let shift = IVec3::new(i, j, k);
                 if skip != Some(shift) {
-                    let apart = near + shift.as_dvec3() * period;
-                    images.push((apart.length() - radii, apart));
+                    let branch = nearest + shift.as_dvec3() * period;
+                    images.push((branch.length() - radii, branch));
                 }
             }
         }
     }
     images.sort_by(|x, y| x.0.total_cmp(&y.0));
     let mut best = limit;
-    for (bound, apart) in images {
+    for (bound, branch) in images {
         if bound >= best {
             break;
         }
-        best = best.min(one_way(a, b, apart)).min(one_way(b, a, -apart));
+        best = best
+            .min(one_way_gap(a, b, branch))
+            .min(one_way_gap(b, a, -branch));
     }
     best
 }
 
-/// Smallest distance between the surfaces of two grains [m] (negative: overlap), nearest periodic image.
+/// Gap between the surfaces of two grains, nearest periodic image [m]; negative: overlap.
 ///
-/// Nodes of each in the field of the other, then slid to the closest point: exact for spheres,
-/// otherwise as good as the sampled fields.
+/// Each surface is tested in the field of the other. The result is exact for spheres; otherwise its
+/// error is that of the sampled fields.
 pub fn surface_gap(a: &Grain, b: &Grain, enclosure: &Enclosure) -> f64 {
     gap_of_images(a, b, enclosure, None, f64::INFINITY)
 }
 
-/// Distance of the grain's surface from a plane [m], negative beyond it.
-fn plane_gap(grain: &Grain, face: &Face) -> f64 {
+/// Gap between the grain's surface and a face of the box [m]; negative: the surface crosses it.
+fn wall_face_gap(grain: &Grain, face: &WallFace) -> f64 {
     let to_body = grain.pose.orientation.conjugate();
     let offset = face.distance(grain.pose.position);
-    let target = Target::HalfSpace {
+    let field = PartnerField::HalfSpace {
         normal: to_body * face.inward,
         offset,
     };
-    closest(grain, &target).map_or(f64::INFINITY, |probe| probe.distance)
+    closest_point(grain, &field).map_or(f64::INFINITY, |point| point.distance)
 }
 
-/// Nearest solid face and the distance of the grain's surface from it [m] (negative: overlap).
+/// Gap between the grain's surface and the nearest wall [m] (negative: overlap), and that wall.
 pub fn wall_gap(grain: &Grain, enclosure: &Enclosure) -> Option<(f64, Partner)> {
-    let gaps = enclosure.faces().map(|face| {
-        let wall = Partner::Wall {
-            axis: face.axis as u8,
-            side: face.side as u8,
-        };
-        (plane_gap(grain, &face), wall)
-    });
+    let gaps = enclosure
+        .faces()
+        .map(|face| (wall_face_gap(grain, &face), Partner::from(&face)));
     gaps.min_by(|x, y| x.0.total_cmp(&y.0))
 }
 
-/// Pairs that share space before the start: grain with grain, with its own images, with walls.
+/// All overlaps of grains with grains, with their own images and with walls.
 pub fn initial_overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap> {
     let mut found = Vec::new();
     for (i, a) in grains.iter().enumerate() {
@@ -165,15 +163,11 @@ pub fn initial_overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap>
             if face.distance(a.pose.position) > a.shape.bounding_radius() {
                 continue;
             }
-            let gap = plane_gap(a, &face);
+            let gap = wall_face_gap(a, &face);
             if gap < 0.0 {
-                let partner = Partner::Wall {
-                    axis: face.axis as u8,
-                    side: face.side as u8,
-                };
                 found.push(Overlap {
                     grain: i,
-                    partner,
+                    partner: Partner::from(&face),
                     depth: -gap,
                 });
             }
@@ -182,7 +176,7 @@ pub fn initial_overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap>
     found
 }
 
-/// Grains that stick out of the box, face by face.
+/// Grains whose surface crosses a face of the box that is not periodic.
 pub fn outside(grains: &[Grain], enclosure: &Enclosure) -> Vec<Outside> {
     let mut found = Vec::new();
     for (index, grain) in grains.iter().enumerate() {
@@ -192,8 +186,8 @@ pub fn outside(grains: &[Grain], enclosure: &Enclosure) -> Vec<Outside> {
             if enclosure.is_periodic(axis) || centroid > grain.shape.bounding_radius() {
                 continue;
             }
-            let gap = plane_gap(grain, &face);
-            // A position that is not a number is outside as well.
+            let gap = wall_face_gap(grain, &face);
+            // A position that is not a number counts as outside.
             if gap.is_nan() || gap < 0.0 {
                 found.push(Outside {
                     grain: index,

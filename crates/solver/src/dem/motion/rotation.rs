@@ -1,27 +1,27 @@
 //! Rotation of a rigid body in its principal frame (Eqs 24-36).
 //!
-//! The orientation is a unit quaternion that turns body vectors into the space frame. The paper's
-//! (q1, q2, q3, q4) are Evans's parameters of the opposite matrix A, space -> body (Eq. 30); the
-//! two are related by x = q2, y = -q1, z = q3, w = q4. Angular velocities and torques here are
-//! components along the principal axes unless a name says `space`.
+//! The orientation is a unit quaternion that rotates body vectors into the space frame. The paper's
+//! (q1, q2, q3, q4) are Evans's parameters of the inverse matrix A, space to body (Eq. 30), with
+//! x = q2, y = -q1, z = q3, w = q4. Angular velocities and torques are components along the
+//! principal axes unless a name says `space`.
 //!
-//! Eqs 25-29 run on half-integer velocities; the two half kicks here are the same scheme cut at
-//! integer times: omega^n = omega^(n-1/2) + dt/2 f(omega^n) (implicit, Eqs 27-28 iterated) and
-//! omega^(n+1/2) = omega^n + dt/2 f(omega^n) (Eq. 29), together the implicit midpoint rule, which
-//! keeps the energy and the length of the angular momentum of a free body.
+//! Eqs 25-29 use half-integer velocities. The two half steps here are this scheme split at integer
+//! times: omega^n = omega^(n-1/2) + dt/2 f(omega^n) (implicit, Eqs 27-28 iterated) and
+//! omega^(n+1/2) = omega^n + dt/2 f(omega^n) (Eq. 29). Together they are the implicit midpoint
+//! rule, which conserves the energy and the length of the angular momentum of a free body.
 
 use glam::{DMat3, DQuat, DVec3};
 
 /// Angular acceleration [rad/s^2] by Euler's equations (Eq. 24), body frame.
 ///
-/// `inertia` are the principal moments [kg m^2], `omega` [rad/s], `torque` [N m], `damping` the
-/// global constant xi [1/s].
+/// `inertia` are the principal moments [kg m^2], `omega` is in [rad/s], `torque` in [N m] and
+/// `damping` is the global damping constant xi [1/s].
 pub fn angular_acceleration(inertia: DVec3, omega: DVec3, torque: DVec3, damping: f64) -> DVec3 {
     (torque + (inertia * omega).cross(omega)) / inertia - damping * omega
 }
 
-/// Explicit half of the kick: omega + half_step * f(omega) (Eq. 29), body frame.
-pub fn half_kick_explicit(
+/// Explicit half step: omega + half_step * f(omega) (Eq. 29), body frame.
+pub fn half_step_explicit(
     inertia: DVec3,
     omega: DVec3,
     torque: DVec3,
@@ -31,12 +31,11 @@ pub fn half_kick_explicit(
     omega + half_step * angular_acceleration(inertia, omega, torque, damping)
 }
 
-/// Implicit half of the kick: solves w = omega + half_step * f(w) (Eqs 26-28 iterated until the
-/// change is at round-off), body frame.
+/// Implicit half step: solves w = omega + half_step * f(w), body frame.
 ///
-/// Where the iteration of the paper contracts too slowly (a step of a good part of a revolution),
-/// Newton's method takes over.
-pub fn half_kick_implicit(
+/// Eqs 26-28 are iterated to round-off. If this iteration does not converge, as for a step of a
+/// good part of a revolution, Newton's method is used.
+pub fn half_step_implicit(
     inertia: DVec3,
     omega: DVec3,
     torque: DVec3,
@@ -45,10 +44,10 @@ pub fn half_kick_implicit(
 ) -> DVec3 {
     const PICARD: usize = 40;
     const NEWTON: usize = 20;
-    let mut guess = half_kick_explicit(inertia, omega, torque, damping, half_step);
+    let mut guess = half_step_explicit(inertia, omega, torque, damping, half_step);
     let mut last = f64::INFINITY;
     for _ in 0..PICARD {
-        let next = half_kick_explicit(inertia, guess, torque, damping, half_step) - guess + omega;
+        let next = half_step_explicit(inertia, guess, torque, damping, half_step) - guess + omega;
         let change = (next - guess).length_squared();
         if !change.is_finite() {
             break;
@@ -89,20 +88,21 @@ pub fn half_kick_implicit(
     guess
 }
 
-/// Turns an orientation over `step` [s] at the mid-step angular velocity `omega` [rad/s, body
-/// frame] by the time-centred rule of Eqs 34-36, B^-1 B^T q, which is the Cayley map: a turn by
-/// 4 atan(|omega| step / 4) about omega. Keeps |q| = 1.
-pub fn turn_by_cayley(orientation: DQuat, omega: DVec3, step: f64) -> DQuat {
+/// Rotates an orientation over `step` [s] at the mid-step angular velocity `omega` [rad/s, body
+/// frame] by the time-centred rule of Eqs 34-36, B^-1 B^T q.
+///
+/// This is the Cayley map: a rotation by 4 atan(|omega| step / 4) about omega with |q| = 1.
+pub fn rotate_by_cayley(orientation: DQuat, omega: DVec3, step: f64) -> DQuat {
     let beta = omega * (0.25 * step);
     let square = beta.length_squared();
-    let turn = DQuat::from_xyzw(2.0 * beta.x, 2.0 * beta.y, 2.0 * beta.z, 1.0 - square)
+    let rotation = DQuat::from_xyzw(2.0 * beta.x, 2.0 * beta.y, 2.0 * beta.z, 1.0 - square)
         * (1.0 / (1.0 + square));
-    (orientation * turn).normalize()
+    (orientation * rotation).normalize()
 }
 
-/// Turns an orientation over `step` [s] at a constant angular velocity [rad/s, space frame],
-/// exactly; used for prescribed rotations.
-pub fn turn_exactly(orientation: DQuat, omega_space: DVec3, step: f64) -> DQuat {
+/// Rotates an orientation over `step` [s] at a constant, prescribed angular velocity
+/// [rad/s, space frame], without time-step error.
+pub fn rotate_exactly(orientation: DQuat, omega_space: DVec3, step: f64) -> DQuat {
     (DQuat::from_scaled_axis(omega_space * step) * orientation).normalize()
 }
 
@@ -116,12 +116,13 @@ pub fn from_paper_quaternion(q: [f64; 4]) -> DQuat {
     DQuat::from_xyzw(q[1], -q[0], q[2], q[3])
 }
 
-/// A rigid body that turns about its centroid, for use without grains (tests, demonstrations).
+/// Rigid body that rotates about its centroid, without grain or contact, for tests and
+/// demonstrations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rotor {
     /// Principal moments of inertia [kg m^2].
     pub inertia: DVec3,
-    /// Orientation, body -> space.
+    /// Orientation, body to space.
     pub orientation: DQuat,
     /// Angular velocity at integer time [rad/s, body frame].
     pub omega: DVec3,
@@ -131,10 +132,10 @@ impl Rotor {
     /// One step [s] with the torque [N m, space frame] that `torque` gives for an orientation.
     pub fn step(&mut self, step: f64, damping: f64, mut torque: impl FnMut(DQuat) -> DVec3) {
         let before = self.orientation.conjugate() * torque(self.orientation);
-        let mid = half_kick_explicit(self.inertia, self.omega, before, damping, 0.5 * step);
-        self.orientation = turn_by_cayley(self.orientation, mid, step);
+        let mid = half_step_explicit(self.inertia, self.omega, before, damping, 0.5 * step);
+        self.orientation = rotate_by_cayley(self.orientation, mid, step);
         let after = self.orientation.conjugate() * torque(self.orientation);
-        self.omega = half_kick_implicit(self.inertia, mid, after, damping, 0.5 * step);
+        self.omega = half_step_implicit(self.inertia, mid, after, damping, 0.5 * step);
     }
     /// Kinetic energy [J].
     pub fn energy(&self) -> f64 {
@@ -151,13 +152,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_solvers_of_the_implicit_kick_agree_with_the_equation() {
+    fn both_solvers_of_the_implicit_half_step_satisfy_the_equation() {
         let inertia = DVec3::new(1.0, 2.0, 3.0);
         let torque = DVec3::new(0.1, -0.2, 0.3);
-        // The long half step makes the plain iteration diverge, so that Newton has to answer.
+        // At the longest half step the fixed-point iteration diverges and Newton is used.
         for half_step in [1e-3, 0.05, 0.4] {
             let omega = DVec3::new(0.9, -2.0, 1.4);
-            let w = half_kick_implicit(inertia, omega, torque, 0.3, half_step);
+            let w = half_step_implicit(inertia, omega, torque, 0.3, half_step);
             let residual = w - omega - half_step * angular_acceleration(inertia, w, torque, 0.3);
             assert!(
                 residual.length() < 1e-13 * omega.length(),
@@ -167,11 +168,11 @@ mod tests {
     }
 
     #[test]
-    fn small_turns_of_both_kinds_agree() {
+    fn small_rotations_of_both_kinds_agree() {
         let q = DQuat::from_scaled_axis(DVec3::new(0.3, -1.0, 0.5));
         let omega = DVec3::new(0.2, 0.5, -0.7);
-        let cayley = turn_by_cayley(q, omega, 1e-3);
-        let exact = turn_exactly(q, q * omega, 1e-3);
+        let cayley = rotate_by_cayley(q, omega, 1e-3);
+        let exact = rotate_exactly(q, q * omega, 1e-3);
         assert!((cayley - exact).length() < 1e-10);
     }
 }
