@@ -11,7 +11,7 @@ use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
 use grainwake_solver::math::{Formula, Pose, Precision};
-use grainwake_solver::sim::{Drive, Setup, Simulation, StepRule};
+use grainwake_solver::sim::{PrescribedMotion, Setup, Simulation, StepRule};
 
 /// Steps limited by this Courant number.
 const fn limits(cfl: f64) -> StepRule {
@@ -467,7 +467,7 @@ fn load_of_a_prescribed_grain_does_not_depend_on_its_density() {
         let mut case = setup([24, 24, 24], 1.0 / 8.0, [WALLS; 3], 0.05, vec![ball]);
         case.step = StepRule::Fixed(0.01);
         let shaken = ["0".into(), "0".into(), "sin(9*t)".into()];
-        case.prescription.motions = vec![Drive {
+        case.prescription.motions = vec![PrescribedMotion {
             grain: 0,
             velocity: Some(Formula::parse(shaken, &["t"]).unwrap()),
             angular_velocity: None,
@@ -524,7 +524,7 @@ fn a_shaken_sphere_moves_as_its_formula_says() {
         vec![sphere(1.0, DVec3::new(2.0, 2.0, 2.0), 2.0)],
     );
     let formula = |z: &str| Formula::parse(["0".into(), "0".into(), z.into()], &["t"]).unwrap();
-    shaken.prescription.motions = vec![Drive {
+    shaken.prescription.motions = vec![PrescribedMotion {
         grain: 0,
         velocity: Some(formula("0.4*sin(3*t)")),
         angular_velocity: Some(formula("0.2*cos(3*t)")),

@@ -8,12 +8,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::math::Pose;
 
-/// Whether the three components of a velocity follow the dynamics or are given.
+/// Whether the three components of a velocity follow the equations of motion or are prescribed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Dof {
     /// Follows Newton's (Euler's) law.
     Free,
-    /// Held at this velocity [m/s] or angular velocity [rad/s, space frame]; zero holds still.
+    /// Velocity [m/s] or angular velocity [rad/s, space frame] over the next step; zero holds the
+    /// grain still.
     Prescribed(DVec3),
 }
 

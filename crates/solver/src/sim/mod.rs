@@ -21,12 +21,12 @@ use crate::immersed::{GrainKinematics, PreviousStep};
 use crate::math::{Load, Pose};
 use crate::poisson::Stages;
 
+use clock::Clock;
 use fluid::Fluid;
 use timing::PassTimes;
 
-pub use clock::Clock;
 pub use diagnostics::Diagnostics;
-pub use prescription::{Drive, Prescription};
+pub use prescription::{PrescribedMotion, Prescription};
 pub use setup::{Setup, SetupError, StepRule};
 pub use stability::StepError;
 
@@ -55,9 +55,7 @@ struct GrainData {
     /// Mean contact loads.
     contact: Vec<Load>,
     responses: Vec<Response>,
-    /// Whether contact was resolved with the fluid's response.
-    resolved: bool,
-    /// States at the end of the sub-steps that were repeated.
+    /// States at the end of the contact sub-steps with the fluid's response.
     ends: Vec<State>,
     /// Poses at which the faces near the grains were found.
     located: Vec<Pose>,
@@ -73,7 +71,6 @@ impl GrainData {
             driving: vec![Load::default(); count],
             contact: vec![Load::default(); count],
             responses: Vec::with_capacity(count),
-            resolved: false,
             ends: grains.iter().map(State::of).collect(),
             located: grains.iter().map(|grain| grain.pose).collect(),
         }

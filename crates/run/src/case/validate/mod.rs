@@ -123,8 +123,8 @@ pub(super) fn validate(
         return Err(CaseError::Invalid(check.problems));
     }
     let mut grains: Vec<Grain> = standing.into_iter().flatten().collect();
-    prescription.motions = grains::drives(&resolved);
-    prescription.drive(&mut grains, 0.0);
+    prescription.motions = grains::prescribed_motions(&resolved);
+    prescription.prescribe_motion(&mut grains, 0.0);
     arrangement::check(&mut check, &grains, &sites, &enclosure);
     if dry && grains.is_empty() {
         check.fail(
