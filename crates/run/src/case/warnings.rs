@@ -285,14 +285,11 @@ fn of_numbers(setup: &Setup, e: &Estimate) -> Vec<String> {
         found.push(format!("a grain at its settling speed would overlap by {:.0} % of its diameter at impact: raise [contact] stiffness", 100.0 * overlap));
     }
     if let StepRule::Fixed(step) = setup.step {
-        let limits = Setup {
-            step: StepRule::Limits {
-                cfl: 0.6,
-                viscous: 0.216,
-                max_step: f64::INFINITY,
-            },
-            ..setup.clone()
-        };
+        let limits = setup.clone().with_step(StepRule::Limits {
+            cfl: 0.6,
+            viscous: 0.216,
+            max_step: f64::INFINITY,
+        });
         let most = time_step(&limits, e.settling_speed_m_per_s.unwrap_or(0.0));
         if step > most {
             found.push(format!(

@@ -20,9 +20,9 @@ pub(super) struct Clock {
 
 /// Largest ratio of successive steps: Adams-Bashforth extrapolates over the previous step.
 const LARGEST_GROWTH: f64 = 1.2;
-/// Margin below the stability limit within which one step fewer to the next output is accepted; it
-/// keeps the number of steps from alternating between two values.
-const GROWTH_MARGIN: f64 = 0.95;
+/// Fraction of the stability limit up to which one step fewer to the next output is taken; this
+/// hysteresis keeps the number of steps from alternating.
+const HYSTERESIS: f64 = 0.95;
 
 impl Clock {
     /// Clock at t = 0.
@@ -88,7 +88,7 @@ impl Clock {
         // LARGEST_GROWTH alone never reaches a fourth of an interval from a fifth.
         let fewer = horizon / (count - 1.0);
         let as_before = self.last_step * count >= horizon * (1.0 - 1e-9);
-        if count > 1.0 && as_before && fewer <= GROWTH_MARGIN * largest {
+        if count > 1.0 && as_before && fewer <= HYSTERESIS * largest {
             fewer
         } else {
             horizon / count

@@ -29,8 +29,8 @@ pub struct PrescribedMotion {
 }
 
 impl Prescription {
-    /// Prescribes the velocities at `time` [s] to the grains: as their degrees of freedom over the next
-    /// step, and as their present velocities.
+    /// Prescribes the velocities at `time` [s] to the grains: as their degrees of freedom over the
+    /// next step, and as their present velocities.
     pub fn prescribe_motion(&self, grains: &mut [Grain], time: f64) {
         self.set_velocities(grains, time);
         for motion in &self.motions {
@@ -57,8 +57,8 @@ impl Prescription {
         }
     }
 
-    /// Largest sum of the absolute components of the initial velocity [m/s], sampled at about thirty
-    /// points along each axis of `mesh`; NaN if a formula is undefined at one of them.
+    /// Largest sum of the absolute components of the initial velocity [m/s], sampled at about
+    /// thirty points along each axis of `mesh`; NaN if a formula is undefined at one of them.
     pub fn initial_speed(&self, mesh: &Mesh) -> Option<f64> {
         let formula = self.initial_velocity.as_ref()?;
         let points = |axis: usize| {

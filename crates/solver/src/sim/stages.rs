@@ -69,9 +69,9 @@ pub(super) struct Projected<'a>(Context<'a>, Substeps, DVec3);
 /// Which contact sub-steps determine the poses at the end of the step.
 #[derive(Clone, Copy)]
 enum Substeps {
-    /// Those under the hydrodynamic load of the last step: no grain was touched.
+    /// Sub-steps under the hydrodynamic load of the last step, if no grain was touched.
     Explicit,
-    /// Those with the response of the fluid in this step.
+    /// Repeated sub-steps with the response of the fluid in this step.
     WithResponse,
 }
 
@@ -162,8 +162,8 @@ impl<'a> Predicted<'a> {
 }
 
 impl<'a> Moved<'a> {
-    /// Locates the grains and assembles their equations of motion with the impulse of the fluid. The
-    /// paper's scheme projects the prediction first.
+    /// Locates the grains and assembles their equations of motion with the impulse of the fluid.
+    /// The paper's scheme projects the prediction first.
     pub fn couple(self) -> Coupled<'a> {
         let Moved(mut step) = self;
         let Context { solid, flow } = &mut step;
@@ -253,7 +253,8 @@ impl Projected<'_> {
             // The fluid lost what it gave the grain, the displaced fluid included.
             residual -= density * grain.shape.volume() * change.linear - dt * load.force;
             let touched = data.contact[i] != Load::default();
-            // The acceleration of an impact does not continue in the next step; its added mass does.
+            // The acceleration of an impact does not continue in the next step; its added mass
+            // does.
             (previous.acceleration, previous.pending_added_mass_velocity) = if touched {
                 (
                     RigidVelocity::default(),

@@ -3,7 +3,21 @@
 use super::stages::Start;
 use super::{Simulation, StepError};
 
+/// Relative difference below which two times count as equal.
+const SAME_TIME: f64 = 1e-9;
+
 impl Simulation {
+    /// Advances the simulation to `time` [s], in steps of which the last ends there.
+    ///
+    /// # Errors
+    /// [`StepError::Unstable`] as in [`Simulation::step`].
+    pub fn advance_to(&mut self, time: f64) -> Result<(), StepError> {
+        while self.clock.time < time * (1.0 - SAME_TIME) {
+            self.step(time - self.clock.time)?;
+        }
+        Ok(())
+    }
+
     /// Advances the simulation by one time step. Its length is chosen by the
     /// [`StepRule`](super::StepRule) and such that a whole number of equal steps ends `horizon` [s]
     /// from now, which makes output times exact; an infinite horizon imposes no such condition.

@@ -152,19 +152,16 @@ pub(super) fn validate(
     let (Some(contact), Some(step)) = (contact, step) else {
         return Err(CaseError::Invalid(check.problems));
     };
-    let scheme = raw.coupling.scheme.value;
-    let setup = Setup {
-        mesh,
-        boundaries,
-        fluid: fluid_params.copied(),
-        precision: raw.run.precision.value,
-        scheme,
-        gravity,
-        grains,
-        contact,
-        step,
-        prescription,
-    };
+    let setup = Setup::new(mesh)
+        .with_boundaries(boundaries.0)
+        .with_fluid(fluid_params.copied())
+        .with_precision(raw.run.precision.value)
+        .with_scheme(raw.coupling.scheme.value)
+        .with_gravity(gravity)
+        .with_grains(grains)
+        .with_contact(contact)
+        .with_step(step)
+        .with_prescription(prescription);
     let plan = plan::plan(&mut check, &raw.time, &mut raw.output, &setup, vertical.0);
     let expect = expectations(
         &raw.expect,
