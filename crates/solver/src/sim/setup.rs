@@ -69,7 +69,7 @@ pub struct Setup {
 /// Set-up that cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
-    /// Some values contradict each other.
+    /// Contradiction between values.
     #[error("{0}")]
     Inconsistent(String),
 }

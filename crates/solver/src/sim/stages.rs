@@ -66,7 +66,7 @@ pub(super) struct Rigid<'a>(Context<'a>, Substeps);
 /// Divergence-free velocity; with the momentum of the fluid before the projection.
 pub(super) struct Projected<'a>(Context<'a>, Substeps, DVec3);
 
-/// Which contact sub-steps determine the poses at the end of the step.
+/// Contact sub-steps that determine the poses at the end of a step.
 #[derive(Clone, Copy)]
 enum Substeps {
     /// Sub-steps under the hydrodynamic load of the last step, if no grain was touched.
