@@ -104,7 +104,7 @@ fn of_given_motions(setup: &Setup, end: f64) -> Vec<String> {
     let (mut grains, enclosure) = (setup.grains.clone(), setup.enclosure());
     let dt = end / f64::from(STEPS);
     let motions = setup.prescription.motions.iter();
-    let driven: Vec<usize> = motions.map(|drive| drive.grain).collect();
+    let driven: Vec<usize> = motions.map(|motion| motion.grain).collect();
     let moves = |index: &usize| match grains[*index].translation {
         Dof::Prescribed(velocity) => velocity != DVec3::ZERO || driven.contains(index),
         Dof::Free => false,
@@ -114,7 +114,7 @@ fn of_given_motions(setup: &Setup, end: f64) -> Vec<String> {
     let mut gone = vec![false; grains.len()];
     for step in 0..STEPS {
         let middle = (f64::from(step) + 0.5) * dt;
-        setup.prescription.drive(&mut grains, middle);
+        setup.prescription.prescribe_motion(&mut grains, middle);
         for &index in &moving {
             if gone[index] {
                 continue;
@@ -298,14 +298,11 @@ fn of_numbers(setup: &Setup, e: &Estimate) -> Vec<String> {
         ));
     }
     if let StepRule::Fixed(step) = setup.step {
-        let limits = Setup {
-            step: StepRule::Limits {
-                cfl: 0.6,
-                viscous: 0.216,
-                max_step: f64::INFINITY,
-            },
-            ..setup.clone()
-        };
+        let limits = setup.clone().with_step(StepRule::Limits {
+            cfl: 0.6,
+            viscous: 0.216,
+            max_step: f64::INFINITY,
+        });
         let most = time_step(&limits, e.settling_speed_m_per_s.unwrap_or(0.0));
         if step > most {
             found.push(format!(

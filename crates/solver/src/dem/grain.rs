@@ -2,19 +2,20 @@
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use grainwake_shape::Shape;
 use serde::{Deserialize, Serialize};
 
 use super::material::Material;
 use crate::math::Pose;
 
-/// Whether a velocity follows from the equation of motion or is prescribed.
+/// Whether the three components of a velocity follow the equations of motion or are prescribed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Dof {
     /// Newton's or Euler's equation determines the velocity.
     Free,
-    /// Prescribed velocity [m/s] or angular velocity [rad/s, space frame]; zero fixes the grain.
+    /// Velocity [m/s] or angular velocity [rad/s, space frame] over the next step; zero holds the
+    /// grain still.
     Prescribed(DVec3),
 }
 
@@ -40,6 +41,54 @@ pub struct Grain {
 }
 
 impl Grain {
+    /// Free grain of `density` [kg/m^3] at rest at the origin.
+    pub fn new(shape: impl Into<Arc<Shape>>, density: f64) -> Grain {
+        Grain {
+            shape: shape.into(),
+            density,
+            material: Material::default(),
+            pose: Pose {
+                position: DVec3::ZERO,
+                orientation: DQuat::IDENTITY,
+            },
+            velocity: DVec3::ZERO,
+            angular_velocity: DVec3::ZERO,
+            translation: Dof::Free,
+            rotation: Dof::Free,
+        }
+    }
+    /// Replaces the position of the centroid [m].
+    pub fn with_position(mut self, position: DVec3) -> Grain {
+        self.pose.position = position;
+        self
+    }
+    /// Replaces the orientation (body frame to space frame).
+    pub fn with_orientation(mut self, orientation: DQuat) -> Grain {
+        self.pose.orientation = orientation;
+        self
+    }
+    /// Replaces the material.
+    pub fn with_material(mut self, material: Material) -> Grain {
+        self.material = material;
+        self
+    }
+    /// Replaces the initial velocity of the centroid [m/s].
+    pub fn with_velocity(mut self, velocity: DVec3) -> Grain {
+        self.velocity = velocity;
+        self
+    }
+    /// Replaces the initial angular velocity, space frame [rad/s].
+    pub fn with_angular_velocity(mut self, angular_velocity: DVec3) -> Grain {
+        self.angular_velocity = angular_velocity;
+        self
+    }
+    /// Holds the grain still.
+    pub fn held(mut self) -> Grain {
+        (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
+        (self.translation, self.rotation) =
+            (Dof::Prescribed(DVec3::ZERO), Dof::Prescribed(DVec3::ZERO));
+        self
+    }
     /// Mass [kg].
     pub fn mass(&self) -> f64 {
         self.density * self.shape.volume()

@@ -53,12 +53,12 @@ impl Boundaries {
     }
 
     /// Axes whose lower boundary face is given, not an unknown.
-    pub fn walled(&self) -> [bool; 3] {
+    pub(crate) fn walled(&self) -> [bool; 3] {
         [0, 1, 2].map(|axis| !self.is_periodic(axis))
     }
 
     /// Conditions on the pressure that go with the faces.
-    pub fn pressure_ends(&self) -> [Ends; 3] {
+    pub(crate) fn pressure_ends(&self) -> [Ends; 3] {
         [0, 1, 2].map(|axis| {
             if self.is_periodic(axis) {
                 Ends::Periodic

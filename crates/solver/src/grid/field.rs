@@ -13,13 +13,15 @@ use std::ops::{Deref, DerefMut};
 
 use glam::DVec3;
 
-use super::Mesh;
+use super::{Axis, FieldView, Mesh};
 use crate::math::{Aligned, Real};
 
 /// A place on the staggered cell.
 pub trait Location: Copy + Send + Sync + 'static {
     /// Offset from the cell's lower corner in units of the spacing.
     const OFFSET: [f64; 3];
+    /// Axis normal to the faces; none for cell centres.
+    const NORMAL: Option<Axis>;
 }
 
 /// Cell centres.
@@ -37,15 +39,19 @@ pub struct FaceZ;
 
 impl Location for Centre {
     const OFFSET: [f64; 3] = [0.5, 0.5, 0.5];
+    const NORMAL: Option<Axis> = None;
 }
 impl Location for FaceX {
     const OFFSET: [f64; 3] = [0.0, 0.5, 0.5];
+    const NORMAL: Option<Axis> = Some(Axis::X);
 }
 impl Location for FaceY {
     const OFFSET: [f64; 3] = [0.5, 0.0, 0.5];
+    const NORMAL: Option<Axis> = Some(Axis::Y);
 }
 impl Location for FaceZ {
     const OFFSET: [f64; 3] = [0.5, 0.5, 0.0];
+    const NORMAL: Option<Axis> = Some(Axis::Z);
 }
 
 /// Offsets of the three face locations, indexed by axis.
@@ -77,10 +83,6 @@ impl Layout {
     /// Entries of a field, ghosts included, without what fills up its rows.
     pub fn entries(&self) -> usize {
         self.cells.iter().map(|n| n + 2).product()
-    }
-    /// A layout always has ghosts, so it is never empty.
-    pub fn is_empty(&self) -> bool {
-        false
     }
     /// The rows of a field, ghosts included, without what fills them up.
     pub fn rows<'a, T>(
@@ -126,16 +128,6 @@ impl Layout {
             0 => (0..outer * middle).for_each(|line| f(line * row + layer)),
             1 => (0..outer).for_each(|k| (0..row).for_each(|i| f(k * plane + layer * row + i))),
             _ => (0..plane).for_each(|at| f(layer * plane + at)),
-        }
-    }
-    /// Calls `f` with the memory position of every entry of a layer, without ghosts.
-    pub fn each_inside_layer(&self, axis: usize, layer: usize, mut f: impl FnMut(usize)) {
-        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-        let strides = self.strides();
-        for second in 1..=self.cells[b] {
-            for first in 1..=self.cells[a] {
-                f(layer * strides[axis] + first * strides[a] + second * strides[b]);
-            }
         }
     }
     /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.
@@ -188,6 +180,10 @@ impl<L: Location, R: Real> Field<L, R> {
     #[inline]
     pub fn layout(&self) -> Layout {
         self.layout
+    }
+    /// Read-only view of all values without ghosts.
+    pub fn view<'a>(&'a self, mesh: &Mesh) -> FieldView<'a, R> {
+        FieldView::new(self, mesh, L::NORMAL)
     }
     /// Value at (i, j, k); ghosts at 0 and n+1.
     #[cfg(test)]
@@ -279,6 +275,10 @@ impl<R: Real> FaceVector<R> {
             y: Field::zeros(mesh),
             z: Field::zeros(mesh),
         }
+    }
+    /// Read-only view of one component without ghosts.
+    pub fn view<'a>(&'a self, axis: Axis, mesh: &Mesh) -> FieldView<'a, R> {
+        FieldView::new(self.component(axis as usize), mesh, Some(axis))
     }
     /// Raw values of one component.
     #[inline]

@@ -27,6 +27,14 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Mesh of cubic cells of edge `spacing` [m] with its lower corner at the origin.
+    pub fn cubic(cells: [usize; 3], spacing: f64) -> Mesh {
+        Mesh {
+            cells,
+            spacing: DVec3::splat(spacing),
+            origin: DVec3::ZERO,
+        }
+    }
     /// Number of cells.
     pub fn cell_count(&self) -> usize {
         self.cells.iter().product()
@@ -49,7 +57,7 @@ impl Mesh {
         self.origin + self.extent()
     }
     /// Memory layout of its fields.
-    pub fn layout(&self) -> Layout {
+    pub(crate) fn layout(&self) -> Layout {
         Layout { cells: self.cells }
     }
     /// Position [m] of the point `offset` (in spacings from the lower corner) of cell `index`,

@@ -55,8 +55,12 @@ impl RigidBodySystem {
                 a[3 + row][3 + column] += (inertia + virtual_mass.inertia).col(column)[row];
             }
         }
-        prescribe(&mut a, &mut b, 0, grain.translation);
-        prescribe(&mut a, &mut b, 3, grain.rotation);
+        if grain.translation != Dof::Free {
+            prescribe(&mut a, &mut b, 0, grain.velocity);
+        }
+        if grain.rotation != Dof::Free {
+            prescribe(&mut a, &mut b, 3, grain.angular_velocity);
+        }
         RigidBodySystem {
             matrix: a,
             right: b,
@@ -162,12 +166,10 @@ impl RigidBodySystem {
 }
 
 /// Replaces three equations by prescribed velocities.
-fn prescribe(a: &mut Matrix6, b: &mut Vector6, first: usize, dof: Dof) {
-    if let Dof::Prescribed(velocity) = dof {
-        for i in 0..3 {
-            a[first + i] = [0.0; 6];
-            a[first + i][first + i] = 1.0;
-            b[first + i] = velocity[i];
-        }
+fn prescribe(a: &mut Matrix6, b: &mut Vector6, first: usize, velocity: DVec3) {
+    for i in 0..3 {
+        a[first + i] = [0.0; 6];
+        a[first + i][first + i] = 1.0;
+        b[first + i] = velocity[i];
     }
 }
