@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::access::AccessLog;
 use super::forcing::{ForcedFaces, ForcingParams};
 use super::geometry::Locator;
-use super::ownership::RowClaims;
 use super::scheme::Scheme;
 use super::scratch::ScratchPool;
 use super::update::{GrainUpdate, ImmersedGrain, ThreadScratch, locate_and_weigh};
@@ -22,7 +22,8 @@ pub struct ImmersedGrains<R> {
     pub(super) scratch: ScratchPool<ThreadScratch<R>>,
     /// Memory of the updates between steps.
     pub(super) updates: Vec<GrainUpdate>,
-    pub(super) claims: RowClaims,
+    /// Accesses to the prediction in this step.
+    pub(super) access: AccessLog,
     mesh: Mesh,
     kinematic_viscosity: f64,
 }
@@ -43,7 +44,7 @@ impl<R: Real> ImmersedGrains<R> {
             grains: grains.iter().map(|_| ImmersedGrain::default()).collect(),
             scratch: ScratchPool::default(),
             updates: Vec::with_capacity(grains.len()),
-            claims: RowClaims::default(),
+            access: AccessLog::default(),
             mesh: *flow.mesh(),
             kinematic_viscosity,
         };

@@ -18,7 +18,7 @@ use crate::grid::Mesh;
 use crate::immersed::geometry::{FaceRow, LocatedBody};
 use crate::immersed::kinematics::GrainKinematics;
 use crate::math::Real;
-use grainwake_simd::{Kernel, Vector, dispatch, prefetch_ahead};
+use grainwake_simd::{Kernel, Vector, dispatch};
 
 /// Change of the tendency of each face near a grain [m/s^2], by component, in the order of
 /// [`LocatedBody::distance`].
@@ -64,18 +64,6 @@ pub fn add_correction<R: Real>(
         correction: &correction[component],
         prediction,
     });
-}
-
-/// Prefetches what [`find_correction`] reads for the grain at `body`.
-pub fn prefetch_velocity<R: Real>(known: &Known<R>, body: &LocatedBody) {
-    for component in 0..3 {
-        (body.index_map).prefetch(known.velocity.component(component));
-        let (spans, rows) = (&body.spans[component], &body.rows[component]);
-        let distances = &body.distance[component];
-        prefetch_ahead(spans, 0, spans.len());
-        prefetch_ahead(rows, 0, rows.len());
-        prefetch_ahead(distances, 0, distances.len());
-    }
 }
 
 struct AddCorrection<'a, 'b, R> {

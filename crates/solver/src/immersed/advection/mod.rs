@@ -5,6 +5,4 @@ mod correction;
 mod links;
 mod weights;
 
-pub use correction::{
-    AdvectionCorrection, AdvectionScratch, add_correction, find_correction, prefetch_velocity,
-};
+pub use correction::{AdvectionCorrection, AdvectionScratch, add_correction, find_correction};

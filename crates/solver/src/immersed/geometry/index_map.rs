@@ -7,7 +7,6 @@ use glam::IVec3;
 use crate::flow::Boundaries;
 use crate::grid::Mesh;
 use crate::math::Real;
-use grainwake_simd::{prefetch, prefetch_ahead};
 
 /// Degrees of freedom of the grid: which faces and cells are unknowns, and where they are stored.
 #[derive(Clone, Copy)]
@@ -19,8 +18,6 @@ pub struct DofMask {
 
 /// Cells beyond the box on each side for which positions are tabulated.
 pub const PAD: i32 = 3;
-/// Rows by which prefetching leads copying.
-const ROWS_AHEAD: usize = 4;
 /// Marks a face or cell that is no unknown: larger than any position, also in sums.
 const NONE: usize = 1 << 60;
 
@@ -165,37 +162,13 @@ impl IndexMap {
         first..last + 1
     }
 
-    /// Prefetches a field in the padded box, except for the corners, which no link reads.
-    pub fn prefetch<R>(&self, field: &[R]) {
-        let [x, y, z] = &self.offsets;
-        let [per_row, per_plane] = [y.len(), z.len()].map(|count| 1.0 / count as f32);
-        for (k, plane) in z.iter().enumerate() {
-            // Distance from the middle: 0 there, 1 at the ends of the box.
-            let from_middle = ((2 * k + 1) as f32 * per_plane - 1.0).abs();
-            for (j, row) in y.iter().enumerate() {
-                let distance = from_middle + ((2 * j + 1) as f32 * per_row - 1.0).abs();
-                if distance > 1.2 {
-                    continue;
-                }
-                // Approximates the faces within a ball, with three more on each side.
-                let fraction = (1.02 - 0.6 * distance).min(1.0);
-                let count = (fraction * x.len() as f32) as usize;
-                let first = x[0] + (x.len() - count) / 2 + row + plane;
-                prefetch_ahead(field, first, count);
-            }
-        }
-    }
-
     /// Copies a field in the padded box, x fastest.
     pub fn copy<R: Real>(&self, field: &[R], to: &mut Vec<R>) {
         to.clear();
         let [x, y, z] = &self.offsets;
         let contiguous = x[x.len() - 1] == x[0] + x.len() - 1;
         for plane in z {
-            for (j, row) in y.iter().enumerate() {
-                if let Some(row) = y.get(j + ROWS_AHEAD) {
-                    prefetch(field, x[0] + row + plane, x.len());
-                }
+            for row in y {
                 if contiguous {
                     to.extend_from_slice(&field[x[0] + row + plane..][..x.len()]);
                 } else {
