@@ -26,12 +26,12 @@ impl<'a, R: Real> BoxVelocity<'a, R> {
         // Links end at walls, so only periodic edges need a copy, and rows shorter than a register.
         let direct = layout.cells[0] >= MOST
             && (0..3).all(|axis| {
-                let high = body.first[axis] + body.size[axis] + PAD - 1;
-                walled[axis] || body.first[axis] >= PAD && high <= layout.cells[axis] as i32 + 1
+                let high = body.lowest[axis] + body.size[axis] + PAD - 1;
+                walled[axis] || body.lowest[axis] >= PAD && high <= layout.cells[axis] as i32 + 1
             });
         if direct {
             let strides = layout.strides();
-            let along = |axis: usize| (body.first[axis] as usize).wrapping_mul(strides[axis]);
+            let along = |axis: usize| (body.lowest[axis] as usize).wrapping_mul(strides[axis]);
             return BoxVelocity {
                 components: [0, 1, 2].map(|axis| velocity.component(axis)),
                 strides,

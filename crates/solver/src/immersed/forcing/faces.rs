@@ -55,14 +55,14 @@ impl ForcedFaces {
             list.resize(count + MOST, 0.0);
         }
         self.closed_by_all.clear();
-        if !band.contested.is_empty() {
+        if !band.shared.is_empty() {
             self.closed_by_all.extend_from_slice(&self.closed);
-            self.share_contested(params, band, neighbours, shapes);
+            self.share_faces(params, band, neighbours, shapes);
         }
     }
 
     /// Divides the forcing of contested faces among the grains.
-    fn share_contested(
+    fn share_faces(
         &mut self,
         params: &ForcingParams,
         band: &BandFaces,
@@ -70,7 +70,7 @@ impl ForcedFaces {
         shapes: &NarrowBandShapes,
     ) {
         let limit = 2.0 * params.eps;
-        for &(entry, x) in &band.contested {
+        for &(entry, x) in &band.shared {
             let (d, normal) = band.face(entry);
             if params.scheme == Scheme::Aperture && d <= -params.eps {
                 // Deep inside, the face belongs to this grain alone.

@@ -122,15 +122,6 @@ impl IndexMap {
             let below = offset(0, false, i - down.x) + row_below;
             (at < NONE && below < NONE).then_some((at, below))
         };
-        // Positions increase by one or jump back at a periodic edge: if the ends match, all do.
-        if let (Some(first), Some(last)) = (positions(range.start), positions(range.end - 1)) {
-            let steps = range.len() - 1;
-            if last == (first.0 + steps, first.1 + steps) {
-                let (at, below) = first;
-                parts.push(RowPart { range, at, below });
-                return;
-            }
-        }
         let mut i = range.start;
         while i < range.end {
             let Some((at, below)) = positions(i) else {
@@ -138,12 +129,8 @@ impl IndexMap {
                 continue;
             };
             let start = i;
-            i += 1;
-            while i < range.end {
-                let steps = (i - start) as usize;
-                if positions(i) != Some((at + steps, below + steps)) {
-                    break;
-                }
+            let next = |i: i32| Some((at + (i - start) as usize, below + (i - start) as usize));
+            while i < range.end && positions(i) == next(i) {
                 i += 1;
             }
             let range = start..i;

@@ -69,11 +69,11 @@ impl Locator {
         self.shapes.bytes()
     }
 
-    /// Finds the neighbours of all grains, before [`Locator::locate`]. `travel(i)` [m] is the
-    /// displacement of grain i whose last position counts as well.
-    pub fn find_neighbours(&mut self, grains: &[Grain], travel: impl Fn(usize) -> f64) {
+    /// Finds the neighbours of all grains, before [`Locator::locate`]. `displacement(i)` [m] leads from
+    /// the last pose of grain i, whose faces count as well; 0 if they do not.
+    pub fn find_neighbours(&mut self, grains: &[Grain], displacement: impl Fn(usize) -> f64) {
         self.neighbours
-            .update(&self.mesh, &self.mask, self.reach, grains, travel);
+            .update(&self.mesh, &self.mask, self.reach, grains, displacement);
     }
 
     /// Neighbours of grain `index`.
@@ -120,17 +120,17 @@ impl Locator {
         for axis in 0..3 {
             let (h, n) = (mesh.spacing[axis], mesh.cells[axis] as i32);
             if n == 1 {
-                (body.first[axis], body.size[axis]) = (1, 1);
+                (body.lowest[axis], body.size[axis]) = (1, 1);
                 continue;
             }
             // Limited so that positions in an unstable run do not overflow before it is stopped.
             let cell = |x: f64| ((x - mesh.origin[axis]) / h).floor().clamp(-1e9, 1e9) as i32;
             let from = cell(middle[axis] - span[axis] - self.reach);
             let to = cell(middle[axis] + span[axis] + self.reach);
-            body.first[axis] = from + 1;
-            body.size[axis] = to + 2 - body.first[axis];
+            body.lowest[axis] = from + 1;
+            body.size[axis] = to + 2 - body.lowest[axis];
         }
-        self.mask.map(body.first, body.size, &mut body.index_map);
+        self.mask.map(body.lowest, body.size, &mut body.index_map);
         body.planes = body.index_map.plane_range();
     }
 }

@@ -7,7 +7,6 @@ mod lists;
 mod locator;
 mod narrow_band;
 mod neighbours;
-mod row_bounds;
 mod samples;
 
 pub use index_map::PAD;

@@ -1,8 +1,8 @@
-//! Distances in a narrow band around a grain, a few nanoseconds each.
+//! Signed distance and its gradient in a narrow band around the surface of a grain.
 //!
-//! The sampled field of a shape ends closer to the surface than the band of the flow, and distances
-//! beyond it are searched for. It may also be finer than the flow resolves and so too large for the
-//! cache. Here a wider and, where possible, coarser grid of 16-bit samples replaces it.
+//! The sampled field of a shape ends closer to the surface than the band of the flow, and is often
+//! finer than the flow resolves. A wider and, where possible, coarser sampled field replaces it, which
+//! fits the cache and is evaluated without searching.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -10,9 +10,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use grainwake_shape::{Field, Shape};
 
-use super::samples::{DistanceSamples, FAR, SampleGrid, SampleLocation, load_all, store_all};
+use super::samples::{DistanceSamples, FAR, SampleGrid, load_all, store_all};
 use crate::dem::Grain;
-use crate::math::Aligned;
 use grainwake_simd::{MOST, MOST_PLACES, Vector};
 
 /// Samples per half-width of the band.
@@ -108,47 +107,31 @@ impl NarrowBandShape {
         found.unwrap_or((f64::INFINITY, DVec3::ZERO))
     }
 
-    /// Fills the distances at the first `count` of `points`, in single precision, and replaces the
-    /// points by the gradients. Infinite distances are at least [`FAR`] here. The lists must be
-    /// `MOST` entries longer than `count`; these are overwritten.
+    /// Fills the distances [m] at the first `count` of `points` [m], in single precision, and replaces
+    /// the points by the gradients; both in the frame of the grain. Infinite distances are at least
+    /// [`FAR`] here. The lists must be `MOST` entries longer than `count`; these are overwritten.
     #[inline(always)]
     pub fn fill_distances<V: Vector<Number = f32>>(
         &self,
         points: &mut [&mut [f32]; 3],
         distances: &mut [f32],
         count: usize,
-        scratch: &mut SampleScratch,
     ) {
-        let Some(samples) = &self.samples else {
+        if let Some(samples) = &self.samples {
+            let grid = SampleGrid::<V>::new(samples);
             for at in (0..count).step_by(V::WIDTH) {
-                let x: [V; 3] = load_all(points, at);
-                let (distance, gradient) = match self.shape.field() {
-                    Field::Sphere(radius) => sphere_distance(*radius, x),
-                    _ => self.lane_by_lane(x),
-                };
+                let (distance, gradient) = grid.distance_and_gradient(load_all(points, at));
                 distance.store(&mut distances[at..]);
                 store_all(gradient, points, at);
             }
             return;
-        };
-        // Two loops: the second contains little but loads, so that those of several vectors overlap.
-        let grid = SampleGrid::<V>::new(samples);
-        let SampleScratch { cell, off_grid } = scratch;
-        cell.make_room(count + MOST);
-        off_grid.make_room(count + MOST);
-        let (cell, off_grid) = (&mut cell[..], &mut off_grid[..]);
-        for at in (0..count).step_by(V::WIDTH) {
-            let location = grid.locate(load_all(points, at));
-            location.cell.store(&mut cell[at..]);
-            location.off_grid.store(&mut off_grid[at..]);
-            store_all(location.fraction, points, at);
         }
         for at in (0..count).step_by(V::WIDTH) {
-            let (distance, gradient) = grid.interpolate(SampleLocation {
-                cell: V::load(&cell[at..]),
-                off_grid: V::load(&off_grid[at..]),
-                fraction: load_all(points, at),
-            });
+            let x: [V; 3] = load_all(points, at);
+            let (distance, gradient) = match self.shape.field() {
+                Field::Sphere(radius) => sphere_distance(*radius, x),
+                _ => self.lane_by_lane(x),
+            };
             distance.store(&mut distances[at..]);
             store_all(gradient, points, at);
         }
@@ -172,13 +155,6 @@ impl NarrowBandShape {
         }
         (V::load(&distances), points.map(|lanes| V::load(&lanes)))
     }
-}
-
-/// Buffers of [`NarrowBandShape::fill_distances`].
-#[derive(Default)]
-pub struct SampleScratch {
-    cell: Aligned<f32>,
-    off_grid: Aligned<f32>,
 }
 
 /// Distance from a sphere around the origin, and its gradient.
@@ -260,7 +236,6 @@ mod tests {
         #[inline(always)]
         fn run<V: Vector<Number = f32>>(self) {
             let mut far = 0;
-            let mut scratch = SampleScratch::default();
             for i in 0..2000 {
                 let mut points = [0; 3].map(|_| vec![0.0_f32; 2 * MOST]);
                 for n in 0..MOST {
@@ -271,8 +246,7 @@ mod tests {
                 }
                 let (mut slopes, mut distance) = (points.clone(), [0.0_f32; 2 * MOST]);
                 let mut lists = slopes.each_mut().map(|list| &mut list[..]);
-                self.0
-                    .fill_distances::<V>(&mut lists, &mut distance, MOST, &mut scratch);
+                (self.0).fill_distances::<V>(&mut lists, &mut distance, MOST);
                 for n in 0..MOST {
                     let of = |lists: &[Vec<f32>; 3]| {
                         DVec3::from_array(lists.each_ref().map(|list| f64::from(list[n])))

@@ -1,5 +1,4 @@
-//! Trilinear interpolation in a grid of distance samples, several points at a time. Locating the points
-//! and reading the samples are separate steps, so that each can run in a loop of its own.
+//! Trilinear interpolation in a grid of distance samples, several points at a time.
 
 use std::ops::Deref;
 
@@ -11,7 +10,7 @@ use grainwake_simd::{One, Vector};
 /// Stands for infinity in single precision [m].
 pub const FAR: f64 = 1e30;
 
-/// Loads a vector from each list. (Kernels use no closures on vectors: these would not be inlined.)
+/// Loads a vector from each list. Kernels use no closures on vectors, which would not be inlined.
 #[inline(always)]
 pub fn load_all<V: Vector>([x, y, z]: &[impl Deref<Target = [V::Number]>; 3], at: usize) -> [V; 3] {
     [V::load(&x[at..]), V::load(&y[at..]), V::load(&z[at..])]
@@ -56,10 +55,8 @@ impl DistanceSamples {
     #[inline(always)]
     pub fn distance_and_gradient(&self, x: DVec3) -> Option<(f64, DVec3)> {
         let grid = SampleGrid::new(self);
-        let location = grid.locate([One(x.x), One(x.y), One(x.z)]);
-        let on_grid = location.off_grid.0 <= 0.0;
-        let (distance, [x, y, z]) = grid.interpolate(location);
-        on_grid.then_some((distance.0, DVec3::new(x.0, y.0, z.0)))
+        let (distance, [x, y, z]) = grid.distance_and_gradient(x.to_array().map(One));
+        (distance.0 < FAR).then_some((distance.0, DVec3::new(x.0, y.0, z.0)))
     }
 
     /// Memory held [bytes].
@@ -81,16 +78,6 @@ pub struct SampleGrid<'a, V> {
     /// Gradient per level and spacing.
     slope: V,
     levels: &'a [i16],
-}
-
-/// Location of points in the sample grid.
-pub struct SampleLocation<V> {
-    /// Position of the lowest corner of the cell in the list of levels.
-    pub cell: V,
-    /// Position within the cell along each axis, 0 to 1.
-    pub fraction: [V; 3],
-    /// Distance off the grid, in spacings (sum over the axes).
-    pub off_grid: V,
 }
 
 impl<'a, V: Vector> SampleGrid<'a, V> {
@@ -115,9 +102,10 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
         }
     }
 
-    /// Locates points; those off the grid at the nearest point on it.
+    /// Interpolates signed distance [m] and gradient at `x`, in the frame of the grain. Off the grid
+    /// the distance is [`FAR`].
     #[inline(always)]
-    pub fn locate(&self, x: [V; 3]) -> SampleLocation<V> {
+    pub fn distance_and_gradient(&self, x: [V; 3]) -> (V, [V; 3]) {
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
         let mut cell = [zero; 3];
         let mut fraction = [zero; 3];
@@ -130,20 +118,9 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
             fraction[axis] = nearest - cell[axis];
         }
         let [row, plane] = self.strides;
-        SampleLocation {
-            cell: cell[0] + row * cell[1] + plane * cell[2],
-            fraction,
-            off_grid,
-        }
-    }
-
-    /// Interpolates distance [m] and gradient.
-    #[inline(always)]
-    pub fn interpolate(&self, location: SampleLocation<V>) -> (V, [V; 3]) {
-        let [fx, fy, fz] = location.fraction;
-        let [row, plane] = self.strides;
+        let [fx, fy, fz] = fraction;
         // Value and slope on the four edges along x.
-        let (at, levels) = (location.cell, self.levels);
+        let (at, levels) = (cell[0] + row * cell[1] + plane * cell[2], self.levels);
         let [a, s] = edge(levels, at, fx);
         let [b, t] = edge(levels, at + row, fx);
         let [c, u] = edge(levels, at + plane, fx);
@@ -155,14 +132,15 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
             self.slope * ((b - a) + fz * ((d - c) - (b - a))),
             self.slope * (high - low),
         ];
-        // Points off the grid are so by more than rounding.
         let distance = self.quantum * (low + fz * (high - low));
-        let distance = V::constant(0.0).where_below(location.off_grid, V::constant(FAR), distance);
-        (distance, gradient)
+        (
+            zero.where_below(off_grid, V::constant(FAR), distance),
+            gradient,
+        )
     }
 }
 
-/// Value between the sample `at` and the next along x, and their difference.
+/// Value at the fraction `x` of the edge from sample `at` to the next along x, and their difference.
 #[inline(always)]
 fn edge<V: Vector>(levels: &[i16], at: V, x: V) -> [V; 2] {
     let [low, high] = V::pairs(levels, at);
