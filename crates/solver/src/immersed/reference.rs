@@ -376,7 +376,7 @@ mod tests {
         let impulse = sum_impulse(&known, &predictions, DENSITY, &mut case.forced, before, DT);
         let x = now.to_vector();
         for (row, expected) in expected.into_iter().enumerate() {
-            let slope = impulse.slope[row].iter().zip(x).map(|(m, x)| m * x);
+            let slope = impulse.matrix[row].iter().zip(x).map(|(m, x)| m * x);
             let found = impulse.constant[row] + slope.sum::<f64>();
             assert_close(found, expected, 2e-6 * DENSITY, "impulse");
         }
