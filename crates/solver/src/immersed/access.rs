@@ -1,5 +1,5 @@
-//! Log of the faces that grains read and write at the same time, kept in debug builds to assert that
-//! no thread writes a face that another one uses.
+//! Log of the faces that grains read and write at the same time, kept in debug builds to assert
+//! that no thread writes a face that another one uses.
 
 use std::ops::Range;
 use std::sync::Mutex;

@@ -6,29 +6,29 @@
 //!
 //! | layer | task | data it makes |
 //! |---|---|---|
-//! | `geometry` | distances to faces, index lists, neighbours, aperture | [`geometry::LocatedBody`], [`geometry::BandFaces`] |
-//! | `forcing` | weights of forced faces, impulse on the fluid, rigid velocity on faces | [`forcing::ForcedFaces`], [`forcing::Impulse`] |
-//! | `advection` | correction of the advection at links near a grain | [`advection::AdvectionCorrection`] |
-//! | `rigid_body` | 6 x 6 equations of motion with the impulse | [`rigid_body::RigidBodySystem`] |
-//! | `update`, `schedule` | work on one grain; order of the grains and threads | [`CoupledGrains`] |
+//! | `geometry` | distances to faces, index lists, neighbours | `LocatedBody`, `BandFaces` |
+//! | `forcing` | weights of faces, impulse, rigid velocity on faces | `ForcedFaces`, `Impulse` |
+//! | `advection` | correction at the links near a grain | `AdvectionCorrection` |
+//! | `rigid_body` | 6 x 6 equations of motion with the impulse | `RigidBodySystem` |
+//! | `update`, `schedule` | work on one grain; order of the grains | `CoupledGrains` |
 //!
 //! # Order in a step
 //!
-//! [`ImmersedGrains::couple`] and [`ImmersedGrains::impose_rigidity`] (`schedule.rs`) do, per grain:
+//! `ImmersedGrains::couple` and `ImmersedGrains::impose_rigidity` in `schedule.rs` do for each grain:
 //!
-//! 1. `advection/correction.rs` corrects the predicted velocity u* at the faces where the grain was;
-//! 2. `geometry/locator.rs` finds the faces near the new pose: `distances.rs` evaluates the signed
-//!    distance d, `narrow_band.rs` interpolates it, `lists.rs` stores it;
+//! 1. `advection/correction.rs` corrects the prediction u* next to the last pose of the grain.
+//! 2. `geometry/locator.rs` lists the faces near the new pose. `distances.rs` evaluates their signed
+//!    distances d, `narrow_band.rs` interpolates d, `lists.rs` defines the lists.
 //! 3. `forcing/faces.rs` weighs the forced faces. The solid fraction of a face is 1 - A(d), with the
-//!    aperture A of `geometry/aperture.rs`;
-//! 4. `forcing/impulse.rs` sums the impulse of the fluid on the grain, with opposite sign, as an
-//!    affine function of the six new velocities;
-//! 5. `rigid_body/system.rs` solves for these velocities, contact load included;
-//! 6. `forcing/rigidity.rs` imposes them on the forced faces.
+//!    aperture A of `geometry/aperture.rs`.
+//! 4. `forcing/impulse.rs` sums the impulse J on the fluid as an affine function of the six new
+//!    velocities of the grain. The impulse on the grain is -J.
+//! 5. `rigid_body/system.rs` solves for these velocities, contact load included.
+//! 6. `forcing/rigidity.rs` imposes the velocities on the forced faces.
 //!
-//! An isolated grain passes through 1 to 6 at once. Where grains touch or are close, each of 1, 2 to 4
-//! and 5 to 6 is completed for all of them before the next begins. Between 4 and 5 the caller repeats
-//! the contact sub-steps with [`CoupledGrains::responses`] (`sim/stages.rs`).
+//! An isolated grain passes from 1 to 6 at once. Grains that touch or are close to others are
+//! processed in passes: 1 for all of them, then 2 to 4, then 5 and 6. If grains touch, the caller
+//! (`sim/stages.rs`) repeats the contact sub-steps between 4 and 5, with `CoupledGrains::responses`.
 //!
 //! Every kernel has a plain scalar form in `reference/`, against which it is tested.
 

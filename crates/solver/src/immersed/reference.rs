@@ -1,5 +1,5 @@
-//! Coupling of one isolated grain in plain scalar loops, beside the equations: aperture scheme, grain
-//! away from the sides of the box. The kernels are tested against it.
+//! Coupling of one isolated grain in plain scalar loops, beside the equations: aperture scheme,
+//! grain away from the sides of the box. The kernels are tested against it.
 //!
 //! Legend: d signed distance, n normal, m open depth, A aperture, s weight of the rigid velocity,
 //! c closed fraction, U rigid velocity, J impulse, h spacing.
@@ -60,8 +60,8 @@ impl Reference {
         [strength / (1.0 + strength), 1.0 - aperture(d, eps)]
     }
 
-    /// Velocity that a face gains by rigidity [m/s] (Eqs 4b, 4c), for a grain that had the velocities
-    /// `before` and has the velocities `now`; `predicted` is u* of the face [m/s].
+    /// Velocity that a face gains by rigidity [m/s] (Eqs 4b, 4c), for a grain that had the
+    /// velocities `before` and has the velocities `now`; `predicted` is u* of the face [m/s].
     pub fn gain(
         &self,
         known: &Known<f64>,
@@ -92,7 +92,8 @@ impl Reference {
         rest_gain + s * at(now) + (1.0 - s) * c * at(now - before)
     }
 
-    /// Impulse J on the fluid [N s, N m s]: sum over the faces of their fluid mass times their gain.
+    /// Impulse J on the fluid [N s, N m s]: sum over the faces of their fluid mass times their
+    /// gain.
     pub fn impulse(
         &self,
         known: &Known<f64>,
@@ -116,7 +117,8 @@ impl Reference {
         [a, b, c, d, e, f]
     }
 
-    /// Correction of the advection of a face [m/s^2]: flux in through its lower links less flux out.
+    /// Correction of the advection of a face [m/s^2]: flux in through its lower links less flux
+    /// out.
     pub fn correction(
         &self,
         known: &Known<f64>,
@@ -202,7 +204,8 @@ mod tests {
     const NU: f64 = 0.01;
     const DENSITY: f64 = 1.3;
 
-    /// A rotating sphere in a smooth flow with pressure and body acceleration, after the prediction.
+    /// A rotating sphere in a smooth flow with pressure and body acceleration, after the
+    /// prediction.
     struct Case {
         flow: Flow<f64>,
         grain: Grain,

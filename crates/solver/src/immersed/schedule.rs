@@ -1,8 +1,9 @@
 //! Order in which the grains of a step are processed, and on which threads.
 //!
-//! A grain is isolated if no other grain uses faces near its last or its present pose and no contact
-//! load acts on it. An isolated grain is updated at once from advection to rigidity, while its faces
-//! are in the cache. The others are processed in passes over all of them, for two reasons:
+//! A grain is isolated if no other grain uses faces near its last or its present pose and no
+//! contact load acts on it. An isolated grain is updated at once from advection to rigidity, while
+//! its faces are in the cache. The others are processed in passes over all of them, for two
+//! reasons:
 //!
 //! - the advection next to a grain must be corrected before the impulse of its neighbour is summed;
 //! - contact must be resolved before rigidity is imposed.

@@ -56,8 +56,8 @@ pub struct PendingRigidity {
 }
 
 impl GrainUpdate {
-    /// Gives the grain its new velocities under the mean `contact` load over `dt` [s]; the part that
-    /// its faces have not taken becomes pending.
+    /// Gives the grain its new velocities under the mean `contact` load over `dt` [s]; the part
+    /// that its faces have not taken becomes pending.
     pub fn set_velocities(
         &mut self,
         grain: &mut Grain,
@@ -127,8 +127,8 @@ pub struct CouplingStep<'a, R> {
 }
 
 impl<R: Real> CouplingStep<'_, R> {
-    /// Updates an isolated grain: corrects the advection at its last pose, locates it, solves for its
-    /// velocities and imposes them on `predictions`.
+    /// Updates an isolated grain: corrects the advection at its last pose, locates it, solves for
+    /// its velocities and imposes them on `predictions`.
     pub fn update_isolated(
         &self,
         index: usize,

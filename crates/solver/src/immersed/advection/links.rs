@@ -1,14 +1,16 @@
 //! Fluxes through the links next to one grain, plane by plane.
 //!
-//! A link joins two neighbouring faces of the same component. The correction adds to its flux over h
+//! A link joins two neighbouring faces of the same component. The correction adds to its flux over
+//! h
 //!
-//! (1/A - 1) (q_mean - U_q)(c - U_c) / h + c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60 h).
+//! (1/A - 1) (q_mean - U_q)(c - U_c) / h + c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60
+//! h).
 //!
 //! The second term is the sixth-order mean of six faces less the mean of two. It is left out at the
 //! ends of the grid, where fewer than six faces are in line.
 //!
-//! Legend: q advected component, c advecting velocity, U rigid velocity at the middle of the link, A
-//! aperture of the link, h spacing along the link.
+//! Legend: q advected component, c advecting velocity, U rigid velocity at the middle of the link,
+//! A aperture of the link, h spacing along the link.
 
 use std::ops::Range;
 
@@ -32,9 +34,9 @@ pub struct ComponentLinks<'a, R> {
     /// Indices of the unknown faces along each axis.
     dofs: [Range<i32>; 3],
     axes: [LinkAxis; 3],
-    /// Rigid velocity [m/s] at the middle of link (0, 0, 0), then its change from a link to the next
-    /// along x, y and z. Entries 2 a and 2 a + 1 are U_q and U_c of the links along axis a; the last
-    /// two are unused.
+    /// Rigid velocity [m/s] at the middle of link (0, 0, 0), then its change from a link to the
+    /// next along x, y and z. Entries 2 a and 2 a + 1 are U_q and U_c of the links along axis a;
+    /// the last two are unused.
     rigid: [[f64; 8]; 4],
 }
 
@@ -127,8 +129,8 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         }
     }
 
-    /// Computes the fluxes of the links whose lower faces are in row (j, k). Writes the correction of
-    /// these faces: fluxes in, from the row and the plane before, less fluxes out.
+    /// Computes the fluxes of the links whose lower faces are in row (j, k). Writes the correction
+    /// of these faces: fluxes in, from the row and the plane before, less fluxes out.
     #[inline(always)]
     fn correct_row<V: Vector<Number = f64>>(
         &self,
@@ -219,9 +221,9 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         }
     }
 
-    /// Correction of the flux through links along an axis, over h [m/s^2]; zero where `weight` is -1.
-    /// The links have the indices `index` in their row, their lower faces lie from position `at` on;
-    /// `rigid` holds U of the first link of the row.
+    /// Correction of the flux through links along an axis, over h [m/s^2]; zero where `weight` is
+    /// -1. The links have the indices `index` in their row, their lower faces lie from position
+    /// `at` on; `rigid` holds U of the first link of the row.
     #[inline(always)]
     fn flux<V: Vector<Number = f64>>(
         &self,

@@ -1,4 +1,4 @@
-//! Correction of the advection at links that a grain cuts or is close to.
+//! Correction of the advection at links that a grain cuts or is close to; see `correction.rs`.
 
 mod box_velocity;
 mod correction;

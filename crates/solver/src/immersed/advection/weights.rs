@@ -3,8 +3,8 @@
 //! The weight of a link is 1 / A - 1 for |d| < eps, 0 for eps <= d < 2 eps, and -1 elsewhere, which
 //! marks links without correction. `immersed::reference` has the scalar form.
 //!
-//! Legend: d signed distance of a link, the mean of the distances of its two faces; eps half-width of
-//! the band; A aperture at d.
+//! Legend: d signed distance of a link, the mean of the distances of its two faces; eps half-width
+//! of the band; A aperture at d.
 
 use std::ops::Range;
 
@@ -13,8 +13,8 @@ use crate::immersed::geometry::aperture::inverse_aperture_excess;
 use crate::math::Aligned;
 use grainwake_simd::{Kernel, MOST, Vector, dispatch};
 
-/// The current plane of a component and the next, in rows aligned to registers. One row precedes the
-/// first, and one follows the last.
+/// The current plane of a component and the next, in rows aligned to registers. One row precedes
+/// the first, and one follows the last.
 #[derive(Default)]
 pub struct LinkPlanes {
     /// Entries from one row to the next.
@@ -62,8 +62,8 @@ pub struct ListedFaces {
     pub first: usize,
 }
 
-/// Returns the unknown faces of row (j, k) within reach, if any; `x`, `y` and `z` are the indices of
-/// the unknowns along each axis.
+/// Returns the unknown faces of row (j, k) within reach, if any; `x`, `y` and `z` are the indices
+/// of the unknowns along each axis.
 #[inline(always)]
 pub fn listed_faces(
     body: &LocatedBody,
@@ -83,8 +83,9 @@ pub fn listed_faces(
     })
 }
 
-/// Weighs the links whose lower faces are in plane `k`. Must be called for the planes -1, 0, 1, ... in
-/// order; `dofs` are the indices of the unknowns along each axis, `eps` [m] the half-width of the band.
+/// Weighs the links whose lower faces are in plane `k`. Must be called for the planes -1, 0, 1, ...
+/// in order; `dofs` are the indices of the unknowns along each axis, `eps` [m] the half-width of
+/// the band.
 pub fn weigh_links(
     dofs: &[Range<i32>; 3],
     body: &LocatedBody,

@@ -11,8 +11,8 @@ use grainwake_simd::Vector;
 
 use crate::immersed::geometry::aperture::open_depth;
 
-/// Drag coefficient over kinematic viscosity [1/m^2] of faces at distances `d` [m] with unit normals `n`,
-/// as numerator and positive denominator; very large where a face is closed.
+/// Drag coefficient over kinematic viscosity [1/m^2] of faces at distances `d` [m] with unit
+/// normals `n`, as numerator and positive denominator; very large where a face is closed.
 #[inline(always)]
 pub fn drag<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
     let depth = open_depth(d, eps);

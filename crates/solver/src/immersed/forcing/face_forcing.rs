@@ -103,8 +103,8 @@ impl ForcingParams {
         ([strength, depth], closed)
     }
 
-    /// Forcing of the paper's scheme: the weight of the rigid velocity is the solid fraction of a cell
-    /// cut by a plane.
+    /// Forcing of the paper's scheme: the weight of the rigid velocity is the solid fraction of a
+    /// cell cut by a plane.
     fn blend(&self, d: f64, normal: DVec3) -> FaceForcing {
         let width = normal.abs().dot(self.spacing);
         let solid_fraction = (0.5 - d / width).clamp(0.0, 1.0);

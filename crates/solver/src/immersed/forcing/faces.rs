@@ -6,15 +6,16 @@ use grainwake_simd::{Kernel, MOST, Vector, dispatch};
 
 use super::face_forcing::ForcingParams;
 
-/// Forced faces of one grain. All lists but `runs` have one entry per face, in the order of the runs,
-/// and `MOST` unused entries at the end.
+/// Forced faces of one grain. All lists but `runs` have one entry per face, in the order of the
+/// runs, and `MOST` unused entries at the end.
 #[derive(Clone, Debug, Default)]
 pub struct ForcedFaces {
     /// Positions of the faces, by component.
     pub runs: [Vec<FaceRun>; 3],
     /// Weight of the rigid velocity, 0 to 1.
     pub weight: Vec<f32>,
-    /// Fraction of a face that the grain closes to the pressure gradient (its solid fraction), 0 to 1.
+    /// Fraction of a face that the grain closes to the pressure gradient (its solid fraction), 0 to
+    /// 1.
     pub closed: Vec<f32>,
     /// Fraction of a face that all grains together close; empty if the grain shares no face.
     closed_by_all: Vec<f32>,

@@ -1,9 +1,10 @@
-//! Impulse that a grain's rigidity takes from the fluid, as an affine function of its new velocities.
+//! Impulse that a grain's rigidity takes from the fluid, as an affine function of its new
+//! velocities.
 //!
 //! In a step of dt, a forced face gains with the rigid velocity U, and U_old before it,
 //!
-//! - e = dt / h (p~(above) - p~(below)) - dt g, if the step's pressure gradient and body acceleration
-//!   are removed from the face;
+//! - e = dt / h (p~(above) - p~(below)) - dt g, if the step's pressure gradient and body
+//!   acceleration are removed from the face;
 //! - r = c e - s (u* + C e), next to a grain at rest: the drag acts on u* + C e;
 //! - r + s U + f (U - U_old), next to a moving grain, with f = (1 - s) c.
 //!
@@ -14,8 +15,8 @@
 //! fluid gains ([`crate::immersed::rigid_body`]). `immersed::reference` has the scalar form.
 //!
 //! Legend: s weight, c closed fraction, C closed fraction of all grains together, f weight of the
-//! change of velocity, u* predicted velocity, h spacing along the component, l and m lever arms of the
-//! face about the two other axes.
+//! change of velocity, u* predicted velocity, h spacing along the component, l and m lever arms of
+//! the face about the two other axes.
 
 use super::faces::ForcedFaces;
 use super::rigid_run::{RigidRun, change_weight, lane_indices};
@@ -35,9 +36,9 @@ pub struct Impulse {
     pub matrix: Matrix6,
 }
 
-/// Sums the impulse over the faces of `forced` for a grain that had the velocity `old`, and fills their
-/// `rest_gain`. `closure_dt` [s] is the length of the step; 0 if faces are not closed to the pressure
-/// gradient, as in the paper's scheme.
+/// Sums the impulse over the faces of `forced` for a grain that had the velocity `old`, and fills
+/// their `rest_gain`. `closure_dt` [s] is the length of the step; 0 if faces are not closed to the
+/// pressure gradient, as in the paper's scheme.
 pub fn sum_impulse<R: Real>(
     known: &Known<R>,
     predictions: &[Prediction<R>; 3],
@@ -188,8 +189,8 @@ struct RunImpulse<'a, R> {
 }
 
 impl<R: Real> RunImpulse<'_, R> {
-    /// Moved pressure p~ [m^2/s^2] of the cells above (`side` 0) or below (1) the faces from face `n`
-    /// of the run on.
+    /// Moved pressure p~ [m^2/s^2] of the cells above (`side` 0) or below (1) the faces from face
+    /// `n` of the run on.
     #[inline(always)]
     fn moved_pressure<V: Vector<Number = f64>>(&self, side: usize, n: usize) -> V {
         let at = [self.run.at, self.run.below][side] + n;
@@ -203,8 +204,8 @@ impl<R: Real> RunImpulse<'_, R> {
         moved
     }
 
-    /// Adds the faces from face `n` of the run on to the sums; returns their gain next to a grain at
-    /// rest [m/s].
+    /// Adds the faces from face `n` of the run on to the sums; returns their gain next to a grain
+    /// at rest [m/s].
     #[inline(always)]
     fn add<V: Vector<Number = f64>>(
         &self,

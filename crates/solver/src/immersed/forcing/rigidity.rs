@@ -2,8 +2,8 @@
 //!
 //! A face gains r + s U + f (U - U_old). `immersed::reference` has the scalar form.
 //!
-//! Legend: r gain next to a grain at rest, U and U_old new and old rigid velocity, s and f weights of the
-//! velocity and of its change ([`super::impulse`]).
+//! Legend: r gain next to a grain at rest, U and U_old new and old rigid velocity, s and f weights
+//! of the velocity and of its change ([`super::impulse`]).
 
 use glam::DVec3;
 
@@ -14,9 +14,9 @@ use crate::immersed::kinematics::RigidVelocity;
 use crate::math::Real;
 use grainwake_simd::{Kernel, Vector, dispatch};
 
-/// Adds the gain of the forced faces to component `axis` of a part of the prediction, for a grain with
-/// the new `velocity` that changed by `change` in the step. [`super::sum_impulse`] has filled the lists of
-/// `forced`; `closure_dt` [s] is the one passed there.
+/// Adds the gain of the forced faces to component `axis` of a part of the prediction, for a grain
+/// with the new `velocity` that changed by `change` in the step. [`super::sum_impulse`] has filled
+/// the lists of `forced`; `closure_dt` [s] is the one passed there.
 pub fn impose_rigidity<R: Real>(
     axis: usize,
     spacing: DVec3,

@@ -10,7 +10,7 @@
 
 use std::ops::Range;
 
-use glam::{DMat3, DVec3, IVec3, Vec3};
+use glam::{DMat3, DVec3, IVec3};
 
 use super::index_map::RowPart;
 use super::lists::{BandFaces, FaceRow, FaceRun, LocatedBody, RowSpan};
@@ -25,8 +25,9 @@ use grainwake_simd::{Kernel, MOST, Vector};
 /// Buffers of one thread.
 #[derive(Default)]
 pub struct DistanceScratch {
-    /// Candidate faces of a plane, row after row, by axis: first their positions in the frame of the
-    /// grain [m], then their unit normals in the space frame. `MOST` unused entries follow the last.
+    /// Candidate faces of a plane, row after row, by axis: first their positions in the frame of
+    /// the grain [m], then their unit normals in the space frame. `MOST` unused entries follow the
+    /// last.
     points: [Aligned<f32>; 3],
     parts: Vec<RowPart>,
 }
@@ -106,8 +107,7 @@ impl FillLists<'_> {
                 end,
                 first: count,
             };
-            let y = (corner - self.grain.pose.position).y as f32 + h.y as f32 * j as f32; // TEMP
-            let first = to_body.as_mat3() * Vec3::new(arm.x as f32, y, arm.z as f32);
+            let first = (to_body * arm).as_vec3();
             for i in (start..end).step_by(V::WIDTH) {
                 let index = V::constant(f64::from(i)) + V::ramp();
                 let mut x = [V::constant(0.0); 3];

@@ -1,4 +1,4 @@
-//! Memory positions of the cells and faces in a box around a grain, across periodic edges.
+//! Positions in memory of the cells and faces in a box around a grain, across periodic edges.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use crate::flow::Boundaries;
 use crate::grid::Mesh;
 use crate::math::Real;
 
-/// Degrees of freedom of the grid: which faces and cells are unknowns, and where they are stored.
+/// Degrees of freedom of the grid: the faces and cells that are unknowns, and their storage.
 #[derive(Clone, Copy)]
 pub struct DofMask {
     cells: IVec3,
@@ -16,9 +16,9 @@ pub struct DofMask {
     periodic: [bool; 3],
 }
 
-/// Cells beyond the box on each side for which positions are tabulated.
+/// Width of the padding: cells on each side of the box for which positions are tabulated too.
 pub const PAD: i32 = 3;
-/// Marks a face or cell that is no unknown: larger than any position, also in sums.
+/// Offset of faces and cells that are not unknown: larger than any position, also in sums.
 const NONE: usize = 1 << 60;
 
 impl DofMask {
@@ -31,6 +31,7 @@ impl DofMask {
         }
     }
 
+    /// Returns whether the grid is periodic along an axis.
     pub fn is_periodic(&self, axis: usize) -> bool {
         self.periodic[axis]
     }
@@ -67,29 +68,29 @@ impl DofMask {
     }
 }
 
-/// Memory positions in the box of one grain, as sums of one offset per axis.
+/// Positions in memory in the padded box of one grain, as sums of one offset per axis.
 #[derive(Clone, Debug, Default)]
 pub struct IndexMap {
     /// Offsets of unknowns by axis, `[0]` for cells and faces parallel to the axis, `[1]` for faces
-    /// normal to it; `NONE` elsewhere. Entry 0 belongs to cell `-PAD` of the box.
+    /// normal to it; `NONE` elsewhere. Entry 0 is the offset of cell `-PAD` of the box.
     dof_offsets: [[Vec<usize>; 2]; 3],
-    /// Offsets of all entries of a field by axis; ghost cells beyond walls included.
+    /// Offsets of all entries of a field by axis, ghost cells beyond walls included.
     offsets: [Vec<usize>; 3],
 }
 
-/// Adjacent unknown faces of one row that are adjacent in memory too.
+/// Unknown faces of one row that are adjacent in memory.
 #[derive(Clone, Debug)]
 pub struct RowPart {
     /// Indices along x, counted from the side of the box.
     pub range: Range<i32>,
-    /// Position of the first face, also that of the cell above it.
+    /// Position in memory of the first face, and of the cell above it.
     pub at: usize,
-    /// Position of the cell below the first face.
+    /// Position in memory of the cell below the first face.
     pub below: usize,
 }
 
 impl IndexMap {
-    /// Indices along `axis` of the unknown faces of `component`, within the padded box. They are
+    /// Indices along `axis` of the unknown faces of `component` in the padded box. They are
     /// contiguous, since only the ends of the grid exclude faces.
     pub fn dof_range(&self, component: usize, axis: usize) -> Range<i32> {
         let offsets = &self.dof_offsets[axis][usize::from(axis == component)];
@@ -99,7 +100,8 @@ impl IndexMap {
         first as i32 - PAD..offsets.len() as i32 - last as i32 - PAD
     }
 
-    /// Appends to `parts` the contiguous parts of the faces `range` in row (j, k) of `component`.
+    /// Appends to `parts` the parts, contiguous in memory, of the faces `range` in row (j, k) of
+    /// `component`.
     #[inline]
     pub fn contiguous_parts(
         &self,
@@ -138,7 +140,7 @@ impl IndexMap {
         }
     }
 
-    /// Positions from the first plane of the box in memory to the last.
+    /// Positions in memory from the first plane of the box to the last.
     pub fn plane_range(&self) -> Range<usize> {
         let offsets = self.dof_offsets[2].iter();
         let offsets = offsets.flat_map(|table| &table[PAD as usize..table.len() - PAD as usize]);
@@ -149,7 +151,7 @@ impl IndexMap {
         first..last + 1
     }
 
-    /// Copies a field in the padded box, x fastest.
+    /// Copies the values of a field in the padded box, x fastest.
     pub fn copy<R: Real>(&self, field: &[R], to: &mut Vec<R>) {
         to.clear();
         let [x, y, z] = &self.offsets;

@@ -1,29 +1,29 @@
 //! Signed distance and its gradient in a narrow band around the surface of a grain.
 //!
 //! The sampled field of a shape ends closer to the surface than the band of the flow, and is often
-//! finer than the flow resolves. A wider and, where possible, coarser sampled field replaces it, which
-//! fits the cache and is evaluated without searching.
+//! finer than the flow resolves. A wider and, where possible, coarser sampled field replaces it,
+//! which fits the cache and is evaluated without searching.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::DVec3;
-use grainwake_shape::{Field, Shape};
+use grainwake_shape::{Field, SampledField, Shape};
 
-use super::samples::{DistanceSamples, FAR, SampleGrid, load_all, store_all};
+use super::samples::{FAR, SampleGrid, load_all, store_all};
 use crate::dem::Grain;
 use grainwake_simd::{MOST, MOST_PLACES, Vector};
 
-/// Samples per half-width of the band.
+/// Least number of samples per half-width of the band.
 const SAMPLES_PER_BAND: f64 = 4.0;
-/// Samples across the thinnest side of a grain, if that needs more of them.
+/// Least number of samples across the thinnest side of a grain.
 const SAMPLES_ACROSS: f64 = 12.0;
-/// Upper limit of samples per half-width of the band: the flow does not resolve a thinner grain.
+/// Largest number of samples per half-width of the band; the flow does not resolve a thinner grain.
 const MOST_SAMPLES_PER_BAND: f64 = 16.0;
 
 /// Narrow-band shapes of all grains; equal shapes share their samples.
 pub struct NarrowBandShapes {
-    /// One per grain.
+    /// Entry i is the shape of grain i.
     shapes: Vec<NarrowBandShape>,
 }
 
@@ -31,12 +31,14 @@ pub struct NarrowBandShapes {
 #[derive(Clone)]
 pub struct NarrowBandShape {
     shape: Arc<Shape>,
-    /// `None` if the shape itself is evaluated: a sphere, or one that would need too many samples.
-    samples: Option<Arc<DistanceSamples>>,
+    /// `None` if the shape itself is evaluated: a closed form, or a shape that needs too many
+    /// samples.
+    samples: Option<Arc<SampledField>>,
 }
 
 impl NarrowBandShapes {
-    /// Samples distances up to `reach` [m] for a flow with the band half-width `eps` [m].
+    /// Samples the distances up to `reach` [m] from the surfaces; `eps` [m] is the half-width of
+    /// the band.
     pub fn new(grains: &[Grain], eps: f64, reach: f64) -> NarrowBandShapes {
         let mut known: HashMap<*const Shape, NarrowBandShape> = HashMap::new();
         let sampled = |grain: &Grain| {
@@ -64,7 +66,8 @@ impl NarrowBandShapes {
         let mut samples: Vec<_> = samples.collect();
         samples.sort_by_key(|samples| Arc::as_ptr(samples));
         samples.dedup_by_key(|samples| Arc::as_ptr(samples));
-        samples.iter().map(|samples| samples.bytes()).sum()
+        let levels = samples.iter().map(|samples| samples.levels().len());
+        size_of::<f32>() * levels.sum::<usize>()
     }
 }
 
@@ -76,17 +79,13 @@ impl NarrowBandShape {
                 let spacing = (eps / SAMPLES_PER_BAND)
                     .min(thickness / SAMPLES_ACROSS)
                     .max(eps / MOST_SAMPLES_PER_BAND);
-                // Doubled until positions fit single precision.
+                // Doubled until single precision represents the indices of all samples.
                 let mut spacings = (0..20).map(|n| spacing * f64::from(1 << n));
                 let field = spacings.find_map(|spacing| {
                     let field = shape.distances(spacing, reach + spacing).ok()?;
                     (field.levels().len() <= MOST_PLACES).then_some(field)
                 });
-                // With this margin interpolated distances are exact up to `reach`.
-                field.map(|field| {
-                    let most = reach + 2.0 * field.spacing();
-                    Arc::new(DistanceSamples::new(&field, most))
-                })
+                field.map(Arc::new)
             }
             _ => None,
         };
@@ -96,20 +95,21 @@ impl NarrowBandShape {
         }
     }
 
-    /// Signed distance [m] and its gradient at `x`, both in the frame of the grain. The distance may
-    /// be infinite where it exceeds the reach.
+    /// Signed distance [m] and its gradient at `x`, both in the frame of the grain. The distance
+    /// may be infinite where it exceeds the reach.
     #[inline(always)]
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         let Some(samples) = &self.samples else {
             return self.shape.distance_and_gradient(x);
         };
-        let found = samples.distance_and_gradient(x);
-        found.unwrap_or((f64::INFINITY, DVec3::ZERO))
+        let on_grid = samples.distance_and_gradient_on_grid(x);
+        on_grid.unwrap_or((f64::INFINITY, DVec3::ZERO))
     }
 
-    /// Fills the distances [m] at the first `count` of `points` [m], in single precision, and replaces
-    /// the points by the gradients; both in the frame of the grain. Infinite distances are at least
-    /// [`FAR`] here. The lists must be `MOST` entries longer than `count`; these are overwritten.
+    /// Fills the distances [m] at the first `count` of `points` [m], in single precision, and
+    /// replaces the points by the gradients; both in the frame of the grain. Infinite distances are
+    /// at least [`FAR`] here. The lists must be `MOST` entries longer than `count`; these are
+    /// overwritten.
     #[inline(always)]
     pub fn fill_distances<V: Vector<Number = f32>>(
         &self,
@@ -137,7 +137,7 @@ impl NarrowBandShape {
         }
     }
 
-    /// Evaluates the shape for one lane after the other.
+    /// Evaluates the shape at the points `x`, lane by lane.
     #[cold]
     fn lane_by_lane<V: Vector<Number = f32>>(&self, x: [V; 3]) -> (V, [V; 3]) {
         let mut points = [[0.0; MOST]; 3];
@@ -181,9 +181,9 @@ mod tests {
     fn sampled_distances_match_the_shape_and_extend_beyond_its_grid() {
         let edges = analytic::rounded_box(0.7, 0.6, 0.5, 0.02, &ShapeOptions::default());
         let edges = Arc::new(edges.unwrap());
-        // The ellipsoid is 17, 8 and 3 flow cells across, the box 10, 5 and 3; its edges are rounded by
-        // less than two of its own samples. Bounds: largest and mean error near the surface, largest
-        // error beyond the grid of the shape.
+        // The ellipsoid is 17, 8 and 3 flow cells across, the box 10, 5 and 3; its edges are
+        // rounded by less than two of its own samples. Bounds: largest and mean error near the
+        // surface, largest error beyond the grid of the shape.
         for (shape, eps, most, mean, most_beyond) in [
             (ellipsoid(), 0.12, 7e-6, 1e-7, 0.001),
             (ellipsoid(), 0.25, 0.0015, 0.00003, 0.003),

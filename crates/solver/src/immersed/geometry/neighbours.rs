@@ -9,8 +9,8 @@ use crate::grid::Mesh;
 use crate::math::Pose;
 
 /// Fraction of the size of two grains below which their distances from a face count as equal, since
-/// distances are in single precision. Exactly one of two grains, or of two periodic images, at equal
-/// distance from a face must be the nearest.
+/// distances are in single precision. Exactly one of two grains, or of two periodic images, at
+/// equal distance from a face must be the nearest.
 const TIE: f64 = 1e-6;
 
 /// A neighbouring grain, or a periodic image of the grain itself.
@@ -28,8 +28,8 @@ pub struct NeighbourGrain {
 }
 
 impl NeighbourGrain {
-    /// Signed distance from `x` to the surface of the neighbour [m], and its gradient in the frame of
-    /// the neighbour. A distance above `limit` [m] may be returned as infinity.
+    /// Signed distance from `x` to the surface of the neighbour [m], and its gradient in the frame
+    /// of the neighbour. A distance above `limit` [m] may be returned as infinity.
     #[inline(always)]
     pub fn distance_and_gradient(
         &self,
@@ -47,7 +47,8 @@ impl NeighbourGrain {
     }
 }
 
-/// Smallest distance from `x` to a neighbour, tie breaker included [m]; infinite beyond `limit` [m].
+/// Smallest distance from `x` to a neighbour, tie breaker included [m]; infinite beyond `limit`
+/// [m].
 pub fn nearest_distance(
     neighbours: &[NeighbourGrain],
     shapes: &NarrowBandShapes,

@@ -2,10 +2,8 @@
 
 use std::ops::Deref;
 
-use glam::DVec3;
 use grainwake_shape::SampledField;
-
-use grainwake_simd::{One, Vector};
+use grainwake_simd::Vector;
 
 /// Stands for infinity in single precision [m].
 pub const FAR: f64 = 1e30;
@@ -24,70 +22,29 @@ pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [&mut [V::Number]; 3
     values[2].store(&mut z[at..]);
 }
 
-/// Signed distances on a uniform grid as 16-bit levels, so that those of a grain fit the cache.
-pub struct DistanceSamples {
-    lower: DVec3,
-    spacing: f64,
-    dims: [usize; 3],
-    /// Distance per level [m].
-    quantum: f64,
-    /// Distances in levels, x fastest.
-    levels: Vec<i16>,
-}
-
-impl DistanceSamples {
-    /// Converts a sampled field; distances are limited to `most` [m] on both sides.
-    pub fn new(field: &SampledField, most: f64) -> DistanceSamples {
-        let quantum = most / f64::from(i16::MAX);
-        let ratio = field.quantum() / quantum;
-        // The conversion saturates.
-        let level = |level: &f32| (f64::from(*level) * ratio).round() as i16;
-        DistanceSamples {
-            lower: field.lower(),
-            spacing: field.spacing(),
-            dims: field.dims(),
-            quantum,
-            levels: field.levels().iter().map(level).collect(),
-        }
-    }
-
-    /// Signed distance [m] and gradient at a point; `None` off the grid.
-    #[inline(always)]
-    pub fn distance_and_gradient(&self, x: DVec3) -> Option<(f64, DVec3)> {
-        let grid = SampleGrid::new(self);
-        let (distance, [x, y, z]) = grid.distance_and_gradient(x.to_array().map(One));
-        (distance.0 < FAR).then_some((distance.0, DVec3::new(x.0, y.0, z.0)))
-    }
-
-    /// Memory held [bytes].
-    pub fn bytes(&self) -> usize {
-        size_of::<i16>() * self.levels.capacity()
-    }
-}
-
-/// Constants of a sample grid in vector registers.
+/// A sampled distance field with its constants in vector registers.
 pub struct SampleGrid<'a, V> {
     lower: [V; 3],
     inverse: V,
     /// Index of the last sample along each axis.
     last: [V; 3],
-    /// Positions from one row and one plane of samples to the next.
+    /// Samples from one row and one plane to the next.
     strides: [V; 2],
     /// Distance per level [m].
     quantum: V,
     /// Gradient per level and spacing.
     slope: V,
-    levels: &'a [i16],
+    levels: &'a [f32],
 }
 
 impl<'a, V: Vector> SampleGrid<'a, V> {
     #[inline(always)]
-    pub fn new(samples: &'a DistanceSamples) -> SampleGrid<'a, V> {
-        let (dims, inverse) = (samples.dims, 1.0 / samples.spacing);
+    pub fn new(field: &'a SampledField) -> SampleGrid<'a, V> {
+        let (dims, inverse) = (field.dims(), 1.0 / field.spacing());
         let mut lower = [V::constant(0.0); 3];
         let mut last = lower;
         for axis in 0..3 {
-            lower[axis] = V::constant(samples.lower[axis]);
+            lower[axis] = V::constant(field.lower()[axis]);
             last[axis] = V::constant(dims[axis] as f64 - 1.0);
         }
         let (row, plane) = (dims[0], dims[0] * dims[1]);
@@ -96,14 +53,14 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
             inverse: V::constant(inverse),
             last,
             strides: [V::constant(row as f64), V::constant(plane as f64)],
-            quantum: V::constant(samples.quantum),
-            slope: V::constant(samples.quantum * inverse),
-            levels: &samples.levels,
+            quantum: V::constant(field.quantum()),
+            slope: V::constant(field.quantum() * inverse),
+            levels: field.levels(),
         }
     }
 
-    /// Interpolates signed distance [m] and gradient at `x`, in the frame of the grain. Off the grid
-    /// the distance is [`FAR`].
+    /// Interpolates signed distance [m] and gradient at `x`, in the frame of the grain. Off the
+    /// grid the distance is [`FAR`].
     #[inline(always)]
     pub fn distance_and_gradient(&self, x: [V; 3]) -> (V, [V; 3]) {
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
@@ -140,9 +97,10 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
     }
 }
 
-/// Value at the fraction `x` of the edge from sample `at` to the next along x, and their difference.
+/// Value at the fraction `x` of the edge from sample `at` to the next along x, and their
+/// difference.
 #[inline(always)]
-fn edge<V: Vector>(levels: &[i16], at: V, x: V) -> [V; 2] {
+fn edge<V: Vector>(levels: &[f32], at: V, x: V) -> [V; 2] {
     let [low, high] = V::pairs(levels, at);
     let slope = high - low;
     [low + x * slope, slope]

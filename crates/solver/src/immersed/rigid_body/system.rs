@@ -24,8 +24,8 @@ pub struct RigidBodySystem {
 }
 
 impl RigidBodySystem {
-    /// Assembles the equations under the `applied` load (weight less buoyancy) over `dt` [s], without
-    /// contact.
+    /// Assembles the equations under the `applied` load (weight less buoyancy) over `dt` [s],
+    /// without contact.
     pub fn new(
         grain: &Grain,
         previous: &PreviousStep,
@@ -116,13 +116,13 @@ impl RigidBodySystem {
         }
     }
 
-    /// Response of the grain to contact in the sub-steps of this step. Without further contact the grain
-    /// has the velocities of [`Self::velocities`] at their end
+    /// Response of the grain to contact in the sub-steps of this step. Without further contact the
+    /// grain has the velocities of [`Self::velocities`] at their end
     /// (`docs/decisions/0014-contact-with-the-fluid-response.md`).
     ///
     /// The mass is at least that of the grain with `added_density` [kg/m^3] of fluid in its volume,
-    /// since most of the added mass responds by the projection, one step late. The initial velocities
-    /// exclude the pending added-mass velocity of the last impact.
+    /// since most of the added mass responds by the projection, one step late. The initial
+    /// velocities exclude the pending added-mass velocity of the last impact.
     pub fn response(
         &self,
         grain: &Grain,
