@@ -6,3 +6,5 @@ mod links;
 mod weights;
 
 pub use correction::{AdvectionCorrection, AdvectionScratch, add_correction, find_correction};
+#[cfg(test)]
+pub use weights::{LinkPlanes, weigh_links};
