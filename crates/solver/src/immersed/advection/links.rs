@@ -130,7 +130,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
     }
 
     /// Computes the fluxes of the links whose lower faces are in row (j, k). Writes the correction
-    /// of these faces: fluxes in, from the row and the plane before, less fluxes out.
+    /// of these faces: fluxes in, from the previous row and plane, less fluxes out.
     #[inline(always)]
     fn correct_row<V: Vector<Number = f64>>(
         &self,
@@ -170,15 +170,15 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             &mut flux_z[first..][..row_length],
         );
         let zero = V::constant(0.0);
-        let (mut n, mut before, mut index) = (0, zero, V::ramp());
+        let (mut n, mut last_flux, mut index) = (0, zero, V::ramp());
         while n + V::WIDTH <= row_length {
             let at = at.wrapping_add(n);
             let mut sum = zero;
             if a.exists {
                 let weight = V::load_from(&wx[n..]);
                 let flux = self.flux::<V>(0, sixth_order[0], &rigid, at, index, weight);
-                sum = flux.behind(before) - flux;
-                before = flux;
+                sum = flux.behind(last_flux) - flux;
+                last_flux = flux;
             }
             if b.exists {
                 let weight = V::load_from(&wy[n..]);

@@ -23,9 +23,9 @@ pub struct LinkPlanes {
     distance: [Aligned<f32>; 2],
     /// Weights of the links of the current plane, by axis.
     pub weight: [Aligned<f32>; 3],
-    /// Fluxes along y out of the row before [m/s^2]; zero before a row without listed faces.
+    /// Fluxes along y out of the previous row [m/s^2]; zero before a row without listed faces.
     pub flux_y: Aligned<f64>,
-    /// Fluxes along z out of the plane before [m/s^2].
+    /// Fluxes along z out of the previous plane [m/s^2].
     pub flux_z: Aligned<f64>,
 }
 
@@ -179,14 +179,10 @@ impl WeighLinks<'_> {
             ];
             for axis in 0..3 {
                 let d = half * (d_0 + d_1[axis]);
-                let mut in_band = zero;
-                if d.mask_below(band) != 0 {
-                    let excess = inverse_aperture_excess(d, self.eps);
-                    // Exactly zero for open links.
-                    let excess = d.where_below(band, excess, zero);
-                    in_band = inside.where_below(d, excess, no_link);
-                }
-                let w = d.where_below(outside, in_band, no_link);
+                let excess = inverse_aperture_excess(d, self.eps);
+                let w = d.where_below(band, excess, zero);
+                let w = inside.where_below(d, w, no_link);
+                let w = d.where_below(outside, w, no_link);
                 w.store(&mut weight[axis][entry..]);
             }
         }

@@ -157,16 +157,16 @@ mod tests {
         for n in -1000..=1000 {
             let s = n as f32 / 1000.0;
             let wide = f64::from(s);
-            let most = |found: f32, exact: f64| (f64::from(found) - exact).abs();
-            assert!(most(sine(One(s)).0, (PI * wide).sin()) < 2.5e-7, "{s}");
+            let error = |found: f32, exact: f64| (f64::from(found) - exact).abs();
+            assert!(error(sine(One(s)).0, (PI * wide).sin()) < 2.5e-7, "{s}");
             assert!(
-                most(cosine(One(s)).0, (0.5 * PI * wide).cos()) < 2e-7,
+                error(cosine(One(s)).0, (0.5 * PI * wide).cos()) < 2e-7,
                 "{s}"
             );
             for eps in [1.0, 0.7] {
                 let exact = reference::inverse_aperture_excess(wide, eps);
                 assert!(
-                    most(inverse_aperture_excess(One(s), eps).0, exact) < 2e-6,
+                    error(inverse_aperture_excess(One(s), eps).0, exact) < 2e-6,
                     "{s} {eps}"
                 );
             }

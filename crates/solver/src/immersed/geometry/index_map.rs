@@ -189,7 +189,7 @@ mod tests {
         };
         let mut map = IndexMap::default();
         mask.map(IVec3::new(6, 1, 1), IVec3::new(5, 3, 1), &mut map);
-        // Memory position of a face; of the cell where the component is 3.
+        // Position in memory of a face, or of a cell if the component is 3.
         let at = |component, i, j| {
             let offset = |axis: usize, index: i32| {
                 map.dof_offsets[axis][usize::from(axis == component)][(index + PAD) as usize]

@@ -196,13 +196,13 @@ mod tests {
                 unreachable!("the shapes are sampled")
             };
             let reach = 2.5 * eps;
-            let near = NarrowBandShape::new(&shape, eps, reach);
+            let band = NarrowBandShape::new(&shape, eps, reach);
             let (mut beyond, mut errors) = (0, Vec::new());
             for i in 0..20_000 {
                 let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
                 let x = (1.1 + reach) * (2.0 * u.fract() - DVec3::ONE);
                 let (exact, gradient) = shape.distance_and_gradient(x);
-                let (distance, slope) = near.distance_and_gradient(x);
+                let (distance, slope) = band.distance_and_gradient(x);
                 if exact > reach {
                     assert!(distance > 0.97 * reach, "at {x}");
                     continue;
@@ -219,12 +219,12 @@ mod tests {
                     assert!(slope.normalize().dot(gradient) > 0.99, "at {x}");
                 }
             }
-            let found = errors.iter().sum::<f64>() / errors.len() as f64;
+            let mean_error = errors.iter().sum::<f64>() / errors.len() as f64;
             println!(
-                "{eps}: mean {found}, beyond {beyond}, near {}",
+                "{eps}: mean {mean_error}, beyond {beyond}, near {}",
                 errors.len()
             );
-            assert!(found.abs() <= mean, "{found} at {eps}");
+            assert!(mean_error.abs() <= mean, "{mean_error} at {eps}");
             assert!(errors.len() > 200, "{}", errors.len());
         }
     }
@@ -263,8 +263,8 @@ mod tests {
                     let step = DVec3::splat(1e-6);
                     let sides = [x - step, x + step].map(|x| self.0.distance_and_gradient(x).1);
                     let mut sides = sides.into_iter().chain([slope]);
-                    let near = |side: DVec3| (of(&slopes) - side).length() < 1e-4;
-                    assert!(sides.any(near), "{} for {slope} at {x}", of(&slopes));
+                    let close = |side: DVec3| (of(&slopes) - side).length() < 1e-4;
+                    assert!(sides.any(close), "{} for {slope} at {x}", of(&slopes));
                 }
             }
             let sphere = matches!(self.0.shape.field(), Field::Sphere(_));
@@ -276,10 +276,10 @@ mod tests {
     fn lanes_match_scalar_evaluation() {
         let sphere = Arc::new(Shape::sphere(0.8, 100));
         for (shape, eps) in [(ellipsoid(), 0.25), (ellipsoid(), 0.05), (sphere, 0.25)] {
-            let near = NarrowBandShape::new(&shape, eps, 2.5 * eps);
-            dispatch(CompareLanes(&near));
-            CompareLanes(&near).run::<<f32 as Registers>::Common>();
-            CompareLanes(&near).run::<One<f32>>();
+            let band = NarrowBandShape::new(&shape, eps, 2.5 * eps);
+            dispatch(CompareLanes(&band));
+            CompareLanes(&band).run::<<f32 as Registers>::Common>();
+            CompareLanes(&band).run::<One<f32>>();
         }
     }
 }

@@ -222,12 +222,12 @@ mod tests {
         let tie = 4.2 * TIE;
         let along_y = DVec3::new(0.0, 4.0, 0.0);
         let along_z = DVec3::new(0.0, 0.0, 4.0);
-        let own = [
+        let images = [
             (-along_z, tie),
             (-along_y, tie),
             (along_y, -tie),
             (along_z, -tie),
         ];
-        assert_eq!(found(&search, 0), own);
+        assert_eq!(found(&search, 0), images);
     }
 }

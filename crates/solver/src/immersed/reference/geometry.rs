@@ -49,8 +49,11 @@ impl Reference {
     pub fn distance(&self, index: usize, component: usize, face: IVec3) -> Option<f64> {
         let x = self.position(component, face);
         let d = |index| self.nearest_image(index, x).distance;
-        let own = d(index);
+        let distance = d(index);
         let others = (0..self.grains.len()).filter(|other| *other != index);
-        others.map(d).all(|other| own < other).then_some(own)
+        others
+            .map(d)
+            .all(|other| distance < other)
+            .then_some(distance)
     }
 }

@@ -95,17 +95,17 @@ impl RigidBodySystem {
         fluid_density: f64,
         dt: f64,
     ) -> Load {
-        let now = RigidVelocity::of(grain);
-        let x = now.to_vector();
+        let new = RigidVelocity::of(grain);
+        let x = new.to_vector();
         let Impulse { constant, matrix } = &self.impulse;
         let j: Vector6 = std::array::from_fn(|row| {
             constant[row] + matrix[row].iter().zip(x).map(|(m, x)| m * x).sum::<f64>()
         });
         let added = &self.virtual_mass;
-        let force = DVec3::from_slice(&j[..3]) + added.mass * now.linear - added.momentum;
+        let force = DVec3::from_slice(&j[..3]) + added.mass * new.linear - added.momentum;
         let torque =
-            DVec3::from_slice(&j[3..]) + added.inertia * now.angular - added.angular_momentum;
-        let change = now - previous.velocity;
+            DVec3::from_slice(&j[3..]) + added.inertia * new.angular - added.angular_momentum;
+        let change = new - previous.velocity;
         let omega = previous.velocity.angular;
         let displaced = fluid_density / grain.density;
         let fluid_inertia = grain.inertia() * displaced;
