@@ -95,6 +95,6 @@ pub struct PreviousStep {
     /// Mean acceleration over the previous step [m/s^2, rad/s^2]; zero after contact.
     pub acceleration: RigidVelocity,
     /// Part of `velocity` that contact caused in the previous step and that the added mass takes up
-    /// in this step (`docs/decisions/0014-contact-and-fluid-at-once.md`).
+    /// in this step (`docs/decisions/0014-contact-with-the-fluid-response.md`).
     pub pending_added_mass_velocity: RigidVelocity,
 }
