@@ -220,9 +220,9 @@ pub trait Vector:
         }
         Self::load(&lanes)
     }
-    /// Of each lane of `at`, a whole number, the entry of `from` there and the next.
+    /// For each lane of `at`, a whole number: the entry of `from` with that index, and the next entry.
     #[inline(always)]
-    fn pairs(from: &[i16], at: Self) -> [Self; 2] {
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
         let mut lanes = [[Self::Number::default(); MOST]; 2];
         at.store(&mut lanes[0]);
         for n in 0..Self::WIDTH {

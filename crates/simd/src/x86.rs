@@ -247,23 +247,6 @@ vector! {
             Four(_mm256_castsi256_pd(_mm256_sub_epi64(one, half)))
         }
     }
-    #[inline(always)]
-    fn pairs(from: &[i16], at: Self) -> [Self; 2] {
-        assert!(from.len() <= i32::MAX as usize);
-        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places fit
-        // the indices.
-        unsafe {
-            let last = _mm256_set1_pd(from.len() as f64 - 2.0);
-            let below = _mm256_cmp_pd::<_CMP_LE_OQ>(at.0, last);
-            let above = _mm256_cmp_pd::<_CMP_GE_OQ>(at.0, _mm256_setzero_pd());
-            assert_eq!(_mm256_movemask_pd(_mm256_and_pd(below, above)), 0xf);
-            let places = _mm256_cvttpd_epi32(at.0);
-            let pairs = _mm_i32gather_epi32::<2>(from.as_ptr().cast(), places);
-            let low = _mm_srai_epi32::<16>(_mm_slli_epi32::<16>(pairs));
-            let high = _mm_srai_epi32::<16>(pairs);
-            [Four(_mm256_cvtepi32_pd(low)), Four(_mm256_cvtepi32_pd(high))]
-        }
-    }
 }
 vector! {
     /// Eight doubles.
@@ -341,23 +324,6 @@ vector! {
             Eight(_mm512_castsi512_pd(_mm512_sub_epi64(one, half)))
         }
     }
-    #[inline(always)]
-    fn pairs(from: &[i16], at: Self) -> [Self; 2] {
-        assert!(from.len() <= i32::MAX as usize);
-        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places fit
-        // the indices.
-        unsafe {
-            let last = _mm512_set1_pd(from.len() as f64 - 2.0);
-            let below = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(at.0, last);
-            let above = _mm512_cmp_pd_mask::<_CMP_GE_OQ>(at.0, _mm512_setzero_pd());
-            assert_eq!(below & above, 0xff);
-            let places = _mm512_cvttpd_epi32(at.0);
-            let pairs = _mm256_i32gather_epi32::<2>(from.as_ptr().cast(), places);
-            let low = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(pairs));
-            let high = _mm256_srai_epi32::<16>(pairs);
-            [Eight(_mm512_cvtepi32_pd(low)), Eight(_mm512_cvtepi32_pd(high))]
-        }
-    }
 }
 vector! {
     /// Four singles.
@@ -415,21 +381,20 @@ vector! {
         }
     }
     #[inline(always)]
-    fn pairs(from: &[i16], at: Self) -> [Self; 2] {
-        assert!(from.len() <= super::MOST_PLACES);
-        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places singles hold.
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+        assert!(2 <= from.len() && from.len() <= super::MOST_PLACES);
+        // SAFETY: see the head of this file; the assertions place all pairs in the slice, and singles
+        // represent its indices exactly.
         unsafe {
             let last = _mm256_set1_ps(from.len() as f32 - 2.0);
             let below = _mm256_cmp_ps::<_CMP_LE_OQ>(at.0, last);
             let above = _mm256_cmp_ps::<_CMP_GE_OQ>(at.0, _mm256_setzero_ps());
             assert_eq!(_mm256_movemask_ps(_mm256_and_ps(below, above)), 0xff);
-            let places = _mm256_cvttps_epi32(at.0);
-            let pairs = _mm256_i32gather_epi32::<2>(from.as_ptr().cast(), places);
-            let low = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(pairs));
-            let high = _mm256_srai_epi32::<16>(pairs);
+            let indices = _mm256_cvttps_epi32(at.0);
+            let first = from.as_ptr();
             [
-                EightSingles(_mm256_cvtepi32_ps(low)),
-                EightSingles(_mm256_cvtepi32_ps(high)),
+                EightSingles(_mm256_i32gather_ps::<4>(first, indices)),
+                EightSingles(_mm256_i32gather_ps::<4>(first.add(1), indices)),
             ]
         }
     }
@@ -471,21 +436,20 @@ vector! {
         }
     }
     #[inline(always)]
-    fn pairs(from: &[i16], at: Self) -> [Self; 2] {
-        assert!(from.len() <= super::MOST_PLACES);
-        // SAFETY: see the head of this file; all pairs are found to lie in the slice, whose places singles hold.
+    fn pairs(from: &[f32], at: Self) -> [Self; 2] {
+        assert!(2 <= from.len() && from.len() <= super::MOST_PLACES);
+        // SAFETY: see the head of this file; the assertions place all pairs in the slice, and singles
+        // represent its indices exactly.
         unsafe {
             let last = _mm512_set1_ps(from.len() as f32 - 2.0);
             let below = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(at.0, last);
             let above = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(at.0, _mm512_setzero_ps());
             assert_eq!(below & above, 0xffff);
-            let places = _mm512_cvttps_epi32(at.0);
-            let pairs = _mm512_i32gather_epi32::<2>(places, from.as_ptr().cast());
-            let low = _mm512_srai_epi32::<16>(_mm512_slli_epi32::<16>(pairs));
-            let high = _mm512_srai_epi32::<16>(pairs);
+            let indices = _mm512_cvttps_epi32(at.0);
+            let first = from.as_ptr();
             [
-                SixteenSingles(_mm512_cvtepi32_ps(low)),
-                SixteenSingles(_mm512_cvtepi32_ps(high)),
+                SixteenSingles(_mm512_i32gather_ps::<4>(indices, first)),
+                SixteenSingles(_mm512_i32gather_ps::<4>(indices, first.add(1))),
             ]
         }
     }
