@@ -152,7 +152,9 @@ fn test_1_elastic_normal_impact_of_two_spheres() {
             open_box(0.1),
             expected.duration,
         );
-        check(&result, &expected, speed);
+        // Measured: 1.6e-3, 6e-4, two steps in 2000, 1.5e-4. At an overlap of 2.5 % of the radius,
+        // friction between the tilted normals of the patch adds to the force.
+        check(&result, &expected, speed, [2e-3, 1e-3, 1.5e-3, 3e-4]);
     }
 }
 
@@ -167,20 +169,21 @@ fn test_2_elastic_normal_impact_on_a_rigid_plane() {
         let expected = hertz(ball.mass(), radius, modulus / (1.0 - ratio * ratio), speed);
         let params = hertz_mindlin(0.0);
         let result = impact(vec![ball], params, floor(), expected.duration);
-        check(&result, &expected, speed);
+        // Measured: 2e-7, 2e-7, one step in 2000, 1e-11.
+        check(&result, &expected, speed, [1e-6, 1e-6, 1e-3, 1e-9]);
     }
 }
 
-/// Force, overlap, duration and rebound speed of an elastic impact.
-fn check(result: &Impact, expected: &Hertz, speed: f64) {
+/// Bounds the relative errors of force, overlap, duration and rebound speed of an elastic impact.
+fn check(result: &Impact, expected: &Hertz, speed: f64, bounds: [f64; 4]) {
     let closed_form = [expected.force, expected.overlap, expected.duration];
-    let errors = [0, 1, 2].map(|n| result.largest[n] / closed_form[n] - 1.0);
+    let [force, overlap, duration] = [0, 1, 2].map(|n| result.largest[n] / closed_form[n] - 1.0);
     let rebound = result.grains[0].velocity.length() / speed - 1.0;
-    println!("errors of force, overlap, duration: {errors:?}, of the rebound: {rebound:e}");
-    // Measured: 2e-6 or less for force and overlap, one step in 2000 for the duration, 1e-6.
-    assert!(errors[0].abs() < 1e-5 && errors[1].abs() < 1e-5);
-    assert!(errors[2].abs() < 1.5e-3);
-    assert!(rebound.abs() < 1e-5);
+    let errors = [force, overlap, duration, rebound];
+    println!("errors of force, overlap, duration and rebound: {errors:?}");
+    for (error, bound) in errors.iter().zip(bounds) {
+        assert!(error.abs() < bound, "{errors:?}");
+    }
 }
 
 #[test]
@@ -195,8 +198,8 @@ fn test_3_normal_impact_with_restitution() {
             let ball = plane_impact((0.0025, density, material), 0.0, velocity, 0.0);
             let found = ball.velocity.z / 3.9;
             println!("restitution {restitution}: {found}");
-            // Measured: 2e-4 or less.
-            assert!((found - restitution).abs() < 5e-4, "{restitution}: {found}");
+            // Measured: 2e-5 or less.
+            assert!((found - restitution).abs() < 5e-5, "{restitution}: {found}");
         }
     }
 }
@@ -231,9 +234,9 @@ fn test_4_oblique_impact_at_constant_speed() {
 fn test_5_oblique_impact_at_constant_normal_speed() {
     let (radius, mu, speed) = (1e-5, 0.3, 5.0);
     let steel = (radius, 7850.0, material(2.08e11, 0.3));
-    // Measured: 0.053. The published points at x < 5, up to 1.5 away, correspond to about half of
+    // Measured: 0.046. The published points at x < 5, up to 1.5 away, correspond to about half of
     // Mindlin's tangential stiffness.
-    compare("Test5_steel", 5.5..20.0, 0.06, |x| {
+    compare("Test5_steel", 5.5..20.0, 0.05, |x| {
         let velocity = DVec3::new(x * mu * speed, 0.0, -speed);
         let ball = plane_impact(steel, mu, velocity, 0.0);
         let found = (ball.velocity.x - radius * ball.angular_velocity.y) / (mu * speed);
@@ -339,8 +342,8 @@ fn test_8_two_spheres_of_different_size() {
         -relative / surface
     };
     // A large sphere of very high density acts as a plane.
-    // Measured: 0.017 for x < 2.2.
-    compare("Test8_case_a", 0.0..2.2, 0.025, |x| {
+    // Measured: 0.016.
+    compare("Test8_case_a", 0.0..2.2, 0.02, |x| {
         run(x, 1e6 * ALLOY_DENSITY)
     });
     // While the contact slides throughout, masses and radii have no effect.

@@ -28,8 +28,8 @@ impl Placed<'_> {
     }
 }
 
-/// Returns the fraction of each voxel inside a body, x fastest; voxels at the surface are sampled at
-/// 4 x 4 x 4 points.
+/// Returns the fraction of each voxel inside a body, x fastest; voxels at the surface are sampled
+/// at 4 x 4 x 4 points.
 pub fn shares(
     dims: [usize; 3],
     bodies: &[&dyn Fn(DVec3) -> f64],
