@@ -97,6 +97,11 @@ pub fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
+/// Returns the first line of a message.
+pub fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or_default()
+}
+
 /// Formats a duration [s] as "1:02:03" or "2:03".
 pub fn clock(seconds: f64) -> String {
     if !(seconds.is_finite() && seconds < 1e9) {

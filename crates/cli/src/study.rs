@@ -11,7 +11,7 @@ use grainwake_study::{
 
 use crate::args::StudyArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO};
-use crate::progress::{clock, count};
+use crate::progress::{clock, count, first_line};
 use crate::study_board::Board;
 use crate::{kind, print, run, tell, threads};
 
@@ -166,11 +166,6 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
         ),
         "the other runs are finished; --retry restarts failed runs",
     ))
-}
-
-/// Returns the first line of a message.
-pub fn first_line(text: &str) -> &str {
-    text.lines().next().unwrap_or_default()
 }
 
 /// Returns a table of number, name, state and hash of the runs.

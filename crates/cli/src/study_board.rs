@@ -11,7 +11,7 @@ use grainwake_run::Progress;
 use grainwake_study::{Outcome, Run, StudyObserver};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use crate::progress::clock;
+use crate::progress::{clock, first_line};
 use crate::tell;
 
 /// Interval between lines without a terminal [s].
@@ -131,7 +131,7 @@ impl Inner {
         let left_waiting: f64 = self.waiting.values().map(|end| expected(*end)).sum();
         let simulated = self.simulated + running;
         let rate = simulated / self.started.elapsed().as_secs_f64().max(1e-9);
-        // At the end there are fewer runs than jobs, and the last run has only its share of the rate.
+        // At the end there are fewer runs than jobs: the last run has only its share of the rate.
         let busy = self.active.len().clamp(1, jobs) as f64;
         let last = self
             .active
@@ -267,7 +267,7 @@ impl StudyObserver for Board<'_> {
                 clock(s.wall_s)
             ),
             Outcome::AlreadyFinished => "had finished before".into(),
-            Outcome::Failed(why, _) => format!("FAILED: {}", crate::study::first_line(why)),
+            Outcome::Failed(why, _) => format!("FAILED: {}", first_line(why)),
             Outcome::Interrupted => "interrupted".into(),
             Outcome::Locked => "locked by another program".into(),
         };

@@ -1,11 +1,11 @@
 //! Features of a run derived from its tables: kind, scales, pair, phases and key instants.
 
 use glam::DVec3;
+use grainwake_formats::events::Event;
 use grainwake_plot::minus;
 
 use crate::phases::{self, Instant, PairEvent, Phase};
 use crate::run_folder::{History, RunFolder};
-use grainwake_formats::events::Event;
 
 /// Kind of a run by its number of grains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -25,7 +25,7 @@ pub struct WrittenFigure {
 ///
 /// # Errors
 /// Error of the operating system.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+pub fn write_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".{}.tmp", std::process::id()));
     let temporary = path.with_file_name(name);
@@ -39,7 +39,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 pub fn write_figure(folder: &Path, figure: Figure) -> Result<WrittenFigure, ReportError> {
     let write = |extension: &str, bytes: std::io::Result<Vec<u8>>| {
         let file = folder.join(format!("{}.{extension}", figure.name));
-        match bytes.and_then(|bytes| write_atomically(&file, &bytes)) {
+        match bytes.and_then(|bytes| write_file(&file, &bytes)) {
             Ok(()) => Ok(file),
             Err(source) => Err(ReportError::Write { file, source }),
         }

@@ -22,7 +22,7 @@ mod testing;
 use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
-pub use files::{WrittenFigure, write_atomically, write_figure};
+pub use files::{WrittenFigure, write_figure, write_file};
 use grainwake_plot::Figure;
 
 use features::RunFeatures;
@@ -100,7 +100,7 @@ pub fn render(run_dir: &Path) -> Result<ReportFiles, ReportError> {
         .collect::<Result<_, _>>()?;
     let page = run_dir.join("report.html");
     let text = page::page(&run, &features, &figures, &notes);
-    write_atomically(&page, text.as_bytes()).map_err(failed(&page))?;
+    write_file(&page, text.as_bytes()).map_err(failed(&page))?;
     Ok(ReportFiles {
         page,
         png: figures.iter().map(|f| f.png_file.clone()).collect(),

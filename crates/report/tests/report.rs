@@ -515,7 +515,7 @@ fn round_off_is_not_a_turn_and_the_summary_knows_all_steps() {
         "{seen}"
     );
     let said = page(&rendered);
-    assert!(said.contains("0.789 at most in any step"), "{said}");
+    assert!(said.contains("at most 0.789 in any step"), "{said}");
     assert!(said.matches("4.56×10<sup>−9</sup>").count() >= 2);
     let tilt = text_of(&svg(&rendered, "gap"));
     assert!(tilt.contains("45") && tilt.contains("135"), "{tilt}");
@@ -533,7 +533,7 @@ fn write_log(folder: &Path, events: &[(f64, &str)]) {
     std::fs::write(folder.join("events.jsonl"), log).unwrap();
 }
 
-/// What the page and the figure of the gap say of a pair with this log.
+/// Returns the text of the page and of the figure of the gap for a pair with the given events.
 fn report(events: &[(f64, &str)]) -> (String, String) {
     let folder = small_pair(0.9);
     std::fs::remove_dir_all(folder.join("slices")).unwrap();
@@ -550,14 +550,14 @@ fn report(events: &[(f64, &str)]) -> (String, String) {
 }
 
 #[test]
-fn headline_and_figures_agree_on_kiss_and_parting() {
+fn headline_and_figures_agree_on_kiss_and_separation() {
     let (page, gap) = report(&[(5.0, "landing"), (7.94, "kiss"), (8.1, "separation")]);
     assert!(!page.contains("did not touch"));
     assert!(page.contains("The two grains kissed at"));
     let late = ", after the first has landed";
     assert!(page.matches(late).count() >= 4, "headline and caption");
-    assert!(gap.contains(&format!("They touch first at t √(g/d) = 7.94{late}.")));
-    assert!(gap.contains(&format!("They part at t √(g/d) = 8.10{late}.")));
+    assert!(gap.contains(&format!("First contact at t √(g/d) = 7.94{late}.")));
+    assert!(gap.contains(&format!("Separation at t √(g/d) = 8.10{late}.")));
 
     let bounce = [
         (13.2, "kiss"),
@@ -567,8 +567,8 @@ fn headline_and_figures_agree_on_kiss_and_parting() {
         (44.0, "landing"),
     ];
     let (page, gap) = report(&bounce);
-    assert!(gap.contains("They part at t √(g/d) = 17.3."), "{gap}");
-    let parted = page.split(", and parted at ").nth(1).unwrap();
+    assert!(gap.contains("Separation at t √(g/d) = 17.3."), "{gap}");
+    let parted = page.split(", and separated at ").nth(1).unwrap();
     assert!(parted.split(". ").next().unwrap().ends_with("= 17.3"));
     assert!(!page.contains(late));
 }
@@ -594,7 +594,7 @@ fn tumbling_after_the_separation_stays_in_the_table() {
         ["drafting", "kissing", "separated", "tumbling", "landed"]
     );
     let lead = page.split("<p class=\"lead\">").nth(1).unwrap();
-    let [parted, tumbled] = ["parted at", "tumbled from"].map(|text| lead.find(text).unwrap());
+    let [parted, tumbled] = ["separated at", "tumbled from"].map(|text| lead.find(text).unwrap());
     assert!(parted < tumbled);
 }
 

@@ -144,8 +144,6 @@ fn libraries_depend_downwards() {
 const KNOWN_CIRCLES: &[(&str, &[&str])] = &[
     // `Exit` prints with `tell!`; `print` returns an `Exit`.
     ("cli", &["exit", "out"]),
-    // The progress display uses `study::first_line`.
-    ("cli", &["study", "study_board"]),
     (
         "shape",
         &[

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_report::{ReportError, write_atomically};
+use grainwake_report::ReportError;
 use grainwake_run::case::{CaseError, Problem, nearest};
 
 /// Reason why a study cannot be read, planned or stored.
@@ -29,7 +29,7 @@ pub enum StudyError {
     Occupied {
         /// The folder.
         folder: PathBuf,
-        /// Its contents.
+        /// Contents of the folder.
         what: String,
     },
     /// A report could not be written.
@@ -73,7 +73,7 @@ impl<T> At<T> for std::io::Result<T> {
 
 /// Writes a file in one piece.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
-    write_atomically(path, bytes).at("write", path)
+    grainwake_report::write_file(path, bytes).at("write", path)
 }
 
 /// Writes a value as indented JSON.

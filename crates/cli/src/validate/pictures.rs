@@ -10,9 +10,9 @@ use super::saved::Saved;
 use crate::exit::{Exit, IO};
 use crate::tell;
 
-/// Draws the figures of `suites` into `folder/figures`, from the runs below `output` and the `saved`
-/// results, and returns their number. Omissions are listed on standard error; an incomplete figure
-/// does not replace an existing one.
+/// Draws the figures of `suites` into `folder/figures`, from the runs below `output` and the
+/// `saved` results, and returns their number. Omissions are listed on standard error; an incomplete
+/// figure does not replace an existing one.
 pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Result<usize, Exit> {
     let place = folder.join("figures");
     std::fs::create_dir_all(&place)

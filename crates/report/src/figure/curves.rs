@@ -1,5 +1,6 @@
 //! Curves against time: distance and velocities of a pair, velocity of a single grain.
 
+use grainwake_formats::events::EventKind;
 use grainwake_plot::axis::Axis;
 use grainwake_plot::stacked::{Panel, Series};
 use grainwake_plot::style;
@@ -8,7 +9,6 @@ use grainwake_plot::{Figure, letter};
 use super::scene::Scene;
 use crate::features::{galileo, short};
 use crate::run_folder::History;
-use grainwake_formats::events::EventKind;
 
 /// Draws the distance of the pair against time, and the tilt of the line of centres.
 pub fn gap(scene: &Scene) -> Option<Figure> {

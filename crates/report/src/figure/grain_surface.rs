@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use glam::{DQuat, DVec3};
+use grainwake_formats::vtp::Surface;
 
 use grainwake_plot::axis::extent;
 use grainwake_plot::contour;
 
 use super::section::SliceView;
 use crate::run_folder::{History, RunFolder};
-use grainwake_formats::vtp::Surface;
 
 /// Closed polygon in two of the three coordinates [m].
 pub type Outline = Vec<(f64, f64)>;
@@ -123,7 +123,8 @@ impl GrainSurface {
     }
 }
 
-/// Reads the surface of each grain from its first surface file; unusable files are added to `notes`.
+/// Reads the surface of each grain from its first surface file; unusable files are added to
+/// `notes`.
 pub fn surfaces(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, GrainSurface> {
     let mut out = BTreeMap::new();
     for frame in &run.surfaces {

@@ -1,7 +1,7 @@
 //! A slice of the fields: interpolation between cells, outlines of the solid, raster image.
 
 use glam::DVec3;
-use grainwake_formats::vti::Image;
+use grainwake_formats::vti::{Frame, Image};
 use grainwake_plot::contour;
 use grainwake_plot::equal_aspect::Window;
 use grainwake_plot::raster::Raster;
@@ -76,10 +76,14 @@ impl Section {
     /// # Errors
     /// If the image is thicker, or its spacing or origin is unusable.
     pub fn of(image: &Image, vertical: usize) -> Result<Section, String> {
-        let [nx, ny, nz] = image.frame.cells;
-        let thin = [1, 0, 2]
-            .into_iter()
-            .find(|axis| image.frame.cells[*axis] == 1);
+        let Frame {
+            cells,
+            spacing,
+            origin,
+            ..
+        } = image.frame;
+        let [nx, ny, nz] = cells;
+        let thin = [1, 0, 2].into_iter().find(|axis| cells[*axis] == 1);
         let normal = thin.ok_or_else(|| {
             format!("{nx} x {ny} x {nz} cells are no slice, which is one cell thick")
         })?;
@@ -87,15 +91,10 @@ impl Section {
         let strides = [1, nx, nx * ny];
         let (across, up) = (view.across, view.up);
         let order = || {
-            let rows = (0..image.frame.cells[up]).map(move |k| k * strides[up]);
-            rows.flat_map(move |row| {
-                (0..image.frame.cells[across]).map(move |i| row + i * strides[across])
-            })
+            let rows = (0..cells[up]).map(move |k| k * strides[up]);
+            rows.flat_map(move |row| (0..cells[across]).map(move |i| row + i * strides[across]))
         };
-        if !(image.frame.spacing.min_element() > 0.0
-            && image.frame.spacing.is_finite()
-            && image.frame.origin.is_finite())
-        {
+        if !(spacing.min_element() > 0.0 && spacing.is_finite() && origin.is_finite()) {
             return Err("its spacing or origin cannot be used".to_owned());
         }
         let array = |name: &str, components: usize| {
@@ -121,11 +120,11 @@ impl Section {
             .map(|data| order().map(|cell| f64::from(data[cell])).collect());
         Ok(Section {
             view,
-            nx: image.frame.cells[across],
-            nz: image.frame.cells[up],
-            lower: view.seen(image.frame.origin),
-            step: view.seen(image.frame.spacing),
-            place: image.frame.origin[normal] + 0.5 * image.frame.spacing[normal],
+            nx: cells[across],
+            nz: cells[up],
+            lower: view.seen(origin),
+            step: view.seen(spacing),
+            place: origin[normal] + 0.5 * spacing[normal],
             velocity,
             vorticity,
             solid,
@@ -251,7 +250,7 @@ fn cubic([a, b, c, d]: [f64; 4], t: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use grainwake_formats::vti::{Array, Frame};
+    use grainwake_formats::vti::Array;
 
     fn image(ny: usize) -> Image {
         let centre = |i: usize| (i % 8) as f32 + 0.5;

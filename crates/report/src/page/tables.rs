@@ -1,5 +1,6 @@
 //! Tables of the report page: parameters, events, provenance.
 
+use grainwake_formats::events::Event;
 use grainwake_plot::literal;
 use maud::{Markup, html};
 use serde_json::Value;
@@ -7,7 +8,6 @@ use serde_json::Value;
 use crate::features::{RunFeatures, galileo, short};
 use crate::html::{label, number_column, properties, table, text_column};
 use crate::run_folder::RunFolder;
-use grainwake_formats::events::Event;
 
 /// Largest number of events in the table.
 const EVENTS: usize = 100;
@@ -216,12 +216,12 @@ fn precise(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// Returns the details of an event in label markup.
+/// Returns the details of an event, in label markup.
 fn details(event: &Event) -> Vec<String> {
     let confirmed = format!("certain at {} s", precise(event.confirmed));
     let gap = event.gap.map(|gap| format!("gap {} mm", short(1e3 * gap)));
-    let tilt = event.tilt.map(f64::to_degrees);
-    let tilt = tilt.map(|tilt| format!("pair {}° from the vertical", short(tilt)));
+    let tilt = event.tilt.map(|tilt| short(tilt.to_degrees()));
+    let tilt = tilt.map(|degrees| format!("pair {degrees}° from the vertical"));
     [Some(confirmed), gap, tilt].into_iter().flatten().collect()
 }
 

@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use glam::DVec3;
-use serde_json::Value;
-
 use grainwake_formats::{FormatError, read_text};
+use serde_json::Value;
 
 use crate::error::ReportError;
 
@@ -176,8 +175,8 @@ fn grain_of(grain: &Value) -> GrainFacts {
 /// Reads a JSON file; an error names the line.
 pub fn read_json(file: &Path) -> Result<Value, ReportError> {
     let text = read_text(file)?;
-    serde_json::from_str(&text)
-        .map_err(|error| FormatError::line(file, error.line().max(1), error.to_string()).into())
+    let value = serde_json::from_str(&text);
+    Ok(value.map_err(|error| FormatError::line(file, error.line().max(1), error.to_string()))?)
 }
 
 /// Adds the properties of the grains in the summary.
