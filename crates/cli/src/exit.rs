@@ -1,4 +1,4 @@
-//! Exit codes, and error messages on standard error.
+//! Exit codes and error messages.
 
 use std::process::ExitCode;
 
@@ -6,8 +6,6 @@ use grainwake_run::RunError;
 use grainwake_run::case::{CaseError, Problem};
 use grainwake_shape::ShapeError;
 use miette::{GraphicalReportHandler, GraphicalTheme};
-
-use crate::tell;
 
 /// The results do not meet `[expect]`.
 pub const MISSED: u8 = 1;
@@ -52,8 +50,13 @@ impl Exit {
         Exit { code, problems }
     }
 
-    /// Prints the messages and returns the exit code.
-    pub fn report(&self) -> ExitCode {
+    /// Returns the exit code.
+    pub fn code(&self) -> ExitCode {
+        ExitCode::from(self.code)
+    }
+
+    /// Returns the messages as they appear on standard error.
+    pub fn messages(&self) -> String {
         let terminal = std::io::IsTerminal::is_terminal(&std::io::stderr())
             && std::env::var_os("NO_COLOR").is_none();
         let theme = if terminal {
@@ -66,14 +69,15 @@ impl Exit {
         let handler = GraphicalReportHandler::new_themed(theme)
             .with_width(width)
             .with_context_lines(1);
-        for problem in &self.problems {
+        let message = |problem: &Problem| {
             let mut text = String::new();
             match handler.render_report(&mut text, problem) {
-                Ok(()) => tell!("{}", text.trim_end_matches('\n')),
-                Err(_) => tell!("{problem}"),
+                Ok(()) => text.trim_end_matches('\n').to_owned(),
+                Err(_) => problem.to_string(),
             }
-        }
-        ExitCode::from(self.code)
+        };
+        let messages: Vec<String> = self.problems.iter().map(message).collect();
+        messages.join("\n")
     }
 }
 

@@ -43,6 +43,9 @@ fn main() -> std::process::ExitCode {
     };
     match done {
         Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(exit) => exit.report(),
+        Err(exit) => {
+            tell!("{}", exit.messages());
+            exit.code()
+        }
     }
 }

@@ -3,13 +3,13 @@
 use crate::distance::Distance;
 use crate::error::{Result, ShapeError, positive, within};
 use crate::field::SampledField;
-use crate::mesh::TriangleMesh;
 use crate::morphology::Morphology;
+use crate::nodes::SurfaceNode;
 use crate::provenance::Provenance;
 use crate::quality::{self, Quality, QualityBounds};
-use crate::shape::{Field, Shape, SurfaceNode};
-use crate::surface::{self, Samples};
-use crate::{inscribed, mass, nodes, roundness};
+use crate::shape::{Field, Shape};
+use crate::triangles::TriangleMesh;
+use crate::{inscribed, mass, nodes, roundness, surface};
 use glam::DVec3;
 
 /// Resolution, surface nodes and bounds of a sampled shape.
@@ -95,7 +95,7 @@ pub(crate) fn assemble<D: Distance>(
     let mass = mass::of_field(&field);
     quality::check_axes(&mass.second)?;
 
-    let mesh = surface_of(&field);
+    let mesh = surface::of_field(&field);
     mesh.check_closed().map_err(|e| {
         ShapeError::quality(format!(
             "the surface of the sampled body is not one closed surface ({e}); ask for more cells \
@@ -156,16 +156,6 @@ pub(crate) fn assemble<D: Distance>(
         quality: Some(quality),
         provenance,
         field: Field::Sampled(field),
-    })
-}
-
-/// Extracts the closed surface of a field.
-pub(crate) fn surface_of(field: &SampledField) -> TriangleMesh {
-    surface::extract(&Samples {
-        dims: field.dims(),
-        lower: field.lower(),
-        spacing: field.spacing(),
-        values: field.levels(),
     })
 }
 

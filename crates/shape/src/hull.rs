@@ -1,6 +1,6 @@
 //! Volume of the convex hull of points (Quickhull, Barber and others 1996).
 
-use crate::mesh::bounds;
+use crate::triangles::bounds;
 use glam::DVec3;
 
 struct Facet {
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn hull_of_a_sphere_and_of_a_cloud() {
-        let sphere = crate::mesh::cube_sphere(24, |u| u);
+        let sphere = crate::triangles::cube_sphere(24, |u| u);
         let hull = volume(&sphere.vertices).unwrap();
         assert!((hull / sphere.signed_volume() - 1.0).abs() < 1e-3, "{hull}");
         let cloud: Vec<DVec3> = (0..200)

@@ -1,7 +1,7 @@
 //! Volume, centroid and second moments of a mesh (exact) and of a sampled field (sub-cell).
 
 use crate::field::SampledField;
-use crate::mesh::TriangleMesh;
+use crate::triangles::TriangleMesh;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -223,7 +223,7 @@ mod tests {
     fn a_block_mesh_has_the_textbook_moments() {
         let size = DVec3::new(3.0, 2.0, 1.0);
         let place = DVec3::new(10.0, -4.0, 7.0);
-        let mut mesh = crate::mesh::unit_cube();
+        let mut mesh = crate::triangles::unit_cube();
         mesh.vertices
             .iter_mut()
             .for_each(|v| *v = place + *v * size);

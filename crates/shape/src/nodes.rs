@@ -5,10 +5,18 @@
 //! samples, then back onto the surface) even them out. The area of a node is that of its samples.
 
 use crate::field::SampledField;
-use crate::mesh::TriangleMesh;
-use crate::shape::SurfaceNode;
+use crate::triangles::TriangleMesh;
 use glam::DVec3;
 use rayon::prelude::*;
+
+/// A surface point with the area that it represents.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceNode {
+    /// Position in the principal frame [m].
+    pub position: DVec3,
+    /// Area represented by the node [m^2]; the areas add up to the surface area.
+    pub area: f64,
+}
 
 /// Returns the unit vector of height `z` and number `n` on a spiral of golden angles: evenly spread
 /// directions if `z` is.

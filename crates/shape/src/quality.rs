@@ -2,7 +2,7 @@
 
 use crate::error::{Result, ShapeError};
 use crate::field::SampledField;
-use crate::shape::SurfaceNode;
+use crate::nodes::SurfaceNode;
 use glam::{DMat3, DVec3};
 
 /// Measured quality of a sampled shape.

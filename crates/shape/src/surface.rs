@@ -4,7 +4,8 @@
 //! face are always separated; this rule depends on the face only, so that adjacent cells agree and
 //! the surface is a closed manifold if the border of the grid is outside.
 
-use crate::mesh::TriangleMesh;
+use crate::field::SampledField;
+use crate::triangles::TriangleMesh;
 use glam::DVec3;
 use std::sync::LazyLock;
 
@@ -197,6 +198,16 @@ fn fill(mesh: &mut TriangleMesh, polygon: &[u32]) {
             }
         }
     }
+}
+
+/// Extracts the closed surface of a field.
+pub(crate) fn of_field(field: &SampledField) -> TriangleMesh {
+    extract(&Samples {
+        dims: field.dims(),
+        lower: field.lower(),
+        spacing: field.spacing(),
+        values: field.levels(),
+    })
 }
 
 #[cfg(test)]

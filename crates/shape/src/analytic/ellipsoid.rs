@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn distance_agrees_with_brute_force() {
         let axes = DVec3::new(1.5, 1.0, 0.6);
-        let mesh = crate::mesh::cube_sphere(160, |u| u * axes);
+        let mesh = crate::triangles::cube_sphere(160, |u| u * axes);
         let queries = [
             DVec3::ZERO,
             DVec3::X * 0.3,

@@ -3,6 +3,7 @@
 
 mod ellipsoid;
 mod solids;
+mod sphere;
 
 #[cfg(test)]
 pub(crate) use ellipsoid::distance as ellipsoid_distance;

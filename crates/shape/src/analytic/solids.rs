@@ -3,9 +3,10 @@
 use super::sorted;
 use crate::assemble::{Body, assemble};
 use crate::error::{Result, positive, within};
-use crate::mesh::{self, cube_sphere};
+use crate::mesh;
 use crate::provenance::Provenance;
 use crate::roundness::Surface;
+use crate::triangles::cube_sphere;
 use crate::{Shape, ShapeOptions};
 use glam::{DVec2, DVec3, Vec3Swizzles};
 use std::f64::consts::PI;

@@ -4,9 +4,10 @@ use super::levels;
 use crate::field::SampledField;
 use crate::limits::hex;
 use crate::morphology::Morphology;
+use crate::nodes::SurfaceNode;
 use crate::provenance::Provenance;
 use crate::quality::Quality;
-use crate::shape::{Field, Shape, SurfaceNode};
+use crate::shape::{Field, Shape};
 use grainwake_formats::codec::{self, Decoder, Encoder, invalid};
 use sha2::{Digest, Sha256};
 use std::io;
@@ -35,7 +36,7 @@ pub(super) fn encode(shape: &Shape) -> Vec<u8> {
 }
 
 /// Returns the SHA-256 of the geometry in hexadecimal.
-pub(crate) fn digest(shape: &Shape) -> String {
+pub(super) fn digest(shape: &Shape) -> String {
     let content = in_memory(|out| {
         encode_mass(out, shape)?;
         match &shape.field {

@@ -8,8 +8,6 @@
 mod content;
 mod levels;
 
-pub(crate) use content::digest;
-
 use crate::error::{Result, ShapeError};
 use crate::shape::Shape;
 use content::in_memory;
@@ -43,6 +41,12 @@ impl Shape {
         };
         let (bytes, _) = crate::limits::read_bytes(path, &limits)?;
         Shape::from_bytes(&bytes, path)
+    }
+
+    /// Returns the hash of the geometry (field, nodes, mass properties) in hexadecimal: equal for
+    /// equal shapes, independent of their provenance.
+    pub fn digest(&self) -> String {
+        content::digest(self)
     }
 
     /// Returns the content of a `.grain` file.

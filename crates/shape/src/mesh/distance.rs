@@ -1,12 +1,11 @@
 //! Signed distance to a closed mesh.
 
 use super::TriangleMesh;
-use super::bvh::{Bvh, Feature, Nearest, nearest_on_triangle};
-use super::check::Neighbours;
 use super::nearest_cache::About;
 use super::propagate;
 use crate::distance::Distance;
 use crate::error::Result;
+use crate::triangles::{Bvh, Feature, Nearest, Neighbours, nearest_on_triangle};
 use glam::DVec3;
 use std::sync::OnceLock;
 
@@ -226,7 +225,7 @@ mod tests {
 
     #[test]
     fn distance_to_a_cube_is_exact_everywhere() {
-        let mut mesh = crate::mesh::unit_cube().scaled(2.0);
+        let mut mesh = crate::triangles::unit_cube().scaled(2.0);
         mesh.vertices.iter_mut().for_each(|v| *v -= DVec3::ONE);
         let field = MeshDistance::new(&mesh).unwrap();
         for i in 0..3000 {

@@ -5,9 +5,9 @@
 //!
 //! Lanczos factors, sin(x) / x at x = pi n / (N + 1), suppress ringing.
 
-use super::{TriangleMesh, cube_sphere};
 use crate::error::{Result, ShapeError};
 use crate::limits::ReadLimits;
+use crate::triangles::{TriangleMesh, cube_sphere};
 use glam::DVec3;
 use std::f64::consts::PI;
 use std::path::Path;

@@ -7,7 +7,7 @@
 //! the surface; the error was below a tenth of a cell in the tests.
 
 use super::MeshDistance;
-use super::bvh::Nearest;
+use crate::triangles::Nearest;
 use glam::{DVec3, Vec3};
 
 /// Width of a bucket of the front [cells]; samples within one bucket are processed in any order.
@@ -265,7 +265,7 @@ mod tests {
 
     use crate::distance::{Distance, EVERYWHERE};
     use crate::grid::place;
-    use crate::mesh::cube_sphere;
+    use crate::triangles::cube_sphere;
 
     #[test]
     fn spread_distances_are_the_exact_ones() {

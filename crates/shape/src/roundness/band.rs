@@ -1,10 +1,10 @@
 //! Samples of the distance around a level set, and curvatures from them.
 
 use crate::distance::{Distance, EVERYWHERE};
+use crate::filter::refine;
 use crate::grid::{coordinates, index, place};
-use crate::mesh::TriangleMesh;
-use crate::scan::refine;
 use crate::surface::{Samples, extract};
+use crate::triangles::TriangleMesh;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -219,7 +219,8 @@ pub(super) fn principal(gradient: DVec3, hessian: DMat3) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{MeshDistance, cube_sphere};
+    use crate::mesh::MeshDistance;
+    use crate::triangles::cube_sphere;
 
     /// A lumpy body, a cube and a waisted body, at the resolution used for scans.
     #[test]

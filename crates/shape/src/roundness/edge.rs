@@ -10,12 +10,9 @@
 //! Symbols: s standard deviation, u multiples of s, z depth below the surface in multiples of s, x
 //! coordinate across the edge, y height above it, k curvature.
 
+use crate::filter::Kernel;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
-
-/// Weights (sum 1) and standard deviations of the Gaussians equivalent to blur and smoothing of an
-/// image.
-pub(crate) type Kernel = [(f64, f64); 2];
 
 /// A section through an edge in the image.
 #[derive(Clone, Debug, Default)]

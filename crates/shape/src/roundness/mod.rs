@@ -17,8 +17,8 @@ mod edge;
 mod scan;
 
 use crate::distance::Distance;
+use crate::filter::Kernel;
 use band::Band;
-pub(crate) use edge::Kernel;
 use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;

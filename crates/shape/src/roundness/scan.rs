@@ -13,11 +13,11 @@
 
 use super::CORNER;
 use super::band::Band;
-use super::edge::{Chain, Kernel, edges_of};
+use super::edge::{Chain, edges_of};
 use super::{Lost, Reading};
 use crate::distance::Distance;
-use crate::mesh::TriangleMesh;
-use crate::scan::gaussian;
+use crate::filter::{Kernel, gaussian};
+use crate::triangles::TriangleMesh;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;

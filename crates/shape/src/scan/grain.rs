@@ -6,6 +6,7 @@ use super::runs::{fill_cavities, pieces};
 use super::{Mask, ScanOptions, smooth, transform};
 use crate::Shape;
 use crate::error::{Result, ShapeError, first_few};
+use crate::filter::refine;
 use crate::grid::{coordinates, index, place};
 use crate::limits::SourceFile;
 use crate::mesh::{TriangleMesh, from_closed};
@@ -144,7 +145,7 @@ fn one_piece(mask: &mut Mask, label: u32, largest: bool) -> Result<u64> {
 /// volume, on a grid refined by `factor`.
 fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Result<TriangleMesh> {
     let (field, dims, lower) = near_surface(field, dims);
-    let (mut fine, dims) = smooth::refine(&field, dims, factor);
+    let (mut fine, dims) = refine(&field, dims, factor);
     let spacing = 1.0 / factor as f64;
     let mut mesh = TriangleMesh::default();
     // Newton's method: the derivative of the volume with respect to the level is the area.

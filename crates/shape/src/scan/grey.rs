@@ -8,10 +8,9 @@
 //! removed by setting the level to match the volume.
 
 use super::Mask;
-use super::smooth::gaussian;
 use super::transform;
 use super::watershed::HALO;
-use crate::roundness::Kernel;
+use crate::filter::{Kernel, gaussian};
 use rayon::prelude::*;
 use std::f64::consts::SQRT_2;
 

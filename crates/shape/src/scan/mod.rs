@@ -25,7 +25,6 @@ mod regions;
 mod runs;
 mod slices;
 mod smooth;
-pub(crate) use smooth::{gaussian, refine};
 mod threshold;
 mod tiff;
 mod transform;

@@ -1,6 +1,7 @@
 //! Exact Euclidean distance transform of a mask, in both directions.
 
 use super::Mask;
+use crate::filter::transpose;
 use rayon::prelude::*;
 
 /// Squared distance if the line has no target voxel.
@@ -44,22 +45,6 @@ fn squared(mask: &Mask, target: bool) -> Vec<f32> {
     lower_lines(&mut field, nz);
     transpose(&field, &mut scratch, [nz, nx, ny]);
     scratch
-}
-
-/// Transposes (x, y, z) with x fastest to (y, z, x) with y fastest.
-pub(super) fn transpose(from: &[f32], to: &mut [f32], [nx, ny, nz]: [usize; 3]) {
-    // Several planes at once, so that complete cache lines of `from` are used.
-    const WIDTH: usize = 16;
-    let blocks = to.par_chunks_mut(WIDTH * ny * nz).enumerate();
-    blocks.for_each(|(block, planes)| {
-        let (first, width) = (block * WIDTH, planes.len() / (ny * nz));
-        for row in 0..ny * nz {
-            let line = &from[nx * row + first..][..width];
-            for (i, value) in line.iter().enumerate() {
-                planes[i * ny * nz + row] = *value;
-            }
-        }
-    });
 }
 
 /// A parabola of the lower envelope: position, height of the vertex, and start of the interval in

@@ -189,7 +189,7 @@ fn split(
 }
 
 /// Returns the nearest point of a triangle (Ericson, Real-Time Collision Detection, section 5.1.5).
-pub(super) fn nearest_on_triangle(x: DVec3, [a, b, c]: &[DVec3; 3]) -> (DVec3, Feature) {
+pub(crate) fn nearest_on_triangle(x: DVec3, [a, b, c]: &[DVec3; 3]) -> (DVec3, Feature) {
     let (ab, ac, ax) = (*b - *a, *c - *a, x - *a);
     let (d1, d2) = (ab.dot(ax), ac.dot(ax));
     if d1 <= 0.0 && d2 <= 0.0 {
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn the_hierarchy_agrees_with_brute_force() {
-        let mesh = crate::mesh::cube_sphere(8, |u| u * (1.0 + 0.3 * (5.0 * u.x).sin() * u.y));
+        let mesh = crate::triangles::cube_sphere(8, |u| u * (1.0 + 0.3 * (5.0 * u.x).sin() * u.y));
         let corners = mesh.faces();
         let bvh = Bvh::new(&corners);
         for i in 0..200 {

@@ -82,8 +82,8 @@ fn passes(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> Option<DVec3> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cube_sphere;
     use super::*;
-    use crate::mesh::cube_sphere;
 
     #[test]
     fn a_dented_ball_passes() {
