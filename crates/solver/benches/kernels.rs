@@ -7,8 +7,8 @@ use std::sync::Arc;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, Material};
-use grainwake_solver::math::{Load, Pose};
+use grainwake_solver::dem::{ContactParams, Dynamics, Enclosure, Grain};
+use grainwake_solver::math::Load;
 
 const DIAMETER: f64 = 2e-3;
 /// Grains along each edge of the heap.
@@ -67,19 +67,10 @@ fn heap() -> (Dynamics, Vec<Grain>) {
             (n / EDGE % EDGE) as f64,
             (n / EDGE / EDGE) as f64,
         );
-        grains.push(Grain {
-            shape: shape.clone(),
-            density: 2500.0,
-            material: Material::default(),
-            pose: Pose {
-                position: (cell + 0.5) * APART * DIAMETER,
-                orientation: DQuat::from_scaled_axis(3.0 * u),
-            },
-            velocity: DVec3::ZERO,
-            angular_velocity: DVec3::ZERO,
-            translation: Dof::Free,
-            rotation: Dof::Free,
-        });
+        let grain = Grain::new(shape.clone(), 2500.0)
+            .with_position((cell + 0.5) * APART * DIAMETER)
+            .with_orientation(DQuat::from_scaled_axis(3.0 * u));
+        grains.push(grain);
     }
     let enclosure = Enclosure {
         lower: DVec3::ZERO,

@@ -8,10 +8,8 @@ use dem_support::{Random, floor, kinetic, open_box, smooth, step};
 use glam::{DQuat, DVec3};
 use grainwake_shape::mesh::{MeshOptions, TriangleMesh, shape_from_mesh};
 use grainwake_shape::{Shape, ShapeOptions, SourceFile, analytic};
-use grainwake_solver::dem::{
-    ContactParams, Dof, Dynamics, Enclosure, Grain, Material, surface_gap,
-};
-use grainwake_solver::math::{Load, Pose};
+use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, surface_gap};
+use grainwake_solver::math::Load;
 
 /// A rounded box of 40 x 30 x 20 mm with edges rounded to 4 mm.
 static BLOCK: LazyLock<Arc<Shape>> = LazyLock::new(|| {
@@ -55,19 +53,9 @@ static PEBBLE: LazyLock<Arc<Shape>> = LazyLock::new(|| {
 });
 
 fn grain(shape: &Arc<Shape>, position: DVec3, orientation: DQuat) -> Grain {
-    Grain {
-        shape: shape.clone(),
-        density: 2500.0,
-        material: Material::default(),
-        pose: Pose {
-            position,
-            orientation,
-        },
-        velocity: DVec3::ZERO,
-        angular_velocity: DVec3::ZERO,
-        translation: Dof::Free,
-        rotation: Dof::Free,
-    }
+    Grain::new(shape.clone(), 2500.0)
+        .with_position(position)
+        .with_orientation(orientation)
 }
 
 /// Moves `b` towards `a` until the surfaces overlap by `depth` [m].

@@ -4,10 +4,10 @@ use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::*;
-use crate::dem::{Dof, Grain, Material};
+use crate::dem::Grain;
 use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
-use crate::math::{Load, Pose, Real};
+use crate::math::{Load, Real};
 
 const DT: f64 = 0.004;
 
@@ -15,18 +15,12 @@ const DT: f64 = 0.004;
 fn grains() -> [Grain; 2] {
     let options = ShapeOptions::default();
     let shape = Arc::new(analytic::ellipsoid(0.5, 0.4, 0.35, &options).unwrap());
-    [DVec3::new(1.55, 2.02, 1.97), DVec3::new(5.1, 3.9, 3.1)].map(|position| Grain {
-        shape: shape.clone(),
-        density: 2.0,
-        material: Material::default(),
-        pose: Pose {
-            position,
-            orientation: DQuat::from_scaled_axis(position),
-        },
-        velocity: DVec3::new(0.3, -0.1, 0.2),
-        angular_velocity: DVec3::new(0.5, 0.2, -0.7),
-        translation: Dof::Free,
-        rotation: Dof::Free,
+    [DVec3::new(1.55, 2.02, 1.97), DVec3::new(5.1, 3.9, 3.1)].map(|position| {
+        Grain::new(shape.clone(), 2.0)
+            .with_position(position)
+            .with_orientation(DQuat::from_scaled_axis(position))
+            .with_velocity(DVec3::new(0.3, -0.1, 0.2))
+            .with_angular_velocity(DVec3::new(0.5, 0.2, -0.7))
     })
 }
 
@@ -158,18 +152,10 @@ fn padding_of_rows_affects_no_link() {
         advection: Advection::Central,
     };
     // Close to corners of the box, where links have fewer than six faces in line.
-    let grain = |place: f64| Grain {
-        shape: Arc::new(Shape::sphere(1.0, 100)),
-        density: 2.0,
-        material: Material::default(),
-        pose: Pose {
-            position: DVec3::splat(place),
-            orientation: DQuat::IDENTITY,
-        },
-        velocity: DVec3::ONE,
-        angular_velocity: DVec3::ZERO,
-        translation: Dof::Free,
-        rotation: Dof::Free,
+    let grain = |x: f64| {
+        Grain::new(Shape::sphere(1.0, 100), 2.0)
+            .with_position(DVec3::splat(x))
+            .with_velocity(DVec3::ONE)
     };
     let grains = [grain(1.1), grain(4.9)];
     let predicted = |filling: f64| {

@@ -5,25 +5,16 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, Material};
-use grainwake_solver::math::{Load, Pose};
+use grainwake_solver::dem::{ContactParams, Dynamics, Enclosure, Grain};
+use grainwake_solver::math::Load;
 
 /// A sphere at rest.
 pub fn sphere(radius: f64, density: f64, nodes: usize, position: DVec3) -> Grain {
-    Grain {
-        shape: Arc::new(Shape::sphere(radius, nodes)),
-        density,
-        material: Material::default(),
-        pose: Pose {
-            position,
-            // Rotated so that no node lies on an axis.
-            orientation: DQuat::from_scaled_axis(DVec3::new(0.4, -0.9, 0.3)),
-        },
-        velocity: DVec3::ZERO,
-        angular_velocity: DVec3::ZERO,
-        translation: Dof::Free,
-        rotation: Dof::Free,
-    }
+    // Rotated so that no node lies on an axis.
+    let orientation = DQuat::from_scaled_axis(DVec3::new(0.4, -0.9, 0.3));
+    Grain::new(Shape::sphere(radius, nodes), density)
+        .with_position(position)
+        .with_orientation(orientation)
 }
 
 /// A box of half width `half` about the origin without walls.
@@ -121,19 +112,12 @@ pub fn cloud(count: usize, half: f64, radius: f64, speed: f64, seed: u64) -> Vec
             .iter()
             .all(|g| g.pose.position.distance(position) > 2.0 * radius)
         {
-            grains.push(Grain {
-                shape: shape.clone(),
-                density: 1000.0 + 500.0 * random.next(),
-                material: Material::default(),
-                pose: Pose {
-                    position,
-                    orientation: DQuat::from_scaled_axis(random.vector() * 3.0),
-                },
-                velocity: (random.vector() - position / half) * speed,
-                angular_velocity: random.vector() * speed / radius,
-                translation: Dof::Free,
-                rotation: Dof::Free,
-            });
+            let grain = Grain::new(shape.clone(), 1000.0 + 500.0 * random.next())
+                .with_position(position)
+                .with_orientation(DQuat::from_scaled_axis(random.vector() * 3.0))
+                .with_velocity((random.vector() - position / half) * speed)
+                .with_angular_velocity(random.vector() * speed / radius);
+            grains.push(grain);
         }
     }
     grains

@@ -14,8 +14,7 @@ use crate::case::quantity::{Density, Quantity, Triple};
 use crate::case::raw::{Law, Orientation, Position, RawGrain, Turns};
 use crate::case::readable::{number, quantity, vector};
 use crate::case::shapes::Library;
-use grainwake_solver::dem::{Dof, Grain, Material};
-use grainwake_solver::math::Pose;
+use grainwake_solver::dem::{Dof, Grain};
 use grainwake_solver::sim::PrescribedMotion;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -64,20 +63,13 @@ pub(super) fn grain(
         Law::Prescribed(v) => Dof::Prescribed(*v),
         Law::Formula(formula) => Dof::Prescribed(formula.at(&[0.0])),
     };
-    let mut grain = Grain {
-        shape,
-        density,
-        // `materials` sets it for the contact laws that use it.
-        material: Material::default(),
-        pose: Pose {
-            position: DVec3::ZERO,
-            orientation,
-        },
-        velocity,
-        angular_velocity,
-        translation: law(&raw.motion.velocity),
-        rotation: law(&raw.motion.angular_velocity),
-    };
+    // `materials` sets the material for the contact laws that use it.
+    let mut grain = Grain::new(shape, density)
+        .with_orientation(orientation)
+        .with_velocity(velocity)
+        .with_angular_velocity(angular_velocity);
+    grain.translation = law(&raw.motion.velocity);
+    grain.rotation = law(&raw.motion.angular_velocity);
     grain.pose.position = position(check, raw, index, &grain, earlier, vertical)?;
     resolved.position = Some(Position(grain.pose.position.to_array().to_vec()).into());
     resolved.gap_above = None;

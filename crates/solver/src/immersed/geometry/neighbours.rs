@@ -167,11 +167,9 @@ impl NeighbourSearch {
 mod tests {
     use std::sync::Arc;
 
-    use glam::DQuat;
     use grainwake_shape::Shape;
 
     use super::*;
-    use crate::dem::Dof;
     use crate::flow::{Boundaries, Boundary};
 
     #[test]
@@ -185,19 +183,7 @@ mod tests {
         let mask = DofMask::new(&mesh, &boundaries);
         let shape = Arc::new(Shape::sphere(0.5, 100));
         // The first and the last are 1.1 apart across x; the second has no neighbours.
-        let at = |x: f64| Grain {
-            shape: shape.clone(),
-            density: 2.0,
-            material: crate::dem::Material::default(),
-            pose: Pose {
-                position: DVec3::new(x, 2.0, 2.0),
-                orientation: DQuat::IDENTITY,
-            },
-            velocity: DVec3::ZERO,
-            angular_velocity: DVec3::ZERO,
-            translation: Dof::Free,
-            rotation: Dof::Free,
-        };
+        let at = |x: f64| Grain::new(shape.clone(), 2.0).with_position(DVec3::new(x, 2.0, 2.0));
         let grains = [at(-0.5), at(3.0), at(6.4)];
         let mut search = NeighbourSearch::default();
         let found = |search: &NeighbourSearch, index| -> Vec<(DVec3, f64)> {
