@@ -36,7 +36,7 @@ pub use stability::StepError;
 /// Simulation of grains in a fluid, or of grains alone.
 ///
 /// Units are SI. Positions, velocities and loads are in the space frame, angular velocities and
-/// torques too; torques are about the centroid of their grain. RigidState refers to the end of the last
+/// torques too; torques are about the centroid of their grain. State refers to the end of the last
 /// step. Built by [`Simulation::new`], advanced by [`Simulation::step`], and stored bit for bit by
 /// [`Simulation::save`] and [`Simulation::restore`]. Results do not depend on the number of
 /// threads.
