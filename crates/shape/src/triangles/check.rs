@@ -226,7 +226,7 @@ mod tests {
     fn a_flipped_face_is_located() {
         let mut mesh = cube();
         mesh.triangles[3].swap(0, 1);
-        assert_refused(&mesh, &["and 3 near (1, ", "opposite orientations"]);
+        assert_refused(&mesh, &["faces ", "near (1, ", "opposite orientations"]);
     }
 
     #[test]
