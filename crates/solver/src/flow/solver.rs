@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use crate::grid::{Centre, FaceVector, Field, Mesh, for_planes_of, row_blocks};
+use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, for_planes_of, row_blocks};
 use crate::math::{Real, last_cache};
 use crate::poisson::{Plane, Poisson, Stages};
 use grainwake_simd::dispatch;
@@ -324,6 +324,14 @@ impl<R: Real> Flow<R> {
         (fields, &mut self.tendency_sums)
     }
 
+    /// View of the velocity component along `axis` on its faces [m/s].
+    pub fn velocity_view(&self, axis: Axis) -> FieldView<'_, R> {
+        self.velocity.view(axis, &self.mesh)
+    }
+    /// View of the dynamic pressure over density at the cell centres [m^2/s^2].
+    pub fn pressure_view(&self) -> FieldView<'_, R> {
+        self.pressure.view(&self.mesh)
+    }
     /// The grid.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh

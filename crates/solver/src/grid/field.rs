@@ -13,13 +13,15 @@ use std::ops::{Deref, DerefMut};
 
 use glam::DVec3;
 
-use super::Mesh;
+use super::{Axis, FieldView, Mesh};
 use crate::math::{Aligned, Real};
 
 /// A place on the staggered cell.
 pub trait Location: Copy + Send + Sync + 'static {
     /// Offset from the cell's lower corner in units of the spacing.
     const OFFSET: [f64; 3];
+    /// Axis normal to the faces; none for cell centres.
+    const NORMAL: Option<Axis>;
 }
 
 /// Cell centres.
@@ -37,15 +39,19 @@ pub struct FaceZ;
 
 impl Location for Centre {
     const OFFSET: [f64; 3] = [0.5, 0.5, 0.5];
+    const NORMAL: Option<Axis> = None;
 }
 impl Location for FaceX {
     const OFFSET: [f64; 3] = [0.0, 0.5, 0.5];
+    const NORMAL: Option<Axis> = Some(Axis::X);
 }
 impl Location for FaceY {
     const OFFSET: [f64; 3] = [0.5, 0.0, 0.5];
+    const NORMAL: Option<Axis> = Some(Axis::Y);
 }
 impl Location for FaceZ {
     const OFFSET: [f64; 3] = [0.5, 0.5, 0.0];
+    const NORMAL: Option<Axis> = Some(Axis::Z);
 }
 
 /// Offsets of the three face locations, indexed by axis.
@@ -189,6 +195,10 @@ impl<L: Location, R: Real> Field<L, R> {
     pub fn layout(&self) -> Layout {
         self.layout
     }
+    /// Read-only view of all values without ghosts.
+    pub fn view<'a>(&'a self, mesh: &Mesh) -> FieldView<'a, R> {
+        FieldView::new(self, mesh, L::NORMAL)
+    }
     /// Value at (i, j, k); ghosts at 0 and n+1.
     #[cfg(test)]
     #[inline]
@@ -279,6 +289,10 @@ impl<R: Real> FaceVector<R> {
             y: Field::zeros(mesh),
             z: Field::zeros(mesh),
         }
+    }
+    /// Read-only view of one component without ghosts.
+    pub fn view<'a>(&'a self, axis: Axis, mesh: &Mesh) -> FieldView<'a, R> {
+        FieldView::new(self.component(axis as usize), mesh, Some(axis))
     }
     /// Raw values of one component.
     #[inline]

@@ -4,11 +4,15 @@ mod field;
 mod loops;
 mod mesh;
 mod part;
+mod view;
 
 pub use field::Layout;
 pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field};
+#[cfg(test)]
+pub(crate) use field::{FaceZ, Location};
 pub(crate) use loops::{
     Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, for_slabs, row_blocks,
 };
 pub use mesh::{Axis, Mesh};
 pub(crate) use part::Part;
+pub use view::FieldView;
