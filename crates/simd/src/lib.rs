@@ -32,7 +32,7 @@ pub use aligned::Aligned;
 pub use complex::{Complex, turned};
 pub use one::One;
 pub use real::{Precision, Real};
-pub use rows::{Partial, RowWork, along_row};
+pub use rows::{Partial, RowWork, along_row, window, window_mut};
 pub use stencil::Stencil;
 
 /// Numbers of the widest register.

@@ -34,6 +34,20 @@ pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number
     }
 }
 
+/// The `V::WIDTH` entries from `at` on and one neighbour on each side.
+///
+/// Windows at one place of lists of one length share one bounds check.
+#[inline(always)]
+pub fn window<V: Vector>(list: &[V::Number], at: usize) -> &[V::Number] {
+    &list[at - 1..][..V::WIDTH + 2]
+}
+
+/// The `V::WIDTH` entries from `at` on, to be overwritten; checked like [`window`].
+#[inline(always)]
+pub fn window_mut<V: Vector>(list: &mut [V::Number], at: usize) -> &mut [V::Number] {
+    &mut list[at - 1..][..V::WIDTH + 2][1..][..V::WIDTH]
+}
+
 /// Partial results of a row in doubles: a sum or a maximum in an order that no width changes.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]

@@ -10,7 +10,7 @@ use super::FlowMeasures;
 use crate::grid::{FaceVector, Layout};
 use crate::math::Real;
 use crate::poisson::{Plane, Solution};
-use grainwake_simd::{Kernel, One, Partial, RowWork, Vector, along_row};
+use grainwake_simd::{Kernel, One, Partial, RowWork, Vector, along_row, window, window_mut};
 
 /// What one plane contributes to the measures.
 #[derive(Clone, Copy, Debug, Default)]
@@ -48,27 +48,25 @@ impl<R: Real> Kernel for Divergence<'_, R> {
             out,
         } = self;
         let [n, ny, nz] = layout.cells;
-        let row = layout.row();
+        let u = layout.plane_of(&predicted.x, k);
+        let v = layout.plane_of(&predicted.y, k);
+        let w = layout.plane_of(&predicted.z, k);
+        let wt = layout.plane_of(&predicted.z, next(k, nz, periodic[2]));
         for j in 1..=ny {
-            let at = layout.index(0, j, k);
-            let up = layout.index(0, next(j, ny, periodic[1]), k);
-            let above = layout.index(0, j, next(k, nz, periodic[2]));
             let mut work = DivergenceRow {
-                u: &predicted.x[at..][..row],
-                v: &predicted.y[at..][..row],
-                vp: &predicted.y[up..][..row],
-                w: &predicted.z[at..][..row],
-                wp: &predicted.z[above..][..row],
+                u: layout.row_of(u, j),
+                v: layout.row_of(v, j),
+                vp: layout.row_of(v, next(j, ny, periodic[1])),
+                w: layout.row_of(w, j),
+                wt: layout.row_of(wt, j),
                 inverse,
                 dt,
-                out: out.row_mut(j),
+                out: &mut out.row_mut(j)[..n + 2],
             };
             if periodic[0] {
                 // The upper face of the last cell is the lower face of the first.
                 along_row::<V>(n - 1, &mut work);
-                let last = [work.u[n], work.u[1]];
-                work.u = &last;
-                work.value::<One<R>>(n, 0);
+                work.value(n, One(work.u[1]));
             } else {
                 along_row::<V>(n, &mut work);
             }
@@ -82,28 +80,29 @@ fn next(at: usize, n: usize, periodic: bool) -> usize {
     if at == n && periodic { 1 } else { at + 1 }
 }
 
+/// One row of cells; all slices have one length, so that a vector of cells is checked once.
 struct DivergenceRow<'a, R> {
     u: &'a [R],
     v: &'a [R],
     vp: &'a [R],
     w: &'a [R],
-    wp: &'a [R],
+    wt: &'a [R],
     inverse: [f64; 3],
     dt: f64,
     out: &'a mut [R],
 }
 
 impl<R: Real> DivergenceRow<'_, R> {
-    /// Entries from `i` on, the x faces from place `at` of `u` on.
+    /// Cells from `i` on, whose upper x faces have the velocity `ur`.
     #[inline(always)]
-    fn value<V: Vector<Number = R>>(&mut self, i: usize, at: usize) {
-        let load = |row: &[R]| V::load(&row[i..]);
+    fn value<V: Vector<Number = R>>(&mut self, i: usize, ur: V) {
+        let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
         let [x, y, z] = self.inverse.map(V::constant);
-        let u = [V::load(&self.u[at..]), V::load(&self.u[at + 1..])];
-        let sum = (u[1] - u[0]) * x
-            + (load(self.vp) - load(self.v)) * y
-            + (load(self.wp) - load(self.w)) * z;
-        sum.over(V::constant(self.dt)).store(&mut self.out[i..]);
+        let sum = (ur - here(self.u)) * x
+            + (here(self.vp) - here(self.v)) * y
+            + (here(self.wt) - here(self.w)) * z;
+        sum.over(V::constant(self.dt))
+            .store(window_mut::<V>(self.out, i));
     }
 }
 
@@ -111,7 +110,8 @@ impl<R: Real> RowWork for DivergenceRow<'_, R> {
     type Number = R;
     #[inline(always)]
     fn at<V: Vector<Number = R>>(&mut self, i: usize) {
-        self.value::<V>(i, i);
+        let ur = V::load(&window::<V>(self.u, i)[2..]);
+        self.value(i, ur);
     }
 }
 
@@ -137,51 +137,60 @@ impl<R: Real> Kernel for Correct<'_, R> {
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
         let (layout, k, periodic) = (self.layout, self.k, self.periodic);
-        let (row, [n, ny, nz]) = (layout.row(), layout.cells);
-        let [x, y, z] = self.velocity;
-        let (predicted, solution) = (self.predicted, self.solution);
+        let [n, ny, nz] = layout.cells;
+        let u = layout.plane_of(&self.predicted.x, k);
+        let v = layout.plane_of(&self.predicted.y, k);
+        let w = layout.plane_of(&self.predicted.z, k);
+        let wt = layout.plane_of(&self.predicted.z, next(k, nz, periodic[2]));
+        let [x, y, z] = self.velocity.map(|plane| &mut plane[..layout.plane()]);
+        let p = &mut self.pressure[..layout.plane()];
+        let Solution {
+            here: f,
+            below: fb,
+            above: ft,
+        } = self.solution;
         let mut partial = CorrectPartial::default();
         let mut rise = [0.0; 2];
         for j in 1..=ny {
-            let (at, here) = (layout.index(0, j, k), j * row..(j + 1) * row);
-            let up = layout.index(0, next(j, ny, periodic[1]), k);
-            let above = layout.index(0, j, next(k, nz, periodic[2]));
             let mut work = CorrectRow {
-                q: [0, 1, 2].map(|axis| &predicted.component(axis)[at..][..row]),
-                u: &predicted.x[at..][..row],
-                vp: &predicted.y[up..][..row],
-                wp: &predicted.z[above..][..row],
-                f: solution.here.row(j),
-                lower: [solution.here.row(j - 1), solution.below.row(j)],
-                upper: [solution.here.row(j + 1), solution.above.row(j)],
+                q: [
+                    layout.row_of(u, j),
+                    layout.row_of(v, j),
+                    layout.row_of(w, j),
+                ],
+                vp: layout.row_of(v, next(j, ny, periodic[1])),
+                wt: layout.row_of(wt, j),
+                f: &f.row(j)[..n + 2],
+                lower: [&f.row(j - 1)[..n + 2], &fb.row(j)[..n + 2]],
+                upper: [&f.row(j + 1)[..n + 2], &ft.row(j)[..n + 2]],
                 inverse: self.inverse,
                 pull: self.pull,
                 out: [
-                    &mut x[here.clone()],
-                    &mut y[here.clone()],
-                    &mut z[here.clone()],
+                    layout.row_of_mut(x, j),
+                    layout.row_of_mut(y, j),
+                    layout.row_of_mut(z, j),
                 ],
-                pressure: &mut self.pressure[here],
+                pressure: layout.row_of_mut(p, j),
                 n,
                 past_caches: self.past_caches,
                 partial: &mut partial,
                 given: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
             };
             if periodic[0] {
+                // The upper face of the last cell is the lower face of the first.
                 along_row::<V>(n - 1, &mut work);
-                let last = [work.u[n], work.u[1]];
-                work.u = &last;
-                work.value::<One<R>>(n, 0);
+                work.value(n, One(work.q[0][1]));
             } else {
                 along_row::<V>(n, &mut work);
                 // The lower boundary face was summed with the others.
-                let given = -x[j * row + 1].wide();
-                partial.momentum[0].add(1, One::<R>::constant(given));
+                let given = -work.out[0][1].wide();
+                work.partial.momentum[0].add(1, One::<R>::constant(given));
             }
-            rise[0] += self.pressure[j * row + n].wide() - self.pressure[j * row + 1].wide();
+            rise[0] += work.pressure[n].wide() - work.pressure[1].wide();
         }
+        let (first, last) = (layout.row_of(p, 1), layout.row_of(p, ny));
         for i in 1..=n {
-            rise[1] += self.pressure[ny * row + i].wide() - self.pressure[row + i].wide();
+            rise[1] += last[i].wide() - first[i].wide();
         }
         V::fence();
         *self.measures = PlaneMeasures {
@@ -207,12 +216,12 @@ struct CorrectPartial {
     momentum: [Partial; 3],
 }
 
+/// One row of cells; all slices have one length, so that a vector of cells is checked once.
 struct CorrectRow<'a, R> {
+    /// Prediction on the lower faces, and on the upper ones along y and z.
     q: [&'a [R]; 3],
-    /// Prediction on the upper faces: from place `at` + 1, one row up in y and in z.
-    u: &'a [R],
     vp: &'a [R],
-    wp: &'a [R],
+    wt: &'a [R],
     f: &'a [R],
     /// The increment one row down in y and in z, and one up.
     lower: [&'a [R]; 2],
@@ -228,22 +237,16 @@ struct CorrectRow<'a, R> {
 }
 
 impl<R: Real> CorrectRow<'_, R> {
-    /// Entries from `i` on, the upper x faces from place `at` + 1 of `u` on.
+    /// Cells from `i` on, whose upper x faces have the predicted velocity `ur`.
     #[inline(always)]
-    fn value<V: Vector<Number = R>>(&mut self, i: usize, at: usize) {
-        let load = |row: &[R]| V::load(&row[i..]);
-        let f = load(self.f);
-        let lower = [
-            V::load(&self.f[i - 1..]),
-            load(self.lower[0]),
-            load(self.lower[1]),
-        ];
-        let upper = [
-            V::load(&self.f[i + 1..]),
-            load(self.upper[0]),
-            load(self.upper[1]),
-        ];
-        let above = [V::load(&self.u[at + 1..]), load(self.vp), load(self.wp)];
+    fn value<V: Vector<Number = R>>(&mut self, i: usize, ur: V) {
+        let left = |row: &[R]| V::load(window::<V>(row, i));
+        let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
+        let right = |row: &[R]| V::load(&window::<V>(row, i)[2..]);
+        let f = here(self.f);
+        let lower = [left(self.f), here(self.lower[0]), here(self.lower[1])];
+        let upper = [right(self.f), here(self.upper[0]), here(self.upper[1])];
+        let above = [ur, here(self.vp), here(self.wt)];
         let zero = V::constant(0.0);
         let (mut square, mut rate, mut divergence) = (zero, zero, zero);
         // The ends of a row are looked at again for the ghosts.
@@ -253,9 +256,9 @@ impl<R: Real> CorrectRow<'_, R> {
                 V::constant(self.pull[axis]),
                 V::constant(self.inverse[axis]),
             );
-            let q = load(self.q[axis]) - pull * (f - lower[axis]);
+            let q = here(self.q[axis]) - pull * (f - lower[axis]);
             let next = above[axis] - pull * (upper[axis] - f);
-            let to = &mut self.out[axis][i..];
+            let to = window_mut::<V>(self.out[axis], i);
             if past {
                 q.store_past(to);
             } else {
@@ -268,7 +271,7 @@ impl<R: Real> CorrectRow<'_, R> {
                 self.partial.momentum[axis].add(i, q);
             }
         }
-        let p = &mut self.pressure[i..];
+        let p = window_mut::<V>(self.pressure, i);
         (V::load(p) + f).store(p);
         let partial = &mut *self.partial;
         partial.divergence.keep_larger(i, divergence.magnitude());
@@ -282,6 +285,7 @@ impl<R: Real> RowWork for CorrectRow<'_, R> {
     type Number = R;
     #[inline(always)]
     fn at<V: Vector<Number = R>>(&mut self, i: usize) {
-        self.value::<V>(i, i);
+        let ur = V::load(&window::<V>(self.q[0], i)[2..]);
+        self.value(i, ur);
     }
 }

@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout, Mesh};
 use crate::math::Real;
-use grainwake_simd::{Kernel, One, Partial, RowWork, Vector, along_row};
+use grainwake_simd::{Kernel, One, Partial, RowWork, Vector, along_row, window, window_mut};
 
 /// Constants of the tendency.
 #[derive(Clone, Copy)]
@@ -97,31 +97,32 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
     type Number = R;
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
-        let (layout, k) = (self.layout, self.k);
-        let (row, plane, n) = (layout.row(), layout.plane(), layout.cells[0]);
-        let FaceVector { x, y, z } = self.velocity;
-        let [tx, ty, tz] = self.tendency;
-        let [px, py, pz] = self.predicted;
+        let (layout, k, n) = (self.layout, self.k, self.layout.cells[0]);
+        let u = planes(layout, &self.velocity.x, k);
+        let v = planes(layout, &self.velocity.y, k);
+        let w = planes(layout, &self.velocity.z, k);
+        let p = planes(layout, self.pressure, k);
+        let [tx, ty, tz] = self.tendency.map(|plane| &mut plane[..layout.plane()]);
+        let [px, py, pz] = self.predicted.map(|plane| &mut plane[..layout.plane()]);
         let mut sums = [Partial::default(); 3];
         for j in self.rows {
-            let (at, here) = (layout.index(0, j, k), j * row..(j + 1) * row);
             let mut work = PredictRow {
-                coefficients: self.coefficients,
+                coefficients: *self.coefficients,
                 weights: self.weights,
-                u: around(x, at, row, plane),
-                v: around(y, at, row, plane),
-                w: around(z, at, row, plane),
-                vpb: &y[at + row - plane..][..row],
-                wmt: &z[at + plane - row..][..row],
-                p: &self.pressure[at..][..row],
-                pm: &self.pressure[at - row..][..row],
-                pb: &self.pressure[at - plane..][..row],
+                u: rows(layout, u, j),
+                v: rows(layout, v, j),
+                w: rows(layout, w, j),
+                p: rows(layout, p, j),
                 tendency: [
-                    &mut tx[here.clone()],
-                    &mut ty[here.clone()],
-                    &mut tz[here.clone()],
+                    layout.row_of_mut(tx, j),
+                    layout.row_of_mut(ty, j),
+                    layout.row_of_mut(tz, j),
                 ],
-                predicted: [&mut px[here.clone()], &mut py[here.clone()], &mut pz[here]],
+                predicted: [
+                    layout.row_of_mut(px, j),
+                    layout.row_of_mut(py, j),
+                    layout.row_of_mut(pz, j),
+                ],
                 sums: &mut sums,
                 n,
                 past_caches: self.past_caches,
@@ -130,8 +131,8 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
             along_row::<V>(n, &mut work);
             if self.walled[0] {
                 // The lower boundary face was summed with the others.
-                let given = -tx[j * row + 1].wide();
-                sums[0].add(1, One::<R>::constant(given));
+                let given = -work.tendency[0][1].wide();
+                work.sums[0].add(1, One::<R>::constant(given));
             }
         }
         V::fence();
@@ -139,31 +140,46 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
     }
 }
 
-/// A row and its four neighbours: here, one row down and up in y, one down and up in z.
-type Around<'a, R> = [&'a [R]; 5];
-
+/// Planes k - 1, k, k + 1 of a field.
 #[inline(always)]
-fn around<R>(values: &[R], at: usize, row: usize, plane: usize) -> Around<'_, R> {
+fn planes<R>(layout: Layout, field: &[R], k: usize) -> [&[R]; 3] {
     [
-        &values[at..][..row],
-        &values[at - row..][..row],
-        &values[at + row..][..row],
-        &values[at - plane..][..row],
-        &values[at + plane..][..row],
+        layout.plane_of(field, k - 1),
+        layout.plane_of(field, k),
+        layout.plane_of(field, k + 1),
     ]
 }
 
+/// Rows j - 1, j, j + 1 of the planes k - 1, k, k + 1. All have one length, so that a vector of
+/// cells is checked against the ends of the rows once.
+type Rows<'a, R> = [[&'a [R]; 3]; 3];
+
+#[inline(always)]
+fn rows<'a, R>(layout: Layout, [below, here, above]: [&'a [R]; 3], j: usize) -> Rows<'a, R> {
+    [
+        rows_of_plane(layout, below, j),
+        rows_of_plane(layout, here, j),
+        rows_of_plane(layout, above, j),
+    ]
+}
+
+#[inline(always)]
+fn rows_of_plane<R>(layout: Layout, plane: &[R], j: usize) -> [&[R]; 3] {
+    [
+        layout.row_of(plane, j - 1),
+        layout.row_of(plane, j),
+        layout.row_of(plane, j + 1),
+    ]
+}
+
+/// One row of the prediction.
 struct PredictRow<'a, R> {
-    coefficients: &'a Coefficients,
+    coefficients: Coefficients,
     weights: Weights,
-    u: Around<'a, R>,
-    v: Around<'a, R>,
-    w: Around<'a, R>,
-    vpb: &'a [R],
-    wmt: &'a [R],
-    p: &'a [R],
-    pm: &'a [R],
-    pb: &'a [R],
+    u: Rows<'a, R>,
+    v: Rows<'a, R>,
+    w: Rows<'a, R>,
+    p: Rows<'a, R>,
     tendency: [&'a mut [R]; 3],
     predicted: [&'a mut [R]; 3],
     sums: &'a mut [Partial; 3],
@@ -177,36 +193,23 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
     type Number = R;
     #[inline(always)]
     fn at<V: Vector<Number = R>>(&mut self, i: usize) {
-        // Entries i - 1, i, i + 1 of a row.
-        macro_rules! three {
-            ($row:expr) => {{
-                let cut = &$row[i - 1..i + V::WIDTH + 1];
-                [V::load(cut), V::load(&cut[1..]), V::load(&cut[2..])]
-            }};
-        }
-        macro_rules! two {
-            ($row:expr) => {{
-                let cut = &$row[i - 1..i + V::WIDTH];
-                [V::load(cut), V::load(&cut[1..])]
-            }};
-        }
-        let c = self.coefficients;
-        let [ul, uc, ur] = three!(self.u[0]);
-        let [_, um, umr] = three!(self.u[1]);
-        let up = V::load(&self.u[2][i..]);
-        let [_, ub, ubr] = three!(self.u[3]);
-        let ut = V::load(&self.u[4][i..]);
-        let [vl, vc, vr] = three!(self.v[0]);
-        let vm = V::load(&self.v[1][i..]);
-        let [vpl, vp] = two!(self.v[2]);
-        let vb = V::load(&self.v[3][i..]);
-        let vt = V::load(&self.v[4][i..]);
-        let [wl, wc, wr] = three!(self.w[0]);
-        let wm = V::load(&self.w[1][i..]);
-        let wp = V::load(&self.w[2][i..]);
-        let wb = V::load(&self.w[3][i..]);
-        let [wtl, wt] = two!(self.w[4]);
-        let (vpb, wmt) = (V::load(&self.vpb[i..]), V::load(&self.wmt[i..]));
+        // The vectors that start at entries i - 1, i and i + 1 of a row.
+        let left = |row: &[R]| V::load(window::<V>(row, i));
+        let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
+        let right = |row: &[R]| V::load(&window::<V>(row, i)[2..]);
+        let c = &self.coefficients;
+        let [[_, ub, _], [um, u, up], [_, ut, _]] = self.u;
+        let (ul, uc, ur) = (left(u), here(u), right(u));
+        let (umr, ubr) = (right(um), right(ub));
+        let (um, up, ub, ut) = (here(um), here(up), here(ub), here(ut));
+        let [[_, vb, vpb], [vm, v, vp], [_, vt, _]] = self.v;
+        let (vl, vc, vr) = (left(v), here(v), right(v));
+        let (vpl, vpb) = (left(vp), here(vpb));
+        let (vm, vp, vb, vt) = (here(vm), here(vp), here(vb), here(vt));
+        let [[_, wb, _], [wm, w, wp], [wmt, wt, _]] = self.w;
+        let (wl, wc, wr) = (left(w), here(w), right(w));
+        let (wtl, wmt) = (left(wt), here(wmt));
+        let (wm, wp, wb, wt) = (here(wm), here(wp), here(wb), here(wt));
 
         let hx = c.at_face(
             0,
@@ -226,8 +229,9 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
             [[wl, wr], [wm, wp], [wb, wt]],
             [[ub + uc, ubr + ur], [vb + vc, vpb + vp], [wb + wc, wc + wt]],
         );
-        let [pl, pc] = two!(self.p);
-        let lower = [pl, V::load(&self.pm[i..]), V::load(&self.pb[i..])];
+        let [[_, pb, _], [pm, p, _], _] = self.p;
+        let pc = here(p);
+        let lower = [left(p), here(pm), here(pb)];
         let (now, before) = (
             V::constant(self.weights.now),
             V::constant(self.weights.before),
@@ -235,11 +239,11 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
         // The ends of a row are looked at again for the boundaries.
         let past = self.past_caches && i > 1 && i + V::WIDTH <= self.n;
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
-            let old = &mut self.tendency[axis][i..];
+            let old = window_mut::<V>(self.tendency[axis], i);
             let push = V::constant(self.weights.push[axis]) * (pc - lower[axis]);
             // What is small is summed first: in singles q would swallow it part by part.
             let gain = now * h + before * V::load(old) - push;
-            let to = &mut self.predicted[axis][i..];
+            let to = window_mut::<V>(self.predicted[axis], i);
             if past {
                 (q + gain).store_past(to);
             } else {

@@ -113,6 +113,21 @@ impl Layout {
     pub fn index(&self, i: usize, j: usize, k: usize) -> usize {
         i + self.row() * (j + (self.cells[1] + 2) * k)
     }
+    /// Plane `k` of a field, ghosts included.
+    #[inline(always)]
+    pub fn plane_of<'a, T>(&self, values: &'a [T], k: usize) -> &'a [T] {
+        &values[k * self.plane()..][..self.plane()]
+    }
+    /// Row `j` of a plane: its entries 0 to n + 1.
+    #[inline(always)]
+    pub fn row_of<'a, T>(&self, plane: &'a [T], j: usize) -> &'a [T] {
+        &plane[j * self.row()..][..self.cells[0] + 2]
+    }
+    /// Row `j` of a plane, to be overwritten.
+    #[inline(always)]
+    pub fn row_of_mut<'a, T>(&self, plane: &'a mut [T], j: usize) -> &'a mut [T] {
+        &mut plane[j * self.row()..][..self.cells[0] + 2]
+    }
     /// Distance in memory between neighbours along each axis.
     #[inline]
     pub fn strides(&self) -> [usize; 3] {

@@ -80,19 +80,17 @@ impl<R: Real> Axis<R> {
     #[inline(always)]
     fn split<V: Vector<Number = R>>(&self, modes: &mut [Complex<V>]) {
         let (n, half) = (self.n, V::constant(0.5));
-        for k in 1..n.div_ceil(2) {
-            let (z, w) = (modes[k], modes[n - k]);
-            let [cos, sin] = self.turn[k];
+        let (low, high) = mirrored(modes);
+        let (pairs, turn) = (low.len(), &self.turn[1..]);
+        let (high, turn) = (&mut high[..pairs], &turn[..pairs]);
+        for k in 0..pairs {
+            let (z, w, [cos, sin]) = (&mut low[k], &mut high[pairs - 1 - k], turn[k]);
             let (cos, sin) = (V::splat(cos) * half, V::splat(sin) * half);
             let (p, q, r, t) = (z.re + w.re, z.im - w.im, z.im + w.im, w.re - z.re);
-            modes[k] = Complex {
-                re: cos * p + sin * q,
-                im: cos * r + sin * t,
-            };
-            modes[n - k] = Complex {
-                re: sin * p - cos * q,
-                im: sin * r - cos * t,
-            };
+            z.re = cos * p + sin * q;
+            z.im = cos * r + sin * t;
+            w.re = sin * p - cos * q;
+            w.im = sin * r - cos * t;
         }
         if n.is_multiple_of(2) {
             modes[n / 2] = modes[n / 2].scale(self.middle[0]);
@@ -105,25 +103,30 @@ impl<R: Real> Axis<R> {
     fn join<V: Vector<Number = R>>(&self, modes: &mut [Complex<V>]) {
         let n = self.n;
         modes[0] = modes[0].exchanged();
-        for k in 1..n.div_ceil(2) {
-            let (x, y) = (modes[k], modes[n - k]);
-            let [cos, sin] = self.turn[k];
+        let (low, high) = mirrored(modes);
+        let (pairs, turn) = (low.len(), &self.turn[1..]);
+        let (high, turn) = (&mut high[..pairs], &turn[..pairs]);
+        for k in 0..pairs {
+            let (x, y, [cos, sin]) = (&mut low[k], &mut high[pairs - 1 - k], turn[k]);
             let (cos, sin) = (V::splat(cos), V::splat(sin));
             let (p, q) = (cos * x.re + sin * y.re, sin * x.re - cos * y.re);
             let (r, t) = (cos * x.im + sin * y.im, sin * x.im - cos * y.im);
-            modes[k] = Complex {
-                re: q + r,
-                im: p - t,
-            };
-            modes[n - k] = Complex {
-                re: r - q,
-                im: p + t,
-            };
+            (x.re, x.im) = (q + r, p - t);
+            (y.re, y.im) = (r - q, p + t);
         }
         if n.is_multiple_of(2) {
             modes[n / 2] = modes[n / 2].scale(self.middle[1]).exchanged();
         }
     }
+}
+
+/// The modes k = 1, 2... below n/2 and, in rising order too, as many mirrors n - k.
+#[inline(always)]
+fn mirrored<T>(modes: &mut [T]) -> (&mut [T], &mut [T]) {
+    let pairs = modes.len().div_ceil(2) - 1;
+    let (low, high) = modes[1..].split_at_mut(pairs);
+    let middle = high.len() - pairs;
+    (low, &mut high[middle..])
 }
 
 /// The transform of a block of lines. It is dispatched on its own, so that its many loops are

@@ -50,13 +50,23 @@ pub struct Lines {
 }
 
 impl Lines {
+    /// Entry i of the lines in `values`.
     #[inline(always)]
     fn entry<V: Vector>(&self, values: &[V::Number], i: usize) -> Complex<V> {
-        let at = self.at + i * self.step;
+        let both = &values[self.at + i * self.step..][..self.second + V::WIDTH];
         Complex {
-            re: V::load(&values[at..]),
-            im: V::load(&values[at + self.second..]),
+            re: V::load(both),
+            im: V::load(&both[self.second..]),
         }
+    }
+    /// Entry i of the lines in `values`, to be overwritten: the first ones, and the second ones.
+    #[inline(always)]
+    fn entry_mut<'a, V: Vector>(
+        &self,
+        values: &'a mut [V::Number],
+        i: usize,
+    ) -> (&'a mut [V::Number], &'a mut [V::Number]) {
+        values[self.at + i * self.step..][..self.second + V::WIDTH].split_at_mut(self.second)
     }
     #[inline(always)]
     pub fn load<V: Vector>(&self, values: &[V::Number], a: &mut [Complex<V>]) {
@@ -67,17 +77,17 @@ impl Lines {
     #[inline(always)]
     pub fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
         for (i, x) in a.iter().enumerate() {
-            let at = self.at + i * self.step;
-            x.re.store(&mut values[at..]);
-            x.im.store(&mut values[at + self.second..]);
+            let (first, second) = self.entry_mut::<V>(values, i);
+            x.re.store(first);
+            x.im.store(second);
         }
     }
     #[inline(always)]
     pub fn store_past<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
         for (i, x) in a.iter().enumerate() {
-            let at = self.at + i * self.step;
-            x.re.store_past(&mut values[at..]);
-            x.im.store_past(&mut values[at + self.second..]);
+            let (first, second) = self.entry_mut::<V>(values, i);
+            x.re.store_past(first);
+            x.im.store_past(second);
         }
     }
     #[inline(always)]
@@ -103,9 +113,10 @@ impl Lines {
         self.load(values, buffers.lines::<V>(axis));
         let lines = buffers.transform::<V>(axis, true);
         for (i, &from) in axis.order.iter().enumerate() {
-            let at = self.at + i * self.step;
-            lines[from].im.store(&mut values[at..]);
-            lines[from].re.store(&mut values[at + self.second..]);
+            let (first, second) = self.entry_mut::<V>(values, i);
+            let line = &lines[from];
+            line.im.store(first);
+            line.re.store(second);
         }
     }
 }
@@ -137,18 +148,40 @@ impl Rows {
     }
     #[inline(always)]
     pub fn store<V: Vector>(&self, order: &[usize], a: &[Complex<V>], values: &mut [V::Number]) {
-        for (group, order) in order.chunks(V::WIDTH).enumerate() {
-            let at = self.at + group * V::WIDTH;
-            let (mut re, mut im) = ([V::constant(0.0); MOST], [V::constant(0.0); MOST]);
-            for ((re, im), &from) in re.iter_mut().zip(&mut im).zip(order) {
-                (*re, *im) = (a[from].im, a[from].re);
+        let groups = order.chunks_exact(V::WIDTH);
+        let rest = groups.remainder();
+        let mut at = self.at;
+        for order in groups {
+            let mut block = [[V::constant(0.0); MOST]; 2];
+            for n in 0..V::WIDTH {
+                let line = &a[order[n]];
+                (block[0][n], block[1][n]) = (line.im, line.re);
             }
-            V::transpose(&mut re);
-            V::transpose(&mut im);
-            for row in 0..V::WIDTH {
-                re[row].store(&mut values[at + row * self.pitch..]);
-                im[row].store(&mut values[at + (row + self.second) * self.pitch..]);
+            self.store_block(block, at, values);
+            at += V::WIDTH;
+        }
+        if !rest.is_empty() {
+            let mut block = [[V::constant(0.0); MOST]; 2];
+            for (n, &from) in rest.iter().enumerate() {
+                (block[0][n], block[1][n]) = (a[from].im, a[from].re);
             }
+            self.store_block(block, at, values);
+        }
+    }
+    /// Overwrites the entries from `at` on of `V::WIDTH` first rows and as many second ones with
+    /// the columns of two blocks.
+    #[inline(always)]
+    fn store_block<V: Vector>(
+        &self,
+        [mut first, mut second]: [[V; MOST]; 2],
+        at: usize,
+        values: &mut [V::Number],
+    ) {
+        V::transpose(&mut first);
+        V::transpose(&mut second);
+        for row in 0..V::WIDTH {
+            first[row].store(&mut values[at + row * self.pitch..]);
+            second[row].store(&mut values[at + (row + self.second) * self.pitch..]);
         }
     }
 }

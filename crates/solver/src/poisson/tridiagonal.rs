@@ -115,6 +115,18 @@ impl<R: Real> Kernel for Solve<'_, '_, R> {
     }
 }
 
+/// The row before row `k` of a list of rows, empty for k = 0, and row `k`, to be overwritten.
+#[inline(always)]
+fn row_of(values: &mut [f64], k: usize, width: usize) -> (&[f64], &mut [f64]) {
+    let (before, rest) = values.split_at_mut(k * width);
+    let before = if k > 0 {
+        &before[(k - 1) * width..][..width]
+    } else {
+        &[]
+    };
+    (before, &mut rest[..width])
+}
+
 impl Tridiagonal {
     #[inline(always)]
     fn solve_flat<R: Real>(&self, columns: &mut Columns<R>, lambda: &[f64]) {
@@ -146,21 +158,18 @@ impl Tridiagonal {
             let open =
                 V::constant(2.0 - f64::from(u8::from(k == 0)) - f64::from(u8::from(k + 1 == n)));
             let row = &columns.row(k)[..width];
-            let (before, here) = pivots[..(k + 1) * width].split_at_mut(k * width);
-            let (values_before, values_here) = values[..(k + 1) * width].split_at_mut(k * width);
+            let (pivots_before, pivots) = row_of(pivots, k, width);
+            let (values_before, values) = row_of(values, k, width);
             for i in (0..width).step_by(V::WIDTH) {
-                let b = open + V::load(&lambda[i..]) * square;
-                let f = factor * V::load_from(&row[i..]);
-                let (pivot, value) = if k == 0 {
-                    let pivot = one.over(b);
-                    (pivot, f * pivot)
-                } else {
-                    let at = (k - 1) * width + i;
-                    let pivot = one.over(b - V::load(&before[at..]));
-                    (pivot, (f + V::load(&values_before[at..])) * pivot)
-                };
-                pivot.store(&mut here[i..]);
-                value.store(&mut values_here[i..]);
+                let mut b = open + V::load(&lambda[i..]) * square;
+                let mut f = factor * V::load_from(&row[i..]);
+                if k > 0 {
+                    b = b - V::load(&pivots_before[i..]);
+                    f = f + V::load(&values_before[i..]);
+                }
+                let pivot = one.over(b);
+                pivot.store(&mut pivots[i..]);
+                (f * pivot).store(&mut values[i..]);
             }
         }
         if singular {
@@ -173,7 +182,7 @@ impl Tridiagonal {
             *last = R::of(*carry);
         }
         for k in (0..n - 1).rev() {
-            let row = columns.row(k);
+            let row = &mut columns.row(k)[..width];
             let (values, pivots) = (&values[k * width..][..width], &pivots[k * width..][..width]);
             for i in (0..width).step_by(V::WIDTH) {
                 let x = V::load(&values[i..]) + V::load(&pivots[i..]) * V::load(&carry[i..]);
