@@ -1,17 +1,17 @@
-//! Work on rows of numbers, and sums in an order that no width of a register changes.
+//! Loops along rows, and sums in an order that does not depend on the width of the registers.
 
-use super::{MOST, One, Real, Vector};
+use super::{MAX_LANES, Real, Scalar, Vector};
 
-/// Work on the neighbouring entries of a row.
+/// Computation along a row, one vector of neighbouring entries at a time.
 pub trait RowWork {
-    /// What rows are made of.
+    /// Type of the entries.
     type Number: Real;
-    /// Treats the `V::WIDTH` entries from `i` on.
+    /// Computes the `V::WIDTH` entries from `i` on.
     fn at<V: Vector<Number = Self::Number>>(&mut self, i: usize);
 }
 
-/// Treats the entries 1..=n of a row, as many at a time as possible. Entry i always falls on lane
-/// (i - 1) % LANES of a sum kept in as many lanes, whatever the width.
+/// Computes entries 1..=n of a row with the widest vectors that fit. Entry i adds to lane
+/// (i - 1) % LANES of a [`Partial`] for every width.
 #[inline(always)]
 pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number>) {
     let mut i = 1;
@@ -29,7 +29,7 @@ pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number
         i += 4;
     }
     while i <= n {
-        work.at::<One<V::Number>>(i);
+        work.at::<Scalar<V::Number>>(i);
         i += 1;
     }
 }
@@ -48,26 +48,26 @@ pub fn window_mut<V: Vector>(list: &mut [V::Number], at: usize) -> &mut [V::Numb
     &mut list[at - 1..][..V::WIDTH + 2][1..][..V::WIDTH]
 }
 
-/// Partial results of a row in doubles: a sum or a maximum in an order that no width changes.
+/// Partial sum or maximum of a row in doubles, in an order that does not depend on the width.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub struct Partial([f64; MOST]);
+pub struct Partial([f64; MAX_LANES]);
 
 impl Partial {
-    /// Adds to the lanes of entry `i` and its neighbours.
+    /// Adds entries `i` to `i + V::WIDTH` to their lanes.
     #[inline(always)]
     pub fn add<V: Vector>(&mut self, i: usize, value: V) {
-        value.add_to(&mut self.0[(i - 1) % V::Number::LANES..]);
+        value.add_into(&mut self.0[(i - 1) % V::Number::LANES..]);
     }
-    /// Keeps the larger in the lanes of entry `i` and its neighbours.
+    /// Replaces the lanes of entries `i` to `i + V::WIDTH` by their maxima with `value`.
     #[inline(always)]
-    pub fn keep_larger<V: Vector>(&mut self, i: usize, value: V) {
-        value.raise(&mut self.0[(i - 1) % V::Number::LANES..]);
+    pub fn max<V: Vector>(&mut self, i: usize, value: V) {
+        value.max_into(&mut self.0[(i - 1) % V::Number::LANES..]);
     }
     /// Sum of the lanes.
     pub fn sum(&self) -> f64 {
         let mut lanes = self.0;
-        let mut half = MOST / 2;
+        let mut half = MAX_LANES / 2;
         while half > 0 {
             for i in 0..half {
                 lanes[i] += lanes[i + half];
@@ -76,7 +76,7 @@ impl Partial {
         }
         lanes[0]
     }
-    /// Largest of the lanes.
+    /// Maximum of the lanes, at least 0.
     pub fn largest(&self) -> f64 {
         self.0.into_iter().fold(0.0, f64::max)
     }

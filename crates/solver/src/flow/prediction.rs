@@ -130,8 +130,8 @@ impl<'a, R: Real> Prediction<'a, R> {
         let weight = V::constant(self.weight);
         for n in (0..count).step_by(V::WIDTH) {
             let extra = V::load(&extra[n..]);
-            extra.add_some(&mut tendency[n..]);
-            (weight * extra).add_some(&mut velocity[n..]);
+            extra.add_partial(&mut tendency[n..]);
+            (weight * extra).add_partial(&mut velocity[n..]);
         }
     }
 }

@@ -10,7 +10,7 @@ use super::FlowMeasures;
 use crate::grid::{FaceVector, Layout};
 use crate::math::Real;
 use crate::poisson::{Plane, Solution};
-use grainwake_simd::{Kernel, One, Partial, RowWork, Vector, along_row, window, window_mut};
+use grainwake_simd::{Kernel, Partial, RowWork, Scalar, Vector, along_row, window, window_mut};
 
 /// What one plane contributes to the measures.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,7 +66,7 @@ impl<R: Real> Kernel for Divergence<'_, R> {
             if periodic[0] {
                 // The upper face of the last cell is the lower face of the first.
                 along_row::<V>(n - 1, &mut work);
-                work.value(n, One(work.u[1]));
+                work.value(n, Scalar(work.u[1]));
             } else {
                 along_row::<V>(n, &mut work);
             }
@@ -101,7 +101,7 @@ impl<R: Real> DivergenceRow<'_, R> {
         let sum = (ur - here(self.u)) * x
             + (here(self.vp) - here(self.v)) * y
             + (here(self.wt) - here(self.w)) * z;
-        sum.over(V::constant(self.dt))
+        sum.div(V::constant(self.dt))
             .store(window_mut::<V>(self.out, i));
     }
 }
@@ -179,12 +179,12 @@ impl<R: Real> Kernel for Correct<'_, R> {
             if periodic[0] {
                 // The upper face of the last cell is the lower face of the first.
                 along_row::<V>(n - 1, &mut work);
-                work.value(n, One(work.q[0][1]));
+                work.value(n, Scalar(work.q[0][1]));
             } else {
                 along_row::<V>(n, &mut work);
                 // The lower boundary face was summed with the others.
                 let given = -work.out[0][1].wide();
-                work.partial.momentum[0].add(1, One::<R>::constant(given));
+                work.partial.momentum[0].add(1, Scalar::<R>::constant(given));
             }
             rise[0] += work.pressure[n].wide() - work.pressure[1].wide();
         }
@@ -265,7 +265,7 @@ impl<R: Real> CorrectRow<'_, R> {
                 q.store(to);
             }
             square = square + q * q;
-            rate = rate + q.magnitude() * inverse;
+            rate = rate + q.abs() * inverse;
             divergence = divergence + (next - q) * inverse;
             if !self.given[axis] {
                 self.partial.momentum[axis].add(i, q);
@@ -274,9 +274,9 @@ impl<R: Real> CorrectRow<'_, R> {
         let p = window_mut::<V>(self.pressure, i);
         (V::load(p) + f).store(p);
         let partial = &mut *self.partial;
-        partial.divergence.keep_larger(i, divergence.magnitude());
-        partial.rate.keep_larger(i, rate);
-        partial.square.keep_larger(i, square);
+        partial.divergence.max(i, divergence.abs());
+        partial.rate.max(i, rate);
+        partial.square.max(i, square);
         partial.kinetic.add(i, square);
     }
 }

@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout, Mesh};
 use crate::math::Real;
-use grainwake_simd::{Kernel, One, Partial, RowWork, Vector, along_row, window, window_mut};
+use grainwake_simd::{Kernel, Partial, RowWork, Scalar, Vector, along_row, window, window_mut};
 
 /// Constants of the tendency.
 #[derive(Clone, Copy)]
@@ -132,7 +132,7 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
             if self.walled[0] {
                 // The lower boundary face was summed with the others.
                 let given = -work.tendency[0][1].wide();
-                work.sums[0].add(1, One::<R>::constant(given));
+                work.sums[0].add(1, Scalar::<R>::constant(given));
             }
         }
         V::fence();

@@ -2,7 +2,7 @@
 
 use super::axis::{self, Axis};
 use crate::math::{Aligned, Real};
-use grainwake_simd::{Complex, MOST, Vector, as_complex, dispatch};
+use grainwake_simd::{Complex, MAX_LANES, Vector, as_complex, dispatch};
 
 /// Both buffers of the transforms of one thread.
 pub struct Buffers<R>(Aligned<R>);
@@ -134,7 +134,7 @@ impl Rows {
     pub fn load<V: Vector>(&self, order: &[usize], values: &[V::Number], a: &mut [Complex<V>]) {
         for (group, order) in order.chunks(V::WIDTH).enumerate() {
             let at = self.at + group * V::WIDTH;
-            let (mut re, mut im) = ([V::constant(0.0); MOST], [V::constant(0.0); MOST]);
+            let (mut re, mut im) = ([V::constant(0.0); MAX_LANES], [V::constant(0.0); MAX_LANES]);
             for row in 0..V::WIDTH {
                 re[row] = V::load(&values[at + row * self.pitch..]);
                 im[row] = V::load(&values[at + (row + self.second) * self.pitch..]);
@@ -152,7 +152,7 @@ impl Rows {
         let rest = groups.remainder();
         let mut at = self.at;
         for order in groups {
-            let mut block = [[V::constant(0.0); MOST]; 2];
+            let mut block = [[V::constant(0.0); MAX_LANES]; 2];
             for n in 0..V::WIDTH {
                 let line = &a[order[n]];
                 (block[0][n], block[1][n]) = (line.im, line.re);
@@ -161,7 +161,7 @@ impl Rows {
             at += V::WIDTH;
         }
         if !rest.is_empty() {
-            let mut block = [[V::constant(0.0); MOST]; 2];
+            let mut block = [[V::constant(0.0); MAX_LANES]; 2];
             for (n, &from) in rest.iter().enumerate() {
                 (block[0][n], block[1][n]) = (a[from].im, a[from].re);
             }
@@ -173,7 +173,7 @@ impl Rows {
     #[inline(always)]
     fn store_block<V: Vector>(
         &self,
-        [mut first, mut second]: [[V; MOST]; 2],
+        [mut first, mut second]: [[V; MAX_LANES]; 2],
         at: usize,
         values: &mut [V::Number],
     ) {

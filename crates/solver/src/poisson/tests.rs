@@ -176,7 +176,7 @@ fn single_precision_solves_to_its_round_off_in_flat_boxes_too() {
 
 #[test]
 fn transforms_of_every_length_match_their_definition() {
-    use grainwake_simd::{Complex, One};
+    use grainwake_simd::{Complex, Scalar};
     for n in (1..=130).chain([143, 251]) {
         let given: Vec<[f64; 2]> = (0..n)
             .map(|t| [(1.3 * t as f64).sin(), (0.7 * (t * t) as f64).cos()])
@@ -184,9 +184,9 @@ fn transforms_of_every_length_match_their_definition() {
         let plan = chirp::Fourier::new(n);
         let len = plan.buffer_len(n);
         let lanes = |values: &[f64]| {
-            let mut a = vec![Complex::<One<f64>>::zero(); len];
+            let mut a = vec![Complex::<Scalar<f64>>::zero(); len];
             for (a, value) in a.iter_mut().zip(values.chunks(2)) {
-                (a.re, a.im) = (One::splat(value[0]), One::splat(value[1]));
+                (a.re, a.im) = (Scalar::splat(value[0]), Scalar::splat(value[1]));
             }
             a
         };
@@ -225,18 +225,23 @@ fn bits<R: Real>(mesh: &Mesh, ends: [Ends; 3]) -> Vec<u64> {
 
 #[test]
 fn bits_do_not_depend_on_the_instruction_set() {
-    use grainwake_simd::{Level, limit_level};
+    use grainwake_simd::{InstructionSet, limit_instructions};
     let mesh = Mesh {
         cells: [37, 39, 18],
         spacing: DVec3::new(0.5, 0.7, 0.6),
         origin: DVec3::ZERO,
     };
     for ends in [[Ends::Neumann; 3], [Ends::Periodic; 3]] {
-        let [eight, four, common] = [Level::Avx512, Level::Avx2, Level::Common].map(|level| {
-            limit_level(level);
+        let [eight, four, common] = [
+            InstructionSet::Avx512,
+            InstructionSet::Avx2,
+            InstructionSet::Baseline,
+        ]
+        .map(|level| {
+            limit_instructions(level);
             [bits::<f64>(&mesh, ends), bits::<f32>(&mesh, ends)]
         });
-        limit_level(Level::Avx512);
+        limit_instructions(InstructionSet::Avx512);
         assert_eq!(eight, four);
         assert_eq!(eight, common);
     }

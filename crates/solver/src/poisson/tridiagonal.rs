@@ -167,7 +167,7 @@ impl Tridiagonal {
                     b = b - V::load(&pivots_before[i..]);
                     f = f + V::load(&values_before[i..]);
                 }
-                let pivot = one.over(b);
+                let pivot = one.div(b);
                 pivot.store(&mut pivots[i..]);
                 (f * pivot).store(&mut values[i..]);
             }
@@ -223,7 +223,7 @@ impl Tridiagonal {
                     (diagonal, u) = (diagonal - g, u + g);
                 }
                 if k + 1 == n {
-                    (diagonal, u) = (diagonal - one.over(g), u - one);
+                    (diagonal, u) = (diagonal - one.div(g), u - one);
                 }
                 let (before, y, q) = if k == 0 {
                     (zero, zero, zero)
@@ -235,7 +235,7 @@ impl Tridiagonal {
                         V::load(&corner[at..]),
                     )
                 };
-                let pivot = one.over(diagonal - before);
+                let pivot = one.div(diagonal - before);
                 let at = k * width + i;
                 pivot.store(&mut pivots[at..]);
                 ((factor * V::load_from(&row[i..]) + y) * pivot).store(&mut values[at..]);
@@ -256,9 +256,9 @@ impl Tridiagonal {
         let last = (n - 1) * width;
         for i in (0..width).step_by(V::WIDTH) {
             let g = zero - (two + V::load(&lambda[i..]) * square);
-            let y = V::load(&values[i..]) - V::load(&values[last + i..]).over(g);
-            let q = one + V::load(&corner[i..]) - V::load(&corner[last + i..]).over(g);
-            y.over(q).store(&mut share[i..]);
+            let y = V::load(&values[i..]) - V::load(&values[last + i..]).div(g);
+            let q = one + V::load(&corner[i..]) - V::load(&corner[last + i..]).div(g);
+            y.div(q).store(&mut share[i..]);
         }
         for k in 0..n {
             let row = columns.row(k);

@@ -9,7 +9,7 @@ use crate::flow::{Advection, Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
 use crate::immersed::Scheme;
 use crate::math::{Pose, Precision};
-use grainwake_simd::{Level, limit_level};
+use grainwake_simd::{InstructionSet, limit_instructions};
 
 /// A turned ellipsoid beside a wall and a sphere across the edges of a periodic box, which move.
 fn two_grains(precision: Precision) -> Setup {
@@ -78,11 +78,16 @@ fn bits_of_coupled_steps_do_not_depend_on_the_instruction_set() {
         all.map(f64::to_bits).collect()
     }
     for precision in [Precision::Double, Precision::Single] {
-        let [widest, middle, common] = [Level::Avx512, Level::Avx2, Level::Common].map(|level| {
-            limit_level(level);
+        let [widest, middle, common] = [
+            InstructionSet::Avx512,
+            InstructionSet::Avx2,
+            InstructionSet::Baseline,
+        ]
+        .map(|level| {
+            limit_instructions(level);
             bits(precision)
         });
-        limit_level(Level::Avx512);
+        limit_instructions(InstructionSet::Avx512);
         assert!(widest == middle && widest == common, "{precision}");
     }
 }

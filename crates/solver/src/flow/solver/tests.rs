@@ -426,7 +426,7 @@ fn outflow_keeps_the_mass_of_the_box() {
 
 #[test]
 fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
-    use grainwake_simd::{Level, limit_level};
+    use grainwake_simd::{InstructionSet, limit_instructions};
     fn bits<R: Real>(boundaries: Boundaries, past_caches: bool) -> Vec<u64> {
         let mesh = Mesh {
             cells: [29, 11, 9],
@@ -454,15 +454,19 @@ fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
     }
     let walls = Boundaries([[Boundary::WALL; 2]; 3]);
     for boundaries in [PERIODIC, walls] {
-        let levels = [Level::Avx512, Level::Avx2, Level::Common];
+        let levels = [
+            InstructionSet::Avx512,
+            InstructionSet::Avx2,
+            InstructionSet::Baseline,
+        ];
         let [widest, middle, common] = levels.map(|level| {
-            limit_level(level);
+            limit_instructions(level);
             let [near, past] = [false, true]
                 .map(|past| [bits::<f64>(boundaries, past), bits::<f32>(boundaries, past)]);
             assert!(near == past, "past the caches, {level:?}");
             near
         });
-        limit_level(Level::Avx512);
+        limit_instructions(InstructionSet::Avx512);
         assert!(widest == middle && widest == common);
     }
 }

@@ -174,7 +174,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             if a.exists {
                 let weight = V::load_from(&wx[n..]);
                 let flux = self.flux::<V>(0, six[0], &rigid, at, index, weight);
-                sum = flux.behind(before) - flux;
+                sum = flux.shift(before) - flux;
                 before = flux;
             }
             if b.exists {
@@ -255,8 +255,8 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let sixth = both.mul_add(V::constant(7.0), outer);
         let higher_order = carrier * V::constant(1.0 / 60.0) * sixth;
         // Values read beyond the ends of the grid are arbitrary.
-        let higher_order = index.where_below(V::constant(six.end), higher_order, zero);
-        let higher_order = index.where_below(V::constant(six.start), zero, higher_order);
+        let higher_order = index.select_below(V::constant(six.end), higher_order, zero);
+        let higher_order = index.select_below(V::constant(six.start), zero, higher_order);
         let mut flux = higher_order;
         // Links outside the band are open: no excess.
         if zero.mask_below(weight) != 0 {
@@ -268,6 +268,6 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             flux = (mean * carrier).mul_add(weight, higher_order);
         }
         let flux = flux * V::constant(axis.inverse);
-        none.where_below(weight, flux, zero)
+        none.select_below(weight, flux, zero)
     }
 }

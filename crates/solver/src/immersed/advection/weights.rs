@@ -8,7 +8,7 @@ use std::ops::Range;
 use crate::immersed::geometry::LocatedBody;
 use crate::immersed::geometry::aperture::inverse_aperture_excess;
 use crate::math::Aligned;
-use grainwake_simd::{Kernel, MOST, Vector, dispatch};
+use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
 /// The current plane of a component and the next, in rows aligned to registers. One row precedes the
 /// first, and one follows the last.
@@ -32,10 +32,10 @@ impl LinkPlanes {
     /// Makes room for the box of a grain and clears the fluxes.
     pub fn reset(&mut self, body: &LocatedBody) {
         // The face after the last of the box ends the last link.
-        self.row_length = (body.size.x as usize + 1).next_multiple_of(MOST);
+        self.row_length = (body.size.x as usize + 1).next_multiple_of(MAX_LANES);
         let count = self.row_length * (body.size.y as usize + 2);
         for list in self.distance.iter_mut().chain(&mut self.weight) {
-            list.make_room(count + MOST);
+            list.make_room(count + MAX_LANES);
         }
         for (list, count) in [
             (&mut self.flux_y, self.row_length),
@@ -129,7 +129,7 @@ impl WeighLinks<'_> {
         let which = (k % 2) as usize;
         let row_length = self.planes.row_length;
         let distance =
-            &mut self.planes.distance[which][..row_length * (body.size.y as usize + 2) + MOST];
+            &mut self.planes.distance[which][..row_length * (body.size.y as usize + 2) + MAX_LANES];
         let far = V::constant(f64::INFINITY);
         for n in (0..distance.len()).step_by(V::WIDTH) {
             far.store(&mut distance[n..]);
@@ -153,7 +153,7 @@ impl WeighLinks<'_> {
                 let left = V::constant((count - n) as f64);
                 // Entries beyond the row are overwritten by the next.
                 V::ramp()
-                    .where_below(left, V::load(&list[near.first + n..]), far)
+                    .select_below(left, V::load(&list[near.first + n..]), far)
                     .store(&mut distance[to + n..]);
             }
         }
@@ -192,10 +192,10 @@ impl WeighLinks<'_> {
                 if d.mask_below(V::constant(band)) != 0 {
                     // Zero for open links, where the series would leave round-off.
                     let excess = inverse_aperture_excess(d, self.eps);
-                    let excess = d.where_below(V::constant(band), excess, zero);
-                    of_near = V::constant(inside).where_below(d, excess, none);
+                    let excess = d.select_below(V::constant(band), excess, zero);
+                    of_near = V::constant(inside).select_below(d, excess, none);
                 }
-                d.where_below(V::constant(outside), of_near, none)
+                d.select_below(V::constant(outside), of_near, none)
                     .store(&mut weight[axis][entry..]);
             }
         }

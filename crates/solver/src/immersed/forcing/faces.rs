@@ -2,12 +2,12 @@
 
 use crate::immersed::geometry::{BandFaces, FaceRun, NarrowBandShapes, NeighbourGrain, load_all};
 use crate::immersed::scheme::Scheme;
-use grainwake_simd::{Kernel, MOST, Vector, dispatch};
+use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
 use super::face_forcing::ForcingParams;
 
 /// Forced faces of one grain. All lists but `runs` have one entry per face, in the order of the runs,
-/// and `MOST` zeros more at the end.
+/// and `MAX_LANES` zeros more at the end.
 #[derive(Clone, Debug, Default)]
 pub struct ForcedFaces {
     /// Positions of the faces, by component.
@@ -52,7 +52,7 @@ impl ForcedFaces {
         }
         for list in [&mut self.weight, &mut self.closed] {
             list.truncate(count);
-            list.resize(count + MOST, 0.0);
+            list.resize(count + MAX_LANES, 0.0);
         }
         self.closed_by_all.clear();
         if !band.contested.is_empty() {
@@ -139,11 +139,11 @@ impl Kernel for WeighFaces<'_> {
             }
             let ([strength, depth], part) = self.params.aperture_forcing(d, load_all(normal, at));
             // strength / (1 + strength) with a single division.
-            let fraction = strength.over(depth + strength);
+            let fraction = strength.div(depth + strength);
             inside
-                .where_below(d, fraction, one)
+                .select_below(d, fraction, one)
                 .store(&mut weight[at..]);
-            inside.where_below(d, part, one).store(&mut closed[at..]);
+            inside.select_below(d, part, one).store(&mut closed[at..]);
         }
     }
 }

@@ -214,7 +214,7 @@ impl<R: Real> RunImpulse<'_, R> {
         sums: &mut Moments,
     ) -> V {
         let (zero, index) = (V::constant(0.0), lane_indices::<V>(n));
-        let predicted = V::load_some(&self.predicted[n..]);
+        let predicted = V::load_partial(&self.predicted[n..]);
         let follow = follow(weight, closed, self.closure_dt);
         let (mut free, mut returned) = (predicted, zero);
         // Nothing is closed outside the band.
@@ -230,8 +230,8 @@ impl<R: Real> RunImpulse<'_, R> {
         let x = V::constant(arm.x) + V::constant(self.spacing) * index;
         let arm = [x, V::constant(arm.y), V::constant(arm.z)];
         let end = V::constant(self.run.count as f64);
-        let constant = index.where_below(end, constant, zero);
-        let slope = index.where_below(end, slope, zero);
+        let constant = index.select_below(end, constant, zero);
+        let slope = index.select_below(end, slope, zero);
         sums.add(self.axis, n, arm, constant, slope);
         rest_gain
     }

@@ -64,7 +64,7 @@ impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
                 let gain = V::load(&forced.rest_gain[entry..])
                     + weight * now.component(axis, index)
                     + follow(weight, closed, self.closure_dt) * change.component(axis, index);
-                gain.add_some(&mut predicted[n..]);
+                gain.add_partial(&mut predicted[n..]);
             }
         }
     }

@@ -16,7 +16,7 @@ use super::samples::{load_all, store_all};
 use crate::dem::Grain;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Aligned;
-use grainwake_simd::{Kernel, MOST, Vector};
+use grainwake_simd::{Kernel, MAX_LANES, Vector};
 
 /// Buffers of one thread.
 #[derive(Default)]
@@ -26,7 +26,7 @@ pub struct DistanceScratch {
 }
 
 /// Candidate faces of a plane, one row after the other so that registers are full: first their
-/// positions in the frame of the grain, then the unit normals in the space frame. `MOST` more
+/// positions in the frame of the grain, then the unit normals in the space frame. `MAX_LANES` more
 /// entries follow the last.
 #[derive(Default)]
 struct FacePoints {
@@ -37,7 +37,7 @@ struct FacePoints {
 impl FacePoints {
     fn reserve(&mut self, count: usize) {
         for list in &mut self.lists {
-            list.make_room(count + MOST);
+            list.make_room(count + MAX_LANES);
         }
     }
     /// Writes the positions of the faces of a `span`, those of the row being `first` + i `step` [m].
@@ -76,7 +76,7 @@ impl FacePoints {
         shape.fill_distances::<V>(&mut lists, distances, count, &mut self.samples);
         for at in (0..count).step_by(V::WIDTH) {
             let [x, y, z] = load_all::<V>(&lists, at);
-            let inverse = (x * x + y * y + z * z).inverse_root();
+            let inverse = (x * x + y * y + z * z).rsqrt();
             let unit = [x * inverse, y * inverse, z * inverse];
             let mut normal = unit;
             for axis in 0..3 {
@@ -151,7 +151,7 @@ impl Kernel for FillLists<'_> {
                         spans.push(span);
                     }
                 }
-                let entries = first_entry + count + MOST;
+                let entries = first_entry + count + MAX_LANES;
                 distance.resize(distance.len().max(entries), f32::INFINITY);
                 let in_plane = &mut distance[first_entry..];
                 points.fill_distances::<V>(in_plane, shapes, index, to_space, count);

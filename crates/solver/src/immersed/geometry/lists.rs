@@ -1,6 +1,6 @@
 //! Index lists of the faces near a grain. Plain data, filled by [`super::Locator`].
 //!
-//! Lists that vector registers read have at least `MOST` more entries than are used.
+//! Lists that vector registers read have at least `MAX_LANES` more entries than are used.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use glam::{DVec3, IVec3};
 
 use super::index_map::IndexMap;
 use crate::grid::Layout;
-use grainwake_simd::{MOST, Vector};
+use grainwake_simd::{MAX_LANES, Vector};
 
 /// Faces of one component in a row along x that lie within reach of a grain.
 #[derive(Clone, Copy, Debug, Default)]
@@ -119,7 +119,7 @@ impl BandFaces {
     }
     /// Makes room for `count` more faces.
     pub(super) fn reserve(&mut self, count: usize) {
-        let needed = self.count + count + MOST;
+        let needed = self.count + count + MAX_LANES;
         for list in [&mut self.distance].into_iter().chain(&mut self.normal) {
             list.resize(list.len().max(needed), 0.0);
         }
@@ -154,7 +154,7 @@ impl BandFaces {
     /// Fills the lists up to a whole number of registers with faces that are not forced; returns
     /// that length. `eps` is the half-width of the band [m].
     pub fn pad(&mut self, eps: f64) -> usize {
-        let padded = self.count.next_multiple_of(MOST);
+        let padded = self.count.next_multiple_of(MAX_LANES);
         for list in [&mut self.distance].into_iter().chain(&mut self.normal) {
             list.resize(padded.max(list.len()), 0.0);
         }

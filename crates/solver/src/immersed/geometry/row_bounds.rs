@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::lists::RowSpan;
 use crate::dem::Grain;
-use grainwake_simd::{MOST, Vector};
+use grainwake_simd::{MAX_LANES, Vector};
 
 /// Ball and box around a grain that contain all points within reach of its surface.
 pub struct RowBounds {
@@ -53,7 +53,7 @@ impl RowBounds {
         let step = V::constant(f64::from(j)) + V::ramp();
         let y = V::constant(arm.y) + V::constant(self.spacing.y) * step;
         let square = V::constant(self.far) - y * y - z * z;
-        let half = square.larger(zero).root();
+        let half = square.max(zero).sqrt();
         let per_step = V::constant(1.0 / self.spacing.x);
         let x = V::constant(arm.x);
         let (mut from, mut to) = ((zero - half - x) * per_step, (half - x) * per_step);
@@ -69,16 +69,16 @@ impl RowBounds {
             let per_step = V::constant(self.per_step[axis]);
             let low = (V::constant(self.lower[axis]) - first) * per_step;
             let high = (V::constant(self.upper[axis]) - first) * per_step;
-            from = from.larger(low.smaller(high));
-            to = to.smaller(low.larger(high));
+            from = from.max(low.min(high));
+            to = to.min(low.max(high));
             first.store(&mut rows.first[axis]);
         }
         // Rows that miss the ball are empty.
         let end = V::constant(f64::from(count));
-        let start = (zero - (zero - from).floor()).larger(zero).smaller(end);
-        let stop = (to.floor() + V::constant(1.0)).larger(start).smaller(end);
+        let start = (zero - (zero - from).floor()).max(zero).min(end);
+        let stop = (to.floor() + V::constant(1.0)).max(start).min(end);
         start.store(&mut rows.start);
-        zero.where_below(square, stop, start).store(&mut rows.end);
+        zero.select_below(square, stop, start).store(&mut rows.end);
         rows
     }
 }
@@ -87,9 +87,9 @@ impl RowBounds {
 #[derive(Default)]
 pub struct CandidateRows {
     /// Face 0 of each row in the frame of the grain [m], by axis.
-    first: [[f32; MOST]; 3],
-    start: [f32; MOST],
-    end: [f32; MOST],
+    first: [[f32; MAX_LANES]; 3],
+    start: [f32; MAX_LANES],
+    end: [f32; MAX_LANES],
 }
 
 impl CandidateRows {

@@ -6,7 +6,7 @@ use std::ops::Deref;
 use glam::DVec3;
 use grainwake_shape::SampledField;
 
-use grainwake_simd::{One, Vector};
+use grainwake_simd::{Scalar, Vector};
 
 /// Stands for infinity in single precision [m].
 pub const FAR: f64 = 1e30;
@@ -56,7 +56,7 @@ impl DistanceSamples {
     #[inline(always)]
     pub fn distance_and_gradient(&self, x: DVec3) -> Option<(f64, DVec3)> {
         let grid = SampleGrid::new(self);
-        let location = grid.locate([One(x.x), One(x.y), One(x.z)]);
+        let location = grid.locate([Scalar(x.x), Scalar(x.y), Scalar(x.z)]);
         let on_grid = location.off_grid.0 <= 0.0;
         let (distance, [x, y, z]) = grid.interpolate(location);
         on_grid.then_some((distance.0, DVec3::new(x.0, y.0, z.0)))
@@ -124,9 +124,9 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
         let mut off_grid = zero;
         for axis in 0..3 {
             let s = (x[axis] - self.lower[axis]) * self.inverse;
-            let nearest = s.larger(zero).smaller(self.last[axis]);
-            off_grid = off_grid + (s - nearest).magnitude();
-            cell[axis] = nearest.floor().smaller(self.last[axis] - one);
+            let nearest = s.max(zero).min(self.last[axis]);
+            off_grid = off_grid + (s - nearest).abs();
+            cell[axis] = nearest.floor().min(self.last[axis] - one);
             fraction[axis] = nearest - cell[axis];
         }
         let [row, plane] = self.strides;
@@ -157,7 +157,7 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
         ];
         // Points off the grid are so by more than rounding.
         let distance = self.quantum * (low + fz * (high - low));
-        let distance = V::constant(0.0).where_below(location.off_grid, V::constant(FAR), distance);
+        let distance = V::constant(0.0).select_below(location.off_grid, V::constant(FAR), distance);
         (distance, gradient)
     }
 }
@@ -165,7 +165,7 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
 /// Value between the sample `at` and the next along x, and their difference.
 #[inline(always)]
 fn edge<V: Vector>(levels: &[i16], at: V, x: V) -> [V; 2] {
-    let [low, high] = V::pairs(levels, at);
+    let [low, high] = V::gather_pairs(levels, at);
     let slope = high - low;
     [low + x * slope, slope]
 }
