@@ -4,13 +4,13 @@
 
 use glam::DVec3;
 
-use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, for_planes_of, row_blocks};
+use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, for_planes_of};
 use crate::math::{Real, last_cache};
 use crate::poisson::{Plane, Poisson, Stages};
 use grainwake_simd::dispatch;
 
 use super::project::{Correct, Divergence, PlaneMeasures};
-use super::tendency::{Coefficients, PLANES_AT_ONCE, PredictPlane, Weights};
+use super::tendency::{Coefficients, PredictPlane, Weights};
 use super::{Boundaries, FluidParams};
 
 /// What a projection measures on the way, over the whole grid.
@@ -136,35 +136,27 @@ impl<R: Real> Flow<R> {
             y: py,
             z: pz,
         } = &mut self.predicted;
-        self.partial
-            .iter_mut()
-            .for_each(|plane| plane.tendency = DVec3::ZERO);
-        for rows in row_blocks(layout, PLANES_AT_ONCE * R::BYTES) {
-            for_planes_of(
-                layout,
-                [&mut *x, y, z, px, py, pz],
-                &mut self.partial,
-                |k, [x, y, z, px, py, pz], partial| {
-                    dispatch(PredictPlane {
-                        layout,
-                        coefficients,
-                        weights,
-                        velocity,
-                        pressure,
-                        walled,
-                        k,
-                        past_caches,
-                        rows: rows.clone(),
-                        tendency: [x, y, z],
-                        predicted: [&mut *px, &mut *py, pz],
-                        sum: &mut partial.tendency,
-                    });
-                    if rows.end > layout.cells[1] {
-                        boundaries.set_normal_of_plane(layout, [px, py]);
-                    }
-                },
-            );
-        }
+        for_planes_of(
+            layout,
+            [&mut *x, y, z, px, py, pz],
+            &mut self.partial,
+            |k, [x, y, z, px, py, pz], partial| {
+                dispatch(PredictPlane {
+                    layout,
+                    coefficients,
+                    weights,
+                    velocity,
+                    pressure,
+                    walled,
+                    k,
+                    past_caches,
+                    tendency: [x, y, z],
+                    predicted: [&mut *px, &mut *py, pz],
+                    sum: &mut partial.tendency,
+                });
+                boundaries.set_normal_of_plane(layout, [px, py]);
+            },
+        );
         for (face, value) in boundaries.given_faces(2, layout.cells[2]) {
             let plane = layout.plane();
             pz[face * plane..(face + 1) * plane].fill(R::of(value));

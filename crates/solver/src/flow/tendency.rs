@@ -8,8 +8,6 @@
 //! Legend: q velocity component, c velocity through a link; u, v, w components along x, y, z; the
 //! letters after them: m/p one row down/up in y, b/t one down/up in z.
 
-use std::ops::Range;
-
 use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout, Mesh};
@@ -69,9 +67,6 @@ pub struct Weights {
     pub push: [f64; 3],
 }
 
-/// Planes that the prediction has in hand: three of each component, two of the pressure, six to be written.
-pub const PLANES_AT_ONCE: usize = 17;
-
 /// Rows of a plane of the prediction u* = u + now H + before H_old - dt grad p.
 pub struct PredictPlane<'a, R> {
     pub layout: Layout,
@@ -84,12 +79,10 @@ pub struct PredictPlane<'a, R> {
     pub k: usize,
     /// Whether the prediction is written past the caches.
     pub past_caches: bool,
-    /// The rows of the plane to treat, one part of it after the other.
-    pub rows: Range<usize>,
     /// H_old, to be replaced by H.
     pub tendency: [&'a mut [R]; 3],
     pub predicted: [&'a mut [R]; 3],
-    /// The sum of H over the unknown faces of the plane is added to it.
+    /// Sum of H over the unknown faces of the plane [m/s^2], to be set.
     pub sum: &'a mut DVec3,
 }
 
@@ -105,7 +98,7 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
         let [tx, ty, tz] = self.tendency.map(|plane| &mut plane[..layout.plane()]);
         let [px, py, pz] = self.predicted.map(|plane| &mut plane[..layout.plane()]);
         let mut sums = [Partial::default(); 3];
-        for j in self.rows {
+        for j in 1..=layout.cells[1] {
             let mut work = PredictRow {
                 coefficients: *self.coefficients,
                 weights: self.weights,
@@ -136,7 +129,7 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
             }
         }
         V::fence();
-        *self.sum += DVec3::from_array(sums.map(|sum| sum.sum()));
+        *self.sum = DVec3::from_array(sums.map(|sum| sum.sum()));
     }
 }
 

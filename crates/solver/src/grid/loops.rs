@@ -27,21 +27,6 @@ pub fn for_planes_of<const N: usize, R: Send, T: Send>(
     });
 }
 
-/// Bytes that stay in a processor's own cache.
-const NEAR: usize = 1536 << 10;
-
-/// The rows 1..=ny of every plane in parts: what is in hand at once, `bytes` a place of a plane, stays near the
-/// processor until the next plane asks for it again. No result may depend on how many parts there are but by
-/// the order of sums.
-pub fn row_blocks(layout: Layout, bytes: usize) -> impl Iterator<Item = Range<usize>> {
-    let lines = layout.cells[1];
-    let most = (NEAR / (bytes * layout.row())).max(8);
-    let length = lines.div_ceil(lines.div_ceil(most));
-    (1..=lines)
-        .step_by(length)
-        .map(move |first| first..(first + length).min(lines + 1))
-}
-
 /// Calls `f(component, start, parts)` in parallel for slabs of whole planes, ghosts included, of the
 /// fields of three components; `start` is where the slab begins in memory.
 pub fn for_slabs<const N: usize, R: Send>(
@@ -230,25 +215,5 @@ impl<R> Pieces<R> {
         assert_eq!(field.len(), layout.len());
         let plane = layout.plane();
         Pieces::new(&mut field[plane..plane * (layout.cells[2] + 1)], plane)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn blocks_are_all_rows_once() {
-        for (cells, blocks) in [
-            ([8, 1, 4], 1),
-            ([100, 100, 8], 1),
-            ([160, 160, 8], 3),
-            ([9000, 37, 2], 5),
-        ] {
-            let found: Vec<_> = row_blocks(Layout { cells }, 17 * 8).collect();
-            assert_eq!(found.len(), blocks, "{cells:?}");
-            let rows: Vec<_> = found.into_iter().flatten().collect();
-            assert_eq!(rows, (1..=cells[1]).collect::<Vec<_>>());
-        }
     }
 }
