@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use grainwake_solver::math::Precision;
+use grainwake_solver::math::{InstructionSet, Precision};
 
 /// Drops real grains into real fluid.
 #[derive(Debug, Parser)]
@@ -195,6 +195,9 @@ pub struct BenchArgs {
     /// Floating-point type of the fields
     #[arg(long, value_name = "f64|f32", default_value_t = Precision::Double)]
     pub precision: Precision,
+    /// Instruction set; one that the processor lacks is an error [default: the widest it has]
+    #[arg(long, value_name = "baseline|avx2|avx512")]
+    pub instructions: Option<InstructionSet>,
     /// Measure cubes of 32 to 256 cells along each edge instead, awkward sizes among them
     #[arg(long, conflicts_with = "size")]
     pub scaling: bool,

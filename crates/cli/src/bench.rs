@@ -10,7 +10,7 @@ use grainwake_solver::dem::{ContactParams, Dof, Grain};
 use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
-use grainwake_solver::math::{Pose, Precision};
+use grainwake_solver::math::{InstructionSet, Pose, Precision, instructions, limit_instructions};
 use grainwake_solver::sim::{Setup, Simulation, StepRule};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -60,6 +60,7 @@ struct Measured {
     grains: usize,
     threads: usize,
     precision: Precision,
+    instructions: &'static str,
     steps: u64,
     /// Median over the steps.
     ns_per_cell_step: f64,
@@ -90,6 +91,20 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
             BAD_INPUT,
             "--size takes 16 to 4096 cells along each axis, --steps at least one step",
         ));
+    }
+    if let Some(set) = args.instructions {
+        let widest = InstructionSet::widest();
+        if set > widest {
+            return Err(Exit::new(
+                BAD_INPUT,
+                format!(
+                    "--instructions {}: this processor has at most {}",
+                    set.name(),
+                    widest.name()
+                ),
+            ));
+        }
+        limit_instructions(set);
     }
     let threads = threads::resolve(args.threads);
     let scheme = if args.scheme == "paper" {
@@ -183,6 +198,7 @@ fn measure(load: &Load, steps: u64, threads: usize) -> Result<Measured, Exit> {
         grains,
         threads,
         precision,
+        instructions: instructions().name(),
         steps,
         ns_per_cell_step: ns,
         bytes_per_cell,
@@ -323,11 +339,12 @@ fn triad_bandwidth(length: usize) -> f64 {
 fn table(m: &Measured) -> String {
     let mut lines = vec![
         format!(
-            "{} x {} x {} cells of {} bytes a number, {} grains, {} threads, {} steps",
+            "{} x {} x {} cells of {} bytes a number, {} instructions, {} grains, {} threads, {} steps",
             m.cells[0],
             m.cells[1],
             m.cells[2],
             m.precision.bytes(),
+            m.instructions,
             m.grains,
             m.threads,
             m.steps

@@ -94,6 +94,14 @@ impl InstructionSet {
     }
 }
 
+impl std::str::FromStr for InstructionSet {
+    type Err = String;
+    fn from_str(name: &str) -> Result<InstructionSet, String> {
+        let found = Self::ALL.into_iter().find(|set| set.name() == name);
+        found.ok_or_else(|| "accepted: baseline, avx2, avx512".into())
+    }
+}
+
 /// Instruction set in use; 0 before the first call of [`instructions`].
 static IN_USE: AtomicU8 = AtomicU8::new(0);
 

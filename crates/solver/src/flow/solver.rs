@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, for_planes_of};
+use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, Slab, for_planes_of};
 use crate::math::{Real, last_cache};
 use crate::poisson::{Plane, Poisson, Stages};
 use grainwake_simd::dispatch;
@@ -31,6 +31,8 @@ pub struct FlowMeasures {
 /// State of the fluid.
 pub struct Flow<R = f64> {
     pub(super) mesh: Mesh,
+    /// Planes whose fields this flow holds: today the whole box.
+    slab: Slab,
     pub(super) boundaries: Boundaries,
     pub(super) coefficients: Coefficients,
     /// Velocity u^n [m/s].
@@ -56,18 +58,20 @@ pub struct Flow<R = f64> {
 impl<R: Real> Flow<R> {
     /// Fluid at its initial velocity, made free of divergence.
     pub fn new(mesh: &Mesh, boundaries: Boundaries, params: &FluidParams) -> Flow<R> {
+        let slab = mesh.whole();
         let mut flow = Flow {
             mesh: *mesh,
+            slab,
             boundaries,
             coefficients: Coefficients::new(
                 mesh,
                 params.kinematic_viscosity,
                 params.body_acceleration,
             ),
-            velocity: FaceVector::zeros(mesh),
-            predicted: FaceVector::zeros(mesh),
-            pressure: Field::zeros(mesh),
-            tendency: FaceVector::zeros(mesh),
+            velocity: FaceVector::zeros(&slab),
+            predicted: FaceVector::zeros(&slab),
+            pressure: Field::zeros(&slab),
+            tendency: FaceVector::zeros(&slab),
             poisson: Poisson::new(mesh, boundaries.pressure_ends()),
             past_caches: false,
             partial: vec![PlaneMeasures::default(); mesh.cells[2]],
@@ -88,10 +92,10 @@ impl<R: Real> Flow<R> {
 
     /// Starts from the velocity `component(axis, position)` [m/s, m], made free of divergence.
     pub fn start_from(&mut self, component: impl Fn(usize, DVec3) -> f64) {
-        let mesh = self.mesh;
-        self.velocity.x.fill_with(&mesh, |at| component(0, at));
-        self.velocity.y.fill_with(&mesh, |at| component(1, at));
-        self.velocity.z.fill_with(&mesh, |at| component(2, at));
+        let slab = self.slab;
+        self.velocity.x.fill_with(&slab, |at| component(0, at));
+        self.velocity.y.fill_with(&slab, |at| component(1, at));
+        self.velocity.z.fill_with(&slab, |at| component(2, at));
         self.make_solenoidal();
     }
 
@@ -318,11 +322,11 @@ impl<R: Real> Flow<R> {
 
     /// View of the velocity component along `axis` on its faces [m/s].
     pub fn velocity_view(&self, axis: Axis) -> FieldView<'_, R> {
-        self.velocity.view(axis, &self.mesh)
+        self.velocity.view(axis, &self.slab)
     }
     /// View of the dynamic pressure over density at the cell centres [m^2/s^2].
     pub fn pressure_view(&self) -> FieldView<'_, R> {
-        self.pressure.view(&self.mesh)
+        self.pressure.view(&self.slab)
     }
     /// The grid.
     pub fn mesh(&self) -> &Mesh {

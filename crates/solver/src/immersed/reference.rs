@@ -10,7 +10,7 @@ use super::geometry::aperture::reference::{aperture, inverse_aperture_excess, op
 use super::kinematics::{GrainKinematics, RigidVelocity};
 use crate::dem::Grain;
 use crate::flow::Known;
-use crate::grid::{FACE_OFFSET, Mesh};
+use crate::grid::{FACE_OFFSET, GlobalCell, Mesh};
 use crate::math::Vector6;
 
 /// One grain on a grid.
@@ -28,7 +28,7 @@ pub struct Reference {
 impl Reference {
     /// Position of a face of `component` [m].
     pub fn position(&self, component: usize, face: USizeVec3) -> DVec3 {
-        (self.mesh).position(FACE_OFFSET[component], face.to_array())
+        (self.mesh).position(FACE_OFFSET[component], GlobalCell(face.to_array()))
     }
 
     /// Signed distance d [m] and unit normal n at `x`.
@@ -76,7 +76,7 @@ impl Reference {
         let p = |cell: USizeVec3| known.pressure.at(cell.x, cell.y, cell.z);
         // p~ = p - dt U . grad p
         let moved = |cell: USizeVec3| {
-            let centre = self.mesh.position([0.5; 3], cell.to_array());
+            let centre = self.mesh.position([0.5; 3], GlobalCell(cell.to_array()));
             let velocity = before.at(centre - centroid);
             let along = |a: usize| {
                 let e = USizeVec3::AXES[a];
@@ -228,7 +228,7 @@ mod tests {
             let boundaries = Boundaries([[Boundary::WALL; 2]; 3]);
             let mut flow = Flow::new(&mesh, boundaries, &params);
             flow.start_from(|axis, x| (1.5 * x).to_array()[(axis + 1) % 3].sin());
-            flow.pressure.fill_with(&mesh, |x| {
+            flow.pressure.fill_with(&mesh.whole(), |x| {
                 (2.0 * x.x).sin() * (1.5 * x.y).cos() + 0.4 * x.z * x.z
             });
             flow.predict(DT);

@@ -20,7 +20,7 @@ fn residual(cells: [usize; 3], ends: [Ends; 3]) -> f64 {
         origin: DVec3::ZERO,
     };
     let [nx, ny, nz] = cells;
-    let mut f = Field::<Centre>::zeros(&mesh);
+    let mut f = Field::<Centre>::zeros(&mesh.whole());
     let mut state = 7;
     let mut sum = 0.0;
     for k in 1..=nz {
@@ -116,8 +116,8 @@ fn single_against_double(cells: [usize; 3], spacing: DVec3, ends: [Ends; 3]) -> 
         origin: DVec3::ZERO,
     };
     let mut state = 7;
-    let mut double = Field::<Centre>::zeros(&mesh);
-    double.fill_with(&mesh, |x| {
+    let mut double = Field::<Centre>::zeros(&mesh.whole());
+    double.fill_with(&mesh.whole(), |x| {
         (std::f64::consts::PI * x.x / mesh.extent().x).cos()
     });
     double
@@ -132,7 +132,7 @@ fn single_against_double(cells: [usize; 3], spacing: DVec3, ends: [Ends; 3]) -> 
         inside.iter().fold(from, |sum, &at| f(sum, field[at]))
     };
     let mean = of_inside(&double, |a, b| a + b, 0.0) / inside.len() as f64;
-    let mut single = Field::<Centre, f32>::zeros(&mesh);
+    let mut single = Field::<Centre, f32>::zeros(&mesh.whole());
     for (double, single) in double.iter_mut().zip(single.iter_mut()) {
         *double -= mean;
         *single = f32::of(*double);
@@ -211,7 +211,7 @@ fn transforms_of_every_length_match_their_definition() {
 /// Bits of a solution that meets whole and half blocks of lines, odd lengths and all stages.
 fn bits<R: Real>(mesh: &Mesh, ends: [Ends; 3]) -> Vec<u64> {
     let mut state = 3;
-    let mut f = Field::<Centre, R>::zeros(mesh);
+    let mut f = Field::<Centre, R>::zeros(&mesh.whole());
     f.iter_mut()
         .for_each(|value| *value = R::of(noise(&mut state)));
     let mut poisson = Poisson::new(mesh, ends);

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::Simulation;
 use crate::dem::Grain;
-use crate::grid::FACE_OFFSET;
+use crate::grid::{FACE_OFFSET, GlobalCell};
 
 /// Cells near a surface are cut into so many along each axis.
 const PARTS: usize = 4;
@@ -62,7 +62,7 @@ impl Simulation {
     /// into smaller ones, and each of these by the plane through the nearest surface.
     pub fn solid_fraction_at(&self, cell: [usize; 3]) -> f64 {
         let mesh = &self.setup.mesh;
-        let x = mesh.position([0.5; 3], cell.map(|i| i + 1));
+        let x = mesh.position([0.5; 3], GlobalCell(cell.map(|i| i + 1)));
         let extent = mesh.extent();
         // A box of one cell along an axis is seen in its middle plane.
         let parts = mesh.cells.map(|n| if n > 1 { PARTS } else { 1 });
