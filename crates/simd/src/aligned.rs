@@ -61,8 +61,8 @@ fn advise_large_pages<R>(values: &[R]) {
     let ahead = first.next_multiple_of(SMALL) - first;
     let bytes = size_of_val(values).saturating_sub(ahead) / SMALL * SMALL;
     if bytes >= 2 * LARGE {
-        // SAFETY: the pages lie within the list, and the advice changes no byte of it. A system that
-        // ignores the advice uses small pages.
+        // SAFETY: the pages lie within the list, and the advice changes no byte of it. A system
+        // that ignores the advice uses small pages.
         unsafe {
             let pages = values.as_ptr().byte_add(ahead).cast_mut().cast();
             libc::madvise(pages, bytes, libc::MADV_HUGEPAGE);

@@ -28,9 +28,10 @@ pub trait Vector:
     /// Overwrites the first `WIDTH` numbers of `to`.
     fn store(self, to: &mut [Self::Number]);
     /// Overwrites the first `WIDTH` numbers of `to` with a non-temporal store, which bypasses the
-    /// caches, if `to` is aligned to the register. Call [`Self::fence`] before another thread reads.
+    /// caches, if `to` is aligned to the register. Call [`Self::fence`] before another thread
+    /// reads.
     #[inline(always)]
-    fn store_past(self, to: &mut [Self::Number]) {
+    fn store_non_temporal(self, to: &mut [Self::Number]) {
         self.store(to);
     }
     /// Orders earlier non-temporal stores before all later stores.
@@ -163,7 +164,8 @@ pub trait Vector:
         Self::load(&lanes)
     }
     /// Lane-wise reciprocal square root of numbers that are not negative, within 1e-10 or the
-    /// rounding of singles; finite and large for 0. It takes a fifth of the time of `sqrt` and `div`.
+    /// rounding of singles; finite and large for 0. It takes a fifth of the time of `sqrt` and
+    /// `div`.
     #[inline(always)]
     fn rsqrt(self) -> Self {
         let (half, more) = (Self::constant(-0.5) * self, Self::constant(1.5));

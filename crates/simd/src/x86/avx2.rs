@@ -12,8 +12,10 @@ vector! {
     Avx2F64x4: 4 x f64 in [0: __m256d],
     half Avx2F64x4, tail Avx2F64x4, transpose transpose::avx2_f64x4,
     doubles Avx2F64x4 [0: same],
-    _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_max_pd, _mm256_min_pd, _mm256_sqrt_pd,
-    select256_pd, _mm256_fmadd_pd, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_stream_pd;
+    _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_max_pd, _mm256_min_pd,
+    _mm256_sqrt_pd,
+    select256_pd, _mm256_fmadd_pd, _mm256_set1_pd, _mm256_loadu_pd,
+    _mm256_storeu_pd, _mm256_stream_pd;
     #[inline(always)]
     fn load_partial<R: Real>(from: &[R]) -> Self {
         let at = from.as_ptr();
@@ -113,8 +115,10 @@ vector! {
     Avx2F32x8: 8 x f32 in [0: __m256],
     half Avx2F32x8, tail Sse2F32x4, transpose transpose::avx2_f32x8,
     doubles Avx2F64x4 [0: widen_lower_four, 1: widen_upper_four],
-    _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps, _mm256_sqrt_ps,
-    select256_ps, _mm256_fmadd_ps, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_stream_ps;
+    _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps,
+    _mm256_sqrt_ps,
+    select256_ps, _mm256_fmadd_ps, _mm256_set1_ps, _mm256_loadu_ps,
+    _mm256_storeu_ps, _mm256_stream_ps;
     #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of `x86/mod.rs`.

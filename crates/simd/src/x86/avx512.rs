@@ -15,8 +15,10 @@ vector! {
     Avx512F64x8: 8 x f64 in [0: __m512d],
     half Avx2F64x4, tail Avx2F64x4, transpose transpose::avx512_f64x8,
     doubles Avx512F64x8 [0: same],
-    _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_max_pd, _mm512_min_pd, _mm512_sqrt_pd,
-    select512_pd, _mm512_fmadd_pd, _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_stream_pd;
+    _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_max_pd, _mm512_min_pd,
+    _mm512_sqrt_pd,
+    select512_pd, _mm512_fmadd_pd, _mm512_set1_pd, _mm512_loadu_pd,
+    _mm512_storeu_pd, _mm512_stream_pd;
     #[inline(always)]
     fn load_partial<R: Real>(from: &[R]) -> Self {
         let (at, lanes) = (from.as_ptr(), first_of_eight(from.len()));
@@ -103,8 +105,10 @@ vector! {
     Avx512F32x16: 16 x f32 in [0: __m512],
     half Avx2F32x8, tail Sse2F32x4, transpose transpose::avx512_f32x16,
     doubles Avx512F64x8 [0: widen_lower_eight, 1: widen_upper_eight],
-    _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps, _mm512_max_ps, _mm512_min_ps, _mm512_sqrt_ps,
-    select512_ps, _mm512_fmadd_ps, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_stream_ps;
+    _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps, _mm512_max_ps, _mm512_min_ps,
+    _mm512_sqrt_ps,
+    select512_ps, _mm512_fmadd_ps, _mm512_set1_ps, _mm512_loadu_ps,
+    _mm512_storeu_ps, _mm512_stream_ps;
     #[inline(always)]
     fn is_zero(self) -> bool {
         // SAFETY: see the head of `x86/mod.rs`.

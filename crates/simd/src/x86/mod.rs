@@ -67,13 +67,14 @@ macro_rules! vector {
                 unsafe { $($store(to.add($i * $width / 2), self.$i));+ }
             }
             #[inline(always)]
-            fn store_past(self, to: &mut [$number]) {
+            fn store_non_temporal(self, to: &mut [$number]) {
                 let register = 0_usize $(.max(size_of_val(&self.$i)))+;
                 if !to.as_ptr().addr().is_multiple_of(register) {
                     return self.store(to);
                 }
                 let to = to[..$width].as_mut_ptr();
-                // SAFETY: see the head of `x86/mod.rs`; the registers fall on multiples of their size.
+                // SAFETY: see the head of `x86/mod.rs`; the registers fall on multiples of their
+                // size.
                 unsafe { $($past(to.add($i * $width / 2), self.$i));+ }
             }
             #[inline(always)]

@@ -1,8 +1,8 @@
-//! The sweeps of the projection: the divergence of the prediction, and the correction by the
-//! pressure increment with everything that it measures, each a plane at a time while that plane is
-//! in cache.
+//! Kernels of the projection, one plane at a time: divergence of the prediction; correction of
+//! velocity and pressure by the increment, with the measures of the flow.
 //!
-//! Legend: u, v, w components along x, y, z; f pressure increment phi over density.
+//! Legend: u, v, w components along x, y, z; q any of them; f pressure increment phi over density;
+//! suffixes as in `tendency.rs`: l/r left and right in x, m/p down and up in y, b/t in z.
 
 use glam::DVec3;
 
@@ -12,13 +12,13 @@ use crate::math::Real;
 use crate::poisson::{Plane, Solution};
 use grainwake_simd::{Kernel, Partial, RowWork, Scalar, Vector, along_row, window, window_mut};
 
-/// What one plane contributes to the measures.
+/// Contribution of one plane to the measures of the flow.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PlaneMeasures {
     pub flow: FlowMeasures,
     /// Sum of the tendencies over the unknown faces [m/s^2].
     pub tendency: DVec3,
-    /// Pressure at the upper end less that at the lower end, summed over the lines along x and y.
+    /// Pressure difference between upper and lower end, summed over the lines along x and along y.
     pub pressure_rise: [f64; 2],
 }
 
@@ -74,13 +74,13 @@ impl<R: Real> Kernel for Divergence<'_, R> {
     }
 }
 
-/// The layer above layer `at` of an axis.
+/// Index of the layer above layer `at` of an axis with `n` layers.
 #[inline(always)]
 fn next(at: usize, n: usize, periodic: bool) -> usize {
     if at == n && periodic { 1 } else { at + 1 }
 }
 
-/// One row of cells; all slices have one length, so that a vector of cells is checked once.
+/// One row of cells. All slices have one length, so that one bounds check serves all of them.
 struct DivergenceRow<'a, R> {
     u: &'a [R],
     v: &'a [R],
@@ -115,7 +115,7 @@ impl<R: Real> RowWork for DivergenceRow<'_, R> {
     }
 }
 
-/// One plane of u = u* - dt grad f and p += f; ghosts are left to the caller.
+/// Correction of one plane: u = u* - dt grad f, p += f; the caller fills the ghosts.
 pub struct Correct<'a, R> {
     pub layout: Layout,
     pub predicted: &'a FaceVector<R>,
@@ -125,8 +125,8 @@ pub struct Correct<'a, R> {
     pub inverse: [f64; 3],
     /// dt/h along each axis [s/m].
     pub pull: [f64; 3],
-    /// Whether the velocity is written past the caches.
-    pub past_caches: bool,
+    /// Whether the velocity is written with non-temporal stores.
+    pub non_temporal: bool,
     pub velocity: [&'a mut [R]; 3],
     pub pressure: &'a mut [R],
     pub measures: &'a mut PlaneMeasures,
@@ -172,7 +172,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 ],
                 pressure: layout.row_of_mut(p, j),
                 n,
-                past_caches: self.past_caches,
+                non_temporal: self.non_temporal,
                 partial: &mut partial,
                 given: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
             };
@@ -182,7 +182,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 work.value(n, Scalar(work.q[0][1]));
             } else {
                 along_row::<V>(n, &mut work);
-                // The lower boundary face was summed with the others.
+                // The sum contains the lower boundary face, which is no unknown.
                 let given = -work.out[0][1].wide();
                 work.partial.momentum[0].add(1, Scalar::<R>::constant(given));
             }
@@ -216,14 +216,14 @@ struct CorrectPartial {
     momentum: [Partial; 3],
 }
 
-/// One row of cells; all slices have one length, so that a vector of cells is checked once.
+/// One row of cells. All slices have one length, so that one bounds check serves all of them.
 struct CorrectRow<'a, R> {
     /// Prediction on the lower faces, and on the upper ones along y and z.
     q: [&'a [R]; 3],
     vp: &'a [R],
     wt: &'a [R],
     f: &'a [R],
-    /// The increment one row down in y and in z, and one up.
+    /// Increment one row down in y and in z, and one row up.
     lower: [&'a [R]; 2],
     upper: [&'a [R]; 2],
     inverse: [f64; 3],
@@ -231,7 +231,7 @@ struct CorrectRow<'a, R> {
     out: [&'a mut [R]; 3],
     pressure: &'a mut [R],
     n: usize,
-    past_caches: bool,
+    non_temporal: bool,
     partial: &'a mut CorrectPartial,
     given: [bool; 3],
 }
@@ -249,8 +249,8 @@ impl<R: Real> CorrectRow<'_, R> {
         let above = [ur, here(self.vp), here(self.wt)];
         let zero = V::constant(0.0);
         let (mut square, mut rate, mut divergence) = (zero, zero, zero);
-        // The ends of a row are looked at again for the ghosts.
-        let past = self.past_caches && i > 1 && i + V::WIDTH <= self.n;
+        // The ghosts are filled from the ends of a row, which therefore stay in the cache.
+        let past = self.non_temporal && i > 1 && i + V::WIDTH <= self.n;
         for axis in 0..3 {
             let (pull, inverse) = (
                 V::constant(self.pull[axis]),
@@ -260,7 +260,7 @@ impl<R: Real> CorrectRow<'_, R> {
             let next = above[axis] - pull * (upper[axis] - f);
             let to = window_mut::<V>(self.out[axis], i);
             if past {
-                q.store_past(to);
+                q.store_non_temporal(to);
             } else {
                 q.store(to);
             }

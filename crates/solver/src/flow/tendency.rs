@@ -1,12 +1,12 @@
-//! Advection and diffusion (the right side of Eq. 1b without the pressure) and the explicit step,
-//! a row at a time.
+//! Tendency (advection and diffusion of Eq. 1b) and prediction, one row at a time.
 //!
 //! Both are differences of fluxes through the six links to the neighbouring faces of the same
-//! component. A link carries the mean of its two ends times the velocity through it: with a
-//! divergence-free velocity this conserves momentum and kinetic energy.
+//! component. The advective flux of a link is the mean of its two ends times the velocity through
+//! the link, which conserves momentum and kinetic energy if the velocity is divergence-free.
 //!
-//! Legend: q velocity component, c velocity through a link; u, v, w components along x, y, z; the
-//! letters after them: m/p one row down/up in y, b/t one down/up in z.
+//! Legend: H tendency; q velocity component, c velocity through a link; u, v, w components along
+//! x, y, z, p pressure. Suffixes: c here, l/r left and right in x, m/p one row down and up in y,
+//! b/t one plane down and up in z; `umr` is u one row down, right.
 
 use glam::DVec3;
 
@@ -17,14 +17,14 @@ use grainwake_simd::{Kernel, Partial, RowWork, Scalar, Vector, along_row, window
 /// Constants of the tendency.
 #[derive(Clone, Copy)]
 pub struct Coefficients {
-    /// 1/4h: a quarter, as both the carried value and the velocity that carries it are means.
+    /// 1/(4 h) along each axis [1/m]: value and velocity of a link are means of two.
     quarter_inverse: [f64; 3],
     nu_inverse_square: [f64; 3],
     pub(super) acceleration: DVec3,
 }
 
 impl Coefficients {
-    /// For a mesh, kinematic viscosity [m^2/s] and body acceleration [m/s^2].
+    /// Constants of a mesh, kinematic viscosity [m^2/s] and body acceleration [m/s^2].
     pub fn new(mesh: &Mesh, kinematic_viscosity: f64, acceleration: DVec3) -> Coefficients {
         let h = mesh.spacing.to_array();
         Coefficients {
@@ -56,30 +56,30 @@ impl Coefficients {
     }
 }
 
-/// What a step multiplies by.
+/// Weights of the terms of the prediction.
 #[derive(Clone, Copy)]
 pub struct Weights {
-    /// Of the new tendency [s].
+    /// Weight of the new tendency [s].
     pub now: f64,
-    /// Of the old one [s].
+    /// Weight of the old tendency [s].
     pub before: f64,
-    /// Of the pressure difference along each axis [s/m].
+    /// Weight of the pressure difference along each axis [s/m].
     pub push: [f64; 3],
 }
 
-/// Rows of a plane of the prediction u* = u + now H + before H_old - dt grad p.
+/// One plane of the prediction u* = u + now H + before H_old - dt grad p.
 pub struct PredictPlane<'a, R> {
     pub layout: Layout,
     pub coefficients: &'a Coefficients,
     pub weights: Weights,
     pub velocity: &'a FaceVector<R>,
     pub pressure: &'a [R],
-    /// Axes whose lower boundary face is given.
+    /// Axes whose boundary faces have a given velocity.
     pub walled: [bool; 3],
     pub k: usize,
-    /// Whether the prediction is written past the caches.
-    pub past_caches: bool,
-    /// H_old, to be replaced by H.
+    /// Whether the prediction is written with non-temporal stores.
+    pub non_temporal: bool,
+    /// H_old, overwritten by H.
     pub tendency: [&'a mut [R]; 3],
     pub predicted: [&'a mut [R]; 3],
     /// Sum of H over the unknown faces of the plane [m/s^2], to be set.
@@ -118,12 +118,12 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
                 ],
                 sums: &mut sums,
                 n,
-                past_caches: self.past_caches,
+                non_temporal: self.non_temporal,
                 given: [false, self.walled[1] && j == 1, self.walled[2] && k == 1],
             };
             along_row::<V>(n, &mut work);
             if self.walled[0] {
-                // The lower boundary face was summed with the others.
+                // The sum contains the lower boundary face, which is no unknown.
                 let given = -work.tendency[0][1].wide();
                 work.sums[0].add(1, Scalar::<R>::constant(given));
             }
@@ -143,8 +143,8 @@ fn planes<R>(layout: Layout, field: &[R], k: usize) -> [&[R]; 3] {
     ]
 }
 
-/// Rows j - 1, j, j + 1 of the planes k - 1, k, k + 1. All have one length, so that a vector of
-/// cells is checked against the ends of the rows once.
+/// Rows j - 1, j, j + 1 of the planes k - 1, k, k + 1, all of one length, so that one bounds check
+/// serves all of them.
 type Rows<'a, R> = [[&'a [R]; 3]; 3];
 
 #[inline(always)]
@@ -177,8 +177,8 @@ struct PredictRow<'a, R> {
     predicted: [&'a mut [R]; 3],
     sums: &'a mut [Partial; 3],
     n: usize,
-    past_caches: bool,
-    /// Components that are given on the whole row.
+    non_temporal: bool,
+    /// Components whose faces on the whole row have a given velocity.
     given: [bool; 3],
 }
 
@@ -229,16 +229,16 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
             V::constant(self.weights.now),
             V::constant(self.weights.before),
         );
-        // The ends of a row are looked at again for the boundaries.
-        let past = self.past_caches && i > 1 && i + V::WIDTH <= self.n;
+        // Boundary conditions read the ends of a row, which therefore stay in the cache.
+        let past = self.non_temporal && i > 1 && i + V::WIDTH <= self.n;
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
             let old = window_mut::<V>(self.tendency[axis], i);
             let push = V::constant(self.weights.push[axis]) * (pc - lower[axis]);
-            // What is small is summed first: in singles q would swallow it part by part.
+            // Small terms are summed before q is added: fewer of their digits are lost.
             let gain = now * h + before * V::load(old) - push;
             let to = window_mut::<V>(self.predicted[axis], i);
             if past {
-                (q + gain).store_past(to);
+                (q + gain).store_non_temporal(to);
             } else {
                 (q + gain).store(to);
             }

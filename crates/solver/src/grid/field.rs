@@ -1,9 +1,9 @@
 //! Fields on the staggered grid. The location is part of the type: a face field cannot be passed
 //! for a centre field.
 //!
-//! Every field has one ghost layer on each side and the same shape (nx+2, ny+2, nz+2), x fastest. In
-//! memory a row is padded to a multiple of eight entries, and i = 1 starts a cache line (half a line
-//! in every other row of singles), so that a vector of neighbours does not straddle two lines.
+//! Every field has one ghost layer on each side and the same shape (nx+2, ny+2, nz+2), x fastest.
+//! In memory a row is padded to a multiple of eight entries, and i = 1 starts a cache line (half a
+//! line in every other row of singles), so that a vector of neighbours does not straddle two lines.
 //! Cell (i, j, k) of the interior has 1 <= i <= nx and so on. A face field stores the *lower* face
 //! of each cell: face i of `FaceX` lies between cells i-1 and i, so a box with walls has its upper
 //! boundary face at index nx+1.

@@ -115,7 +115,8 @@ impl Slab {
     pub fn global(&self, LocalCell([i, j, k]): LocalCell) -> GlobalCell {
         GlobalCell([i, j, k + self.below])
     }
-    /// Index in the slab of a cell of the box; none if neither the slab nor its ghosts hold the cell.
+    /// Index in the slab of a cell of the box; none if neither the slab nor its ghosts hold the
+    /// cell.
     pub fn local(&self, GlobalCell([i, j, k]): GlobalCell) -> Option<LocalCell> {
         let k = k.checked_sub(self.below)?;
         (k <= self.planes + 1).then_some(LocalCell([i, j, k]))

@@ -107,7 +107,7 @@ impl<R: Real> IsolatedUpdate<'_, R> {
         scratch: &mut ThreadScratch<R>,
     ) {
         // SAFETY: the faces of this grain are used by no other, as the caller guarantees.
-        let mut own = (self.predictions.each_ref()).map(|one| unsafe { one.again() });
+        let mut own = (self.predictions.each_ref()).map(|one| unsafe { one.alias() });
         let ThreadScratch {
             advection,
             locate,

@@ -1,4 +1,4 @@
-//! Small mathematics shared by every layer: poses, dense 6 x 6 systems, formulas.
+//! Mathematics shared by all layers: poses, dense 6 x 6 systems, formulas.
 
 mod cache;
 mod formula;

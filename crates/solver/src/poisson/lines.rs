@@ -1,10 +1,10 @@
-//! Blocks of lines on their way into the transforms and out of them.
+//! Loads and stores of blocks of lines before and after the transforms.
 
 use super::axis::{self, Axis};
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Complex, MAX_LANES, Vector, as_complex, dispatch};
 
-/// Both buffers of the transforms of one thread.
+/// Both buffers of the transforms, one set per thread.
 pub struct Buffers<R>(Aligned<R>);
 
 impl<R: Real> Buffers<R> {
@@ -15,12 +15,12 @@ impl<R: Real> Buffers<R> {
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.0)
     }
-    /// Where the lines of `axis` are put.
+    /// Input lines of a transform along `axis`.
     #[inline(always)]
     pub fn lines<V: Vector<Number = R>>(&mut self, axis: &Axis<R>) -> &mut [Complex<V>] {
         &mut as_complex::<V>(&mut self.0)[..axis.n]
     }
-    /// Transforms them.
+    /// Transforms the input lines and returns the result.
     #[inline(always)]
     pub fn transform<V: Vector<Number = R>>(
         &mut self,
@@ -41,7 +41,8 @@ impl<R: Real> Buffers<R> {
     }
 }
 
-/// Lines side by side: entry i of the first ones at `at + i step`, of the second ones `second` on.
+/// Pairs of adjacent lines: entry i of the first lines at `at + i step`, of the second lines
+/// `second` further.
 #[derive(Clone, Copy)]
 pub struct Lines {
     pub at: usize,
@@ -50,7 +51,7 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Entry i of the lines in `values`.
+    /// Loads entry i of the lines.
     #[inline(always)]
     fn entry<V: Vector>(&self, values: &[V::Number], i: usize) -> Complex<V> {
         let both = &values[self.at + i * self.step..][..self.second + V::WIDTH];
@@ -59,7 +60,7 @@ impl Lines {
             im: V::load(&both[self.second..]),
         }
     }
-    /// Entry i of the lines in `values`, to be overwritten: the first ones, and the second ones.
+    /// Mutable entry i of the first lines, and of the second lines.
     #[inline(always)]
     fn entry_mut<'a, V: Vector>(
         &self,
@@ -83,11 +84,11 @@ impl Lines {
         }
     }
     #[inline(always)]
-    pub fn store_past<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
+    pub fn store_non_temporal<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
         for (i, x) in a.iter().enumerate() {
             let (first, second) = self.entry_mut::<V>(values, i);
-            x.re.store_past(first);
-            x.im.store_past(second);
+            x.re.store_non_temporal(first);
+            x.im.store_non_temporal(second);
         }
     }
     #[inline(always)]
@@ -121,7 +122,7 @@ impl Lines {
     }
 }
 
-/// Rows of a plane: the first of the first ones starts at `at`, the second ones `second` rows on.
+/// Pairs of rows of a plane: the first rows start at `at`, the second rows `second` rows further.
 #[derive(Clone, Copy)]
 pub struct Rows {
     pub at: usize,
@@ -168,8 +169,7 @@ impl Rows {
             self.store_block(block, at, values);
         }
     }
-    /// Overwrites the entries from `at` on of `V::WIDTH` first rows and as many second ones with
-    /// the columns of two blocks.
+    /// Transposes two blocks into the entries from `at` on of `V::WIDTH` first and second rows.
     #[inline(always)]
     fn store_block<V: Vector>(
         &self,

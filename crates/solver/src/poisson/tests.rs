@@ -107,8 +107,8 @@ fn residual_is_round_off_for_every_pairing_and_awkward_sizes() {
     }
 }
 
-/// A smooth right-hand side of zero mean with noise, solved in both precisions: largest difference over the
-/// largest value.
+/// A smooth right-hand side of zero mean with noise, solved in both precisions: largest difference
+/// over the largest value.
 fn single_against_double(cells: [usize; 3], spacing: DVec3, ends: [Ends; 3]) -> f64 {
     let mesh = Mesh {
         cells,

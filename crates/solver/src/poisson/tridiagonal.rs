@@ -1,35 +1,36 @@
-//! The tridiagonal systems left along z, one for each pair of modes along x and y.
+//! Tridiagonal systems along z, one for each pair of modes along x and y.
 //!
 //! With lambda = lambda_x + lambda_y and b = 2 + lambda dz^2 each reads
 //! -x[k-1] + b x[k] - x[k+1] = -dz^2 f[k], with b lowered by one next to a Neumann end and the
-//! corners closed by Sherman-Morrison on a periodic axis. A block of columns is eliminated at a
-//! time: as many as the cache holds, so that memory sees each mode once in and once out. All of it
-//! is in doubles, whatever the modes are: the lowest modes of a wide flat box have lambda dz^2 below
-//! the rounding of singles, and would be lost.
+//! corners closed by Sherman-Morrison on a periodic axis. Blocks of columns that fit the cache are
+//! solved one after the other, so that each mode is read from and written to memory once. The
+//! solution is in double precision for either type of field: the lowest modes of a wide flat box
+//! have lambda dz^2 below the rounding of singles.
 //!
-//! Legend: y solution of the open system, q its answer to the corner, g = -b, v values in cache.
+//! Legend: f right-hand side; y solution of the system without its corners; q solution for the
+//! corner vector u; g = -b.
 
 use super::Ends;
 use crate::grid::Columns;
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Kernel, Vector};
 
-/// Bytes of cache that a block of columns may take.
+/// Cache for a block of columns [bytes].
 const CACHE: usize = 1 << 19;
 
-/// Columns of a block: a multiple of two cache lines.
+/// Width of a block of columns: a multiple of two cache lines.
 pub fn block_width<R: Real>(nz: usize) -> usize {
     let least = 2 * R::LANES;
     (CACHE / size_of::<f64>() / 2 / nz / least * least).max(least)
 }
 
-/// One block of columns in cache.
+/// Scratch for one block of columns.
 pub struct ColumnScratch {
     values: Aligned<f64>,
     pivots: Aligned<f64>,
     corner: Aligned<f64>,
     carry: Aligned<f64>,
-    /// Right-hand side of the mean mode and the pivots of its system.
+    /// Right-hand side of the mean mode and pivots of its system.
     mean: [Vec<f64>; 2],
 }
 
@@ -115,7 +116,7 @@ impl<R: Real> Kernel for Solve<'_, '_, R> {
     }
 }
 
-/// The row before row `k` of a list of rows, empty for k = 0, and row `k`, to be overwritten.
+/// Row k - 1 of a list of rows, empty for k = 0, and mutable row k.
 #[inline(always)]
 fn row_of(values: &mut [f64], k: usize, width: usize) -> (&[f64], &mut [f64]) {
     let (before, rest) = values.split_at_mut(k * width);
@@ -173,7 +174,7 @@ impl Tridiagonal {
             }
         }
         if singular {
-            // The last pivot of the mean mode vanishes; the value there is pinned to zero.
+            // The last pivot of the mean mode vanishes; its last value is set to zero.
             values[(n - 1) * width] = 0.0;
         }
         let carry = &mut scratch.carry[..width];
@@ -270,7 +271,7 @@ impl Tridiagonal {
         }
     }
 
-    /// The mean mode of a periodic axis, in doubles: its first value is pinned to zero.
+    /// Solves the mean mode of a periodic axis, whose first value is set to zero.
     #[inline(always)]
     fn solve_mean<R: Real>(&self, columns: &mut Columns<R>, [f, pivots]: &mut [Vec<f64>; 2]) {
         let (n, factor) = (self.n, -self.square * self.scale);

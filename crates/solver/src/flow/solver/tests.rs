@@ -441,14 +441,14 @@ fn outflow_keeps_the_mass_of_the_box() {
 #[test]
 fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
     use grainwake_simd::{InstructionSet, limit_instructions};
-    fn bits<R: Real>(boundaries: Boundaries, past_caches: bool) -> Vec<u64> {
+    fn bits<R: Real>(boundaries: Boundaries, non_temporal: bool) -> Vec<u64> {
         let mesh = Mesh {
             cells: [29, 11, 9],
             spacing: DVec3::new(0.3, 0.4, 0.5),
             origin: DVec3::ZERO,
         };
         let mut flow = Flow::<R>::new(&mesh, boundaries, &params(0.01));
-        (flow.past_caches, flow.poisson.past_caches) = (past_caches, past_caches);
+        (flow.non_temporal, flow.poisson.non_temporal) = (non_temporal, non_temporal);
         flow.start_from(|axis, x| (x + DVec3::new(0.1, 0.2, 0.3)).to_array()[axis].sin());
         let mut kept = Vec::new();
         for _ in 0..3 {
