@@ -2,7 +2,7 @@
 
 use crate::math::Real;
 
-/// How a ghost layer follows from the interior.
+/// Rule by which a ghost layer follows from the interior.
 #[derive(Clone, Copy)]
 pub(super) enum Mirror {
     /// The ghost layer is not read.

@@ -58,7 +58,7 @@ impl Boundaries {
     }
 
     /// Axes whose lower boundary face has a given velocity, all that are not periodic.
-    pub fn walled(&self) -> [bool; 3] {
+    pub(crate) fn walled(&self) -> [bool; 3] {
         [0, 1, 2].map(|axis| !self.is_periodic(axis))
     }
 

@@ -24,7 +24,7 @@ fn pressure_condition(boundary: &Boundary) -> Ends {
 
 impl Boundaries {
     /// Conditions on the pressure at the ends of each axis.
-    pub fn pressure_ends(&self) -> [Ends; 3] {
+    pub(crate) fn pressure_ends(&self) -> [Ends; 3] {
         [0, 1, 2].map(|axis| pressure_condition(&self.0[axis][0]))
     }
 

@@ -89,7 +89,7 @@ impl Boundaries {
         }
     }
 
-    /// How the ghosts of a component on one side follow from the inside.
+    /// Rule for the ghosts of a velocity component on one side of the box.
     fn mirror(&self, axis: usize, side: usize, component: usize) -> Mirror {
         match self.0[axis][side] {
             Boundary::Periodic => Mirror::Wrap,
