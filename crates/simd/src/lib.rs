@@ -30,7 +30,7 @@ pub use complex::{Complex, as_complex, turned};
 pub use dispatch::{InstructionSet, Kernel, Registers, dispatch, instructions, limit_instructions};
 pub use prefetch::{prefetch, prefetch_ahead};
 pub use real::{Precision, Real};
-pub use rows::{Partial, RowWork, along_row, window, window_mut};
+pub use rows::{Maximum, Partial, RowWork, along_row, inside_row, window, window_mut};
 pub use scalar::Scalar;
 pub use stencil::Stencil;
 pub use vector::Vector;

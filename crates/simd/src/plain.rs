@@ -101,11 +101,4 @@ impl<R: Real, const N: usize> Vector for Plain<R, N> {
             *sum += lane.wide();
         }
     }
-    #[inline(always)]
-    fn max_into(self, tops: &mut [f64]) {
-        for (top, lane) in tops[..N].iter_mut().zip(self.0) {
-            let lane = lane.wide();
-            *top = if *top > lane { *top } else { lane };
-        }
-    }
 }

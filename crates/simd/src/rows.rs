@@ -34,7 +34,14 @@ pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number
     }
 }
 
-/// The `V::WIDTH` entries from `at` on and one neighbour on each side.
+/// Whether the `width` entries from `i` on contain neither end of a row of `n` entries; one
+/// comparison.
+#[inline(always)]
+pub fn inside_row(i: usize, width: usize, n: usize) -> bool {
+    i.wrapping_sub(2) < n.saturating_sub(width + 1)
+}
+
+/// Slice of the `V::WIDTH` entries from `at` on and one neighbour on each side.
 ///
 /// Windows at one place of lists of one length share one bounds check.
 #[inline(always)]
@@ -42,13 +49,13 @@ pub fn window<V: Vector>(list: &[V::Number], at: usize) -> &[V::Number] {
     &list[at - 1..][..V::WIDTH + 2]
 }
 
-/// The `V::WIDTH` entries from `at` on, to be overwritten; checked like [`window`].
+/// Mutable slice of the `V::WIDTH` entries from `at` on; checked like [`window`].
 #[inline(always)]
 pub fn window_mut<V: Vector>(list: &mut [V::Number], at: usize) -> &mut [V::Number] {
     &mut list[at - 1..][..V::WIDTH + 2][1..][..V::WIDTH]
 }
 
-/// Partial sum or maximum of a row in doubles, in an order that does not depend on the width.
+/// Partial sum of a row in doubles, in an order that does not depend on the width.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub struct Partial([f64; MAX_LANES]);
@@ -58,11 +65,6 @@ impl Partial {
     #[inline(always)]
     pub fn add<V: Vector>(&mut self, i: usize, value: V) {
         value.add_into(&mut self.0[(i - 1) % V::Number::LANES..]);
-    }
-    /// Replaces the lanes of entries `i` to `i + V::WIDTH` by their maxima with `value`.
-    #[inline(always)]
-    pub fn max<V: Vector>(&mut self, i: usize, value: V) {
-        value.max_into(&mut self.0[(i - 1) % V::Number::LANES..]);
     }
     /// Sum of the lanes.
     pub fn sum(&self) -> f64 {
@@ -76,8 +78,22 @@ impl Partial {
         }
         lanes[0]
     }
-    /// Maximum of the lanes, at least 0.
-    pub fn largest(&self) -> f64 {
-        self.0.into_iter().fold(0.0, f64::max)
+}
+
+/// Maximum of numbers of a row that are not negative, lane by lane.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub struct Maximum<R>([R; MAX_LANES]);
+
+impl<R: Real> Maximum<R> {
+    /// Includes entries `i` to `i + V::WIDTH`.
+    #[inline(always)]
+    pub fn include<V: Vector<Number = R>>(&mut self, i: usize, value: V) {
+        let lanes = &mut self.0[(i - 1) % R::LANES..];
+        V::load(lanes).max(value).store(lanes);
+    }
+    /// Maximum of the lanes in double precision.
+    pub fn get(&self) -> f64 {
+        self.0.into_iter().map(R::wide).fold(0.0, f64::max)
     }
 }

@@ -73,9 +73,4 @@ impl<R: Real> Vector for Scalar<R> {
     fn add_into(self, sums: &mut [f64]) {
         sums[0] += self.0.wide();
     }
-    #[inline(always)]
-    fn max_into(self, tops: &mut [f64]) {
-        let lane = self.0.wide();
-        tops[0] = if tops[0] > lane { tops[0] } else { lane };
-    }
 }

@@ -47,11 +47,9 @@ fn check<V: Vector>() {
         v.store(found);
     }
     assert_eq!(x.mask_below(y).checked_shr(V::WIDTH as u32).unwrap_or(0), 0);
-    let (mut sums, mut tops) = ([1.0; MAX_LANES], [0.25; MAX_LANES]);
+    let mut sums = [1.0; MAX_LANES];
     x.add_into(&mut sums);
-    x.max_into(&mut tops);
     assert_eq!(sums[V::WIDTH..], [1.0; MAX_LANES][V::WIDTH..]);
-    assert_eq!(tops[V::WIDTH..], [0.25; MAX_LANES][V::WIDTH..]);
     for i in 0..V::WIDTH {
         // One operation in double precision rounds to the same single.
         let (a, b) = (a[i].wide(), b[i].wide());
@@ -71,7 +69,7 @@ fn check<V: Vector>() {
             let expected = number(expected).wide();
             assert_eq!(found[i].wide().to_bits(), expected.to_bits());
         }
-        assert_eq!([sums[i], tops[i]], [1.0 + a, a.max(0.25)]);
+        assert_eq!(sums[i], 1.0 + a);
         assert_eq!(x.mask_below(y) >> i & 1 == 1, a < b);
     }
     let signed: [V::Number; MAX_LANES] = std::array::from_fn(|i| number(1.7 * i as f64 - 5.0));
@@ -155,6 +153,7 @@ fn each_level<R: Real>() {
 struct Sum<'a, R> {
     row: &'a [R],
     sum: &'a mut Partial,
+    maximum: &'a mut Maximum<R>,
     seen: &'a mut Vec<usize>,
 }
 impl<R: Real> RowWork for Sum<'_, R> {
@@ -162,6 +161,7 @@ impl<R: Real> RowWork for Sum<'_, R> {
     #[inline(always)]
     fn at<V: Vector<Number = R>>(&mut self, i: usize) {
         self.sum.add(i, V::load(&self.row[i..]));
+        self.maximum.include(i, V::load(&self.row[i..]));
         self.seen.extend(i..i + V::WIDTH);
     }
 }
@@ -178,13 +178,17 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
     fn sums<R: Real>(n: usize) {
         let row: Vec<R> = (0..=n).map(|i| R::of((i as f64).sin())).collect();
         let sum = |run: fn(Sum<R>)| {
-            let (mut sum, mut seen) = (Partial::default(), Vec::new());
+            let (mut sum, mut maximum) = (Partial::default(), Maximum::default());
+            let mut seen = Vec::new();
             run(Sum {
                 row: &row,
                 sum: &mut sum,
+                maximum: &mut maximum,
                 seen: &mut seen,
             });
             assert_eq!(seen, (1..=n).collect::<Vec<_>>());
+            let largest = row[1..].iter().fold(0.0, |top, x| x.wide().max(top));
+            assert_eq!(maximum.get(), largest);
             sum.sum()
         };
         let one = sum(|work| work.run::<Scalar<R>>());
@@ -201,6 +205,19 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
     for n in 1..70 {
         sums::<f64>(n);
         sums::<f32>(n);
+    }
+}
+
+#[test]
+fn vectors_inside_a_row_contain_neither_end() {
+    for n in 0..20 {
+        for (i, width) in (1..25).flat_map(|i| [1, 4, 8].map(|width| (i, width))) {
+            assert_eq!(
+                inside_row(i, width, n),
+                i > 1 && i + width <= n,
+                "{i} {width} {n}"
+            );
+        }
     }
 }
 

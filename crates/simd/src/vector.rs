@@ -203,8 +203,6 @@ pub trait Vector:
     fn transpose(block: &mut [Self]);
     /// Adds the lanes, as doubles, to the first `WIDTH` entries of `sums`.
     fn add_into(self, sums: &mut [f64]);
-    /// Replaces the first `WIDTH` entries of `tops` by their maxima with the lanes, as doubles.
-    fn max_into(self, tops: &mut [f64]);
 }
 
 /// Lane indices 0, 1, 2...

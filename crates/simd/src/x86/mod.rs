@@ -126,14 +126,6 @@ macro_rules! vector {
                     ($wide::load(here) + unsafe { $widen(self) }).store(here);
                 )+
             }
-            #[inline(always)]
-            fn max_into(self, tops: &mut [f64]) {
-                $(
-                    let here = &mut tops[$w * $wide::WIDTH..];
-                    // SAFETY: see the head of `x86/mod.rs`.
-                    $wide::load(here).max(unsafe { $widen(self) }).store(here);
-                )+
-            }
         }
     };
 }

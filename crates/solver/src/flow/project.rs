@@ -10,7 +10,9 @@ use super::FlowMeasures;
 use crate::grid::{FaceVector, Layout};
 use crate::math::Real;
 use crate::poisson::{Plane, Solution};
-use grainwake_simd::{Kernel, Partial, RowWork, Scalar, Vector, along_row, window, window_mut};
+use grainwake_simd::{
+    Kernel, Maximum, Partial, RowWork, Scalar, Vector, along_row, inside_row, window, window_mut,
+};
 
 /// Contribution of one plane to the measures of the flow.
 #[derive(Clone, Copy, Debug, Default)]
@@ -149,7 +151,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
             below: fb,
             above: ft,
         } = self.solution;
-        let mut partial = CorrectPartial::default();
+        let mut partial = CorrectPartial::<R>::default();
         let mut rise = [0.0; 2];
         for j in 1..=ny {
             let mut work = CorrectRow {
@@ -171,8 +173,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
                     layout.row_of_mut(z, j),
                 ],
                 pressure: layout.row_of_mut(p, j),
-                n,
-                non_temporal: self.non_temporal,
+                streamed: if self.non_temporal { n } else { 0 },
                 partial: &mut partial,
                 given: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
             };
@@ -195,9 +196,9 @@ impl<R: Real> Kernel for Correct<'_, R> {
         V::fence();
         *self.measures = PlaneMeasures {
             flow: FlowMeasures {
-                max_divergence: partial.divergence.largest(),
-                max_rate: partial.rate.largest(),
-                max_velocity: partial.square.largest(),
+                max_divergence: partial.divergence.get(),
+                max_rate: partial.rate.get(),
+                max_velocity: partial.square.get(),
                 kinetic_energy: 0.5 * partial.kinetic.sum(),
                 momentum: DVec3::from_array(partial.momentum.map(|sum| sum.sum())),
             },
@@ -207,11 +208,12 @@ impl<R: Real> Kernel for Correct<'_, R> {
     }
 }
 
+/// Partial measures of a plane.
 #[derive(Default)]
-struct CorrectPartial {
-    divergence: Partial,
-    rate: Partial,
-    square: Partial,
+struct CorrectPartial<R> {
+    divergence: Maximum<R>,
+    rate: Maximum<R>,
+    square: Maximum<R>,
     kinetic: Partial,
     momentum: [Partial; 3],
 }
@@ -230,9 +232,10 @@ struct CorrectRow<'a, R> {
     pull: [f64; 3],
     out: [&'a mut [R]; 3],
     pressure: &'a mut [R],
-    n: usize,
-    non_temporal: bool,
-    partial: &'a mut CorrectPartial,
+    /// Entries of the row if written with non-temporal stores, else 0.
+    streamed: usize,
+    partial: &'a mut CorrectPartial<R>,
+    /// Components whose faces on the whole row have a given velocity.
     given: [bool; 3],
 }
 
@@ -250,7 +253,7 @@ impl<R: Real> CorrectRow<'_, R> {
         let zero = V::constant(0.0);
         let (mut square, mut rate, mut divergence) = (zero, zero, zero);
         // The ghosts are filled from the ends of a row, which therefore stay in the cache.
-        let past = self.non_temporal && i > 1 && i + V::WIDTH <= self.n;
+        let streamed = inside_row(i, V::WIDTH, self.streamed);
         for axis in 0..3 {
             let (pull, inverse) = (
                 V::constant(self.pull[axis]),
@@ -259,7 +262,7 @@ impl<R: Real> CorrectRow<'_, R> {
             let q = here(self.q[axis]) - pull * (f - lower[axis]);
             let next = above[axis] - pull * (upper[axis] - f);
             let to = window_mut::<V>(self.out[axis], i);
-            if past {
+            if streamed {
                 q.store_non_temporal(to);
             } else {
                 q.store(to);
@@ -274,9 +277,9 @@ impl<R: Real> CorrectRow<'_, R> {
         let p = window_mut::<V>(self.pressure, i);
         (V::load(p) + f).store(p);
         let partial = &mut *self.partial;
-        partial.divergence.max(i, divergence.abs());
-        partial.rate.max(i, rate);
-        partial.square.max(i, square);
+        partial.divergence.include(i, divergence.abs());
+        partial.rate.include(i, rate);
+        partial.square.include(i, square);
         partial.kinetic.add(i, square);
     }
 }

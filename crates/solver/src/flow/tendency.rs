@@ -12,7 +12,9 @@ use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout, Mesh};
 use crate::math::Real;
-use grainwake_simd::{Kernel, Partial, RowWork, Scalar, Vector, along_row, window, window_mut};
+use grainwake_simd::{
+    Kernel, Partial, RowWork, Scalar, Vector, along_row, inside_row, window, window_mut,
+};
 
 /// Constants of the tendency.
 #[derive(Clone, Copy)]
@@ -91,6 +93,7 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
         let (layout, k, n) = (self.layout, self.k, self.layout.cells[0]);
+        let (coefficients, weights) = (*self.coefficients, self.weights);
         let u = planes(layout, &self.velocity.x, k);
         let v = planes(layout, &self.velocity.y, k);
         let w = planes(layout, &self.velocity.z, k);
@@ -100,8 +103,8 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
         let mut sums = [Partial::default(); 3];
         for j in 1..=layout.cells[1] {
             let mut work = PredictRow {
-                coefficients: *self.coefficients,
-                weights: self.weights,
+                coefficients,
+                weights,
                 u: rows(layout, u, j),
                 v: rows(layout, v, j),
                 w: rows(layout, w, j),
@@ -117,9 +120,8 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
                     layout.row_of_mut(pz, j),
                 ],
                 sums: &mut sums,
-                n,
-                non_temporal: self.non_temporal,
                 given: [false, self.walled[1] && j == 1, self.walled[2] && k == 1],
+                streamed: if self.non_temporal { n } else { 0 },
             };
             along_row::<V>(n, &mut work);
             if self.walled[0] {
@@ -176,10 +178,10 @@ struct PredictRow<'a, R> {
     tendency: [&'a mut [R]; 3],
     predicted: [&'a mut [R]; 3],
     sums: &'a mut [Partial; 3],
-    n: usize,
-    non_temporal: bool,
     /// Components whose faces on the whole row have a given velocity.
     given: [bool; 3],
+    /// Entries of the row if written with non-temporal stores, else 0.
+    streamed: usize,
 }
 
 impl<R: Real> RowWork for PredictRow<'_, R> {
@@ -230,14 +232,14 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
             V::constant(self.weights.before),
         );
         // Boundary conditions read the ends of a row, which therefore stay in the cache.
-        let past = self.non_temporal && i > 1 && i + V::WIDTH <= self.n;
+        let streamed = inside_row(i, V::WIDTH, self.streamed);
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
             let old = window_mut::<V>(self.tendency[axis], i);
             let push = V::constant(self.weights.push[axis]) * (pc - lower[axis]);
             // Small terms are summed before q is added: fewer of their digits are lost.
             let gain = now * h + before * V::load(old) - push;
             let to = window_mut::<V>(self.predicted[axis], i);
-            if past {
+            if streamed {
                 (q + gain).store_non_temporal(to);
             } else {
                 (q + gain).store(to);
