@@ -6,11 +6,11 @@ use std::time::Instant;
 use glam::{DQuat, DVec3};
 use grainwake_shape::ShapeOptions;
 use grainwake_shape::analytic::ellipsoid;
-use grainwake_solver::dem::{ContactParams, Dof, Grain};
-use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
+use grainwake_solver::dem::Grain;
+use grainwake_solver::flow::FluidParams;
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
-use grainwake_solver::math::{InstructionSet, Pose, Precision, instructions, limit_instructions};
+use grainwake_solver::math::{InstructionSet, Precision, instructions, limit_instructions};
 use grainwake_solver::sim::{Setup, Simulation, StepRule};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -259,51 +259,30 @@ fn setup(load: &Load) -> Result<Setup, Exit> {
         scheme,
         precision,
     } = *load;
-    let spacing = DVec3::splat(0.25e-3);
-    let mesh = Mesh {
-        cells,
-        spacing,
-        origin: DVec3::ZERO,
-    };
-    let radius = 4.0 * spacing.x;
+    let spacing = 0.25e-3;
+    let mesh = Mesh::cubic(cells, spacing);
+    let radius = 4.0 * spacing;
     let axes = [1.1 * radius, radius, radius / 1.1];
     let shape = ellipsoid(axes[0], axes[1], axes[2], &ShapeOptions::default());
     let shape = Arc::new(shape.expect("a plain ellipsoid"));
-    let grain = |place: DVec3| Grain {
-        shape: shape.clone(),
-        density: 1500.0,
-        pose: Pose {
-            position: mesh.extent() * place,
-            // Each grain has its own orientation.
-            orientation: DQuat::from_scaled_axis(7.0 * place),
-        },
-        velocity: DVec3::ZERO,
-        angular_velocity: DVec3::ZERO,
-        translation: Dof::Free,
-        rotation: Dof::Free,
+    let grain = |place: DVec3| {
+        // Every grain has its own orientation.
+        let orientation = DQuat::from_scaled_axis(7.0 * place);
+        Grain::new(shape.clone(), 1500.0)
+            .with_position(mesh.extent() * place)
+            .with_orientation(orientation)
     };
-    Ok(Setup {
-        prescription: Default::default(),
-        mesh,
-        boundaries: Boundaries([[Boundary::WALL; 2]; 3]),
-        fluid: Some(FluidParams {
-            density: 1000.0,
-            kinematic_viscosity: 1e-6,
-            body_acceleration: DVec3::ZERO,
-            initial_velocity: DVec3::ZERO,
-            advection: Advection::Central,
-        }),
-        precision,
-        scheme,
-        gravity: DVec3::new(0.0, 0.0, -9.81),
-        grains: places(cells, grains)?.into_iter().map(grain).collect(),
-        contact: ContactParams::default(),
-        step: StepRule::Limits {
+    Ok(Setup::new(mesh)
+        .with_fluid(FluidParams::new(1000.0, 1e-6))
+        .with_precision(precision)
+        .with_scheme(scheme)
+        .with_gravity(DVec3::new(0.0, 0.0, -9.81))
+        .with_grains(places(cells, grains)?.into_iter().map(grain))
+        .with_step(StepRule::Limits {
             cfl: 0.3,
             viscous: 0.2,
             max_step: 1e-3,
-        },
-    })
+        }))
 }
 
 /// Bandwidth of a = b + s c over three arrays of `length` doubles, best of several [bytes/s].

@@ -1,4 +1,4 @@
-//! How a command ends: messages on standard error, and the exit code.
+//! Exit codes and error messages.
 
 use std::process::ExitCode;
 
@@ -7,18 +7,16 @@ use grainwake_run::case::{CaseError, Problem};
 use grainwake_shape::ShapeError;
 use miette::{GraphicalReportHandler, GraphicalTheme};
 
-use crate::tell;
-
-/// The run did not give what `[expect]` says.
+/// The results do not meet `[expect]`.
 pub const MISSED: u8 = 1;
-/// Bad input; nothing was written.
+/// Invalid input; nothing was written.
 pub const BAD_INPUT: u8 = 2;
 /// Input or output failed.
 pub const IO: u8 = 4;
 /// Interrupted after writing a checkpoint.
 pub const INTERRUPTED: u8 = 130;
 
-/// An ending other than success.
+/// Failure of a command.
 #[derive(Debug)]
 pub struct Exit {
     code: u8,
@@ -26,27 +24,39 @@ pub struct Exit {
 }
 
 impl Exit {
-    /// With one message.
+    /// Creates a failure with one message.
     pub fn new(code: u8, message: impl Into<String>) -> Exit {
         Exit {
             code,
             problems: vec![Problem::new(message)],
         }
     }
-    /// With one message and what to do about it.
+    /// Creates a failure with one message and its remedy.
     pub fn with_help(code: u8, message: impl Into<String>, help: impl Into<String>) -> Exit {
         Exit {
             code,
             problems: vec![Problem::new(message).help(help)],
         }
     }
-    /// With several problems.
+    /// Creates a failure with one message and its remedy if there is one.
+    pub fn with_hint(code: u8, message: impl ToString, help: Option<impl Into<String>>) -> Exit {
+        match help {
+            Some(help) => Exit::with_help(code, message.to_string(), help),
+            None => Exit::new(code, message.to_string()),
+        }
+    }
+    /// Creates a failure with several problems.
     pub fn problems(code: u8, problems: Vec<Problem>) -> Exit {
         Exit { code, problems }
     }
 
-    /// Prints the messages and gives the exit code.
-    pub fn report(&self) -> ExitCode {
+    /// Returns the exit code.
+    pub fn code(&self) -> ExitCode {
+        ExitCode::from(self.code)
+    }
+
+    /// Returns the messages as they appear on standard error.
+    pub fn messages(&self) -> String {
         let terminal = std::io::IsTerminal::is_terminal(&std::io::stderr())
             && std::env::var_os("NO_COLOR").is_none();
         let theme = if terminal {
@@ -54,19 +64,20 @@ impl Exit {
         } else {
             GraphicalTheme::none()
         };
-        // A narrow report breaks paths and numbers; what is not a terminal has no width.
+        // A narrow report breaks paths and numbers; files and pipes have no width.
         let width = if terminal { 100 } else { 400 };
         let handler = GraphicalReportHandler::new_themed(theme)
             .with_width(width)
             .with_context_lines(1);
-        for problem in &self.problems {
+        let message = |problem: &Problem| {
             let mut text = String::new();
             match handler.render_report(&mut text, problem) {
-                Ok(()) => tell!("{}", text.trim_end_matches('\n')),
-                Err(_) => tell!("{problem}"),
+                Ok(()) => text.trim_end_matches('\n').to_owned(),
+                Err(_) => problem.to_string(),
             }
-        }
-        ExitCode::from(self.code)
+        };
+        let messages: Vec<String> = self.problems.iter().map(message).collect();
+        messages.join("\n")
     }
 }
 
@@ -80,7 +91,7 @@ impl From<CaseError> for Exit {
                         "give the path of a case file, for example cases/dkt-pair/quick.toml",
                     ),
                     std::io::ErrorKind::InvalidData => {
-                        (BAD_INPUT, "a case file is text (UTF-8) in TOML")
+                        (BAD_INPUT, "a case file is a TOML text in UTF-8")
                     }
                     _ => (IO, "check the file and its permissions"),
                 };
@@ -97,15 +108,12 @@ impl From<RunError> for Exit {
             RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => {
                 Some("the disk is full: free some space, then continue with --resume")
             }
-            RunError::Io { .. } => Some(
-                "check the folder and its permissions; a run that has begun goes on with --resume",
-            ),
+            RunError::Io { .. } => {
+                Some("check the folder and its permissions; continue a started run with --resume")
+            }
             _ => None,
         };
-        match help {
-            Some(help) => Exit::with_help(error.exit_code(), error.to_string(), help),
-            None => Exit::new(error.exit_code(), error.to_string()),
-        }
+        Exit::with_hint(error.exit_code(), error, help)
     }
 }
 
@@ -115,36 +123,33 @@ impl From<ShapeError> for Exit {
             ShapeError::Io { source, .. } if source.kind() != std::io::ErrorKind::NotFound => IO,
             _ => BAD_INPUT,
         };
-        match shape_help(&error) {
-            Some(help) => Exit::with_help(code, error.to_string(), help),
-            None => Exit::new(code, error.to_string()),
-        }
+        Exit::with_hint(code, &error, shape_help(&error))
     }
 }
 
-/// Options that help against a refused shape.
+/// Returns the options that may remedy a refused shape.
 pub fn shape_help(error: &ShapeError) -> Option<String> {
     let help = match error {
         ShapeError::EmptyVolume | ShapeError::SolidVolume => {
-            "look at the image and its grey values; a grey image needs --threshold VALUE, otsu or otsu3"
+            "check the grey values of the image; a grey image needs --threshold VALUE, otsu or otsu3"
         }
         ShapeError::CutByBorder { label, faces } if faces.split(", ").count() == 6 => {
             return Some(format!(
-                "if label {label} is a whole phase: --split takes each of its pieces as a grain, --separate also parts grains that touch; if it is one grain: --pad takes it as cut there"
+                "if label {label} is a whole phase: --split treats each piece as a grain, --separate also separates touching grains; if it is one grain: --pad includes it, truncated at the border"
             ));
         }
         ShapeError::CutByBorder { .. } | ShapeError::CutByView { .. } => {
-            "scan a larger region; where the crop is merely tight, --pad takes the grain as cut there"
+            "scan a larger region; if the crop is merely tight, --pad includes the grain, truncated there"
         }
         ShapeError::SeveralPieces { label, .. } => {
             return Some(format!(
-                "if label {label} is a whole phase: --split takes each piece as a grain, --separate also parts grains that touch; if it is one grain: --largest-piece keeps the largest"
+                "if label {label} is a whole phase: --split treats each piece as a grain, --separate also separates touching grains; if it is one grain: --largest-piece keeps the largest"
             ));
         }
-        ShapeError::InsideOut { .. } => "--flip inverts its faces",
-        ShapeError::TooFewVoxels { .. } => "scan it finer, or leave it out",
+        ShapeError::InsideOut { .. } => "--flip inverts its normals",
+        ShapeError::TooFewVoxels { .. } => "scan at a higher resolution, or omit the grain",
         ShapeError::Malformed { .. } => {
-            "copy or export the file again; where it opens elsewhere, save it uncompressed"
+            "copy or export the file again; if another program opens it, save it uncompressed"
         }
         _ => return None,
     };

@@ -1,11 +1,11 @@
-//! `[expect]` for people: what was expected, what the run gave, and whether it holds.
+//! Text form of the results of `[expect]`.
 
 use grainwake_run::case::readable::quantity;
 use grainwake_run::case::{Problem, Verdict};
 
-/// A line that says how a quantity compares with what was expected of it.
+/// Returns the value, the expected range and the verdict on one line.
 pub fn line(v: &Verdict) -> String {
-    let verdict = if v.pass { "held" } else { "missed" };
+    let verdict = if v.pass { "met" } else { "missed" };
     let (value, error) = (value(v), error(v));
     format!(
         "{}: {value}{error}, expected {}: {verdict}",
@@ -14,7 +14,7 @@ pub fn line(v: &Verdict) -> String {
     )
 }
 
-/// The message of an expectation that was missed.
+/// Returns the message of a missed expectation.
 pub fn missed(v: &Verdict) -> Problem {
     let is = if v.value.is_some() { "is " } else { "" };
     Problem::new(format!(
@@ -31,7 +31,7 @@ fn value(v: &Verdict) -> String {
         .map_or("did not happen".into(), |x| with_unit(x, &v.quantity))
 }
 
-/// The accepted range in words.
+/// Returns the accepted range in words.
 fn range(v: &Verdict) -> String {
     let unit = |x| with_unit(x, &v.quantity);
     match v.bound {
@@ -42,7 +42,7 @@ fn range(v: &Verdict) -> String {
     }
 }
 
-/// The difference from the reference, where there is one.
+/// Returns the deviation from the reference; empty without a reference.
 fn error(v: &Verdict) -> String {
     match v.error.zip(v.reference) {
         Some((error, reference)) if reference != 0.0 => {
@@ -56,7 +56,7 @@ fn with_unit(x: f64, name: &str) -> String {
     quantity(x, unit(name))
 }
 
-/// Unit of a quantity of `[expect]`; its name may be followed by that of a grain.
+/// Returns the unit of a quantity of `[expect]`; its name may be followed by that of a grain.
 fn unit(quantity: &str) -> &'static str {
     match quantity.split(' ').next() {
         Some("peak_settling_speed") => "m/s",
@@ -109,7 +109,7 @@ mod tests {
             pass: true,
             ..verdict("role_changes", Some(3.0), [None, Some(10.0)])
         };
-        assert_eq!(line(&roles), "role_changes: 3, expected at most 10: held");
+        assert_eq!(line(&roles), "role_changes: 3, expected at most 10: met");
         let still = verdict("max_divergence", Some(2.5e-14), [None, Some(0.0)]);
         assert_eq!(
             line(&still),

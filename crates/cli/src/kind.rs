@@ -1,4 +1,4 @@
-//! Case files and study files: a command that got the one for the other names the right command.
+//! Distinction of case files and study files, to suggest the right command for a confused file.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use serde::de::IgnoredAny;
 
 use crate::exit::{BAD_INPUT, Exit};
 
-/// Keys that only one of the two has at its top.
+/// Top-level keys that occur in one of the two kinds only.
 #[derive(Deserialize)]
 struct Marks {
     domain: Option<IgnoredAny>,
@@ -26,7 +26,7 @@ enum Kind {
     Study,
 }
 
-/// What a file is by its keys; none where they leave it open.
+/// Returns the kind of a file by its keys; `None` if they are ambiguous.
 fn kind(path: &Path) -> Option<Kind> {
     let text = std::fs::read_to_string(path).ok()?;
     let (_, marks): (Source, Marks) = Source::parse("", &text, &[]).ok()?;
@@ -47,7 +47,7 @@ pub fn case(path: &Path, set: &[String]) -> Result<Case, Exit> {
                 BAD_INPUT,
                 format!("{} is a study file, not a case", path.display()),
                 format!(
-                    "run it with: grainwake study {}; --dry-run says what it would run",
+                    "use: grainwake study {}; --dry-run lists its runs",
                     path.display()
                 ),
             );
@@ -64,7 +64,7 @@ pub fn study(path: &Path) -> Result<Study, Exit> {
                 BAD_INPUT,
                 format!("{} is a case, not a study file", path.display()),
                 format!(
-                    "run it with: grainwake run {}; a study file names it as its `base`",
+                    "use: grainwake run {}; a study file refers to it as its `base`",
                     path.display()
                 ),
             );

@@ -1,6 +1,6 @@
-//! `grainwake`: reads its arguments, calls the libraries, prints.
+//! `grainwake`: parses the arguments, calls the libraries and prints the results.
 
-// The macros of the standard library panic where nobody reads on; `out` does not.
+// The print macros of the standard library panic on a closed pipe; module `out` does not.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod args;
@@ -43,6 +43,9 @@ fn main() -> std::process::ExitCode {
     };
     match done {
         Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(exit) => exit.report(),
+        Err(exit) => {
+            tell!("{}", exit.messages());
+            exit.code()
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The progress of a run on standard error: a bar on a terminal, now and then a line elsewhere.
+//! Progress of a run on standard error: a bar on a terminal, otherwise a line at intervals.
 
 use std::io::IsTerminal;
 use std::sync::Arc;
@@ -11,23 +11,24 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::tell;
 
-/// Seconds between lines where there is no terminal.
+/// Interval of the lines without a terminal [s].
 const LINE_INTERVAL: f64 = 10.0;
 const TICKS: u64 = 10_000;
 
-/// Shows a run.
-pub struct Shown {
+/// Progress display of a run.
+pub struct ProgressDisplay {
     bar: Option<ProgressBar>,
     quiet: bool,
     last_line: Instant,
     stop: Arc<AtomicBool>,
-    /// Lengths are shown in parts of this [m].
+    /// Unit of displayed gaps [m].
     diameter: Option<f64>,
 }
 
-impl Shown {
-    /// A display that stops the run when `stop` is set; `diameter` [m] scales the gap of a pair.
-    pub fn new(quiet: bool, stop: Arc<AtomicBool>, diameter: Option<f64>) -> Shown {
+impl ProgressDisplay {
+    /// Creates a display that stops the run when `stop` is set; gaps are shown in units of
+    /// `diameter` [m].
+    pub fn new(quiet: bool, stop: Arc<AtomicBool>, diameter: Option<f64>) -> ProgressDisplay {
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::new(TICKS);
             if let Ok(style) =
@@ -37,7 +38,7 @@ impl Shown {
             }
             bar
         });
-        Shown {
+        ProgressDisplay {
             bar,
             quiet,
             last_line: Instant::now(),
@@ -46,7 +47,7 @@ impl Shown {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn clear(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
@@ -91,12 +92,17 @@ fn per_second(rate: f64) -> String {
     }
 }
 
-/// A number of things: "1 grain", "2 grains".
+/// Formats a count with its noun: "1 grain", "2 grains".
 pub fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
-/// Seconds as "1:02:03" or "2:03".
+/// Returns the first line of a message.
+pub fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or_default()
+}
+
+/// Formats a duration [s] as "1:02:03" or "2:03".
 pub fn clock(seconds: f64) -> String {
     if !(seconds.is_finite() && seconds < 1e9) {
         return "?".into();
@@ -109,7 +115,7 @@ pub fn clock(seconds: f64) -> String {
     }
 }
 
-impl Observer for Shown {
+impl Observer for ProgressDisplay {
     fn progress(&mut self, p: &Progress) {
         if self.quiet {
             return;
@@ -138,7 +144,7 @@ impl Observer for Shown {
         }
     }
     fn note(&mut self, text: &str) {
-        // A warning is a problem, and problems are shown even when quiet.
+        // Warnings are printed even with --quiet.
         if !self.quiet || text.starts_with("warning") {
             self.line(text);
         }

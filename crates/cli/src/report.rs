@@ -1,6 +1,5 @@
 //! `grainwake report`.
 
-use grainwake_formats::FormatError;
 use grainwake_report::{ReportError, render};
 use grainwake_study::{Analysis, Plan};
 
@@ -8,7 +7,18 @@ use crate::args::ReportArgs;
 use crate::exit::{BAD_INPUT, Exit, IO};
 use crate::{print, tell};
 
-/// Draws the figures and the page of a run folder, or of a study folder.
+impl From<ReportError> for Exit {
+    fn from(error: ReportError) -> Exit {
+        let code = if error.is_input_output() {
+            IO
+        } else {
+            BAD_INPUT
+        };
+        Exit::new(code, error.to_string())
+    }
+}
+
+/// Writes the figures and the page of a run folder or a study folder.
 pub fn report(args: &ReportArgs) -> Result<(), Exit> {
     if Plan::exists_in(&args.run) {
         let done = grainwake_study::render(&args.run)?;
@@ -25,13 +35,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
             done.png.len()
         ));
     }
-    let done = render(&args.run).map_err(|error| {
-        let code = match &error {
-            ReportError::NotARun(_) | ReportError::Format(FormatError::Line { .. }) => BAD_INPUT,
-            _ => IO,
-        };
-        Exit::new(code, error.to_string())
-    })?;
+    let done = render(&args.run)?;
     for note in &done.notes {
         tell!("note: {note}");
     }

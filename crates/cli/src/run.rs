@@ -11,7 +11,7 @@ use grainwake_run::{Ending, Existing, Options, RESOLVED};
 
 use crate::args::RunArgs;
 use crate::exit::{Exit, INTERRUPTED, MISSED};
-use crate::progress::{Shown, count};
+use crate::progress::{ProgressDisplay, count};
 use crate::{check, expect, kind, print, tell, threads};
 
 /// Runs a case.
@@ -55,7 +55,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         .grains
         .first()
         .map(|g| g.shape.equivalent_diameter());
-    let mut shown = Shown::new(args.quiet, stop, diameter);
+    let mut shown = ProgressDisplay::new(args.quiet, stop, diameter);
     let ending = threads::on(threads, || {
         let ending = grainwake_run::run(case.job(), &out, &options, &mut shown);
         shown.clear();
@@ -77,7 +77,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         }
         Ending::AlreadyFinished(summary) => {
             if !args.quiet {
-                tell!("the run had finished before");
+                tell!("the run has already finished");
             }
             if !args.no_report && !out.join("report.html").exists() {
                 draw(args, &out);
@@ -93,19 +93,19 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
     }
 }
 
-/// Draws the report. The run is good without it, so trouble is told and no more.
+/// Writes the report. The run is valid without it, so an error is only noted.
 fn draw(args: &RunArgs, out: &Path) {
     match grainwake_report::render(out) {
         Ok(done) if !args.quiet => tell!("report: {}", done.page.display()),
         Ok(_) => {}
         Err(error) => tell!(
-            "note: no report: {error}; `grainwake report {}` tries again",
+            "note: the report could not be drawn: {error}; retry with `grainwake report {}`",
             out.display()
         ),
     }
 }
 
-/// Prints the summary and compares it with what was expected.
+/// Prints the summary and compares it with `[expect]`.
 fn conclude(args: &RunArgs, case: &Case, summary: &Summary, out: &Path) -> Result<(), Exit> {
     let verdicts: Vec<Verdict> = case.expect.iter().map(|e| e.judge(summary)).collect();
     if args.json {
@@ -157,8 +157,8 @@ fn describe(s: &Summary, wet: bool, out: &Path) -> String {
     lines.join("\n")
 }
 
-/// `runs/NAME`, where NAME is that of the case's folder, with the file's name where it is not
-/// the folder's main case; a resolved case runs in its own folder.
+/// Returns the default run folder: `runs/FOLDER` for a `case.toml`, `runs/FOLDER-FILE` for other
+/// cases beside it, `runs/FILE` elsewhere, and its own folder for a resolved case.
 fn default_folder(case: &Path) -> PathBuf {
     if case.file_name().is_some_and(|name| name == RESOLVED) {
         return match case.parent() {
@@ -180,14 +180,16 @@ fn default_folder(case: &Path) -> PathBuf {
     Path::new("runs").join(name)
 }
 
-/// The first interrupt asks for a checkpoint, the second one ends the program at once.
+/// Requests a checkpoint on the first interrupt and ends the program on the second.
 pub(crate) fn watch_for_interrupt(stop: Arc<AtomicBool>) {
-    // Without a handler an interrupt ends the program at once, which the checkpoints survive.
+    // Without a handler an interrupt ends the program, and the last checkpoint remains.
     let _ = ctrlc::set_handler(move || {
         if stop.swap(true, Ordering::Relaxed) {
             std::process::exit(i32::from(INTERRUPTED));
         }
-        tell!("interrupted: writing a checkpoint after this step (once more to stop at once)");
+        tell!(
+            "interrupted: writing a checkpoint after this step (interrupt again to stop immediately)"
+        );
     });
 }
 

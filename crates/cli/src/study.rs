@@ -11,7 +11,7 @@ use grainwake_study::{
 
 use crate::args::StudyArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO};
-use crate::progress::{clock, count};
+use crate::progress::{clock, count, first_line};
 use crate::study_board::Board;
 use crate::{kind, print, run, tell, threads};
 
@@ -20,13 +20,14 @@ impl From<StudyError> for Exit {
         match error {
             StudyError::Invalid(problems) => Exit::problems(BAD_INPUT, problems),
             StudyError::Case(error) => error.into(),
+            StudyError::Report(error) => error.into(),
             StudyError::Occupied { .. } => {
                 Exit::with_help(BAD_INPUT, error.to_string(), "give another folder with -o")
             }
             StudyError::Damaged { .. } => Exit::with_help(
                 BAD_INPUT,
                 error.to_string(),
-                "start the study again: it writes the file anew and keeps what is finished",
+                "start the study again: it rewrites the file and keeps finished runs",
             ),
             StudyError::Io {
                 action, ref source, ..
@@ -36,7 +37,7 @@ impl From<StudyError> for Exit {
                 let help = if bad {
                     "give the path of a study file, for example studies/dkt-morphology/study.toml"
                 } else {
-                    "check the folder, its permissions and the room on the disk"
+                    "check the folder, its permissions and the free disk space"
                 };
                 Exit::with_help(if bad { BAD_INPUT } else { IO }, error.to_string(), help)
             }
@@ -44,7 +45,7 @@ impl From<StudyError> for Exit {
     }
 }
 
-/// Runs a study.
+/// Executes a study, or lists its runs.
 pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let study = kind::study(&args.study)?;
     let selection = args
@@ -80,7 +81,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         if args.list {
             return print(&list(runs, &states));
         }
-        return print(&intent(args, runs, &states, jobs, each));
+        return print(&dry_run(args, runs, &states, jobs, each));
     }
     plan.create_folder(&folder)?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -125,6 +126,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     conclude(runs, &ended, stop.load(Ordering::Relaxed))
 }
 
+/// Reports the failed runs; the exit code is that of the worst failure.
 fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(), Exit> {
     let failed: Vec<(&str, &str, u8)> = ended
         .iter()
@@ -140,12 +142,12 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
     if stopped {
         return Err(Exit::with_help(
             INTERRUPTED,
-            format!("interrupted with {open} runs to go; checkpoints were written"),
-            "go on with the same command",
+            format!("interrupted with {open} runs unfinished; checkpoints were written"),
+            "continue with the same command",
         ));
     }
     if ended.iter().any(|(_, o)| *o == Outcome::Locked) {
-        tell!("note: some runs are in the hands of another program");
+        tell!("note: some runs are locked by another program");
     }
     let Some(code) = failed.iter().map(|(.., code)| *code).max() else {
         return Ok(());
@@ -162,15 +164,11 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
             ended.len(),
             lines.join("\n")
         ),
-        "the others are done; --retry starts failed runs over",
+        "the other runs are finished; --retry restarts failed runs",
     ))
 }
 
-/// The first line of a message: what went wrong.
-pub fn first_line(text: &str) -> &str {
-    text.lines().next().unwrap_or_default()
-}
-
+/// Returns a table of number, name, state and hash of the runs.
 fn list(runs: &[Run], states: &[(usize, RunState)]) -> String {
     let width = runs.iter().map(|r| r.name.len()).max().unwrap_or(0);
     let line = |(i, state): &(usize, RunState)| {
@@ -186,6 +184,7 @@ fn list(runs: &[Run], states: &[(usize, RunState)]) -> String {
     states.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
+/// Returns the runs and their states as JSON. The names are stable.
 fn listed(runs: &[Run], states: &[(usize, RunState)]) -> serde_json::Value {
     let entry = |(i, state): &(usize, RunState)| {
         let run = &runs[*i];
@@ -198,8 +197,8 @@ fn listed(runs: &[Run], states: &[(usize, RunState)]) -> serde_json::Value {
     states.iter().map(entry).collect()
 }
 
-/// What would be done, and what it would cost at most.
-fn intent(
+/// Returns the action on each run, and an upper estimate of the cost.
+fn dry_run(
     args: &StudyArgs,
     runs: &[Run],
     states: &[(usize, RunState)],
@@ -211,14 +210,14 @@ fn intent(
     for (i, state) in states {
         let doing = match state {
             RunState::Missing => "run".to_owned(),
-            RunState::Unfinished => "go on".to_owned(),
+            RunState::Unfinished => "resume".to_owned(),
             RunState::Finished => continue,
-            RunState::Failed(why) if args.retry => format!("start over, failed before: {why}"),
+            RunState::Failed(why) if args.retry => format!("restart, failed before: {why}"),
             RunState::Failed(why) => {
-                lines.push(format!("{}: left alone, failed: {why}", runs[*i].name));
+                lines.push(format!("{}: skip, failed: {why}", runs[*i].name));
                 continue;
             }
-            RunState::Stale(why) => format!("start over: {why}"),
+            RunState::Stale(why) => format!("restart: {why}"),
         };
         wall += runs[*i].wall_s;
         to_do += 1;
@@ -239,6 +238,7 @@ fn intent(
     lines.join("\n")
 }
 
+/// Returns the table of the terminal.
 fn pretty(rows: &[&RunRecord]) -> Table {
     const PAIR: [(&str, &str); 8] = [
         ("kiss", "kiss_time"),

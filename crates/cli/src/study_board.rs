@@ -1,4 +1,4 @@
-//! The progress of a study on standard error: a line for each run in hand and one for the whole.
+//! Progress of a study on standard error: one bar per active run and one for the study.
 
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
@@ -11,14 +11,14 @@ use grainwake_run::Progress;
 use grainwake_study::{Outcome, Run, StudyObserver};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use crate::progress::clock;
+use crate::progress::{clock, first_line};
 use crate::tell;
 
-/// Seconds between lines where there is no terminal.
+/// Interval between lines without a terminal [s].
 const LINE_INTERVAL: f64 = 60.0;
 const TICKS: u64 = 10_000;
 
-/// Shows a study.
+/// Progress display of a study.
 pub struct Board<'a> {
     runs: &'a [Run],
     total: usize,
@@ -32,12 +32,12 @@ pub struct Board<'a> {
 struct Inner {
     started: Instant,
     last_line: Instant,
-    /// Runs that are in hand.
+    /// Active runs.
     active: BTreeMap<usize, Active>,
-    /// Runs that are not begun, with their latest end [s].
+    /// Runs not yet started, with their latest end [s].
     waiting: BTreeMap<usize, f64>,
     ended: usize,
-    /// Simulated by runs that ended in this session [s].
+    /// Time simulated by the runs that ended in this session [s].
     simulated: f64,
     /// Ends of the runs that finished in this session [s].
     ends: Vec<f64>,
@@ -53,7 +53,7 @@ struct Active {
 }
 
 impl<'a> Board<'a> {
-    /// A board for the chosen runs of a plan.
+    /// Creates a display of the chosen runs of a plan.
     pub fn new(
         runs: &'a [Run],
         chosen: &[usize],
@@ -85,10 +85,10 @@ impl<'a> Board<'a> {
         }
     }
 
-    /// Takes the bars away.
+    /// Removes the bars.
     pub fn clear(&self) {
         if let Some(bars) = &self.bars {
-            // A terminal that is gone needs no clearing.
+            // A failure means that the terminal has been closed.
             let _ = bars.clear();
         }
     }
@@ -116,7 +116,8 @@ fn bar(template: &str) -> ProgressBar {
 }
 
 impl Inner {
-    /// Done part of the whole, and seconds to go: what is left to simulate, at the rate so far.
+    /// Returns the completed fraction of the study and the remaining wall-clock time [s], from the
+    /// time that remains to be simulated and the rate so far.
     fn whole(&self, total: usize, jobs: usize) -> (f64, f64) {
         let typical =
             (!self.ends.is_empty()).then(|| self.ends.iter().sum::<f64>() / self.ends.len() as f64);
@@ -130,7 +131,7 @@ impl Inner {
         let left_waiting: f64 = self.waiting.values().map(|end| expected(*end)).sum();
         let simulated = self.simulated + running;
         let rate = simulated / self.started.elapsed().as_secs_f64().max(1e-9);
-        // Fewer runs than jobs at the end: the last one alone has a share of the rate.
+        // At the end there are fewer runs than jobs: the last run has only its share of the rate.
         let busy = self.active.len().clamp(1, jobs) as f64;
         let last = self
             .active
@@ -266,9 +267,9 @@ impl StudyObserver for Board<'_> {
                 clock(s.wall_s)
             ),
             Outcome::AlreadyFinished => "had finished before".into(),
-            Outcome::Failed(why, _) => format!("FAILED: {}", crate::study::first_line(why)),
+            Outcome::Failed(why, _) => format!("FAILED: {}", first_line(why)),
             Outcome::Interrupted => "interrupted".into(),
-            Outcome::Locked => "in the hands of another program".into(),
+            Outcome::Locked => "locked by another program".into(),
         };
         self.line(&format!(
             "{}: {how} {}",

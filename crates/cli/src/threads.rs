@@ -2,7 +2,7 @@
 
 use crate::exit::{BAD_INPUT, Exit};
 
-/// Number of threads: the given one, 0 or none for all cores (or `RAYON_NUM_THREADS`).
+/// Returns the number of threads; 0 stands for `RAYON_NUM_THREADS` or all cores.
 pub fn resolve(threads: usize) -> usize {
     if threads > 0 {
         return threads;
@@ -21,7 +21,7 @@ pub fn on<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T,
         Exit::with_help(
             BAD_INPUT,
             format!("cannot start {threads} threads: {error}"),
-            "ask for fewer with --threads",
+            "use fewer threads (--threads N)",
         )
     })?;
     Ok(pool.install(work))

@@ -1,11 +1,11 @@
-//! Damaged meshes and images: exit code 2, no grain file, and a message that names place and remedy.
+//! Damaged meshes and images: exit code 2, no grain file, and a message with location and remedy.
 
 mod common;
 
 use common::grainwake;
 use std::path::Path;
 
-/// Runs `grain` with these words before `-o`; standard error must hold `words`.
+/// Runs `grain` with these arguments before `-o` and asserts that standard error contains `words`.
 fn refused(command: &[&str], input: &Path, words: &[&str]) {
     let out = input.with_extension("grain");
     let done = grainwake()
@@ -17,11 +17,11 @@ fn refused(command: &[&str], input: &Path, words: &[&str]) {
         .arg(&out)
         .assert()
         .code(2);
-    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
     for word in words {
-        assert!(said.contains(word), "`{word}` is missing in:\n{said}");
+        assert!(message.contains(word), "`{word}` is missing in:\n{message}");
     }
-    assert!(!said.contains("panicked") && !out.exists());
+    assert!(!message.contains("panicked") && !out.exists());
 }
 
 type Face = [[f64; 3]; 3];
@@ -91,8 +91,8 @@ fn the_cube_itself_is_taken_with_a_bare_unit() {
     // A length that is no unit of a file needs its number.
     make(&["--equivalent-diameter", "mm"]).code(2);
     let done = make(&[]).success();
-    let said = String::from_utf8_lossy(&done.get_output().stdout).into_owned();
-    assert!(said.contains("1.000000e-9 m3"), "{said}");
+    let message = String::from_utf8_lossy(&done.get_output().stdout).into_owned();
+    assert!(message.contains("1.000000e-9 m3"), "{message}");
 }
 
 #[test]
@@ -111,13 +111,18 @@ fn outputs_that_are_inputs_or_have_the_name_of_something_else() {
         }
         program.arg("-o").arg(path(out));
         let done = program.assert().code(2);
-        let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
-        assert!(said.contains(word), "`{word}` is missing in:\n{said}");
+        let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        assert!(message.contains(word), "`{word}` is missing in:\n{message}");
         assert_eq!(before, common::contents(folder.path()), "{out}");
     };
     let mesh = ["from-mesh", "--unit", "mm", "--force"];
-    run(&mesh, "cube.stl", "cube.stl", "is what is read");
-    run(&mesh, "cube.stl", "slices/../cube.stl", "is what is read");
+    run(&mesh, "cube.stl", "cube.stl", "is an input of this command");
+    run(
+        &mesh,
+        "cube.stl",
+        "slices/../cube.stl",
+        "is an input of this command",
+    );
     run(&mesh, "cube.stl", "e2.stl", "e2.grain");
     run(
         &["make", "sphere", "2 mm"],
@@ -126,11 +131,16 @@ fn outputs_that_are_inputs_or_have_the_name_of_something_else() {
         "does not end in .grain",
     );
     let scan = ["from-scan", "--voxel", "10 um", "--force"];
-    run(&scan, "ball.nrrd", "ball.nrrd", "is what is read");
-    run(&scan, "slices", "slices", "is what is read");
-    run(&scan, "ball.nrrd", "s.grian", "the name of a file");
+    run(
+        &scan,
+        "ball.nrrd",
+        "ball.nrrd",
+        "is an input of this command",
+    );
+    run(&scan, "slices", "slices", "is an input of this command");
+    run(&scan, "ball.nrrd", "s.grian", "the extension of a file");
     let family = ["family", "--sphericity", "0.7", "--roundness", "0.5"];
-    run(&family, "", "all.grain", "the name of a file");
+    run(&family, "", "all.grain", "the extension of a file");
 }
 
 #[test]
@@ -190,7 +200,7 @@ fn millimetres_for_metres() {
         "1 m",
         &[
             "equivalent diameter of 2.481",
-            "is --unit right",
+            "check the unit of --unit",
             "1 um to 1 m",
         ],
     );
@@ -198,7 +208,7 @@ fn millimetres_for_metres() {
         .iter()
         .map(|f| f.map(|p| p.map(|x| 2e-4 * x)))
         .collect();
-    refused_mesh(&small, "1 mm", &["of 0.2481", "is --unit right"]);
+    refused_mesh(&small, "1 mm", &["of 0.2481", "check the unit of --unit"]);
 }
 
 #[test]
@@ -325,9 +335,12 @@ fn a_threshold_in_hounsfield_units() {
     let bytes: Vec<u8> = values.flat_map(i16::to_le_bytes).collect();
     let file = nrrd("int16", [24; 3], &bytes);
     for threshold in ["-500", "-1.5e2"] {
-        let said = all_grains(&file, &["--threshold", threshold], 0);
+        let message = all_grains(&file, &["--threshold", threshold], 0);
         let number: f64 = threshold.parse().unwrap();
-        assert!(said.contains(&format!("threshold {number}")), "{said}");
+        assert!(
+            message.contains(&format!("threshold {number}")),
+            "{message}"
+        );
     }
 }
 
@@ -377,10 +390,10 @@ fn a_folder_without_one_of_its_slices() {
         String::from_utf8_lossy(&done.code(code).get_output().stderr).into_owned()
     };
     std::fs::rename(slices.join("s17.tif"), folder.path().join("s17.tif")).unwrap();
-    let said = run(2);
+    let message = run(2);
     assert!(
-        said.contains("after s16.tif: numbers 17;") && said.contains("rename"),
-        "{said}"
+        message.contains("after s16.tif: numbers 17;") && message.contains("rename"),
+        "{message}"
     );
     std::fs::rename(folder.path().join("s17.tif"), slices.join("s17.tif")).unwrap();
     run(0);
@@ -408,10 +421,10 @@ fn grains_of_an_earlier_run_do_not_stay() {
         std::fs::copy(out.join("label-00007.grain"), out.join(own)).unwrap();
     }
     // Other numbers than before: the old ones belong to no table.
-    let said = run(&["--split"], 2);
+    let message = run(&["--split"], 2);
     assert!(
-        said.contains("label-00007.grain is there already"),
-        "{said}"
+        message.contains("label-00007.grain exists already"),
+        "{message}"
     );
     // What gives no grain removes none.
     run(&["--threshold", "200", "--force"], 2);
@@ -444,9 +457,9 @@ fn a_flatness_that_the_sphericity_does_not_allow() {
     ]);
     program.args(["--flatness", "0.5", "-o"]).arg(&out);
     let done = program.assert().code(2);
-    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
     for word in ["flatness = 0.5", "--sphericity 0.9", "0.729 to 1"] {
-        assert!(said.contains(word), "`{word}` is missing in:\n{said}");
+        assert!(message.contains(word), "`{word}` is missing in:\n{message}");
     }
     assert!(!out.exists());
 }
@@ -472,37 +485,37 @@ fn a_grey_image_taken_for_labels() {
         noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         *value = 100 + (noise >> 27) as u8;
     }
-    let said = all_grains(&nrrd("uint8", [24; 3], &grey), &[], 2);
+    let message = all_grains(&nrrd("uint8", [24; 3], &grey), &[], 2);
     assert!(
-        said.contains("looks like a grey image") && said.contains("--threshold otsu"),
-        "{said}"
+        message.contains("looks like a grey image") && message.contains("--threshold otsu"),
+        "{message}"
     );
     assert!(
-        said.contains("32 labels left out, each of several separate pieces: 100, 101, "),
-        "{said}"
+        message.contains("32 labels rejected, each of several separate pieces: 100, 101, "),
+        "{message}"
     );
-    assert!(said.lines().count() < 8, "{said}");
-    // With it the grain is there and nothing is said of grey.
-    let said = all_grains(
+    assert!(message.lines().count() < 8, "{message}");
+    // With it the grain is there and no hint at grey values is printed.
+    let message = all_grains(
         &nrrd("uint8", [24; 3], &grey),
         &["--threshold", "otsu", "--largest-piece"],
         0,
     );
-    assert!(!said.contains("grey image"), "{said}");
+    assert!(!message.contains("grey image"), "{message}");
 }
 
 #[test]
 fn a_whole_phase_taken_for_a_grain() {
     let everywhere = nrrd("uint8", [24; 3], &image(|r| u8::from(r < 15.0)));
-    let said = all_grains(&everywhere, &[], 2);
+    let message = all_grains(&everywhere, &[], 2);
     for word in ["label 1 is a whole phase", "--split", "--separate", "--pad"] {
-        assert!(said.contains(word), "`{word}` is missing in:\n{said}");
+        assert!(message.contains(word), "`{word}` is missing in:\n{message}");
     }
     let two = image(|r| u8::from(r < 3.0 || (6.0..10.0).contains(&r)));
-    let said = all_grains(&nrrd("uint8", [24; 3], &two), &[], 2);
+    let message = all_grains(&nrrd("uint8", [24; 3], &two), &[], 2);
     assert!(
-        said.contains("label 1 is a whole phase") && said.contains("--largest-piece"),
-        "{said}"
+        message.contains("label 1 is a whole phase") && message.contains("--largest-piece"),
+        "{message}"
     );
 }
 
@@ -531,7 +544,7 @@ fn millimetres_for_micrometres() {
     refused(
         &["from-scan", "--voxel", "100 mm"],
         &path,
-        &["equivalent diameter", "is --voxel right"],
+        &["equivalent diameter", "check the unit of --voxel"],
     );
     // All grains of an image: nothing is written.
     let all = folder.path().join("all");

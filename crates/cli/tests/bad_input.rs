@@ -4,7 +4,7 @@ mod common;
 
 use common::{WET, folder_with, grainwake};
 
-/// Runs a changed case; standard error must hold these words.
+/// Runs a modified case and asserts that standard error contains these words.
 fn refused(from: &str, to: &str, words: &[&str]) {
     assert!(WET.contains(from), "{from}");
     let (folder, case) = folder_with(&WET.replacen(from, to, 1));
@@ -16,12 +16,12 @@ fn refused(from: &str, to: &str, words: &[&str]) {
             program.arg("-o").arg(&out);
         }
         let done = program.assert().code(2);
-        let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
         assert!(done.get_output().stdout.is_empty());
         for word in words {
             assert!(
-                said.contains(word),
-                "{command}: `{word}` is missing in:\n{said}"
+                message.contains(word),
+                "{command}: `{word}` is missing in:\n{message}"
             );
         }
     }
@@ -132,13 +132,13 @@ fn a_study_file_for_a_case() {
     std::fs::write(&study, text).unwrap();
     for command in ["run", "check"] {
         let done = grainwake().arg(command).arg(&study).assert().code(2);
-        let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
         assert!(
-            said.contains("is a study file") && said.contains("grainwake study"),
-            "{said}"
+            message.contains("is a study file") && message.contains("grainwake study"),
+            "{message}"
         );
     }
-    // A slip in a case is told as before.
+    // An error in a case gives the message of the case.
     let slip = WET.replace("[time]", "[tyme]");
     std::fs::write(&study, slip).unwrap();
     let done = grainwake().arg("check").arg(&study).assert().code(2);
@@ -182,9 +182,9 @@ fn a_damaged_grain_file_is_told_of_with_its_place() {
     bytes[middle] ^= 4;
     std::fs::write(&grain, bytes).unwrap();
     let done = grainwake().arg("check").arg(&case).assert().code(2);
-    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
     assert!(
-        said.contains("case.toml:18:8") && said.contains("checksum"),
-        "{said}"
+        message.contains("case.toml:18:8") && message.contains("checksum"),
+        "{message}"
     );
 }

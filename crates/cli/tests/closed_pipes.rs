@@ -1,4 +1,4 @@
-//! Nobody reads on (`| head -1`, `| true`): the work goes on, and nothing is said of it.
+//! A pipe closed early (`| head -1`, `| true`) neither stops a command nor causes a message.
 #![cfg(unix)]
 
 mod common;
@@ -53,9 +53,9 @@ fn a_reader_that_has_gone_is_no_error() {
     ];
     for (words, paths) in calls {
         let done = program(words, paths).stdout(closed()).output().unwrap();
-        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        let message = String::from_utf8_lossy(&done.stderr).into_owned();
         assert_eq!(
-            (done.status.code(), said.as_str()),
+            (done.status.code(), message.as_str()),
             (Some(0), ""),
             "{words:?}"
         );

@@ -1,4 +1,4 @@
-//! What the commands print.
+//! Output of the commands.
 
 mod common;
 
@@ -165,9 +165,12 @@ fn a_run_says_what_check_warns_of() {
     let mut check = grainwake();
     check.arg("check").arg(&case).args(short);
     let check = check.assert().success();
-    let said = String::from_utf8_lossy(&check.get_output().stdout).into_owned();
-    let warnings: Vec<&str> = said.lines().filter(|l| l.starts_with("warning")).collect();
-    assert!(!warnings.is_empty(), "{said}");
+    let message = String::from_utf8_lossy(&check.get_output().stdout).into_owned();
+    let warnings: Vec<&str> = message
+        .lines()
+        .filter(|l| l.starts_with("warning"))
+        .collect();
+    assert!(!warnings.is_empty(), "{message}");
     let run = |out: &str, more: &[&str]| {
         let mut command = grainwake();
         command.arg("run").arg(&case).arg("-o");
@@ -175,8 +178,8 @@ fn a_run_says_what_check_warns_of() {
         let done = command.args(short).assert().success();
         String::from_utf8_lossy(&done.get_output().stderr).into_owned()
     };
-    let told = run("a", &["--no-report"]);
-    assert!(warnings.iter().all(|w| told.contains(w)), "{told}");
+    let message = run("a", &["--no-report"]);
+    assert!(warnings.iter().all(|w| message.contains(w)), "{message}");
     assert_eq!(run("b", &["--no-report", "--quiet"]), "");
 }
 
@@ -195,28 +198,28 @@ fn expectations_are_told_with_their_units() {
         let done = command.arg("--no-report").assert().code(1);
         String::from_utf8_lossy(&done.get_output().stderr).into_owned()
     };
-    let told = run("a", &[]);
+    let message = run("a", &[]);
     let line = |start: &str, end: &str| {
-        let mut lines = told.lines();
+        let mut lines = message.lines();
         assert!(
             lines.any(|l| l.starts_with(start) && l.ends_with(end)),
-            "{told}"
+            "{message}"
         );
     };
-    line("landing_time of grain 0: 2", " ms: held");
+    line("landing_time of grain 0: 2", " ms: met");
     line(
         "landing_time of grain 0: 2",
         ", expected 49 ms to 51 ms: missed",
     );
-    line("end_time: 120 ms, expected at least 100 ms: held", "");
+    line("end_time: 120 ms, expected at least 100 ms: met", "");
     let miss = "expected landing_time of grain 0: 49 ms to 51 ms, but it is 2";
     assert!(
-        told.contains(miss) && told.contains(" ms (error -4"),
-        "{told}"
+        message.contains(miss) && message.contains(" ms (error -4"),
+        "{message}"
     );
-    // A miss is a problem, and problems are told even when quiet.
+    // Missed expectations are printed even with --quiet.
     let quiet = run("b", &["--quiet"]);
-    assert!(quiet.contains(miss) && !quiet.contains("held"), "{quiet}");
+    assert!(quiet.contains(miss) && !quiet.contains(": met"), "{quiet}");
 }
 
 #[test]
@@ -452,7 +455,9 @@ fn grains_are_compared() {
         .args([path("long.grain"), path("flat.grain")])
         .arg("--picture")
         .arg(path("long.grain"));
-    over.assert().code(2).stderr(contains("is what is read"));
+    over.assert()
+        .code(2)
+        .stderr(contains("is an input of this command"));
 }
 
 #[test]

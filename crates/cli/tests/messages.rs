@@ -1,4 +1,4 @@
-//! What the program says of a case and a run: places, warnings, hints.
+//! Messages about cases and runs: locations, warnings and hints.
 
 mod common;
 

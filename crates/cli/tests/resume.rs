@@ -2,6 +2,8 @@
 
 mod common;
 
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::SplitMix64;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -28,18 +30,6 @@ fn checkpoints(run: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Small and the same on every machine.
-struct Random(u64);
-impl Random {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 33) % n
-    }
-}
-
 /// Kills the run at random moments until it comes through, and compares with an unharmed one.
 fn survives_kills(case_text: &str, seed: u64) {
     let (folder, case) = folder_with(case_text);
@@ -47,7 +37,7 @@ fn survives_kills(case_text: &str, seed: u64) {
     let start = std::time::Instant::now();
     run(&case, &whole, &["--threads", "2"]).success();
     let length = start.elapsed().as_millis() as u64;
-    let mut random = Random(seed);
+    let mut random = SplitMix64::seed_from_u64(seed);
     let mut kills = 0;
     for attempt in 0..200 {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin("grainwake"));
@@ -67,7 +57,9 @@ fn survives_kills(case_text: &str, seed: u64) {
             .spawn()
             .unwrap();
         if attempt < 10 {
-            std::thread::sleep(Duration::from_millis(random.below(length.max(20) * 2 / 3)));
+            std::thread::sleep(Duration::from_millis(
+                random.random_range(0..length.max(20) * 2 / 3),
+            ));
             // The run may have come to its end just before.
             if child.kill().is_ok() {
                 kills += 1;
@@ -77,10 +69,10 @@ fn survives_kills(case_text: &str, seed: u64) {
         if output.status.success() && attempt >= 10 {
             break;
         }
-        let said = String::from_utf8_lossy(&output.stderr);
+        let message = String::from_utf8_lossy(&output.stderr);
         assert!(
             output.status.success() || output.status.code().is_none(),
-            "attempt {attempt}: {:?} {said}",
+            "attempt {attempt}: {:?} {message}",
             output.status
         );
     }
@@ -180,10 +172,10 @@ fn a_damaged_checkpoint_gives_way_to_the_one_before() {
         let out = unfinished(folder.path(), &case);
         harm(&checkpoints(&out)[1]);
         let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).success();
-        let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
         assert!(
-            said.contains("warning") && said.contains("checkpoint before it"),
-            "{said}"
+            message.contains("warning") && message.contains("checkpoint before it"),
+            "{message}"
         );
         assert_same_run(&whole, &out);
         std::fs::remove_dir_all(out).unwrap();
@@ -199,10 +191,12 @@ fn two_damaged_checkpoints_end_with_exit_code_4() {
     }
     let before = common::contents(&out);
     let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).code(4);
-    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
     assert!(
-        said.contains("no checkpoint") && said.contains("checksum") && said.contains("--force"),
-        "{said}"
+        message.contains("no checkpoint")
+            && message.contains("checksum")
+            && message.contains("--force"),
+        "{message}"
     );
     assert_eq!(before, common::contents(&out), "nothing may change");
 }
@@ -214,10 +208,10 @@ fn a_finished_run_is_not_overwritten() {
     run(&case, &out, &["--set", "time.end=2 ms"]).success();
     let before = common::contents(&out);
     let refused = run(&case, &out, &["--set", "time.end=2 ms"]).code(2);
-    let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
     assert!(
-        said.contains("finished run") && said.contains("--force") && said.contains("-o"),
-        "{said}"
+        message.contains("finished run") && message.contains("--force") && message.contains("-o"),
+        "{message}"
     );
     run(&case, &out, &["--set", "time.end=2 ms", "--resume"]).success();
     assert_eq!(before, common::contents(&out));
@@ -288,13 +282,13 @@ fn an_interrupt_writes_a_checkpoint_and_exits_with_130() {
         .status()
         .unwrap();
     let output = child.wait_with_output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
+    let message = String::from_utf8_lossy(&output.stderr);
     if output.status.success() {
         // The run was faster than the signal.
         return;
     }
-    assert_eq!(output.status.code(), Some(130), "{said}");
-    assert!(said.contains("--resume"), "{said}");
+    assert_eq!(output.status.code(), Some(130), "{message}");
+    assert!(message.contains("--resume"), "{message}");
     run(&case, &out, &[&long[..], &["--resume"]].concat()).success();
     let tables = |run: &Path| std::fs::read(run.join("grains.csv")).unwrap();
     assert!(tables(&whole) == tables(&out));
@@ -321,14 +315,14 @@ fn a_run_that_blows_up_keeps_its_last_checkpoint() {
         "output.checkpoint_steps=1",
     ];
     let done = run(&case, &out, &unstable).code(3);
-    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
     assert!(
-        said.contains("unstable") && said.contains("try") && said.contains("checkpoint"),
-        "{said}"
+        message.contains("unstable") && message.contains("try") && message.contains("checkpoint"),
+        "{message}"
     );
     assert!(
-        said.contains("a smaller [time] step") && !said.contains("cfl"),
-        "the case has a fixed step: {said}"
+        message.contains("a smaller [time] step") && !message.contains("cfl"),
+        "the case has a fixed step: {message}"
     );
     assert!(
         !checkpoints(&out).is_empty()

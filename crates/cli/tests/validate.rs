@@ -199,7 +199,7 @@ of = "z"
     std::fs::write(figures.join("fall-height.png"), "of more runs").unwrap();
     validate(folder.path(), &["--save", "kept"])
         .success()
-        .stderr(contains("figure fall-height: kept as it is"));
+        .stderr(contains("figure fall-height: not replaced"));
     let kept = std::fs::read_to_string(figures.join("fall-height.png"));
     assert_eq!(kept.unwrap(), "of more runs");
     // Without --save nothing is drawn.
@@ -285,7 +285,7 @@ fn runs_of_another_program_can_be_judged_but_not_those_of_another_case() {
     std::fs::write(suite.join("case.toml"), heavier).unwrap();
     validate(folder.path(), &judge)
         .code(2)
-        .stderr(contains("a run of another case"));
+        .stderr(contains("its case has changed"));
 }
 
 #[test]

@@ -78,13 +78,9 @@ impl Drawing {
     /// the identifiers of its clip paths unique.
     pub fn inset(&mut self, other: &Drawing, x: f64, y: f64, tag: &str) {
         for (left, top, width, height, raster) in &other.rasters {
-            let place = (x + left, y + top, *width, *height, raster.clone());
-            self.rasters.push(place);
+            self.raster(x + left, y + top, *width, *height, raster.clone());
         }
-        let vectors = other
-            .vectors
-            .replace("#clip-", &format!("#clip-{tag}-"))
-            .replace("id=\"clip-", &format!("id=\"clip-{tag}-"));
+        let vectors = rename_clips(&other.vectors, &format!("clip-{tag}-"));
         self.vectors.push_str(&format!(
             "<g transform=\"translate({} {})\">\n{vectors}</g>\n",
             number(x),
@@ -115,7 +111,7 @@ impl Drawing {
         self.path(&path_data(points, false), &style);
     }
 
-    /// A rectangle; `style` are SVG attributes.
+    /// Adds a rectangle [pt] with SVG attributes `style`.
     pub fn rectangle(&mut self, x: f64, y: f64, width: f64, height: f64, style: &str) {
         let [x, y, width, height] = [x, y, width, height].map(number);
         self.vectors.push_str(&format!(
@@ -125,77 +121,66 @@ impl Drawing {
 
     /// Adds the outline of a frame [pt].
     pub fn outline(&mut self, x: f64, y: f64, width: f64, height: f64) {
-        let style = format!(
-            "fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"",
-            style::INK,
-            style::HAIR
-        );
+        let (ink, hair) = (style::INK, style::HAIR);
+        let style = format!("fill=\"none\" stroke=\"{ink}\" stroke-width=\"{hair}\"");
         self.rectangle(x, y, width, height, &style);
     }
 
-    /// Adds a label with its baseline at `(x, y)` [pt]; a rotated one runs upwards.
-    pub fn label(
-        &mut self,
-        x: f64,
-        y: f64,
-        anchor: Anchor,
-        size: f64,
-        colour: &str,
-        label: &str,
-        rotated: bool,
-    ) {
-        self.styled_label(
-            x,
-            y,
-            anchor,
-            size,
-            &format!("fill=\"{colour}\""),
-            label,
-            rotated,
-        );
+    /// Adds a label of text size with its baseline at `(x, y)` [pt].
+    pub fn text(&mut self, at: (f64, f64), anchor: Anchor, label: &str) {
+        self.label(at, anchor, style::TEXT, style::INK, label);
     }
 
-    /// Adds a label with a white halo, legible over colours.
-    pub fn label_with_halo(
-        &mut self,
-        x: f64,
-        y: f64,
-        anchor: Anchor,
-        size: f64,
-        colour: &str,
-        label: &str,
-    ) {
-        let halo = "fill=\"none\" stroke=\"#ffffff\" stroke-width=\"1.8\" stroke-linejoin=\"round\" stroke-opacity=\"0.85\"";
-        self.styled_label(x, y, anchor, size, halo, label, false);
-        self.label(x, y, anchor, size, colour, label, false);
+    /// Adds a label of text size that runs upwards; the middle of its baseline is at `(x, y)` [pt].
+    pub fn upward_text(&mut self, at: (f64, f64), label: &str) {
+        self.upward_label(at, style::TEXT, style::INK, label);
+    }
+
+    /// Adds a small label, vertically centred at `(x, y)` [pt].
+    pub fn note(&mut self, (x, y): (f64, f64), anchor: Anchor, label: &str) {
+        let base = (x, y + 0.36 * style::SMALL);
+        self.label(base, anchor, style::SMALL, style::INK, label);
+    }
+
+    /// Adds a label with its baseline at `(x, y)` [pt].
+    pub fn label(&mut self, at: (f64, f64), anchor: Anchor, size: f64, colour: &str, label: &str) {
+        let style = format!("fill=\"{colour}\"");
+        self.styled_label(at, anchor, size, &style, label);
+    }
+
+    /// Adds a label that runs upwards, with the middle of its baseline at `(x, y)` [pt].
+    pub fn upward_label(&mut self, (x, y): (f64, f64), size: f64, colour: &str, label: &str) {
+        let turn = format!("rotate(-90 {} {})", number(x), number(y));
+        let style = format!("fill=\"{colour}\" transform=\"{turn}\"");
+        self.styled_label((x, y), Anchor::Middle, size, &style, label);
+    }
+
+    /// Adds a small label with a white halo, legible over colours; baseline at `(x, y)` [pt].
+    pub fn note_with_halo(&mut self, at: (f64, f64), anchor: Anchor, colour: &str, label: &str) {
+        let halo = "fill=\"none\" stroke=\"#ffffff\" stroke-width=\"1.8\" \
+                    stroke-linejoin=\"round\" stroke-opacity=\"0.85\"";
+        self.styled_label(at, anchor, style::SMALL, halo, label);
+        self.label(at, anchor, style::SMALL, colour, label);
     }
 
     fn styled_label(
         &mut self,
-        x: f64,
-        y: f64,
+        (x, y): (f64, f64),
         anchor: Anchor,
         size: f64,
         style: &str,
         label: &str,
-        rotated: bool,
     ) {
         let anchor = match anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
             Anchor::End => "end",
         };
-        let rotation = if rotated {
-            format!(" transform=\"rotate(-90 {} {})\"", number(x), number(y))
-        } else {
-            String::new()
-        };
+        let (x, y, spans) = (number(x), number(y), text::spans(label, size));
         self.vectors.push_str(&format!(
-            "<text x=\"{}\" y=\"{}\" font-size=\"{}\" text-anchor=\"{anchor}\" {style}{rotation}>{}</text>\n",
-            number(x),
-            number(y),
-            number(size),
-            text::spans(label, size)
+            "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" text-anchor=\"{anchor}\" \
+             {style}>{spans}</text>\n",
+            number(size)
         ));
     }
 
@@ -204,7 +189,8 @@ impl Drawing {
     pub fn begin_clip(&mut self, name: &str, x: f64, y: f64, width: f64, height: f64) {
         let [x, y, width, height] = [x, y, width, height].map(number);
         self.vectors.push_str(&format!(
-            "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>\n<g clip-path=\"url(#{name})\">\n"
+            "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" \
+             height=\"{height}\"/></clipPath>\n<g clip-path=\"url(#{name})\">\n"
         ));
     }
 
@@ -217,7 +203,8 @@ impl Drawing {
     pub fn to_svg(&self, name: &str, title: &str, description: &str) -> String {
         let (width, height) = (number(self.width), number(self.height));
         let mut out = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\" viewBox=\"0 0 {width} {height}\" \
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\" \
+             viewBox=\"0 0 {width} {height}\" \
              role=\"img\" aria-labelledby=\"{name}-title {name}-description\" font-family=\"{}\">\n\
              <title id=\"{name}-title\">{}</title>\n<desc id=\"{name}-description\">{}</desc>\n\
              <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n",
@@ -229,18 +216,11 @@ impl Drawing {
             let data = base64::engine::general_purpose::STANDARD.encode(raster.to_png());
             let [x, y, width, height] = [*x, *y, *width, *height].map(number);
             out.push_str(&format!(
-                "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" preserveAspectRatio=\"none\" \
-                 href=\"data:image/png;base64,{data}\"/>\n"
+                "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
+                 preserveAspectRatio=\"none\" href=\"data:image/png;base64,{data}\"/>\n"
             ));
         }
-        out.push_str(
-            &self
-                .vectors
-                .replace("#clip-", &format!("#{name}-clip-"))
-                .replace("id=\"clip-", &format!("id=\"{name}-clip-")),
-        );
-        out.push_str("</svg>\n");
-        out
+        out + &rename_clips(&self.vectors, &format!("{name}-clip-")) + "</svg>\n"
     }
 
     /// Renders a PNG file at 300 dots per inch, in the embedded font.
@@ -273,7 +253,8 @@ impl Drawing {
             pixmap.draw_pixmap(0, 0, picture.as_ref(), &paint, transform, None);
         }
         let document = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" font-family=\"DejaVu Sans\">{}</svg>",
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" \
+             viewBox=\"0 0 {w} {h}\" font-family=\"DejaVu Sans\">{}</svg>",
             self.vectors,
             w = number(self.width),
             h = number(self.height)
@@ -287,6 +268,12 @@ impl Drawing {
         );
         encode_png(width, height, &pixmap)
     }
+}
+
+/// Replaces the prefix "clip-" of the identifiers of clip paths.
+fn rename_clips(vectors: &str, prefix: &str) -> String {
+    let used = vectors.replace("#clip-", &format!("#{prefix}"));
+    used.replace("id=\"clip-", &format!("id=\"{prefix}"))
 }
 
 /// Returns rendering options that contain the embedded fonts only.
@@ -323,15 +310,8 @@ mod tests {
     fn text_is_set_without_system_fonts() {
         let mut drawing = Drawing::new(60.0, 20.0);
         let blank = drawing.to_png().unwrap();
-        drawing.label(
-            5.0,
-            14.0,
-            Anchor::Start,
-            10.0,
-            "#000000",
-            "√*x*_{2} kiss",
-            false,
-        );
+        let label = "√*x*_{2} kiss";
+        drawing.label((5.0, 14.0), Anchor::Start, 10.0, "#000000", label);
         let png = drawing.to_png().unwrap();
         let ink = |png: &[u8]| {
             let mut reader = png::Decoder::new(std::io::Cursor::new(png))

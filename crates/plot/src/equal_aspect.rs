@@ -2,7 +2,7 @@
 
 use crate::axis::Axis;
 use crate::drawing::{Anchor, Drawing, path_data};
-use crate::style::{self, HAIR, INK, SMALL, TEXT, TICK};
+use crate::style::{self, HAIR, INK, SMALL, TICK};
 use crate::ticks;
 
 /// The displayed range of two of the three coordinates.
@@ -22,6 +22,15 @@ impl Window {
     /// Height [m].
     pub fn height(&self) -> f64 {
         self.high.1 - self.low.1
+    }
+    /// Returns the part inside another window; its size is negative if there is none.
+    pub fn intersection(&self, other: Window) -> Window {
+        let larger = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
+        let smaller = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.min(b.1));
+        Window {
+            low: larger(self.low, other.low),
+            high: smaller(self.high, other.high),
+        }
     }
 }
 
@@ -63,12 +72,17 @@ impl EqualAspectFrame {
             self.corner.1 + (self.window.high.1 - y) * self.scale,
         )
     }
+    /// Returns the point [m] at a position on paper [pt].
+    pub fn point(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        (
+            self.window.low.0 + (x - self.corner.0) / self.scale,
+            self.window.high.1 - (y - self.corner.1) / self.scale,
+        )
+    }
     /// Returns SVG path data through points [m].
     pub fn path(&self, points: &[(f64, f64)], closed: bool) -> String {
-        path_data(
-            &points.iter().map(|p| self.at(*p)).collect::<Vec<_>>(),
-            closed,
-        )
+        let placed: Vec<_> = points.iter().map(|p| self.at(*p)).collect();
+        path_data(&placed, closed)
     }
 
     /// Begins clipping to the frame.
@@ -94,12 +108,11 @@ impl EqualAspectFrame {
         let widest = ticks::vertical(drawing, &up, (x, y), height, labels.1.is_some(), None);
         drawing.outline(x, y, width, height);
         if let Some(label) = labels.0.filter(|label| !label.is_empty()) {
-            let (middle, base) = (x + 0.5 * width, bottom + TICK + SMALL + 10.5);
-            drawing.label(middle, base, Anchor::Middle, TEXT, INK, label, false);
+            let base = (x + 0.5 * width, bottom + TICK + SMALL + 10.5);
+            drawing.text(base, Anchor::Middle, label);
         }
         if let Some(label) = labels.1.filter(|label| !label.is_empty()) {
-            let (left, middle) = (x - TICK - widest - 6.0, y + 0.5 * height);
-            drawing.label(left, middle, Anchor::Middle, TEXT, INK, label, true);
+            drawing.upward_text((x - TICK - widest - 6.0, y + 0.5 * height), label);
         }
     }
 }
@@ -139,8 +152,8 @@ pub fn colour_bar(
     }
     drawing.outline(x, y, width, HEIGHT);
     ticks::horizontal(drawing, axis, (x, y + HEIGHT), width, true);
-    let (middle, base) = (x + 0.5 * width, y + HEIGHT + TICK + SMALL + 10.5);
-    drawing.label(middle, base, Anchor::Middle, TEXT, INK, &axis.label, false);
+    let base = (x + 0.5 * width, y + HEIGHT + TICK + SMALL + 10.5);
+    drawing.text(base, Anchor::Middle, &axis.label);
 }
 
 /// Returns SVG attributes of an outline with a light fill; `strength` from 0 to 1 sets opacity.

@@ -1,8 +1,9 @@
 //! A rectangular frame with two axes, for points, boxes and curves; markers of data points.
 
 use crate::axis::Axis;
+use crate::curve;
 use crate::drawing::{Anchor, Drawing, path_data};
-use crate::style::{FAINT, GRID, INK, LINE, SMALL, TEXT, TICK};
+use crate::style::{FAINT, GRID, LINE, SMALL, TICK};
 use crate::ticks;
 
 /// A rectangle on paper with a horizontal and a vertical axis.
@@ -53,23 +54,27 @@ impl Frame {
     /// Draws the outline, the ticks and the labels; `labelled` selects the axes that have labels.
     pub fn outline(&self, drawing: &mut Drawing, labelled: (bool, bool)) {
         let (x, y, width, height) = (self.x, self.y, self.width, self.height);
-        let bottom = y + height;
-        ticks::horizontal(drawing, &self.across, (x, bottom), width, labelled.0);
+        ticks::horizontal(drawing, &self.across, (x, y + height), width, labelled.0);
         let widest = ticks::vertical(drawing, &self.up, (x, y), height, labelled.1, None);
         drawing.outline(x, y, width, height);
         if labelled.0 {
-            let (middle, base) = (x + 0.5 * width, bottom + TICK + SMALL + 11.0);
-            let label = &self.across.label;
-            drawing.label(middle, base, Anchor::Middle, TEXT, INK, label, false);
+            self.horizontal_label(drawing);
         }
         if labelled.1 {
-            let (left, middle) = (x - TICK - widest - 7.0, y + 0.5 * height);
-            let label = &self.up.label;
-            drawing.label(left, middle, Anchor::Middle, TEXT, INK, label, true);
+            let middle = (x - TICK - widest - 7.0, y + 0.5 * height);
+            drawing.upward_text(middle, &self.up.label);
         }
     }
 
-    /// Draws a curve, clipped to the frame; `clip` is an identifier unique in the drawing.
+    /// Draws the label of the horizontal axis below its tick labels.
+    pub fn horizontal_label(&self, drawing: &mut Drawing) {
+        let base = self.y + self.height + TICK + SMALL + 11.0;
+        let middle = self.x + 0.5 * self.width;
+        drawing.text((middle, base), Anchor::Middle, &self.across.label);
+    }
+
+    /// Draws a curve, clipped to the frame and interrupted at points without a position; `clip` is
+    /// an identifier unique in the drawing.
     pub fn curve(
         &self,
         drawing: &mut Drawing,
@@ -78,10 +83,10 @@ impl Frame {
         dash: Option<&str>,
         clip: &str,
     ) {
-        let position = |(x, y): &(f64, f64)| (self.px(*x), self.py(*y));
-        let placed: Vec<(f64, f64)> = points.iter().map(position).collect();
         drawing.begin_clip(clip, self.x, self.y, self.width, self.height);
-        drawing.line(&thin(&placed), colour, LINE, dash);
+        for segment in curve::segments(points, |point| self.position(point)) {
+            drawing.line(&curve::thinned(&segment), colour, LINE, dash);
+        }
         drawing.end_clip();
     }
 
@@ -91,20 +96,6 @@ impl Frame {
         let ends = [(self.x, y), (self.x + self.width, y)];
         drawing.line(&ends, FAINT, 0.8, Some("4 2.5"));
     }
-}
-
-/// Removes points within 0.2 pt of the previous one; the last point stays.
-fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let mut out: Vec<(f64, f64)> = Vec::with_capacity(points.len());
-    for (i, p) in points.iter().enumerate() {
-        let far = out
-            .last()
-            .is_none_or(|last| (p.0 - last.0).hypot(p.1 - last.1) > 0.2);
-        if far || i + 1 == points.len() {
-            out.push(*p);
-        }
-    }
-    out
 }
 
 /// Shapes of data points that differ without colour.
@@ -137,7 +128,7 @@ impl Marker {
         ][n % 6]
     }
 
-    /// Draws the marker around `(x, y)` [pt]; a hollow one usually stands for a bound.
+    /// Draws the marker around `(x, y)` [pt]; a hollow one usually marks a bound.
     pub fn draw(
         self,
         drawing: &mut Drawing,

@@ -9,9 +9,12 @@
 pub mod axis;
 pub mod colormap;
 pub mod contour;
+mod curve;
 pub mod drawing;
 pub mod equal_aspect;
+mod figure;
 pub mod frame;
+pub mod legend;
 pub mod raster;
 pub mod stacked;
 pub mod style;
@@ -20,5 +23,6 @@ mod ticks;
 
 pub use axis::minus;
 pub use drawing::Drawing;
+pub use figure::Figure;
 pub use style::COLUMN;
-pub use text::{escape, html, literal, plain};
+pub use text::{letter, literal, plain};

@@ -11,15 +11,17 @@ const SMALL: f64 = 0.72;
 
 /// A part of a label with one style.
 #[derive(Clone, Debug, PartialEq)]
-struct Piece {
-    text: String,
-    italic: bool,
-    /// -1: subscript, 0: baseline, +1: superscript.
-    level: i8,
+pub struct Piece {
+    /// Characters.
+    pub text: String,
+    /// Whether the characters are italic.
+    pub italic: bool,
+    /// Subscript (-1), baseline (0) or superscript (+1).
+    pub level: i8,
 }
 
 /// Splits a label by style; `\` escapes the next character.
-fn pieces(label: &str) -> Vec<Piece> {
+pub fn pieces(label: &str) -> Vec<Piece> {
     let mut out: Vec<Piece> = Vec::new();
     let mut italic = false;
     let mut level = 0;
@@ -68,8 +70,13 @@ pub fn literal(text: &str) -> String {
     out
 }
 
-/// Escapes the five reserved characters of XML and HTML; removes control characters.
-pub fn escape(text: &str) -> String {
+/// Returns the letter of the i-th panel of a figure: "(a)", "(b)" ...
+pub fn letter(i: usize) -> String {
+    format!("({})", char::from(b'a' + (i % 26) as u8))
+}
+
+/// Escapes the five reserved characters of XML; removes control characters.
+pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -116,23 +123,6 @@ pub fn spans(label: &str, size: f64) -> String {
     out
 }
 
-/// Converts a label to HTML.
-pub fn html(label: &str) -> String {
-    let mut out = String::new();
-    for piece in pieces(label) {
-        let mut text = escape(&piece.text);
-        if piece.italic {
-            text = format!("<i>{text}</i>");
-        }
-        out.push_str(&match piece.level {
-            -1 => format!("<sub>{text}</sub>"),
-            1 => format!("<sup>{text}</sup>"),
-            _ => text,
-        });
-    }
-    out
-}
-
 /// Returns the width of a label at font size `size` [pt].
 pub fn width(label: &str, size: f64) -> f64 {
     static FONT: OnceLock<Option<FontRef<'static>>> = OnceLock::new();
@@ -173,14 +163,6 @@ mod tests {
             "the line comes back up after a subscript: {svg}"
         );
         assert_eq!(plain("*v*_{z} / √(*d* *g*)"), "vz / √(d g)");
-    }
-
-    #[test]
-    fn labels_become_html() {
-        assert_eq!(
-            html("*v*_{z} < 10^{3}"),
-            "<i>v</i><sub>z</sub> &lt; 10<sup>3</sup>"
-        );
     }
 
     #[test]

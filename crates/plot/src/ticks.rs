@@ -21,7 +21,7 @@ pub fn horizontal(
         drawing.line(&[(x, bottom), (x, bottom + TICK)], INK, HAIR, None);
         if labelled {
             let y = bottom + TICK + SMALL + 0.5;
-            drawing.label(x, y, Anchor::Middle, SMALL, INK, name, false);
+            drawing.label((x, y), Anchor::Middle, SMALL, INK, name);
         }
     }
 }
@@ -51,8 +51,7 @@ pub fn vertical(
         drawing.line(&[(left - TICK, y), (left, y)], INK, HAIR, None);
         if labelled {
             widest = widest.max(text::width(name, SMALL));
-            let (x, base) = (left - TICK - 2.0, y + 0.36 * SMALL);
-            drawing.label(x, base, Anchor::End, SMALL, INK, name, false);
+            drawing.note((left - TICK - 2.0, y), Anchor::End, name);
         }
     }
     widest

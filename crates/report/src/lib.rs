@@ -1,129 +1,111 @@
 //! Figures and pages from run folders.
 //!
 //! [`render`] reads the files of one run folder (never the simulation) and writes into it
-//! `figures/*.png`, `figures/*.svg` and one self-contained `report.html`. The same folder gives the
-//! same bytes. Each figure is described once and written as SVG and, in an embedded font, as PNG.
+//! `figures/*.png`, `figures/*.svg` and one self-contained `report.html`. Equal folders result in
+//! equal bytes. Each figure is described once and written as SVG and, in an embedded font, as PNG.
 //!
-//! A run that was interrupted still gives a report of what is there, and says so. Damaged tables and
-//! logs are errors that name the file and the line; pictures (`slices/`, `grains/`) that cannot be
-//! read are left out and listed on the page.
+//! The report of an interrupted run shows the results up to the interruption and states it. Damaged
+//! tables and logs are errors that name the file and the line. Pictures (`slices/`, `grains/`) that
+//! cannot be read are omitted and listed on the page.
 
 mod error;
+pub mod features;
 pub mod figure;
+mod files;
+pub mod html;
 mod page;
 pub mod phases;
 pub mod run_folder;
-pub mod story;
 #[cfg(test)]
 mod testing;
 
 use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
-pub use page::STYLE;
+pub use files::{WrittenFigure, write_figure, write_file};
+use grainwake_plot::Figure;
 
-use figure::Figure;
+use features::RunFeatures;
 use run_folder::RunFolder;
-use story::Story;
 
-/// What was written.
+/// Files of a report.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Rendered {
-    /// The page.
+pub struct ReportFiles {
+    /// HTML page.
     pub page: PathBuf,
-    /// The figures as PNG, in the order of the page.
+    /// Figures as PNG, in page order.
     pub png: Vec<PathBuf>,
-    /// The figures as SVG, in the same order.
+    /// Figures as SVG, in page order.
     pub svg: Vec<PathBuf>,
-    /// What was missing or had to be left out; also on the page.
+    /// Missing or omitted parts; also listed on the page.
     pub notes: Vec<String>,
-    /// Whether the run came to its end.
+    /// Whether the run reached its end.
     pub finished: bool,
 }
 
-/// A run folder with what it tells and its figures; nothing is written.
-pub struct Told {
-    /// The run folder.
+/// A run folder with its derived features and its figures.
+pub struct RunReport {
+    /// Run folder.
     pub run: RunFolder,
-    /// What it tells.
-    pub story: Story,
-    /// Its figures, in the order of the page.
+    /// Features derived from the tables.
+    pub features: RunFeatures,
+    /// Figures, in page order.
     pub figures: Vec<Figure>,
-    /// What was missing or had to be left out.
+    /// Missing or omitted parts.
     pub notes: Vec<String>,
 }
 
-/// Reads a run folder and draws its figures.
-pub fn tell(run_dir: &Path) -> Result<Told, ReportError> {
+/// Reads a run folder and draws its figures, without writing.
+///
+/// # Errors
+/// If the folder holds no run, or a table or log cannot be read.
+pub fn read_report(run_dir: &Path) -> Result<RunReport, ReportError> {
     let mut run = RunFolder::open(run_dir)?;
     let mut notes = std::mem::take(&mut run.notes);
-    let bodies = figure::bodies(&run, &mut notes);
-    run.facts.add_diameters(
-        bodies
-            .iter()
-            .filter_map(|(grain, body)| Some((*grain, body.diameter()?))),
-    );
-    let story = Story::of(&run);
-    let figures = figure::all(&run, &story, bodies, &mut notes);
-    Ok(Told {
+    let surfaces = figure::surfaces(&run, &mut notes);
+    let diameter =
+        |(grain, body): (&usize, &figure::GrainSurface)| Some((*grain, body.diameter()?));
+    run.facts
+        .add_diameters(surfaces.iter().filter_map(diameter));
+    let features = RunFeatures::of(&run);
+    let figures = figure::all(&run, &features, surfaces, &mut notes);
+    Ok(RunReport {
         run,
-        story,
+        features,
         figures,
         notes,
     })
 }
 
-/// Draws the figures and the page of a run folder.
-pub fn render(run_dir: &Path) -> Result<Rendered, ReportError> {
-    let Told {
+/// Writes the figures and the page of a run folder.
+///
+/// # Errors
+/// If the folder holds no run, a table or log cannot be read, or a file cannot be written.
+pub fn render(run_dir: &Path) -> Result<ReportFiles, ReportError> {
+    let RunReport {
         run,
-        story,
+        features,
         figures,
         notes,
-    } = tell(run_dir)?;
+    } = read_report(run_dir)?;
     let folder = run_dir.join("figures");
-    std::fs::create_dir_all(&folder).map_err(|source| ReportError::Write {
-        file: folder.clone(),
-        source,
-    })?;
-    let mut out = Rendered {
-        page: run_dir.join("report.html"),
+    let failed = |file: &Path| {
+        let file = file.to_owned();
+        move |source| ReportError::Write { file, source }
+    };
+    std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
+    let figures = figures.into_iter().zip(1..);
+    let figures: Vec<WrittenFigure> = figures
+        .map(|(figure, number)| write_figure(&folder, figure.numbered(number)))
+        .collect::<Result<_, _>>()?;
+    let page = run_dir.join("report.html");
+    let text = page::page(&run, &features, &figures, &notes);
+    write_file(&page, text.as_bytes()).map_err(failed(&page))?;
+    Ok(ReportFiles {
+        page,
+        png: figures.iter().map(|f| f.png_file.clone()).collect(),
+        svg: figures.iter().map(|f| f.svg_file.clone()).collect(),
+        notes,
         finished: run.finished(),
-        ..Rendered::default()
-    };
-    let with_svg = |figure: Figure| {
-        let svg = figure.svg();
-        (figure, svg)
-    };
-    let figures: Vec<(Figure, String)> = figures.into_iter().map(with_svg).collect();
-    for (figure, svg) in &figures {
-        let draw = |what| ReportError::Draw {
-            figure: figure.name.to_owned(),
-            what,
-        };
-        let png = figure.drawing.to_png().map_err(draw)?;
-        out.png
-            .push(write(folder.join(format!("{}.png", figure.name)), &png)?);
-        out.svg.push(write(
-            folder.join(format!("{}.svg", figure.name)),
-            svg.as_bytes(),
-        )?);
-    }
-    let page = page::page(&run, &story, &figures, &notes);
-    out.page = write(out.page, page.as_bytes())?;
-    out.notes = notes;
-    Ok(out)
-}
-
-/// Writes a file under a temporary name first, so that a reader never finds half of it.
-pub fn write(file: PathBuf, bytes: &[u8]) -> Result<PathBuf, ReportError> {
-    let mut name = file.clone().into_os_string();
-    name.push(".tmp");
-    let temporary = PathBuf::from(name);
-    let written =
-        std::fs::write(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, &file));
-    match written {
-        Ok(()) => Ok(file),
-        Err(source) => Err(ReportError::Write { file, source }),
-    }
+    })
 }

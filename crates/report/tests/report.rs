@@ -5,18 +5,18 @@ mod synthetic;
 use std::path::Path;
 
 use grainwake_formats::FormatError;
-use grainwake_report::{Rendered, ReportError, render};
+use grainwake_report::{ReportError, ReportFiles, render};
 
-fn names(rendered: &Rendered) -> Vec<String> {
+fn names(rendered: &ReportFiles) -> Vec<String> {
     let stem = |file: &std::path::PathBuf| file.file_stem().unwrap().to_string_lossy().into_owned();
     rendered.png.iter().map(stem).collect()
 }
 
-fn page(rendered: &Rendered) -> String {
+fn page(rendered: &ReportFiles) -> String {
     std::fs::read_to_string(&rendered.page).unwrap()
 }
 
-fn svg(rendered: &Rendered, name: &str) -> String {
+fn svg(rendered: &ReportFiles, name: &str) -> String {
     let file = rendered
         .svg
         .iter()
@@ -220,7 +220,7 @@ fn the_page_stands_alone_and_can_be_read_aloud() {
 #[test]
 fn the_same_folder_gives_the_same_bytes() {
     let folder = small_pair(0.9);
-    let read = |rendered: &Rendered| -> Vec<Vec<u8>> {
+    let read = |rendered: &ReportFiles| -> Vec<Vec<u8>> {
         let files = rendered
             .png
             .iter()
@@ -351,7 +351,7 @@ fn damage_to_any_file_is_an_error_or_a_note() {
         (
             "events.jsonl",
             "{\"time\":\"now\",\"event\":\"kiss\"}\n",
-            "events.jsonl, line 1: 'time'",
+            "events.jsonl, line 1: invalid type",
         ),
     ];
     for (name, content, message) in damage {
@@ -515,7 +515,7 @@ fn round_off_is_not_a_turn_and_the_summary_knows_all_steps() {
         "{seen}"
     );
     let said = page(&rendered);
-    assert!(said.contains("0.789 at most in any step"), "{said}");
+    assert!(said.contains("at most 0.789 in any step"), "{said}");
     assert!(said.matches("4.56×10<sup>−9</sup>").count() >= 2);
     let tilt = text_of(&svg(&rendered, "gap"));
     assert!(tilt.contains("45") && tilt.contains("135"), "{tilt}");
@@ -527,14 +527,14 @@ fn write_log(folder: &Path, events: &[(f64, &str)]) {
     let unit = (synthetic::D / synthetic::G).sqrt();
     let line = |(s, name): &(f64, &str)| {
         let time = s * unit;
-        format!("{{\"time\":{time},\"event\":\"{name}\",\"grains\":[0,1]}}\n")
+        format!("{{\"time\":{time},\"event\":\"{name}\",\"grains\":[0,1],\"confirmed\":{time}}}\n")
     };
     let log: String = events.iter().map(line).collect();
     std::fs::write(folder.join("events.jsonl"), log).unwrap();
 }
 
-/// What the page and the figure of the gap say of a pair with this log.
-fn told(events: &[(f64, &str)]) -> (String, String) {
+/// Returns the text of the page and of the figure of the gap for a pair with the given events.
+fn report(events: &[(f64, &str)]) -> (String, String) {
     let folder = small_pair(0.9);
     std::fs::remove_dir_all(folder.join("slices")).unwrap();
     let summary = folder.join("summary.json");
@@ -550,14 +550,14 @@ fn told(events: &[(f64, &str)]) -> (String, String) {
 }
 
 #[test]
-fn headline_and_figures_agree_on_kiss_and_parting() {
-    let (page, gap) = told(&[(5.0, "landing"), (7.94, "kiss"), (8.1, "separation")]);
+fn headline_and_figures_agree_on_kiss_and_separation() {
+    let (page, gap) = report(&[(5.0, "landing"), (7.94, "kiss"), (8.1, "separation")]);
     assert!(!page.contains("did not touch"));
     assert!(page.contains("The two grains kissed at"));
     let late = ", after the first has landed";
     assert!(page.matches(late).count() >= 4, "headline and caption");
-    assert!(gap.contains(&format!("They touch first at t √(g/d) = 7.94{late}.")));
-    assert!(gap.contains(&format!("They part at t √(g/d) = 8.10{late}.")));
+    assert!(gap.contains(&format!("First contact at t √(g/d) = 7.94{late}.")));
+    assert!(gap.contains(&format!("Separation at t √(g/d) = 8.10{late}.")));
 
     let bounce = [
         (13.2, "kiss"),
@@ -566,16 +566,16 @@ fn headline_and_figures_agree_on_kiss_and_parting() {
         (17.3, "separation"),
         (44.0, "landing"),
     ];
-    let (page, gap) = told(&bounce);
-    assert!(gap.contains("They part at t √(g/d) = 17.3."), "{gap}");
-    let parted = page.split(", and parted at ").nth(1).unwrap();
+    let (page, gap) = report(&bounce);
+    assert!(gap.contains("Separation at t √(g/d) = 17.3."), "{gap}");
+    let parted = page.split(", and separated at ").nth(1).unwrap();
     assert!(parted.split(". ").next().unwrap().ends_with("= 17.3"));
     assert!(!page.contains(late));
 }
 
 #[test]
 fn tumbling_after_the_separation_stays_in_the_table() {
-    let (page, _) = told(&[
+    let (page, _) = report(&[
         (13.2, "kiss"),
         (13.6, "separation"),
         (13.8, "tumble"),
@@ -594,7 +594,7 @@ fn tumbling_after_the_separation_stays_in_the_table() {
         ["drafting", "kissing", "separated", "tumbling", "landed"]
     );
     let lead = page.split("<p class=\"lead\">").nth(1).unwrap();
-    let [parted, tumbled] = ["parted at", "tumbled from"].map(|text| lead.find(text).unwrap());
+    let [parted, tumbled] = ["separated at", "tumbled from"].map(|text| lead.find(text).unwrap());
     assert!(parted < tumbled);
 }
 

@@ -6,7 +6,7 @@ use glam::DVec3;
 use grainwake_run::case::estimate::Estimate;
 use grainwake_run::case::{Case, CaseError, Problem};
 use grainwake_run::{Plane, PlanePosition};
-use grainwake_solver::dem::{Dof, surface_gap};
+use grainwake_solver::dem::{ContactLawKind, Dof, Material, surface_gap};
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::sim::StepRule;
 
@@ -841,5 +841,124 @@ fn what_an_override_broke_is_told_of_the_override() {
             let found = first.key.as_deref().unwrap();
             assert!(found.starts_with(key), "{set}: {first}");
         }
+    }
+}
+
+const HERTZ: &str = r#"
+[domain]
+size = ["40 mm", "20 mm", "40 mm"]
+
+[contact]
+law = "hertz-mindlin"
+youngs_modulus = "48 GPa"
+poisson_ratio = 0.2
+wall_youngs_modulus = "70 GPa"
+
+[[grain]]
+shape = { kind = "sphere", diameter = "4 mm" }
+density = 7850
+position = ["10 mm", "10 mm", "22 mm"]
+youngs_modulus = "208 GPa"
+poisson_ratio = 0.3
+restitution = 0.9
+
+[[grain]]
+shape = { kind = "sphere", diameter = "4 mm" }
+density = 2800
+position = ["30 mm", "10 mm", "22 mm"]
+
+[time]
+end = "0.2 s"
+"#;
+
+#[test]
+fn hertz_mindlin_takes_materials_from_the_grain_or_from_contact() {
+    let case = good(HERTZ);
+    let materials: Vec<_> = case.setup.grains.iter().map(|g| g.material).collect();
+    let steel = (materials[0].youngs_modulus, materials[0].poisson_ratio);
+    let glass = (materials[1].youngs_modulus, materials[1].poisson_ratio);
+    assert_eq!((steel, glass), ((208e9, 0.3), (48e9, 0.2)));
+    assert_eq!(
+        (materials[0].restitution, materials[1].restitution),
+        (0.9, 1.0)
+    );
+    let contact = case.setup.contact;
+    assert_eq!(contact.law, ContactLawKind::HertzMindlin);
+    let wall = contact.wall_material;
+    assert_eq!((wall.youngs_modulus, wall.poisson_ratio), (70e9, 0.2));
+    // The resolved case gives the same run.
+    let again = good(&case.resolved);
+    assert_eq!(
+        (again.digest, again.setup.contact),
+        (case.digest.clone(), contact)
+    );
+    let time = Estimate::of(&case, 1).contact_time_s.unwrap();
+    // Hertz duration of two glass spheres at sqrt(2 g 40 mm).
+    let mass = 2800.0 * std::f64::consts::PI / 6.0 * 0.004f64.powi(3) / 2.0;
+    let (radius, modulus) = (0.001, 24e9 / 0.96);
+    let speed = (2.0f64 * 9.81 * 0.04).sqrt();
+    let expected = 2.868 * (mass * mass / (radius * modulus * modulus * speed)).powf(0.2);
+    assert!((time / expected - 1.0).abs() < 1e-3, "{time} {expected}");
+    let soft = good(&HERTZ.replace("wall_youngs_modulus = \"70 GPa\"\n", ""));
+    assert_eq!(soft.setup.contact.wall_material, Material::RIGID);
+}
+
+#[test]
+fn keys_of_the_other_contact_law_are_refused_where_they_stand() {
+    let hertz = |from: &str, to: &str| problems(&HERTZ.replacen(from, to, 1));
+    for (from, to, key, words) in [
+        (
+            "law =",
+            "stiffness = 100\nlaw =",
+            "contact.stiffness",
+            "does not use stiffness",
+        ),
+        (
+            "\"hertz-mindlin\"",
+            "\"linear\"",
+            "contact.youngs_modulus",
+            "does not use",
+        ),
+        (
+            "\"48 GPa\"",
+            "\"-48 GPa\"",
+            "contact.youngs_modulus",
+            "greater than zero",
+        ),
+        (
+            "\"208 GPa\"",
+            "\"208 kg\"",
+            "grain.0.youngs_modulus",
+            "an elastic modulus",
+        ),
+        (
+            "poisson_ratio = 0.3",
+            "poisson_ratio = 0.6",
+            "grain.0.poisson_ratio",
+            "out of range",
+        ),
+        (
+            "youngs_modulus = \"48 GPa\"\n",
+            "",
+            "contact.law",
+            "needs the youngs_modulus",
+        ),
+        (
+            "youngs_modulus = \"48",
+            "youngs_modulos = \"48",
+            "contact.youngs_modulos",
+            "unknown",
+        ),
+        (
+            "\"hertz-mindlin\"",
+            "\"hertz\"",
+            "contact.law",
+            "hertz-mindlin",
+        ),
+    ] {
+        let found = hertz(from, to);
+        let problem = found.iter().find(|p| p.key.as_deref() == Some(key));
+        let problem = problem.unwrap_or_else(|| panic!("{key}: {found:?}"));
+        assert!(problem.to_string().contains(words), "{problem}");
     }
 }

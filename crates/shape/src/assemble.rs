@@ -1,15 +1,15 @@
 //! Assembly of a shape from a distance function in the principal frame.
 
 use crate::distance::Distance;
-use crate::error::{Result, ShapeError, positive};
+use crate::error::{Result, ShapeError, positive, within};
 use crate::field::SampledField;
-use crate::mesh::TriangleMesh;
 use crate::morphology::Morphology;
+use crate::nodes::SurfaceNode;
 use crate::provenance::Provenance;
 use crate::quality::{self, Quality, QualityBounds};
-use crate::shape::{Field, Shape, SurfaceNode};
-use crate::surface::{self, Samples};
-use crate::{inscribed, mass, nodes, roundness};
+use crate::shape::{Field, Shape};
+use crate::triangles::TriangleMesh;
+use crate::{inscribed, mass, nodes, roundness, surface};
 use glam::DVec3;
 
 /// Resolution, surface nodes and bounds of a sampled shape.
@@ -64,23 +64,10 @@ pub(crate) struct Body<D> {
 impl ShapeOptions {
     fn spacing(&self, extent: DVec3) -> Result<f64> {
         for (name, value) in [("cells", self.cells), ("least_cells", self.least_cells)] {
-            if !(8..=1024).contains(&value) {
-                let value = value as f64;
-                return Err(ShapeError::BadParameter {
-                    name,
-                    value,
-                    reason: "must be 8 to 1024",
-                });
-            }
+            within(name, value as f64, 8.0..=1024.0, "must be 8 to 1024")?;
         }
-        if let Some(nodes @ (0..16 | 1_000_001..)) = self.nodes {
-            let value = nodes as f64;
-            let reason = "must be 16 to 1000000";
-            return Err(ShapeError::BadParameter {
-                name: "nodes",
-                value,
-                reason,
-            });
+        if let Some(nodes) = self.nodes {
+            within("nodes", nodes as f64, 16.0..=1e6, "must be 16 to 1000000")?;
         }
         positive("shortest extent of the body", extent.min_element())?;
         Ok((extent.max_element() / self.cells as f64)
@@ -101,18 +88,19 @@ pub(crate) fn assemble<D: Distance>(
     let field = SampledField::sample(&body.distance, body.lower, body.upper, spacing, margin)?;
     let off = mass::of_field(&field).centroid;
     if !off.is_finite() {
-        return Err(ShapeError::Quality {
-            reason: "the sampled body is empty".into(),
-        });
+        return Err(ShapeError::quality("the sampled body is empty"));
     }
     provenance.centroid += provenance.rotation * off;
     let field = field.shifted(-off);
     let mass = mass::of_field(&field);
     quality::check_axes(&mass.second)?;
 
-    let mesh = surface_of(&field);
-    mesh.check_closed().map_err(|e| ShapeError::Quality {
-        reason: format!("the surface of the sampled body is not one closed surface ({e}); ask for more cells across the grain"),
+    let mesh = surface::of_field(&field);
+    mesh.check_closed().map_err(|e| {
+        ShapeError::quality(format!(
+            "the surface of the sampled body is not one closed surface ({e}); ask for more cells \
+             across the grain"
+        ))
     })?;
     let diameter = (6.0 * mass.volume / std::f64::consts::PI).cbrt();
     let count = options.nodes.unwrap_or_else(|| {
@@ -168,16 +156,6 @@ pub(crate) fn assemble<D: Distance>(
         quality: Some(quality),
         provenance,
         field: Field::Sampled(field),
-    })
-}
-
-/// Extracts the closed surface of a field.
-pub(crate) fn surface_of(field: &SampledField) -> TriangleMesh {
-    surface::extract(&Samples {
-        dims: field.dims(),
-        lower: field.lower(),
-        spacing: field.spacing(),
-        values: field.levels(),
     })
 }
 

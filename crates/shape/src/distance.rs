@@ -1,5 +1,6 @@
 //! Signed-distance functions from which shapes are sampled [m]; negative inside.
 
+use crate::grid::coordinates;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -38,7 +39,7 @@ pub(crate) trait Distance: Sync {
             let (j, k) = (row % dims[1], row / dims[1]);
             let mut hint = 0;
             for (i, value) in line.iter_mut().enumerate() {
-                let x = first + spacing * DVec3::new(i as f64, j as f64, k as f64);
+                let x = first + spacing * coordinates([i, j, k]);
                 *value = self.near(x, &mut hint);
             }
         });

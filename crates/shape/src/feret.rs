@@ -1,5 +1,6 @@
 //! Feret (caliper) diameters of a point set.
 
+use crate::nodes::golden_spiral;
 use glam::DVec3;
 
 /// Directions sampled for the longest diameter.
@@ -10,12 +11,7 @@ const ACROSS: usize = 90;
 /// Returns the longest Feret diameter, the longest perpendicular to it, and the one perpendicular
 /// to both, in the unit of the points.
 pub(crate) fn lengths(points: &[DVec3]) -> [f64; 3] {
-    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-    let spiral = (0..DIRECTIONS).map(|n| {
-        let z = (n as f64 + 0.5) / DIRECTIONS as f64;
-        let (s, c) = (golden * n as f64).sin_cos();
-        DVec3::new((1.0 - z * z).sqrt() * c, (1.0 - z * z).sqrt() * s, z)
-    });
+    let spiral = (0..DIRECTIONS).map(|n| golden_spiral(n, (n as f64 + 0.5) / DIRECTIONS as f64));
     let long = longest(points, spiral, |u| u);
     let e = long.any_orthonormal_vector();
     let f = long.cross(e);

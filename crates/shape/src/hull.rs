@@ -1,5 +1,6 @@
 //! Volume of the convex hull of points (Quickhull, Barber and others 1996).
 
+use crate::triangles::bounds;
 use glam::DVec3;
 
 struct Facet {
@@ -28,11 +29,7 @@ struct Hull<'a> {
 
 impl<'a> Hull<'a> {
     fn build(points: &'a [DVec3]) -> Option<Hull<'a>> {
-        let (lower, upper) = points
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, u), p| {
-                (l.min(*p), u.max(*p))
-            });
+        let (lower, upper) = bounds(points);
         let size = (upper - lower).max_element();
         if !(size.is_finite() && size > 0.0) {
             return None;
@@ -256,7 +253,7 @@ mod tests {
 
     #[test]
     fn hull_of_a_sphere_and_of_a_cloud() {
-        let sphere = crate::mesh::cube_sphere(24, |u| u);
+        let sphere = crate::triangles::cube_sphere(24, |u| u);
         let hull = volume(&sphere.vertices).unwrap();
         assert!((hull / sphere.signed_volume() - 1.0).abs() < 1e-3, "{hull}");
         let cloud: Vec<DVec3> = (0..200)

@@ -1,6 +1,7 @@
 //! The largest inscribed sphere of a body.
 
 use crate::distance::Distance;
+use crate::grid::{coordinates, index, place};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -56,22 +57,19 @@ pub(crate) fn sphere(
     let size = upper - lower;
     let spacing = (size.min_element() / ACROSS).max(size.max_element() / 200.0);
     let dims = (size / spacing).ceil().to_array().map(|n| n as usize + 1);
-    let place = |n: usize| {
-        let (i, j, k) = (n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]);
-        lower + spacing * DVec3::new(i as f64, j as f64, k as f64)
-    };
+    let position = |n: usize| lower + spacing * coordinates(place(dims, n));
     let depths: Vec<f64> = (0..dims.iter().product())
         .into_par_iter()
-        .map_init(|| 0, |hint, n| -about.near(place(n), hint))
+        .map_init(|| 0, |hint, n| -about.near(position(n), hint))
         .collect();
     let highest = |n: usize| {
-        let at = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
+        let at = place(dims, n);
         (0..27usize).all(|m| {
             let to = [m % 3, m / 3 % 3, m / 9];
             let other: Option<Vec<usize>> = (0..3)
                 .map(|a| (at[a] + to[a]).checked_sub(1).filter(|i| *i < dims[a]))
                 .collect();
-            other.is_none_or(|o| depths[o[0] + dims[0] * (o[1] + dims[1] * o[2])] <= depths[n])
+            other.is_none_or(|o| depths[index(dims, [o[0], o[1], o[2]])] <= depths[n])
         })
     };
     let mut candidates: Vec<usize> = (0..depths.len()).filter(|n| highest(*n)).collect();
@@ -84,9 +82,9 @@ pub(crate) fn sphere(
     };
     let mut best = (0.5 * (lower + upper), 0.0);
     for start in candidates.iter().take(CANDIDATES) {
-        let found = deepest(&mut depth, place(*start), 5.0 * spacing, 240, best.1);
-        if found.1 > best.1 {
-            best = found;
+        let candidate = deepest(&mut depth, position(*start), 5.0 * spacing, 240, best.1);
+        if candidate.1 > best.1 {
+            best = candidate;
         }
     }
     best

@@ -51,8 +51,8 @@ impl ReadLimits {
     /// default if the available memory is unknown.
     pub fn of_this_machine(per_voxel: u64) -> ReadLimits {
         // Only Linux reports the memory available without swapping.
-        let told = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-        ReadLimits::default().within(mem_available(&told), per_voxel)
+        let meminfo = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+        ReadLimits::default().within(mem_available(&meminfo), per_voxel)
     }
 
     fn within(self, available: Option<u64>, per_voxel: u64) -> ReadLimits {
@@ -73,11 +73,9 @@ impl ReadLimits {
 
     /// Refuses dimensions that exceed the limits; returns the number of voxels.
     pub(crate) fn admit(&self, path: &Path, dims: [u64; 3]) -> Result<u64> {
-        let too_large = |more: String, limit, unit| ShapeError::TooLarge {
-            path: path.to_owned(),
-            claimed: format!("{} x {} x {} voxels{more}", dims[0], dims[1], dims[2]),
-            limit,
-            unit,
+        let too_large = |more: String, limit, unit| {
+            let claimed = format!("{} x {} x {} voxels{more}", dims[0], dims[1], dims[2]);
+            ShapeError::too_large(path, &claimed, limit, unit)
         };
         let voxels = dims.iter().try_fold(1u64, |n, d| n.checked_mul(*d));
         let Some(voxels) = voxels.filter(|n| *n <= self.voxels) else {
@@ -97,8 +95,10 @@ impl ReadLimits {
 }
 
 /// Parses the available memory [bytes] from the text of /proc/meminfo.
-fn mem_available(told: &str) -> Option<u64> {
-    let line = told.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+fn mem_available(meminfo: &str) -> Option<u64> {
+    let line = meminfo
+        .lines()
+        .find_map(|l| l.strip_prefix("MemAvailable:"))?;
     let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kib.checked_mul(1024)
 }
@@ -112,15 +112,23 @@ pub struct SourceFile {
     pub sha256: String,
 }
 
+impl SourceFile {
+    pub(crate) fn new(path: &Path, content: Sha256) -> SourceFile {
+        let name = path.file_name().unwrap_or_default();
+        SourceFile {
+            name: name.to_string_lossy().into_owned(),
+            sha256: hex(&content.finalize()),
+        }
+    }
+}
+
 /// Reads a whole file within the size limit; returns content and identity.
 pub(crate) fn read_bytes(path: &Path, limits: &ReadLimits) -> Result<(Vec<u8>, SourceFile)> {
     let file = std::fs::File::open(path).map_err(|e| ShapeError::io(path, e))?;
     let claimed = file.metadata().map_err(|e| ShapeError::io(path, e))?.len();
-    let too_large = |bytes: u64| ShapeError::TooLarge {
-        path: path.to_owned(),
-        claimed: format!("at least {bytes} bytes"),
-        limit: limits.file_bytes,
-        unit: "bytes",
+    let too_large = |bytes: u64| {
+        let claimed = format!("at least {bytes} bytes");
+        ShapeError::too_large(path, &claimed, limits.file_bytes, "bytes")
     };
     if claimed > limits.file_bytes {
         return Err(too_large(claimed));
@@ -134,12 +142,8 @@ pub(crate) fn read_bytes(path: &Path, limits: &ReadLimits) -> Result<(Vec<u8>, S
     if bytes.len() as u64 > limits.file_bytes {
         return Err(too_large(bytes.len() as u64));
     }
-    let name = path
-        .file_name()
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default();
-    let sha256 = hex(&Sha256::digest(&bytes));
-    Ok((bytes, SourceFile { name, sha256 }))
+    let source = SourceFile::new(path, Sha256::new_with_prefix(&bytes));
+    Ok((bytes, source))
 }
 
 /// Returns the lower-case extension of a file name.
@@ -159,8 +163,8 @@ mod tests {
 
     #[test]
     fn a_volume_has_to_fit_into_the_memory_there_is() {
-        let told = "MemTotal:       24000000 kB\nMemAvailable:    4000000 kB\nSwapFree: 0 kB\n";
-        assert_eq!(mem_available(told), Some(4_096_000_000));
+        let message = "MemTotal:       24000000 kB\nMemAvailable:    4000000 kB\nSwapFree: 0 kB\n";
+        assert_eq!(mem_available(message), Some(4_096_000_000));
         assert_eq!(mem_available("MemTotal: 24000000 kB\n"), None);
         assert_eq!(mem_available("MemAvailable: many kB\n"), None);
         let path = Path::new("a.npy");
@@ -173,9 +177,9 @@ mod tests {
         assert!(read(None, 813).is_err());
         // 400^3 voxels need 1.28 GB.
         assert_eq!(read(Some(1_280_000_000), 400), Ok(64_000_000));
-        let said = read(Some(1_279_999_999), 400).unwrap_err();
+        let message = read(Some(1_279_999_999), 400).unwrap_err();
         for word in ["a.npy", "400 x 400 x 400", "1280 MB", "1279 MB", "crop"] {
-            assert!(said.contains(word), "`{word}` is missing in: {said}");
+            assert!(message.contains(word), "`{word}` is missing in: {message}");
         }
         // Ample memory: the range of the indices is the limit.
         assert!(read(Some(1 << 40), 1290).is_ok());

@@ -1,7 +1,7 @@
 //! Volume, centroid and second moments of a mesh (exact) and of a sampled field (sub-cell).
 
 use crate::field::SampledField;
-use crate::mesh::TriangleMesh;
+use crate::triangles::TriangleMesh;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -223,31 +223,10 @@ mod tests {
     fn a_block_mesh_has_the_textbook_moments() {
         let size = DVec3::new(3.0, 2.0, 1.0);
         let place = DVec3::new(10.0, -4.0, 7.0);
-        let vertices = (0..8)
-            .map(|c| {
-                DVec3::new(
-                    f64::from(c & 1),
-                    f64::from(c >> 1 & 1),
-                    f64::from(c >> 2 & 1),
-                )
-            })
-            .map(|v| place + v * size)
-            .collect();
-        let quads: [[u32; 4]; 6] = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
-        let mesh = TriangleMesh {
-            vertices,
-            triangles: triangles.collect(),
-        };
+        let mut mesh = crate::triangles::unit_cube();
+        mesh.vertices
+            .iter_mut()
+            .for_each(|v| *v = place + *v * size);
         let mass = of_mesh(&mesh);
         assert!((mass.volume - 6.0).abs() < 1e-12);
         assert!((mass.centroid - (place + 0.5 * size)).length() < 1e-12);

@@ -1,9 +1,8 @@
 //! Morphology of a grain.
 
-use crate::mesh::TriangleMesh;
+use crate::triangles::TriangleMesh;
 use crate::{feret, hull};
 use glam::DVec3;
-use serde::Serialize;
 use std::f64::consts::PI;
 
 /// Morphology, measured on the surface of the shape.
@@ -98,66 +97,6 @@ impl Morphology {
             ..*self
         }
     }
-}
-
-/// Morphology record, printed by `grain info --json`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Record {
-    /// Volume [m^3].
-    pub volume_m3: f64,
-    /// Diameter of the sphere of equal volume [m].
-    pub equivalent_diameter_m: f64,
-    /// Longest extent [m].
-    pub a_m: f64,
-    /// Intermediate extent [m].
-    pub b_m: f64,
-    /// Shortest extent [m].
-    pub c_m: f64,
-    /// Elongation b / a.
-    pub elongation: f64,
-    /// Flatness c / b.
-    pub flatness: f64,
-    /// Feret diameters [m]: the longest, the longest perpendicular to it, the one perpendicular to
-    /// both.
-    pub feret_m: Option<[f64; 3]>,
-    /// Krumbein sphericity (Eq. 38).
-    pub krumbein_sphericity: f64,
-    /// Krumbein sphericity (Eq. 38) from the Feret diameters.
-    pub krumbein_sphericity_feret: Option<f64>,
-    /// Wadell's true sphericity.
-    pub wadell_sphericity: f64,
-    /// Wadell roundness (Eq. 39); null if not measured.
-    pub wadell_roundness: Option<f64>,
-    /// Size of the smallest detail that the roundness resolves [m].
-    pub roundness_cutoff_m: Option<f64>,
-    /// Radius of the largest inscribed sphere [m].
-    pub inscribed_radius_m: Option<f64>,
-    /// Volume divided by that of the convex hull; null if not measured.
-    pub convexity: Option<f64>,
-    /// Surface area [m^2].
-    pub surface_area_m2: f64,
-    /// Principal second moments per unit density [m^5].
-    pub inertia_m5: [f64; 3],
-    /// Radius of the smallest sphere about the centroid that contains the grain [m].
-    pub bounding_radius_m: f64,
-    /// Number of surface nodes.
-    pub surface_nodes: usize,
-    /// Samples of the distance field along x, y and z; null for an exact sphere.
-    pub field_samples: Option<[usize; 3]>,
-    /// Spacing of the samples [m]; null for an exact sphere.
-    pub field_spacing_m: Option<f64>,
-    /// 0.9 quantile of | |grad phi| - 1 | at the surface; null for an exact sphere.
-    pub gradient_error: Option<f64>,
-    /// Relative difference of the volume from that of the source; null without a source volume.
-    pub volume_error: Option<f64>,
-    /// Origin of the shape: `analytic`, `mesh` or `scan`.
-    pub method: String,
-    /// Source file.
-    pub source: String,
-    /// SHA-256 of the source file.
-    pub source_sha256: String,
-    /// Hash of the geometry.
-    pub digest: String,
 }
 
 /// Returns the area of the sphere of this volume [m^3] divided by this area [m^2].

@@ -5,10 +5,27 @@
 //! samples, then back onto the surface) even them out. The area of a node is that of its samples.
 
 use crate::field::SampledField;
-use crate::mesh::TriangleMesh;
-use crate::shape::SurfaceNode;
+use crate::triangles::TriangleMesh;
 use glam::DVec3;
 use rayon::prelude::*;
+
+/// A surface point with the area that it represents.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceNode {
+    /// Position in the principal frame [m].
+    pub position: DVec3,
+    /// Area represented by the node [m^2]; the areas add up to the surface area.
+    pub area: f64,
+}
+
+/// Returns the unit vector of height `z` and number `n` on a spiral of golden angles: evenly spread
+/// directions if `z` is.
+pub(crate) fn golden_spiral(n: usize, z: f64) -> DVec3 {
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let (sine, cosine) = (golden * n as f64).sin_cos();
+    let ring = (1.0 - z * z).sqrt();
+    DVec3::new(ring * cosine, ring * sine, z)
+}
 
 /// Approximate number of samples per node.
 const SAMPLES_PER_NODE: f64 = 16.0;
@@ -83,7 +100,7 @@ fn samples(mesh: &TriangleMesh, largest: f64) -> Vec<Sample> {
     let mut samples = Vec::new();
     for face in 0..mesh.triangles.len() {
         let corners = mesh.corners(face);
-        let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let cross = mesh.twice_area(face);
         let normal = cross.normalize_or_zero();
         let area = 0.5 * cross.length();
         let levels = if area > largest {
@@ -99,14 +116,10 @@ fn samples(mesh: &TriangleMesh, largest: f64) -> Vec<Sample> {
         };
         for i in 0..n {
             for j in 0..n - i {
-                samples.push(Sample {
-                    position: at(i, j, 1.0 / 3.0),
-                    normal,
-                    area: share,
-                });
-                if i + j + 1 < n {
+                let inner = (i + j + 1 < n).then_some(2.0 / 3.0);
+                for third in [1.0 / 3.0].into_iter().chain(inner) {
                     samples.push(Sample {
-                        position: at(i, j, 2.0 / 3.0),
+                        position: at(i, j, third),
                         normal,
                         area: share,
                     });
@@ -160,6 +173,8 @@ fn discs(samples: &[Sample], order: &[u32], bounds: (DVec3, DVec3), radius: f64)
 /// Returns 0..n in an arbitrary but fixed order.
 fn shuffled(n: usize) -> Vec<u32> {
     let mut order: Vec<u32> = (0..n as u32).collect();
+    // The linear congruential generator of Knuth's MMIX instead of `random`: the nodes of committed
+    // grains depend on this order.
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     for i in (1..n).rev() {
         state = state
@@ -259,9 +274,9 @@ impl Buckets {
         *head = (self.chain.len() - 1) as u32;
     }
 
-    /// Returns whether `is_so` holds for any item in the bucket of `x` and its 26 neighbours,
+    /// Returns whether `matches` is true for any item in the bucket of `x` and its 26 neighbours,
     /// tested in a fixed order.
-    fn any_around(&self, x: DVec3, mut is_so: impl FnMut(u32) -> bool) -> bool {
+    fn any_around(&self, x: DVec3, mut matches: impl FnMut(u32) -> bool) -> bool {
         let [i, j, k] = self.key(x);
         for k in k - 1..=k + 1 {
             for j in j - 1..=j + 1 {
@@ -270,7 +285,7 @@ impl Buckets {
                     let mut at = *head;
                     while at != NONE {
                         let (item, next) = self.chain[at as usize];
-                        if is_so(item) {
+                        if matches(item) {
                             return true;
                         }
                         at = next;

@@ -2,7 +2,7 @@
 
 use crate::error::{Result, ShapeError};
 use crate::field::SampledField;
-use crate::shape::SurfaceNode;
+use crate::nodes::SurfaceNode;
 use glam::{DMat3, DVec3};
 
 /// Measured quality of a sampled shape.
@@ -35,27 +35,21 @@ impl Default for QualityBounds {
 
 impl QualityBounds {
     pub(crate) fn check(&self, quality: &Quality) -> Result<()> {
-        let refuse = |what: &str, value: f64, bound: f64| {
-            Err(ShapeError::Quality {
-                reason: format!(
-                    "{what} is {value:.4}, allowed is {bound}; \
-                     ask for more cells across the grain, or smooth the source"
-                ),
-            })
-        };
-        let within = |value: f64, bound: f64| value.is_finite() && value <= bound;
-        if !within(quality.gradient_error, self.gradient_error) {
-            let what = "the 0.9 quantile of | |grad phi| - 1 | at the surface";
-            return refuse(what, quality.gradient_error, self.gradient_error);
+        let gradient = "the 0.9 quantile of | |grad phi| - 1 | at the surface";
+        let volume = "the relative difference of volume from the source";
+        let measured = [
+            (gradient, Some(quality.gradient_error), self.gradient_error),
+            (volume, quality.volume_error, self.volume_error),
+        ];
+        for (what, value, bound) in measured {
+            if let Some(value) = value.filter(|v| v.is_nan() || v.abs() > bound) {
+                return Err(ShapeError::quality(format!(
+                    "{what} is {value:.4}, the bound is {bound}; ask for more cells across the \
+                     grain, or smooth the source"
+                )));
+            }
         }
-        match quality.volume_error {
-            Some(error) if !within(error.abs(), self.volume_error) => refuse(
-                "the relative difference of volume from the source",
-                error,
-                self.volume_error,
-            ),
-            _ => Ok(()),
-        }
+        Ok(())
     }
 }
 
@@ -93,10 +87,8 @@ pub(crate) fn check_axes(second: &DMat3) -> Result<()> {
     if share < 5e-3 {
         return Ok(());
     }
-    Err(ShapeError::Quality {
-        reason: format!(
-            "the products of inertia of the sampled body are {share:.4} of its largest moment; \
-             ask for more cells across the grain"
-        ),
-    })
+    Err(ShapeError::quality(format!(
+        "the products of inertia of the sampled body are {share:.4} of its largest moment; ask for \
+         more cells across the grain"
+    )))
 }

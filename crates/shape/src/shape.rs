@@ -2,21 +2,13 @@
 
 use crate::error::{Result, positive};
 use crate::field::SampledField;
-use crate::mesh::cube_sphere;
-use crate::morphology::{Morphology, Record};
+use crate::morphology::Morphology;
+use crate::nodes::SurfaceNode;
 use crate::provenance::Provenance;
 use crate::quality::Quality;
-use crate::{assemble, grain_file, roundness};
+use crate::surface;
+use crate::triangles::cube_sphere;
 use glam::DVec3;
-
-/// A surface point with the area that it represents.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfaceNode {
-    /// Position in the principal frame [m].
-    pub position: DVec3,
-    /// Area represented by the node [m^2]; the areas add up to the surface area.
-    pub area: f64,
-}
 
 /// Representation of the distance.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,45 +36,6 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Builds a sphere of `radius` [m] with about `nodes` evenly spread surface nodes and exact
-    /// distances. [`analytic::sphere`](crate::analytic::sphere) checks its arguments.
-    pub fn sphere(radius: f64, nodes: usize) -> Shape {
-        let volume = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
-        let area = 4.0 * std::f64::consts::PI * radius * radius;
-        let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-        let share = area / nodes as f64;
-        let provenance = Provenance::new("analytic")
-            .with("body", "sphere")
-            .with("radius_m", radius);
-        let nodes = (0..nodes)
-            .map(|i| {
-                let z = 1.0 - (2.0 * i as f64 + 1.0) / nodes as f64;
-                let rho = (1.0 - z * z).sqrt();
-                let (s, c) = (golden * i as f64).sin_cos();
-                SurfaceNode {
-                    position: radius * DVec3::new(rho * c, rho * s, z),
-                    area: share,
-                }
-            })
-            .collect();
-        let mut morphology = Morphology::new(DVec3::splat(2.0 * radius), area, volume, Some(1.0));
-        morphology.wadell_roundness = Some(1.0);
-        morphology.inscribed_radius = Some(radius);
-        morphology.feret = Some([2.0 * radius; 3]);
-        Shape {
-            field: Field::Sphere(radius),
-            nodes,
-            volume,
-            inertia: DVec3::splat(0.4 * volume * radius * radius),
-            lower: DVec3::splat(-radius),
-            upper: DVec3::splat(radius),
-            bounding_radius: radius,
-            morphology,
-            quality: None,
-            provenance,
-        }
-    }
-
     /// Returns the signed distance [m] at `x` (principal frame), negative inside.
     #[inline]
     pub fn distance(&self, x: DVec3) -> f64 {
@@ -190,7 +143,7 @@ impl Shape {
     pub fn surface_mesh(&self) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         let mesh = match &self.field {
             Field::Sphere(radius) => cube_sphere(24, |u| *radius * u),
-            Field::Sampled(field) => assemble::surface_of(field),
+            Field::Sampled(field) => surface::of_field(field),
         };
         (mesh.vertices, mesh.triangles)
     }
@@ -226,51 +179,5 @@ impl Shape {
     pub fn scaled_to_equivalent_diameter(&self, diameter: f64) -> Result<Shape> {
         positive("equivalent diameter", diameter)?;
         self.scaled(diameter / self.equivalent_diameter())
-    }
-
-    /// Returns the hash of the geometry (field, nodes, mass properties) in hexadecimal: equal for
-    /// equal shapes, independent of their provenance.
-    pub fn digest(&self) -> String {
-        grain_file::digest(self)
-    }
-
-    /// Returns the morphology record printed by the command line.
-    pub fn record(&self) -> Record {
-        let m = &self.morphology;
-        let field = match &self.field {
-            Field::Sphere(_) => None,
-            Field::Sampled(field) => Some(field),
-        };
-        Record {
-            volume_m3: self.volume,
-            equivalent_diameter_m: self.equivalent_diameter(),
-            a_m: m.a,
-            b_m: m.b,
-            c_m: m.c,
-            elongation: m.elongation(),
-            flatness: m.flatness(),
-            feret_m: m.feret,
-            krumbein_sphericity_feret: m.feret.map(|[l, w, t]| (w * t / (l * l)).cbrt()),
-            krumbein_sphericity: m.krumbein_sphericity,
-            wadell_sphericity: m.wadell_sphericity,
-            wadell_roundness: m.wadell_roundness,
-            roundness_cutoff_m: m
-                .inscribed_radius
-                .map(|r| roundness::cutoff(&self.provenance.method) * r),
-            inscribed_radius_m: m.inscribed_radius,
-            convexity: m.convexity,
-            surface_area_m2: m.area,
-            inertia_m5: self.inertia.to_array(),
-            bounding_radius_m: self.bounding_radius,
-            surface_nodes: self.nodes.len(),
-            field_samples: field.map(SampledField::dims),
-            field_spacing_m: field.map(SampledField::spacing),
-            gradient_error: self.quality.map(|q| q.gradient_error),
-            volume_error: self.quality.and_then(|q| q.volume_error),
-            method: self.provenance.method.clone(),
-            source: self.provenance.source.clone(),
-            source_sha256: self.provenance.source_sha256.clone(),
-            digest: self.digest(),
-        }
     }
 }

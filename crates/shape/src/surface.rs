@@ -4,7 +4,8 @@
 //! face are always separated; this rule depends on the face only, so that adjacent cells agree and
 //! the surface is a closed manifold if the border of the grid is outside.
 
-use crate::mesh::TriangleMesh;
+use crate::field::SampledField;
+use crate::triangles::TriangleMesh;
 use glam::DVec3;
 use std::sync::LazyLock;
 
@@ -18,7 +19,7 @@ pub(crate) struct Samples<'a> {
 
 /// Corner indices of the six faces, counter-clockwise seen from outside the cell; bits 0, 1 and 2
 /// of a corner are its x, y and z.
-const FACES: [[u8; 4]; 6] = [
+pub(crate) const FACES: [[u8; 4]; 6] = [
     [0, 4, 6, 2],
     [1, 3, 7, 5],
     [0, 1, 5, 4],
@@ -199,9 +200,21 @@ fn fill(mesh: &mut TriangleMesh, polygon: &[u32]) {
     }
 }
 
+/// Extracts the closed surface of a field.
+pub(crate) fn of_field(field: &SampledField) -> TriangleMesh {
+    extract(&Samples {
+        dims: field.dims(),
+        lower: field.lower(),
+        spacing: field.spacing(),
+        values: field.levels(),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
+    use rand::{RngExt, SeedableRng};
 
     fn ball(n: usize) -> (Vec<f32>, f64) {
         let spacing = 2.5 / (n - 1) as f64;
@@ -239,15 +252,12 @@ mod tests {
     #[test]
     fn noise_gives_a_closed_manifold() {
         let n = 14;
-        let mut state = 1u64;
+        let mut random = Random::seed_from_u64(1);
         let mut values = vec![1.0f32; n * n * n];
         for k in 1..n - 1 {
             for j in 1..n - 1 {
                 for i in 1..n - 1 {
-                    state = state
-                        .wrapping_mul(6364136223846793005)
-                        .wrapping_add(1442695040888963407);
-                    values[i + n * (j + n * k)] = (state >> 40) as f32 / (1 << 23) as f32 - 1.0;
+                    values[i + n * (j + n * k)] = random.random_range(-1.0..1.0);
                 }
             }
         }

@@ -1,10 +1,10 @@
-//! The grain files that the cases use: they load, and are what their sources give.
+//! Grain files of the cases: they load and agree with shapes built from their sources.
 
 mod common;
 
 use common::{close, shared};
 use grainwake_shape::mesh::{MeshOptions, read_mesh, shape_from_mesh};
-use grainwake_shape::scan::{Denoise, ScanOptions, Threshold, read_volume, shapes_from_volume};
+use grainwake_shape::scan::{ScanOptions, Threshold, read_volume, shapes_from_volume};
 use grainwake_shape::{ReadLimits, Shape, ShapeError};
 use std::path::{Path, PathBuf};
 
@@ -52,7 +52,8 @@ fn the_aggregate_is_what_its_mesh_gives() {
     assert_eq!(file.nodes().len(), made.nodes().len());
 }
 
-/// `cases/scan-pair`: of a volume with five grains that touch two are whole, and are the files kept.
+/// Two of the five grains in the volume of `cases/scan-pair` are complete and equal the committed
+/// files.
 #[test]
 fn the_pair_of_the_scan_is_what_its_volume_gives() {
     let volume = kept("../scan-pair/powder-crop.tif");
@@ -60,7 +61,7 @@ fn the_pair_of_the_scan_is_what_its_volume_gives() {
     let (volume, source) = read_volume(&volume, &ReadLimits::default()).unwrap();
     let options = ScanOptions {
         threshold: Some(Threshold::Otsu),
-        denoise: Denoise::Median,
+        median: true,
         separate: Some(0.87),
         ..ScanOptions::new(2e-6)
     };

@@ -1,10 +1,10 @@
-//! Generated grains: what was asked for is what is measured; the kept set of the study.
+//! Generated grains: the measures agree with the targets; the committed grains of the study.
 
 mod common;
 
 use common::close;
-use glam::{DQuat, DVec3};
-use grainwake_shape::family::{FamilyTarget, family_grain, family_options, study_orientation};
+use glam::{DMat3, DQuat, DVec3};
+use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
 use grainwake_shape::{Shape, ShapeOptions};
 use std::f64::consts::FRAC_PI_4;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ fn parameter(shape: &Shape, name: &str) -> f64 {
     found.unwrap().1.parse().unwrap()
 }
 
-/// Area of the shadow of a convex grain: half the sum of its faces' projections.
+/// Projected area of a convex grain: half the sum of its faces' projections.
 fn shadow(shape: &Shape, body_direction: DVec3) -> f64 {
     let (vertices, triangles) = shape.surface_mesh();
     let corner = |v: u32| vertices[v as usize];
@@ -130,7 +130,7 @@ fn targets_at_the_edge_of_the_chart_are_met_or_refused() {
         let target = FamilyTarget::new(sphericity, roundness, 1e-3);
         assert!(family_grain(&target, 1, &family_options()).is_err());
     }
-    // The cube of the sphericity is .857.
+    // The cube of the sphericity is 0.857.
     let mut target = FamilyTarget::new(0.95, 0.5, 1e-3);
     assert!(target.flatness > 0.857);
     target.flatness = 0.8;
@@ -140,7 +140,18 @@ fn targets_at_the_edge_of_the_chart_are_met_or_refused() {
     assert!(family_grain(&target, 1, &family_options()).is_err());
 }
 
-/// Orientation 1 stands on its end, orientation 3 lies on its broad side, 2 and 4 lean between.
+/// Initial orientation `number` (1 to 4) of the morphology study: body to space, z up.
+///
+/// Number 1 has the long axis along z and the short axis along x. The others follow by rotations of
+/// 45 degrees about y: number 3 has the long axis along x and the broad side, seen along the short
+/// axis, normal to z (Fig. 5 of the paper).
+fn study_orientation(number: u32) -> DQuat {
+    let upright = DMat3::from_cols(DVec3::Z, DVec3::NEG_Y, DVec3::X);
+    let angle = f64::from(number.saturating_sub(1)) * FRAC_PI_4;
+    DQuat::from_rotation_y(angle) * DQuat::from_mat3(&upright)
+}
+
+/// Orientation 1 is upright, orientation 3 lies on its broad side, 2 and 4 are in between.
 #[test]
 fn the_four_orientations_show_the_areas_they_should() {
     for number in 1..=4 {

@@ -25,7 +25,7 @@ fn limits() -> ReadLimits {
 /// Data beside a detached header.
 const RAW: [u8; 60] = [7; 60];
 
-/// Hands the bytes to the reader of this extension: `slices` is the second of three in a folder.
+/// Passes the bytes to the reader of this extension: `slices` is the second of three in a folder.
 fn open(extension: &str, bytes: &[u8]) -> bool {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(format!("a.{extension}"));

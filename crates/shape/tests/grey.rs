@@ -1,4 +1,4 @@
-//! Surfaces from grey values: finer than the voxels; from the mask beside them.
+//! Accuracy of surfaces from grey values, compared with surfaces from a mask.
 
 mod common;
 #[path = "common/render.rs"]
@@ -10,7 +10,7 @@ use grainwake_shape::{Shape, ShapeOptions, SourceFile};
 use render::{blurred, greys, shares};
 use std::f64::consts::PI;
 
-/// How far a shape is from the body that was rendered.
+/// Errors of a shape relative to the rendered body.
 #[derive(Debug)]
 struct Errors {
     /// Relative.
@@ -125,9 +125,8 @@ fn the_blur_need_not_be_known() {
     }
 }
 
-/// Position of the surface over the diameter, against voxels per diameter: from grey values the error
-/// of the position falls with the voxels until noise is all that is left, from a mask it stays the
-/// same share of a voxel.
+/// Convergence of the surface position with the voxels per diameter. From grey values the relative
+/// error decreases until noise dominates; from a mask it stays a constant fraction of a voxel.
 #[test]
 fn the_surface_converges_with_the_voxels() {
     let places = [

@@ -6,7 +6,7 @@ mod render;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::family::{FamilyTarget, family_grain};
-use grainwake_shape::scan::{Denoise, ScanOptions, Threshold, Volume, Voxels, scan_volume};
+use grainwake_shape::scan::{ScanOptions, Threshold, Volume, Voxels, scan_volume};
 use grainwake_shape::{Shape, ShapeOptions, SourceFile};
 use render::{Noise, Placed, blurred, greys, shares};
 use std::collections::HashMap;
@@ -58,7 +58,7 @@ fn overlap(a: &Placed, b: &Placed, depth: f64) -> bool {
     reaches(a, b) || reaches(b, a)
 }
 
-/// Grains let down one by one, each at the lowest of several places, until it touches.
+/// Places grains one by one, each lowered until it touches at the lowest of several positions.
 fn heap(shapes: &[Shape], count: usize, width: f64, diameter: f64, seed: u64) -> Vec<Placed<'_>> {
     let mut random = Noise::new(seed);
     let mut placed: Vec<Placed> = Vec::new();
@@ -108,7 +108,7 @@ fn heap(shapes: &[Shape], count: usize, width: f64, diameter: f64, seed: u64) ->
     placed
 }
 
-/// The grain after small moves and turns at random, of which those that lower it are kept.
+/// Lowers a grain by random displacements and rotations.
 fn settled<'a>(
     mut grain: Placed<'a>,
     placed: &[Placed<'a>],
@@ -157,7 +157,8 @@ fn other_heaps_and_more_noise() {
     }
 }
 
-/// Of 200 grains in the heap `seed`, those found one to one, and the mean error of their volume.
+/// Returns how many of 200 grains in the heap `seed` are identified one to one, and the mean
+/// relative error of their volume.
 fn separated(seed: u64, noise: f64) -> (usize, f64) {
     let started = std::time::Instant::now();
     let shapes = grains();
@@ -187,7 +188,7 @@ fn separated(seed: u64, noise: f64) -> (usize, f64) {
     let volume = Volume::from_labels(dims, image).unwrap();
     let options = ScanOptions {
         threshold: Some(Threshold::Otsu),
-        denoise: Denoise::Median,
+        median: true,
         separate: Some(0.87),
         shape: ShapeOptions {
             cells: 16,

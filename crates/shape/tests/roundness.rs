@@ -10,7 +10,7 @@ use bodies::{Body, Scan};
 use grainwake_shape::ShapeOptions;
 use rayon::prelude::*;
 
-/// Noise of the scans, as a share of the contrast.
+/// Noise of the scans relative to the contrast.
 const NOISE: f64 = 0.05;
 
 #[test]
@@ -27,7 +27,7 @@ fn noise_makes_no_corners_on_a_scanned_sphere() {
     assert!(found > 0.95, "{found}");
 }
 
-/// As near the closed forms as is asked of exact bodies, and no nearer with twice the voxels.
+/// The roundness lies within the bounds of exact bodies at both resolutions.
 #[test]
 fn scanned_bodies_have_the_roundness_of_their_edges() {
     let names = [
@@ -50,8 +50,8 @@ fn scanned_bodies_have_the_roundness_of_their_edges() {
     assert!(missed.is_empty(), "{missed:?}");
 }
 
-/// Blur and smoothing round sharp edges and take 3 percent off the area of a box of 40 voxels, which
-/// the model of the edge gives back.
+/// Blur and smoothing round sharp edges, which reduces the area of a box of 40 voxels by 3 percent;
+/// the edge model restores it.
 #[test]
 fn scanned_bodies_have_their_area_though_blur_rounds_their_edges() {
     for (name, bound) in [("box", 0.018), ("box.1", 0.006), ("spheroid", 0.003)] {
@@ -65,7 +65,7 @@ fn scanned_bodies_have_their_area_though_blur_rounds_their_edges() {
     }
 }
 
-/// Edges that do not turn by right angles, of which the rule knows nothing beforehand.
+/// Edges that do not turn by right angles.
 #[test]
 fn sharp_edges_of_any_angle_are_sharp() {
     for name in ["octahedron", "tetrahedron", "prism"] {

@@ -1,4 +1,4 @@
-//! Shapes from voxels: accuracy against the bodies that were voxelised, and refusals.
+//! Shapes from voxels: accuracy relative to the voxelised bodies, and errors.
 
 mod common;
 
@@ -42,9 +42,9 @@ fn only(volume: &Volume, options: &ScanOptions) -> Result<Shape, ShapeError> {
     grains.remove(0).shape
 }
 
-/// Several placements of a body, none symmetric about a voxel (then whole shells of voxels enter
-/// the mask at once and the mask itself misses the volume by up to 3 %), checked against its closed form: volume within 0.5 %, inertia
-/// within 1 %, distances within half a voxel, normals within 0.12 rad (rms).
+/// Compares several placements of a body with its closed form: volume within 0.5 %, inertia within
+/// 1 %, distances within half a voxel, normals within 0.12 rad (rms). No placement is symmetric
+/// about a voxel, where the mask itself misses the volume by up to 3 %.
 fn check_ellipsoid(axes: DVec3) {
     for i in 1..=3 {
         let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);

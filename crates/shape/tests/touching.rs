@@ -4,7 +4,7 @@
 mod render;
 
 use glam::DVec3;
-use grainwake_shape::scan::{Denoise, ScanOptions, Threshold, Volume, shapes_from_volume};
+use grainwake_shape::scan::{ScanOptions, Threshold, Volume, shapes_from_volume};
 use grainwake_shape::{ShapeOptions, SourceFile};
 use render::{blurred, greys, shares};
 
@@ -19,7 +19,7 @@ fn measured(
     let volume = Volume::from_labels(dims, image).unwrap();
     let options = ScanOptions {
         threshold: Some(Threshold::Otsu),
-        denoise: Denoise::Median,
+        median: true,
         separate: Some(0.87),
         shape: ShapeOptions {
             cells: 24,

@@ -79,8 +79,8 @@ fn check<V: Vector>() {
     );
     V::load(&signed).floor().store(&mut floors);
     V::load(&signed).abs().sqrt().store(&mut roots);
-    let entry = |n: usize| 100 * (n * n) as i32 % 65536 - 32768;
-    let table: Vec<i16> = (0..40).map(|n| entry(n) as i16).collect();
+    let entry = |n: usize| 100.5 * (n * n) as f32 - 32768.0;
+    let table: Vec<f32> = (0..40).map(entry).collect();
     let places: [V::Number; MAX_LANES] = std::array::from_fn(|i| number((7 * i % 39) as f64));
     let mut pairs = [[V::Number::default(); MAX_LANES]; 2];
     for (lanes, found) in pairs

@@ -188,7 +188,7 @@ pub trait Vector:
     }
     /// Entries `at` and `at + 1` of `from` for each lane; the lanes of `at` are whole numbers.
     #[inline(always)]
-    fn gather_pairs(from: &[i16], at: Self) -> [Self; 2] {
+    fn gather_pairs(from: &[f32], at: Self) -> [Self; 2] {
         let mut lanes = [[Self::Number::default(); MAX_LANES]; 2];
         at.store(&mut lanes[0]);
         for n in 0..Self::WIDTH {

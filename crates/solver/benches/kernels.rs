@@ -7,7 +7,7 @@ use std::sync::Arc;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain};
+use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, Material};
 use grainwake_solver::math::{Load, Pose};
 
 const DIAMETER: f64 = 2e-3;
@@ -70,6 +70,7 @@ fn heap() -> (Dynamics, Vec<Grain>) {
         grains.push(Grain {
             shape: shape.clone(),
             density: 2500.0,
+            material: Material::default(),
             pose: Pose {
                 position: (cell + 0.5) * APART * DIAMETER,
                 orientation: DQuat::from_scaled_axis(3.0 * u),

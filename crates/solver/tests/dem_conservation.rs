@@ -1,5 +1,5 @@
-//! What contact must keep: Newton's third law, momentum, angular momentum, energy, and the same
-//! result whether a pair meets in the interior or across a periodic face.
+//! Conservation in contact: Newton's third law, momentum, angular momentum, energy; invariance of a
+//! contact across a periodic face.
 
 mod dem_support;
 
@@ -96,7 +96,7 @@ fn both_bodies_get_opposite_loads_to_round_off() {
         let force = mean[0].force + mean[1].force;
         assert!(mean[0].force.length() > 0.0);
         assert!(force.length() <= 1e-15 * mean[0].force.length(), "{force}");
-        // About the origin, with the arms of the middle of the step.
+        // About the origin, with the lever arms at the middle of the step.
         let arm = |i: usize| 0.5 * (at[i] + grains[i].pose.position);
         let moment = mean[0].torque
             + arm(0).cross(mean[0].force)
@@ -105,7 +105,7 @@ fn both_bodies_get_opposite_loads_to_round_off() {
         let scale = mean[0].torque.length() + arm(0).length() * mean[0].force.length();
         assert!(moment.length() <= 1e-8 * scale, "{moment}");
     }
-    // At one instant: the reported load of the pair against its mean at a vanishing step.
+    // The reported load of the pair equals its mean over a vanishing step.
     let mut mean = [Load::default(); 2];
     dynamics.advance(&mut grains, &[], 1e-14, &mut mean);
     let about = |i: usize| mean[i].torque + grains[i].pose.position.cross(mean[i].force);
@@ -194,7 +194,8 @@ fn contact_across_a_periodic_face_equals_contact_in_the_interior() {
 
 #[test]
 fn a_grain_that_fills_a_periodic_box_presses_on_its_own_image() {
-    // Radius .5 in a box .98 wide: overlap .02 along x with itself, none along y and z.
+    // Radius 0.5 in a box of width 0.98: overlap 0.02 along x with its own image, none along y and
+    // z.
     let enclosure = periodic(DVec3::new(0.98, 3.0, 3.0));
     let mut grains = [sphere(0.5, 1000.0, 500, DVec3::new(0.1, 0.2, 0.3))];
     let mut dynamics = Dynamics::new(smooth(1e5), enclosure);
@@ -206,14 +207,14 @@ fn a_grain_that_fills_a_periodic_box_presses_on_its_own_image() {
     assert_eq!((contact.grain, contact.partner), (0, Partner::Grain(0)));
     assert!((contact.overlap - 0.02).abs() < 1e-4 * 0.02);
     assert!((contact.load.force.length() / (1e5 * 0.02) - 1.0).abs() < 1e-3);
-    // It pushes itself from both sides: nothing is left.
+    // The forces of the two images cancel.
     assert!(mean[0].force.length() < 1e-12 * contact.load.force.length());
     assert!(grains[0].velocity.length() < 1e-15);
 }
 
 #[test]
 fn pairs_touch_through_several_images() {
-    // Two spheres that alternate along x with period 1: each touches the other on both sides.
+    // Two spheres alternate along x with period 1, so each touches the other on both sides.
     let enclosure = periodic(DVec3::new(1.0, 3.0, 3.0));
     let mut grains = [
         sphere(0.26, 1000.0, 500, DVec3::new(0.0, 1.0, 1.0)),
@@ -273,7 +274,7 @@ fn a_step_without_any_partner_takes_one_sub_step() {
     let mut dynamics = Dynamics::new(smooth(1e6), open_box(10.0));
     assert_eq!(step(&mut dynamics, &mut grains, DVec3::ZERO, 0.1), 1);
     grains[0].velocity.x = 7.0;
-    // .7 of the way in this step: bounding spheres stay apart by .1.
+    // The grains travel 0.7 of the distance in this step; the bounding spheres keep a gap of 0.1.
     assert_eq!(step(&mut dynamics, &mut grains, DVec3::ZERO, 0.1), 1);
     assert!(step(&mut dynamics, &mut grains, DVec3::ZERO, 0.1) > 10);
     assert!(grains[1].velocity.x > 6.9, "{}", grains[1].velocity);
@@ -299,7 +300,7 @@ fn bad_input_does_not_panic() {
             }
         }
     }
-    // Two grains at one place have no direction to part in, and must not make one up from 0/0.
+    // Two grains at one position have no contact normal; 0/0 must not produce one.
     let mut same = [
         sphere(0.1, 1000.0, 100, DVec3::ZERO),
         sphere(0.1, 1000.0, 100, DVec3::ZERO),

@@ -11,7 +11,8 @@ fn dem04_slip_becomes_rolling_at_two_sevenths() {
     let (radius, g, v0) = (5e-4, 9.80665, 0.1);
     for friction in [0.2, 0.5, 1.0] {
         let mut grain = sphere(radius, 2000.0, 4000, DVec3::ZERO);
-        // Stiff: the spring that is left loaded when slip ends rings with a speed mu g / w0.
+        // A stiff spring: the tangential spring is loaded when sliding ends and oscillates with a
+        // speed mu g / w0.
         let k = 1e4;
         // At rest on the floor: the overlap carries the weight.
         grain.pose.position.z = radius - grain.mass() * g / k;
@@ -30,7 +31,7 @@ fn dem04_slip_becomes_rolling_at_two_sevenths() {
         for _ in 0..600 {
             step(&mut dynamics, &mut grains, DVec3::new(0.0, 0.0, -g), dt);
             time += dt;
-            // Tangential force under the cone: no more slip.
+            // Tangential force below Coulomb's bound: no sliding.
             let slip = grains[0].velocity.x - grains[0].angular_velocity.y * radius;
             if rolling.is_none() && slip < 1e-3 * v0 {
                 rolling = Some(time);
@@ -131,11 +132,11 @@ fn dem05_agrees_with_the_experiment_as_far_as_a_linear_spring_can() {
             "{angle}: {rebound} v {expected}"
         );
     }
-    // Restitution of the tangential velocity and spin where the impact slides throughout.
+    // Restitution of the tangential velocity, and spin, of an impact that slides throughout.
     for (angle, restitution, spin) in [(49.6, 0.8469, 452.9444), (59.9, 0.9019, 381.3185)] {
         let (_, e_t, omega) = kharaz(angle);
         println!(
-            "Kharaz {angle}: e_t {e_t:.4} (measured {restitution}), omega {omega:.1} (measured {spin})"
+            "{angle}: e_t {e_t:.4} (experiment {restitution}), omega {omega:.1} (experiment {spin})"
         );
         assert!((e_t - restitution).abs() < 0.02, "{angle}: {e_t}");
         assert!((omega / spin - 1.0).abs() < 0.2, "{angle}: {omega}");
@@ -167,7 +168,7 @@ fn gross_sliding_takes_mu_one_plus_e_of_the_normal_velocity() {
     );
 }
 
-/// Mean acceleration down a plane of 30 degrees, gravity turned instead of the plane.
+/// Mean acceleration down a plane of 30 degrees; gravity is inclined instead of the plane.
 fn slide(friction: f64, may_turn: bool) -> f64 {
     let (radius, g, k) = (0.01, 9.81, 1e4);
     let (s, c) = 30f64.to_radians().sin_cos();
@@ -197,7 +198,7 @@ fn slide(friction: f64, may_turn: bool) -> f64 {
 
 #[test]
 fn block_on_an_incline_slides_or_rests() {
-    // A sphere that may not turn is a block with one point of support.
+    // A sphere that cannot rotate acts as a block with one contact point.
     let a = slide(0.3, false);
     assert!((a - 2.35629).abs() < 1e-3 * 2.35629, "{a}");
     let rest = slide(0.6, false);
@@ -206,7 +207,7 @@ fn block_on_an_incline_slides_or_rests() {
 
 #[test]
 fn sphere_rolls_down_an_incline_at_five_sevenths() {
-    // mu above 2/7 tan(30 deg) = .16496 rolls, below slides.
+    // The sphere rolls for mu above 2/7 tan(30 deg) = 0.16496, and slides below.
     for friction in [0.2, 0.5] {
         let a = slide(friction, true);
         println!("rolling, mu {friction}: {a:.5}");

@@ -1,4 +1,4 @@
-//! Surface distances and the input checks made of them.
+//! Gaps between surfaces, initial overlaps and grains outside the box.
 
 mod dem_support;
 
@@ -79,7 +79,7 @@ fn initial_overlaps_are_found_with_their_depth() {
         (0, Partner::Wall { axis: 2, side: 0 })
     );
     assert!((wall.depth - 0.01).abs() < 1e-9);
-    // Its own image counts too.
+    // The own periodic image counts as a partner.
     let narrow = Enclosure {
         lower: DVec3::ZERO,
         upper: DVec3::splat(0.95),

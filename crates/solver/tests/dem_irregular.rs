@@ -1,4 +1,4 @@
-//! Grains that are no spheres: Newton's third law, momentum, blocks on a plane, nodes.
+//! Contact of grains other than spheres: Newton's third law, momentum, blocks on a plane, nodes.
 
 mod dem_support;
 
@@ -8,7 +8,9 @@ use dem_support::{Random, floor, kinetic, open_box, smooth, step};
 use glam::{DQuat, DVec3};
 use grainwake_shape::mesh::{MeshOptions, TriangleMesh, shape_from_mesh};
 use grainwake_shape::{Shape, ShapeOptions, SourceFile, analytic};
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, surface_gap};
+use grainwake_solver::dem::{
+    ContactParams, Dof, Dynamics, Enclosure, Grain, Material, surface_gap,
+};
 use grainwake_solver::math::{Load, Pose};
 
 /// A rounded box of 40 x 30 x 20 mm with edges rounded to 4 mm.
@@ -56,6 +58,7 @@ fn grain(shape: &Arc<Shape>, position: DVec3, orientation: DQuat) -> Grain {
     Grain {
         shape: shape.clone(),
         density: 2500.0,
+        material: Material::default(),
         pose: Pose {
             position,
             orientation,
@@ -162,7 +165,8 @@ fn colliding_irregular_grains_keep_momentum_and_angular_momentum() {
     );
     assert!(met > 50, "{met}");
     assert!((p - p0).length() <= 1e-14 * scale);
-    // The rotation scheme keeps L of a tumbling body to second order in the step, not to round-off.
+    // The rotation scheme conserves L of a tumbling body to second order in the step, not to
+    // round-off.
     assert!(
         (l - l0).length() <= 1e-5 * spins,
         "{}",
@@ -299,7 +303,7 @@ fn a_dropped_block_comes_to_rest_on_a_face() {
         grains[0].angular_velocity.length()
     );
     assert!(up.abs().max_element() > 0.9999, "{up}");
-    // A thousandth of the speed of impact: a rattle of 3e-4 m/s stays between the corners of the
+    // A thousandth of the impact speed: a vibration of 3e-4 m/s remains between the corners of the
     // sampled field.
     assert!(grains[0].velocity.length() < 7e-4);
     assert!(grains[0].angular_velocity.length() < 0.05);
@@ -307,7 +311,8 @@ fn a_dropped_block_comes_to_rest_on_a_face() {
 
 #[test]
 fn a_spinning_top_on_its_face_is_stopped_by_the_friction_of_its_whole_face() {
-    // Only contact points off the axis can brake the spin: mu m g times a lever of some millimetres.
+    // Only contact points off the axis brake the spin: mu m g times a lever arm of some
+    // millimetres.
     let params = ContactParams {
         normal_stiffness: 2e4,
         restitution: 0.5,
@@ -329,7 +334,7 @@ fn a_spinning_top_on_its_face_is_stopped_by_the_friction_of_its_whole_face() {
         );
         brakes.push((before - grains[0].angular_velocity.z) / 1e-3);
     }
-    // Uniform pressure on the flat of 32 x 22 mm: mean distance from its centre 10.4 mm.
+    // Uniform pressure on the flat face of 32 x 22 mm: mean distance from its centre 10.4 mm.
     let inertia = grains[0].principal_inertia().z;
     let expected = 0.5 * grains[0].mass() * 9.81 * 0.0104 / inertia;
     let mean = brakes[5..].iter().sum::<f64>() / 20.0;
@@ -339,7 +344,7 @@ fn a_spinning_top_on_its_face_is_stopped_by_the_friction_of_its_whole_face() {
 
 #[test]
 fn elastic_irregular_bounces_keep_their_energy_on_average() {
-    // Not to round-off: total force and lever come from different estimates of one patch.
+    // Not to round-off: total force and lever arm are different estimates from one patch.
     let mut random = Random(23);
     let params = ContactParams {
         substeps_per_contact: 50.0,
@@ -415,8 +420,8 @@ fn irregular_contact_across_a_periodic_face_is_the_same() {
 
 #[test]
 fn pairs_that_are_not_looked_at_do_not_miss_a_contact() {
-    // One long step skips pairs known to be apart and starts its search from the last nearest node;
-    // a hundred short ones look at everything anew.
+    // One long step skips pairs with a known separation and starts from the last nearest node; a
+    // hundred short steps search without this information.
     let turn = DQuat::from_scaled_axis(DVec3::new(0.4, -0.2, 0.9));
     let start = {
         let mut a = grain(&PEBBLE, DVec3::ZERO, turn);
@@ -432,8 +437,9 @@ fn pairs_that_are_not_looked_at_do_not_miss_a_contact() {
         friction: 0.3,
         ..Default::default()
     };
-    // A hundredth of the step is just one sub-step.
-    params.substeps_per_contact = 100.0 * params.contact_time(mass) / 1e-2 * 0.9999;
+    // A hundredth of the step is one sub-step.
+    let contact_time = std::f64::consts::PI * (mass / params.normal_stiffness).sqrt();
+    params.substeps_per_contact = 100.0 * contact_time / 1e-2 * 0.9999;
     let run = |steps: u32| {
         let mut grains = start.clone();
         let mut dynamics = Dynamics::new(params, open_box(1.0));

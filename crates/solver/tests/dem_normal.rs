@@ -28,7 +28,8 @@ fn dem01_free_fall_and_damped_contact() {
     let gravity = DVec3::new(0.0, 0.0, -G);
     let dt = 2e-5;
 
-    // Stage 1: free fall. Stage 2: damped oscillator about its sagged rest, until the force vanishes.
+    // Stage 1: free fall. Stage 2: damped oscillator about its equilibrium, until the force
+    // vanishes.
     let mass = grains[0].mass();
     let (zeta, w0) = (params.damping_ratio(), (k / mass).sqrt());
     let (wd, b) = (w0 * (1.0 - zeta * zeta).sqrt(), w0 * zeta);
@@ -83,7 +84,7 @@ fn dem01_free_fall_and_damped_contact() {
 fn dem02_bounce_heights_fall_with_restitution_squared() {
     let gravity = DVec3::new(0.0, 0.0, -G);
     for restitution in [1.0, 0.9, 0.7, 0.5] {
-        // Hard spheres: the overlap that is left when a damped contact lets go costs height.
+        // The hard-sphere height is not reached: a damped contact ends with an overlap.
 
         let params = ContactParams {
             restitution,
@@ -110,7 +111,7 @@ fn dem02_bounce_heights_fall_with_restitution_squared() {
             let expected = 0.4 * restitution.powi(2 * (n as i32 + 1));
             let error = top / expected - 1.0;
             println!("DEM02: e {restitution}, bounce {}: {error:.2e}", n + 1);
-            // The bound grows as the fall gets shorter.
+            // The bound grows as the fall becomes shorter.
             assert!(
                 error.abs() < 2e-3 * (n as f64 + 1.0),
                 "e {restitution}: {top} v {expected}"
@@ -218,7 +219,7 @@ fn head_on_collision_lasts_pi_sqrt_of_mass_over_two_k() {
         deepest = deepest.max(-after);
         if let [contact] = dynamics.contacts() {
             assert_eq!((contact.grain, contact.partner), (0, Partner::Grain(1)));
-            // In the step of the parting the pair is listed with no overlap left.
+            // In the step in which the contact ends, the pair is listed with zero overlap.
             let depth = (-after).max(0.0);
             let error = (contact.overlap - depth).abs();
             assert!(error <= 1e-4 * depth + 1e-14, "{} {after}", contact.overlap);
@@ -290,9 +291,9 @@ fn stiffness_does_not_depend_on_the_number_of_nodes() {
                 assert!(error.abs() < 1e-3, "{name} {nodes} {depth}: {error}");
             }
             assert_eq!(dynamics.contacts().len(), 2);
-            // Impulse over the step is that of a constant force.
+            // The impulse over the step equals that of a constant force.
             assert!((mean[2].force.z / (1000.0 * depth) - 1.0).abs() < 1e-3);
-            // A single sphere leans on the floor without a turning moment worth its radius.
+            // The moment of a single sphere on the floor is small compared with force times radius.
             let lever = mean[2].torque.length() / mean[2].force.length();
             assert!(lever < 1e-3, "{nodes} {depth}: lever {lever}");
         }
@@ -416,10 +417,10 @@ fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
             assert!(f.truncate().length() < 1e-3 * f.z.abs());
         }
     }
-    // No thinner than the asperities, and gone beyond the range.
+    // The film is not thinner than the asperities; the force vanishes beyond the range.
     assert!((force(1e-8, 0.01).z / expected(1e-6, 0.01) - 1.0).abs() < 1e-3);
     assert_eq!(force(1.1e-4, 0.01), DVec3::ZERO);
-    // An overlap is the spring alone.
+    // In contact only the spring acts.
     assert!((force(-1e-5, 0.0).z / (1e3 * 1e-5) - 1.0).abs() < 1e-3);
 }
 
@@ -449,7 +450,7 @@ fn a_contact_turns_the_added_mass_as_well() {
 
 #[test]
 fn a_film_takes_its_speed_whatever_the_step() {
-    // m dv = -6 pi mu R^2 (1/h - 1/h0) dh down to the asperities, the last film from there on.
+    // m dv = -6 pi mu R^2 (1/h - 1/h0) dh down to the asperities, the thinnest film below them.
     let (radius, viscosity, range, roughness) = (3e-3, 0.1, 7.5e-4, 9e-6);
     let params = ContactParams {
         lubrication_gap: range,

@@ -1,8 +1,8 @@
-//! Rotation: the paper's printed matrices, the symmetric top, the tennis-racket turn.
+//! Rotation: the paper's printed matrices, the symmetric top, the Dzhanibekov effect.
 
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 use grainwake_solver::dem::rotation::{
-    Rotor, from_paper_quaternion, to_paper_quaternion, turn_by_cayley, turn_exactly,
+    Rotor, from_paper_quaternion, rotate_by_cayley, rotate_exactly, to_paper_quaternion,
 };
 
 /// Eq. 30 as printed, rows first.
@@ -65,7 +65,7 @@ fn printed_eq_30_is_a_proper_rotation_from_space_to_body() {
             .all(|x| x.abs() < 1e-15)
     );
     assert!((a.determinant() - 1.0).abs() < 1e-14);
-    // It equals the transpose of body -> space: A takes space vectors to the body.
+    // A is the transpose of the matrix from body to space: it maps space vectors to the body frame.
     let space_to_body = DMat3::from_quat(sample()).transpose();
     assert!(a.abs_diff_eq(space_to_body, 1e-15));
 }
@@ -89,8 +89,8 @@ fn printed_eq_32_is_the_rate_of_eq_30_for_body_frame_rates() {
     let q = to_paper_quaternion(sample());
     let rate = printed_rates(q, omega);
     let h = 1e-6;
-    // Orientation turned exactly by omega (given in the body frame) for +-h.
-    let turned = |h: f64| to_paper_quaternion(turn_exactly(sample(), sample() * omega, h));
+    // Orientation rotated exactly by omega (body frame) over +-h.
+    let turned = |h: f64| to_paper_quaternion(rotate_exactly(sample(), sample() * omega, h));
     let (ahead, behind) = (turned(h), turned(-h));
     for i in 0..4 {
         assert!(
@@ -107,19 +107,18 @@ fn eq_34_equals_the_cayley_turn() {
     let b = printed_b(omega, dt);
     let q = DVec4::from_array(to_paper_quaternion(sample()));
     let expected = b.inverse() * (b.transpose() * q);
-    let cayley = DVec4::from_array(to_paper_quaternion(turn_by_cayley(sample(), omega, dt)));
+    let cayley = DVec4::from_array(to_paper_quaternion(rotate_by_cayley(sample(), omega, dt)));
     assert!((expected - cayley).length() < 1e-15);
     assert!((expected.length() - 1.0).abs() < 1e-15);
-    // The turn is by 4 atan(|omega| dt / 4) about omega.
+    // The rotation is by 4 atan(|omega| dt / 4) about omega.
     let angle = 4.0 * (0.25 * omega.length() * dt).atan();
     let exact = sample() * DQuat::from_axis_angle(omega.normalize(), angle);
-    assert!((exact - turn_by_cayley(sample(), omega, dt)).length() < 1e-15);
+    assert!((exact - rotate_by_cayley(sample(), omega, dt)).length() < 1e-15);
 }
 
 #[test]
 fn printed_eq_37_turns_the_torque_the_wrong_way() {
-    // A body whose x axis points along space y, pushed by a torque about space y: in its own frame
-    // that torque is about x.
+    // The body x axis points along space y. A torque about space y is about x in the body frame.
     let orientation = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
     let a = printed_a(to_paper_quaternion(orientation));
     let torque = DVec3::Y;
@@ -145,7 +144,7 @@ fn printed_eq_37_would_change_the_angular_momentum_direction() {
         };
         let start = rotor.angular_momentum();
         for _ in 0..2000 {
-            // The integrator applies A to what it gets: A (A^T A^T M) = A^T M.
+            // The integrator applies A to its torque: A (A^T A^T M) = A^T M.
             rotor.step(1e-3, 0.0, |q| if wrong { q * (q * torque) } else { torque });
         }
         (rotor.angular_momentum() - start - 2.0 * torque).length() / (2.0 * torque.length())
@@ -156,7 +155,7 @@ fn printed_eq_37_would_change_the_angular_momentum_direction() {
 
 #[test]
 fn symmetric_top_precesses_at_the_analytic_rates() {
-    // I = (1, 1, 2), omega = (.1, 0, 1): body rate 1, space rate |L| / I1 = 2.00250.
+    // I = (1, 1, 2), omega = (0.1, 0, 1): body rate 1, space rate |L| / I1 = 2.00250.
     let mut rotor = Rotor {
         inertia: DVec3::new(1.0, 1.0, 2.0),
         orientation: sample(),

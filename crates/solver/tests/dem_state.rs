@@ -4,7 +4,7 @@ mod dem_support;
 
 use dem_support::{Random, bits, cloud, step};
 use glam::DVec3;
-use grainwake_solver::dem::{ContactParams, Dynamics, Enclosure, Grain};
+use grainwake_solver::dem::{ContactLawKind, ContactParams, Dynamics, Enclosure, Grain, Material};
 
 fn params() -> ContactParams {
     ContactParams {
@@ -57,13 +57,30 @@ fn one_two_and_three_threads_give_the_same_bits() {
 
 #[test]
 fn saved_and_restored_history_continues_with_the_same_bits() {
+    continues_with_the_same_bits(params(), Material::default());
+    let hertz = ContactParams {
+        law: ContactLawKind::HertzMindlin,
+        ..params()
+    };
+    let soft = Material {
+        youngs_modulus: 1e5,
+        poisson_ratio: 0.3,
+        restitution: 0.8,
+    };
+    continues_with_the_same_bits(hertz, soft);
+}
+
+fn continues_with_the_same_bits(params: ContactParams, material: Material) {
     let mut grains = cloud(60, 0.045, 0.007, 0.3, 5);
-    let mut dynamics = Dynamics::new(params(), tank());
+    grains
+        .iter_mut()
+        .for_each(|grain| grain.material = material);
+    let mut dynamics = Dynamics::new(params, tank());
     settle(&mut dynamics, &mut grains, 120);
     for _ in 0..10 {
         let mut file = Vec::new();
         dynamics.save(&mut file).unwrap();
-        let mut other = Dynamics::new(params(), tank());
+        let mut other = Dynamics::new(params, tank());
         other.restore(&mut file.as_slice()).unwrap();
         assert_eq!(other.contacts(), dynamics.contacts());
         assert_eq!(
@@ -76,9 +93,9 @@ fn saved_and_restored_history_continues_with_the_same_bits() {
         assert!(bits(&grains) == bits(&copy));
         assert_eq!(other.contacts(), dynamics.contacts());
     }
-    // Without the history the springs of friction start anew: it does matter.
+    // Without the history the tangential springs start from zero, and the bits differ.
     let mut copy = grains.clone();
-    let mut fresh = Dynamics::new(params(), tank());
+    let mut fresh = Dynamics::new(params, tank());
     settle(&mut dynamics, &mut grains, 3);
     settle(&mut fresh, &mut copy, 3);
     assert!(bits(&grains) != bits(&copy));
@@ -104,7 +121,7 @@ fn damaged_history_is_an_error_and_leaves_the_state_alone() {
         assert!(restore(&file[..length]).is_err(), "cut at {length}");
     }
     assert!(restore(b"not a history at all, but long enough to look like one").is_err());
-    // Any flipped byte is either an error or a readable state; never a panic, here or in the step.
+    // A flipped bit gives an error or a readable state; neither reading nor the step panics.
     let mut random = Random(1);
     for _ in 0..300 {
         let mut damaged = file.clone();
@@ -115,7 +132,7 @@ fn damaged_history_is_an_error_and_leaves_the_state_alone() {
             settle(&mut other, &mut grains.clone(), 1);
         }
     }
-    // A count that asks for all the memory there is.
+    // A damaged count must not exhaust the memory.
     let mut greedy = file.clone();
     greedy[8..16].copy_from_slice(&u64::MAX.to_le_bytes());
     assert!(restore(&greedy).is_err());

@@ -1,56 +1,34 @@
-//! The solid fraction that is written: its sum is the volume of the grains.
+//! Solid fraction of cells: its sum is the volume of the grains.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, analytic};
-use grainwake_solver::dem::{ContactParams, Dof, Grain};
-use grainwake_solver::flow::{Boundaries, Boundary};
+use grainwake_solver::dem::Grain;
+use grainwake_solver::flow::Boundary;
 use grainwake_solver::grid::Mesh;
-use grainwake_solver::immersed::Scheme;
-use grainwake_solver::math::{Pose, Precision};
 use grainwake_solver::sim::{Setup, Simulation, StepRule};
 
 const PERIODIC: [Boundary; 2] = [Boundary::Periodic; 2];
 const WALLS: [Boundary; 2] = [Boundary::WALL; 2];
 
 fn grain(shape: Shape, position: DVec3, orientation: DQuat) -> Grain {
-    Grain {
-        shape: Arc::new(shape),
-        density: 2.0,
-        pose: Pose {
-            position,
-            orientation,
-        },
-        velocity: DVec3::ZERO,
-        angular_velocity: DVec3::ZERO,
-        translation: Dof::Free,
-        rotation: Dof::Free,
-    }
+    Grain::new(shape, 2.0)
+        .with_position(position)
+        .with_orientation(orientation)
 }
 
-/// Solid volume of a box with cells of `spacing`, from the fractions.
+/// Sum of the solid fractions times the cell volume [m^3].
 fn solid(cells: [usize; 3], spacing: DVec3, sides: [Boundary; 2], grains: Vec<Grain>) -> f64 {
-    let setup = Setup {
-        prescription: Default::default(),
-        mesh: Mesh {
-            cells,
-            spacing,
-            origin: DVec3::ZERO,
-        },
-        boundaries: Boundaries([sides, WALLS, WALLS]),
-        fluid: None,
-        precision: Precision::Double,
-        scheme: Scheme::Aperture,
-        gravity: DVec3::ZERO,
-        grains,
-        contact: ContactParams {
-            normal_stiffness: 50.0,
-            ..ContactParams::default()
-        },
-        step: StepRule::Fixed(1e-3),
+    let mesh = Mesh {
+        cells,
+        spacing,
+        origin: DVec3::ZERO,
     };
+    let setup = Setup::new(mesh)
+        .with_boundaries([sides, WALLS, WALLS])
+        .with_grains(grains)
+        .with_step(StepRule::Fixed(1e-3));
     let sim = Simulation::new(setup).unwrap();
     let mut sum = 0.0;
     for k in 0..cells[2] {
@@ -97,7 +75,7 @@ fn fractions_of_a_turned_ellipsoid_sum_to_its_volume() {
         vec![grain(shape(), middle, turn)],
     );
     assert_volume(found, exact, "ellipsoid");
-    // Flat cells, and the grain across a periodic edge.
+    // Anisotropic cells, and the grain across a periodic boundary.
     let found = solid(
         [14, 18, 20],
         DVec3::new(0.1, 0.08, 0.07),

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use grainwake_report::ReportError;
 use grainwake_run::case::{CaseError, Problem, nearest};
 
 /// Reason why a study cannot be read, planned or stored.
@@ -28,9 +29,12 @@ pub enum StudyError {
     Occupied {
         /// The folder.
         folder: PathBuf,
-        /// Its contents.
+        /// Contents of the folder.
         what: String,
     },
+    /// A report could not be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
     /// A file of the study folder is damaged.
     #[error("{} is damaged: {what}", file.display())]
     Damaged {
@@ -67,22 +71,15 @@ impl<T> At<T> for std::io::Result<T> {
     }
 }
 
-/// Writes a file through a temporary name, so that readers never see a part of it.
-///
-/// The temporary name holds the process id: several programs may share the folder.
-pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".{}.tmp", std::process::id()));
-    let temporary = path.with_file_name(name);
-    std::fs::write(&temporary, bytes)
-        .and_then(|()| std::fs::rename(&temporary, path))
-        .at("write", path)
+/// Writes a file in one piece.
+pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
+    grainwake_report::write_file(path, bytes).at("write", path)
 }
 
 /// Writes a value as indented JSON.
 pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), StudyError> {
     let text = serde_json::to_string_pretty(value).map_err(std::io::Error::from);
-    write_atomically(path, text.at("write", path)?.as_bytes())
+    write_file(path, text.at("write", path)?.as_bytes())
 }
 
 /// Refers to the page with the keys of studies; `grainwake schema` lists the keys of cases.

@@ -29,7 +29,7 @@ pub use measure::record::{RunRecord, records};
 pub use measure::settling::{GrainSettling, SettlingMeasures};
 pub use measure::table::{columns, to_csv, write_tables};
 pub use measure::trajectory::Trajectory;
-pub use page::{Rendered, render};
+pub use page::{StudyReportFiles, render};
 pub use plan::claims::{Analysis, Claim, Condition, Correlations, FigureRequest, Sign, Test};
 pub use plan::expand::{Model, Setting};
 pub use plan::file::{Ensemble, Study};

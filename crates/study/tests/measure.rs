@@ -2,8 +2,8 @@
 
 use glam::{DQuat, DVec3};
 use grainwake_formats::events::{Event, EventKind};
+use grainwake_report::features::Scales;
 use grainwake_report::run_folder::History;
-use grainwake_report::story::Scales;
 use grainwake_study::plan::quantities::PAIR_QUANTITIES;
 use grainwake_study::{PairHistory, PairMeasures};
 

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use grainwake_study::{Plan, RUNS, Rendered, Run, Study, render};
+use grainwake_study::{Plan, RUNS, Run, Study, StudyReportFiles, render};
 
 /// Plan of the 65 models of the repository, with the hashes of the synthetic run folders.
 fn synthetic_plan() -> Plan {
@@ -104,7 +104,7 @@ fn study(root: &Path, wanted: impl Fn(&Run) -> bool) -> PathBuf {
     folder
 }
 
-fn names(rendered: &Rendered) -> Vec<String> {
+fn names(rendered: &StudyReportFiles) -> Vec<String> {
     let stem = |file: &PathBuf| file.file_stem().unwrap().to_string_lossy().into_owned();
     rendered.png.iter().map(stem).collect()
 }

@@ -20,7 +20,7 @@ pub enum Level {
 
 /// Run of a case, and its checks.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub struct SuiteRun {
     /// Name within the suite.
     pub name: String,
     /// Case file.

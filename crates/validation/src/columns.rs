@@ -133,7 +133,8 @@ impl Columns {
     }
 }
 
-/// Separates the rows of the grains into columns, and repeats those of the chosen grain unnumbered.
+/// Separates the rows of the grains into numbered columns; the chosen grain also has unnumbered
+/// columns.
 fn split_by_grain(table: &Table, chosen: usize) -> Result<Columns, String> {
     let index = table
         .column("grain")

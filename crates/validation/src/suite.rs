@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use grainwake_run::case::{Loc, Problem, Source};
 use serde::Deserialize;
 
-use crate::check::{Bounds, Check, Level, Reference, Run};
+use crate::check::{Bounds, Check, Level, Reference, SuiteRun};
 use crate::columns::TableSource;
-use crate::figure::{self, Figure, RawFigure};
+use crate::figure::{self, FigureSpec, RawFigure};
 use crate::measurement::{Measure, Sampling};
 use crate::problem;
 
@@ -25,9 +25,9 @@ pub struct Suite {
     /// Title, one line.
     pub title: String,
     /// Runs with their checks.
-    pub runs: Vec<Run>,
+    pub runs: Vec<SuiteRun>,
     /// Figures of the results.
-    pub figures: Vec<Figure>,
+    pub figures: Vec<FigureSpec>,
 }
 
 /// Reason why a suite cannot be read.
@@ -189,7 +189,7 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     fn suite(&self, raw: RawSuite) -> Result<Suite, Problem> {
-        let mut runs: Vec<Run> = Vec::new();
+        let mut runs: Vec<SuiteRun> = Vec::new();
         for run in raw.run {
             let run = self.run(run, &raw.constants, &runs)?;
             runs.push(run);
@@ -211,8 +211,8 @@ impl Builder<'_> {
         &self,
         raw: RawRun,
         constants: &BTreeMap<String, f64>,
-        earlier: &[Run],
-    ) -> Result<Run, Problem> {
+        earlier: &[SuiteRun],
+    ) -> Result<SuiteRun, Problem> {
         let name = raw.name.value.clone();
         if earlier.iter().any(|other| other.name == name) {
             let message = format!("there are two runs called \"{name}\"");
@@ -237,7 +237,7 @@ impl Builder<'_> {
             .check
             .into_iter()
             .map(|check| self.check(check, &constants));
-        Ok(Run {
+        Ok(SuiteRun {
             name,
             case,
             set: raw.set,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::check::{Check, Reference, Run};
+use crate::check::{Check, Reference, SuiteRun};
 use crate::suite::Suite;
 
 /// Result of one check. The JSON names are stable.
@@ -34,10 +34,11 @@ pub struct Verdict {
 impl Suite {
     /// Evaluates the checks of a run in its folder.
     ///
-    /// `known` holds the values of earlier runs, by run and quantity; those of this run are added.
+    /// `known` holds the values of earlier runs, by run and quantity; the values of this run are
+    /// added.
     pub fn evaluate(
         &self,
-        run: &Run,
+        run: &SuiteRun,
         folder: &Path,
         known: &mut BTreeMap<(String, String), f64>,
     ) -> Vec<Verdict> {
@@ -60,14 +61,14 @@ impl Suite {
     }
 
     /// Returns the verdicts of a run that did not reach its end.
-    pub fn verdicts_of_failed_run(&self, run: &Run, reason: &str) -> Vec<Verdict> {
+    pub fn verdicts_of_failed_run(&self, run: &SuiteRun, reason: &str) -> Vec<Verdict> {
         let failed = |check: &Check| self.verdict(run, check, Err(reason.into()), None);
         run.checks.iter().map(failed).collect()
     }
 
     fn verdict(
         &self,
-        run: &Run,
+        run: &SuiteRun,
         check: &Check,
         measured: Result<f64, String>,
         reference: Option<f64>,

@@ -10,7 +10,7 @@ use crate::args::CompareArgs;
 use crate::exit::Exit;
 use crate::print;
 
-/// Prints how far two grains are from each other.
+/// Prints the morphology of two grains and the distance of their surfaces.
 pub fn compare(args: &CompareArgs) -> Result<(), Exit> {
     if let Some(picture) = &args.picture {
         not_input(picture, &args.first)?;
@@ -41,49 +41,29 @@ pub fn compare(args: &CompareArgs) -> Result<(), Exit> {
     Ok(())
 }
 
-fn measures(one: &Record, other: &Record) -> Table {
-    let mm = |x: f64| 1e3 * x;
-    let rows = [
-        (
-            "equivalent diameter [mm]",
-            Some(mm(one.equivalent_diameter_m)),
-            Some(mm(other.equivalent_diameter_m)),
-        ),
-        ("a [mm]", Some(mm(one.a_m)), Some(mm(other.a_m))),
-        ("b [mm]", Some(mm(one.b_m)), Some(mm(other.b_m))),
-        ("c [mm]", Some(mm(one.c_m)), Some(mm(other.c_m))),
-        (
-            "elongation b/a",
-            Some(one.elongation),
-            Some(other.elongation),
-        ),
-        ("flatness c/b", Some(one.flatness), Some(other.flatness)),
-        (
-            "Krumbein sphericity",
-            Some(one.krumbein_sphericity),
-            Some(other.krumbein_sphericity),
-        ),
-        (
-            "Wadell sphericity",
-            Some(one.wadell_sphericity),
-            Some(other.wadell_sphericity),
-        ),
-        (
-            "Wadell roundness",
-            one.wadell_roundness,
-            other.wadell_roundness,
-        ),
-        ("convexity", one.convexity, other.convexity),
-        (
-            "surface area [mm2]",
-            Some(1e6 * one.surface_area_m2),
-            Some(1e6 * other.surface_area_m2),
-        ),
-    ];
+fn measures(first: &Record, second: &Record) -> Table {
+    let rows = |r: &Record| {
+        [
+            (
+                "equivalent diameter [mm]",
+                Some(1e3 * r.equivalent_diameter_m),
+            ),
+            ("a [mm]", Some(1e3 * r.a_m)),
+            ("b [mm]", Some(1e3 * r.b_m)),
+            ("c [mm]", Some(1e3 * r.c_m)),
+            ("elongation b/a", Some(r.elongation)),
+            ("flatness c/b", Some(r.flatness)),
+            ("Krumbein sphericity", Some(r.krumbein_sphericity)),
+            ("Wadell sphericity", Some(r.wadell_sphericity)),
+            ("Wadell roundness", r.wadell_roundness),
+            ("convexity", r.convexity),
+            ("surface area [mm2]", Some(1e6 * r.surface_area_m2)),
+        ]
+    };
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
     table.set_header(["", "first", "second", "difference"]);
-    for (name, p, q) in rows {
+    for ((name, p), (_, q)) in rows(first).into_iter().zip(rows(second)) {
         let value = |x: Option<f64>| x.map_or("not measured".into(), |x| format!("{x:.4}"));
         let difference = match (p, q) {
             (Some(p), Some(q)) => format!("{:+.2} %", 100.0 * (q / p - 1.0)),
@@ -97,19 +77,19 @@ fn measures(one: &Record, other: &Record) -> Table {
     table
 }
 
-fn surfaces(found: &Comparison, diameter: f64) -> String {
+fn surfaces(comparison: &Comparison, diameter: f64) -> String {
     let line = |name: &str, x: f64| {
         format!(
-            "{name:26} {:>10.5} mm  {:>8.3} % of the first one's diameter",
+            "{name:31} {:>10.5} mm  {:>8.3} % of the first diameter",
             1e3 * x,
             100.0 * x / diameter
         )
     };
     [
-        "Surfaces, centroids together and principal axes along each other:".to_string(),
-        line("mean (first outside: +)", found.mean_distance_m),
-        line("root mean square", found.rms_distance_m),
-        line("largest", found.largest_distance_m),
+        "Distance of the surfaces, with centroids and principal axes aligned:".to_string(),
+        line("mean (positive: first outside)", comparison.mean_distance_m),
+        line("root mean square", comparison.rms_distance_m),
+        line("largest", comparison.largest_distance_m),
     ]
     .join("\n")
 }

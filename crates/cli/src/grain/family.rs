@@ -11,23 +11,26 @@ use crate::exit::{BAD_INPUT, Exit};
 /// Pixels of one view in the contact sheet.
 const PIXELS: usize = 130;
 
-/// One grain for each pair of sphericity and roundness, numbered row by row.
+/// Generates one grain for each pair of sphericity and roundness, numbered row by row.
 pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
     folder(&args.output)?;
     let diameter = length("--equivalent-diameter", &args.equivalent_diameter)?;
     let mut options = family_options();
-    options.nodes = args.nodes;
-    options.cells = args.cells.unwrap_or(options.cells);
+    options.nodes = args.common.nodes;
+    options.cells = args.common.cells.unwrap_or(options.cells);
     let count = args.sphericity.len() * args.roundness.len();
     if count > 999 {
-        return Err(Exit::new(BAD_INPUT, format!("{count} grains; at most 999")));
+        return Err(Exit::new(
+            BAD_INPUT,
+            format!("the family has {count} grains, the maximum is 999"),
+        ));
     }
     let file = |n: usize| args.output.join(format!("{n:02}.grain"));
     let (table, sheet) = (args.output.join("table.csv"), args.output.join("sheet.png"));
     for path in (1..=count).map(file).chain([table.clone(), sheet.clone()]) {
-        may_write(&path, args.force)?;
+        may_write(&path, args.common.force)?;
     }
-    // All of them before any is written: bad input writes nothing.
+    // All grains are built before any is written, so that bad input writes nothing.
     let mut shapes = Vec::with_capacity(count);
     for &sphericity in &args.sphericity {
         for &roundness in &args.roundness {
@@ -42,7 +45,7 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
     for (n, shape) in shapes.iter().enumerate() {
         let path = file(n + 1);
         shape.save(&path)?;
-        show(shape, &path, args.json)?;
+        show(shape, &path, args.common.json)?;
         rows.push((format!("{:02}", n + 1), shape.record()));
         let number = n as u32 + 1;
         pictures.push(Picture::three_sides(shape, PIXELS, false).numbered(number));
@@ -52,7 +55,7 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
     Ok(())
 }
 
-/// With the range of a flatness that cannot be had.
+/// Adds the admissible range to an error about the flatness.
 fn refused(error: ShapeError, sphericity: f64) -> Exit {
     let ShapeError::BadParameter {
         name: "flatness", ..
@@ -65,7 +68,7 @@ fn refused(error: ShapeError, sphericity: f64) -> Exit {
         BAD_INPUT,
         error.to_string(),
         format!(
-            "with --sphericity {sphericity} it can be {least} to 1; without --flatness it is chosen"
+            "with --sphericity {sphericity} the flatness can be {least} to 1; omit --flatness for the default"
         ),
     )
 }

@@ -1,4 +1,4 @@
-//! `grain make`: shapes of closed form.
+//! `grain make`: analytic shapes.
 
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
@@ -6,7 +6,7 @@ use super::{grain_file, length, may_write, options, save};
 use crate::args::Body;
 use crate::exit::Exit;
 
-/// A grain of closed form.
+/// Creates a grain of analytic shape.
 pub fn make(body: &Body) -> Result<(), Exit> {
     let new = match body {
         Body::Sphere { new, .. }
@@ -17,7 +17,7 @@ pub fn make(body: &Body) -> Result<(), Exit> {
         | Body::Superquadric { new, .. } => new,
     };
     grain_file(&new.output)?;
-    may_write(&new.output, new.force)?;
+    may_write(&new.output, new.common.force)?;
     save(build(body, &options(new))?, new)
 }
 
@@ -28,6 +28,10 @@ fn build(body: &Body, options: &ShapeOptions) -> Result<Shape, Exit> {
             *value = length(name, text)?;
         }
         Ok(values)
+    };
+    let round = |diameter: &str, height: &str| -> Result<(f64, f64), Exit> {
+        let radius = 0.5 * length("diameter", diameter)?;
+        Ok((radius, length("height", height)?))
     };
     Ok(match body {
         Body::Sphere { diameter, .. } => {
@@ -43,18 +47,16 @@ fn build(body: &Body, options: &ShapeOptions) -> Result<Shape, Exit> {
         }
         Body::Cylinder {
             diameter, height, ..
-        } => analytic::cylinder(
-            0.5 * length("diameter", diameter)?,
-            length("height", height)?,
-            options,
-        )?,
+        } => {
+            let (radius, height) = round(diameter, height)?;
+            analytic::cylinder(radius, height, options)?
+        }
         Body::Capsule {
             diameter, height, ..
-        } => analytic::capsule(
-            0.5 * length("diameter", diameter)?,
-            length("height", height)?,
-            options,
-        )?,
+        } => {
+            let (radius, height) = round(diameter, height)?;
+            analytic::capsule(radius, height, options)?
+        }
         Body::Superquadric {
             axes, exponents, ..
         } => {

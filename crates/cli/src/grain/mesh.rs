@@ -7,12 +7,12 @@ use super::{grain_file, length, may_write, not_input, options, plausible, save};
 use crate::args::FromMeshArgs;
 use crate::exit::Exit;
 
-/// A grain from a closed surface mesh.
+/// Creates a grain from a closed surface mesh.
 pub fn from_mesh(args: &FromMeshArgs) -> Result<(), Exit> {
     not_input(&args.new.output, &args.mesh)?;
     grain_file(&args.new.output)?;
-    may_write(&args.new.output, args.new.force)?;
-    // "mm" is "1 mm" here; elsewhere a length without a number is a slip.
+    may_write(&args.new.output, args.new.common.force)?;
+    // A bare unit such as "mm" means "1 mm" here; in other options it is an error.
     let bare = args.unit.chars().all(char::is_alphabetic);
     let unit = if bare {
         format!("1 {}", args.unit)

@@ -1,4 +1,4 @@
-//! `grainwake grain`: shapes in, `.grain` files out.
+//! `grainwake grain`: creates, inspects and compares `.grain` files.
 
 mod compare;
 mod family;
@@ -19,7 +19,7 @@ use crate::args::{GrainArgs, GrainCommand, InfoArgs, NewGrain};
 use crate::exit::{BAD_INPUT, Exit};
 use crate::print;
 
-/// Carries out one of the commands.
+/// Runs one of the commands.
 pub fn grain(args: &GrainArgs) -> Result<(), Exit> {
     match &args.command {
         GrainCommand::FromScan(args) => scan::from_scan(args),
@@ -31,15 +31,15 @@ pub fn grain(args: &GrainArgs) -> Result<(), Exit> {
     }
 }
 
-/// A length given on the command line [m].
+/// Parses a length of the command line [m].
 fn length(name: &str, text: &str) -> Result<f64, Exit> {
     parse_length(text).map_err(|message| Exit::new(BAD_INPUT, format!("{name}: {message}")))
 }
 
-/// Diameters [m] that grains have; others come of a wrong unit.
+/// Accepted equivalent diameters [m]; others indicate a wrong unit.
 const GRAINS: std::ops::Range<f64> = 1e-6..1.0;
 
-/// Refuses a grain of which `option` says that it is larger or smaller than grains are.
+/// Refuses a grain of implausible size, which indicates a wrong unit of `option`.
 fn plausible(shape: &Shape, new: &NewGrain, option: &str) -> Result<(), Exit> {
     let diameter = shape.equivalent_diameter();
     if GRAINS.contains(&diameter) || new.equivalent_diameter.is_some() {
@@ -48,39 +48,39 @@ fn plausible(shape: &Shape, new: &NewGrain, option: &str) -> Result<(), Exit> {
     Err(Exit::with_help(
         BAD_INPUT,
         format!(
-            "the grain has an equivalent diameter of {}; grains have 1 um to 1 m",
+            "the grain has an equivalent diameter of {}; accepted are 1 um to 1 m",
             readable::length(diameter)
         ),
         format!(
-            "is {option} right (mm for m, or m for mm)? --equivalent-diameter LENGTH gives any size"
+            "check the unit of {option} (mm or m?), or set the size with --equivalent-diameter LENGTH"
         ),
     ))
 }
 
 fn options(new: &NewGrain) -> ShapeOptions {
     let mut options = ShapeOptions {
-        nodes: new.nodes,
+        nodes: new.common.nodes,
         ..ShapeOptions::default()
     };
-    if let Some(cells) = new.cells {
+    if let Some(cells) = new.common.cells {
         options.cells = cells;
     }
     options
 }
 
-/// Refuses to replace a file without `--force`; asked before any work is done.
+/// Refuses to replace a file without `--force`; called before the work starts.
 fn may_write(path: &Path, force: bool) -> Result<(), Exit> {
     if path.exists() && !force {
         return Err(Exit::with_help(
             BAD_INPUT,
-            format!("{} is there already", path.display()),
-            "give another name with -o, or --force to replace it",
+            format!("{} exists already", path.display()),
+            "choose another name with -o, or replace it with --force",
         ));
     }
     Ok(())
 }
 
-/// Refuses to write over what is read, whatever `--force` says.
+/// Refuses to overwrite an input file, even with `--force`.
 fn not_input(output: &Path, input: &Path) -> Result<(), Exit> {
     let same = match (output.canonicalize(), input.canonicalize()) {
         (Ok(output), Ok(input)) => output == input,
@@ -89,14 +89,14 @@ fn not_input(output: &Path, input: &Path) -> Result<(), Exit> {
     if same {
         return Err(Exit::with_help(
             BAD_INPUT,
-            format!("{} is what is read", output.display()),
-            "give the output another name",
+            format!("{} is an input of this command", output.display()),
+            "choose another name for the output",
         ));
     }
     Ok(())
 }
 
-/// Refuses a file that does not say by its name that it holds a grain.
+/// Refuses a file name without the extension `.grain`.
 fn grain_file(path: &Path) -> Result<(), Exit> {
     if path.extension().is_some_and(|e| e == "grain") {
         return Ok(());
@@ -104,17 +104,17 @@ fn grain_file(path: &Path) -> Result<(), Exit> {
     Err(Exit::with_help(
         BAD_INPUT,
         format!("{} does not end in .grain", path.display()),
-        format!("give -o {}", path.with_extension("grain").display()),
+        format!("use -o {}", path.with_extension("grain").display()),
     ))
 }
 
-/// Endings of files that are read and written here; those of grain files, rightly or wrongly
-/// spelled, begin with "gr".
+/// Extensions of other files that are read or written here. Those of grain files, also misspelled
+/// ones, begin with "gr".
 const FILES: [&str; 10] = [
     "stl", "ply", "obj", "tif", "tiff", "npy", "npz", "nrrd", "mha", "png",
 ];
 
-/// Refuses a new folder that has the name of a file, which is a slip.
+/// Refuses a new folder with the extension of a file, which indicates a mistake.
 fn folder(path: &Path) -> Result<(), Exit> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     let file = ending.is_some_and(|e| e.starts_with("gr") || FILES.contains(&e.as_str()));
@@ -124,14 +124,14 @@ fn folder(path: &Path) -> Result<(), Exit> {
     Err(Exit::with_help(
         BAD_INPUT,
         format!(
-            "{} would be a folder with the name of a file",
+            "{} is a folder with the extension of a file",
             path.display()
         ),
-        "give -o a name without this ending; from-scan takes NAME.grain for one grain",
+        "use a name without this extension; from-scan writes a single grain to NAME.grain",
     ))
 }
 
-/// Rescales as asked and saves.
+/// Rescales on request and saves.
 fn finish(shape: Shape, path: &Path, new: &NewGrain) -> Result<Shape, Exit> {
     let shape = match &new.equivalent_diameter {
         Some(text) => {
@@ -149,7 +149,7 @@ fn finish(shape: Shape, path: &Path, new: &NewGrain) -> Result<Shape, Exit> {
 /// Saves and prints one shape.
 fn save(shape: Shape, new: &NewGrain) -> Result<(), Exit> {
     let shape = finish(shape, &new.output, new)?;
-    show(&shape, &new.output, new.json)
+    show(&shape, &new.output, new.common.json)
 }
 
 fn show(shape: &Shape, path: &Path, json: bool) -> Result<(), Exit> {

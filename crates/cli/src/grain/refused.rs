@@ -1,4 +1,4 @@
-//! Labels of an image that gave no grain: told by reason, and what the image itself looks like.
+//! Rejected labels of an image: list of the reasons, and advice on the options.
 
 use grainwake_shape::ShapeError;
 use grainwake_shape::scan::{Volume, Voxels};
@@ -6,28 +6,28 @@ use grainwake_shape::scan::{Volume, Voxels};
 use crate::args::FromScanArgs;
 use crate::exit::shape_help;
 
-/// As many labels with the same reason have a line each; more share one.
+/// Maximum number of labels with the same reason that are listed on separate lines.
 const FEW: usize = 3;
-/// As many labels are named in a line that they share.
+/// Maximum number of labels named on a common line.
 const NAMED: usize = 12;
-/// A grey image has more values than this.
+/// Minimum number of rejected labels that indicates a grey image.
 const VALUES: usize = 16;
-/// Share of neighbours that differ: grains of ten voxels across have less, grey values more.
+/// Fraction of differing neighbours that indicates a grey image; labels of grains have less.
 const DIFFERENT: f64 = 1.0 / 3.0;
 
-/// A label that gave no grain.
+/// A rejected label.
 pub struct Refused {
     pub label: u32,
     pub voxels: u64,
     pub why: ShapeError,
 }
 
-/// Which labels were left out and why, in the order in which the reasons occur.
+/// Lists the rejected labels with the reason, grouped if more than [`FEW`] share it.
 pub fn lines(refused: &[Refused]) -> Vec<String> {
     let mut groups: Vec<(String, Vec<&Refused>)> = Vec::new();
     for one in refused {
         let reason = reason(&one.why);
-        match groups.iter_mut().find(|(known, _)| *known == reason) {
+        match groups.iter_mut().find(|(other, _)| *other == reason) {
             Some((_, group)) => group.push(one),
             None => groups.push((reason, vec![one])),
         }
@@ -38,7 +38,7 @@ pub fn lines(refused: &[Refused]) -> Vec<String> {
         }
         let alone = |r: &&Refused| {
             format!(
-                "label {} ({} voxels) left out: {}",
+                "label {} ({} voxels) rejected: {}",
                 r.label, r.voxels, r.why
             )
         };
@@ -51,13 +51,13 @@ fn together(reason: &str, group: &[&Refused]) -> String {
     let named = group.iter().take(NAMED).map(|r| r.label.to_string());
     let more = if group.len() > NAMED { ", ..." } else { "" };
     format!(
-        "{} labels left out, {reason}: {}{more}",
+        "{} labels rejected, {reason}: {}{more}",
         group.len(),
         named.collect::<Vec<_>>().join(", ")
     )
 }
 
-/// The reason without what belongs to one label alone.
+/// Returns the reason without the data of the single label.
 fn reason(why: &ShapeError) -> String {
     match why {
         ShapeError::CutByBorder { .. } => "cut by the image border".into(),
@@ -68,7 +68,7 @@ fn reason(why: &ShapeError) -> String {
     }
 }
 
-/// What to do with an image that gave few grains or none, where it shows.
+/// Returns advice on the options if most labels were rejected and the cause is evident.
 pub fn advice(
     refused: &[Refused],
     written: usize,
@@ -80,9 +80,9 @@ pub fn advice(
     }
     let as_labels = args.threshold.is_none() && !args.split && args.separate.is_none();
     if as_labels && refused.len() > VALUES && many_neighbours_differ(labels) {
-        return Some("this looks like a grey image: give --threshold otsu".into());
+        return Some("this looks like a grey image: add --threshold otsu".into());
     }
-    // One label that holds most of the solid may be a whole phase.
+    // A label with most of the solid voxels may be a whole phase.
     let largest = refused.iter().max_by_key(|r| r.voxels)?;
     let all: u64 = refused.iter().map(|r| r.voxels).sum();
     let most = 2 * largest.voxels > all;

@@ -3,9 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use grainwake_shape::render::{Picture, View};
-use grainwake_shape::scan::{
-    Denoise, Scan, ScanOptions, ScannedGrain, Threshold, read_volume, scan_volume,
-};
+use grainwake_shape::scan::{Scan, ScanOptions, ScannedGrain, Threshold, read_volume, scan_volume};
 use grainwake_shape::{ReadLimits, Shape, write_table};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
@@ -15,18 +13,19 @@ use super::refused::{Refused, advice, lines};
 use super::{finish, folder, length, may_write, not_input, options, plausible, save};
 use crate::args::FromScanArgs;
 use crate::exit::{BAD_INPUT, Exit, IO};
+use crate::progress::count;
 use crate::{print, tell};
 
-/// Pixels of one grain in the contact sheet, grains in a row, and the most it shows.
+/// Contact sheet: pixels per grain, grains per row, and maximum number of grains.
 const SHEET: (usize, usize, usize) = (110, 12, 600);
 
-/// One grain, or all grains of an image.
+/// Creates one grain, or all grains of an image.
 pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     let output = &args.new.output;
     let one_file = output.extension().is_some_and(|e| e == "grain");
     not_input(output, &args.image)?;
     if one_file {
-        may_write(output, args.new.force)?;
+        may_write(output, args.new.common.force)?;
     } else {
         folder(output)?;
     }
@@ -54,19 +53,19 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     let grain = match <[ScannedGrain; 1]>::try_from(scan.grains) {
         Ok([grain]) => grain,
         Err(grains) => {
-            let labels = grains.iter().take(10).map(|g| g.label.to_string());
+            let labels: Vec<String> = grains.iter().map(|g| g.label.to_string()).collect();
             let message = format!(
-                "{} holds {} grains, for the one file {}; their labels are {}{}",
+                "{} holds {} grains, but the output {} is one file; the labels are {}{}",
                 args.image.display(),
                 grains.len(),
                 output.display(),
-                labels.collect::<Vec<_>>().join(", "),
-                if grains.len() > 10 { ", ..." } else { "" }
+                labels[..labels.len().min(10)].join(", "),
+                if labels.len() > 10 { ", ..." } else { "" }
             );
             return Err(Exit::with_help(
                 BAD_INPUT,
                 message,
-                "choose one with --label N, or give -o a folder to take them all; values that are grey, not labels, need --threshold otsu",
+                "select one with --label N, or write all to a folder with -o DIR; if the values are grey values instead of labels, add --threshold otsu",
             ));
         }
     };
@@ -85,14 +84,12 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
         Some(text) => Some(Threshold::Value(text.parse().map_err(|_| {
             Exit::with_help(
                 BAD_INPUT,
-                format!("--threshold: {text:?} is no number"),
-                "give a grey value, otsu or otsu3",
+                format!("--threshold: {text:?} is not a number"),
+                "use a grey value, otsu or otsu3",
             )
         })?)),
     };
-    if args.median {
-        how.denoise = Denoise::Median;
-    }
+    how.median = args.median;
     how.split = args.split;
     how.separate = args.separate;
     how.sub_voxel = !args.from_mask;
@@ -104,10 +101,10 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
     Ok(how)
 }
 
-/// Cuts over more than this part of a surface decide its roundness.
+/// Fraction of the surface cut from neighbours above which the roundness is doubtful.
 const MUCH_SHARED: f64 = 0.01;
 
-/// Grain files of an earlier run in a folder.
+/// Returns the grain files of an earlier command in a folder.
 fn earlier(folder: &Path) -> Vec<PathBuf> {
     let ours = |path: &PathBuf| {
         let name = path.file_name().and_then(|name| name.to_str());
@@ -120,8 +117,8 @@ fn earlier(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Every grain into a folder, with table, contact sheet and label image; those that are refused
-/// are listed with the reason.
+/// Writes every grain into a folder, with table, contact sheet and label image, and lists rejected
+/// labels with the reason.
 fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     let Scan { grains, labels, .. } = scan;
     let place = &args.new.output;
@@ -138,9 +135,9 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     };
     let earlier = earlier(place);
     for file in &earlier {
-        may_write(file, args.new.force)?;
+        may_write(file, args.new.common.force)?;
     }
-    // The largest alone: fragments may be small.
+    // Only the largest grain is checked, because fragments may be small.
     let size = |shape: &Shape| shape.equivalent_diameter();
     let largest = usable().max_by(|a, b| size(a.1).total_cmp(&size(b.1)));
     if let Some((_, shape)) = largest {
@@ -148,9 +145,9 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     }
     for file in [&table, &sheet, &image] {
         not_input(file, &args.image)?;
-        may_write(file, args.new.force)?;
+        may_write(file, args.new.common.force)?;
     }
-    // The table and the label image will not know of them.
+    // Grains of an earlier command are not part of the new table and label image.
     for file in earlier.iter().filter(|_| largest.is_some()) {
         let failed = |e| Exit::new(IO, format!("cannot remove {}: {e}", file.display()));
         std::fs::remove_file(file).map_err(failed)?;
@@ -178,7 +175,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
             Ok(written) => {
                 let (file, record, picture) = written?;
                 pictures.extend(picture.map(|picture| picture.numbered(label)));
-                if args.new.json {
+                if args.new.common.json {
                     print(&json!({ "label": label, "voxels": voxels, "shared_surface": shared_surface, "file": file, "record": record }).to_string())?;
                 } else {
                     print(&format!(
@@ -196,14 +193,15 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
         }
     }
     lines(&refused).iter().for_each(|line| tell!("{line}"));
-    tell!("{} grains written, {} left out", rows.len(), refused.len());
+    tell!(
+        "{} written, {} rejected",
+        count(rows.len(), "grain"),
+        refused.len()
+    );
     let advice = advice(&refused, rows.len(), &labels, args);
     if rows.is_empty() {
-        let message = "no grain of the image can be used";
-        return Err(match advice {
-            Some(advice) => Exit::with_help(BAD_INPUT, message, advice),
-            None => Exit::new(BAD_INPUT, message),
-        });
+        let message = "no label of the image gives a valid grain";
+        return Err(Exit::with_hint(BAD_INPUT, message, advice));
     }
     if let Some(advice) = advice {
         tell!("note: {advice}");
@@ -211,7 +209,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     let cut = shared.iter().filter(|part| **part > MUCH_SHARED).count();
     if cut > 0 && !args.no_roundness {
         tell!(
-            "note: {cut} of {} grains were cut from neighbours over more than {:.0} % of their surface (shared_surface in {}): their roundness is that of what lies clear of the cuts, and left out where too little does",
+            "note: {cut} of {} grains were cut from neighbours over more than {:.0} % of their surface (shared_surface in {}); their roundness is measured away from the cuts, and missing where too little surface remains",
             rows.len(),
             100.0 * MUCH_SHARED,
             table.display()

@@ -13,12 +13,12 @@ use grainwake_formats::summary::Summary;
 use grainwake_run::case::{Case, nearest};
 use grainwake_run::provenance::Provenance;
 use grainwake_run::{Ending, Existing, Options, RunError};
-use grainwake_validation::{Level, Run, Suite, SuiteError};
+use grainwake_validation::{Level, Suite, SuiteError, SuiteRun};
 use table::{line, table};
 
 use crate::args::ValidateArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, MISSED};
-use crate::progress::{Shown, clock};
+use crate::progress::{ProgressDisplay, clock};
 use crate::{print, run, tell, threads};
 
 impl From<SuiteError> for Exit {
@@ -30,15 +30,15 @@ impl From<SuiteError> for Exit {
                 Exit::with_help(
                     if missing { BAD_INPUT } else { IO },
                     error.to_string(),
-                    "the validations lie in the folder `validation` of the source tree: run from \
-                     its top, or give the folder with --suites",
+                    "the validations are in the folder `validation` of the source tree: run from \
+                     its top folder, or give the folder with --suites",
                 )
             }
         }
     }
 }
 
-/// Runs validations and prints how far each number is from its reference.
+/// Runs validations and prints the deviation of each value from its reference.
 pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     let mut suites = chosen(Suite::read_all(&args.suites)?, &args.names)?;
     for run in suites.iter_mut().flat_map(|suite| &mut suite.runs) {
@@ -59,13 +59,13 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         let mut known = BTreeMap::new();
         for run in suite.runs.iter().filter(|run| run.level <= level) {
             let folder = args.output.join(&suite.name).join(&run.name);
-            if args.judge && !there(run, &folder)? {
+            if args.judge && !is_finished(run, &folder)? {
                 continue;
             }
             let ending = if args.judge {
                 Ok(())
             } else {
-                one(args, suite, run, &folder, stop.clone())?
+                execute(args, suite, run, &folder, stop.clone())?
             };
             let found = match ending {
                 Ok(()) => suite.evaluate(run, &folder, &mut known),
@@ -84,7 +84,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
                 "{}: no finished run of these validations",
                 args.output.display()
             ),
-            "leave out --judge to carry them out, or give their folder with -o",
+            "omit --judge to execute them, or give their folder with -o",
         ));
     }
     if args.json {
@@ -124,7 +124,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     ))
 }
 
-/// The suites that were asked for.
+/// Returns the suites and runs with the given names; all without names.
 fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
     let known: Vec<String> = all.iter().map(|s| s.name.clone()).collect();
     if all.is_empty() {
@@ -170,24 +170,24 @@ fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
     Ok(chosen)
 }
 
-/// Whether `folder` holds a finished run of this very case.
-fn there(run: &Run, folder: &Path) -> Result<bool, Exit> {
+/// Returns whether `folder` holds a finished run of the same case.
+fn is_finished(run: &SuiteRun, folder: &Path) -> Result<bool, Exit> {
     let Some(provenance) = Provenance::read(folder).filter(|_| Summary::read(folder).is_ok())
     else {
         return Ok(false);
     };
     if provenance.case_sha256 != Case::load(&run.case, &run.set)?.digest {
-        tell!("{}: left out: a run of another case", folder.display());
+        tell!("{}: left out: its case has changed", folder.display());
         return Ok(false);
     }
     Ok(true)
 }
 
-/// Carries out one run. The outer error ends the command, the inner one only this run.
-fn one(
+/// Executes one run. The outer error ends the command, the inner one only this run.
+fn execute(
     args: &ValidateArgs,
     suite: &Suite,
-    run: &Run,
+    run: &SuiteRun,
     folder: &Path,
     stop: Arc<AtomicBool>,
 ) -> Result<Result<(), String>, Exit> {
@@ -218,7 +218,7 @@ fn one(
         .grains
         .first()
         .map(|g| g.shape.equivalent_diameter());
-    let mut shown = Shown::new(args.quiet, stop.clone(), diameter);
+    let mut shown = ProgressDisplay::new(args.quiet, stop.clone(), diameter);
     let ending = threads::on(threads, || {
         let ending = grainwake_run::run(case.job(), folder, &options, &mut shown);
         shown.clear();
@@ -228,7 +228,7 @@ fn one(
         Ok(Ending::Interrupted(_)) => Err(Exit::with_help(
             INTERRUPTED,
             "interrupted; a checkpoint was written",
-            "go on with the same command and --resume",
+            "continue with the same command and --resume",
         )),
         Ok(_) if stop.load(Ordering::Relaxed) => {
             Err(Exit::new(INTERRUPTED, "interrupted between two runs"))
@@ -239,6 +239,7 @@ fn one(
     }
 }
 
+/// Lists the suites with their runs and quantities.
 fn listing(suites: &[Suite]) -> String {
     let mut lines = Vec::new();
     for suite in suites {

@@ -1,17 +1,18 @@
-//! Figures that are kept: `figures/SUITE-NAME.png` and `.svg`, and a page that lists them.
+//! Saved figures: `figures/SUITE-NAME.png` and `.svg`, and a page that lists them.
 
 use std::path::Path;
 
-use grainwake_plot::plain;
+use grainwake_plot::{Figure, plain};
+use grainwake_report::write_figure;
 use grainwake_validation::Suite;
 
 use super::saved::Saved;
 use crate::exit::{Exit, IO};
 use crate::tell;
 
-/// Draws the figures of `suites` that have data below `output`, or numbers among the `saved` results,
-/// into `folder/figures`, and says on stderr what had to be left out, or that an earlier figure stays
-/// for that; gives their number.
+/// Draws the figures of `suites` into `folder/figures`, from the runs below `output` and the
+/// `saved` results, and returns their number. Omissions are listed on standard error; an incomplete
+/// figure does not replace an existing one.
 pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Result<usize, Exit> {
     let place = folder.join("figures");
     std::fs::create_dir_all(&place)
@@ -23,10 +24,9 @@ pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Res
             let drawn = figure.draw(&output.join(&suite.name), |run, quantity| {
                 saved.value(&suite.name, run, quantity)
             });
-            // A figure of more runs is not replaced by one of fewer.
             if !drawn.notes.is_empty() && place.join(format!("{name}.png")).is_file() {
                 tell!(
-                    "figure {name}: kept as it is, delete it to draw what is here: {}",
+                    "figure {name}: not replaced, because the new one would lack: {}; delete it to draw it again",
                     drawn.notes.join("; ")
                 );
                 continue;
@@ -38,20 +38,18 @@ pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Res
                 tell!("figure {name}: not drawn, no run has data for it");
                 continue;
             };
-            let failed = |what| Exit::new(IO, format!("figure {name}: {what}"));
-            let png = drawing.to_png().map_err(failed)?;
-            let svg = drawing.to_svg(&name, &plain(&figure.title), &plain(&figure.description()));
-            let written = |e: grainwake_report::ReportError| Exit::new(IO, e.to_string());
-            grainwake_report::write(place.join(format!("{name}.png")), &png).map_err(written)?;
-            grainwake_report::write(place.join(format!("{name}.svg")), svg.as_bytes())
-                .map_err(written)?;
+            let title = figure.title.as_str();
+            write_figure(
+                &place,
+                Figure::new(name, title, figure.description(), drawing),
+            )?;
             count += 1;
         }
     }
     Ok(count)
 }
 
-/// Writes `folder/figures/README.md` with the figures of `suites` that are there.
+/// Writes `folder/figures/README.md` with the existing figures of `suites`.
 pub fn list(folder: &Path, suites: &[Suite]) -> Result<(), Exit> {
     let place = folder.join("figures");
     let mut text = String::from("# Figures of the validations\n");

@@ -1,4 +1,4 @@
-//! Results that are kept: `LEVEL.json` and `LEVEL.md`.
+//! Saved results: `LEVEL.json` and `LEVEL.md`.
 
 use std::path::Path;
 
@@ -19,14 +19,14 @@ pub struct Saved {
 }
 
 impl Saved {
-    /// A quantity of a run.
+    /// Returns the value of a quantity of a run.
     pub fn value(&self, name: &str, run: &str, quantity: &str) -> Option<f64> {
         let of = |v: &&Verdict| v.name == name && v.run == run && v.quantity == quantity;
         self.results.iter().find(of)?.value
     }
 }
 
-/// Where the numbers of a run come from.
+/// Provenance of the values of a run.
 #[derive(Serialize, Deserialize)]
 struct Source {
     name: String,
@@ -34,7 +34,7 @@ struct Source {
     commit: Option<String>,
     cpu: String,
     threads: usize,
-    /// Cells of the grid; not in results kept by earlier versions.
+    /// Cells of the grid; missing in results saved by earlier versions.
     #[serde(default)]
     cells: Option<u64>,
     steps: u64,
@@ -42,15 +42,16 @@ struct Source {
 }
 
 impl Source {
-    /// Wall time [ns] for each cell and step.
+    /// Returns the wall-clock time per cell and step [ns].
     fn cost(&self) -> Option<f64> {
         let updates = self.cells? * self.steps;
         (updates > 0).then(|| 1e9 * self.wall_s / updates as f64)
     }
 }
 
-/// Adds `verdicts` of runs below `output` to the results in `folder`, in place of earlier ones of
-/// the same runs; all are listed in the order of the `suites`. Gives them all.
+/// Adds the `verdicts` of runs below `output` to the results in `folder`, and returns all results.
+///
+/// Earlier verdicts of the same runs are replaced; the results are in the order of the `suites`.
 pub fn add(
     folder: &Path,
     level: &str,
@@ -114,14 +115,14 @@ pub fn add(
     Ok(saved)
 }
 
-/// Where a run stands in the suites: by name of the suite, then in its order.
+/// Returns the sort key of a run: name of the suite, then position in it.
 fn place(suites: &[Suite], name: &str, run: &str) -> (String, usize) {
     let suite = suites.iter().find(|s| s.name == name);
     let at = suite.and_then(|s| s.runs.iter().position(|r| r.name == run));
     (name.to_string(), at.unwrap_or(usize::MAX))
 }
 
-/// Cells of a run's grid.
+/// Returns the number of cells of a run.
 fn cells(suites: &[Suite], name: &str, run: &str) -> Option<u64> {
     let suite = suites.iter().find(|s| s.name == name)?;
     let run = suite.runs.iter().find(|r| r.name == run)?;
@@ -131,7 +132,7 @@ fn cells(suites: &[Suite], name: &str, run: &str) -> Option<u64> {
 
 fn markdown(level: &str, saved: &Saved) -> String {
     let mut text = format!(
-        "# Results of the validations, level {level}\n\nMade by `grainwake validate --level {level} \
+        "# Results of the validations, level {level}\n\nWritten by `grainwake validate --level {level} \
          --save`. A row without a bound is context.\n\n{}\n\n## Runs\n\n| run | cells | steps | wall time [s] \
          | ns per cell and step | threads | commit | processor |\n|---|---|---|---|---|---|---|---|\n",
         table(&saved.results)

@@ -1,4 +1,4 @@
-//! Verdicts for people to read.
+//! Text form of verdicts.
 
 use comfy_table::{CellAlignment, Table, presets};
 use grainwake_validation::Verdict;
@@ -29,7 +29,7 @@ fn verdict(v: &Verdict) -> &'static str {
     }
 }
 
-/// A verdict in a line.
+/// Returns a verdict on one line.
 pub fn line(v: &Verdict) -> String {
     let mut text = format!("{}/{} {}: {}", v.name, v.run, v.quantity, number(v.value));
     if v.reference.is_some() {
@@ -45,7 +45,7 @@ pub fn line(v: &Verdict) -> String {
     }
 }
 
-/// Verdicts as a table in Markdown.
+/// Returns verdicts as a Markdown table.
 pub fn table(verdicts: &[Verdict]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);

@@ -106,8 +106,7 @@ pub fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     found
 }
 
-/// Asserts that two run folders hold the same bits, but for where and how long they ran; the report,
-/// which says so too and is drawn from the rest, is not compared.
+/// Asserts that two run folders have equal bits, except for provenance, wall time and the report.
 pub fn assert_same_run(a: &Path, b: &Path) {
     let drawn = |name: &str| name == "report.html" || name.starts_with("figures/");
     let strip = |files: Vec<(String, Vec<u8>)>| -> Vec<(String, Vec<u8>)> {

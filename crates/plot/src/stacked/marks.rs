@@ -1,11 +1,28 @@
 //! Vertical lines that mark instants across all panels, with their names above.
 
-use super::{LABEL_ROWS, LEFT, RIGHT, ROW, VerticalMark};
 use crate::axis::Axis;
 use crate::drawing::{Anchor, Drawing};
 use crate::frame::Frame;
 use crate::style::{FAINT, GRID, HAIR, INK, SMALL};
 use crate::text;
+
+/// Margin to the left of the panels [pt].
+pub(super) const LEFT: f64 = 38.0;
+/// Margin to the right of the panels [pt].
+pub(super) const RIGHT: f64 = 8.0;
+/// Height of a row of names [pt].
+pub(super) const ROW: f64 = 9.5;
+/// Largest number of rows of names.
+const LABEL_ROWS: usize = 5;
+
+/// A vertical line across all panels.
+#[derive(Clone, Debug)]
+pub struct VerticalMark {
+    /// Value on the horizontal axis.
+    pub at: f64,
+    /// Name above the first panel; empty for none.
+    pub name: String,
+}
 
 /// Draws the lines across a panel, and the given names above it.
 pub fn draw(
@@ -31,7 +48,7 @@ pub fn draw(
     for (row, at, name) in names {
         let y = frame.y - 3.0 - ROW * *row as f64;
         let (centre, _) = centre_and_half_width(name, *at, frame.width);
-        drawing.label_with_halo(frame.x + centre, y, Anchor::Middle, SMALL, INK, name);
+        drawing.note_with_halo((frame.x + centre, y), Anchor::Middle, INK, name);
     }
 }
 

@@ -1,15 +1,18 @@
 //! Curves in panels stacked over a shared horizontal axis, with marked instants.
 
-mod curve;
-mod legend;
 mod marks;
 
-use crate::axis::Axis;
+use crate::axis::{Axis, extent};
+use crate::curve;
 use crate::drawing::{Anchor, Drawing};
 use crate::frame::Frame;
-use crate::style::{COLUMN, FAINT, INK, LINE, SMALL, TEXT, TICK};
+use crate::legend::{Entry, Legend};
+use crate::style::{COLUMN, FAINT, LINE, SMALL, TEXT};
 use crate::text;
 use crate::ticks;
+
+pub use marks::VerticalMark;
+use marks::{LEFT, RIGHT, ROW};
 
 /// A curve.
 #[derive(Clone, Debug)]
@@ -22,6 +25,47 @@ pub struct Series {
     pub colour: &'static str,
     /// SVG dash pattern.
     pub dash: Option<&'static str>,
+}
+
+impl Series {
+    /// Creates a solid curve without an entry in the legend.
+    pub fn new(points: Vec<(f64, f64)>, colour: &'static str) -> Series {
+        Series {
+            name: None,
+            points,
+            colour,
+            dash: None,
+        }
+    }
+
+    /// Sets the name in the legend.
+    #[must_use]
+    pub fn named(mut self, name: impl Into<String>) -> Series {
+        self.name = Some(name.into());
+        self
+    }
+
+    /// Sets the SVG dash pattern.
+    #[must_use]
+    pub fn dashed(mut self, pattern: &'static str) -> Series {
+        self.dash = Some(pattern);
+        self
+    }
+
+    /// Returns the entry in the legend, if the curve has a name.
+    fn entry(&self) -> Option<Entry> {
+        Some(Entry {
+            name: self.name.clone()?,
+            colour: self.colour,
+            line: Some(self.dash.unwrap_or_default()),
+            symbol: None,
+        })
+    }
+
+    /// Returns the vertical values.
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        self.points.iter().map(|point| point.1)
+    }
 }
 
 /// A panel with its curves.
@@ -37,41 +81,56 @@ pub struct Panel {
     pub height: f64,
 }
 
-/// A vertical line across all panels.
-#[derive(Clone, Debug)]
-pub struct VerticalMark {
-    /// Value on the horizontal axis.
-    pub at: f64,
-    /// Name above the first panel; empty for none.
-    pub name: String,
-}
+impl Panel {
+    /// Creates a panel of the given height [pt] with an axis that covers the curves and the values
+    /// `also`.
+    pub fn linear(label: &str, series: Vec<Series>, also: &[f64], height: f64) -> Panel {
+        let values = series.iter().flat_map(Series::values);
+        let (low, high) = extent(values.chain(also.iter().copied())).unwrap_or((0.0, 1.0));
+        Panel::with_axis(Axis::linear(label, low, high, 5, false), series, height)
+    }
 
-const LEFT: f64 = 38.0;
-const RIGHT: f64 = 8.0;
-const ROW: f64 = 9.5;
-const LABEL_ROWS: usize = 5;
+    /// Creates a panel with a logarithmic axis; `None` if no value is positive.
+    pub fn log(label: &str, series: Vec<Series>, height: f64) -> Option<Panel> {
+        let values = series.iter().flat_map(Series::values);
+        let (low, high) = extent(values.filter(|v| *v > 0.0))?;
+        Some(Panel::with_axis(
+            Axis::log(label, low, high),
+            series,
+            height,
+        ))
+    }
+
+    /// Creates a panel with a given vertical axis.
+    pub fn with_axis(y: Axis, series: Vec<Series>, height: f64) -> Panel {
+        Panel {
+            y,
+            series,
+            levels: Vec::new(),
+            height,
+        }
+    }
+}
 
 /// Draws the panels over one horizontal axis, in a drawing of one column width.
 pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) -> Drawing {
     let width = COLUMN - LEFT - RIGHT;
     let names = marks::name_positions(x, verticals, width);
     let rows = names.iter().map(|(row, _, _)| row + 1).max().unwrap_or(0);
-    let mut legends: Vec<Vec<Vec<&Series>>> = Vec::new();
-    let mut before: Vec<&str> = Vec::new();
-    for panel in panels {
-        let named: Vec<&Series> = panel.series.iter().filter(|s| s.name.is_some()).collect();
-        let these: Vec<&str> = named.iter().filter_map(|s| s.name.as_deref()).collect();
-        legends.push(if these == before {
-            Vec::new()
-        } else {
-            legend::rows(&named, width)
-        });
-        before = these;
-    }
+    let names_of = |panel: &Panel| -> Vec<Option<String>> {
+        panel.series.iter().map(|s| s.name.clone()).collect()
+    };
+    // A panel with the names of the previous panel has no legend of its own.
+    let legend = |i: usize| {
+        let repeated = i > 0 && names_of(&panels[i]) == names_of(&panels[i - 1]);
+        let series = panels[i].series.iter().filter(|_| !repeated);
+        Legend::new(series.filter_map(Series::entry), width)
+    };
+    let legends: Vec<Legend> = (0..panels.len()).map(legend).collect();
     let top = |i: usize| {
         let marks = if i == 0 { ROW * rows as f64 } else { 0.0 };
         let letter = if panels.len() > 1 { 5.0 } else { 0.0 };
-        7.0 + letter + ROW * legends[i].len() as f64 + marks
+        7.0 + letter + legends[i].height() + marks
     };
     // A long label makes its panel taller.
     let height = |panel: &Panel| panel.height.max(text::width(&panel.y.label, TEXT) + 4.0);
@@ -83,7 +142,7 @@ pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) ->
     let mut drawing = Drawing::new(COLUMN, heights + 26.0);
     let mut y = 0.0;
     for (i, panel) in panels.iter().enumerate() {
-        legend::draw(&mut drawing, &legends[i], y + 7.0);
+        legends[i].draw(&mut drawing, (LEFT, y + 7.0));
         y += top(i);
         let frame = Frame {
             x: LEFT,
@@ -98,10 +157,12 @@ pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) ->
         draw_panel(&mut drawing, &frame, panel, i);
         y += frame.height;
         let last = i + 1 == panels.len();
-        draw_x_axis(&mut drawing, &frame, last);
+        ticks::horizontal(&mut drawing, x, (LEFT, y), width, last);
+        if last {
+            frame.horizontal_label(&mut drawing);
+        }
         if panels.len() > 1 {
-            let letter = format!("({})", char::from(b'a' + (i % 26) as u8));
-            drawing.label(2.0, frame.y - 4.0, Anchor::Start, TEXT, INK, &letter, false);
+            drawing.text((2.0, frame.y - 4.0), Anchor::Start, &text::letter(i));
         }
     }
     drawing
@@ -124,12 +185,11 @@ fn draw_panel(drawing: &mut Drawing, frame: &Frame, panel: &Panel, index: usize)
     }
     drawing.end_clip();
     for (value, note) in &panel.levels {
-        let (left, base) = note_position(frame, panel, frame.py(*value), text::width(note, SMALL));
-        drawing.label_with_halo(left, base, Anchor::Start, SMALL, FAINT, note);
+        let place = note_position(frame, panel, frame.py(*value), text::width(note, SMALL));
+        drawing.note_with_halo(place, Anchor::Start, FAINT, note);
     }
     drawing.outline(x, y, width, height);
-    let middle = y + 0.5 * height;
-    drawing.label(9.0, middle, Anchor::Middle, TEXT, INK, &panel.y.label, true);
+    drawing.upward_text((9.0, y + 0.5 * height), &panel.y.label);
 }
 
 /// Returns the left end and baseline [pt] where the note of a reference line at height `y` covers
@@ -156,22 +216,6 @@ fn note_position(frame: &Frame, panel: &Panel, y: f64, width: f64) -> (f64, f64)
     best.unwrap_or((ends[0], bases[0]))
 }
 
-fn draw_x_axis(drawing: &mut Drawing, frame: &Frame, labelled: bool) {
-    let bottom = frame.y + frame.height;
-    ticks::horizontal(
-        drawing,
-        &frame.across,
-        (frame.x, bottom),
-        frame.width,
-        labelled,
-    );
-    if labelled {
-        let (middle, base) = (frame.x + 0.5 * frame.width, bottom + TICK + SMALL + 11.0);
-        let label = &frame.across.label;
-        drawing.label(middle, base, Anchor::Middle, TEXT, INK, label, false);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -182,19 +226,8 @@ mod tests {
         let points = (0..=100)
             .map(|i| (0.1 * f64::from(i), if i < 60 { 1.0 } else { 5.5 }))
             .collect();
-        let series = Series {
-            name: None,
-            points,
-            colour: INK,
-            dash: None,
-        };
         let y = Axis::linear("y", 0.0, 10.0, 5, true);
-        let panel = Panel {
-            y,
-            series: vec![series],
-            levels: Vec::new(),
-            height: 100.0,
-        };
+        let panel = Panel::with_axis(y, vec![Series::new(points, FAINT)], 100.0);
         let frame = Frame {
             across: x,
             up: panel.y.clone(),

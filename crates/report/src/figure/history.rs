@@ -1,86 +1,70 @@
-//! Curves of the run as a whole: many grains coming to rest, diagnostics.
+//! Curves against time: several or many grains, the force of the fluid, the diagnostics.
 
-use super::curves::{Points, log_panel, panel, series};
-use super::{AXES, Figure, Scene};
+use grainwake_plot::stacked::{Panel, Series};
+use grainwake_plot::{Figure, letter, style};
+
+use super::scene::{AXES, Points, Scene};
+use crate::features::short;
 use crate::run_folder::History;
-use crate::story::short;
-use grainwake_plot::stacked::{Series, stacked_panels};
-use grainwake_plot::style;
 
-/// Mean height, speed and contacts of many grains.
+/// Draws the mean height, speed and number of contacts of many grains.
 pub fn many(scene: &Scene) -> Option<Figure> {
     let moving = scene.moving();
     let first = &scene.run.grains[*moving.first()?];
-    let (_, factor) = scene.story.time_axis();
-    let up = scene.story.up;
-    let over = |value: &dyn Fn(&History, usize) -> f64| -> Points {
-        (0..first.len())
-            .map(|row| {
-                let present: Vec<&History> = moving
-                    .iter()
-                    .map(|g| &scene.run.grains[*g])
-                    .filter(|h| h.len() > row)
-                    .collect();
-                let sum: f64 = present.iter().map(|h| value(h, row)).sum();
-                (first.time[row] * factor, sum / present.len() as f64)
-            })
-            .collect()
+    let (_, factor) = scene.features.time_axis();
+    let up = scene.features.up;
+    let mean = |value: &dyn Fn(&History, usize) -> f64| -> Points {
+        let at = |row: usize| {
+            let histories = moving.iter().map(|g| &scene.run.grains[*g]);
+            let values = histories.filter(|h| h.len() > row).map(|h| value(h, row));
+            let (sum, count) = values.fold((0.0, 0), |(sum, n), v| (sum + v, n + 1));
+            (first.time[row] * factor, sum / f64::from(count))
+        };
+        (0..first.len()).map(at).collect()
     };
-    let speed = over(&|h, row| h.velocity[row].length_squared());
-    let speed: Points = speed.into_iter().map(|(t, v)| (t, v.sqrt())).collect();
-    let contacts = over(&|h, row| h.contacts[row]);
-    let height = over(&|h, row| 1e3 * h.position[row].dot(up));
+    let squares = mean(&|h, row| h.velocity[row].length_squared());
+    let speed: Points = squares.into_iter().map(|(t, v)| (t, v.sqrt())).collect();
+    let contacts = mean(&|h, row| h.contacts[row]);
+    let height = mean(&|h, row| 1e3 * h.position[row].dot(up));
     let (last_speed, last_contacts) = (speed.last()?.1, contacts.last()?.1);
-    let mut panels = vec![panel(
-        "mean height  [mm]",
-        vec![series(None, height, style::BLUE)],
-        &[],
-        70.0,
-    )];
-    panels.extend(log_panel(
-        "rms speed  [m/s]",
-        vec![series(None, speed, style::VERMILION)],
-        80.0,
-    ));
+    let curve = |points, colour| vec![Series::new(points, colour)];
+    let height = curve(height, style::BLUE);
+    let mut panels = vec![Panel::linear("mean height  [mm]", height, &[], 70.0)];
+    let speed = curve(speed, style::VERMILION);
+    panels.extend(Panel::log("rms speed  [m/s]", speed, 80.0));
     let mut caption = format!(
-        "(a) Mean height of the {} grains. (b) Root mean square of their speeds, {} m/s at the end.",
+        "(a) Mean height of the {} grains. (b) Root mean square of their speeds, {} m/s at the \
+         end.",
         moving.len(),
         short(last_speed)
     );
     if last_contacts.is_finite() {
-        panels.push(panel(
+        let contacts = curve(contacts, style::GREEN);
+        panels.push(Panel::linear(
             "contacts per grain  [–]",
-            vec![series(None, contacts, style::GREEN)],
+            contacts,
             &[0.0],
             70.0,
         ));
-        caption.push_str(&format!(
-            " (c) Mean number of contacts of a grain, {} at the end.",
-            short(last_contacts)
-        ));
+        let last = short(last_contacts);
+        caption += &format!(" (c) Mean number of contacts of a grain, {last} at the end.");
     }
-    Some(Figure {
-        name: "history",
-        title: "Coming to rest".to_owned(),
-        caption,
-        drawing: stacked_panels(&scene.time(), &panels, &[]),
-    })
+    Some(scene.without_events("history", "Coming to rest", caption, &panels))
 }
 
-/// Most grains that are drawn one by one.
+/// Largest number of grains that have curves of their own.
 pub const FEW: usize = 12;
 
-/// Height and vertical velocity of each of a few grains.
+/// Draws the height and the vertical velocity of each of a few grains.
 pub fn each(scene: &Scene) -> Option<Figure> {
-    const DASHED: Option<&str> = Some("3.5 1.6");
     let moving = scene.moving();
-    if moving.len() > FEW || !scene.story.travels {
+    if moving.len() > FEW || !scene.features.travels {
         return None;
     }
-    let up = scene.story.up;
+    let up = scene.features.up;
     let curves = |value: &dyn Fn(&History, usize) -> f64| -> Vec<Series> {
         let one = |(n, grain): (usize, &usize)| Series {
-            dash: DASHED.filter(|_| n >= style::SERIES_COLOURS),
+            dash: (n >= style::SERIES_COLOURS).then_some("3.5 1.6"),
             colour: style::series_colour(n),
             ..scene.curve(*grain, value)
         };
@@ -88,168 +72,113 @@ pub fn each(scene: &Scene) -> Option<Figure> {
     };
     let fastest = |grain: &usize| {
         let speeds = scene.run.grains[*grain].velocity.iter().map(|v| -v.dot(up));
-        speeds.max_by(|a, b| a.abs().total_cmp(&b.abs()))
+        let speed = speeds.max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        Some(format!("{} of grain {grain}", short(speed)))
     };
-    let named: Vec<String> = moving
-        .iter()
-        .filter_map(|grain| Some(format!("{} of grain {grain}", short(fastest(grain)?))))
-        .collect();
+    let fastest: Vec<String> = moving.iter().filter_map(fastest).collect();
+    let height = curves(&|h, row| 1e3 * h.position[row].dot(up));
+    let velocity = curves(&|h, row| h.velocity[row].dot(up));
     let panels = [
-        panel(
-            "height  [mm]",
-            curves(&|h, row| 1e3 * h.position[row].dot(up)),
-            &[],
-            110.0,
-        ),
-        panel(
-            "*v*_{z}  [m/s]",
-            curves(&|h, row| h.velocity[row].dot(up)),
-            &[0.0],
-            110.0,
-        ),
+        Panel::linear("height  [mm]", height, &[], 110.0),
+        Panel::linear("*v*_{z}  [m/s]", velocity, &[0.0], 110.0),
     ];
-    Some(Figure {
-        name: "grains",
-        title: "Height and velocity of each grain".to_owned(),
-        caption: format!(
-            "(a) Height of the centre of each grain. (b) Vertical velocity (down is negative); the largest settling speeds [m/s] are {}.",
-            named.join(", ")
-        ),
-        drawing: stacked_panels(&scene.time(), &panels, &scene.marks()),
-    })
+    let caption = format!(
+        "(a) Height of the centre of each grain. (b) Vertical velocity (down is negative); the \
+         largest settling speeds [m/s] are {}.",
+        fastest.join(", ")
+    );
+    let title = "Height and velocity of each grain";
+    Some(scene.with_events("grains", title, caption, &panels))
 }
 
-/// Force of the fluid on a grain that is held or driven.
+/// Draws the force of the fluid on a held or driven grain.
 pub fn force(scene: &Scene) -> Option<Figure> {
-    let driven = !scene.story.travels || scene.story.scales.is_none();
+    let driven = !scene.features.travels || scene.features.scales.is_none();
     let grain = scene.moving().first().copied().filter(|_| driven)?;
     let history = &scene.run.grains[grain];
-    let (_, factor) = scene.story.time_axis();
-    let part = |axis: usize| -> Points {
-        let rows = 0..history.len();
-        rows.map(|row| (history.time[row] * factor, history.force[row][axis]))
-            .collect()
+    let component = |(axis, colour): (usize, &'static str)| Series {
+        name: Some(format!("*F*_{{{}}}", AXES[axis])),
+        colour,
+        ..scene.curve(grain, |h, row| h.force[row][axis])
     };
-    let curves: Vec<Series> = [style::BLUE, style::VERMILION, style::GREEN]
-        .into_iter()
-        .enumerate()
-        .map(|(axis, colour)| series(Some(format!("*F*_{{{}}}", AXES[axis])), part(axis), colour))
-        .collect();
-    let any = curves
-        .iter()
-        .flat_map(|s| &s.points)
-        .any(|p| p.1.is_finite() && p.1 != 0.0);
-    let last = history.force.last().filter(|_| any)?;
+    let colours = [style::BLUE, style::VERMILION, style::GREEN];
+    let curves: Vec<Series> = colours.into_iter().enumerate().map(component).collect();
+    let known = |v: f64| v.is_finite() && v != 0.0;
+    let known = curves.iter().flat_map(Series::values).any(known);
+    let last = history
+        .force
+        .last()
+        .filter(|_| known)?
+        .to_array()
+        .map(short);
     let caption = format!(
-        "Force of the fluid on grain {grain}: ({}, {}, {}) N at the end.",
-        short(last.x),
-        short(last.y),
-        short(last.z)
+        "Force of the fluid on grain {grain}: ({}) N at the end.",
+        last.join(", ")
     );
-    let panels = [panel("force  [N]", curves, &[0.0], 110.0)];
-    Some(Figure {
-        name: "force",
-        title: "Force of the fluid".to_owned(),
-        caption,
-        drawing: stacked_panels(&scene.time(), &panels, &scene.marks()),
-    })
+    let panels = [Panel::linear("force  [N]", curves, &[0.0], 110.0)];
+    Some(scene.with_events("force", "Force of the fluid", caption, &panels))
 }
 
-/// What the method may break, against time.
+/// Draws the conservation checks: divergence, Courant number, momentum residual, kinetic energy.
 pub fn diagnostics(scene: &Scene) -> Option<Figure> {
-    let table = scene.run.diagnostics.as_ref()?;
-    let time = table.column("time")?;
-    let (_, factor) = scene.story.time_axis();
-    let points = |names: &[&str]| -> Option<Points> {
-        let column = names.iter().find_map(|name| table.column(name))?;
-        let points: Points = time
-            .iter()
-            .zip(column)
-            .map(|(t, v)| (t * factor, *v))
-            .collect();
-        points
-            .iter()
-            .any(|p| p.1.is_finite() && p.1 != 0.0)
-            .then_some(points)
+    let points = |names: &[&str]| {
+        let points = scene.diagnostic(names)?;
+        let known = |p: &(f64, f64)| p.1.is_finite() && p.1 != 0.0;
+        points.iter().any(known).then_some(points)
     };
     let peak = |points: &Points| {
-        points
-            .iter()
-            .map(|p| p.1.abs())
-            .filter(|v| v.is_finite())
-            .fold(0.0, f64::max)
+        let sizes = points.iter().map(|p| p.1.abs());
+        sizes.filter(|v| v.is_finite()).fold(0.0, f64::max)
     };
-    // The summary knows all steps, the table those that were written.
+    // The summary covers all steps, the table only those with output.
     let highest = |name: &str, points: &Points| {
-        let of_all = scene
-            .run
-            .summary
-            .as_ref()
-            .and_then(|s| s.get(name)?.as_f64());
-        of_all.unwrap_or(0.0).max(peak(points))
+        let overall = scene.run.summary_number(name).unwrap_or(0.0);
+        short(overall.max(peak(points)))
     };
     let mut panels = Vec::new();
     let mut parts = Vec::new();
     if let Some(divergence) = points(&["max_divergence", "divergence"]) {
         parts.push(format!(
-            "largest divergence after projection, {} 1/s at most after any step",
-            short(highest("max_divergence", &divergence))
+            "largest divergence after projection, at most {} 1/s after any step",
+            highest("max_divergence", &divergence)
         ));
-        panels.extend(log_panel(
-            "max |div *u*|  [1/s]",
-            vec![series(None, divergence, style::BLUE)],
-            65.0,
-        ));
+        let curve = Series::new(divergence, style::BLUE);
+        panels.extend(Panel::log("max |div *u*|  [1/s]", vec![curve], 65.0));
     }
     if let Some(cfl) = points(&["cfl"]) {
-        parts.push(format!(
-            "Courant number, {} at most in any step",
-            short(highest("max_cfl", &cfl))
-        ));
-        panels.push(panel(
-            "CFL  [–]",
-            vec![series(None, cfl, style::INK)],
-            &[0.0],
-            60.0,
-        ));
+        let largest = highest("max_cfl", &cfl);
+        parts.push(format!("Courant number, at most {largest} in any step"));
+        let curve = Series::new(cfl, style::INK);
+        panels.push(Panel::linear("CFL  [–]", vec![curve], &[0.0], 60.0));
     }
     if let Some(residual) = points(&["momentum_residual"]) {
         let residual: Points = residual.into_iter().map(|(t, v)| (t, v.abs())).collect();
-        parts.push(format!("momentum of fluid, grains and walls that a step leaves unaccounted for, as a fraction of the mass of the fluid times its largest velocity, {} at most in the rows of the table", short(peak(&residual))));
-        panels.extend(log_panel(
-            "residual  [–]",
-            vec![series(None, residual, style::PURPLE)],
-            65.0,
+        parts.push(format!(
+            "change of the momentum of fluid, grains and walls in a step that no force accounts \
+             for, relative to the mass of the fluid times its largest velocity, at most {} in the \
+             rows of the table",
+            short(peak(&residual))
         ));
+        let curve = Series::new(residual, style::PURPLE);
+        panels.extend(Panel::log("residual  [–]", vec![curve], 65.0));
     }
-    let energies: Vec<Series> = [
-        ("fluid", "fluid_kinetic_energy", style::BLUE),
-        ("grains", "grain_kinetic_energy", style::VERMILION),
-    ]
-    .into_iter()
-    .filter_map(|(name, column, colour)| {
-        Some(series(Some(name.to_owned()), points(&[column])?, colour))
-    })
-    .collect();
+    let fluid = ("fluid", "fluid_kinetic_energy", style::BLUE);
+    let grains = ("grains", "grain_kinetic_energy", style::VERMILION);
+    let energy = |(name, column, colour): (&str, &str, &'static str)| {
+        Some(Series::new(points(&[column])?, colour).named(name))
+    };
+    let energies: Vec<Series> = [fluid, grains].into_iter().filter_map(energy).collect();
     if !energies.is_empty() {
         parts.push("kinetic energy".to_owned());
-        panels.push(panel("energy  [J]", energies, &[0.0], 80.0));
+        panels.push(Panel::linear("energy  [J]", energies, &[0.0], 80.0));
     }
     if panels.is_empty() {
         return None;
     }
-    let letters = parts
-        .iter()
-        .enumerate()
-        .map(|(i, part)| format!("({}) {part}", char::from(b'a' + i as u8)));
-    let caption = format!(
-        "What the method may break: {}.",
-        letters.collect::<Vec<_>>().join("; ")
-    );
-    Some(Figure {
-        name: "diagnostics",
-        title: "Diagnostics".to_owned(),
-        caption,
-        drawing: stacked_panels(&scene.time(), &panels, &[]),
-    })
+    let parts = parts.iter().enumerate();
+    let parts: Vec<String> = parts
+        .map(|(i, part)| format!("{} {part}", letter(i)))
+        .collect();
+    let caption = format!("Conservation checks: {}.", parts.join("; "));
+    Some(scene.without_events("diagnostics", "Diagnostics", caption, &panels))
 }

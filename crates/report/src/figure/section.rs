@@ -1,16 +1,23 @@
-//! A slice of the fields, ready to be drawn: values between cells, grain outlines.
+//! A slice of the fields: interpolation between cells, outlines of the solid, raster image.
 
 use glam::DVec3;
-use grainwake_formats::vti::Image;
-
-use super::sheet::Cells;
+use grainwake_formats::vti::{Frame, Image};
 use grainwake_plot::contour;
 use grainwake_plot::equal_aspect::Window;
 use grainwake_plot::raster::Raster;
 
-/// How a plane is looked at: axes 0, 1, 2 are x, y, z.
+/// Representation of the values of cells in a raster.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct View {
+pub enum Shading {
+    /// Interpolated between cell centres.
+    Smooth,
+    /// One colour per cell.
+    Flat,
+}
+
+/// Direction of view onto a plane; axes 0, 1, 2 are x, y, z.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SliceView {
     /// Axis across the plane.
     pub normal: usize,
     /// Axis to the right.
@@ -19,27 +26,27 @@ pub struct View {
     pub up: usize,
 }
 
-impl View {
-    /// The view of a slice with this normal; `vertical` points up where it lies in the plane.
-    pub fn along(normal: usize, vertical: usize) -> View {
-        let up = if vertical != normal {
-            vertical
-        } else {
-            if normal == 2 { 1 } else { 2 }
+impl SliceView {
+    /// Returns the view along a normal, with the axis `vertical` upwards if it lies in the plane.
+    pub fn along(normal: usize, vertical: usize) -> SliceView {
+        let up = match (vertical == normal, normal) {
+            (false, _) => vertical,
+            (true, 2) => 1,
+            (true, _) => 2,
         };
-        View {
+        SliceView {
             normal,
             across: 3 - normal - up,
             up,
         }
     }
 
-    /// The two coordinates that are seen.
+    /// Projects a point to the plane.
     pub fn seen(&self, x: DVec3) -> (f64, f64) {
         (x[self.across], x[self.up])
     }
 
-    /// Whether positive rotation about the normal turns clockwise to the eye.
+    /// Returns whether a positive rotation about the normal appears clockwise.
     pub fn clockwise(&self) -> bool {
         DVec3::AXES[self.across].cross(DVec3::AXES[self.up])[self.normal] < 0.0
     }
@@ -48,15 +55,15 @@ impl View {
 /// A slice one cell thick.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// How it is looked at.
-    pub view: View,
+    /// Direction of view.
+    pub view: SliceView,
     nx: usize,
     nz: usize,
     lower: (f64, f64),
     step: (f64, f64),
-    /// Place of the plane along its normal [m].
+    /// Position of the plane along its normal [m].
     pub place: f64,
-    /// Velocity in the plane (right, up) and its magnitude in space [m/s], by cell.
+    /// Velocity to the right, upwards, and its magnitude in space [m/s], by cell.
     pub velocity: Option<Vec<[f64; 3]>>,
     /// Vorticity along the normal [1/s], by cell.
     pub vorticity: Option<Vec<f64>>,
@@ -64,28 +71,30 @@ pub struct Section {
 }
 
 impl Section {
-    /// Takes what is drawn from an image file one cell thick in y, else x, else z.
+    /// Extracts the slice from an image that is one cell thick in y, else in x, else in z.
+    ///
+    /// # Errors
+    /// If the image is thicker, or its spacing or origin is unusable.
     pub fn of(image: &Image, vertical: usize) -> Result<Section, String> {
-        let [nx, ny, nz] = image.frame.cells;
-        let thin = [1, 0, 2]
-            .into_iter()
-            .find(|axis| image.frame.cells[*axis] == 1);
+        let Frame {
+            cells,
+            spacing,
+            origin,
+            ..
+        } = image.frame;
+        let [nx, ny, nz] = cells;
+        let thin = [1, 0, 2].into_iter().find(|axis| cells[*axis] == 1);
         let normal = thin.ok_or_else(|| {
             format!("{nx} x {ny} x {nz} cells are no slice, which is one cell thick")
         })?;
-        let view = View::along(normal, vertical);
+        let view = SliceView::along(normal, vertical);
         let strides = [1, nx, nx * ny];
         let (across, up) = (view.across, view.up);
         let order = || {
-            let rows = (0..image.frame.cells[up]).map(move |k| k * strides[up]);
-            rows.flat_map(move |row| {
-                (0..image.frame.cells[across]).map(move |i| row + i * strides[across])
-            })
+            let rows = (0..cells[up]).map(move |k| k * strides[up]);
+            rows.flat_map(move |row| (0..cells[across]).map(move |i| row + i * strides[across]))
         };
-        if !(image.frame.spacing.min_element() > 0.0
-            && image.frame.spacing.is_finite()
-            && image.frame.origin.is_finite())
-        {
+        if !(spacing.min_element() > 0.0 && spacing.is_finite() && origin.is_finite()) {
             return Err("its spacing or origin cannot be used".to_owned());
         }
         let array = |name: &str, components: usize| {
@@ -111,18 +120,18 @@ impl Section {
             .map(|data| order().map(|cell| f64::from(data[cell])).collect());
         Ok(Section {
             view,
-            nx: image.frame.cells[across],
-            nz: image.frame.cells[up],
-            lower: view.seen(image.frame.origin),
-            step: view.seen(image.frame.spacing),
-            place: image.frame.origin[normal] + 0.5 * image.frame.spacing[normal],
+            nx: cells[across],
+            nz: cells[up],
+            lower: view.seen(origin),
+            step: view.seen(spacing),
+            place: origin[normal] + 0.5 * spacing[normal],
             velocity,
             vorticity,
             solid,
         })
     }
 
-    /// All of the slice.
+    /// Returns the extent of the slice.
     pub fn whole(&self) -> Window {
         let (x, z) = self.lower;
         Window {
@@ -134,23 +143,16 @@ impl Section {
         }
     }
 
-    /// Value at a point by cubic interpolation that does not overshoot its neighbours.
+    /// Interpolates at a point with cubics, limited to the range of the four nearest cells.
     pub fn sample(&self, value: impl Fn(usize) -> f64, (x, z): (f64, f64)) -> f64 {
         let place = |at: f64, low: f64, step: f64, n: usize| {
             ((at - low) / step - 0.5).clamp(0.0, (n - 1) as f64)
         };
-        let (px, pz) = (
-            place(x, self.lower.0, self.step.0, self.nx),
-            place(z, self.lower.1, self.step.1, self.nz),
-        );
+        let px = place(x, self.lower.0, self.step.0, self.nx);
+        let pz = place(z, self.lower.1, self.step.1, self.nz);
         let (i, k) = (px.floor() as isize, pz.floor() as isize);
-        let at = |i: isize, k: isize| {
-            let (i, k) = (
-                i.clamp(0, self.nx as isize - 1),
-                k.clamp(0, self.nz as isize - 1),
-            );
-            value(i as usize + self.nx * k as usize)
-        };
+        let inside = |i: isize, n: usize| i.clamp(0, n as isize - 1) as usize;
+        let at = |i: isize, k: isize| value(inside(i, self.nx) + self.nx * inside(k, self.nz));
         let (u, w) = (px - i as f64, pz - k as f64);
         let row = |k: isize| cubic([at(i - 1, k), at(i, k), at(i + 1, k), at(i + 2, k)], u);
         let out = cubic([row(k - 1), row(k), row(k + 1), row(k + 2)], w);
@@ -161,7 +163,7 @@ impl Section {
         )
     }
 
-    /// The cell that holds a point, or the one nearest to it.
+    /// Returns the cell that contains a point, or the nearest cell.
     pub fn cell(&self, (x, z): (f64, f64)) -> usize {
         let place = |at: f64, low: f64, step: f64, n: usize| {
             (((at - low) / step).floor() as isize).clamp(0, n as isize - 1) as usize
@@ -170,17 +172,17 @@ impl Section {
             + self.nx * place(z, self.lower.1, self.step.1, self.nz)
     }
 
-    /// Solid fraction of a cell; zero where the file has none.
+    /// Returns the solid fraction of a cell; zero if the file has none.
     pub fn solid(&self, cell: usize) -> f64 {
         self.solid.as_ref().map_or(0.0, |solid| solid[cell])
     }
 
-    /// Solid fractions by cell, if the file has them.
+    /// Returns the solid fractions by cell, if the file has them.
     pub fn solid_fraction(&self) -> Option<&[f64]> {
         self.solid.as_deref()
     }
 
-    /// Cells whose centre lies in the window.
+    /// Returns the cells whose centres lie in the window.
     pub fn cells_in(&self, window: Window) -> impl Iterator<Item = usize> + '_ {
         let inside = move |cell: usize| {
             let x = self.lower.0 + (0.5 + (cell % self.nx) as f64) * self.step.0;
@@ -190,7 +192,7 @@ impl Section {
         (0..self.nx * self.nz).filter(move |cell| inside(*cell))
     }
 
-    /// Outlines of the solid [m].
+    /// Returns the contours of solid fraction 0.5 [m].
     pub fn outlines(&self) -> Vec<Vec<(f64, f64)>> {
         let Some(solid) = &self.solid else {
             return Vec::new();
@@ -208,25 +210,25 @@ impl Section {
             .collect()
     }
 
-    /// The window in colours: `position` turns a value into a place in the palette, 0 to 1.
+    /// Returns the window as a raster of `width` x `height` pixels; `position` maps a value to a
+    /// position in the palette, 0 to 1.
     pub fn raster(
         &self,
         window: Window,
-        width: usize,
-        height: usize,
+        [width, height]: [usize; 2],
         palette: Vec<[u8; 3]>,
-        value: impl Fn(usize) -> f64,
+        values: &[f64],
         position: impl Fn(f64) -> f64,
-        cells: Cells,
+        shading: Shading,
     ) -> Raster {
         let mut pixels = Vec::with_capacity(width * height);
         for row in 0..height {
             let z = window.high.1 - window.height() * (row as f64 + 0.5) / height as f64;
             for column in 0..width {
                 let x = window.low.0 + window.width() * (column as f64 + 0.5) / width as f64;
-                let place = position(match cells {
-                    Cells::Smooth => self.sample(&value, (x, z)),
-                    Cells::Flat => value(self.cell((x, z))),
+                let place = position(match shading {
+                    Shading::Smooth => self.sample(|cell| values[cell], (x, z)),
+                    Shading::Flat => values[self.cell((x, z))],
                 });
                 pixels.push((255.0 * place.clamp(0.0, 1.0)).round() as u8);
             }
@@ -248,7 +250,7 @@ fn cubic([a, b, c, d]: [f64; 4], t: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use grainwake_formats::vti::{Array, Frame};
+    use grainwake_formats::vti::Array;
 
     fn image(ny: usize) -> Image {
         let centre = |i: usize| (i % 8) as f32 + 0.5;
@@ -317,23 +319,13 @@ mod tests {
             high: (4.0, 6.0),
         };
         assert_eq!(section.cells_in(window).count(), 24);
-        let raster = section.raster(
-            window,
-            4,
-            6,
-            vec![[0; 3]; 256],
-            |i| section.solid(i),
-            |v| v,
-            Cells::Smooth,
-        );
-        let flat = section.raster(
-            window,
-            8,
-            12,
-            vec![[0; 3]; 256],
-            |i| section.solid(i),
-            |v| v,
-            Cells::Flat,
+        let raster = |size: [usize; 2], shading: Shading| {
+            let values = section.solid_fraction().unwrap();
+            section.raster(window, size, vec![[0; 3]; 256], values, |v| v, shading)
+        };
+        let (flat, raster) = (
+            raster([8, 12], Shading::Flat),
+            raster([4, 6], Shading::Smooth),
         );
         assert!(
             flat.pixels.iter().all(|v| [0, 255].contains(v)),
@@ -345,30 +337,30 @@ mod tests {
     #[test]
     fn every_normal_has_its_view() {
         assert_eq!(
-            View::along(1, 2),
-            View {
+            SliceView::along(1, 2),
+            SliceView {
                 normal: 1,
                 across: 0,
                 up: 2
             }
         );
         assert_eq!(
-            View::along(0, 1),
-            View {
+            SliceView::along(0, 1),
+            SliceView {
                 normal: 0,
                 across: 2,
                 up: 1
             }
         );
         assert_eq!(
-            View::along(2, 2),
-            View {
+            SliceView::along(2, 2),
+            SliceView {
                 normal: 2,
                 across: 0,
                 up: 1
             }
         );
-        assert!(View::along(1, 2).clockwise() && !View::along(0, 2).clockwise());
+        assert!(SliceView::along(1, 2).clockwise() && !SliceView::along(0, 2).clockwise());
         let mut turned = image(1);
         turned.frame.cells = [1, 8, 6];
         let section = Section::of(&turned, 1).unwrap();

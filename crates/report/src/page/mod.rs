@@ -1,178 +1,130 @@
-//! The page: one self-contained HTML file without scripts or outside resources.
+//! The report page of a run.
 
 mod tables;
 
-use grainwake_plot::{COLUMN, escape, html, literal, plain};
+use grainwake_plot::{literal, plain};
+use maud::{Markup, html};
+use serde_json::Value;
 
-use crate::figure::Figure;
+use crate::features::{RunFeatures, RunKind, short};
+use crate::files::WrittenFigure;
+use crate::html::{self, label, name_column, notice, number_column, section};
 use crate::phases::{Phase, PhaseKind};
 use crate::run_folder::RunFolder;
-use crate::story::{Story, Subject, short};
 
-/// Style sheet of all pages.
-pub const STYLE: &str = include_str!("style.css");
-
-/// The whole page; `figures` come with their SVG documents.
+/// Returns the page.
 pub fn page(
     run: &RunFolder,
-    story: &Story,
-    figures: &[(Figure, String)],
+    features: &RunFeatures,
+    figures: &[WrittenFigure],
     notes: &[String],
 ) -> String {
-    let title = title(run, story);
-    let mut out = String::with_capacity(1 << 20);
-    out.push_str("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
-    out.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
-    out.push_str(&format!(
-        "<title>{}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n",
-        escape(&title)
-    ));
-    out.push_str(&format!(
-        "<header>\n<h1>{}</h1>\n<p class=\"lead\">{}</p>\n</header>\n",
-        escape(&title),
-        lead(run, story)
-    ));
-    out.push_str(&notices(run, story, notes));
-    if !story.phases.is_empty() {
-        out.push_str(&format!(
-            "<section>\n<h2>Phases</h2>\n{}</section>\n",
-            phase_bar(story)
-        ));
-    }
-    if !figures.is_empty() {
-        out.push_str("<section>\n<h2>Figures</h2>\n<div class=\"figures\">\n");
-        for (i, (figure, svg)) in figures.iter().enumerate() {
-            out.push_str(&figure_block(i + 1, figure, svg));
-        }
-        out.push_str("</div>\n</section>\n");
-    }
-    out.push_str(&format!(
-        "<section>\n<h2>What was run</h2>\n{}</section>\n",
-        tables::parameters(run, story)
-    ));
-    if !run.events.is_empty() {
-        out.push_str(&format!(
-            "<section>\n<h2>Events</h2>\n{}</section>\n",
-            tables::events(run, story)
-        ));
-    }
-    out.push_str(&format!(
-        "<section>\n<h2>Where it comes from</h2>\n{}</section>\n",
-        tables::provenance(run)
-    ));
-    out.push_str("<footer>Made by Grainwake from the tables of this run folder; the same figures are in <code>figures/</code> as PNG and SVG.</footer>\n");
-    out.push_str("</main>\n</body>\n</html>\n");
-    out
-}
-
-fn title(run: &RunFolder, story: &Story) -> String {
-    let what = match story.subject {
-        Subject::Flow => "Flow without grains",
-        Subject::Single => "One grain",
-        Subject::Pair => "Settling pair",
-        Subject::Many => "Many grains",
+    let content = html! {
+        (state(run, features))
+        (html::omissions(notes))
+        @if !features.phases.is_empty() { (section("Phases", &phases(features))) }
+        @if !figures.is_empty() { (section("Figures", &html::figures(figures))) }
+        (section("Set-up", &tables::parameters(run, features)))
+        @if !run.events.is_empty() { (section("Events", &tables::events(run, features))) }
+        (section("Provenance", &tables::provenance(run)))
     };
-    run.facts.title.clone().unwrap_or_else(|| what.to_owned())
-}
-
-/// One or two sentences with the result.
-fn lead(run: &RunFolder, story: &Story) -> String {
-    let end = format!("The run covers {} s of simulated time", short(story.end));
-    let first = match story.subject {
-        Subject::Pair => pair_sentence(story),
-        Subject::Single => single_sentence(run, story),
-        Subject::Many => format!(
-            "{} grains. ",
-            run.grains.iter().filter(|h| !h.is_empty()).count()
-        ),
-        Subject::Flow => String::new(),
+    let footer = html! {
+        "Produced by Grainwake from the tables of this run folder. Figures as PNG and SVG: "
+        code { "figures/" } "."
     };
-    let wall = run
-        .summary
-        .as_ref()
-        .and_then(|s| s.get("wall_s"))
-        .and_then(serde_json::Value::as_f64);
-    let wall = wall.map_or(String::new(), |wall| {
-        format!(" and took {}", tables::duration(wall))
-    });
-    let ended = run
-        .summary
-        .as_ref()
-        .and_then(|s| s.get("ended_by"))
-        .and_then(serde_json::Value::as_str);
-    let ended = ended.filter(|reason| *reason != "end");
-    let ended = ended.map_or(String::new(), |reason| {
-        format!("; it ended by {}", literal(reason))
-    });
-    html(&format!("{first}{end}{wall}{ended}."))
+    html::page(
+        title(run, features),
+        &lead(run, features),
+        &content,
+        &footer,
+    )
 }
 
-fn pair_sentence(story: &Story) -> String {
-    let Some(kiss) = story.kiss else {
+fn title<'a>(run: &'a RunFolder, features: &RunFeatures) -> &'a str {
+    let general = match features.kind {
+        RunKind::Flow => "Flow without grains",
+        RunKind::Single => "One grain",
+        RunKind::Pair => "Settling pair",
+        RunKind::Many => "Many grains",
+    };
+    run.facts.title.as_deref().unwrap_or(general)
+}
+
+/// Returns one or two sentences with the main result and the extent of the run.
+fn lead(run: &RunFolder, features: &RunFeatures) -> Markup {
+    let result = match features.kind {
+        RunKind::Pair => pair_sentence(features),
+        RunKind::Single => single_sentence(run, features),
+        RunKind::Many => format!("{} grains. ", run.moving().len()),
+        RunKind::Flow => String::new(),
+    };
+    let wall = run.summary_number("wall_s");
+    let wall = wall.map_or(String::new(), |s| {
+        format!(" and took {}", tables::duration(s))
+    });
+    let summary = run.summary.as_ref();
+    let reason = summary.and_then(|s| s.get("ended_by")?.as_str());
+    let reason = reason.filter(|reason| *reason != "end");
+    let reason = reason.map_or(String::new(), |r| format!("; it ended by {}", literal(r)));
+    let end = short(features.end);
+    label(&format!(
+        "{result}The run covers {end} s of simulated time{wall}{reason}."
+    ))
+}
+
+fn pair_sentence(features: &RunFeatures) -> String {
+    let Some(kiss) = features.kiss else {
         return "The two grains did not touch. ".to_owned();
     };
-    let mut happened = vec![(kiss.time, format!("kissed at {}", story.moment_text(kiss)))];
+    let mut events = vec![(
+        kiss.time,
+        format!("kissed at {}", features.pair_event_text(kiss)),
+    )];
     let tumbling = |phase: &&Phase| phase.kind == PhaseKind::Tumbling;
-    if let Some(phase) = story.phases.iter().find(tumbling) {
-        let text = format!("tumbled from {}", story.time_text(phase.start));
-        happened.push((phase.start, text));
+    if let Some(phase) = features.phases.iter().find(tumbling) {
+        let text = format!("tumbled from {}", features.time_text(phase.start));
+        events.push((phase.start, text));
     }
-    if let Some(parting) = story.parting {
-        let text = format!("parted at {}", story.moment_text(parting));
-        happened.push((parting.time, text));
+    if let Some(separation) = features.separation {
+        let text = format!("separated at {}", features.pair_event_text(separation));
+        events.push((separation.time, text));
     }
-    happened.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut texts: Vec<String> = happened.into_iter().map(|(_, text)| text).collect();
+    events.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut texts: Vec<String> = events.into_iter().map(|(_, text)| text).collect();
     if let [_, .., last] = &mut texts[..] {
         last.insert_str(0, "and ");
     }
     format!("The two grains {}. ", texts.join(", "))
 }
 
-fn single_sentence(run: &RunFolder, story: &Story) -> String {
-    let peak = run
-        .grains
-        .iter()
-        .flat_map(|h| h.velocity.iter().map(|v| -v.dot(story.up)))
-        .fold(f64::NEG_INFINITY, f64::max);
-    if peak > 0.0 {
-        format!("The grain reached {} m/s downwards. ", short(peak))
-    } else {
-        String::new()
+fn single_sentence(run: &RunFolder, features: &RunFeatures) -> String {
+    let velocities = run.grains.iter().flat_map(|h| &h.velocity);
+    let peak = velocities.map(|v| -v.dot(features.up)).fold(0.0, f64::max);
+    match peak > 0.0 {
+        true => format!("The grain reached {} m/s downwards. ", short(peak)),
+        false => String::new(),
     }
 }
 
-fn notices(run: &RunFolder, story: &Story, notes: &[String]) -> String {
-    let mut out = String::new();
-    let up_to = html(&short(story.end));
-    if let Some(failure) = &run.failure {
-        let say = |name: &str| {
-            failure
-                .get(name)
-                .and_then(serde_json::Value::as_str)
-                .unwrap_or("not known")
-        };
-        out.push_str(&format!(
-            "<div class=\"notice\" role=\"alert\"><b>This run failed</b>: {}. To try: {}. What follows goes up to <i>t</i> = {up_to} s.</div>\n",
-            escape(say("what")),
-            escape(say("remedy"))
-        ));
-    } else if !run.finished() {
-        out.push_str(&format!(
-            "<div class=\"notice\" role=\"note\"><b>This run has not finished</b>: there is no <code>summary.json</code>. What follows goes up to <i>t</i> = {up_to} s.</div>\n",
-        ));
+/// Returns the notice of a failed or unfinished run; empty for a finished one.
+fn state(run: &RunFolder, features: &RunFeatures) -> Markup {
+    let extent = html! { "Results up to " i { "t" } " = " (label(&short(features.end))) " s." };
+    let failure = run.failure.as_ref();
+    let text = |name| failure.and_then(|f| f.get(name)).and_then(Value::as_str);
+    let text = |name| text(name).unwrap_or("not known");
+    html! {
+        @if failure.is_some() {
+            div.notice role="alert" {
+                b { "This run failed" } ": " (text("what")) ". To try: " (text("remedy")) ". "
+                (extent)
+            }
+        } @else if !run.finished() {
+            (notice(&html! {
+                b { "This run has not finished" } ": there is no " code { "summary.json" } ". "
+                (extent)
+            }))
+        }
     }
-    if !notes.is_empty() {
-        let items: Vec<String> = notes
-            .iter()
-            .map(|note| format!("<li>{}</li>", escape(note)))
-            .collect();
-        out.push_str(&format!(
-            "<div class=\"notice\" role=\"note\"><b>Missing or left out</b><ul>{}</ul></div>\n",
-            items.join("")
-        ));
-    }
-    out
 }
 
 fn phase_colour(kind: PhaseKind) -> &'static str {
@@ -185,73 +137,45 @@ fn phase_colour(kind: PhaseKind) -> &'static str {
     }
 }
 
-fn phase_bar(story: &Story) -> String {
-    let total: f64 = story
-        .phases
-        .iter()
-        .map(|phase| phase.end - phase.start)
-        .sum();
-    let (label, factor) = story.time_axis();
-    let dimensionless = factor != 1.0;
-    let mut bar = String::new();
-    let mut rows = String::new();
-    let mut spoken = Vec::new();
-    for phase in &story.phases {
-        let share = 100.0 * (phase.end - phase.start) / total;
-        let name = phase.kind.name();
-        let colour = phase_colour(phase.kind);
-        // A name that would be cut is left to the table below.
-        let shown = if share >= 1.1 * name.len() as f64 {
-            name
-        } else {
-            ""
-        };
-        bar.push_str(&format!(
-            "<div style=\"width:{share:.3}%;background:{colour}\">{shown}</div>"
-        ));
-        let scaled = |time: f64| html(&short(time * factor));
-        let scaled = if dimensionless {
-            format!(
-                "<td class=\"number\">{}</td><td class=\"number\">{}</td>",
-                scaled(phase.start),
-                scaled(phase.end)
-            )
-        } else {
-            String::new()
-        };
-        rows.push_str(&format!(
-            "<tr><td class=\"name\"><span class=\"swatch\" style=\"background:{colour}\"></span>{name}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>{scaled}</tr>\n",
-            html(&short(phase.start)),
-            html(&short(phase.end))
-        ));
-        spoken.push(format!(
-            "{name} from {} s to {} s",
-            plain(&short(phase.start)),
-            plain(&short(phase.end))
-        ));
+/// Returns a bar with the share of each phase, and a table of their times.
+fn phases(features: &RunFeatures) -> Markup {
+    let duration = |phase: &Phase| phase.end - phase.start;
+    let total: f64 = features.phases.iter().map(duration).sum();
+    let ends = |phase: &Phase| [phase.start, phase.end].map(short);
+    let spoken = |phase: &Phase| {
+        let [start, end] = ends(phase).map(|text| plain(&text));
+        format!("{} from {start} s to {end} s", phase.kind.name())
+    };
+    let spoken: Vec<String> = features.phases.iter().map(spoken).collect();
+    let scaled = tables::scaled_time(features);
+    let mut columns = vec![
+        name_column("phase"),
+        number_column("from [s]"),
+        number_column("to [s]"),
+    ];
+    if let Some((label, _)) = scaled {
+        columns.extend(["from", "to"].map(|end| number_column(&format!("{end}, {label}"))));
     }
-    let scaled = if dimensionless {
-        let label = html(label.split("  ").next().unwrap_or(label));
-        format!("<th class=\"number\">from, {label}</th><th class=\"number\">to, {label}</th>")
-    } else {
-        String::new()
+    let row = |phase: &Phase| {
+        let colour = format!("background:{}", phase_colour(phase.kind));
+        let mut row = vec![html! { span.swatch style=(colour) {} (phase.kind.name()) }];
+        row.extend(ends(phase).map(|text| label(&text)));
+        if let Some((_, factor)) = scaled {
+            row.extend([phase.start, phase.end].map(|time| label(&short(time * factor))));
+        }
+        row
     };
-    format!(
-        "<div class=\"bar\" role=\"img\" aria-label=\"Phases: {}\">{bar}</div>\n<div class=\"scroll\"><table><thead><tr><th>phase</th><th class=\"number\">from [s]</th><th class=\"number\">to [s]</th>{scaled}</tr></thead><tbody>\n{rows}</tbody></table></div>\n",
-        escape(&spoken.join("; "))
-    )
-}
-
-fn figure_block(number: usize, figure: &Figure, svg: &str) -> String {
-    let class = if figure.drawing.width() <= COLUMN + 30.0 {
-        " class=\"column\""
-    } else {
-        ""
-    };
-    format!(
-        "<figure{class} id=\"{name}\">\n<div class=\"paper\">{svg}</div>\n<figcaption><b>Figure {number}. {}.</b> {} <span>(<a href=\"figures/{name}.png\">PNG</a>, <a href=\"figures/{name}.svg\">SVG</a>)</span></figcaption>\n</figure>\n",
-        html(&figure.title),
-        html(&figure.caption),
-        name = figure.name,
-    )
+    html! {
+        div.bar role="img" aria-label={ "Phases: " (spoken.join("; ")) } {
+            @for phase in &features.phases {
+                @let (name, share) = (phase.kind.name(), 100.0 * duration(phase) / total);
+                @let colour = phase_colour(phase.kind);
+                div style=(format!("width:{share:.3}%;background:{colour}")) {
+                    // A name that does not fit is left to the table.
+                    @if share >= 1.1 * name.len() as f64 { (name) }
+                }
+            }
+        }
+        (html::table(&columns, features.phases.iter().map(row)))
+    }
 }

@@ -1,271 +1,213 @@
-//! Tables of the page: parameters with units, events, provenance.
-
-use serde_json::Value;
+//! Tables of the report page: parameters, events, provenance.
 
 use grainwake_formats::events::Event;
+use grainwake_plot::literal;
+use maud::{Markup, html};
+use serde_json::Value;
 
+use crate::features::{RunFeatures, galileo, short};
+use crate::html::{label, number_column, properties, table, text_column};
 use crate::run_folder::RunFolder;
-use crate::story::{Story, galileo, short};
-use grainwake_plot::{escape, html, literal};
 
-/// Most events that are listed.
+/// Largest number of events in the table.
 const EVENTS: usize = 100;
-/// Most entries of a list in the provenance that are listed.
+/// Largest number of entries of a list in the provenance.
 const SESSIONS: usize = 8;
+/// Largest number of kinds of grains in the table of parameters.
+const GRAIN_KINDS: usize = 6;
 
-fn row(out: &mut String, name: &str, value: &str) {
-    out.push_str(&format!(
-        "<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n",
-        html(name),
-        html(value)
-    ));
+/// Names and values of a table of properties.
+#[derive(Default)]
+struct Rows(Vec<(Markup, Markup)>);
+
+impl Rows {
+    /// Adds a row, in label markup, if the value is known.
+    fn add(&mut self, name: &str, value: impl Into<Option<String>>) {
+        if let Some(value) = value.into() {
+            self.0.push((label(name), label(&value)));
+        }
+    }
+
+    /// Adds a row with a value in the font of code.
+    fn add_code(&mut self, name: &str, value: &str) {
+        let name = name.replace('_', " ");
+        self.0.push((html! { (name) }, html! { code { (value) } }));
+    }
 }
 
-fn table(rows: &str) -> String {
-    format!("<table><tbody>\n{rows}</tbody></table>\n")
+/// Returns two tables side by side: physics and numerics.
+pub fn parameters(run: &RunFolder, features: &RunFeatures) -> Markup {
+    html! {
+        div.pair {
+            div { (properties(&physics(run, features).0)) }
+            div { (properties(&numerics(run, features).0)) }
+        }
+    }
 }
 
-/// What was run: two tables side by side, physics and numerics.
-pub fn parameters(run: &RunFolder, story: &Story) -> String {
+fn physics(run: &RunFolder, features: &RunFeatures) -> Rows {
     let facts = &run.facts;
-    let mut physics = String::new();
-    if let Some(density) = facts.fluid_density {
-        row(
-            &mut physics,
-            "fluid density *ρ*_{f}",
-            &format!("{} kg/m^{{3}}", short(density)),
-        );
-    }
-    if let Some(viscosity) = facts.viscosity {
-        row(
-            &mut physics,
-            "kinematic viscosity *ν*",
-            &format!("{} m^{{2}}/s", short(viscosity)),
-        );
-    }
-    if let Some(gravity) = facts.gravity {
-        row(
-            &mut physics,
-            "gravity *g*",
-            &format!(
-                "({}, {}, {}) m/s^{{2}}",
-                short(gravity.x),
-                short(gravity.y),
-                short(gravity.z)
-            ),
-        );
-    }
-    grain_rows(&mut physics, run);
-    let ratio = facts
-        .grain_density()
-        .zip(facts.fluid_density)
-        .map(|(grain, fluid)| grain / fluid);
-    if let Some(ratio) = ratio {
-        row(&mut physics, "density ratio *ρ*_{p}/*ρ*_{f}", &short(ratio));
-    }
-    let differ = facts.grains.iter().any(|grain| {
-        (grain.diameter, grain.density) != (facts.grains[0].diameter, facts.grains[0].density)
-    });
-    if let (Some(scales), Some(ratio), Some(viscosity)) = (story.scales, ratio, facts.viscosity) {
-        row(
-            &mut physics,
-            &format!(
-                "Galileo number √(|*ρ*_{{p}}/*ρ*_{{f}} − 1| *g* *d*^{{3}}) / *ν*{}",
-                if differ {
-                    ", of the mean diameter and density"
-                } else {
-                    ""
-                }
-            ),
-            &short(galileo(scales, ratio, viscosity)),
-        );
-    }
-    if let (Some(diameter), Some(viscosity)) = (facts.diameter(), facts.viscosity) {
-        let fastest = run
-            .grains
-            .iter()
-            .flat_map(|h| h.velocity.iter().map(|v| v.length()))
-            .filter(|v| v.is_finite())
-            .fold(0.0, f64::max);
-        row(
-            &mut physics,
-            "Reynolds number at the largest speed, |*v*| *d* / *ν*",
-            &short(fastest * diameter / viscosity),
-        );
-    }
-    if let Some(scales) = story.scales {
-        row(
-            &mut physics,
-            "time scale √(*d*/*g*)",
-            &format!("{} s", short(scales.time())),
-        );
-        row(
-            &mut physics,
-            "velocity scale √(*d* *g*)",
-            &format!("{} m/s", short(scales.velocity())),
-        );
-    }
-    let mut numerics = String::new();
-    if let Some(size) = facts.size {
-        row(
-            &mut numerics,
-            "box",
-            &format!(
-                "{} × {} × {} mm",
-                short(1e3 * size.x),
-                short(1e3 * size.y),
-                short(1e3 * size.z)
-            ),
-        );
-    }
-    if let Some([x, y, z]) = facts.cells {
-        row(
-            &mut numerics,
-            "cells",
-            &format!("{x} × {y} × {z} = {:.3} million", (x * y * z) as f64 / 1e6),
-        );
-    }
-    if facts.single_precision {
-        row(&mut numerics, "fields", "single precision");
-    }
-    if let Some(cell) = facts.cell() {
-        row(
-            &mut numerics,
-            "cell edge *h*",
-            &format!("{} mm", short(1e3 * cell)),
-        );
-        if let Some(diameter) = facts.diameter() {
-            row(
-                &mut numerics,
-                "cells per diameter *d*/*h*",
-                &short(diameter / cell),
-            );
-        }
-    }
-    if let Some(faces) = &facts.boundaries {
-        for (axis, [lower, upper]) in ["x", "y", "z"].iter().zip(faces) {
-            let text = if lower == upper {
-                literal(lower)
-            } else {
-                format!("{} below, {} above", literal(lower), literal(upper))
-            };
-            row(&mut numerics, &format!("faces in *{axis}*"), &text);
-        }
-    }
-    if let Some(scheme) = &facts.scheme {
-        row(&mut numerics, "coupling", &literal(scheme));
-    }
-    row(
-        &mut numerics,
-        "simulated time",
-        &format!("{} s", short(story.end)),
+    let (diameter, viscosity) = (facts.diameter(), facts.viscosity);
+    let mut rows = Rows::default();
+    let with_unit = |unit: &'static str| move |value: f64| format!("{} {unit}", short(value));
+    rows.add(
+        "fluid density *ρ*_{f}",
+        facts.fluid_density.map(with_unit("kg/m^{3}")),
     );
-    if let Some(scales) = story.scales {
-        row(
-            &mut numerics,
-            "simulated time *t* √(*g*/*d*)",
-            &short(story.end / scales.time()),
-        );
-    }
-    let of_summary = |name: &str| run.summary.as_ref()?.get(name)?.as_f64();
-    if let Some(steps) = of_summary("steps") {
-        row(&mut numerics, "steps", &format!("{steps}"));
-    }
-    if let Some(wall) = of_summary("wall_s") {
-        row(&mut numerics, "wall time", &duration(wall));
-    }
-    if let Some(divergence) = of_summary("max_divergence") {
-        row(
-            &mut numerics,
-            "largest divergence after projection",
-            &format!("{} 1/s", short(divergence)),
-        );
-    }
-    format!(
-        "<div class=\"pair\">\n<div>{}</div>\n<div>{}</div>\n</div>\n",
-        table(&physics),
-        table(&numerics)
-    )
+    rows.add(
+        "kinematic viscosity *ν*",
+        viscosity.map(with_unit("m^{2}/s")),
+    );
+    let gravity = facts.gravity.map(|g| g.to_array().map(short).join(", "));
+    rows.add("gravity *g*", gravity.map(|g| format!("({g}) m/s^{{2}}")));
+    add_grains(&mut rows, run);
+    let ratio = facts.density_ratio();
+    rows.add("density ratio *ρ*_{p}/*ρ*_{f}", ratio.map(short));
+    let first = facts.grains.first().map(|g| (g.diameter, g.density));
+    let differ = facts
+        .grains
+        .iter()
+        .any(|g| Some((g.diameter, g.density)) != first);
+    let suffix = if differ {
+        ", of the mean diameter and density"
+    } else {
+        ""
+    };
+    let name = format!("Galileo number √(|*ρ*_{{p}}/*ρ*_{{f}} − 1| *g* *d*^{{3}}) / *ν*{suffix}");
+    let known = features.scales.zip(ratio).zip(viscosity);
+    rows.add(
+        &name,
+        known.map(|((scales, ratio), nu)| short(galileo(scales, ratio, nu))),
+    );
+    let speeds = run
+        .grains
+        .iter()
+        .flat_map(|h| &h.velocity)
+        .map(|v| v.length());
+    let fastest = speeds.filter(|v| v.is_finite()).fold(0.0, f64::max);
+    let reynolds = diameter
+        .zip(viscosity)
+        .map(|(d, nu)| short(fastest * d / nu));
+    rows.add(
+        "Reynolds number at the largest speed, |*v*| *d* / *ν*",
+        reynolds,
+    );
+    let (time, velocity) = features.scales.map(|s| (s.time(), s.velocity())).unzip();
+    rows.add("time scale √(*d*/*g*)", time.map(with_unit("s")));
+    rows.add("velocity scale √(*d* *g*)", velocity.map(with_unit("m/s")));
+    rows
 }
 
-/// One row for each kind of grain, called by its number or, where there are several, by how many
-/// they are.
-fn grain_rows(out: &mut String, run: &RunFolder) {
+fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
+    let facts = &run.facts;
+    let mut rows = Rows::default();
+    let size = facts.size.map(|size| (1e3 * size).to_array().map(short));
+    rows.add("box", size.map(|size| format!("{} mm", size.join(" × "))));
+    let cells = |[x, y, z]: [usize; 3]| {
+        format!("{x} × {y} × {z} = {:.3} million", (x * y * z) as f64 / 1e6)
+    };
+    rows.add("cells", facts.cells.map(cells));
+    if facts.single_precision {
+        rows.add("fields", "single precision".to_owned());
+    }
+    let cell = facts.cell();
+    rows.add(
+        "cell edge *h*",
+        cell.map(|h| format!("{} mm", short(1e3 * h))),
+    );
+    let resolution = facts.diameter().zip(cell).map(|(d, h)| short(d / h));
+    rows.add("cells per diameter *d*/*h*", resolution);
+    for (axis, [lower, upper]) in ["x", "y", "z"]
+        .iter()
+        .zip(facts.boundaries.iter().flatten())
+    {
+        let text = match lower == upper {
+            true => literal(lower),
+            false => format!("{} below, {} above", literal(lower), literal(upper)),
+        };
+        rows.add(&format!("faces in *{axis}*"), text);
+    }
+    rows.add("coupling", facts.scheme.as_deref().map(literal));
+    rows.add("simulated time", format!("{} s", short(features.end)));
+    let scaled = features
+        .scales
+        .map(|scales| short(features.end / scales.time()));
+    rows.add("simulated time *t* √(*g*/*d*)", scaled);
+    rows.add(
+        "steps",
+        run.summary_number("steps").map(|steps| steps.to_string()),
+    );
+    rows.add("wall time", run.summary_number("wall_s").map(duration));
+    let divergence = run.summary_number("max_divergence");
+    let divergence = divergence.map(|d| format!("{} 1/s", short(d)));
+    rows.add("largest divergence after projection", divergence);
+    rows
+}
+
+/// Adds one row per kind of grain, with the number of the grain or the count of equal grains.
+fn add_grains(rows: &mut Rows, run: &RunFolder) {
     let mut kinds: Vec<(String, Vec<usize>)> = Vec::new();
     for (index, grain) in run.facts.grains.iter().enumerate() {
         let mut text = literal(grain.shape.as_deref().unwrap_or("shape not known"));
         if let Some(diameter) = grain.diameter {
-            text.push_str(&format!(", *d* = {} mm", short(1e3 * diameter)));
+            text += &format!(", *d* = {} mm", short(1e3 * diameter));
         }
         if let Some(density) = grain.density {
-            text.push_str(&format!(", *ρ*_{{p}} = {} kg/m^{{3}}", short(density)));
+            text += &format!(", *ρ*_{{p}} = {} kg/m^{{3}}", short(density));
         }
         match kinds.iter_mut().find(|(kind, _)| *kind == text) {
             Some((_, members)) => members.push(index),
             None => kinds.push((text, vec![index])),
         }
     }
-    let rest = kinds.len().saturating_sub(6);
-    for (text, members) in kinds.iter().take(6) {
+    let rest = kinds.len().saturating_sub(GRAIN_KINDS);
+    for (text, members) in kinds.into_iter().take(GRAIN_KINDS) {
         let name = match members[..] {
             [one] => format!("grain {one}"),
             _ => format!("{} grains", members.len()),
         };
-        row(out, &name, text);
+        rows.add(&name, text);
     }
     if rest > 0 {
-        row(
-            out,
+        rows.add(
             "grains",
-            &format!("and {rest} more kinds; see case.resolved.toml"),
+            format!("and {rest} more kinds; see case.resolved.toml"),
         );
     }
 }
 
-/// What happened.
-pub fn events(run: &RunFolder, story: &Story) -> String {
-    let (label, factor) = story.time_axis();
-    let scaled = factor != 1.0;
-    let mut out =
-        String::from("<div class=\"scroll\"><table><thead><tr><th class=\"number\">time [s]</th>");
-    if scaled {
-        out.push_str(&format!(
-            "<th class=\"number\">{}</th>",
-            html(label.split("  ").next().unwrap_or(label))
-        ));
-    }
-    out.push_str("<th>event</th><th>grains</th><th>details</th></tr></thead><tbody>\n");
-    for event in run.events.iter().take(EVENTS) {
-        out.push_str(&format!(
-            "<tr><td class=\"number\">{}</td>",
-            html(&precise(event.time))
-        ));
-        if scaled {
-            out.push_str(&format!(
-                "<td class=\"number\">{}</td>",
-                html(&precise(event.time * factor))
-            ));
-        }
-        let grains: Vec<String> = event.grains.iter().map(usize::to_string).collect();
-        let details: Vec<String> = details(event).iter().map(|text| html(text)).collect();
-        out.push_str(&format!(
-            "<td>{}</td><td>{}</td><td>{}</td></tr>\n",
-            escape(event.kind.name()),
-            grains.join(", "),
-            details.join("; ")
-        ));
-    }
-    out.push_str("</tbody></table></div>\n");
-    if run.events.len() > EVENTS {
-        out.push_str(&format!(
-            "<p>and {} more in <code>events.jsonl</code>.</p>\n",
-            run.events.len() - EVENTS
-        ));
-    }
-    out
+/// Returns the label of the dimensionless time and its value for one second; none if the figures
+/// show seconds.
+pub fn scaled_time(features: &RunFeatures) -> Option<(&'static str, f64)> {
+    let (label, factor) = features.time_axis();
+    let label = label.split("  ").next().unwrap_or(label);
+    (factor != 1.0).then_some((label, factor))
 }
 
-/// Five digits for times that one may want to compare.
+/// Returns the table of events.
+pub fn events(run: &RunFolder, features: &RunFeatures) -> Markup {
+    let scaled = scaled_time(features);
+    let mut columns = vec![number_column("time [s]")];
+    columns.extend(scaled.map(|(label, _)| number_column(label)));
+    columns.extend(["event", "grains", "details"].map(text_column));
+    let row = |event: &Event| {
+        let mut row = vec![label(&precise(event.time))];
+        row.extend(scaled.map(|(_, factor)| label(&precise(event.time * factor))));
+        let grains: Vec<String> = event.grains.iter().map(usize::to_string).collect();
+        row.push(html! { (event.kind.label()) });
+        row.push(html! { (grains.join(", ")) });
+        row.push(label(&details(event).join("; ")));
+        row
+    };
+    html! {
+        (table(&columns, run.events.iter().take(EVENTS).map(row)))
+        @if run.events.len() > EVENTS {
+            p { "and " (run.events.len() - EVENTS) " more in " code { "events.jsonl" } "." }
+        }
+    }
+}
+
+/// Returns five significant digits, so that times of events can be compared.
 fn precise(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -274,57 +216,56 @@ fn precise(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// A detail of an event with its unit, where that is known; else as it stands.
+/// Returns the details of an event, in label markup.
 fn details(event: &Event) -> Vec<String> {
     let confirmed = format!("certain at {} s", precise(event.confirmed));
     let gap = event.gap.map(|gap| format!("gap {} mm", short(1e3 * gap)));
-    let tilt =
-        (event.tilt).map(|tilt| format!("pair {}° from the vertical", short(tilt.to_degrees())));
+    let tilt = event.tilt.map(|tilt| short(tilt.to_degrees()));
+    let tilt = tilt.map(|degrees| format!("pair {degrees}° from the vertical"));
     [Some(confirmed), gap, tilt].into_iter().flatten().collect()
 }
 
-/// Who made this, with what.
-pub fn provenance(run: &RunFolder) -> String {
-    let mut rows = String::new();
+/// Returns the provenance of the run and the files for further use.
+pub fn provenance(run: &RunFolder) -> Markup {
+    let mut rows = Rows::default();
     match &run.provenance {
         Some(value) => flatten(&mut rows, "", value, 0),
-        None => row(&mut rows, "provenance", "provenance.json is missing"),
+        None => rows.add("provenance", "provenance.json is missing".to_owned()),
     }
-    let known = "case.resolved.toml runs again as it is; grains.csv and diagnostics.csv hold the numbers of the curves; run.pvd opens in ParaView";
-    row(&mut rows, "files", &literal(known));
-    table(&rows)
+    let files = "case.resolved.toml can be run as it is; grains.csv and diagnostics.csv hold the \
+                 values of the curves; run.pvd opens in ParaView";
+    rows.add("files", literal(files));
+    properties(&rows.0)
 }
 
-fn flatten(out: &mut String, name: &str, value: &Value, depth: usize) {
-    let nested = |key: &str| {
-        if name.is_empty() {
-            key.to_owned()
-        } else {
-            format!("{name}, {key}")
-        }
-    };
-    let plain = |value: &Value| !value.is_object() && !value.is_array();
+/// Adds the entries of a JSON value as rows; nested names are joined by commas.
+fn flatten(rows: &mut Rows, name: &str, value: &Value, depth: usize) {
+    let simple = |value: &Value| !value.is_object() && !value.is_array();
     match value {
-        Value::Null => code_row(out, name, "not known"),
+        Value::Null => rows.add_code(name, "not known"),
         Value::Object(map) if depth < 4 => {
-            map.iter()
-                .for_each(|(key, value)| flatten(out, &nested(key), value, depth + 1));
+            for (key, value) in map {
+                let nested = match name {
+                    "" => key.clone(),
+                    _ => format!("{name}, {key}"),
+                };
+                flatten(rows, &nested, value, depth + 1);
+            }
         }
-        Value::Array(list) if list.iter().all(plain) => {
+        Value::Array(list) if list.iter().all(simple) => {
             let texts: Vec<String> = list.iter().map(text).collect();
-            code_row(out, name, &texts.join(" "));
+            rows.add_code(name, &texts.join(" "));
         }
         Value::Array(list) if depth < 4 => {
-            let (first, rest) = list.split_at(list.len().min(SESSIONS));
-            for (i, value) in first.iter().enumerate() {
+            for (i, value) in list.iter().take(SESSIONS).enumerate() {
                 let name = format!("{} {}", name.trim_end_matches('s'), i + 1);
-                flatten(out, &name, value, depth + 1);
+                flatten(rows, &name, value, depth + 1);
             }
-            if !rest.is_empty() {
-                code_row(out, name, &format!("and {} more", rest.len()));
+            if list.len() > SESSIONS {
+                rows.add_code(name, &format!("and {} more", list.len() - SESSIONS));
             }
         }
-        other => code_row(out, name, &text(other)),
+        other => rows.add_code(name, &text(other)),
     }
 }
 
@@ -334,28 +275,20 @@ fn text(value: &Value) -> String {
         .map_or_else(|| value.to_string(), str::to_owned)
 }
 
-fn code_row(out: &mut String, name: &str, value: &str) {
-    let name = escape(&name.replace('_', " "));
-    out.push_str(&format!(
-        "<tr><th scope=\"row\">{name}</th><td><code>{}</code></td></tr>\n",
-        escape(value)
-    ));
-}
-
-/// A wall time for people.
+/// Returns a wall time in seconds, minutes or hours.
 pub fn duration(seconds: f64) -> String {
+    let parts =
+        |unit: f64, small: f64| ((seconds / unit).floor(), (seconds % unit / small).floor());
     match seconds {
         s if s < 120.0 => format!("{} s", short(s)),
-        s if s < 7200.0 => format!(
-            "{:.0} min {:02.0} s",
-            (s / 60.0).floor(),
-            (s % 60.0).floor()
-        ),
-        s => format!(
-            "{:.0} h {:02.0} min",
-            (s / 3600.0).floor(),
-            ((s % 3600.0) / 60.0).floor()
-        ),
+        s if s < 7200.0 => {
+            let (minutes, seconds) = parts(60.0, 1.0);
+            format!("{minutes:.0} min {seconds:02.0} s")
+        }
+        _ => {
+            let (hours, minutes) = parts(3600.0, 60.0);
+            format!("{hours:.0} h {minutes:02.0} min")
+        }
     }
 }
 

@@ -1,30 +1,28 @@
-//! What was run: the parts of `case.resolved.toml` and `summary.json` that a report speaks of.
+//! Set-up of a run, from `case.resolved.toml` and `summary.json`.
 
 use std::path::Path;
 
 use glam::DVec3;
-use serde_json::Value as Json;
-use toml::{Table, Value};
-
 use grainwake_formats::{FormatError, read_text};
+use serde_json::Value;
 
 use crate::error::ReportError;
 
-/// A grain as the case and the summary describe it.
+/// A grain as described by the case and the summary.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GrainFacts {
     /// Diameter of the sphere of equal volume [m].
     pub diameter: Option<f64>,
     /// Density [kg/m^3].
     pub density: Option<f64>,
-    /// What it is: a closed form or a file.
+    /// Name of its closed form, or its file.
     pub shape: Option<String>,
 }
 
-/// The set-up of a run; what the folder does not tell is none.
+/// Set-up of a run; entries that the folder does not hold are `None`.
 #[derive(Clone, Debug, Default)]
 pub struct Facts {
-    /// One line that says what the case is.
+    /// Title of the case, one line.
     pub title: Option<String>,
     /// Lower corner of the box [m].
     pub lower: DVec3,
@@ -36,7 +34,7 @@ pub struct Facts {
     pub boundaries: Option<[[String; 2]; 3]>,
     /// Gravity [m/s^2].
     pub gravity: Option<DVec3>,
-    /// Density of the fluid [kg/m^3]; none for a dry run.
+    /// Density of the fluid [kg/m^3]; `None` for a dry run.
     pub fluid_density: Option<f64>,
     /// Kinematic viscosity of the fluid [m^2/s].
     pub viscosity: Option<f64>,
@@ -44,194 +42,155 @@ pub struct Facts {
     pub scheme: Option<String>,
     /// Whether the fields are in single precision.
     pub single_precision: bool,
-    /// The grains.
+    /// Grains.
     pub grains: Vec<GrainFacts>,
 }
 
 impl Facts {
-    /// Cell edge along x [m].
+    /// Returns the cell edge along x [m].
     pub fn cell(&self) -> Option<f64> {
         Some(self.size?.x / self.cells?[0] as f64)
     }
 
-    /// Mean equal-volume diameter of the grains [m].
-    pub fn diameter(&self) -> Option<f64> {
-        let known: Vec<f64> = self
-            .grains
-            .iter()
-            .filter_map(|grain| grain.diameter)
-            .collect();
+    /// Returns the mean of the known values of all grains.
+    fn mean(&self, value: fn(&GrainFacts) -> Option<f64>) -> Option<f64> {
+        let known: Vec<f64> = self.grains.iter().filter_map(value).collect();
         (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
     }
 
-    /// Takes the diameters [m] of grains whose diameter is not known otherwise.
+    /// Returns the mean equal-volume diameter of the grains [m].
+    pub fn diameter(&self) -> Option<f64> {
+        self.mean(|grain| grain.diameter)
+    }
+
+    /// Returns the mean density of the grains divided by that of the fluid.
+    pub fn density_ratio(&self) -> Option<f64> {
+        Some(self.mean(|grain| grain.density)? / self.fluid_density?)
+    }
+
+    /// Returns whether a grain is a sphere.
+    pub fn is_sphere(&self, grain: usize) -> bool {
+        let facts = self.grains.get(grain);
+        facts.is_some_and(|facts| facts.shape.as_deref() == Some("sphere"))
+    }
+
+    /// Sets the diameters [m] of grains whose diameter is unknown.
     pub fn add_diameters(&mut self, known: impl Iterator<Item = (usize, f64)>) {
         for (grain, diameter) in known {
-            if self.grains.len() <= grain {
-                self.grains.resize_with(grain + 1, GrainFacts::default);
-            }
+            self.reserve_grains(grain + 1);
             self.grains[grain].diameter.get_or_insert(diameter);
         }
     }
 
-    /// Mean density of the grains [kg/m^3].
-    pub fn grain_density(&self) -> Option<f64> {
-        let known: Vec<f64> = self
-            .grains
-            .iter()
-            .filter_map(|grain| grain.density)
-            .collect();
-        (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+    fn reserve_grains(&mut self, count: usize) {
+        let count = count.max(self.grains.len());
+        self.grains.resize_with(count, GrainFacts::default);
     }
 }
 
-/// Reads the case file as it was resolved: SI numbers, all defaults spelled out.
+/// Reads the resolved case file: SI numbers, with all defaults.
 pub fn read_case(file: &Path) -> Result<Facts, ReportError> {
     let text = read_text(file)?;
-    let table: Table = text.parse().map_err(|error: toml::de::Error| {
-        let line = error.span().map_or(1, |span| {
-            1 + text[..span.start.min(text.len())].matches('\n').count()
-        });
+    let case: Value = toml::from_str(&text).map_err(|error: toml::de::Error| {
+        let start = error.span().map_or(0, |span| span.start.min(text.len()));
+        let line = 1 + text[..start].matches('\n').count();
         FormatError::line(file, line, error.message())
     })?;
-    Ok(facts_of(&table))
+    Ok(facts_of(&case))
 }
 
-fn facts_of(table: &Table) -> Facts {
-    let empty = Table::new();
-    let section = |name: &str| table.get(name).and_then(Value::as_table).unwrap_or(&empty);
-    let (domain, fluid) = (section("domain"), section("fluid"));
-    let faces = domain.get("boundaries").and_then(Value::as_table);
-    let boundaries = faces.map(|faces| ["x", "y", "z"].map(|axis| faces_of(faces.get(axis))));
-    let density = number(fluid, "density");
-    let dynamic = number(fluid, "viscosity");
-    let kinematic = number(fluid, "kinematic_viscosity");
+/// Extracts the set-up; entries of a wrong type count as missing.
+fn facts_of(case: &Value) -> Facts {
+    let density = number(case, "/fluid/density");
+    let kinematic = number(case, "/fluid/kinematic_viscosity");
+    let dynamic = number(case, "/fluid/viscosity");
+    let faces = case.pointer("/domain/boundaries");
+    let cells = list(case, "/domain/cells", |n| n.as_u64().filter(|n| *n > 0));
     Facts {
-        title: word(table, "title"),
-        lower: vector(domain, "origin").unwrap_or(DVec3::ZERO),
-        size: vector(domain, "size").filter(|size| size.min_element() > 0.0),
-        cells: cells_of(domain),
-        boundaries,
-        gravity: vector(table, "gravity"),
+        title: text(case, "/title").filter(|title| !title.is_empty()),
+        lower: vector(case, "/domain/origin").unwrap_or(DVec3::ZERO),
+        size: vector(case, "/domain/size").filter(|size| size.min_element() > 0.0),
+        cells: cells.map(|cells| cells.map(|n| n as usize)),
+        boundaries: faces.map(|faces| ["x", "y", "z"].map(|axis| conditions(faces.get(axis)))),
+        gravity: vector(case, "/gravity"),
         fluid_density: density,
         viscosity: kinematic.or_else(|| Some(dynamic? / density?)),
-        scheme: word(section("coupling"), "scheme"),
-        single_precision: word(section("run"), "precision").as_deref() == Some("f32"),
-        grains: table
+        scheme: text(case, "/coupling/scheme"),
+        single_precision: text(case, "/run/precision").as_deref() == Some("f32"),
+        grains: case
             .get("grain")
             .and_then(Value::as_array)
-            .into_iter()
-            .flatten()
-            .map(grain_of)
-            .collect(),
+            .map_or(Vec::new(), |grains| grains.iter().map(grain_of).collect()),
     }
 }
 
-fn word(table: &Table, name: &str) -> Option<String> {
-    table
-        .get(name)?
-        .as_str()
-        .map(str::to_owned)
-        .filter(|word| !word.is_empty())
+fn text(value: &Value, path: &str) -> Option<String> {
+    value.pointer(path)?.as_str().map(str::to_owned)
 }
 
-fn number(table: &Table, name: &str) -> Option<f64> {
-    as_number(table.get(name)?)
+fn number(value: &Value, path: &str) -> Option<f64> {
+    value.pointer(path)?.as_f64()
 }
 
-fn as_number(value: &Value) -> Option<f64> {
-    value
-        .as_float()
-        .or_else(|| value.as_integer().map(|i| i as f64))
-        .filter(|v| v.is_finite())
+fn vector(value: &Value, path: &str) -> Option<DVec3> {
+    list(value, path, Value::as_f64).map(DVec3::from_array)
 }
 
-fn vector(table: &Table, name: &str) -> Option<DVec3> {
-    let list = table.get(name)?.as_array()?;
-    let numbers: Vec<f64> = list.iter().filter_map(as_number).collect();
-    (numbers.len() == 3).then(|| DVec3::from_slice(&numbers))
+/// Returns a list of three entries.
+fn list<T>(value: &Value, path: &str, entry: fn(&Value) -> Option<T>) -> Option<[T; 3]> {
+    let entries = value.pointer(path)?.as_array()?.iter().map(entry);
+    entries.collect::<Option<Vec<T>>>()?.try_into().ok()
 }
 
-fn cells_of(domain: &Table) -> Option<[usize; 3]> {
-    let list: Vec<usize> = domain
-        .get("cells")?
-        .as_array()?
-        .iter()
-        .filter_map(|v| usize::try_from(v.as_integer()?).ok().filter(|n| *n > 0))
-        .collect();
-    list.try_into().ok()
-}
-
-fn faces_of(axis: Option<&Value>) -> [String; 2] {
+/// Returns the conditions on the lower and the upper face normal to an axis.
+fn conditions(axis: Option<&Value>) -> [String; 2] {
     let kind = |value: &Value| {
-        let word = value
-            .as_str()
-            .or_else(|| value.get("kind")?.as_str())
-            .unwrap_or("?");
-        let moving = value.get("velocity").is_some();
-        if moving {
-            format!("{word} (moving)")
+        let name = value.as_str().or_else(|| value.get("kind")?.as_str());
+        let moving = if value.get("velocity").is_some() {
+            " (moving)"
         } else {
-            word.to_owned()
-        }
+            ""
+        };
+        format!("{}{moving}", name.unwrap_or("?"))
     };
     match axis {
         Some(Value::Array(pair)) if pair.len() == 2 => [kind(&pair[0]), kind(&pair[1])],
-        Some(one) => [kind(one), kind(one)],
+        Some(both) => [kind(both), kind(both)],
         None => ["?".to_owned(), "?".to_owned()],
     }
 }
 
-fn grain_of(value: &Value) -> GrainFacts {
-    let empty = Table::new();
-    let grain = value.as_table().unwrap_or(&empty);
-    let form = grain.get("shape").and_then(Value::as_table);
-    let kind = form
-        .and_then(|form| form.get("kind"))
-        .and_then(Value::as_str);
-    let round = kind == Some("sphere");
-    let diameter = number(grain, "equivalent_diameter")
-        .or_else(|| {
-            form.filter(|_| round)
-                .and_then(|form| number(form, "diameter"))
-        })
-        .filter(|d| *d > 0.0);
-    let file = grain.get("file").and_then(Value::as_str);
+fn grain_of(grain: &Value) -> GrainFacts {
+    let form = text(grain, "/shape/kind");
+    let sphere = form.as_deref() == Some("sphere");
+    let own = || number(grain, "/shape/diameter").filter(|_| sphere);
+    let diameter = number(grain, "/equivalent_diameter").or_else(own);
     GrainFacts {
-        diameter,
-        density: number(grain, "density"),
-        shape: kind.or(file).map(str::to_owned),
+        diameter: diameter.filter(|d| *d > 0.0),
+        density: number(grain, "/density"),
+        shape: form.or_else(|| text(grain, "/file")),
     }
 }
 
-/// Reads a JSON file; the line of a damage is named.
-pub fn read_json(file: &Path) -> Result<Json, ReportError> {
+/// Reads a JSON file; an error names the line.
+pub fn read_json(file: &Path) -> Result<Value, ReportError> {
     let text = read_text(file)?;
-    serde_json::from_str(&text)
-        .map_err(|error| FormatError::line(file, error.line().max(1), error.to_string()).into())
+    let value = serde_json::from_str(&text);
+    Ok(value.map_err(|error| FormatError::line(file, error.line().max(1), error.to_string()))?)
 }
 
-/// Fills in what the summary knows of the grains.
-pub fn add_summary(facts: &mut Facts, summary: &Json) {
-    let Some(list) = summary.get("grains").and_then(Json::as_array) else {
+/// Adds the properties of the grains in the summary.
+pub fn add_summary(facts: &mut Facts, summary: &Value) {
+    let Some(list) = summary.get("grains").and_then(Value::as_array) else {
         return;
     };
-    if facts.grains.len() < list.len() {
-        facts.grains.resize_with(list.len(), GrainFacts::default);
-    }
+    facts.reserve_grains(list.len());
     for (grain, entry) in facts.grains.iter_mut().zip(list) {
-        let number = |name: &str| {
-            entry
-                .get(name)
-                .and_then(Json::as_f64)
-                .filter(|v| v.is_finite() && *v > 0.0)
-        };
-        grain.diameter = number("equivalent_diameter_m").or(grain.diameter);
-        grain.density = number("density")
-            .or_else(|| number("density_kg_per_m3"))
-            .or(grain.density);
-        let shape = entry.get("shape").and_then(Json::as_str).map(str::to_owned);
-        grain.shape = grain.shape.take().or(shape);
+        let positive = |path: &str| number(entry, path).filter(|v| *v > 0.0);
+        grain.diameter = positive("/equivalent_diameter_m").or(grain.diameter);
+        let density = positive("/density").or_else(|| positive("/density_kg_per_m3"));
+        grain.density = density.or(grain.density);
+        grain.shape = grain.shape.take().or_else(|| text(entry, "/shape"));
     }
 }
 
@@ -239,17 +198,20 @@ pub fn add_summary(facts: &mut Facts, summary: &Json) {
 mod tests {
     use super::*;
 
+    fn read(text: &str) -> Facts {
+        facts_of(&toml::from_str(text).unwrap())
+    }
+
     #[test]
     fn a_resolved_case_is_understood() {
-        let table: Table = "gravity = [0.0, 0.0, -9.81]\n\
+        let facts = read(
+            "gravity = [0.0, 0.0, -9.81]\n\
             [domain]\nsize = [0.025, 0.025, 0.0975]\ncells = [100, 100, 390]\norigin = [0.0, 0.0, 0.0]\n\
             [domain.boundaries]\nx = ['wall', 'wall']\ny = 'slip'\nz = ['wall', { kind = 'wall', velocity = [1, 0, 0] }]\n\
             [fluid]\ndensity = 1000.0\nviscosity = 0.001\n\
             [[grain]]\nfile = 'a.grain'\ndensity = 1500\nequivalent_diameter = 2e-3\n\
-            [[grain]]\nshape = { kind = 'sphere', diameter = 4e-3 }\ndensity = 1500.0\n"
-            .parse()
-            .unwrap();
-        let facts = facts_of(&table);
+            [[grain]]\nshape = { kind = 'sphere', diameter = 4e-3 }\ndensity = 1500.0\n",
+        );
         assert_eq!(facts.gravity, Some(DVec3::new(0.0, 0.0, -9.81)));
         assert_eq!(facts.viscosity, Some(1e-6));
         assert_eq!(facts.cell(), Some(0.00025));
@@ -262,11 +224,7 @@ mod tests {
 
     #[test]
     fn the_summary_fills_gaps() {
-        let mut facts = facts_of(
-            &"[[grain]]\nfile = 'a.grain'\ndensity = 1500\n"
-                .parse()
-                .unwrap(),
-        );
+        let mut facts = read("[[grain]]\nfile = 'a.grain'\ndensity = 1500\n");
         let summary = serde_json::json!({"grains": [{"equivalent_diameter_m": 2e-3}, {"density": 7800.0, "shape": "ball"}]});
         add_summary(&mut facts, &summary);
         assert_eq!(
@@ -281,8 +239,11 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_left_out_rather_than_believed() {
-        let facts = facts_of(&"[domain]\nsize = [1, 'x', 2]\ncells = [0, 1, 2]\ngravity = 3\n[fluid]\nviscosity = nan\n".parse().unwrap());
+    fn entries_of_a_wrong_type_count_as_missing() {
+        let facts = read(
+            "[domain]\nsize = [1, 'x', 2]\ncells = [0, 1, 2]\ngravity = 3\n\
+             [fluid]\nviscosity = nan\n",
+        );
         assert!(
             facts.size.is_none()
                 && facts.cells.is_none()

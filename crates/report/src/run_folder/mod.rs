@@ -1,4 +1,4 @@
-//! A run folder as it lies on disk: everything a report is made of.
+//! Contents of a run folder.
 
 mod facts;
 mod history;
@@ -20,46 +20,49 @@ use crate::error::ReportError;
 pub use facts::Facts;
 pub use history::{History, histories};
 
-/// A picture file of the run: a slice of the fields or the surface of grains.
+/// VTK file of a run: a slice of the fields, or surfaces of grains.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameFile {
-    /// The file.
+    /// File.
     pub file: PathBuf,
     /// Time [s].
     pub time: f64,
-    /// The grain it belongs to, where its name or content says so.
+    /// Grain in the name of the file, if any.
     pub grain: Option<usize>,
 }
 
-/// What a run left behind.
+/// Contents of a run folder.
 #[derive(Clone, Debug, Default)]
 pub struct RunFolder {
-    /// The folder.
+    /// Folder.
     pub path: PathBuf,
-    /// The set-up.
+    /// Set-up.
     pub facts: Facts,
-    /// Motion of each grain.
+    /// History of each grain.
     pub grains: Vec<History>,
-    /// Diagnostics against time.
+    /// Table `diagnostics.csv`.
     pub diagnostics: Option<Table>,
-    /// What happened, in order of time.
+    /// Events, in order of time.
     pub events: Vec<Event>,
-    /// The summary, written when the run ended.
+    /// Contents of `summary.json`, which is written at the end of the run.
     pub summary: Option<Value>,
-    /// Why the run broke off, if it says so.
+    /// Contents of `failure.json`, which a failed run writes.
     pub failure: Option<Value>,
-    /// Where the run comes from.
+    /// Contents of `provenance.json`.
     pub provenance: Option<Value>,
-    /// Slices in order of time.
+    /// Slices, in order of time.
     pub slices: Vec<FrameFile>,
-    /// Surfaces in order of time.
+    /// Surfaces, in order of time.
     pub surfaces: Vec<FrameFile>,
-    /// What was missing or had to be left out.
+    /// Missing or omitted parts.
     pub notes: Vec<String>,
 }
 
 impl RunFolder {
-    /// Reads the folder. Missing files are noted; damaged tables and logs are errors.
+    /// Reads a run folder; missing files are noted.
+    ///
+    /// # Errors
+    /// If the folder holds no run, or a table or log is damaged.
     pub fn open(path: &Path) -> Result<RunFolder, ReportError> {
         let mut run = RunFolder {
             path: path.to_owned(),
@@ -112,25 +115,29 @@ impl RunFolder {
         Ok(run)
     }
 
-    /// Whether the run came to its end: the summary is written last.
+    /// Returns whether the run reached its end.
     pub fn finished(&self) -> bool {
         self.summary.is_some()
     }
 
-    /// Last time of any table [s].
+    /// Returns the last time of any table [s].
     pub fn end(&self) -> f64 {
-        let of_grains = self
-            .grains
-            .iter()
-            .filter_map(|history| history.time.last().copied());
-        let of_diagnostics = self
-            .diagnostics
-            .as_ref()
-            .and_then(|table| table.column("time")?.last().copied());
-        of_grains
-            .chain(of_diagnostics)
-            .filter(|t| t.is_finite())
-            .fold(0.0, f64::max)
+        let of_grains = self.grains.iter().filter_map(|h| h.time.last());
+        let table = self.diagnostics.as_ref();
+        let of_diagnostics = table.and_then(|table| table.column("time")?.last());
+        let times = of_grains.chain(of_diagnostics).copied();
+        times.filter(|t| t.is_finite()).fold(0.0, f64::max)
+    }
+
+    /// Returns the grains that have a history.
+    pub fn moving(&self) -> Vec<usize> {
+        let grains = 0..self.grains.len();
+        grains.filter(|i| !self.grains[*i].is_empty()).collect()
+    }
+
+    /// Returns a number of the summary by its name.
+    pub fn summary_number(&self, name: &str) -> Option<f64> {
+        self.summary.as_ref()?.get(name)?.as_f64()
     }
 
     /// Reads a slice.
@@ -143,7 +150,7 @@ impl RunFolder {
         vtp::read(&frame.file)
     }
 
-    /// A file's path inside the folder.
+    /// Returns the path of a file relative to the folder.
     pub fn short_name(&self, file: &Path) -> String {
         file.strip_prefix(&self.path)
             .unwrap_or(file)
@@ -151,14 +158,14 @@ impl RunFolder {
             .to_string()
     }
 
-    /// Edge of the box along a periodic axis [m].
+    /// Returns the length of the box along a periodic axis [m]; `None` for other axes.
     pub fn period(&self, axis: usize) -> Option<f64> {
         let faces = self.facts.boundaries.as_ref()?;
         let size = self.facts.size?;
         (faces[axis][0] == "periodic").then_some(size[axis])
     }
 
-    /// The shortest of a line and its periodic images.
+    /// Returns the shortest periodic image of a distance vector.
     pub fn nearest(&self, line: DVec3) -> DVec3 {
         let part = |axis: usize| match self.period(axis) {
             Some(period) => line[axis] - period * (line[axis] / period).round(),
@@ -167,7 +174,7 @@ impl RunFolder {
         DVec3::new(part(0), part(1), part(2))
     }
 
-    /// The image of a point that lies in the box.
+    /// Returns the periodic image of a point inside the box.
     pub fn wrapped(&self, x: DVec3) -> DVec3 {
         let inside = |axis: usize| match self.period(axis) {
             Some(period) => {
@@ -192,7 +199,7 @@ impl RunFolder {
             })
     }
 
-    /// Files of a kind below `folder` with their times: from the collection, else from inside them.
+    /// Lists the files of a subfolder with their times, from `run.pvd` or else from the files.
     fn frames(
         &mut self,
         folder: &str,
@@ -239,14 +246,14 @@ fn time_inside(file: &Path, extension: &str) -> Result<f64, String> {
         _ => vtp::read(file)?.time,
     };
     time.filter(|t| t.is_finite())
-        .ok_or_else(|| "it does not tell its time".to_owned())
+        .ok_or_else(|| "it holds no time".to_owned())
 }
 
 fn read_image(file: &Path) -> Result<Image, String> {
     vti::read(file).map_err(|error| error.to_string())
 }
 
-/// The number after "grain" in a file name such as `grain1_000040.vti`.
+/// Returns the number after "grain" in a file name such as `grain1_000040.vti`.
 fn grain_of_name(name: &str) -> Option<usize> {
     let rest = name
         .split("grain")

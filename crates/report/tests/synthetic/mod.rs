@@ -491,7 +491,7 @@ pub fn single(folder: &Path) {
     write(
         folder,
         "events.jsonl",
-        "{\"time\":1.25,\"event\":\"landing\",\"grains\":[0]}\n",
+        "{\"time\":1.25,\"event\":\"landing\",\"grains\":[0],\"confirmed\":1.25}\n",
     );
     write(
         folder,

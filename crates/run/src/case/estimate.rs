@@ -6,6 +6,7 @@ use super::readable::quantity;
 use super::{Case, warnings};
 use grainwake_solver::dem::{Dof, Grain};
 use grainwake_solver::flow::{Boundary, FluidParams};
+use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::{Setup, StepRule};
 
 /// Numbers of the fields and the solver per cell, for the estimate; `grainwake bench` measures the
@@ -60,6 +61,23 @@ pub fn settling_reynolds(galileo: f64) -> f64 {
 pub fn terminal_speed(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
     settling_reynolds(galileo(grain, fluid, g)) * fluid.kinematic_viscosity
         / grain.shape.equivalent_diameter()
+}
+
+/// Speed at which a grain may hit a wall [m/s]: 1.5 times its settling speed, without fluid the
+/// speed after falling through the box; at least its speed at the start.
+pub(super) fn impact_speed(
+    grain: &Grain,
+    fluid: Option<&FluidParams>,
+    gravity: DVec3,
+    mesh: &Mesh,
+) -> f64 {
+    let g = gravity.length();
+    let height = (mesh.extent() * gravity.normalize_or_zero()).length();
+    let falling = match fluid {
+        Some(fluid) => 1.5 * terminal_speed(grain, fluid, g),
+        None => (2.0 * g * height).sqrt(),
+    };
+    falling.max(grain.velocity.length())
 }
 
 /// Derived numbers and warnings. The JSON names are stable.
@@ -222,13 +240,12 @@ pub(super) fn time_step(setup: &Setup, speed: f64) -> f64 {
 }
 
 fn contact_time(setup: &Setup) -> Option<f64> {
-    let lightest = setup
-        .grains
-        .iter()
-        .map(Grain::mass)
-        .fold(f64::INFINITY, f64::min);
-    (setup.grains.len() > 1 && lightest.is_finite())
-        .then(|| setup.contact.contact_time(0.5 * lightest))
+    let of = |grain: &Grain| {
+        let speed = impact_speed(grain, setup.fluid.as_ref(), setup.gravity, &setup.mesh);
+        setup.contact.contact_time(grain, speed)
+    };
+    let times = setup.grains.iter().map(of);
+    (times.reduce(f64::min)).filter(|time| setup.grains.len() > 1 && time.is_finite())
 }
 
 /// Cross-section of the largest grain over that of the box, normal to gravity.

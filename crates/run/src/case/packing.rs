@@ -1,41 +1,26 @@
 //! `[[packing]]` -> grains: positions on a jittered lattice or at random, orientations by seed.
 
 use glam::{DQuat, DVec3};
+use rand::RngExt;
+use std::f64::consts::TAU;
 
 use grainwake_solver::dem::Enclosure;
 
-/// SplitMix64: small, and the same on every machine for ever.
-pub(super) struct Random(u64);
+/// Generator of a packing: the reference sequence of SplitMix64 (Steele, Lea and Flood 2014), on
+/// which the packings of published cases depend.
+pub(super) type Random = rand_xoshiro::SplitMix64;
 
-impl Random {
-    /// From a seed.
-    pub fn new(seed: u64) -> Random {
-        Random(seed)
-    }
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-    /// Evenly in 0..1.
-    pub fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-    fn point(&mut self) -> DVec3 {
-        DVec3::new(self.unit(), self.unit(), self.unit())
-    }
-    /// Evenly over all orientations (Shoemake 1992).
-    pub fn orientation(&mut self) -> DQuat {
-        let (u, a, b) = (
-            self.unit(),
-            std::f64::consts::TAU * self.unit(),
-            std::f64::consts::TAU * self.unit(),
-        );
-        let (low, high) = ((1.0 - u).sqrt(), u.sqrt());
-        DQuat::from_xyzw(low * a.sin(), low * a.cos(), high * b.sin(), high * b.cos()).normalize()
-    }
+/// Returns a uniformly distributed orientation (Shoemake 1992).
+pub(super) fn orientation(random: &mut Random) -> DQuat {
+    let [u, a, b]: [f64; 3] = random.random();
+    let (a, b) = (TAU * a, TAU * b);
+    let (low, high) = ((1.0 - u).sqrt(), u.sqrt());
+    DQuat::from_xyzw(low * a.sin(), low * a.cos(), high * b.sin(), high * b.cos()).normalize()
+}
+
+/// Returns a uniformly distributed point of the unit cube.
+fn point(random: &mut Random) -> DVec3 {
+    DVec3::from_array(random.random())
 }
 
 /// A ball that must keep clear of others.
@@ -102,7 +87,7 @@ impl Space<'_> {
             }
             let found = (0..20_000).find_map(|_| {
                 let ball = Ball {
-                    centre: self.lower + margin + room * random.point(),
+                    centre: self.lower + margin + room * point(random),
                     radius,
                 };
                 self.free(ball, &placed).then_some(ball)
@@ -179,8 +164,8 @@ impl Space<'_> {
                 level as f64,
             );
             let free = (pitch - smallest_pitch).max(DVec3::ZERO) + 2.0 * (largest - radius);
-            let offset = pitch * DVec3::from_array(site)
-                + jitter * 0.5 * free * (2.0 * random.point() - 1.0);
+            let offset =
+                pitch * DVec3::from_array(site) + jitter * 0.5 * free * (2.0 * point(random) - 1.0);
             let corner = self.lower + margin;
             let mut centre = corner + offset;
             if sign < 0.0 {
@@ -206,6 +191,7 @@ impl Space<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::SeedableRng;
 
     fn space<'a>(enclosure: &'a Enclosure, taken: &'a [Ball]) -> Space<'a> {
         Space {
@@ -248,7 +234,7 @@ mod tests {
             let radii: Vec<f64> = (0..150).map(|i| 0.06 + 0.0002 * f64::from(i)).collect();
             for jitter in [0.0, 0.5, 1.0] {
                 let centres = space
-                    .lattice(&radii, jitter, (2, 1.0), &mut Random::new(7))
+                    .lattice(&radii, jitter, (2, 1.0), &mut Random::seed_from_u64(7))
                     .unwrap();
                 assert!(
                     space.clear(&balls(&centres, &radii)),
@@ -278,10 +264,16 @@ mod tests {
         );
         let space = space(&enclosure, &taken);
         let radii = [0.1; 60];
-        let centres = space.random(&radii, &mut Random::new(3)).unwrap();
+        let centres = space.random(&radii, &mut Random::seed_from_u64(3)).unwrap();
         assert!(space.clear(&balls(&centres, &radii)));
-        assert_eq!(centres, space.random(&radii, &mut Random::new(3)).unwrap());
-        assert_ne!(centres, space.random(&radii, &mut Random::new(4)).unwrap());
+        assert_eq!(
+            centres,
+            space.random(&radii, &mut Random::seed_from_u64(3)).unwrap()
+        );
+        assert_ne!(
+            centres,
+            space.random(&radii, &mut Random::seed_from_u64(4)).unwrap()
+        );
     }
 
     #[test]
@@ -289,19 +281,21 @@ mod tests {
         let enclosure = closed();
         let space = space(&enclosure, &[]);
         assert_eq!(
-            space.lattice(&[0.4; 9], 0.0, (2, 1.0), &mut Random::new(0)),
+            space.lattice(&[0.4; 9], 0.0, (2, 1.0), &mut Random::seed_from_u64(0)),
             Err(3)
         );
-        let placed = space.random(&[0.4; 9], &mut Random::new(0)).unwrap_err();
+        let placed = space
+            .random(&[0.4; 9], &mut Random::seed_from_u64(0))
+            .unwrap_err();
         assert!((1..4).contains(&placed));
     }
 
     #[test]
     fn orientations_are_of_unit_length_and_even() {
-        let mut random = Random::new(1);
+        let mut random = Random::seed_from_u64(1);
         let mut mean = DVec3::ZERO;
         for _ in 0..4000 {
-            let q = random.orientation();
+            let q = orientation(&mut random);
             assert!((q.length_squared() - 1.0).abs() < 1e-14);
             mean += q * DVec3::Z / 4000.0;
         }

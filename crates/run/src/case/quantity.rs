@@ -69,6 +69,8 @@ kinds! {
     AngularVelocity(0, 0, -1, 1) "an angular velocity", "rad/s", "90 deg/s";
     /// Stiffness [N/m].
     Stiffness(1, 0, -2, 0) "a stiffness", "N/m", "100 N/m";
+    /// Elastic modulus [Pa].
+    ElasticModulus(1, -1, -2, 0) "an elastic modulus", "Pa", "70 GPa";
     /// Rate [1/s].
     Rate(0, 0, -1, 0) "a rate", "1/s", "2 1/s";
     /// Plain number.

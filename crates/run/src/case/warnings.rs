@@ -6,7 +6,7 @@ use super::Case;
 use super::estimate::{Estimate, terminal_speed, time_step};
 use super::readable::quantity;
 use crate::{Plane, PlanePosition, Stop};
-use grainwake_solver::dem::{Dof, Grain, outside};
+use grainwake_solver::dem::{ContactLawKind, Dof, Grain, outside};
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::events::StopWhen;
@@ -104,7 +104,7 @@ fn of_given_motions(setup: &Setup, end: f64) -> Vec<String> {
     let (mut grains, enclosure) = (setup.grains.clone(), setup.enclosure());
     let dt = end / f64::from(STEPS);
     let motions = setup.prescription.motions.iter();
-    let driven: Vec<usize> = motions.map(|drive| drive.grain).collect();
+    let driven: Vec<usize> = motions.map(|motion| motion.grain).collect();
     let moves = |index: &usize| match grains[*index].translation {
         Dof::Prescribed(velocity) => velocity != DVec3::ZERO || driven.contains(index),
         Dof::Free => false,
@@ -114,7 +114,7 @@ fn of_given_motions(setup: &Setup, end: f64) -> Vec<String> {
     let mut gone = vec![false; grains.len()];
     for step in 0..STEPS {
         let middle = (f64::from(step) + 0.5) * dt;
-        setup.prescription.drive(&mut grains, middle);
+        setup.prescription.prescribe_motion(&mut grains, middle);
         for &index in &moving {
             if gone[index] {
                 continue;
@@ -279,20 +279,30 @@ fn of_numbers(setup: &Setup, e: &Estimate) -> Vec<String> {
         ));
     }
     if let Some(substeps) = e.contact_substeps.filter(|n| wet && *n > 200.0) {
-        found.push(format!("contacts need {substeps:.0} sub-steps a step: a lower [contact] stiffness or a larger maximum_overlap is cheaper"));
+        let remedy = match setup.contact.law {
+            ContactLawKind::Linear => "a lower [contact] stiffness or a larger maximum_overlap",
+            ContactLawKind::HertzMindlin => "a lower youngs_modulus",
+        };
+        found.push(format!(
+            "contacts need {substeps:.0} sub-steps a step: {remedy} is cheaper"
+        ));
     }
     if let Some(overlap) = expected_overlap(setup).filter(|overlap| *overlap > 0.05) {
-        found.push(format!("a grain at its settling speed would overlap by {:.0} % of its diameter at impact: raise [contact] stiffness", 100.0 * overlap));
+        let remedy = match setup.contact.law {
+            ContactLawKind::Linear => "[contact] stiffness",
+            ContactLawKind::HertzMindlin => "youngs_modulus",
+        };
+        found.push(format!(
+            "a grain at its settling speed would overlap by {:.0} % of its diameter at impact: raise {remedy}",
+            100.0 * overlap
+        ));
     }
     if let StepRule::Fixed(step) = setup.step {
-        let limits = Setup {
-            step: StepRule::Limits {
-                cfl: 0.6,
-                viscous: 0.216,
-                max_step: f64::INFINITY,
-            },
-            ..setup.clone()
-        };
+        let limits = setup.clone().with_step(StepRule::Limits {
+            cfl: 0.6,
+            viscous: 0.216,
+            max_step: f64::INFINITY,
+        });
         let most = time_step(&limits, e.settling_speed_m_per_s.unwrap_or(0.0));
         if step > most {
             found.push(format!(
@@ -356,8 +366,7 @@ fn expected_overlap(setup: &Setup) -> Option<f64> {
     let g = setup.gravity.length();
     let of = |grain: &Grain| {
         let speed = terminal_speed(grain, fluid, g).max(grain.velocity.length());
-        speed * (grain.mass() / setup.contact.normal_stiffness).sqrt()
-            / grain.shape.equivalent_diameter()
+        setup.contact.impact_overlap(grain, speed) / grain.shape.equivalent_diameter()
     };
     setup.grains.iter().map(of).reduce(f64::max)
 }

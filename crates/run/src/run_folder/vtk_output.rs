@@ -5,7 +5,7 @@ use std::path::Path;
 use grainwake_formats::pvd::Entry;
 use grainwake_formats::vti::{self, Frame, Source};
 use grainwake_formats::vtp;
-use grainwake_solver::sim::Simulation;
+use grainwake_solver::sim::{CELL_FIELDS, Simulation};
 
 use super::surfaces::Surfaces;
 use crate::error::{Context, RunError};
@@ -113,28 +113,15 @@ fn write_image(
         origin: mesh.origin + mesh.spacing * corner,
         time: sim.time(),
     };
-    let scalar = |x: f64| [x as f32, 0.0, 0.0];
-    let sources = [
-        Source {
-            name: "velocity",
-            components: 3,
-            value: &|c| sim.velocity_at(cell(c)).as_vec3().to_array(),
-        },
-        Source {
-            name: "vorticity",
-            components: 3,
-            value: &|c| sim.vorticity_at(cell(c)).as_vec3().to_array(),
-        },
-        Source {
-            name: "pressure",
-            components: 1,
-            value: &|c| scalar(sim.pressure_at(cell(c))),
-        },
-        Source {
-            name: "solid_fraction",
-            components: 1,
-            value: &|c| scalar(sim.solid_fraction_at(cell(c))),
-        },
-    ];
+    let values = CELL_FIELDS
+        .each_ref()
+        .map(|field| move |c: [usize; 3]| field.at(sim, cell(c)).as_vec3().to_array());
+    let sources: Vec<Source> = (CELL_FIELDS.iter().zip(&values))
+        .map(|(field, value)| Source {
+            name: field.name,
+            components: field.components,
+            value,
+        })
+        .collect();
     vti::write_from(path, &frame, &sources).context("write", path)
 }

@@ -53,22 +53,8 @@ pub(crate) fn distance(axes: DVec3, x: DVec3) -> f64 {
 /// Returns the foot of the normal from a point with y.z > 0.
 fn foot(axes: DVec3, y: DVec3, r: DVec3, z: DVec3) -> DVec3 {
     let value = |s: f64| (r * z / (DVec3::splat(s) + r)).length_squared() - 1.0;
-    let (mut low, mut high) = (z.z - 1.0, (r * z).length() - 1.0);
-    if high < low {
-        high = low;
-    }
-    let mut s = 0.5 * (low + high);
-    for _ in 0..200 {
-        s = 0.5 * (low + high);
-        if s == low || s == high {
-            break;
-        }
-        if value(s) > 0.0 {
-            low = s;
-        } else {
-            high = s;
-        }
-    }
+    let low = z.z - 1.0;
+    let s = root(value, low, ((r * z).length() - 1.0).max(low));
     let nearest = r * y / (DVec3::splat(s) + r);
     // Rescale onto the surface: bisection stops one rounding step away from it.
     let length = (nearest / axes).length();
@@ -103,19 +89,7 @@ fn foot_in_plane(axes: DVec3, y: DVec3) -> DVec3 {
         let r = (axes / axes.y) * (axes / axes.y);
         let z = DVec3::new(y.x / axes.x, y.y / axes.y, 0.0);
         let value = |s: f64| (r.x * z.x / (s + r.x)).powi(2) + (z.y / (s + 1.0)).powi(2) - 1.0;
-        let (mut low, mut high) = (z.y - 1.0, (r.x * z.x).hypot(z.y) - 1.0);
-        let mut s = 0.5 * (low + high);
-        for _ in 0..200 {
-            s = 0.5 * (low + high);
-            if s == low || s == high {
-                break;
-            }
-            if value(s) > 0.0 {
-                low = s;
-            } else {
-                high = s;
-            }
-        }
+        let s = root(value, z.y - 1.0, (r.x * z.x).hypot(z.y) - 1.0);
         let nearest = DVec3::new(r.x * y.x / (s + r.x), y.y / (s + 1.0), 0.0);
         return nearest / (nearest / axes).length();
     }
@@ -128,6 +102,23 @@ fn foot_in_plane(axes: DVec3, y: DVec3) -> DVec3 {
     DVec3::new(axes.x, 0.0, 0.0)
 }
 
+/// Returns the root of a decreasing function between `low` and `high`, by bisection.
+fn root(value: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    let mut middle = 0.5 * (low + high);
+    for _ in 0..200 {
+        middle = 0.5 * (low + high);
+        if middle == low || middle == high {
+            break;
+        }
+        if value(middle) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    middle
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,7 +128,7 @@ mod tests {
     #[test]
     fn distance_agrees_with_brute_force() {
         let axes = DVec3::new(1.5, 1.0, 0.6);
-        let mesh = crate::mesh::cube_sphere(160, |u| u * axes);
+        let mesh = crate::triangles::cube_sphere(160, |u| u * axes);
         let queries = [
             DVec3::ZERO,
             DVec3::X * 0.3,

@@ -3,13 +3,14 @@
 
 mod ellipsoid;
 mod solids;
+mod sphere;
 
 #[cfg(test)]
 pub(crate) use ellipsoid::distance as ellipsoid_distance;
 pub use ellipsoid::ellipsoid;
 pub use solids::{capsule, cylinder, rounded_box, superquadric};
 
-use crate::error::{Result, ShapeError, positive};
+use crate::error::{Result, positive, within};
 use crate::{Shape, ShapeOptions};
 
 /// Default node count of a sphere: one node per (diameter / 20)^2 of surface.
@@ -19,14 +20,7 @@ const SPHERE_NODES: usize = 1257;
 pub fn sphere(radius: f64, options: &ShapeOptions) -> Result<Shape> {
     positive("radius", radius)?;
     let nodes = options.nodes.unwrap_or(SPHERE_NODES);
-    if !(1..=1_000_000).contains(&nodes) {
-        let reason = "must be 1 to 1000000";
-        return Err(ShapeError::BadParameter {
-            name: "nodes",
-            value: nodes as f64,
-            reason,
-        });
-    }
+    within("nodes", nodes as f64, 1.0..=1e6, "must be 1 to 1000000")?;
     Ok(Shape::sphere(radius, nodes))
 }
 

@@ -2,10 +2,11 @@
 
 use super::sorted;
 use crate::assemble::{Body, assemble};
-use crate::error::{Result, ShapeError, positive};
-use crate::mesh::{self, cube_sphere};
+use crate::error::{Result, positive, within};
+use crate::mesh;
 use crate::provenance::Provenance;
 use crate::roundness::Surface;
+use crate::triangles::cube_sphere;
 use crate::{Shape, ShapeOptions};
 use glam::{DVec2, DVec3, Vec3Swizzles};
 use std::f64::consts::PI;
@@ -20,14 +21,8 @@ pub fn rounded_box(
     options: &ShapeOptions,
 ) -> Result<Shape> {
     let lengths = sorted(["length", "width", "height"], [length, width, height])?;
-    if !(radius.is_finite() && (0.0..=0.5 * lengths[2]).contains(&radius)) {
-        let reason = "must lie between 0 and half the shortest edge";
-        return Err(ShapeError::BadParameter {
-            name: "radius",
-            value: radius,
-            reason,
-        });
-    }
+    let reason = "must lie between 0 and half the shortest edge";
+    within("radius", radius, 0.0..=0.5 * lengths[2], reason)?;
     let half = 0.5 * DVec3::from_array(lengths);
     let core = half - DVec3::splat(radius);
     let edges = 2.0 * core;
@@ -130,14 +125,8 @@ pub fn superquadric(
         positive(name, length)?;
     }
     for (name, value) in [("e1", e1), ("e2", e2)] {
-        if !(0.1..=2.0).contains(&value) {
-            let reason = "must lie between 0.1 and 2 (convex, and not too sharp to mesh)";
-            return Err(ShapeError::BadParameter {
-                name,
-                value,
-                reason,
-            });
-        }
+        let reason = "must lie between 0.1 and 2 (convex, and not too sharp to mesh)";
+        within(name, value, 0.1..=2.0, reason)?;
     }
     let axes = DVec3::from_array(semi_axes);
     let mesh = cube_sphere(FACETS, |u| {

@@ -104,7 +104,7 @@ impl Core {
                 let mut on_surface = false;
                 for k in (0..n).filter(|k| *k != i && *k != j) {
                     for point in circle.meet(core.balls[k]).into_iter().flatten() {
-                        if core.holds(point, &[i, j, k]) {
+                        if core.contains(point, &[i, j, k]) {
                             on_surface = true;
                             if k > j {
                                 core.corners.push(point);
@@ -113,7 +113,7 @@ impl Core {
                     }
                 }
                 // A complete circle has no corner: any of its points is representative.
-                if on_surface || core.holds(circle.towards(DVec3::X), &[i, j]) {
+                if on_surface || core.contains(circle.towards(DVec3::X), &[i, j]) {
                     core.edges.push(circle);
                 }
             }
@@ -122,7 +122,7 @@ impl Core {
     }
 
     /// Returns whether all balls except `but` contain the point.
-    fn holds(&self, x: DVec3, but: &[usize]) -> bool {
+    fn contains(&self, x: DVec3, but: &[usize]) -> bool {
         self.balls.iter().enumerate().all(|(n, ball)| {
             let reach = ball.radius + self.slack;
             x.distance_squared(ball.centre) <= reach * reach || but.contains(&n)
@@ -149,7 +149,7 @@ impl Core {
             if length > ball.radius {
                 let foot = ball.centre + reach * (ball.radius / length);
                 // If the nearest point of a ball lies in the body, it is the body's nearest point.
-                if self.holds(foot, &[n]) {
+                if self.contains(foot, &[n]) {
                     return (length - ball.radius, reach / length);
                 }
             }
@@ -157,7 +157,7 @@ impl Core {
         for edge in &self.edges {
             let foot = edge.foot(x);
             let squared = foot.distance_squared(x);
-            if squared < best.0 && self.holds(foot, &edge.balls) {
+            if squared < best.0 && self.contains(foot, &edge.balls) {
                 best = (squared, foot);
             }
         }
@@ -175,7 +175,7 @@ impl Core {
     pub(super) fn support(&self, u: DVec3) -> f64 {
         let mut reach = f64::NEG_INFINITY;
         let mut offer = |x: DVec3, balls: &[usize]| {
-            if u.dot(x) > reach && self.holds(x, balls) {
+            if u.dot(x) > reach && self.contains(x, balls) {
                 reach = u.dot(x);
             }
         };
@@ -211,14 +211,15 @@ pub(super) fn inscribed(balls: &[Ball], start: DVec3, reach: f64) -> (DVec3, f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use crate::random::{Random, direction};
+    use rand::{RngExt, SeedableRng};
 
     fn stone() -> Vec<Ball> {
-        let mut random = Random::new(4);
+        let mut random = Random::seed_from_u64(4);
         (0..14)
             .map(|_| {
-                let radius = 2.0 + 3.0 * random.unit();
-                let centre = (0.8 + 0.4 * random.unit() - radius) * random.direction();
+                let radius = 2.0 + 3.0 * random.random::<f64>();
+                let centre = (0.8 + 0.4 * random.random::<f64>() - radius) * direction(&mut random);
                 Ball { centre, radius }
             })
             .collect()
@@ -230,9 +231,9 @@ mod tests {
         let balls = stone();
         let core = Core::new(balls.clone());
         assert!(core.corners.len() >= 12 && core.edges.len() >= 18);
-        let mut random = Random::new(9);
+        let mut random = Random::seed_from_u64(9);
         for _ in 0..60 {
-            let x = (1.0 + 2.0 * random.unit()) * random.direction();
+            let x = (1.0 + 2.0 * random.random::<f64>()) * direction(&mut random);
             let (found, outward) = core.distance(x);
             if found <= 0.0 {
                 continue;
@@ -269,18 +270,18 @@ mod tests {
         depths.sort_by(f64::total_cmp);
         assert!(depths[2] - radius < 1e-7, "{depths:?}");
         // No random point nearby is deeper.
-        let mut random = Random::new(2);
+        let mut random = Random::seed_from_u64(2);
         for _ in 0..300 {
-            assert!(core.distance(centre + 0.05 * random.direction()).0 >= -radius);
+            assert!(core.distance(centre + 0.05 * direction(&mut random)).0 >= -radius);
         }
     }
 
     #[test]
     fn the_support_is_the_limit_of_the_distance_from_afar() {
         let core = Core::new(stone());
-        let mut random = Random::new(5);
+        let mut random = Random::seed_from_u64(5);
         for _ in 0..100 {
-            let u = random.direction();
+            let u = direction(&mut random);
             let far = 1e5;
             let limit = far - core.distance(far * u).0;
             assert!(

@@ -11,12 +11,13 @@ mod ball_intersection;
 mod stone;
 
 use crate::assemble::{Body, assemble};
-use crate::error::{Result, ShapeError, positive};
+use crate::error::{Result, ShapeError, positive, within};
 use crate::provenance::Provenance;
 use crate::random::Random;
 use crate::roundness::Surface;
 use crate::{Shape, ShapeOptions};
-use glam::{DMat3, DQuat, DVec3};
+use glam::DVec3;
+use rand::SeedableRng;
 
 /// Target measures of a generated grain.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,46 +45,16 @@ impl FamilyTarget {
     }
 
     fn check(&self) -> Result<()> {
-        let bounds = [
-            (
-                "sphericity",
-                self.sphericity,
-                0.3,
-                0.97,
-                "must lie between 0.3 and 0.97",
-            ),
-            (
-                "roundness",
-                self.roundness,
-                0.05,
-                0.95,
-                "must lie between 0.05 and 0.95",
-            ),
-            (
-                "flatness",
-                self.flatness,
-                0.2,
-                1.0,
-                "must lie between 0.2 and 1",
-            ),
-        ];
-        for (name, value, low, high, reason) in bounds {
-            if !(low..=high).contains(&value) {
-                return Err(ShapeError::BadParameter {
-                    name,
-                    value,
-                    reason,
-                });
-            }
-        }
+        let reason = "must lie between 0.3 and 0.97";
+        within("sphericity", self.sphericity, 0.3..=0.97, reason)?;
+        let reason = "must lie between 0.05 and 0.95";
+        within("roundness", self.roundness, 0.05..=0.95, reason)?;
+        let reason = "must lie between 0.2 and 1";
+        within("flatness", self.flatness, 0.2..=1.0, reason)?;
         // S^3 = (b/a) (c/a) with b <= a; the tolerance admits decimal rounding.
-        if self.flatness < self.sphericity.powi(3) - 1e-6 {
-            return Err(ShapeError::BadParameter {
-                name: "flatness",
-                value: self.flatness,
-                reason: "must be no less than the cube of the sphericity",
-            });
-        }
+        let least = self.sphericity.powi(3) - 1e-6;
+        let reason = "must be no less than the cube of the sphericity";
+        within("flatness", self.flatness, least..=1.0, reason)?;
         positive("equivalent diameter", self.equivalent_diameter).map(|_| ())
     }
 }
@@ -96,17 +67,6 @@ pub fn family_options() -> ShapeOptions {
         least_cells: 22,
         ..ShapeOptions::default()
     }
-}
-
-/// Returns the initial orientation `number` (1 to 4) of the morphology study: body to space, z up.
-///
-/// Number 1 has the long axis along z and the short axis along x. The others follow by rotations of
-/// 45 degrees about y: number 3 has the long axis along x and the broad side, seen along the short
-/// axis, normal to z (Fig. 5 of the paper).
-pub fn study_orientation(number: u32) -> DQuat {
-    let upright = DMat3::from_cols(DVec3::Z, DVec3::NEG_Y, DVec3::X);
-    let angle = f64::from(number.saturating_sub(1)) * std::f64::consts::FRAC_PI_4;
-    DQuat::from_rotation_y(angle) * DQuat::from_mat3(&upright)
 }
 
 /// Attempts with other random faces before the search fails.
@@ -124,7 +84,8 @@ pub fn family_grain(target: &FamilyTarget, seed: u64, options: &ShapeOptions) ->
         ^ target.sphericity.to_bits().rotate_left(17)
         ^ target.roundness.to_bits().rotate_left(41);
     for attempt in 0..ATTEMPTS {
-        let mut random = Random::new(key.wrapping_add(attempt.wrapping_mul(0xd134_2543_de82_ef95)));
+        let mut random =
+            Random::seed_from_u64(key.wrapping_add(attempt.wrapping_mul(0xd134_2543_de82_ef95)));
         let Some(stone) = stone::stone(ratios, target.roundness, &mut random) else {
             continue;
         };
@@ -151,11 +112,9 @@ pub fn family_grain(target: &FamilyTarget, seed: u64, options: &ShapeOptions) ->
         let shape = assemble(&body, provenance, options)?;
         return shape.scaled_to_equivalent_diameter(target.equivalent_diameter);
     }
-    Err(ShapeError::Quality {
-        reason: format!(
-            "no stone of sphericity {} and roundness {} in {ATTEMPTS} attempts; try another seed \
-             or flatness",
-            target.sphericity, target.roundness
-        ),
-    })
+    Err(ShapeError::quality(format!(
+        "no stone of sphericity {} and roundness {} in {ATTEMPTS} attempts; try another seed or \
+         flatness",
+        target.sphericity, target.roundness
+    )))
 }

@@ -2,9 +2,11 @@
 
 use super::ball_intersection::{Ball, Core, inscribed};
 use crate::mass::Mass;
+use crate::nodes::golden_spiral;
 use crate::principal;
-use crate::random::Random;
+use crate::random::{Random, direction};
 use glam::{DMat3, DVec3};
+use rand::{Rng, RngExt};
 
 /// Minimum and maximum number of faces.
 const FACES: (u64, u64) = (13, 20);
@@ -93,8 +95,8 @@ pub(super) fn stone(shape: DVec3, roundness: f64, random: &mut Random) -> Option
 
 /// Returns planes around the origin with random, slightly repelled directions and varied distances.
 fn faces(random: &mut Random) -> Vec<Plane> {
-    let count = FACES.0 + random.next() % (FACES.1 - FACES.0 + 1);
-    let mut normals: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
+    let count = FACES.0 + random.next_u64() % (FACES.1 - FACES.0 + 1);
+    let mut normals: Vec<DVec3> = (0..count).map(|_| direction(random)).collect();
     for _ in 0..ROUNDS {
         let old = normals.clone();
         for (n, normal) in normals.iter_mut().enumerate() {
@@ -108,7 +110,7 @@ fn faces(random: &mut Random) -> Vec<Plane> {
     }
     let plane = |normal: DVec3| Plane {
         normal,
-        offset: 1.0 + UNEVEN * (2.0 * random.unit() - 1.0),
+        offset: 1.0 + UNEVEN * (2.0 * random.random::<f64>() - 1.0),
     };
     normals.into_iter().map(plane).collect()
 }
@@ -194,12 +196,8 @@ impl Built {
     /// Returns the distances of the surface from the centre of the inscribed sphere along `count`
     /// evenly spread directions (a golden spiral).
     fn radii(&self, count: usize) -> impl Iterator<Item = (DVec3, f64)> + '_ {
-        let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
         (0..count).map(move |n| {
-            let z = 1.0 - (2.0 * n as f64 + 1.0) / count as f64;
-            let (s, c) = (golden * n as f64).sin_cos();
-            let ring = (1.0 - z * z).sqrt();
-            let u = DVec3::new(ring * c, ring * s, z);
+            let u = golden_spiral(n, 1.0 - (2.0 * n as f64 + 1.0) / count as f64);
             // Newton's method from outside: the distance is convex, so the iteration never
             // overshoots.
             let mut t = self.reach;
@@ -254,7 +252,7 @@ impl Built {
 
 /// Returns the corners of the polytope, each with the three planes that meet in it.
 fn corners(planes: &[Plane]) -> Vec<(DVec3, [usize; 3])> {
-    let mut found = Vec::new();
+    let mut corners = Vec::new();
     for i in 0..planes.len() {
         for j in i + 1..planes.len() {
             for k in j + 1..planes.len() {
@@ -264,14 +262,14 @@ fn corners(planes: &[Plane]) -> Vec<(DVec3, [usize; 3])> {
                     continue;
                 }
                 let x = rows.inverse() * DVec3::new(p.offset, q.offset, r.offset);
-                let holds = |n: usize| {
+                let inside = |n: usize| {
                     [i, j, k].contains(&n) || planes[n].normal.dot(x) <= planes[n].offset
                 };
-                if (0..planes.len()).all(holds) {
-                    found.push((x, [i, j, k]));
+                if (0..planes.len()).all(inside) {
+                    corners.push((x, [i, j, k]));
                 }
             }
         }
     }
-    found
+    corners
 }

@@ -84,17 +84,15 @@ pub(super) fn unpack(packed: &[u8], dims: [usize; 3]) -> Option<Vec<f32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
+    use rand::{RngExt, SeedableRng};
 
     #[test]
     fn any_levels_come_back() {
         let dims = [5, 4, 3];
-        let mut state = 9u64;
-        let levels: Vec<f32> = (0..60)
-            .map(|_| {
-                state = state.wrapping_mul(6364136223846793005).wrapping_add(1);
-                ((state >> 40) as i64 - (1 << 23)) as f32
-            })
-            .collect();
+        let mut random = Random::seed_from_u64(9);
+        let level = |_| random.random_range(-(1 << 23)..1 << 23) as f32;
+        let levels: Vec<f32> = (0..60).map(level).collect();
         assert_eq!(unpack(&pack(&levels, dims), dims), Some(levels.clone()));
         assert_eq!(unpack(&pack(&levels, dims), [5, 4, 4]), None);
         assert_eq!(unpack(&pack(&levels, dims), [5, 4, 2]), None);

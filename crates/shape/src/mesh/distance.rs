@@ -1,12 +1,11 @@
 //! Signed distance to a closed mesh.
 
 use super::TriangleMesh;
-use super::bvh::{Bvh, Feature, Nearest, nearest_on_triangle};
-use super::check::Neighbours;
 use super::nearest_cache::About;
 use super::propagate;
 use crate::distance::Distance;
 use crate::error::Result;
+use crate::triangles::{Bvh, Feature, Nearest, Neighbours, nearest_on_triangle};
 use glam::DVec3;
 use std::sync::OnceLock;
 
@@ -36,9 +35,7 @@ impl MeshDistance {
         let mut corner_normals = vec![DVec3::ZERO; mesh.vertices.len()];
         for (face, triangle) in mesh.triangles.iter().enumerate() {
             let corners = mesh.corners(face);
-            let normal = (corners[1] - corners[0])
-                .cross(corners[2] - corners[0])
-                .normalize_or_zero();
+            let normal = mesh.twice_area(face).normalize_or_zero();
             for i in 0..3 {
                 let forward = corners[(i + 1) % 3] - corners[i];
                 let back = corners[(i + 2) % 3] - corners[i];
@@ -228,31 +225,8 @@ mod tests {
 
     #[test]
     fn distance_to_a_cube_is_exact_everywhere() {
-        let vertices = (0..8)
-            .map(|c| {
-                DVec3::new(
-                    f64::from(c & 1),
-                    f64::from(c >> 1 & 1),
-                    f64::from(c >> 2 & 1),
-                )
-            })
-            .map(|v| 2.0 * v - DVec3::ONE)
-            .collect();
-        let quads: [[u32; 4]; 6] = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
-        let mesh = TriangleMesh {
-            vertices,
-            triangles: triangles.collect(),
-        };
+        let mut mesh = crate::triangles::unit_cube().scaled(2.0);
+        mesh.vertices.iter_mut().for_each(|v| *v -= DVec3::ONE);
         let field = MeshDistance::new(&mesh).unwrap();
         for i in 0..3000 {
             let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);

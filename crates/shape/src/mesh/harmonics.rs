@@ -5,9 +5,9 @@
 //!
 //! Lanczos factors, sin(x) / x at x = pi n / (N + 1), suppress ringing.
 
-use super::{TriangleMesh, cube_sphere};
 use crate::error::{Result, ShapeError};
 use crate::limits::ReadLimits;
+use crate::triangles::{TriangleMesh, cube_sphere};
 use glam::DVec3;
 use std::f64::consts::PI;
 use std::path::Path;
@@ -24,15 +24,11 @@ struct Series {
 
 pub(super) fn read(path: &Path, bytes: Vec<u8>, _: &ReadLimits) -> Result<TriangleMesh> {
     let series = Series::parse(path, &String::from_utf8_lossy(&bytes))?;
-    let mut lowest = f64::INFINITY;
     let radius = |u: DVec3| series.radius(u);
     let mesh = cube_sphere(FACETS, |u| radius(u) * u);
-    for v in &mesh.vertices {
-        lowest = lowest.min(v.length());
-    }
     // A negative radius moves its vertex to the opposite side.
-    let turned = |v: &DVec3| radius(v.normalize_or_zero()) <= 0.0;
-    if lowest.is_nan() || lowest <= 0.0 || mesh.vertices.iter().any(turned) {
+    let positive = |v: &DVec3| v.length() > 0.0 && radius(v.normalize_or_zero()) > 0.0;
+    if !mesh.vertices.iter().all(positive) {
         let reason = "the radius is not positive in every direction";
         return Err(ShapeError::malformed(path, reason));
     }

@@ -1,12 +1,8 @@
-//! Closed triangle meshes: readers, checks, exact distances, and shapes built from them.
+//! Closed surface meshes: readers, exact distances, and shapes built from them.
 
 mod build;
-mod bvh;
-mod check;
-mod cube_sphere;
 mod distance;
 mod harmonics;
-mod intersect;
 mod nearest_cache;
 mod obj;
 mod ply;
@@ -15,83 +11,8 @@ mod read;
 mod stl;
 mod weld;
 
+pub use crate::triangles::TriangleMesh;
 pub(crate) use build::from_closed;
 pub use build::{MeshOptions, shape_from_mesh};
-pub(crate) use cube_sphere::cube_sphere;
 pub(crate) use distance::MeshDistance;
 pub use read::read_mesh;
-
-use glam::{DMat3, DVec3};
-
-/// Triangles with shared vertices, counter-clockwise seen from outside.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TriangleMesh {
-    /// Vertex positions [m].
-    pub vertices: Vec<DVec3>,
-    /// Vertex indices of each face.
-    pub triangles: Vec<[u32; 3]>,
-}
-
-impl TriangleMesh {
-    /// Returns the three corners of face `face`.
-    pub(crate) fn corners(&self, face: usize) -> [DVec3; 3] {
-        self.triangles[face].map(|v| self.vertices[v as usize])
-    }
-
-    /// Returns the corners of every face.
-    pub(crate) fn faces(&self) -> Vec<[DVec3; 3]> {
-        (0..self.triangles.len()).map(|f| self.corners(f)).collect()
-    }
-
-    /// Returns the volume [m^3] by the divergence theorem; negative for inward normals.
-    pub fn signed_volume(&self) -> f64 {
-        let reference = self.vertices.first().copied().unwrap_or(DVec3::ZERO);
-        let six: f64 = (0..self.triangles.len())
-            .map(|f| {
-                let [a, b, c] = self.corners(f).map(|p| p - reference);
-                a.dot(b.cross(c))
-            })
-            .sum();
-        six / 6.0
-    }
-
-    /// Returns the surface area [m^2].
-    pub fn area(&self) -> f64 {
-        let twice: f64 = (0..self.triangles.len())
-            .map(|f| {
-                let [a, b, c] = self.corners(f);
-                (b - a).cross(c - a).length()
-            })
-            .sum();
-        0.5 * twice
-    }
-
-    /// Returns the lower and upper corner of the bounding box [m].
-    pub fn bounds(&self) -> (DVec3, DVec3) {
-        let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        self.vertices
-            .iter()
-            .fold(start, |(lo, hi), v| (lo.min(*v), hi.max(*v)))
-    }
-
-    /// Returns the mesh scaled by `factor`.
-    pub(crate) fn scaled(mut self, factor: f64) -> TriangleMesh {
-        for v in &mut self.vertices {
-            *v *= factor;
-        }
-        self
-    }
-
-    /// Returns the mesh in the frame with this origin and these axes (columns).
-    pub(crate) fn in_frame(&self, origin: DVec3, axes: DMat3) -> TriangleMesh {
-        let to_frame = axes.transpose();
-        TriangleMesh {
-            vertices: self
-                .vertices
-                .iter()
-                .map(|v| to_frame * (*v - origin))
-                .collect(),
-            triangles: self.triangles.clone(),
-        }
-    }
-}

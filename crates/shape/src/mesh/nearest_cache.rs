@@ -6,7 +6,7 @@
 //! sequence converges.
 
 use super::MeshDistance;
-use super::bvh::Nearest;
+use crate::triangles::Nearest;
 use glam::DVec3;
 
 /// Maximum number of cached faces.
@@ -83,7 +83,7 @@ impl<'a> About<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::cube_sphere;
+    use crate::triangles::cube_sphere;
 
     /// Convergence to a point in a lumpy ball with decreasing steps.
     #[test]

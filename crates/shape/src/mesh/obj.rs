@@ -16,7 +16,7 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
     };
     let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
     let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
-        .map_err(|e| ShapeError::malformed(path, e.to_string()))?;
+        .map_err(|e| ShapeError::malformed(path, e))?;
     let mut mesh = TriangleMesh::default();
     for model in models {
         let first = mesh.vertices.len() as u32;

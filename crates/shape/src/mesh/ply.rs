@@ -59,15 +59,15 @@ impl PropertyAccess for Element {
 }
 
 pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<TriangleMesh> {
-    let malformed = |e: &dyn std::fmt::Display| ShapeError::malformed(path, e.to_string());
+    let malformed = |e: ply_rs_bw::parser::ParseError| ShapeError::malformed(path, e);
     let size = bytes.len() as u64;
     let mut reader = Reader::new(Cursor::new(bytes));
     let parser = Parser::<Element>::new();
-    let header = parser.read_header(&mut reader).map_err(|e| malformed(&e))?;
+    let header = parser.read_header(&mut reader).map_err(malformed)?;
     check_header(path, &header, size, limits)?;
     let payload = parser
         .read_payload(&mut reader, &header)
-        .map_err(|e| malformed(&e))?;
+        .map_err(malformed)?;
     let mut mesh = TriangleMesh::default();
     for (name, elements) in payload {
         match name.as_str() {
@@ -92,10 +92,8 @@ fn push_fan(path: &Path, out: &mut Vec<[u32; 3]>, face: usize, corners: &[i64]) 
             .map_err(|_| ShapeError::malformed(path, format!("face {face} has corner number {c}")))
     };
     if corners.len() < 3 {
-        return Err(ShapeError::malformed(
-            path,
-            format!("face {face} has {} corners", corners.len()),
-        ));
+        let reason = format!("face {face} has {} corners", corners.len());
+        return Err(ShapeError::malformed(path, reason));
     }
     for pair in corners[1..].windows(2) {
         out.push([number(corners[0])?, number(pair[0])?, number(pair[1])?]);
@@ -107,26 +105,20 @@ fn push_fan(path: &Path, out: &mut Vec<[u32; 3]>, face: usize, corners: &[i64]) 
 fn check_header(path: &Path, header: &Header, size: u64, limits: &ReadLimits) -> Result<()> {
     for needed in ["vertex", "face"] {
         if !header.elements.contains_key(needed) {
-            return Err(ShapeError::malformed(
-                path,
-                format!("no element named {needed:?}"),
-            ));
+            let reason = format!("no element named {needed:?}");
+            return Err(ShapeError::malformed(path, reason));
         }
     }
     for axis in ["x", "y", "z"] {
         if !header.elements["vertex"].properties.contains_key(axis) {
-            return Err(ShapeError::malformed(
-                path,
-                format!("vertices have no property {axis:?}"),
-            ));
+            let reason = format!("vertices have no property {axis:?}");
+            return Err(ShapeError::malformed(path, reason));
         }
     }
     let faces = &header.elements["face"].properties;
     if !faces.contains_key("vertex_indices") && !faces.contains_key("vertex_index") {
-        return Err(ShapeError::malformed(
-            path,
-            "faces have no property \"vertex_indices\"",
-        ));
+        let reason = "faces have no property \"vertex_indices\"";
+        return Err(ShapeError::malformed(path, reason));
     }
     for element in header.elements.values() {
         let count = element.count as u64;
@@ -135,13 +127,9 @@ fn check_header(path: &Path, header: &Header, size: u64, limits: &ReadLimits) ->
             return Err(super::read::too_many(path, &claimed(), limits));
         }
         if count.saturating_mul(least_bytes(element, header)) > size {
-            return Err(ShapeError::malformed(
-                path,
-                format!(
-                    "the header claims {}, the file has only {size} bytes",
-                    claimed()
-                ),
-            ));
+            let claimed = claimed();
+            let reason = format!("the header claims {claimed}, the file has only {size} bytes");
+            return Err(ShapeError::malformed(path, reason));
         }
     }
     Ok(())

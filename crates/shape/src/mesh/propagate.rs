@@ -7,7 +7,7 @@
 //! the surface; the error was below a tenth of a cell in the tests.
 
 use super::MeshDistance;
-use super::bvh::Nearest;
+use crate::triangles::Nearest;
 use glam::{DVec3, Vec3};
 
 /// Width of a bucket of the front [cells]; samples within one bucket are processed in any order.
@@ -225,14 +225,14 @@ impl<'a> Front<'a> {
         let (mesh, grid) = (self.mesh, self.grid);
         let (at, from, value) = (grid.position(n), self.origins[n], self.values[n]);
         let strides = [1, grid.dims[0], grid.dims[0] * grid.dims[1]];
-        let beside = (0..3).flat_map(|axis| {
+        let neighbours = (0..3).flat_map(|axis| {
             let step = grid.spacing * DVec3::AXES[axis];
             [
                 (n - strides[axis], at - step),
                 (n + strides[axis], at + step),
             ]
         });
-        for (m, x) in beside {
+        for (m, x) in neighbours {
             if self.open[m] == SETTLED {
                 continue;
             }
@@ -265,7 +265,7 @@ mod tests {
 
     use crate::distance::{Distance, EVERYWHERE};
     use crate::grid::place;
-    use crate::mesh::cube_sphere;
+    use crate::triangles::cube_sphere;
 
     #[test]
     fn spread_distances_are_the_exact_ones() {

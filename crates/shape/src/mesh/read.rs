@@ -20,10 +20,8 @@ pub fn read_mesh(
         "ply" => ply::read,
         "anm" => harmonics::read,
         _ => {
-            return Err(ShapeError::UnknownFormat {
-                path: path.to_owned(),
-                known: ".stl, .obj, .ply, .anm",
-            });
+            let reason = "unknown file type; supported: .stl, .obj, .ply, .anm";
+            return Err(ShapeError::unsupported(path, reason));
         }
     };
     let (bytes, source) = read_bytes(path, limits)?;
@@ -38,10 +36,5 @@ pub fn read_mesh(
 }
 
 pub(super) fn too_many(path: &Path, claimed: &str, limits: &ReadLimits) -> ShapeError {
-    ShapeError::TooLarge {
-        path: path.to_owned(),
-        claimed: claimed.to_owned(),
-        limit: limits.mesh_elements,
-        unit: "faces or vertices",
-    }
+    ShapeError::too_large(path, claimed, limits.mesh_elements, "faces or vertices")
 }

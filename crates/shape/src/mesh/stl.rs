@@ -14,18 +14,16 @@ const TRIANGLE: usize = 50;
 pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Result<TriangleMesh> {
     let binary = bytes.len() >= HEADER && {
         let count = u32::from_le_bytes([bytes[80], bytes[81], bytes[82], bytes[83]]);
-        let fits = HEADER as u64 + TRIANGLE as u64 * u64::from(count) == bytes.len() as u64;
-        if !fits && !bytes.starts_with(b"solid") {
-            return Err(ShapeError::malformed(
-                path,
-                format!(
-                    "the header counts {count} triangles, which take {} bytes, but the file has {}",
-                    HEADER as u64 + TRIANGLE as u64 * u64::from(count),
-                    bytes.len()
-                ),
-            ));
+        let needed = HEADER as u64 + TRIANGLE as u64 * u64::from(count);
+        let size = bytes.len() as u64;
+        if needed != size && !bytes.starts_with(b"solid") {
+            let reason = format!(
+                "the header counts {count} triangles, which take {needed} bytes, but the file has \
+                 {size}"
+            );
+            return Err(ShapeError::malformed(path, reason));
         }
-        fits
+        needed == size
     };
     if binary {
         // Binary files often begin with the keyword that identifies text files.
@@ -34,20 +32,17 @@ pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Resu
         return Err(ShapeError::malformed(path, "too short for an STL file"));
     }
     let mut cursor = Cursor::new(bytes);
-    let triangles = stl_io::create_stl_reader(&mut cursor)
-        .map_err(|e| ShapeError::malformed(path, e.to_string()))?;
+    let triangles =
+        stl_io::create_stl_reader(&mut cursor).map_err(|e| ShapeError::malformed(path, e))?;
     let mut mesh = TriangleMesh::default();
     for triangle in triangles {
-        let triangle = triangle.map_err(|e| ShapeError::malformed(path, e.to_string()))?;
+        let triangle = triangle.map_err(|e| ShapeError::malformed(path, e))?;
         if mesh.triangles.len() as u64 >= limits.mesh_elements {
             return Err(super::read::too_many(path, "more faces", limits));
         }
         let first = mesh.vertices.len() as u32;
-        mesh.vertices.extend(
-            triangle
-                .vertices
-                .map(|v| DVec3::from_array(v.0.map(f64::from))),
-        );
+        let corner = |v: stl_io::Vector<f32>| DVec3::from_array(v.0.map(f64::from));
+        mesh.vertices.extend(triangle.vertices.map(corner));
         mesh.triangles.push([first, first + 1, first + 2]);
     }
     Ok(mesh)

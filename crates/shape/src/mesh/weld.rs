@@ -24,9 +24,9 @@ pub(crate) fn weld(mesh: &TriangleMesh) -> (TriangleMesh, usize) {
         for k in low[2]..=high[2] {
             for j in low[1]..=high[1] {
                 for i in low[0]..=high[0] {
-                    for &known in buckets.get(&[i, j, k]).into_iter().flatten() {
-                        if vertices[known as usize].distance(v) <= tolerance {
-                            return known;
+                    for &vertex in buckets.get(&[i, j, k]).into_iter().flatten() {
+                        if vertices[vertex as usize].distance(v) <= tolerance {
+                            return vertex;
                         }
                     }
                 }

@@ -1,8 +1,10 @@
 //! Samples of the distance around a level set, and curvatures from them.
 
 use crate::distance::{Distance, EVERYWHERE};
-use crate::grid::place;
-use crate::scan::refine;
+use crate::filter::refine;
+use crate::grid::{coordinates, index, place};
+use crate::surface::{Samples, extract};
+use crate::triangles::TriangleMesh;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -51,8 +53,8 @@ impl Band {
         let corner = first + DVec3::splat(spacing * left_out as f64);
         let exact = distance.on_grid(corner, spacing, inner, EXACT, needed);
         for (n, exact) in exact.iter().enumerate().filter(|(_, v)| v.is_finite()) {
-            let [i, j, k] = place(inner, n).map(|i| i + left_out);
-            values[i + dims[0] * (j + dims[1] * k)] = (exact - level) as f32;
+            let at = place(inner, n).map(|i| i + left_out);
+            values[index(dims, at)] = (exact - level) as f32;
         }
         Some(Band {
             dims,
@@ -62,6 +64,8 @@ impl Band {
         })
     }
 
+    /// Samples the body to `reach` [samples] around the level set; blocks of samples farther away
+    /// have the distance of their centre.
     pub(super) fn around(
         distance: &(impl Fn(DVec3, &mut u32) -> f64 + Sync),
         lower: DVec3,
@@ -80,27 +84,17 @@ impl Band {
         }
         let blocks = blocks.map(|n| n as usize);
         let dims = blocks.map(|n| n * BLOCK);
-        let first =
-            0.5 * (lower + upper) - 0.5 * spacing * DVec3::from_array(dims.map(|n| n as f64 - 1.0));
-        let at = |i: usize, j: usize, k: usize| {
-            first + spacing * DVec3::new(i as f64, j as f64, k as f64)
-        };
+        let first = 0.5 * (lower + upper) - 0.5 * spacing * coordinates(dims.map(|n| n - 1));
+        let at = |place: [usize; 3]| first + spacing * coordinates(place);
         // Values are needed in the support of a Gaussian about the level set, corners included.
         let needed = 3f64.sqrt() * (reach + 0.5 * BLOCK as f64) * spacing;
+        let centre = |n: usize| {
+            let half = spacing * DVec3::splat(0.5 * (BLOCK as f64 - 1.0));
+            at(place(blocks, n).map(|i| BLOCK * i)) + half
+        };
         let near: Vec<f64> = (0..blocks.iter().product())
             .into_par_iter()
-            .map_init(
-                || 0,
-                |hint, n| {
-                    let (i, j, k) = (
-                        n % blocks[0],
-                        n / blocks[0] % blocks[1],
-                        n / blocks[0] / blocks[1],
-                    );
-                    let half = spacing * DVec3::splat(0.5 * (BLOCK as f64 - 1.0));
-                    distance(at(BLOCK * i, BLOCK * j, BLOCK * k) + half, hint) - level
-                },
-            )
+            .map_init(|| 0, |hint, n| distance(centre(n), hint) - level)
             .collect();
         let mut values = vec![0.0f32; dims.iter().product()];
         values
@@ -110,12 +104,11 @@ impl Band {
                 let (j, k) = (row % dims[1], row / dims[1]);
                 let mut hint = 0;
                 for (i, value) in line.iter_mut().enumerate() {
-                    let block = i / BLOCK + blocks[0] * (j / BLOCK + blocks[1] * (k / BLOCK));
-                    let centre = near[block];
+                    let centre = near[index(blocks, [i, j, k].map(|i| i / BLOCK))];
                     *value = if centre.abs() > needed {
                         centre as f32
                     } else {
-                        (distance(at(i, j, k), &mut hint) - level) as f32
+                        (distance(at([i, j, k]), &mut hint) - level) as f32
                     };
                 }
             });
@@ -124,6 +117,16 @@ impl Band {
             lower: first,
             spacing,
             values,
+        })
+    }
+
+    /// Extracts the level set as a closed mesh.
+    pub(super) fn surface(&self) -> TriangleMesh {
+        extract(&Samples {
+            dims: self.dims,
+            lower: self.lower,
+            spacing: self.spacing,
+            values: &self.values,
         })
     }
 
@@ -161,8 +164,7 @@ impl Band {
             // Sums over x and y; the digits are the orders of the derivatives in x and in y.
             let [mut p00, mut p10, mut p20, mut p01, mut p11, mut p02] = [0.0; 6];
             for (j, y) in taps[1].iter().enumerate() {
-                let row =
-                    start[0] + self.dims[0] * ((start[1] + j) + self.dims[1] * (start[2] + k));
+                let row = index(self.dims, [start[0], start[1] + j, start[2] + k]);
                 let [mut q0, mut q1, mut q2] = [0.0; 3];
                 let line = self.values.get(row..row + taps[0].len()).unwrap_or(&[]);
                 for (value, x) in line.iter().zip(&taps[0]) {
@@ -217,7 +219,8 @@ pub(super) fn principal(gradient: DVec3, hessian: DMat3) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{MeshDistance, cube_sphere};
+    use crate::mesh::MeshDistance;
+    use crate::triangles::cube_sphere;
 
     /// A lumpy body, a cube and a waisted body, at the resolution used for scans.
     #[test]

@@ -10,12 +10,9 @@
 //! Symbols: s standard deviation, u multiples of s, z depth below the surface in multiples of s, x
 //! coordinate across the edge, y height above it, k curvature.
 
+use crate::filter::Kernel;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
-
-/// Weights (sum 1) and standard deviations of the Gaussians equivalent to blur and smoothing of an
-/// image.
-pub(crate) type Kernel = [(f64, f64); 2];
 
 /// A section through an edge in the image.
 #[derive(Clone, Debug, Default)]
@@ -212,7 +209,7 @@ const FINER: [usize; 2] = [9, 30];
 /// Returns the edge parameters for values measured with two widths. The value from the wider
 /// Gaussian determines the angle, because blunt edges are rounded more. For round edges the angle
 /// has little influence and stays near a right angle.
-pub(super) fn edges_of(chain: &Chain, found: [f64; 2]) -> Edges {
+pub(super) fn edges_of(chain: &Chain, measured: [f64; 2]) -> Edges {
     let table: Vec<[f64; 2]> = (0..=TRIED * (RADII + 1) + RADII)
         .into_par_iter()
         .map(|n| {
@@ -233,7 +230,7 @@ pub(super) fn edges_of(chain: &Chain, found: [f64; 2]) -> Edges {
             let (column, v) = between(m, FINER[1], RADII);
             let at = row * (RADII + 1) + column;
             let mut misfit = unusual * unusual;
-            for (width, value) in found.iter().enumerate() {
+            for (width, value) in measured.iter().enumerate() {
                 let near = |n: usize| table[n][width] * (1.0 - v) + table[n + 1][width] * v;
                 let model = near(at) * (1.0 - u) + near(at + RADII + 1) * u;
                 misfit += ((model - value) / MISFIT).powi(2);

@@ -17,9 +17,8 @@ mod edge;
 mod scan;
 
 use crate::distance::Distance;
-use crate::surface::{Samples, extract};
+use crate::filter::Kernel;
 use band::Band;
-pub(crate) use edge::Kernel;
 use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -128,17 +127,12 @@ fn of_exact(distance: &impl Distance, lower: DVec3, upper: DVec3, inscribed: f64
     let level = LEVEL * spacing;
     let near = |x: DVec3, hint: &mut u32| distance.near(x, hint);
     let band = Band::around(&near, lower, upper, spacing, [level, REACH * WIDTHS[1]])?;
-    let mesh = extract(&Samples {
-        dims: band.dims,
-        lower: band.lower,
-        spacing,
-        values: &band.values,
-    });
+    let mesh = band.surface();
     let mut areas = vec![0.0; mesh.vertices.len()];
     for (face, triangle) in mesh.triangles.iter().enumerate() {
-        let [a, b, c] = mesh.corners(face);
+        let third = mesh.twice_area(face).length() / 6.0;
         for v in triangle {
-            areas[*v as usize] += (b - a).cross(c - a).length() / 6.0;
+            areas[*v as usize] += third;
         }
     }
     // Surface radius below a vertex from the larger curvature of the level set.

@@ -13,12 +13,11 @@
 
 use super::CORNER;
 use super::band::Band;
-use super::edge::{Chain, Kernel, edges_of};
+use super::edge::{Chain, edges_of};
 use super::{Lost, Reading};
 use crate::distance::Distance;
-use crate::mesh::TriangleMesh;
-use crate::scan::gaussian;
-use crate::surface::{Samples, extract};
+use crate::filter::{Kernel, gaussian};
+use crate::triangles::TriangleMesh;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -73,12 +72,7 @@ pub(super) fn measure(
         spacing,
         [LEVEL * inscribed, reach, near],
     )?;
-    let mesh = extract(&Samples {
-        dims: band.dims,
-        lower: band.lower,
-        spacing,
-        values: &band.values,
-    });
+    let mesh = band.surface();
     let (natural, left) = natural(&mesh, inscribed, cuts);
     if left < LEAST_LEFT {
         return None;
@@ -101,20 +95,19 @@ pub(super) fn measure(
     let coarse = bends(COARSE);
     let fine = WIDTHS.map(bends);
     // Area and turning [R_in^2, R_in] for each width.
-    let mut found = [(0.0, 0.0); 2];
+    let mut totals = [(0.0, 0.0); 2];
     for (face, triangle) in mesh.triangles.iter().enumerate() {
         if triangle.iter().any(|v| !natural[*v as usize]) {
             continue;
         }
-        let [a, b, c] = mesh.corners(face);
-        let part = (b - a).cross(c - a).length() / (2.0 * (PARTS * PARTS) as f64);
+        let part = mesh.twice_area(face).length() / (2.0 * (PARTS * PARTS) as f64);
         let part = part / (inscribed * inscribed);
         for weights in parts() {
-            let (seen, along) = sharpest(&coarse, triangle, weights);
-            if seen * (COARSE_CORNER + LEVEL) <= 1.0 {
+            let (k1, along) = sharpest(&coarse, triangle, weights);
+            if k1 * (COARSE_CORNER + LEVEL) <= 1.0 {
                 continue;
             }
-            for (fine, (area, turn)) in fine.iter().zip(&mut found) {
+            for (fine, (area, turn)) in fine.iter().zip(&mut totals) {
                 let [k1, k2] = along_and_across(fine, triangle, weights, along);
                 if k1 * (CORNER + LEVEL) <= 1.0 {
                     continue;
@@ -125,8 +118,8 @@ pub(super) fn measure(
             }
         }
     }
-    let (_, turn) = found[0];
-    if found.iter().any(|(_, turn)| *turn <= 0.0) {
+    let (_, turn) = totals[0];
+    if totals.iter().any(|(_, turn)| *turn <= 0.0) {
         return Some(Reading::of(1.0));
     }
     // Linear interpolation between the vertices widens the curvatures.
@@ -137,8 +130,8 @@ pub(super) fn measure(
         widths: WIDTHS.map(|width| (width * width + interpolated).sqrt()),
         corner: CORNER,
     };
-    let found = found.map(|(area, turn)| area / turn);
-    let edges = edges_of(&chain, found);
+    let radii = totals.map(|(area, turn)| area / turn);
+    let edges = edges_of(&chain, radii);
     let least = LEAST_TURN * 4.0 * PI * left;
     let section = chain.section(edges);
     let length = chain.length(edges, &section, turn);
@@ -176,7 +169,7 @@ fn spread(mesh: &TriangleMesh) -> f64 {
     let (mut sum, mut whole) = (0.0, 0.0);
     for face in 0..mesh.triangles.len() {
         let [a, b, c] = mesh.corners(face);
-        let area = (b - a).cross(c - a).length();
+        let area = mesh.twice_area(face).length();
         let sides = a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
         sum += area * sides / 24.0;
         whole += area;

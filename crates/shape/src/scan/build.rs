@@ -3,16 +3,15 @@
 use super::field_of_view::FieldOfView;
 use super::grain::{self, Context};
 use super::grey::{Grey, LAYERS};
-use super::regions::regions;
-use super::regions::shared_surfaces;
+use super::regions::{regions, shared_surfaces};
 use super::runs::{fill_cavities, pieces};
 use super::threshold::median;
 use super::volume::Voxels;
 use super::watershed::{HALO, add_halo, separate};
-use super::{Denoise, Mask, Threshold, Volume, transform};
+use super::{Mask, Threshold, Volume, transform};
 use crate::Shape;
 use crate::assemble::ShapeOptions;
-use crate::error::{Result, ShapeError, positive};
+use crate::error::{Result, ShapeError, first_few, positive, within};
 use crate::limits::SourceFile;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -28,8 +27,9 @@ pub struct ScanOptions {
     pub label: Option<u32>,
     /// Segmentation of solid and void; required for grey images, `None` for labels.
     pub threshold: Option<Threshold>,
-    /// Noise filter applied before the threshold.
-    pub denoise: Denoise,
+    /// Whether to apply a median of 27 voxels before the threshold. Surfaces are located in the
+    /// unfiltered image.
+    pub median: bool,
     /// Whether to treat each connected piece of the solid voxels as a grain.
     pub split: bool,
     /// Separates touching grains. Two maxima of the distance from the void are two grains if the
@@ -57,7 +57,7 @@ impl ScanOptions {
             voxel,
             label: None,
             threshold: None,
-            denoise: Denoise::None,
+            median: false,
             split: false,
             separate: None,
             sub_voxel: true,
@@ -67,9 +67,7 @@ impl ScanOptions {
             shape: ShapeOptions::default(),
         }
     }
-}
 
-impl ScanOptions {
     /// Returns the memory for an image of many grains [bytes per voxel], as measured, including a
     /// 16-bit file. Surfaces of a grain that fills the image need as much again.
     pub fn bytes_per_voxel(&self) -> u64 {
@@ -133,54 +131,41 @@ pub fn scan_volume(
     check(options)?;
     let dims = volume.dims;
     // Voxel indices share 32 bits with a flag.
-    let count = dims.iter().product::<usize>();
-    if count >= 1 << 31 {
-        return Err(ShapeError::BadParameter {
-            name: "number of voxels",
-            value: count as f64,
-            reason: "must be below 2^31; crop the image, or bin it",
-        });
-    }
-    let Segments {
-        labels,
-        grey,
-        threshold,
-        cut_by_view,
-    } = segment(volume, source, options, progress)?;
-    let found = regions(dims, &labels);
-    if found.is_empty() {
+    let (count, largest) = (dims.iter().product::<usize>(), f64::from((1u32 << 31) - 1));
+    let reason = "must be below 2^31; crop the image, or bin it";
+    within("number of voxels", count as f64, 0.0..=largest, reason)?;
+    let segments = segment(volume, source, options, progress)?;
+    let labels = &segments.labels;
+    let regions = regions(dims, labels);
+    if regions.is_empty() {
         return Err(ShapeError::EmptyVolume);
     }
-    if found.len() == 1 && found.values().all(|r| r.voxels == labels.len() as u64) {
+    if regions.len() == 1 && regions.values().all(|r| r.voxels == labels.len() as u64) {
         return Err(ShapeError::SolidVolume);
     }
     let phase = options.divides() && options.threshold.is_none();
-    let wanted: Vec<_> = match options.label.filter(|_| !phase) {
-        None => found.iter().collect(),
-        Some(label) => match found.get_key_value(&label) {
+    let selected: Vec<_> = match options.label.filter(|_| !phase) {
+        None => regions.iter().collect(),
+        Some(label) => match regions.get_key_value(&label) {
             Some(one) => vec![one],
             None => {
-                let shown: Vec<String> = found.keys().take(10).map(u32::to_string).collect();
-                let more = if found.len() > 10 { ", ..." } else { "" };
-                let present = format!("{}{more}", shown.join(", "));
-                return Err(ShapeError::NoSuchLabel { label, present });
+                let present = first_few(regions.keys(), 10);
+                let reason = format!("does not occur; labels present: {present}");
+                return Err(ShapeError::parameter("label", label.into(), &reason));
             }
         },
     };
     let context = Context {
         dims,
-        labels: &labels,
-        grey: grey.as_ref(),
-        threshold,
-        cut_by_view: &cut_by_view,
+        segments: &segments,
         source,
         options,
     };
-    let shared = shared_surfaces(dims, &labels);
+    let shared = shared_surfaces(dims, labels);
     let done = AtomicU64::new(0);
-    let total = wanted.len() as u64;
+    let total = selected.len() as u64;
     progress("shapes", 0, total);
-    let grains = wanted
+    let grains = selected
         .par_iter()
         .map(|(label, region)| {
             let shape = grain::shape(&context, **label, region);
@@ -197,41 +182,36 @@ pub fn scan_volume(
         grains,
         labels: Volume {
             dims,
-            voxels: Voxels::Labels(labels),
+            voxels: Voxels::Labels(segments.labels),
         },
-        threshold,
+        threshold: segments.threshold,
     })
 }
 
 fn check(options: &ScanOptions) -> Result<()> {
     positive("voxel size", options.voxel)?;
-    let within = |name, value: Option<f64>, low: f64, high: f64, reason| match value {
-        Some(value) if !(low..=high).contains(&value) => Err(ShapeError::BadParameter {
-            name,
-            value,
-            reason,
-        }),
-        _ => Ok(()),
-    };
-    let reason = "must lie between 0.5 and 5 voxels";
-    within("smoothing", options.smoothing, 0.5, 5.0, reason)?;
-    let reason = "must lie between 0.3 and 1: neck over grain";
-    within("separate", options.separate, 0.3, 1.0, reason)?;
-    let threshold = match options.threshold {
-        Some(Threshold::Value(value)) => Some(value),
-        _ => None,
-    };
-    within("threshold", threshold, f64::MIN, f64::MAX, "must be finite")
+    if let Some(smoothing) = options.smoothing {
+        let reason = "must lie between 0.5 and 5 voxels";
+        within("smoothing", smoothing, 0.5..=5.0, reason)?;
+    }
+    if let Some(neck) = options.separate {
+        let reason = "must lie between 0.3 and 1: neck over grain";
+        within("separate", neck, 0.3..=1.0, reason)?;
+    }
+    if let Some(Threshold::Value(value)) = options.threshold {
+        within("threshold", value, f64::MIN..=f64::MAX, "must be finite")?;
+    }
+    Ok(())
 }
 
 /// Result of the segmentation.
-struct Segments {
-    labels: Vec<u32>,
+pub(super) struct Segments {
+    pub labels: Vec<u32>,
     /// Grey values, if surfaces are located by them.
-    grey: Option<Grey>,
-    threshold: Option<f64>,
+    pub grey: Option<Grey>,
+    pub threshold: Option<f64>,
     /// Labels at the edge of the field of view.
-    cut_by_view: BTreeSet<u32>,
+    pub cut_by_view: BTreeSet<u32>,
 }
 
 fn segment(
@@ -258,28 +238,22 @@ fn segment(
             });
         }
         (Voxels::Grey(_), None) => {
-            return Err(ShapeError::Unsupported {
-                path: source.name.clone().into(),
-                reason: "the image has grey values, not labels; give a threshold (--threshold \
-                         otsu, otsu3, or a grey value)"
-                    .into(),
-            });
+            let reason = "the image has grey values, not labels; give a threshold (--threshold \
+                          otsu, otsu3, or a grey value)";
+            return Err(ShapeError::unsupported(source.name.as_ref(), reason));
         }
         (Voxels::Labels(v), _) => v.iter().map(|v| *v as f32).collect(),
         (Voxels::Grey(v), _) => v.clone(),
     };
     progress("threshold", 0, 1);
-    let clean = match options.denoise {
-        Denoise::None => None,
-        Denoise::Median => Some(median(&values, dims)),
-    };
-    let seen = clean.as_ref().unwrap_or(&values);
-    let cut = options.threshold.and_then(|t| t.of(seen));
+    let clean = options.median.then(|| median(&values, dims));
+    let filtered = clean.as_ref().unwrap_or(&values);
+    let cut = options.threshold.and_then(|t| t.of(filtered));
     let Some(cut) = cut else {
         // All values are equal: black counts as empty.
         return Err(ShapeError::EmptyVolume);
     };
-    let binary: Vec<u32> = seen
+    let binary: Vec<u32> = filtered
         .iter()
         .map(|v| u32::from(f64::from(*v) >= cut))
         .collect();

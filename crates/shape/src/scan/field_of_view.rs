@@ -68,23 +68,23 @@ impl FieldOfView {
     /// Returns the labels at its edge.
     pub fn cuts(&self, labels: &[u32]) -> BTreeSet<u32> {
         let [nx, ny, nz] = self.dims;
-        let mut found = BTreeSet::new();
+        let mut truncated = BTreeSet::new();
         for (row, line) in labels.chunks(nx).enumerate() {
             let (j, k) = (row % ny, row / ny);
             let [from, to] = self.rows[row];
             // Voxels excluded by adjacent rows are equally close to the edge.
-            let mut beside = Vec::new();
+            let mut adjacent = Vec::new();
             if j >= NEAR && j + NEAR < ny {
-                beside.extend([row - NEAR, row + NEAR]);
+                adjacent.extend([row - NEAR, row + NEAR]);
             }
             if k >= NEAR && k + NEAR < nz {
-                beside.extend([row - NEAR * ny, row + NEAR * ny]);
+                adjacent.extend([row - NEAR * ny, row + NEAR * ny]);
             }
             let mut cut = |part: std::ops::Range<usize>| {
-                found.extend(line[part].iter().filter(|label| **label != 0));
+                truncated.extend(line[part].iter().filter(|label| **label != 0));
             };
             let mut within = [from, to];
-            for row in beside {
+            for row in adjacent {
                 let [a, b] = self.rows[row];
                 within = [within[0].max(a.min(nx)), within[1].min(b)];
             }
@@ -97,7 +97,7 @@ impl FieldOfView {
             cut(0..low.min(nx));
             cut(high.max(low.min(nx))..nx);
         }
-        found
+        truncated
     }
 }
 

@@ -1,18 +1,19 @@
 //! The shape of one grain of a volume.
 
-use super::grey::Grey;
+use super::build::Segments;
 use super::regions::{Region, crop, cuts};
 use super::runs::{fill_cavities, pieces};
 use super::{Mask, ScanOptions, smooth, transform};
 use crate::Shape;
-use crate::error::{Result, ShapeError};
+use crate::error::{Result, ShapeError, first_few};
+use crate::filter::refine;
+use crate::grid::{coordinates, index, place};
 use crate::limits::SourceFile;
 use crate::mesh::{TriangleMesh, from_closed};
 use crate::provenance::Provenance;
 use crate::roundness::Surface;
 use crate::surface::{Samples, extract};
 use glam::DVec3;
-use std::collections::BTreeSet;
 
 /// Minimum number of voxels of a grain: a ball of diameter 5 voxels.
 const FEWEST: u64 = 64;
@@ -29,11 +30,7 @@ const SMOOTHING: [f64; 2] = [1.1, 1.5];
 /// The segmented volume.
 pub(super) struct Context<'a> {
     pub dims: [usize; 3],
-    pub labels: &'a [u32],
-    pub grey: Option<&'a Grey>,
-    pub threshold: Option<f64>,
-    /// Labels at the edge of the field of view.
-    pub cut_by_view: &'a BTreeSet<u32>,
+    pub segments: &'a Segments,
     pub source: &'a SourceFile,
     pub options: &'a ScanOptions,
 }
@@ -42,19 +39,19 @@ pub(super) struct Context<'a> {
 pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Shape> {
     let Context {
         dims,
-        labels,
+        segments,
         source,
         options,
-        ..
     } = *context;
+    let labels = &segments.labels;
     let faces = region.faces(dims);
     if !faces.is_empty() && !options.pad {
         return Err(ShapeError::CutByBorder { label, faces });
     }
-    if context.cut_by_view.contains(&label) && !options.pad {
+    if segments.cut_by_view.contains(&label) && !options.pad {
         return Err(ShapeError::CutByView { label });
     }
-    let smoothing = SMOOTHING[usize::from(context.grey.is_none())];
+    let smoothing = SMOOTHING[usize::from(segments.grey.is_none())];
     let smoothing = options.smoothing.unwrap_or(smoothing);
     let margin = (4.0 * smoothing).ceil() as usize + 4;
     let mut mask = crop(dims, labels, label, region, margin);
@@ -72,7 +69,7 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
         .map(|a| region.upper[a] - region.lower[a] + 1)
         .max()
         .unwrap_or(1);
-    let factor = FINE[usize::from(context.grey.is_none())]
+    let factor = FINE[usize::from(segments.grey.is_none())]
         .div_ceil(longest)
         .clamp(1, 4);
     let mut provenance = Provenance::new("scan")
@@ -83,13 +80,13 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
         .with("smoothing_voxels", smoothing)
         .with("split", options.split)
         .with("pad", options.pad);
-    if let Some(threshold) = context.threshold {
+    if let Some(threshold) = segments.threshold {
         provenance = provenance.with("threshold", threshold);
     }
     if let Some(neck) = options.separate {
         provenance = provenance.with("separate", neck);
     }
-    let (field, volume, image) = match context.grey {
+    let (field, volume, image) = match &segments.grey {
         Some(grey) => {
             let low = region.lower.map(|n| n as isize - margin as isize);
             let cut = grey.cut(&mask, low, label, smoothing);
@@ -130,17 +127,10 @@ fn one_piece(mask: &mut Mask, label: u32, largest: bool) -> Result<u64> {
     let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by_key(|n| std::cmp::Reverse(sizes[*n]));
     if sizes.len() > 1 && !largest {
-        let shown: Vec<String> = order
-            .iter()
-            .take(5)
-            .map(|n| sizes[*n].to_string())
-            .collect();
-        let more = if sizes.len() > 5 { ", ..." } else { "" };
-        let sizes = format!("{}{more}", shown.join(", "));
         return Err(ShapeError::SeveralPieces {
             label,
             count: order.len(),
-            sizes,
+            sizes: first_few(order.iter().map(|n| sizes[*n]), 5),
         });
     }
     let kept = order[0];
@@ -155,7 +145,7 @@ fn one_piece(mask: &mut Mask, label: u32, largest: bool) -> Result<u64> {
 /// volume, on a grid refined by `factor`.
 fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Result<TriangleMesh> {
     let (field, dims, lower) = near_surface(field, dims);
-    let (mut fine, dims) = smooth::refine(&field, dims, factor);
+    let (mut fine, dims) = refine(&field, dims, factor);
     let spacing = 1.0 / factor as f64;
     let mut mesh = TriangleMesh::default();
     // Newton's method: the derivative of the volume with respect to the level is the area.
@@ -166,13 +156,12 @@ fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Resul
             spacing,
             values: &fine,
         };
-        mesh = extract(&samples)
-            .largest_piece(CRUMBS)
-            .ok_or_else(|| ShapeError::Quality {
-                reason: "smoothing leaves no single surface (a neck of a voxel or two breaks); \
-                     reduce the smoothing"
-                    .into(),
-            })?;
+        mesh = extract(&samples).largest_piece(CRUMBS).ok_or_else(|| {
+            ShapeError::quality(
+                "smoothing leaves no single surface (a neck of a voxel or two breaks); reduce \
+                     the smoothing",
+            )
+        })?;
         let missing = (volume - mesh.signed_volume()) / mesh.area();
         if missing.abs() < 1e-4 {
             break;
@@ -190,10 +179,9 @@ const AROUND: usize = 4;
 
 /// Returns the part of a field around the body, its dimensions, and its origin.
 fn near_surface(field: &[f32], dims: [usize; 3]) -> (Vec<f32>, [usize; 3], DVec3) {
-    let [nx, ny, _] = dims;
     let (mut low, mut high) = (dims, [0; 3]);
     for (n, _) in field.iter().enumerate().filter(|(_, value)| **value < 0.0) {
-        for (axis, i) in [n % nx, n / nx % ny, n / nx / ny].into_iter().enumerate() {
+        for (axis, i) in place(dims, n).into_iter().enumerate() {
             low[axis] = low[axis].min(i);
             high[axis] = high[axis].max(i);
         }
@@ -207,9 +195,9 @@ fn near_surface(field: &[f32], dims: [usize; 3]) -> (Vec<f32>, [usize; 3], DVec3
     let mut part = Vec::with_capacity(size.iter().product());
     for k in low[2]..high[2] {
         for j in low[1]..high[1] {
-            let row = nx * (j + ny * k);
+            let row = index(dims, [0, j, k]);
             part.extend_from_slice(&field[row + low[0]..row + high[0]]);
         }
     }
-    (part, size, DVec3::from_array(low.map(|n| n as f64)))
+    (part, size, coordinates(low))
 }

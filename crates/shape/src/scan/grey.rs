@@ -8,10 +8,9 @@
 //! removed by setting the level to match the volume.
 
 use super::Mask;
-use super::smooth::gaussian;
 use super::transform;
 use super::watershed::HALO;
-use crate::roundness::Kernel;
+use crate::filter::{Kernel, gaussian};
 use rayon::prelude::*;
 use std::f64::consts::SQRT_2;
 
@@ -28,8 +27,6 @@ pub(crate) struct Grey {
 
 /// Distance from the surface beyond which a voxel is entirely solid or void [voxels].
 const BAND: f32 = 2.7;
-/// Range of the distance computation: the band plus [`DEEPER`] [voxels].
-const REACH: usize = 4;
 /// Additional distance from the band at which the grey of the grain is sampled [voxels].
 const DEEPER: f32 = 0.5;
 /// Layers of void that are assigned to a grain [voxels].
@@ -84,7 +81,7 @@ impl Grey {
     /// the image coordinate of the first voxel of the mask, which may lie outside.
     pub(crate) fn cut(&self, mask: &Mask, low: [isize; 3], label: u32, sigma: f64) -> Cut {
         let dims = mask.dims;
-        let distance = transform::signed_near(mask, REACH);
+        let distance = transform::signed(mask);
         let place = |n: usize| -> Option<usize> {
             let at = crate::grid::place(dims, n);
             let mut index = 0;

@@ -1,5 +1,7 @@
 //! Volumes with a text header: NRRD (`.nrrd`, `.nhdr`) and MetaImage (`.mha`, `.mhd`). Voxels are
 //! raw or gzipped, in the header's file or in a separate one.
+//!
+//! Parsed here, because there is no dedicated crate for NRRD or MetaImage headers.
 
 use super::npy::Number;
 use super::volume::{Volume, count};
@@ -16,11 +18,12 @@ const LONGEST: usize = 1 << 16;
 #[derive(Default)]
 struct Fields {
     sizes: Vec<u64>,
-    number: Option<Number>,
+    /// Kind and width [bytes] of the numbers, as in [`Number`].
+    number: Option<(u8, usize)>,
     big: bool,
     packed: Packed,
     /// File with the voxels; `None` if they follow the header.
-    beside: Option<String>,
+    data_file: Option<String>,
     /// Bytes before the voxels; -1 to read them from the end of the file.
     skip: i64,
 }
@@ -69,7 +72,7 @@ pub(super) fn read_nrrd(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
                     _ => Packed::Other,
                 }
             }
-            "data file" | "datafile" => fields.beside = Some(value.to_owned()),
+            "data file" | "datafile" => fields.data_file = Some(value.to_owned()),
             "byte skip" | "byteskip" => {
                 fields.skip =
                     skip(value).ok_or_else(|| malformed("byte skip is not 0, 1, ... or -1"))?;
@@ -77,7 +80,7 @@ pub(super) fn read_nrrd(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
             _ => {}
         }
     }
-    if end.is_none() && fields.beside.is_none() {
+    if end.is_none() && fields.data_file.is_none() {
         return Err(malformed("the NRRD header does not end"));
     }
     voxels(path, fields, &bytes[start..], limits)
@@ -88,7 +91,7 @@ pub(super) fn read_meta(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
     let mut fields = Fields::default();
     let mut at = 0;
     // The data file name is the last line of the header.
-    while fields.beside.is_none() {
+    while fields.data_file.is_none() {
         let rest = &bytes[at..bytes.len().min(LONGEST).max(at)];
         let Some(end) = rest.iter().position(|b| *b == b'\n') else {
             return Err(malformed("the MetaImage header names no ElementDataFile"));
@@ -109,12 +112,12 @@ pub(super) fn read_meta(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
                 fields.skip =
                     skip(value).ok_or_else(|| malformed("HeaderSize is not 0, 1, ... or -1"))?;
             }
-            "ElementDataFile" => fields.beside = Some(value.to_owned()),
+            "ElementDataFile" => fields.data_file = Some(value.to_owned()),
             _ => {}
         }
     }
-    if fields.beside.as_deref() == Some("LOCAL") {
-        fields.beside = None;
+    if fields.data_file.as_deref() == Some("LOCAL") {
+        fields.data_file = None;
     }
     voxels(path, fields, &bytes[at..], limits)
 }
@@ -131,7 +134,7 @@ fn skip(value: &str) -> Option<i64> {
     value.parse().ok().filter(|n| *n >= -1)
 }
 
-fn nrrd_type(value: &str) -> Option<Number> {
+fn nrrd_type(value: &str) -> Option<(u8, usize)> {
     let (kind, width) = match value.to_ascii_lowercase().as_str() {
         "signed char" | "int8" | "int8_t" => (b'i', 1),
         "uchar" | "unsigned char" | "uint8" | "uint8_t" => (b'u', 1),
@@ -143,14 +146,10 @@ fn nrrd_type(value: &str) -> Option<Number> {
         "double" => (b'f', 8),
         _ => return None,
     };
-    Some(Number {
-        big: false,
-        kind,
-        width,
-    })
+    Some((kind, width))
 }
 
-fn meta_type(value: &str) -> Option<Number> {
+fn meta_type(value: &str) -> Option<(u8, usize)> {
     let (kind, width) = match value {
         "MET_CHAR" => (b'i', 1),
         "MET_UCHAR" => (b'u', 1),
@@ -162,18 +161,11 @@ fn meta_type(value: &str) -> Option<Number> {
         "MET_DOUBLE" => (b'f', 8),
         _ => return None,
     };
-    Some(Number {
-        big: false,
-        kind,
-        width,
-    })
+    Some((kind, width))
 }
 
 fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Result<Volume> {
-    let unsupported = |reason: String| ShapeError::Unsupported {
-        path: path.to_owned(),
-        reason,
-    };
+    let unsupported = |reason: String| ShapeError::unsupported(path, reason);
     let [nx, ny, nz] = fields.sizes[..] else {
         return Err(unsupported(format!(
             "the image has sizes {:?}; a volume has 3",
@@ -181,14 +173,18 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
         )));
     };
     let voxels = count(path, [nx, ny, nz], limits)? as u64;
-    let Some(mut number) = fields.number else {
-        return Err(unsupported(
-            "the type of the voxels is missing or unknown; save whole or floating numbers".into(),
-        ));
+    let Some((kind, width)) = fields.number else {
+        let reason = "the type of the voxels is missing or unknown; save integers or floating-point \
+                      numbers";
+        return Err(unsupported(reason.into()));
     };
-    number.big = fields.big;
+    let number = Number {
+        big: fields.big,
+        kind,
+        width,
+    };
     let apart;
-    let data = match &fields.beside {
+    let data = match &fields.data_file {
         None => own,
         Some(name) if name.contains(['/', '\\', ' ']) || name == "LIST" || name.contains('%') => {
             return Err(unsupported(format!(
@@ -219,7 +215,10 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
         .get(usize::try_from(skip).unwrap_or(usize::MAX)..)
         .unwrap_or(&[]);
     // Surplus data indicates slices that would be lost without notice.
-    if let Some(name) = fields.beside.filter(|_| raw && data.len() as u64 > needed) {
+    if let Some(name) = fields
+        .data_file
+        .filter(|_| raw && data.len() as u64 > needed)
+    {
         return Err(unsupported(format!(
             "the header states {nx} x {ny} x {nz} voxels of {} bytes, {needed} bytes; {name:?} \
              has {} after a byte skip of {skip}; correct the sizes (DimSize), or the byte skip \
@@ -228,31 +227,20 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
             data.len()
         )));
     }
-    let mut plain = Vec::new();
-    let failed = |e: std::io::Error| ShapeError::malformed(path, format!("packed voxels: {e}"));
-    let data = match fields.packed {
-        Packed::Raw => data,
-        Packed::Gzip => {
-            MultiGzDecoder::new(data)
-                .take(needed + 1)
-                .read_to_end(&mut plain)
-                .map_err(failed)?;
-            &plain
-        }
-        Packed::Zlib => {
-            ZlibDecoder::new(data)
-                .take(needed + 1)
-                .read_to_end(&mut plain)
-                .map_err(failed)?;
-            &plain
-        }
+    let dims = [nx, ny, nz].map(|n| n as usize);
+    let unpacked: &mut dyn Read = match fields.packed {
+        Packed::Raw => return number.volume(path, dims, false, data),
+        Packed::Gzip => &mut MultiGzDecoder::new(data),
+        Packed::Zlib => &mut ZlibDecoder::new(data),
         Packed::Other => {
-            return Err(unsupported(
-                "the voxels are neither raw nor gzipped; save them so".into(),
-            ));
+            let reason = "the voxels are neither raw nor gzipped; save them so";
+            return Err(unsupported(reason.into()));
         }
     };
-    number.volume(path, [nx, ny, nz].map(|n| n as usize), false, data)
+    let mut plain = Vec::new();
+    let read = unpacked.take(needed + 1).read_to_end(&mut plain);
+    read.map_err(|e| ShapeError::malformed(path, format!("packed voxels: {e}")))?;
+    number.volume(path, dims, false, &plain)
 }
 
 #[cfg(test)]
@@ -325,8 +313,8 @@ mod tests {
             read_nrrd(&path, ending.as_bytes(), &limits()).unwrap(),
             expect
         );
-        let said = |read: Result<Volume>| read.unwrap_err().to_string();
-        let fewer = said(read_nrrd(
+        let message = |read: Result<Volume>| read.unwrap_err().to_string();
+        let fewer = message(read_nrrd(
             &path,
             apart.replace("3 2 1", "3 1 1").as_bytes(),
             &limits(),
@@ -335,10 +323,10 @@ mod tests {
             assert!(fewer.contains(word), "`{word}` is missing in: {fewer}");
         }
         let fewer = meta.replace("HeaderSize = 5", "HeaderSize = 3");
-        let fewer = said(read_meta(&path, fewer.as_bytes(), &limits()));
+        let fewer = message(read_meta(&path, fewer.as_bytes(), &limits()));
         assert!(fewer.contains("has 14"), "{fewer}");
         let none = apart.replace("a.raw", "none.raw");
-        let none = said(read_nrrd(&path, none.as_bytes(), &limits()));
+        let none = message(read_nrrd(&path, none.as_bytes(), &limits()));
         assert!(
             none.contains("a.nrrd") && none.contains("none.raw"),
             "{none}"

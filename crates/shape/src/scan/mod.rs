@@ -25,7 +25,6 @@ mod regions;
 mod runs;
 mod slices;
 mod smooth;
-pub(crate) use smooth::{gaussian, refine};
 mod threshold;
 mod tiff;
 mod transform;
@@ -33,7 +32,7 @@ mod volume;
 mod watershed;
 
 pub use build::{Progress, Scan, ScanOptions, ScannedGrain, scan_volume, shapes_from_volume};
-pub use threshold::{Denoise, Threshold};
+pub use threshold::Threshold;
 pub use volume::{Volume, Voxels, read_volume};
 
 /// Solid voxels of one grain in a box of background.

@@ -6,6 +6,7 @@
 
 use super::volume::{Volume, Voxels, count};
 use crate::error::{Result, ShapeError};
+use crate::grid::place;
 use crate::limits::ReadLimits;
 use std::path::Path;
 
@@ -63,23 +64,18 @@ pub(super) fn header(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<A
     let header = Header::parse(header)
         .ok_or_else(|| malformed("the header lacks a readable descr, fortran_order or shape"))?;
     let [nz, ny, nx] = header.shape[..] else {
-        return Err(ShapeError::Unsupported {
-            path: path.to_owned(),
-            reason: format!(
-                "the array has {} dimensions {:?}; a volume has 3, indexed [z][y][x]",
-                header.shape.len(),
-                header.shape
-            ),
-        });
+        let reason = format!(
+            "the array has {} dimensions {:?}; a volume has 3, indexed [z][y][x]",
+            header.shape.len(),
+            header.shape
+        );
+        return Err(ShapeError::unsupported(path, reason));
     };
     count(path, [nx, ny, nz], limits)?;
     let dims = [nx as usize, ny as usize, nz as usize];
-    let number = Number::parse(&header.descr).ok_or_else(|| ShapeError::Unsupported {
-        path: path.to_owned(),
-        reason: format!(
-            "values of type {:?}; save whole or floating numbers",
-            header.descr
-        ),
+    let number = Number::parse(&header.descr).ok_or_else(|| {
+        let (descr, remedy) = (&header.descr, "save integers or floating-point numbers");
+        ShapeError::unsupported(path, format!("values of type {descr:?}; {remedy}"))
     })?;
     Ok(Array {
         number,
@@ -101,38 +97,28 @@ impl Number {
         let voxels: usize = dims.iter().product();
         let needed = voxels as u64 * self.width as u64;
         if (data.len() as u64) < needed {
-            return Err(ShapeError::malformed(
-                path,
-                format!(
-                    "the header claims {needed} bytes of data, the file has {}",
-                    data.len()
-                ),
-            ));
+            let has = data.len();
+            let reason = format!("the header claims {needed} bytes of data, the file has {has}");
+            return Err(ShapeError::malformed(path, reason));
         }
         let data = &data[..needed as usize];
         // Index of voxel n (x fastest) in the file.
-        let place = |n: usize| {
-            let (i, j, k) = (n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]);
+        let index = |n: usize| {
+            let [i, j, k] = place(dims, n);
             if fortran {
                 k + dims[2] * (j + dims[1] * i)
             } else {
                 n
             }
         };
-        let values = (0..voxels).map(|n| self.value(&data[self.width * place(n)..]));
-        if self.kind != b'f' {
-            let labels: Option<Vec<u32>> = values
-                .clone()
-                .map(|v| (v >= 0.0 && v <= f64::from(u32::MAX)).then_some(v as u32))
-                .collect();
-            if let Some(labels) = labels {
-                return Ok(Volume {
-                    dims,
-                    voxels: Voxels::Labels(labels),
-                });
-            }
-        }
-        Volume::from_numbers(path, dims, values.map(|v| v as f32).collect())
+        let values = (0..voxels).map(|n| self.value(&data[self.width * index(n)..]));
+        let label = |v: f64| (v >= 0.0 && v <= f64::from(u32::MAX)).then_some(v as u32);
+        let labels = (self.kind != b'f').then(|| values.clone().map(label).collect());
+        let voxels = match labels.flatten() {
+            Some(labels) => Voxels::Labels(labels),
+            None => Voxels::Grey(values.map(|v| v as f32).collect()),
+        };
+        Volume::from_voxels(path, dims, voxels)
     }
 }
 
@@ -298,8 +284,8 @@ mod tests {
         assert!(matches!(flat, Err(ShapeError::Unsupported { .. })));
         let nan: Vec<u8> = [f32::NAN; 8].iter().flat_map(|v| v.to_le_bytes()).collect();
         let nan = open(&file(&header("(2, 2, 2)"), &nan));
-        let said = nan.unwrap_err().to_string();
-        assert!(said.contains("x 0, y 0, z 0 is NaN"), "{said}");
+        let message = nan.unwrap_err().to_string();
+        assert!(message.contains("x 0, y 0, z 0 is NaN"), "{message}");
         let nested = "(".repeat(60_000);
         assert!(open(&file(&header(&nested), &[])).is_err());
         let good = file(&header("(2, 2, 2)"), &[0; 32]);

@@ -2,46 +2,42 @@
 
 use super::npy;
 use super::volume::Volume;
-use crate::error::{Result, ShapeError};
+use crate::error::{Result, ShapeError, first_few};
 use crate::limits::ReadLimits;
 use std::io::{Cursor, Read};
 use std::path::Path;
 
 pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
-    let malformed = |e: &dyn std::fmt::Display| ShapeError::malformed(path, e.to_string());
-    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| malformed(&e))?;
+    let damaged = |e: zip::result::ZipError| ShapeError::malformed(path, e);
+    let unreadable = |e: std::io::Error| ShapeError::malformed(path, e);
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(damaged)?;
     let names: Vec<String> = archive.file_names().map(str::to_owned).collect();
     let [name] = &names[..] else {
-        return Err(ShapeError::Unsupported {
-            path: path.to_owned(),
-            reason: format!(
-                "it holds {} arrays ({}); save the one volume alone",
-                names.len(),
-                names.iter().take(5).cloned().collect::<Vec<_>>().join(", ")
-            ),
-        });
+        let reason = format!(
+            "it holds {} arrays ({}); save the one volume alone",
+            names.len(),
+            first_few(&names, 5)
+        );
+        return Err(ShapeError::unsupported(path, reason));
     };
-    let mut file = archive.by_name(name).map_err(|e| malformed(&e))?;
+    let mut file = archive.by_name(name).map_err(damaged)?;
     let mut plain = Vec::new();
     // The header is decompressed first, so that an oversized array is refused before allocation.
     file.by_ref()
         .take(npy::HEAD)
         .read_to_end(&mut plain)
-        .map_err(|e| malformed(&e))?;
+        .map_err(unreadable)?;
     let array = npy::header(path, &plain, limits)?;
     if array.bytes() > limits.file_bytes {
-        return Err(ShapeError::TooLarge {
-            path: path.to_owned(),
-            claimed: format!("{} bytes unpacked", array.bytes()),
-            limit: limits.file_bytes,
-            unit: "bytes",
-        });
+        let claimed = format!("{} bytes unpacked", array.bytes());
+        let limit = limits.file_bytes;
+        return Err(ShapeError::too_large(path, &claimed, limit, "bytes"));
     }
     // One additional byte: the archive's checksum is compared at the end of the data.
     let rest = (array.bytes() + 1).saturating_sub(plain.len() as u64);
     file.take(rest)
         .read_to_end(&mut plain)
-        .map_err(|e| malformed(&e))?;
+        .map_err(unreadable)?;
     array.volume(path, &plain)
 }
 

@@ -30,7 +30,7 @@ impl Region {
 
 /// Returns the regions by label, without the background (0).
 pub(crate) fn regions(dims: [usize; 3], labels: &[u32]) -> BTreeMap<u32, Region> {
-    let mut found: BTreeMap<u32, Region> = BTreeMap::new();
+    let mut regions: BTreeMap<u32, Region> = BTreeMap::new();
     for (row, line) in labels.chunks(dims[0]).enumerate() {
         let (j, k) = (row % dims[1], row / dims[1]);
         let mut i = 0;
@@ -39,7 +39,7 @@ pub(crate) fn regions(dims: [usize; 3], labels: &[u32]) -> BTreeMap<u32, Region>
             let label = line[i];
             let end = i + line[i..].iter().take_while(|l| **l == label).count();
             if label != 0 {
-                let region = found.entry(label).or_insert(Region {
+                let region = regions.entry(label).or_insert(Region {
                     voxels: 0,
                     lower: [i, j, k],
                     upper: [i, j, k],
@@ -53,7 +53,7 @@ pub(crate) fn regions(dims: [usize; 3], labels: &[u32]) -> BTreeMap<u32, Region>
             i = end;
         }
     }
-    found
+    regions
 }
 
 /// Returns the mask of one label with `pad` voxels of background on every side.
@@ -85,7 +85,7 @@ pub(crate) fn crop(
 pub(crate) fn cuts(dims: [usize; 3], labels: &[u32], label: u32, region: &Region) -> Vec<DVec3> {
     let strides = [1, dims[0], dims[0] * dims[1]];
     let (low, high) = (region.lower, region.upper);
-    let mut found = Vec::new();
+    let mut centres = Vec::new();
     for (k, j) in (low[2]..=high[2]).flat_map(|k| (low[1]..=high[1]).map(move |j| (k, j))) {
         for i in low[0]..=high[0] {
             let (place, at) = ([i, j, k], i + strides[1] * j + strides[2] * k);
@@ -96,15 +96,15 @@ pub(crate) fn cuts(dims: [usize; 3], labels: &[u32], label: u32, region: &Region
             let middle = DVec3::new(i as f64, j as f64, k as f64) + 0.5;
             for (axis, step) in DVec3::AXES.into_iter().enumerate() {
                 if place[axis] > 0 && other(at - strides[axis]) {
-                    found.push(middle - 0.5 * step);
+                    centres.push(middle - 0.5 * step);
                 }
                 if place[axis] + 1 < dims[axis] && other(at + strides[axis]) {
-                    found.push(middle + 0.5 * step);
+                    centres.push(middle + 0.5 * step);
                 }
             }
         }
     }
-    found
+    centres
 }
 
 /// Returns for each label the fraction of its voxel faces shared with another label.

@@ -1,6 +1,7 @@
 //! Connected components of a volume, computed from runs: sequences of equal voxels along x.
 
 use super::Mask;
+use crate::grid::root;
 use rayon::prelude::*;
 
 /// Voxels `begin..end` along x.
@@ -21,7 +22,7 @@ impl Runs {
     /// with `corners` through faces, edges and corners.
     fn new(dims: [usize; 3], corners: bool, chosen: impl Fn(usize) -> bool + Sync) -> Runs {
         let [nx, ny, nz] = dims;
-        let found: Vec<Vec<Run>> = (0..ny * nz)
+        let by_row: Vec<Vec<Run>> = (0..ny * nz)
             .into_par_iter()
             .map(|row| {
                 let mut runs: Vec<Run> = Vec::new();
@@ -35,11 +36,11 @@ impl Runs {
             })
             .collect();
         let mut rows = vec![0];
-        rows.extend(found.iter().scan(0, |sum, runs| {
+        rows.extend(by_row.iter().scan(0, |sum, runs| {
             *sum += runs.len();
             Some(*sum)
         }));
-        let runs = found.concat();
+        let runs = by_row.concat();
         let parent = (0..runs.len() as u32).collect();
         let mut all = Runs {
             dims,
@@ -65,19 +66,9 @@ impl Runs {
             }
         }
         for n in 0..all.parent.len() {
-            all.parent[n] = all.root(n as u32);
+            all.parent[n] = root(&mut all.parent, n as u32);
         }
         all
-    }
-
-    /// Returns the root of run `n`.
-    fn root(&mut self, mut n: u32) -> u32 {
-        while self.parent[n as usize] != n {
-            let above = self.parent[self.parent[n as usize] as usize];
-            self.parent[n as usize] = above;
-            n = above;
-        }
-        n
     }
 
     /// Joins the connected runs of two adjacent rows.
@@ -87,7 +78,7 @@ impl Runs {
         while p < self.rows[row + 1] && q < self.rows[other + 1] {
             let ([a, b], [c, d]) = (self.runs[p], self.runs[q]);
             if a < d + slack && c < b + slack {
-                let (r, s) = (self.root(p as u32), self.root(q as u32));
+                let [r, s] = [p, q].map(|n| root(&mut self.parent, n as u32));
                 self.parent[r.max(s) as usize] = r.min(s);
             }
             if b < d {
@@ -161,16 +152,12 @@ pub(super) fn fill_cavities(mask: &mut Mask) -> u64 {
 mod tests {
     use super::*;
     use crate::grid::place;
+    use crate::random::Random;
+    use rand::{RngExt, SeedableRng};
 
-    fn noise(count: usize, share: u64) -> Vec<bool> {
-        let mut state = 5u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            state >> 60 < share
-        };
-        (0..count).map(|_| next()).collect()
+    fn noise(count: usize, share: f64) -> Vec<bool> {
+        let mut random = Random::seed_from_u64(5);
+        (0..count).map(|_| random.random_bool(share)).collect()
     }
 
     /// Reference by flood fill; neighbours differ by at most one along every axis, and along at
@@ -206,7 +193,7 @@ mod tests {
     #[test]
     fn runs_find_what_flooding_finds() {
         let dims = [9, 8, 7];
-        for share in [3, 6, 10, 13] {
+        for share in [0.2, 0.4, 0.6, 0.8] {
             let solid = noise(504, share);
             let (number, sizes) = pieces(dims, |n| solid[n]);
             assert_eq!(number, flood(dims, &solid, 1));

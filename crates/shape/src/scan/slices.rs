@@ -3,7 +3,7 @@
 use super::tiff;
 use super::volume::{Volume, Voxels, count};
 use crate::error::{Result, ShapeError};
-use crate::limits::{ReadLimits, SourceFile, extension, hex, read_bytes};
+use crate::limits::{ReadLimits, SourceFile, extension, read_bytes};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -18,14 +18,10 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, Source
     }
     files.sort_by_cached_key(|path| by_number(path));
     if let Some(reason) = gap(&files) {
-        return Err(ShapeError::Unsupported {
-            path: folder.to_owned(),
-            reason,
-        });
+        return Err(ShapeError::unsupported(folder, reason));
     }
     let mut dims = [0; 3];
-    let mut labels: Vec<u32> = Vec::new();
-    let mut numbers: Option<Vec<f32>> = None;
+    let mut voxels = Voxels::Labels(Vec::new());
     let mut digest = Sha256::new();
     for path in &files {
         let (bytes, source) = read_bytes(path, limits)?;
@@ -43,36 +39,14 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, Source
         // The total is checked at the first slice, before the others are read.
         let all = [dims[0], dims[1], files.len()];
         count(folder, all.map(|n| n as u64), limits)?;
-        match (&mut numbers, slice.voxels) {
-            (None, Voxels::Labels(v)) => labels.extend(v),
-            (all, voxels) => {
-                let all = all.get_or_insert_with(|| labels.iter().map(|v| *v as f32).collect());
-                match voxels {
-                    Voxels::Labels(v) => all.extend(v.iter().map(|v| *v as f32)),
-                    Voxels::Grey(v) => all.extend(v),
-                }
-            }
-        }
+        voxels.append(slice.voxels);
     }
     if files.is_empty() {
-        return Err(ShapeError::Unsupported {
-            path: folder.to_owned(),
-            reason: "the folder holds no .tif slices".into(),
-        });
+        let reason = "the folder holds no .tif slices";
+        return Err(ShapeError::unsupported(folder, reason));
     }
-    let volume = match numbers {
-        None => Volume {
-            dims,
-            voxels: Voxels::Labels(labels),
-        },
-        Some(numbers) => Volume::from_numbers(folder, dims, numbers)?,
-    };
-    let name = folder
-        .file_name()
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default();
-    let sha256 = hex(&digest.finalize());
-    Ok((volume, SourceFile { name, sha256 }))
+    let volume = Volume::from_voxels(folder, dims, voxels)?;
+    Ok((volume, SourceFile::new(folder, digest)))
 }
 
 /// Describes missing or duplicate numbers among slices whose names differ in one number only. The
@@ -81,7 +55,7 @@ fn gap(files: &[PathBuf]) -> Option<String> {
     let name = |n: usize| files[n].file_name().unwrap_or_default().to_string_lossy();
     let keys: Vec<_> = files.iter().map(|path| by_number(path)).collect();
     // Adjacent slices with the numbers that distinguish them.
-    let beside = |(n, pair): (usize, &[Vec<(u128, String)>])| {
+    let adjacent = |(n, pair): (usize, &[Vec<(u128, String)>])| {
         let (one, next) = (&pair[0], &pair[1]);
         let alike = one.len() == next.len() && one.iter().zip(next).all(|(p, q)| p.1 == q.1);
         let numbers = one.iter().zip(next).map(|(p, q)| (p.0, q.0));
@@ -89,7 +63,7 @@ fn gap(files: &[PathBuf]) -> Option<String> {
         let differ = numbers.filter(|(p, q)| p != q).count();
         (alike && differ <= 1).then_some((n, low, high))
     };
-    let pairs: Vec<_> = keys.windows(2).enumerate().filter_map(beside).collect();
+    let pairs: Vec<_> = keys.windows(2).enumerate().filter_map(adjacent).collect();
     let step = pairs.iter().map(|(_, low, high)| high - low).min()?;
     if step == 0 {
         let (n, ..) = pairs.iter().find(|(_, low, high)| low == high)?;
@@ -186,25 +160,28 @@ mod tests {
                 .map(|n| all[n].clone())
                 .collect()
         };
-        let said = gap(&some(|n| n != 17)).unwrap();
-        assert!(said.contains("after s16.tif: numbers 17;"), "{said}");
-        let said = gap(&some(|n| n != 17 && n != 30)).unwrap();
-        assert!(said.contains("after s16.tif: numbers 17, 30;"), "{said}");
-        let said = gap(&some(|n| !(5..=35).contains(&n))).unwrap();
+        let message = gap(&some(|n| n != 17)).unwrap();
+        assert!(message.contains("after s16.tif: numbers 17;"), "{message}");
+        let message = gap(&some(|n| n != 17 && n != 30)).unwrap();
         assert!(
-            said.contains("5, 6, 7, 8, 9, 10, 11, 12, 13, 14, ...;"),
-            "{said}"
+            message.contains("after s16.tif: numbers 17, 30;"),
+            "{message}"
+        );
+        let message = gap(&some(|n| !(5..=35).contains(&n))).unwrap();
+        assert!(
+            message.contains("5, 6, 7, 8, 9, 10, 11, 12, 13, 14, ...;"),
+            "{message}"
         );
         // Increment of ten, with other constant numbers, and with several varying numbers.
         assert_eq!(gap(&some(|n| n % 10 == 0)), None);
-        let said = gap(&some(|n| n % 4 == 0 && n != 8)).unwrap();
-        assert!(said.contains("after s4.tif: numbers 8;"), "{said}");
-        let said = gap(&names(&["2_5um_001.tif", "2_5um_002.tif", "2_5um_004.tif"])).unwrap();
-        assert!(said.contains("numbers 3;"), "{said}");
+        let message = gap(&some(|n| n % 4 == 0 && n != 8)).unwrap();
+        assert!(message.contains("after s4.tif: numbers 8;"), "{message}");
+        let message = gap(&names(&["2_5um_001.tif", "2_5um_002.tif", "2_5um_004.tif"])).unwrap();
+        assert!(message.contains("numbers 3;"), "{message}");
         assert_eq!(gap(&names(&["a1.tif", "b2.tif", "c7.tif", "d.tif"])), None);
         assert_eq!(gap(&names(&["t1_s1.tif", "t1_s2.tif", "t2_s4.tif"])), None);
-        let said = gap(&names(&["s1.tif", "s01.tif", "s2.tif"])).unwrap();
-        assert!(said.contains("the same number"), "{said}");
+        let message = gap(&names(&["s1.tif", "s01.tif", "s2.tif"])).unwrap();
+        assert!(message.contains("the same number"), "{message}");
         // Refused before a slice is read.
         let folder = tempfile::tempdir().unwrap();
         for name in ["s1.tif", "s2.tif", "s4.tif"] {

@@ -1,4 +1,4 @@
-//! Segmentation of grey values: thresholds and noise filters.
+//! Segmentation of grey values: thresholds and the median filter.
 
 use rayon::prelude::*;
 
@@ -12,15 +12,6 @@ pub enum Threshold {
     /// The upper of Otsu's two thresholds between three classes (Liao and others 2001): for images
     /// of solid, an intermediate phase such as resin, and void.
     Otsu3,
-}
-
-/// Noise filter applied before the threshold. Surfaces are located in the unfiltered image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Denoise {
-    /// No filter.
-    None,
-    /// Median of the 27 voxels around each voxel.
-    Median,
 }
 
 const BINS: usize = 1024;
@@ -39,18 +30,11 @@ impl Threshold {
 
 /// Returns counts by bin, the lowest value and the bin width.
 fn histogram(values: &[f32], bins: usize) -> Option<(Vec<f64>, f64, f64)> {
+    let start = || (f32::INFINITY, f32::NEG_INFINITY);
     let (low, high) = values
-        .par_chunks(1 << 16)
-        .map(|c| {
-            c.iter()
-                .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| {
-                    (l.min(*v), h.max(*v))
-                })
-        })
-        .reduce(
-            || (f32::INFINITY, f32::NEG_INFINITY),
-            |a, b| (a.0.min(b.0), a.1.max(b.1)),
-        );
+        .par_iter()
+        .map(|v| (*v, *v))
+        .reduce(start, |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let (low, high) = (f64::from(low), f64::from(high));
     let width = (high - low) / bins as f64;
     if width.is_nan() || width <= 0.0 {
@@ -144,14 +128,15 @@ pub(crate) fn median(values: &[f32], dims: [usize; 3]) -> Vec<f32> {
 mod tests {
     use super::*;
     use crate::random::Random;
+    use rand::{RngExt, SeedableRng};
 
     /// Classes with these grey values and counts, with normal noise.
     fn classes(greys: &[(f32, usize)], noise: f64) -> Vec<f32> {
-        let mut random = Random::new(3);
+        let mut random = Random::seed_from_u64(3);
         let mut values = Vec::new();
         for (grey, count) in greys {
             for _ in 0..*count {
-                let sum: f64 = (0..12).map(|_| random.unit()).sum();
+                let sum: f64 = (0..12).map(|_| random.random::<f64>()).sum();
                 values.push(grey + (noise * (sum - 6.0)) as f32);
             }
         }

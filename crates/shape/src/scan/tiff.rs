@@ -12,17 +12,11 @@ use tiff::tags::Tag;
 /// Upper bound of the compression ratio of all TIFF codecs; pages that declare more are refused.
 const BEST_RATIO: u64 = 5000;
 
-/// Values collected from the pages.
-enum Values {
-    Labels(Vec<u32>),
-    Numbers(Vec<f32>),
-}
-
 pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
-    let malformed = |e: &dyn std::fmt::Display| ShapeError::malformed(path, e.to_string());
+    let malformed = |e: &dyn std::fmt::Display| ShapeError::malformed(path, e);
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| malformed(&e))?;
     let mut first: Option<(u32, u32, ColorType)> = None;
-    let mut values = Values::Labels(Vec::new());
+    let mut all = Voxels::Labels(Vec::new());
     let mut pages = 0u64;
     loop {
         let (width, height) = decoder.dimensions().map_err(|e| malformed(&e))?;
@@ -30,12 +24,9 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
         let bits = match color {
             ColorType::Gray(bits @ (8 | 16 | 32 | 64)) => bits,
             other => {
-                return Err(ShapeError::Unsupported {
-                    path: path.to_owned(),
-                    reason: format!(
-                        "page {pages} is {other:?}; convert it to greyscale of 8, 16 or 32 bits"
-                    ),
-                });
+                let remedy = "convert it to greyscale of 8, 16 or 32 bits";
+                let reason = format!("page {pages} is {other:?}; {remedy}");
+                return Err(ShapeError::unsupported(path, reason));
             }
         };
         let page = (width, height, color);
@@ -60,13 +51,12 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
         let decoded = decoder
             .read_image()
             .map_err(|e| malformed(&format!("page {pages}: {e}")))?;
-        let before = pages * u64::from(width) * u64::from(height);
-        values = append(values, decoded);
-        pages += 1;
-        let after = values.len() as u64;
-        if after != before + u64::from(width) * u64::from(height) {
-            return Err(malformed(&format!("page {} is incomplete", pages - 1)));
+        let voxels = voxels(decoded);
+        if voxels.len() as u64 != u64::from(width) * u64::from(height) {
+            return Err(malformed(&format!("page {pages} is incomplete")));
         }
+        all.append(voxels);
+        pages += 1;
         if !decoder.more_images() {
             break;
         }
@@ -75,13 +65,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
     check_claimed_slices(path, &mut decoder, pages)?;
     let (width, height, _) = first.unwrap_or((0, 0, ColorType::Gray(8)));
     let dims = [width as usize, height as usize, pages as usize];
-    match values {
-        Values::Labels(labels) => Ok(Volume {
-            dims,
-            voxels: Voxels::Labels(labels),
-        }),
-        Values::Numbers(numbers) => Volume::from_numbers(path, dims, numbers),
-    }
+    Volume::from_voxels(path, dims, all)
 }
 
 /// Refuses ImageJ stacks over 4 GiB, stored as one page with the slice count in the description.
@@ -101,78 +85,47 @@ fn check_claimed_slices(
         .find_map(|line| line.trim().strip_prefix("images="))
         .and_then(|n| n.parse::<u64>().ok());
     match claimed {
-        Some(claimed) if claimed > 1 => Err(ShapeError::Unsupported {
-            path: path.to_owned(),
-            reason: format!(
-                "the description tells of {claimed} slices but the file has one page \
-                 (ImageJ does so with large stacks); save it as NPY or as a true multi-page TIFF"
-            ),
-        }),
+        Some(claimed) if claimed > 1 => {
+            let reason = format!(
+                "the description states {claimed} slices, but the file has one page (ImageJ writes \
+                 large stacks so); save it as NPY or as a true multi-page TIFF"
+            );
+            Err(ShapeError::unsupported(path, reason))
+        }
         _ => Ok(()),
     }
 }
 
-impl Values {
-    fn len(&self) -> usize {
-        match self {
-            Values::Labels(v) => v.len(),
-            Values::Numbers(v) => v.len(),
-        }
-    }
-}
-
-/// Appends a page. Labels are converted to floating-point values if a value is not a valid label.
-fn append(values: Values, page: DecodingResult) -> Values {
+/// Returns the voxels of a page: labels if every value is one, and grey values otherwise.
+fn voxels(page: DecodingResult) -> Voxels {
     use DecodingResult as Page;
-    fn whole<T: Copy + TryInto<u32>>(values: Values, page: &[T], f: fn(T) -> f32) -> Values {
-        match values {
-            Values::Labels(mut labels) => {
-                let before = labels.len();
-                for v in page {
-                    match (*v).try_into() {
-                        Ok(label) => labels.push(label),
-                        Err(_) => {
-                            labels.truncate(before);
-                            let mut numbers: Vec<f32> = labels.iter().map(|v| *v as f32).collect();
-                            numbers.extend(page.iter().map(|v| f(*v)));
-                            return Values::Numbers(numbers);
-                        }
-                    }
-                }
-                Values::Labels(labels)
-            }
-            Values::Numbers(mut numbers) => {
-                numbers.extend(page.iter().map(|v| f(*v)));
-                Values::Numbers(numbers)
-            }
-        }
-    }
-    fn floats(values: Values, page: impl Iterator<Item = f32>) -> Values {
-        let mut numbers = match values {
-            Values::Labels(labels) => labels.iter().map(|v| *v as f32).collect(),
-            Values::Numbers(numbers) => numbers,
-        };
-        numbers.extend(page);
-        Values::Numbers(numbers)
+    fn integers<T: Copy + TryInto<u32>>(page: Vec<T>, grey: fn(T) -> f32) -> Voxels {
+        let labels: Option<Vec<u32>> = page.iter().map(|v| (*v).try_into().ok()).collect();
+        labels.map_or_else(
+            || Voxels::Grey(page.into_iter().map(grey).collect()),
+            Voxels::Labels,
+        )
     }
     match page {
-        Page::U8(v) => whole(values, &v, f32::from),
-        Page::U16(v) => whole(values, &v, f32::from),
-        Page::U32(v) => whole(values, &v, |v| v as f32),
-        Page::U64(v) => whole(values, &v, |v| v as f32),
-        Page::I8(v) => whole(values, &v, f32::from),
-        Page::I16(v) => whole(values, &v, f32::from),
-        Page::I32(v) => whole(values, &v, |v| v as f32),
-        Page::I64(v) => whole(values, &v, |v| v as f32),
-        Page::F16(v) => floats(values, v.iter().map(|v| v.to_f32())),
-        Page::F32(v) => floats(values, v.iter().copied()),
-        Page::F64(v) => floats(values, v.iter().map(|v| *v as f32)),
+        Page::U8(v) => integers(v, f32::from),
+        Page::U16(v) => integers(v, f32::from),
+        Page::U32(v) => integers(v, |v| v as f32),
+        Page::U64(v) => integers(v, |v| v as f32),
+        Page::I8(v) => integers(v, f32::from),
+        Page::I16(v) => integers(v, f32::from),
+        Page::I32(v) => integers(v, |v| v as f32),
+        Page::I64(v) => integers(v, |v| v as f32),
+        Page::F16(v) => Voxels::Grey(v.into_iter().map(|v| v.to_f32()).collect()),
+        Page::F32(v) => Voxels::Grey(v),
+        Page::F64(v) => Voxels::Grey(v.into_iter().map(|v| v as f32).collect()),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
+    use rand::{RngExt, SeedableRng};
     use tiff::encoder::colortype::{
         ColorType as Written, Gray8, Gray16, Gray32, Gray32Float, RGB8,
     };
@@ -223,22 +176,19 @@ mod tests {
             "{colour:?}"
         );
         let nan = open(&write::<Gray32Float>(&[&[f32::NAN, 1.0]], 2, 1));
-        let said = nan.unwrap_err().to_string();
-        assert!(said.contains("not a finite number"), "{said}");
+        let message = nan.unwrap_err().to_string();
+        assert!(message.contains("not a finite number"), "{message}");
         let good = write::<Gray8>(&[&[7; 64], &[9; 64]], 8, 8);
         for length in 0..good.len() {
             assert!(open(&good[..length]).is_err(), "{length} bytes");
         }
         // Width and height of 10^6 in the directory of the last page, and arbitrary bytes
         // elsewhere: an error or an image, never a panic.
-        let mut state = 3u64;
+        let mut random = Random::seed_from_u64(3);
         for at in 0..good.len() {
             for _ in 0..4 {
-                state = state
-                    .wrapping_mul(6364136223846793005)
-                    .wrapping_add(1442695040888963407);
                 let mut bad = good.clone();
-                bad[at] = (state >> 56) as u8;
+                bad[at] = random.random();
                 let _ = open(&bad);
             }
         }

@@ -1,6 +1,7 @@
 //! Exact Euclidean distance transform of a mask, in both directions.
 
 use super::Mask;
+use crate::filter::transpose;
 use rayon::prelude::*;
 
 /// Squared distance if the line has no target voxel.
@@ -10,12 +11,7 @@ const FAR: f32 = 1e30;
 /// negative inside: the exact distance to the nearest voxel centre of the other phase minus half a
 /// voxel.
 pub(crate) fn signed(mask: &Mask) -> Vec<f32> {
-    let outside = squared(mask, true, lower_lines);
-    let inside = squared(mask, false, lower_lines);
-    difference(&outside, &inside)
-}
-
-fn difference(to_solid: &[f32], to_void: &[f32]) -> Vec<f32> {
+    let (to_solid, to_void) = (squared(mask, true), squared(mask, false));
     let distance = |(to_solid, to_void): (&f32, &f32)| {
         if *to_void > 0.0 {
             0.5 - to_void.sqrt()
@@ -23,26 +19,17 @@ fn difference(to_solid: &[f32], to_void: &[f32]) -> Vec<f32> {
             to_solid.sqrt() - 0.5
         }
     };
-    to_solid.par_iter().zip(to_void).map(distance).collect()
-}
-
-/// Returns the signed distance up to `reach` - 1/2 voxels; larger values are lower bounds beyond
-/// it.
-pub(crate) fn signed_near(mask: &Mask, reach: usize) -> Vec<f32> {
-    let outside = squared(mask, true, |lines, n| lower_near(lines, n, reach));
-    let inside = squared(mask, false, |lines, n| lower_near(lines, n, reach));
-    difference(&outside, &inside)
+    to_solid.par_iter().zip(&to_void).map(distance).collect()
 }
 
 /// Returns the squared distance [voxels^2] of every voxel centre to the nearest void voxel; 0 in
 /// the void.
 pub(crate) fn to_void(mask: &Mask) -> Vec<f32> {
-    squared(mask, false, lower_lines)
+    squared(mask, false)
 }
 
-/// Returns the squared distance of every voxel to the nearest voxel with mask value `target`;
-/// `lower` applies the one-dimensional transform to all lines of a given length.
-fn squared(mask: &Mask, target: bool, lower: impl Fn(&mut [f32], usize)) -> Vec<f32> {
+/// Returns the squared distance of every voxel to the nearest voxel with mask value `target`.
+fn squared(mask: &Mask, target: bool) -> Vec<f32> {
     let [nx, ny, nz] = mask.dims;
     let mut field: Vec<f32> = mask
         .solid
@@ -50,30 +37,14 @@ fn squared(mask: &Mask, target: bool, lower: impl Fn(&mut [f32], usize)) -> Vec<
         .map(|s| if *s == target { 0.0 } else { FAR })
         .collect();
     let mut scratch = vec![0.0f32; field.len()];
-    lower(&mut field, nx);
+    lower_lines(&mut field, nx);
     // Lines along y and z are made contiguous first.
     transpose(&field, &mut scratch, [nx, ny, nz]);
-    lower(&mut scratch, ny);
+    lower_lines(&mut scratch, ny);
     transpose(&scratch, &mut field, [ny, nz, nx]);
-    lower(&mut field, nz);
+    lower_lines(&mut field, nz);
     transpose(&field, &mut scratch, [nz, nx, ny]);
     scratch
-}
-
-/// Transposes (x, y, z) with x fastest to (y, z, x) with y fastest.
-pub(super) fn transpose(from: &[f32], to: &mut [f32], [nx, ny, nz]: [usize; 3]) {
-    // Several planes at once, so that complete cache lines of `from` are used.
-    const WIDTH: usize = 16;
-    let blocks = to.par_chunks_mut(WIDTH * ny * nz).enumerate();
-    blocks.for_each(|(block, planes)| {
-        let (first, width) = (block * WIDTH, planes.len() / (ny * nz));
-        for row in 0..ny * nz {
-            let line = &from[nx * row + first..][..width];
-            for (i, value) in line.iter().enumerate() {
-                planes[i * ny * nz + row] = *value;
-            }
-        }
-    });
 }
 
 /// A parabola of the lower envelope: position, height of the vertex, and start of the interval in
@@ -134,46 +105,21 @@ fn lower_lines(field: &mut [f32], length: usize) {
     });
 }
 
-/// Applies [`lower`] to every line of `length` values, restricted to parabolas up to `reach` away.
-fn lower_near(field: &mut [f32], length: usize, reach: usize) {
-    let lines = field.par_chunks_mut(length);
-    lines.for_each_init(Vec::new, |padded, line| {
-        if line.iter().all(|v| *v == line[0]) {
-            return;
-        }
-        padded.clear();
-        padded.resize(reach, FAR);
-        padded.extend_from_slice(line);
-        padded.resize(length + 2 * reach, FAR);
-        for step in 1..=reach {
-            let rise = (step * step) as f32;
-            let sides = padded[reach - step..].iter().zip(&padded[reach + step..]);
-            for (out, (below, above)) in line.iter_mut().zip(sides) {
-                *out = out.min(below.min(*above) + rise);
-            }
-        }
-    });
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
+    use rand::{RngExt, SeedableRng};
 
     #[test]
     fn the_transform_is_exact() {
         let dims = [9, 7, 8];
-        let mut state = 5u64;
+        let mut random = Random::seed_from_u64(5);
         let solid: Vec<bool> = (0..dims.iter().product())
-            .map(|_| {
-                state = state
-                    .wrapping_mul(6364136223846793005)
-                    .wrapping_add(1442695040888963407);
-                state >> 60 < 3
-            })
+            .map(|_| random.random_bool(0.2))
             .collect();
         let mask = Mask { dims, solid };
         let found = signed(&mask);
-        let near = [1, 2, 3].map(|reach| signed_near(&mask, reach));
         let at = |n: usize| [n % 9, n / 9 % 7, n / 63].map(|v| v as f64);
         for n in 0..found.len() {
             let nearest = (0..found.len())
@@ -189,15 +135,6 @@ mod tests {
                 nearest - 0.5
             };
             assert!((f64::from(found[n]) - exact).abs() < 1e-5, "voxel {n}");
-            for reach in [1, 2, 3] {
-                let value = f64::from(near[reach - 1][n]);
-                if nearest <= reach as f64 {
-                    assert!((value - exact).abs() < 1e-5, "voxel {n}, reach {reach}");
-                } else {
-                    assert_eq!(value < 0.0, exact < 0.0);
-                    assert!(value.abs() > reach as f64 - 0.5, "voxel {n}, reach {reach}");
-                }
-            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! A 3-D image in memory.
 
 use crate::error::{Result, ShapeError};
+use crate::grid::place;
 use crate::limits::{ReadLimits, SourceFile, extension, read_bytes};
 use ::tiff::encoder::colortype::{Gray16, Gray32};
 use ::tiff::encoder::{Compression, DeflateLevel, TiffEncoder};
@@ -13,6 +14,30 @@ pub enum Voxels {
     Labels(Vec<u32>),
     /// Grey values, to be segmented by a threshold.
     Grey(Vec<f32>),
+}
+
+impl Voxels {
+    pub(super) fn len(&self) -> usize {
+        match self {
+            Voxels::Labels(labels) => labels.len(),
+            Voxels::Grey(values) => values.len(),
+        }
+    }
+
+    /// Appends further voxels; labels become grey values if either part has grey values.
+    pub(super) fn append(&mut self, more: Voxels) {
+        let grey = |labels: &[u32]| labels.iter().map(|v| *v as f32).collect::<Vec<f32>>();
+        match (&mut *self, more) {
+            (Voxels::Labels(all), Voxels::Labels(more)) => all.extend(more),
+            (Voxels::Grey(all), Voxels::Grey(more)) => all.extend(more),
+            (Voxels::Grey(all), Voxels::Labels(more)) => all.extend(grey(&more)),
+            (Voxels::Labels(all), Voxels::Grey(more)) => {
+                let mut values = grey(all);
+                values.extend(more);
+                *self = Voxels::Grey(values);
+            }
+        }
+    }
 }
 
 /// A 3-D image, x fastest, then y, then z.
@@ -29,13 +54,9 @@ impl Volume {
     /// dimensions.
     pub fn from_labels(dims: [usize; 3], labels: Vec<u32>) -> Result<Volume> {
         if dims.iter().try_fold(1usize, |n, d| n.checked_mul(*d)) != Some(labels.len()) {
-            let value = labels.len() as f64;
+            let (name, count) = ("number of voxels", labels.len() as f64);
             let reason = "does not equal the product of the dimensions";
-            return Err(ShapeError::BadParameter {
-                name: "number of voxels",
-                value,
-                reason,
-            });
+            return Err(ShapeError::parameter(name, count, reason));
         }
         Ok(Volume {
             dims,
@@ -43,19 +64,19 @@ impl Volume {
         })
     }
 
-    /// Creates a volume of labels if all values are non-negative integers, and of grey values
-    /// otherwise.
-    pub(super) fn from_numbers(path: &Path, dims: [usize; 3], values: Vec<f32>) -> Result<Volume> {
+    /// Creates a volume, of labels if all values are non-negative integers; refuses values that are
+    /// not finite.
+    pub(super) fn from_voxels(path: &Path, dims: [usize; 3], voxels: Voxels) -> Result<Volume> {
+        let Voxels::Grey(values) = voxels else {
+            return Ok(Volume { dims, voxels });
+        };
         if let Some(n) = values.iter().position(|v| !v.is_finite()) {
-            let (i, j, k) = (n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]);
-            return Err(ShapeError::Unsupported {
-                path: path.to_owned(),
-                reason: format!(
-                    "the value of voxel x {i}, y {j}, z {k} is {}, not a finite number; give such \
-                     voxels the value of the void and save the image again",
-                    values[n]
-                ),
-            });
+            let ([i, j, k], value) = (place(dims, n), values[n]);
+            let reason = format!(
+                "the value of voxel x {i}, y {j}, z {k} is {value}, not a finite number; give such \
+                 voxels the value of the void and save the image again"
+            );
+            return Err(ShapeError::unsupported(path, reason));
         }
         // Single precision does not represent all larger integers, so that labels could merge.
         let whole = |v: &f32| *v >= 0.0 && *v <= 16_777_216.0 && v.fract() == 0.0;
@@ -82,10 +103,9 @@ pub fn read_volume(path: &Path, limits: &ReadLimits) -> Result<(Volume, SourceFi
         "nrrd" | "nhdr" => super::header::read_nrrd,
         "mha" | "mhd" => super::header::read_meta,
         _ => {
-            return Err(ShapeError::UnknownFormat {
-                path: path.to_owned(),
-                known: ".tif, .tiff, .npy, .npz, .nrrd, .nhdr, .mha, .mhd, or a folder of .tif slices",
-            });
+            let reason = "unknown file type; supported: .tif, .tiff, .npy, .npz, .nrrd, .nhdr, \
+                          .mha, .mhd, or a folder of .tif slices";
+            return Err(ShapeError::unsupported(path, reason));
         }
     };
     let (bytes, source) = read_bytes(path, limits)?;
@@ -97,10 +117,7 @@ impl Volume {
     /// Writes labels as a multi-page TIFF of 16 bits (32 bits if labels need them).
     pub fn save_labels(&self, path: &Path) -> Result<()> {
         let Voxels::Labels(labels) = &self.voxels else {
-            return Err(ShapeError::Unsupported {
-                path: path.to_owned(),
-                reason: "grey values are not labels".into(),
-            });
+            return Err(ShapeError::unsupported(path, "grey values are not labels"));
         };
         let failed = |e: ::tiff::TiffError| ShapeError::io(path, std::io::Error::other(e));
         let file = std::fs::File::create(path).map_err(|e| ShapeError::io(path, e))?;

@@ -5,7 +5,7 @@
 //! two grains if the neck is narrow relative to the smaller grain, and otherwise one grain with two
 //! maxima.
 
-use crate::grid::{beside, place};
+use crate::grid::{neighbours, place, root};
 use rayon::prelude::*;
 
 /// Union-find forest of merged basins with the highest maximum of each.
@@ -15,15 +15,6 @@ struct Hills {
 }
 
 impl Hills {
-    fn root(&mut self, mut n: u32) -> u32 {
-        while self.parent[n as usize] != n {
-            let above = self.parent[self.parent[n as usize] as usize];
-            self.parent[n as usize] = above;
-            n = above;
-        }
-        n
-    }
-
     /// Merges two basins that meet at this height if the saddle is not a neck.
     fn join(&mut self, p: u32, q: u32, height: f32, neck: f64) {
         if p == q {
@@ -61,14 +52,14 @@ pub(crate) fn separate(squared: &[f32], dims: [usize; 3], neck: f64) -> Vec<u32>
                 return;
             }
             if last != 0 {
-                let (p, q) = (hills.root(last), hills.root(labels[n]));
+                let [p, q] = [last, labels[n]].map(|n| root(&mut hills.parent, n));
                 hills.join(p, q, height, neck);
             }
             last = labels[n];
         });
     }
     let roots: Vec<u32> = (0..hills.parent.len() as u32)
-        .map(|n| hills.root(n))
+        .map(|n| root(&mut hills.parent, n))
         .collect();
     let mut names = vec![0u32; roots.len()];
     let mut next = 0;
@@ -85,13 +76,13 @@ pub(crate) fn separate(squared: &[f32], dims: [usize; 3], neck: f64) -> Vec<u32>
 
 /// Returns the offsets of the neighbours of an interior voxel, in index order.
 fn offsets([nx, ny, _]: [usize; 3]) -> [isize; 26] {
-    let mut found = [0; 26];
+    let mut offsets = [0; 26];
     let steps = (0..27).filter(|n| *n != 13);
-    for (offset, n) in found.iter_mut().zip(steps) {
+    for (offset, n) in offsets.iter_mut().zip(steps) {
         let (a, b, c) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
         *offset = a + nx as isize * (b + ny as isize * c);
     }
-    found
+    offsets
 }
 
 /// The neighbourhood of a voxel.
@@ -196,15 +187,15 @@ fn borders(squared: &[f32], dims: [usize; 3], labels: &[u32]) -> Vec<u32> {
         }
         met
     };
-    let mut found: Vec<u32> = (0..labels.len() as u32)
+    let mut borders: Vec<u32> = (0..labels.len() as u32)
         .into_par_iter()
         .filter(meet)
         .collect();
-    found.par_sort_unstable_by(|p, q| {
+    borders.par_sort_unstable_by(|p, q| {
         let [a, b] = [p, q].map(|n| squared[*n as usize]);
         b.total_cmp(&a).then(p.cmp(q))
     });
-    found
+    borders
 }
 
 /// Flag of a void voxel near a grain: the top bit of the grain's label.
@@ -215,13 +206,15 @@ pub(crate) const HALO: u32 = 1 << 31;
 pub(crate) fn add_halo(labels: &mut [u32], dims: [usize; 3], layers: usize) {
     let mut front: Vec<u32> = (0..labels.len() as u32)
         .into_par_iter()
-        .filter(|n| labels[*n as usize] != 0 && beside(dims, *n as usize).any(|m| labels[m] == 0))
+        .filter(|n| {
+            labels[*n as usize] != 0 && neighbours(dims, *n as usize).any(|m| labels[m] == 0)
+        })
         .collect();
     for _ in 0..layers {
         let mut next = Vec::new();
         for at in front {
             let label = labels[at as usize] | HALO;
-            for to in beside(dims, at as usize) {
+            for to in neighbours(dims, at as usize) {
                 if labels[to] == 0 {
                     labels[to] = label;
                     next.push(to as u32);

@@ -19,10 +19,10 @@ pub struct Body {
     pub reach: f64,
     /// Roundness in closed form.
     pub roundness: f64,
-    /// Krumbein and Wadell sphericity and convexity in closed form, where they are of use: the axes
-    /// of a cube could be any.
+    /// Krumbein and Wadell sphericity and convexity in closed form; `None` for bodies without
+    /// unique principal axes, such as a cube.
     pub others: Option<[f64; 3]>,
-    /// What is asked of a measured roundness.
+    /// Accepted range of the measured roundness.
     bounds: [f64; 2],
 }
 
@@ -189,7 +189,7 @@ fn sphericity(volume: f64, area: f64) -> f64 {
     (36.0 * PI * volume * volume).cbrt() / area
 }
 
-/// The other measures of a spheroid of semi-axes `a`, 1, 1, `a` above 1.
+/// Returns sphericities and convexity of a spheroid of semi-axes `a`, 1, 1, `a` above 1.
 fn of_spheroid(a: f64) -> [f64; 3] {
     let eccentricity = (1.0 - 1.0 / (a * a)).sqrt();
     let area = 2.0 * PI * (1.0 + a / eccentricity * eccentricity.asin());
@@ -200,7 +200,7 @@ fn of_spheroid(a: f64) -> [f64; 3] {
     ]
 }
 
-/// The other measures of two unit spheres with their centres `half` on either side.
+/// Returns sphericities and convexity of two unit spheres with their centres `half` on either side.
 fn of_peanut(half: f64) -> [f64; 3] {
     let height = 1.0 - half;
     let cap = PI * height * height * (3.0 - height) / 3.0;
@@ -246,7 +246,7 @@ impl Scan {
         Scan { dims, shares }
     }
 
-    /// The shape that the scan gives, with noise as a share of the contrast, of a coarse field.
+    /// Builds a coarse shape of the scan; `noise` is relative to the contrast.
     pub fn shape(&self, noise: f64, seed: u64, from_mask: bool) -> Shape {
         let options = ShapeOptions {
             cells: 24,
@@ -261,7 +261,7 @@ impl Scan {
         self.shape_with(noise, seed, from_mask, options)
     }
 
-    /// The same with these options.
+    /// Builds the shape of the rendered scan with these options.
     pub fn shape_with(&self, noise: f64, seed: u64, from_mask: bool, shape: ShapeOptions) -> Shape {
         let image = greys(&self.shares, noise, seed);
         let volume = Volume::from_labels(self.dims, image).unwrap();
@@ -276,7 +276,7 @@ impl Scan {
         grains.remove(0).shape.unwrap()
     }
 
-    /// Its roundness, from grey values.
+    /// Measures the roundness from grey values.
     pub fn roundness(&self, noise: f64, seed: u64) -> f64 {
         let shape = self.shape(noise, seed, false);
         shape.morphology().wadell_roundness.unwrap()

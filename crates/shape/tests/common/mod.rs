@@ -1,10 +1,10 @@
-//! What several tests need.
+//! Helpers of several tests.
 #![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
 
-/// The folder of shared data, or none (said loudly) where it is absent: the environment variable
-/// `GRAINWAKE_SHARED`, else `shared` beside the workspace.
+/// Returns a path in the folder of shared data: `GRAINWAKE_SHARED`, or `shared` beside the
+/// workspace. Prints a notice and returns `None` if it does not exist.
 pub fn shared(below: &str) -> Option<PathBuf> {
     let root = std::env::var_os("GRAINWAKE_SHARED").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
@@ -21,7 +21,7 @@ pub fn shared(below: &str) -> Option<PathBuf> {
     None
 }
 
-/// Fails unless `found` is within the share `relative` of `exact`.
+/// Asserts that the relative error of `found` is at most `relative`.
 #[track_caller]
 pub fn close(found: f64, exact: f64, relative: f64) {
     let error = found / exact - 1.0;

@@ -4,6 +4,8 @@
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::SplitMix64;
 
 /// A grain with its place [voxels].
 pub struct Placed<'a> {
@@ -26,7 +28,8 @@ impl Placed<'_> {
     }
 }
 
-/// Share of each voxel inside a body (by 4 x 4 x 4 points where the surface passes), x fastest.
+/// Returns the fraction of each voxel inside a body, x fastest; voxels at the surface are sampled
+/// at 4 x 4 x 4 points.
 pub fn shares(
     dims: [usize; 3],
     bodies: &[&dyn Fn(DVec3) -> f64],
@@ -89,19 +92,15 @@ pub fn blurred(values: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f32> {
     values
 }
 
-/// A small generator of normal numbers.
-pub struct Noise(u64);
+/// Generator of normally distributed numbers.
+pub struct Noise(SplitMix64);
 
 impl Noise {
     pub fn new(seed: u64) -> Noise {
-        Noise(seed)
+        Noise(SplitMix64::seed_from_u64(seed))
     }
     pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        self.0.random()
     }
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();

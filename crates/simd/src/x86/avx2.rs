@@ -92,23 +92,6 @@ vector! {
             Avx2F64x4(_mm256_castsi256_pd(_mm256_sub_epi64(one, half)))
         }
     }
-    #[inline(always)]
-    fn gather_pairs(from: &[i16], at: Self) -> [Self; 2] {
-        assert!(from.len() <= i32::MAX as usize);
-        // SAFETY: see the head of `x86/mod.rs`; the assertions place all pairs
-        // in the slice, and its indices fit 32 bits.
-        unsafe {
-            let last = _mm256_set1_pd(from.len() as f64 - 2.0);
-            let below = _mm256_cmp_pd::<_CMP_LE_OQ>(at.0, last);
-            let above = _mm256_cmp_pd::<_CMP_GE_OQ>(at.0, _mm256_setzero_pd());
-            assert_eq!(_mm256_movemask_pd(_mm256_and_pd(below, above)), 0xf);
-            let places = _mm256_cvttpd_epi32(at.0);
-            let pairs = _mm_i32gather_epi32::<2>(from.as_ptr().cast(), places);
-            let low = _mm_srai_epi32::<16>(_mm_slli_epi32::<16>(pairs));
-            let high = _mm_srai_epi32::<16>(pairs);
-            [Avx2F64x4(_mm256_cvtepi32_pd(low)), Avx2F64x4(_mm256_cvtepi32_pd(high))]
-        }
-    }
 }
 vector! {
     /// Eight singles.
@@ -147,22 +130,20 @@ vector! {
         }
     }
     #[inline(always)]
-    fn gather_pairs(from: &[i16], at: Self) -> [Self; 2] {
-        assert!(from.len() <= crate::MAX_SINGLE_INDEX);
-        // SAFETY: see the head of `x86/mod.rs`; the assertions place all pairs
-        // in the slice, and singles hold its indices exactly.
+    fn gather_pairs(from: &[f32], at: Self) -> [Self; 2] {
+        assert!(2 <= from.len() && from.len() <= crate::MAX_SINGLE_INDEX);
+        // SAFETY: see the head of `x86/mod.rs`; the assertions place all pairs in the slice, and
+        // singles represent its indices exactly.
         unsafe {
             let last = _mm256_set1_ps(from.len() as f32 - 2.0);
             let below = _mm256_cmp_ps::<_CMP_LE_OQ>(at.0, last);
             let above = _mm256_cmp_ps::<_CMP_GE_OQ>(at.0, _mm256_setzero_ps());
             assert_eq!(_mm256_movemask_ps(_mm256_and_ps(below, above)), 0xff);
-            let places = _mm256_cvttps_epi32(at.0);
-            let pairs = _mm256_i32gather_epi32::<2>(from.as_ptr().cast(), places);
-            let low = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(pairs));
-            let high = _mm256_srai_epi32::<16>(pairs);
+            let indices = _mm256_cvttps_epi32(at.0);
+            let first = from.as_ptr();
             [
-                Avx2F32x8(_mm256_cvtepi32_ps(low)),
-                Avx2F32x8(_mm256_cvtepi32_ps(high)),
+                Avx2F32x8(_mm256_i32gather_ps::<4>(first, indices)),
+                Avx2F32x8(_mm256_i32gather_ps::<4>(first.add(1), indices)),
             ]
         }
     }

@@ -82,23 +82,6 @@ vector! {
             Avx512F64x8(_mm512_castsi512_pd(_mm512_sub_epi64(one, half)))
         }
     }
-    #[inline(always)]
-    fn gather_pairs(from: &[i16], at: Self) -> [Self; 2] {
-        assert!(from.len() <= i32::MAX as usize);
-        // SAFETY: see the head of `x86/mod.rs`; the assertions place all pairs
-        // in the slice, and its indices fit 32 bits.
-        unsafe {
-            let last = _mm512_set1_pd(from.len() as f64 - 2.0);
-            let below = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(at.0, last);
-            let above = _mm512_cmp_pd_mask::<_CMP_GE_OQ>(at.0, _mm512_setzero_pd());
-            assert_eq!(below & above, 0xff);
-            let places = _mm512_cvttpd_epi32(at.0);
-            let pairs = _mm256_i32gather_epi32::<2>(from.as_ptr().cast(), places);
-            let low = _mm256_srai_epi32::<16>(_mm256_slli_epi32::<16>(pairs));
-            let high = _mm256_srai_epi32::<16>(pairs);
-            [Avx512F64x8(_mm512_cvtepi32_pd(low)), Avx512F64x8(_mm512_cvtepi32_pd(high))]
-        }
-    }
 }
 vector! {
     /// Sixteen singles.
@@ -134,22 +117,20 @@ vector! {
         }
     }
     #[inline(always)]
-    fn gather_pairs(from: &[i16], at: Self) -> [Self; 2] {
-        assert!(from.len() <= crate::MAX_SINGLE_INDEX);
-        // SAFETY: see the head of `x86/mod.rs`; the assertions place all pairs
-        // in the slice, and singles hold its indices exactly.
+    fn gather_pairs(from: &[f32], at: Self) -> [Self; 2] {
+        assert!(2 <= from.len() && from.len() <= crate::MAX_SINGLE_INDEX);
+        // SAFETY: see the head of `x86/mod.rs`; the assertions place all pairs in the slice, and
+        // singles represent its indices exactly.
         unsafe {
             let last = _mm512_set1_ps(from.len() as f32 - 2.0);
             let below = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(at.0, last);
             let above = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(at.0, _mm512_setzero_ps());
             assert_eq!(below & above, 0xffff);
-            let places = _mm512_cvttps_epi32(at.0);
-            let pairs = _mm512_i32gather_epi32::<2>(places, from.as_ptr().cast());
-            let low = _mm512_srai_epi32::<16>(_mm512_slli_epi32::<16>(pairs));
-            let high = _mm512_srai_epi32::<16>(pairs);
+            let indices = _mm512_cvttps_epi32(at.0);
+            let first = from.as_ptr();
             [
-                Avx512F32x16(_mm512_cvtepi32_ps(low)),
-                Avx512F32x16(_mm512_cvtepi32_ps(high)),
+                Avx512F32x16(_mm512_i32gather_ps::<4>(indices, first)),
+                Avx512F32x16(_mm512_i32gather_ps::<4>(indices, first.add(1))),
             ]
         }
     }

@@ -1,37 +1,37 @@
-//! The box as the grains see it: its faces, and its images along periodic axes.
+//! Box of the grains: its solid faces, and its images along periodic axes.
 
 use glam::{DVec3, IVec3};
 
-/// The box as the grains see it.
+/// Box of the grains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Enclosure {
     /// Lower corner [m].
     pub lower: DVec3,
     /// Upper corner [m].
     pub upper: DVec3,
-    /// Axes along which images interact.
+    /// Periodic axes: grains interact with images along them.
     pub periodic: [bool; 3],
-    /// Faces `[axis][side]` that stop a grain; ignored along periodic axes.
+    /// Faces `[axis][side]` that are walls for a grain; ignored along periodic axes.
     pub solid: [[bool; 2]; 3],
 }
 
-/// A solid face as a half space: the grain is on the side of `inward`.
+/// Face of the box as a half space: a grain inside the box is on the side of `inward`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Face {
+pub(super) struct WallFace {
     /// Axis of the normal.
     pub axis: usize,
     /// 0 lower, 1 upper.
     pub side: usize,
-    /// Unit normal that points into the box: the gradient of the wall's distance field.
+    /// Unit normal into the box: the gradient of the wall's distance field.
     pub inward: DVec3,
     /// Coordinate of the face along its axis [m].
-    pub at: f64,
+    pub coordinate: f64,
 }
 
-impl Face {
+impl WallFace {
     /// Signed distance of a point of the space frame, negative inside the wall [m].
     pub fn distance(&self, x: DVec3) -> f64 {
-        self.inward[self.axis] * (x[self.axis] - self.at)
+        self.inward[self.axis] * (x[self.axis] - self.coordinate)
     }
 }
 
@@ -40,11 +40,11 @@ impl Enclosure {
     pub fn size(&self) -> DVec3 {
         self.upper - self.lower
     }
-    /// Whether images along `axis` interact.
+    /// Whether grains interact with images along `axis`.
     pub fn is_periodic(&self, axis: usize) -> bool {
         self.periodic[axis] && self.size()[axis] > 0.0
     }
-    /// Periods along the three axes [m], zero where not periodic.
+    /// Periods along the three axes [m], zero along axes that are not periodic.
     pub(super) fn period(&self) -> DVec3 {
         DVec3::from_array([0, 1, 2].map(|axis| {
             if self.is_periodic(axis) {
@@ -54,28 +54,29 @@ impl Enclosure {
             }
         }))
     }
-    /// Face `side` of `axis`, if it stops grains.
-    pub(super) fn face(&self, axis: usize, side: usize) -> Option<Face> {
+    /// Face `side` of `axis`, if it is a wall for grains.
+    pub(super) fn face(&self, axis: usize, side: usize) -> Option<WallFace> {
         let solid = self.solid[axis][side] && !self.is_periodic(axis);
         solid.then(|| self.plane(axis, side))
     }
     /// Face `side` of `axis` as a plane, solid or not.
-    pub(super) fn plane(&self, axis: usize, side: usize) -> Face {
+    pub(super) fn plane(&self, axis: usize, side: usize) -> WallFace {
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let corner = if side == 0 { self.lower } else { self.upper };
-        Face {
+        WallFace {
             axis,
             side,
             inward: sign * DVec3::AXES[axis],
-            at: corner[axis],
+            coordinate: corner[axis],
         }
     }
-    /// All faces that stop grains.
-    pub(super) fn faces(&self) -> impl Iterator<Item = Face> + '_ {
+    /// All faces that are walls for grains.
+    pub(super) fn faces(&self) -> impl Iterator<Item = WallFace> + '_ {
         (0..6).filter_map(|k| self.face(k / 2, k % 2))
     }
-    /// Number of periods by which `x` lies outside the box, zero along other axes (and at most a
-    /// million, so that a runaway grain cannot overflow the count).
+    /// Number of periods by which `x` lies outside the box, zero along axes that are not periodic.
+    ///
+    /// The count is clamped to a million, so that a diverging grain cannot overflow it.
     pub(super) fn periods_outside(&self, x: DVec3) -> IVec3 {
         let period = self.period();
         IVec3::from_array([0, 1, 2].map(|axis| {
@@ -88,11 +89,11 @@ impl Enclosure {
             }
         }))
     }
-    /// The image of `x` inside the box along periodic axes [m].
+    /// Image of `x` inside the box along periodic axes [m].
     pub fn wrap(&self, x: DVec3) -> DVec3 {
         x - self.periods_outside(x).as_dvec3() * self.period()
     }
-    /// The image of a separation that is shortest along every periodic axis [m].
+    /// Shortest periodic image of a separation vector [m].
     pub fn nearest_image(&self, separation: DVec3) -> DVec3 {
         let period = self.period();
         DVec3::from_array([0, 1, 2].map(|axis| {

@@ -1,57 +1,109 @@
-//! A grain: a shared shape, a density, and its state of motion.
+//! Grain: a shared shape, density, material, pose and velocities.
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use grainwake_shape::Shape;
 use serde::{Deserialize, Serialize};
 
+use super::material::Material;
 use crate::math::Pose;
 
-/// Whether the three components of a velocity follow the dynamics or are given.
+/// Whether the three components of a velocity follow the equations of motion or are prescribed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Dof {
-    /// Follows Newton's (Euler's) law.
+    /// Newton's or Euler's equation determines the velocity.
     Free,
-    /// Held at this velocity [m/s] or angular velocity [rad/s, space frame]; zero holds still.
+    /// Velocity [m/s] or angular velocity [rad/s, space frame] over the next step; zero holds the
+    /// grain still.
     Prescribed(DVec3),
 }
 
-/// One grain. Velocities are at integer times and in the space frame.
+/// One grain. Velocities are at integer time levels, in the space frame.
 #[derive(Clone, Debug)]
 pub struct Grain {
-    /// Shape, shared between equal grains.
+    /// Shape, shared between grains of equal shape.
     pub shape: Arc<Shape>,
     /// Density [kg/m^3].
     pub density: f64,
+    /// Material, for contact laws with elastic constants.
+    pub material: Material,
     /// Position and orientation.
     pub pose: Pose,
     /// Velocity of the centroid [m/s].
     pub velocity: DVec3,
     /// Angular velocity, space frame [rad/s].
     pub angular_velocity: DVec3,
-    /// Law of the translation.
+    /// Translational degrees of freedom.
     pub translation: Dof,
-    /// Law of the rotation.
+    /// Rotational degrees of freedom.
     pub rotation: Dof,
 }
 
 impl Grain {
+    /// Free grain of `density` [kg/m^3] at rest at the origin.
+    pub fn new(shape: impl Into<Arc<Shape>>, density: f64) -> Grain {
+        Grain {
+            shape: shape.into(),
+            density,
+            material: Material::default(),
+            pose: Pose {
+                position: DVec3::ZERO,
+                orientation: DQuat::IDENTITY,
+            },
+            velocity: DVec3::ZERO,
+            angular_velocity: DVec3::ZERO,
+            translation: Dof::Free,
+            rotation: Dof::Free,
+        }
+    }
+    /// Replaces the position of the centroid [m].
+    pub fn with_position(mut self, position: DVec3) -> Grain {
+        self.pose.position = position;
+        self
+    }
+    /// Replaces the orientation (body frame to space frame).
+    pub fn with_orientation(mut self, orientation: DQuat) -> Grain {
+        self.pose.orientation = orientation;
+        self
+    }
+    /// Replaces the material.
+    pub fn with_material(mut self, material: Material) -> Grain {
+        self.material = material;
+        self
+    }
+    /// Replaces the initial velocity of the centroid [m/s].
+    pub fn with_velocity(mut self, velocity: DVec3) -> Grain {
+        self.velocity = velocity;
+        self
+    }
+    /// Replaces the initial angular velocity, space frame [rad/s].
+    pub fn with_angular_velocity(mut self, angular_velocity: DVec3) -> Grain {
+        self.angular_velocity = angular_velocity;
+        self
+    }
+    /// Holds the grain still.
+    pub fn held(mut self) -> Grain {
+        (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
+        (self.translation, self.rotation) =
+            (Dof::Prescribed(DVec3::ZERO), Dof::Prescribed(DVec3::ZERO));
+        self
+    }
     /// Mass [kg].
     pub fn mass(&self) -> f64 {
         self.density * self.shape.volume()
     }
     /// Inertia tensor in the space frame [kg m^2].
     pub fn inertia(&self) -> DMat3 {
-        let turn = DMat3::from_quat(self.pose.orientation);
-        turn * DMat3::from_diagonal(self.shape.inertia() * self.density) * turn.transpose()
+        let rotation = DMat3::from_quat(self.pose.orientation);
+        rotation * DMat3::from_diagonal(self.shape.inertia() * self.density) * rotation.transpose()
     }
     /// Principal moments of inertia [kg m^2].
     pub fn principal_inertia(&self) -> DVec3 {
         self.shape.inertia() * self.density
     }
-    /// One over the mass that resists a force, with fluid of `added_density` [kg/m^3] dragged along;
-    /// zero where the translation is prescribed [1/kg].
+    /// Inverse of the mass and the added mass of fluid, `added_density` [kg/m^3] times the volume;
+    /// zero if the translation is prescribed [1/kg].
     pub(super) fn inverse_mass(&self, added_density: f64) -> f64 {
         match self.translation {
             Dof::Free => 1.0 / (self.mass() + added_density * self.shape.volume()),

@@ -26,3 +26,16 @@ pub struct FluidParams {
     /// Advection scheme.
     pub advection: Advection,
 }
+
+impl FluidParams {
+    /// Fluid at rest of `density` [kg/m^3] and `kinematic_viscosity` [m^2/s].
+    pub fn new(density: f64, kinematic_viscosity: f64) -> FluidParams {
+        FluidParams {
+            density,
+            kinematic_viscosity,
+            body_acceleration: DVec3::ZERO,
+            initial_velocity: DVec3::ZERO,
+            advection: Advection::default(),
+        }
+    }
+}

@@ -84,10 +84,6 @@ impl Layout {
     pub fn entries(&self) -> usize {
         self.cells.iter().map(|n| n + 2).product()
     }
-    /// Always false: every layout has ghosts.
-    pub fn is_empty(&self) -> bool {
-        false
-    }
     /// Rows of a field, ghosts included, padding excluded.
     pub fn rows<'a, T>(
         &self,
@@ -147,16 +143,6 @@ impl Layout {
             0 => (0..outer * middle).for_each(|line| f(line * row + layer)),
             1 => (0..outer).for_each(|k| (0..row).for_each(|i| f(k * plane + layer * row + i))),
             _ => (0..plane).for_each(|at| f(layer * plane + at)),
-        }
-    }
-    /// Calls `f` with the memory position of every entry of a layer, without ghosts.
-    pub fn each_inside_layer(&self, axis: usize, layer: usize, mut f: impl FnMut(usize)) {
-        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-        let strides = self.strides();
-        for second in 1..=self.cells[b] {
-            for first in 1..=self.cells[a] {
-                f(layer * strides[axis] + first * strides[a] + second * strides[b]);
-            }
         }
     }
     /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.

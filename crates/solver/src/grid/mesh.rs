@@ -30,6 +30,14 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Mesh of cubic cells of edge `spacing` [m] with its lower corner at the origin.
+    pub fn cubic(cells: [usize; 3], spacing: f64) -> Mesh {
+        Mesh {
+            cells,
+            spacing: DVec3::splat(spacing),
+            origin: DVec3::ZERO,
+        }
+    }
     /// Number of cells.
     pub fn cell_count(&self) -> usize {
         self.cells.iter().product()
@@ -65,7 +73,7 @@ impl Mesh {
         }
     }
     /// Memory layout of the fields of the whole box.
-    pub fn layout(&self) -> Layout {
+    pub(crate) fn layout(&self) -> Layout {
         Layout { cells: self.cells }
     }
     /// Position [m] of the point `offset` (in spacings from the lower corner) of a cell.
@@ -105,7 +113,7 @@ impl Slab {
         &self.mesh
     }
     /// Memory layout of the fields of the slab.
-    pub fn layout(&self) -> Layout {
+    pub(crate) fn layout(&self) -> Layout {
         let [nx, ny, _] = self.mesh.cells;
         Layout {
             cells: [nx, ny, self.planes],

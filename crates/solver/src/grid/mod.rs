@@ -6,8 +6,7 @@ mod mesh;
 mod part;
 mod view;
 
-pub use field::Layout;
-pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field};
+pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field, Layout};
 #[cfg(test)]
 pub(crate) use field::{FaceZ, Location};
 pub(crate) use loops::{Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, for_slabs};

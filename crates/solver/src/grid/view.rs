@@ -3,7 +3,6 @@
 use glam::DVec3;
 
 use super::{Axis, LocalCell, Slab};
-use crate::math::Real;
 
 /// All values of one field without ghosts, indexed by [k, j, i] (z, y, x order), counted from 0.
 ///
@@ -17,7 +16,7 @@ pub struct FieldView<'a, R> {
     normal: Option<Axis>,
 }
 
-impl<'a, R: Real> FieldView<'a, R> {
+impl<'a, R: Copy> FieldView<'a, R> {
     /// View of the padded `field` on the faces `normal` to an axis, or on the cell centres.
     pub(crate) fn new(field: &'a [R], slab: &Slab, normal: Option<Axis>) -> FieldView<'a, R> {
         let layout = slab.layout();

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::access::AccessLog;
 use super::forcing::{ForcedFaces, ForcingParams};
 use super::geometry::Locator;
-use super::ownership::RowClaims;
 use super::scheme::Scheme;
 use super::scratch::ScratchPool;
 use super::update::{GrainUpdate, ImmersedGrain, ThreadScratch, locate_and_weigh};
@@ -20,9 +20,10 @@ pub struct ImmersedGrains<R> {
     pub(super) locator: Locator,
     pub(super) grains: Vec<ImmersedGrain>,
     pub(super) scratch: ScratchPool<ThreadScratch<R>>,
-    /// Memory of the updates between steps.
+    /// Allocation of the updates, kept from one step to the next.
     pub(super) updates: Vec<GrainUpdate>,
-    pub(super) claims: RowClaims,
+    /// Accesses to the prediction in this step.
+    pub(super) access: AccessLog,
     mesh: Mesh,
     kinematic_viscosity: f64,
 }
@@ -43,7 +44,7 @@ impl<R: Real> ImmersedGrains<R> {
             grains: grains.iter().map(|_| ImmersedGrain::default()).collect(),
             scratch: ScratchPool::default(),
             updates: Vec::with_capacity(grains.len()),
-            claims: RowClaims::default(),
+            access: AccessLog::default(),
             mesh: *flow.mesh(),
             kinematic_viscosity,
         };
@@ -51,13 +52,13 @@ impl<R: Real> ImmersedGrains<R> {
         immersed
     }
 
-    /// Finds the faces near the grains at their present poses.
+    /// Lists the faces near the grains at their present poses.
     pub fn locate(&mut self, grains: &[Grain]) {
         self.locate_with_forcing(grains, 1.0);
         self.release_forcing();
     }
 
-    /// Finds the faces near the grains, and the weights of those they force in a step of `dt` [s].
+    /// Lists the faces near the grains and weighs the forced faces for a step of `dt` [s].
     pub(super) fn locate_with_forcing(&mut self, grains: &[Grain], dt: f64) {
         self.locator.find_neighbours(grains, |_| 0.0);
         let params = self.forcing_params(dt);
@@ -82,8 +83,8 @@ impl<R: Real> ImmersedGrains<R> {
         ForcingParams::new(self.scheme, eps, spacing, self.kinematic_viscosity, dt)
     }
 
-    /// Step for which closed parts of faces follow the grain instead of the pressure gradient [s]; zero
-    /// in the paper's scheme, which does not close faces.
+    /// Length `dt` of a step if faces are closed to the pressure gradient [s]; 0 in the paper's
+    /// scheme, which does not close faces.
     pub(super) fn closure_dt(&self, dt: f64) -> f64 {
         match self.scheme {
             Scheme::Aperture => dt,
@@ -91,7 +92,7 @@ impl<R: Real> ImmersedGrains<R> {
         }
     }
 
-    /// Memory held [bytes], without the buffers of threads.
+    /// Memory held without the buffers of threads [bytes].
     pub fn bytes(&self) -> usize {
         self.grains.iter().map(ImmersedGrain::bytes).sum::<usize>() + self.locator.bytes()
     }

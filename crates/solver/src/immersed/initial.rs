@@ -1,4 +1,4 @@
-//! Initial state of the fluid in and next to the grains.
+//! Initial velocity of the fluid in and next to the grains.
 
 use super::forcing::sum_impulse;
 use super::grains::ImmersedGrains;
@@ -9,13 +9,14 @@ use crate::flow::{Flow, FlowMeasures};
 use crate::math::Real;
 
 impl<R: Real> ImmersedGrains<R> {
-    /// Gives the fluid inside and next to the grains their rigid velocity, and makes it solenoidal.
+    /// Imposes the rigid velocities of the grains on the forced faces and makes the flow
+    /// solenoidal.
     pub fn initialise(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> FlowMeasures {
         for axis in 0..3 {
             let velocity = flow.velocity.component(axis);
             flow.predicted.component_mut(axis).copy_from_slice(velocity);
         }
-        // A step this long gives every face of the band its full weight.
+        // In the limit of a long step every forced face takes the rigid velocity.
         self.locate_with_forcing(grains, f64::MAX.sqrt());
         let (known, predictions) = flow.prediction();
         let (rest, density) = (RigidVelocity::default(), self.fluid_density);

@@ -7,7 +7,8 @@ use glam::DVec3;
 use crate::dem::Grain;
 use crate::math::Vector6;
 
-/// Velocity and angular velocity of a grain, space frame; also changes and rates of them.
+/// Velocity and angular velocity of a grain in the space frame, or a change or rate of change of
+/// both.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RigidVelocity {
     /// Velocity of the centroid [m/s].
@@ -17,19 +18,19 @@ pub struct RigidVelocity {
 }
 
 impl RigidVelocity {
-    /// Velocities of a grain at present.
+    /// Present velocities of a grain.
     pub fn of(grain: &Grain) -> RigidVelocity {
         RigidVelocity {
             linear: grain.velocity,
             angular: grain.angular_velocity,
         }
     }
-    /// Velocity V + Omega x r at `arm` r from the centroid [m/s].
+    /// Velocity V + Omega x r [m/s] at the vector `arm` r [m] from the centroid.
     #[inline(always)]
     pub fn at(self, arm: DVec3) -> DVec3 {
         self.linear + self.angular.cross(arm)
     }
-    /// Components as the unknowns of a 6 x 6 system.
+    /// Vector (V, Omega) of the six unknowns of the equations of motion.
     pub fn to_vector(self) -> Vector6 {
         let ([a, b, c], [d, e, f]) = (self.linear.to_array(), self.angular.to_array());
         [a, b, c, d, e, f]
@@ -73,14 +74,14 @@ pub struct GrainKinematics {
 }
 
 impl GrainKinematics {
-    /// Kinematics of a grain at present.
+    /// Present kinematics of a grain.
     pub fn of(grain: &Grain) -> GrainKinematics {
         GrainKinematics {
             position: grain.pose.position,
             velocity: RigidVelocity::of(grain),
         }
     }
-    /// Velocity of the material point at `x` [m/s].
+    /// Velocity [m/s] of the grain's material point at `x` [m].
     pub fn velocity_at(&self, x: DVec3) -> DVec3 {
         self.velocity.at(x - self.position)
     }
@@ -93,7 +94,7 @@ pub struct PreviousStep {
     pub velocity: RigidVelocity,
     /// Mean acceleration over the previous step [m/s^2, rad/s^2]; zero after contact.
     pub acceleration: RigidVelocity,
-    /// Part of `velocity` that came from contact in the previous step and that the fluid around the
-    /// grain takes up in this one (decision 0014).
+    /// Part of `velocity` that contact caused in the previous step and that the added mass takes up
+    /// in this step (`docs/decisions/0014-contact-with-the-fluid-response.md`).
     pub pending_added_mass_velocity: RigidVelocity,
 }

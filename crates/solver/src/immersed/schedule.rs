@@ -1,21 +1,24 @@
-//! Order in which the grains of a step are processed, and by how many threads.
+//! Order in which the grains of a step are processed, and on which threads.
 //!
-//! A grain is isolated if no other grain uses faces near it, where it was or where it is, and nothing
-//! touches it. Isolated grains are updated one at a time from advection to rigidity, while their
-//! faces are in the cache. The others are processed in passes over all of them: the advection next
-//! to one must be corrected before the impulse of its neighbour is summed, and contact is resolved
-//! before rigidity is imposed. Both orders give the same bits (decision 0016).
+//! A grain is isolated if no other grain uses faces near its last or its present pose and no
+//! contact load acts on it. An isolated grain is updated at once from advection to rigidity, while
+//! its faces are in the cache. The others are processed in passes over all of them, for two
+//! reasons:
+//!
+//! - the advection next to a grain must be corrected before the impulse of its neighbour is summed;
+//! - contact must be resolved before rigidity is imposed.
+//!
+//! Both orders give the same bits (`docs/decisions/0016-isolated-grains-in-one-traversal.md`).
 
 use rayon::prelude::*;
 
-use super::advection::{add_correction, find_correction, prefetch_velocity};
+use super::advection::{add_correction, find_correction};
 use super::forcing::impose_rigidity;
 use super::grains::ImmersedGrains;
 use super::kinematics::PreviousStep;
 use super::scheme::Scheme;
-use super::scratch::ScratchPool;
 use super::update::{
-    GrainUpdate, ImmersedGrain, IsolatedUpdate, PendingRigidity, StepInput, locate_and_weigh,
+    CouplingStep, GrainUpdate, ImmersedGrain, PendingRigidity, StepInput, locate_and_weigh,
 };
 use crate::dem::{Grain, Response};
 use crate::flow::Flow;
@@ -45,16 +48,18 @@ impl CoupledGrains {
         responses.extend(each);
     }
 
-    /// Whether each grain was updated as an isolated one.
+    /// Returns for each grain whether it was updated as an isolated one.
     #[cfg(test)]
     pub fn isolated(&self) -> Vec<bool> {
         self.updates.iter().map(|update| update.isolated).collect()
     }
 }
 
-/// Grains whose new velocities a step determines, one entry per grain.
+/// Input and output of [`ImmersedGrains::impose_rigidity`], one entry per grain.
 pub struct RigidStep<'a> {
+    /// Grains, which get their new velocities.
     pub grains: &'a mut [Grain],
+    /// State carried over from the previous step.
     pub previous: &'a [PreviousStep],
     /// Mean contact loads over the step.
     pub contact: &'a [Load],
@@ -65,47 +70,43 @@ pub struct RigidStep<'a> {
 }
 
 impl<R: Real> ImmersedGrains<R> {
-    /// Corrects the advection next to the grains where they were, locates them where they are, and
-    /// assembles their equations of motion with the impulse of the fluid. Imposes rigidity on
-    /// isolated grains at once.
+    /// Corrects the advection next to the last poses of the grains, locates the grains at their
+    /// present poses, and assembles their equations of motion. Imposes rigidity on isolated grains.
     pub fn couple(&mut self, flow: &mut Flow<R>, input: StepInput) -> CoupledGrains {
         let mut updates = std::mem::take(&mut self.updates);
         self.find_isolated(&input, &mut updates);
         let corrects_advection = self.scheme == Scheme::Aperture;
         if corrects_advection && updates.iter().any(|update| !update.isolated) {
-            self.correct_advection(flow, &input, &mut updates);
+            self.correct_advection(flow, &input, &updates);
         }
         let (known, predictions) = flow.prediction();
-        let step = IsolatedUpdate {
+        let step = CouplingStep {
             locator: &self.locator,
             params: self.forcing_params(input.dt),
             input,
             known,
-            predictions,
             corrects_advection,
             fluid_density: self.fluid_density,
             closure_dt: self.closure_dt(input.dt),
-            claims: &self.claims,
+            access: &self.access,
         };
-        let (grains, scratch) = (&mut self.grains, &self.scratch);
-        for_each_grain(grains, &mut updates, scratch, |item, scratch| {
-            let GrainItem {
-                index,
-                grain,
-                update,
-                next,
-            } = item;
-            if let Some((next, _)) = next.filter(|(_, update)| update.isolated) {
-                step.prefetch(next);
-            }
+        let scratch = &self.scratch;
+        let each = self.grains.par_iter_mut().zip(&mut updates).enumerate();
+        each.for_each(|(index, (grain, update))| {
+            let scratch = &mut *scratch.borrow();
             if update.isolated {
-                // SAFETY: `find_isolated` found no other grain that uses its faces.
-                unsafe { step.run(index, grain, update, scratch) };
+                // SAFETY: `find_isolated` found no other grain that uses the faces which this grain
+                // reads or writes. The access log asserts it below in debug builds. `Part` checks
+                // the bounds of every row.
+                let mut aliases = predictions.each_ref().map(|one| unsafe { one.alias() });
+                step.update_isolated(index, grain, update, &mut aliases, scratch);
             } else {
-                step.locate_and_assemble(index, grain, update, &mut scratch.locate);
+                step.locate_and_assemble(index, grain, update, &predictions, &mut scratch.locate);
             }
         });
-        self.claims.assert_disjoint();
+        if cfg!(debug_assertions) {
+            self.access.assert_no_conflict();
+        }
         CoupledGrains { updates }
     }
 
@@ -113,16 +114,21 @@ impl<R: Real> ImmersedGrains<R> {
     fn find_isolated(&mut self, input: &StepInput, updates: &mut Vec<GrainUpdate>) {
         let (immersed, grains) = (&self.grains, input.grains);
         let reach = self.locator.reach();
-        let travel = |index: usize| {
+        let displacement = |index: usize| {
             let last = immersed[index].body.position;
             grains[index].pose.position.distance(last)
         };
-        // A grain that crossed a periodic edge was located elsewhere.
-        let stayed = |index: usize| travel(index) <= reach;
-        // The margin covers rounding: rows end where single-precision distances do.
+        // A grain that crossed a periodic edge has its last faces elsewhere.
+        let stayed = |index: usize| displacement(index) <= reach;
+        // The margin covers the rounding of distances, which are in single precision.
         let margin = 0.01 * reach;
         self.locator.find_neighbours(grains, |index| {
-            margin + if stayed(index) { travel(index) } else { 0.0 }
+            margin
+                + if stayed(index) {
+                    displacement(index)
+                } else {
+                    0.0
+                }
         });
         let locator = &self.locator;
         updates.clear();
@@ -139,27 +145,27 @@ impl<R: Real> ImmersedGrains<R> {
         &mut self,
         flow: &mut Flow<R>,
         input: &StepInput,
-        updates: &mut [GrainUpdate],
+        updates: &[GrainUpdate],
     ) {
         let (known, _) = flow.prediction();
-        let eps = self.locator.eps();
-        let (grains, scratch) = (&mut self.grains, &self.scratch);
-        for_each_grain(grains, updates, scratch, |item, scratch| {
-            if let Some((next, _)) = item.next.filter(|(_, update)| !update.isolated) {
-                prefetch_velocity(&known, &next.body);
-            }
-            if !item.update.isolated {
-                let ImmersedGrain {
-                    body, correction, ..
-                } = item.grain;
-                let kinematics = &input.kinematics[item.index];
-                let scratch = &mut scratch.advection;
-                find_correction(eps, &known, kinematics, body, scratch, correction);
-            }
+        let (eps, scratch) = (self.locator.eps(), &self.scratch);
+        let each = self.grains.par_iter_mut().zip(updates).enumerate();
+        let each = each.filter(|(_, (_, update))| !update.isolated);
+        each.for_each(|(index, (grain, _))| {
+            let (kinematics, scratch) = (&input.kinematics[index], &mut *scratch.borrow());
+            let (body, correction) = (&grain.body, &mut grain.correction);
+            find_correction(
+                eps,
+                &known,
+                kinematics,
+                body,
+                &mut scratch.advection,
+                correction,
+            );
         });
         let (layout, grains) = (flow.mesh().layout(), &self.grains);
         flow.for_predictions(|component, mut prediction| {
-            for (grain, update) in grains.iter().zip(&*updates) {
+            for (grain, update) in grains.iter().zip(updates) {
                 if !update.isolated && grain.body.overlaps(prediction.range(), layout) {
                     add_correction(&grain.body, &grain.correction, component, &mut prediction);
                 }
@@ -167,25 +173,21 @@ impl<R: Real> ImmersedGrains<R> {
         });
     }
 
-    /// Gives the grains their new velocities under the mean contact loads, and imposes them on the
-    /// faces that have not been forced yet.
+    /// Gives the grains their new velocities under the mean contact loads, and imposes the
+    /// velocities on the faces that have not been forced yet.
     pub fn impose_rigidity(&mut self, flow: &mut Flow<R>, coupled: CoupledGrains, step: RigidStep) {
         let mut updates = coupled.updates;
         let RigidStep { dt, .. } = step;
         let density = self.fluid_density;
-        let each = updates
-            .par_iter_mut()
-            .zip(&mut *step.grains)
-            .zip(step.loads);
+        let each = (updates.par_iter_mut().zip(&mut *step.grains)).zip(step.loads);
         each.enumerate()
             .for_each(|(index, ((update, grain), load))| {
                 let (previous, contact) = (&step.previous[index], step.contact[index]);
                 update.set_velocities(grain, previous, contact, dt);
-                *load = update
-                    .system
-                    .hydrodynamic_load(grain, previous, density, dt);
+                *load = (update.system).hydrodynamic_load(grain, previous, density, dt);
             });
-        // Contact reached isolated grains after all: they are located again for the remaining change.
+        // A contact load found in the repeated sub-steps changes the velocity of an isolated grain
+        // after its rigidity was imposed: its faces are listed again and take the difference.
         let params = self.forcing_params(dt);
         for (index, update) in updates.iter().enumerate() {
             if update.isolated && update.pending.is_some() {
@@ -217,10 +219,11 @@ impl<R: Real> ImmersedGrains<R> {
                     continue;
                 };
                 if grain.body.overlaps(prediction.range(), mesh.layout()) {
+                    let (h, forced) = (mesh.spacing, &grain.forced);
                     impose_rigidity(
                         axis,
-                        mesh.spacing,
-                        &grain.forced,
+                        h,
+                        forced,
                         velocity,
                         change,
                         closure_dt,
@@ -230,71 +233,4 @@ impl<R: Real> ImmersedGrains<R> {
             }
         });
     }
-}
-
-impl GrainUpdate {
-    /// Gives the grain its new velocities; those that its faces lack become pending.
-    fn set_velocities(
-        &mut self,
-        grain: &mut Grain,
-        previous: &PreviousStep,
-        contact: Load,
-        dt: f64,
-    ) {
-        let untouched = contact == Load::default();
-        let now = match self.imposed {
-            Some(imposed) if untouched => imposed,
-            _ => self.system.velocities(grain, previous, contact, dt),
-        };
-        grain.velocity = now.linear;
-        grain.angular_velocity = now.angular;
-        self.pending = match self.imposed {
-            None => Some(PendingRigidity {
-                velocity: now,
-                change: now - previous.velocity,
-            }),
-            Some(_) if untouched => None,
-            Some(imposed) => Some(PendingRigidity {
-                velocity: now - imposed,
-                change: now - imposed,
-            }),
-        };
-    }
-}
-
-/// A grain in a parallel loop.
-struct GrainItem<'a> {
-    index: usize,
-    grain: &'a mut ImmersedGrain,
-    update: &'a mut GrainUpdate,
-    /// Grain that the same thread processes next.
-    next: Option<(&'a ImmersedGrain, &'a GrainUpdate)>,
-}
-
-/// Calls `work` for all grains in parallel, with the buffers of the thread.
-fn for_each_grain<S: Default + Send>(
-    grains: &mut [ImmersedGrain],
-    updates: &mut [GrainUpdate],
-    scratch: &ScratchPool<S>,
-    work: impl Fn(GrainItem, &mut S) + Sync,
-) {
-    // Several chunks per thread balance the load.
-    let chunk = (grains.len() / (8 * rayon::current_num_threads())).clamp(1, 16);
-    let chunks = grains
-        .par_chunks_mut(chunk)
-        .zip(updates.par_chunks_mut(chunk));
-    chunks.enumerate().for_each(|(number, (grains, updates))| {
-        let mut scratch = scratch.borrow();
-        for n in 0..grains.len() {
-            let (grain, next_grains) = grains[n..].split_first_mut().expect("n is an index");
-            let (update, next_updates) = updates[n..].split_first_mut().expect("one per grain");
-            let item = GrainItem {
-                index: number * chunk + n,
-                grain,
-                update,
-                next: next_grains.first().zip(next_updates.first()),
-            };
-            work(item, &mut scratch);
-        }
-    });
 }

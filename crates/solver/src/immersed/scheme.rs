@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How rigidity is imposed.
+/// Scheme by which the coupling imposes rigidity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {

@@ -1,14 +1,14 @@
-//! Buffers of threads that are kept from one step to the next.
+//! Pool of buffers for threads, kept from one step to the next.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::Mutex;
 
-/// Buffers not in use; as many as threads have worked at once.
+/// Pool of idle buffers. It grows to the largest number of threads that have worked at once.
 #[derive(Default)]
 pub struct ScratchPool<T>(Mutex<Vec<T>>);
 
 impl<T: Default> ScratchPool<T> {
-    /// Borrows a buffer, a new one if all are in use.
+    /// Borrows an idle buffer, or a new one if there is none.
     pub fn borrow(&self) -> Scratch<'_, T> {
         let buffer = self.0.lock().expect("no thread panicked").pop();
         Scratch {
@@ -18,7 +18,7 @@ impl<T: Default> ScratchPool<T> {
     }
 }
 
-/// A borrowed buffer, returned when dropped.
+/// A borrowed buffer, returned to the pool when dropped.
 pub struct Scratch<'a, T: Default> {
     pool: &'a ScratchPool<T>,
     buffer: T,

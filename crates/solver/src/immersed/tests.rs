@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::*;
-use crate::dem::{Dof, Grain};
+use crate::dem::{Dof, Grain, Material};
 use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
 use crate::math::{Load, Pose, Real};
@@ -18,6 +18,7 @@ fn grains() -> [Grain; 2] {
     [DVec3::new(1.55, 2.02, 1.97), DVec3::new(5.1, 3.9, 3.1)].map(|position| Grain {
         shape: shape.clone(),
         density: 2.0,
+        material: Material::default(),
         pose: Pose {
             position,
             orientation: DQuat::from_scaled_axis(position),
@@ -160,6 +161,7 @@ fn padding_of_rows_affects_no_link() {
     let grain = |place: f64| Grain {
         shape: Arc::new(Shape::sphere(1.0, 100)),
         density: 2.0,
+        material: Material::default(),
         pose: Pose {
             position: DVec3::splat(place),
             orientation: DQuat::IDENTITY,

@@ -1,25 +1,24 @@
-//! Work on one grain in a step: all of it at once for an isolated grain, else up to the equations of
-//! motion.
+//! Work on one grain in a step: the whole update of an isolated grain; location and equations of
+//! motion of any other.
 
-use super::advection::{
-    AdvectionCorrection, AdvectionScratch, add_correction, find_correction, prefetch_velocity,
-};
+use super::access::{Access, AccessLog};
+use super::advection::{AdvectionCorrection, AdvectionScratch, add_correction, find_correction};
 use super::forcing::{ForcedFaces, ForcingParams, impose_rigidity, sum_impulse};
 use super::geometry::{LocateScratch, LocatedBody, Locator};
 use super::kinematics::{GrainKinematics, PreviousStep, RigidVelocity};
-use super::ownership::RowClaims;
 use super::rigid_body::RigidBodySystem;
 use crate::dem::Grain;
 use crate::flow::{Known, Prediction};
 use crate::math::{Load, Real};
 
-/// Faces near one grain, kept from one step to the next.
+/// Lists of the faces near one grain, kept from one step to the next.
 #[derive(Default)]
 pub struct ImmersedGrain {
+    /// Faces within reach and their distances.
     pub body: LocatedBody,
-    /// Forced faces; empty for an isolated grain, whose lists are buffers of the thread.
+    /// Forced faces; empty for an isolated grain, which uses [`ThreadScratch`].
     pub forced: ForcedFaces,
-    /// Correction of the advection; likewise.
+    /// Correction of the advection; empty for an isolated grain.
     pub correction: AdvectionCorrection,
 }
 
@@ -37,21 +36,53 @@ impl ImmersedGrain {
 /// Progress of one grain in a step.
 #[derive(Clone, Copy, Default)]
 pub struct GrainUpdate {
-    /// Whether no other grain uses the same faces and nothing touched the grain.
+    /// Whether no other grain uses the same faces and no contact load acts on the grain.
     pub isolated: bool,
-    /// Equations for its new velocities.
+    /// Equations for the new velocities.
     pub system: RigidBodySystem,
-    /// New velocities with which its faces have been forced already.
+    /// Velocities that the forced faces have taken already.
     pub imposed: Option<RigidVelocity>,
-    /// Velocities with which its faces still have to be forced.
+    /// Velocities that the forced faces have yet to take.
     pub pending: Option<PendingRigidity>,
 }
 
 /// Rigid velocity to be imposed, and the change of the grain's velocity that goes with it.
 #[derive(Clone, Copy)]
 pub struct PendingRigidity {
+    /// U, or its part that has not been imposed yet.
     pub velocity: RigidVelocity,
+    /// U - U_old, or its part that has not been imposed yet.
     pub change: RigidVelocity,
+}
+
+impl GrainUpdate {
+    /// Gives the grain its new velocities under the mean `contact` load over `dt` [s]; the part
+    /// that its faces have not taken becomes pending.
+    pub fn set_velocities(
+        &mut self,
+        grain: &mut Grain,
+        previous: &PreviousStep,
+        contact: Load,
+        dt: f64,
+    ) {
+        let touched = contact != Load::default();
+        let velocity = match self.imposed {
+            Some(imposed) if !touched => imposed,
+            _ => self.system.velocities(grain, previous, contact, dt),
+        };
+        grain.velocity = velocity.linear;
+        grain.angular_velocity = velocity.angular;
+        self.pending = match self.imposed {
+            None => Some(PendingRigidity {
+                velocity,
+                change: velocity - previous.velocity,
+            }),
+            Some(imposed) => touched.then_some(PendingRigidity {
+                velocity: velocity - imposed,
+                change: velocity - imposed,
+            }),
+        };
+    }
 }
 
 /// Inputs of a step, one entry per grain.
@@ -61,6 +92,7 @@ pub struct StepInput<'a> {
     pub grains: &'a [Grain],
     /// Kinematics when the flow was predicted.
     pub kinematics: &'a [GrainKinematics],
+    /// State carried over from the previous step.
     pub previous: &'a [PreviousStep],
     /// Mean contact loads in the sub-steps so far.
     pub contact: &'a [Load],
@@ -75,39 +107,36 @@ pub struct StepInput<'a> {
 pub struct ThreadScratch<R> {
     pub advection: AdvectionScratch<R>,
     pub locate: LocateScratch,
+    /// Lists of the isolated grain that the thread updates.
     correction: AdvectionCorrection,
     forced: ForcedFaces,
 }
 
 /// Fields and parameters of a step, shared by all grains.
-pub struct IsolatedUpdate<'a, R> {
+pub struct CouplingStep<'a, R> {
     pub locator: &'a Locator,
     pub params: ForcingParams,
     pub input: StepInput<'a>,
     pub known: Known<'a, R>,
-    pub predictions: [Prediction<'a, R>; 3],
     pub corrects_advection: bool,
+    /// [kg/m^3]
     pub fluid_density: f64,
-    /// See [`sum_impulse`].
+    /// Length of the step if faces are closed to the pressure gradient, else 0 [s].
     pub closure_dt: f64,
-    pub claims: &'a RowClaims,
+    pub access: &'a AccessLog,
 }
 
-impl<R: Real> IsolatedUpdate<'_, R> {
-    /// Updates an isolated grain: corrects the advection where it was, locates it, solves for its
-    /// velocities and imposes them.
-    ///
-    /// # Safety
-    /// No grain updated at the same time uses faces that this one uses, where it was or where it is.
-    pub unsafe fn run(
+impl<R: Real> CouplingStep<'_, R> {
+    /// Updates an isolated grain: corrects the advection at its last pose, locates it, solves for
+    /// its velocities and imposes them on `predictions`.
+    pub fn update_isolated(
         &self,
         index: usize,
         grain: &mut ImmersedGrain,
         update: &mut GrainUpdate,
+        predictions: &mut [Prediction<R>; 3],
         scratch: &mut ThreadScratch<R>,
     ) {
-        // SAFETY: the faces of this grain are used by no other, as the caller guarantees.
-        let mut own = (self.predictions.each_ref()).map(|one| unsafe { one.alias() });
         let ThreadScratch {
             advection,
             locate,
@@ -116,34 +145,25 @@ impl<R: Real> IsolatedUpdate<'_, R> {
         } = scratch;
         let body = &mut grain.body;
         if self.corrects_advection {
-            let kinematics = &self.input.kinematics[index];
-            let eps = self.locator.eps();
+            let (kinematics, eps) = (&self.input.kinematics[index], self.locator.eps());
             find_correction(eps, &self.known, kinematics, body, advection, correction);
-            self.claims.claim_corrected(index, body);
-            for (component, prediction) in own.iter_mut().enumerate() {
+            self.access.record_rows(index, body);
+            for (component, prediction) in predictions.iter_mut().enumerate() {
                 add_correction(body, correction, component, prediction);
             }
         }
         self.locate(index, body, forced, locate);
-        self.claims.claim_forced(index, true, forced);
-        update.system = self.assemble(index, &own, forced);
+        self.access.record_forced(index, Access::Write, forced);
+        update.system = self.assemble(index, predictions, forced);
         let (grain, previous) = (&self.input.grains[index], &self.input.previous[index]);
-        let system = &update.system;
-        let now = system.velocities(grain, previous, Load::default(), self.input.dt);
-        let change = now - previous.velocity;
-        let spacing = self.known.mesh.spacing;
-        for (axis, prediction) in own.iter_mut().enumerate() {
-            impose_rigidity(
-                axis,
-                spacing,
-                forced,
-                now,
-                change,
-                self.closure_dt,
-                prediction,
-            );
+        let no_contact = Load::default();
+        let velocity = (update.system).velocities(grain, previous, no_contact, self.input.dt);
+        let change = velocity - previous.velocity;
+        let (h, dt) = (self.known.mesh.spacing, self.closure_dt);
+        for (axis, prediction) in predictions.iter_mut().enumerate() {
+            impose_rigidity(axis, h, forced, velocity, change, dt, prediction);
         }
-        update.imposed = Some(now);
+        update.imposed = Some(velocity);
     }
 
     /// Locates a grain that is not isolated and assembles its equations of motion.
@@ -152,16 +172,12 @@ impl<R: Real> IsolatedUpdate<'_, R> {
         index: usize,
         grain: &mut ImmersedGrain,
         update: &mut GrainUpdate,
+        predictions: &[Prediction<R>; 3],
         scratch: &mut LocateScratch,
     ) {
         self.locate(index, &mut grain.body, &mut grain.forced, scratch);
-        self.claims.claim_forced(index, false, &grain.forced);
-        update.system = self.assemble(index, &self.predictions, &mut grain.forced);
-    }
-
-    /// Prefetches the velocity around a grain that is updated next.
-    pub fn prefetch(&self, grain: &ImmersedGrain) {
-        prefetch_velocity(&self.known, &grain.body);
+        (self.access).record_forced(index, Access::Read, &grain.forced);
+        update.system = self.assemble(index, predictions, &mut grain.forced);
     }
 
     fn locate(
@@ -171,35 +187,23 @@ impl<R: Real> IsolatedUpdate<'_, R> {
         forced: &mut ForcedFaces,
         scratch: &mut LocateScratch,
     ) {
-        let grain = &self.input.grains[index];
-        locate_and_weigh(
-            self.locator,
-            &self.params,
-            index,
-            grain,
-            body,
-            forced,
-            scratch,
-        );
+        let (params, grain) = (&self.params, &self.input.grains[index]);
+        locate_and_weigh(self.locator, params, index, grain, body, forced, scratch);
     }
 
+    /// Sums the impulse of the fluid and assembles the equations of motion.
     fn assemble(
         &self,
         index: usize,
         predictions: &[Prediction<R>; 3],
         forced: &mut ForcedFaces,
     ) -> RigidBodySystem {
-        let (previous, density) = (&self.input.previous[index], self.fluid_density);
-        let impulse = sum_impulse(
-            &self.known,
-            predictions,
-            density,
-            forced,
-            previous.velocity,
-            self.closure_dt,
-        );
-        let (grain, applied) = (&self.input.grains[index], self.input.applied[index]);
-        RigidBodySystem::new(grain, previous, impulse, density, applied, self.input.dt)
+        let (known, density, dt) = (&self.known, self.fluid_density, self.input.dt);
+        let (grain, previous) = (&self.input.grains[index], &self.input.previous[index]);
+        let old = previous.velocity;
+        let impulse = sum_impulse(known, predictions, density, forced, old, self.closure_dt);
+        let applied = self.input.applied[index];
+        RigidBodySystem::new(grain, previous, impulse, density, applied, dt)
     }
 }
 

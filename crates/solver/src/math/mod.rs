@@ -9,5 +9,5 @@ pub(crate) use cache::last_cache;
 pub use formula::Formula;
 pub(crate) use grainwake_simd::{Aligned, Real};
 pub use grainwake_simd::{InstructionSet, Precision, instructions, limit_instructions};
-pub use linear::{Matrix6, Vector6, solve6};
+pub(crate) use linear::{Matrix6, Vector6, solve6};
 pub use pose::{Load, Pose};

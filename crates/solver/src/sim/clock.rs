@@ -1,10 +1,10 @@
-//! Time, step count and the choice of the time step.
+//! Time-step control.
 
 use super::{Setup, StepRule};
 
-/// Where the simulation is in time.
+/// Simulated time and time-step control.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Clock {
+pub(super) struct Clock {
     /// Simulated time [s].
     pub time: f64,
     /// Steps taken.
@@ -14,18 +14,18 @@ pub struct Clock {
     rule: StepRule,
     /// nu * sum 1/h_a^2 over the resolved axes [1/s]; zero without fluid.
     viscous_rate: f64,
-    /// First step from rest: gravity moves a grain by `cfl` cells in it at most [s].
+    /// Longest first step: from rest, gravity moves no grain by more than `cfl` cells in it [s].
     first_step: f64,
 }
 
-/// A step grows by this factor at most, which keeps the extrapolation in time tame.
+/// Largest ratio of successive steps: Adams-Bashforth extrapolates over the previous step.
 const LARGEST_GROWTH: f64 = 1.2;
-/// It grows by more, to take one step fewer to the next output, where it stays this far below its
-/// limit, so that it does not change to and fro.
-const CLEARLY: f64 = 0.95;
+/// Fraction of the stability limit up to which one step fewer to the next output is taken; this
+/// hysteresis keeps the number of steps from alternating.
+const HYSTERESIS: f64 = 0.95;
 
 impl Clock {
-    /// At t = 0.
+    /// Clock at t = 0.
     pub fn new(setup: &Setup) -> Clock {
         let mesh = &setup.mesh;
         let resolved = (0..3).filter(|&axis| mesh.cells[axis] > 1);
@@ -37,14 +37,16 @@ impl Clock {
             .map(|axis| mesh.spacing[axis])
             .fold(f64::INFINITY, f64::min);
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
-        let pull = setup
+        let acceleration = setup
             .grains
             .iter()
             .map(|grain| setup.gravity.length() * (1.0 - fluid_density / grain.density).abs())
             .chain(setup.fluid.map(|fluid| fluid.body_acceleration.length()))
             .fold(0.0, f64::max);
         let first_step = match setup.step {
-            StepRule::Limits { cfl, .. } if pull > 0.0 => (cfl * smallest / pull).sqrt(),
+            StepRule::Limits { cfl, .. } if acceleration > 0.0 => {
+                (cfl * smallest / acceleration).sqrt()
+            }
             _ => f64::INFINITY,
         };
         Clock {
@@ -59,10 +61,10 @@ impl Clock {
         }
     }
 
-    /// Next step [s]: by the rule, for a flow that crosses `rate` cells a second, and such that a
-    /// whole number of equal steps ends at `limit` [s] from now.
-    pub fn choose(&self, rate: f64, limit: f64) -> f64 {
-        let (largest, wanted) = match self.rule {
+    /// Length of the next step [s], such that a whole number of equal steps ends `horizon` [s] from
+    /// now; `rate` is max(sum |u_a| / h_a) of the flow [1/s].
+    pub fn next_step(&self, rate: f64, horizon: f64) -> f64 {
+        let (largest, preferred) = match self.rule {
             StepRule::Fixed(step) => (step, step),
             StepRule::Limits {
                 cfl,
@@ -78,22 +80,22 @@ impl Clock {
                 (largest, next.min(largest))
             }
         };
-        if !limit.is_finite() {
-            return wanted;
+        if !horizon.is_finite() {
+            return preferred;
         }
-        let count = (limit / wanted * (1.0 - 1e-12)).ceil().max(1.0);
-        // One step fewer, where steps of this length were taken before: a fifth of an interval
-        // never became a fourth by the usual growth.
-        let fewer = limit / (count - 1.0);
-        let as_before = self.last_step * count >= limit * (1.0 - 1e-9);
-        if count > 1.0 && as_before && fewer <= CLEARLY * largest {
+        let count = (horizon / preferred * (1.0 - 1e-12)).ceil().max(1.0);
+        // If the last step was a `count`-th of the horizon, one step fewer is tried: growth by
+        // LARGEST_GROWTH alone never reaches a fourth of an interval from a fifth.
+        let fewer = horizon / (count - 1.0);
+        let as_before = self.last_step * count >= horizon * (1.0 - 1e-9);
+        if count > 1.0 && as_before && fewer <= HYSTERESIS * largest {
             fewer
         } else {
-            limit / count
+            horizon / count
         }
     }
 
-    /// Moves on by `step` [s].
+    /// Advances the time by `step` [s].
     pub fn advance(&mut self, step: f64) {
         self.time += step;
         self.steps += 1;
@@ -105,7 +107,7 @@ impl Clock {
 mod tests {
     use super::*;
 
-    /// Steps over an interval of 1, the last one before it being `last`, none above `largest`.
+    /// Steps over an interval of 1 after a step of length `last`; none exceeds `largest`.
     fn interval(last: f64, largest: f64) -> Vec<f64> {
         let mut clock = Clock {
             time: 0.0,
@@ -121,7 +123,7 @@ mod tests {
         };
         let mut steps = Vec::new();
         while clock.time < 1.0 - 1e-9 {
-            let step = clock.choose(1.0, 1.0 - clock.time);
+            let step = clock.next_step(1.0, 1.0 - clock.time);
             assert!(step <= largest * (1.0 + 1e-9), "{step}");
             clock.advance(step);
             steps.push(step);

@@ -1,11 +1,12 @@
-//! What the method may break, measured.
+//! Conservation checks and other measures of the state.
 
 use glam::DVec3;
 
 use super::Simulation;
 
-/// Measures of the present state.
+/// Measures of the state at the end of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Diagnostics {
     /// Largest |div u| after projection [1/s].
     pub max_divergence: f64,
@@ -19,11 +20,11 @@ pub struct Diagnostics {
     pub fluid_kinetic_energy: f64,
     /// Kinetic energy of the grains [J].
     pub grain_kinetic_energy: f64,
-    /// Momentum of the box [kg m/s]: fluid in all cells plus what grains hold beyond the fluid they
-    /// displace.
+    /// Momentum of the box [kg m/s]: fluid in all cells plus that of the grains beyond the
+    /// displaced fluid.
     pub momentum: DVec3,
-    /// Momentum of fluid + grains + walls unaccounted for in the last step, as a fraction of what
-    /// moves: fluid density times box volume times the largest velocity.
+    /// Change of momentum of fluid, grains and walls in the last step that no force explains,
+    /// relative to fluid density times box volume times the largest velocity.
     pub momentum_residual: f64,
 }
 
@@ -40,7 +41,7 @@ impl Simulation {
             fluid.measures().max_rate * self.clock.last_step
         })
     }
-    /// Measures the present state.
+    /// Measures the state at the end of the last step.
     pub fn diagnostics(&self) -> Diagnostics {
         let grains = &self.setup.grains;
         let mut d = Diagnostics::default();
@@ -70,7 +71,8 @@ impl Simulation {
         d
     }
 
-    /// Root mean square, over all surface nodes in the box, of the fluid's velocity against the grain's.
+    /// Root mean square of the velocity of the fluid relative to the grain over all surface nodes
+    /// in the box [m/s].
     fn slip(&self) -> f64 {
         let (mut sum, mut area) = (0.0, 0.0);
         for grain in &self.setup.grains {

@@ -5,21 +5,29 @@ use std::io;
 use glam::DVec3;
 use grainwake_formats::codec::{Decoder, Encoder};
 
-use super::Setup;
+use super::fields::AnyFieldView;
+use super::probe::Probe;
+use super::setup::Setup;
 use crate::dem::Grain;
 use crate::flow::{Flow, FlowMeasures, FluidParams};
+use crate::grid::{Axis, FieldView};
 use crate::immersed::{CoupledGrains, ImmersedGrains, RigidStep, StepInput};
 use crate::math::{Precision, Real};
 use crate::poisson::Stages;
 
-/// Flow and coupling in either precision; the stages of a step (`stages.rs`) call it in order.
+/// Flow and coupling in either precision; called in order by the stages of a step (`stages.rs`).
 pub(super) trait Fluid: Send + Sync {
+    /// Replaces the body acceleration [m/s^2].
     fn set_body_acceleration(&mut self, acceleration: DVec3);
+    /// Predicts u* over `dt` [s] without the grains.
     fn predict(&mut self, dt: f64);
     /// First projection of the paper's scheme.
     fn project_prediction(&mut self, dt: f64);
+    /// Locates the grains and assembles their equations of motion.
     fn couple(&mut self, input: StepInput) -> CoupledGrains;
+    /// Solves for the velocities of the grains and imposes them on the forced faces.
     fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidStep);
+    /// Makes the velocity divergence-free.
     fn project(&mut self, dt: f64);
     /// Finds the faces near restored grains.
     fn locate(&mut self, grains: &[Grain]);
@@ -27,15 +35,23 @@ pub(super) trait Fluid: Send + Sync {
     fn measures(&self) -> &FlowMeasures;
     /// Momentum per density gained through the boundaries in a step of `dt` [s] [m^4/s].
     fn boundary_impulse(&self, dt: f64) -> DVec3;
-    /// Velocity component of the face at a position in memory [m/s].
-    fn velocity(&self, component: usize, at: usize) -> f64;
-    /// Dynamic pressure over density of the cell at a position in memory [m^2/s^2].
-    fn pressure(&self, at: usize) -> f64;
+    /// Velocity component along `axis` on its faces [m/s].
+    fn velocity(&self, axis: Axis) -> AnyFieldView<'_>;
+    /// Dynamic pressure over density at the cell centres [m^2/s^2].
+    fn kinematic_pressure(&self) -> AnyFieldView<'_>;
+    /// Velocity [m/s] at the centre of cell (i, j, k), counted from 0.
+    fn velocity_at(&self, cell: [usize; 3]) -> DVec3;
+    /// Vorticity [1/s] at the centre of cell (i, j, k), counted from 0.
+    fn vorticity_at(&self, cell: [usize; 3]) -> DVec3;
+    /// Velocity [m/s] at a point; `None` outside the box.
+    fn interpolate_velocity(&self, x: DVec3) -> Option<DVec3>;
+    /// Wall time that the Poisson solver has spent in each of its stages.
     fn poisson_stages(&self) -> Stages;
     /// Memory held [bytes].
     fn bytes(&self) -> usize;
+    /// Writes measures and fields.
     fn save(&self, out: &mut Encoder) -> io::Result<()>;
-    /// Reads what `save` wrote; `last_step` [s] is the length of the last step.
+    /// Restores the state written by `save`; `last_step` [s] is the length of the last step.
     fn restore(&mut self, input: &mut Decoder, last_step: f64) -> io::Result<()>;
 }
 
@@ -54,6 +70,13 @@ struct FluidOf<R> {
 }
 
 impl<R: Real> FluidOf<R> {
+    fn probe(&self) -> Probe<'_, R> {
+        Probe {
+            velocity: &self.flow.velocity,
+            mesh: self.flow.mesh(),
+            boundaries: self.flow.boundaries(),
+        }
+    }
     fn start(setup: &Setup, params: &FluidParams) -> FluidOf<R> {
         let mut flow = Flow::new(&setup.mesh, setup.boundaries, params);
         if let Some(velocity) = &setup.prescription.initial_velocity {
@@ -70,7 +93,10 @@ impl<R: Real> FluidOf<R> {
     }
 }
 
-impl<R: Real> Fluid for FluidOf<R> {
+impl<R: Real> Fluid for FluidOf<R>
+where
+    for<'a> AnyFieldView<'a>: From<FieldView<'a, R>>,
+{
     fn set_body_acceleration(&mut self, acceleration: DVec3) {
         self.flow.set_body_acceleration(acceleration);
     }
@@ -98,11 +124,20 @@ impl<R: Real> Fluid for FluidOf<R> {
     fn boundary_impulse(&self, dt: f64) -> DVec3 {
         self.flow.boundary_impulse(dt)
     }
-    fn velocity(&self, component: usize, at: usize) -> f64 {
-        self.flow.velocity.component(component)[at].wide()
+    fn velocity(&self, axis: Axis) -> AnyFieldView<'_> {
+        self.flow.velocity_view(axis).into()
     }
-    fn pressure(&self, at: usize) -> f64 {
-        self.flow.pressure[at].wide()
+    fn kinematic_pressure(&self) -> AnyFieldView<'_> {
+        self.flow.pressure_view().into()
+    }
+    fn velocity_at(&self, cell: [usize; 3]) -> DVec3 {
+        self.probe().velocity_at(cell)
+    }
+    fn vorticity_at(&self, cell: [usize; 3]) -> DVec3 {
+        self.probe().vorticity_at(cell)
+    }
+    fn interpolate_velocity(&self, x: DVec3) -> Option<DVec3> {
+        self.probe().interpolate_velocity(x)
     }
     fn poisson_stages(&self) -> Stages {
         self.flow.poisson_stages()

@@ -3,10 +3,12 @@
 mod clock;
 mod diagnostics;
 pub mod events;
+mod fields;
 mod fluid;
 mod prescription;
 mod probe;
 mod setup;
+mod solid_fraction;
 mod stability;
 mod stages;
 mod state;
@@ -15,28 +17,35 @@ mod step;
 mod tests;
 mod timing;
 
-use crate::dem::{Contact, Dynamics, Grain, Response, State};
+use crate::dem::{Contact, Dynamics, Grain, Response, RigidState};
 use crate::grid::Mesh;
 use crate::immersed::{GrainKinematics, PreviousStep};
 use crate::math::{Load, Pose};
 use crate::poisson::Stages;
 
+use clock::Clock;
 use fluid::Fluid;
 use timing::PassTimes;
 
-pub use clock::Clock;
 pub use diagnostics::Diagnostics;
-pub use prescription::{Drive, Prescription};
+pub use fields::{AnyFieldView, CELL_FIELDS, CellField};
+pub use prescription::{PrescribedMotion, Prescription};
 pub use setup::{Setup, SetupError, StepRule};
 pub use stability::StepError;
 
-/// A running simulation.
+/// Simulation of grains in a fluid, or of grains alone.
+///
+/// Units are SI. Positions, velocities and loads are in the space frame, angular velocities and
+/// torques too; torques are about the centroid of their grain. RigidState refers to the end of the last
+/// step. Built by [`Simulation::new`], advanced by [`Simulation::step`], and stored bit for bit by
+/// [`Simulation::save`] and [`Simulation::restore`]. Results do not depend on the number of
+/// threads.
 pub struct Simulation {
     setup: Setup,
     clock: Clock,
     fluid: Option<Box<dyn Fluid>>,
     dynamics: Dynamics,
-    /// Hydrodynamic load on each grain over the last step.
+    /// Mean hydrodynamic load on each grain over the last step.
     loads: Vec<Load>,
     /// Change of momentum in the last step not explained by forces [kg m/s].
     momentum_residual: glam::DVec3,
@@ -44,22 +53,20 @@ pub struct Simulation {
     times: PassTimes,
 }
 
-/// Data of a step, one entry per grain.
+/// Data of a step; each list has one entry per grain.
 struct GrainData {
     previous: Vec<PreviousStep>,
     kinematics: Vec<GrainKinematics>,
     /// Weight less buoyancy.
     applied: Vec<Load>,
-    /// Applied load and the hydrodynamic load of the last step.
+    /// Load during the sub-steps: applied load and hydrodynamic load of the last step.
     driving: Vec<Load>,
-    /// Mean contact loads.
+    /// Mean contact loads over the step.
     contact: Vec<Load>,
     responses: Vec<Response>,
-    /// Whether contact was resolved with the fluid's response.
-    resolved: bool,
-    /// States at the end of the sub-steps that were repeated.
-    ends: Vec<State>,
-    /// Poses at which the faces near the grains were found.
+    /// States at the end of the contact sub-steps with the fluid's response.
+    ends: Vec<RigidState>,
+    /// Poses at which the grains were located on the grid.
     located: Vec<Pose>,
 }
 
@@ -73,17 +80,21 @@ impl GrainData {
             driving: vec![Load::default(); count],
             contact: vec![Load::default(); count],
             responses: Vec::with_capacity(count),
-            resolved: false,
-            ends: grains.iter().map(State::of).collect(),
+            ends: grains.iter().map(RigidState::of).collect(),
             located: grains.iter().map(|grain| grain.pose).collect(),
         }
     }
 }
 
 impl Simulation {
-    /// Builds the simulation at t = 0; the fluid next to moving grains starts at their velocity.
-    pub fn new(setup: Setup) -> Result<Simulation, SetupError> {
+    /// Builds the simulation at t = 0. The fluid inside and next to a grain starts at the velocity
+    /// of the grain.
+    ///
+    /// # Errors
+    /// [`SetupError::Inconsistent`] if values of the set-up contradict each other.
+    pub fn new(mut setup: Setup) -> Result<Simulation, SetupError> {
         setup.validate()?;
+        (setup.prescription).prescribe_motion(&mut setup.grains, 0.0);
         let enclosure = setup.enclosure();
         let fluid = setup.fluid.map(|params| fluid::start(&setup, &params));
         let initial = fluid
@@ -107,7 +118,7 @@ impl Simulation {
     pub fn time(&self) -> f64 {
         self.clock.time
     }
-    /// Steps taken.
+    /// Number of steps taken.
     pub fn steps(&self) -> u64 {
         self.clock.steps
     }
@@ -119,15 +130,16 @@ impl Simulation {
     pub fn mesh(&self) -> &Mesh {
         &self.setup.mesh
     }
-    /// The set-up, with the grains in their present state.
+    /// The set-up; its grains are in their present state.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
-    /// The grains.
+    /// Grains in their present state.
     pub fn grains(&self) -> &[Grain] {
         &self.setup.grains
     }
-    /// Hydrodynamic load on each grain over the last step (Eq. 5), buoyancy excluded.
+    /// Mean hydrodynamic load on each grain over the last step (Eq. 5), without buoyancy: force [N]
+    /// and torque about the centroid [N m], space frame.
     pub fn loads(&self) -> &[Load] {
         &self.loads
     }

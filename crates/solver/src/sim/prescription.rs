@@ -1,4 +1,4 @@
-//! What is given by formulas: the velocity at the start, and what changes with time.
+//! Quantities prescribed by formulas: initial velocity, body acceleration, motion of grains.
 
 use glam::DVec3;
 
@@ -6,46 +6,59 @@ use crate::dem::{Dof, Grain};
 use crate::grid::Mesh;
 use crate::math::Formula;
 
-/// Formulas of a set-up; where one is given it goes before the constant of the same name.
+/// Formulas of a set-up; a formula overrides the constant of the same name.
 #[derive(Clone, Debug, Default)]
 pub struct Prescription {
-    /// Velocity of the fluid at the start [m/s], of x, y, z [m].
+    /// Initial velocity of the fluid [m/s], a function of x, y, z [m].
     pub initial_velocity: Option<Formula>,
-    /// Body acceleration of the fluid [m/s^2], of t [s].
+    /// Body acceleration of the fluid [m/s^2], a function of t [s].
     pub body_acceleration: Option<Formula>,
-    /// Motions of grains, of t [s].
-    pub motions: Vec<Drive>,
+    /// Prescribed motions of grains, functions of t [s].
+    pub motions: Vec<PrescribedMotion>,
 }
 
-/// Motion of one grain.
+/// Prescribed motion of one grain; components without a formula keep their [`Dof`].
 #[derive(Clone, Debug)]
-pub struct Drive {
-    /// Number of the grain.
+pub struct PrescribedMotion {
+    /// Index of the grain.
     pub grain: usize,
-    /// Velocity [m/s].
+    /// Velocity of the centroid [m/s].
     pub velocity: Option<Formula>,
-    /// Angular velocity, axes of space [rad/s].
+    /// Angular velocity, space frame [rad/s].
     pub angular_velocity: Option<Formula>,
 }
 
 impl Prescription {
-    /// Sets the prescribed velocities of `grains` to those of `time` [s].
-    pub fn drive(&self, grains: &mut [Grain], time: f64) {
-        for drive in &self.motions {
-            let grain = &mut grains[drive.grain];
-            if let Some(formula) = &drive.velocity {
-                grain.velocity = formula.at(&[time]);
+    /// Prescribes the velocities at `time` [s] to the grains: as their degrees of freedom over the
+    /// next step, and as their present velocities.
+    pub fn prescribe_motion(&self, grains: &mut [Grain], time: f64) {
+        self.set_velocities(grains, time);
+        for motion in &self.motions {
+            let grain = &mut grains[motion.grain];
+            if motion.velocity.is_some() {
                 grain.translation = Dof::Prescribed(grain.velocity);
             }
-            if let Some(formula) = &drive.angular_velocity {
-                grain.angular_velocity = formula.at(&[time]);
+            if motion.angular_velocity.is_some() {
                 grain.rotation = Dof::Prescribed(grain.angular_velocity);
             }
         }
     }
 
-    /// Largest sum of the absolute components of the velocity at the start [m/s], on some thirty
-    /// points along each axis of `mesh`; NaN where a formula is not defined.
+    /// Sets the present velocities of the grains with prescribed motion to those at `time` [s].
+    pub(super) fn set_velocities(&self, grains: &mut [Grain], time: f64) {
+        for motion in &self.motions {
+            let grain = &mut grains[motion.grain];
+            if let Some(formula) = &motion.velocity {
+                grain.velocity = formula.at(&[time]);
+            }
+            if let Some(formula) = &motion.angular_velocity {
+                grain.angular_velocity = formula.at(&[time]);
+            }
+        }
+    }
+
+    /// Largest sum of the absolute components of the initial velocity [m/s], sampled at about
+    /// thirty points along each axis of `mesh`; NaN if a formula is undefined at one of them.
     pub fn initial_speed(&self, mesh: &Mesh) -> Option<f64> {
         let formula = self.initial_velocity.as_ref()?;
         let points = |axis: usize| {
@@ -68,7 +81,7 @@ impl Prescription {
         Some(largest)
     }
 
-    /// Body acceleration of the fluid at `time` [s], where a formula gives it [m/s^2].
+    /// Body acceleration of the fluid at `time` [s] if a formula prescribes it [m/s^2].
     pub fn body_acceleration(&self, time: f64) -> Option<DVec3> {
         let formula = self.body_acceleration.as_ref()?;
         Some(formula.at(&[time]))

@@ -1,4 +1,4 @@
-//! Everything a simulation is built from, validated.
+//! Set-up of a simulation and its validation.
 
 use glam::DVec3;
 
@@ -10,57 +10,133 @@ use crate::math::Precision;
 
 use super::Prescription;
 
-/// How the time step is chosen.
+/// Rule for the length of the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepRule {
-    /// The same step always [s].
+    /// Constant step [s].
     Fixed(f64),
-    /// The largest step that keeps both limits.
+    /// Largest step within all limits; the default has CFL number 0.4 and viscous number 0.2.
     Limits {
-        /// dt * max(sum |u_a| / h_a) at most this.
+        /// Largest CFL number dt * max(sum |u_a| / h_a).
         cfl: f64,
-        /// nu dt sum 1/h_a^2 at most this.
+        /// Largest viscous number nu dt sum 1/h_a^2.
         viscous: f64,
-        /// Never above this [s].
+        /// Largest step [s].
         max_step: f64,
     },
 }
 
-/// A validated set-up.
+impl Default for StepRule {
+    fn default() -> StepRule {
+        StepRule::Limits {
+            cfl: 0.4,
+            viscous: 0.2,
+            max_step: f64::INFINITY,
+        }
+    }
+}
+
+/// Set-up of a simulation: everything that determines its course.
+///
+/// [`Setup::new`] has defaults for all but the grid, and the `with_` methods replace them. All
+/// lengths are in metres, vectors in the space frame; [`Simulation::new`](super::Simulation::new)
+/// validates the set-up.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Setup {
     /// The grid.
     pub mesh: Mesh,
-    /// Conditions on the faces of the box.
+    /// Conditions on the faces of the box; by default no-slip walls at rest.
     pub boundaries: Boundaries,
-    /// The fluid; none for a dry run (contact only).
+    /// The fluid; by default none, which leaves contact and motion alone (a dry run).
     pub fluid: Option<FluidParams>,
-    /// Numbers that the fields are made of.
+    /// Floating-point precision of the fields; by default double.
     pub precision: Precision,
     /// Coupling scheme.
     pub scheme: Scheme,
-    /// Gravity [m/s^2].
+    /// Gravity [m/s^2]; by default zero.
     pub gravity: DVec3,
-    /// The grains at t = 0.
+    /// The grains at t = 0; during a run, in their present state.
     pub grains: Vec<Grain>,
-    /// Contact law.
+    /// Parameters of the contact law.
     pub contact: ContactParams,
-    /// Time step.
+    /// Rule for the time step.
     pub step: StepRule,
-    /// What formulas give.
+    /// Quantities prescribed by formulas.
     pub prescription: Prescription,
 }
 
-/// A set-up that cannot be simulated.
+/// Set-up that cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
-    /// Some values contradict each other.
+    /// Contradiction between values.
     #[error("{0}")]
     Inconsistent(String),
 }
 
 impl Setup {
-    /// The box as the grains see it.
+    /// Set-up of a box with walls, without fluid, grains and gravity.
+    pub fn new(mesh: Mesh) -> Setup {
+        Setup {
+            mesh,
+            boundaries: Boundaries([[Boundary::WALL; 2]; 3]),
+            fluid: None,
+            precision: Precision::Double,
+            scheme: Scheme::default(),
+            gravity: DVec3::ZERO,
+            grains: Vec::new(),
+            contact: ContactParams::default(),
+            step: StepRule::default(),
+            prescription: Prescription::default(),
+        }
+    }
+    /// Replaces the boundary conditions, lower and upper side of each axis.
+    pub fn with_boundaries(mut self, boundaries: [[Boundary; 2]; 3]) -> Setup {
+        self.boundaries = Boundaries(boundaries);
+        self
+    }
+    /// Fills the box with a fluid; `None` leaves it empty.
+    pub fn with_fluid(mut self, fluid: impl Into<Option<FluidParams>>) -> Setup {
+        self.fluid = fluid.into();
+        self
+    }
+    /// Replaces the floating-point precision of the fields.
+    pub fn with_precision(mut self, precision: Precision) -> Setup {
+        self.precision = precision;
+        self
+    }
+    /// Replaces the coupling scheme.
+    pub fn with_scheme(mut self, scheme: Scheme) -> Setup {
+        self.scheme = scheme;
+        self
+    }
+    /// Replaces gravity [m/s^2].
+    pub fn with_gravity(mut self, gravity: DVec3) -> Setup {
+        self.gravity = gravity;
+        self
+    }
+    /// Adds grains, whose indices follow those already there.
+    pub fn with_grains(mut self, grains: impl IntoIterator<Item = Grain>) -> Setup {
+        self.grains.extend(grains);
+        self
+    }
+    /// Replaces the parameters of the contact law.
+    pub fn with_contact(mut self, contact: ContactParams) -> Setup {
+        self.contact = contact;
+        self
+    }
+    /// Replaces the rule for the time step.
+    pub fn with_step(mut self, step: StepRule) -> Setup {
+        self.step = step;
+        self
+    }
+    /// Replaces the quantities prescribed by formulas.
+    pub fn with_prescription(mut self, prescription: Prescription) -> Setup {
+        self.prescription = prescription;
+        self
+    }
+
+    /// Walls and periodic axes of the box for contact.
     pub fn enclosure(&self) -> Enclosure {
         Enclosure {
             lower: self.mesh.origin,
@@ -73,10 +149,10 @@ impl Setup {
         }
     }
 
-    /// Checks what the parts cannot check alone.
+    /// Checks the parts of the set-up against each other.
     ///
     /// # Errors
-    /// [`SetupError::Inconsistent`] with what contradicts what.
+    /// [`SetupError::Inconsistent`] names the contradiction.
     pub fn validate(&self) -> Result<(), SetupError> {
         let fail = |message: String| Err(SetupError::Inconsistent(message));
         let open = |side: &Boundary| matches!(side, Boundary::Outflow);
@@ -112,6 +188,21 @@ impl Setup {
         }
         if let Some(i) = self.grains.iter().position(|grain| !bounded(grain.density)) {
             return fail(format!("the density of grain {i} must be positive"));
+        }
+        let motions = &self.prescription.motions;
+        if let Some(motion) = motions.iter().find(|m| m.grain >= self.grains.len()) {
+            return fail(format!(
+                "a motion is given for grain {}, which is not there",
+                motion.grain
+            ));
+        }
+        let step = match self.step {
+            StepRule::Limits { max_step, .. } if self.fluid.is_none() => max_step,
+            StepRule::Limits { max_step, .. } => max_step.min(f64::MAX),
+            StepRule::Fixed(step) => step,
+        };
+        if !bounded(step) {
+            return fail("the time step must be positive and, without a fluid, finite".into());
         }
         Ok(())
     }

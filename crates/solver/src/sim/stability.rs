@@ -2,10 +2,10 @@
 
 use super::Simulation;
 
-/// Why a step failed.
+/// Failure of a step.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
-    /// The numerics failed.
+    /// The state is not finite or changes too fast.
     #[error("the run became unstable at t = {time:.6e} s (step {step}): {what}; try {remedy}")]
     Unstable {
         /// Time [s].
@@ -19,11 +19,11 @@ pub enum StepError {
     },
 }
 
-/// CFL number above which a step has lost all accuracy.
+/// CFL number above which a step counts as unstable.
 const MAX_CFL: f64 = 10.0;
 
 impl Simulation {
-    /// Fails if the state is not finite or the speed of the flow has jumped.
+    /// Checks that the state is finite and the CFL number below its bound.
     pub(super) fn check_stability(&self) -> Result<(), StepError> {
         let unstable = |what: String, remedy: &str| {
             Err(StepError::Unstable {

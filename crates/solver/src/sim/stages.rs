@@ -1,5 +1,5 @@
-//! Stages of a coupled time step. Each is a value that the next one consumes, so that they can only
-//! be called in order.
+//! Stages of a time step. Each is a value that the next one consumes, so that they can only be
+//! called in order.
 
 use glam::DVec3;
 
@@ -7,93 +7,148 @@ use super::fluid::Fluid;
 use super::prescription::Prescription;
 use super::timing::{PassTimes, timed};
 use super::{GrainData, Simulation};
-use crate::dem::{Dof, Dynamics, Grain, State};
+use crate::dem::{Dof, Dynamics, Grain, RigidState, TrialStep};
 use crate::immersed::{
-    CoupledGrains, GrainKinematics, PreviousStep, RigidStep, RigidVelocity, Scheme, StepInput,
+    CoupledGrains, GrainKinematics, RigidStep, RigidVelocity, Scheme, StepInput,
 };
 use crate::math::Load;
 
-/// State that all stages work on.
-struct Context<'a> {
+/// Grains of a step, with or without fluid.
+struct GrainStep<'a> {
     grains: &'a mut [Grain],
-    fluid: &'a mut dyn Fluid,
     dynamics: &'a mut Dynamics,
+    /// Hydrodynamic loads; zero without fluid.
     loads: &'a mut [Load],
     data: &'a mut GrainData,
-    times: &'a mut PassTimes,
-    momentum_residual: &'a mut DVec3,
     prescription: &'a Prescription,
-    scheme: Scheme,
-    fluid_density: f64,
+    times: &'a mut PassTimes,
     /// Time at the start of the step [s].
     time: f64,
     /// Length of the step [s].
     dt: f64,
 }
 
+/// Fluid of a step.
+struct FluidStep<'a> {
+    fluid: &'a mut dyn Fluid,
+    scheme: Scheme,
+    /// Density [kg/m^3].
+    density: f64,
+    momentum_residual: &'a mut DVec3,
+}
+
+/// State that all stages of a coupled step work on.
+struct Context<'a> {
+    solid: GrainStep<'a>,
+    flow: FluidStep<'a>,
+}
+
 /// Step about to begin.
-pub(super) struct Start<'a>(Context<'a>);
+pub(super) enum Start<'a> {
+    Coupled(CoupledStart<'a>),
+    Dry(DryStart<'a>),
+}
+
+/// Coupled step about to begin.
+pub(super) struct CoupledStart<'a>(Context<'a>);
+/// Step without fluid about to begin.
+pub(super) struct DryStart<'a>(GrainStep<'a>);
 /// Flow predicted without the grains.
 pub(super) struct Predicted<'a>(Context<'a>);
-/// Grains at their new poses.
-pub(super) struct Moved<'a>(Context<'a>);
+/// Grains at their new poses, by a trial step of contact.
+pub(super) struct Moved<'a>(Context<'a>, TrialStep);
 /// Grains located, with their equations of motion.
-pub(super) struct Coupled<'a>(Context<'a>, CoupledGrains);
+pub(super) struct Coupled<'a>(Context<'a>, CoupledGrains, TrialStep);
 /// Contact loads known.
-pub(super) struct Resolved<'a>(Context<'a>, CoupledGrains);
+pub(super) struct Resolved<'a>(Context<'a>, CoupledGrains, Substeps);
 /// Rigid velocities imposed on the prediction.
-pub(super) struct Rigid<'a>(Context<'a>);
+pub(super) struct Rigid<'a>(Context<'a>, Substeps);
 /// Divergence-free velocity; with the momentum of the fluid before the projection.
-pub(super) struct Projected<'a>(Context<'a>, DVec3);
+pub(super) struct Projected<'a>(Context<'a>, Substeps, DVec3);
+
+/// Contact sub-steps that determine the poses at the end of a step.
+#[derive(Clone, Copy)]
+enum Substeps {
+    /// Sub-steps under the hydrodynamic load of the last step, if no grain was touched.
+    Explicit,
+    /// Repeated sub-steps with the response of the fluid in this step.
+    WithResponse,
+}
 
 impl<'a> Start<'a> {
-    /// Records the state before the step of `dt` [s] and applies what is prescribed; `None` without
-    /// fluid.
-    pub fn new(sim: &'a mut Simulation, dt: f64) -> Option<Start<'a>> {
-        let Simulation {
-            setup,
-            clock,
-            fluid,
-            dynamics,
-            loads,
-            data,
-            times,
-            momentum_residual,
-        } = sim;
-        let (fluid, params) = (fluid.as_deref_mut()?, setup.fluid?);
-        let (grains, time) = (&mut setup.grains[..], clock.time);
-        for (i, grain) in grains.iter().enumerate() {
+    /// Records the state before the step of `dt` [s] and sets weight, buoyancy and prescribed
+    /// motion.
+    pub fn new(sim: &'a mut Simulation, dt: f64) -> Start<'a> {
+        let (setup, time) = (&mut sim.setup, sim.clock.time);
+        let solid = GrainStep {
+            grains: &mut setup.grains,
+            dynamics: &mut sim.dynamics,
+            loads: &mut sim.loads,
+            data: &mut sim.data,
+            prescription: &setup.prescription,
+            times: &mut sim.times,
+            time,
+            dt,
+        };
+        let fluid_density = setup.fluid.map_or(0.0, |params| params.density);
+        let data = &mut *solid.data;
+        for (i, grain) in solid.grains.iter().enumerate() {
             data.previous[i].velocity = RigidVelocity::of(grain);
-            data.applied[i] = weight_less_buoyancy(grain, setup.gravity, params.density);
+            data.applied[i] = weight_less_buoyancy(grain, setup.gravity, fluid_density);
         }
-        // Prescribed velocities during the sub-steps are those of the middle of the step.
-        setup.prescription.drive(grains, time + 0.5 * dt);
-        for (kinematics, grain) in data.kinematics.iter_mut().zip(&*grains) {
+        // Midpoint rule: the sub-steps take the prescribed velocities at the middle of the step.
+        (setup.prescription).prescribe_motion(solid.grains, time + 0.5 * dt);
+        let Some(fluid) = sim.fluid.as_deref_mut() else {
+            return Start::Dry(DryStart(solid));
+        };
+        for (kinematics, grain) in data.kinematics.iter_mut().zip(&*solid.grains) {
             *kinematics = GrainKinematics::of(grain);
         }
         if let Some(acceleration) = setup.prescription.body_acceleration(time) {
             fluid.set_body_acceleration(acceleration);
         }
-        Some(Start(Context {
-            grains,
+        let flow = FluidStep {
             fluid,
-            dynamics,
-            loads,
-            data,
-            times,
-            momentum_residual,
-            prescription: &setup.prescription,
             scheme: setup.scheme,
-            fluid_density: params.density,
-            time,
-            dt,
-        }))
+            density: fluid_density,
+            momentum_residual: &mut sim.momentum_residual,
+        };
+        Start::Coupled(CoupledStart(Context { solid, flow }))
     }
+}
 
+impl GrainStep<'_> {
+    /// Moves the grains in contact sub-steps under weight, buoyancy and the hydrodynamic load of
+    /// the last step (Eqs 6 to 36).
+    fn trial_step(&mut self) -> TrialStep {
+        let data = &mut *self.data;
+        for (i, driving) in data.driving.iter_mut().enumerate() {
+            *driving = data.applied[i] + self.loads[i];
+        }
+        let trial = timed(&mut self.times.contact, || {
+            (self.dynamics).trial_step(self.grains, &data.driving, self.dt, &mut data.contact)
+        });
+        let end = self.time + self.dt;
+        self.prescription.set_velocities(self.grains, end);
+        trial
+    }
+}
+
+impl DryStart<'_> {
+    /// Moves the grains in contact sub-steps; nothing else happens without fluid.
+    pub fn move_grains(self) {
+        let DryStart(mut step) = self;
+        let trial = step.trial_step();
+        step.dynamics.accept(trial);
+    }
+}
+
+impl<'a> CoupledStart<'a> {
     /// Predicts the flow without the grains.
     pub fn predict(self) -> Predicted<'a> {
-        let Start(step) = self;
-        timed(&mut step.times.predict, || step.fluid.predict(step.dt));
+        let CoupledStart(mut step) = self;
+        let Context { solid, flow } = &mut step;
+        timed(&mut solid.times.predict, || flow.fluid.predict(solid.dt));
         Predicted(step)
     }
 }
@@ -101,138 +156,122 @@ impl<'a> Start<'a> {
 impl<'a> Predicted<'a> {
     /// Moves the grains in contact sub-steps under the hydrodynamic load of the last step.
     pub fn move_grains(self) -> Moved<'a> {
-        let Predicted(step) = self;
-        let (grains, data) = (&mut *step.grains, &mut *step.data);
-        for (i, driving) in data.driving.iter_mut().enumerate() {
-            *driving = data.applied[i] + step.loads[i];
-        }
-        timed(&mut step.times.contact, || {
-            step.dynamics.remember(grains);
-            (step.dynamics).advance(grains, &data.driving, step.dt, &mut data.contact)
-        });
-        step.prescription.drive(grains, step.time + step.dt);
-        for (i, applied) in data.applied.iter_mut().enumerate() {
-            *applied = data.driving[i] + step.loads[i] * -1.0;
-        }
-        Moved(step)
+        let Predicted(mut step) = self;
+        let trial = step.solid.trial_step();
+        Moved(step, trial)
     }
 }
 
 impl<'a> Moved<'a> {
-    /// Locates the grains and assembles their equations of motion with the impulse of the fluid. The
-    /// paper's scheme projects the prediction first.
+    /// Locates the grains and assembles their equations of motion with the impulse of the fluid.
+    /// The paper's scheme projects the prediction first.
     pub fn couple(self) -> Coupled<'a> {
-        let Moved(step) = self;
-        if step.scheme == Scheme::Paper {
-            timed(&mut step.times.project, || {
-                step.fluid.project_prediction(step.dt)
+        let Moved(mut step, trial) = self;
+        let Context { solid, flow } = &mut step;
+        let dt = solid.dt;
+        if flow.scheme == Scheme::Paper {
+            timed(&mut solid.times.project, || {
+                flow.fluid.project_prediction(dt)
             });
         }
         let input = StepInput {
-            grains: step.grains,
-            kinematics: &step.data.kinematics,
-            previous: &step.data.previous,
-            contact: &step.data.contact,
-            applied: &step.data.applied,
-            dt: step.dt,
+            grains: solid.grains,
+            kinematics: &solid.data.kinematics,
+            previous: &solid.data.previous,
+            contact: &solid.data.contact,
+            applied: &solid.data.applied,
+            dt,
         };
-        let coupled = timed(&mut step.times.coupling, || step.fluid.couple(input));
-        Coupled(step, coupled)
+        let coupled = timed(&mut solid.times.coupling, || flow.fluid.couple(input));
+        Coupled(step, coupled, trial)
     }
 }
 
 impl<'a> Coupled<'a> {
     /// Repeats the contact sub-steps with the fluid's response of this step if grains touch.
     pub fn resolve_contact(self) -> Resolved<'a> {
-        let Coupled(step, coupled) = self;
-        let (grains, data, dt) = (&mut *step.grains, &mut *step.data, step.dt);
-        data.resolved = data.contact.iter().any(|load| *load != Load::default());
-        if data.resolved {
-            let added_density = step.dynamics.params().added_density;
-            coupled.responses(
-                grains,
-                &data.previous,
-                added_density,
-                dt,
-                &mut data.responses,
-            );
-            step.prescription.drive(grains, step.time + 0.5 * dt);
-            timed(&mut step.times.contact, || {
-                let (contact, ends) = (&mut data.contact, &mut data.ends);
-                (step.dynamics).again(grains, &data.responses, dt, contact, ends)
-            });
-            step.prescription.drive(grains, step.time + dt);
+        let Coupled(mut step, coupled, trial) = self;
+        let solid = &mut step.solid;
+        let (grains, data, dt) = (&mut *solid.grains, &mut *solid.data, solid.dt);
+        if data.contact.iter().all(|load| *load == Load::default()) {
+            solid.dynamics.accept(trial);
+            return Resolved(step, coupled, Substeps::Explicit);
         }
-        Resolved(step, coupled)
+        let added_density = solid.dynamics.params().added_density;
+        let (previous, responses) = (&data.previous, &mut data.responses);
+        coupled.responses(grains, previous, added_density, dt, responses);
+        timed(&mut solid.times.contact, || {
+            let (contact, ends) = (&mut data.contact, &mut data.ends);
+            (solid.dynamics).resolve_with_response(trial, grains, &data.responses, contact, ends)
+        });
+        Resolved(step, coupled, Substeps::WithResponse)
     }
 }
 
 impl<'a> Resolved<'a> {
     /// Gives the grains their new velocities and imposes them on the forced faces.
     pub fn impose_rigidity(self) -> Rigid<'a> {
-        let Resolved(step, coupled) = self;
+        let Resolved(mut step, coupled, substeps) = self;
+        let Context { solid, flow } = &mut step;
         let rigid = RigidStep {
-            grains: step.grains,
-            previous: &step.data.previous,
-            contact: &step.data.contact,
-            dt: step.dt,
-            loads: step.loads,
+            grains: solid.grains,
+            previous: &solid.data.previous,
+            contact: &solid.data.contact,
+            dt: solid.dt,
+            loads: solid.loads,
         };
-        timed(&mut step.times.coupling, || {
-            step.fluid.impose_rigidity(coupled, rigid)
+        timed(&mut solid.times.coupling, || {
+            flow.fluid.impose_rigidity(coupled, rigid)
         });
-        Rigid(step)
+        Rigid(step, substeps)
     }
 }
 
 impl<'a> Rigid<'a> {
     /// Projects the velocity onto the divergence-free fields.
     pub fn project(self) -> Projected<'a> {
-        let Rigid(step) = self;
-        let momentum = step.fluid.measures().momentum;
-        timed(&mut step.times.project, || step.fluid.project(step.dt));
-        Projected(step, momentum)
+        let Rigid(mut step, substeps) = self;
+        let Context { solid, flow } = &mut step;
+        let momentum = flow.fluid.measures().momentum;
+        timed(&mut solid.times.project, || flow.fluid.project(solid.dt));
+        Projected(step, substeps, momentum)
     }
 }
 
 impl Projected<'_> {
     /// Balances the momentum and records what the next step needs.
     pub fn finish(self) {
-        let Projected(step, momentum) = self;
-        let (density, dt, data) = (step.fluid_density, step.dt, step.data);
-        let gain = step.fluid.measures().momentum - momentum;
-        let mut residual = density * (gain - step.fluid.boundary_impulse(dt));
-        for (i, (grain, load)) in step.grains.iter_mut().zip(&*step.loads).enumerate() {
+        let Projected(Context { solid, flow }, substeps, momentum) = self;
+        let (density, dt, data) = (flow.density, solid.dt, solid.data);
+        let gain = flow.fluid.measures().momentum - momentum;
+        let mut residual = density * (gain - flow.fluid.boundary_impulse(dt));
+        for (i, (grain, load)) in solid.grains.iter_mut().zip(&*solid.loads).enumerate() {
             data.located[i] = grain.pose;
-            if data.resolved {
+            if let Substeps::WithResponse = substeps {
                 grain.pose = data.ends[i].pose;
             }
-            let touched = data.contact[i] != Load::default();
             let previous = &mut data.previous[i];
             let change = RigidVelocity::of(grain) - previous.velocity;
             // The fluid lost what it gave the grain, the displaced fluid included.
             residual -= density * grain.shape.volume() * change.linear - dt * load.force;
-            *previous = PreviousStep {
-                velocity: previous.velocity,
-                // The acceleration of an impact does not continue in the next step.
-                acceleration: if touched {
-                    RigidVelocity::default()
-                } else {
-                    change / dt
-                },
-                pending_added_mass_velocity: if touched {
-                    beyond_substeps(grain, &data.ends[i])
-                } else {
-                    RigidVelocity::default()
-                },
+            let touched = data.contact[i] != Load::default();
+            // The acceleration of an impact does not continue in the next step; its added mass
+            // does.
+            (previous.acceleration, previous.pending_added_mass_velocity) = if touched {
+                (
+                    RigidVelocity::default(),
+                    beyond_substeps(grain, &data.ends[i]),
+                )
+            } else {
+                (change / dt, RigidVelocity::default())
             };
         }
-        *step.momentum_residual = residual;
+        *flow.momentum_residual = residual;
     }
 }
 
 /// Velocities of a grain beyond those at the end of its sub-steps; zero where they are prescribed.
-fn beyond_substeps(grain: &Grain, end: &State) -> RigidVelocity {
+fn beyond_substeps(grain: &Grain, end: &RigidState) -> RigidVelocity {
     let [linear, angular] = end.velocities;
     let beyond = RigidVelocity::of(grain) - RigidVelocity { linear, angular };
     let free = |dof: Dof, velocity: DVec3| match dof {
@@ -246,7 +285,7 @@ fn beyond_substeps(grain: &Grain, end: &State) -> RigidVelocity {
 }
 
 /// Weight of a grain less its buoyancy in a fluid of `fluid_density` [kg/m^3].
-pub(super) fn weight_less_buoyancy(grain: &Grain, gravity: DVec3, fluid_density: f64) -> Load {
+fn weight_less_buoyancy(grain: &Grain, gravity: DVec3, fluid_density: f64) -> Load {
     Load {
         force: gravity * (grain.density - fluid_density) * grain.shape.volume(),
         torque: DVec3::ZERO,

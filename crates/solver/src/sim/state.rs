@@ -1,4 +1,4 @@
-//! The full state, written and read bit for bit.
+//! State of a simulation as bytes, exact to the bit.
 
 use std::io::{self, Read, Write};
 
@@ -8,7 +8,10 @@ use super::Simulation;
 use crate::math::Load;
 
 impl Simulation {
-    /// Writes the full state; reading it back continues with the same bits.
+    /// Writes the full state; a simulation restored from it continues with identical bits.
+    ///
+    /// # Errors
+    /// Errors of the writer.
     pub fn save(&self, writer: &mut dyn Write) -> io::Result<()> {
         let mut out = Encoder::new(writer);
         out.u64(self.clock.steps)?;
@@ -45,7 +48,8 @@ impl Simulation {
     /// Restores a state written by [`Simulation::save`] from the same set-up.
     ///
     /// # Errors
-    /// `InvalidData` where the data do not fit this set-up; the simulation is then not to be used.
+    /// `InvalidData` if the state does not fit this set-up; the simulation is then unusable. Errors
+    /// of the reader.
     pub fn restore(&mut self, reader: &mut dyn Read) -> io::Result<()> {
         let mut input = Decoder::new(reader);
         self.clock.steps = input.u64()?;
@@ -69,7 +73,7 @@ impl Simulation {
         }
         if let Some(fluid) = &mut self.fluid {
             self.momentum_residual = input.vector()?;
-            // The faces belong to the poses at which the grains were located, before contact was resolved.
+            // Faces are found at the poses before contact was resolved.
             let mut grains = self.setup.grains.clone();
             for (grain, pose) in grains.iter_mut().zip(&mut self.data.located) {
                 pose.position = input.vector()?;

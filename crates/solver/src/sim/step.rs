@@ -1,20 +1,35 @@
 //! The time step, in the order of section 2 of the paper.
 
-use super::stages::{Start, weight_less_buoyancy};
-use super::timing::timed;
+use super::stages::Start;
 use super::{Simulation, StepError};
 
+/// Relative difference below which two times count as equal.
+const SAME_TIME: f64 = 1e-9;
+
 impl Simulation {
-    /// Advances the simulation by one time step; `limit` [s] caps it so that output times are met
-    /// exactly.
+    /// Advances the simulation to `time` [s], in steps of which the last ends there.
     ///
     /// # Errors
-    /// [`StepError::Unstable`] if the state is no longer finite or the CFL number has jumped.
-    pub fn step(&mut self, limit: f64) -> Result<(), StepError> {
+    /// [`StepError::Unstable`] as in [`Simulation::step`].
+    pub fn advance_to(&mut self, time: f64) -> Result<(), StepError> {
+        while self.clock.time < time * (1.0 - SAME_TIME) {
+            self.step(time - self.clock.time)?;
+        }
+        Ok(())
+    }
+
+    /// Advances the simulation by one time step. Its length is chosen by the
+    /// [`StepRule`](super::StepRule) and such that a whole number of equal steps ends `horizon` [s]
+    /// from now, which makes output times exact; an infinite horizon imposes no such condition.
+    ///
+    /// # Errors
+    /// [`StepError::Unstable`] if the state is no longer finite or the CFL number has jumped; the
+    /// simulation cannot be continued from such a state.
+    pub fn step(&mut self, horizon: f64) -> Result<(), StepError> {
         let rate = (self.fluid.as_ref()).map_or(0.0, |fluid| fluid.measures().max_rate);
-        let dt = self.clock.choose(rate, limit);
+        let dt = self.clock.next_step(rate, horizon);
         match Start::new(self, dt) {
-            Some(start) => {
+            Start::Coupled(start) => {
                 // u* of the momentum equation (Eqs 1b to 3), without the grains.
                 let predicted = start.predict();
                 // Contact sub-steps (Eqs 6 to 36) under the last hydrodynamic load.
@@ -29,23 +44,10 @@ impl Simulation {
                 let projected = rigid.project();
                 projected.finish();
             }
-            None => self.step_without_fluid(dt),
+            // Contact sub-steps alone (Eqs 6 to 36).
+            Start::Dry(start) => start.move_grains(),
         }
         self.clock.advance(dt);
         self.check_stability()
-    }
-
-    /// Contact sub-steps alone (Eqs 6 to 36).
-    fn step_without_fluid(&mut self, dt: f64) {
-        let (grains, prescription) = (&mut self.setup.grains, &self.setup.prescription);
-        for (load, grain) in self.data.applied.iter_mut().zip(&*grains) {
-            *load = weight_less_buoyancy(grain, self.setup.gravity, 0.0);
-        }
-        prescription.drive(grains, self.clock.time + 0.5 * dt);
-        let (dynamics, data) = (&mut self.dynamics, &mut self.data);
-        timed(&mut self.times.contact, || {
-            dynamics.advance(grains, &data.applied, dt, &mut data.contact)
-        });
-        prescription.drive(grains, self.clock.time + dt);
     }
 }

@@ -1,65 +1,45 @@
-use std::sync::Arc;
-
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
-use super::{Setup, Simulation, StepRule};
-use crate::dem::{ContactParams, Dof, Grain};
-use crate::flow::{Advection, Boundaries, Boundary, FluidParams};
-use crate::grid::Mesh;
-use crate::immersed::Scheme;
-use crate::math::{Pose, Precision};
+use super::{CELL_FIELDS, PrescribedMotion, Prescription, Setup, Simulation, StepRule};
+use crate::dem::Grain;
+use crate::flow::{Boundary, FluidParams};
+use crate::grid::{Axis, Mesh};
+use crate::math::Precision;
 use grainwake_simd::{InstructionSet, limit_instructions};
 
-/// A turned ellipsoid beside a wall and a sphere across the edges of a periodic box, which move.
+/// Rotated ellipsoid beside a wall and sphere across the edges of a periodic box, both moving.
 fn two_grains(precision: Precision) -> Setup {
-    let grain = |shape, position, velocity| Grain {
-        shape: Arc::new(shape),
-        density: 2.0,
-        pose: Pose {
-            position,
-            orientation: DQuat::from_scaled_axis(DVec3::new(0.4, 0.7, -0.3)),
-        },
-        velocity,
-        angular_velocity: DVec3::new(1.0, -2.0, 0.5),
-        translation: Dof::Free,
-        rotation: Dof::Free,
+    let orientation = DQuat::from_scaled_axis(DVec3::new(0.4, 0.7, -0.3));
+    let grain = |shape, position, velocity| {
+        Grain::new(shape, 2.0)
+            .with_position(position)
+            .with_orientation(orientation)
+            .with_velocity(velocity)
+            .with_angular_velocity(DVec3::new(1.0, -2.0, 0.5))
     };
     let ellipsoid = analytic::ellipsoid(0.5, 0.4, 0.35, &ShapeOptions::default()).unwrap();
     let along = |x, y, z| DVec3::new(x, y, z);
-    Setup {
-        prescription: Default::default(),
-        mesh: Mesh {
-            cells: [21, 18, 17],
-            spacing: DVec3::splat(0.125),
-            origin: DVec3::ZERO,
-        },
-        boundaries: Boundaries([
+    let mut fluid = FluidParams::new(1.0, 0.01);
+    fluid.initial_velocity = along(0.2, 0.1, 0.0);
+    Setup::new(Mesh::cubic([21, 18, 17], 0.125))
+        .with_boundaries([
             [Boundary::Periodic; 2],
             [Boundary::Periodic; 2],
             [Boundary::WALL; 2],
-        ]),
-        fluid: Some(FluidParams {
-            density: 1.0,
-            kinematic_viscosity: 0.01,
-            body_acceleration: DVec3::ZERO,
-            initial_velocity: along(0.2, 0.1, 0.0),
-            advection: Advection::Central,
-        }),
-        precision,
-        scheme: Scheme::Aperture,
-        gravity: along(0.0, 0.0, -1.0),
-        grains: vec![
+        ])
+        .with_fluid(fluid)
+        .with_precision(precision)
+        .with_gravity(along(0.0, 0.0, -1.0))
+        .with_grains([
             grain(ellipsoid, along(1.3, 1.1, 0.52), along(0.5, 0.2, 0.1)),
             grain(
                 Shape::sphere(0.4, 600),
                 along(0.1, 0.2, 1.5),
                 along(-0.3, 0.4, 0.2),
             ),
-        ],
-        contact: ContactParams::default(),
-        step: StepRule::Fixed(0.02),
-    }
+        ])
+        .with_step(StepRule::Fixed(0.02))
 }
 
 #[test]
@@ -69,9 +49,12 @@ fn bits_of_coupled_steps_do_not_depend_on_the_instruction_set() {
         for _ in 0..4 {
             sim.step(f64::INFINITY).unwrap();
         }
-        let fluid = sim.fluid.as_ref().unwrap();
-        let faces = sim.setup.mesh.layout().len();
-        let velocity = (0..3).flat_map(|axis| (0..faces).map(move |at| fluid.velocity(axis, at)));
+        let velocity = [Axis::X, Axis::Y, Axis::Z].into_iter().flat_map(|axis| {
+            let view = sim.velocity(axis).unwrap();
+            let [nz, ny, nx] = view.shape();
+            let rows = (0..nz).flat_map(move |k| (0..ny).map(move |j| (k, j)));
+            rows.flat_map(move |(k, j)| (0..nx).map(move |i| view.get([k, j, i])))
+        });
         let of = |grain: &Grain| [grain.pose.position, grain.velocity, grain.angular_velocity];
         let grains = sim.setup.grains.iter().flat_map(of);
         let all = velocity.chain(grains.flat_map(|v| v.to_array()));
@@ -89,5 +72,60 @@ fn bits_of_coupled_steps_do_not_depend_on_the_instruction_set() {
         });
         limit_instructions(InstructionSet::Avx512);
         assert!(widest == middle && widest == common, "{precision}");
+    }
+}
+
+#[test]
+fn views_hold_the_values_of_cells_and_points() {
+    for precision in [Precision::Double, Precision::Single] {
+        let mut sim = Simulation::new(two_grains(precision)).unwrap();
+        sim.step(f64::INFINITY).unwrap();
+        let [i, j, k] = [4, 17, 9];
+        for (n, axis) in [Axis::X, Axis::Y, Axis::Z].into_iter().enumerate() {
+            let view = sim.velocity(axis).unwrap();
+            assert_eq!(view.normal(), Some(axis));
+            let mut upper = [k, j, i];
+            upper[2 - n] += 1;
+            let mean = 0.5 * (view.get([k, j, i]) + view.get(upper));
+            assert_eq!(sim.velocity_at([i, j, k])[n], mean);
+            let at_face = sim.interpolate_velocity(view.position([k, j, i])).unwrap()[n];
+            assert!((at_face - view.get([k, j, i])).abs() < 1e-12 * at_face.abs());
+        }
+        let pressure = sim.kinematic_pressure().unwrap();
+        assert_eq!((pressure.normal(), pressure.shape()), (None, [17, 18, 21]));
+        let density = sim.setup().fluid.unwrap().density;
+        let [.., field, _] = &CELL_FIELDS;
+        let written = field.at(&sim, [i, j, k]).x;
+        assert_eq!(
+            (field.name, written),
+            ("pressure", density * pressure.get([k, j, i]))
+        );
+    }
+}
+
+#[test]
+fn contradictions_in_a_set_up_are_named() {
+    let motion = PrescribedMotion {
+        grain: 2,
+        velocity: None,
+        angular_velocity: None,
+    };
+    let prescription = Prescription {
+        motions: vec![motion],
+        ..Prescription::default()
+    };
+    let setup = || two_grains(Precision::Double);
+    let bad = [
+        (setup().with_prescription(prescription), "grain 2"),
+        (setup().with_step(StepRule::Fixed(0.0)), "time step"),
+        (
+            setup().with_fluid(None).with_step(StepRule::default()),
+            "without a fluid",
+        ),
+        (setup().with_fluid(FluidParams::new(0.0, 1.0)), "density"),
+    ];
+    for (setup, word) in bad {
+        let message = Simulation::new(setup).err().expect(word).to_string();
+        assert!(message.contains(word), "{message}");
     }
 }

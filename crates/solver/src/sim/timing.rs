@@ -6,14 +6,14 @@ use crate::poisson::Stages;
 
 use super::Simulation;
 
-/// Time spent in each pass since the start.
+/// Wall time spent in each pass since the start.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PassTimes {
     pub predict: Duration,
     pub contact: Duration,
     pub coupling: Duration,
     pub project: Duration,
-    /// Time that the Poisson solver had spent before the first step.
+    /// Wall time of the Poisson solver before the first step.
     pub initial: Stages,
 }
 
@@ -26,9 +26,9 @@ pub(super) fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {
 }
 
 impl Simulation {
-    /// Seconds spent since the start in each pass of the step. The projection is split into the
-    /// right-hand side with its transforms, the tridiagonal columns, the transforms back with the
-    /// correction, and the remaining ghost cells and sums.
+    /// Wall time spent in each pass of the step since the start [s]. The projection has four
+    /// passes: right-hand side and forward transforms, tridiagonal columns, inverse transforms and
+    /// correction, ghost cells and sums.
     pub fn pass_times(&self) -> [(&'static str, f64); 7] {
         let times = &self.times;
         let stages = (self.fluid.as_ref()).map_or(times.initial, |fluid| fluid.poisson_stages());

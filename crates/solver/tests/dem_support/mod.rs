@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain};
+use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, Material};
 use grainwake_solver::math::{Load, Pose};
 
 /// A sphere at rest.
@@ -13,9 +13,10 @@ pub fn sphere(radius: f64, density: f64, nodes: usize, position: DVec3) -> Grain
     Grain {
         shape: Arc::new(Shape::sphere(radius, nodes)),
         density,
+        material: Material::default(),
         pose: Pose {
             position,
-            // Turned so that no node points along an axis.
+            // Rotated so that no node lies on an axis.
             orientation: DQuat::from_scaled_axis(DVec3::new(0.4, -0.9, 0.3)),
         },
         velocity: DVec3::ZERO,
@@ -73,7 +74,7 @@ pub fn step(dynamics: &mut Dynamics, grains: &mut [Grain], gravity: DVec3, dt: f
     dynamics.advance(grains, &loads, dt, &mut mean)
 }
 
-/// Repeatable numbers in 0..1.
+/// Pseudo-random numbers in 0..1.
 pub struct Random(pub u64);
 
 impl Random {
@@ -89,7 +90,7 @@ impl Random {
     }
 }
 
-/// Every bit of a grain's state.
+/// Bits of the state of all grains.
 pub fn bits(grains: &[Grain]) -> Vec<u64> {
     let vector = |v: DVec3| v.to_array().map(f64::to_bits);
     grains
@@ -108,7 +109,8 @@ pub fn bits(grains: &[Grain]) -> Vec<u64> {
         .collect()
 }
 
-/// `count` spheres that do not touch in a cube of half width `half`, moving inwards at about `speed`.
+/// `count` separate spheres in a cube of half width `half` [m] that move inwards at about `speed`
+/// [m/s].
 pub fn cloud(count: usize, half: f64, radius: f64, speed: f64, seed: u64) -> Vec<Grain> {
     let mut random = Random(seed);
     let shape = Arc::new(Shape::sphere(radius, 150));
@@ -122,6 +124,7 @@ pub fn cloud(count: usize, half: f64, radius: f64, speed: f64, seed: u64) -> Vec
             grains.push(Grain {
                 shape: shape.clone(),
                 density: 1000.0 + 500.0 * random.next(),
+                material: Material::default(),
                 pose: Pose {
                     position,
                     orientation: DQuat::from_scaled_axis(random.vector() * 3.0),

@@ -6,8 +6,8 @@
 
 use glam::{DQuat, DVec3};
 use grainwake_formats::events::{Event, EventKind};
+use grainwake_report::features::{RunFeatures, Scales};
 use grainwake_report::run_folder::{History, RunFolder};
-use grainwake_report::story::{Scales, Story};
 use serde::{Deserialize, Serialize};
 
 /// Measured values of a pair. The JSON names are stable.
@@ -78,16 +78,16 @@ pub struct PairHistory<'a> {
 impl PairMeasures {
     /// Measures the pair of a run folder; none if the run is not a pair.
     pub fn from_run(run: &RunFolder) -> Option<PairMeasures> {
-        let story = Story::of(run);
-        let [trailing, leading] = story.pair?;
+        let features = RunFeatures::of(run);
+        let [trailing, leading] = features.pair?;
         let oblong = [trailing, leading].iter().all(|g| {
             let facts = run.facts.grains.get(*g);
             facts.is_none_or(|f| f.shape.as_deref() != Some("sphere"))
         });
-        let scales = story.scales?;
+        let scales = features.scales?;
         let mut measures = PairMeasures::from_history(&PairHistory {
             grains: [&run.grains[trailing], &run.grains[leading]],
-            up: story.up,
+            up: features.up,
             scales,
             events: &run.events,
             oblong,

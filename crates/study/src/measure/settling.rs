@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 
 use glam::{DQuat, DVec3};
 use grainwake_formats::events::EventKind;
-use grainwake_report::figure::{Body, bodies};
+use grainwake_report::features::{RunFeatures, Scales};
+use grainwake_report::figure::{GrainSurface, surfaces};
 use grainwake_report::run_folder::{History, RunFolder};
-use grainwake_report::story::{Scales, Story};
 use serde::{Deserialize, Serialize};
 
 use super::pair::mean_tilt;
@@ -85,15 +85,15 @@ pub struct GrainSettling {
 impl SettlingMeasures {
     /// Measures the grains of a run; none for a pair, without gravity, or if no grain moves.
     pub fn from_run(run: &RunFolder) -> Option<SettlingMeasures> {
-        let story = Story::of(run);
-        let scales = story.scales?;
-        if story.pair.is_some() || !story.travels {
+        let features = RunFeatures::of(run);
+        let scales = features.scales?;
+        if features.pair.is_some() || !features.travels {
             return None;
         }
-        let bodies = bodies(run, &mut Vec::new());
+        let surfaces = surfaces(run, &mut Vec::new());
         let each: Vec<GrainSettling> = (0..run.grains.len())
             .filter(|grain| !run.grains[*grain].is_empty())
-            .map(|grain| GrainSettling::from_run(run, grain, story.up, scales, &bodies))
+            .map(|grain| GrainSettling::from_run(run, grain, features.up, scales, &surfaces))
             .collect();
         Some(SettlingMeasures::summarise(each, scales))
     }
@@ -164,7 +164,7 @@ impl GrainSettling {
         grain: usize,
         up: DVec3,
         scales: Scales,
-        bodies: &BTreeMap<usize, Body>,
+        surfaces: &BTreeMap<usize, GrainSurface>,
     ) -> GrainSettling {
         let history = &run.grains[grain];
         let facts = run.facts.grains.get(grain);
@@ -189,9 +189,9 @@ impl GrainSettling {
         let elapsed = history.time[rows - 1] - history.time[0];
         let drift = |p: &DVec3| (*p - start).reject_from_normalized(up).length();
         let rotation = |q: &DQuat| history.orientation[0].angle_between(*q).to_degrees();
-        let long_axis = bodies
+        let long_axis = surfaces
             .get(&grain)
-            .and_then(Body::axes)
+            .and_then(GrainSurface::axes)
             .map(|axes| axes.long);
         let tilt = |axis: DVec3| {
             let w = window.as_ref()?;

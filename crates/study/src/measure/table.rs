@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::record::RunRecord;
 use super::settling::GrainSettling;
-use crate::error::{At, StudyError, write_atomically, write_json};
+use crate::error::{At, StudyError, write_file, write_json};
 use crate::format::rounded;
 use crate::plan::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES};
 
@@ -48,7 +48,7 @@ pub(crate) fn write_csv(
     file: &Path,
     rows: impl IntoIterator<Item = Vec<String>>,
 ) -> Result<(), StudyError> {
-    write_atomically(file, csv_text(rows).at("write", file)?.as_bytes())
+    write_file(file, csv_text(rows).at("write", file)?.as_bytes())
 }
 
 fn csv_text(rows: impl IntoIterator<Item = Vec<String>>) -> std::io::Result<String> {

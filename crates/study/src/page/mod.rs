@@ -1,20 +1,23 @@
 //! The report of a study: tables, analysis, figures and one HTML page.
 
+mod content;
+mod document;
 pub mod figure;
-mod html;
+mod pairs;
 mod settling;
 mod tables;
 
 use std::path::{Path, PathBuf};
 
+use grainwake_report::{WrittenFigure, write_figure};
 use grainwake_run::case::Problem;
 use rayon::prelude::*;
 
-use self::figure::{FigureData, StudyFigure};
-use self::html::Content;
+use self::content::Content;
+use self::figure::FigureData;
 use crate::analysis::correlation::correlations;
 use crate::analysis::verdict::evaluate;
-use crate::error::{At, StudyError, write_atomically, write_json};
+use crate::error::{At, StudyError, write_file, write_json};
 use crate::measure::record::{RunRecord, records};
 use crate::measure::table::write_tables;
 use crate::measure::trajectory::{Trajectory, write_thinned_history};
@@ -23,7 +26,7 @@ use crate::plan::{Plan, Run};
 
 /// Files of a report.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Rendered {
+pub struct StudyReportFiles {
     /// HTML page.
     pub page: PathBuf,
     /// Figures as PNG, in page order; each has an SVG file of the same name.
@@ -40,7 +43,7 @@ pub struct Rendered {
 ///
 /// # Errors
 /// If the folder holds no study, the analysis file is wrong, or a file cannot be written.
-pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
+pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     let mut plan = Plan::read(folder)?;
     let mut notes: Vec<String> = refresh_analysis(&mut plan, folder)?.into_iter().collect();
     let plan = plan;
@@ -74,7 +77,12 @@ pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
         trajectories,
     };
     let figures = figure::all(&data, &mut notes);
-    let (png, figures) = write_figures(folder, figures)?;
+    let figure_folder = folder.join("figures");
+    std::fs::create_dir_all(&figure_folder).at("create", &figure_folder)?;
+    let figures: Vec<WrittenFigure> = figures
+        .into_par_iter()
+        .map(|figure| write_figure(&figure_folder, figure))
+        .collect::<Result<_, _>>()?;
     let content = Content {
         plan: &plan,
         records: &records,
@@ -84,10 +92,10 @@ pub fn render(folder: &Path) -> Result<Rendered, StudyError> {
         notes: &notes,
     };
     let page = folder.join("report.html");
-    write_atomically(&page, content.html().as_bytes())?;
-    Ok(Rendered {
+    write_file(&page, content.html().as_bytes())?;
+    Ok(StudyReportFiles {
         page,
-        png,
+        png: figures.into_iter().map(|figure| figure.png_file).collect(),
         runs: (finished.len(), records.len()),
         notes,
     })
@@ -121,25 +129,4 @@ fn refresh_analysis(plan: &mut Plan, folder: &Path) -> Result<Option<String>, St
             error.to_string().lines().next().unwrap_or_default()
         ))),
     }
-}
-
-type Written = (Vec<PathBuf>, Vec<(StudyFigure, String)>);
-
-/// Writes all figures as PNG and SVG; returns the PNG files and the figures with their SVG text.
-fn write_figures(folder: &Path, figures: Vec<StudyFigure>) -> Result<Written, StudyError> {
-    let folder = folder.join("figures");
-    std::fs::create_dir_all(&folder).at("create", &folder)?;
-    let write = |figure: StudyFigure| -> Result<(PathBuf, (StudyFigure, String)), StudyError> {
-        let file = folder.join(format!("{}.png", figure.name));
-        let png = figure.drawing.to_png().map_err(std::io::Error::other);
-        write_atomically(&file, &png.at("draw", &file)?)?;
-        let svg = figure.svg();
-        write_atomically(&folder.join(format!("{}.svg", figure.name)), svg.as_bytes())?;
-        Ok((file, (figure, svg)))
-    };
-    let written: Vec<_> = figures
-        .into_par_iter()
-        .map(write)
-        .collect::<Result<_, _>>()?;
-    Ok(written.into_iter().unzip())
 }

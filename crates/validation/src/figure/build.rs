@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_plot::{equal_aspect, style};
-use grainwake_report::figure::field::{Quantity, Style};
+use grainwake_plot::style;
 use grainwake_run::case::{Loc, Problem, Source};
 
+use super::raw::{AxisSpec, SliceSpec};
 use super::raw::{
-    Colour, Coordinates, FieldQuantity, Line, Mark, RawAxis, RawField, RawFigure, RawHistory,
-    RawPicture, RawReference, RawResults, Scale,
+    Colour, Coordinates, LineKind, RawFigure, RawHistory, RawReferenceCurve, RawResults, Scale,
+    Symbol,
 };
-use super::{AxisSpec, Content, Data, Figure, Picture, Point, Series};
-use crate::check::{Check, Reference, Run};
+use super::spec::{Content, Data, FigureSpec, ResultPoint, SeriesSpec};
+use crate::check::{Check, Reference, SuiteRun};
 use crate::columns::Columns;
 use crate::measurement::Sampling;
 use crate::{expression, problem};
@@ -20,7 +20,7 @@ use crate::{expression, problem};
 /// File, runs and constants that the figures refer to.
 struct Context<'a> {
     source: &'a Source,
-    runs: &'a [Run],
+    runs: &'a [SuiteRun],
     folder: &'a Path,
     constants: &'a BTreeMap<String, f64>,
 }
@@ -32,17 +32,17 @@ struct Context<'a> {
 pub fn build(
     source: &Source,
     raw: Vec<RawFigure>,
-    runs: &[Run],
+    runs: &[SuiteRun],
     folder: &Path,
     constants: &BTreeMap<String, f64>,
-) -> Result<Vec<Figure>, Problem> {
+) -> Result<Vec<FigureSpec>, Problem> {
     let context = Context {
         source,
         runs,
         folder,
         constants,
     };
-    let mut out: Vec<Figure> = Vec::new();
+    let mut out: Vec<FigureSpec> = Vec::new();
     for figure in raw {
         let name = &figure.name;
         let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
@@ -71,7 +71,7 @@ impl Context<'_> {
         problem::at(self.source, value, message, help, label)
     }
 
-    fn figure(&self, raw: RawFigure) -> Result<Figure, Problem> {
+    fn figure(&self, raw: RawFigure) -> Result<FigureSpec, Problem> {
         let curves = raw.reference.len() + raw.history.len() + raw.results.len();
         let sources = raw
             .reference
@@ -80,13 +80,23 @@ impl Context<'_> {
             .collect();
         let content = match (raw.field, raw.x, raw.y) {
             (Some(field), None, None) if curves == 0 && !raw.picture.is_empty() => {
-                self.fields(field, raw.picture)?
+                for picture in &raw.picture {
+                    self.check_picture(picture)?;
+                }
+                Content::Pictures {
+                    style: field,
+                    pictures: raw.picture,
+                }
             }
-            (None, Some(x), Some(y)) if curves > 0 && raw.picture.is_empty() => Content::Plot {
-                across: self.axis(x)?,
-                up: self.axis(y)?,
-                series: self.series(raw.reference, raw.history, raw.results)?,
-            },
+            (None, Some(across), Some(up)) if curves > 0 && raw.picture.is_empty() => {
+                self.check_axis(&across)?;
+                self.check_axis(&up)?;
+                Content::Plot {
+                    across,
+                    up,
+                    series: self.series(raw.reference, raw.history, raw.results)?,
+                }
+            }
             _ => {
                 let name = &raw.name.value;
                 let message = format!("figure \"{name}\" is neither curves nor pictures");
@@ -95,7 +105,7 @@ impl Context<'_> {
                 return Err(self.at(&raw.name, message, help, "this figure"));
             }
         };
-        Ok(Figure {
+        Ok(FigureSpec {
             name: raw.name.value,
             title: raw.title,
             caption: raw.caption,
@@ -104,57 +114,33 @@ impl Context<'_> {
         })
     }
 
-    fn fields(&self, field: RawField, pictures: Vec<RawPicture>) -> Result<Content, Problem> {
-        let pictures = pictures.into_iter().map(|picture| self.picture(picture));
-        Ok(Content::Pictures {
-            quantity: match field.quantity {
-                FieldQuantity::Speed => Quantity::Speed,
-                FieldQuantity::Vorticity => Quantity::Vorticity,
-                FieldQuantity::SolidFraction => Quantity::SolidFraction,
-            },
-            style: Style {
-                label: field.label,
-                limit: field.limit,
-                length: field.length,
-                arrows: field.arrows,
-            },
-            pictures: pictures.collect::<Result<_, _>>()?,
-        })
-    }
-
-    fn axis(&self, raw: RawAxis) -> Result<AxisSpec, Problem> {
-        let log = raw.scale == Scale::Log;
-        for end in [&raw.from, &raw.to].into_iter().flatten() {
-            if !end.value.is_finite() || (log && end.value <= 0.0) {
+    fn check_axis(&self, axis: &AxisSpec) -> Result<(), Problem> {
+        for end in [&axis.from, &axis.to].into_iter().flatten() {
+            if !end.value.is_finite() || (axis.scale == Scale::Log && end.value <= 0.0) {
                 let message = format!("an axis cannot end at {}", end.value);
                 let help = "a logarithmic axis has positive ends";
                 return Err(self.at(end, message, help, "this end"));
             }
         }
-        Ok(AxisSpec {
-            label: raw.label,
-            log,
-            ends: [raw.from.map(|v| v.value), raw.to.map(|v| v.value)],
-            ticks: raw.ticks,
-        })
+        Ok(())
     }
 
     /// Orders references, histories and results; default colours and symbols follow this order.
     fn series(
         &self,
-        references: Vec<RawReference>,
+        references: Vec<RawReferenceCurve>,
         histories: Vec<RawHistory>,
         results: Vec<RawResults>,
-    ) -> Result<Vec<Series>, Problem> {
-        let mut out: Vec<Series> = Vec::new();
+    ) -> Result<Vec<SeriesSpec>, Problem> {
+        let mut out: Vec<SeriesSpec> = Vec::new();
         let mut push =
-            |label, colour: Option<Colour>, sign: Option<Mark>, line: Option<Line>, data| {
+            |label, colour: Option<Colour>, sign: Option<Symbol>, line: Option<LineKind>, data| {
                 let number = out.len();
-                out.push(Series {
+                out.push(SeriesSpec {
                     label,
                     colour: colour.map_or(style::series_colour(number), Colour::hex),
                     sign: sign.map_or(number, |sign| sign as usize),
-                    line: line.map(Line::dash),
+                    line: line.map(LineKind::dash),
                     data,
                 });
             };
@@ -164,7 +150,7 @@ impl Context<'_> {
         }
         for raw in histories {
             let (label, colour) = (raw.label.clone(), raw.colour);
-            let line = raw.line.unwrap_or(Line::Full);
+            let line = raw.line.unwrap_or(LineKind::Full);
             push(label, colour, None, Some(line), self.history(raw)?);
         }
         for raw in results {
@@ -174,7 +160,7 @@ impl Context<'_> {
         Ok(out)
     }
 
-    fn reference(&self, raw: &RawReference) -> Result<Data, Problem> {
+    fn reference(&self, raw: &RawReferenceCurve) -> Result<Data, Problem> {
         let file = self.folder.join(&raw.data);
         for text in [&raw.x, &raw.y] {
             self.check_syntax(text)?;
@@ -235,7 +221,12 @@ impl Context<'_> {
     }
 
     /// Builds the point of the `i`-th run of a series.
-    fn point(&self, raw: &RawResults, i: usize, name: &Loc<String>) -> Result<Point, Problem> {
+    fn point(
+        &self,
+        raw: &RawResults,
+        i: usize,
+        name: &Loc<String>,
+    ) -> Result<ResultPoint, Problem> {
         let run = self.run(name)?;
         let wanted = |check: &&Check| check.quantity == raw.quantity.value;
         let check = run.checks.iter().find(wanted).ok_or_else(|| {
@@ -275,7 +266,7 @@ impl Context<'_> {
             let help = "a relative error needs `reference = ...`, other than 0, in this series";
             return Err(self.at(&raw.error, message, help, "relative error"));
         }
-        Ok(Point {
+        Ok(ResultPoint {
             run: run.name.clone(),
             x,
             check: check.clone(),
@@ -283,31 +274,19 @@ impl Context<'_> {
         })
     }
 
-    fn picture(&self, raw: RawPicture) -> Result<Picture, Problem> {
-        let value = |corner: &Option<Loc<[f64; 2]>>, default: f64| {
-            corner.as_ref().map_or([default; 2], |v| v.value)
-        };
-        let low = value(&raw.from, f64::NEG_INFINITY);
-        let high = value(&raw.to, f64::INFINITY);
-        if !(low[0] < high[0] && low[1] < high[1]) {
-            let help = "`from` is the lower left corner, `to` the upper right one";
-            let problem = Problem::new("the window is empty").help(help);
-            let span = raw.to.as_ref().and_then(|to| to.span.as_ref());
-            return Err(self.source.locate(problem, span, "not above `from`"));
+    fn check_picture(&self, picture: &SliceSpec) -> Result<(), Problem> {
+        self.run(&picture.run)?;
+        let window = picture.window();
+        if window.width() > 0.0 && window.height() > 0.0 {
+            return Ok(());
         }
-        let given = raw.from.is_some() || raw.to.is_some();
-        Ok(Picture {
-            run: self.run(&raw.run)?.name.clone(),
-            plane: raw.plane,
-            title: raw.title,
-            window: given.then_some(equal_aspect::Window {
-                low: low.into(),
-                high: high.into(),
-            }),
-        })
+        let help = "`from` is the lower left corner, `to` the upper right one";
+        let problem = Problem::new("the window is empty").help(help);
+        let span = picture.to.as_ref().and_then(|to| to.span.as_ref());
+        Err(self.source.locate(problem, span, "not above `from`"))
     }
 
-    fn run(&self, name: &Loc<String>) -> Result<&Run, Problem> {
+    fn run(&self, name: &Loc<String>) -> Result<&SuiteRun, Problem> {
         let found = self.runs.iter().find(|run| run.name == name.value);
         found.ok_or_else(|| {
             let names: Vec<&str> = self.runs.iter().map(|run| run.name.as_str()).collect();

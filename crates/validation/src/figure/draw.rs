@@ -11,7 +11,8 @@ use grainwake_formats::summary;
 use grainwake_formats::vti::Image;
 
 use super::plot::{self, DataSet};
-use super::{Content, Data, Figure, Picture, Point, Series};
+use super::raw::SliceSpec;
+use super::spec::{Content, Data, FigureSpec, ResultPoint, SeriesSpec};
 use crate::columns::{Columns, last_slice};
 use crate::{expression, signal};
 
@@ -57,7 +58,7 @@ fn notes(omissions: Vec<Omission>) -> Vec<String> {
     notes
 }
 
-impl Figure {
+impl FigureSpec {
     /// Draws the data sets that exist in the run folders below `runs`.
     ///
     /// `saved` returns stored values, by run and quantity, of runs whose folders do not exist.
@@ -79,11 +80,7 @@ impl Figure {
                 }
                 measured.then(|| plot::draw(across, up, &shown))
             }
-            Content::Pictures {
-                quantity,
-                style,
-                pictures,
-            } => {
+            Content::Pictures { style, pictures } => {
                 let mut images = Vec::new();
                 for picture in pictures {
                     match picture.image(runs) {
@@ -96,14 +93,14 @@ impl Figure {
                     .map(|(picture, folder, image)| Panel {
                         title: picture.title.clone(),
                         image,
-                        window: picture.window,
+                        window: Some(picture.window()),
                         run: Some(folder.as_path()),
                     })
                     .collect();
                 if panels.is_empty() {
                     None
                 } else {
-                    field::draw(&panels, *quantity, style)
+                    field::draw(&panels, style)
                         .map_err(|why| omissions.push(Omission::Other(why)))
                         .ok()
                 }
@@ -135,16 +132,16 @@ fn finished(runs: &Path, name: &str) -> Result<PathBuf, Omission> {
     }
 }
 
-impl Picture {
+impl SliceSpec {
     fn image(&self, runs: &Path) -> Result<(PathBuf, Image), Omission> {
         let folder = finished(runs, &self.run)?;
         let image = last_slice(&folder, &self.plane);
-        let image = image.map_err(|why| Omission::Other(format!("{}: {why}", self.run)))?;
+        let image = image.map_err(|why| Omission::Other(format!("{}: {why}", self.run.value)))?;
         Ok((folder, image))
     }
 }
 
-impl Series {
+impl SeriesSpec {
     /// Adds the label of the series to the reason of an omission.
     fn named(&self, omission: Omission) -> Omission {
         match omission {
@@ -228,7 +225,7 @@ impl Series {
     }
 }
 
-impl Point {
+impl ResultPoint {
     fn value(
         &self,
         runs: &Path,

@@ -2,19 +2,16 @@
 
 use grainwake_plot::COLUMN;
 use grainwake_plot::axis::{Axis, extent};
-use grainwake_plot::drawing::{Anchor, Drawing};
+use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::{Frame, Marker};
-use grainwake_plot::style::{INK, LINE, SMALL};
-use grainwake_plot::text;
+use grainwake_plot::legend::{Entry, Legend};
+use grainwake_run::case::Loc;
 
-use super::AxisSpec;
+use super::raw::{AxisSpec, Scale};
 
 const LEFT: f64 = 42.0;
 const RIGHT: f64 = 9.0;
 const HEIGHT: f64 = 150.0;
-const ROW: f64 = 10.0;
-/// Width of a line in the legend [pt].
-const SAMPLE: f64 = 16.0;
 /// Half the size of a symbol [pt].
 const SIGN: f64 = 2.4;
 
@@ -46,19 +43,20 @@ impl DataSet {
         }
     }
 
-    /// Width of the line or symbol in the legend [pt].
-    fn sample(&self) -> f64 {
-        if self.line.is_some() { SAMPLE } else { 6.0 }
-    }
-
-    fn entry(&self) -> f64 {
-        self.sample() + 4.0 + text::width(&self.label, SMALL) + 9.0
+    /// Returns the entry in the legend, if the data set has a name.
+    fn entry(&self) -> Option<Entry> {
+        (!self.label.is_empty()).then(|| Entry {
+            name: self.label.clone(),
+            colour: self.colour,
+            line: self.line,
+            symbol: self.sign.map(|sign| (Marker::nth(sign), self.hollow)),
+        })
     }
 }
 
 /// Draws the data sets, in their order, at column width.
 pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
-    let valid = |axis: &AxisSpec, v: f64| v.is_finite() && (!axis.log || v > 0.0);
+    let valid = |axis: &AxisSpec, v: f64| v.is_finite() && (axis.scale != Scale::Log || v > 0.0);
     let points = || {
         let all = sets.iter().flat_map(|s| s.points.iter().copied());
         all.filter(|(x, y)| valid(across, *x) && valid(up, *y))
@@ -71,23 +69,10 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
     };
     let up = axis(up, points().filter(|p| inside(p.0)).map(|p| p.1), 5);
 
-    let rows = legend(sets);
-    let top = 6.0 + ROW * rows.len() as f64;
+    let legend = Legend::new(sets.iter().filter_map(DataSet::entry), COLUMN - LEFT);
+    let top = 6.0 + legend.height();
     let mut drawing = Drawing::new(COLUMN, top + HEIGHT + 26.0);
-    for (r, row) in rows.iter().enumerate() {
-        let y = 7.0 + ROW * r as f64;
-        let mut x = LEFT;
-        for one in row {
-            if one.line.is_some() {
-                drawing.line(&[(x, y), (x + SAMPLE, y)], one.colour, LINE, one.dash());
-            }
-            one.mark(&mut drawing, (x + 0.5 * one.sample(), y));
-            let left = x + one.sample() + 4.0;
-            let base = y + 0.36 * SMALL;
-            drawing.label(left, base, Anchor::Start, SMALL, INK, &one.label, false);
-            x += one.entry();
-        }
-    }
+    legend.draw(&mut drawing, (LEFT, 7.0));
     let frame = Frame {
         x: LEFT,
         y: top,
@@ -97,14 +82,10 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
         up,
     };
     frame.grid(&mut drawing);
-    for (i, one) in sets
-        .iter()
-        .enumerate()
-        .filter(|(_, one)| one.line.is_some())
-    {
-        for (k, part) in parts(&frame, &one.points).iter().enumerate() {
-            let clip = format!("clip-{i}-{k}");
-            frame.curve(&mut drawing, part, one.colour, one.dash(), &clip);
+    for (i, one) in sets.iter().enumerate() {
+        if one.line.is_some() {
+            let clip = format!("clip-{i}-0");
+            frame.curve(&mut drawing, &one.points, one.colour, one.dash(), &clip);
         }
     }
     frame.outline(&mut drawing, (true, true));
@@ -122,9 +103,10 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
 
 fn axis(plan: &AxisSpec, values: impl Iterator<Item = f64>, count: usize) -> Axis {
     let (low, high) = extent(values).unwrap_or((1.0, 10.0));
-    let (low, high) = (plan.ends[0].unwrap_or(low), plan.ends[1].unwrap_or(high));
-    let tight = plan.ends.iter().all(Option::is_some);
-    let axis = if plan.log {
+    let end = |given: &Option<Loc<f64>>, default: f64| given.as_ref().map_or(default, |v| v.value);
+    let (low, high) = (end(&plan.from, low), end(&plan.to, high));
+    let tight = plan.from.is_some() && plan.to.is_some();
+    let axis = if plan.scale == Scale::Log {
         Axis::log_rounded(&plan.label, low, high, tight)
     } else {
         Axis::linear(&plan.label, low, high, count, tight)
@@ -135,49 +117,18 @@ fn axis(plan: &AxisSpec, values: impl Iterator<Item = f64>, count: usize) -> Axi
     }
 }
 
-/// Distributes the entries of the legend over rows.
-fn legend(sets: &[DataSet]) -> Vec<Vec<&DataSet>> {
-    let width = COLUMN - LEFT;
-    let mut rows: Vec<Vec<&DataSet>> = Vec::new();
-    let mut used = f64::INFINITY;
-    for one in sets.iter().filter(|one| !one.label.is_empty()) {
-        if used + one.entry() - 9.0 > width {
-            rows.push(Vec::new());
-            used = 0.0;
-        }
-        used += one.entry();
-        if let Some(row) = rows.last_mut() {
-            row.push(one);
-        }
-    }
-    rows
-}
-
-/// Splits a curve at points that cannot be drawn.
-fn parts(frame: &Frame, points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
-    let placed = |p: &(f64, f64)| {
-        p.0.is_finite()
-            && p.1.is_finite()
-            && frame.across.fraction(p.0).is_some()
-            && frame.up.fraction(p.1).is_some()
-    };
-    points
-        .split(|p| !placed(p))
-        .filter(|part| part.len() > 1)
-        .map(<[_]>::to_vec)
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use grainwake_plot::style::INK;
 
     #[test]
     fn a_data_set_outside_a_logarithmic_axis_is_left_out() {
-        let plan = |log| AxisSpec {
+        let plan = AxisSpec {
             label: "x".into(),
-            log,
-            ends: [None, None],
+            scale: Scale::Log,
+            from: None,
+            to: None,
             ticks: None,
         };
         let shown = |label: &str, points: &[(f64, f64)]| DataSet {
@@ -201,9 +152,14 @@ mod tests {
             ),
             shown("none", &[(-1.0, 0.0), (0.0, -1.0)]),
         ];
-        let svg = draw(&plan(true), &plan(true), &sets).to_svg("f", "t", "d");
+        let svg = draw(&plan, &plan, &sets).to_svg("f", "t", "d");
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
-        assert_eq!(svg.matches("<clipPath").count(), 2, "the curve breaks");
+        let curves = svg.matches("stroke-width=\"1.2\"").count();
+        assert_eq!(
+            curves,
+            2 + 2,
+            "two samples in the legend, and a curve in two parts"
+        );
         assert!(svg.contains(">good<") && svg.contains(">none<"));
     }
 }

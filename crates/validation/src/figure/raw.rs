@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
+use grainwake_plot::equal_aspect::Window;
 use grainwake_plot::style;
+use grainwake_report::figure::field::Style;
 use grainwake_run::case::Loc;
 use serde::Deserialize;
 
@@ -15,31 +17,37 @@ pub struct RawFigure {
     pub title: String,
     #[serde(default)]
     pub caption: String,
-    pub x: Option<RawAxis>,
-    pub y: Option<RawAxis>,
+    pub x: Option<AxisSpec>,
+    pub y: Option<AxisSpec>,
     #[serde(default)]
-    pub reference: Vec<RawReference>,
+    pub reference: Vec<RawReferenceCurve>,
     #[serde(default)]
     pub history: Vec<RawHistory>,
     #[serde(default)]
     pub results: Vec<RawResults>,
-    pub field: Option<RawField>,
+    pub field: Option<Style>,
     #[serde(default)]
-    pub picture: Vec<RawPicture>,
+    pub picture: Vec<SliceSpec>,
 }
 
-#[derive(Deserialize)]
+/// Axis of a plot.
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RawAxis {
+pub struct AxisSpec {
+    /// Label, in label markup.
     pub label: String,
+    /// Linear or logarithmic.
     #[serde(default)]
     pub scale: Scale,
+    /// Lower end; `None` for that of the data.
     pub from: Option<Loc<f64>>,
+    /// Upper end; `None` for that of the data.
     pub to: Option<Loc<f64>>,
+    /// Positions of the ticks; `None` for round values.
     pub ticks: Option<Vec<f64>>,
 }
 
-#[derive(Clone, Copy, Default, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scale {
     #[default]
@@ -63,7 +71,7 @@ pub enum Colour {
 /// Symbol of the points, in the order of `frame::Marker::nth`.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Mark {
+pub enum Symbol {
     Circle,
     Square,
     Triangle,
@@ -74,7 +82,7 @@ pub enum Mark {
 
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Line {
+pub enum LineKind {
     Full,
     Dashed,
     Dotted,
@@ -82,15 +90,15 @@ pub enum Line {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RawReference {
+pub struct RawReferenceCurve {
     pub label: String,
     pub data: PathBuf,
     pub x: Loc<String>,
     pub y: Loc<String>,
     pub source: Option<String>,
     pub colour: Option<Colour>,
-    pub sign: Option<Mark>,
-    pub line: Option<Line>,
+    pub sign: Option<Symbol>,
+    pub line: Option<LineKind>,
 }
 
 #[derive(Deserialize)]
@@ -109,7 +117,7 @@ pub struct RawHistory {
     #[serde(default)]
     pub derivative: bool,
     pub colour: Option<Colour>,
-    pub line: Option<Line>,
+    pub line: Option<LineKind>,
 }
 
 #[derive(Deserialize)]
@@ -124,8 +132,8 @@ pub struct RawResults {
     pub reference: Option<f64>,
     pub slope: Option<f64>,
     pub colour: Option<Colour>,
-    pub sign: Option<Mark>,
-    pub line: Option<Line>,
+    pub sign: Option<Symbol>,
+    pub line: Option<LineKind>,
 }
 
 #[derive(Clone, Deserialize)]
@@ -135,34 +143,32 @@ pub enum Coordinates {
     Expression(String),
 }
 
-#[derive(Deserialize)]
+/// Slice of a run.
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RawField {
-    pub quantity: FieldQuantity,
-    pub label: Option<String>,
-    pub limit: Option<f64>,
-    pub length: Option<String>,
-    #[serde(default)]
-    pub arrows: bool,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum FieldQuantity {
-    Speed,
-    Vorticity,
-    SolidFraction,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RawPicture {
+pub struct SliceSpec {
+    /// Name of the run.
     pub run: Loc<String>,
+    /// Name of the plane.
     pub plane: String,
+    /// Title, in label markup.
     #[serde(default)]
     pub title: String,
-    pub from: Option<Loc<[f64; 2]>>,
+    /// Lower left corner [m]; `None` for that of the slice.
+    pub from: Option<[f64; 2]>,
+    /// Upper right corner [m]; `None` for that of the slice.
     pub to: Option<Loc<[f64; 2]>>,
+}
+
+impl SliceSpec {
+    /// Returns the displayed range.
+    pub fn window(&self) -> Window {
+        let to = self.to.as_ref().map(|to| to.value);
+        Window {
+            low: self.from.unwrap_or([f64::NEG_INFINITY; 2]).into(),
+            high: to.unwrap_or([f64::INFINITY; 2]).into(),
+        }
+    }
 }
 
 impl Colour {
@@ -181,13 +187,13 @@ impl Colour {
     }
 }
 
-impl Line {
+impl LineKind {
     /// Returns the SVG dash pattern, empty for a solid line.
     pub fn dash(self) -> &'static str {
         match self {
-            Line::Full => "",
-            Line::Dashed => "4.5 2",
-            Line::Dotted => "1.2 1.6",
+            LineKind::Full => "",
+            LineKind::Dashed => "4.5 2",
+            LineKind::Dotted => "1.2 1.6",
         }
     }
 }

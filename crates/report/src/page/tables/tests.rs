@@ -31,6 +31,6 @@ fn provenance_cannot_bring_markup_in() {
         provenance: Some(value),
         ..RunFolder::default()
     };
-    let html = provenance(&run);
+    let html = provenance(&run).into_string();
     assert!(html.contains("grainwake run &lt;script&gt;") && html.contains("session 1, threads"));
 }

@@ -9,7 +9,9 @@ use super::forms::{Forms, Never, deserialize_forms};
 use super::motion::Motion;
 use super::orientation::{Orientation, Turns};
 use crate::case::loc::Loc;
-use crate::case::quantity::{AngularVelocity, Density, Length, Quantity, Triple, Velocity};
+use crate::case::quantity::{
+    AngularVelocity, Density, ElasticModulus, Length, Number, Quantity, Triple, Velocity,
+};
 
 /// One grain.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
@@ -29,6 +31,17 @@ pub struct RawGrain {
     pub nodes: Option<Loc<usize>>,
     /// Density [kg/m3].
     pub density: Loc<Quantity<Density>>,
+    /// Young's modulus [Pa], for the contact law "hertz-mindlin"; the one of `[contact]` if not
+    /// given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub youngs_modulus: Option<Loc<Quantity<ElasticModulus>>>,
+    /// Poisson ratio, for the contact law "hertz-mindlin"; the one of `[contact]` if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poisson_ratio: Option<Loc<Quantity<Number>>>,
+    /// Coefficient of restitution, for the contact law "hertz-mindlin"; the one of `[contact]` if
+    /// not given. A pair takes the smaller value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub restitution: Option<Loc<Quantity<Number>>>,
     /// Centroid [m]: `[x, y, z]`; with `gap_above` only the two horizontal components.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position: Option<Loc<Position>>,

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use super::given::{Given, OfPlace, OfTime};
 use crate::case::loc::Loc;
 use crate::case::quantity::{
-    Acceleration, Density, DynamicViscosity, KinematicViscosity, Length, Number, Quantity, Rate,
-    Stiffness, Velocity,
+    Acceleration, Density, DynamicViscosity, ElasticModulus, KinematicViscosity, Length, Number,
+    Quantity, Rate, Stiffness, Velocity,
 };
-use grainwake_solver::dem::ContactParams;
+use grainwake_solver::dem::{ContactLawKind, ContactParams};
 use grainwake_solver::flow::Advection;
 use grainwake_solver::immersed::Scheme;
 
@@ -58,6 +58,12 @@ fn scheme_schema(_: &mut SchemaGenerator) -> Schema {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawContact {
+    /// `linear` (Eqs 9 and 14) or `hertz-mindlin` (Hertz normal force, no-slip Mindlin tangential
+    /// force, material by grain).
+    // The default is not written, so that checkpoints of earlier versions still match their case.
+    #[serde(skip_serializing_if = "is_linear")]
+    #[schemars(schema_with = "law_schema")]
+    pub law: Loc<ContactLawKind>,
     /// Normal stiffness k_n [N/m] (Eq. 9). Give either this or `maximum_overlap`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<Loc<Quantity<Stiffness>>>,
@@ -65,8 +71,9 @@ pub struct RawContact {
     /// diameter. 0.01 where neither is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub maximum_overlap: Option<Loc<Quantity<Number>>>,
-    /// Tangential over normal stiffness (Eq. 14).
-    pub tangential_ratio: Loc<Quantity<Number>>,
+    /// Tangential over normal stiffness (Eq. 14); 2/7 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tangential_ratio: Option<Loc<Quantity<Number>>>,
     /// Coulomb friction coefficient between grains (Eq. 15).
     pub friction: Loc<Quantity<Number>>,
     /// Coulomb friction coefficient at walls; that of the grains where it is not given.
@@ -74,8 +81,21 @@ pub struct RawContact {
     pub wall_friction: Option<Loc<Quantity<Number>>>,
     /// Coefficient of restitution; 1 has no dashpot.
     pub restitution: Loc<Quantity<Number>>,
-    /// Tangential over normal dashpot, where `restitution` is below 1.
-    pub tangential_damping: Loc<Quantity<Number>>,
+    /// Tangential over normal dashpot, where `restitution` is below 1; 0.5 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tangential_damping: Option<Loc<Quantity<Number>>>,
+    /// Young's modulus of the grains [Pa], for the law "hertz-mindlin".
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub youngs_modulus: Option<Loc<Quantity<ElasticModulus>>>,
+    /// Poisson ratio of the grains, 0 to 0.5, for the law "hertz-mindlin".
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub poisson_ratio: Option<Loc<Quantity<Number>>>,
+    /// Young's modulus of the walls [Pa], for the law "hertz-mindlin"; rigid walls if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wall_youngs_modulus: Option<Loc<Quantity<ElasticModulus>>>,
+    /// Poisson ratio of the walls, for the law "hertz-mindlin"; `poisson_ratio` if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wall_poisson_ratio: Option<Loc<Quantity<Number>>>,
     /// Global damping xi [1/s] (Eqs 6, 22, 24).
     pub global_damping: Loc<Quantity<Rate>>,
     /// Lubrication correction below this gap [m]; 0 turns it off.
@@ -88,17 +108,30 @@ pub struct RawContact {
     pub substeps_per_contact: Loc<Quantity<Number>>,
 }
 
+fn is_linear(law: &Loc<ContactLawKind>) -> bool {
+    law.value == ContactLawKind::Linear
+}
+
+fn law_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "enum": [ContactLawKind::Linear, ContactLawKind::HertzMindlin] })
+}
+
 impl Default for RawContact {
     fn default() -> Self {
         let params = ContactParams::default();
         RawContact {
+            law: Loc::default(),
             stiffness: None,
             maximum_overlap: None,
-            tangential_ratio: Quantity::new(params.tangential_ratio).into(),
+            tangential_ratio: None,
             friction: Quantity::new(params.friction).into(),
             wall_friction: None,
             restitution: Quantity::new(params.restitution).into(),
-            tangential_damping: Quantity::new(params.tangential_damping).into(),
+            tangential_damping: None,
+            youngs_modulus: None,
+            poisson_ratio: None,
+            wall_youngs_modulus: None,
+            wall_poisson_ratio: None,
             global_damping: Quantity::new(params.global_damping).into(),
             lubrication_gap: Quantity::new(params.lubrication_gap).into(),
             roughness: None,

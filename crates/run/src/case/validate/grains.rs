@@ -14,9 +14,9 @@ use crate::case::quantity::{Density, Quantity, Triple};
 use crate::case::raw::{Law, Orientation, Position, RawGrain, Turns};
 use crate::case::readable::{number, quantity, vector};
 use crate::case::shapes::Library;
-use grainwake_solver::dem::{Dof, Grain};
+use grainwake_solver::dem::{Dof, Grain, Material};
 use grainwake_solver::math::Pose;
-use grainwake_solver::sim::Drive;
+use grainwake_solver::sim::PrescribedMotion;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -67,6 +67,8 @@ pub(super) fn grain(
     let mut grain = Grain {
         shape,
         density,
+        // `materials` sets it for the contact laws that use it.
+        material: Material::default(),
         pose: Pose {
             position: DVec3::ZERO,
             orientation,
@@ -203,20 +205,20 @@ pub(super) fn shape(
 }
 
 /// Motions given by formulas.
-pub(super) fn drives(grains: &[Loc<RawGrain>]) -> Vec<Drive> {
+pub(super) fn prescribed_motions(grains: &[Loc<RawGrain>]) -> Vec<PrescribedMotion> {
     let formula = |law: &Law| match law {
         Law::Formula(formula) => Some(formula.clone()),
         _ => None,
     };
-    let drive = |(grain, raw): (usize, &Loc<RawGrain>)| {
-        let drive = Drive {
+    let motion = |(grain, raw): (usize, &Loc<RawGrain>)| {
+        let motion = PrescribedMotion {
             grain,
             velocity: formula(&raw.motion.velocity),
             angular_velocity: formula(&raw.motion.angular_velocity),
         };
-        (drive.velocity.is_some() || drive.angular_velocity.is_some()).then_some(drive)
+        (motion.velocity.is_some() || motion.angular_velocity.is_some()).then_some(motion)
     };
-    grains.iter().enumerate().filter_map(drive).collect()
+    grains.iter().enumerate().filter_map(motion).collect()
 }
 
 /// Velocities at the start: the prescribed ones, else the given ones, else zero.

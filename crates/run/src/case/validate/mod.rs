@@ -4,6 +4,7 @@ mod arrangement;
 mod check;
 mod domain;
 mod grains;
+mod materials;
 mod packings;
 mod physics;
 mod plan;
@@ -123,8 +124,8 @@ pub(super) fn validate(
         return Err(CaseError::Invalid(check.problems));
     }
     let mut grains: Vec<Grain> = standing.into_iter().flatten().collect();
-    prescription.motions = grains::drives(&resolved);
-    prescription.drive(&mut grains, 0.0);
+    prescription.motions = grains::prescribed_motions(&resolved);
+    prescription.prescribe_motion(&mut grains, 0.0);
     arrangement::check(&mut check, &grains, &sites, &enclosure);
     if dry && grains.is_empty() {
         check.fail(
@@ -136,11 +137,13 @@ pub(super) fn validate(
     }
 
     let fluid_params = fluid.as_ref().and_then(|f| f.as_ref());
+    let wall_material = materials::materials(&mut check, &raw.contact, &resolved, &mut grains);
     let contact = if fluid.is_some() == fluid_params.is_some() {
         physics::contact(
             &mut check,
             &mut raw.contact,
             &grains,
+            wall_material,
             fluid_params,
             gravity,
             &mesh,
@@ -152,19 +155,16 @@ pub(super) fn validate(
     let (Some(contact), Some(step)) = (contact, step) else {
         return Err(CaseError::Invalid(check.problems));
     };
-    let scheme = raw.coupling.scheme.value;
-    let setup = Setup {
-        mesh,
-        boundaries,
-        fluid: fluid_params.copied(),
-        precision: raw.run.precision.value,
-        scheme,
-        gravity,
-        grains,
-        contact,
-        step,
-        prescription,
-    };
+    let setup = Setup::new(mesh)
+        .with_boundaries(boundaries.0)
+        .with_fluid(fluid_params.copied())
+        .with_precision(raw.run.precision.value)
+        .with_scheme(raw.coupling.scheme.value)
+        .with_gravity(gravity)
+        .with_grains(grains)
+        .with_contact(contact)
+        .with_step(step)
+        .with_prescription(prescription);
     let plan = plan::plan(&mut check, &raw.time, &mut raw.output, &setup, vertical.0);
     let expect = expectations(
         &raw.expect,

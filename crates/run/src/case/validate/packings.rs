@@ -3,7 +3,7 @@
 use super::check::Checker;
 use super::grains::{not_too_light, shape};
 use crate::case::loc::Loc;
-use crate::case::packing::{Ball, Random, Space};
+use crate::case::packing::{Ball, Random, Space, orientation};
 use crate::case::quantity::Quantity;
 use crate::case::raw::{
     Arrangement, Orientation, PackingOrientation, Position, RawGrain, RawPacking,
@@ -11,6 +11,7 @@ use crate::case::raw::{
 use crate::case::readable::vector;
 use crate::case::shapes::Library;
 use grainwake_solver::dem::{Enclosure, Grain};
+use rand::{RngExt, SeedableRng};
 
 /// Grains of a packing as the raw grains that stand for them.
 pub(super) fn packing(
@@ -62,7 +63,7 @@ pub(super) fn packing(
         );
         return Vec::new();
     }
-    let mut random = Random::new(raw.seed);
+    let mut random = Random::seed_from_u64(raw.seed);
     let mut grains = Vec::with_capacity(count);
     let mut radii = Vec::with_capacity(count);
     for n in 0..count {
@@ -84,7 +85,7 @@ pub(super) fn packing(
         }
         if let Some(range) = diameters {
             let d = if range.to > range.from {
-                range.from + (range.to - range.from) * random.unit()
+                range.from + (range.to - range.from) * random.random::<f64>()
             } else {
                 range.from
             };
@@ -94,7 +95,7 @@ pub(super) fn packing(
             });
         }
         if raw.orientation == PackingOrientation::Random {
-            grain.orientation = Orientation::Quaternion(random.orientation()).into();
+            grain.orientation = Orientation::Quaternion(orientation(&mut random)).into();
         }
         let mut scratch = grain.clone();
         let located = Loc {

@@ -3,12 +3,13 @@
 use glam::DVec3;
 
 use super::check::Checker;
-use crate::case::estimate::terminal_speed;
+use super::materials::restitution;
+use crate::case::estimate::impact_speed;
 use crate::case::loc::Loc;
 use crate::case::quantity::Quantity;
 use crate::case::raw::{RawContact, RawFluid};
 use crate::case::readable::length;
-use grainwake_solver::dem::{ContactParams, Grain};
+use grainwake_solver::dem::{ContactLawKind, ContactParams, Grain, Material};
 use grainwake_solver::flow::FluidParams;
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::Prescription;
@@ -17,9 +18,10 @@ use grainwake_solver::sim::Prescription;
 const MAXIMUM_OVERLAP: f64 = 0.01;
 /// Roughness over the smallest equal-volume radius, where none is given.
 const ROUGHNESS: f64 = 3e-3;
-/// Added mass of a sphere in contact, over the mass of the fluid that it displaces: .5 far from a wall and .803
-/// at it in potential flow (Hicks 1879), .75 on the grid; undamped impacts give the speed back with .7
-/// (`docs/decisions/0014-contact-with-the-fluid-response.md`).
+/// Added mass of a sphere in contact over the mass of the displaced fluid.
+///
+/// Potential flow gives 0.5 far from a wall and 0.803 at it (Hicks 1879), the grid 0.75. With 0.7,
+/// undamped impacts conserve the speed (`docs/decisions/0014-contact-with-the-fluid-response.md`).
 const ADDED_MASS: f64 = 0.7;
 
 /// The fluid; the viscosity is kept as a kinematic one.
@@ -107,35 +109,29 @@ pub(super) fn contact(
     check: &mut Checker,
     raw: &mut RawContact,
     grains: &[Grain],
+    wall_material: Option<Material>,
     fluid: Option<&FluidParams>,
     gravity: DVec3,
     mesh: &Mesh,
 ) -> Option<ContactParams> {
     let before = check.problems.len();
     let infinite = f64::INFINITY;
-    let tangential_ratio = check.within(
-        &raw.tangential_ratio,
-        "contact.tangential_ratio",
-        0.0,
-        infinite,
-    );
+    let defaults = ContactParams::default();
+    let law = raw.law.value;
+    let tangential_ratio = match &raw.tangential_ratio {
+        Some(ratio) => check.within(ratio, "contact.tangential_ratio", 0.0, infinite),
+        None => Some(defaults.tangential_ratio),
+    };
     let friction = check.within(&raw.friction, "contact.friction", 0.0, infinite);
     let wall_friction = match &raw.wall_friction {
         Some(wall) => check.within(wall, "contact.wall_friction", 0.0, infinite),
         None => friction,
     };
-    let restitution = check.within(
-        &raw.restitution,
-        "contact.restitution",
-        ContactParams::SMALLEST_RESTITUTION,
-        1.0,
-    );
-    let tangential_damping = check.within(
-        &raw.tangential_damping,
-        "contact.tangential_damping",
-        0.0,
-        infinite,
-    );
+    let restitution = restitution(check, &raw.restitution, "contact.restitution");
+    let tangential_damping = match &raw.tangential_damping {
+        Some(damping) => check.within(damping, "contact.tangential_damping", 0.0, infinite),
+        None => Some(defaults.tangential_damping),
+    };
     let global_damping = check.within(&raw.global_damping, "contact.global_damping", 0.0, infinite);
     let lubrication_gap = check.within(
         &raw.lubrication_gap,
@@ -176,18 +172,23 @@ pub(super) fn contact(
         (None, Some(overlap)) => check
             .within(overlap, "contact.maximum_overlap", 1e-6, 0.2)
             .map(|overlap| stiffness_for(overlap, grains, fluid, gravity, mesh)),
-        (None, None) => Some(stiffness_for(MAXIMUM_OVERLAP, grains, fluid, gravity, mesh)),
+        (None, None) if law == ContactLawKind::Linear => {
+            Some(stiffness_for(MAXIMUM_OVERLAP, grains, fluid, gravity, mesh))
+        }
+        (None, None) => Some(defaults.normal_stiffness),
     };
     if check.problems.len() > before {
         return None;
     }
     let params = ContactParams {
+        law,
         normal_stiffness: stiffness?,
         tangential_ratio: tangential_ratio?,
         friction: friction?,
         wall_friction: wall_friction?,
         restitution: restitution?,
         tangential_damping: tangential_damping?,
+        wall_material: wall_material?,
         global_damping: global_damping?,
         lubrication_gap: lubrication_gap?,
         lubrication_viscosity: viscosity,
@@ -199,7 +200,11 @@ pub(super) fn contact(
     if params.lubrication_gap > 0.0 {
         raw.roughness = Some(Quantity::new(params.roughness).into());
     }
-    raw.stiffness = Some(Quantity::new(params.normal_stiffness).into());
+    if law == ContactLawKind::Linear {
+        raw.stiffness = Some(Quantity::new(params.normal_stiffness).into());
+        raw.tangential_ratio = Some(Quantity::new(params.tangential_ratio).into());
+        raw.tangential_damping = Some(Quantity::new(params.tangential_damping).into());
+    }
     raw.wall_friction = Some(Quantity::new(params.wall_friction).into());
     Some(params)
 }
@@ -223,16 +228,10 @@ fn stiffness_for(
     mesh: &Mesh,
 ) -> f64 {
     let overlap = fraction * smallest_diameter(grains);
-    let g = gravity.length();
-    let height = (mesh.extent() * gravity.normalize_or_zero()).length();
     let needed = |grain: &Grain| {
-        let falling = match fluid {
-            Some(fluid) => 1.5 * terminal_speed(grain, fluid, g),
-            None => (2.0 * g * height).sqrt(),
-        };
-        let speed = falling.max(grain.velocity.length());
+        let speed = impact_speed(grain, fluid, gravity, mesh);
         let buoyant = fluid.map_or(0.0, |f| f.density);
-        let weight = (grain.density - buoyant).abs() * grain.shape.volume() * g;
+        let weight = (grain.density - buoyant).abs() * grain.shape.volume() * gravity.length();
         ContactParams::stiffness_for_overlap(grain.mass(), speed, overlap).max(weight / overlap)
     };
     let stiffness = grains.iter().map(needed).fold(0.0, f64::max);

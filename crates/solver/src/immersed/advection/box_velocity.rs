@@ -1,21 +1,21 @@
-//! Velocity in the box around a grain, contiguous across periodic edges.
+//! Velocity in the padded box around a grain, with constant strides even across periodic edges.
 
 use crate::flow::Known;
 use crate::immersed::geometry::{LocatedBody, PAD};
 use crate::math::Real;
 use grainwake_simd::MAX_LANES;
 
-/// Velocity in the padded box around a grain, either in the fields or copied.
+/// Velocity in the padded box around a grain [m/s], either in the fields or copied.
 pub struct BoxVelocity<'a, R> {
     pub components: [&'a [R]; 3],
+    /// Entries from one face to the next along each axis.
     pub strides: [usize; 3],
-    /// Position of cell (0, 0, 0) of the box, modulo the range of `usize` if it is not in memory.
+    /// Position of the lowest cell of the box, modulo the range of `usize` if it is not in memory.
     origin: usize,
 }
 
 impl<'a, R: Real> BoxVelocity<'a, R> {
-    /// Refers to the fields where all links read unknowns or ghost cells in memory order, else fills
-    /// `copies`.
+    /// Refers to the fields if they hold the padded box with constant strides, else fills `copies`.
     pub fn new(
         known: &Known<'a, R>,
         body: &LocatedBody,
@@ -23,15 +23,15 @@ impl<'a, R: Real> BoxVelocity<'a, R> {
     ) -> BoxVelocity<'a, R> {
         let (layout, velocity) = (known.mesh.layout(), known.velocity);
         let walled = known.boundaries.walled();
-        // Links end at walls, so only periodic edges need a copy, and rows shorter than a register.
+        // Links end at walls, so only periodic edges and rows shorter than a register need a copy.
         let direct = layout.cells[0] >= MAX_LANES
             && (0..3).all(|axis| {
-                let high = body.first[axis] + body.size[axis] + PAD - 1;
-                walled[axis] || body.first[axis] >= PAD && high <= layout.cells[axis] as i32 + 1
+                let high = body.lowest[axis] + body.size[axis] + PAD - 1;
+                walled[axis] || body.lowest[axis] >= PAD && high <= layout.cells[axis] as i32 + 1
             });
         if direct {
             let strides = layout.strides();
-            let along = |axis: usize| (body.first[axis] as usize).wrapping_mul(strides[axis]);
+            let along = |axis: usize| (body.lowest[axis] as usize).wrapping_mul(strides[axis]);
             return BoxVelocity {
                 components: [0, 1, 2].map(|axis| velocity.component(axis)),
                 strides,
@@ -51,7 +51,7 @@ impl<'a, R: Real> BoxVelocity<'a, R> {
         }
     }
 
-    /// Position of the first face of row (j, k).
+    /// Position of face 0 of row (j, k) of the box.
     #[inline(always)]
     pub fn row(&self, [j, k]: [i32; 2]) -> usize {
         let [_, line, plane] = self.strides;

@@ -1,14 +1,17 @@
-//! Correction of the central advection scheme next to a grain, link by link.
+//! Correction of the second-order central advection scheme at the links near a grain.
 //!
-//! 1. A face value near the surface represents its open part only, q = A u, so a link's product of two
-//!    such values carries A^2 u u where the flux is A u u: the flux relative to the grain is divided
-//!    by the aperture of the link.
+//! A link joins two neighbouring faces of the same component. Two terms correct its flux:
+//!
+//! 1. A face value near the surface represents the open part of the face only, q = A u. The product
+//!    of two such values carries A^2 u u where the flux is A u u. The flux relative to the grain is
+//!    therefore divided by the aperture A of the link.
 //! 2. The boundary layer is about one cell thick and moves with the grain. Second-order central
-//!    differences carry such a profile at about two thirds of its speed; within two cells of the
-//!    surface the sixth-order mean of six faces replaces the mean of two.
+//!    differences advect such a profile at about two thirds of its speed. Within two half-widths of
+//!    the band around the surface the sixth-order mean of six faces replaces the mean of two.
 //!
 //! Both are fluxes between two faces, so momentum is conserved
-//! (`docs/decisions/0003-advection-next-to-grains.md`). `immersed::reference` has the scalar form.
+//! (`docs/decisions/0003-advection-next-to-grains.md`). `weights.rs` finds the links, `links.rs`
+//! has the formula of the flux, `immersed::reference` the scalar form.
 
 use super::box_velocity::BoxVelocity;
 use super::links::ComponentLinks;
@@ -18,7 +21,7 @@ use crate::grid::Mesh;
 use crate::immersed::geometry::{FaceRow, LocatedBody};
 use crate::immersed::kinematics::GrainKinematics;
 use crate::math::Real;
-use grainwake_simd::{Kernel, Vector, dispatch, prefetch_ahead};
+use grainwake_simd::{Kernel, Vector, dispatch};
 
 /// Change of the tendency of each face near a grain [m/s^2], by component, in the order of
 /// [`LocatedBody::distance`].
@@ -31,8 +34,8 @@ pub struct AdvectionScratch<R> {
     planes: LinkPlanes,
 }
 
-/// Fills the `correction` of a grain that was located at `body` and moves by `kinematics`; `eps` [m] is
-/// the half-width of the band.
+/// Fills the `correction` for a grain at the location `body` that moves with `kinematics`; `eps`
+/// [m] is the half-width of the band.
 pub fn find_correction<R: Real>(
     eps: f64,
     known: &Known<R>,
@@ -52,7 +55,7 @@ pub fn find_correction<R: Real>(
     });
 }
 
-/// Adds a component of the correction to the prediction, as far as it lies there.
+/// Adds a component of the correction to a part of the prediction.
 pub fn add_correction<R: Real>(
     body: &LocatedBody,
     correction: &AdvectionCorrection,
@@ -64,18 +67,6 @@ pub fn add_correction<R: Real>(
         correction: &correction[component],
         prediction,
     });
-}
-
-/// Prefetches what [`find_correction`] reads for the grain at `body`.
-pub fn prefetch_velocity<R: Real>(known: &Known<R>, body: &LocatedBody) {
-    for component in 0..3 {
-        (body.index_map).prefetch(known.velocity.component(component));
-        let (spans, rows) = (&body.spans[component], &body.rows[component]);
-        let distances = &body.distance[component];
-        prefetch_ahead(spans, 0, spans.len());
-        prefetch_ahead(rows, 0, rows.len());
-        prefetch_ahead(distances, 0, distances.len());
-    }
 }
 
 struct AddCorrection<'a, 'b, R> {

@@ -1,20 +1,23 @@
 //! Fluxes through the links next to one grain, plane by plane.
 //!
-//! A link joins two neighbouring faces of the same component. Its flux changes by
+//! A link joins two neighbouring faces of the same component. The correction adds to its flux over
+//! h
 //!
-//! excess (q_mean - U_q)(c - U_c) / h + c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60 h),
+//! (1/A - 1) (q_mean - U_q)(c - U_c) / h + c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60
+//! h).
 //!
-//! the second term being the sixth-order mean of six faces less the mean of two.
+//! The second term is the sixth-order mean of six faces less the mean of two. It is left out at the
+//! ends of the grid, where fewer than six faces are in line.
 //!
-//! Legend: q component carried, c velocity that carries it, U rigid velocity in the middle of the
-//! link, excess 1 / A - 1 of the link's aperture A, h spacing along the link.
+//! Legend: q advected component, c advecting velocity, U rigid velocity at the middle of the link,
+//! A aperture of the link, h spacing along the link.
 
 use std::ops::Range;
 
 use glam::DVec3;
 
 use super::box_velocity::BoxVelocity;
-use super::weights::{LinkPlanes, near_faces, weigh_links};
+use super::weights::{LinkPlanes, listed_faces, weigh_links};
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::immersed::geometry::LocatedBody;
 use crate::immersed::kinematics::GrainKinematics;
@@ -31,9 +34,9 @@ pub struct ComponentLinks<'a, R> {
     /// Indices of the unknown faces along each axis.
     dofs: [Range<i32>; 3],
     axes: [LinkAxis; 3],
-    /// Rigid velocity [m/s] in the middle of link (0, 0, 0), then its change from a link to the next
-    /// along each axis. Entries 2 a and 2 a + 1 are U_q and U_c of the links along axis a; the last
-    /// two are unused.
+    /// Rigid velocity [m/s] at the middle of link (0, 0, 0), then its change from a link to the
+    /// next along x, y and z. Entries 2 a and 2 a + 1 are U_q and U_c of the links along axis a;
+    /// the last two are unused.
     rigid: [[f64; 8]; 4],
 }
 
@@ -42,23 +45,23 @@ struct LinkAxis {
     /// Whether the grid has more than one cell along the axis.
     exists: bool,
     /// The six faces in line with a link, relative to its lower face, q_0 and q_1 first.
-    carried: Stencil<6>,
-    /// The two faces of the carrying component, relative to the lower face.
-    carrying: Stencil<2>,
+    six_faces: Stencil<6>,
     /// q_0 and q_1 three times, for links without six faces in line.
     two_faces: Stencil<6>,
-    /// 1/h [1/m].
-    inverse: f64,
+    /// The two faces of the advecting component, relative to the lower face.
+    advecting: Stencil<2>,
+    /// 1 / h [1/m].
+    per_spacing: f64,
 }
 
-/// Links of a row along one axis that have six faces in line.
+/// Links of a row along one axis that get the sixth-order mean.
 #[derive(Clone, Copy)]
-struct SixFaces<'a> {
+struct SixthOrderLinks<'a> {
     /// First index along x, and the index after the last.
     start: f64,
     end: f64,
-    /// Faces to load.
-    carried: &'a Stencil<6>,
+    /// Faces to load for all links of the row.
+    advected: &'a Stencil<6>,
 }
 
 impl<'a, R: Real> ComponentLinks<'a, R> {
@@ -73,7 +76,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let mut rigid = [[0.0; 8]; 4];
         for along in 0..3 {
             let middle = DVec3::from_array(FACE_OFFSET[component]) - 1.0;
-            let middle = body.first.as_dvec3() + middle + 0.5 * DVec3::AXES[along];
+            let middle = body.lowest.as_dvec3() + middle + 0.5 * DVec3::AXES[along];
             let first = kinematics.velocity_at(mesh.origin + mesh.spacing * middle);
             let omega = kinematics.velocity.angular;
             let change = DVec3::AXES.map(|axis| omega.cross(axis * mesh.spacing));
@@ -86,13 +89,13 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             let [next, across] = [along, component].map(|axis| velocity.strides[axis] as isize);
             LinkAxis {
                 exists: mesh.cells[along] > 1,
-                carried: Stencil::new([0, next, -next, 2 * next, -2 * next, 3 * next]),
-                carrying: match along == component {
+                six_faces: Stencil::new([0, next, -next, 2 * next, -2 * next, 3 * next]),
+                two_faces: Stencil::new([0, next, 0, next, 0, next]),
+                advecting: match along == component {
                     true => Stencil::new([0, next]),
                     false => Stencil::new([next, next - across]),
                 },
-                two_faces: Stencil::new([0, next, 0, next, 0, next]),
-                inverse: 1.0 / mesh.spacing[along],
+                per_spacing: 1.0 / mesh.spacing[along],
             }
         });
         ComponentLinks {
@@ -120,14 +123,14 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         weigh(-1, planes);
         for k in 0..self.body.size.z {
             weigh(k, planes);
-            for j in planes.rows[(k % 2) as usize].clone() {
+            for j in 0..self.body.size.y {
                 self.correct_row::<V>([j, k], planes, correction);
             }
         }
     }
 
-    /// Computes the fluxes of the links whose lower faces are in row (j, k). Writes the correction of
-    /// these faces: fluxes in from the row and the plane before less fluxes out.
+    /// Computes the fluxes of the links whose lower faces are in row (j, k). Writes the correction
+    /// of these faces: fluxes in, from the previous row and plane, less fluxes out.
     #[inline(always)]
     fn correct_row<V: Vector<Number = f64>>(
         &self,
@@ -135,13 +138,13 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         planes: &mut LinkPlanes,
         correction: &mut [f64],
     ) {
-        let Some(near) = near_faces(self.body, &self.dofs, self.component, [j, k]) else {
+        let Some(listed) = listed_faces(self.body, &self.dofs, self.component, [j, k]) else {
             return;
         };
         let (at, first) = (self.velocity.row([j, k]), planes.first_entry(j));
         let [a, b, c] = &self.axes;
         let index = [0, j, k];
-        let six = [self.six(0, index), self.six(1, index), self.six(2, index)];
+        let sixth_order = [0, 1, 2].map(|along| self.sixth_order_links(along, index));
         let [y, z] = [j, k].map(f64::from);
         let [rigid_0, _, by_y, by_z] = &self.rigid;
         let mut rigid = [0.0; 8];
@@ -167,32 +170,32 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             &mut flux_z[first..][..row_length],
         );
         let zero = V::constant(0.0);
-        let (mut n, mut before, mut index) = (0, zero, V::ramp());
+        let (mut n, mut last_flux, mut index) = (0, zero, V::ramp());
         while n + V::WIDTH <= row_length {
             let at = at.wrapping_add(n);
             let mut sum = zero;
             if a.exists {
                 let weight = V::load_from(&wx[n..]);
-                let flux = self.flux::<V>(0, six[0], &rigid, at, index, weight);
-                sum = flux.shift(before) - flux;
-                before = flux;
+                let flux = self.flux::<V>(0, sixth_order[0], &rigid, at, index, weight);
+                sum = flux.shift(last_flux) - flux;
+                last_flux = flux;
             }
             if b.exists {
                 let weight = V::load_from(&wy[n..]);
-                let flux = self.flux::<V>(1, six[1], &rigid, at, index, weight);
+                let flux = self.flux::<V>(1, sixth_order[1], &rigid, at, index, weight);
                 sum = sum + (V::load(&fy[n..]) - flux);
                 flux.store(&mut fy[n..]);
             }
             if c.exists {
                 let weight = V::load_from(&wz[n..]);
-                let flux = self.flux::<V>(2, six[2], &rigid, at, index, weight);
+                let flux = self.flux::<V>(2, sixth_order[2], &rigid, at, index, weight);
                 sum = sum + (V::load(&fz[n..]) - flux);
                 flux.store(&mut fz[n..]);
             }
             // Lanes whose faces are listed.
-            let (start, end) = (near.start.max(n), near.end.min(n + V::WIDTH));
+            let (start, end) = (listed.start.max(n), listed.end.min(n + V::WIDTH));
             if start < end {
-                let entry = near.first + (start - near.start);
+                let entry = listed.first + (start - listed.start);
                 sum.store_from(start - n, &mut correction[entry..entry + (end - start)]);
             }
             n += V::WIDTH;
@@ -200,74 +203,64 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         }
     }
 
-    /// Links along an axis of the row with `index` that have six faces in line; none at the ends of
-    /// the grid.
-    fn six(&self, along: usize, index: [i32; 3]) -> SixFaces<'_> {
+    /// Returns the links along an axis of the row with `index` that have six faces in line.
+    fn sixth_order_links(&self, along: usize, index: [i32; 3]) -> SixthOrderLinks<'_> {
         let (axis, range, index) = (&self.axes[along], &self.dofs[along], index[along]);
         let (start, end) = (range.start + 2 - index, range.end - 3 - index);
-        if along == 0 {
-            return SixFaces {
-                start: f64::from(start),
-                end: f64::from(end),
-                carried: &axis.carried,
-            };
-        }
-        if start <= 0 && 0 < end {
-            return SixFaces {
-                start: f64::NEG_INFINITY,
-                end: f64::INFINITY,
-                carried: &axis.carried,
-            };
-        }
-        SixFaces {
-            start: 0.0,
-            end: 0.0,
-            carried: &axis.two_faces,
+        let (start, end, advected) = if along == 0 {
+            (f64::from(start), f64::from(end), &axis.six_faces)
+        } else if start <= 0 && 0 < end {
+            (f64::NEG_INFINITY, f64::INFINITY, &axis.six_faces)
+        } else {
+            (0.0, 0.0, &axis.two_faces)
+        };
+        SixthOrderLinks {
+            start,
+            end,
+            advected,
         }
     }
 
-    /// Change of the flux through links along an axis, over their length [m/s^2]; zero away from the
-    /// surface. The links have the indices `index` in their row, their lower faces lie from position
+    /// Correction of the flux through links along an axis, over h [m/s^2]; zero where `weight` is
+    /// -1. The links have the indices `index` in their row, their lower faces lie from position
     /// `at` on; `rigid` holds U of the first link of the row.
     #[inline(always)]
     fn flux<V: Vector<Number = f64>>(
         &self,
         along: usize,
-        six: SixFaces,
+        sixth_order: SixthOrderLinks,
         rigid: &[f64; 8],
         at: usize,
         index: V,
         weight: V,
     ) -> V {
         let (zero, half) = (V::constant(0.0), V::constant(0.5));
-        // Weights are -1 away from the surface, else the excess.
-        let none = V::constant(-0.5);
-        if none.mask_below(weight) == 0 {
+        let no_link = V::constant(-0.5);
+        if no_link.mask_below(weight) == 0 {
             return zero;
         }
         let axis = &self.axes[along];
         let [q, c] = [self.component, along].map(|of| self.velocity.components[of]);
-        let [q_0, q_1, below, above, far_below, far_above] = six.carried.load::<V, R>(q, at);
-        let [c_0, c_1] = axis.carrying.load::<V, R>(c, at);
+        let [q_0, q_1, below, above, far_below, far_above] =
+            sixth_order.advected.load::<V, R>(q, at);
+        let [c_0, c_1] = axis.advecting.load::<V, R>(c, at);
         let both = q_0 + q_1;
-        let (mean, carrier) = (half * both, half * (c_0 + c_1));
+        let (q_mean, c_mean) = (half * both, half * (c_0 + c_1));
         let outer = V::constant(-8.0).mul_add(below + above, far_below + far_above);
         let sixth = both.mul_add(V::constant(7.0), outer);
-        let higher_order = carrier * V::constant(1.0 / 60.0) * sixth;
+        let higher_order = c_mean * V::constant(1.0 / 60.0) * sixth;
         // Values read beyond the ends of the grid are arbitrary.
-        let higher_order = index.select_below(V::constant(six.end), higher_order, zero);
-        let higher_order = index.select_below(V::constant(six.start), zero, higher_order);
+        let higher_order = index.select_below(V::constant(sixth_order.end), higher_order, zero);
+        let higher_order = index.select_below(V::constant(sixth_order.start), zero, higher_order);
         let mut flux = higher_order;
-        // Links outside the band are open: no excess.
+        // Links outside the band are open: 1/A - 1 is zero.
         if zero.mask_below(weight) != 0 {
-            let by_x = &self.rigid[1];
-            let [own, other] = [2 * along, 2 * along + 1];
-            let mean = mean - index.mul_add(V::constant(by_x[own]), V::constant(rigid[own]));
-            let carrier =
-                carrier - index.mul_add(V::constant(by_x[other]), V::constant(rigid[other]));
-            flux = (mean * carrier).mul_add(weight, higher_order);
+            let (by_x, [n, m]) = (&self.rigid[1], [2 * along, 2 * along + 1]);
+            let u_q = index.mul_add(V::constant(by_x[n]), V::constant(rigid[n]));
+            let u_c = index.mul_add(V::constant(by_x[m]), V::constant(rigid[m]));
+            flux = ((q_mean - u_q) * (c_mean - u_c)).mul_add(weight, higher_order);
         }
-        let flux = flux * V::constant(axis.inverse);
-        none.select_below(weight, flux, zero)
+        let flux = flux * V::constant(axis.per_spacing);
+        no_link.select_below(weight, flux, zero)
     }
 }

@@ -1,7 +1,10 @@
 //! Weights of the links next to a grain, plane by plane, in single precision like the distances.
 //!
-//! The distance d of a link is the mean of those of its two faces. The weight is the inverse-aperture
-//! excess for |d| < eps, 0 for eps <= d < 2 eps, and -1 elsewhere.
+//! The weight of a link is 1 / A - 1 for |d| < eps, 0 for eps <= d < 2 eps, and -1 elsewhere, which
+//! marks links without correction. `immersed::reference` has the scalar form.
+//!
+//! Legend: d signed distance of a link, the mean of the distances of its two faces; eps half-width
+//! of the band; A aperture at d.
 
 use std::ops::Range;
 
@@ -10,21 +13,19 @@ use crate::immersed::geometry::aperture::inverse_aperture_excess;
 use crate::math::Aligned;
 use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
-/// The current plane of a component and the next, in rows aligned to registers. One row precedes the
-/// first, and one follows the last.
+/// The current plane of a component and the next, in rows aligned to registers. One row precedes
+/// the first, and one follows the last.
 #[derive(Default)]
 pub struct LinkPlanes {
     /// Entries from one row to the next.
     pub row_length: usize,
-    /// Rows with faces near the grain, in even and in odd planes.
-    pub rows: [Range<i32>; 2],
     /// Signed distances of the faces [m] in even and in odd planes, infinite where no link may end.
     distance: [Aligned<f32>; 2],
     /// Weights of the links of the current plane, by axis.
     pub weight: [Aligned<f32>; 3],
-    /// Fluxes along y out of the row before [m/s^2]. Fluxes never enter rows without faces near.
+    /// Fluxes along y out of the previous row [m/s^2]; zero before a row without listed faces.
     pub flux_y: Aligned<f64>,
-    /// Fluxes along z out of the plane before [m/s^2].
+    /// Fluxes along z out of the previous plane [m/s^2].
     pub flux_z: Aligned<f64>,
 }
 
@@ -53,7 +54,7 @@ impl LinkPlanes {
 }
 
 /// Unknown faces of a row within reach of the grain.
-pub struct NearFaces {
+pub struct ListedFaces {
     /// First index along x, and the index after the last.
     pub start: usize,
     pub end: usize,
@@ -61,28 +62,30 @@ pub struct NearFaces {
     pub first: usize,
 }
 
-/// Unknown faces of row (j, k) within reach, if any; `x`, `y` and `z` are the unknowns along each axis.
+/// Returns the unknown faces of row (j, k) within reach, if any; `x`, `y` and `z` are the indices
+/// of the unknowns along each axis.
 #[inline(always)]
-pub fn near_faces(
+pub fn listed_faces(
     body: &LocatedBody,
     [x, y, z]: &[Range<i32>; 3],
     component: usize,
     [j, k]: [i32; 2],
-) -> Option<NearFaces> {
+) -> Option<ListedFaces> {
     let span = &body.spans[component][(j + body.size.y * k) as usize];
     let (start, end) = (span.start.max(x.start), span.end.min(x.end));
     if start >= end || j < y.start || j >= y.end || k < z.start || k >= z.end {
         return None;
     }
-    Some(NearFaces {
+    Some(ListedFaces {
         start: start as usize,
         end: end as usize,
         first: span.entry(start),
     })
 }
 
-/// Weighs the links whose lower faces are in plane `k`. To be called for plane -1 first, then for one
-/// plane after the other; `dofs` are the unknowns along each axis.
+/// Weighs the links whose lower faces are in plane `k`. Must be called for the planes -1, 0, 1, ...
+/// in order; `dofs` are the indices of the unknowns along each axis, `eps` [m] the half-width of
+/// the band.
 pub fn weigh_links(
     dofs: &[Range<i32>; 3],
     body: &LocatedBody,
@@ -122,42 +125,33 @@ impl Kernel for WeighLinks<'_> {
 }
 
 impl WeighLinks<'_> {
-    /// Copies the distances of the next plane from the list.
+    /// Copies the distances of the plane above from the list.
     #[inline(always)]
     fn read_next_plane<V: Vector<Number = f32>>(&mut self) {
         let (body, k) = (self.body, self.k + 1);
-        let which = (k % 2) as usize;
         let row_length = self.planes.row_length;
-        let distance =
-            &mut self.planes.distance[which][..row_length * (body.size.y as usize + 2) + MAX_LANES];
-        let far = V::constant(f64::INFINITY);
-        for n in (0..distance.len()).step_by(V::WIDTH) {
-            far.store(&mut distance[n..]);
+        let length = row_length * (body.size.y as usize + 2) + MAX_LANES;
+        let distance = &mut self.planes.distance[(k % 2) as usize][..length];
+        let infinity = V::constant(f64::INFINITY);
+        for n in (0..length).step_by(V::WIDTH) {
+            infinity.store(&mut distance[n..]);
         }
-        let (mut first, mut last) = (0, 0);
         let list = &body.distance[self.component][..];
         let rows = if k < body.size.z { body.size.y } else { 0 };
         for j in 0..rows {
-            let Some(near) = near_faces(body, self.dofs, self.component, [j, k]) else {
+            let Some(listed) = listed_faces(body, self.dofs, self.component, [j, k]) else {
                 continue;
             };
-            if last == 0 {
-                first = j;
-            }
-            last = j + 1;
-            let (count, to) = (
-                near.end - near.start,
-                (j + 1) as usize * row_length + near.start,
-            );
+            let count = listed.end - listed.start;
+            let first = (j + 1) as usize * row_length + listed.start;
             for n in (0..count).step_by(V::WIDTH) {
-                let left = V::constant((count - n) as f64);
-                // Entries beyond the row are overwritten by the next.
-                V::ramp()
-                    .select_below(left, V::load(&list[near.first + n..]), far)
-                    .store(&mut distance[to + n..]);
+                // Entries beyond the row are overwritten by the next row.
+                let end = V::constant((count - n) as f64);
+                let d = V::load(&list[listed.first + n..]);
+                let d = V::ramp().select_below(end, d, infinity);
+                d.store(&mut distance[first + n..]);
             }
         }
-        self.planes.rows[which] = first..last;
     }
 
     /// Weighs the links of this plane.
@@ -165,38 +159,31 @@ impl WeighLinks<'_> {
     fn weigh<V: Vector<Number = f32>>(&mut self) {
         let LinkPlanes {
             row_length,
-            rows,
             distance,
             weight,
             ..
         } = &mut *self.planes;
-        let [this, other] = [self.k, self.k + 1].map(|k| (k % 2) as usize);
-        let (here, above) = (&distance[this][..], &distance[other][..]);
+        let [this, next] = [self.k, self.k + 1].map(|k| (k % 2) as usize);
+        let (this, above) = (&distance[this][..], &distance[next][..]);
         let [x, y, z] = weight;
         let weight = [&mut x[..], &mut y[..], &mut z[..]];
-        let (half, zero, none) = (V::constant(0.5), V::constant(0.0), V::constant(-1.0));
-        let [inside, band, outside] = [-1.0, 1.0, 2.0].map(|half_widths| half_widths * self.eps);
-        let rows = &rows[this];
-        let (first, last) = (rows.start + 1, rows.end + 1);
-        let row_length = *row_length;
-        for entry in (first as usize * row_length..last as usize * row_length).step_by(V::WIDTH) {
-            let own = V::load(&here[entry..]);
-            let next = [
-                V::load(&here[entry + 1..]),
-                V::load(&here[entry + row_length..]),
+        let (half, zero, no_link) = (V::constant(0.5), V::constant(0.0), V::constant(-1.0));
+        let [inside, band, outside] = [-1.0, 1.0, 2.0].map(|n| V::constant(n * self.eps));
+        let rows = *row_length..*row_length * (self.body.size.y as usize + 1);
+        for entry in rows.step_by(V::WIDTH) {
+            let d_0 = V::load(&this[entry..]);
+            let d_1 = [
+                V::load(&this[entry + 1..]),
+                V::load(&this[entry + *row_length..]),
                 V::load(&above[entry..]),
             ];
             for axis in 0..3 {
-                let d = half * (own + next[axis]);
-                let mut of_near = zero;
-                if d.mask_below(V::constant(band)) != 0 {
-                    // Zero for open links, where the series would leave round-off.
-                    let excess = inverse_aperture_excess(d, self.eps);
-                    let excess = d.select_below(V::constant(band), excess, zero);
-                    of_near = V::constant(inside).select_below(d, excess, none);
-                }
-                d.select_below(V::constant(outside), of_near, none)
-                    .store(&mut weight[axis][entry..]);
+                let d = half * (d_0 + d_1[axis]);
+                let excess = inverse_aperture_excess(d, self.eps);
+                let w = d.select_below(band, excess, zero);
+                let w = inside.select_below(d, w, no_link);
+                let w = d.select_below(outside, w, no_link);
+                w.store(&mut weight[axis][entry..]);
             }
         }
     }

@@ -1,8 +1,9 @@
-//! Drag on a face near a surface.
+//! Drag on a face near a surface: smoothed ghost-Dirichlet condition.
 //!
-//! The drag makes the velocity profile m(d) of a linear shear over a plane wall an exact solution of
-//! the discrete equations, so that the wall acts at d = 0 wherever the grid lies:
-//! drag = sum_a (m(d + h_a n_a) + m(d - h_a n_a) - 2 m(d)) / h_a^2 / m(d).
+//! drag = sum_a (m(d + h_a n_a) + m(d - h_a n_a) - 2 m(d)) / h_a^2 / m(d)
+//!
+//! With this drag the velocity profile m(d) of a linear shear over a plane wall solves the discrete
+//! equations exactly, so that the wall acts at d = 0 wherever the grid lies.
 //!
 //! Legend: d signed distance, n unit normal, h spacing, eps half-width of the band, m open depth.
 
@@ -10,8 +11,8 @@ use grainwake_simd::Vector;
 
 use crate::immersed::geometry::aperture::open_depth;
 
-/// Drag coefficient [1/s] per kinematic viscosity [m^2/s] of faces at distances `d` [m], as numerator
-/// and positive denominator; very large where a face is closed.
+/// Drag coefficient over kinematic viscosity [1/m^2] of faces at distances `d` [m] with unit
+/// normals `n`, as numerator and positive denominator; very large where a face is closed.
 #[inline(always)]
 pub fn drag<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
     let depth = open_depth(d, eps);

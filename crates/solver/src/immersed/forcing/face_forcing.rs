@@ -1,4 +1,6 @@
-//! Forcing of a single face: drag, and closed fraction.
+//! Forcing of a face near a surface: strength of the drag, and closed fraction.
+//!
+//! Legend: d signed distance, eps half-width of the band, A aperture.
 
 use std::ops::Add;
 
@@ -12,14 +14,14 @@ use grainwake_simd::{Kernel, Scalar, Vector, dispatch};
 /// Forcing of a face by one grain, or by several together.
 #[derive(Clone, Copy, Debug)]
 pub struct FaceForcing {
-    /// Drag coefficient times the step; a face takes strength / (1 + strength) of the rigid velocity.
+    /// Drag coefficient times dt; the weight of the rigid velocity is strength / (1 + strength).
     pub strength: f64,
-    /// Fraction of the face closed to the pressure gradient.
+    /// Fraction of the face closed to the pressure gradient, 1 - A(d).
     pub closed: f64,
 }
 
 impl FaceForcing {
-    /// Weight of the grain's rigid velocity on a face that all grains together force by `all`.
+    /// Weight of one grain's rigid velocity on a face with the total forcing `all`.
     pub fn weight(self, all: FaceForcing) -> f64 {
         if self.strength.is_finite() {
             self.strength / (1.0 + all.strength)
@@ -45,6 +47,7 @@ pub struct ForcingParams {
     pub scheme: Scheme,
     /// Half-width of the band [m].
     pub eps: f64,
+    /// Spacing of the grid [m].
     pub spacing: DVec3,
     /// Kinematic viscosity times the step [m^2].
     diffusion: f64,
@@ -68,7 +71,7 @@ impl ForcingParams {
         }
     }
 
-    /// Forcing of one face at the distance `d` [m] from a surface with unit `normal`.
+    /// Forcing of a face at the distance `d` [m] from a surface with the unit `normal`.
     pub fn of(&self, d: f64, normal: DVec3) -> FaceForcing {
         match self.scheme {
             Scheme::Aperture => {
@@ -88,7 +91,7 @@ impl ForcingParams {
         }
     }
 
-    /// Strength of the drag as numerator and denominator, and closed fraction.
+    /// Strength of the drag as numerator and positive denominator, and closed fraction.
     #[inline(always)]
     pub fn aperture_forcing<V: Vector>(&self, d: V, normal: [V; 3]) -> ([V; 2], V) {
         let [drag, depth] = drag(d, normal, self.spacing.to_array(), self.eps);
@@ -100,7 +103,8 @@ impl ForcingParams {
         ([strength, depth], closed)
     }
 
-    /// Forcing of the paper's scheme: the weight of the rigid velocity is the solid fraction.
+    /// Forcing of the paper's scheme: the weight of the rigid velocity is the solid fraction of a
+    /// cell cut by a plane.
     fn blend(&self, d: f64, normal: DVec3) -> FaceForcing {
         let width = normal.abs().dot(self.spacing);
         let solid_fraction = (0.5 - d / width).clamp(0.0, 1.0);
@@ -111,7 +115,7 @@ impl ForcingParams {
     }
 }
 
-/// Evaluates one face with the instruction set in use: without it fused products are library calls.
+/// Evaluates one face with the instruction set in use, in which fused products are instructions.
 struct OneFace<'a> {
     params: &'a ForcingParams,
     d: f64,

@@ -6,24 +6,25 @@ use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
 use super::face_forcing::ForcingParams;
 
-/// Forced faces of one grain. All lists but `runs` have one entry per face, in the order of the runs,
-/// and `MAX_LANES` zeros more at the end.
+/// Forced faces of one grain. All lists but `runs` have one entry per face, in the order of the
+/// runs, and `MAX_LANES` unused entries at the end.
 #[derive(Clone, Debug, Default)]
 pub struct ForcedFaces {
     /// Positions of the faces, by component.
     pub runs: [Vec<FaceRun>; 3],
     /// Weight of the rigid velocity, 0 to 1.
     pub weight: Vec<f32>,
-    /// Fraction of a face that the grain closes to the pressure gradient, 0 to 1.
+    /// Fraction of a face that the grain closes to the pressure gradient (its solid fraction), 0 to
+    /// 1.
     pub closed: Vec<f32>,
-    /// Fraction that all grains together close; empty unless another grain is near.
+    /// Fraction of a face that all grains together close; empty if the grain shares no face.
     closed_by_all: Vec<f32>,
     /// Velocity that a face gains next to a grain at rest [m/s]; filled by [`super::sum_impulse`].
     pub rest_gain: Vec<f64>,
 }
 
 impl ForcedFaces {
-    /// Computes the weights of the faces in `band`, which `neighbours` may force as well.
+    /// Computes the weights of the faces in `band`, which `neighbours` may force too.
     pub fn weigh(
         &mut self,
         params: &ForcingParams,
@@ -44,9 +45,9 @@ impl ForcedFaces {
             Scheme::Paper => {
                 for entry in 0..count {
                     let (d, normal) = band.face(entry);
-                    let own = params.of(d, normal);
-                    self.weight[entry] = own.weight(own) as f32;
-                    self.closed[entry] = own.closed as f32;
+                    let forcing = params.of(d, normal);
+                    self.weight[entry] = forcing.weight(forcing) as f32;
+                    self.closed[entry] = forcing.closed as f32;
                 }
             }
         }
@@ -55,14 +56,14 @@ impl ForcedFaces {
             list.resize(count + MAX_LANES, 0.0);
         }
         self.closed_by_all.clear();
-        if !band.contested.is_empty() {
+        if !band.shared.is_empty() {
             self.closed_by_all.extend_from_slice(&self.closed);
-            self.share_contested(params, band, neighbours, shapes);
+            self.share_faces(params, band, neighbours, shapes);
         }
     }
 
-    /// Divides the forcing of contested faces among the grains.
-    fn share_contested(
+    /// Divides the forcing of shared faces among the grains, in proportion to their strengths.
+    fn share_faces(
         &mut self,
         params: &ForcingParams,
         band: &BandFaces,
@@ -70,14 +71,14 @@ impl ForcedFaces {
         shapes: &NarrowBandShapes,
     ) {
         let limit = 2.0 * params.eps;
-        for &(entry, x) in &band.contested {
+        for &(entry, x) in &band.shared {
             let (d, normal) = band.face(entry);
             if params.scheme == Scheme::Aperture && d <= -params.eps {
-                // Deep inside, the face belongs to this grain alone.
+                // A face deep inside a grain takes the velocity of this grain alone.
                 continue;
             }
-            let own = params.of(d, normal);
-            let mut all = own;
+            let forcing = params.of(d, normal);
+            let mut all = forcing;
             for other in neighbours {
                 let (d, gradient) = other.distance_and_gradient(shapes, x, limit);
                 if d < limit {
@@ -85,8 +86,8 @@ impl ForcedFaces {
                     all = all + params.of(d, normal);
                 }
             }
-            self.weight[entry] = own.weight(all) as f32;
-            self.closed[entry] = (own.closed / all.closed.max(1.0)) as f32;
+            self.weight[entry] = forcing.weight(all) as f32;
+            self.closed[entry] = (forcing.closed / all.closed.max(1.0)) as f32;
             self.closed_by_all[entry] = all.closed.min(1.0) as f32;
         }
     }
@@ -130,20 +131,12 @@ impl Kernel for WeighFaces<'_> {
         let inside = V::constant(-self.params.eps);
         for at in (0..weight.len()).step_by(V::WIDTH) {
             let d = V::load(&distance[at..]);
-            // Faces deep inside take the rigid velocity as it is.
-            let shallow = inside.is_below(d);
-            if shallow.is_zero() {
-                one.store(&mut weight[at..]);
-                one.store(&mut closed[at..]);
-                continue;
-            }
-            let ([strength, depth], part) = self.params.aperture_forcing(d, load_all(normal, at));
+            let ([strength, depth], c) = self.params.aperture_forcing(d, load_all(normal, at));
             // strength / (1 + strength) with a single division.
-            let fraction = strength.div(depth + strength);
-            inside
-                .select_below(d, fraction, one)
-                .store(&mut weight[at..]);
-            inside.select_below(d, part, one).store(&mut closed[at..]);
+            let s = strength.div(depth + strength);
+            // Faces deep inside take the rigid velocity.
+            inside.select_below(d, s, one).store(&mut weight[at..]);
+            inside.select_below(d, c, one).store(&mut closed[at..]);
         }
     }
 }

@@ -1,23 +1,25 @@
-//! Impulse that a grain's rigidity takes from the fluid, as an affine function of its new velocities.
+//! Impulse that a grain's rigidity takes from the fluid, as an affine function of its new
+//! velocities.
 //!
-//! In a step a forced face gains, with the new rigid velocity U and the one before, U_old:
+//! In a step of dt, a forced face gains with the rigid velocity U, and U_old before it,
 //!
-//! - back = dt / h (p~(above) - p~(below)) - dt g: removes pressure gradient and body acceleration,
-//! - free = u* + C back: velocity of the face without drag,
-//! - rest_gain = c back - s free: gain next to a grain at rest,
-//! - gain = rest_gain + s U + f (U - U_old), with f = (1 - s) c.
+//! - e = dt / h (p~(above) - p~(below)) - dt g, if the step's pressure gradient and body
+//!   acceleration are removed from the face;
+//! - r = c e - s (u* + C e), next to a grain at rest: the drag acts on u* + C e;
+//! - r + s U + f (U - U_old), next to a moving grain, with f = (1 - s) c.
 //!
-//! p~ = p - dt U_old . grad p is the pressure of the last step moved with the grain; the unmoved one
-//! would make the drag of a moving grain first order in the step
-//! (`docs/decisions/0011-pressure-moves-with-the-grain.md`). The sum of w gain over the faces is the
-//! impulse J = constant + slope (V, Omega). What the fluid gains the grain loses
-//! ([`crate::immersed::rigid_body`]). `immersed::reference` has the scalar form.
+//! p~ = p - dt U_old . grad p is the pressure of the last step, moved with the grain; without this
+//! shift the drag of a moving grain is of first order in the step
+//! (`docs/decisions/0011-pressure-moves-with-the-grain.md`). The impulse on the fluid is the sum of
+//! fluid mass times gain over the faces, J = constant + matrix (V, Omega). The grain loses what the
+//! fluid gains ([`crate::immersed::rigid_body`]). `immersed::reference` has the scalar form.
 //!
-//! Legend: s weight, c closed fraction, C closed fraction of all grains together, w fluid mass of a
-//! face, h spacing along the component, l and m levers of the face about the two other axes.
+//! Legend: s weight, c closed fraction, C closed fraction of all grains together, f weight of the
+//! change of velocity, u* predicted velocity, h spacing along the component, l and m lever arms of
+//! the face about the two other axes.
 
 use super::faces::ForcedFaces;
-use super::rigid_run::{RigidRun, follow, lane_indices};
+use super::rigid_run::{RigidRun, change_weight, lane_indices};
 use crate::flow::{Known, Prediction};
 use crate::immersed::geometry::FaceRun;
 use crate::immersed::kinematics::RigidVelocity;
@@ -30,19 +32,19 @@ use grainwake_simd::{Kernel, Partial, Stencil, Vector, dispatch};
 pub struct Impulse {
     /// Impulse for a grain at rest.
     pub constant: Vector6,
-    /// Derivative by the six velocities.
-    pub slope: Matrix6,
+    /// Derivative with respect to the six velocities.
+    pub matrix: Matrix6,
 }
 
-/// Sums the impulse over the faces of `forced` for a grain that had the velocities `before`, and fills
-/// their `rest_gain`. `closure_dt` [s] is the step for which closed fractions follow the grain instead
-/// of the pressure gradient; zero turns both off.
+/// Sums the impulse over the faces of `forced` for a grain that had the velocity `old`, and fills
+/// their `rest_gain`. `closure_dt` [s] is the length of the step; 0 if faces are not closed to the
+/// pressure gradient, as in the paper's scheme.
 pub fn sum_impulse<R: Real>(
     known: &Known<R>,
     predictions: &[Prediction<R>; 3],
     fluid_density: f64,
     forced: &mut ForcedFaces,
-    before: RigidVelocity,
+    old: RigidVelocity,
     closure_dt: f64,
 ) -> Impulse {
     let mut sums = [Moments::default(); 3];
@@ -50,7 +52,7 @@ pub fn sum_impulse<R: Real>(
         known,
         predictions,
         forced,
-        before,
+        old,
         closure_dt,
         sums: &mut sums,
     });
@@ -58,30 +60,30 @@ pub fn sum_impulse<R: Real>(
     let mut impulse = Impulse::default();
     for (axis, sum) in sums.iter().enumerate() {
         let constant = sum.constant.map(|s| s.sum());
-        let slope = sum.slope.map(|s| s.sum());
+        let matrix = sum.matrix.map(|s| s.sum());
         // A force along the axis has no torque about it.
         let rows = [axis, 3 + (axis + 1) % 3, 3 + (axis + 2) % 3];
         for (a, row) in rows.into_iter().enumerate() {
             impulse.constant[row] += w * constant[a];
             for (b, column) in rows.into_iter().enumerate() {
-                impulse.slope[row][column] += w * slope[a + b + usize::from(a.min(b) > 0)];
+                impulse.matrix[row][column] += w * matrix[a + b + usize::from(a.min(b) > 0)];
             }
         }
     }
     impulse
 }
 
-/// Sums over the faces of one component.
+/// Moments of the gain of one component: its part at U = 0 and its derivative dGain / dU.
 #[derive(Clone, Copy, Default)]
 struct Moments {
-    /// Constant part with the factors 1, l, m.
+    /// Sums of the part at U = 0 times 1, l and m.
     constant: [Partial; 3],
-    /// Slope with the factors 1, l, m, l l, l m, m m.
-    slope: [Partial; 6],
+    /// Sums of the derivative times 1, l, m, l l, l m and m m.
+    matrix: [Partial; 6],
 }
 
 impl Moments {
-    /// Adds the faces from the `n`th of a run on, at `arm` from the centroid.
+    /// Adds the faces from face `n` of a run on, at `arm` [m] from the centroid.
     #[inline(always)]
     fn add<V: Vector<Number = f64>>(
         &mut self,
@@ -89,23 +91,16 @@ impl Moments {
         n: usize,
         arm: [V; 3],
         constant: V,
-        slope: V,
+        derivative: V,
     ) {
         let (l, m) = (arm[(axis + 2) % 3], V::constant(0.0) - arm[(axis + 1) % 3]);
-        let [slope_l, slope_m] = [slope * l, slope * m];
+        let [by_l, by_m] = [derivative * l, derivative * m];
         let constants = [constant, constant * l, constant * m];
-        let slopes = [
-            slope,
-            slope_l,
-            slope_m,
-            slope_l * l,
-            slope_l * m,
-            slope_m * m,
-        ];
+        let derivatives = [derivative, by_l, by_m, by_l * l, by_l * m, by_m * m];
         for (sum, value) in self.constant.iter_mut().zip(&constants) {
             sum.add(n + 1, *value);
         }
-        for (sum, value) in self.slope.iter_mut().zip(&slopes) {
+        for (sum, value) in self.matrix.iter_mut().zip(&derivatives) {
             sum.add(n + 1, *value);
         }
     }
@@ -115,7 +110,7 @@ struct SumImpulse<'a, R> {
     known: &'a Known<'a, R>,
     predictions: &'a [Prediction<'a, R>; 3],
     forced: &'a mut ForcedFaces,
-    before: RigidVelocity,
+    old: RigidVelocity,
     closure_dt: f64,
     sums: &'a mut [Moments; 3],
 }
@@ -135,9 +130,9 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
             (&forced.weight, &forced.closed, forced.closed_by_all());
         for (axis, runs) in forced.runs.iter().enumerate() {
             let half_cell = 0.5 * spacing[axis] * DVec3::AXES[axis];
-            let above = self.before.angular.cross(half_cell);
+            let above = self.old.angular.cross(half_cell);
             for run in runs {
-                let rigid = RigidRun::new(self.before, run.arm, spacing);
+                let rigid = RigidRun::new(self.old, run.arm, spacing);
                 let faces = RunImpulse {
                     axis,
                     run,
@@ -146,9 +141,9 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
                     stencil,
                     rigid,
                     cells: [above, -above].map(|offset| rigid.shifted(offset)),
-                    drift: (0.5 * self.closure_dt / spacing).to_array(),
+                    dt_per_2h: (0.5 * self.closure_dt / spacing).to_array(),
                     dt_per_h: self.closure_dt / spacing[axis],
-                    driven: self.closure_dt * self.known.body_acceleration[axis],
+                    dt_g: self.closure_dt * self.known.body_acceleration[axis],
                     closure_dt: self.closure_dt,
                     spacing: spacing.x,
                 };
@@ -157,10 +152,10 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
                     let weight = V::load_from(&weights[entry..]);
                     let closed = V::load_from(&closed[entry..]);
                     let closed_by_all = V::load_from(&closed_by_all[entry..]);
-                    // Lanes beyond the run are overwritten by the next.
-                    faces
-                        .add(n, weight, [closed, closed_by_all], &mut self.sums[axis])
-                        .store(&mut rest_gain[entry..]);
+                    let sums = &mut self.sums[axis];
+                    let gain = faces.add(n, weight, [closed, closed_by_all], sums);
+                    // Entries beyond the run are overwritten by the next run.
+                    gain.store(&mut rest_gain[entry..]);
                 }
             }
         }
@@ -174,37 +169,43 @@ struct RunImpulse<'a, R> {
     run: &'a FaceRun,
     /// u* of the faces [m/s].
     predicted: &'a [R],
+    /// p of the last step [m^2/s^2].
     pressure: &'a [R],
     /// A cell and its six neighbours.
     stencil: Stencil<7>,
+    /// U_old at the faces [m/s].
     rigid: RigidRun,
-    /// Rigid velocity at the centres of the cells above and below the faces.
+    /// U_old at the centres of the cells above and below the faces [m/s].
     cells: [RigidRun; 2],
     /// dt / (2 h) along each axis [s/m].
-    drift: [f64; 3],
+    dt_per_2h: [f64; 3],
     /// dt / h along the component [s/m].
     dt_per_h: f64,
     /// dt g along the component [m/s].
-    driven: f64,
+    dt_g: f64,
     closure_dt: f64,
+    /// h along x [m].
     spacing: f64,
 }
 
 impl<R: Real> RunImpulse<'_, R> {
-    /// Moved pressure p~ of the cells above (`side` 0) or below (1) the faces from the `n`th on.
+    /// Moved pressure p~ [m^2/s^2] of the cells above (`side` 0) or below (1) the faces from face
+    /// `n` of the run on.
     #[inline(always)]
     fn moved_pressure<V: Vector<Number = f64>>(&self, side: usize, n: usize) -> V {
         let at = [self.run.at, self.run.below][side] + n;
-        let [mut moved, rest @ ..] = self.stencil.load_within::<V, R>(self.pressure, at);
+        let [mut moved, neighbours @ ..] = self.stencil.load_within::<V, R>(self.pressure, at);
         for axis in 0..3 {
             let velocity = self.cells[side].component(axis, lane_indices(n));
-            let cells = V::constant(-self.drift[axis]) * velocity;
-            moved = cells.mul_add(rest[2 * axis] - rest[2 * axis + 1], moved);
+            let displacement = V::constant(-self.dt_per_2h[axis]) * velocity;
+            let difference = neighbours[2 * axis] - neighbours[2 * axis + 1];
+            moved = displacement.mul_add(difference, moved);
         }
         moved
     }
 
-    /// Adds the faces from the `n`th on to the sums; returns their `rest_gain`.
+    /// Adds the faces from face `n` of the run on to the sums; returns their gain next to a grain
+    /// at rest [m/s].
     #[inline(always)]
     fn add<V: Vector<Number = f64>>(
         &self,
@@ -215,24 +216,20 @@ impl<R: Real> RunImpulse<'_, R> {
     ) -> V {
         let (zero, index) = (V::constant(0.0), lane_indices::<V>(n));
         let predicted = V::load_partial(&self.predicted[n..]);
-        let follow = follow(weight, closed, self.closure_dt);
-        let (mut free, mut returned) = (predicted, zero);
-        // Nothing is closed outside the band.
-        if !closed_by_all.is_zero() {
-            let rise = self.moved_pressure::<V>(0, n) - self.moved_pressure(1, n);
-            let back = rise.mul_add(V::constant(self.dt_per_h), V::constant(-self.driven));
-            (free, returned) = (closed_by_all.mul_add(back, predicted), closed * back);
-        }
-        let rest_gain = (zero - weight).mul_add(free, returned);
-        let constant = rest_gain - follow * self.rigid.component(self.axis, index);
-        let slope = weight + follow;
+        let rise = self.moved_pressure::<V>(0, n) - self.moved_pressure(1, n);
+        let e = rise.mul_add(V::constant(self.dt_per_h), V::constant(-self.dt_g));
+        let without_drag = closed_by_all.mul_add(e, predicted);
+        let rest_gain = (zero - weight).mul_add(without_drag, closed * e);
+        let f = change_weight(weight, closed, self.closure_dt);
+        let constant = rest_gain - f * self.rigid.component(self.axis, index);
+        let derivative = weight + f;
         let arm = self.run.arm;
         let x = V::constant(arm.x) + V::constant(self.spacing) * index;
         let arm = [x, V::constant(arm.y), V::constant(arm.z)];
         let end = V::constant(self.run.count as f64);
         let constant = index.select_below(end, constant, zero);
-        let slope = index.select_below(end, slope, zero);
-        sums.add(self.axis, n, arm, constant, slope);
+        let derivative = index.select_below(end, derivative, zero);
+        sums.add(self.axis, n, arm, constant, derivative);
         rest_gain
     }
 }

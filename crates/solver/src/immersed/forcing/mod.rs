@@ -1,5 +1,6 @@
-//! Forcing of the faces in and near a grain: their weights, the impulse it takes from the fluid, and
-//! the rigid velocity imposed on them (Eqs 4b, 4c, 5).
+//! Forcing of the faces in and near a grain (Eqs 4b, 4c, 5): weights of the faces (`faces`),
+//! impulse that the forcing takes from the fluid (`impulse`), rigid velocity imposed on the faces
+//! (`rigidity`).
 
 mod drag;
 mod face_forcing;

@@ -1,4 +1,4 @@
-//! Rigid velocity along a run of faces, and lane indices.
+//! Rigid velocity along a run of faces, and the weight of its change.
 
 use glam::DVec3;
 
@@ -23,7 +23,7 @@ impl RigidRun {
             change: velocity.angular.cross(DVec3::X * spacing.x),
         }
     }
-    /// Velocity along a parallel line, on which it differs by `offset` [m/s].
+    /// Velocity along a parallel line, on which the velocity differs by `offset` [m/s].
     #[inline(always)]
     pub fn shifted(self, offset: DVec3) -> RigidRun {
         RigidRun {
@@ -31,7 +31,7 @@ impl RigidRun {
             ..self
         }
     }
-    /// Component `axis` at the faces `index` of the run.
+    /// Component `axis` of the velocity at the faces `index` of the run [m/s].
     #[inline(always)]
     pub fn component<V: Vector<Number = f64>>(&self, axis: usize, index: V) -> V {
         let [first, change] = [self.first, self.change].map(|u| V::constant(u[axis]));
@@ -45,10 +45,10 @@ pub fn lane_indices<V: Vector<Number = f64>>(n: usize) -> V {
     V::constant(n as f64) + V::ramp()
 }
 
-/// Fraction (1 - weight) closed by which a face follows the grain's change of velocity, in addition to
-/// the weight of the velocity itself; zero unless `closure_dt` is positive.
+/// Weight f = (1 - s) c of the change U - U_old of the rigid velocity, with the weight s of the
+/// velocity and the closed fraction c; zero unless `closure_dt` is positive.
 #[inline(always)]
-pub fn follow<V: Vector<Number = f64>>(weight: V, closed: V, closure_dt: f64) -> V {
+pub fn change_weight<V: Vector<Number = f64>>(weight: V, closed: V, closure_dt: f64) -> V {
     let switch = if closure_dt > 0.0 { 1.0 } else { 0.0 };
     V::constant(switch) * (V::constant(1.0) - weight) * closed
 }

@@ -1,25 +1,27 @@
 //! Rigid velocity imposed on the forced faces (Eqs 4b, 4c).
 //!
-//! A face gains `rest_gain + s U + f (U - U_old)`, see [`super::impulse`] for the symbols.
-//! `immersed::reference` has the scalar form.
+//! A face gains r + s U + f (U - U_old). `immersed::reference` has the scalar form.
+//!
+//! Legend: r gain next to a grain at rest, U and U_old new and old rigid velocity, s and f weights
+//! of the velocity and of its change ([`super::impulse`]).
 
 use glam::DVec3;
 
 use super::faces::ForcedFaces;
-use super::rigid_run::{RigidRun, follow, lane_indices};
+use super::rigid_run::{RigidRun, change_weight, lane_indices};
 use crate::flow::Prediction;
 use crate::immersed::kinematics::RigidVelocity;
 use crate::math::Real;
 use grainwake_simd::{Kernel, Vector, dispatch};
 
-/// Adds to component `axis` of the prediction, as far as it holds forced faces, the gain for a grain
-/// with the new velocity `now` that changed by `change` in the step. [`super::sum_impulse`] has filled
+/// Adds the gain of the forced faces to component `axis` of a part of the prediction, for a grain
+/// with the new `velocity` that changed by `change` in the step. [`super::sum_impulse`] has filled
 /// the lists of `forced`; `closure_dt` [s] is the one passed there.
 pub fn impose_rigidity<R: Real>(
     axis: usize,
     spacing: DVec3,
     forced: &ForcedFaces,
-    now: RigidVelocity,
+    velocity: RigidVelocity,
     change: RigidVelocity,
     closure_dt: f64,
     prediction: &mut Prediction<R>,
@@ -28,7 +30,7 @@ pub fn impose_rigidity<R: Real>(
         axis,
         spacing,
         forced,
-        now,
+        velocity,
         change,
         closure_dt,
         prediction,
@@ -39,7 +41,7 @@ struct ImposeRigidity<'a, 'b, R> {
     axis: usize,
     spacing: DVec3,
     forced: &'a ForcedFaces,
-    now: RigidVelocity,
+    velocity: RigidVelocity,
     change: RigidVelocity,
     closure_dt: f64,
     prediction: &'a mut Prediction<'b, R>,
@@ -53,7 +55,7 @@ impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
         let part = self.prediction.range().clone();
         let runs = forced.runs[axis].iter();
         for run in runs.filter(|run| part.contains(&run.at)) {
-            let now = RigidRun::new(self.now, run.arm, self.spacing);
+            let velocity = RigidRun::new(self.velocity, run.arm, self.spacing);
             let change = RigidRun::new(self.change, run.arm, self.spacing);
             let predicted = self.prediction.velocity_mut(run.at, run.count);
             for n in (0..run.count).step_by(V::WIDTH) {
@@ -62,8 +64,9 @@ impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
                 let closed = V::load_from(&forced.closed[entry..]);
                 let index = lane_indices(n);
                 let gain = V::load(&forced.rest_gain[entry..])
-                    + weight * now.component(axis, index)
-                    + follow(weight, closed, self.closure_dt) * change.component(axis, index);
+                    + weight * velocity.component(axis, index)
+                    + change_weight(weight, closed, self.closure_dt)
+                        * change.component(axis, index);
                 gain.add_partial(&mut predicted[n..]);
             }
         }

@@ -1,4 +1,4 @@
-//! Memory positions of the cells and faces in a box around a grain, across periodic edges.
+//! Positions in memory of the cells and faces in a box around a grain, across periodic edges.
 
 use std::ops::Range;
 
@@ -7,9 +7,8 @@ use glam::IVec3;
 use crate::flow::Boundaries;
 use crate::grid::Mesh;
 use crate::math::Real;
-use grainwake_simd::{prefetch, prefetch_ahead};
 
-/// Degrees of freedom of the grid: which faces and cells are unknowns, and where they are stored.
+/// Degrees of freedom of the grid: the faces and cells that are unknowns, and their storage.
 #[derive(Clone, Copy)]
 pub struct DofMask {
     cells: IVec3,
@@ -17,11 +16,9 @@ pub struct DofMask {
     periodic: [bool; 3],
 }
 
-/// Cells beyond the box on each side for which positions are tabulated.
+/// Width of the padding: cells on each side of the box for which positions are tabulated too.
 pub const PAD: i32 = 3;
-/// Rows by which prefetching leads copying.
-const ROWS_AHEAD: usize = 4;
-/// Marks a face or cell that is no unknown: larger than any position, also in sums.
+/// Offset of faces and cells that are not unknown: larger than any position, also in sums.
 const NONE: usize = 1 << 60;
 
 impl DofMask {
@@ -34,6 +31,7 @@ impl DofMask {
         }
     }
 
+    /// Returns whether the grid is periodic along an axis.
     pub fn is_periodic(&self, axis: usize) -> bool {
         self.periodic[axis]
     }
@@ -70,29 +68,29 @@ impl DofMask {
     }
 }
 
-/// Memory positions in the box of one grain, as sums of one offset per axis.
+/// Positions in memory in the padded box of one grain, as sums of one offset per axis.
 #[derive(Clone, Debug, Default)]
 pub struct IndexMap {
     /// Offsets of unknowns by axis, `[0]` for cells and faces parallel to the axis, `[1]` for faces
-    /// normal to it; `NONE` elsewhere. Entry 0 belongs to cell `-PAD` of the box.
+    /// normal to it; `NONE` elsewhere. Entry 0 is the offset of cell `-PAD` of the box.
     dof_offsets: [[Vec<usize>; 2]; 3],
-    /// Offsets of all entries of a field by axis; ghost cells beyond walls included.
+    /// Offsets of all entries of a field by axis, ghost cells beyond walls included.
     offsets: [Vec<usize>; 3],
 }
 
-/// Adjacent unknown faces of one row that are adjacent in memory too.
+/// Unknown faces of one row that are adjacent in memory.
 #[derive(Clone, Debug)]
 pub struct RowPart {
     /// Indices along x, counted from the side of the box.
     pub range: Range<i32>,
-    /// Position of the first face, also that of the cell above it.
+    /// Position in memory of the first face, and of the cell above it.
     pub at: usize,
-    /// Position of the cell below the first face.
+    /// Position in memory of the cell below the first face.
     pub below: usize,
 }
 
 impl IndexMap {
-    /// Indices along `axis` of the unknown faces of `component`, within the padded box. They are
+    /// Indices along `axis` of the unknown faces of `component` in the padded box. They are
     /// contiguous, since only the ends of the grid exclude faces.
     pub fn dof_range(&self, component: usize, axis: usize) -> Range<i32> {
         let offsets = &self.dof_offsets[axis][usize::from(axis == component)];
@@ -102,7 +100,8 @@ impl IndexMap {
         first as i32 - PAD..offsets.len() as i32 - last as i32 - PAD
     }
 
-    /// Appends to `parts` the contiguous parts of the faces `range` in row (j, k) of `component`.
+    /// Appends to `parts` the parts, contiguous in memory, of the faces `range` in row (j, k) of
+    /// `component`.
     #[inline]
     pub fn contiguous_parts(
         &self,
@@ -125,15 +124,6 @@ impl IndexMap {
             let below = offset(0, false, i - down.x) + row_below;
             (at < NONE && below < NONE).then_some((at, below))
         };
-        // Positions increase by one or jump back at a periodic edge: if the ends match, all do.
-        if let (Some(first), Some(last)) = (positions(range.start), positions(range.end - 1)) {
-            let steps = range.len() - 1;
-            if last == (first.0 + steps, first.1 + steps) {
-                let (at, below) = first;
-                parts.push(RowPart { range, at, below });
-                return;
-            }
-        }
         let mut i = range.start;
         while i < range.end {
             let Some((at, below)) = positions(i) else {
@@ -141,12 +131,8 @@ impl IndexMap {
                 continue;
             };
             let start = i;
-            i += 1;
-            while i < range.end {
-                let steps = (i - start) as usize;
-                if positions(i) != Some((at + steps, below + steps)) {
-                    break;
-                }
+            let next = |i: i32| Some((at + (i - start) as usize, below + (i - start) as usize));
+            while i < range.end && positions(i) == next(i) {
                 i += 1;
             }
             let range = start..i;
@@ -154,7 +140,7 @@ impl IndexMap {
         }
     }
 
-    /// Positions from the first plane of the box in memory to the last.
+    /// Positions in memory from the first plane of the box to the last.
     pub fn plane_range(&self) -> Range<usize> {
         let offsets = self.dof_offsets[2].iter();
         let offsets = offsets.flat_map(|table| &table[PAD as usize..table.len() - PAD as usize]);
@@ -165,37 +151,13 @@ impl IndexMap {
         first..last + 1
     }
 
-    /// Prefetches a field in the padded box, except for the corners, which no link reads.
-    pub fn prefetch<R>(&self, field: &[R]) {
-        let [x, y, z] = &self.offsets;
-        let [per_row, per_plane] = [y.len(), z.len()].map(|count| 1.0 / count as f32);
-        for (k, plane) in z.iter().enumerate() {
-            // Distance from the middle: 0 there, 1 at the ends of the box.
-            let from_middle = ((2 * k + 1) as f32 * per_plane - 1.0).abs();
-            for (j, row) in y.iter().enumerate() {
-                let distance = from_middle + ((2 * j + 1) as f32 * per_row - 1.0).abs();
-                if distance > 1.2 {
-                    continue;
-                }
-                // Approximates the faces within a ball, with three more on each side.
-                let fraction = (1.02 - 0.6 * distance).min(1.0);
-                let count = (fraction * x.len() as f32) as usize;
-                let first = x[0] + (x.len() - count) / 2 + row + plane;
-                prefetch_ahead(field, first, count);
-            }
-        }
-    }
-
-    /// Copies a field in the padded box, x fastest.
+    /// Copies the values of a field in the padded box, x fastest.
     pub fn copy<R: Real>(&self, field: &[R], to: &mut Vec<R>) {
         to.clear();
         let [x, y, z] = &self.offsets;
         let contiguous = x[x.len() - 1] == x[0] + x.len() - 1;
         for plane in z {
-            for (j, row) in y.iter().enumerate() {
-                if let Some(row) = y.get(j + ROWS_AHEAD) {
-                    prefetch(field, x[0] + row + plane, x.len());
-                }
+            for row in y {
                 if contiguous {
                     to.extend_from_slice(&field[x[0] + row + plane..][..x.len()]);
                 } else {
@@ -227,7 +189,7 @@ mod tests {
         };
         let mut map = IndexMap::default();
         mask.map(IVec3::new(6, 1, 1), IVec3::new(5, 3, 1), &mut map);
-        // Memory position of a face; of the cell where the component is 3.
+        // Position in memory of a face, or of a cell if the component is 3.
         let at = |component, i, j| {
             let offset = |axis: usize, index: i32| {
                 map.dof_offsets[axis][usize::from(axis == component)][(index + PAD) as usize]

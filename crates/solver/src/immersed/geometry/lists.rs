@@ -1,6 +1,7 @@
-//! Index lists of the faces near a grain. Plain data, filled by [`super::Locator`].
+//! Index lists of the faces near a grain: plain data, filled by [`super::Locator`].
 //!
-//! Lists that vector registers read have at least `MAX_LANES` more entries than are used.
+//! `at` is a position in the memory of a field, `entry` an index into the lists of one grain. Lists
+//! that vector registers read have at least `MAX_LANES` unused entries at the end.
 
 use std::ops::Range;
 
@@ -34,51 +35,51 @@ impl RowSpan {
 pub struct FaceRow {
     /// Position in memory of the first face.
     pub at: usize,
-    /// Its entry in [`LocatedBody::distance`].
+    /// Entry of the first face in [`LocatedBody::distance`].
     pub first: usize,
     /// Number of faces.
     pub count: usize,
 }
 
-/// Faces of a row within the forcing band, adjacent in memory.
+/// Faces of a row within the forcing band that are adjacent in memory.
 #[derive(Clone, Copy, Debug)]
 pub struct FaceRun {
-    /// Position in memory of the first face, also that of the cell above it.
+    /// Position in memory of the first face, and of the cell above it.
     pub at: usize,
-    /// Position of the cell below the first face, across a periodic edge if need be.
+    /// Position in memory of the cell below the first face, across a periodic edge if need be.
     pub below: usize,
-    /// Vector from the grain's centroid to the first face [m].
+    /// Vector from the grain's centroid to the first face, space frame [m].
     pub arm: DVec3,
-    /// Entry of the first face in [`BandFaces`] and the lists made from it.
+    /// Entry of the first face in [`BandFaces`] and in the lists made from it.
     pub first: usize,
     /// Number of faces.
     pub count: usize,
 }
 
-/// Position of a grain on the grid and the faces near it.
+/// Location of a grain on the grid and the faces near it.
 #[derive(Clone, Debug, Default)]
 pub struct LocatedBody {
     /// Centroid [m].
     pub position: DVec3,
     /// Lowest cell of the box of cells around the grain, counted from 1; may lie across a periodic
     /// edge.
-    pub first: IVec3,
-    /// Cells of the box.
+    pub lowest: IVec3,
+    /// Cells of the box along each axis.
     pub size: IVec3,
-    /// Signed distances [m] by component, row by row; infinite where another grain is closer.
+    /// Signed distances [m] by component, row by row; infinite where another grain is nearer.
     pub distance: [Vec<f32>; 3],
     /// Spans by component, one for each row of the box, y fastest.
     pub spans: [Vec<RowSpan>; 3],
-    /// Positions of the box in memory.
+    /// Positions in memory of the cells and faces of the box.
     pub index_map: IndexMap,
-    /// Positions from the first plane of the box in memory to the last.
+    /// Positions in memory from the first plane of the box to the last.
     pub planes: Range<usize>,
-    /// Positions of the faces in the spans, by component.
+    /// Faces of the spans by component, in parts adjacent in memory.
     pub rows: [Vec<FaceRow>; 3],
 }
 
 impl LocatedBody {
-    /// Whether faces of the box may lie in a part of a field.
+    /// Returns whether faces of the box may lie in a part of a field.
     pub fn overlaps(&self, part: &Range<usize>, layout: Layout) -> bool {
         self.planes.start < part.end && part.start < self.planes.end + layout.plane()
     }
@@ -95,7 +96,7 @@ impl LocatedBody {
     }
 }
 
-/// Distances and normals of the faces in the forcing band of one grain, in the order of its
+/// Distances and normals of the faces in the forcing band of one grain, in the order of the
 /// [`FaceRun`]s.
 #[derive(Debug, Default)]
 pub struct BandFaces {
@@ -104,8 +105,8 @@ pub struct BandFaces {
     pub distance: Vec<f32>,
     /// Unit normals out of the grain, space frame, by axis.
     pub normal: [Vec<f32>; 3],
-    /// Faces that other grains may force too: entry, and position [m].
-    pub contested: Vec<(usize, DVec3)>,
+    /// Faces in the bands of other grains as well: entry and position [m].
+    pub shared: Vec<(usize, DVec3)>,
 }
 
 impl BandFaces {
@@ -113,9 +114,10 @@ impl BandFaces {
     pub fn count(&self) -> usize {
         self.count
     }
+    /// Removes all faces.
     pub(super) fn clear(&mut self) {
         self.count = 0;
-        self.contested.clear();
+        self.shared.clear();
     }
     /// Makes room for `count` more faces.
     pub(super) fn reserve(&mut self, count: usize) {
@@ -124,7 +126,7 @@ impl BandFaces {
             list.resize(list.len().max(needed), 0.0);
         }
     }
-    /// Appends `count` faces, for which [`Self::reserve`] made room. Reads whole registers.
+    /// Appends `count` faces, for which [`Self::reserve`] made room; reads whole registers.
     #[inline(always)]
     pub(super) fn extend<V: Vector<Number = f32>>(
         &mut self,
@@ -147,18 +149,18 @@ impl BandFaces {
         let normal = self.normal.each_ref().map(|list| f64::from(list[entry]));
         (f64::from(self.distance[entry]), DVec3::from_array(normal))
     }
-    /// Distance at which a grain forces no face [m].
-    pub(super) fn far(eps: f64) -> f64 {
+    /// Distance outside the forcing band [m].
+    pub(super) fn outside(eps: f64) -> f64 {
         4.0 * eps
     }
-    /// Fills the lists up to a whole number of registers with faces that are not forced; returns
-    /// that length. `eps` is the half-width of the band [m].
+    /// Fills the lists up to a whole number of registers with faces outside the band of half-width
+    /// `eps` [m]; returns that length.
     pub fn pad(&mut self, eps: f64) -> usize {
         let padded = self.count.next_multiple_of(MAX_LANES);
         for list in [&mut self.distance].into_iter().chain(&mut self.normal) {
             list.resize(padded.max(list.len()), 0.0);
         }
-        self.distance[self.count..padded].fill(Self::far(eps) as f32);
+        self.distance[self.count..padded].fill(Self::outside(eps) as f32);
         padded
     }
 }

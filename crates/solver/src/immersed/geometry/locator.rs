@@ -1,4 +1,4 @@
-//! Locates grains on the grid: boxes of cells, distances and lists of faces.
+//! Location of grains on the grid: boxes of cells, distances and lists of faces.
 
 use glam::{DMat3, DVec3};
 
@@ -24,7 +24,7 @@ pub struct LocateScratch {
 pub struct Locator {
     mesh: Mesh,
     mask: DofMask,
-    /// Half-width of the band [m].
+    /// Half-width of the band around the surface, the mean spacing of the grid [m].
     eps: f64,
     /// Distance from the surface up to which a grain affects faces [m].
     reach: f64,
@@ -33,6 +33,7 @@ pub struct Locator {
 }
 
 impl Locator {
+    /// Samples the shapes of `grains` for a grid.
     pub fn new(mesh: &Mesh, boundaries: &Boundaries, grains: &[Grain]) -> Locator {
         let resolved = (0..3).filter(|&axis| mesh.cells[axis] > 1);
         let resolved: Vec<f64> = resolved.map(|axis| mesh.spacing[axis]).collect();
@@ -69,11 +70,11 @@ impl Locator {
         self.shapes.bytes()
     }
 
-    /// Finds the neighbours of all grains, before [`Locator::locate`]. `travel(i)` [m] is the
-    /// displacement of grain i whose last position counts as well.
-    pub fn find_neighbours(&mut self, grains: &[Grain], travel: impl Fn(usize) -> f64) {
+    /// Finds the neighbours of all grains, before [`Locator::locate`]. `displacement(i)` [m] leads
+    /// from the last pose of grain i, whose faces count as well; 0 if they do not.
+    pub fn find_neighbours(&mut self, grains: &[Grain], displacement: impl Fn(usize) -> f64) {
         self.neighbours
-            .update(&self.mesh, &self.mask, self.reach, grains, travel);
+            .update(&self.mesh, &self.mask, self.reach, grains, displacement);
     }
 
     /// Neighbours of grain `index`.
@@ -81,8 +82,8 @@ impl Locator {
         self.neighbours.of(index)
     }
 
-    /// Locates grain `index`: fills the lists of faces within reach in `body`, of faces in the
-    /// forcing band in `runs`, and their distances and normals in `scratch.band`.
+    /// Locates grain `index`: lists the faces within reach in `body`, and those in the forcing band
+    /// in `runs`, with their distances and normals in `scratch.band`.
     pub fn locate(
         &self,
         index: usize,
@@ -120,17 +121,17 @@ impl Locator {
         for axis in 0..3 {
             let (h, n) = (mesh.spacing[axis], mesh.cells[axis] as i32);
             if n == 1 {
-                (body.first[axis], body.size[axis]) = (1, 1);
+                (body.lowest[axis], body.size[axis]) = (1, 1);
                 continue;
             }
-            // Limited so that positions in an unstable run do not overflow before it is stopped.
+            // Limited so that positions do not overflow in an unstable run before it is stopped.
             let cell = |x: f64| ((x - mesh.origin[axis]) / h).floor().clamp(-1e9, 1e9) as i32;
             let from = cell(middle[axis] - span[axis] - self.reach);
             let to = cell(middle[axis] + span[axis] + self.reach);
-            body.first[axis] = from + 1;
-            body.size[axis] = to + 2 - body.first[axis];
+            body.lowest[axis] = from + 1;
+            body.size[axis] = to + 2 - body.lowest[axis];
         }
-        self.mask.map(body.first, body.size, &mut body.index_map);
+        self.mask.map(body.lowest, body.size, &mut body.index_map);
         body.planes = body.index_map.plane_range();
     }
 }

@@ -1,4 +1,7 @@
-//! Geometry of grains on the grid: distances to faces, index lists, neighbouring grains, apertures.
+//! Geometry of grains on the grid. [`Locator`] fills the lists of faces (`lists`) with the
+//! distances of `distances` and `narrow_band`; `neighbours` finds the grains that share faces;
+//! `index_map` converts indices in the box of a grain to positions in memory; `aperture` gives open
+//! and solid fractions.
 
 pub mod aperture;
 mod distances;
@@ -7,7 +10,6 @@ mod lists;
 mod locator;
 mod narrow_band;
 mod neighbours;
-mod row_bounds;
 mod samples;
 
 pub use index_map::PAD;

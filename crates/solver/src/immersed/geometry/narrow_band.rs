@@ -1,30 +1,29 @@
-//! Distances in a narrow band around a grain, a few nanoseconds each.
+//! Signed distance and its gradient in a narrow band around the surface of a grain.
 //!
-//! The sampled field of a shape ends closer to the surface than the band of the flow, and distances
-//! beyond it are searched for. It may also be finer than the flow resolves and so too large for the
-//! cache. Here a wider and, where possible, coarser grid of 16-bit samples replaces it.
+//! The sampled field of a shape ends closer to the surface than the band of the flow, and is often
+//! finer than the flow resolves. A wider and, where possible, coarser sampled field replaces it,
+//! which fits the cache and is evaluated without searching.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::DVec3;
-use grainwake_shape::{Field, Shape};
+use grainwake_shape::{Field, SampledField, Shape};
 
-use super::samples::{DistanceSamples, FAR, SampleGrid, SampleLocation, load_all, store_all};
+use super::samples::{FAR, SampleGrid, load_all, store_all};
 use crate::dem::Grain;
-use crate::math::Aligned;
 use grainwake_simd::{MAX_LANES, MAX_SINGLE_INDEX, Vector};
 
-/// Samples per half-width of the band.
+/// Least number of samples per half-width of the band.
 const SAMPLES_PER_BAND: f64 = 4.0;
-/// Samples across the thinnest side of a grain, if that needs more of them.
+/// Least number of samples across the thinnest side of a grain.
 const SAMPLES_ACROSS: f64 = 12.0;
-/// Upper limit of samples per half-width of the band: the flow does not resolve a thinner grain.
+/// Largest number of samples per half-width of the band; the flow does not resolve a thinner grain.
 const MOST_SAMPLES_PER_BAND: f64 = 16.0;
 
 /// Narrow-band shapes of all grains; equal shapes share their samples.
 pub struct NarrowBandShapes {
-    /// One per grain.
+    /// Entry i is the shape of grain i.
     shapes: Vec<NarrowBandShape>,
 }
 
@@ -32,12 +31,14 @@ pub struct NarrowBandShapes {
 #[derive(Clone)]
 pub struct NarrowBandShape {
     shape: Arc<Shape>,
-    /// `None` if the shape itself is evaluated: a sphere, or one that would need too many samples.
-    samples: Option<Arc<DistanceSamples>>,
+    /// `None` if the shape itself is evaluated: a closed form, or a shape that needs too many
+    /// samples.
+    samples: Option<Arc<SampledField>>,
 }
 
 impl NarrowBandShapes {
-    /// Samples distances up to `reach` [m] for a flow with the band half-width `eps` [m].
+    /// Samples the distances up to `reach` [m] from the surfaces; `eps` [m] is the half-width of
+    /// the band.
     pub fn new(grains: &[Grain], eps: f64, reach: f64) -> NarrowBandShapes {
         let mut known: HashMap<*const Shape, NarrowBandShape> = HashMap::new();
         let sampled = |grain: &Grain| {
@@ -65,7 +66,8 @@ impl NarrowBandShapes {
         let mut samples: Vec<_> = samples.collect();
         samples.sort_by_key(|samples| Arc::as_ptr(samples));
         samples.dedup_by_key(|samples| Arc::as_ptr(samples));
-        samples.iter().map(|samples| samples.bytes()).sum()
+        let levels = samples.iter().map(|samples| samples.levels().len());
+        size_of::<f32>() * levels.sum::<usize>()
     }
 }
 
@@ -77,17 +79,13 @@ impl NarrowBandShape {
                 let spacing = (eps / SAMPLES_PER_BAND)
                     .min(thickness / SAMPLES_ACROSS)
                     .max(eps / MOST_SAMPLES_PER_BAND);
-                // Doubled until positions fit single precision.
+                // Doubled until single precision represents the indices of all samples.
                 let mut spacings = (0..20).map(|n| spacing * f64::from(1 << n));
                 let field = spacings.find_map(|spacing| {
                     let field = shape.distances(spacing, reach + spacing).ok()?;
                     (field.levels().len() <= MAX_SINGLE_INDEX).then_some(field)
                 });
-                // With this margin interpolated distances are exact up to `reach`.
-                field.map(|field| {
-                    let most = reach + 2.0 * field.spacing();
-                    Arc::new(DistanceSamples::new(&field, most))
-                })
+                field.map(Arc::new)
             }
             _ => None,
         };
@@ -97,64 +95,49 @@ impl NarrowBandShape {
         }
     }
 
-    /// Signed distance [m] and its gradient at `x`, both in the frame of the grain. The distance may
-    /// be infinite where it exceeds the reach.
+    /// Signed distance [m] and its gradient at `x`, both in the frame of the grain. The distance
+    /// may be infinite where it exceeds the reach.
     #[inline(always)]
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         let Some(samples) = &self.samples else {
             return self.shape.distance_and_gradient(x);
         };
-        let found = samples.distance_and_gradient(x);
-        found.unwrap_or((f64::INFINITY, DVec3::ZERO))
+        let on_grid = samples.distance_and_gradient_on_grid(x);
+        on_grid.unwrap_or((f64::INFINITY, DVec3::ZERO))
     }
 
-    /// Fills the distances at the first `count` of `points`, in single precision, and replaces the
-    /// points by the gradients. Infinite distances are at least [`FAR`] here. The lists must be
-    /// `MAX_LANES` entries longer than `count`; these are overwritten.
+    /// Fills the distances [m] at the first `count` of `points` [m], in single precision, and
+    /// replaces the points by the gradients; both in the frame of the grain. Infinite distances are
+    /// at least [`FAR`] here. The lists must be `MAX_LANES` entries longer than `count`; these are
+    /// overwritten.
     #[inline(always)]
     pub fn fill_distances<V: Vector<Number = f32>>(
         &self,
         points: &mut [&mut [f32]; 3],
         distances: &mut [f32],
         count: usize,
-        scratch: &mut SampleScratch,
     ) {
-        let Some(samples) = &self.samples else {
+        if let Some(samples) = &self.samples {
+            let grid = SampleGrid::<V>::new(samples);
             for at in (0..count).step_by(V::WIDTH) {
-                let x: [V; 3] = load_all(points, at);
-                let (distance, gradient) = match self.shape.field() {
-                    Field::Sphere(radius) => sphere_distance(*radius, x),
-                    _ => self.lane_by_lane(x),
-                };
+                let (distance, gradient) = grid.distance_and_gradient(load_all(points, at));
                 distance.store(&mut distances[at..]);
                 store_all(gradient, points, at);
             }
             return;
-        };
-        // Two loops: the second contains little but loads, so that those of several vectors overlap.
-        let grid = SampleGrid::<V>::new(samples);
-        let SampleScratch { cell, off_grid } = scratch;
-        cell.make_room(count + MAX_LANES);
-        off_grid.make_room(count + MAX_LANES);
-        let (cell, off_grid) = (&mut cell[..], &mut off_grid[..]);
-        for at in (0..count).step_by(V::WIDTH) {
-            let location = grid.locate(load_all(points, at));
-            location.cell.store(&mut cell[at..]);
-            location.off_grid.store(&mut off_grid[at..]);
-            store_all(location.fraction, points, at);
         }
         for at in (0..count).step_by(V::WIDTH) {
-            let (distance, gradient) = grid.interpolate(SampleLocation {
-                cell: V::load(&cell[at..]),
-                off_grid: V::load(&off_grid[at..]),
-                fraction: load_all(points, at),
-            });
+            let x: [V; 3] = load_all(points, at);
+            let (distance, gradient) = match self.shape.field() {
+                Field::Sphere(radius) => sphere_distance(*radius, x),
+                _ => self.lane_by_lane(x),
+            };
             distance.store(&mut distances[at..]);
             store_all(gradient, points, at);
         }
     }
 
-    /// Evaluates the shape for one lane after the other.
+    /// Evaluates the shape at the points `x`, lane by lane.
     #[cold]
     fn lane_by_lane<V: Vector<Number = f32>>(&self, x: [V; 3]) -> (V, [V; 3]) {
         let mut points = [[0.0; MAX_LANES]; 3];
@@ -172,13 +155,6 @@ impl NarrowBandShape {
         }
         (V::load(&distances), points.map(|lanes| V::load(&lanes)))
     }
-}
-
-/// Buffers of [`NarrowBandShape::fill_distances`].
-#[derive(Default)]
-pub struct SampleScratch {
-    cell: Aligned<f32>,
-    off_grid: Aligned<f32>,
 }
 
 /// Distance from a sphere around the origin, and its gradient.
@@ -205,9 +181,9 @@ mod tests {
     fn sampled_distances_match_the_shape_and_extend_beyond_its_grid() {
         let edges = analytic::rounded_box(0.7, 0.6, 0.5, 0.02, &ShapeOptions::default());
         let edges = Arc::new(edges.unwrap());
-        // The ellipsoid is 17, 8 and 3 flow cells across, the box 10, 5 and 3; its edges are rounded by
-        // less than two of its own samples. Bounds: largest and mean error near the surface, largest
-        // error beyond the grid of the shape.
+        // The ellipsoid is 17, 8 and 3 flow cells across, the box 10, 5 and 3; its edges are
+        // rounded by less than two of its own samples. Bounds: largest and mean error near the
+        // surface, largest error beyond the grid of the shape.
         for (shape, eps, most, mean, most_beyond) in [
             (ellipsoid(), 0.12, 7e-6, 1e-7, 0.001),
             (ellipsoid(), 0.25, 0.0015, 0.00003, 0.003),
@@ -220,13 +196,13 @@ mod tests {
                 unreachable!("the shapes are sampled")
             };
             let reach = 2.5 * eps;
-            let near = NarrowBandShape::new(&shape, eps, reach);
+            let band = NarrowBandShape::new(&shape, eps, reach);
             let (mut beyond, mut errors) = (0, Vec::new());
             for i in 0..20_000 {
                 let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
                 let x = (1.1 + reach) * (2.0 * u.fract() - DVec3::ONE);
                 let (exact, gradient) = shape.distance_and_gradient(x);
-                let (distance, slope) = near.distance_and_gradient(x);
+                let (distance, slope) = band.distance_and_gradient(x);
                 if exact > reach {
                     assert!(distance > 0.97 * reach, "at {x}");
                     continue;
@@ -243,12 +219,12 @@ mod tests {
                     assert!(slope.normalize().dot(gradient) > 0.99, "at {x}");
                 }
             }
-            let found = errors.iter().sum::<f64>() / errors.len() as f64;
+            let mean_error = errors.iter().sum::<f64>() / errors.len() as f64;
             println!(
-                "{eps}: mean {found}, beyond {beyond}, near {}",
+                "{eps}: mean {mean_error}, beyond {beyond}, near {}",
                 errors.len()
             );
-            assert!(found.abs() <= mean, "{found} at {eps}");
+            assert!(mean_error.abs() <= mean, "{mean_error} at {eps}");
             assert!(errors.len() > 200, "{}", errors.len());
         }
     }
@@ -260,7 +236,6 @@ mod tests {
         #[inline(always)]
         fn run<V: Vector<Number = f32>>(self) {
             let mut far = 0;
-            let mut scratch = SampleScratch::default();
             for i in 0..2000 {
                 let mut points = [0; 3].map(|_| vec![0.0_f32; 2 * MAX_LANES]);
                 for n in 0..MAX_LANES {
@@ -271,8 +246,7 @@ mod tests {
                 }
                 let (mut slopes, mut distance) = (points.clone(), [0.0_f32; 2 * MAX_LANES]);
                 let mut lists = slopes.each_mut().map(|list| &mut list[..]);
-                self.0
-                    .fill_distances::<V>(&mut lists, &mut distance, MAX_LANES, &mut scratch);
+                (self.0).fill_distances::<V>(&mut lists, &mut distance, MAX_LANES);
                 for n in 0..MAX_LANES {
                     let of = |lists: &[Vec<f32>; 3]| {
                         DVec3::from_array(lists.each_ref().map(|list| f64::from(list[n])))
@@ -289,8 +263,8 @@ mod tests {
                     let step = DVec3::splat(1e-6);
                     let sides = [x - step, x + step].map(|x| self.0.distance_and_gradient(x).1);
                     let mut sides = sides.into_iter().chain([slope]);
-                    let near = |side: DVec3| (of(&slopes) - side).length() < 1e-4;
-                    assert!(sides.any(near), "{} for {slope} at {x}", of(&slopes));
+                    let close = |side: DVec3| (of(&slopes) - side).length() < 1e-4;
+                    assert!(sides.any(close), "{} for {slope} at {x}", of(&slopes));
                 }
             }
             let sphere = matches!(self.0.shape.field(), Field::Sphere(_));
@@ -302,10 +276,10 @@ mod tests {
     fn lanes_match_scalar_evaluation() {
         let sphere = Arc::new(Shape::sphere(0.8, 100));
         for (shape, eps) in [(ellipsoid(), 0.25), (ellipsoid(), 0.05), (sphere, 0.25)] {
-            let near = NarrowBandShape::new(&shape, eps, 2.5 * eps);
-            dispatch(CompareLanes(&near));
-            CompareLanes(&near).run::<<f32 as Registers>::Baseline>();
-            CompareLanes(&near).run::<Scalar<f32>>();
+            let band = NarrowBandShape::new(&shape, eps, 2.5 * eps);
+            dispatch(CompareLanes(&band));
+            CompareLanes(&band).run::<<f32 as Registers>::Baseline>();
+            CompareLanes(&band).run::<Scalar<f32>>();
         }
     }
 }

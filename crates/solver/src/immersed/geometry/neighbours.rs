@@ -4,13 +4,13 @@ use glam::DVec3;
 
 use super::index_map::DofMask;
 use super::narrow_band::NarrowBandShapes;
-use crate::dem::{Ball, BroadPhase, Enclosure, Grain, Partner};
+use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};
 use crate::grid::Mesh;
 use crate::math::Pose;
 
-/// Distances that differ by less than this fraction of the size of both grains count as equal,
-/// since they are computed in single precision. Of two copies of a link across a periodic edge,
-/// and of the two grains at equal distance from a link, exactly one must own the link.
+/// Fraction of the size of two grains below which their distances from a face count as equal, since
+/// distances are in single precision. Exactly one of two grains, or of two periodic images, at
+/// equal distance from a face must be the nearest.
 const TIE: f64 = 1e-6;
 
 /// A neighbouring grain, or a periodic image of the grain itself.
@@ -18,22 +18,18 @@ const TIE: f64 = 1e-6;
 pub struct NeighbourGrain {
     /// Index of the neighbour.
     pub grain: usize,
+    /// Pose of the grain itself, without the shift.
     pub pose: Pose,
     bounding_radius: f64,
-    /// Shift of the image in question [m].
+    /// Vector from the grain to its image [m].
     pub shift: DVec3,
-    /// Added to its distance [m], so that ties are decided the same way from both sides.
+    /// Added to the distance [m], so that both grains of a pair decide a tie alike.
     pub tie_breaker: f64,
 }
 
 impl NeighbourGrain {
-    /// Distance from `x` to its surface [m] if that is at most `limit` [m], else at least `limit`.
-    #[inline(always)]
-    pub fn distance(&self, shapes: &NarrowBandShapes, x: DVec3, limit: f64) -> f64 {
-        self.distance_and_gradient(shapes, x, limit).0
-    }
-
-    /// Distance as in [`Self::distance`], and its gradient in the frame of the neighbour.
+    /// Signed distance from `x` to the surface of the neighbour [m], and its gradient in the frame
+    /// of the neighbour. A distance above `limit` [m] may be returned as infinity.
     #[inline(always)]
     pub fn distance_and_gradient(
         &self,
@@ -51,11 +47,25 @@ impl NeighbourGrain {
     }
 }
 
-/// Search for the neighbours of all grains.
+/// Smallest distance from `x` to a neighbour, tie breaker included [m]; infinite beyond `limit`
+/// [m].
+pub fn nearest_distance(
+    neighbours: &[NeighbourGrain],
+    shapes: &NarrowBandShapes,
+    x: DVec3,
+    limit: f64,
+) -> f64 {
+    let distances = neighbours
+        .iter()
+        .map(|other| other.distance_and_gradient(shapes, x, limit).0 + other.tie_breaker);
+    distances.fold(f64::INFINITY, f64::min)
+}
+
+/// Lists of the neighbours of all grains, found with the broad phase of the contact search.
 #[derive(Default)]
 pub struct NeighbourSearch {
     search: BroadPhase,
-    balls: Vec<Ball>,
+    balls: Vec<BoundingSphere>,
     pairs: Vec<NeighbourPair>,
     /// Neighbours of grain 0, then of grain 1, ...
     neighbours: Vec<NeighbourGrain>,
@@ -63,6 +73,7 @@ pub struct NeighbourSearch {
     first: Vec<usize>,
 }
 
+/// One direction of a pair, in the order of the lists.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct NeighbourPair {
     grain: usize,
@@ -72,15 +83,15 @@ struct NeighbourPair {
 }
 
 impl NeighbourSearch {
-    /// Finds the pairs whose reaches overlap. `reach` [m] is counted from the surface; `travel(i)`
-    /// [m], the displacement of grain i in this step, extends it to include its last position.
+    /// Finds the pairs whose balls overlap. A ball contains all faces within `reach` [m] of the
+    /// surface of grain i, and `displacement(i)` [m] extends it to the last pose of the grain.
     pub fn update(
         &mut self,
         mesh: &Mesh,
         mask: &DofMask,
         reach: f64,
         grains: &[Grain],
-        travel: impl Fn(usize) -> f64,
+        displacement: impl Fn(usize) -> f64,
     ) {
         let enclosure = Enclosure {
             lower: mesh.origin,
@@ -89,10 +100,13 @@ impl NeighbourSearch {
             solid: [[false; 2]; 3],
         };
         self.balls.clear();
-        let balls = grains.iter().enumerate().map(|(index, grain)| Ball {
-            center: grain.pose.position,
-            radius: grain.shape.bounding_radius() + reach + travel(index),
-        });
+        let balls = grains
+            .iter()
+            .enumerate()
+            .map(|(index, grain)| BoundingSphere {
+                center: grain.pose.position,
+                radius: grain.shape.bounding_radius() + reach + displacement(index),
+            });
         self.balls.extend(balls);
         self.search.search(&self.balls, &enclosure);
         self.pairs.clear();
@@ -143,7 +157,7 @@ impl NeighbourSearch {
         self.first.resize(grains.len() + 1, self.neighbours.len());
     }
 
-    /// Neighbours of grain `index`, by index and image.
+    /// Neighbours of grain `index`, sorted by index and image.
     pub fn of(&self, index: usize) -> &[NeighbourGrain] {
         &self.neighbours[self.first[index]..self.first[index + 1]]
     }
@@ -174,6 +188,7 @@ mod tests {
         let at = |x: f64| Grain {
             shape: shape.clone(),
             density: 2.0,
+            material: crate::dem::Material::default(),
             pose: Pose {
                 position: DVec3::new(x, 2.0, 2.0),
                 orientation: DQuat::IDENTITY,
@@ -211,12 +226,12 @@ mod tests {
         let tie = 4.2 * TIE;
         let along_y = DVec3::new(0.0, 4.0, 0.0);
         let along_z = DVec3::new(0.0, 0.0, 4.0);
-        let own = [
+        let images = [
             (-along_z, tie),
             (-along_y, tie),
             (along_y, -tie),
             (along_z, -tie),
         ];
-        assert_eq!(found(&search, 0), own);
+        assert_eq!(found(&search, 0), images);
     }
 }

@@ -1,17 +1,14 @@
-//! Trilinear interpolation in a grid of distance samples, several points at a time. Locating the points
-//! and reading the samples are separate steps, so that each can run in a loop of its own.
+//! Trilinear interpolation in a grid of distance samples, several points at a time.
 
 use std::ops::Deref;
 
-use glam::DVec3;
 use grainwake_shape::SampledField;
-
-use grainwake_simd::{Scalar, Vector};
+use grainwake_simd::Vector;
 
 /// Stands for infinity in single precision [m].
 pub const FAR: f64 = 1e30;
 
-/// Loads a vector from each list. (Kernels use no closures on vectors: these would not be inlined.)
+/// Loads a vector from each list. Kernels use no closures on vectors, which would not be inlined.
 #[inline(always)]
 pub fn load_all<V: Vector>([x, y, z]: &[impl Deref<Target = [V::Number]>; 3], at: usize) -> [V; 3] {
     [V::load(&x[at..]), V::load(&y[at..]), V::load(&z[at..])]
@@ -25,82 +22,29 @@ pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [&mut [V::Number]; 3
     values[2].store(&mut z[at..]);
 }
 
-/// Signed distances on a uniform grid as 16-bit levels, so that those of a grain fit the cache.
-pub struct DistanceSamples {
-    lower: DVec3,
-    spacing: f64,
-    dims: [usize; 3],
-    /// Distance per level [m].
-    quantum: f64,
-    /// Distances in levels, x fastest.
-    levels: Vec<i16>,
-}
-
-impl DistanceSamples {
-    /// Converts a sampled field; distances are limited to `most` [m] on both sides.
-    pub fn new(field: &SampledField, most: f64) -> DistanceSamples {
-        let quantum = most / f64::from(i16::MAX);
-        let ratio = field.quantum() / quantum;
-        // The conversion saturates.
-        let level = |level: &f32| (f64::from(*level) * ratio).round() as i16;
-        DistanceSamples {
-            lower: field.lower(),
-            spacing: field.spacing(),
-            dims: field.dims(),
-            quantum,
-            levels: field.levels().iter().map(level).collect(),
-        }
-    }
-
-    /// Signed distance [m] and gradient at a point; `None` off the grid.
-    #[inline(always)]
-    pub fn distance_and_gradient(&self, x: DVec3) -> Option<(f64, DVec3)> {
-        let grid = SampleGrid::new(self);
-        let location = grid.locate([Scalar(x.x), Scalar(x.y), Scalar(x.z)]);
-        let on_grid = location.off_grid.0 <= 0.0;
-        let (distance, [x, y, z]) = grid.interpolate(location);
-        on_grid.then_some((distance.0, DVec3::new(x.0, y.0, z.0)))
-    }
-
-    /// Memory held [bytes].
-    pub fn bytes(&self) -> usize {
-        size_of::<i16>() * self.levels.capacity()
-    }
-}
-
-/// Constants of a sample grid in vector registers.
+/// A sampled distance field with its constants in vector registers.
 pub struct SampleGrid<'a, V> {
     lower: [V; 3],
     inverse: V,
     /// Index of the last sample along each axis.
     last: [V; 3],
-    /// Positions from one row and one plane of samples to the next.
+    /// Samples from one row and one plane to the next.
     strides: [V; 2],
     /// Distance per level [m].
     quantum: V,
     /// Gradient per level and spacing.
     slope: V,
-    levels: &'a [i16],
-}
-
-/// Location of points in the sample grid.
-pub struct SampleLocation<V> {
-    /// Position of the lowest corner of the cell in the list of levels.
-    pub cell: V,
-    /// Position within the cell along each axis, 0 to 1.
-    pub fraction: [V; 3],
-    /// Distance off the grid, in spacings (sum over the axes).
-    pub off_grid: V,
+    levels: &'a [f32],
 }
 
 impl<'a, V: Vector> SampleGrid<'a, V> {
     #[inline(always)]
-    pub fn new(samples: &'a DistanceSamples) -> SampleGrid<'a, V> {
-        let (dims, inverse) = (samples.dims, 1.0 / samples.spacing);
+    pub fn new(field: &'a SampledField) -> SampleGrid<'a, V> {
+        let (dims, inverse) = (field.dims(), 1.0 / field.spacing());
         let mut lower = [V::constant(0.0); 3];
         let mut last = lower;
         for axis in 0..3 {
-            lower[axis] = V::constant(samples.lower[axis]);
+            lower[axis] = V::constant(field.lower()[axis]);
             last[axis] = V::constant(dims[axis] as f64 - 1.0);
         }
         let (row, plane) = (dims[0], dims[0] * dims[1]);
@@ -109,15 +53,16 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
             inverse: V::constant(inverse),
             last,
             strides: [V::constant(row as f64), V::constant(plane as f64)],
-            quantum: V::constant(samples.quantum),
-            slope: V::constant(samples.quantum * inverse),
-            levels: &samples.levels,
+            quantum: V::constant(field.quantum()),
+            slope: V::constant(field.quantum() * inverse),
+            levels: field.levels(),
         }
     }
 
-    /// Locates points; those off the grid at the nearest point on it.
+    /// Interpolates signed distance [m] and gradient at `x`, in the frame of the grain. Off the
+    /// grid the distance is [`FAR`].
     #[inline(always)]
-    pub fn locate(&self, x: [V; 3]) -> SampleLocation<V> {
+    pub fn distance_and_gradient(&self, x: [V; 3]) -> (V, [V; 3]) {
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
         let mut cell = [zero; 3];
         let mut fraction = [zero; 3];
@@ -130,20 +75,9 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
             fraction[axis] = nearest - cell[axis];
         }
         let [row, plane] = self.strides;
-        SampleLocation {
-            cell: cell[0] + row * cell[1] + plane * cell[2],
-            fraction,
-            off_grid,
-        }
-    }
-
-    /// Interpolates distance [m] and gradient.
-    #[inline(always)]
-    pub fn interpolate(&self, location: SampleLocation<V>) -> (V, [V; 3]) {
-        let [fx, fy, fz] = location.fraction;
-        let [row, plane] = self.strides;
+        let [fx, fy, fz] = fraction;
         // Value and slope on the four edges along x.
-        let (at, levels) = (location.cell, self.levels);
+        let (at, levels) = (cell[0] + row * cell[1] + plane * cell[2], self.levels);
         let [a, s] = edge(levels, at, fx);
         let [b, t] = edge(levels, at + row, fx);
         let [c, u] = edge(levels, at + plane, fx);
@@ -155,16 +89,18 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
             self.slope * ((b - a) + fz * ((d - c) - (b - a))),
             self.slope * (high - low),
         ];
-        // Points off the grid are so by more than rounding.
         let distance = self.quantum * (low + fz * (high - low));
-        let distance = V::constant(0.0).select_below(location.off_grid, V::constant(FAR), distance);
-        (distance, gradient)
+        (
+            zero.select_below(off_grid, V::constant(FAR), distance),
+            gradient,
+        )
     }
 }
 
-/// Value between the sample `at` and the next along x, and their difference.
+/// Value at the fraction `x` of the edge from sample `at` to the next along x, and their
+/// difference.
 #[inline(always)]
-fn edge<V: Vector>(levels: &[i16], at: V, x: V) -> [V; 2] {
+fn edge<V: Vector>(levels: &[f32], at: V, x: V) -> [V; 2] {
     let [low, high] = V::gather_pairs(levels, at);
     let slope = high - low;
     [low + x * slope, slope]

@@ -1,4 +1,4 @@
-//! Motion of a grain together with the fluid that responds to it.
+//! Equations of motion of a grain together with the impulse of the fluid (Eqs 4b, 4c, 5).
 
 mod system;
 mod virtual_mass;

@@ -14,7 +14,7 @@ use crate::immersed::forcing::Impulse;
 use crate::immersed::kinematics::{PreviousStep, RigidVelocity};
 use crate::math::{Load, Matrix6, Vector6, solve6};
 
-/// Equations of one grain for its new velocities after a step.
+/// Equations a x = b for the new velocities x of one grain.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RigidBodySystem {
     matrix: Matrix6,
@@ -24,8 +24,8 @@ pub struct RigidBodySystem {
 }
 
 impl RigidBodySystem {
-    /// Assembles the equations under the `applied` load (weight less buoyancy) over `dt` [s], without
-    /// contact.
+    /// Assembles the equations under the `applied` load (weight less buoyancy) over `dt` [s],
+    /// without contact.
     pub fn new(
         grain: &Grain,
         previous: &PreviousStep,
@@ -44,7 +44,7 @@ impl RigidBodySystem {
         let momentum = mass * v + dt * applied.force;
         let angular_momentum = inertia * omega + dt * (applied.torque - gyroscopic);
         let virtual_mass = VirtualMass::new(grain, previous, fluid_density, dt);
-        let mut a = impulse.slope;
+        let mut a = impulse.matrix;
         let mut b = [0.0; 6];
         for row in 0..3 {
             a[row][row] += mass + virtual_mass.mass;
@@ -55,8 +55,12 @@ impl RigidBodySystem {
                 a[3 + row][3 + column] += (inertia + virtual_mass.inertia).col(column)[row];
             }
         }
-        prescribe(&mut a, &mut b, 0, grain.translation);
-        prescribe(&mut a, &mut b, 3, grain.rotation);
+        if grain.translation != Dof::Free {
+            prescribe(&mut a, &mut b, 0, grain.velocity);
+        }
+        if grain.rotation != Dof::Free {
+            prescribe(&mut a, &mut b, 3, grain.angular_velocity);
+        }
         RigidBodySystem {
             matrix: a,
             right: b,
@@ -95,17 +99,17 @@ impl RigidBodySystem {
         fluid_density: f64,
         dt: f64,
     ) -> Load {
-        let now = RigidVelocity::of(grain);
-        let x = now.to_vector();
-        let Impulse { constant, slope } = &self.impulse;
+        let new = RigidVelocity::of(grain);
+        let x = new.to_vector();
+        let Impulse { constant, matrix } = &self.impulse;
         let j: Vector6 = std::array::from_fn(|row| {
-            constant[row] + slope[row].iter().zip(x).map(|(m, x)| m * x).sum::<f64>()
+            constant[row] + matrix[row].iter().zip(x).map(|(m, x)| m * x).sum::<f64>()
         });
         let added = &self.virtual_mass;
-        let force = DVec3::from_slice(&j[..3]) + added.mass * now.linear - added.momentum;
+        let force = DVec3::from_slice(&j[..3]) + added.mass * new.linear - added.momentum;
         let torque =
-            DVec3::from_slice(&j[3..]) + added.inertia * now.angular - added.angular_momentum;
-        let change = now - previous.velocity;
+            DVec3::from_slice(&j[3..]) + added.inertia * new.angular - added.angular_momentum;
+        let change = new - previous.velocity;
         let omega = previous.velocity.angular;
         let displaced = fluid_density / grain.density;
         let fluid_inertia = grain.inertia() * displaced;
@@ -116,13 +120,13 @@ impl RigidBodySystem {
         }
     }
 
-    /// Response of the grain to contact within the step, such that without further contact it leaves
-    /// the sub-steps with [`Self::velocities`]
+    /// Response of the grain to contact in the sub-steps of this step. Without further contact the
+    /// grain has the velocities of [`Self::velocities`] at their end
     /// (`docs/decisions/0014-contact-with-the-fluid-response.md`).
     ///
-    /// The mass is at least that of the grain with `added_density` [kg/m^3] of fluid in its volume:
-    /// most of the added mass responds by the projection, one step late. The velocity that it takes
-    /// up from the last impact is not part of the initial velocities.
+    /// The mass is at least that of the grain with `added_density` [kg/m^3] of fluid in its volume,
+    /// since most of the added mass responds by the projection, one step late. The initial
+    /// velocities exclude the pending added-mass velocity of the last impact.
     pub fn response(
         &self,
         grain: &Grain,
@@ -132,7 +136,7 @@ impl RigidBodySystem {
     ) -> Response {
         let start = previous.velocity - previous.pending_added_mass_velocity;
         let x = start.to_vector();
-        // Impulse over dt that changes the initial velocities, with the matrix before mass is added.
+        // Load that changes the initial velocities over dt, with the matrix before mass is added.
         let mut drive: Vector6 = std::array::from_fn(|row| {
             let momentum: f64 = (0..6).map(|n| self.matrix[row][n] * x[n]).sum();
             (self.right[row] - momentum) / dt
@@ -162,12 +166,10 @@ impl RigidBodySystem {
 }
 
 /// Replaces three equations by prescribed velocities.
-fn prescribe(a: &mut Matrix6, b: &mut Vector6, first: usize, dof: Dof) {
-    if let Dof::Prescribed(velocity) = dof {
-        for i in 0..3 {
-            a[first + i] = [0.0; 6];
-            a[first + i][first + i] = 1.0;
-            b[first + i] = velocity[i];
-        }
+fn prescribe(a: &mut Matrix6, b: &mut Vector6, first: usize, velocity: DVec3) {
+    for i in 0..3 {
+        a[first + i] = [0.0; 6];
+        a[first + i][first + i] = 1.0;
+        b[first + i] = velocity[i];
     }
 }

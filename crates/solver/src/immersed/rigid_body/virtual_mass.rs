@@ -1,8 +1,8 @@
 //! Virtual mass of grains lighter than the fluid.
 //!
-//! The fluid around a grain responds by the projection, one step late; without a virtual mass a
-//! light grain and this response amplify each other. The displaced fluid is therefore added to both
-//! sides of the grain's equations, with the new acceleration on the left and the previous one on the
+//! The fluid around a grain responds by the projection, one step late. A light grain and this
+//! response amplify each other. The inertia of the displaced fluid is therefore added to both sides
+//! of the equations of motion, times the new acceleration on the left and the previous one on the
 //! right (`docs/decisions/0013-light-grains.md`).
 
 use glam::{DMat3, DVec3};
@@ -10,24 +10,25 @@ use glam::{DMat3, DVec3};
 use crate::dem::{Dof, Grain};
 use crate::immersed::kinematics::PreviousStep;
 
-/// Fluid that a light grain accelerates with itself.
+/// Inertia of the fluid that a light grain accelerates with itself.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VirtualMass {
-    /// [kg]
+    /// Virtual mass [kg].
     pub mass: f64,
-    /// [kg m^2]
+    /// Virtual inertia about the centroid, space frame [kg m^2].
     pub inertia: DMat3,
-    /// Momentum it would have after a step of the previous acceleration [kg m/s].
+    /// Momentum of the virtual mass after a step with the previous acceleration [kg m/s].
     pub momentum: DVec3,
-    /// Angular momentum likewise [kg m^2/s].
+    /// Angular momentum of the virtual inertia after such a step [kg m^2/s].
     pub angular_momentum: DVec3,
 }
 
-/// Density ratio below which the virtual mass is the whole displaced mass. It decreases linearly to
-/// none at 1.
+/// Density ratio below which the virtual mass is the displaced mass. Above it the virtual mass
+/// decreases linearly to 0 at a density ratio of 1.
 const FULL_BELOW: f64 = 0.8;
 
 impl VirtualMass {
+    /// Virtual mass of a grain in a step of `dt` [s]; 0 along prescribed degrees of freedom.
     pub fn new(grain: &Grain, previous: &PreviousStep, fluid_density: f64, dt: f64) -> VirtualMass {
         let ratio = grain.density / fluid_density;
         let part = ((1.0 - ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0) / ratio;

@@ -1,10 +1,13 @@
-//! What happens to the grains: kiss, tumbling, role change, separation, landing.
+//! Events of the grains: kiss, tumbling, role change, separation, landing.
 //!
-//! Pure logic on positions, contacts and the gap of a pair; it neither moves nor writes anything.
-//! The states of a pair (exactly two grains) follow the paper: drafting until the first contact,
-//! kissing until the line of centres has turned far from the vertical, tumbling until the grains
-//! part for good, separated until they touch again.
+//! Events depend on positions, contacts and the gap of a pair alone. The phases of a pair (exactly
+//! two grains) follow the paper: drafting until the first contact, kissing until the line of
+//! centres has turned far from the vertical, tumbling until the grains stay apart, separated until
+//! they touch again.
 
+mod pair;
+#[cfg(test)]
+mod tests;
 mod tracker;
 
 use glam::DVec3;
@@ -16,19 +19,19 @@ use crate::dem::{Dof, Grain};
 
 pub use tracker::{Tracker, TrackerState};
 
-/// What ends a run early.
+/// Condition that ends a run early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopWhen {
     /// Every free grain has touched the floor.
     Landing,
-    /// Every free grain touches something and lies still.
+    /// Every free grain has contact and is at rest.
     Rest,
-    /// The pair has parted after kissing.
+    /// The pair has separated after a kiss.
     Separation,
 }
 
-/// State of a pair.
+/// Phase of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
@@ -36,9 +39,9 @@ pub enum Phase {
     Drafting,
     /// In contact, one above the other.
     Kissing,
-    /// Turning about each other.
+    /// Rotating about each other.
     Tumbling,
-    /// Parted.
+    /// Apart after contact.
     Separated,
 }
 
@@ -54,31 +57,31 @@ impl Phase {
     }
 }
 
-/// Thresholds. `for_grains` chooses them from the grains and gravity.
+/// Thresholds of the events; [`EventParams::for_grains`] derives them from grains and gravity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EventParams {
-    /// Unit vector the way the grains settle: along gravity, or against it if all free grains are
+    /// Settling direction, a unit vector: along gravity, or against it if all free grains are
     /// lighter than the fluid; -z without gravity.
     pub down: DVec3,
-    /// The face that grains land on: axis and side.
+    /// Face of the box on which grains land: axis and side.
     pub floor: (u8, u8),
     /// Period of the box along periodic axes [m].
     pub period: [Option<f64>; 3],
-    /// A pair has parted beyond this gap [m].
+    /// Smallest gap of a separated pair [m].
     pub separation_gap: f64,
-    /// ... held without contact this long [s].
+    /// Time without contact after which a pair counts as separated [s].
     pub separation_hold: f64,
-    /// Tumbling begins at this angle of the line of centres from the vertical [rad].
+    /// Angle between line of centres and vertical at which tumbling begins [rad].
     pub tumble_angle: f64,
-    /// A role change counts beyond this difference in height [m].
+    /// Difference in height that confirms a role change [m].
     pub role_margin: f64,
-    /// A grain lies still below this speed of its fastest point [m/s].
+    /// Largest speed of the fastest point of a grain at rest [m/s].
     pub rest_speed: f64,
 }
 
 impl EventParams {
-    /// Separation beyond 0.05 d for sqrt(d/g), tumbling from 45 degrees, role change beyond
-    /// 0.02 d, rest below 0.001 sqrt(g d); d is the mean equal-volume diameter.
+    /// Default thresholds: separation beyond 0.05 d for sqrt(d/g), tumbling from 45 degrees, role
+    /// change beyond 0.02 d, rest below 0.001 sqrt(g d); d is the mean equal-volume diameter.
     pub fn for_grains(
         grains: &[Grain],
         gravity: DVec3,

@@ -3,13 +3,13 @@
 use glam::{DQuat, DVec3};
 use grainwake_plot::drawing::{Anchor, Drawing, path_data};
 use grainwake_plot::raster::Raster;
-use grainwake_plot::style::{HAIR, INK, PAGE, SMALL, TEXT};
-use grainwake_plot::text;
+use grainwake_plot::style::{HAIR, INK, PAGE, SMALL};
+use grainwake_plot::{Figure, letter, text};
 use grainwake_shape::Shape;
 use grainwake_shape::render::{Picture, View};
 use grainwake_solver::dem::Grain;
 
-use super::{FigureData, StudyFigure, factor_label, heading, note, value_text};
+use super::data::{FigureData, factor_label, value_text};
 use crate::plan::Run;
 
 /// Pixels of a picture per point of the page.
@@ -25,7 +25,7 @@ fn first_grain(data: &FigureData, run: &Run) -> Option<Grain> {
 }
 
 /// Draws the grains of an axis, seen from the same side at the same scale.
-pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure> {
+pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure> {
     let request = &data.plan.analysis.figures;
     let axis = request.grains.as_ref()?;
     let (rows, columns) = (request.rows.as_ref()?, request.columns.as_ref()?);
@@ -68,46 +68,31 @@ pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure>
         drawing.raster(x, y, cell, height, picture);
         let base = y + row_height - 4.0 - 0.36 * SMALL;
         let place = (x + 0.5 * cell, base);
-        note(&mut drawing, place, Anchor::Middle, &text::literal(name));
+        drawing.note(place, Anchor::Middle, &text::literal(name));
     }
     for (n, value) in across.iter().enumerate() {
         let place = (left + cell * (n as f64 + 0.5), 9.0);
-        heading(
-            &mut drawing,
-            place,
-            Anchor::Middle,
-            &factor_label(columns, *value),
-        );
+        drawing.text(place, Anchor::Middle, &factor_label(columns, *value));
     }
     for (n, value) in down.iter().enumerate() {
         let label = factor_label(rows, *value);
         let y = top + row_height * (n as f64 + 0.45);
-        drawing.label(12.0, y, Anchor::Middle, TEXT, INK, &label, true);
+        drawing.upward_text((12.0, y), &label);
     }
     let diameter = found.first()?.3.shape.equivalent_diameter();
-    scale_bar(
-        &mut drawing,
-        (left + 6.0, bottom + 10.0),
-        cell / window,
-        diameter,
-    );
+    let corner = (left + 6.0, bottom + 10.0);
+    scale_bar(&mut drawing, corner, cell / window, diameter);
     let caption = format!(
         "{} grains at the same scale, from the same side. Rows: equal {rows}; columns: equal \
          {columns}. The bar is the equal-volume diameter, {:.3} mm.",
         found.len(),
         1e3 * diameter
     );
-    Some(StudyFigure::new(
-        "fig04-grains",
-        "4",
-        "The grains",
-        caption,
-        drawing,
-    ))
+    Some(Figure::new("fig04-grains", "The grains", caption, drawing).numbered(4))
 }
 
 /// Draws one grain in all orientations, seen along y with gravity downwards.
-pub fn orientations(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure> {
+pub fn orientations(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure> {
     let request = &data.plan.analysis.figures;
     let (grains, axis) = (request.grains.as_ref()?, request.orientations.as_ref()?);
     let oriented = request.oriented.as_ref()?;
@@ -134,9 +119,8 @@ pub fn orientations(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyF
         let x = cell * n as f64;
         let picture = picture(&grain.shape, view, window, (cell, cell));
         drawing.raster(x, 12.0, cell, cell, picture);
-        let letter = char::from(b'a' + (n % 26) as u8);
-        let label = format!("({letter})  {}", text::literal(name));
-        heading(&mut drawing, (x + 6.0, 9.0), Anchor::Start, &label);
+        let label = format!("{}  {}", letter(n), text::literal(name));
+        drawing.text((x + 6.0, 9.0), Anchor::Start, &label);
         drawn += 1;
     }
     let corner = (10.0, cell + 2.0);
@@ -145,15 +129,16 @@ pub fn orientations(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyF
         ((corner.0, corner.1 - 20.0), "*z*", (-2.5, -3.0)),
     ] {
         arrow(&mut drawing, corner, tip);
-        let (x, y) = (tip.0 + shift.0, tip.1 + shift.1);
-        drawing.label(x, y, Anchor::Start, SMALL, INK, name, false);
+        let place = (tip.0 + shift.0, tip.1 + shift.1);
+        drawing.label(place, Anchor::Start, SMALL, INK, name);
     }
     let caption = format!(
         "The initial orientations of {}, seen along y. Gravity points down.",
         text::literal(oriented)
     );
     let title = "The initial orientations";
-    (drawn > 0).then(|| StudyFigure::new("fig05-orientations", "5", title, caption, drawing))
+    let figure = Figure::new("fig05-orientations", title, caption, drawing).numbered(5);
+    (drawn > 0).then_some(figure)
 }
 
 /// Draws an arrow with its head at `to`.
@@ -180,7 +165,7 @@ fn scale_bar(drawing: &mut Drawing, (x, y): (f64, f64), scale: f64, length: f64)
         drawing.line(&[(at, y - 2.5), (at, y + 2.5)], INK, HAIR, None);
     }
     let label = format!("*d* = {} mm", value_text(1e3 * length));
-    note(drawing, (end + 5.0, y), Anchor::Start, &label);
+    drawing.note((end + 5.0, y), Anchor::Start, &label);
 }
 
 /// Renders a shape in a window [m] of the given width, cropped to the size [pt] around its middle.

@@ -3,10 +3,11 @@
 use grainwake_plot::axis::{Axis, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::Frame;
-use grainwake_plot::style::{BLUE, GREEN, INK, LINE, ORANGE, PAGE, SMALL, VERMILION};
-use grainwake_plot::text;
+use grainwake_plot::legend::{Entry, Legend};
+use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
+use grainwake_plot::{Figure, letter, text};
 
-use super::{FigureData, StudyFigure, factor_label, heading};
+use super::data::{FigureData, factor_label};
 use crate::measure::trajectory::Trajectory;
 use crate::plan::Run;
 
@@ -39,7 +40,7 @@ struct Layout<'a> {
 }
 
 /// Draws figures 15, 16, 17 and 18.
-pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
+pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     let request = &data.plan.analysis.figures;
     let (Some(rows), Some(columns), Some(axis), Some(level)) = (
         &request.rows,
@@ -77,7 +78,7 @@ pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
     layouts.into_iter().filter_map(draw).collect()
 }
 
-fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> Option<StudyFigure> {
+fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> Option<Figure> {
     let Layout {
         number,
         curve,
@@ -130,14 +131,8 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
             up: Axis::linear(label, low, high.max(0.0), 5, false),
         };
         frame.grid(&mut drawing);
-        let letter = char::from(b'a' + (i % 26) as u8);
-        let title = format!("({letter})  {}", factor_label(by, *value));
-        heading(
-            &mut drawing,
-            (frame.x, frame.y - 4.0),
-            Anchor::Start,
-            &title,
-        );
+        let title = format!("{}  {}", letter(i), factor_label(by, *value));
+        drawing.text((frame.x, frame.y - 4.0), Anchor::Start, &title);
         let mut draw = |t: &Trajectory, colour: &str, name: &str| {
             let clip = format!("clip-{i}-{name}");
             let mut line = |values: &[f64], dash, clip: &str| {
@@ -164,20 +159,26 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
         }
         frame.outline(&mut drawing, (row + 1 == rows, column == 0));
     }
-    let mut entries: Vec<(String, &str, Option<&str>)> = lines
+    let entry = |name: String, colour: &'static str, dash: Option<&'static str>| Entry {
+        name,
+        colour,
+        line: Some(dash.unwrap_or_default()),
+        symbol: None,
+    };
+    let mut entries: Vec<Entry> = lines
         .iter()
         .enumerate()
-        .map(|(n, v)| (factor_label(within, *v), COLOURS[n % 4], None))
+        .map(|(n, v)| entry(factor_label(within, *v), COLOURS[n % 4], None))
         .collect();
     match (curve, reference) {
         (Curve::Velocity, _) => {
-            entries.push(("leading".to_owned(), INK, None));
-            entries.push(("trailing".to_owned(), INK, DASHED));
+            entries.push(entry("leading".to_owned(), INK, None));
+            entries.push(entry("trailing".to_owned(), INK, DASHED));
         }
-        (Curve::Gap, Some((name, _))) => entries.push((text::literal(name), INK, None)),
+        (Curve::Gap, Some((name, _))) => entries.push(entry(text::literal(name), INK, None)),
         (Curve::Gap, None) => {}
     }
-    legend(&mut drawing, &entries);
+    Legend::new(entries, PAGE - LEFT).draw(&mut drawing, (LEFT, LEGEND - 8.0));
     let (quantity, file) = match curve {
         Curve::Gap => ("Distance of the centres", "gap"),
         Curve::Velocity => ("Vertical velocity", "velocity"),
@@ -200,19 +201,5 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
     };
     let name = format!("fig{number}-{file}-by-{way}");
     let title = format!("{quantity} by {by}");
-    Some(StudyFigure::new(name, number, title, caption, drawing))
-}
-
-/// Draws a legend of lines, aligned with the right edge of the panels.
-fn legend(drawing: &mut Drawing, entries: &[(String, &str, Option<&str>)]) {
-    let base = LEGEND - 6.0;
-    let mut x = LEFT + 2.0 * WIDTH + GAP;
-    for (name, colour, dash) in entries.iter().rev() {
-        x -= text::width(name, SMALL);
-        drawing.label(x, base, Anchor::Start, SMALL, INK, name, false);
-        x -= 15.0;
-        let y = base - 0.36 * SMALL;
-        drawing.line(&[(x, y), (x + 12.0, y)], colour, LINE, *dash);
-        x -= 8.0;
-    }
+    Some(Figure::new(name, title, caption, drawing).numbered(number))
 }

@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use grainwake_plot::axis::{Axis, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::{Frame, Marker};
+use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::{BLUE, GREEN, HAIR, INK, ORANGE, PAGE, TEXT, VERMILION};
-use grainwake_plot::text;
+use grainwake_plot::{Figure, text};
 
-use super::{FigureData, StudyFigure, factor_label, heading, sign_entry};
+use super::data::{FigureData, factor_label, symbol_entry};
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::quantile;
 use crate::format::significant;
@@ -105,7 +106,7 @@ impl Layout<'_> {
                 let (middle, width) = (0.5 * (left + right), text::width(&label, TEXT) + 4.0);
                 // Hides the grid behind the letters.
                 drawing.rectangle(middle - 0.5 * width, f.y + 1.0, width, 11.0, &shade);
-                heading(&mut drawing, (middle, f.y + 9.0), Anchor::Middle, &label);
+                drawing.text((middle, f.y + 9.0), Anchor::Middle, &label);
             }
         }
         if let Some(reference) = &self.reference {
@@ -136,7 +137,7 @@ impl Layout<'_> {
 }
 
 /// Draws the kissing time of every model, with its range over the ensemble.
-pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
+pub fn by_model(data: &FigureData) -> Option<Figure> {
     let request = &data.plan.analysis.figures;
     let layout = layout(data, 190.0, 20.0)?;
     let mut drawing = layout.drawing(request.rows.as_deref());
@@ -144,21 +145,18 @@ pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
     let levels = orientations
         .map(|axis| data.levels(axis))
         .unwrap_or_default();
-    let mut x = LEFT;
-    for (n, name) in levels.iter().enumerate() {
-        let sign = (Marker::nth(n), COLOURS[n % 4], false);
-        x = sign_entry(&mut drawing, (x, LEGEND), sign, &text::literal(name));
-    }
+    let entry = |(n, name): (usize, &String)| symbol_entry(name, n, COLOURS[n % 4]);
+    let mut entries: Vec<Entry> = levels.iter().enumerate().map(entry).collect();
     let censored = layout.censored();
     if censored > 0 {
-        let label = "hollow: landed before kissing; the landing is shown";
-        sign_entry(
-            &mut drawing,
-            (x, LEGEND),
-            (Marker::Circle, INK, true),
-            label,
-        );
+        entries.push(Entry {
+            name: "hollow: landed before kissing; the landing is shown".into(),
+            colour: INK,
+            line: None,
+            symbol: Some((Marker::Circle, true)),
+        });
     }
+    Legend::new(entries, PAGE - LEFT).draw(&mut drawing, (LEFT, LEGEND));
     for observation in &layout.all {
         let grain = observation.levels.get(layout.axis);
         let Some(i) = grain.and_then(|g| layout.grains.iter().position(|o| o == g)) else {
@@ -173,13 +171,8 @@ pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
             count => 0.6 * n as f64 / (count - 1) as f64 - 0.3,
         };
         let at = i as f64 + 0.5 + shift;
-        layout.mark(
-            &mut drawing,
-            at,
-            observation,
-            Marker::nth(n),
-            COLOURS[n % 4],
-        );
+        let sign = Marker::nth(n);
+        layout.mark(&mut drawing, at, observation, sign, COLOURS[n % 4]);
     }
     if let Some(reference) = &layout.reference {
         let at = layout.reference_position();
@@ -205,17 +198,12 @@ pub fn by_model(data: &FigureData) -> Option<StudyFigure> {
     if censored > 0 {
         caption += &format!(" {censored} pairs landed before they kissed.");
     }
-    Some(StudyFigure::new(
-        "fig14a-kissing-time",
-        "14a",
-        "Kissing time of all models",
-        caption,
-        drawing,
-    ))
+    let title = "Kissing time of all models";
+    Some(Figure::new("fig14a-kissing-time", title, caption, drawing).numbered("14a"))
 }
 
 /// Draws a box plot of the kissing times over the orientations of each grain.
-pub fn box_plot(data: &FigureData) -> Option<StudyFigure> {
+pub fn box_plot(data: &FigureData) -> Option<Figure> {
     let layout = layout(data, 160.0, 8.0)?;
     let f = &layout.frame;
     let mut drawing = layout.drawing(data.plan.analysis.figures.rows.as_deref());
@@ -238,12 +226,8 @@ pub fn box_plot(data: &FigureData) -> Option<StudyFigure> {
         }
         let (x, half) = (f.px(i as f64 + 0.5), 7.0);
         let mut bar = |from: (f64, f64), to: (f64, f64), width: f64| {
-            drawing.line(
-                &[(from.0, f.py(from.1)), (to.0, f.py(to.1))],
-                INK,
-                width,
-                None,
-            );
+            let ends = [(from.0, f.py(from.1)), (to.0, f.py(to.1))];
+            drawing.line(&ends, INK, width, None);
         };
         for (from, end) in [(q1, low), (q3, high)] {
             bar((x, from), (x, end), HAIR);
@@ -273,11 +257,6 @@ pub fn box_plot(data: &FigureData) -> Option<StudyFigure> {
              landing."
         );
     }
-    Some(StudyFigure::new(
-        "fig14b-kissing-time-spread",
-        "14b",
-        "Spread of the kissing time by grain",
-        caption,
-        drawing,
-    ))
+    let title = "Spread of the kissing time by grain";
+    Some(Figure::new("fig14b-kissing-time-spread", title, caption, drawing).numbered("14b"))
 }

@@ -1,17 +1,14 @@
 //! Line styles of runs in the overview figures, and their legend.
 
-use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::Marker;
-use grainwake_plot::style::{BLUE, GREEN, INK, LINE, ORANGE, PAGE, PURPLE, SKY, SMALL, VERMILION};
+use grainwake_plot::legend::{Entry, Legend};
+use grainwake_plot::style::{INK, PAGE, SERIES_COLOURS, series_colour};
 use grainwake_plot::text;
 
-use super::{FigureData, note, unique};
+use super::data::{FigureData, unique};
 use crate::plan::Run;
 
-const COLOURS: [&str; 6] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY];
 const DASHES: [Option<&str>; 4] = [None, Some("4 1.8"), Some("1.2 1.5"), Some("6 1.6 1.2 1.6")];
-/// Height of a row of the legend [pt].
-const ROW: f64 = 10.0;
 
 /// Line style of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +24,7 @@ pub struct LineStyle {
 impl LineStyle {
     fn numbered(colour: usize, dash: usize, sign: usize) -> LineStyle {
         LineStyle {
-            colour: COLOURS[colour % COLOURS.len()],
+            colour: series_colour(colour),
             dash: DASHES[dash % DASHES.len()],
             sign: Marker::nth(sign),
         }
@@ -47,7 +44,7 @@ impl LineStyles {
     pub fn of(data: &FigureData) -> LineStyles {
         let models = unique(data.plan.runs.iter().map(|run| &run.model));
         let axes = axes(data);
-        if models.len() <= COLOURS.len() || axes.is_empty() {
+        if models.len() <= SERIES_COLOURS || axes.is_empty() {
             return LineStyles::Models(models);
         }
         LineStyles::Axes(axes.into_iter().take(2).collect())
@@ -80,7 +77,7 @@ impl LineStyles {
             // Colours repeat, so a longer legend would be ambiguous.
             LineStyles::Models(models) => models
                 .iter()
-                .take(4 * COLOURS.len())
+                .take(4 * SERIES_COLOURS)
                 .enumerate()
                 .map(|(i, model)| (model.clone(), LineStyle::numbered(i, 0, i)))
                 .collect(),
@@ -104,28 +101,15 @@ impl LineStyles {
         }
     }
 
-    /// Draws the legend in rows from `left`, or only measures it; returns its height [pt].
-    pub fn legend(&self, mut drawing: Option<&mut Drawing>, left: f64, signs: bool) -> f64 {
-        let (mut x, mut y) = (left, 0.5 * ROW);
-        for (name, style) in self.entries() {
-            let label = text::literal(&name);
-            let width = 17.0 + text::width(&label, SMALL) + 12.0;
-            if x + width > PAGE && x > left {
-                (x, y) = (left, y + ROW);
-            }
-            if let Some(drawing) = drawing.as_deref_mut() {
-                if signs {
-                    style
-                        .sign
-                        .draw(drawing, (x + 7.0, y), 2.7, style.colour, false);
-                } else {
-                    drawing.line(&[(x, y), (x + 14.0, y)], style.colour, LINE, style.dash);
-                }
-                note(drawing, (x + 17.0, y), Anchor::Start, &label);
-            }
-            x += width;
-        }
-        y + 0.5 * ROW
+    /// Returns the legend, with symbols or else lines, for a frame with the given left edge [pt].
+    pub fn legend(&self, left: f64, symbols: bool) -> Legend {
+        let entry = |(name, style): (String, LineStyle)| Entry {
+            name: text::literal(&name),
+            colour: style.colour,
+            line: (!symbols).then_some(style.dash.unwrap_or_default()),
+            symbol: symbols.then_some((style.sign, false)),
+        };
+        Legend::new(self.entries().into_iter().map(entry), PAGE - left)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Figures of a study, each a drawing with its caption.
 
+mod data;
 mod grains;
 mod histories;
 mod kissing_time;
@@ -10,122 +11,13 @@ mod setup;
 mod snapshots;
 mod trends;
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use grainwake_plot::Figure;
 
-use grainwake_plot::drawing::{Anchor, Drawing};
-use grainwake_plot::frame::Marker;
-use grainwake_plot::style::{INK, SMALL, TEXT};
-use grainwake_plot::text;
-use grainwake_run::RESOLVED;
-use grainwake_run::case::Case;
-
-use crate::analysis::correlation::Correlation;
-use crate::measure::record::RunRecord;
-use crate::measure::trajectory::Trajectory;
-use crate::plan::{Plan, Run};
-
-/// A figure of the report.
-pub struct StudyFigure {
-    /// File name without extension.
-    pub name: String,
-    /// Number of its counterpart in the paper; empty if there is none.
-    pub number: String,
-    /// Title.
-    pub title: String,
-    /// Caption, in label markup.
-    pub caption: String,
-    /// Drawing.
-    pub drawing: Drawing,
-}
-
-impl StudyFigure {
-    fn new(
-        name: impl Into<String>,
-        number: impl Into<String>,
-        title: impl Into<String>,
-        caption: impl Into<String>,
-        drawing: Drawing,
-    ) -> StudyFigure {
-        StudyFigure {
-            name: name.into(),
-            number: number.into(),
-            title: title.into(),
-            caption: caption.into(),
-            drawing,
-        }
-    }
-
-    /// Returns the SVG document, which can also be embedded in a page.
-    pub fn svg(&self) -> String {
-        let (title, caption) = (text::plain(&self.title), text::plain(&self.caption));
-        self.drawing.to_svg(&self.name, &title, &caption)
-    }
-}
-
-/// Data of the figures.
-pub struct FigureData<'a> {
-    /// Plan.
-    pub plan: &'a Plan,
-    /// Records of the runs, in the order of the plan.
-    pub records: &'a [RunRecord],
-    /// Study folder.
-    pub folder: &'a Path,
-    /// Correlations.
-    pub correlations: &'a [Correlation],
-    /// Trajectories of the finished runs that are compared, by name of the run.
-    pub trajectories: BTreeMap<String, Trajectory>,
-}
-
-impl FigureData<'_> {
-    /// Returns the first run of a model.
-    pub fn run(&self, model: &str) -> Option<&Run> {
-        self.plan.runs.iter().find(|run| run.model == model)
-    }
-
-    /// Returns the first run at a level of an axis.
-    pub fn run_at(&self, axis: &str, level: &String) -> Option<&Run> {
-        self.plan
-            .runs
-            .iter()
-            .find(|run| run.levels.get(axis) == Some(level))
-    }
-
-    /// Reads the case of a run from its run folder, or else as planned.
-    pub fn case(&self, run: &Run) -> Option<Case> {
-        let resolved = run.folder(self.folder).join(RESOLVED);
-        Case::load(&resolved, &[]).or_else(|_| run.case()).ok()
-    }
-
-    /// Returns the levels of an axis, in the order of the runs.
-    pub fn levels(&self, axis: &str) -> Vec<String> {
-        unique(self.plan.runs.iter().filter_map(|run| run.levels.get(axis)))
-    }
-
-    /// Returns the distinct values of a factor among the models on the axes, in ascending order.
-    pub fn factor_values(&self, factor: &str) -> Vec<f64> {
-        let on_axes = self.plan.runs.iter().filter(|run| !run.levels.is_empty());
-        let known = on_axes.filter_map(|run| run.factors.get(factor).copied());
-        let mut out: Vec<f64> = known.collect();
-        out.sort_by(f64::total_cmp);
-        out.dedup();
-        out
-    }
-}
-
-/// Returns the distinct names, in order of first appearance.
-fn unique<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
-    let mut out: Vec<String> = Vec::new();
-    for name in names {
-        if !out.contains(name) {
-            out.push(name.clone());
-        }
-    }
-    out
-}
+pub use data::FigureData;
+use data::numbered_as_in_paper;
 
 /// Draws all figures that the study has data for; omitted ones are added to `notes`.
-pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
+pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     let mut out = Vec::new();
     out.extend(grains::family(data, notes));
     out.extend(grains::orientations(data, notes));
@@ -142,14 +34,8 @@ pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<StudyFigure> {
     out
 }
 
-/// Returns whether the study shows grains, orientations and set-up as the paper's first figures.
-fn numbered_as_in_paper(data: &FigureData) -> bool {
-    let request = &data.plan.analysis.figures;
-    request.grains.is_some() && request.orientations.is_some() && request.setup.is_some()
-}
-
 /// Numbers the figures from 1, also in their file names.
-fn renumber(figures: &mut [StudyFigure]) {
+fn renumber(figures: &mut [Figure]) {
     for (i, figure) in figures.iter_mut().enumerate() {
         figure.number = (i + 1).to_string();
         let numbered = figure
@@ -160,48 +46,4 @@ fn renumber(figures: &mut [StudyFigure]) {
         let name = numbered.map_or(figure.name.as_str(), |(_, name)| name);
         figure.name = format!("fig{:02}-{name}", i + 1);
     }
-}
-
-/// Symbol of a factor in labels: its first letter in italics.
-fn symbol(factor: &str) -> String {
-    let first = factor.chars().next();
-    first.map_or(String::new(), |c| format!("*{}*", c.to_uppercase()))
-}
-
-/// Value with at most three decimals, without trailing zeros, but "0.40" with two.
-fn value_text(value: f64) -> String {
-    let text = format!("{value:.3}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text.contains('.') && text.len() == 3 {
-        format!("{text}0")
-    } else {
-        text.to_owned()
-    }
-}
-
-/// Label "S = 0.45" of a factor's value.
-fn factor_label(factor: &str, value: f64) -> String {
-    format!("{} = {}", symbol(factor), value_text(value))
-}
-
-/// Writes a small label, vertically centred at `y`.
-fn note(drawing: &mut Drawing, (x, y): (f64, f64), anchor: Anchor, label: &str) {
-    drawing.label(x, y + 0.36 * SMALL, anchor, SMALL, INK, label, false);
-}
-
-/// Writes a label of normal size with its baseline at `y`.
-fn heading(drawing: &mut Drawing, (x, y): (f64, f64), anchor: Anchor, label: &str) {
-    drawing.label(x, y, anchor, TEXT, INK, label, false);
-}
-
-/// Draws an entry of a legend, symbol and name, at the height `y`; returns the end of the entry.
-fn sign_entry(
-    drawing: &mut Drawing,
-    (x, y): (f64, f64),
-    (sign, colour, hollow): (Marker, &str, bool),
-    label: &str,
-) -> f64 {
-    sign.draw(drawing, (x + 4.0, y), 3.0, colour, hollow);
-    note(drawing, (x + 10.0, y), Anchor::Start, label);
-    x + 24.0 + text::width(label, SMALL)
 }

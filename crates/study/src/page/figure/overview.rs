@@ -1,34 +1,25 @@
 //! Figures of a study that requests none: curves of all runs against time, and results against the
 //! varied parameters.
 
+use grainwake_plot::Figure;
 use grainwake_plot::axis::{Axis, extent};
 use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::Frame;
 use grainwake_plot::style::{LINE, PAGE};
 
+use super::data::FigureData;
 use super::legend::LineStyles;
-use super::panels::against_parameters;
-use super::{FigureData, StudyFigure};
+use super::panels::{LEFT, Texts, against_parameters};
 use crate::measure::record::RunRecord;
 use crate::measure::trajectory::{Trajectory, settling_curve};
 use crate::plan::Run;
 use crate::plan::claims::FigureRequest;
 
-/// Left edge of the frames [pt].
-pub(super) const LEFT: f64 = 42.0;
 /// Largest number of runs that are drawn with lines of normal width.
 const FEW: usize = 12;
 
-/// Texts of a figure: file name, title, label of the vertical axis, caption.
-pub(super) struct Texts {
-    pub name: &'static str,
-    pub title: &'static str,
-    pub up: &'static str,
-    pub caption: String,
-}
-
 /// Draws the overview figures, if the analysis requests no figures.
-pub fn figures(data: &FigureData) -> Vec<StudyFigure> {
+pub fn figures(data: &FigureData) -> Vec<Figure> {
     if data.plan.analysis.figures != FigureRequest::default() {
         return Vec::new();
     }
@@ -74,7 +65,7 @@ fn curves<'a>(
         .collect()
 }
 
-fn settling_speeds(data: &FigureData) -> Option<StudyFigure> {
+fn settling_speeds(data: &FigureData) -> Option<Figure> {
     let curves = curves(data, |run, record| {
         record.settling.as_ref()?;
         settling_curve(run, record, data.folder)
@@ -97,7 +88,7 @@ fn settling_speeds(data: &FigureData) -> Option<StudyFigure> {
     against_time(data, &curves, "*t*  [s]", texts)
 }
 
-fn distances(data: &FigureData) -> Option<StudyFigure> {
+fn distances(data: &FigureData) -> Option<Figure> {
     let curves = curves(data, |run, record| {
         record.pair.as_ref()?;
         let trajectory = Trajectory::read(run, record, data.folder)?;
@@ -115,17 +106,13 @@ fn distances(data: &FigureData) -> Option<StudyFigure> {
     against_time(data, &curves, "*t* √(*g*/*d*)  [–]", texts)
 }
 
-fn against_time(
-    data: &FigureData,
-    curves: &Curves,
-    time: &str,
-    texts: Texts,
-) -> Option<StudyFigure> {
+fn against_time(data: &FigureData, curves: &Curves, time: &str, texts: Texts) -> Option<Figure> {
     let points = || curves.iter().flat_map(|(_, points)| points.iter().copied());
     let (_, end) = extent(points().map(|p| p.0))?;
     let (low, high) = extent(points().map(|p| p.1).chain([0.0]))?;
     let styles = LineStyles::of(data);
-    let top = styles.legend(None, LEFT, false) + 4.0;
+    let legend = styles.legend(LEFT, false);
+    let top = legend.height() + 4.0;
     let frame = Frame {
         x: LEFT,
         y: top,
@@ -135,7 +122,7 @@ fn against_time(
         up: Axis::linear(texts.up, low, high, 6, false),
     };
     let mut drawing = Drawing::new(PAGE, top + frame.height + 26.0);
-    styles.legend(Some(&mut drawing), LEFT, false);
+    legend.draw(&mut drawing, (LEFT, 5.0));
     frame.grid(&mut drawing);
     for (run, points) in curves {
         let style = styles.style(run);
@@ -149,11 +136,5 @@ fn against_time(
         }
     }
     frame.outline(&mut drawing, (true, true));
-    Some(StudyFigure::new(
-        texts.name,
-        "",
-        texts.title,
-        texts.caption,
-        drawing,
-    ))
+    Some(texts.figure(drawing))
 }

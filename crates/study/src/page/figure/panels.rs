@@ -6,15 +6,35 @@ use grainwake_plot::axis::{Axis, extent};
 use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::Frame;
 use grainwake_plot::style::PAGE;
-use grainwake_plot::text;
+use grainwake_plot::{Figure, text};
 
+use super::data::{FigureData, unique};
 use super::legend::{LineStyles, axes};
-use super::overview::{LEFT, Texts};
-use super::{FigureData, StudyFigure, unique};
 use crate::analysis::observation::{Observation, observations};
 use crate::format::title;
 use crate::plan::quantities::SHAPE_FACTORS;
 
+/// Texts of a figure.
+pub(super) struct Texts {
+    /// File name without extension.
+    pub name: &'static str,
+    /// Title.
+    pub title: &'static str,
+    /// Label of the vertical axis.
+    pub up: &'static str,
+    /// Caption.
+    pub caption: String,
+}
+
+impl Texts {
+    /// Returns the figure of a drawing.
+    pub fn figure(self, drawing: Drawing) -> Figure {
+        Figure::new(self.name, self.title, self.caption, drawing)
+    }
+}
+
+/// Left edge of the frames [pt].
+pub(super) const LEFT: f64 = 42.0;
 const GAP: f64 = 14.0;
 const HEIGHT: f64 = 150.0;
 /// Largest number of panels in a figure.
@@ -108,18 +128,19 @@ pub(super) fn against_parameters(
     data: &FigureData,
     quantity: &str,
     texts: Texts,
-) -> Option<StudyFigure> {
+) -> Option<Figure> {
     let all = observations(data.records, quantity, &BTreeMap::new());
     let (low, high) = extent(all.iter().flat_map(|o| [o.range.0, o.range.1, 0.0]))?;
     let mut parameters = parameters(data);
     let left_out = parameters.len().saturating_sub(PANELS);
     parameters.truncate(PANELS);
     let styles = LineStyles::of(data);
-    let top = styles.legend(None, LEFT, true) + 4.0;
+    let legend = styles.legend(LEFT, true);
+    let top = legend.height() + 4.0;
     let row = HEIGHT + 30.0;
     let rows = parameters.len().div_ceil(2);
     let mut drawing = Drawing::new(PAGE, top + rows as f64 * row);
-    styles.legend(Some(&mut drawing), LEFT, true);
+    legend.draw(&mut drawing, (LEFT, 5.0));
     let width = (PAGE - LEFT - 8.0 - GAP) / 2.0;
     for (i, parameter) in parameters.iter().enumerate() {
         let label = text::literal(&title(&parameter.name));
@@ -148,7 +169,7 @@ pub(super) fn against_parameters(
         draw_panel(&mut drawing, &frame, parameter, &all, data, &styles);
         frame.outline(&mut drawing, (true, i % 2 == 0));
     }
-    let mut caption = texts.caption;
+    let mut caption = texts.caption.clone();
     let models = data.plan.runs.iter().filter(|r| r.member == 0).count();
     if all.len() < models {
         caption += &format!(" {} of {models} models have a value.", all.len());
@@ -159,13 +180,7 @@ pub(super) fn against_parameters(
     if left_out > 0 {
         caption += &format!(" {left_out} more axes or factors are not shown.");
     }
-    Some(StudyFigure::new(
-        texts.name,
-        "",
-        texts.title,
-        caption,
-        drawing,
-    ))
+    Some(Texts { caption, ..texts }.figure(drawing))
 }
 
 fn draw_panel(

@@ -3,19 +3,19 @@
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, length_unit, outline_style};
 use grainwake_plot::style::{BLUE, COLUMN, FAINT, HAIR, INK, SMALL, VERMILION};
-use grainwake_plot::text;
-use grainwake_report::figure::silhouette::{Body, Outline};
+use grainwake_plot::{Figure, text};
+use grainwake_report::figure::grain_surface::{GrainSurface, Outline};
 use grainwake_run::case::Case;
 use grainwake_solver::dem::Grain;
 
+use super::data::{FigureData, value_text};
 use super::grains::arrow;
-use super::{FigureData, StudyFigure, note, value_text};
 
 /// Top of both views [pt].
 const TOP: f64 = 10.0;
 
 /// Draws the initial state of the requested model.
-pub fn figure(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure> {
+pub fn figure(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure> {
     let name = data.plan.analysis.figures.setup.as_ref()?;
     let case = data.run(name).and_then(|run| data.case(run));
     if case.is_none() {
@@ -26,7 +26,7 @@ pub fn figure(data: &FigureData, notes: &mut Vec<String>) -> Option<StudyFigure>
     draw(name, &case?)
 }
 
-fn draw(name: &str, case: &Case) -> Option<StudyFigure> {
+fn draw(name: &str, case: &Case) -> Option<Figure> {
     let mesh = &case.setup.mesh;
     let (low, high) = (mesh.origin, mesh.upper());
     let [first, second] = case.setup.grains.as_slice() else {
@@ -84,21 +84,18 @@ fn draw(name: &str, case: &Case) -> Option<StudyFigure> {
     arrow(&mut drawing, centre, to);
     let side = right + width + 4.0;
     let gap = format!("{} mm", value_text(1e3 * (bottom - top)));
-    note(&mut drawing, (side, centre.1), Anchor::Start, &gap);
+    drawing.note((side, centre.1), Anchor::Start, &gap);
     for (grain, word, colour) in [
         (trailing, "trailing", BLUE),
         (leading, "leading", VERMILION),
     ] {
         let y = detail.at((0.0, grain.pose.position.z)).1 + 0.36 * SMALL;
-        drawing.label(side, y, Anchor::Start, SMALL, colour, word, false);
+        drawing.label((side, y), Anchor::Start, SMALL, colour, word);
     }
     let foot = TOP + height + 24.0;
-    arrow(
-        &mut drawing,
-        (right + 6.0, foot - 12.0),
-        (right + 6.0, foot + 8.0),
-    );
-    drawing.label(right + 12.0, foot, Anchor::Start, SMALL, INK, "*g*", false);
+    let arrow_end = |y: f64| (right + 6.0, foot + y);
+    arrow(&mut drawing, arrow_end(-12.0), arrow_end(8.0));
+    drawing.label((right + 12.0, foot), Anchor::Start, SMALL, INK, "*g*");
     let size = (high - low)
         .to_array()
         .map(|length| value_text(1e3 * length))
@@ -112,13 +109,7 @@ fn draw(name: &str, case: &Case) -> Option<StudyFigure> {
         1e3 * (bottom - top),
         (bottom - top) / leading.shape.equivalent_diameter()
     );
-    Some(StudyFigure::new(
-        "fig07-setup",
-        "7",
-        "The set-up",
-        caption,
-        drawing,
-    ))
+    Some(Figure::new("fig07-setup", "The set-up", caption, drawing).numbered(7))
 }
 
 /// Window around both outlines, with a margin; at least 0.6 times as wide as the pair is high.
@@ -139,5 +130,5 @@ fn pair_window(outlines: &[Outline; 2]) -> Window {
 fn outline(grain: &Grain) -> Outline {
     let (points, triangles) = grain.shape.surface_mesh();
     let triangles = triangles.iter().map(|t| t.map(|i| i as usize)).collect();
-    Body::new(points, triangles).outline(grain.pose.position, grain.pose.orientation, 0, 2)
+    GrainSurface::new(points, triangles).outline(grain.pose.position, grain.pose.orientation, 0, 2)
 }

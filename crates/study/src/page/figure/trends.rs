@@ -3,10 +3,11 @@
 use grainwake_plot::axis::Axis;
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::{Frame, Marker};
+use grainwake_plot::legend::Legend;
 use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
-use grainwake_plot::text;
+use grainwake_plot::{Figure, text};
 
-use super::{FigureData, StudyFigure, note, sign_entry};
+use super::data::{FigureData, symbol_entry};
 use crate::analysis::correlation::Correlation;
 use crate::format::title;
 
@@ -18,7 +19,7 @@ const GAP: f64 = 26.0;
 const TOP: f64 = 26.0;
 
 /// Draws one panel per factor, with one row per quantity and level of the axis.
-pub fn figure(data: &FigureData) -> Option<StudyFigure> {
+pub fn figure(data: &FigureData) -> Option<Figure> {
     let request = data.plan.analysis.correlations.as_ref()?;
     let known = data.correlations.iter().filter(|c| c.interval.is_some());
     let known: Vec<&Correlation> = known.collect();
@@ -48,12 +49,7 @@ pub fn figure(data: &FigureData) -> Option<StudyFigure> {
             }
             if i == 0 {
                 let place = (LEFT - 6.0, top + 0.5 * block);
-                note(
-                    &mut drawing,
-                    place,
-                    Anchor::End,
-                    &text::literal(&title(quantity)),
-                );
+                drawing.note(place, Anchor::End, &text::literal(&title(quantity)));
             }
             for (l, level) in levels.iter().enumerate() {
                 let found = known
@@ -64,12 +60,8 @@ pub fn figure(data: &FigureData) -> Option<StudyFigure> {
                 };
                 let y = top + 4.0 + ROW * (l as f64 + 0.5);
                 let colour = COLOURS[l % 4];
-                drawing.line(
-                    &[(frame.px(low), y), (frame.px(high), y)],
-                    colour,
-                    1.2,
-                    None,
-                );
+                let interval = [(frame.px(low), y), (frame.px(high), y)];
+                drawing.line(&interval, colour, 1.2, None);
                 Marker::nth(l).draw(&mut drawing, (frame.px(rho), y), 2.7, colour, false);
             }
         }
@@ -78,20 +70,13 @@ pub fn figure(data: &FigureData) -> Option<StudyFigure> {
         drawing.line(&zero, INK, 0.6, Some("2 2"));
         frame.outline(&mut drawing, (true, false));
     }
-    let mut x = LEFT;
-    for (l, level) in levels.iter().enumerate() {
-        let sign = (Marker::nth(l), COLOURS[l % 4], false);
-        x = sign_entry(&mut drawing, (x, 12.0), sign, &text::literal(level));
-    }
+    let entry = |(l, level): (usize, &String)| symbol_entry(level, l, COLOURS[l % 4]);
+    let legend = Legend::new(levels.iter().enumerate().map(entry), PAGE - LEFT);
+    legend.draw(&mut drawing, (LEFT, 12.0));
     let caption = format!(
         "Spearman's rank correlation of each quantity with each factor, over up to {n} grains in \
          one orientation, with 95 % intervals. An interval that excludes zero indicates a trend."
     );
-    Some(StudyFigure::new(
-        "correlations",
-        "",
-        "Rank correlations with shape factors",
-        caption,
-        drawing,
-    ))
+    let title = "Rank correlations with shape factors";
+    Some(Figure::new("correlations", title, caption, drawing))
 }

@@ -1,0 +1,253 @@
+//! Arguments of `grain`.
+
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+
+/// Arguments of `grain`.
+#[derive(Debug, Args)]
+pub struct GrainArgs {
+    /// Command.
+    #[command(subcommand)]
+    pub command: GrainCommand,
+}
+
+/// Commands of `grain`.
+#[derive(Debug, Subcommand)]
+pub enum GrainCommand {
+    /// Create grains from a 3-D image: grey, binary or labelled
+    FromScan(FromScanArgs),
+    /// Create a grain from a closed surface mesh or from spherical harmonics
+    FromMesh(FromMeshArgs),
+    /// Create a grain of analytic shape
+    Make(MakeArgs),
+    /// Generate grains of given sphericity and roundness, one for each pair
+    Family(FamilyArgs),
+    /// Print the size and morphology of grain files
+    Info(InfoArgs),
+    /// Compare two grains by their morphology and the distance of their surfaces
+    Compare(CompareArgs),
+}
+
+/// Output and resolution of new grains.
+#[derive(Debug, Args)]
+pub struct NewGrain {
+    /// Grain file; from-scan writes all grains if it is a folder
+    #[arg(short, long, value_name = "FILE.grain")]
+    pub output: PathBuf,
+    /// Rescale to this diameter of the sphere of equal volume, for example "2 mm"
+    #[arg(long, value_name = "LENGTH")]
+    pub equivalent_diameter: Option<String>,
+    /// Other options.
+    #[command(flatten)]
+    pub common: GrainOptions,
+}
+
+/// Options of all commands that create grains.
+#[derive(Debug, Args)]
+pub struct GrainOptions {
+    /// Number of surface nodes [default: one per (diameter / 20)^2 of surface]
+    #[arg(long, value_name = "N")]
+    pub nodes: Option<usize>,
+    /// Number of cells of the distance field across the longest extent
+    #[arg(long, value_name = "N")]
+    pub cells: Option<usize>,
+    /// Replace existing files
+    #[arg(long)]
+    pub force: bool,
+    /// Print the record of each grain as a JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `grain from-mesh`.
+#[derive(Debug, Args)]
+pub struct FromMeshArgs {
+    /// Mesh (.stl, .ply, .obj) or spherical-harmonic coefficients (.anm)
+    pub mesh: PathBuf,
+    /// Length of one unit of the file, for example "1 mm"
+    #[arg(long, value_name = "LENGTH")]
+    pub unit: String,
+    /// Invert a mesh with inward normals
+    #[arg(long)]
+    pub flip: bool,
+    /// Output and resolution.
+    #[command(flatten)]
+    pub new: NewGrain,
+}
+
+/// Arguments of `grain from-scan`.
+#[derive(Debug, Args)]
+pub struct FromScanArgs {
+    /// Image: multi-page .tif, .npy, .npz, .nrrd, .mha, or a folder of .tif slices
+    pub image: PathBuf,
+    /// Edge length of a voxel, for example "12 um"
+    #[arg(long, value_name = "LENGTH")]
+    pub voxel: String,
+    /// Label of a single grain [default: all]
+    #[arg(long, value_name = "N")]
+    pub label: Option<u32>,
+    /// Threshold between void and solid in a grey image: a grey value, "otsu", or "otsu3" (the
+    /// upper of two thresholds)
+    #[arg(long, value_name = "VALUE|otsu|otsu3", allow_negative_numbers = true)]
+    pub threshold: Option<String>,
+    /// Apply a median filter of 27 voxels before the threshold
+    #[arg(long)]
+    pub median: bool,
+    /// Separate touching grains where the neck is narrower than this fraction of the smaller grain
+    #[arg(long, value_name = "NECK", num_args = 0..=1, default_missing_value = "0.87")]
+    pub separate: Option<f64>,
+    /// Locate surfaces by the mask even if there are grey values
+    #[arg(long)]
+    pub from_mask: bool,
+    /// Skip the roundness measurement, which takes long
+    #[arg(long)]
+    pub no_roundness: bool,
+    /// Treat each connected piece of solid as a grain
+    #[arg(long)]
+    pub split: bool,
+    /// Include grains at the image border, truncated there (for tight crops)
+    #[arg(long)]
+    pub pad: bool,
+    /// Keep the largest piece of a label with several pieces
+    #[arg(long)]
+    pub largest_piece: bool,
+    /// Standard deviation of the smoothing, in voxels [default: 1.1 with grey values, 1.5 with a
+    /// mask]
+    #[arg(long, value_name = "VOXELS")]
+    pub smoothing: Option<f64>,
+    /// Output and resolution.
+    #[command(flatten)]
+    pub new: NewGrain,
+}
+
+/// Arguments of `grain family`.
+#[derive(Debug, Args)]
+pub struct FamilyArgs {
+    /// Krumbein sphericities S, 0.3 to 0.97, one per row of the family
+    #[arg(long, value_delimiter = ',', required = true, value_name = "S,...")]
+    pub sphericity: Vec<f64>,
+    /// Wadell roundnesses R, 0.05 to 0.95, one per column of the family
+    #[arg(long, value_delimiter = ',', required = true, value_name = "R,...")]
+    pub roundness: Vec<f64>,
+    /// Flatness c/b, 0.2 to 1 and at least S^3 [default: 0.8, or S^3 if that is larger]
+    #[arg(long, value_name = "RATIO")]
+    pub flatness: Option<f64>,
+    /// Seed of the generator; equal seeds give equal grains
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// Diameter of the sphere of equal volume of all grains
+    #[arg(long, default_value = "2 mm", value_name = "LENGTH")]
+    pub equivalent_diameter: String,
+    /// Folder for 01.grain, 02.grain, ... (row by row), table.csv and sheet.png
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Other options.
+    #[command(flatten)]
+    pub common: GrainOptions,
+}
+
+/// Arguments of `grain make`.
+#[derive(Debug, Args)]
+pub struct MakeArgs {
+    /// Shape.
+    #[command(subcommand)]
+    pub body: Body,
+}
+
+/// Analytic shapes.
+#[derive(Debug, Subcommand)]
+pub enum Body {
+    /// Sphere
+    Sphere {
+        /// Diameter
+        diameter: String,
+        /// Output and resolution.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+    /// Ellipsoid
+    Ellipsoid {
+        /// Full axes, three lengths
+        #[arg(num_args = 3)]
+        axes: Vec<String>,
+        /// Output and resolution.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+    /// Box with rounded edges
+    RoundedBox {
+        /// Full edges, three lengths
+        #[arg(num_args = 3)]
+        edges: Vec<String>,
+        /// Radius of the edges
+        #[arg(long)]
+        radius: String,
+        /// Output and resolution.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+    /// Circular cylinder
+    Cylinder {
+        /// Diameter
+        diameter: String,
+        /// Height
+        height: String,
+        /// Output and resolution.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+    /// Circular cylinder with hemispherical caps
+    Capsule {
+        /// Diameter
+        diameter: String,
+        /// Distance between the centres of the caps
+        height: String,
+        /// Output and resolution.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+    /// Superquadric
+    Superquadric {
+        /// Full axes, three lengths
+        #[arg(num_args = 3)]
+        axes: Vec<String>,
+        /// Exponents e1 and e2, 0.1 to 2
+        #[arg(long, num_args = 2, required = true)]
+        exponents: Vec<f64>,
+        /// Output and resolution.
+        #[command(flatten)]
+        new: NewGrain,
+    },
+}
+
+/// Arguments of `grain info`.
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// Grain files
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Print the record of each file as a JSON object
+    #[arg(long)]
+    pub json: bool,
+    /// Render three sides of each grain with its surface nodes into this PNG, one row per grain
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+}
+
+/// Arguments of `grain compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// First grain file
+    pub first: PathBuf,
+    /// Second grain file
+    pub second: PathBuf,
+    /// Scale the second grain to the volume of the first, to compare the form alone
+    #[arg(long)]
+    pub same_size: bool,
+    /// Print a JSON object
+    #[arg(long)]
+    pub json: bool,
+    /// Render three sides of both grains, aligned as compared, into this PNG
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+}

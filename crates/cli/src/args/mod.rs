@@ -1,0 +1,55 @@
+//! Arguments of the command line, one module per command.
+
+mod bench;
+mod grain;
+mod report;
+mod run;
+mod study;
+mod validate;
+
+use clap::{Parser, Subcommand};
+
+pub use bench::BenchArgs;
+pub use grain::{
+    Body, CompareArgs, FamilyArgs, FromMeshArgs, FromScanArgs, GrainArgs, GrainCommand, InfoArgs,
+    NewGrain,
+};
+pub use report::ReportArgs;
+pub use run::{CheckArgs, RunArgs};
+pub use study::StudyArgs;
+pub use validate::ValidateArgs;
+
+/// Resolved simulation of grains in fluid: from images or meshes to figures.
+#[derive(Debug, Parser)]
+#[command(name = "grainwake", version, about, propagate_version = true)]
+pub struct Cli {
+    /// Command.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a case
+    Run(RunArgs),
+    /// Check a case without running it: derived numbers, cost and warnings
+    Check(CheckArgs),
+    /// Create, inspect and compare grain shapes
+    Grain(GrainArgs),
+    /// Run the validation cases and compare them with references
+    Validate(ValidateArgs),
+    /// Run a parameter study; finished runs are kept, interrupted runs are resumed
+    Study(StudyArgs),
+    /// Draw the figures and the page of a run folder or a study folder
+    Report(ReportArgs),
+    /// Measure the speed and memory of the solver on this machine
+    Bench(BenchArgs),
+    /// Print the JSON schema of the case file
+    Schema,
+    /// Print a shell completion script
+    Completions {
+        /// Shell
+        shell: clap_complete::Shell,
+    },
+}

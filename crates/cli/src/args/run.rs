@@ -1,0 +1,51 @@
+//! Arguments of `run` and `check`.
+
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// Case file
+    pub case: PathBuf,
+    /// Run folder [default: runs/NAME; for a case.resolved.toml its own folder]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Number of threads, 0 for all cores [default: value of the case]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Continue from the last checkpoint
+    #[arg(long, conflicts_with = "force")]
+    pub resume: bool,
+    /// Replace an existing run
+    #[arg(long)]
+    pub force: bool,
+    /// Override a value of the case, for example time.end=0.5 or grain.0.density=2600
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Do not draw the figures and the page at the end of the run
+    #[arg(long)]
+    pub no_report: bool,
+    /// Print warnings and errors only
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the summary as a JSON object; other messages go to standard error
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Case file
+    pub case: PathBuf,
+    /// Number of threads for the estimated wall time, 0 for all cores [default: value of the case]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Override a value of the case, for example time.end=0.5
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Print a JSON object
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,286 @@
+//! Features of a run derived from its tables: kind, scales, pair, phases and key instants.
+
+use glam::DVec3;
+use grainwake_formats::events::Event;
+use grainwake_plot::minus;
+
+use crate::phases::{self, Instant, PairEvent, Phase};
+use crate::run_folder::{History, RunFolder};
+
+/// Kind of a run by its number of grains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RunKind {
+    /// Fluid only.
+    Flow,
+    /// One grain.
+    Single,
+    /// Two grains.
+    Pair,
+    /// Three or more grains.
+    Many,
+}
+
+/// Scales of dimensionless quantities, as in the paper.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scales {
+    /// Mean equal-volume diameter d [m].
+    pub diameter: f64,
+    /// Magnitude of gravity g [m/s^2].
+    pub gravity: f64,
+}
+
+impl Scales {
+    /// Time scale sqrt(d/g) [s].
+    pub fn time(&self) -> f64 {
+        (self.diameter / self.gravity).sqrt()
+    }
+    /// Velocity scale sqrt(d g) [m/s].
+    pub fn velocity(&self) -> f64 {
+        (self.diameter * self.gravity).sqrt()
+    }
+}
+
+/// Features of a run.
+#[derive(Clone, Debug)]
+pub struct RunFeatures {
+    /// Kind of the run.
+    pub kind: RunKind,
+    /// Scales; `None` without diameter or gravity.
+    pub scales: Option<Scales>,
+    /// Unit vector against gravity; +z if gravity is unknown or zero.
+    pub up: DVec3,
+    /// Trailing (upper) and leading grain of a pair at the start.
+    pub pair: Option<[usize; 2]>,
+    /// Phases of a pair.
+    pub phases: Vec<Phase>,
+    /// First contact of a pair.
+    pub kiss: Option<PairEvent>,
+    /// Separation of a pair after its contact.
+    pub separation: Option<PairEvent>,
+    /// Key instants, shown in the figures.
+    pub instants: Vec<Instant>,
+    /// Whether any grain moves by a tenth of the mean diameter or more.
+    pub travels: bool,
+    /// Last time [s].
+    pub end: f64,
+}
+
+impl RunFeatures {
+    /// Derives the features from the tables of a run folder.
+    pub fn of(run: &RunFolder) -> RunFeatures {
+        let moving = run.moving();
+        let kind = match moving.len() {
+            0 => RunKind::Flow,
+            1 => RunKind::Single,
+            2 => RunKind::Pair,
+            _ => RunKind::Many,
+        };
+        let gravity = run.facts.gravity.unwrap_or(DVec3::ZERO);
+        let up = (-gravity).try_normalize().unwrap_or(DVec3::Z);
+        let diameter = run.facts.diameter().filter(|_| gravity.length() > 0.0);
+        let scales = diameter.map(|diameter| Scales {
+            diameter,
+            gravity: gravity.length(),
+        });
+        let end = run.end();
+        let height = |i: usize| run.grains[i].position[0].dot(up);
+        let pair = match moving[..] {
+            [a, b] if height(a) >= height(b) => Some([a, b]),
+            [a, b] => Some([b, a]),
+            _ => None,
+        };
+        let phases = pair.map_or(Vec::new(), |_| {
+            phases::phases(&run.events, run.summary_number("tumble_time_s"), end)
+        });
+        let of_pair =
+            |moment: fn(&[Event]) -> Option<PairEvent>| pair.and_then(|_| moment(&run.events));
+        let least = 0.1 * run.facts.diameter().unwrap_or(0.0);
+        let moves = |history: &History| {
+            let mut positions = history.position.iter();
+            positions.any(|p| p.distance(history.position[0]) > least)
+        };
+        let travels = run.grains.iter().any(moves);
+        let last = || {
+            vec![Instant {
+                time: end,
+                name: "",
+            }]
+        };
+        let instants = match kind {
+            RunKind::Flow => last(),
+            RunKind::Single if !travels => last(),
+            RunKind::Pair => phases::pair_instants(&phases, &run.events, closest(run, pair), end),
+            _ => phases::even_instants(end),
+        };
+        RunFeatures {
+            kind,
+            scales,
+            up,
+            pair,
+            phases,
+            kiss: of_pair(phases::kiss),
+            separation: of_pair(phases::separation),
+            instants,
+            travels,
+            end,
+        }
+    }
+
+    /// Returns the name of a grain in legends.
+    pub fn grain_name(&self, grain: usize) -> String {
+        let role = match self.pair {
+            Some([trailing, _]) if grain == trailing => " (trailing at the start)",
+            Some([_, leading]) if grain == leading => " (leading at the start)",
+            _ => "",
+        };
+        format!("grain {grain}{role}")
+    }
+
+    /// Returns the number of a grain in the cycle of colours; the trailing grain of a pair is 0.
+    pub fn grain_rank(&self, grain: usize) -> usize {
+        let pair = self.pair;
+        pair.map_or(grain, |[trailing, _]| usize::from(grain != trailing))
+    }
+
+    /// Returns the time scale of a pair; `None` for runs whose figures show seconds.
+    fn time_scale(&self) -> Option<f64> {
+        let scales = self.scales.filter(|_| self.kind == RunKind::Pair);
+        scales.map(|scales| scales.time())
+    }
+
+    /// Returns the label of the time axis, and its value for one second.
+    pub fn time_axis(&self) -> (&'static str, f64) {
+        match self.time_scale() {
+            Some(scale) => ("*t* √(*g*/*d*)  [–]", 1.0 / scale),
+            None => ("*t*  [s]", 1.0),
+        }
+    }
+
+    /// Returns a time in label markup, in the unit of the figures.
+    pub fn time_text(&self, time: f64) -> String {
+        match self.time_scale() {
+            Some(scale) => format!("*t* √(*g*/*d*) = {}", short(time / scale)),
+            None => format!("*t* = {} s", short(time)),
+        }
+    }
+
+    /// Returns the time of a first contact or separation in label markup.
+    pub fn pair_event_text(&self, moment: PairEvent) -> String {
+        let landed = match moment.landed {
+            true => ", after the first has landed",
+            false => "",
+        };
+        format!("{}{landed}", self.time_text(moment.time))
+    }
+}
+
+/// Returns the time of the smallest gap between the surfaces or, if the gap is unknown, of the
+/// smallest distance of the centres [s].
+fn closest(run: &RunFolder, pair: Option<[usize; 2]>) -> f64 {
+    let least = |points: &mut dyn Iterator<Item = (f64, f64)>| {
+        let known = points.filter(|(time, gap)| time.is_finite() && gap.is_finite());
+        known
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(time, _)| time)
+    };
+    let surfaces = run.diagnostics.as_ref().and_then(|table| {
+        let (time, gap) = (table.column("time")?, table.column("gap")?);
+        least(&mut time.iter().copied().zip(gap.iter().copied()))
+    });
+    let centres = || {
+        let [a, b] = pair?.map(|grain| &run.grains[grain]);
+        let lines = a.position.iter().zip(&b.position).map(|(a, b)| *a - *b);
+        let distances = lines.map(|line| run.nearest(line).length());
+        least(&mut a.time.iter().copied().zip(distances))
+    };
+    surfaces.or_else(centres).unwrap_or(0.0)
+}
+
+/// Returns the Galileo number sqrt(|s - 1| g d^3) / nu for the density ratio s.
+pub fn galileo(scales: Scales, ratio: f64, viscosity: f64) -> f64 {
+    ((ratio - 1.0).abs() * scales.gravity * scales.diameter.powi(3)).sqrt() / viscosity
+}
+
+/// Returns a value with three significant digits, in label markup.
+pub fn short(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !value.is_finite() {
+        return "not known".to_owned();
+    }
+    // The exponent of the rounded value: 0.9999 becomes 1.00.
+    let rounded = format!("{value:.2e}");
+    let (mantissa, exponent) = rounded.split_once('e').unwrap_or((&rounded, "0"));
+    match exponent.parse::<i32>().unwrap_or(0) {
+        power @ -3..=5 => {
+            let decimals = (2 - power).clamp(0, 6) as usize;
+            minus(&format!("{value:.decimals$}"))
+        }
+        _ => minus(&format!("{mantissa}×10^{{{exponent}}}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits() {
+        let texts = [
+            0.0,
+            18.234,
+            0.99999,
+            -0.002_346,
+            123_456.0,
+            1.0e-9,
+            -4.2e7,
+            f64::NAN,
+        ]
+        .map(short);
+        assert_eq!(
+            texts,
+            [
+                "0",
+                "18.2",
+                "1.00",
+                "−0.00235",
+                "123456",
+                "1.00×10^{−9}",
+                "−4.20×10^{7}",
+                "not known"
+            ]
+        );
+    }
+
+    #[test]
+    fn the_grain_above_trails() {
+        let mut run = RunFolder::default();
+        for z in [0.02, 0.05] {
+            run.grains.push(History {
+                time: vec![0.0],
+                position: vec![DVec3::Z * z],
+                ..History::default()
+            });
+        }
+        assert_eq!(RunFeatures::of(&run).pair, Some([1, 0]));
+        run.facts.gravity = Some(DVec3::new(0.0, 0.0, 9.81));
+        assert_eq!(
+            RunFeatures::of(&run).pair,
+            Some([0, 1]),
+            "down is where gravity points"
+        );
+    }
+
+    #[test]
+    fn galileo_number_of_the_paper() {
+        let scales = Scales {
+            diameter: 2e-3,
+            gravity: 9.81,
+        };
+        assert!((galileo(scales, 1.5, 1e-6) - 198.1).abs() < 0.1);
+        assert!(
+            (scales.time() - 0.014_28).abs() < 1e-5 && (scales.velocity() - 0.140_07).abs() < 1e-5
+        );
+    }
+}

@@ -1,0 +1,342 @@
+//! Surfaces of the grains, with their projected outlines and plane sections.
+
+use std::collections::BTreeMap;
+
+use glam::{DQuat, DVec3};
+use grainwake_formats::vtp::Surface;
+
+use grainwake_plot::axis::extent;
+use grainwake_plot::contour;
+
+use super::section::SliceView;
+use crate::run_folder::{History, RunFolder};
+
+/// Closed polygon in two of the three coordinates [m].
+pub type Outline = Vec<(f64, f64)>;
+
+/// Resolution of the mask from which an outline is traced.
+const SAMPLES: usize = 72;
+
+/// Closed triangulated surface of a grain, in the body frame.
+#[derive(Clone, Debug)]
+pub struct GrainSurface {
+    points: Vec<DVec3>,
+    triangles: Vec<[usize; 3]>,
+}
+
+/// Principal axes of a grain, in the body frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrincipalAxes {
+    /// Axis of the longest extent.
+    pub long: DVec3,
+    /// Axis of the shortest extent: normal of the broad side.
+    pub short: DVec3,
+}
+
+impl GrainSurface {
+    /// Creates a body from its closed surface; points in the body frame [m].
+    pub fn new(points: Vec<DVec3>, triangles: Vec<[usize; 3]>) -> GrainSurface {
+        GrainSurface { points, triangles }
+    }
+
+    /// Returns the outline of the body at a pose, projected to the axes `across` and `up`.
+    pub fn outline(&self, position: DVec3, rotation: DQuat, across: usize, up: usize) -> Outline {
+        let project = |p: &DVec3| {
+            let x = position + rotation * *p;
+            (x[across], x[up])
+        };
+        let points: Vec<(f64, f64)> = self.points.iter().map(project).collect();
+        largest_outline(&points, &self.triangles)
+    }
+
+    /// Returns the intersection of the body at a pose with the plane at `place` along the normal of
+    /// the view.
+    pub fn section(
+        &self,
+        position: DVec3,
+        rotation: DQuat,
+        view: SliceView,
+        place: f64,
+    ) -> Vec<Outline> {
+        let points = self.points.iter().map(|p| position + rotation * *p);
+        let points: Vec<DVec3> = points.collect();
+        let above = |i: usize| points[i][view.normal] >= place;
+        let cross = |a: usize, b: usize| {
+            let (p, q) = (points[a], points[b]);
+            let (from, to) = (p[view.normal], q[view.normal]);
+            view.seen(p.lerp(q, (place - from) / (to - from)))
+        };
+        // An intersected triangle connects two edges, which its neighbours share.
+        let mut next: BTreeMap<(usize, usize), (usize, usize)> = BTreeMap::new();
+        for triangle in &self.triangles {
+            let [a, b, c] = *triangle;
+            let edges = [(a, b), (b, c), (c, a)];
+            let into = edges.iter().find(|(i, j)| !above(*i) && above(*j));
+            let out = edges.iter().find(|(i, j)| above(*i) && !above(*j));
+            if let (Some(into), Some(out)) = (into, out) {
+                let name = |edge: &(usize, usize)| (edge.0.min(edge.1), edge.0.max(edge.1));
+                next.insert(name(into), name(out));
+            }
+        }
+        let mut loops = Vec::new();
+        while let Some((&start, _)) = next.first_key_value() {
+            let mut ring = Outline::new();
+            let mut edge = start;
+            while let Some(following) = next.remove(&edge) {
+                ring.push(cross(edge.0, edge.1));
+                edge = following;
+            }
+            if ring.len() > 2 {
+                loops.push(ring);
+            }
+        }
+        loops
+    }
+
+    /// Returns the diameter of the sphere of equal volume [m].
+    pub fn diameter(&self) -> Option<f64> {
+        let volumes = self.corners().map(|[a, b, c]| a.dot(b.cross(c)) / 6.0);
+        let volume = volumes.sum::<f64>().abs();
+        Some((6.0 * volume / std::f64::consts::PI).cbrt()).filter(|d| d.is_finite() && *d > 0.0)
+    }
+
+    fn corners(&self) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+        self.triangles.iter().map(|t| t.map(|i| self.points[i]))
+    }
+
+    /// Returns the axes of the largest and the smallest second moment of the volume; `None` if the
+    /// moments differ by less than 4 %, as of a sphere or a cube.
+    pub fn axes(&self) -> Option<PrincipalAxes> {
+        let mut moments = DVec3::ZERO;
+        for [a, b, c] in self.corners() {
+            let six_volumes = a.dot(b.cross(c));
+            moments += six_volumes * (a * a + b * b + c * c + a * b + b * c + c * a) / 60.0;
+        }
+        let moments = moments.abs().to_array();
+        let by_size = |i: &usize, j: &usize| moments[*i].total_cmp(&moments[*j]);
+        let (long, short) = ((0..3).max_by(by_size)?, (0..3).min_by(by_size)?);
+        let clear = moments[long] > 1.04 * moments[short];
+        clear.then_some(PrincipalAxes {
+            long: DVec3::AXES[long],
+            short: DVec3::AXES[short],
+        })
+    }
+}
+
+/// Reads the surface of each grain from its first surface file; unusable files are added to
+/// `notes`.
+pub fn surfaces(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, GrainSurface> {
+    let mut out = BTreeMap::new();
+    for frame in &run.surfaces {
+        let known = match frame.grain {
+            Some(grain) => out.contains_key(&grain),
+            None => !out.is_empty(),
+        };
+        if known {
+            continue;
+        }
+        match run.surface(frame) {
+            Ok(surface) => add_surfaces(&surface, frame.grain, frame.time, &run.grains, &mut out),
+            Err(what) => {
+                let name = run.short_name(&frame.file);
+                notes.push(format!("{name} was left out: {what}"));
+            }
+        }
+    }
+    out
+}
+
+/// Splits a surface by grain and transforms each part to the body frame.
+fn add_surfaces(
+    surface: &Surface,
+    grain_of_file: Option<usize>,
+    time: f64,
+    histories: &[History],
+    out: &mut BTreeMap<usize, GrainSurface>,
+) {
+    let only = (histories.len() == 1).then_some(0);
+    let mut parts: BTreeMap<usize, Vec<[usize; 3]>> = BTreeMap::new();
+    for (i, triangle) in surface.triangles.iter().enumerate() {
+        let listed = surface
+            .grains
+            .as_ref()
+            .and_then(|grains| grains.get(i).copied());
+        if let Some(grain) = listed.or(grain_of_file).or(only) {
+            parts.entry(grain).or_default().push(*triangle);
+        }
+    }
+    for (grain, triangles) in parts {
+        let Some((position, rotation)) = histories.get(grain).and_then(|h| h.pose(time)) else {
+            continue;
+        };
+        let inverse = rotation.conjugate();
+        let mut renumbered: BTreeMap<usize, usize> = BTreeMap::new();
+        let mut points = Vec::new();
+        let mut number = |i: usize| {
+            *renumbered.entry(i).or_insert_with(|| {
+                points.push(inverse * (surface.points[i] - position));
+                points.len() - 1
+            })
+        };
+        let triangles = triangles.into_iter().map(|t| t.map(&mut number)).collect();
+        out.entry(grain)
+            .or_insert(GrainSurface { points, triangles });
+    }
+}
+
+/// Returns a circle as a polygon of 48 points.
+pub fn circle(centre: (f64, f64), radius: f64) -> Outline {
+    (0..48)
+        .map(|i| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / 48.0).sin_cos();
+            (centre.0 + radius * cos, centre.1 + radius * sin)
+        })
+        .collect()
+}
+
+/// Returns the longest contour of the union of projected triangles, from a smoothed mask.
+fn largest_outline(points: &[(f64, f64)], triangles: &[[usize; 3]]) -> Outline {
+    let range = |pick: fn(&(f64, f64)) -> f64| extent(points.iter().map(pick));
+    let (Some((x0, x1)), Some((y0, y1))) = (range(|p| p.0), range(|p| p.1)) else {
+        return Outline::new();
+    };
+    let step = (x1 - x0).max(y1 - y0) / (SAMPLES as f64 - 10.0);
+    if !(step > 0.0 && step.is_finite()) {
+        return Outline::new();
+    }
+    let (x0, y0) = (x0 - 4.5 * step, y0 - 4.5 * step);
+    let local = points
+        .iter()
+        .map(|(x, y)| ((x - x0) / step, (y - y0) / step));
+    let local: Vec<(f64, f64)> = local.collect();
+    let mut mask = vec![0.0; SAMPLES * SAMPLES];
+    for triangle in triangles {
+        paint(&mut mask, triangle.map(|i| local[i]));
+    }
+    let smooth = blur(&blur(&mask));
+    let loops = contour::closed_contours(SAMPLES, SAMPLES, |i, j| smooth[i + SAMPLES * j], 0.5);
+    let longest = loops.into_iter().max_by_key(Vec::len).unwrap_or_default();
+    let place = |(i, j): (f64, f64)| (x0 + i * step, y0 + j * step);
+    longest.into_iter().map(place).collect()
+}
+
+/// Sets the mask at the nodes inside a triangle.
+fn paint(mask: &mut [f64], [a, b, c]: [(f64, f64); 3]) {
+    let side = |p: (f64, f64), q: (f64, f64), x: f64, y: f64| {
+        (q.0 - p.0) * (y - p.1) - (q.1 - p.1) * (x - p.0)
+    };
+    let low = |p: f64, q: f64, r: f64| p.min(q).min(r).floor().max(0.0) as usize;
+    let high = |p: f64, q: f64, r: f64| (p.max(q).max(r).ceil().max(0.0) as usize).min(SAMPLES - 1);
+    for j in low(a.1, b.1, c.1)..=high(a.1, b.1, c.1) {
+        for i in low(a.0, b.0, c.0)..=high(a.0, b.0, c.0) {
+            let (x, y) = (i as f64, j as f64);
+            let sides = [side(a, b, x, y), side(b, c, x, y), side(c, a, x, y)];
+            if sides.iter().all(|s| *s >= -1e-9) || sides.iter().all(|s| *s <= 1e-9) {
+                mask[i + SAMPLES * j] = 1.0;
+            }
+        }
+    }
+}
+
+/// Returns the mean over the 3 x 3 neighbours of each node; zero at the edge.
+fn blur(mask: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; mask.len()];
+    for j in 1..SAMPLES - 1 {
+        for i in 1..SAMPLES - 1 {
+            let at = i + SAMPLES * j;
+            let rows = [at - SAMPLES, at, at + SAMPLES];
+            let sums = rows.iter().map(|k| mask[k - 1] + mask[*k] + mask[k + 1]);
+            out[at] = sums.sum::<f64>() / 9.0;
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A box with half edges a, b, c.
+    fn block(a: f64, b: f64, c: f64) -> GrainSurface {
+        let corner = |i: usize| {
+            let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            DVec3::new(a * sign(0), b * sign(1), c * sign(2))
+        };
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let triangles = quads
+            .iter()
+            .flat_map(|[p, q, r, s]| [[*p, *q, *r], [*p, *r, *s]])
+            .collect();
+        GrainSurface {
+            points: (0..8).map(corner).collect(),
+            triangles,
+        }
+    }
+
+    fn area(ring: &[(f64, f64)]) -> f64 {
+        0.5 * ring
+            .iter()
+            .zip(ring.iter().cycle().skip(1))
+            .map(|(a, b)| a.0 * b.1 - b.0 * a.1)
+            .sum::<f64>()
+            .abs()
+    }
+
+    #[test]
+    fn outlines_have_the_size_of_the_body() {
+        let body = block(2e-3, 1e-3, 0.5e-3);
+        let at = DVec3::new(0.1, 0.2, 0.3);
+        let side = body.outline(at, DQuat::IDENTITY, 0, 2);
+        assert!((area(&side) / 4e-6 - 1.0).abs() < 0.03, "{}", area(&side));
+        let turned = body.outline(
+            at,
+            DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),
+            0,
+            2,
+        );
+        assert!(
+            (area(&turned) / 2e-6 - 1.0).abs() < 0.03,
+            "{}",
+            area(&turned)
+        );
+        let centre = side.iter().map(|p| p.0).sum::<f64>() / side.len() as f64;
+        assert!((centre - 0.1).abs() < 1e-4);
+    }
+
+    #[test]
+    fn sections_are_loops_of_the_body() {
+        let body = block(2e-3, 1e-3, 0.5e-3);
+        let at = DVec3::new(0.1, 0.2, 0.3);
+        let view = SliceView::along(1, 2);
+        let cut = body.section(at, DQuat::IDENTITY, view, 0.2004);
+        assert_eq!(cut.len(), 1);
+        assert!((area(&cut[0]) - 4e-6).abs() < 1e-12, "{}", area(&cut[0]));
+        assert!(body.section(at, DQuat::IDENTITY, view, 0.2011).is_empty());
+    }
+
+    #[test]
+    fn axes_follow_the_extents() {
+        let axes = block(1.0, 3.0, 2.0).axes().unwrap();
+        assert_eq!((axes.long, axes.short), (DVec3::Y, DVec3::X));
+        assert!(block(1.0, 1.0, 1.0).axes().is_none());
+        let diameter = block(1.0, 3.0, 2.0).diameter().unwrap();
+        assert!((diameter - (6.0 * 48.0 / std::f64::consts::PI).cbrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn flat_or_empty_bodies_have_no_outline() {
+        let body = GrainSurface {
+            points: vec![DVec3::ZERO; 3],
+            triangles: vec![[0, 1, 2]],
+        };
+        assert!(body.outline(DVec3::ZERO, DQuat::IDENTITY, 0, 2).is_empty());
+        assert_eq!(circle((1.0, 2.0), 0.5).len(), 48);
+    }
+}

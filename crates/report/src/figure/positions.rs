@@ -1,0 +1,128 @@
+//! Final positions of many grains, from the side and from above.
+
+use grainwake_plot::Figure;
+use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::colormap::{hex, sequential};
+use grainwake_plot::drawing::Drawing;
+use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_unit};
+use grainwake_plot::style::PAGE;
+
+use super::scene::{AXES, Scene};
+use crate::features::short;
+
+/// Left margin [pt].
+const LEFT: f64 = 38.0;
+/// Distance of views side by side [pt].
+const MIDDLE: f64 = 44.0;
+/// Top margin [pt].
+const TOP: f64 = 8.0;
+
+/// Draws the grains at the end of the run, coloured by height.
+pub fn figure(scene: &Scene) -> Option<Figure> {
+    let run = scene.run;
+    let grains = run.moving();
+    let last = |g: usize| run.grains[g].len() - 1;
+    let place = |g: usize| run.wrapped(run.grains[g].position[last(g)]);
+    let up = scene.vertical();
+    let [across, depth] = scene.horizontal();
+    let (low, high) = extent(grains.iter().map(|g| place(*g)[up]))?;
+    let default = 0.05 * (high - low);
+    let margin = run.facts.diameter().unwrap_or(default).max(1e-9);
+    let span = |axis: usize| -> Option<(f64, f64)> {
+        let reach = |g: usize| {
+            let own = run.facts.grains.get(g).and_then(|facts| facts.diameter);
+            margin.max(own.unwrap_or(0.0))
+        };
+        let ends = |g: &usize| [place(*g)[axis] - reach(*g), place(*g)[axis] + reach(*g)];
+        let (a, b) = extent(grains.iter().flat_map(ends))?;
+        let Some(size) = run.facts.size else {
+            return Some((a, b));
+        };
+        let (l, h) = (run.facts.lower[axis], run.facts.lower[axis] + size[axis]);
+        let least = if axis == up {
+            a + margin
+        } else {
+            f64::NEG_INFINITY
+        };
+        Some((a.max(l), b.min(h).max(least)))
+    };
+    let (x, y, z) = (span(across)?, span(depth)?, span(up)?);
+    let window = |h: (f64, f64), v: (f64, f64)| Window {
+        low: (h.0, v.0),
+        high: (h.1, v.1),
+    };
+    let (side, top) = (window(x, z), window(x, y));
+    // The view from above lies below the side view, or beside that of a tall column.
+    let tall = side.height() > 1.2 * side.width();
+    let (across_room, up_room, stacked) = if tall {
+        let room = 0.5 * (PAGE - 2.0 * LEFT - MIDDLE);
+        (room, 330.0, side.height())
+    } else {
+        (300.0, 420.0, side.height() + top.height())
+    };
+    let scale = (across_room / side.width()).min(up_room / stacked);
+    let (width, height) = (scale * side.width(), scale * side.height());
+    let depth_height = scale * top.height();
+    let (total, bottom, corner) = if tall {
+        let corner = (LEFT + width + MIDDLE, (height - depth_height).max(0.0));
+        (corner.0 + width + 10.0, height.max(depth_height), corner)
+    } else {
+        let corner = (LEFT, height + 16.0);
+        (LEFT + width + 10.0, corner.1 + depth_height, corner)
+    };
+    let total = total.max(240.0);
+    let mut drawing = Drawing::new(total, TOP + bottom + 26.0 + 36.0);
+    let (unit, factor) = length_unit(side.width().max(side.height()).max(top.height()));
+    let views = [
+        (side, (LEFT, TOP), [across, up, depth], -1.0),
+        (top, (corner.0, TOP + corner.1), [across, depth, up], 1.0),
+    ];
+    for (i, (window, corner, [h, v, hidden], direction)) in views.into_iter().enumerate() {
+        let frame = EqualAspectFrame {
+            window,
+            corner,
+            scale,
+        };
+        // Grains nearer to the viewer cover others.
+        let nearness = |g: &usize| direction * place(*g)[hidden];
+        let mut order = grains.clone();
+        order.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)).then(a.cmp(b)));
+        frame.clip(&mut drawing, &format!("clip-{i}"));
+        for grain in order {
+            let height = place(grain)[up];
+            let colour = hex(sequential((height - low) / (high - low).max(1e-12)));
+            let style = format!(
+                "fill=\"{colour}\" stroke=\"#ffffff\" stroke-width=\"0.35\" \
+                 stroke-linejoin=\"round\""
+            );
+            let outline = scene.outline(grain, last(grain), h, v);
+            drawing.path(&frame.path(&outline, true), &style);
+        }
+        drawing.end_clip();
+        let names = [h, v].map(|axis| format!("*{}*  [{unit}]", AXES[axis]));
+        let below = (tall || i == 1).then_some(names[0].as_str());
+        frame.frame(&mut drawing, (below, Some(&names[1])));
+    }
+    let palette: Vec<[u8; 3]> = (0..256).map(|i| sequential(f64::from(i) / 255.0)).collect();
+    let label = format!("height of the centre  [{unit}]");
+    let axis = Axis::linear(&label, low * factor, high * factor, 5, true);
+    let corner = (0.5 * total - 90.0, TOP + bottom + 30.0);
+    colour_bar(&mut drawing, corner, 180.0, &palette, &axis, (false, false));
+    let time = run.grains[grains[0]].time[last(grains[0])];
+    let caption = format!(
+        "The {} grains at *t* = {} s, from the side (along {}) and from above, as {}; colour shows \
+         the height of the centre. The highest centre lies {} mm above the floor of the box.{}",
+        grains.len(),
+        short(time),
+        AXES[depth],
+        scene.drawn_as(&grains),
+        short(1e3 * (high - run.facts.lower[up])),
+        scene.left_out(&grains)
+    );
+    Some(Figure::new(
+        "positions",
+        "Positions of the grains",
+        caption,
+        drawing,
+    ))
+}

@@ -1,0 +1,57 @@
+//! Writing of files and figures.
+
+use std::path::{Path, PathBuf};
+
+use grainwake_plot::Figure;
+
+use crate::error::ReportError;
+
+/// A figure with its files.
+#[derive(Clone, Debug)]
+pub struct WrittenFigure {
+    /// Figure.
+    pub figure: Figure,
+    /// Text of the SVG file.
+    pub svg: String,
+    /// PNG file.
+    pub png_file: PathBuf,
+    /// SVG file.
+    pub svg_file: PathBuf,
+}
+
+/// Writes a file through a temporary name, so that readers never see a part of it.
+///
+/// The temporary name holds the process id: several programs may share the folder.
+///
+/// # Errors
+/// Error of the operating system.
+pub fn write_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(format!(".{}.tmp", std::process::id()));
+    let temporary = path.with_file_name(name);
+    std::fs::write(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, path))
+}
+
+/// Writes a figure as `NAME.png` and `NAME.svg` into an existing folder.
+///
+/// # Errors
+/// If the figure cannot be drawn, or a file cannot be written.
+pub fn write_figure(folder: &Path, figure: Figure) -> Result<WrittenFigure, ReportError> {
+    let write = |extension: &str, bytes: std::io::Result<Vec<u8>>| {
+        let file = folder.join(format!("{}.{extension}", figure.name));
+        match bytes.and_then(|bytes| write_file(&file, &bytes)) {
+            Ok(()) => Ok(file),
+            Err(source) => Err(ReportError::Write { file, source }),
+        }
+    };
+    let png = figure.drawing.to_png().map_err(std::io::Error::other);
+    let png_file = write("png", png)?;
+    let svg = figure.svg();
+    let svg_file = write("svg", Ok(svg.clone().into_bytes()))?;
+    Ok(WrittenFigure {
+        figure,
+        svg,
+        png_file,
+        svg_file,
+    })
+}

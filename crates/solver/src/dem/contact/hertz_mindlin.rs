@@ -1,0 +1,102 @@
+//! Hertz normal law and no-slip Mindlin tangential law with Coulomb's bound.
+//!
+//! The law applies to the equal-volume spheres of the pair: the radius of curvature is the reduced
+//! radius of these spheres, not the local curvature at the contact, which a sampled distance field
+//! does not resolve. It is exact for spheres.
+
+use super::law::{ContactCoefficients, ContactLaw, PairProperties};
+
+/// Duration of a Hertz impact over pi sqrt(m / S_n), with S_n at the largest overlap: the duration
+/// is
+/// 2.9432 overlap / speed (Timoshenko & Goodier 1970, section 142), and pi sqrt(m / S_n) is
+/// pi sqrt(8/15) overlap / speed.
+const HERTZ_DURATION: f64 = 2.943_275 / (std::f64::consts::PI * 0.730_296_743_340_221_5);
+
+/// Hertz-Mindlin law. Moduli, radius and restitution come from the pair.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::dem) struct HertzMindlin;
+
+impl ContactLaw for HertzMindlin {
+    /// With the contact radius a = sqrt(R* delta): normal force 4/3 E* a delta, tangential
+    /// stiffness 8 G* a (Mindlin 1949), dashpots 2 zeta sqrt(5/6) sqrt(S m*) with S = 2 E* a or 8
+    /// G* a.
+    ///
+    /// The dashpot is Tsuji's (1992). In the variable delta^(5/4) the damped Hertz impact is a
+    /// damped linear oscillator (Antypov & Elliott 2011), with the same end of contact at zero
+    /// force, so the damping ratio of the linear law gives the restitution here as well.
+    fn coefficients(&self, pair: &PairProperties, overlap: f64) -> ContactCoefficients {
+        let contact_radius = (pair.reduced_radius * overlap).sqrt();
+        let normal_force = 4.0 / 3.0 * pair.effective_youngs_modulus * contact_radius * overlap;
+        let normal_stiffness = 2.0 * pair.effective_youngs_modulus * contact_radius;
+        let tangential_stiffness = 8.0 * pair.effective_shear_modulus * contact_radius;
+        let normal_damping = if pair.inverse_mass > 0.0 {
+            2.0 * pair.damping_ratio * (5.0 / 6.0 * normal_stiffness / pair.inverse_mass).sqrt()
+        } else {
+            0.0
+        };
+        ContactCoefficients {
+            normal_force,
+            normal_energy: 0.4 * normal_force * overlap,
+            normal_damping,
+            tangential_stiffness,
+            tangential_damping_ratio: (tangential_stiffness / normal_stiffness).sqrt(),
+        }
+    }
+
+    /// Hertz duration of the impact that reaches the overlap at which the kinetic energy and the
+    /// energy of the present overlap are stored; 2.87 (m^2 / (R* E*^2 speed))^(1/5) from zero
+    /// overlap.
+    fn contact_time(&self, pair: &PairProperties, speed: f64, overlap: f64) -> f64 {
+        let largest = (self.impact_overlap(pair, speed).powf(2.5) + overlap.powf(2.5)).powf(0.4);
+        let contact_radius = (pair.reduced_radius * largest).sqrt();
+        let normal_stiffness = 2.0 * pair.effective_youngs_modulus * contact_radius;
+        let half_period =
+            std::f64::consts::PI * (1.0 / (pair.inverse_mass * normal_stiffness)).sqrt();
+        HERTZ_DURATION * half_period
+    }
+
+    fn impact_overlap(&self, pair: &PairProperties, speed: f64) -> f64 {
+        let stiffness = 16.0 / 15.0 * pair.effective_youngs_modulus * pair.reduced_radius.sqrt();
+        (speed * speed / (pair.inverse_mass * stiffness)).powf(0.4)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contact_time_is_the_duration_of_a_hertz_impact() {
+        let pair = PairProperties {
+            inverse_mass: 40.0,
+            reduced_radius: 0.005,
+            effective_youngs_modulus: 2.5e10,
+            effective_shear_modulus: 8e9,
+            damping_ratio: 0.0,
+            wall: false,
+        };
+        let (mut overlap, mut speed, mut time, dt) = (0.0, 3.0, 0.0, 1e-9);
+        let expected = HertzMindlin.contact_time(&pair, speed, 0.0);
+        let largest = HertzMindlin.impact_overlap(&pair, speed);
+        let mut deepest = 0.0f64;
+        while overlap >= 0.0 {
+            let force = HertzMindlin.coefficients(&pair, overlap).normal_force;
+            speed -= dt * force * pair.inverse_mass;
+            overlap += dt * speed;
+            time += dt;
+            deepest = deepest.max(overlap);
+        }
+        assert!((time / expected - 1.0).abs() < 1e-4, "{time} {expected}");
+        assert!(
+            (deepest / largest - 1.0).abs() < 1e-4,
+            "{deepest} {largest}"
+        );
+        // Half way into the contact the speed is lower, but the expected duration is unchanged.
+        let half: f64 = 0.5 * largest;
+        let energy: f64 = 0.5 * 9.0 / pair.inverse_mass;
+        let stored = HertzMindlin.coefficients(&pair, half).normal_energy;
+        let speed = (2.0 * (energy - stored) * pair.inverse_mass).sqrt();
+        let later = HertzMindlin.contact_time(&pair, speed, half);
+        assert!((later / expected - 1.0).abs() < 1e-9, "{later} {expected}");
+    }
+}

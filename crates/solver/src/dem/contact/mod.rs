@@ -1,0 +1,41 @@
+//! Contact forces (Eqs 9-18): force laws, friction history and lubrication.
+//!
+//! A further force law is one file beside `linear.rs` that implements `ContactLaw`, and one variant
+//! of [`ContactLawKind`] and of `law::SelectedLaw`.
+
+mod friction;
+mod hertz_mindlin;
+mod law;
+mod linear;
+mod lubrication;
+mod model;
+mod params;
+mod record;
+
+use glam::DVec3;
+
+use super::search::Partner;
+use crate::math::Load;
+
+pub(super) use law::{ContactMaterial, PairProperties};
+pub(super) use model::{ContactModel, PairKinematics, PointMotion};
+pub use params::{ContactLawKind, ContactParams};
+pub(super) use record::{ContactRecord, TangentialHistory, update_records};
+
+/// Contact of a step; `grain` < partner if the partner is a grain, and equal if a grain touches its
+/// own periodic image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// First grain.
+    pub grain: usize,
+    /// Second body.
+    pub partner: Partner,
+    /// Deepest overlap at the end of the step [m]; zero if the contact has ended within the step.
+    pub overlap: f64,
+    /// Load on `grain`; the partner receives the opposite force.
+    pub load: Load,
+    /// Mean contact point, next to `grain` at its present position [m].
+    pub point: DVec3,
+    /// Mean unit normal, out of `grain`.
+    pub normal: DVec3,
+}

@@ -1,0 +1,172 @@
+//! Contact record of a pair: friction history, loads and search buffers between sub-steps.
+
+use glam::DVec3;
+
+use crate::dem::search::{ContactPatch, PairKey};
+use crate::math::Load;
+
+/// Tangential displacement of a contact point, accumulated since the contact began (Eqs 13-15).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::dem) struct TangentialHistory {
+    /// Identifier of the contact point; ascending within a pair.
+    pub id: u32,
+    /// Normal to which `displacement` is tangential.
+    pub normal: DVec3,
+    /// Displacement of the first grain relative to the partner, limited by Coulomb's bound [m].
+    pub displacement: DVec3,
+}
+
+impl TangentialHistory {
+    const NONE: TangentialHistory = TangentialHistory {
+        id: 0,
+        normal: DVec3::ZERO,
+        displacement: DVec3::ZERO,
+    };
+}
+
+/// Overlap and loads of a pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(in crate::dem) struct PairLoads {
+    /// Deepest overlap [m]; zero or negative without contact.
+    pub overlap: f64,
+    /// Load on the first grain.
+    pub on_grain: Load,
+    /// Load on the partner.
+    pub on_partner: Load,
+    /// Lever arm of the mean contact point from the first grain's centroid [m].
+    pub lever_arm: DVec3,
+    /// Mean unit normal out of the first grain.
+    pub normal: DVec3,
+    /// Energy of the springs [J].
+    pub elastic_energy: f64,
+}
+
+/// Pair that may touch, with its friction history and buffers, kept between sub-steps.
+#[derive(Clone, Debug)]
+pub(in crate::dem) struct ContactRecord {
+    /// Identity of the pair.
+    pub key: PairKey,
+    /// Whether the pair was in contact at the last evaluation.
+    pub in_contact: bool,
+    /// Whether the pair was in contact at any sub-step of the present step.
+    pub in_contact_during_step: bool,
+    /// Fraction of the dashpot that acts; differs from one just after the contact began.
+    pub dashpot_fraction: f64,
+    /// Tangential stiffness at the last evaluation [N/m]; zero before the first.
+    pub tangential_stiffness: f64,
+    /// Mean displacement of the patch, inherited by new contact points.
+    pub mean_history: TangentialHistory,
+    /// Displacements by contact point.
+    pub history: Vec<TangentialHistory>,
+    /// Displacements under evaluation.
+    pub next_history: Vec<TangentialHistory>,
+    /// Penetrating points of the last search.
+    pub patch: ContactPatch,
+    /// Loads of the last evaluation.
+    pub loads: PairLoads,
+}
+
+impl ContactRecord {
+    /// Record of a pair that has not touched.
+    pub fn new(key: PairKey) -> ContactRecord {
+        ContactRecord {
+            key,
+            in_contact: false,
+            in_contact_during_step: false,
+            dashpot_fraction: 1.0,
+            tangential_stiffness: 0.0,
+            mean_history: TangentialHistory::NONE,
+            history: Vec::new(),
+            next_history: Vec::new(),
+            patch: ContactPatch::default(),
+            loads: PairLoads::default(),
+        }
+    }
+    /// Ends the contact and clears its history; the last contact point and normal are kept.
+    pub fn end_contact(&mut self) {
+        self.in_contact = false;
+        self.dashpot_fraction = 1.0;
+        self.tangential_stiffness = 0.0;
+        self.mean_history = TangentialHistory::NONE;
+        self.history.clear();
+        self.loads = PairLoads {
+            lever_arm: self.loads.lever_arm,
+            normal: self.loads.normal,
+            ..Default::default()
+        };
+    }
+    /// Prepares another step: only quantities of the checkpoint may affect it.
+    pub fn begin_step(&mut self) {
+        self.in_contact_during_step = false;
+        self.patch.reset();
+    }
+    /// Prepares the record for another pair; only the buffers are reused.
+    fn reuse(&mut self, key: PairKey) {
+        self.end_contact();
+        self.begin_step();
+        self.loads = PairLoads::default();
+        self.key = key;
+    }
+}
+
+/// Replaces `records` by one record for each of the ascending `keys`.
+///
+/// Records whose key remains are kept; `spare` takes the others and provides buffers for new ones.
+/// `old` is a buffer.
+pub(in crate::dem) fn update_records(
+    records: &mut Vec<ContactRecord>,
+    old: &mut Vec<ContactRecord>,
+    spare: &mut Vec<ContactRecord>,
+    keys: &[PairKey],
+) {
+    std::mem::swap(records, old);
+    let mut previous = old.drain(..).peekable();
+    for &key in keys {
+        while let Some(gone) = previous.next_if(|record| record.key < key) {
+            spare.push(gone);
+        }
+        let kept = previous.next_if(|record| record.key == key);
+        records.push(kept.unwrap_or_else(|| match spare.pop() {
+            Some(mut record) => {
+                record.reuse(key);
+                record
+            }
+            None => ContactRecord::new(key),
+        }));
+    }
+    spare.extend(previous);
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::IVec3;
+
+    use super::*;
+    use crate::dem::search::Partner;
+
+    fn key((grain, partner): (u32, usize)) -> PairKey {
+        PairKey {
+            grain,
+            partner: Partner::Grain(partner),
+            image: IVec3::ZERO,
+        }
+    }
+
+    #[test]
+    fn updating_keeps_the_records_of_pairs_that_remain() {
+        let (mut records, mut old, mut spare) = (Vec::new(), Vec::new(), Vec::new());
+        let mut update = |records: &mut Vec<ContactRecord>, pairs: [(u32, usize); 3]| {
+            update_records(records, &mut old, &mut spare, &pairs.map(key));
+            spare.len()
+        };
+        update(&mut records, [(0, 1), (0, 2), (1, 2)]);
+        records[1].in_contact = true;
+        records[2].in_contact = true;
+        let spare = update(&mut records, [(0, 2), (0, 3), (1, 3)]);
+        let in_contact: Vec<_> = records.iter().map(|r| r.in_contact).collect();
+        assert_eq!(in_contact, [true, false, false]);
+        let keys: Vec<_> = records.iter().map(|r| r.key).collect();
+        assert_eq!(keys, [(0, 2), (0, 3), (1, 3)].map(key));
+        assert_eq!(spare, 0);
+    }
+}

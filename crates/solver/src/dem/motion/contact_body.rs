@@ -1,0 +1,236 @@
+//! Grain as a body of the contact search, and the evaluation of one pair.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use grainwake_shape::Shape;
+
+use super::integrator::{EffectiveInertia, HalfStepVelocity};
+use super::response::Response;
+use crate::dem::contact::{
+    ContactMaterial, ContactModel, ContactRecord, PairKinematics, PairProperties, PointMotion,
+};
+use crate::dem::enclosure::Enclosure;
+use crate::dem::grain::Grain;
+use crate::dem::material::Material;
+use crate::dem::search::{NodeTree, PairKey, Partner, PosedShape};
+use crate::math::Load;
+
+/// Safety factor on the motion that reduces the known separation of a pair.
+const MOTION_MARGIN: f64 = 1.01;
+
+/// State of one grain in the contact sub-steps.
+#[derive(Clone, Debug)]
+pub(super) struct ContactBody {
+    shape: Arc<Shape>,
+    tree: Arc<NodeTree>,
+    material: Material,
+    contact_material: ContactMaterial,
+    rotation: DMat3,
+    mid_step: PointMotion,
+    end_of_step: PointMotion,
+    /// Upper bound of the displacement of any surface point since the last evaluation [m].
+    displacement: f64,
+    /// Velocities in the middle of the sub-step.
+    pub half_step: HalfStepVelocity,
+    /// Contact load at the last evaluation.
+    pub contact: Load,
+    /// Response to contact with the fluid of the present step, if known.
+    pub response: Option<Response>,
+    /// Inverse of the mass in a contact, added mass included [1/kg].
+    pub inverse_mass: f64,
+    /// Inverse of the grain's mass [1/kg].
+    pub own_inverse_mass: f64,
+    /// Largest speed gained from the known loads in the rest of the step [m/s].
+    pub speed_gain: f64,
+    /// Position at the last search of pairs [m].
+    pub search_position: DVec3,
+    /// Displacement after which the pairs are searched again [m].
+    pub search_margin: f64,
+}
+
+impl ContactBody {
+    /// Updates the list to one body a grain, reusing bodies of equal shape and material.
+    ///
+    /// Only quantities of the checkpoint may affect the next step, so contact loads are cleared.
+    pub fn synchronise(bodies: &mut Vec<ContactBody>, grains: &[Grain]) {
+        bodies.truncate(grains.len());
+        for body in &mut *bodies {
+            body.contact = Load::default();
+        }
+        for (i, grain) in grains.iter().enumerate() {
+            let same_shape = |body: &ContactBody| Arc::ptr_eq(&body.shape, &grain.shape);
+            let current = bodies.get(i).filter(|body| same_shape(body));
+            if current.is_some_and(|body| body.material == grain.material) {
+                continue;
+            }
+            let tree = match bodies.iter().find(|body| same_shape(body)) {
+                Some(known) => known.tree.clone(),
+                None => Arc::new(NodeTree::new(&grain.shape)),
+            };
+            let body = ContactBody::new(grain, tree);
+            match bodies.get_mut(i) {
+                Some(old) => *old = body,
+                None => bodies.push(body),
+            }
+        }
+    }
+
+    fn new(grain: &Grain, tree: Arc<NodeTree>) -> ContactBody {
+        ContactBody {
+            shape: grain.shape.clone(),
+            tree,
+            material: grain.material,
+            contact_material: ContactMaterial::new(&grain.material),
+            rotation: DMat3::IDENTITY,
+            mid_step: PointMotion::default(),
+            end_of_step: PointMotion::default(),
+            displacement: 0.0,
+            half_step: HalfStepVelocity::default(),
+            contact: Load::default(),
+            response: None,
+            inverse_mass: 0.0,
+            own_inverse_mass: 0.0,
+            speed_gain: 0.0,
+            search_position: DVec3::ZERO,
+            search_margin: 0.0,
+        }
+    }
+
+    /// Inertia against the present loads.
+    pub fn inertia(&self) -> EffectiveInertia<'_> {
+        match &self.response {
+            Some(response) => EffectiveInertia::WithFluid(response),
+            None if self.contact.force == DVec3::ZERO => {
+                EffectiveInertia::Grain(self.own_inverse_mass)
+            }
+            None => EffectiveInertia::Grain(self.inverse_mass),
+        }
+    }
+
+    /// Upper bound of the speed of any surface point [m/s].
+    pub fn surface_speed(&self) -> f64 {
+        let motion = &self.end_of_step;
+        motion.linear.length() + motion.angular.length() * self.shape.bounding_radius()
+    }
+
+    /// Upper bound of the relative speed of any two surface points [m/s].
+    pub fn surface_speed_relative_to(&self, other: &ContactBody) -> f64 {
+        (self.end_of_step.linear - other.end_of_step.linear).length()
+            + self.end_of_step.angular.length() * self.shape.bounding_radius()
+            + other.end_of_step.angular.length() * other.shape.bounding_radius()
+    }
+
+    /// Takes pose and velocities of the grain and clears the contact load; `step` [s] is the time
+    /// since the last evaluation.
+    pub fn update_kinematics(&mut self, grain: &Grain, step: f64) {
+        self.contact = Load::default();
+        self.rotation = DMat3::from_quat(grain.pose.orientation);
+        let half_step = &self.half_step;
+        let radius = grain.shape.bounding_radius();
+        self.displacement =
+            step * (half_step.velocity.length() + radius * half_step.angular_velocity.length());
+        if step > 0.0 {
+            self.mid_step = PointMotion {
+                linear: half_step.velocity,
+                angular: half_step.angular_velocity,
+            };
+            self.end_of_step = PointMotion {
+                linear: half_step.predicted_velocity,
+                angular: half_step.predicted_angular_velocity,
+            };
+        } else {
+            self.mid_step = PointMotion {
+                linear: grain.velocity,
+                angular: grain.angular_velocity,
+            };
+            self.end_of_step = self.mid_step;
+        }
+    }
+
+    fn posed_shape(&self, position: DVec3) -> PosedShape<'_> {
+        PosedShape {
+            shape: &self.shape,
+            tree: &self.tree,
+            rotation: self.rotation,
+            position,
+        }
+    }
+}
+
+/// Properties of the pair `key`; `wall` is the material of the walls.
+pub(super) fn pair_properties(
+    key: &PairKey,
+    bodies: &[ContactBody],
+    wall: &ContactMaterial,
+) -> PairProperties {
+    let radius = |body: &ContactBody| 0.5 * body.shape.equivalent_diameter();
+    let a = &bodies[key.grain as usize];
+    match key.partner {
+        Partner::Grain(j) => {
+            let b = &bodies[j];
+            PairProperties::new(
+                [a.inverse_mass, b.inverse_mass],
+                [radius(a), radius(b)],
+                [&a.contact_material, &b.contact_material],
+                false,
+            )
+        }
+        Partner::Wall { .. } => PairProperties::new(
+            [a.inverse_mass, 0.0],
+            [radius(a); 2],
+            [&a.contact_material, wall],
+            true,
+        ),
+    }
+}
+
+/// Quantities that the evaluation of all pairs shares.
+pub(super) struct PairContext<'a> {
+    pub grains: &'a [Grain],
+    pub bodies: &'a [ContactBody],
+    pub model: &'a ContactModel,
+    pub wall: &'a ContactMaterial,
+    pub enclosure: &'a Enclosure,
+    /// Time since the last evaluation [s].
+    pub step: f64,
+}
+
+/// Finds the penetrating points of a pair and evaluates its loads (Eqs 7-18).
+pub(super) fn evaluate_pair(record: &mut ContactRecord, context: &PairContext) {
+    let PairContext { grains, bodies, .. } = *context;
+    let i = record.key.grain as usize;
+    let partner_displacement = match record.key.partner {
+        Partner::Grain(j) => bodies[j].displacement,
+        Partner::Wall { .. } => 0.0,
+    };
+    record.patch.separation -= MOTION_MARGIN * (bodies[i].displacement + partner_displacement);
+    if record.patch.separation > 0.0 {
+        return;
+    }
+    let a = bodies[i].posed_shape(grains[i].pose.position);
+    let reach = context.model.range();
+    let mut pair = PairKinematics {
+        branch: DVec3::ZERO,
+        mid_step: [bodies[i].mid_step, PointMotion::default()],
+        end_of_step: [bodies[i].end_of_step, PointMotion::default()],
+    };
+    let closest = match record.key.partner {
+        Partner::Grain(j) => {
+            let image = record.key.image.as_dvec3() * context.enclosure.period();
+            let b = bodies[j].posed_shape(grains[j].pose.position + image);
+            pair.branch = a.position - b.position;
+            pair.mid_step[1] = bodies[j].mid_step;
+            pair.end_of_step[1] = bodies[j].end_of_step;
+            record.patch.find_grain_contact(&a, &b, reach)
+        }
+        Partner::Wall { axis, side } => {
+            let face = context.enclosure.plane(axis as usize, side as usize);
+            let offset = face.distance(a.position);
+            let patch = &mut record.patch;
+            patch.find_wall_contact(&a, face.inward, offset, reach)
+        }
+    };
+    let properties = pair_properties(&record.key, bodies, context.wall);
+    (context.model).evaluate(record, closest, &properties, &pair, context.step);
+}

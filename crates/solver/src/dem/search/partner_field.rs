@@ -1,0 +1,123 @@
+//! Distance field of the partner in the principal frame of the grain whose nodes are tested.
+
+use glam::{DMat3, DVec3};
+use grainwake_shape::{Field, Shape};
+
+/// Safety factor on a distance from a sampled field, whose gradient may slightly exceed one.
+const SLACK: f64 = 1.1;
+
+/// Signed distance field of a grain or a wall in the principal frame of another grain.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum PartnerField<'a> {
+    /// Grain; `rotation` x + `translation` are coordinates in its own principal frame.
+    Shape {
+        /// Shape of the partner.
+        shape: &'a Shape,
+        /// Rotation into the partner's principal frame.
+        rotation: DMat3,
+        /// Translation after the rotation [m].
+        translation: DVec3,
+        /// Corners of the box in which the field is a distance and not an estimate [m].
+        exact: (DVec3, DVec3),
+    },
+    /// Wall with the distance `normal` . x + `offset`.
+    HalfSpace {
+        /// Unit normal out of the wall.
+        normal: DVec3,
+        /// Distance of the grain's centroid from the wall [m].
+        offset: f64,
+    },
+}
+
+impl<'a> PartnerField<'a> {
+    /// Field of a grain whose principal frame has the coordinates `rotation` x + `translation`.
+    pub fn grain(shape: &'a Shape, rotation: DMat3, translation: DVec3) -> PartnerField<'a> {
+        let exact = match shape.field() {
+            Field::Sphere(_) => (DVec3::NEG_INFINITY, DVec3::INFINITY),
+            Field::Sampled(field) => (field.lower(), field.upper()),
+            _ => (shape.lower(), shape.upper()),
+        };
+        PartnerField::Shape {
+            shape,
+            rotation,
+            translation,
+            exact,
+        }
+    }
+    /// Signed distance [m] and its gradient at `x`.
+    pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
+        match self {
+            PartnerField::Shape {
+                shape,
+                rotation,
+                translation,
+                ..
+            } => {
+                let (distance, gradient) =
+                    shape.distance_and_gradient(*rotation * x + *translation);
+                (distance, rotation.transpose() * gradient)
+            }
+            PartnerField::HalfSpace { normal, offset } => (normal.dot(x) + offset, *normal),
+        }
+    }
+    /// Signed distance [m] at `x`, or `None` if a bound shows that it exceeds `reach` [m].
+    pub fn distance_within(&self, x: DVec3, reach: f64) -> Option<f64> {
+        match self {
+            PartnerField::Shape {
+                shape,
+                rotation,
+                translation,
+                ..
+            } => {
+                let y = *rotation * x + *translation;
+                let outside = (shape.lower() - y).max(y - shape.upper()).max(DVec3::ZERO);
+                (outside.length_squared() <= reach * reach).then(|| shape.distance(y))
+            }
+            PartnerField::HalfSpace { normal, offset } => Some(normal.dot(x) + offset),
+        }
+    }
+    /// Signed distance [m] at `x`.
+    pub fn distance(&self, x: DVec3) -> f64 {
+        match self {
+            PartnerField::Shape {
+                shape,
+                rotation,
+                translation,
+                ..
+            } => shape.distance(*rotation * x + *translation),
+            PartnerField::HalfSpace { normal, offset } => normal.dot(x) + offset,
+        }
+    }
+    /// Whether a bound shows that every point of the sphere is farther away than `reach` [m].
+    pub fn is_beyond(&self, center: DVec3, radius: f64, reach: f64) -> bool {
+        match self {
+            PartnerField::Shape {
+                shape,
+                rotation,
+                translation,
+                exact,
+            } => {
+                let y = *rotation * center + *translation;
+                let far = radius + reach;
+                if y.length_squared() > (shape.bounding_radius() + far).powi(2) {
+                    return true;
+                }
+                if y.cmpge(exact.0).all() && y.cmple(exact.1).all() {
+                    return shape.distance(y) > SLACK * far;
+                }
+                let outside = (shape.lower() - y).max(y - shape.upper()).max(DVec3::ZERO);
+                outside.length_squared() > far * far
+            }
+            PartnerField::HalfSpace { normal, offset } => {
+                normal.dot(center) + offset > radius + reach
+            }
+        }
+    }
+    /// Radius of curvature for the first step of a descent [m].
+    pub fn curvature_radius(&self) -> f64 {
+        match self {
+            PartnerField::Shape { shape, .. } => shape.bounding_radius(),
+            PartnerField::HalfSpace { .. } => f64::INFINITY,
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! Weights of forced faces, their gain of velocity, and the impulse on the fluid.
+//!
+//! Legend: d signed distance, n normal, m open depth, A aperture, s weight of the rigid velocity, c
+//! closed fraction, C closed fraction of all grains together, U and U_old new and old rigid
+//! velocity, J impulse, h spacing, nu kinematic viscosity, p pressure, g body acceleration.
+
+use glam::{DVec3, IVec3};
+
+use super::Reference;
+use crate::flow::Known;
+use crate::immersed::geometry::aperture::reference::{aperture, open_depth};
+use crate::immersed::kinematics::RigidVelocity;
+use crate::immersed::scheme::Scheme;
+
+/// Forcing of a face by one grain.
+#[derive(Clone, Copy, Default)]
+pub struct Weights {
+    /// Weight s of the rigid velocity.
+    pub weight: f64,
+    /// Closed fraction c.
+    pub closed: f64,
+    /// Closed fraction C of all grains together.
+    pub closed_by_all: f64,
+}
+
+impl Reference {
+    /// Drag coefficient times dt, and closed fraction 1 - A(d), of a face at the distance `d` [m]
+    /// from a surface with the normal `n`.
+    ///
+    /// drag = nu sum_a (m(d + h_a n_a) + m(d - h_a n_a) - 2 m(d)) / h_a^2 / m(d) in the aperture
+    /// scheme. In the paper's scheme drag / (1 + drag) is the solid fraction of a cell cut by a
+    /// plane.
+    fn drag(&self, d: f64, n: DVec3) -> [f64; 2] {
+        let (eps, h) = (self.eps, self.mesh.spacing);
+        if self.scheme == Scheme::Paper {
+            let solid_fraction = (0.5 - d / n.abs().dot(h)).clamp(0.0, 1.0);
+            return [solid_fraction / (1.0 - solid_fraction), 0.0];
+        }
+        let m = |d| open_depth(d, eps);
+        let second =
+            |a: usize| (m(d + h[a] * n[a]) + m(d - h[a] * n[a]) - 2.0 * m(d)) / h[a].powi(2);
+        let drag = (0..3).map(second).sum::<f64>().max(0.0) / m(d);
+        [
+            self.kinematic_viscosity * self.dt * drag,
+            1.0 - aperture(d, eps),
+        ]
+    }
+
+    /// Weights of grain `index` on a face at `x`: s = drag / (1 + drag of all grains).
+    pub fn weights(&self, index: usize, x: DVec3) -> Weights {
+        let eps = self.eps;
+        let d = self.nearest_image(index, x).distance;
+        let (mut all_drag, mut all_closed) = (0.0, 0.0);
+        let mut forcing = [0.0; 2];
+        for other in 0..self.grains.len() {
+            let image = self.nearest_image(other, x);
+            // A face deep inside another, nearer grain is forced by that grain alone.
+            if image.distance <= -eps && image.distance < d {
+                return Weights::default();
+            }
+            if image.distance < 2.0 * eps {
+                let [drag, closed] = self.drag(image.distance, image.normal);
+                all_drag += drag;
+                all_closed += closed;
+                if other == index {
+                    forcing = [drag, closed];
+                }
+            }
+        }
+        let [drag, closed] = forcing;
+        if d <= -eps && self.scheme == Scheme::Aperture {
+            return Weights {
+                weight: 1.0,
+                closed: 1.0,
+                closed_by_all: 1.0,
+            };
+        }
+        Weights {
+            weight: if drag.is_finite() {
+                drag / (1.0 + all_drag)
+            } else {
+                1.0
+            },
+            closed: closed / all_closed.max(1.0),
+            closed_by_all: all_closed.min(1.0),
+        }
+    }
+
+    /// Velocity that a face gains by the rigidity of grain `index` [m/s] (Eqs 4b, 4c), which had
+    /// the velocity U_old and has U; `predicted` is u* of the face [m/s].
+    pub fn gain(
+        &self,
+        index: usize,
+        known: &Known<f64>,
+        predicted: f64,
+        [old, new]: [RigidVelocity; 2],
+        component: usize,
+        face: IVec3,
+    ) -> f64 {
+        let (h, e) = (self.mesh.spacing, IVec3::AXES[component]);
+        let dt = if self.scheme == Scheme::Aperture {
+            self.dt
+        } else {
+            0.0
+        };
+        let x = self.position(component, face);
+        let arm = self.nearest_image(index, x).arm;
+        let Weights {
+            weight: s,
+            closed: c,
+            closed_by_all: all,
+        } = self.weights(index, x);
+        // p~ = p - dt U_old . grad p, at half a spacing above and below the face.
+        let moved = |cell: IVec3, arm: DVec3| {
+            let (at, velocity) = (self.at(cell), old.at(arm));
+            let along = |a: usize| {
+                let stride = self.mesh.layout().strides()[a];
+                velocity[a] * (known.pressure[at + stride] - known.pressure[at - stride])
+                    / (2.0 * h[a])
+            };
+            known.pressure[at] - dt * (0..3).map(along).sum::<f64>()
+        };
+        let half = 0.5 * h * DVec3::AXES[component];
+        let rise = moved(face, arm + half) - moved(face - e, arm - half);
+        let removed = dt / h[component] * rise - dt * known.body_acceleration[component];
+        let rest_gain = c * removed - s * (predicted + all * removed);
+        let change = if dt > 0.0 {
+            (1.0 - s) * c * (new - old).at(arm)[component]
+        } else {
+            0.0
+        };
+        rest_gain + s * new.at(arm)[component] + change
+    }
+
+    /// Impulse J on the fluid by grain `index`, linear [N s] and angular [N m s]: the sum over the
+    /// faces of fluid mass times gain.
+    pub fn impulse(
+        &self,
+        index: usize,
+        known: &Known<f64>,
+        predicted: [&[f64]; 3],
+        velocities: [RigidVelocity; 2],
+        fluid_density: f64,
+    ) -> [DVec3; 2] {
+        let fluid_mass = fluid_density * self.mesh.cell_volume();
+        let [mut linear, mut angular] = [DVec3::ZERO; 2];
+        for component in 0..3 {
+            for face in self.faces(component) {
+                let image = self.nearest_image(index, self.position(component, face));
+                if image.distance < 2.0 * self.eps {
+                    let u = predicted[component][self.at(face)];
+                    let gain = self.gain(index, known, u, velocities, component, face);
+                    let impulse = fluid_mass * gain * DVec3::AXES[component];
+                    linear += impulse;
+                    angular += image.arm.cross(impulse);
+                }
+            }
+        }
+        [linear, angular]
+    }
+}

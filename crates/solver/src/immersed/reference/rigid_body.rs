@@ -1,0 +1,62 @@
+//! Equations of motion of a grain with the impulse of the fluid (Eqs 4b, 4c, 5).
+//!
+//! Legend: m mass, I inertia, m_f and I_f mass and inertia of the displaced fluid, m_v and I_v
+//! virtual mass and inertia, V and Omega velocities, a previous acceleration, J impulse on the
+//! fluid.
+
+use glam::DVec3;
+
+use super::Reference;
+use crate::immersed::kinematics::{PreviousStep, RigidVelocity};
+use crate::math::Load;
+
+impl Reference {
+    /// Residual of the momentum [N s] and angular momentum [N m s] of grain `index` in a step from
+    /// the previous velocities to `new`, under the `load` of weight, buoyancy and contact:
+    ///
+    /// (m - m_f)(V - V_old) + m_v (V - V_old - dt a) + J - dt F = 0, and the same with I, Omega and
+    /// the gyroscopic torque Omega_old x (I - I_f) Omega_old.
+    pub fn momentum_residual(
+        &self,
+        index: usize,
+        previous: &PreviousStep,
+        new: RigidVelocity,
+        [linear_impulse, angular_impulse]: [DVec3; 2],
+        fluid_density: f64,
+        load: Load,
+    ) -> [DVec3; 2] {
+        let (grain, dt) = (&self.grains[index], self.dt);
+        let ratio = grain.density / fluid_density;
+        // The virtual mass is the displaced mass below a density ratio of 0.8, and 0 above 1.
+        let virtual_part = ((1.0 - ratio) / 0.2).clamp(0.0, 1.0) / ratio;
+        let own_part = 1.0 - 1.0 / ratio;
+        let (change, rate) = (new - previous.velocity, previous.acceleration);
+        let omega = previous.velocity.angular;
+        let inertia = grain.inertia();
+        let gyroscopic = omega.cross(own_part * (inertia * omega));
+        let linear = own_part * change.linear + virtual_part * (change.linear - dt * rate.linear);
+        let angular =
+            own_part * change.angular + virtual_part * (change.angular - dt * rate.angular);
+        [
+            grain.mass() * linear + linear_impulse - dt * load.force,
+            inertia * angular + angular_impulse - dt * (load.torque - gyroscopic),
+        ]
+    }
+
+    /// Hydrodynamic load (Eq. 5) from the momentum balance of the grain: mass times acceleration
+    /// less all other loads.
+    pub fn hydrodynamic_load(
+        &self,
+        index: usize,
+        previous: &PreviousStep,
+        new: RigidVelocity,
+        load: Load,
+    ) -> Load {
+        let (grain, rate) = (&self.grains[index], (new - previous.velocity) / self.dt);
+        let (inertia, omega) = (grain.inertia(), previous.velocity.angular);
+        Load {
+            force: grain.mass() * rate.linear - load.force,
+            torque: inertia * rate.angular + omega.cross(inertia * omega) - load.torque,
+        }
+    }
+}

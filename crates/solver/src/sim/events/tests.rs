@@ -1,0 +1,226 @@
+use glam::DVec3;
+use grainwake_shape::Shape;
+
+use super::*;
+use crate::dem::{Contact, Partner};
+use crate::math::Load;
+
+fn grain(x: f64, z: f64) -> Grain {
+    Grain::new(Shape::sphere(0.5, 50), 2.0).with_position(DVec3::new(x, 0.0, z))
+}
+
+fn touch(grain: usize, partner: Partner) -> Contact {
+    Contact {
+        grain,
+        partner,
+        overlap: 1e-3,
+        load: Load::default(),
+        point: DVec3::ZERO,
+        normal: DVec3::Z,
+    }
+}
+
+/// Runs positions (grain 0 at the origin, grain 1 at x, z) through a tracker; g = d = 1.
+fn follow(path: &[(f64, f64, f64)]) -> Tracker {
+    let grains = |x: f64, z: f64| [grain(0.0, 0.0), grain(x, z)];
+    let gap = |x: f64, z: f64| x.hypot(z) - 1.0;
+    let start = grains(path[0].1, path[0].2);
+    let params = EventParams::for_grains(&start, DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
+    let mut tracker = Tracker::new(params, &start, Some(gap(path[0].1, path[0].2)));
+    for &(t, x, z) in path {
+        let contacts = if gap(x, z) <= 0.0 {
+            vec![touch(0, Partner::Grain(1))]
+        } else {
+            vec![]
+        };
+        tracker.update(t, &grains(x, z), &contacts, Some(gap(x, z)));
+    }
+    tracker
+}
+
+/// Trailer comes down on the leader, rolls over it, and leads.
+fn dkt() -> Vec<(f64, f64, f64)> {
+    let mut path: Vec<(f64, f64, f64)> = (0..=10)
+        .map(|i| (0.1 * f64::from(i), 0.0, 2.0 - 0.1 * f64::from(i)))
+        .collect();
+    path.extend((1..=24).map(|i| {
+        let angle = f64::from(i) * 5f64.to_radians();
+        (
+            1.0 + 0.1 * f64::from(i),
+            0.9999 * angle.sin(),
+            0.9999 * angle.cos(),
+        )
+    }));
+    let (t, x, z) = path[path.len() - 1];
+    path.extend((1..=30).map(|i| {
+        (
+            t + 0.1 * f64::from(i),
+            x + 0.02 * f64::from(i),
+            z - 0.02 * f64::from(i),
+        )
+    }));
+    path
+}
+
+#[test]
+fn phases_of_a_pair_come_in_order() {
+    let tracker = follow(&dkt());
+    let kinds: Vec<EventKind> = tracker.events().iter().map(|e| e.kind).collect();
+    assert_eq!(
+        kinds,
+        [
+            EventKind::Kiss,
+            EventKind::Tumble,
+            EventKind::RoleChange,
+            EventKind::Separation
+        ]
+    );
+    assert_eq!(tracker.phase(), Some(Phase::Separated));
+    assert!((tracker.kiss_time().unwrap() - 1.0).abs() < 1e-12);
+    assert!((tracker.tumble_time().unwrap() - 1.9).abs() < 1e-12);
+    assert!((tracker.separation_time().unwrap() - 3.5).abs() < 1e-9);
+    assert_eq!((tracker.role_changes(), tracker.leader()), (1, Some(1)));
+    let separation = &tracker.events()[3];
+    assert!(separation.confirmed >= separation.time + 1.0 && separation.gap.unwrap() > 0.05);
+}
+
+#[test]
+fn a_grain_that_lands_beside_one_on_the_floor_does_not_change_roles() {
+    let grains = |z: f64| [grain(0.0, 0.0), grain(3.0, z)];
+    let params = EventParams::for_grains(&grains(1.0), DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
+    let (axis, side) = params.floor;
+    for (contacts, changes) in [
+        (vec![touch(0, Partner::Wall { axis, side })], 0),
+        (vec![], 1),
+    ] {
+        let mut tracker = Tracker::new(params, &grains(1.0), Some(2.0));
+        for (t, z) in [(1.0, 0.5), (2.0, -0.5), (3.0, -0.5)] {
+            tracker.update(t, &grains(z), &contacts, Some(2.0));
+        }
+        assert_eq!(tracker.role_changes(), changes);
+    }
+}
+
+#[test]
+fn a_bounce_is_not_a_separation() {
+    let path = [
+        (0.0, 0.0, 1.5),
+        (1.0, 0.0, 0.999),
+        (1.1, 0.0, 1.2),
+        (1.2, 0.0, 0.999),
+        (1.3, 0.0, 1.04),
+        (9.0, 0.0, 1.04),
+    ];
+    let tracker = follow(&path);
+    assert_eq!(tracker.events().len(), 1);
+    assert_eq!(
+        (tracker.phase(), tracker.separation_time()),
+        (Some(Phase::Kissing), None)
+    );
+}
+
+#[test]
+fn a_second_kiss_withdraws_the_separation() {
+    let path = [
+        (0.0, 0.0, 1.5),
+        (1.0, 0.0, 0.999),
+        (2.0, 0.0, 1.2),
+        (4.0, 0.0, 1.3),
+        (5.0, 0.0, 0.999),
+    ];
+    let tracker = follow(&path);
+    let kinds: Vec<EventKind> = tracker.events().iter().map(|e| e.kind).collect();
+    assert_eq!(
+        kinds,
+        [EventKind::Kiss, EventKind::Separation, EventKind::Kiss]
+    );
+    assert_eq!(
+        (tracker.separation_time(), tracker.kiss_time()),
+        (None, Some(1.0))
+    );
+}
+
+#[test]
+fn level_grains_do_not_chatter() {
+    let path = [
+        (0.0, 2.0, 0.01),
+        (1.0, 2.0, -0.01),
+        (2.0, 2.0, 0.01),
+        (3.0, 2.0, -0.01),
+        (4.0, 2.0, -0.03),
+    ];
+    let tracker = follow(&path);
+    assert_eq!(tracker.role_changes(), 1);
+    assert_eq!(
+        (tracker.events()[0].time, tracker.events()[0].confirmed),
+        (3.0, 4.0)
+    );
+}
+
+#[test]
+fn landing_and_rest_need_all_free_grains() {
+    let mut grains = [grain(0.0, 0.5), grain(3.0, 0.5), grain(6.0, 5.0)];
+    grains[2].translation = Dof::Prescribed(DVec3::ZERO);
+    let params = EventParams::for_grains(&grains, DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
+    let mut tracker = Tracker::new(params, &grains, None);
+    let floor = Partner::Wall { axis: 2, side: 0 };
+    let events = tracker.update(
+        1.0,
+        &grains,
+        &[
+            touch(0, floor),
+            touch(1, Partner::Wall { axis: 0, side: 1 }),
+        ],
+        None,
+    );
+    assert_eq!(
+        (events.len(), events[0].kind, events[0].grains.as_slice()),
+        (1, EventKind::Landing, &[0][..])
+    );
+    assert_eq!(tracker.holds_since(StopWhen::Landing, &grains), None);
+    assert_eq!(tracker.holds_since(StopWhen::Rest, &grains), Some(1.0));
+    grains[0].velocity.z = -0.1;
+    assert_eq!(
+        tracker
+            .update(2.0, &grains, &[touch(0, floor), touch(1, floor)], None)
+            .len(),
+        1
+    );
+    assert_eq!(tracker.holds_since(StopWhen::Landing, &grains), Some(2.0));
+    assert_eq!(tracker.holds_since(StopWhen::Rest, &grains), None);
+    assert_eq!(tracker.peak_settling_speeds()[0], 0.1);
+}
+
+#[test]
+fn the_nearest_image_counts() {
+    let grains = [grain(0.1, 0.0), grain(9.9, 1.2)];
+    let params = EventParams::for_grains(
+        &grains,
+        DVec3::new(0.0, 0.0, -1.0),
+        0.0,
+        [Some(10.0), None, None],
+    );
+    let line = params.line_of_centres(&grains[0], &grains[1]);
+    assert!((line - DVec3::new(-0.2, 0.0, 1.2)).length() < 1e-12);
+}
+
+#[test]
+fn a_restored_tracker_goes_on_with_the_same_bits() {
+    let path = dkt();
+    let whole = follow(&path);
+    let text = serde_json::to_string(follow(&path[..20]).state()).unwrap();
+    let start = [grain(0.0, 0.0), grain(path[0].1, path[0].2)];
+    let params = EventParams::for_grains(&start, DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
+    let mut tracker = Tracker::new(params, &start, Some(1.0));
+    tracker.restore(serde_json::from_str(&text).unwrap());
+    for &(t, x, z) in &path[20..] {
+        let gap = x.hypot(z) - 1.0;
+        let contacts = if gap <= 0.0 {
+            vec![touch(0, Partner::Grain(1))]
+        } else {
+            vec![]
+        };
+        tracker.update(t, &[grain(0.0, 0.0), grain(x, z)], &contacts, Some(gap));
+    }
+    assert_eq!(tracker.state(), whole.state());
+}

@@ -1,0 +1,90 @@
+//! Solid fraction of cells, for output.
+
+use glam::DVec3;
+
+use super::Simulation;
+use crate::dem::Grain;
+use crate::grid::GlobalCell;
+
+/// Sub-cells along each axis of a cell cut by a surface.
+const SUBCELLS: usize = 4;
+
+impl Simulation {
+    /// Solid fraction of cell (i, j, k), counted from 0. A cell near a surface is divided into
+    /// sub-cells, and each of these is cut by the plane of the nearest surface.
+    pub fn solid_fraction_at(&self, cell: [usize; 3]) -> f64 {
+        let mesh = &self.setup.mesh;
+        // An axis of one cell is evaluated in its middle plane.
+        let counts = mesh.cells.map(|n| if n > 1 { SUBCELLS } else { 1 });
+        let edge = DVec3::from_array([0, 1, 2].map(|axis| {
+            let resolved = mesh.cells[axis] > 1;
+            if resolved { mesh.spacing[axis] } else { 0.0 }
+        }));
+        let near = match self.grains_near(cell, edge) {
+            Near::Inside => return 1.0,
+            Near::Cut(near) if near.is_empty() => return 0.0,
+            Near::Cut(near) => near,
+        };
+        let subcell = edge / DVec3::from_array(counts.map(|n| n as f64));
+        let thinnest = (0..3)
+            .filter(|axis| subcell[*axis] > 0.0)
+            .map(|axis| subcell[axis])
+            .fold(f64::INFINITY, f64::min);
+        let offset =
+            |i: usize, axis: usize| (i as f64 + 0.5 - 0.5 * counts[axis] as f64) * subcell[axis];
+        let mut sum = 0.0;
+        for (i, j, k) in (0..counts[0])
+            .flat_map(|i| (0..counts[1]).flat_map(move |j| (0..counts[2]).map(move |k| (i, j, k))))
+        {
+            let offset = DVec3::new(offset(i, 0), offset(j, 1), offset(k, 2));
+            let fractions = near.iter().map(|(grain, arm)| {
+                let orientation = grain.pose.orientation;
+                let point = orientation.conjugate() * (*arm + offset);
+                let (distance, gradient) = grain.shape.distance_and_gradient(point);
+                let normal = orientation * gradient.normalize_or_zero();
+                let width = normal.abs().dot(subcell).max(thinnest);
+                (0.5 - distance / width).clamp(0.0, 1.0)
+            });
+            sum += fractions.fold(0.0, f64::max);
+        }
+        sum / counts.iter().product::<usize>() as f64
+    }
+
+    /// Grains whose surface may cut a cell with these edges [m].
+    fn grains_near(&self, cell: [usize; 3], edge: DVec3) -> Near<'_> {
+        let mesh = &self.setup.mesh;
+        let centre = mesh.position([0.5; 3], GlobalCell(cell.map(|i| i + 1)));
+        let extent = mesh.extent();
+        let mut near = Vec::new();
+        for grain in &self.setup.grains {
+            let mut arm = centre - grain.pose.position;
+            for axis in 0..3 {
+                if self.setup.boundaries.is_periodic(axis) && mesh.cells[axis] > 1 {
+                    arm[axis] -= (arm[axis] / extent[axis]).round() * extent[axis];
+                }
+            }
+            let reach = grain.shape.bounding_radius() + mesh.spacing.length();
+            if arm.length_squared() > reach * reach {
+                continue;
+            }
+            let to_body = grain.pose.orientation.conjugate();
+            let (distance, _) = grain.shape.distance_and_gradient(to_body * arm);
+            // From the centre to a corner, the distance changes by at most half the diagonal.
+            if distance <= -0.5 * edge.length() {
+                return Near::Inside;
+            }
+            if distance < 0.5 * edge.length() {
+                near.push((grain, arm));
+            }
+        }
+        Near::Cut(near)
+    }
+}
+
+/// Position of a cell relative to the grains.
+enum Near<'a> {
+    /// The cell lies inside a grain.
+    Inside,
+    /// Grains that may cut the cell, with the vector from centroid to cell centre [m].
+    Cut(Vec<(&'a Grain, DVec3)>),
+}

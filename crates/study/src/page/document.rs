@@ -1,0 +1,85 @@
+//! The report page: one HTML file without scripts and external resources.
+
+use grainwake_report::html::{self, section};
+use maud::{Markup, html};
+
+use super::content::Content;
+use super::{pairs, settling, tables};
+use crate::measure::record::RunRecord;
+
+impl Content<'_> {
+    /// Returns the page.
+    pub fn html(&self) -> String {
+        let content = html! {
+            (self.resolution())
+            (html::omissions(&self.omissions()))
+            @if self.has_settling() {
+                (section("Settling speeds and their uncertainty", &settling::summary(self)))
+            }
+            @if self.has_pairs() {
+                @let title = "Contact and separation times and their uncertainty";
+                (section(title, &pairs::summary(self)))
+            }
+            @if !self.findings.is_empty() {
+                (section("Claims and verdicts", &tables::claims(self.findings)))
+            }
+            @if !self.figures.is_empty() { (section("Figures", &html::figures(self.figures))) }
+            (section("All runs", &tables::runs(self)))
+            @if !self.correlations.is_empty() {
+                (section("Rank correlations", &tables::correlations(self.correlations)))
+            }
+            (section("Provenance", &tables::provenance(self)))
+        };
+        let footer = html! {
+            "Produced by Grainwake from the run folders of this study. Figures: "
+            code { "figures/" } "; values: " code { "table.csv" } ", " code { "table.json" } " and "
+            code { "analysis.json" } "."
+        };
+        html::page(&self.plan.title, &self.lead(), &content, &footer)
+    }
+
+    /// Returns the warning that quantities are not converged with the grid, with the evidence.
+    fn resolution(&self) -> Markup {
+        html! {
+            @if let Some(resolution) = &self.plan.analysis.resolution {
+                (html::notice(&html! {
+                    b { "Not converged with the grid" }
+                    p { (resolution.note) }
+                }))
+            }
+        }
+    }
+
+    fn lead(&self) -> Markup {
+        let finished = self.records.iter().filter(|record| record.finished());
+        let finished = finished.count();
+        let verdicts = |v: &str| self.findings.iter().filter(|f| f.verdict == v).count();
+        html! {
+            (finished) " of " (self.records.len()) " runs are finished"
+            (settling::lead(self.records))
+            @if finished > 0 && self.has_pairs() { (pairs::lead(self.records)) }
+            @if !self.findings.is_empty() {
+                ". Of " (self.findings.len()) " claims, " (verdicts("holds")) " hold, "
+                (verdicts("contradicted")) " are contradicted and " (verdicts("open")) " are open"
+            }
+            ". Times are in √(d/g), lengths in the equal-volume diameter d, speeds in √(d g)."
+        }
+    }
+
+    /// Lists runs without results and omitted parts.
+    fn omissions(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        for state in ["missing", "unfinished", "failed", "stale"] {
+            let runs = self.records.iter().filter(|r| r.state == state);
+            let names: Vec<&str> = runs.map(|r| r.name.as_str()).collect();
+            if !names.is_empty() {
+                out.push(format!("{state}: {}", names.join(", ")));
+            }
+        }
+        let failed = self.records.iter().filter(|r| r.state == "failed");
+        let reason = |r: &RunRecord| Some(format!("{}: {}", r.name, r.remark.as_ref()?));
+        out.extend(failed.filter_map(reason));
+        out.extend(self.notes.iter().cloned());
+        out
+    }
+}

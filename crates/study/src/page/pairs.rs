@@ -1,0 +1,85 @@
+//! Parts of the report page about pairs.
+
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+
+use super::content::{Content, paragraph};
+use crate::analysis::observation::{Observation, observations};
+use crate::analysis::statistics::median;
+use crate::format::{percent, significant};
+use crate::measure::pair::PairMeasures;
+use crate::measure::record::RunRecord;
+
+/// Gap that counts as a near miss of a pair without contact [d]: one cell of the paper's mesh.
+const NEAR_MISS: f64 = 0.125;
+
+/// Returns the numbers of contacts and separations as half a sentence.
+pub(super) fn lead(records: &[RunRecord]) -> Markup {
+    let count = |property: fn(&PairMeasures) -> bool| {
+        let pairs = records.iter().filter_map(|r| r.pair.as_ref());
+        pairs.filter(|p| property(p)).count()
+    };
+    let near_miss =
+        count(|p| p.kiss_time.is_none() && p.closest_gap.is_some_and(|gap| gap < NEAR_MISS));
+    html! {
+        "; " (count(|p| p.kiss_time.is_some())) " pairs kissed before landing, "
+        (count(|p| p.parted == Some(true))) " of them separated, "
+        (count(|p| p.repeated == Some(true))) " kissed more than once; " (near_miss)
+        " passed within " (NEAR_MISS) " d of each other without contact"
+    }
+}
+
+/// Returns the shortest and longest contact times, and their uncertainty.
+pub(super) fn summary(content: &Content) -> Markup {
+    let all = BTreeMap::new();
+    let kiss = observations(content.records, "kiss_time", &all);
+    let contact = observations(content.records, "contact_stage", &all);
+    html! {
+        (extremes("first contact", &kiss))
+        (extremes("time in contact until separation", &contact))
+        (paragraph("Uncertainty", &uncertainty(content, &kiss, &contact)))
+    }
+}
+
+/// Returns the five shortest and the three longest times, censored ones left out.
+fn extremes(what: &str, all: &[Observation]) -> Markup {
+    let mut sorted: Vec<&Observation> = all.iter().filter(|o| !o.censored).collect();
+    sorted.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let censored = all.len() - sorted.len();
+    let name = |o: &&Observation| format!("{} ({})", o.model, significant(o.value));
+    let first: Vec<String> = sorted.iter().take(5).map(name).collect();
+    let last: Vec<String> = sorted.iter().rev().take(3).map(name).collect();
+    html! {
+        p {
+            @if sorted.is_empty() {
+                "No finished run has a " (what) "."
+            } @else {
+                b { "Shortest " (what) } ": " (first.join(", ")) ". "
+                b { "Longest" } ": " (last.join(", ")) "."
+                @if censored > 0 { " " (censored) " pairs landed before (right-censored)." }
+            }
+        }
+    }
+}
+
+fn uncertainty(content: &Content, kiss: &[Observation], contact: &[Observation]) -> Markup {
+    let spread = |list: &[Observation]| {
+        let varied = list.iter().filter(|o| o.range.1 > o.range.0);
+        let relative: Vec<f64> = varied.map(|o| (o.range.1 - o.range.0) / o.value).collect();
+        median(&relative).map_or("unknown".into(), percent)
+    };
+    html! {
+        @if content.without_ensemble() {
+            "every model was run once. The motion before the first contact is reproducible; after \
+             it, small disturbances grow. An " code { "[ensemble]" } " of repetitions measures \
+             their effect. Claims and correlations are tested by ranks over all models, so no \
+             single run decides them."
+        } @else {
+            "models were repeated with small random offsets of the initial position. The range of \
+             the repetitions relative to their median is " (spread(kiss)) " for the first contact \
+             and " (spread(contact)) " for the time in contact (medians over the models). Smaller \
+             differences between single models are not significant."
+        }
+    }
+}
