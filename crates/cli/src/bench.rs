@@ -1,4 +1,4 @@
-//! `grainwake bench`: time and memory per cell, against the memory bandwidth of the same minute.
+//! `grainwake bench`: time and memory per cell, compared with the memory bandwidth.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -10,7 +10,7 @@ use grainwake_solver::dem::Grain;
 use grainwake_solver::flow::FluidParams;
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
-use grainwake_solver::math::Precision;
+use grainwake_solver::math::{InstructionSet, Precision, instructions, limit_instructions};
 use grainwake_solver::sim::{Setup, Simulation, StepRule};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -19,8 +19,8 @@ use crate::args::BenchArgs;
 use crate::exit::{BAD_INPUT, Exit};
 use crate::{print, threads};
 
-/// Numbers per cell that each pass must move through memory, each read and each write counted (what
-/// a store fetches before it writes is left out, as in the triad):
+/// Numbers per cell that each pass reads from and writes to memory (write-allocate traffic is not
+/// counted, as in the triad):
 ///
 /// - predict: reads u (3), the old tendency (3), p; writes the tendency (3) and u* (3);
 /// - divergence: reads u* (3), writes the modes;
@@ -39,12 +39,12 @@ const TRAFFIC: [(&str, f64); 4] = [
 const CUBES: [usize; 14] = [
     32, 48, 64, 67, 80, 96, 97, 100, 128, 131, 160, 192, 200, 256,
 ];
-/// Least doubles in each array of the triad, 64 MiB: its three arrays are as large as the fields, so
-/// that both find the same caches, and never so small that handing out the work counts.
+/// Least number of doubles in each array of the triad, 64 MiB. The three arrays are as large as the
+/// fields, so that caches act alike, and large enough to hide the scheduling of threads.
 const LEAST_TRIAD_LENGTH: usize = 1 << 23;
 const TRIAD_REPEATS: usize = 8;
 
-/// What is run.
+/// Benchmark case.
 #[derive(Clone, Copy)]
 struct Load {
     cells: [usize; 3],
@@ -53,13 +53,14 @@ struct Load {
     precision: Precision,
 }
 
-/// What was measured. The JSON names are stable.
+/// Measurement of one case. The JSON names are stable.
 #[derive(Debug, Serialize)]
 struct Measured {
     cells: [usize; 3],
     grains: usize,
     threads: usize,
     precision: Precision,
+    instructions: &'static str,
     steps: u64,
     /// Median over the steps.
     ns_per_cell_step: f64,
@@ -76,11 +77,11 @@ struct Measured {
 struct Pass {
     name: &'static str,
     ns_per_cell_step: f64,
-    /// What memory bandwidth alone would take; none for passes that depend on the grains alone.
+    /// Time at the memory bandwidth; none for passes that depend on the grains alone.
     limit_ns_per_cell_step: Option<f64>,
 }
 
-/// Measures and prints.
+/// Runs the benchmark and prints the measurements.
 pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     let &[nx, ny, nz] = &args.size[..] else {
         return Err(Exit::new(BAD_INPUT, "--size takes three numbers"));
@@ -90,6 +91,20 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
             BAD_INPUT,
             "--size takes 16 to 4096 cells along each axis, --steps at least one step",
         ));
+    }
+    if let Some(set) = args.instructions {
+        let widest = InstructionSet::widest();
+        if set > widest {
+            return Err(Exit::new(
+                BAD_INPUT,
+                format!(
+                    "--instructions {}: this processor has at most {}",
+                    set.name(),
+                    widest.name()
+                ),
+            ));
+        }
+        limit_instructions(set);
     }
     let threads = threads::resolve(args.threads);
     let scheme = if args.scheme == "paper" {
@@ -183,6 +198,7 @@ fn measure(load: &Load, steps: u64, threads: usize) -> Result<Measured, Exit> {
         grains,
         threads,
         precision,
+        instructions: instructions().name(),
         steps,
         ns_per_cell_step: ns,
         bytes_per_cell,
@@ -194,17 +210,17 @@ fn measure(load: &Load, steps: u64, threads: usize) -> Result<Measured, Exit> {
     })
 }
 
-/// The middle one; of an even number the mean of the middle two.
+/// Median of the values.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let n = values.len();
     0.5 * (values[(n - 1) / 2] + values[n / 2])
 }
 
-/// Cells that a grain takes up along each axis, at least: its longest axis and two.
+/// Least number of cells per grain along each axis: its longest axis and two.
 const ROOM: usize = 11;
 
-/// Middles of the cells of the widest lattice with a place for each grain, as shares of the box.
+/// Positions of grains on the widest lattice with enough sites, as fractions of the box.
 fn places(cells: [usize; 3], grains: usize) -> Result<Vec<DVec3>, Exit> {
     let narrowest = cells.iter().copied().fold(usize::MAX, usize::min);
     let across = |pitch: usize| cells.map(|n| n / pitch);
@@ -223,7 +239,7 @@ fn places(cells: [usize; 3], grains: usize) -> Result<Vec<DVec3>, Exit> {
     let [nx, ny, nz] = across(pitch);
     let total = nx * ny * nz;
     let middle = |n: usize, of: usize| (n as f64 + 0.5) / of as f64;
-    // Evenly among the places.
+    // Grains are spread evenly over the sites.
     let all = (0..grains).map(|n| (2 * n + 1) * total / (2 * grains));
     let all = all.map(|n| {
         DVec3::new(
@@ -235,7 +251,7 @@ fn places(cells: [usize; 3], grains: usize) -> Result<Vec<DVec3>, Exit> {
     Ok(all.collect())
 }
 
-/// Sampled grains of eight cells' diameter in water.
+/// Set-up: sampled grains of eight cells diameter in water.
 fn setup(load: &Load) -> Result<Setup, Exit> {
     let Load {
         cells,
@@ -302,14 +318,15 @@ fn triad_bandwidth(length: usize) -> f64 {
 fn table(m: &Measured) -> String {
     let mut lines = vec![
         format!(
-            "{} x {} x {} cells of {} bytes a number, {} grains, {} threads, {} steps",
+            "{} x {} x {} cells of {} bytes a number, {} grains, {} threads, {} steps, {}",
             m.cells[0],
             m.cells[1],
             m.cells[2],
             m.precision.bytes(),
             m.grains,
             m.threads,
-            m.steps
+            m.steps,
+            m.instructions
         ),
         format!(
             "time        {:8.2} ns per cell per step",
@@ -334,7 +351,7 @@ fn table(m: &Measured) -> String {
     lines.join("\n")
 }
 
-/// One line a size; the last column compares with the cube before, the first with itself.
+/// Table with one line per size; the last column is the ratio to the preceding cube.
 fn scaling(all: &[Measured]) -> String {
     let mut lines = vec![format!(
         "{:>5} {:>10} {:>9} {:>7} {:>7} {:>9}",

@@ -3,6 +3,7 @@
 mod common;
 
 use common::{DRY, WET, folder_with, grainwake};
+use grainwake_solver::math::InstructionSet;
 use predicates::str::contains;
 use serde_json::Value;
 
@@ -325,6 +326,30 @@ fn bench_measures_time_memory_and_the_limit() {
     assert_eq!(single["traffic_bytes_per_cell"], 112.0);
     let bytes = |m: &serde_json::Value| m["bytes_per_cell"].as_f64().unwrap();
     assert!(bytes(&single) < bytes(&measured), "{single}");
+    let baseline = grainwake()
+        .args(["bench", "--size", "24", "24", "48", "--steps", "1"])
+        .args(["--instructions", "baseline", "--json"])
+        .assert()
+        .success();
+    assert_eq!(
+        json(&baseline.get_output().stdout)["instructions"],
+        "baseline"
+    );
+    let unknown = grainwake()
+        .args(["bench", "--instructions", "sse9"])
+        .assert()
+        .code(2);
+    assert!(
+        String::from_utf8_lossy(&unknown.get_output().stderr).contains("baseline, avx2, avx512")
+    );
+    if InstructionSet::widest() < InstructionSet::Avx512 {
+        let lacking = grainwake()
+            .args(["bench", "--instructions", "avx512"])
+            .assert()
+            .code(2);
+        let message = String::from_utf8_lossy(&lacking.get_output().stderr).into_owned();
+        assert!(message.contains("this processor has at most"), "{message}");
+    }
     // Two by two by four places of eleven cells.
     let many = grainwake()
         .args(["bench", "--size", "24", "24", "48", "--grains", "17"])

@@ -1,12 +1,11 @@
-//! Numbers that start on a cache line.
+//! Lists of numbers aligned to cache lines.
 
 use std::ops::{Deref, DerefMut};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::Real;
 
-/// A fixed number of numbers, one of which, the first unless said, lies at the start of a cache line. Nothing
-/// is touched when it is made: a page belongs to the thread that first writes to it.
+/// List of fixed length, one entry of which, the first by default, starts a cache line. Creation
+/// writes no entry: the operating system places a page near the thread that first writes to it.
 #[derive(Debug, Default)]
 pub struct Aligned<R> {
     values: Vec<R>,
@@ -15,40 +14,27 @@ pub struct Aligned<R> {
 }
 
 impl<R: Real> Aligned<R> {
-    /// `len` zeros.
+    /// List of `len` zeros.
     pub fn zeros(len: usize) -> Aligned<R> {
         Aligned::with_head(0, len)
     }
-    /// `len` zeros, of which entry `head` lies at the start of a cache line.
+    /// List of `len` zeros, entry `head` of which starts a cache line.
     pub fn with_head(head: usize, len: usize) -> Aligned<R> {
         assert!(head <= R::LANES);
-        let apart = R::LANES * lines_apart(R::BYTES * len);
-        let values: Vec<R> = zeros(len + 2 * R::LANES - 1 + apart);
+        let values = vec![R::default(); len + 2 * R::LANES - 1];
+        #[cfg(target_os = "linux")]
+        advise_large_pages(&values);
         // The buffer is never reallocated, so the start stays where it is.
         let line = values.as_ptr().align_offset(R::LANES * R::BYTES);
-        let start = line + R::LANES - head + apart;
+        let start = line + R::LANES - head;
         Aligned { values, start, len }
     }
-    /// Makes it at least so long; what it held is lost where it was not.
+    /// Replaces a list shorter than `len` by `len` zeros.
     pub fn make_room(&mut self, len: usize) {
         if self.len < len {
             *self = Aligned::zeros(len);
         }
     }
-}
-
-/// How many cache lines after the first of its memory a list of so many bytes starts. The system maps large lists
-/// one by one, each at the start of a page; they start at different places in turn: a processor tells loads from
-/// stores before them by the place within the page, so without that it waits for what it has stored to one field
-/// before it loads from another at the same place.
-fn lines_apart(bytes: usize) -> usize {
-    const SMALL: usize = 1 << 16;
-    static LARGE: AtomicUsize = AtomicUsize::new(0);
-    if bytes < SMALL {
-        return 0;
-    }
-    // Seven places, nine of the 64 lines of a page apart.
-    9 * (LARGE.fetch_add(1, Ordering::Relaxed) % 7)
 }
 
 impl<R> Deref for Aligned<R> {
@@ -65,26 +51,18 @@ impl<R> DerefMut for Aligned<R> {
     }
 }
 
-/// `len` zeros, not touched yet, in large pages where the system has them.
-fn zeros<R: Real>(len: usize) -> Vec<R> {
-    let values = vec![R::default(); len];
-    #[cfg(target_os = "linux")]
-    ask_for_large_pages(&values);
-    values
-}
-
-/// Asks for pages of 2 MiB instead of 4 KiB for a long list before it is touched. What lies about a grain
-/// is on a page of its own for every row or two; the processor does not remember where so many small ones are.
+/// Advises pages of 2 MiB instead of 4 KiB for a long list before its first use. Consecutive rows
+/// about a grain lie on different small pages, more than the processor's page table cache holds.
 #[cfg(target_os = "linux")]
-fn ask_for_large_pages<R>(values: &[R]) {
+fn advise_large_pages<R>(values: &[R]) {
     const SMALL: usize = 4096;
     const LARGE: usize = 2 << 20;
     let first = values.as_ptr().addr();
     let ahead = first.next_multiple_of(SMALL) - first;
     let bytes = size_of_val(values).saturating_sub(ahead) / SMALL * SMALL;
     if bytes >= 2 * LARGE {
-        // SAFETY: the pages lie within the list, and the advice changes no byte of it. Where it is not
-        // taken the pages are small.
+        // SAFETY: the pages lie within the list, and the advice changes no byte of it. A system
+        // that ignores the advice uses small pages.
         unsafe {
             let pages = values.as_ptr().byte_add(ahead).cast_mut().cast();
             libc::madvise(pages, bytes, libc::MADV_HUGEPAGE);
@@ -97,19 +75,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn large_lists_start_on_cache_lines_at_different_places_of_a_page() {
-        let fields = [0; 4].map(|_| Aligned::<f64>::with_head(1, 1 << 15));
-        let starts = fields.each_ref().map(|field| {
-            assert_eq!((field.len(), field[1 << 14]), (1 << 15, 0.0));
-            field[1..].as_ptr().addr()
-        });
-        let mut places = starts.map(|start| {
-            assert_eq!(start % 64, 0);
-            start % 4096
-        });
-        places.sort();
-        // Other tests take places too, at the same time.
-        assert!(places[0] != places[3], "{places:?}");
+    fn the_head_starts_a_cache_line_and_room_is_made_only_where_it_lacks() {
+        let field = Aligned::<f64>::with_head(1, 1 << 15);
+        assert_eq!((field.len(), field[1 << 14]), (1 << 15, 0.0));
+        assert_eq!(field[1..].as_ptr().addr() % 64, 0);
         let mut short = Aligned::<f32>::zeros(20);
         short[19] = 1.0;
         short.make_room(20);

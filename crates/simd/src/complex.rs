@@ -1,4 +1,4 @@
-//! Complex numbers, one a lane.
+//! Vectors of complex numbers.
 
 use std::ops::{Add, Sub};
 
@@ -72,7 +72,7 @@ impl<V: Vector> Sub for Complex<V> {
     }
 }
 
-/// a - i b and a + i b.
+/// Complex numbers a - i b and a + i b.
 #[inline(always)]
 pub fn turned<V: Vector>(a: Complex<V>, b: Complex<V>) -> [Complex<V>; 2] {
     [
@@ -85,4 +85,13 @@ pub fn turned<V: Vector>(a: Complex<V>, b: Complex<V>) -> [Complex<V>; 2] {
             im: a.im + b.re,
         },
     ]
+}
+
+/// View of `values`, aligned to a cache line, as complex vectors.
+#[inline(always)]
+pub fn as_complex<V: Vector>(values: &mut [V::Number]) -> &mut [Complex<V>] {
+    // SAFETY: every `Vector` is `WIDTH` numbers without padding, for which all bits are valid.
+    let (head, lanes, _) = unsafe { values.align_to_mut::<Complex<V>>() };
+    assert!(head.is_empty(), "lanes start on a cache line");
+    lanes
 }

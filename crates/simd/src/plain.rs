@@ -1,10 +1,10 @@
-//! Lanes without intrinsics, for any machine.
+//! Vectors without intrinsics, for any machine.
 
 use std::ops::{Add, Mul, Sub};
 
 use super::{Real, Vector};
 
-/// `N` numbers that the compiler may put into registers as it likes.
+/// Vector of `N` numbers whose registers the compiler chooses.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub struct Plain<R, const N: usize>([R; N]);
@@ -60,19 +60,19 @@ impl<R: Real, const N: usize> Vector for Plain<R, N> {
         to[..N].copy_from_slice(&self.0);
     }
     #[inline(always)]
-    fn over(self, divisor: Self) -> Self {
+    fn div(self, divisor: Self) -> Self {
         self.zip(divisor, |a, b| a / b)
     }
     #[inline(always)]
-    fn larger(self, other: Self) -> Self {
+    fn max(self, other: Self) -> Self {
         self.zip(other, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
-    fn smaller(self, other: Self) -> Self {
+    fn min(self, other: Self) -> Self {
         self.zip(other, |a, b| if a < b { a } else { b })
     }
     #[inline(always)]
-    fn where_below(self, limit: Self, yes: Self, mut no: Self) -> Self {
+    fn select_below(self, limit: Self, yes: Self, mut no: Self) -> Self {
         for i in 0..N {
             if self.0[i] < limit.0[i] {
                 no.0[i] = yes.0[i];
@@ -96,16 +96,9 @@ impl<R: Real, const N: usize> Vector for Plain<R, N> {
         }
     }
     #[inline(always)]
-    fn add_to(self, sums: &mut [f64]) {
+    fn add_into(self, sums: &mut [f64]) {
         for (sum, lane) in sums[..N].iter_mut().zip(self.0) {
             *sum += lane.wide();
-        }
-    }
-    #[inline(always)]
-    fn raise(self, tops: &mut [f64]) {
-        for (top, lane) in tops[..N].iter_mut().zip(self.0) {
-            let lane = lane.wide();
-            *top = if *top > lane { *top } else { lane };
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The numbers that fields are made of.
+//! Numbers of fields: single or double precision.
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Sub};
@@ -10,10 +10,10 @@ use super::Registers;
 /// Precision of the fields of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Precision {
-    /// Single: half the memory, up to twice the speed.
+    /// Single precision: half the memory, up to twice the speed.
     #[serde(rename = "f32")]
     Single,
-    /// Double.
+    /// Double precision.
     #[default]
     #[serde(rename = "f64")]
     Double,
@@ -49,8 +49,8 @@ impl Precision {
     }
 }
 
-/// A number of a field, `f64` or `f32`. Sums over the grid, and the motion of grains, are doubles
-/// whatever the fields are.
+/// Number of a field, `f64` or `f32`. Sums over the grid and the motion of grains are doubles for
+/// either.
 pub trait Real:
     Registers
     + Copy
@@ -65,31 +65,31 @@ pub trait Real:
     + Sync
     + 'static
 {
-    /// Its size.
+    /// Size [bytes].
     const BYTES: usize = size_of::<Self>();
-    /// How many fill a cache line, and the widest register: 8 or 16.
+    /// Numbers in a cache line and in the widest register: 8 or 16.
     const LANES: usize = 64 / Self::BYTES;
-    /// The nearest number to `value`.
+    /// Number nearest to `value`.
     fn of(value: f64) -> Self;
-    /// Its value.
+    /// Value in double precision.
     fn wide(self) -> f64;
     /// `self * factor + term`, rounded once.
     fn mul_add(self, factor: Self, term: Self) -> Self;
-    /// One over its square root within .035: half the exponent, turned around.
-    fn inverse_root_guess(self) -> Self;
-    /// Writes it to the first bytes of `to`, little end first.
+    /// Reciprocal square root within 0.035: the exponent is halved and negated.
+    fn rsqrt_estimate(self) -> Self;
+    /// Writes the number to the first bytes of `to`, little-endian.
     fn write_to(self, to: &mut [u8]);
-    /// Reads it from the first bytes of `from`, little end first.
+    /// Reads a number from the first bytes of `from`, little-endian.
     fn read_from(from: &[u8]) -> Self;
 }
 
-/// Bits of a number near one, plus half of them.
-pub const INVERSE_ROOT_OF_ONE: u64 = 0x5fe6_eb50_c7b5_37a9;
-/// The same of a single.
-pub const INVERSE_ROOT_OF_ONE_SINGLE: u32 = 0x5f37_5a86;
+/// Constant of the estimate: 1.5 times the bits of a double near one.
+pub const RSQRT_MAGIC_F64: u64 = 0x5fe6_eb50_c7b5_37a9;
+/// Constant of the estimate: 1.5 times the bits of a single near one.
+pub const RSQRT_MAGIC_F32: u32 = 0x5f37_5a86;
 
 macro_rules! real {
-    ($number:ident, $inverse_root_of_one:ident) => {
+    ($number:ident, $rsqrt_magic:ident) => {
         impl Real for $number {
             #[inline(always)]
             fn of(value: f64) -> Self {
@@ -104,8 +104,8 @@ macro_rules! real {
                 $number::mul_add(self, factor, term)
             }
             #[inline(always)]
-            fn inverse_root_guess(self) -> Self {
-                $number::from_bits($inverse_root_of_one.wrapping_sub(self.to_bits() >> 1))
+            fn rsqrt_estimate(self) -> Self {
+                $number::from_bits($rsqrt_magic.wrapping_sub(self.to_bits() >> 1))
             }
             fn write_to(self, to: &mut [u8]) {
                 to[..Self::BYTES].copy_from_slice(&self.to_le_bytes());
@@ -118,5 +118,5 @@ macro_rules! real {
         }
     };
 }
-real!(f64, INVERSE_ROOT_OF_ONE);
-real!(f32, INVERSE_ROOT_OF_ONE_SINGLE);
+real!(f64, RSQRT_MAGIC_F64);
+real!(f32, RSQRT_MAGIC_F32);

@@ -1,17 +1,17 @@
-//! Work on rows of numbers, and sums in an order that no width of a register changes.
+//! Loops along rows, and sums in an order that does not depend on the width of the registers.
 
-use super::{MOST, One, Real, Vector};
+use super::{MAX_LANES, Real, Scalar, Vector};
 
-/// Work on the neighbouring entries of a row.
+/// Computation along a row, one vector of neighbouring entries at a time.
 pub trait RowWork {
-    /// What rows are made of.
+    /// Type of the entries.
     type Number: Real;
-    /// Treats the `V::WIDTH` entries from `i` on.
+    /// Computes the `V::WIDTH` entries from `i` on.
     fn at<V: Vector<Number = Self::Number>>(&mut self, i: usize);
 }
 
-/// Treats the entries 1..=n of a row, as many at a time as possible. Entry i always falls on lane
-/// (i - 1) % LANES of a sum kept in as many lanes, whatever the width.
+/// Computes entries 1..=n of a row with the widest vectors that fit. Entry i adds to lane
+/// (i - 1) % LANES of a [`Partial`] for every width.
 #[inline(always)]
 pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number>) {
     let mut i = 1;
@@ -29,31 +29,47 @@ pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number
         i += 4;
     }
     while i <= n {
-        work.at::<One<V::Number>>(i);
+        work.at::<Scalar<V::Number>>(i);
         i += 1;
     }
 }
 
-/// Partial results of a row in doubles: a sum or a maximum in an order that no width changes.
+/// Whether the `width` entries from `i` on contain neither end of a row of `n` entries; one
+/// comparison.
+#[inline(always)]
+pub fn inside_row(i: usize, width: usize, n: usize) -> bool {
+    i.wrapping_sub(2) < n.saturating_sub(width + 1)
+}
+
+/// Slice of the `V::WIDTH` entries from `at` on and one neighbour on each side.
+///
+/// Windows at one place of lists of one length share one bounds check.
+#[inline(always)]
+pub fn window<V: Vector>(list: &[V::Number], at: usize) -> &[V::Number] {
+    &list[at - 1..][..V::WIDTH + 2]
+}
+
+/// Mutable slice of the `V::WIDTH` entries from `at` on; checked like [`window`].
+#[inline(always)]
+pub fn window_mut<V: Vector>(list: &mut [V::Number], at: usize) -> &mut [V::Number] {
+    &mut list[at - 1..][..V::WIDTH + 2][1..][..V::WIDTH]
+}
+
+/// Partial sum of a row in doubles, in an order that does not depend on the width.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub struct Partial([f64; MOST]);
+pub struct Partial([f64; MAX_LANES]);
 
 impl Partial {
-    /// Adds to the lanes of entry `i` and its neighbours.
+    /// Adds entries `i` to `i + V::WIDTH` to their lanes.
     #[inline(always)]
     pub fn add<V: Vector>(&mut self, i: usize, value: V) {
-        value.add_to(&mut self.0[(i - 1) % V::Number::LANES..]);
-    }
-    /// Keeps the larger in the lanes of entry `i` and its neighbours.
-    #[inline(always)]
-    pub fn keep_larger<V: Vector>(&mut self, i: usize, value: V) {
-        value.raise(&mut self.0[(i - 1) % V::Number::LANES..]);
+        value.add_into(&mut self.0[(i - 1) % V::Number::LANES..]);
     }
     /// Sum of the lanes.
     pub fn sum(&self) -> f64 {
         let mut lanes = self.0;
-        let mut half = MOST / 2;
+        let mut half = MAX_LANES / 2;
         while half > 0 {
             for i in 0..half {
                 lanes[i] += lanes[i + half];
@@ -62,8 +78,22 @@ impl Partial {
         }
         lanes[0]
     }
-    /// Largest of the lanes.
-    pub fn largest(&self) -> f64 {
-        self.0.into_iter().fold(0.0, f64::max)
+}
+
+/// Maximum of numbers of a row that are not negative, lane by lane.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub struct Maximum<R>([R; MAX_LANES]);
+
+impl<R: Real> Maximum<R> {
+    /// Includes entries `i` to `i + V::WIDTH`.
+    #[inline(always)]
+    pub fn include<V: Vector<Number = R>>(&mut self, i: usize, value: V) {
+        let lanes = &mut self.0[(i - 1) % R::LANES..];
+        V::load(lanes).max(value).store(lanes);
+    }
+    /// Maximum of the lanes in double precision.
+    pub fn get(&self) -> f64 {
+        self.0.into_iter().map(R::wide).fold(0.0, f64::max)
     }
 }

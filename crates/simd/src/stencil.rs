@@ -1,18 +1,18 @@
-//! Entries of a list at fixed offsets from a place, found in it by one comparison.
+//! Loads at fixed offsets from a position of a list, with one bounds check.
 
 use super::{Real, Vector};
 
-/// Offsets from a place of a list.
+/// Fixed offsets from a position of a list.
 #[derive(Clone, Copy)]
 pub struct Stencil<const N: usize> {
     offsets: [isize; N],
-    /// The lowest and the highest of them.
+    /// Lowest and highest offset.
     low: isize,
     high: isize,
 }
 
 impl<const N: usize> Stencil<N> {
-    /// The stencil with the given offsets [entries].
+    /// Stencil with the given offsets [entries].
     #[inline(always)]
     pub fn new(offsets: [isize; N]) -> Stencil<N> {
         let (mut low, mut high) = (offsets[0], offsets[0]);
@@ -22,21 +22,21 @@ impl<const N: usize> Stencil<N> {
         Stencil { offsets, low, high }
     }
 
-    /// The `V::WIDTH` numbers of a list from each of the places on. Panics where the list does not have them.
+    /// Vectors of `V::WIDTH` numbers that start at each offset from `at`. Panics beyond the list.
     #[inline(always)]
     pub fn load<V: Vector, R: Real>(&self, list: &[R], at: usize) -> [V; N] {
         assert!(self.fits::<V, R>(list, at), "the list goes on");
         let mut found = [V::constant(0.0); N];
         for n in 0..N {
             let at = at.wrapping_add_signed(self.offsets[n]);
-            // SAFETY: no offset is below the lowest or above the highest, between which, and a width
-            // beyond, all entries were found to be in the list.
+            // SAFETY: `fits` found all entries from the lowest offset to a width beyond the highest
+            // one in the list.
             found[n] = V::load_from(unsafe { list.get_unchecked(at..at + V::WIDTH) });
         }
         found
     }
 
-    /// The same with zeros where the list has ended.
+    /// Vectors that start at each offset from `at`, with zeros beyond the end of the list.
     #[inline(always)]
     pub fn load_within<V: Vector, R: Real>(&self, list: &[R], at: usize) -> [V; N] {
         if self.fits::<V, R>(list, at) {
@@ -45,7 +45,7 @@ impl<const N: usize> Stencil<N> {
         let mut found = [V::constant(0.0); N];
         for n in 0..N {
             let at = at.wrapping_add_signed(self.offsets[n]);
-            found[n] = V::load_some(list.get(at..).unwrap_or(&[]));
+            found[n] = V::load_partial(list.get(at..).unwrap_or(&[]));
         }
         found
     }

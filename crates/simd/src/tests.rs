@@ -1,5 +1,6 @@
 //! Every vector against plain numbers.
 
+use super::dispatch::with_avx2;
 use super::plain::Plain;
 use super::*;
 
@@ -19,38 +20,36 @@ impl<R: Real> Kernel for Check<R> {
         check::<V>();
         check::<V::Half>();
         check::<V::Tail>();
-        check::<One<R>>();
+        check::<Scalar<R>>();
     }
 }
 
 #[inline(always)]
 fn check<V: Vector>() {
     let number = V::Number::of;
-    let a: [V::Number; MOST] = std::array::from_fn(|i| number((i as f64 + 0.3).sin()));
-    let b: [V::Number; MOST] = std::array::from_fn(|i| number((i as f64 + 0.7).cos()));
+    let a: [V::Number; MAX_LANES] = std::array::from_fn(|i| number((i as f64 + 0.3).sin()));
+    let b: [V::Number; MAX_LANES] = std::array::from_fn(|i| number((i as f64 + 0.7).cos()));
     let (x, y) = (V::load(&a), V::load(&b));
     let c = V::constant(0.1);
-    let mut found = [[V::Number::default(); MOST]; 10];
+    let mut found = [[V::Number::default(); MAX_LANES]; 10];
     for (found, v) in found.iter_mut().zip([
         x + y,
         x - y,
         x * c,
-        x.over(y),
-        x.larger(y),
-        y.magnitude(),
-        x.smaller(y),
+        x.div(y),
+        x.max(y),
+        y.abs(),
+        x.min(y),
         x.is_below(y),
-        x.where_below(y, c, x),
+        x.select_below(y, c, x),
         x.mul_add(y, c),
     ]) {
         v.store(found);
     }
     assert_eq!(x.mask_below(y).checked_shr(V::WIDTH as u32).unwrap_or(0), 0);
-    let (mut sums, mut tops) = ([1.0; MOST], [0.25; MOST]);
-    x.add_to(&mut sums);
-    x.raise(&mut tops);
-    assert_eq!(sums[V::WIDTH..], [1.0; MOST][V::WIDTH..]);
-    assert_eq!(tops[V::WIDTH..], [0.25; MOST][V::WIDTH..]);
+    let mut sums = [1.0; MAX_LANES];
+    x.add_into(&mut sums);
+    assert_eq!(sums[V::WIDTH..], [1.0; MAX_LANES][V::WIDTH..]);
     for i in 0..V::WIDTH {
         // One operation in double precision rounds to the same single.
         let (a, b) = (a[i].wide(), b[i].wide());
@@ -70,22 +69,28 @@ fn check<V: Vector>() {
             let expected = number(expected).wide();
             assert_eq!(found[i].wide().to_bits(), expected.to_bits());
         }
-        assert_eq!([sums[i], tops[i]], [1.0 + a, a.max(0.25)]);
+        assert_eq!(sums[i], 1.0 + a);
         assert_eq!(x.mask_below(y) >> i & 1 == 1, a < b);
     }
-    let signed: [V::Number; MOST] = std::array::from_fn(|i| number(1.7 * i as f64 - 5.0));
-    let (mut floors, mut roots) = ([V::Number::default(); MOST], [V::Number::default(); MOST]);
+    let signed: [V::Number; MAX_LANES] = std::array::from_fn(|i| number(1.7 * i as f64 - 5.0));
+    let (mut floors, mut roots) = (
+        [V::Number::default(); MAX_LANES],
+        [V::Number::default(); MAX_LANES],
+    );
     V::load(&signed).floor().store(&mut floors);
-    V::load(&signed).magnitude().root().store(&mut roots);
+    V::load(&signed).abs().sqrt().store(&mut roots);
     let entry = |n: usize| 100.5 * (n * n) as f32 - 32768.0;
     let table: Vec<f32> = (0..40).map(entry).collect();
-    let places: [V::Number; MOST] = std::array::from_fn(|i| number((7 * i % 39) as f64));
-    let mut pairs = [[V::Number::default(); MOST]; 2];
-    for (lanes, found) in pairs.iter_mut().zip(V::pairs(&table, V::load(&places))) {
+    let places: [V::Number; MAX_LANES] = std::array::from_fn(|i| number((7 * i % 39) as f64));
+    let mut pairs = [[V::Number::default(); MAX_LANES]; 2];
+    for (lanes, found) in pairs
+        .iter_mut()
+        .zip(V::gather_pairs(&table, V::load(&places)))
+    {
         found.store(lanes);
     }
-    let mut inverses = [V::Number::default(); MOST];
-    (x * x).inverse_root().store(&mut inverses);
+    let mut inverses = [V::Number::default(); MAX_LANES];
+    (x * x).rsqrt().store(&mut inverses);
     for i in 0..V::WIDTH {
         assert_eq!(floors[i].wide(), signed[i].wide().floor());
         assert_eq!(roots[i], number(signed[i].wide().abs().sqrt()));
@@ -98,27 +103,27 @@ fn check<V: Vector>() {
         let within = if V::Number::BYTES == 4 { 1e-6 } else { 2e-10 };
         assert!((square * inverses[i].wide().powi(2) - 1.0).abs() < within);
     }
-    let mut behind = [V::Number::default(); MOST];
-    x.behind(y).store(&mut behind);
+    let mut behind = [V::Number::default(); MAX_LANES];
+    x.shift(y).store(&mut behind);
     assert_eq!(behind[0], b[V::WIDTH - 1]);
     assert_eq!(behind[1..V::WIDTH], a[..V::WIDTH - 1]);
-    let doubles: [f64; MOST] = std::array::from_fn(|i| (i as f64 + 0.1).sin());
-    let (mut back, mut exact) = ([0.0; MOST], [0.0_f32; MOST]);
+    let doubles: [f64; MAX_LANES] = std::array::from_fn(|i| (i as f64 + 0.1).sin());
+    let (mut back, mut exact) = ([0.0; MAX_LANES], [0.0_f32; MAX_LANES]);
     V::load_from(&doubles).store_to(&mut back);
     V::load_from(&doubles).store_to(&mut exact);
     for i in 0..V::WIDTH {
         assert_eq!(back[i], number(doubles[i]).wide());
         assert_eq!(exact[i], doubles[i] as f32);
     }
-    let rows: [[V::Number; MOST]; MOST] =
+    let rows: [[V::Number; MAX_LANES]; MAX_LANES] =
         std::array::from_fn(|row| std::array::from_fn(|i| number((20 * row + i) as f64)));
-    let mut block = [V::constant(0.0); MOST];
+    let mut block = [V::constant(0.0); MAX_LANES];
     for (v, row) in block.iter_mut().zip(&rows) {
         *v = V::load(row);
     }
     V::transpose(&mut block);
     for i in 0..V::WIDTH {
-        let mut column = [V::Number::default(); MOST];
+        let mut column = [V::Number::default(); MAX_LANES];
         block[i].store(&mut column);
         for row in 0..V::WIDTH {
             assert_eq!(column[row], rows[row][i]);
@@ -135,7 +140,7 @@ fn all_vectors_compute_alike() {
 }
 
 fn each_level<R: Real>() {
-    Check::<R>::new().run::<R::Common>();
+    Check::<R>::new().run::<R::Baseline>();
     dispatch(Check::<R>::new());
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
@@ -148,6 +153,7 @@ fn each_level<R: Real>() {
 struct Sum<'a, R> {
     row: &'a [R],
     sum: &'a mut Partial,
+    maximum: &'a mut Maximum<R>,
     seen: &'a mut Vec<usize>,
 }
 impl<R: Real> RowWork for Sum<'_, R> {
@@ -155,6 +161,7 @@ impl<R: Real> RowWork for Sum<'_, R> {
     #[inline(always)]
     fn at<V: Vector<Number = R>>(&mut self, i: usize) {
         self.sum.add(i, V::load(&self.row[i..]));
+        self.maximum.include(i, V::load(&self.row[i..]));
         self.seen.extend(i..i + V::WIDTH);
     }
 }
@@ -171,17 +178,21 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
     fn sums<R: Real>(n: usize) {
         let row: Vec<R> = (0..=n).map(|i| R::of((i as f64).sin())).collect();
         let sum = |run: fn(Sum<R>)| {
-            let (mut sum, mut seen) = (Partial::default(), Vec::new());
+            let (mut sum, mut maximum) = (Partial::default(), Maximum::default());
+            let mut seen = Vec::new();
             run(Sum {
                 row: &row,
                 sum: &mut sum,
+                maximum: &mut maximum,
                 seen: &mut seen,
             });
             assert_eq!(seen, (1..=n).collect::<Vec<_>>());
+            let largest = row[1..].iter().fold(0.0, |top, x| x.wide().max(top));
+            assert_eq!(maximum.get(), largest);
             sum.sum()
         };
-        let one = sum(|work| work.run::<One<R>>());
-        assert_eq!(one, sum(|work| work.run::<R::Common>()));
+        let one = sum(|work| work.run::<Scalar<R>>());
+        assert_eq!(one, sum(|work| work.run::<R::Baseline>()));
         assert_eq!(one, sum(|work| dispatch(work)));
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
@@ -197,6 +208,19 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
     }
 }
 
+#[test]
+fn vectors_inside_a_row_contain_neither_end() {
+    for n in 0..20 {
+        for (i, width) in (1..25).flat_map(|i| [1, 4, 8].map(|width| (i, width))) {
+            assert_eq!(
+                inside_row(i, width, n),
+                i > 1 && i + width <= n,
+                "{i} {width} {n}"
+            );
+        }
+    }
+}
+
 /// Reads and writes at the end of a list.
 struct Ends<R>(R);
 
@@ -206,15 +230,15 @@ impl<R: Real> Kernel for Ends<R> {
     fn run<V: Vector<Number = f64>>(self) {
         let list: Vec<R> = (1..40).map(|n| R::of(f64::from(n))).collect();
         for at in [0, 3, 30, 31, 36, 38, 39] {
-            let mut lanes = [9.0; MOST];
-            V::load_some(&list[at..]).store(&mut lanes);
+            let mut lanes = [9.0; MAX_LANES];
+            V::load_partial(&list[at..]).store(&mut lanes);
             for n in 0..V::WIDTH {
                 let entry = list.get(at + n).map_or(0.0, |entry| entry.wide());
                 assert_eq!(lanes[n], entry, "{at} {n}");
             }
             for end in at..=list.len() {
                 let mut copy = list.clone();
-                V::constant(0.5).store_some(&mut copy[at..end]);
+                V::constant(0.5).store_partial(&mut copy[at..end]);
                 for (n, (new, old)) in copy.iter().zip(&list).enumerate() {
                     let written = (at..end.min(at + V::WIDTH)).contains(&n);
                     let expected = if written { 0.5 } else { old.wide() };
@@ -240,11 +264,11 @@ fn lists_may_end_within_a_vector() {
     fn ends<R: Real>() {
         let ends = || Ends(R::default());
         dispatch(ends());
-        if level() >= Level::Avx2 {
+        if instructions() >= InstructionSet::Avx2 {
             ends().run::<<f64 as Registers>::Avx2>();
         }
-        ends().run::<<f64 as Registers>::Common>();
-        ends().run::<One<f64>>();
+        ends().run::<<f64 as Registers>::Baseline>();
+        ends().run::<Scalar<f64>>();
     }
     ends::<f64>();
     ends::<f32>();
@@ -263,7 +287,7 @@ impl Kernel for Around {
         for at in [0, 1, 2, 10, 20, 38, 50, 58, 70, usize::MAX] {
             let found = stencil.load_within::<V, f32>(&list, at);
             for (offset, found) in offsets.into_iter().zip(found) {
-                let mut lanes = [0.0; MOST];
+                let mut lanes = [0.0; MAX_LANES];
                 found.store(&mut lanes);
                 for n in 0..V::WIDTH {
                     let place = at.wrapping_add_signed(offset).wrapping_add(n);
@@ -275,7 +299,7 @@ impl Kernel for Around {
             }
         }
         let all = stencil.load::<V, f32>(&list, 2);
-        let mut lanes = [0.0; MOST];
+        let mut lanes = [0.0; MAX_LANES];
         all[2].store(&mut lanes);
         assert_eq!(lanes[0], 1.0);
     }
@@ -284,12 +308,12 @@ impl Kernel for Around {
 #[test]
 fn stencils_read_what_is_there() {
     dispatch(Around);
-    Around.run::<<f64 as Registers>::Common>();
-    Around.run::<One<f64>>();
+    Around.run::<<f64 as Registers>::Baseline>();
+    Around.run::<Scalar<f64>>();
     let list = [1.0; 40];
     for (offsets, at) in [([0, 39], 1), ([-3, 0], 2), ([isize::MIN, isize::MAX], 20)] {
         let stencil = Stencil::new(offsets);
-        let read = || stencil.load::<One<f64>, f64>(&list, at);
+        let read = || stencil.load::<Scalar<f64>, f64>(&list, at);
         assert!(std::panic::catch_unwind(read).is_err(), "{offsets:?}");
     }
 }

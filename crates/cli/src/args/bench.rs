@@ -1,7 +1,7 @@
 //! Arguments of `bench`.
 
 use clap::Args;
-use grainwake_solver::math::Precision;
+use grainwake_solver::math::{InstructionSet, Precision};
 
 /// Arguments of `bench`.
 #[derive(Debug, Args)]
@@ -24,6 +24,9 @@ pub struct BenchArgs {
     /// Floating-point type of the fields
     #[arg(long, value_name = "f64|f32", default_value_t = Precision::Double)]
     pub precision: Precision,
+    /// Instruction set; one that the processor lacks is an error [default: the widest it has]
+    #[arg(long, value_name = "baseline|avx2|avx512")]
+    pub instructions: Option<InstructionSet>,
     /// Measure cubes of 32 to 256 cells along an edge instead, some with large prime factors
     #[arg(long, conflicts_with = "size")]
     pub scaling: bool,

@@ -1,4 +1,4 @@
-//! Incompressible Navier-Stokes on the staggered grid (Eqs 1-4). Knows no grain.
+//! Incompressible Navier-Stokes on the staggered grid (Eqs 1-4), without grains.
 //!
 //! Adams-Bashforth for advection and diffusion, incremental pressure correction, one direct
 //! Poisson solve a step.

@@ -12,7 +12,7 @@ pub enum Advection {
     Central,
 }
 
-/// The fluid.
+/// Properties of the fluid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluidParams {
     /// Density [kg/m^3].

@@ -1,4 +1,4 @@
-//! The flow between prediction and projection, as grains see and change it.
+//! Access of the immersed boundary to the flow between prediction and projection.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::grid::{Centre, FaceVector, Field, Mesh, Part, for_slabs};
 use crate::math::Real;
 use grainwake_simd::Vector;
 
-/// What the prediction was made of.
+/// State at t^n from which the prediction was computed.
 pub struct Known<'a, R> {
     pub mesh: &'a Mesh,
     pub boundaries: &'a Boundaries,
@@ -17,11 +17,11 @@ pub struct Known<'a, R> {
     pub velocity: &'a FaceVector<R>,
     /// Dynamic pressure over density p^n [m^2/s^2].
     pub pressure: &'a Field<Centre, R>,
-    /// [m/s^2]
+    /// Uniform acceleration that drives the flow [m/s^2].
     pub body_acceleration: DVec3,
 }
 
-/// One component of the predicted velocity u* and of the tendency H^n it came of, or a slab of them.
+/// One component of the predicted velocity u* and of the tendency H^n, of the box or of a slab.
 pub struct Prediction<'a, R> {
     /// Weight of H^n in u* [s].
     weight: f64,
@@ -30,7 +30,7 @@ pub struct Prediction<'a, R> {
 }
 
 impl<R: Real> Flow<R> {
-    /// What is known, and what has been predicted of each component.
+    /// State at t^n, and the prediction of each component.
     pub fn prediction(&mut self) -> (Known<'_, R>, [Prediction<'_, R>; 3]) {
         let weight = self.weight;
         let known = Known {
@@ -59,7 +59,7 @@ impl<R: Real> Flow<R> {
     }
 }
 
-/// Two fields by component.
+/// Components of two vector fields, paired by axis.
 fn fields<'a, R>(
     one: &'a mut FaceVector<R>,
     other: &'a mut FaceVector<R>,
@@ -87,22 +87,22 @@ impl<'a, R: Real> Prediction<'a, R> {
         }
     }
 
-    /// The same once more.
+    /// Second handle to the same faces.
     ///
     /// # Safety
-    /// As long as both are in use, no face that is changed by one is read or changed by the other.
-    pub unsafe fn again(&self) -> Prediction<'a, R> {
-        // SAFETY: as the caller has promised.
+    /// While both exist, no face that one handle changes is read or changed through the other.
+    pub unsafe fn alias(&self) -> Prediction<'a, R> {
+        // SAFETY: guaranteed by the caller.
         unsafe {
             Prediction {
                 weight: self.weight,
-                tendency: self.tendency.again(),
-                velocity: self.velocity.again(),
+                tendency: self.tendency.alias(),
+                velocity: self.velocity.alias(),
             }
         }
     }
 
-    /// Where in memory it lies.
+    /// Positions of the faces in the memory of the field.
     pub fn range(&self) -> &Range<usize> {
         self.velocity.range()
     }
@@ -113,16 +113,21 @@ impl<'a, R: Real> Prediction<'a, R> {
         self.velocity.row(at, count)
     }
 
-    /// The same, to be changed.
+    /// Mutable u* of `count` faces from position `at` on [m/s].
     #[inline(always)]
     pub fn velocity_mut(&mut self, at: usize, count: usize) -> &mut [R] {
         self.velocity.row_mut(at, count)
     }
 
-    /// Adds the first `count` of `extra` [m/s^2] to the tendency of the faces from position `at` on, as if they had
-    /// been part of H^n. Vectors reach beyond what counts of that list.
+    /// Adds the first `count` entries of `extra` [m/s^2] to H^n of the faces from position `at` on,
+    /// and updates u*. `extra` must be padded to whole vectors.
     #[inline(always)]
-    pub fn push<V: Vector<Number = f64>>(&mut self, at: usize, count: usize, extra: &[f64]) {
+    pub fn add_tendency<V: Vector<Number = f64>>(
+        &mut self,
+        at: usize,
+        count: usize,
+        extra: &[f64],
+    ) {
         let (tendency, velocity) = (
             self.tendency.row_mut(at, count),
             self.velocity.row_mut(at, count),
@@ -130,8 +135,8 @@ impl<'a, R: Real> Prediction<'a, R> {
         let weight = V::constant(self.weight);
         for n in (0..count).step_by(V::WIDTH) {
             let extra = V::load(&extra[n..]);
-            extra.add_some(&mut tendency[n..]);
-            (weight * extra).add_some(&mut velocity[n..]);
+            extra.add_partial(&mut tendency[n..]);
+            (weight * extra).add_partial(&mut velocity[n..]);
         }
     }
 }

@@ -1,8 +1,8 @@
-//! The sweeps of the projection: the divergence of the prediction, and the correction by the
-//! pressure increment with everything that it measures, each a plane at a time while that plane is
-//! in cache.
+//! Kernels of the projection, one plane at a time: divergence of the prediction; correction of
+//! velocity and pressure by the increment, with the measures of the flow.
 //!
-//! Legend: u, v, w components along x, y, z; f pressure increment phi over density.
+//! Legend: u, v, w components along x, y, z; q any of them; f pressure increment phi over density;
+//! suffixes as in `tendency.rs`: l/r left and right in x, m/p down and up in y, b/t in z.
 
 use glam::DVec3;
 
@@ -10,15 +10,17 @@ use super::FlowMeasures;
 use crate::grid::{FaceVector, Layout};
 use crate::math::Real;
 use crate::poisson::{Plane, Solution};
-use grainwake_simd::{Kernel, One, Partial, RowWork, Vector, along_row};
+use grainwake_simd::{
+    Kernel, Maximum, Partial, RowWork, Scalar, Vector, along_row, inside_row, window, window_mut,
+};
 
-/// What one plane contributes to the measures.
+/// Contribution of one plane to the measures of the flow.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PlaneMeasures {
     pub flow: FlowMeasures,
     /// Sum of the tendencies over the unknown faces [m/s^2].
     pub tendency: DVec3,
-    /// Pressure at the upper end less that at the lower end, summed over the lines along x and y.
+    /// Pressure difference between upper and lower end, summed over the lines along x and along y.
     pub pressure_rise: [f64; 2],
 }
 
@@ -48,27 +50,25 @@ impl<R: Real> Kernel for Divergence<'_, R> {
             out,
         } = self;
         let [n, ny, nz] = layout.cells;
-        let row = layout.row();
+        let u = layout.plane_of(&predicted.x, k);
+        let v = layout.plane_of(&predicted.y, k);
+        let w = layout.plane_of(&predicted.z, k);
+        let wt = layout.plane_of(&predicted.z, next(k, nz, periodic[2]));
         for j in 1..=ny {
-            let at = layout.index(0, j, k);
-            let up = layout.index(0, next(j, ny, periodic[1]), k);
-            let above = layout.index(0, j, next(k, nz, periodic[2]));
             let mut work = DivergenceRow {
-                u: &predicted.x[at..][..row],
-                v: &predicted.y[at..][..row],
-                vp: &predicted.y[up..][..row],
-                w: &predicted.z[at..][..row],
-                wp: &predicted.z[above..][..row],
+                u: layout.row_of(u, j),
+                v: layout.row_of(v, j),
+                vp: layout.row_of(v, next(j, ny, periodic[1])),
+                w: layout.row_of(w, j),
+                wt: layout.row_of(wt, j),
                 inverse,
                 dt,
-                out: out.row_mut(j),
+                out: &mut out.row_mut(j)[..n + 2],
             };
             if periodic[0] {
                 // The upper face of the last cell is the lower face of the first.
                 along_row::<V>(n - 1, &mut work);
-                let last = [work.u[n], work.u[1]];
-                work.u = &last;
-                work.value::<One<R>>(n, 0);
+                work.value(n, Scalar(work.u[1]));
             } else {
                 along_row::<V>(n, &mut work);
             }
@@ -76,34 +76,35 @@ impl<R: Real> Kernel for Divergence<'_, R> {
     }
 }
 
-/// The layer above layer `at` of an axis.
+/// Index of the layer above layer `at` of an axis with `n` layers.
 #[inline(always)]
 fn next(at: usize, n: usize, periodic: bool) -> usize {
     if at == n && periodic { 1 } else { at + 1 }
 }
 
+/// One row of cells. All slices have one length, so that one bounds check serves all of them.
 struct DivergenceRow<'a, R> {
     u: &'a [R],
     v: &'a [R],
     vp: &'a [R],
     w: &'a [R],
-    wp: &'a [R],
+    wt: &'a [R],
     inverse: [f64; 3],
     dt: f64,
     out: &'a mut [R],
 }
 
 impl<R: Real> DivergenceRow<'_, R> {
-    /// Entries from `i` on, the x faces from place `at` of `u` on.
+    /// Cells from `i` on, whose upper x faces have the velocity `ur`.
     #[inline(always)]
-    fn value<V: Vector<Number = R>>(&mut self, i: usize, at: usize) {
-        let load = |row: &[R]| V::load(&row[i..]);
+    fn value<V: Vector<Number = R>>(&mut self, i: usize, ur: V) {
+        let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
         let [x, y, z] = self.inverse.map(V::constant);
-        let u = [V::load(&self.u[at..]), V::load(&self.u[at + 1..])];
-        let sum = (u[1] - u[0]) * x
-            + (load(self.vp) - load(self.v)) * y
-            + (load(self.wp) - load(self.w)) * z;
-        sum.over(V::constant(self.dt)).store(&mut self.out[i..]);
+        let sum = (ur - here(self.u)) * x
+            + (here(self.vp) - here(self.v)) * y
+            + (here(self.wt) - here(self.w)) * z;
+        sum.div(V::constant(self.dt))
+            .store(window_mut::<V>(self.out, i));
     }
 }
 
@@ -111,11 +112,12 @@ impl<R: Real> RowWork for DivergenceRow<'_, R> {
     type Number = R;
     #[inline(always)]
     fn at<V: Vector<Number = R>>(&mut self, i: usize) {
-        self.value::<V>(i, i);
+        let ur = V::load(&window::<V>(self.u, i)[2..]);
+        self.value(i, ur);
     }
 }
 
-/// One plane of u = u* - dt grad f and p += f; ghosts are left to the caller.
+/// Correction of one plane: u = u* - dt grad f, p += f; the caller fills the ghosts.
 pub struct Correct<'a, R> {
     pub layout: Layout,
     pub predicted: &'a FaceVector<R>,
@@ -125,8 +127,8 @@ pub struct Correct<'a, R> {
     pub inverse: [f64; 3],
     /// dt/h along each axis [s/m].
     pub pull: [f64; 3],
-    /// Whether the velocity is written past the caches.
-    pub past_caches: bool,
+    /// Whether the velocity is written with non-temporal stores.
+    pub non_temporal: bool,
     pub velocity: [&'a mut [R]; 3],
     pub pressure: &'a mut [R],
     pub measures: &'a mut PlaneMeasures,
@@ -137,58 +139,66 @@ impl<R: Real> Kernel for Correct<'_, R> {
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
         let (layout, k, periodic) = (self.layout, self.k, self.periodic);
-        let (row, [n, ny, nz]) = (layout.row(), layout.cells);
-        let [x, y, z] = self.velocity;
-        let (predicted, solution) = (self.predicted, self.solution);
-        let mut partial = CorrectPartial::default();
+        let [n, ny, nz] = layout.cells;
+        let u = layout.plane_of(&self.predicted.x, k);
+        let v = layout.plane_of(&self.predicted.y, k);
+        let w = layout.plane_of(&self.predicted.z, k);
+        let wt = layout.plane_of(&self.predicted.z, next(k, nz, periodic[2]));
+        let [x, y, z] = self.velocity.map(|plane| &mut plane[..layout.plane()]);
+        let p = &mut self.pressure[..layout.plane()];
+        let Solution {
+            here: f,
+            below: fb,
+            above: ft,
+        } = self.solution;
+        let mut partial = CorrectPartial::<R>::default();
         let mut rise = [0.0; 2];
         for j in 1..=ny {
-            let (at, here) = (layout.index(0, j, k), j * row..(j + 1) * row);
-            let up = layout.index(0, next(j, ny, periodic[1]), k);
-            let above = layout.index(0, j, next(k, nz, periodic[2]));
             let mut work = CorrectRow {
-                q: [0, 1, 2].map(|axis| &predicted.component(axis)[at..][..row]),
-                u: &predicted.x[at..][..row],
-                vp: &predicted.y[up..][..row],
-                wp: &predicted.z[above..][..row],
-                f: solution.here.row(j),
-                lower: [solution.here.row(j - 1), solution.below.row(j)],
-                upper: [solution.here.row(j + 1), solution.above.row(j)],
+                q: [
+                    layout.row_of(u, j),
+                    layout.row_of(v, j),
+                    layout.row_of(w, j),
+                ],
+                vp: layout.row_of(v, next(j, ny, periodic[1])),
+                wt: layout.row_of(wt, j),
+                f: &f.row(j)[..n + 2],
+                lower: [&f.row(j - 1)[..n + 2], &fb.row(j)[..n + 2]],
+                upper: [&f.row(j + 1)[..n + 2], &ft.row(j)[..n + 2]],
                 inverse: self.inverse,
                 pull: self.pull,
                 out: [
-                    &mut x[here.clone()],
-                    &mut y[here.clone()],
-                    &mut z[here.clone()],
+                    layout.row_of_mut(x, j),
+                    layout.row_of_mut(y, j),
+                    layout.row_of_mut(z, j),
                 ],
-                pressure: &mut self.pressure[here],
-                n,
-                past_caches: self.past_caches,
+                pressure: layout.row_of_mut(p, j),
+                streamed: if self.non_temporal { n } else { 0 },
                 partial: &mut partial,
                 given: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
             };
             if periodic[0] {
+                // The upper face of the last cell is the lower face of the first.
                 along_row::<V>(n - 1, &mut work);
-                let last = [work.u[n], work.u[1]];
-                work.u = &last;
-                work.value::<One<R>>(n, 0);
+                work.value(n, Scalar(work.q[0][1]));
             } else {
                 along_row::<V>(n, &mut work);
-                // The lower boundary face was summed with the others.
-                let given = -x[j * row + 1].wide();
-                partial.momentum[0].add(1, One::<R>::constant(given));
+                // The sum contains the lower boundary face, which is no unknown.
+                let given = -work.out[0][1].wide();
+                work.partial.momentum[0].add(1, Scalar::<R>::constant(given));
             }
-            rise[0] += self.pressure[j * row + n].wide() - self.pressure[j * row + 1].wide();
+            rise[0] += work.pressure[n].wide() - work.pressure[1].wide();
         }
+        let (first, last) = (layout.row_of(p, 1), layout.row_of(p, ny));
         for i in 1..=n {
-            rise[1] += self.pressure[ny * row + i].wide() - self.pressure[row + i].wide();
+            rise[1] += last[i].wide() - first[i].wide();
         }
         V::fence();
         *self.measures = PlaneMeasures {
             flow: FlowMeasures {
-                max_divergence: partial.divergence.largest(),
-                max_rate: partial.rate.largest(),
-                max_velocity: partial.square.largest(),
+                max_divergence: partial.divergence.get(),
+                max_rate: partial.rate.get(),
+                max_velocity: partial.square.get(),
                 kinetic_energy: 0.5 * partial.kinetic.sum(),
                 momentum: DVec3::from_array(partial.momentum.map(|sum| sum.sum())),
             },
@@ -198,82 +208,78 @@ impl<R: Real> Kernel for Correct<'_, R> {
     }
 }
 
+/// Partial measures of a plane.
 #[derive(Default)]
-struct CorrectPartial {
-    divergence: Partial,
-    rate: Partial,
-    square: Partial,
+struct CorrectPartial<R> {
+    divergence: Maximum<R>,
+    rate: Maximum<R>,
+    square: Maximum<R>,
     kinetic: Partial,
     momentum: [Partial; 3],
 }
 
+/// One row of cells. All slices have one length, so that one bounds check serves all of them.
 struct CorrectRow<'a, R> {
+    /// Prediction on the lower faces, and on the upper ones along y and z.
     q: [&'a [R]; 3],
-    /// Prediction on the upper faces: from place `at` + 1, one row up in y and in z.
-    u: &'a [R],
     vp: &'a [R],
-    wp: &'a [R],
+    wt: &'a [R],
     f: &'a [R],
-    /// The increment one row down in y and in z, and one up.
+    /// Increment one row down in y and in z, and one row up.
     lower: [&'a [R]; 2],
     upper: [&'a [R]; 2],
     inverse: [f64; 3],
     pull: [f64; 3],
     out: [&'a mut [R]; 3],
     pressure: &'a mut [R],
-    n: usize,
-    past_caches: bool,
-    partial: &'a mut CorrectPartial,
+    /// Entries of the row if written with non-temporal stores, else 0.
+    streamed: usize,
+    partial: &'a mut CorrectPartial<R>,
+    /// Components whose faces on the whole row have a given velocity.
     given: [bool; 3],
 }
 
 impl<R: Real> CorrectRow<'_, R> {
-    /// Entries from `i` on, the upper x faces from place `at` + 1 of `u` on.
+    /// Cells from `i` on, whose upper x faces have the predicted velocity `ur`.
     #[inline(always)]
-    fn value<V: Vector<Number = R>>(&mut self, i: usize, at: usize) {
-        let load = |row: &[R]| V::load(&row[i..]);
-        let f = load(self.f);
-        let lower = [
-            V::load(&self.f[i - 1..]),
-            load(self.lower[0]),
-            load(self.lower[1]),
-        ];
-        let upper = [
-            V::load(&self.f[i + 1..]),
-            load(self.upper[0]),
-            load(self.upper[1]),
-        ];
-        let above = [V::load(&self.u[at + 1..]), load(self.vp), load(self.wp)];
+    fn value<V: Vector<Number = R>>(&mut self, i: usize, ur: V) {
+        let left = |row: &[R]| V::load(window::<V>(row, i));
+        let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
+        let right = |row: &[R]| V::load(&window::<V>(row, i)[2..]);
+        let f = here(self.f);
+        let lower = [left(self.f), here(self.lower[0]), here(self.lower[1])];
+        let upper = [right(self.f), here(self.upper[0]), here(self.upper[1])];
+        let above = [ur, here(self.vp), here(self.wt)];
         let zero = V::constant(0.0);
         let (mut square, mut rate, mut divergence) = (zero, zero, zero);
-        // The ends of a row are looked at again for the ghosts.
-        let past = self.past_caches && i > 1 && i + V::WIDTH <= self.n;
+        // The ghosts are filled from the ends of a row, which therefore stay in the cache.
+        let streamed = inside_row(i, V::WIDTH, self.streamed);
         for axis in 0..3 {
             let (pull, inverse) = (
                 V::constant(self.pull[axis]),
                 V::constant(self.inverse[axis]),
             );
-            let q = load(self.q[axis]) - pull * (f - lower[axis]);
+            let q = here(self.q[axis]) - pull * (f - lower[axis]);
             let next = above[axis] - pull * (upper[axis] - f);
-            let to = &mut self.out[axis][i..];
-            if past {
-                q.store_past(to);
+            let to = window_mut::<V>(self.out[axis], i);
+            if streamed {
+                q.store_non_temporal(to);
             } else {
                 q.store(to);
             }
             square = square + q * q;
-            rate = rate + q.magnitude() * inverse;
+            rate = rate + q.abs() * inverse;
             divergence = divergence + (next - q) * inverse;
             if !self.given[axis] {
                 self.partial.momentum[axis].add(i, q);
             }
         }
-        let p = &mut self.pressure[i..];
+        let p = window_mut::<V>(self.pressure, i);
         (V::load(p) + f).store(p);
         let partial = &mut *self.partial;
-        partial.divergence.keep_larger(i, divergence.magnitude());
-        partial.rate.keep_larger(i, rate);
-        partial.square.keep_larger(i, square);
+        partial.divergence.include(i, divergence.abs());
+        partial.rate.include(i, rate);
+        partial.square.include(i, square);
         partial.kinetic.add(i, square);
     }
 }
@@ -282,6 +288,7 @@ impl<R: Real> RowWork for CorrectRow<'_, R> {
     type Number = R;
     #[inline(always)]
     fn at<V: Vector<Number = R>>(&mut self, i: usize) {
-        self.value::<V>(i, i);
+        let ur = V::load(&window::<V>(self.q[0], i)[2..]);
+        self.value(i, ur);
     }
 }

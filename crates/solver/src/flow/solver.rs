@@ -1,19 +1,19 @@
-//! The flow: predict without the divergence constraint, project onto it.
+//! Time step of the flow: prediction without the divergence constraint, projection onto it.
 //!
 //! Legend: u velocity, p dynamic pressure over density, phi its increment, H tendency.
 
 use glam::DVec3;
 
-use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, for_planes_of, row_blocks};
+use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, Slab, for_planes_of};
 use crate::math::{Real, last_cache};
 use crate::poisson::{Plane, Poisson, Stages};
 use grainwake_simd::dispatch;
 
 use super::project::{Correct, Divergence, PlaneMeasures};
-use super::tendency::{Coefficients, PLANES_AT_ONCE, PredictPlane, Weights};
+use super::tendency::{Coefficients, PredictPlane, Weights};
 use super::{Boundaries, FluidParams};
 
-/// What a projection measures on the way, over the whole grid.
+/// Measures of the flow over the whole grid after a projection.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FlowMeasures {
     /// Largest |div u| [1/s].
@@ -31,6 +31,8 @@ pub struct FlowMeasures {
 /// State of the fluid.
 pub struct Flow<R = f64> {
     pub(super) mesh: Mesh,
+    /// Planes whose fields this flow holds: today the whole box.
+    slab: Slab,
     pub(super) boundaries: Boundaries,
     pub(super) coefficients: Coefficients,
     /// Velocity u^n [m/s].
@@ -41,35 +43,37 @@ pub struct Flow<R = f64> {
     pub pressure: Field<Centre, R>,
     pub(super) tendency: FaceVector<R>,
     poisson: Poisson<R>,
-    /// Whether what is written as a whole goes past the caches.
-    past_caches: bool,
+    /// Whether fields are written with non-temporal stores.
+    non_temporal: bool,
     partial: Vec<PlaneMeasures>,
     previous_step: Option<f64>,
     pub(super) weight: f64,
-    /// Sums of H over the unknown faces, of the last step and of the one before, three each.
+    /// Sums of H over the unknown faces: three of the previous step, then three of the last one.
     tendency_sums: [f64; 6],
     impulse: DVec3,
-    /// Pressure at the upper end less that at the lower end, summed over the lines along each axis.
+    /// Pressure difference between upper and lower end, summed over the lines along each axis.
     pressure_rise: DVec3,
 }
 
 impl<R: Real> Flow<R> {
-    /// Fluid at its initial velocity, made free of divergence.
+    /// Fluid at the initial velocity, projected onto the divergence-free fields.
     pub fn new(mesh: &Mesh, boundaries: Boundaries, params: &FluidParams) -> Flow<R> {
+        let slab = mesh.whole();
         let mut flow = Flow {
             mesh: *mesh,
+            slab,
             boundaries,
             coefficients: Coefficients::new(
                 mesh,
                 params.kinematic_viscosity,
                 params.body_acceleration,
             ),
-            velocity: FaceVector::zeros(mesh),
-            predicted: FaceVector::zeros(mesh),
-            pressure: Field::zeros(mesh),
-            tendency: FaceVector::zeros(mesh),
+            velocity: FaceVector::zeros(&slab),
+            predicted: FaceVector::zeros(&slab),
+            pressure: Field::zeros(&slab),
+            tendency: FaceVector::zeros(&slab),
             poisson: Poisson::new(mesh, boundaries.pressure_ends()),
-            past_caches: false,
+            non_temporal: false,
             partial: vec![PlaneMeasures::default(); mesh.cells[2]],
             previous_step: None,
             weight: 0.0,
@@ -77,8 +81,8 @@ impl<R: Real> Flow<R> {
             impulse: DVec3::ZERO,
             pressure_rise: DVec3::ZERO,
         };
-        flow.past_caches = flow.bytes() > last_cache() / 4 * 3;
-        flow.poisson.past_caches = flow.past_caches;
+        flow.non_temporal = flow.bytes() > last_cache() / 4 * 3;
+        flow.poisson.non_temporal = flow.non_temporal;
         flow.velocity.x.fill(R::of(params.initial_velocity.x));
         flow.velocity.y.fill(R::of(params.initial_velocity.y));
         flow.velocity.z.fill(R::of(params.initial_velocity.z));
@@ -86,22 +90,22 @@ impl<R: Real> Flow<R> {
         flow
     }
 
-    /// Starts from the velocity `component(axis, position)` [m/s, m], made free of divergence.
+    /// Sets the velocity to `component(axis, position)` [m/s, m] and projects.
     pub fn start_from(&mut self, component: impl Fn(usize, DVec3) -> f64) {
-        let mesh = self.mesh;
-        self.velocity.x.fill_with(&mesh, |at| component(0, at));
-        self.velocity.y.fill_with(&mesh, |at| component(1, at));
-        self.velocity.z.fill_with(&mesh, |at| component(2, at));
+        let slab = self.slab;
+        self.velocity.x.fill_with(&slab, |at| component(0, at));
+        self.velocity.y.fill_with(&slab, |at| component(1, at));
+        self.velocity.z.fill_with(&slab, |at| component(2, at));
         self.make_solenoidal();
     }
 
-    /// Uniform acceleration that drives the flow from now on [m/s^2].
+    /// Sets the uniform acceleration that drives the flow [m/s^2].
     pub fn set_body_acceleration(&mut self, acceleration: DVec3) {
         self.coefficients.acceleration = acceleration;
     }
 
-    /// Projects the present velocity onto the divergence-free fields with the given boundaries;
-    /// the pressure is left alone. For initial states.
+    /// Projects the velocity onto the divergence-free fields and keeps the pressure; for initial
+    /// states.
     pub fn make_solenoidal(&mut self) -> FlowMeasures {
         for axis in 0..3 {
             self.predicted
@@ -117,8 +121,8 @@ impl<R: Real> Flow<R> {
         measures
     }
 
-    /// u* = u + dt (3/2 H^n - 1/2 H^{n-1}) - dt grad p^n, with the weights of a changing step;
-    /// the first step is Euler's. Boundary faces of u* are those of the new time.
+    /// Predicts u* = u + dt (3/2 H^n - 1/2 H^{n-1}) - dt grad p^n, with the weights of a variable
+    /// time step; the first step is forward Euler. Boundary faces of u* have the new velocity.
     pub fn predict(&mut self, dt: f64) {
         let ratio = self.previous_step.map_or(0.0, |previous| dt / previous);
         let (now, before) = (dt * (1.0 + 0.5 * ratio), -dt * 0.5 * ratio);
@@ -129,42 +133,34 @@ impl<R: Real> Flow<R> {
         };
         let (layout, walled) = (self.mesh.layout(), self.boundaries.walled());
         let (velocity, pressure, boundaries) = (&self.velocity, &self.pressure, &self.boundaries);
-        let (coefficients, past_caches) = (&self.coefficients, self.past_caches);
+        let (coefficients, non_temporal) = (&self.coefficients, self.non_temporal);
         let FaceVector { x, y, z } = &mut self.tendency;
         let FaceVector {
             x: px,
             y: py,
             z: pz,
         } = &mut self.predicted;
-        self.partial
-            .iter_mut()
-            .for_each(|plane| plane.tendency = DVec3::ZERO);
-        for rows in row_blocks(layout, PLANES_AT_ONCE * R::BYTES) {
-            for_planes_of(
-                layout,
-                [&mut *x, y, z, px, py, pz],
-                &mut self.partial,
-                |k, [x, y, z, px, py, pz], partial| {
-                    dispatch(PredictPlane {
-                        layout,
-                        coefficients,
-                        weights,
-                        velocity,
-                        pressure,
-                        walled,
-                        k,
-                        past_caches,
-                        rows: rows.clone(),
-                        tendency: [x, y, z],
-                        predicted: [&mut *px, &mut *py, pz],
-                        sum: &mut partial.tendency,
-                    });
-                    if rows.end > layout.cells[1] {
-                        boundaries.set_normal_of_plane(layout, [px, py]);
-                    }
-                },
-            );
-        }
+        for_planes_of(
+            layout,
+            [&mut *x, y, z, px, py, pz],
+            &mut self.partial,
+            |k, [x, y, z, px, py, pz], partial| {
+                dispatch(PredictPlane {
+                    layout,
+                    coefficients,
+                    weights,
+                    velocity,
+                    pressure,
+                    walled,
+                    k,
+                    non_temporal,
+                    tendency: [x, y, z],
+                    predicted: [&mut *px, &mut *py, pz],
+                    sum: &mut partial.tendency,
+                });
+                boundaries.set_normal_of_plane(layout, [px, py]);
+            },
+        );
         for (face, value) in boundaries.given_faces(2, layout.cells[2]) {
             let plane = layout.plane();
             pz[face * plane..(face + 1) * plane].fill(R::of(value));
@@ -191,7 +187,7 @@ impl<R: Real> Flow<R> {
         let walled = self.boundaries.walled();
         let periodic = walled.map(|walled| !walled);
         let (predicted, boundaries) = (&self.predicted, &self.boundaries);
-        let past_caches = self.past_caches;
+        let non_temporal = self.non_temporal;
         let divergence = |k: usize, out: &mut Plane<R>| {
             dispatch(Divergence {
                 layout,
@@ -217,12 +213,12 @@ impl<R: Real> Flow<R> {
                     k,
                     inverse,
                     pull: inverse.map(|inverse| dt * inverse),
-                    past_caches,
+                    non_temporal,
                     velocity: [&mut *x, &mut *y, &mut *z],
                     pressure: &mut *p,
                     measures,
                 });
-                // The upper boundary faces are left as predicted.
+                // The upper boundary faces keep the predicted velocity.
                 if walled[0] {
                     for j in 1..=ny {
                         let at = j * row + nx + 1;
@@ -247,7 +243,7 @@ impl<R: Real> Flow<R> {
         self.total()
     }
 
-    /// What all planes measured, in their order.
+    /// Sums and maxima over all planes, in the order of the planes.
     fn total(&mut self) -> FlowMeasures {
         let mut total = FlowMeasures::default();
         let mut rise = DVec3::ZERO;
@@ -272,7 +268,7 @@ impl<R: Real> Flow<R> {
         total.kinetic_energy *= self.mesh.cell_volume();
         total.momentum *= self.mesh.cell_volume();
         if total.kinetic_energy.is_nan() {
-            // A maximum passes over what is not a number; a sum does not.
+            // `max` ignores NaN, a sum does not.
             total.max_divergence = f64::NAN;
             total.max_rate = f64::NAN;
             total.max_velocity = f64::NAN;
@@ -280,19 +276,19 @@ impl<R: Real> Flow<R> {
         total
     }
 
-    /// What walls, open faces and body force have given the box in the step just projected, per
-    /// density [m^4/s]: its momentum changes by this and by the impulse of grains.
+    /// Impulse per density [m^4/s] on the fluid from walls, open faces and body force in the step
+    /// just projected.
     pub fn boundary_impulse(&self, dt: f64) -> DVec3 {
         let mut sum = self.impulse;
         for axis in (0..3).filter(|&axis| !self.boundaries.is_periodic(axis)) {
-            // The sum of a gradient over the inner faces leaves the two outermost cells.
+            // The sum of a gradient over the inner faces is the difference of the outermost cells.
             sum[axis] -= dt * self.pressure_rise[axis] / self.mesh.spacing[axis];
         }
         sum * self.mesh.cell_volume()
     }
 
-    /// Projects the prediction in place: u* becomes the flow without grains, and the pressure takes
-    /// its increment (the first of the two projections of the paper's scheme).
+    /// First projection of the paper's scheme: u* becomes the divergence-free flow without grains,
+    /// and p is incremented.
     pub fn project_prediction(&mut self, dt: f64) {
         self.project(dt);
         for axis in 0..3 {
@@ -302,13 +298,13 @@ impl<R: Real> Flow<R> {
         }
     }
 
-    /// Everything that a later step depends on: fields, and sums over them.
+    /// State on which later steps depend: fields, and sums over them.
     pub fn state(&self) -> ([&[R]; 7], &[f64]) {
         let (u, h) = (&self.velocity, &self.tendency);
         let fields = [&*u.x, &u.y, &u.z, &h.x, &h.y, &h.z, &self.pressure];
         (fields, &self.tendency_sums)
     }
-    /// The same to be overwritten by a state whose last step was `last_step` [s] long.
+    /// State to be overwritten by one whose last step was `last_step` [s] long.
     pub fn state_mut(&mut self, last_step: f64) -> ([&mut [R]; 7], &mut [f64]) {
         self.previous_step = (last_step > 0.0).then_some(last_step);
         let (u, h) = (&mut self.velocity, &mut self.tendency);
@@ -326,11 +322,11 @@ impl<R: Real> Flow<R> {
 
     /// View of the velocity component along `axis` on its faces [m/s].
     pub fn velocity_view(&self, axis: Axis) -> FieldView<'_, R> {
-        self.velocity.view(axis, &self.mesh)
+        self.velocity.view(axis, &self.slab)
     }
     /// View of the dynamic pressure over density at the cell centres [m^2/s^2].
     pub fn pressure_view(&self) -> FieldView<'_, R> {
-        self.pressure.view(&self.mesh)
+        self.pressure.view(&self.slab)
     }
     /// The grid.
     pub fn mesh(&self) -> &Mesh {

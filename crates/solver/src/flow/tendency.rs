@@ -1,32 +1,32 @@
-//! Advection and diffusion (the right side of Eq. 1b without the pressure) and the explicit step,
-//! a row at a time.
+//! Tendency (advection and diffusion of Eq. 1b) and prediction, one row at a time.
 //!
 //! Both are differences of fluxes through the six links to the neighbouring faces of the same
-//! component. A link carries the mean of its two ends times the velocity through it: with a
-//! divergence-free velocity this conserves momentum and kinetic energy.
+//! component. The advective flux of a link is the mean of its two ends times the velocity through
+//! the link, which conserves momentum and kinetic energy if the velocity is divergence-free.
 //!
-//! Legend: q velocity component, c velocity through a link; u, v, w components along x, y, z; the
-//! letters after them: m/p one row down/up in y, b/t one down/up in z.
-
-use std::ops::Range;
+//! Legend: H tendency; q velocity component, c velocity through a link; u, v, w components along
+//! x, y, z, p pressure. Suffixes: c here, l/r left and right in x, m/p one row down and up in y,
+//! b/t one plane down and up in z; `umr` is u one row down, right.
 
 use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout, Mesh};
 use crate::math::Real;
-use grainwake_simd::{Kernel, One, Partial, RowWork, Vector, along_row};
+use grainwake_simd::{
+    Kernel, Partial, RowWork, Scalar, Vector, along_row, inside_row, window, window_mut,
+};
 
 /// Constants of the tendency.
 #[derive(Clone, Copy)]
 pub struct Coefficients {
-    /// 1/4h: a quarter, as both the carried value and the velocity that carries it are means.
+    /// 1/(4 h) along each axis [1/m]: value and velocity of a link are means of two.
     quarter_inverse: [f64; 3],
     nu_inverse_square: [f64; 3],
     pub(super) acceleration: DVec3,
 }
 
 impl Coefficients {
-    /// For a mesh, kinematic viscosity [m^2/s] and body acceleration [m/s^2].
+    /// Constants of a mesh, kinematic viscosity [m^2/s] and body acceleration [m/s^2].
     pub fn new(mesh: &Mesh, kinematic_viscosity: f64, acceleration: DVec3) -> Coefficients {
         let h = mesh.spacing.to_array();
         Coefficients {
@@ -58,38 +58,33 @@ impl Coefficients {
     }
 }
 
-/// What a step multiplies by.
+/// Weights of the terms of the prediction.
 #[derive(Clone, Copy)]
 pub struct Weights {
-    /// Of the new tendency [s].
+    /// Weight of the new tendency [s].
     pub now: f64,
-    /// Of the old one [s].
+    /// Weight of the old tendency [s].
     pub before: f64,
-    /// Of the pressure difference along each axis [s/m].
+    /// Weight of the pressure difference along each axis [s/m].
     pub push: [f64; 3],
 }
 
-/// Planes that the prediction has in hand: three of each component, two of the pressure, six to be written.
-pub const PLANES_AT_ONCE: usize = 17;
-
-/// Rows of a plane of the prediction u* = u + now H + before H_old - dt grad p.
+/// One plane of the prediction u* = u + now H + before H_old - dt grad p.
 pub struct PredictPlane<'a, R> {
     pub layout: Layout,
     pub coefficients: &'a Coefficients,
     pub weights: Weights,
     pub velocity: &'a FaceVector<R>,
     pub pressure: &'a [R],
-    /// Axes whose lower boundary face is given.
+    /// Axes whose boundary faces have a given velocity.
     pub walled: [bool; 3],
     pub k: usize,
-    /// Whether the prediction is written past the caches.
-    pub past_caches: bool,
-    /// The rows of the plane to treat, one part of it after the other.
-    pub rows: Range<usize>,
-    /// H_old, to be replaced by H.
+    /// Whether the prediction is written with non-temporal stores.
+    pub non_temporal: bool,
+    /// H_old, overwritten by H.
     pub tendency: [&'a mut [R]; 3],
     pub predicted: [&'a mut [R]; 3],
-    /// The sum of H over the unknown faces of the plane is added to it.
+    /// Sum of H over the unknown faces of the plane [m/s^2], to be set.
     pub sum: &'a mut DVec3,
 }
 
@@ -97,116 +92,119 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
     type Number = R;
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
-        let (layout, k) = (self.layout, self.k);
-        let (row, plane, n) = (layout.row(), layout.plane(), layout.cells[0]);
-        let FaceVector { x, y, z } = self.velocity;
-        let [tx, ty, tz] = self.tendency;
-        let [px, py, pz] = self.predicted;
+        let (layout, k, n) = (self.layout, self.k, self.layout.cells[0]);
+        let (coefficients, weights) = (*self.coefficients, self.weights);
+        let u = planes(layout, &self.velocity.x, k);
+        let v = planes(layout, &self.velocity.y, k);
+        let w = planes(layout, &self.velocity.z, k);
+        let p = planes(layout, self.pressure, k);
+        let [tx, ty, tz] = self.tendency.map(|plane| &mut plane[..layout.plane()]);
+        let [px, py, pz] = self.predicted.map(|plane| &mut plane[..layout.plane()]);
         let mut sums = [Partial::default(); 3];
-        for j in self.rows {
-            let (at, here) = (layout.index(0, j, k), j * row..(j + 1) * row);
+        for j in 1..=layout.cells[1] {
             let mut work = PredictRow {
-                coefficients: self.coefficients,
-                weights: self.weights,
-                u: around(x, at, row, plane),
-                v: around(y, at, row, plane),
-                w: around(z, at, row, plane),
-                vpb: &y[at + row - plane..][..row],
-                wmt: &z[at + plane - row..][..row],
-                p: &self.pressure[at..][..row],
-                pm: &self.pressure[at - row..][..row],
-                pb: &self.pressure[at - plane..][..row],
+                coefficients,
+                weights,
+                u: rows(layout, u, j),
+                v: rows(layout, v, j),
+                w: rows(layout, w, j),
+                p: rows(layout, p, j),
                 tendency: [
-                    &mut tx[here.clone()],
-                    &mut ty[here.clone()],
-                    &mut tz[here.clone()],
+                    layout.row_of_mut(tx, j),
+                    layout.row_of_mut(ty, j),
+                    layout.row_of_mut(tz, j),
                 ],
-                predicted: [&mut px[here.clone()], &mut py[here.clone()], &mut pz[here]],
+                predicted: [
+                    layout.row_of_mut(px, j),
+                    layout.row_of_mut(py, j),
+                    layout.row_of_mut(pz, j),
+                ],
                 sums: &mut sums,
-                n,
-                past_caches: self.past_caches,
                 given: [false, self.walled[1] && j == 1, self.walled[2] && k == 1],
+                streamed: if self.non_temporal { n } else { 0 },
             };
             along_row::<V>(n, &mut work);
             if self.walled[0] {
-                // The lower boundary face was summed with the others.
-                let given = -tx[j * row + 1].wide();
-                sums[0].add(1, One::<R>::constant(given));
+                // The sum contains the lower boundary face, which is no unknown.
+                let given = -work.tendency[0][1].wide();
+                work.sums[0].add(1, Scalar::<R>::constant(given));
             }
         }
         V::fence();
-        *self.sum += DVec3::from_array(sums.map(|sum| sum.sum()));
+        *self.sum = DVec3::from_array(sums.map(|sum| sum.sum()));
     }
 }
 
-/// A row and its four neighbours: here, one row down and up in y, one down and up in z.
-type Around<'a, R> = [&'a [R]; 5];
-
+/// Planes k - 1, k, k + 1 of a field.
 #[inline(always)]
-fn around<R>(values: &[R], at: usize, row: usize, plane: usize) -> Around<'_, R> {
+fn planes<R>(layout: Layout, field: &[R], k: usize) -> [&[R]; 3] {
     [
-        &values[at..][..row],
-        &values[at - row..][..row],
-        &values[at + row..][..row],
-        &values[at - plane..][..row],
-        &values[at + plane..][..row],
+        layout.plane_of(field, k - 1),
+        layout.plane_of(field, k),
+        layout.plane_of(field, k + 1),
     ]
 }
 
+/// Rows j - 1, j, j + 1 of the planes k - 1, k, k + 1, all of one length, so that one bounds check
+/// serves all of them.
+type Rows<'a, R> = [[&'a [R]; 3]; 3];
+
+#[inline(always)]
+fn rows<'a, R>(layout: Layout, [below, here, above]: [&'a [R]; 3], j: usize) -> Rows<'a, R> {
+    [
+        rows_of_plane(layout, below, j),
+        rows_of_plane(layout, here, j),
+        rows_of_plane(layout, above, j),
+    ]
+}
+
+#[inline(always)]
+fn rows_of_plane<R>(layout: Layout, plane: &[R], j: usize) -> [&[R]; 3] {
+    [
+        layout.row_of(plane, j - 1),
+        layout.row_of(plane, j),
+        layout.row_of(plane, j + 1),
+    ]
+}
+
+/// One row of the prediction.
 struct PredictRow<'a, R> {
-    coefficients: &'a Coefficients,
+    coefficients: Coefficients,
     weights: Weights,
-    u: Around<'a, R>,
-    v: Around<'a, R>,
-    w: Around<'a, R>,
-    vpb: &'a [R],
-    wmt: &'a [R],
-    p: &'a [R],
-    pm: &'a [R],
-    pb: &'a [R],
+    u: Rows<'a, R>,
+    v: Rows<'a, R>,
+    w: Rows<'a, R>,
+    p: Rows<'a, R>,
     tendency: [&'a mut [R]; 3],
     predicted: [&'a mut [R]; 3],
     sums: &'a mut [Partial; 3],
-    n: usize,
-    past_caches: bool,
-    /// Components that are given on the whole row.
+    /// Components whose faces on the whole row have a given velocity.
     given: [bool; 3],
+    /// Entries of the row if written with non-temporal stores, else 0.
+    streamed: usize,
 }
 
 impl<R: Real> RowWork for PredictRow<'_, R> {
     type Number = R;
     #[inline(always)]
     fn at<V: Vector<Number = R>>(&mut self, i: usize) {
-        // Entries i - 1, i, i + 1 of a row.
-        macro_rules! three {
-            ($row:expr) => {{
-                let cut = &$row[i - 1..i + V::WIDTH + 1];
-                [V::load(cut), V::load(&cut[1..]), V::load(&cut[2..])]
-            }};
-        }
-        macro_rules! two {
-            ($row:expr) => {{
-                let cut = &$row[i - 1..i + V::WIDTH];
-                [V::load(cut), V::load(&cut[1..])]
-            }};
-        }
-        let c = self.coefficients;
-        let [ul, uc, ur] = three!(self.u[0]);
-        let [_, um, umr] = three!(self.u[1]);
-        let up = V::load(&self.u[2][i..]);
-        let [_, ub, ubr] = three!(self.u[3]);
-        let ut = V::load(&self.u[4][i..]);
-        let [vl, vc, vr] = three!(self.v[0]);
-        let vm = V::load(&self.v[1][i..]);
-        let [vpl, vp] = two!(self.v[2]);
-        let vb = V::load(&self.v[3][i..]);
-        let vt = V::load(&self.v[4][i..]);
-        let [wl, wc, wr] = three!(self.w[0]);
-        let wm = V::load(&self.w[1][i..]);
-        let wp = V::load(&self.w[2][i..]);
-        let wb = V::load(&self.w[3][i..]);
-        let [wtl, wt] = two!(self.w[4]);
-        let (vpb, wmt) = (V::load(&self.vpb[i..]), V::load(&self.wmt[i..]));
+        // The vectors that start at entries i - 1, i and i + 1 of a row.
+        let left = |row: &[R]| V::load(window::<V>(row, i));
+        let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
+        let right = |row: &[R]| V::load(&window::<V>(row, i)[2..]);
+        let c = &self.coefficients;
+        let [[_, ub, _], [um, u, up], [_, ut, _]] = self.u;
+        let (ul, uc, ur) = (left(u), here(u), right(u));
+        let (umr, ubr) = (right(um), right(ub));
+        let (um, up, ub, ut) = (here(um), here(up), here(ub), here(ut));
+        let [[_, vb, vpb], [vm, v, vp], [_, vt, _]] = self.v;
+        let (vl, vc, vr) = (left(v), here(v), right(v));
+        let (vpl, vpb) = (left(vp), here(vpb));
+        let (vm, vp, vb, vt) = (here(vm), here(vp), here(vb), here(vt));
+        let [[_, wb, _], [wm, w, wp], [wmt, wt, _]] = self.w;
+        let (wl, wc, wr) = (left(w), here(w), right(w));
+        let (wtl, wmt) = (left(wt), here(wmt));
+        let (wm, wp, wb, wt) = (here(wm), here(wp), here(wb), here(wt));
 
         let hx = c.at_face(
             0,
@@ -226,22 +224,23 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
             [[wl, wr], [wm, wp], [wb, wt]],
             [[ub + uc, ubr + ur], [vb + vc, vpb + vp], [wb + wc, wc + wt]],
         );
-        let [pl, pc] = two!(self.p);
-        let lower = [pl, V::load(&self.pm[i..]), V::load(&self.pb[i..])];
+        let [[_, pb, _], [pm, p, _], _] = self.p;
+        let pc = here(p);
+        let lower = [left(p), here(pm), here(pb)];
         let (now, before) = (
             V::constant(self.weights.now),
             V::constant(self.weights.before),
         );
-        // The ends of a row are looked at again for the boundaries.
-        let past = self.past_caches && i > 1 && i + V::WIDTH <= self.n;
+        // Boundary conditions read the ends of a row, which therefore stay in the cache.
+        let streamed = inside_row(i, V::WIDTH, self.streamed);
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
-            let old = &mut self.tendency[axis][i..];
+            let old = window_mut::<V>(self.tendency[axis], i);
             let push = V::constant(self.weights.push[axis]) * (pc - lower[axis]);
-            // What is small is summed first: in singles q would swallow it part by part.
+            // Small terms are summed before q is added: fewer of their digits are lost.
             let gain = now * h + before * V::load(old) - push;
-            let to = &mut self.predicted[axis][i..];
-            if past {
-                (q + gain).store_past(to);
+            let to = window_mut::<V>(self.predicted[axis], i);
+            if streamed {
+                (q + gain).store_non_temporal(to);
             } else {
                 (q + gain).store(to);
             }

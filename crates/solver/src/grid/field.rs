@@ -1,9 +1,9 @@
-//! Fields on the staggered grid. The location is part of the type, so that a face field cannot be
-//! passed for a centre field.
+//! Fields on the staggered grid. The location is part of the type: a face field cannot be passed
+//! for a centre field.
 //!
-//! Every field has one ghost layer on each side and the same shape (nx+2, ny+2, nz+2), x fastest. In memory a
-//! row is as long as the next number of eights, with i = 1 at the start of a cache line (of half a line in every
-//! other row of singles): a vector of neighbours is then read as one line and not as parts of two.
+//! Every field has one ghost layer on each side and the same shape (nx+2, ny+2, nz+2), x fastest.
+//! In memory a row is padded to a multiple of eight entries, and i = 1 starts a cache line (half a
+//! line in every other row of singles), so that a vector of neighbours does not straddle two lines.
 //! Cell (i, j, k) of the interior has 1 <= i <= nx and so on. A face field stores the *lower* face
 //! of each cell: face i of `FaceX` lies between cells i-1 and i, so a box with walls has its upper
 //! boundary face at index nx+1.
@@ -13,10 +13,10 @@ use std::ops::{Deref, DerefMut};
 
 use glam::DVec3;
 
-use super::{Axis, FieldView, Mesh};
+use super::{Axis, FieldView, LocalCell, Slab};
 use crate::math::{Aligned, Real};
 
-/// A place on the staggered cell.
+/// Location on the staggered cell.
 pub trait Location: Copy + Send + Sync + 'static {
     /// Offset from the cell's lower corner in units of the spacing.
     const OFFSET: [f64; 3];
@@ -65,26 +65,26 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Places of a row in memory: its entries, ghosts included, and what fills up the last eight.
+    /// Length of a row in memory: entries, ghosts and padding to a multiple of eight.
     #[inline]
     pub fn row(&self) -> usize {
         (self.cells[0] + 2).next_multiple_of(8)
     }
-    /// Places of a plane, ghosts included.
+    /// Length of a plane in memory, ghosts and padding included.
     #[inline]
     pub fn plane(&self) -> usize {
         self.row() * (self.cells[1] + 2)
     }
-    /// Places of a field, ghosts included.
+    /// Length of a field in memory, ghosts and padding included.
     #[inline]
     pub fn len(&self) -> usize {
         self.plane() * (self.cells[2] + 2)
     }
-    /// Entries of a field, ghosts included, without what fills up its rows.
+    /// Entries of a field, ghosts included, padding excluded.
     pub fn entries(&self) -> usize {
         self.cells.iter().map(|n| n + 2).product()
     }
-    /// The rows of a field, ghosts included, without what fills them up.
+    /// Rows of a field, ghosts included, padding excluded.
     pub fn rows<'a, T>(
         &self,
         values: &'a [T],
@@ -94,7 +94,7 @@ impl Layout {
             .chunks_exact(self.row())
             .map(move |row| &row[..entries])
     }
-    /// The same to write.
+    /// Mutable rows of a field, ghosts included, padding excluded.
     pub fn rows_mut<'a, T>(
         &self,
         values: &'a mut [T],
@@ -108,6 +108,21 @@ impl Layout {
     #[inline]
     pub fn index(&self, i: usize, j: usize, k: usize) -> usize {
         i + self.row() * (j + (self.cells[1] + 2) * k)
+    }
+    /// Plane `k` of a field, ghosts included.
+    #[inline(always)]
+    pub fn plane_of<'a, T>(&self, values: &'a [T], k: usize) -> &'a [T] {
+        &values[k * self.plane()..][..self.plane()]
+    }
+    /// Row `j` of a plane: its entries 0 to n + 1.
+    #[inline(always)]
+    pub fn row_of<'a, T>(&self, plane: &'a [T], j: usize) -> &'a [T] {
+        &plane[j * self.row()..][..self.cells[0] + 2]
+    }
+    /// Row `j` of a plane, to be overwritten.
+    #[inline(always)]
+    pub fn row_of_mut<'a, T>(&self, plane: &'a mut [T], j: usize) -> &'a mut [T] {
+        &mut plane[j * self.row()..][..self.cells[0] + 2]
     }
     /// Distance in memory between neighbours along each axis.
     #[inline]
@@ -141,7 +156,7 @@ impl Layout {
     ) {
         self.map_layers(values, axis, [from; 2], to, |[value, _]| f(value));
     }
-    /// The same of two layers.
+    /// Sets layer `to` to `f` of two layers `from` of `axis`, ghosts of the other axes included.
     pub fn map_layers<T: Copy>(
         &self,
         values: &mut [T],
@@ -167,23 +182,23 @@ pub struct Field<L, R = f64> {
 }
 
 impl<L: Location, R: Real> Field<L, R> {
-    /// A field of zeros on `mesh`.
-    pub fn zeros(mesh: &Mesh) -> Self {
-        let layout = mesh.layout();
+    /// Field of zeros on the cells of `slab`.
+    pub fn zeros(slab: &Slab) -> Self {
+        let layout = slab.layout();
         Field {
             layout,
             values: Aligned::with_head(1, layout.len()),
             location: PhantomData,
         }
     }
-    /// Its layout.
+    /// Layout in memory.
     #[inline]
     pub fn layout(&self) -> Layout {
         self.layout
     }
     /// Read-only view of all values without ghosts.
-    pub fn view<'a>(&'a self, mesh: &Mesh) -> FieldView<'a, R> {
-        FieldView::new(self, mesh, L::NORMAL)
+    pub fn view<'a>(&'a self, slab: &Slab) -> FieldView<'a, R> {
+        FieldView::new(self, slab, L::NORMAL)
     }
     /// Value at (i, j, k); ghosts at 0 and n+1.
     #[cfg(test)]
@@ -205,12 +220,12 @@ impl<L: Location, R: Real> Field<L, R> {
         &self.values[start..start + self.layout.row()]
     }
     /// Sets every interior value from its position [m].
-    pub fn fill_with(&mut self, mesh: &Mesh, f: impl Fn(DVec3) -> f64) {
+    pub fn fill_with(&mut self, slab: &Slab, f: impl Fn(DVec3) -> f64) {
         let [nx, ny, nz] = self.layout.cells;
         for k in 1..=nz + 1 {
             for j in 1..=ny + 1 {
                 for i in 1..=nx + 1 {
-                    let value = f(mesh.position(L::OFFSET, [i, j, k]));
+                    let value = f(slab.position(L::OFFSET, LocalCell([i, j, k])));
                     self.set(i, j, k, R::of(value));
                 }
             }
@@ -268,19 +283,19 @@ pub struct FaceVector<R = f64> {
 }
 
 impl<R: Real> FaceVector<R> {
-    /// A vector field of zeros.
-    pub fn zeros(mesh: &Mesh) -> Self {
+    /// Vector field of zeros on the cells of `slab`.
+    pub fn zeros(slab: &Slab) -> Self {
         FaceVector {
-            x: Field::zeros(mesh),
-            y: Field::zeros(mesh),
-            z: Field::zeros(mesh),
+            x: Field::zeros(slab),
+            y: Field::zeros(slab),
+            z: Field::zeros(slab),
         }
     }
     /// Read-only view of one component without ghosts.
-    pub fn view<'a>(&'a self, axis: Axis, mesh: &Mesh) -> FieldView<'a, R> {
-        FieldView::new(self.component(axis as usize), mesh, Some(axis))
+    pub fn view<'a>(&'a self, axis: Axis, slab: &Slab) -> FieldView<'a, R> {
+        FieldView::new(self.component(axis as usize), slab, Some(axis))
     }
-    /// Raw values of one component.
+    /// Values of one component in memory.
     #[inline]
     pub fn component(&self, axis: usize) -> &[R] {
         match axis {
@@ -289,7 +304,7 @@ impl<R: Real> FaceVector<R> {
             _ => &self.z,
         }
     }
-    /// Raw values of one component, to write.
+    /// Mutable values of one component in memory.
     #[inline]
     pub fn component_mut(&mut self, axis: usize) -> &mut [R] {
         match axis {
@@ -313,6 +328,7 @@ impl<R: Real> Clone for FaceVector<R> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Mesh;
     use super::*;
 
     #[test]
@@ -323,7 +339,7 @@ mod tests {
             origin: DVec3::ZERO,
         };
         let layout = mesh.layout();
-        let mut field = Field::<Centre>::zeros(&mesh);
+        let mut field = Field::<Centre>::zeros(&mesh.whole());
         for (n, row) in layout.rows_mut(&mut field).enumerate() {
             assert_eq!(row.len(), 7);
             assert!(row[1..].as_ptr().addr().is_multiple_of(64));

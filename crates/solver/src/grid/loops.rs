@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::Layout;
 
 /// Calls `f(k, plane, partial)` for the interior planes k = 1..=nz of several fields in parallel,
-/// with one partial result a plane.
+/// with one partial result per plane.
 pub fn for_planes_of<const N: usize, R: Send, T: Send>(
     layout: Layout,
     fields: [&mut [R]; N],
@@ -21,35 +21,20 @@ pub fn for_planes_of<const N: usize, R: Send, T: Send>(
     let fields = fields.map(|field| Pieces::interior(layout, field));
     assert_eq!(partial.len(), layout.cells[2]);
     partial.par_iter_mut().enumerate().for_each(|(k, partial)| {
-        // SAFETY: each k is visited once, so no two threads hold the same plane.
+        // SAFETY: each k occurs once, so no two threads hold the same plane.
         let slabs = fields.each_ref().map(|field| unsafe { field.get(k) });
         f(k + 1, slabs, partial);
     });
 }
 
-/// Bytes that stay in a processor's own cache.
-const NEAR: usize = 1536 << 10;
-
-/// The rows 1..=ny of every plane in parts: what is in hand at once, `bytes` a place of a plane, stays near the
-/// processor until the next plane asks for it again. No result may depend on how many parts there are but by
-/// the order of sums.
-pub fn row_blocks(layout: Layout, bytes: usize) -> impl Iterator<Item = Range<usize>> {
-    let lines = layout.cells[1];
-    let most = (NEAR / (bytes * layout.row())).max(8);
-    let length = lines.div_ceil(lines.div_ceil(most));
-    (1..=lines)
-        .step_by(length)
-        .map(move |first| first..(first + length).min(lines + 1))
-}
-
-/// Calls `f(component, start, parts)` in parallel for slabs of whole planes, ghosts included, of the
-/// fields of three components; `start` is where the slab begins in memory.
+/// Calls `f(component, start, parts)` in parallel for slabs of whole planes, ghosts included, of
+/// the fields of three components; `start` is where the slab begins in memory.
 pub fn for_slabs<const N: usize, R: Send>(
     layout: Layout,
     components: [[&mut [R]; N]; 3],
     f: impl Fn(usize, usize, [&mut [R]; N]) + Sync,
 ) {
-    // Enough for even shares, wherever the grains crowd.
+    // More slabs than threads balance the load where grains cluster.
     let slabs = 4 * rayon::current_num_threads();
     let length = (layout.cells[2] + 2).div_ceil(slabs) * layout.plane();
     let mut tasks = Vec::with_capacity(3 * slabs);
@@ -76,7 +61,7 @@ pub struct Run<'a, const N: usize, R, T> {
 }
 
 impl<const N: usize, R, T> Run<'_, N, R, T> {
-    /// Its planes k.
+    /// Indices k of the planes.
     pub fn range(&self) -> Range<usize> {
         self.range.clone()
     }
@@ -92,7 +77,8 @@ impl<const N: usize, R, T> Run<'_, N, R, T> {
     }
 }
 
-/// Calls `f(run, scratch)` for one run of consecutive interior planes a scratch slot, in parallel.
+/// Calls `f(run, scratch)` for one run of consecutive interior planes per scratch slot, in
+/// parallel.
 pub fn for_runs<const N: usize, R: Send, T: Send, S: Send>(
     layout: Layout,
     fields: [&mut [R]; N],
@@ -151,11 +137,11 @@ impl<R> Columns<'_, R> {
     pub fn width(&self) -> usize {
         self.width
     }
-    /// Their entries in plane `k`, counted from 0.
+    /// Entries of the columns in plane `k`, counted from 0.
     #[inline(always)]
     pub fn row(&mut self, k: usize) -> &mut [R] {
         assert!(k < self.planes);
-        // SAFETY: disjoint from all other columns, and borrowed from `self` as a whole.
+        // SAFETY: blocks of columns are disjoint, and the result borrows `self` as a whole.
         unsafe { std::slice::from_raw_parts_mut(self.start.add(k * self.stride), self.width) }
     }
 }
@@ -201,7 +187,7 @@ struct Pieces<T> {
     count: usize,
 }
 
-// SAFETY: whoever takes a piece promises that nobody else holds it.
+// SAFETY: the callers of `get` guarantee that no piece is borrowed twice.
 unsafe impl<T: Send> Send for Pieces<T> {}
 unsafe impl<T: Send> Sync for Pieces<T> {}
 
@@ -213,7 +199,7 @@ impl<T> Pieces<T> {
             count: values.len() / size,
         }
     }
-    /// Piece `k`.
+    /// Returns piece `k`.
     ///
     /// # Safety
     /// No two live borrows may have the same `k`, and the slice must outlive them.
@@ -225,30 +211,10 @@ impl<T> Pieces<T> {
 }
 
 impl<R> Pieces<R> {
-    /// The interior planes of a field.
+    /// Cuts a field into its interior planes.
     fn interior(layout: Layout, field: &mut [R]) -> Pieces<R> {
         assert_eq!(field.len(), layout.len());
         let plane = layout.plane();
         Pieces::new(&mut field[plane..plane * (layout.cells[2] + 1)], plane)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn blocks_are_all_rows_once() {
-        for (cells, blocks) in [
-            ([8, 1, 4], 1),
-            ([100, 100, 8], 1),
-            ([160, 160, 8], 3),
-            ([9000, 37, 2], 5),
-        ] {
-            let found: Vec<_> = row_blocks(Layout { cells }, 17 * 8).collect();
-            assert_eq!(found.len(), blocks, "{cells:?}");
-            let rows: Vec<_> = found.into_iter().flatten().collect();
-            assert_eq!(rows, (1..=cells[1]).collect::<Vec<_>>());
-        }
     }
 }

@@ -1,10 +1,13 @@
 //! Geometry of the uniform grid: cells of constant spacing, axis order x, y, z, x fastest.
+//!
+//! Positions depend on the index of a cell in the box ([`GlobalCell`]); fields are indexed by the
+//! cells of their own slab ([`LocalCell`]). Today one slab is the whole box.
 
 use glam::DVec3;
 
 use super::Layout;
 
-/// One of the three space axes.
+/// Axis of space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// First axis, fastest in memory.
@@ -56,14 +59,26 @@ impl Mesh {
     pub fn upper(&self) -> DVec3 {
         self.origin + self.extent()
     }
-    /// Memory layout of its fields.
+    /// All planes of the box as one slab.
+    pub fn whole(&self) -> Slab {
+        self.slab(0, self.cells[2])
+    }
+    /// Slab of `planes` planes of cells above the first `below` planes of the box.
+    pub fn slab(&self, below: usize, planes: usize) -> Slab {
+        assert!(planes > 0 && below + planes <= self.cells[2]);
+        Slab {
+            mesh: *self,
+            below,
+            planes,
+        }
+    }
+    /// Memory layout of the fields of the whole box.
     pub(crate) fn layout(&self) -> Layout {
         Layout { cells: self.cells }
     }
-    /// Position [m] of the point `offset` (in spacings from the lower corner) of cell `index`,
-    /// counted from 1.
+    /// Position [m] of the point `offset` (in spacings from the lower corner) of a cell.
     #[inline]
-    pub fn position(&self, offset: [f64; 3], index: [usize; 3]) -> DVec3 {
+    pub fn position(&self, offset: [f64; 3], GlobalCell(index): GlobalCell) -> DVec3 {
         self.origin
             + self.spacing
                 * DVec3::new(
@@ -71,5 +86,92 @@ impl Mesh {
                     index[1] as f64 - 1.0 + offset[1],
                     index[2] as f64 - 1.0 + offset[2],
                 )
+    }
+}
+
+/// Index of a cell of the whole box, counted from 1 along each axis; 0 and n + 1 are ghost cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GlobalCell(pub [usize; 3]);
+
+/// Index of a cell of a [`Slab`] and of its fields, counted from 1 along each axis; 0 and n + 1 are
+/// ghost cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LocalCell(pub [usize; 3]);
+
+/// Consecutive planes of the box along z, whose fields lie in one memory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slab {
+    mesh: Mesh,
+    /// Planes of the box below the slab.
+    below: usize,
+    planes: usize,
+}
+
+impl Slab {
+    /// Mesh of the whole box.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+    /// Memory layout of the fields of the slab.
+    pub(crate) fn layout(&self) -> Layout {
+        let [nx, ny, _] = self.mesh.cells;
+        Layout {
+            cells: [nx, ny, self.planes],
+        }
+    }
+    /// Index in the box of a cell of the slab.
+    pub fn global(&self, LocalCell([i, j, k]): LocalCell) -> GlobalCell {
+        GlobalCell([i, j, k + self.below])
+    }
+    /// Index in the slab of a cell of the box; none if neither the slab nor its ghosts hold the
+    /// cell.
+    pub fn local(&self, GlobalCell([i, j, k]): GlobalCell) -> Option<LocalCell> {
+        let k = k.checked_sub(self.below)?;
+        (k <= self.planes + 1).then_some(LocalCell([i, j, k]))
+    }
+    /// Position [m] of the point `offset` (in spacings from the lower corner) of a cell.
+    #[inline]
+    pub fn position(&self, offset: [f64; 3], cell: LocalCell) -> DVec3 {
+        self.mesh.position(offset, self.global(cell))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{FACE_OFFSET, FaceZ, Field};
+    use super::*;
+
+    #[test]
+    fn the_faces_of_a_slab_lie_where_those_of_the_box_lie() {
+        let mesh = Mesh {
+            cells: [3, 2, 12],
+            spacing: DVec3::new(0.1, 0.2, 0.3),
+            origin: DVec3::new(-0.7, 0.0, 1.1),
+        };
+        let slab = mesh.slab(5, 4);
+        assert_eq!(slab.layout().cells, [3, 2, 4]);
+        for k in 0..=5 {
+            let (local, global) = (LocalCell([3, 1, k]), GlobalCell([3, 1, k + 5]));
+            assert_eq!(slab.global(local), global);
+            assert_eq!(slab.local(global), Some(local));
+            for offset in FACE_OFFSET {
+                assert_eq!(slab.position(offset, local), mesh.position(offset, global));
+            }
+        }
+        assert_eq!(slab.local(GlobalCell([1, 1, 4])), None);
+        assert_eq!(slab.local(GlobalCell([1, 1, 11])), None);
+        let value = |x: DVec3| x.x + 3.0 * x.y + 7.0 * x.z;
+        let (mut part, mut all) = (
+            Field::<FaceZ>::zeros(&slab),
+            Field::<FaceZ, f64>::zeros(&mesh.whole()),
+        );
+        part.fill_with(&slab, value);
+        all.fill_with(&mesh.whole(), value);
+        let (part, all) = (part.view(&slab), all.view(&mesh.whole()));
+        for k in 0..=4 {
+            assert_eq!(part.row(k, 1), all.row(k + 5, 1));
+            let [here, there] = [part.position([k, 1, 2]), all.position([k + 5, 1, 2])];
+            assert_eq!(here, there);
+        }
     }
 }

@@ -9,9 +9,7 @@ mod view;
 pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field, Layout};
 #[cfg(test)]
 pub(crate) use field::{FaceZ, Location};
-pub(crate) use loops::{
-    Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, for_slabs, row_blocks,
-};
-pub use mesh::{Axis, Mesh};
+pub(crate) use loops::{Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, for_slabs};
+pub use mesh::{Axis, GlobalCell, LocalCell, Mesh, Slab};
 pub(crate) use part::Part;
 pub use view::FieldView;

@@ -1,22 +1,21 @@
-//! Rows of a field handed out one by one, so that several may write where no other does.
+//! Part of a field that several threads may write at disjoint rows.
 
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Neighbouring entries of a field, all of them or some planes, of which rows are read and written.
+/// Contiguous part of a field, read and written by rows.
 pub struct Part<'a, R> {
     range: Range<usize>,
     first: *mut R,
     entries: PhantomData<&'a mut [R]>,
 }
 
-// SAFETY: it is the slice it was made of, or one of several to whose makers it was promised that they
-// never hand out what another one writes.
+// SAFETY: a part is the slice it was made of, or an alias whose maker guarantees disjoint writes.
 unsafe impl<R: Send> Send for Part<'_, R> {}
 unsafe impl<R: Sync> Sync for Part<'_, R> {}
 
 impl<'a, R> Part<'a, R> {
-    /// Of the entries of a field from `start` on.
+    /// Part of a field whose entries start at position `start`.
     pub fn new(start: usize, entries: &'a mut [R]) -> Part<'a, R> {
         Part {
             range: start..start + entries.len(),
@@ -25,34 +24,33 @@ impl<'a, R> Part<'a, R> {
         }
     }
 
-    /// The same entries once more.
+    /// Second handle to the same entries.
     ///
     /// # Safety
-    /// As long as both are in use, no entry of a row that one gives for writing is in a row that the other
-    /// gives.
-    pub unsafe fn again(&self) -> Part<'a, R> {
+    /// While both exist, no entry of a mutable row of one is in a row of the other.
+    pub unsafe fn alias(&self) -> Part<'a, R> {
         Part {
             range: self.range.clone(),
             ..*self
         }
     }
 
-    /// Where in memory it lies.
+    /// Positions of the entries in the memory of the field.
     pub fn range(&self) -> &Range<usize> {
         &self.range
     }
 
-    /// `count` entries from position `at` on. Panics if they are not all here.
+    /// Row of `count` entries from position `at` on. Panics outside the part.
     #[inline(always)]
     pub fn row(&self, at: usize, count: usize) -> &[R] {
-        // SAFETY: the entries are here, and nobody else writes them: see `again`.
+        // SAFETY: `find` checked the bounds; no other handle writes the entries, see `alias`.
         unsafe { std::slice::from_raw_parts(self.find(at, count), count) }
     }
 
-    /// The same for writing.
+    /// Mutable row of `count` entries from position `at` on. Panics outside the part.
     #[inline(always)]
     pub fn row_mut(&mut self, at: usize, count: usize) -> &mut [R] {
-        // SAFETY: the entries are here, and nobody else has them: see `again`.
+        // SAFETY: `find` checked the bounds; no other handle borrows the entries, see `alias`.
         unsafe { std::slice::from_raw_parts_mut(self.find(at, count), count) }
     }
 
@@ -63,7 +61,7 @@ impl<'a, R> Part<'a, R> {
             start <= at && at <= end && count <= end - at,
             "a row lies within its part"
         );
-        // SAFETY: the entry is here, or is the end.
+        // SAFETY: the position lies in the part or at its end.
         unsafe { self.first.add(at - start) }
     }
 }
@@ -79,10 +77,10 @@ mod tests {
         assert_eq!(part.row(22, 3), [22, 23, 24]);
         assert!(part.row(40, 0).is_empty());
         part.row_mut(38, 2).fill(7);
-        // SAFETY: the rows that are written are not the same.
-        let mut again = unsafe { part.again() };
+        // SAFETY: the mutable rows are disjoint.
+        let mut alias = unsafe { part.alias() };
         std::thread::scope(|scope| {
-            scope.spawn(|| again.row_mut(21, 4).fill(8));
+            scope.spawn(|| alias.row_mut(21, 4).fill(8));
             part.row_mut(25, 4).fill(9);
         });
         assert_eq!(field[20..30], [20, 8, 8, 8, 8, 9, 9, 9, 9, 29]);

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Axis, Layout, Mesh};
+use super::{Axis, LocalCell, Slab};
 
 /// All values of one field without ghosts, indexed by [k, j, i] (z, y, x order), counted from 0.
 ///
@@ -12,17 +12,16 @@ use super::{Axis, Layout, Mesh};
 pub struct FieldView<'a, R> {
     values: &'a [R],
     shape: [usize; 3],
-    layout: Layout,
-    mesh: Mesh,
+    slab: Slab,
     normal: Option<Axis>,
 }
 
 impl<'a, R: Copy> FieldView<'a, R> {
     /// View of the padded `field` on the faces `normal` to an axis, or on the cell centres.
-    pub(crate) fn new(field: &'a [R], mesh: &Mesh, normal: Option<Axis>) -> FieldView<'a, R> {
-        let layout = mesh.layout();
+    pub(crate) fn new(field: &'a [R], slab: &Slab, normal: Option<Axis>) -> FieldView<'a, R> {
+        let layout = slab.layout();
         assert_eq!(field.len(), layout.len());
-        let mut entries = mesh.cells;
+        let mut entries = layout.cells;
         if let Some(axis) = normal {
             entries[axis as usize] += 1;
         }
@@ -30,8 +29,7 @@ impl<'a, R: Copy> FieldView<'a, R> {
         FieldView {
             values: &field[layout.index(1, 1, 1)..=layout.index(nx, ny, nz)],
             shape: [nz, ny, nx],
-            layout,
-            mesh: *mesh,
+            slab: *slab,
             normal,
         }
     }
@@ -46,7 +44,7 @@ impl<'a, R: Copy> FieldView<'a, R> {
     }
     /// Distance in memory between neighbours along z, y, x [entries]; rows are padded.
     pub fn strides(&self) -> [usize; 3] {
-        let [x, y, z] = self.layout.strides();
+        let [x, y, z] = self.slab.layout().strides();
         [z, y, x]
     }
     /// Axis normal to the faces that hold the values; none for values at cell centres.
@@ -59,7 +57,7 @@ impl<'a, R: Copy> FieldView<'a, R> {
     }
     /// Distance between neighbours along x, y, z [m].
     pub fn spacing(&self) -> DVec3 {
-        self.mesh.spacing
+        self.slab.mesh().spacing
     }
     /// Position of entry [k, j, i] [m].
     pub fn position(&self, [k, j, i]: [usize; 3]) -> DVec3 {
@@ -67,7 +65,7 @@ impl<'a, R: Copy> FieldView<'a, R> {
         if let Some(axis) = self.normal {
             offset[axis as usize] = 0.0;
         }
-        self.mesh.position(offset, [i + 1, j + 1, k + 1])
+        self.slab.position(offset, LocalCell([i + 1, j + 1, k + 1]))
     }
     /// Row of entries along x at plane `k` and line `j`. Panics outside the shape.
     pub fn row(&self, k: usize, j: usize) -> &'a [R] {
@@ -92,7 +90,7 @@ impl<'a, R: Copy> FieldView<'a, R> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{FaceZ, Field, Location};
+    use super::super::{FaceZ, Field, Location, Mesh};
     use super::*;
 
     #[test]
@@ -102,12 +100,16 @@ mod tests {
             spacing: DVec3::new(0.1, 0.2, 0.3),
             origin: DVec3::new(-1.0, 2.0, 0.0),
         };
-        let mut field = Field::<FaceZ>::zeros(&mesh);
-        field.fill_with(&mesh, |x| x.x + 10.0 * x.y + 100.0 * x.z);
-        let view = field.view(&mesh);
+        let slab = mesh.whole();
+        let mut field = Field::<FaceZ>::zeros(&slab);
+        field.fill_with(&slab, |x| x.x + 10.0 * x.y + 100.0 * x.z);
+        let view = field.view(&slab);
         assert_eq!(view.shape(), [3, 3, 5]);
         assert_eq!(view.normal(), Some(Axis::Z));
-        assert_eq!(view.origin(), mesh.position(FaceZ::OFFSET, [1; 3]));
+        assert_eq!(
+            view.origin(),
+            slab.position(FaceZ::OFFSET, LocalCell([1; 3]))
+        );
         assert_eq!(
             (view.get([0; 3]), view.spacing()),
             (view.values()[0], mesh.spacing)

@@ -98,7 +98,7 @@ impl<R: Real> ImmersedGrains<R> {
                 // SAFETY: `find_isolated` found no other grain that uses the faces which this grain
                 // reads or writes. The access log asserts it below in debug builds. `Part` checks
                 // the bounds of every row.
-                let mut aliases = predictions.each_ref().map(|one| unsafe { one.again() });
+                let mut aliases = predictions.each_ref().map(|one| unsafe { one.alias() });
                 step.update_isolated(index, grain, update, &mut aliases, scratch);
             } else {
                 step.locate_and_assemble(index, grain, update, &predictions, &mut scratch.locate);

@@ -1,11 +1,11 @@
-//! How much the caches hold.
+//! Size of the processor's caches.
 
 use std::sync::OnceLock;
 
-/// What is assumed where the system does not say [bytes].
+/// Size assumed if the system does not report one [bytes].
 const COMMON: usize = 32 << 20;
 
-/// Size of the last cache before memory [bytes].
+/// Size of the last-level cache [bytes].
 pub fn last_cache() -> usize {
     static SIZE: OnceLock<usize> = OnceLock::new();
     *SIZE.get_or_init(|| {
@@ -19,7 +19,7 @@ pub fn last_cache() -> usize {
     })
 }
 
-/// The size that `text`, such as `32768K`, means.
+/// Parses a size such as `32768K` [bytes].
 fn bytes(text: &str) -> Option<usize> {
     let unit = text
         .find(|c: char| !c.is_ascii_digit())

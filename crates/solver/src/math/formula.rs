@@ -9,22 +9,22 @@ use glam::DVec3;
 #[derive(Clone, Debug)]
 pub struct Formula {
     text: [String; 3],
-    /// Kept apart: an expression takes tens of kilobytes.
+    /// Boxed: an expression takes tens of kilobytes.
     parts: Arc<[Part]>,
 }
 
 #[derive(Debug)]
 struct Part {
     expression: Box<exmex::FlatEx<f64>>,
-    /// Which of the variables it takes, in the order in which it takes them.
+    /// Indices of the variables that the expression uses, in its own order.
     takes: Vec<usize>,
 }
 
 impl Formula {
-    /// Reads three formulas whose names may be `variables` (and PI, E, TAU).
+    /// Parses three formulas in `variables` and the constants PI, E, TAU.
     ///
     /// # Errors
-    /// What is wrong with which component.
+    /// Names the component and the error.
     pub fn parse(text: [String; 3], variables: &[&str]) -> Result<Formula, String> {
         let part = |axis: usize| -> Result<Part, String> {
             let component = &text[axis];
@@ -54,12 +54,12 @@ impl Formula {
         Ok(Formula { text, parts })
     }
 
-    /// The formulas as written.
+    /// Text of the formulas.
     pub fn text(&self) -> &[String; 3] {
         &self.text
     }
 
-    /// One component at the given values of the variables; NaN where it is not defined.
+    /// Value of one component at `values` of the variables; NaN where undefined.
     pub fn component(&self, axis: usize, values: &[f64]) -> f64 {
         let Part { expression, takes } = &self.parts[axis];
         let mut taken = [0.0; 4];
@@ -69,7 +69,7 @@ impl Formula {
         expression.eval(&taken[..takes.len()]).unwrap_or(f64::NAN)
     }
 
-    /// The vector at the given values of the variables.
+    /// Vector at `values` of the variables.
     pub fn at(&self, values: &[f64]) -> DVec3 {
         DVec3::from_array([0, 1, 2].map(|axis| self.component(axis, values)))
     }

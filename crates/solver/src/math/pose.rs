@@ -1,4 +1,4 @@
-//! Where a body is and how it is turned.
+//! Position and orientation of a body, force and torque on it.
 
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
@@ -13,11 +13,11 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Space point -> body point.
+    /// Transforms a point from the space frame to the body frame [m].
     pub fn to_body(&self, x: DVec3) -> DVec3 {
         self.orientation.conjugate() * (x - self.position)
     }
-    /// Body point -> space point.
+    /// Transforms a point from the body frame to the space frame [m].
     pub fn to_space(&self, x: DVec3) -> DVec3 {
         self.position + self.orientation * x
     }

@@ -1,6 +1,6 @@
-//! The modes of the second difference along one axis.
+//! Eigenmodes of the second difference along one axis.
 //!
-//! Two real lines travel as the real and imaginary part of one complex Fourier transform. The
+//! Two real lines are transformed as real and imaginary part of one complex line. The
 //! cosine transform (type II and its inverse) uses Makhoul's even-odd reordering (1980), so its
 //! Fourier transform has the length of the line; any length works, primes included.
 //!
@@ -15,9 +15,9 @@ use grainwake_simd::{Complex, Kernel, Vector, as_complex};
 
 /// Transforms of one axis and the eigenvalues of minus the second difference.
 pub struct Axis<R> {
-    /// Cells.
+    /// Number of cells.
     pub n: usize,
-    /// Place of cell i in the transform's input.
+    /// Position of cell i in the input of the transform.
     pub order: Vec<usize>,
     /// Eigenvalue of mode k [1/m^2], in the order in which modes are stored. On a periodic axis
     /// index k <= n/2 holds the cosine part of mode k, its mirror the sine part.
@@ -25,7 +25,7 @@ pub struct Axis<R> {
     fourier: Fourier<R>,
     /// cos and sin of pi k / 2n for cosine modes; 1 and 0 on a periodic axis.
     turn: Vec<[R; 2]>,
-    /// Factors of the mode k = n/2, its own mirror, there and back.
+    /// Factors of the mode k = n/2, its own mirror, in the forward and inverse transform.
     middle: [R; 2],
 }
 
@@ -66,59 +66,54 @@ impl<R: Real> Axis<R> {
         }
     }
 
-    /// What forward then inverse multiplies by.
+    /// Factor by which a forward and an inverse transform multiply.
     pub fn norm(&self) -> f64 {
         self.n as f64
     }
 
-    /// Entries of each of the two buffers.
+    /// Length of each of the two buffers.
     pub fn buffer_len(&self) -> usize {
         self.fourier.buffer_len(self.n)
     }
 
-    /// Spectra of pairs of lines -> modes: real parts of the first lines, imaginary of the second.
+    /// Turns spectra of pairs of lines into modes: real parts belong to the first lines, imaginary
+    /// parts to the second lines.
     #[inline(always)]
     fn split<V: Vector<Number = R>>(&self, modes: &mut [Complex<V>]) {
         let (n, half) = (self.n, V::constant(0.5));
-        for k in 1..n.div_ceil(2) {
-            let (z, w) = (modes[k], modes[n - k]);
-            let [cos, sin] = self.turn[k];
+        let (low, high) = mirrored(modes);
+        let (pairs, turn) = (low.len(), &self.turn[1..]);
+        let (high, turn) = (&mut high[..pairs], &turn[..pairs]);
+        for k in 0..pairs {
+            let (z, w, [cos, sin]) = (&mut low[k], &mut high[pairs - 1 - k], turn[k]);
             let (cos, sin) = (V::splat(cos) * half, V::splat(sin) * half);
             let (p, q, r, t) = (z.re + w.re, z.im - w.im, z.im + w.im, w.re - z.re);
-            modes[k] = Complex {
-                re: cos * p + sin * q,
-                im: cos * r + sin * t,
-            };
-            modes[n - k] = Complex {
-                re: sin * p - cos * q,
-                im: sin * r - cos * t,
-            };
+            z.re = cos * p + sin * q;
+            z.im = cos * r + sin * t;
+            w.re = sin * p - cos * q;
+            w.im = sin * r - cos * t;
         }
         if n.is_multiple_of(2) {
             modes[n / 2] = modes[n / 2].scale(self.middle[0]);
         }
     }
 
-    /// The way back. Real and imaginary parts are exchanged on the way into the transform, and so
-    /// on the way out, which turns it into its inverse.
+    /// Turns modes into spectra of pairs of lines with real and imaginary parts exchanged, which
+    /// makes the forward transform an inverse one.
     #[inline(always)]
     fn join<V: Vector<Number = R>>(&self, modes: &mut [Complex<V>]) {
         let n = self.n;
         modes[0] = modes[0].exchanged();
-        for k in 1..n.div_ceil(2) {
-            let (x, y) = (modes[k], modes[n - k]);
-            let [cos, sin] = self.turn[k];
+        let (low, high) = mirrored(modes);
+        let (pairs, turn) = (low.len(), &self.turn[1..]);
+        let (high, turn) = (&mut high[..pairs], &turn[..pairs]);
+        for k in 0..pairs {
+            let (x, y, [cos, sin]) = (&mut low[k], &mut high[pairs - 1 - k], turn[k]);
             let (cos, sin) = (V::splat(cos), V::splat(sin));
             let (p, q) = (cos * x.re + sin * y.re, sin * x.re - cos * y.re);
             let (r, t) = (cos * x.im + sin * y.im, sin * x.im - cos * y.im);
-            modes[k] = Complex {
-                re: q + r,
-                im: p - t,
-            };
-            modes[n - k] = Complex {
-                re: r - q,
-                im: p + t,
-            };
+            (x.re, x.im) = (q + r, p - t);
+            (y.re, y.im) = (r - q, p + t);
         }
         if n.is_multiple_of(2) {
             modes[n / 2] = modes[n / 2].scale(self.middle[1]).exchanged();
@@ -126,8 +121,17 @@ impl<R: Real> Axis<R> {
     }
 }
 
-/// The transform of a block of lines. It is dispatched on its own, so that its many loops are
-/// compiled once for each instruction set and not once for each place that needs them.
+/// Modes k = 1, 2... below n/2, and as many mirrors n - k in rising order.
+#[inline(always)]
+fn mirrored<T>(modes: &mut [T]) -> (&mut [T], &mut [T]) {
+    let pairs = modes.len().div_ceil(2) - 1;
+    let (low, high) = modes[1..].split_at_mut(pairs);
+    let middle = high.len() - pairs;
+    (low, &mut high[middle..])
+}
+
+/// Transform of a block of lines. It is a kernel of its own, so that its loops are compiled once
+/// per instruction set and not once per caller.
 pub struct Lines<'a, R> {
     pub axis: &'a Axis<R>,
     /// Both buffers, one after the other; the first holds the lines.
@@ -138,7 +142,7 @@ pub struct Lines<'a, R> {
     pub inverse: bool,
     /// Whether the block has half the lanes of the widest register.
     pub half: bool,
-    /// Set to which of the buffers holds the result.
+    /// Set to whether the second buffer holds the result.
     pub second: &'a mut bool,
 }
 

@@ -1,4 +1,4 @@
-//! Short Fourier transforms, the building blocks of the long ones.
+//! Fourier transforms of short fixed lengths (butterflies).
 //!
 //! Outputs come in pairs k, r - k: with e_k the cosine sum over x_t + x_{r-t} and o_k the sine sum
 //! over x_t - x_{r-t} they are e_k - i o_k and e_k + i o_k.
@@ -6,9 +6,9 @@
 use crate::math::Real;
 use grainwake_simd::{Complex, Vector, turned};
 
-/// A transform of fixed length `R`.
+/// Fourier transform of fixed length `R`.
 pub trait Butterfly<const R: usize> {
-    /// X_k = sum over t of x_t exp(-2 pi i k t / R).
+    /// Returns X_k = sum over t of x_t exp(-2 pi i k t / R).
     fn apply<V: Vector>(x: [Complex<V>; R]) -> [Complex<V>; R];
 }
 
@@ -112,7 +112,7 @@ impl Butterfly<8> for Eight {
     #[inline(always)]
     fn apply<V: Vector>([a, b, c, d, e, f, g, h]: [Complex<V>; 8]) -> [Complex<V>; 8] {
         use std::f64::consts::FRAC_1_SQRT_2;
-        // Fours of the even and of the odd inputs.
+        // Transforms of length four of the even and of the odd inputs.
         let [p, q, r, s] = Four::apply([a, c, e, g]);
         let [t, u, v, w] = Four::apply([b, d, f, h]);
         let half = V::Number::of(FRAC_1_SQRT_2);

@@ -5,15 +5,15 @@ use super::fft::{Fft, LARGEST_PRIME, factors, root};
 use crate::math::Real;
 use grainwake_simd::{Complex, Vector};
 
-/// A planned transform of any length.
+/// Planned transform of any length.
 pub enum Fourier<R> {
-    /// Only small factors.
+    /// Transform of a length with small prime factors.
     Direct(Fft<R>),
-    /// A padded convolution.
+    /// Transform of another length by a padded convolution.
     Padded(Chirp<R>),
 }
 
-/// A planned convolution.
+/// Planned convolution.
 pub struct Chirp<R> {
     fft: Fft<R>,
     /// exp(-pi i t^2 / n), t < n.
@@ -55,7 +55,7 @@ impl<R: Real> Fourier<R> {
         })
     }
 
-    /// Entries that each of the two buffers must have for `n` points.
+    /// Length of each of the two buffers for `n` points.
     pub fn buffer_len(&self, n: usize) -> usize {
         match self {
             Fourier::Direct(_) => n,
@@ -85,7 +85,7 @@ impl<R: Real> Fourier<R> {
         for time in 0..1 + usize::from(chirp.is_some()) {
             let [a, b] = buffers;
             buffers = fft.run(a, b);
-            // The way back is the way there with real and imaginary parts exchanged.
+            // With real and imaginary parts exchanged, a forward transform is an inverse one.
             match chirp {
                 Some(plan) if time == 0 => {
                     for (x, turn) in buffers[0].iter_mut().zip(&plan.spectrum) {
@@ -104,7 +104,7 @@ impl<R: Real> Fourier<R> {
     }
 }
 
-/// The smallest convenient length that holds the convolution.
+/// Smallest length with butterflies alone that holds the convolution.
 fn padded(n: usize) -> usize {
     (2 * n - 1..)
         .find(|len| {

@@ -1,10 +1,11 @@
-//! Complex Fourier transforms of any length, as many at once as a register has lanes.
+//! Complex Fourier transforms of any length, one line per lane.
 //!
-//! Stockham's self-sorting scheme: one pass over the data a factor, from one buffer to the other,
+//! Stockham's self-sorting scheme: one pass over the data per factor, from one buffer to the other,
 //! no bit reversal. Factors 2, 3, 4, 5, 7 and 8 have butterflies of their own, other primes a loop
 //! over pairs of outputs; beyond `LARGEST_PRIME` the length is padded instead (`chirp.rs`).
 //!
-//! Legend: r radix, blocks twiddled groups of a pass, stride distance of what a pass has merged.
+//! Legend: r radix; blocks number of groups with different twiddle factors; stride product of the
+//! radices of the earlier passes.
 
 use std::f64::consts::PI;
 
@@ -12,9 +13,9 @@ use super::butterfly::{Butterfly, Eight, Five, Four, Seven, Three, Two};
 use crate::math::Real;
 use grainwake_simd::{Complex, Vector, turned};
 
-/// Largest prime factor that is transformed by its definition; measured, decision 0005.
+/// Largest prime factor that is transformed by its definition (measured: decision 0005).
 pub const LARGEST_PRIME: usize = 113;
-/// Outputs (and their mirrors) of a prime radix that are summed in one sweep over its inputs.
+/// Outputs (and their mirrors) of a prime radix that are summed in one loop over its inputs.
 const TOGETHER: usize = 4;
 
 /// exp(-2 pi i numerator / denominator).
@@ -26,7 +27,7 @@ pub fn root(numerator: usize, denominator: usize) -> [f64; 2] {
 /// Factors in the order of the passes.
 pub fn factors(mut n: usize) -> Vec<usize> {
     let mut found = Vec::new();
-    // As few passes for the powers of two as there can be.
+    // As few passes as possible for the powers of two.
     let mut twos = n.trailing_zeros();
     n >>= twos;
     while twos > 0 {
@@ -59,18 +60,18 @@ pub fn factors(mut n: usize) -> Vec<usize> {
     found
 }
 
-/// One pass.
+/// One pass of the transform.
 struct Pass<R> {
     radix: usize,
     blocks: usize,
     stride: usize,
-    /// Twiddles: `radix - 1` for each block.
+    /// Twiddle factors: `radix - 1` for each block.
     turn: Vec<[R; 2]>,
     /// Cosines and sines of a prime radix without a butterfly, in the order in which `modes` reads.
     circle: Vec<[R; 2]>,
 }
 
-/// A planned transform.
+/// Planned transform.
 pub struct Fft<R> {
     passes: Vec<Pass<R>>,
 }
@@ -123,7 +124,7 @@ impl<R: Real> Fft<R> {
     }
 }
 
-/// A pass with a butterfly.
+/// Pass with a butterfly.
 #[inline(always)]
 fn step<V: Vector, B: Butterfly<R>, const R: usize>(
     pass: &Pass<V::Number>,
@@ -185,7 +186,7 @@ fn step<V: Vector, B: Butterfly<R>, const R: usize>(
     }
 }
 
-/// Cuts the first `len` entries off.
+/// Splits off the first `len` entries of `rest`.
 #[inline(always)]
 fn cut<'a, T>(rest: &mut &'a mut [T], len: usize) -> &'a mut [T] {
     let (first, others) = std::mem::take(rest).split_at_mut(len);
@@ -193,7 +194,7 @@ fn cut<'a, T>(rest: &mut &'a mut [T], len: usize) -> &'a mut [T] {
     first
 }
 
-/// A pass of any odd prime radix; uses up `source`.
+/// Pass of any odd prime radix; `source` is overwritten.
 #[inline(always)]
 fn prime_step<V: Vector>(
     pass: &Pass<V::Number>,
@@ -226,7 +227,7 @@ fn prime_step<V: Vector>(
     }
 }
 
-/// Outputs k..k + K of a prime radix and their mirrors.
+/// Computes outputs k..k + K of a prime radix and their mirrors.
 #[inline(always)]
 fn modes<V: Vector, const K: usize>(
     pass: &Pass<V::Number>,
@@ -260,7 +261,7 @@ fn modes<V: Vector, const K: usize>(
     }
 }
 
-/// Cosine and sine of 2 pi k t / r, grouped as `prime_step` sums them.
+/// Cosines and sines of 2 pi k t / r in the order in which `prime_step` sums.
 fn circle<R: Real>(r: usize) -> Vec<[R; 2]> {
     let half = r / 2;
     let mut found = Vec::with_capacity(half * half);

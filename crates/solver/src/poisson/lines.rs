@@ -1,10 +1,10 @@
-//! Blocks of lines on their way into the transforms and out of them.
+//! Loads and stores of blocks of lines before and after the transforms.
 
 use super::axis::{self, Axis};
 use crate::math::{Aligned, Real};
-use grainwake_simd::{Complex, MOST, Vector, as_complex, dispatch};
+use grainwake_simd::{Complex, MAX_LANES, Vector, as_complex, dispatch};
 
-/// Both buffers of the transforms of one thread.
+/// Both buffers of the transforms, one set per thread.
 pub struct Buffers<R>(Aligned<R>);
 
 impl<R: Real> Buffers<R> {
@@ -15,12 +15,12 @@ impl<R: Real> Buffers<R> {
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.0)
     }
-    /// Where the lines of `axis` are put.
+    /// Input lines of a transform along `axis`.
     #[inline(always)]
     pub fn lines<V: Vector<Number = R>>(&mut self, axis: &Axis<R>) -> &mut [Complex<V>] {
         &mut as_complex::<V>(&mut self.0)[..axis.n]
     }
-    /// Transforms them.
+    /// Transforms the input lines and returns the result.
     #[inline(always)]
     pub fn transform<V: Vector<Number = R>>(
         &mut self,
@@ -41,7 +41,8 @@ impl<R: Real> Buffers<R> {
     }
 }
 
-/// Lines side by side: entry i of the first ones at `at + i step`, of the second ones `second` on.
+/// Pairs of adjacent lines: entry i of the first lines at `at + i step`, of the second lines
+/// `second` further.
 #[derive(Clone, Copy)]
 pub struct Lines {
     pub at: usize,
@@ -50,13 +51,23 @@ pub struct Lines {
 }
 
 impl Lines {
+    /// Loads entry i of the lines.
     #[inline(always)]
     fn entry<V: Vector>(&self, values: &[V::Number], i: usize) -> Complex<V> {
-        let at = self.at + i * self.step;
+        let both = &values[self.at + i * self.step..][..self.second + V::WIDTH];
         Complex {
-            re: V::load(&values[at..]),
-            im: V::load(&values[at + self.second..]),
+            re: V::load(both),
+            im: V::load(&both[self.second..]),
         }
+    }
+    /// Mutable entry i of the first lines, and of the second lines.
+    #[inline(always)]
+    fn entry_mut<'a, V: Vector>(
+        &self,
+        values: &'a mut [V::Number],
+        i: usize,
+    ) -> (&'a mut [V::Number], &'a mut [V::Number]) {
+        values[self.at + i * self.step..][..self.second + V::WIDTH].split_at_mut(self.second)
     }
     #[inline(always)]
     pub fn load<V: Vector>(&self, values: &[V::Number], a: &mut [Complex<V>]) {
@@ -67,17 +78,17 @@ impl Lines {
     #[inline(always)]
     pub fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
         for (i, x) in a.iter().enumerate() {
-            let at = self.at + i * self.step;
-            x.re.store(&mut values[at..]);
-            x.im.store(&mut values[at + self.second..]);
+            let (first, second) = self.entry_mut::<V>(values, i);
+            x.re.store(first);
+            x.im.store(second);
         }
     }
     #[inline(always)]
-    pub fn store_past<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
+    pub fn store_non_temporal<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
         for (i, x) in a.iter().enumerate() {
-            let at = self.at + i * self.step;
-            x.re.store_past(&mut values[at..]);
-            x.im.store_past(&mut values[at + self.second..]);
+            let (first, second) = self.entry_mut::<V>(values, i);
+            x.re.store_non_temporal(first);
+            x.im.store_non_temporal(second);
         }
     }
     #[inline(always)]
@@ -103,14 +114,15 @@ impl Lines {
         self.load(values, buffers.lines::<V>(axis));
         let lines = buffers.transform::<V>(axis, true);
         for (i, &from) in axis.order.iter().enumerate() {
-            let at = self.at + i * self.step;
-            lines[from].im.store(&mut values[at..]);
-            lines[from].re.store(&mut values[at + self.second..]);
+            let (first, second) = self.entry_mut::<V>(values, i);
+            let line = &lines[from];
+            line.im.store(first);
+            line.re.store(second);
         }
     }
 }
 
-/// Rows of a plane: the first of the first ones starts at `at`, the second ones `second` rows on.
+/// Pairs of rows of a plane: the first rows start at `at`, the second rows `second` rows further.
 #[derive(Clone, Copy)]
 pub struct Rows {
     pub at: usize,
@@ -123,7 +135,7 @@ impl Rows {
     pub fn load<V: Vector>(&self, order: &[usize], values: &[V::Number], a: &mut [Complex<V>]) {
         for (group, order) in order.chunks(V::WIDTH).enumerate() {
             let at = self.at + group * V::WIDTH;
-            let (mut re, mut im) = ([V::constant(0.0); MOST], [V::constant(0.0); MOST]);
+            let (mut re, mut im) = ([V::constant(0.0); MAX_LANES], [V::constant(0.0); MAX_LANES]);
             for row in 0..V::WIDTH {
                 re[row] = V::load(&values[at + row * self.pitch..]);
                 im[row] = V::load(&values[at + (row + self.second) * self.pitch..]);
@@ -137,18 +149,39 @@ impl Rows {
     }
     #[inline(always)]
     pub fn store<V: Vector>(&self, order: &[usize], a: &[Complex<V>], values: &mut [V::Number]) {
-        for (group, order) in order.chunks(V::WIDTH).enumerate() {
-            let at = self.at + group * V::WIDTH;
-            let (mut re, mut im) = ([V::constant(0.0); MOST], [V::constant(0.0); MOST]);
-            for ((re, im), &from) in re.iter_mut().zip(&mut im).zip(order) {
-                (*re, *im) = (a[from].im, a[from].re);
+        let groups = order.chunks_exact(V::WIDTH);
+        let rest = groups.remainder();
+        let mut at = self.at;
+        for order in groups {
+            let mut block = [[V::constant(0.0); MAX_LANES]; 2];
+            for n in 0..V::WIDTH {
+                let line = &a[order[n]];
+                (block[0][n], block[1][n]) = (line.im, line.re);
             }
-            V::transpose(&mut re);
-            V::transpose(&mut im);
-            for row in 0..V::WIDTH {
-                re[row].store(&mut values[at + row * self.pitch..]);
-                im[row].store(&mut values[at + (row + self.second) * self.pitch..]);
+            self.store_block(block, at, values);
+            at += V::WIDTH;
+        }
+        if !rest.is_empty() {
+            let mut block = [[V::constant(0.0); MAX_LANES]; 2];
+            for (n, &from) in rest.iter().enumerate() {
+                (block[0][n], block[1][n]) = (a[from].im, a[from].re);
             }
+            self.store_block(block, at, values);
+        }
+    }
+    /// Transposes two blocks into the entries from `at` on of `V::WIDTH` first and second rows.
+    #[inline(always)]
+    fn store_block<V: Vector>(
+        &self,
+        [mut first, mut second]: [[V; MAX_LANES]; 2],
+        at: usize,
+        values: &mut [V::Number],
+    ) {
+        V::transpose(&mut first);
+        V::transpose(&mut second);
+        for row in 0..V::WIDTH {
+            first[row].store(&mut values[at + row * self.pitch..]);
+            second[row].store(&mut values[at + (row + self.second) * self.pitch..]);
         }
     }
 }

@@ -2,11 +2,11 @@
 //!
 //! Along x and y the second difference is diagonalised (cosine modes between impermeable faces,
 //! Fourier modes on a periodic axis); along z a tridiagonal system is left for each pair of modes.
-//! Every scaling of the transforms is hidden in here.
+//! All scalings of the transforms are internal.
 //!
-//! Memory is the bottleneck, so the solver holds nothing but the modes: the right-hand side of a
-//! plane is made by the caller when its transform begins, and the solution of a plane is used by
-//! the caller while it is in cache, together with the plane below, and then forgotten.
+//! Memory bandwidth limits the speed, so the solver stores the modes alone: the caller computes the
+//! right-hand side of a plane when its transform begins, and uses the solution of a plane and its
+//! neighbours while they are in the cache.
 
 mod axis;
 mod butterfly;
@@ -30,10 +30,10 @@ use tridiagonal::{ColumnScratch, Solve, Tridiagonal, block_width};
 
 pub use plane::Plane;
 
-/// The pair of conditions at the two ends of an axis.
+/// Conditions at the two ends of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
-    /// The ends are neighbours.
+    /// Periodic axis.
     Periodic,
     /// Zero normal derivative at both ends.
     Neumann,
@@ -46,12 +46,12 @@ pub struct Stages {
     pub forward: Duration,
     /// Tridiagonal systems.
     pub columns: Duration,
-    /// Transforms back and what the caller does with the solution.
+    /// Inverse transforms and the caller's use of the solution.
     pub inverse: Duration,
 }
 
-/// One plane of the solution and its neighbours, ghosts included. Beyond the ends of the box lie
-/// the plane across it on a periodic axis, else the plane itself.
+/// One plane of the solution and its neighbours, ghosts included. Beyond an end of the box the
+/// neighbour is the plane at the other end if z is periodic, else the plane itself.
 pub struct Solution<'a, R> {
     /// Plane k.
     pub here: &'a Plane<R>,
@@ -61,7 +61,7 @@ pub struct Solution<'a, R> {
     pub above: &'a Plane<R>,
 }
 
-/// Solver for lap(phi) = f. Planned once for a mesh; solving allocates nothing.
+/// Solver for lap(phi) = f, planned once for a mesh; solving allocates no memory.
 pub struct Poisson<R = f64> {
     mesh: Mesh,
     ends: [Ends; 3],
@@ -74,8 +74,8 @@ pub struct Poisson<R = f64> {
     slots: Vec<Slot<R>>,
     columns: Vec<ColumnScratch>,
     stages: Stages,
-    /// Whether the modes are written past the caches on the way there.
-    pub past_caches: bool,
+    /// Whether the forward transform writes the modes with non-temporal stores.
+    pub non_temporal: bool,
 }
 
 /// Scratch of one run of planes.
@@ -84,9 +84,9 @@ struct Slot<R> {
     buffers: Buffers<R>,
 }
 
-/// Runs of planes or blocks of columns: enough to keep many threads busy, whatever their number.
+/// Number of runs of planes and of blocks of columns, enough for many threads.
 const SLOTS: usize = 32;
-/// Planes of a run at least: the planes below and above each run are transformed twice.
+/// Least number of planes of a run: the planes below and above each run are transformed twice.
 const LEAST_RUN: usize = 16;
 
 impl<R: Real> Poisson<R> {
@@ -97,8 +97,8 @@ impl<R: Real> Poisson<R> {
         let scale = 1.0 / (axes[0].norm() * axes[1].norm());
         let shape = Shape::new::<R>(nx, ny);
         let mut eigenvalues = vec![0.0; shape.modes()];
-        // Lines that only fill up a block must not be singular: what they hold, round-off of their
-        // partners, would become infinite and come back to them.
+        // Padding lines of a block hold round-off of their partners; a singular system would turn
+        // it into infinities that return to the partners.
         let filler = mesh.spacing.y.powi(-2);
         shape.each_mode(|at, i, j| {
             let along_y = axes[1].eigenvalues.get(j).unwrap_or(&filler);
@@ -125,14 +125,14 @@ impl<R: Real> Poisson<R> {
                 .collect(),
             axes,
             stages: Stages::default(),
-            past_caches: false,
+            non_temporal: false,
         }
     }
 
     /// Solves for the right-hand side whose plane k = 1..=nz `source` writes (rows 1..=ny, entries
     /// 1..=nx), and hands each plane of the solution to `sink` with the same plane of `fields` and
     /// its `partial` result. Where the solution is defined up to a constant, the mean of the
-    /// right-hand side is taken to be zero and one value of the mean mode is pinned.
+    /// right-hand side must be zero, and one value of the mean mode is set to zero.
     pub fn solve<const N: usize, T: Send>(
         &mut self,
         source: impl Fn(usize, &mut Plane<R>) + Sync,
@@ -141,7 +141,7 @@ impl<R: Real> Poisson<R> {
         sink: impl Fn(usize, Solution<R>, &mut Run<N, R, T>) + Sync,
     ) {
         let start = Instant::now();
-        let past_caches = self.past_caches;
+        let non_temporal = self.non_temporal;
         let (axes, stride) = ([&self.axes[0], &self.axes[1]], self.shape.stride());
         for_chunks(
             &mut self.modes,
@@ -158,7 +158,7 @@ impl<R: Real> Poisson<R> {
                     plane,
                     modes,
                     buffers,
-                    past_caches,
+                    non_temporal,
                 });
             },
         );
@@ -202,7 +202,7 @@ impl<R: Real> Poisson<R> {
             &mut self.slots,
             |run, slot| {
                 let Slot { planes, buffers } = slot;
-                // Plane k on the other side of the box; none beyond an end that is not periodic.
+                // Plane k, wrapped on a periodic axis; none beyond another end.
                 let across = |k: usize| match k {
                     0 => periodic[2].then_some(nz),
                     k if k > nz => periodic[2].then_some(1),
@@ -235,8 +235,8 @@ impl<R: Real> Poisson<R> {
         self.stages.inverse += columns.elapsed();
     }
 
-    /// Replaces the right-hand side in the interior of `field` by the solution; ghosts are not
-    /// touched.
+    /// Replaces the right-hand side in the interior of `field` by the solution; ghosts keep
+    /// their values.
     #[cfg(test)]
     pub fn solve_field(&mut self, field: &mut Field<Centre, R>) {
         let layout = self.mesh.layout();

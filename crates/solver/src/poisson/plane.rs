@@ -1,12 +1,12 @@
-//! The transforms of one xy plane, in cache: cells to modes and back.
+//! Transforms of one xy plane: cells to modes and back.
 //!
-//! Lines go through the transforms in blocks of two cache lines (a full register of pairs) or one
-//! (half a register); the first half of a block are the real parts. Lines along y lie side by side
-//! in the plane; lines along x are turned over in registers on their way in, and their modes stay
-//! side by side, so that a plane of modes is a row of blocks, each [mode along x][line]. The pairs
-//! do not depend on the width of the registers, so neither do the bits.
+//! Lines are transformed in blocks of two cache lines (a full register of pairs) or one (half a
+//! register); the first half of a block are the real parts. Lines along y are adjacent in the
+//! plane. Lines along x are transposed in registers before the transform, and their modes stay
+//! adjacent: a plane of modes is a row of blocks, each [mode along x][line]. The pairs, hence the
+//! bits, do not depend on the width of the registers.
 //!
-//! Legend: L numbers of a cache line.
+//! Legend: L count of numbers in a cache line.
 
 use super::axis::Axis;
 use super::lines::{Buffers, Lines, Rows};
@@ -18,8 +18,8 @@ use grainwake_simd::{Kernel, Vector};
 pub struct Shape {
     nx: usize,
     ny: usize,
-    /// Numbers of a cache line: also the place of i = 1 in a row of a [`Plane`], whose rows start on
-    /// cache lines, with room for a ghost before.
+    /// Count of numbers in a cache line, and position of i = 1 in a row of a [`Plane`]: rows start
+    /// on cache lines, and a ghost precedes i = 1.
     line: usize,
     pitch: usize,
 }
@@ -34,21 +34,21 @@ impl Shape {
             pitch: line + nx.next_multiple_of(line) + line,
         }
     }
-    /// Lines along x, a multiple of L.
+    /// Number of lines along x, padded to a multiple of L.
     fn lines(&self) -> usize {
         self.ny.next_multiple_of(self.line)
     }
-    /// Modes of a plane, those of the lines beyond the last included.
+    /// Number of modes of a plane, padding lines included.
     pub fn modes(&self) -> usize {
         self.nx * self.lines()
     }
-    /// Distance of two planes of modes: an odd number of cache lines, so that a column of modes
-    /// does not crowd into a few sets of the cache.
+    /// Distance of two planes of modes: an odd number of cache lines, so that a column of modes is
+    /// spread over all sets of the cache.
     pub fn stride(&self) -> usize {
         self.line * ((self.modes() / self.line) | 1)
     }
-    /// Calls `f` with the place of each mode in its plane, its index along x and its line along x,
-    /// both from 0; lines from `ny` on fill up the last block.
+    /// Calls `f` with the position of each mode in its plane, the index of the mode along x and the
+    /// line along x, both from 0; lines from `ny` on are padding.
     pub fn each_mode(&self, mut f: impl FnMut(usize, usize, usize)) {
         for (first, width) in self.blocks(self.lines()) {
             for m in 0..self.nx {
@@ -71,7 +71,7 @@ impl Shape {
     }
 }
 
-/// A plane of cells with one layer of ghosts, rows on cache lines.
+/// Plane of cells with one layer of ghosts, rows aligned to cache lines.
 pub struct Plane<R> {
     shape: Shape,
     values: Aligned<R>,
@@ -92,12 +92,12 @@ impl<R: Real> Plane<R> {
     pub fn row(&self, j: usize) -> &[R] {
         &self.values[j * self.shape.pitch + R::LANES - 1..][..self.shape.nx + 2]
     }
-    /// Row j to write.
+    /// Mutable row j, ghosts included.
     #[inline(always)]
     pub fn row_mut(&mut self, j: usize) -> &mut [R] {
         &mut self.values[j * self.shape.pitch + R::LANES - 1..][..self.shape.nx + 2]
     }
-    /// Sets the ghosts: the neighbours across a periodic axis, else the cells next to them.
+    /// Sets the ghosts: periodic, or equal to the adjacent cells.
     #[inline(always)]
     fn fill_ghosts(&mut self, [periodic_x, periodic_y]: [bool; 2]) {
         let Shape { nx, ny, pitch, .. } = self.shape;
@@ -112,7 +112,8 @@ impl<R: Real> Plane<R> {
         self.values
             .copy_within(above * pitch..(above + 1) * pitch, (ny + 1) * pitch);
     }
-    /// Clears what shares a block with lines along y: a stale partner would leave its rounding.
+    /// Clears the padding lines along y, whose old values would change the rounding of their
+    /// partners.
     #[inline(always)]
     fn clear_columns(&mut self) {
         let Shape { nx, pitch, .. } = self.shape;
@@ -120,7 +121,7 @@ impl<R: Real> Plane<R> {
             row[R::LANES + nx..R::LANES + nx.next_multiple_of(R::LANES)].fill(R::default());
         }
     }
-    /// Clears what shares a block with lines along x.
+    /// Clears the padding lines along x.
     #[inline(always)]
     fn clear_rows(&mut self) {
         let Shape { ny, pitch, .. } = self.shape;
@@ -128,14 +129,14 @@ impl<R: Real> Plane<R> {
     }
 }
 
-/// Cells of `plane` -> `modes`; uses up the plane.
+/// Forward transform: cells of `plane` to `modes`; the plane is overwritten.
 pub struct Forward<'a, R> {
     pub axes: [&'a Axis<R>; 2],
     pub plane: &'a mut Plane<R>,
     pub modes: &'a mut [R],
     pub buffers: &'a mut Buffers<R>,
-    /// Whether the modes are written past the caches.
-    pub past_caches: bool,
+    /// Whether the modes are written with non-temporal stores.
+    pub non_temporal: bool,
 }
 
 impl<R: Real> Kernel for Forward<'_, R> {
@@ -147,7 +148,7 @@ impl<R: Real> Kernel for Forward<'_, R> {
             plane,
             modes,
             buffers,
-            past_caches,
+            non_temporal,
         } = self;
         let shape = plane.shape;
         plane.clear_columns();
@@ -190,9 +191,9 @@ impl<R: Real> Kernel for Forward<'_, R> {
                     };
                     rows.load(&along_x.order, values, buffers.lines::<V>(along_x));
                     let found = buffers.transform::<V>(along_x, false);
-                    // Narrower registers would write a line in parts.
-                    if past_caches && V::WIDTH == R::LANES {
-                        lines.store_past(found, modes);
+                    // A narrower register writes part of a cache line.
+                    if non_temporal && V::WIDTH == R::LANES {
+                        lines.store_non_temporal(found, modes);
                     } else {
                         lines.store(found, modes);
                     }
@@ -216,7 +217,7 @@ impl<R: Real> Kernel for Forward<'_, R> {
     }
 }
 
-/// `modes` -> cells of `plane` and its ghosts.
+/// Inverse transform: `modes` to cells of `plane` and its ghosts.
 pub struct Inverse<'a, R> {
     pub axes: [&'a Axis<R>; 2],
     pub periodic: [bool; 2],

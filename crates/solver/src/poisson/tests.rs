@@ -20,7 +20,7 @@ fn residual(cells: [usize; 3], ends: [Ends; 3]) -> f64 {
         origin: DVec3::ZERO,
     };
     let [nx, ny, nz] = cells;
-    let mut f = Field::<Centre>::zeros(&mesh);
+    let mut f = Field::<Centre>::zeros(&mesh.whole());
     let mut state = 7;
     let mut sum = 0.0;
     for k in 1..=nz {
@@ -107,8 +107,8 @@ fn residual_is_round_off_for_every_pairing_and_awkward_sizes() {
     }
 }
 
-/// A smooth right-hand side of zero mean with noise, solved in both precisions: largest difference over the
-/// largest value.
+/// A smooth right-hand side of zero mean with noise, solved in both precisions: largest difference
+/// over the largest value.
 fn single_against_double(cells: [usize; 3], spacing: DVec3, ends: [Ends; 3]) -> f64 {
     let mesh = Mesh {
         cells,
@@ -116,8 +116,8 @@ fn single_against_double(cells: [usize; 3], spacing: DVec3, ends: [Ends; 3]) -> 
         origin: DVec3::ZERO,
     };
     let mut state = 7;
-    let mut double = Field::<Centre>::zeros(&mesh);
-    double.fill_with(&mesh, |x| {
+    let mut double = Field::<Centre>::zeros(&mesh.whole());
+    double.fill_with(&mesh.whole(), |x| {
         (std::f64::consts::PI * x.x / mesh.extent().x).cos()
     });
     double
@@ -132,7 +132,7 @@ fn single_against_double(cells: [usize; 3], spacing: DVec3, ends: [Ends; 3]) -> 
         inside.iter().fold(from, |sum, &at| f(sum, field[at]))
     };
     let mean = of_inside(&double, |a, b| a + b, 0.0) / inside.len() as f64;
-    let mut single = Field::<Centre, f32>::zeros(&mesh);
+    let mut single = Field::<Centre, f32>::zeros(&mesh.whole());
     for (double, single) in double.iter_mut().zip(single.iter_mut()) {
         *double -= mean;
         *single = f32::of(*double);
@@ -176,7 +176,7 @@ fn single_precision_solves_to_its_round_off_in_flat_boxes_too() {
 
 #[test]
 fn transforms_of_every_length_match_their_definition() {
-    use grainwake_simd::{Complex, One};
+    use grainwake_simd::{Complex, Scalar};
     for n in (1..=130).chain([143, 251]) {
         let given: Vec<[f64; 2]> = (0..n)
             .map(|t| [(1.3 * t as f64).sin(), (0.7 * (t * t) as f64).cos()])
@@ -184,9 +184,9 @@ fn transforms_of_every_length_match_their_definition() {
         let plan = chirp::Fourier::new(n);
         let len = plan.buffer_len(n);
         let lanes = |values: &[f64]| {
-            let mut a = vec![Complex::<One<f64>>::zero(); len];
+            let mut a = vec![Complex::<Scalar<f64>>::zero(); len];
             for (a, value) in a.iter_mut().zip(values.chunks(2)) {
-                (a.re, a.im) = (One::splat(value[0]), One::splat(value[1]));
+                (a.re, a.im) = (Scalar::splat(value[0]), Scalar::splat(value[1]));
             }
             a
         };
@@ -211,7 +211,7 @@ fn transforms_of_every_length_match_their_definition() {
 /// Bits of a solution that meets whole and half blocks of lines, odd lengths and all stages.
 fn bits<R: Real>(mesh: &Mesh, ends: [Ends; 3]) -> Vec<u64> {
     let mut state = 3;
-    let mut f = Field::<Centre, R>::zeros(mesh);
+    let mut f = Field::<Centre, R>::zeros(&mesh.whole());
     f.iter_mut()
         .for_each(|value| *value = R::of(noise(&mut state)));
     let mut poisson = Poisson::new(mesh, ends);
@@ -225,18 +225,23 @@ fn bits<R: Real>(mesh: &Mesh, ends: [Ends; 3]) -> Vec<u64> {
 
 #[test]
 fn bits_do_not_depend_on_the_instruction_set() {
-    use grainwake_simd::{Level, limit_level};
+    use grainwake_simd::{InstructionSet, limit_instructions};
     let mesh = Mesh {
         cells: [37, 39, 18],
         spacing: DVec3::new(0.5, 0.7, 0.6),
         origin: DVec3::ZERO,
     };
     for ends in [[Ends::Neumann; 3], [Ends::Periodic; 3]] {
-        let [eight, four, common] = [Level::Avx512, Level::Avx2, Level::Common].map(|level| {
-            limit_level(level);
+        let [eight, four, common] = [
+            InstructionSet::Avx512,
+            InstructionSet::Avx2,
+            InstructionSet::Baseline,
+        ]
+        .map(|level| {
+            limit_instructions(level);
             [bits::<f64>(&mesh, ends), bits::<f32>(&mesh, ends)]
         });
-        limit_level(Level::Avx512);
+        limit_instructions(InstructionSet::Avx512);
         assert_eq!(eight, four);
         assert_eq!(eight, common);
     }

@@ -1,35 +1,36 @@
-//! The tridiagonal systems left along z, one for each pair of modes along x and y.
+//! Tridiagonal systems along z, one for each pair of modes along x and y.
 //!
 //! With lambda = lambda_x + lambda_y and b = 2 + lambda dz^2 each reads
 //! -x[k-1] + b x[k] - x[k+1] = -dz^2 f[k], with b lowered by one next to a Neumann end and the
-//! corners closed by Sherman-Morrison on a periodic axis. A block of columns is eliminated at a
-//! time: as many as the cache holds, so that memory sees each mode once in and once out. All of it
-//! is in doubles, whatever the modes are: the lowest modes of a wide flat box have lambda dz^2 below
-//! the rounding of singles, and would be lost.
+//! corners closed by Sherman-Morrison on a periodic axis. Blocks of columns that fit the cache are
+//! solved one after the other, so that each mode is read from and written to memory once. The
+//! solution is in double precision for either type of field: the lowest modes of a wide flat box
+//! have lambda dz^2 below the rounding of singles.
 //!
-//! Legend: y solution of the open system, q its answer to the corner, g = -b, v values in cache.
+//! Legend: f right-hand side; y solution of the system without its corners; q solution for the
+//! corner vector u; g = -b.
 
 use super::Ends;
 use crate::grid::Columns;
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Kernel, Vector};
 
-/// Bytes of cache that a block of columns may take.
+/// Cache for a block of columns [bytes].
 const CACHE: usize = 1 << 19;
 
-/// Columns of a block: a multiple of two cache lines.
+/// Width of a block of columns: a multiple of two cache lines.
 pub fn block_width<R: Real>(nz: usize) -> usize {
     let least = 2 * R::LANES;
     (CACHE / size_of::<f64>() / 2 / nz / least * least).max(least)
 }
 
-/// One block of columns in cache.
+/// Scratch for one block of columns.
 pub struct ColumnScratch {
     values: Aligned<f64>,
     pivots: Aligned<f64>,
     corner: Aligned<f64>,
     carry: Aligned<f64>,
-    /// Right-hand side of the mean mode and the pivots of its system.
+    /// Right-hand side of the mean mode and pivots of its system.
     mean: [Vec<f64>; 2],
 }
 
@@ -115,6 +116,18 @@ impl<R: Real> Kernel for Solve<'_, '_, R> {
     }
 }
 
+/// Row k - 1 of a list of rows, empty for k = 0, and mutable row k.
+#[inline(always)]
+fn row_of(values: &mut [f64], k: usize, width: usize) -> (&[f64], &mut [f64]) {
+    let (before, rest) = values.split_at_mut(k * width);
+    let before = if k > 0 {
+        &before[(k - 1) * width..][..width]
+    } else {
+        &[]
+    };
+    (before, &mut rest[..width])
+}
+
 impl Tridiagonal {
     #[inline(always)]
     fn solve_flat<R: Real>(&self, columns: &mut Columns<R>, lambda: &[f64]) {
@@ -146,25 +159,22 @@ impl Tridiagonal {
             let open =
                 V::constant(2.0 - f64::from(u8::from(k == 0)) - f64::from(u8::from(k + 1 == n)));
             let row = &columns.row(k)[..width];
-            let (before, here) = pivots[..(k + 1) * width].split_at_mut(k * width);
-            let (values_before, values_here) = values[..(k + 1) * width].split_at_mut(k * width);
+            let (pivots_before, pivots) = row_of(pivots, k, width);
+            let (values_before, values) = row_of(values, k, width);
             for i in (0..width).step_by(V::WIDTH) {
-                let b = open + V::load(&lambda[i..]) * square;
-                let f = factor * V::load_from(&row[i..]);
-                let (pivot, value) = if k == 0 {
-                    let pivot = one.over(b);
-                    (pivot, f * pivot)
-                } else {
-                    let at = (k - 1) * width + i;
-                    let pivot = one.over(b - V::load(&before[at..]));
-                    (pivot, (f + V::load(&values_before[at..])) * pivot)
-                };
-                pivot.store(&mut here[i..]);
-                value.store(&mut values_here[i..]);
+                let mut b = open + V::load(&lambda[i..]) * square;
+                let mut f = factor * V::load_from(&row[i..]);
+                if k > 0 {
+                    b = b - V::load(&pivots_before[i..]);
+                    f = f + V::load(&values_before[i..]);
+                }
+                let pivot = one.div(b);
+                pivot.store(&mut pivots[i..]);
+                (f * pivot).store(&mut values[i..]);
             }
         }
         if singular {
-            // The last pivot of the mean mode vanishes; the value there is pinned to zero.
+            // The last pivot of the mean mode vanishes; its last value is set to zero.
             values[(n - 1) * width] = 0.0;
         }
         let carry = &mut scratch.carry[..width];
@@ -173,7 +183,7 @@ impl Tridiagonal {
             *last = R::of(*carry);
         }
         for k in (0..n - 1).rev() {
-            let row = columns.row(k);
+            let row = &mut columns.row(k)[..width];
             let (values, pivots) = (&values[k * width..][..width], &pivots[k * width..][..width]);
             for i in (0..width).step_by(V::WIDTH) {
                 let x = V::load(&values[i..]) + V::load(&pivots[i..]) * V::load(&carry[i..]);
@@ -214,7 +224,7 @@ impl Tridiagonal {
                     (diagonal, u) = (diagonal - g, u + g);
                 }
                 if k + 1 == n {
-                    (diagonal, u) = (diagonal - one.over(g), u - one);
+                    (diagonal, u) = (diagonal - one.div(g), u - one);
                 }
                 let (before, y, q) = if k == 0 {
                     (zero, zero, zero)
@@ -226,7 +236,7 @@ impl Tridiagonal {
                         V::load(&corner[at..]),
                     )
                 };
-                let pivot = one.over(diagonal - before);
+                let pivot = one.div(diagonal - before);
                 let at = k * width + i;
                 pivot.store(&mut pivots[at..]);
                 ((factor * V::load_from(&row[i..]) + y) * pivot).store(&mut values[at..]);
@@ -247,9 +257,9 @@ impl Tridiagonal {
         let last = (n - 1) * width;
         for i in (0..width).step_by(V::WIDTH) {
             let g = zero - (two + V::load(&lambda[i..]) * square);
-            let y = V::load(&values[i..]) - V::load(&values[last + i..]).over(g);
-            let q = one + V::load(&corner[i..]) - V::load(&corner[last + i..]).over(g);
-            y.over(q).store(&mut share[i..]);
+            let y = V::load(&values[i..]) - V::load(&values[last + i..]).div(g);
+            let q = one + V::load(&corner[i..]) - V::load(&corner[last + i..]).div(g);
+            y.div(q).store(&mut share[i..]);
         }
         for k in 0..n {
             let row = columns.row(k);
@@ -261,7 +271,7 @@ impl Tridiagonal {
         }
     }
 
-    /// The mean mode of a periodic axis, in doubles: its first value is pinned to zero.
+    /// Solves the mean mode of a periodic axis, whose first value is set to zero.
     #[inline(always)]
     fn solve_mean<R: Real>(&self, columns: &mut Columns<R>, [f, pivots]: &mut [Vec<f64>; 2]) {
         let (n, factor) = (self.n, -self.square * self.scale);

@@ -6,7 +6,7 @@ use crate::dem::Grain;
 use crate::flow::{Boundary, FluidParams};
 use crate::grid::{Axis, Mesh};
 use crate::math::Precision;
-use grainwake_simd::{Level, limit_level};
+use grainwake_simd::{InstructionSet, limit_instructions};
 
 /// Rotated ellipsoid beside a wall and sphere across the edges of a periodic box, both moving.
 fn two_grains(precision: Precision) -> Setup {
@@ -61,11 +61,16 @@ fn bits_of_coupled_steps_do_not_depend_on_the_instruction_set() {
         all.map(f64::to_bits).collect()
     }
     for precision in [Precision::Double, Precision::Single] {
-        let [widest, middle, common] = [Level::Avx512, Level::Avx2, Level::Common].map(|level| {
-            limit_level(level);
+        let [widest, middle, common] = [
+            InstructionSet::Avx512,
+            InstructionSet::Avx2,
+            InstructionSet::Baseline,
+        ]
+        .map(|level| {
+            limit_instructions(level);
             bits(precision)
         });
-        limit_level(Level::Avx512);
+        limit_instructions(InstructionSet::Avx512);
         assert!(widest == middle && widest == common, "{precision}");
     }
 }

@@ -68,7 +68,7 @@ fn divergence_is_minus_the_transposed_gradient() {
         0.0,
     );
     let mut state = 5;
-    let mut p = Field::<Centre>::zeros(&mesh);
+    let mut p = Field::<Centre>::zeros(&mesh.whole());
     p.iter_mut().for_each(|value| *value = noise(&mut state));
     flow.boundaries.fill_pressure(&mut p);
     let mut u = flow.velocity.clone();
@@ -186,9 +186,15 @@ fn taylor_green(n: usize, dt: f64, steps: usize, nu: f64, plane: [usize; 2]) -> 
             0.0
         }
     };
-    flow.velocity.x.fill_with(&mesh, |x| exact(0, x, 0.0));
-    flow.velocity.y.fill_with(&mesh, |x| exact(1, x, 0.0));
-    flow.velocity.z.fill_with(&mesh, |x| exact(2, x, 0.0));
+    flow.velocity
+        .x
+        .fill_with(&mesh.whole(), |x| exact(0, x, 0.0));
+    flow.velocity
+        .y
+        .fill_with(&mesh.whole(), |x| exact(1, x, 0.0));
+    flow.velocity
+        .z
+        .fill_with(&mesh.whole(), |x| exact(2, x, 0.0));
     flow.boundaries.fill_ghosts(&mut flow.velocity);
     for _ in 0..steps {
         flow.predict(dt);
@@ -198,7 +204,10 @@ fn taylor_green(n: usize, dt: f64, steps: usize, nu: f64, plane: [usize; 2]) -> 
     let mut worst: f64 = 0.0;
     for [i, j, k] in interior(&mesh) {
         for axis in 0..3 {
-            let x = mesh.position(crate::grid::FACE_OFFSET[axis], [i, j, k]);
+            let x = mesh.position(
+                crate::grid::FACE_OFFSET[axis],
+                crate::grid::GlobalCell([i, j, k]),
+            );
             let u = flow.velocity.component(axis)[mesh.layout().index(i, j, k)];
             worst = worst.max((u - exact(axis, x, t)).abs());
         }
@@ -231,10 +240,12 @@ fn taylor_green_is_second_order_in_time() {
         };
         let mut flow = Flow::<f64>::new(&mesh, PERIODIC, &params(0.05));
         // Two superposed vortices interact, so that advection is not a gradient.
+        flow.velocity.x.fill_with(&mesh.whole(), |x| {
+            x.x.sin() * x.z.cos() + 0.5 * (2.0 * x.z).sin()
+        });
         flow.velocity
-            .x
-            .fill_with(&mesh, |x| x.x.sin() * x.z.cos() + 0.5 * (2.0 * x.z).sin());
-        flow.velocity.z.fill_with(&mesh, |x| -x.x.cos() * x.z.sin());
+            .z
+            .fill_with(&mesh.whole(), |x| -x.x.cos() * x.z.sin());
         flow.make_solenoidal();
         for _ in 0..steps {
             flow.predict(1.0 / steps as f64);
@@ -268,13 +279,13 @@ fn beltrami(n: usize) -> f64 {
     let mut flow = Flow::<f64>::new(&mesh, PERIODIC, &params(nu));
     flow.velocity
         .x
-        .fill_with(&mesh, |x| x.z.sin() + 0.7 * x.y.cos());
+        .fill_with(&mesh.whole(), |x| x.z.sin() + 0.7 * x.y.cos());
     flow.velocity
         .y
-        .fill_with(&mesh, |x| 0.8 * x.x.sin() + x.z.cos());
+        .fill_with(&mesh.whole(), |x| 0.8 * x.x.sin() + x.z.cos());
     flow.velocity
         .z
-        .fill_with(&mesh, |x| 0.7 * x.y.sin() + 0.8 * x.x.cos());
+        .fill_with(&mesh.whole(), |x| 0.7 * x.y.sin() + 0.8 * x.x.cos());
     flow.boundaries.fill_ghosts(&mut flow.velocity);
     let (dt, steps) = (4e-3, 100);
     for _ in 0..steps {
@@ -284,7 +295,10 @@ fn beltrami(n: usize) -> f64 {
     let decay = (-nu * dt * steps as f64).exp();
     interior(&mesh)
         .map(|[i, j, k]| {
-            let x = mesh.position(crate::grid::FACE_OFFSET[0], [i, j, k]);
+            let x = mesh.position(
+                crate::grid::FACE_OFFSET[0],
+                crate::grid::GlobalCell([i, j, k]),
+            );
             (flow.velocity.x.at(i, j, k) - decay * (x.z.sin() + 0.7 * x.y.cos())).abs()
         })
         .fold(0.0, f64::max)
@@ -426,15 +440,15 @@ fn outflow_keeps_the_mass_of_the_box() {
 
 #[test]
 fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
-    use grainwake_simd::{Level, limit_level};
-    fn bits<R: Real>(boundaries: Boundaries, past_caches: bool) -> Vec<u64> {
+    use grainwake_simd::{InstructionSet, limit_instructions};
+    fn bits<R: Real>(boundaries: Boundaries, non_temporal: bool) -> Vec<u64> {
         let mesh = Mesh {
             cells: [29, 11, 9],
             spacing: DVec3::new(0.3, 0.4, 0.5),
             origin: DVec3::ZERO,
         };
         let mut flow = Flow::<R>::new(&mesh, boundaries, &params(0.01));
-        (flow.past_caches, flow.poisson.past_caches) = (past_caches, past_caches);
+        (flow.non_temporal, flow.poisson.non_temporal) = (non_temporal, non_temporal);
         flow.start_from(|axis, x| (x + DVec3::new(0.1, 0.2, 0.3)).to_array()[axis].sin());
         let mut kept = Vec::new();
         for _ in 0..3 {
@@ -454,15 +468,19 @@ fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
     }
     let walls = Boundaries([[Boundary::WALL; 2]; 3]);
     for boundaries in [PERIODIC, walls] {
-        let levels = [Level::Avx512, Level::Avx2, Level::Common];
+        let levels = [
+            InstructionSet::Avx512,
+            InstructionSet::Avx2,
+            InstructionSet::Baseline,
+        ];
         let [widest, middle, common] = levels.map(|level| {
-            limit_level(level);
+            limit_instructions(level);
             let [near, past] = [false, true]
                 .map(|past| [bits::<f64>(boundaries, past), bits::<f32>(boundaries, past)]);
             assert!(near == past, "past the caches, {level:?}");
             near
         });
-        limit_level(Level::Avx512);
+        limit_instructions(InstructionSet::Avx512);
         assert!(widest == middle && widest == common);
     }
 }

@@ -3,7 +3,7 @@
 use crate::flow::Known;
 use crate::immersed::geometry::{LocatedBody, PAD};
 use crate::math::Real;
-use grainwake_simd::MOST;
+use grainwake_simd::MAX_LANES;
 
 /// Velocity in the padded box around a grain [m/s], either in the fields or copied.
 pub struct BoxVelocity<'a, R> {
@@ -24,7 +24,7 @@ impl<'a, R: Real> BoxVelocity<'a, R> {
         let (layout, velocity) = (known.mesh.layout(), known.velocity);
         let walled = known.boundaries.walled();
         // Links end at walls, so only periodic edges and rows shorter than a register need a copy.
-        let direct = layout.cells[0] >= MOST
+        let direct = layout.cells[0] >= MAX_LANES
             && (0..3).all(|axis| {
                 let high = body.lowest[axis] + body.size[axis] + PAD - 1;
                 walled[axis] || body.lowest[axis] >= PAD && high <= layout.cells[axis] as i32 + 1
@@ -40,7 +40,7 @@ impl<'a, R: Real> BoxVelocity<'a, R> {
         }
         for (axis, copy) in copies.iter_mut().enumerate() {
             body.index_map.copy(velocity.component(axis), copy);
-            copy.resize(copy.len() + MOST, R::default());
+            copy.resize(copy.len() + MAX_LANES, R::default());
         }
         let wide = (body.size + 2 * PAD).to_array().map(|n| n as usize);
         let strides = [1, wide[0], wide[0] * wide[1]];

@@ -82,7 +82,8 @@ impl<R: Real> Kernel for AddCorrection<'_, '_, R> {
         let part = self.prediction.range().clone();
         for row in self.rows.iter().filter(|row| part.contains(&row.at)) {
             let correction = &self.correction[row.first..];
-            self.prediction.push::<V>(row.at, row.count, correction);
+            self.prediction
+                .add_tendency::<V>(row.at, row.count, correction);
         }
     }
 }

@@ -177,7 +177,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             if a.exists {
                 let weight = V::load_from(&wx[n..]);
                 let flux = self.flux::<V>(0, sixth_order[0], &rigid, at, index, weight);
-                sum = flux.behind(last_flux) - flux;
+                sum = flux.shift(last_flux) - flux;
                 last_flux = flux;
             }
             if b.exists {
@@ -250,8 +250,8 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let sixth = both.mul_add(V::constant(7.0), outer);
         let higher_order = c_mean * V::constant(1.0 / 60.0) * sixth;
         // Values read beyond the ends of the grid are arbitrary.
-        let higher_order = index.where_below(V::constant(sixth_order.end), higher_order, zero);
-        let higher_order = index.where_below(V::constant(sixth_order.start), zero, higher_order);
+        let higher_order = index.select_below(V::constant(sixth_order.end), higher_order, zero);
+        let higher_order = index.select_below(V::constant(sixth_order.start), zero, higher_order);
         let mut flux = higher_order;
         // Links outside the band are open: 1/A - 1 is zero.
         if zero.mask_below(weight) != 0 {
@@ -261,6 +261,6 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             flux = ((q_mean - u_q) * (c_mean - u_c)).mul_add(weight, higher_order);
         }
         let flux = flux * V::constant(axis.per_spacing);
-        no_link.where_below(weight, flux, zero)
+        no_link.select_below(weight, flux, zero)
     }
 }

@@ -11,7 +11,7 @@ use std::ops::Range;
 use crate::immersed::geometry::LocatedBody;
 use crate::immersed::geometry::aperture::inverse_aperture_excess;
 use crate::math::Aligned;
-use grainwake_simd::{Kernel, MOST, Vector, dispatch};
+use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
 /// The current plane of a component and the next, in rows aligned to registers. One row precedes
 /// the first, and one follows the last.
@@ -33,10 +33,10 @@ impl LinkPlanes {
     /// Makes room for the box of a grain and clears the fluxes.
     pub fn reset(&mut self, body: &LocatedBody) {
         // The face after the last of the box ends the last link.
-        self.row_length = (body.size.x as usize + 1).next_multiple_of(MOST);
+        self.row_length = (body.size.x as usize + 1).next_multiple_of(MAX_LANES);
         let count = self.row_length * (body.size.y as usize + 2);
         for list in self.distance.iter_mut().chain(&mut self.weight) {
-            list.make_room(count + MOST);
+            list.make_room(count + MAX_LANES);
         }
         for (list, count) in [
             (&mut self.flux_y, self.row_length),
@@ -130,7 +130,7 @@ impl WeighLinks<'_> {
     fn read_next_plane<V: Vector<Number = f32>>(&mut self) {
         let (body, k) = (self.body, self.k + 1);
         let row_length = self.planes.row_length;
-        let length = row_length * (body.size.y as usize + 2) + MOST;
+        let length = row_length * (body.size.y as usize + 2) + MAX_LANES;
         let distance = &mut self.planes.distance[(k % 2) as usize][..length];
         let infinity = V::constant(f64::INFINITY);
         for n in (0..length).step_by(V::WIDTH) {
@@ -148,7 +148,7 @@ impl WeighLinks<'_> {
                 // Entries beyond the row are overwritten by the next row.
                 let end = V::constant((count - n) as f64);
                 let d = V::load(&list[listed.first + n..]);
-                let d = V::ramp().where_below(end, d, infinity);
+                let d = V::ramp().select_below(end, d, infinity);
                 d.store(&mut distance[first + n..]);
             }
         }
@@ -180,9 +180,9 @@ impl WeighLinks<'_> {
             for axis in 0..3 {
                 let d = half * (d_0 + d_1[axis]);
                 let excess = inverse_aperture_excess(d, self.eps);
-                let w = d.where_below(band, excess, zero);
-                let w = inside.where_below(d, w, no_link);
-                let w = d.where_below(outside, w, no_link);
+                let w = d.select_below(band, excess, zero);
+                let w = inside.select_below(d, w, no_link);
+                let w = d.select_below(outside, w, no_link);
                 w.store(&mut weight[axis][entry..]);
             }
         }

@@ -25,13 +25,13 @@ pub fn drag<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
         excess = rise.mul_add(V::constant(1.0 / (h * h)), excess);
     }
     let least = V::constant(1e-12 * eps);
-    [excess.larger(V::constant(0.0)), depth.larger(least)]
+    [excess.max(V::constant(0.0)), depth.max(least)]
 }
 
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
-    use grainwake_simd::One;
+    use grainwake_simd::Scalar;
 
     use super::*;
     use crate::immersed::geometry::aperture::reference;
@@ -46,8 +46,8 @@ mod tests {
                 for e in [DVec3::X, DVec3::Y, DVec3::Z] {
                     laplacian += (u(0.5 * e) + u(-0.5 * e) - 2.0 * u(DVec3::ZERO)) / 0.25;
                 }
-                let normal = n.to_array().map(One);
-                let [excess, depth] = drag(One(d), normal, spacing.to_array(), 0.5);
+                let normal = n.to_array().map(Scalar);
+                let [excess, depth] = drag(Scalar(d), normal, spacing.to_array(), 0.5);
                 let residual = laplacian - excess.0 / depth.0 * u(DVec3::ZERO);
                 assert!(residual.abs() < 1e-12, "{d}: {residual:e}");
             }

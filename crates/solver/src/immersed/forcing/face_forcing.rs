@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::drag::drag;
 use crate::immersed::geometry::aperture::aperture;
 use crate::immersed::scheme::Scheme;
-use grainwake_simd::{Kernel, One, Vector, dispatch};
+use grainwake_simd::{Kernel, Scalar, Vector, dispatch};
 
 /// Forcing of a face by one grain, or by several together.
 #[derive(Clone, Copy, Debug)]
@@ -98,7 +98,7 @@ impl ForcingParams {
         let strength = V::constant(self.diffusion) * drag;
         // Zero outside the band: a concave grain may enclose such faces.
         let outside = V::constant(2.0 * self.eps);
-        let strength = d.where_below(outside, strength, V::constant(0.0));
+        let strength = d.select_below(outside, strength, V::constant(0.0));
         let closed = V::constant(1.0) - aperture(d, self.eps);
         ([strength, depth], closed)
     }
@@ -127,8 +127,8 @@ impl Kernel for OneFace<'_> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let normal = self.normal.to_array().map(One);
-        let ([strength, depth], closed) = self.params.aperture_forcing(One(self.d), normal);
+        let normal = self.normal.to_array().map(Scalar);
+        let ([strength, depth], closed) = self.params.aperture_forcing(Scalar(self.d), normal);
         *self.forcing = FaceForcing {
             strength: strength.0 / depth.0,
             closed: closed.0,

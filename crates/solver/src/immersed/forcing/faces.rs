@@ -2,12 +2,12 @@
 
 use crate::immersed::geometry::{BandFaces, FaceRun, NarrowBandShapes, NeighbourGrain, load_all};
 use crate::immersed::scheme::Scheme;
-use grainwake_simd::{Kernel, MOST, Vector, dispatch};
+use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
 use super::face_forcing::ForcingParams;
 
 /// Forced faces of one grain. All lists but `runs` have one entry per face, in the order of the
-/// runs, and `MOST` unused entries at the end.
+/// runs, and `MAX_LANES` unused entries at the end.
 #[derive(Clone, Debug, Default)]
 pub struct ForcedFaces {
     /// Positions of the faces, by component.
@@ -53,7 +53,7 @@ impl ForcedFaces {
         }
         for list in [&mut self.weight, &mut self.closed] {
             list.truncate(count);
-            list.resize(count + MOST, 0.0);
+            list.resize(count + MAX_LANES, 0.0);
         }
         self.closed_by_all.clear();
         if !band.shared.is_empty() {
@@ -133,10 +133,10 @@ impl Kernel for WeighFaces<'_> {
             let d = V::load(&distance[at..]);
             let ([strength, depth], c) = self.params.aperture_forcing(d, load_all(normal, at));
             // strength / (1 + strength) with a single division.
-            let s = strength.over(depth + strength);
+            let s = strength.div(depth + strength);
             // Faces deep inside take the rigid velocity.
-            inside.where_below(d, s, one).store(&mut weight[at..]);
-            inside.where_below(d, c, one).store(&mut closed[at..]);
+            inside.select_below(d, s, one).store(&mut weight[at..]);
+            inside.select_below(d, c, one).store(&mut closed[at..]);
         }
     }
 }

@@ -215,7 +215,7 @@ impl<R: Real> RunImpulse<'_, R> {
         sums: &mut Moments,
     ) -> V {
         let (zero, index) = (V::constant(0.0), lane_indices::<V>(n));
-        let predicted = V::load_some(&self.predicted[n..]);
+        let predicted = V::load_partial(&self.predicted[n..]);
         let rise = self.moved_pressure::<V>(0, n) - self.moved_pressure(1, n);
         let e = rise.mul_add(V::constant(self.dt_per_h), V::constant(-self.dt_g));
         let without_drag = closed_by_all.mul_add(e, predicted);
@@ -227,8 +227,8 @@ impl<R: Real> RunImpulse<'_, R> {
         let x = V::constant(arm.x) + V::constant(self.spacing) * index;
         let arm = [x, V::constant(arm.y), V::constant(arm.z)];
         let end = V::constant(self.run.count as f64);
-        let constant = index.where_below(end, constant, zero);
-        let derivative = index.where_below(end, derivative, zero);
+        let constant = index.select_below(end, constant, zero);
+        let derivative = index.select_below(end, derivative, zero);
         sums.add(self.axis, n, arm, constant, derivative);
         rest_gain
     }

@@ -67,7 +67,7 @@ impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
                     + weight * velocity.component(axis, index)
                     + change_weight(weight, closed, self.closure_dt)
                         * change.component(axis, index);
-                gain.add_some(&mut predicted[n..]);
+                gain.add_partial(&mut predicted[n..]);
             }
         }
     }

@@ -80,8 +80,8 @@ pub fn aperture<V: Vector>(d: V, eps: f64) -> V {
 /// Inverse-aperture excess 1 / max(A, 0.4) - 1 at distances `d` [m].
 #[inline(always)]
 pub fn inverse_aperture_excess<V: Vector>(d: V, eps: f64) -> V {
-    let open = aperture(d, eps).larger(V::constant(LEAST_APERTURE));
-    (V::constant(1.0) - open).over(open)
+    let open = aperture(d, eps).max(V::constant(LEAST_APERTURE));
+    (V::constant(1.0) - open).div(open)
 }
 
 /// Open depth m(d) [m], the integral of the aperture up to `d`: 0 inside, d outside the band.
@@ -93,7 +93,7 @@ pub fn open_depth<V: Vector>(d: V, eps: f64) -> V {
     let cosine = cosine(s);
     let inside = V::constant(-2.0 / (PI * PI)) * cosine * cosine;
     let inside = (half * (one + s)).mul_add(one + s, inside);
-    let beyond = (d - V::constant(eps)).larger(zero);
+    let beyond = (d - V::constant(eps)).max(zero);
     inside.mul_add(V::constant(0.5 * eps), beyond)
 }
 
@@ -101,7 +101,7 @@ pub fn open_depth<V: Vector>(d: V, eps: f64) -> V {
 #[inline(always)]
 fn clamped<V: Vector>(d: V, eps: f64) -> V {
     let s = d * V::constant(1.0 / eps);
-    s.larger(V::constant(-1.0)).smaller(V::constant(1.0))
+    s.max(V::constant(-1.0)).min(V::constant(1.0))
 }
 
 /// Scalar forms of the kernels.
@@ -131,24 +131,24 @@ pub mod reference {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use grainwake_simd::One;
+    use grainwake_simd::Scalar;
 
     fn open_depth(d: f64, eps: f64) -> f64 {
-        super::open_depth(One(d), eps).0
+        super::open_depth(Scalar(d), eps).0
     }
 
     #[test]
     fn series_match_sine_and_cosine() {
         for n in -1000..=1000 {
             let s = f64::from(n) / 1000.0;
-            assert!((sine(One(s)).0 - (PI * s).sin()).abs() < 1e-14, "{s}");
+            assert!((sine(Scalar(s)).0 - (PI * s).sin()).abs() < 1e-14, "{s}");
             assert!(
-                (cosine(One(s)).0 - (0.5 * PI * s).cos()).abs() < 1e-14,
+                (cosine(Scalar(s)).0 - (0.5 * PI * s).cos()).abs() < 1e-14,
                 "{s}"
             );
         }
         for s in [-1.0, 1.0] {
-            assert_eq!((sine(One(s)).0, cosine(One(s)).0), (0.0, 0.0));
+            assert_eq!((sine(Scalar(s)).0, cosine(Scalar(s)).0), (0.0, 0.0));
         }
     }
 
@@ -158,21 +158,21 @@ mod tests {
             let s = n as f32 / 1000.0;
             let wide = f64::from(s);
             let error = |found: f32, exact: f64| (f64::from(found) - exact).abs();
-            assert!(error(sine(One(s)).0, (PI * wide).sin()) < 2.5e-7, "{s}");
+            assert!(error(sine(Scalar(s)).0, (PI * wide).sin()) < 2.5e-7, "{s}");
             assert!(
-                error(cosine(One(s)).0, (0.5 * PI * wide).cos()) < 2e-7,
+                error(cosine(Scalar(s)).0, (0.5 * PI * wide).cos()) < 2e-7,
                 "{s}"
             );
             for eps in [1.0, 0.7] {
                 let exact = reference::inverse_aperture_excess(wide, eps);
                 assert!(
-                    error(inverse_aperture_excess(One(s), eps).0, exact) < 2e-6,
+                    error(inverse_aperture_excess(Scalar(s), eps).0, exact) < 2e-6,
                     "{s} {eps}"
                 );
             }
         }
         for s in [-1.0_f32, 1.0] {
-            assert_eq!((sine(One(s)).0, cosine(One(s)).0), (0.0, 0.0));
+            assert_eq!((sine(Scalar(s)).0, cosine(Scalar(s)).0), (0.0, 0.0));
         }
     }
 
@@ -182,12 +182,12 @@ mod tests {
         for n in -2000..=2000 {
             let d = f64::from(n) / 1000.0;
             let exact = reference::inverse_aperture_excess(d, eps);
-            let found = inverse_aperture_excess(One(d), eps).0;
+            let found = inverse_aperture_excess(Scalar(d), eps).0;
             assert!((found - exact).abs() < 1e-13, "{d}: {found} for {exact}");
         }
-        assert!(inverse_aperture_excess(One(eps), eps).0.abs() < 1e-15);
+        assert!(inverse_aperture_excess(Scalar(eps), eps).0.abs() < 1e-15);
         assert_eq!(
-            [9.0, f64::INFINITY].map(|d| inverse_aperture_excess(One(d), eps).0),
+            [9.0, f64::INFINITY].map(|d| inverse_aperture_excess(Scalar(d), eps).0),
             [0.0; 2]
         );
     }
@@ -198,14 +198,14 @@ mod tests {
         let (mut sum, from) = (0.0, -1.2);
         let width = 2.4 / steps as f64;
         for i in 0..steps {
-            sum += aperture(One(from + (i as f64 + 0.5) * width), eps).0 * width;
+            sum += aperture(Scalar(from + (i as f64 + 0.5) * width), eps).0 * width;
             let d = from + (i as f64 + 1.0) * width;
             assert!((sum - open_depth(d, eps)).abs() < 1e-8, "{d}");
         }
         assert_eq!(open_depth(-eps, eps), 0.0);
         assert_eq!(open_depth(-9.0, eps), 0.0);
         for (d, open) in [(-eps, 0.0), (eps, 1.0), (-9.0, 0.0), (f64::INFINITY, 1.0)] {
-            assert_eq!(aperture(One(d), eps).0, open);
+            assert_eq!(aperture(Scalar(d), eps).0, open);
         }
     }
 
@@ -214,7 +214,7 @@ mod tests {
         let eps = 0.7;
         for n in -2000..=2000 {
             let d = f64::from(n) / 1000.0;
-            let [open, depth] = [aperture(One(d), eps).0, open_depth(d, eps)];
+            let [open, depth] = [aperture(Scalar(d), eps).0, open_depth(d, eps)];
             assert!((open - reference::aperture(d, eps)).abs() < 1e-14, "{d}");
             assert!((depth - reference::open_depth(d, eps)).abs() < 1e-14, "{d}");
         }

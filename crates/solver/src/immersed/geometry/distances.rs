@@ -20,13 +20,13 @@ use super::samples::{load_all, store_all};
 use crate::dem::Grain;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Aligned;
-use grainwake_simd::{Kernel, MOST, Vector};
+use grainwake_simd::{Kernel, MAX_LANES, Vector};
 
 /// Buffers of one thread.
 #[derive(Default)]
 pub struct DistanceScratch {
     /// Candidate faces of a plane, row after row, by axis: first their positions in the frame of
-    /// the grain [m], then their unit normals in the space frame. `MOST` unused entries follow the
+    /// the grain [m], then their unit normals in the space frame. `MAX_LANES` unused entries follow the
     /// last.
     points: [Aligned<f32>; 3],
     parts: Vec<RowPart>,
@@ -57,7 +57,7 @@ impl Kernel for FillLists<'_> {
         self.band.clear();
         let size = self.body.size;
         for list in &mut self.scratch.points {
-            list.make_room((size.x * size.y) as usize + MOST);
+            list.make_room((size.x * size.y) as usize + MAX_LANES);
         }
         for component in 0..3 {
             self.body.spans[component].clear();
@@ -68,7 +68,7 @@ impl Kernel for FillLists<'_> {
             for k in 0..size.z {
                 let count = self.list_candidates::<V>(component, corner, k);
                 let distances = &mut self.body.distance[component];
-                let needed = plane_entry + count + MOST;
+                let needed = plane_entry + count + MAX_LANES;
                 distances.resize(distances.len().max(needed), f32::INFINITY);
                 self.evaluate::<V>(component, plane_entry, count);
                 self.band.reserve(count);
@@ -139,7 +139,7 @@ impl FillLists<'_> {
         let [a, b, c] = DMat3::from_quat(self.grain.pose.orientation).to_cols_array_2d();
         for at in (0..count).step_by(V::WIDTH) {
             let [x, y, z] = load_all::<V>(&points, at);
-            let inverse = (x * x + y * y + z * z).inverse_root();
+            let inverse = (x * x + y * y + z * z).rsqrt();
             let [x, y, z] = [x * inverse, y * inverse, z * inverse];
             let mut normal = [x; 3];
             for n in 0..3 {

@@ -1,7 +1,7 @@
 //! Index lists of the faces near a grain: plain data, filled by [`super::Locator`].
 //!
 //! `at` is a position in the memory of a field, `entry` an index into the lists of one grain. Lists
-//! that vector registers read have at least `MOST` unused entries at the end.
+//! that vector registers read have at least `MAX_LANES` unused entries at the end.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use glam::{DVec3, IVec3};
 
 use super::index_map::IndexMap;
 use crate::grid::Layout;
-use grainwake_simd::{MOST, Vector};
+use grainwake_simd::{MAX_LANES, Vector};
 
 /// Faces of one component in a row along x that lie within reach of a grain.
 #[derive(Clone, Copy, Debug, Default)]
@@ -121,7 +121,7 @@ impl BandFaces {
     }
     /// Makes room for `count` more faces.
     pub(super) fn reserve(&mut self, count: usize) {
-        let needed = self.count + count + MOST;
+        let needed = self.count + count + MAX_LANES;
         for list in [&mut self.distance].into_iter().chain(&mut self.normal) {
             list.resize(list.len().max(needed), 0.0);
         }
@@ -156,7 +156,7 @@ impl BandFaces {
     /// Fills the lists up to a whole number of registers with faces outside the band of half-width
     /// `eps` [m]; returns that length.
     pub fn pad(&mut self, eps: f64) -> usize {
-        let padded = self.count.next_multiple_of(MOST);
+        let padded = self.count.next_multiple_of(MAX_LANES);
         for list in [&mut self.distance].into_iter().chain(&mut self.normal) {
             list.resize(padded.max(list.len()), 0.0);
         }

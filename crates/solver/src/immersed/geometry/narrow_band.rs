@@ -12,7 +12,7 @@ use grainwake_shape::{Field, SampledField, Shape};
 
 use super::samples::{FAR, SampleGrid, load_all, store_all};
 use crate::dem::Grain;
-use grainwake_simd::{MOST, MOST_PLACES, Vector};
+use grainwake_simd::{MAX_LANES, MAX_SINGLE_INDEX, Vector};
 
 /// Least number of samples per half-width of the band.
 const SAMPLES_PER_BAND: f64 = 4.0;
@@ -83,7 +83,7 @@ impl NarrowBandShape {
                 let mut spacings = (0..20).map(|n| spacing * f64::from(1 << n));
                 let field = spacings.find_map(|spacing| {
                     let field = shape.distances(spacing, reach + spacing).ok()?;
-                    (field.levels().len() <= MOST_PLACES).then_some(field)
+                    (field.levels().len() <= MAX_SINGLE_INDEX).then_some(field)
                 });
                 field.map(Arc::new)
             }
@@ -108,7 +108,7 @@ impl NarrowBandShape {
 
     /// Fills the distances [m] at the first `count` of `points` [m], in single precision, and
     /// replaces the points by the gradients; both in the frame of the grain. Infinite distances are
-    /// at least [`FAR`] here. The lists must be `MOST` entries longer than `count`; these are
+    /// at least [`FAR`] here. The lists must be `MAX_LANES` entries longer than `count`; these are
     /// overwritten.
     #[inline(always)]
     pub fn fill_distances<V: Vector<Number = f32>>(
@@ -140,11 +140,11 @@ impl NarrowBandShape {
     /// Evaluates the shape at the points `x`, lane by lane.
     #[cold]
     fn lane_by_lane<V: Vector<Number = f32>>(&self, x: [V; 3]) -> (V, [V; 3]) {
-        let mut points = [[0.0; MOST]; 3];
+        let mut points = [[0.0; MAX_LANES]; 3];
         x.iter()
             .zip(&mut points)
             .for_each(|(x, lanes)| x.store(lanes));
-        let mut distances = [0.0; MOST];
+        let mut distances = [0.0; MAX_LANES];
         for n in 0..V::WIDTH {
             let x = DVec3::from_array(points.map(|lanes| f64::from(lanes[n])));
             let (d, gradient) = self.distance_and_gradient(x);
@@ -160,9 +160,9 @@ impl NarrowBandShape {
 /// Distance from a sphere around the origin, and its gradient.
 #[inline(always)]
 fn sphere_distance<V: Vector>(radius: f64, [x, y, z]: [V; 3]) -> (V, [V; 3]) {
-    let length = (x * x + y * y + z * z).root();
-    let divisor = length.larger(V::constant(1.0 / FAR));
-    let normal = [x.over(divisor), y.over(divisor), z.over(divisor)];
+    let length = (x * x + y * y + z * z).sqrt();
+    let divisor = length.max(V::constant(1.0 / FAR));
+    let normal = [x.div(divisor), y.div(divisor), z.div(divisor)];
     (length - V::constant(radius), normal)
 }
 
@@ -170,7 +170,7 @@ fn sphere_distance<V: Vector>(radius: f64, [x, y, z]: [V; 3]) -> (V, [V; 3]) {
 mod tests {
     use super::*;
     use grainwake_shape::{ShapeOptions, analytic};
-    use grainwake_simd::{Kernel, One, Registers, dispatch};
+    use grainwake_simd::{Kernel, Registers, Scalar, dispatch};
 
     /// Ellipsoid with the half-axes 1, 0.8 and 0.7.
     fn ellipsoid() -> Arc<Shape> {
@@ -237,17 +237,17 @@ mod tests {
         fn run<V: Vector<Number = f32>>(self) {
             let mut far = 0;
             for i in 0..2000 {
-                let mut points = [0; 3].map(|_| vec![0.0_f32; 2 * MOST]);
-                for n in 0..MOST {
+                let mut points = [0; 3].map(|_| vec![0.0_f32; 2 * MAX_LANES]);
+                for n in 0..MAX_LANES {
                     let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779);
                     let u = u * f64::from(i * 16 + n as i32);
                     let x = 2.0 * (2.0 * u.fract() - DVec3::ONE);
                     (0..3).for_each(|axis| points[axis][n] = x[axis] as f32);
                 }
-                let (mut slopes, mut distance) = (points.clone(), [0.0_f32; 2 * MOST]);
+                let (mut slopes, mut distance) = (points.clone(), [0.0_f32; 2 * MAX_LANES]);
                 let mut lists = slopes.each_mut().map(|list| &mut list[..]);
-                (self.0).fill_distances::<V>(&mut lists, &mut distance, MOST);
-                for n in 0..MOST {
+                (self.0).fill_distances::<V>(&mut lists, &mut distance, MAX_LANES);
+                for n in 0..MAX_LANES {
                     let of = |lists: &[Vec<f32>; 3]| {
                         DVec3::from_array(lists.each_ref().map(|list| f64::from(list[n])))
                     };
@@ -278,8 +278,8 @@ mod tests {
         for (shape, eps) in [(ellipsoid(), 0.25), (ellipsoid(), 0.05), (sphere, 0.25)] {
             let band = NarrowBandShape::new(&shape, eps, 2.5 * eps);
             dispatch(CompareLanes(&band));
-            CompareLanes(&band).run::<<f32 as Registers>::Common>();
-            CompareLanes(&band).run::<One<f32>>();
+            CompareLanes(&band).run::<<f32 as Registers>::Baseline>();
+            CompareLanes(&band).run::<Scalar<f32>>();
         }
     }
 }

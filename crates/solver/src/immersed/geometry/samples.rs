@@ -69,9 +69,9 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
         let mut off_grid = zero;
         for axis in 0..3 {
             let s = (x[axis] - self.lower[axis]) * self.inverse;
-            let nearest = s.larger(zero).smaller(self.last[axis]);
-            off_grid = off_grid + (s - nearest).magnitude();
-            cell[axis] = nearest.floor().smaller(self.last[axis] - one);
+            let nearest = s.max(zero).min(self.last[axis]);
+            off_grid = off_grid + (s - nearest).abs();
+            cell[axis] = nearest.floor().min(self.last[axis] - one);
             fraction[axis] = nearest - cell[axis];
         }
         let [row, plane] = self.strides;
@@ -91,7 +91,7 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
         ];
         let distance = self.quantum * (low + fz * (high - low));
         (
-            zero.where_below(off_grid, V::constant(FAR), distance),
+            zero.select_below(off_grid, V::constant(FAR), distance),
             gradient,
         )
     }
@@ -101,7 +101,7 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
 /// difference.
 #[inline(always)]
 fn edge<V: Vector>(levels: &[f32], at: V, x: V) -> [V; 2] {
-    let [low, high] = V::pairs(levels, at);
+    let [low, high] = V::gather_pairs(levels, at);
     let slope = high - low;
     [low + x * slope, slope]
 }

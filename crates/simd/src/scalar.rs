@@ -1,81 +1,76 @@
-//! One lane, for the ends of rows.
+//! Vector of one lane, for the ends of rows and for scalar references.
 
 use std::ops::{Add, Mul, Sub};
 
 use super::{Real, Vector};
 
-/// One number.
+/// Vector of one number.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub struct One<R>(pub R);
+pub struct Scalar<R>(pub R);
 
-impl<R: Real> Add for One<R> {
+impl<R: Real> Add for Scalar<R> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        One(self.0 + other.0)
+        Scalar(self.0 + other.0)
     }
 }
-impl<R: Real> Sub for One<R> {
+impl<R: Real> Sub for Scalar<R> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        One(self.0 - other.0)
+        Scalar(self.0 - other.0)
     }
 }
-impl<R: Real> Mul for One<R> {
+impl<R: Real> Mul for Scalar<R> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        One(self.0 * other.0)
+        Scalar(self.0 * other.0)
     }
 }
-impl<R: Real> Vector for One<R> {
+impl<R: Real> Vector for Scalar<R> {
     const WIDTH: usize = 1;
     type Number = R;
     type Half = Self;
     type Tail = Self;
     #[inline(always)]
     fn splat(value: R) -> Self {
-        One(value)
+        Scalar(value)
     }
     #[inline(always)]
     fn load(from: &[R]) -> Self {
-        One(from[0])
+        Scalar(from[0])
     }
     #[inline(always)]
     fn store(self, to: &mut [R]) {
         to[0] = self.0;
     }
     #[inline(always)]
-    fn over(self, divisor: Self) -> Self {
-        One(self.0 / divisor.0)
+    fn div(self, divisor: Self) -> Self {
+        Scalar(self.0 / divisor.0)
     }
     #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        One(if self.0 > other.0 { self.0 } else { other.0 })
+    fn max(self, other: Self) -> Self {
+        Scalar(if self.0 > other.0 { self.0 } else { other.0 })
     }
     #[inline(always)]
-    fn smaller(self, other: Self) -> Self {
-        One(if self.0 < other.0 { self.0 } else { other.0 })
+    fn min(self, other: Self) -> Self {
+        Scalar(if self.0 < other.0 { self.0 } else { other.0 })
     }
     #[inline(always)]
-    fn where_below(self, limit: Self, yes: Self, no: Self) -> Self {
+    fn select_below(self, limit: Self, yes: Self, no: Self) -> Self {
         if self.0 < limit.0 { yes } else { no }
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
-        One(self.0.mul_add(factor.0, term.0))
+        Scalar(self.0.mul_add(factor.0, term.0))
     }
     #[inline(always)]
     fn transpose(_: &mut [Self]) {}
     #[inline(always)]
-    fn add_to(self, sums: &mut [f64]) {
+    fn add_into(self, sums: &mut [f64]) {
         sums[0] += self.0.wide();
-    }
-    #[inline(always)]
-    fn raise(self, tops: &mut [f64]) {
-        let lane = self.0.wide();
-        tops[0] = if tops[0] > lane { tops[0] } else { lane };
     }
 }

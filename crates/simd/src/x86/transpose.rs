@@ -3,38 +3,38 @@
 
 use std::arch::x86_64::*;
 
-use super::x86::*;
+use super::*;
 
 /// # Safety
 /// The machine must have the instruction set of the vector, here and below.
 #[inline(always)]
-pub unsafe fn pairs(block: &mut [Pairs]) {
+pub unsafe fn sse2_f64x4(block: &mut [Sse2F64x4]) {
     let block = &mut block[..4];
     let [a, b, c, d] = [block[0], block[1], block[2], block[3]];
     unsafe {
-        block[0] = Pairs(_mm_unpacklo_pd(a.0, b.0), _mm_unpacklo_pd(c.0, d.0));
-        block[1] = Pairs(_mm_unpackhi_pd(a.0, b.0), _mm_unpackhi_pd(c.0, d.0));
-        block[2] = Pairs(_mm_unpacklo_pd(a.1, b.1), _mm_unpacklo_pd(c.1, d.1));
-        block[3] = Pairs(_mm_unpackhi_pd(a.1, b.1), _mm_unpackhi_pd(c.1, d.1));
+        block[0] = Sse2F64x4(_mm_unpacklo_pd(a.0, b.0), _mm_unpacklo_pd(c.0, d.0));
+        block[1] = Sse2F64x4(_mm_unpackhi_pd(a.0, b.0), _mm_unpackhi_pd(c.0, d.0));
+        block[2] = Sse2F64x4(_mm_unpacklo_pd(a.1, b.1), _mm_unpacklo_pd(c.1, d.1));
+        block[3] = Sse2F64x4(_mm_unpackhi_pd(a.1, b.1), _mm_unpackhi_pd(c.1, d.1));
     }
 }
 
 #[inline(always)]
-pub unsafe fn four(block: &mut [Four]) {
+pub unsafe fn avx2_f64x4(block: &mut [Avx2F64x4]) {
     let block = &mut block[..4];
     let [a, b, c, d] = [block[0].0, block[1].0, block[2].0, block[3].0];
     unsafe {
         let (e, f) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
         let (g, h) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
-        block[0] = Four(_mm256_permute2f128_pd::<0x20>(e, g));
-        block[1] = Four(_mm256_permute2f128_pd::<0x20>(f, h));
-        block[2] = Four(_mm256_permute2f128_pd::<0x31>(e, g));
-        block[3] = Four(_mm256_permute2f128_pd::<0x31>(f, h));
+        block[0] = Avx2F64x4(_mm256_permute2f128_pd::<0x20>(e, g));
+        block[1] = Avx2F64x4(_mm256_permute2f128_pd::<0x20>(f, h));
+        block[2] = Avx2F64x4(_mm256_permute2f128_pd::<0x31>(e, g));
+        block[3] = Avx2F64x4(_mm256_permute2f128_pd::<0x31>(f, h));
     }
 }
 
 #[inline(always)]
-pub unsafe fn eight(block: &mut [Eight]) {
+pub unsafe fn avx512_f64x8(block: &mut [Avx512F64x8]) {
     let block = &mut block[..8];
     unsafe {
         let mut pairs = [block[0].0; 8];
@@ -53,10 +53,10 @@ pub unsafe fn eight(block: &mut [Eight]) {
                 _mm512_shuffle_f64x2::<0xdd>(here[0], here[1]),
                 _mm512_shuffle_f64x2::<0xdd>(here[2], here[3]),
             ];
-            block[i] = Eight(_mm512_shuffle_f64x2::<0x88>(even[0], even[1]));
-            block[2 + i] = Eight(_mm512_shuffle_f64x2::<0x88>(odd[0], odd[1]));
-            block[4 + i] = Eight(_mm512_shuffle_f64x2::<0xdd>(even[0], even[1]));
-            block[6 + i] = Eight(_mm512_shuffle_f64x2::<0xdd>(odd[0], odd[1]));
+            block[i] = Avx512F64x8(_mm512_shuffle_f64x2::<0x88>(even[0], even[1]));
+            block[2 + i] = Avx512F64x8(_mm512_shuffle_f64x2::<0x88>(odd[0], odd[1]));
+            block[4 + i] = Avx512F64x8(_mm512_shuffle_f64x2::<0xdd>(even[0], even[1]));
+            block[6 + i] = Avx512F64x8(_mm512_shuffle_f64x2::<0xdd>(odd[0], odd[1]));
         }
     }
 }
@@ -77,16 +77,16 @@ unsafe fn square([a, b, c, d]: [__m128; 4]) -> [__m128; 4] {
 }
 
 #[inline(always)]
-pub unsafe fn four_singles(block: &mut [FourSingles]) {
+pub unsafe fn sse2_f32x4(block: &mut [Sse2F32x4]) {
     let block = &mut block[..4];
     let columns = unsafe { square([block[0].0, block[1].0, block[2].0, block[3].0]) };
     for i in 0..4 {
-        block[i] = FourSingles(columns[i]);
+        block[i] = Sse2F32x4(columns[i]);
     }
 }
 
 #[inline(always)]
-pub unsafe fn singles_twice(block: &mut [SinglesTwice]) {
+pub unsafe fn sse2_f32x8(block: &mut [Sse2F32x8]) {
     let block = &mut block[..8];
     let [upper, lower] = [0, 4].map(|at| [block[at], block[at + 1], block[at + 2], block[at + 3]]);
     unsafe {
@@ -99,14 +99,14 @@ pub unsafe fn singles_twice(block: &mut [SinglesTwice]) {
             square([lower[0].1, lower[1].1, lower[2].1, lower[3].1]),
         );
         for i in 0..4 {
-            block[i] = SinglesTwice(a[i], b[i]);
-            block[4 + i] = SinglesTwice(c[i], d[i]);
+            block[i] = Sse2F32x8(a[i], b[i]);
+            block[4 + i] = Sse2F32x8(c[i], d[i]);
         }
     }
 }
 
 #[inline(always)]
-pub unsafe fn eight_singles(block: &mut [EightSingles]) {
+pub unsafe fn avx2_f32x8(block: &mut [Avx2F32x8]) {
     let block = &mut block[..8];
     unsafe {
         // Columns c and 4 + c of the rows 4 i to 4 i + 3.
@@ -128,14 +128,14 @@ pub unsafe fn eight_singles(block: &mut [EightSingles]) {
         }
         for c in 0..4 {
             let (a, b) = (quarters[c], quarters[4 + c]);
-            block[c] = EightSingles(_mm256_permute2f128_ps::<0x20>(a, b));
-            block[4 + c] = EightSingles(_mm256_permute2f128_ps::<0x31>(a, b));
+            block[c] = Avx2F32x8(_mm256_permute2f128_ps::<0x20>(a, b));
+            block[4 + c] = Avx2F32x8(_mm256_permute2f128_ps::<0x31>(a, b));
         }
     }
 }
 
 #[inline(always)]
-pub unsafe fn sixteen_singles(block: &mut [SixteenSingles]) {
+pub unsafe fn avx512_f32x16(block: &mut [Avx512F32x16]) {
     let block = &mut block[..16];
     unsafe {
         // Columns c, 4 + c, 8 + c and 12 + c of the rows 4 i to 4 i + 3.
@@ -164,10 +164,10 @@ pub unsafe fn sixteen_singles(block: &mut [SixteenSingles]) {
                 _mm512_shuffle_f32x4::<0xdd>(quarters[c], quarters[4 + c]),
                 _mm512_shuffle_f32x4::<0xdd>(quarters[8 + c], quarters[12 + c]),
             ];
-            block[c] = SixteenSingles(_mm512_shuffle_f32x4::<0x88>(even[0], even[1]));
-            block[4 + c] = SixteenSingles(_mm512_shuffle_f32x4::<0x88>(odd[0], odd[1]));
-            block[8 + c] = SixteenSingles(_mm512_shuffle_f32x4::<0xdd>(even[0], even[1]));
-            block[12 + c] = SixteenSingles(_mm512_shuffle_f32x4::<0xdd>(odd[0], odd[1]));
+            block[c] = Avx512F32x16(_mm512_shuffle_f32x4::<0x88>(even[0], even[1]));
+            block[4 + c] = Avx512F32x16(_mm512_shuffle_f32x4::<0x88>(odd[0], odd[1]));
+            block[8 + c] = Avx512F32x16(_mm512_shuffle_f32x4::<0xdd>(even[0], even[1]));
+            block[12 + c] = Avx512F32x16(_mm512_shuffle_f32x4::<0xdd>(odd[0], odd[1]));
         }
     }
 }

@@ -1,0 +1,148 @@
+//! Choice among instruction sets, made when the program runs.
+
+use std::sync::atomic::{AtomicU8, Ordering};
+
+#[cfg(not(target_arch = "x86_64"))]
+use super::plain::Plain;
+#[cfg(target_arch = "x86_64")]
+use super::x86::{Avx2F32x8, Avx2F64x4, Avx512F32x16, Avx512F64x8, Sse2F32x8, Sse2F64x4};
+use super::{Real, Vector};
+
+/// Widest vectors of a number for each instruction set.
+pub trait Registers: Sized {
+    /// Vector of [`InstructionSet::Baseline`].
+    type Baseline: Vector<Number = Self>;
+    /// Vector of [`InstructionSet::Avx2`].
+    type Avx2: Vector<Number = Self>;
+    /// Vector of [`InstructionSet::Avx512`].
+    type Avx512: Vector<Number = Self>;
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Registers for f64 {
+    type Baseline = Sse2F64x4;
+    type Avx2 = Avx2F64x4;
+    type Avx512 = Avx512F64x8;
+}
+#[cfg(target_arch = "x86_64")]
+impl Registers for f32 {
+    type Baseline = Sse2F32x8;
+    type Avx2 = Avx2F32x8;
+    type Avx512 = Avx512F32x16;
+}
+#[cfg(not(target_arch = "x86_64"))]
+impl Registers for f64 {
+    type Baseline = Plain<f64, 4>;
+    type Avx2 = Self::Baseline;
+    type Avx512 = Self::Baseline;
+}
+#[cfg(not(target_arch = "x86_64"))]
+impl Registers for f32 {
+    type Baseline = Plain<f32, 8>;
+    type Avx2 = Self::Baseline;
+    type Avx512 = Self::Baseline;
+}
+
+/// Computation compiled for every instruction set.
+pub trait Kernel {
+    /// Type of its numbers.
+    type Number: Real;
+    /// Computes with the widest vectors of the instruction set; mark it `inline(always)`.
+    fn run<V: Vector<Number = Self::Number>>(self);
+}
+
+/// Instruction set of the kernels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum InstructionSet {
+    /// Instructions of every machine: SSE2 on x86-64.
+    Baseline = 1,
+    /// AVX2 with FMA: registers of four doubles or eight singles.
+    Avx2 = 2,
+    /// AVX-512: registers of eight doubles or sixteen singles.
+    Avx512 = 3,
+}
+
+impl InstructionSet {
+    /// All instruction sets, the narrowest first.
+    pub const ALL: [InstructionSet; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
+
+    /// Widest instruction set of this machine.
+    #[cfg(target_arch = "x86_64")]
+    pub fn widest() -> InstructionSet {
+        if !(is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")) {
+            InstructionSet::Baseline
+        } else if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
+            InstructionSet::Avx512
+        } else {
+            InstructionSet::Avx2
+        }
+    }
+    /// Widest instruction set of this machine.
+    #[cfg(not(target_arch = "x86_64"))]
+    pub fn widest() -> InstructionSet {
+        InstructionSet::Baseline
+    }
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            InstructionSet::Baseline => "baseline",
+            InstructionSet::Avx2 => "avx2",
+            InstructionSet::Avx512 => "avx512",
+        }
+    }
+}
+
+impl std::str::FromStr for InstructionSet {
+    type Err = String;
+    fn from_str(name: &str) -> Result<InstructionSet, String> {
+        let found = Self::ALL.into_iter().find(|set| set.name() == name);
+        found.ok_or_else(|| "accepted: baseline, avx2, avx512".into())
+    }
+}
+
+/// Instruction set in use; 0 before the first call of [`instructions`].
+static IN_USE: AtomicU8 = AtomicU8::new(0);
+
+/// Instruction set in use: the widest of this machine, or less after [`limit_instructions`].
+pub fn instructions() -> InstructionSet {
+    match IN_USE.load(Ordering::Relaxed) {
+        3 => InstructionSet::Avx512,
+        2 => InstructionSet::Avx2,
+        1 => InstructionSet::Baseline,
+        _ => limit_instructions(InstructionSet::Avx512),
+    }
+}
+
+/// Makes the whole program use the widest instruction set of this machine up to `highest`, and
+/// returns it.
+pub fn limit_instructions(highest: InstructionSet) -> InstructionSet {
+    let set = InstructionSet::widest().min(highest);
+    IN_USE.store(set as u8, Ordering::Relaxed);
+    set
+}
+
+/// Runs `kernel` with the instruction set of [`instructions`].
+#[inline]
+pub fn dispatch<K: Kernel>(kernel: K) {
+    match instructions() {
+        // SAFETY: `instructions` never exceeds the sets detected on this machine.
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx512 => unsafe { with_avx512(kernel) },
+        #[cfg(target_arch = "x86_64")]
+        InstructionSet::Avx2 => unsafe { with_avx2(kernel) },
+        _ => kernel.run::<<K::Number as Registers>::Baseline>(),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
+fn with_avx512<K: Kernel>(kernel: K) {
+    kernel.run::<<K::Number as Registers>::Avx512>();
+}
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+pub(crate) fn with_avx2<K: Kernel>(kernel: K) {
+    kernel.run::<<K::Number as Registers>::Avx2>();
+}
