@@ -98,8 +98,8 @@ pub enum Ending {
 
 /// Runs a job in the folder `out`.
 ///
-/// Tables, VTK files and the final state have the same bits for any number of threads, and after any
-/// number of interruptions and resumptions.
+/// Tables, VTK files and the final state have the same bits for any number of threads, and after
+/// any number of interruptions and resumptions.
 ///
 /// # Errors
 /// [`RunError`]; if the numerics or the disk fail, the last valid checkpoint is kept.

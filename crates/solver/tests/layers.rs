@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What each module of the solver may import besides itself.
+/// Modules of the solver that each module may import.
 const ALLOWED: [(&str, &[&str]); 7] = [
     ("math", &[]),
     ("grid", &["math"]),

@@ -1,7 +1,7 @@
 //! Kernels of the projection, one plane at a time: divergence of the prediction; correction of
 //! velocity and pressure by the increment, with the measures of the flow.
 //!
-//! Legend: u, v, w components along x, y, z; q any of them; f pressure increment phi over density;
+//! Legend: u, v, w components along x, y, z; q any of them; f pressure increment over density;
 //! suffixes as in `tendency.rs`: l/r left and right in x, m/p down and up in y, b/t in z.
 
 use glam::DVec3;

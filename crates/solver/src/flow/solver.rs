@@ -1,6 +1,6 @@
 //! Time step of the flow: prediction without the divergence constraint, projection onto it.
 //!
-//! Legend: u velocity, p dynamic pressure over density, phi its increment, H tendency.
+//! Legend: u velocity, p dynamic pressure over density, f its increment, H tendency.
 
 use glam::DVec3;
 
@@ -178,7 +178,7 @@ impl<R: Real> Flow<R> {
         self.weight = now;
     }
 
-    /// Solves lap(phi) = div(u*)/dt, sets u = u* - dt grad(phi), p += phi, and fills the ghosts.
+    /// Solves lap(f) = div(u*)/dt, sets u = u* - dt grad(f), p += f, and fills the ghosts.
     pub fn project(&mut self, dt: f64) -> FlowMeasures {
         let layout = self.mesh.layout();
         let [row, plane] = [layout.row(), layout.plane()];

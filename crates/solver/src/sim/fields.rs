@@ -110,9 +110,9 @@ impl CellField {
     }
 }
 
-/// Fields written to slices and field files, in the order of the files. A further field is one more
-/// entry.
-pub static CELL_FIELDS: [CellField; 4] = [
+/// Fields written to slices and field files, in the order of the files. A further field needs an
+/// entry here with its function, and a row in `docs/reference/run-folder.md`.
+pub static CELL_FIELDS: &[CellField] = &[
     CellField::vector("velocity", "m/s", Simulation::velocity_at),
     CellField::vector("vorticity", "1/s", Simulation::vorticity_at),
     CellField::scalar("pressure", "Pa", |sim, cell| {

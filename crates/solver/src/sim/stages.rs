@@ -69,7 +69,7 @@ pub(super) struct Projected<'a>(Context<'a>, Substeps, DVec3);
 /// Contact sub-steps that determine the poses at the end of a step.
 #[derive(Clone, Copy)]
 enum Substeps {
-    /// Sub-steps under the hydrodynamic load of the last step, if no grain was touched.
+    /// Sub-steps under the hydrodynamic load of the last step, if no contact load acts.
     Explicit,
     /// Repeated sub-steps with the response of the fluid in this step.
     WithResponse,
@@ -188,7 +188,8 @@ impl<'a> Moved<'a> {
 }
 
 impl<'a> Coupled<'a> {
-    /// Repeats the contact sub-steps with the fluid's response of this step if grains touch.
+    /// Repeats the contact sub-steps with the 6 x 6 mass of grain and fluid if a contact or
+    /// lubrication load acts, walls included.
     pub fn resolve_contact(self) -> Resolved<'a> {
         let Coupled(mut step, coupled, trial) = self;
         let solid = &mut step.solid;

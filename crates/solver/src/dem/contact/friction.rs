@@ -45,12 +45,14 @@ impl FrictionStep {
             DQuat::from_axis_angle(point.normal, twist)
                 * rotate_tangential(displacement, history.normal, point.normal)
         });
-        let increment = relative_velocity(&pair.mid_step, point, pair.branch);
-        let displacement = earlier + self.time_in_contact * tangential(increment);
+        // Eq. 13 with the relative velocity of Eq. 12 at the middle of the sub-step.
+        let velocity = relative_velocity(&pair.mid_step, point, pair.branch);
+        let displacement = earlier + self.time_in_contact * tangential(velocity);
         let sliding = relative_velocity(&pair.end_of_step, point, pair.branch);
         let viscous = self.damping * tangential(sliding);
         let force = -(self.stiffness * displacement + viscous);
-        let limit = self.coefficient * normal_force;
+        // Coulomb's bound (Eq. 15); an attractive normal force carries no friction.
+        let limit = self.coefficient * normal_force.max(0.0);
         if force.length_squared() <= limit * limit {
             return (force, displacement);
         }

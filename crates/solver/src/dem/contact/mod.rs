@@ -1,7 +1,9 @@
 //! Contact forces (Eqs 9-18): force laws, friction history and lubrication.
 //!
-//! A further force law is one file beside `linear.rs` that implements `ContactLaw`, and one variant
-//! of [`ContactLawKind`] and of `law::SelectedLaw`.
+//! A further force law is one file beside `linear.rs` that implements `ContactLaw`, one variant of
+//! [`ContactLawKind`] and of `law::SelectedLaw`, and its keys in the case file. A cohesive law
+//! overrides `ContactLaw::normal_force`, which is never negative by default; a force across a gap
+//! belongs beside `lubrication.rs`.
 
 mod friction;
 mod hertz_mindlin;

@@ -1,4 +1,4 @@
-//! Forcing of a face near a surface: strength of the drag, and closed fraction.
+//! Forcing of a face near a surface: strength of the drag, and solid fraction.
 //!
 //! Legend: d signed distance, eps half-width of the band, A aperture.
 
@@ -16,8 +16,9 @@ use grainwake_simd::{Kernel, Scalar, Vector, dispatch};
 pub struct FaceForcing {
     /// Drag coefficient times dt; the weight of the rigid velocity is strength / (1 + strength).
     pub strength: f64,
-    /// Fraction of the face closed to the pressure gradient, 1 - A(d).
-    pub closed: f64,
+    /// Solid fraction of the face, 1 - A(d), which the pressure gradient does not reach; zero in
+    /// the paper's scheme, which blends by the weight alone.
+    pub solid_fraction: f64,
 }
 
 impl FaceForcing {
@@ -36,7 +37,7 @@ impl Add for FaceForcing {
     fn add(self, other: FaceForcing) -> FaceForcing {
         FaceForcing {
             strength: self.strength + other.strength,
-            closed: self.closed + other.closed,
+            solid_fraction: self.solid_fraction + other.solid_fraction,
         }
     }
 }
@@ -77,7 +78,7 @@ impl ForcingParams {
             Scheme::Aperture => {
                 let mut forcing = FaceForcing {
                     strength: 0.0,
-                    closed: 0.0,
+                    solid_fraction: 0.0,
                 };
                 dispatch(OneFace {
                     params: self,
@@ -91,7 +92,7 @@ impl ForcingParams {
         }
     }
 
-    /// Strength of the drag as numerator and positive denominator, and closed fraction.
+    /// Strength of the drag as numerator and positive denominator, and solid fraction.
     #[inline(always)]
     pub fn aperture_forcing<V: Vector>(&self, d: V, normal: [V; 3]) -> ([V; 2], V) {
         let [drag, depth] = drag(d, normal, self.spacing.to_array(), self.eps);
@@ -99,8 +100,8 @@ impl ForcingParams {
         // Zero outside the band: a concave grain may enclose such faces.
         let outside = V::constant(2.0 * self.eps);
         let strength = d.select_below(outside, strength, V::constant(0.0));
-        let closed = V::constant(1.0) - aperture(d, self.eps);
-        ([strength, depth], closed)
+        let solid_fraction = V::constant(1.0) - aperture(d, self.eps);
+        ([strength, depth], solid_fraction)
     }
 
     /// Forcing of the paper's scheme: the weight of the rigid velocity is the solid fraction of a
@@ -110,7 +111,7 @@ impl ForcingParams {
         let solid_fraction = (0.5 - d / width).clamp(0.0, 1.0);
         FaceForcing {
             strength: solid_fraction / (1.0 - solid_fraction),
-            closed: 0.0,
+            solid_fraction: 0.0,
         }
     }
 }
@@ -128,10 +129,11 @@ impl Kernel for OneFace<'_> {
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
         let normal = self.normal.to_array().map(Scalar);
-        let ([strength, depth], closed) = self.params.aperture_forcing(Scalar(self.d), normal);
+        let ([strength, depth], solid_fraction) =
+            self.params.aperture_forcing(Scalar(self.d), normal);
         *self.forcing = FaceForcing {
             strength: strength.0 / depth.0,
-            closed: closed.0,
+            solid_fraction: solid_fraction.0,
         };
     }
 }

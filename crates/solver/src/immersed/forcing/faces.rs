@@ -16,9 +16,9 @@ pub struct ForcedFaces {
     pub weight: Vec<f32>,
     /// Fraction of a face that the grain closes to the pressure gradient (its solid fraction), 0 to
     /// 1.
-    pub closed: Vec<f32>,
+    pub solid_fraction: Vec<f32>,
     /// Fraction of a face that all grains together close; empty if the grain shares no face.
-    closed_by_all: Vec<f32>,
+    total_solid_fraction: Vec<f32>,
     /// Velocity that a face gains next to a grain at rest [m/s]; filled by [`super::sum_impulse`].
     pub rest_gain: Vec<f64>,
 }
@@ -35,7 +35,7 @@ impl ForcedFaces {
         let count = band.count();
         let padded = band.pad(params.eps);
         self.weight.resize(padded, 0.0);
-        self.closed.resize(padded, 0.0);
+        self.solid_fraction.resize(padded, 0.0);
         match params.scheme {
             Scheme::Aperture => dispatch(WeighFaces {
                 params,
@@ -47,17 +47,18 @@ impl ForcedFaces {
                     let (d, normal) = band.face(entry);
                     let forcing = params.of(d, normal);
                     self.weight[entry] = forcing.weight(forcing) as f32;
-                    self.closed[entry] = forcing.closed as f32;
+                    self.solid_fraction[entry] = forcing.solid_fraction as f32;
                 }
             }
         }
-        for list in [&mut self.weight, &mut self.closed] {
+        for list in [&mut self.weight, &mut self.solid_fraction] {
             list.truncate(count);
             list.resize(count + MAX_LANES, 0.0);
         }
-        self.closed_by_all.clear();
+        self.total_solid_fraction.clear();
         if !band.shared.is_empty() {
-            self.closed_by_all.extend_from_slice(&self.closed);
+            self.total_solid_fraction
+                .extend_from_slice(&self.solid_fraction);
             self.share_faces(params, band, neighbours, shapes);
         }
     }
@@ -87,23 +88,28 @@ impl ForcedFaces {
                 }
             }
             self.weight[entry] = forcing.weight(all) as f32;
-            self.closed[entry] = (forcing.closed / all.closed.max(1.0)) as f32;
-            self.closed_by_all[entry] = all.closed.min(1.0) as f32;
+            self.solid_fraction[entry] =
+                (forcing.solid_fraction / all.solid_fraction.max(1.0)) as f32;
+            self.total_solid_fraction[entry] = all.solid_fraction.min(1.0) as f32;
         }
     }
 
     /// Fraction of each face that all grains together close, 0 to 1.
-    pub fn closed_by_all(&self) -> &[f32] {
-        if self.closed_by_all.is_empty() {
-            &self.closed
+    pub fn total_solid_fraction(&self) -> &[f32] {
+        if self.total_solid_fraction.is_empty() {
+            &self.solid_fraction
         } else {
-            &self.closed_by_all
+            &self.total_solid_fraction
         }
     }
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let lists = [&self.weight, &self.closed, &self.closed_by_all];
+        let lists = [
+            &self.weight,
+            &self.solid_fraction,
+            &self.total_solid_fraction,
+        ];
         let runs: usize = self.runs.iter().map(Vec::capacity).sum();
         let values: usize = lists.iter().map(|list| list.capacity()).sum();
         size_of::<FaceRun>() * runs
@@ -126,7 +132,11 @@ impl Kernel for WeighFaces<'_> {
         let BandFaces {
             distance, normal, ..
         } = self.band;
-        let ForcedFaces { weight, closed, .. } = self.forced;
+        let ForcedFaces {
+            weight,
+            solid_fraction,
+            ..
+        } = self.forced;
         let one = V::constant(1.0);
         let inside = V::constant(-self.params.eps);
         for at in (0..weight.len()).step_by(V::WIDTH) {
@@ -136,7 +146,9 @@ impl Kernel for WeighFaces<'_> {
             let s = strength.div(depth + strength);
             // Faces deep inside take the rigid velocity.
             inside.select_below(d, s, one).store(&mut weight[at..]);
-            inside.select_below(d, c, one).store(&mut closed[at..]);
+            inside
+                .select_below(d, c, one)
+                .store(&mut solid_fraction[at..]);
         }
     }
 }

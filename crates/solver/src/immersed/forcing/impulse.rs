@@ -14,7 +14,7 @@
 //! fluid mass times gain over the faces, J = constant + matrix (V, Omega). The grain loses what the
 //! fluid gains ([`crate::immersed::rigid_body`]). `immersed::reference` has the scalar form.
 //!
-//! Legend: s weight, c closed fraction, C closed fraction of all grains together, f weight of the
+//! Legend: s weight, c solid fraction, C total solid fraction, f weight of the
 //! change of velocity, u* predicted velocity, h spacing along the component, l and m lever arms of
 //! the face about the two other axes.
 
@@ -126,8 +126,11 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
         let spacing = mesh.spacing;
         let [x, y, z] = mesh.layout().strides().map(|stride| stride as isize);
         let stencil = Stencil::new([0, x, -x, y, -y, z, -z]);
-        let (weights, closed, closed_by_all) =
-            (&forced.weight, &forced.closed, forced.closed_by_all());
+        let (weights, solid_fraction, total_solid_fraction) = (
+            &forced.weight,
+            &forced.solid_fraction,
+            forced.total_solid_fraction(),
+        );
         for (axis, runs) in forced.runs.iter().enumerate() {
             let half_cell = 0.5 * spacing[axis] * DVec3::AXES[axis];
             let above = self.old.angular.cross(half_cell);
@@ -150,10 +153,10 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
                 for n in (0..run.count).step_by(V::WIDTH) {
                     let entry = run.first + n;
                     let weight = V::load_from(&weights[entry..]);
-                    let closed = V::load_from(&closed[entry..]);
-                    let closed_by_all = V::load_from(&closed_by_all[entry..]);
+                    let solid_fraction = V::load_from(&solid_fraction[entry..]);
+                    let total_solid_fraction = V::load_from(&total_solid_fraction[entry..]);
                     let sums = &mut self.sums[axis];
-                    let gain = faces.add(n, weight, [closed, closed_by_all], sums);
+                    let gain = faces.add(n, weight, [solid_fraction, total_solid_fraction], sums);
                     // Entries beyond the run are overwritten by the next run.
                     gain.store(&mut rest_gain[entry..]);
                 }
@@ -211,16 +214,16 @@ impl<R: Real> RunImpulse<'_, R> {
         &self,
         n: usize,
         weight: V,
-        [closed, closed_by_all]: [V; 2],
+        [solid_fraction, total_solid_fraction]: [V; 2],
         sums: &mut Moments,
     ) -> V {
         let (zero, index) = (V::constant(0.0), lane_indices::<V>(n));
         let predicted = V::load_partial(&self.predicted[n..]);
         let rise = self.moved_pressure::<V>(0, n) - self.moved_pressure(1, n);
         let e = rise.mul_add(V::constant(self.dt_per_h), V::constant(-self.dt_g));
-        let without_drag = closed_by_all.mul_add(e, predicted);
-        let rest_gain = (zero - weight).mul_add(without_drag, closed * e);
-        let f = change_weight(weight, closed, self.closure_dt);
+        let without_drag = total_solid_fraction.mul_add(e, predicted);
+        let rest_gain = (zero - weight).mul_add(without_drag, solid_fraction * e);
+        let f = change_weight(weight, solid_fraction, self.closure_dt);
         let constant = rest_gain - f * self.rigid.component(self.axis, index);
         let derivative = weight + f;
         let arm = self.run.arm;

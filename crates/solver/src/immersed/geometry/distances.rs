@@ -26,8 +26,8 @@ use grainwake_simd::{Kernel, MAX_LANES, Vector};
 #[derive(Default)]
 pub struct DistanceScratch {
     /// Candidate faces of a plane, row after row, by axis: first their positions in the frame of
-    /// the grain [m], then their unit normals in the space frame. `MAX_LANES` unused entries follow the
-    /// last.
+    /// the grain [m], then their unit normals in the space frame. `MAX_LANES` unused entries
+    /// follow the last.
     points: [Aligned<f32>; 3],
     parts: Vec<RowPart>,
 }

@@ -1,7 +1,7 @@
 //! Weights of forced faces, their gain of velocity, and the impulse on the fluid.
 //!
 //! Legend: d signed distance, n normal, m open depth, A aperture, s weight of the rigid velocity, c
-//! closed fraction, C closed fraction of all grains together, U and U_old new and old rigid
+//! solid fraction, C total solid fraction, U and U_old new and old rigid
 //! velocity, J impulse, h spacing, nu kinematic viscosity, p pressure, g body acceleration.
 
 use glam::{DVec3, IVec3};
@@ -18,13 +18,13 @@ pub struct Weights {
     /// Weight s of the rigid velocity.
     pub weight: f64,
     /// Closed fraction c.
-    pub closed: f64,
+    pub solid_fraction: f64,
     /// Closed fraction C of all grains together.
-    pub closed_by_all: f64,
+    pub total_solid_fraction: f64,
 }
 
 impl Reference {
-    /// Drag coefficient times dt, and closed fraction 1 - A(d), of a face at the distance `d` [m]
+    /// Drag coefficient times dt, and solid fraction 1 - A(d), of a face at the distance `d` [m]
     /// from a surface with the normal `n`.
     ///
     /// drag = nu sum_a (m(d + h_a n_a) + m(d - h_a n_a) - 2 m(d)) / h_a^2 / m(d) in the aperture
@@ -50,7 +50,7 @@ impl Reference {
     pub fn weights(&self, index: usize, x: DVec3) -> Weights {
         let eps = self.eps;
         let d = self.nearest_image(index, x).distance;
-        let (mut all_drag, mut all_closed) = (0.0, 0.0);
+        let (mut all_drag, mut total_solid_fraction) = (0.0, 0.0);
         let mut forcing = [0.0; 2];
         for other in 0..self.grains.len() {
             let image = self.nearest_image(other, x);
@@ -59,20 +59,20 @@ impl Reference {
                 return Weights::default();
             }
             if image.distance < 2.0 * eps {
-                let [drag, closed] = self.drag(image.distance, image.normal);
+                let [drag, solid_fraction] = self.drag(image.distance, image.normal);
                 all_drag += drag;
-                all_closed += closed;
+                total_solid_fraction += solid_fraction;
                 if other == index {
-                    forcing = [drag, closed];
+                    forcing = [drag, solid_fraction];
                 }
             }
         }
-        let [drag, closed] = forcing;
+        let [drag, solid_fraction] = forcing;
         if d <= -eps && self.scheme == Scheme::Aperture {
             return Weights {
                 weight: 1.0,
-                closed: 1.0,
-                closed_by_all: 1.0,
+                solid_fraction: 1.0,
+                total_solid_fraction: 1.0,
             };
         }
         Weights {
@@ -81,8 +81,8 @@ impl Reference {
             } else {
                 1.0
             },
-            closed: closed / all_closed.max(1.0),
-            closed_by_all: all_closed.min(1.0),
+            solid_fraction: solid_fraction / total_solid_fraction.max(1.0),
+            total_solid_fraction: total_solid_fraction.min(1.0),
         }
     }
 
@@ -107,8 +107,8 @@ impl Reference {
         let arm = self.nearest_image(index, x).arm;
         let Weights {
             weight: s,
-            closed: c,
-            closed_by_all: all,
+            solid_fraction: c,
+            total_solid_fraction: all,
         } = self.weights(index, x);
         // p~ = p - dt U_old . grad p, at half a spacing above and below the face.
         let moved = |cell: IVec3, arm: DVec3| {

@@ -207,15 +207,25 @@ fn weights_of_forced_faces_match_the_reference() {
                 let runs = forced.runs[component].iter();
                 let runs = runs.map(|run| (run.at, run.first, run.count));
                 let weights = case.by_position(runs.clone(), &forced.weight, 0.0);
-                let closed = case.by_position(runs.clone(), &forced.closed, 0.0);
-                let by_all = case.by_position(runs, forced.closed_by_all(), 0.0);
+                let solid_fraction = case.by_position(runs.clone(), &forced.solid_fraction, 0.0);
+                let by_all = case.by_position(runs, forced.total_solid_fraction(), 0.0);
                 for face in reference.faces(component) {
                     let x = reference.position(component, face);
                     let (at, expected) = (reference.at(face), reference.weights(index, x));
                     assert_close(weights[at], expected.weight, 2e-5, "weight");
-                    assert_close(closed[at], expected.closed, 2e-5, "closed fraction");
+                    assert_close(
+                        solid_fraction[at],
+                        expected.solid_fraction,
+                        2e-5,
+                        "solid fraction",
+                    );
                     if expected.weight > 0.0 {
-                        assert_close(by_all[at], expected.closed_by_all, 2e-5, "closed by all");
+                        assert_close(
+                            by_all[at],
+                            expected.total_solid_fraction,
+                            2e-5,
+                            "total solid fraction",
+                        );
                         forced_faces += 1;
                         let other = reference.weights(1 - index, x).weight;
                         shared_faces += usize::from(other > 0.0);
