@@ -118,7 +118,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         tell!("{}", folder.join("table.csv").display());
         if study.analysis == Analysis::default() {
             tell!(
-                "note: `grainwake report {}` draws the figures; claims and more figures come with an `analysis` file (docs/study.md)",
+                "note: `grainwake report {}` draws the figures; claims and more figures come with an `analysis` file (docs/reference/study-file.md)",
                 folder.display()
             );
         }

@@ -147,5 +147,5 @@ fn an_analysis_without_a_key_points_to_its_own_page() {
         .assert()
         .code(2)
         .stderr(contains("a.toml:1:").and(contains("`by` is missing")))
-        .stderr(contains("docs/study.md").and(contains("grainwake schema").not()));
+        .stderr(contains("docs/reference/study-file.md").and(contains("grainwake schema").not()));
 }

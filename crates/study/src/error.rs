@@ -84,7 +84,7 @@ pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(
 
 /// Refers to the page with the keys of studies; `grainwake schema` lists the keys of cases.
 pub(crate) fn refer_to_study_keys(mut problem: Problem) -> Problem {
-    let here = "docs/study.md lists the keys of study and analysis files";
+    let here = "docs/reference/study-file.md lists the keys of study and analysis files";
     problem.help = problem
         .help
         .map(|help| help.replace("`grainwake schema` lists every key", here));
