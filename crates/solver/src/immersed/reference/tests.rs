@@ -173,7 +173,15 @@ fn distances_to_faces_match_the_reference() {
     let reference = &case.reference;
     let mut nearer_to_another = 0;
     for (index, (body, _)) in case.located.iter().enumerate() {
-        let tolerance = if SPHERES.contains(&index) { 1e-6 } else { 1e-3 };
+        // Samples of the ellipsoid are interpolated: poorly near its medial axis, far below the
+        // band.
+        let band = 2.0 * case.locator.eps();
+        let tolerance_at = |d: f64| match SPHERES.contains(&index) {
+            true => 1e-6,
+            false if d > -band => 1e-3,
+            false => 2e-2,
+        };
+        let tolerance = tolerance_at(0.0);
         for component in 0..3 {
             let distances = &body.distance[component];
             let distances = case.by_row(index, component, distances, f64::INFINITY);
@@ -181,7 +189,7 @@ fn distances_to_faces_match_the_reference() {
                 let found = distances[reference.at(face)];
                 match reference.distance(index, component, face) {
                     Some(d) if d < case.locator.reach() - tolerance => {
-                        assert_close(found, d, tolerance, "distance");
+                        assert_close(found, d, tolerance_at(d), "distance");
                     }
                     Some(_) => assert!(found > case.locator.reach() - tolerance),
                     None => {
@@ -292,7 +300,9 @@ fn the_advection_correction_matches_the_reference() {
             let reference = &case.reference;
             for face in reference.faces(component) {
                 let expected = reference.correction(index, &known, &kinematics, component, face);
-                assert_close(found[reference.at(face)], expected, 3e-5, "correction");
+                // The kernels compute the weights of the links in single precision.
+                let tolerance = 3e-5 * (1.0 + expected.abs());
+                assert_close(found[reference.at(face)], expected, tolerance, "correction");
                 largest = largest.max(expected.abs());
             }
         }
