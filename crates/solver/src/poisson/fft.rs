@@ -138,8 +138,7 @@ fn step<V: Vector, B: Butterfly<R>, const R: usize>(
     }
     let target = &mut target[..R * span];
     if pass.blocks == 1 {
-        let mut rest = target;
-        let to: [_; R] = std::array::from_fn(|_| cut(&mut rest, span));
+        let to: [_; R] = cut(target, span);
         for q in 0..span {
             let mut x = [Complex::zero(); R];
             for t in 0..R {
@@ -165,12 +164,12 @@ fn step<V: Vector, B: Butterfly<R>, const R: usize>(
         }
     } else {
         let blocks = target.chunks_exact_mut(R * stride);
-        for ((p, turn), mut rest) in pass.turn.chunks_exact(R - 1).enumerate().zip(blocks) {
+        for ((p, turn), block) in pass.turn.chunks_exact(R - 1).enumerate().zip(blocks) {
             let mut here: [&[Complex<V>]; R] = [&[]; R];
             for t in 0..R {
                 here[t] = &from[t][p * stride..][..stride];
             }
-            let to: [_; R] = std::array::from_fn(|_| cut(&mut rest, stride));
+            let to: [_; R] = cut(block, stride);
             for q in 0..stride {
                 let mut x = [Complex::zero(); R];
                 for t in 0..R {
@@ -186,12 +185,14 @@ fn step<V: Vector, B: Butterfly<R>, const R: usize>(
     }
 }
 
-/// Splits off the first `len` entries of `rest`.
+/// Splits `R` slices of `len` entries off `rest`.
 #[inline(always)]
-fn cut<'a, T>(rest: &mut &'a mut [T], len: usize) -> &'a mut [T] {
-    let (first, others) = std::mem::take(rest).split_at_mut(len);
-    *rest = others;
-    first
+fn cut<'a, T, const R: usize>(mut rest: &'a mut [T], len: usize) -> [&'a mut [T]; R] {
+    let mut slices = std::array::from_fn(|_| Default::default());
+    for slice in &mut slices {
+        (*slice, rest) = rest.split_at_mut(len);
+    }
+    slices
 }
 
 /// Pass of any odd prime radix; `source` is overwritten.

@@ -116,6 +116,12 @@ impl<R: Real> Kernel for Solve<'_, '_, R> {
     }
 }
 
+/// First entries of the vectors in a row of `width`, a multiple of `V::WIDTH`.
+#[inline(always)]
+fn starts<V: Vector>(width: usize) -> impl Iterator<Item = usize> {
+    (0..width / V::WIDTH).map(|n| n * V::WIDTH)
+}
+
 /// Row k - 1 of a list of rows, empty for k = 0, and mutable row k.
 #[inline(always)]
 fn row_of(values: &mut [f64], k: usize, width: usize) -> (&[f64], &mut [f64]) {
@@ -161,7 +167,7 @@ impl Tridiagonal {
             let row = &columns.row(k)[..width];
             let (pivots_before, pivots) = row_of(pivots, k, width);
             let (values_before, values) = row_of(values, k, width);
-            for i in (0..width).step_by(V::WIDTH) {
+            for i in starts::<V>(width) {
                 let mut b = open + V::load(&lambda[i..]) * square;
                 let mut f = factor * V::load_from(&row[i..]);
                 if k > 0 {
@@ -185,7 +191,7 @@ impl Tridiagonal {
         for k in (0..n - 1).rev() {
             let row = &mut columns.row(k)[..width];
             let (values, pivots) = (&values[k * width..][..width], &pivots[k * width..][..width]);
-            for i in (0..width).step_by(V::WIDTH) {
+            for i in starts::<V>(width) {
                 let x = V::load(&values[i..]) + V::load(&pivots[i..]) * V::load(&carry[i..]);
                 x.store(&mut carry[i..]);
                 x.store_to(&mut row[i..]);
@@ -216,7 +222,7 @@ impl Tridiagonal {
         // A = T + u v^T with u = (g, 0.., -1), v = (1, 0.., -1/g), g = -b.
         for k in 0..n {
             let row = &columns.row(k)[..width];
-            for i in (0..width).step_by(V::WIDTH) {
+            for i in starts::<V>(width) {
                 let b = two + V::load(&lambda[i..]) * square;
                 let g = zero - b;
                 let (mut diagonal, mut u) = (b, zero);
@@ -244,7 +250,7 @@ impl Tridiagonal {
             }
         }
         for k in (0..n - 1).rev() {
-            for i in (0..width).step_by(V::WIDTH) {
+            for i in starts::<V>(width) {
                 let (at, after) = (k * width + i, (k + 1) * width + i);
                 let pivot = V::load(&pivots[at..]);
                 (V::load(&values[at..]) + pivot * V::load(&values[after..]))
@@ -255,7 +261,7 @@ impl Tridiagonal {
         }
         let share = &mut carry[..width];
         let last = (n - 1) * width;
-        for i in (0..width).step_by(V::WIDTH) {
+        for i in starts::<V>(width) {
             let g = zero - (two + V::load(&lambda[i..]) * square);
             let y = V::load(&values[i..]) - V::load(&values[last + i..]).div(g);
             let q = one + V::load(&corner[i..]) - V::load(&corner[last + i..]).div(g);
@@ -263,7 +269,7 @@ impl Tridiagonal {
         }
         for k in 0..n {
             let row = columns.row(k);
-            for i in (0..width).step_by(V::WIDTH) {
+            for i in starts::<V>(width) {
                 let at = k * width + i;
                 let x = V::load(&values[at..]) - V::load(&share[i..]) * V::load(&corner[at..]);
                 x.store_to(&mut row[i..]);
