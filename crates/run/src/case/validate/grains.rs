@@ -181,7 +181,11 @@ impl<'a> Grains<'a> {
             };
             (motion.velocity.is_some() || motion.angular_velocity.is_some()).then_some(motion)
         };
-        self.resolved.iter().enumerate().filter_map(motion).collect()
+        self.resolved
+            .iter()
+            .enumerate()
+            .filter_map(motion)
+            .collect()
     }
 }
 

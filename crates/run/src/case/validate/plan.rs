@@ -12,10 +12,6 @@ use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{Setup, StepRule};
 
-/// Default limit of the CFL number.
-const CFL: f64 = 0.4;
-/// Default limit of the viscous number.
-const VISCOUS: f64 = 0.2;
 /// Smallest plausible step over the step at the settling speed: velocities 1000 times larger mean
 /// instability.
 const SMALLEST_STEP: f64 = 1e-3;
@@ -46,9 +42,11 @@ pub(super) fn step(
         }
         return Some(StepRule::Fixed(fixed));
     }
-    let cfl = raw.cfl.get_or_insert_with(|| Quantity::new(CFL).into());
+    let number = |limit: f64| Quantity::new(limit).into();
+    let (default_cfl, default_viscous) = StepRule::DEFAULT_LIMITS;
+    let cfl = raw.cfl.get_or_insert_with(|| number(default_cfl));
     let cfl = check.within(cfl, 1e-6, 1.0);
-    let viscous = (raw.viscous).get_or_insert_with(|| Quantity::new(VISCOUS).into());
+    let viscous = raw.viscous.get_or_insert_with(|| number(default_viscous));
     // Above 0.216 the two-step extrapolation of diffusion is unstable at a wall.
     let viscous = check.within(viscous, 1e-6, 0.21);
     let longest = || default_max_step(mesh.spacing, grains, gravity, dry, end);
