@@ -98,7 +98,7 @@ pub enum Ending {
 
 /// Runs a job in the folder `out`.
 ///
-/// Tables, VTK files and the final state have the same bits for any number of threads, and after any
+/// Tables, VTK files and the final state have the same bits for any number of threads and for any
 /// number of interruptions and resumptions.
 ///
 /// # Errors

@@ -79,7 +79,7 @@ struct RawRun {
 }
 
 fn default_case() -> Located<PathBuf> {
-    Located::none("case.toml".into())
+    PathBuf::from("case.toml").into()
 }
 
 #[derive(Deserialize)]

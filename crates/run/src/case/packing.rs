@@ -97,8 +97,8 @@ impl Region<'_> {
         Ok(placed.iter().map(|sphere| sphere.centre).collect())
     }
 
-    /// Returns centres on a cubic lattice [m], filled layer by layer along `up`. Each is shifted by up
-    /// to `jitter` of its free space. The error is the number of lattice sites.
+    /// Returns centres on a cubic lattice [m], filled layer by layer along `up`. Each centre is
+    /// shifted by up to `jitter` of its free space. The error is the number of lattice sites.
     pub fn lattice(
         &self,
         radii: &[f64],

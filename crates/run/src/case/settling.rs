@@ -7,8 +7,8 @@ use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::{Setup, StepRule};
 
-/// Smallest density ratio of a free grain and the fluid, tested for spheres, flat and long grains. At
-/// a tenth of this ratio some grains become unstable.
+/// Smallest density ratio of a free grain and the fluid, tested for spheres, flat and long grains.
+/// At a tenth of this ratio some grains become unstable.
 pub(super) const LIGHTEST_FREE: f64 = 0.01;
 
 /// Returns the Galileo number sqrt(|rho_p / rho_f - 1| g d^3) / nu of a grain.
@@ -51,8 +51,8 @@ pub fn terminal_speed(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
         / grain.shape.equivalent_diameter()
 }
 
-/// Returns the speed at which a grain may hit a wall [m/s]: 1.5 times its settling speed, without fluid the
-/// speed after falling through the box; at least its speed at the start.
+/// Returns the speed at which a grain may hit a wall [m/s]: 1.5 times its settling speed, without
+/// fluid the speed after falling through the box; at least its speed at the start.
 pub(super) fn impact_speed(
     grain: &Grain,
     fluid: Option<&FluidParams>,
@@ -114,8 +114,8 @@ pub(super) fn time_step(setup: &Setup, speed: f64) -> f64 {
     }
 }
 
-/// Returns the default of the longest step [s]: gravity moves a grain by one cell (dry: a fiftieth of
-/// its diameter) from rest in this time.
+/// Returns the default of the longest step [s]: gravity moves a grain by one cell (dry: a fiftieth
+/// of its diameter) from rest in this time.
 pub(super) fn default_max_step(
     mesh_spacing: DVec3,
     grains: &[Grain],

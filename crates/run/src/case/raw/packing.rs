@@ -20,8 +20,8 @@ pub struct RawPacking {
     /// Closed forms, taken in turn after the files.
     #[serde(default)]
     pub shapes: Vec<Located<RawShape>>,
-    /// Rescales each grain to this equal-volume diameter [m], or to one drawn evenly from
-    /// `{ from, to }`.
+    /// Rescales each grain to this equal-volume diameter [m], or to one drawn uniformly
+    /// from `{ from, to }`.
     pub equivalent_diameter: Option<Located<DiameterRange>>,
     /// Number of surface nodes of each grain.
     pub nodes: Option<Located<usize>>,
@@ -32,7 +32,7 @@ pub struct RawPacking {
     /// `lattice` or `random`.
     #[serde(default)]
     pub arrangement: Arrangement,
-    /// Lattice only: random shift as a fraction (0 to 1) of the free space around a site.
+    /// Lattice only: random shift as a fraction (0 to 1) of the free space around a lattice site.
     #[serde(default = "half")]
     pub jitter: Located<Quantity<Number>>,
     /// Smallest distance between bounding spheres, and from them to the walls [m].
@@ -52,6 +52,7 @@ pub struct RawPacking {
 fn half() -> Located<Quantity<Number>> {
     Quantity::new(0.5).into()
 }
+
 /// A part of the box.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -77,7 +78,7 @@ pub enum Arrangement {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PackingOrientation {
-    /// Evenly over all orientations.
+    /// Uniformly distributed orientations.
     #[default]
     Random,
     /// Principal axes along x, y, z.
