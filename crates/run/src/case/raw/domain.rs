@@ -84,9 +84,13 @@ impl AxisFaces {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxisTable {
+    /// Condition on the lower face.
     lower: Option<Located<Face>>,
+    /// Condition on the upper face.
     upper: Option<Located<Face>>,
+    /// Kind of condition on both faces.
     kind: Option<FaceKind>,
+    /// Velocity of both walls or of the entering fluid [m/s].
     velocity: Option<Triple<Velocity>>,
 }
 
@@ -161,7 +165,9 @@ pub struct Face {
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaceTable {
+    /// Kind of condition.
     kind: FaceKind,
+    /// Velocity of a moving wall or of the entering fluid [m/s].
     velocity: Option<Triple<Velocity>>,
 }
 

@@ -87,8 +87,10 @@ pub struct RawMotion {
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MotionTable {
+    /// Law of the translation [m/s].
     #[serde(default)]
     velocity: MotionLaw<Velocity>,
+    /// Law of the rotation [rad/s, axes of space].
     #[serde(default)]
     angular_velocity: MotionLaw<AngularVelocity>,
 }

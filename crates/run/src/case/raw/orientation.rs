@@ -95,10 +95,15 @@ impl Default for Orientation {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OrientationTable {
+    /// Axis of a turn.
     axis: Option<Direction>,
+    /// Angle of the turn, right-handed [rad].
     angle: Option<Quantity<Angle>>,
+    /// Direction of the longest principal axis.
     long_axis: Option<Direction>,
+    /// Direction of the middle principal axis.
     middle_axis: Option<Direction>,
+    /// Direction of the shortest principal axis.
     short_axis: Option<Direction>,
 }
 

@@ -42,8 +42,10 @@ pub struct RawStop {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StopTable {
+    /// Event that must have happened.
     #[schemars(schema_with = "stop_schema")]
     when: StopWhen,
+    /// Time to continue after the event [s].
     #[serde(default)]
     hold: Located<Quantity<Time>>,
 }
