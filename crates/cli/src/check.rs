@@ -1,8 +1,8 @@
 //! `grainwake check`.
 
 use grainwake_run::case::Case;
-use grainwake_run::case::estimate::Estimate;
-use grainwake_run::case::readable::{number, quantity};
+use grainwake_run::case::Estimate;
+use grainwake_run::case::number_format::{number, quantity};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 
 use crate::args::CheckArgs;
@@ -15,7 +15,7 @@ use crate::{kind, print, threads};
 pub fn check(args: &CheckArgs) -> Result<(), Exit> {
     let case = kind::case(&args.case, &args.set)?;
     let threads = threads::resolve(args.threads.unwrap_or(case.threads));
-    let estimate = Estimate::of(&case, threads);
+    let estimate = case.estimate(threads);
     if args.json {
         return print(&serde_json::to_string(&estimate)?);
     }

@@ -1,6 +1,6 @@
 //! Text form of the results of `[expect]`.
 
-use grainwake_run::case::readable::quantity;
+use grainwake_run::case::number_format::quantity;
 use grainwake_run::case::{Problem, Verdict};
 
 /// Returns the value, the expected range and the verdict on one line.

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use grainwake_formats::summary::Summary;
-use grainwake_run::case::estimate::Estimate;
 use grainwake_run::case::{Case, Problem, Verdict};
 use grainwake_run::{Ending, Existing, Options, RESOLVED};
 
@@ -48,7 +47,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
             count(threads, "thread"),
             out.display()
         );
-        check::warnings(&Estimate::of(&case, threads)).for_each(|w| tell!("{w}"));
+        check::warnings(&case.estimate(threads)).for_each(|w| tell!("{w}"));
     }
     let diameter = case
         .setup

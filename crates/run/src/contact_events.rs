@@ -101,7 +101,7 @@ mod tests {
             vec![floor],
             vec![touch(2, 0), touch(0, 2)],
             vec![touch(2, 0), touch(1, 2)],
-            // A bounce shorter than the hold is no parting.
+            // A bounce shorter than the hold is no separation.
             vec![touch(1, 2)],
             vec![touch(0, 2), touch(1, 2)],
             vec![touch(1, 2)],

@@ -1,11 +1,11 @@
 //! Problems of `validation.toml`, located in the file.
 
-use grainwake_run::case::{Loc, Problem, Source, nearest};
+use grainwake_run::case::{Located, Problem, Source, nearest};
 
 /// Returns a problem at a value of the file; `label` marks the value.
 pub(crate) fn at<T>(
     source: &Source,
-    value: &Loc<T>,
+    value: &Located<T>,
     message: impl Into<String>,
     help: impl Into<String>,
     label: &str,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use grainwake_run::case::{Loc, Problem, Source};
+use grainwake_run::case::{Located, Problem, Source};
 use serde::Deserialize;
 
 use crate::check::{Bounds, Check, Level, Reference, SuiteRun};
@@ -66,9 +66,9 @@ struct RawSuite {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawRun {
-    name: Loc<String>,
+    name: Located<String>,
     #[serde(default = "default_case")]
-    case: Loc<PathBuf>,
+    case: Located<PathBuf>,
     #[serde(default)]
     set: Vec<String>,
     #[serde(default)]
@@ -78,15 +78,15 @@ struct RawRun {
     check: Vec<RawCheck>,
 }
 
-fn default_case() -> Loc<PathBuf> {
-    Loc::none("case.toml".into())
+fn default_case() -> Located<PathBuf> {
+    PathBuf::from("case.toml").into()
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawCheck {
-    quantity: Loc<String>,
-    take: Loc<Measure>,
+    quantity: Located<String>,
+    take: Located<Measure>,
     #[serde(default)]
     of: String,
     #[serde(default)]
@@ -102,8 +102,8 @@ struct RawCheck {
     x: String,
     #[serde(default)]
     y: String,
-    reference: Option<Loc<RawReference>>,
-    tolerance: Option<Loc<Tolerance>>,
+    reference: Option<Located<RawReference>>,
+    tolerance: Option<Located<Tolerance>>,
     at_least: Option<f64>,
     at_most: Option<f64>,
     /// Publication of the reference, for readers of the file.

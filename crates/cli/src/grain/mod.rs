@@ -10,8 +10,8 @@ mod table;
 
 use std::path::Path;
 
+use grainwake_run::case::number_format;
 use grainwake_run::case::parse_length;
-use grainwake_run::case::readable;
 use grainwake_shape::render::Picture;
 use grainwake_shape::{Shape, ShapeOptions};
 
@@ -49,7 +49,7 @@ fn plausible(shape: &Shape, new: &NewGrain, option: &str) -> Result<(), Exit> {
         BAD_INPUT,
         format!(
             "the grain has an equivalent diameter of {}; accepted are 1 um to 1 m",
-            readable::length(diameter)
+            number_format::length(diameter)
         ),
         format!(
             "check the unit of {option} (mm or m?), or set the size with --equivalent-diameter LENGTH"

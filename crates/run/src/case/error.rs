@@ -1,4 +1,4 @@
-//! What is wrong with a case file, and where.
+//! Problems of case files with their positions.
 
 use std::fmt;
 use std::ops::Range;
@@ -6,49 +6,49 @@ use std::path::PathBuf;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
-/// One thing wrong with a case file.
+/// Problem of a case file.
 #[derive(Clone, Debug)]
 pub struct Problem {
     /// Dotted key, "fluid.density".
     pub key: Option<String>,
-    /// What was found and what is wrong with it.
+    /// Value found and the rule it breaks.
     pub message: String,
-    /// What to do.
+    /// Remedy.
     pub help: Option<String>,
-    place: Option<Box<Place>>,
+    excerpt: Option<Box<Excerpt>>,
 }
 
-/// A range of a named text, and a few words about it.
+/// Range of a named text with a label.
 #[derive(Clone, Debug)]
-struct Place {
+struct Excerpt {
     source: NamedSource<String>,
     label: String,
     span: Range<usize>,
 }
 
 impl Problem {
-    /// A problem without a place.
+    /// Returns a problem without a position.
     pub fn new(message: impl Into<String>) -> Problem {
         Problem {
             key: None,
             message: message.into(),
             help: None,
-            place: None,
+            excerpt: None,
         }
     }
-    /// With the dotted key it concerns.
+    /// Adds the dotted key.
     #[must_use]
     pub fn key(mut self, key: impl Into<String>) -> Problem {
         self.key = Some(key.into());
         self
     }
-    /// With what to do about it.
+    /// Adds the remedy.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Problem {
         self.help = Some(help.into());
         self
     }
-    /// With its place: a name and text, a range of its bytes, and a few words about that range.
+    /// Adds the position: name and text of the source, range of its bytes, and a label.
     #[must_use]
     pub fn at(
         mut self,
@@ -58,16 +58,16 @@ impl Problem {
         label: impl Into<String>,
     ) -> Problem {
         let source = NamedSource::new(name, text.to_string());
-        self.place = Some(Box::new(Place {
+        self.excerpt = Some(Box::new(Excerpt {
             source,
             label: label.into(),
             span,
         }));
         self
     }
-    /// File, line and column (both from 1) of the place.
+    /// Returns file, line and column of the position; lines and columns count from 1.
     pub fn place(&self) -> Option<(&str, usize, usize)> {
-        let Place { source, span, .. } = self.place.as_deref()?;
+        let Excerpt { source, span, .. } = self.excerpt.as_deref()?;
         let before = source.inner().get(..span.start)?;
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
@@ -88,27 +88,20 @@ impl std::error::Error for Problem {}
 
 impl Diagnostic for Problem {
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.help
-            .as_ref()
-            .map(|h| Box::new(h) as Box<dyn fmt::Display>)
+        Some(Box::new(self.help.as_ref()?))
     }
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.place
-            .as_deref()
-            .map(|place| &place.source as &dyn SourceCode)
+        Some(&self.excerpt.as_deref()?.source)
     }
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let Place { label, span, .. } = self.place.as_deref()?;
+        let Excerpt { label, span, .. } = self.excerpt.as_deref()?;
         let label = (!label.is_empty()).then(|| label.clone());
-        Some(Box::new(std::iter::once(LabeledSpan::new(
-            label,
-            span.start,
-            span.len().max(1),
-        ))))
+        let label = LabeledSpan::new(label, span.start, span.len().max(1));
+        Some(Box::new(std::iter::once(label)))
     }
 }
 
-/// Why a case could not be loaded.
+/// Error of loading a case.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
     /// The file could not be read.
@@ -116,7 +109,7 @@ pub enum CaseError {
     Unreadable {
         /// Path of the case file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The contents are wrong.
@@ -125,15 +118,12 @@ pub enum CaseError {
 }
 
 fn list(problems: &[Problem]) -> String {
-    problems
-        .iter()
-        .map(Problem::to_string)
-        .collect::<Vec<_>>()
-        .join("\n")
+    let lines: Vec<String> = problems.iter().map(Problem::to_string).collect();
+    lines.join("\n")
 }
 
 impl CaseError {
-    /// The problems, for a reporter that shows them one by one.
+    /// Returns the problems of an invalid case.
     pub fn problems(&self) -> &[Problem] {
         match self {
             CaseError::Unreadable { .. } => &[],

@@ -1,28 +1,37 @@
 //! Case files: TOML in, a validated set-up and a run plan out.
 //!
-//! A case passes three forms: as written (`raw`, every key with its place), validated (the
-//! parameter structs of the modules that own them), and resolved (the same file with every
-//! default spelled out, which runs as it is and gives the same bits). What is wrong is reported
-//! with file, line, key and remedy, and nothing is written.
+//! A case has three representations:
+//!
+//! 1. raw: the file as written, each key with its position (`raw`),
+//! 2. validated: the parameter structs of the modules that own them (`validate`),
+//! 3. resolved: the raw case with every default written out. It gives the same bits when it is run.
+//!
+//! A problem is reported with file, line, key and remedy; then nothing is written.
+//!
+//! Layers, downwards: `validate` -> `warnings` -> `estimate`, `packing`, `placement`, `shapes` ->
+//! `settling`, `expect` -> `raw` -> `source` -> `quantity` -> `notation`, `units`, `located`,
+//! `error`, `number_format`, `suggest`.
 
 mod error;
-pub mod estimate;
+mod estimate;
 mod expect;
-mod loc;
+mod located;
+mod notation;
+pub mod number_format;
 mod overrides;
 mod packing;
 mod placement;
 mod quantity;
 mod raw;
-pub mod readable;
 mod schema;
+mod settling;
 mod shapes;
 mod source;
 mod suggest;
+mod toml_messages;
 mod units;
 mod validate;
 mod warnings;
-mod wording;
 
 use std::path::Path;
 
@@ -32,8 +41,9 @@ use crate::{Job, RunPlan};
 use grainwake_solver::sim::Setup;
 
 pub use error::{CaseError, Problem};
+pub use estimate::Estimate;
 pub use expect::{Expectation, Verdict};
-pub use loc::Loc;
+pub use located::Located;
 pub use schema::schema;
 pub use shapes::ShapeFile;
 pub use source::Source;
@@ -44,19 +54,19 @@ use raw::{RawCase, RawExpect, RawRun};
 /// A case that can be run.
 #[derive(Debug)]
 pub struct Case {
-    /// One line that says what it is.
+    /// Title, one line.
     pub title: String,
-    /// What is simulated.
+    /// Set-up of the simulation.
     pub setup: Setup,
-    /// What is written and when it ends.
+    /// Outputs and end of the run.
     pub plan: RunPlan,
     /// Threads; 0 for all cores.
     pub threads: usize,
-    /// What the run must give.
+    /// Expected results.
     pub expect: Vec<Expectation>,
-    /// The case as TOML with all defaults spelled out; grain files as they are called in the run folder.
+    /// Resolved case as TOML, with the names that grain files have in the run folder.
     pub resolved: String,
-    /// Grain files that the case uses.
+    /// Grain files of the case.
     pub shapes: Vec<ShapeFile>,
     /// Hash of everything that decides the results up to a given time: threads, `[expect]`, the
     /// title, the end and the checkpoint intervals do not.
@@ -77,7 +87,7 @@ impl Case {
         Case::parse(&text, &path.display().to_string(), folder, overrides)
     }
 
-    /// The same from text; `name` stands in messages, grain files are relative to `folder`.
+    /// Reads a case from text. Messages contain `name`; grain files are relative to `folder`.
     ///
     /// # Errors
     /// [`CaseError`] with every problem found and its place.
@@ -88,49 +98,43 @@ impl Case {
         overrides: &[String],
     ) -> Result<Case, CaseError> {
         let (source, raw) = source::Source::parse(name, text, overrides)?;
-        let v = validate::validate(&source, raw, folder)?;
-        let write = |raw: &RawCase| {
-            toml::to_string(raw).map_err(|e| CaseError::from(Problem::new(e.to_string())))
-        };
-        let resolved = write(&v.resolved)?;
-        let digest = digest(&v.resolved, &v.shapes, &write)?;
-        let title = v.resolved.title;
-        let validate::Validated {
-            setup,
-            plan,
-            threads,
-            expect,
-            shapes,
-            ..
-        } = v;
+        let validated = validate::validate(&source, raw, folder)?;
+        let resolved = write(&validated.resolved)?;
+        let digest = digest(&validated.resolved, &validated.shapes)?;
         Ok(Case {
-            title,
-            setup,
-            plan,
-            threads,
-            expect,
+            title: validated.resolved.title,
+            setup: validated.setup,
+            plan: validated.plan,
+            threads: validated.threads,
+            expect: validated.expect,
             resolved,
-            shapes,
+            shapes: validated.shapes,
             digest,
         })
     }
-}
 
-impl Case {
-    /// What the run loop needs of the case.
+    /// Returns the input of the run loop.
     pub fn job(&self) -> Job {
+        let files = self.shapes.iter();
         Job {
             setup: self.setup.clone(),
             plan: self.plan.clone(),
             resolved: self.resolved.clone(),
             digest: self.digest.clone(),
-            files: self
-                .shapes
-                .iter()
-                .map(|file| (file.name.clone(), file.bytes.clone()))
-                .collect(),
+            files: (files.map(|file| (file.name.clone(), file.bytes.clone()))).collect(),
         }
     }
+
+    /// Estimates a run on `threads` threads, with warnings.
+    pub fn estimate(&self, threads: usize) -> Estimate {
+        let mut estimate = Estimate::of(&self.setup, &self.plan, threads);
+        estimate.warnings = warnings::warnings(&self.setup, &self.plan, &self.expect, &estimate);
+        estimate
+    }
+}
+
+fn write(raw: &RawCase) -> Result<String, CaseError> {
+    toml::to_string(raw).map_err(|e| CaseError::from(Problem::new(e.to_string())))
 }
 
 /// Reads a length such as "2 mm" or "0.002" [m]; the error says what is accepted.
@@ -141,14 +145,10 @@ pub fn parse_length(text: &str) -> Result<f64, String> {
     quantity::parse_quantity::<quantity::Length>(text)
 }
 
-fn digest(
-    resolved: &RawCase,
-    shapes: &[ShapeFile],
-    write: &dyn Fn(&RawCase) -> Result<String, CaseError>,
-) -> Result<String, CaseError> {
+fn digest(resolved: &RawCase, shapes: &[ShapeFile]) -> Result<String, CaseError> {
     let mut core = resolved.clone();
     core.title = String::new();
-    // Rounding decides results; threads do not.
+    // The precision decides the results; the number of threads does not.
     core.run.threads = RawRun::default().threads;
     core.expect = RawExpect::default();
     core.time.end = Default::default();
@@ -161,9 +161,6 @@ fn digest(
         hash.update(shape.name.as_bytes());
         hash.update(shape.bytes.as_slice());
     }
-    Ok(hash
-        .finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect())
+    let bytes = hash.finalize();
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }

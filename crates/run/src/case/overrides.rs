@@ -1,11 +1,12 @@
-//! `key=value` overrides of a file: their text, and how they are laid over its tables.
+//! `key=value` overrides of a TOML file.
 
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
 use super::error::Problem;
 
-/// "time.end=0.5" -> "time.end = 0.5"; a value that is not TOML is taken as a string.
+/// Returns an override as TOML, "time.end=0.5" -> "time.end = 0.5". A value that is not TOML
+/// becomes a string.
 pub(super) fn override_line(item: &str) -> Result<String, Problem> {
     let usage = "write key=value, for example --set time.end=0.5 or --set grain.0.density=2600";
     let (key, value) = item
@@ -36,9 +37,9 @@ pub(super) fn override_line(item: &str) -> Result<String, Problem> {
     ))
 }
 
-/// Lays `extra`, one override with a key of `parts` parts, over a file: what the key names is replaced
-/// as a whole, and all beside it stays.
-pub(super) fn lay_over<'i>(
+/// Applies `extra`, an override whose key has `parts` parts, to a table. The value of the key is
+/// replaced as a whole; its siblings stay.
+pub(super) fn override_table<'i>(
     base: &mut DeTable<'i>,
     extra: DeTable<'i>,
     parts: usize,
@@ -49,19 +50,19 @@ pub(super) fn lay_over<'i>(
         let old = base.get_mut(&key).map(|old| old.get_mut());
         let value = match (old, value.into_inner()) {
             (Some(DeValue::Table(old)), DeValue::Table(new)) if parts > 1 => {
-                lay_over(old, new, parts - 1)?;
+                override_table(old, new, parts - 1)?;
                 continue;
             }
-            // Not `vector.formula = ...`, which takes the place of `[x, y, z]`.
+            // `vector.formula = ...` replaces `[x, y, z]` instead.
             (Some(DeValue::Array(items)), DeValue::Table(new))
                 if parts > 1 && (is_of_tables(items) || has_index(&new)) =>
             {
-                lay_over_list(&name, items, new, parts - 1)?;
+                override_list(&name, items, new, parts - 1)?;
                 continue;
             }
             (_, value) => value,
         };
-        // The map would keep the old key and its place.
+        // Without removal the map would keep the position of the old key.
         base.remove(&key);
         base.insert(key, Spanned::new(span, value));
     }
@@ -78,8 +79,8 @@ fn has_index(table: &DeTable) -> bool {
         .any(|key| key.get_ref().parse::<usize>().is_ok())
 }
 
-/// The same for an element of the list `name`.
-fn lay_over_list<'i>(
+/// Applies an override to elements of the list `name`.
+fn override_list<'i>(
     name: &str,
     items: &mut DeArray<'i>,
     extra: DeTable<'i>,
@@ -97,7 +98,7 @@ fn lay_over_list<'i>(
         let span = value.span();
         let value = match (slot.get_mut(), value.into_inner()) {
             (DeValue::Table(old), DeValue::Table(new)) if parts > 1 => {
-                lay_over(old, new, parts - 1)?;
+                override_table(old, new, parts - 1)?;
                 continue;
             }
             (_, value) => value,

@@ -1,4 +1,4 @@
-//! `[[packing]]` -> grains: positions on a jittered lattice or at random, orientations by seed.
+//! Positions of packed grains, on a jittered lattice or at random, and random orientations.
 
 use glam::{DQuat, DVec3};
 use rand::RngExt;
@@ -23,45 +23,45 @@ fn point(random: &mut Random) -> DVec3 {
     DVec3::from_array(random.random())
 }
 
-/// A ball that must keep clear of others.
+/// Bounding sphere of a grain.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ball {
+pub(super) struct Sphere {
     /// Centre [m].
     pub centre: DVec3,
     /// Radius [m].
     pub radius: f64,
 }
 
-/// Part of the box to be filled and what already stands there.
-pub(super) struct Space<'a> {
+/// Part of the box to fill, and the spheres in it.
+pub(super) struct Region<'a> {
     /// Lower corner [m].
     pub lower: DVec3,
     /// Upper corner [m].
     pub upper: DVec3,
-    /// Smallest distance between balls and to the walls [m].
+    /// Smallest distance between spheres, and from them to the walls [m].
     pub clearance: f64,
-    /// The box, for its periods.
+    /// Box with its periodic axes.
     pub enclosure: &'a Enclosure,
-    /// Balls that stand there.
-    pub taken: &'a [Ball],
+    /// Spheres of the grains that are placed already.
+    pub taken: &'a [Sphere],
 }
 
-impl Space<'_> {
-    fn free(&self, ball: Ball, placed: &[Ball]) -> bool {
+impl Region<'_> {
+    fn free(&self, sphere: Sphere, placed: &[Sphere]) -> bool {
         self.taken.iter().chain(placed).all(|other| {
-            let mut arm = ball.centre - other.centre;
+            let mut arm = sphere.centre - other.centre;
             for axis in 0..3 {
                 if self.enclosure.periodic[axis] {
                     let period = self.enclosure.size()[axis];
                     arm[axis] -= period * (arm[axis] / period).round();
                 }
             }
-            arm.length() >= ball.radius + other.radius + self.clearance
+            arm.length() >= sphere.radius + other.radius + self.clearance
         })
     }
 
-    /// Margin that a ball of this radius keeps from the region's faces, axis by axis: none
-    /// where the region spans a periodic axis.
+    /// Returns the distance of a sphere's centre from the faces of the region along each axis [m];
+    /// zero where the region spans a periodic axis.
     fn margin(&self, radius: f64) -> DVec3 {
         let spans = |axis: usize| {
             self.enclosure.periodic[axis]
@@ -76,9 +76,9 @@ impl Space<'_> {
         }))
     }
 
-    /// Random centres without overlap; the error says how many found a place.
+    /// Returns random centres without overlap [m]; the error is the number of spheres placed.
     pub fn random(&self, radii: &[f64], random: &mut Random) -> Result<Vec<DVec3>, usize> {
-        let mut placed: Vec<Ball> = Vec::new();
+        let mut placed: Vec<Sphere> = Vec::new();
         for &radius in radii {
             let margin = self.margin(radius);
             let room = self.upper - self.lower - 2.0 * margin;
@@ -86,19 +86,19 @@ impl Space<'_> {
                 return Err(placed.len());
             }
             let found = (0..20_000).find_map(|_| {
-                let ball = Ball {
+                let sphere = Sphere {
                     centre: self.lower + margin + room * point(random),
                     radius,
                 };
-                self.free(ball, &placed).then_some(ball)
+                self.free(sphere, &placed).then_some(sphere)
             });
             placed.push(found.ok_or(placed.len())?);
         }
-        Ok(placed.iter().map(|ball| ball.centre).collect())
+        Ok(placed.iter().map(|sphere| sphere.centre).collect())
     }
 
-    /// Centres on a cubic lattice filled layer by layer from below (along `up`), each shifted by
-    /// up to `jitter` of its free space; the error says how many sites there are.
+    /// Returns centres on a cubic lattice [m], filled layer by layer along `up`. Each centre is
+    /// shifted by up to `jitter` of its free space. The error is the number of lattice sites.
     pub fn lattice(
         &self,
         radii: &[f64],
@@ -171,7 +171,7 @@ impl Space<'_> {
             if sign < 0.0 {
                 centre[axis] = self.lower[axis] + self.upper[axis] - centre[axis];
             }
-            // Jitter may not push a ball out of the region.
+            // Jitter may not push a sphere out of the region.
             let inner = self.margin(radius);
             centre = centre.max(self.lower + inner).min(self.upper - inner);
             centres.push(centre);
@@ -179,12 +179,12 @@ impl Space<'_> {
         Ok(centres)
     }
 
-    /// Whether none of these balls meets another or one that stands there.
-    pub fn clear(&self, balls: &[Ball]) -> bool {
-        balls
+    /// Returns whether no sphere overlaps another one or a placed one.
+    pub fn clear(&self, spheres: &[Sphere]) -> bool {
+        spheres
             .iter()
             .enumerate()
-            .all(|(i, ball)| self.free(*ball, &balls[..i]))
+            .all(|(i, sphere)| self.free(*sphere, &spheres[..i]))
     }
 }
 
@@ -193,8 +193,8 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
 
-    fn space<'a>(enclosure: &'a Enclosure, taken: &'a [Ball]) -> Space<'a> {
-        Space {
+    fn space<'a>(enclosure: &'a Enclosure, taken: &'a [Sphere]) -> Region<'a> {
+        Region {
             lower: DVec3::ZERO,
             upper: DVec3::new(1.0, 1.0, 3.0),
             clearance: 0.01,
@@ -212,11 +212,11 @@ mod tests {
         }
     }
 
-    fn balls(centres: &[DVec3], radii: &[f64]) -> Vec<Ball> {
+    fn spheres(centres: &[DVec3], radii: &[f64]) -> Vec<Sphere> {
         centres
             .iter()
             .zip(radii)
-            .map(|(centre, radius)| Ball {
+            .map(|(centre, radius)| Sphere {
                 centre: *centre,
                 radius: *radius,
             })
@@ -237,7 +237,7 @@ mod tests {
                     .lattice(&radii, jitter, (2, 1.0), &mut Random::seed_from_u64(7))
                     .unwrap();
                 assert!(
-                    space.clear(&balls(&centres, &radii)),
+                    space.clear(&spheres(&centres, &radii)),
                     "periodic {periodic}, jitter {jitter}"
                 );
                 if !periodic {
@@ -257,7 +257,7 @@ mod tests {
     fn random_places_are_clear_and_repeat() {
         let (enclosure, taken) = (
             closed(),
-            [Ball {
+            [Sphere {
                 centre: DVec3::splat(0.5),
                 radius: 0.3,
             }],
@@ -265,7 +265,7 @@ mod tests {
         let space = space(&enclosure, &taken);
         let radii = [0.1; 60];
         let centres = space.random(&radii, &mut Random::seed_from_u64(3)).unwrap();
-        assert!(space.clear(&balls(&centres, &radii)));
+        assert!(space.clear(&spheres(&centres, &radii)));
         assert_eq!(
             centres,
             space.random(&radii, &mut Random::seed_from_u64(3)).unwrap()

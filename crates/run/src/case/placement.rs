@@ -1,15 +1,14 @@
-//! Where grains stand and how they are turned.
+//! Orientation of grains and their extent along an axis.
 
 use glam::{DMat3, DQuat, DVec3};
 
 use super::raw::{Orientation, Turns};
 use grainwake_solver::dem::{Enclosure, Grain, wall_gap};
 
-/// Orientation of a grain after its turns. The principal frame of a shape has the longest axis
-/// along x, the shortest along z.
+/// Returns the orientation of a grain after its turns. The principal frame of a shape has the
+/// longest axis along x and the shortest along z.
 ///
-/// Quaternions that are of unit length already keep their bits, so that a resolved case gives
-/// the same grain.
+/// A quaternion of unit length keeps its bits, so that a resolved case gives the same grain.
 pub(super) fn orientation(orientation: &Orientation, turns: &Turns) -> Result<DQuat, String> {
     let start = match orientation {
         Orientation::Quaternion(q) => *q,
@@ -23,9 +22,9 @@ pub(super) fn orientation(orientation: &Orientation, turns: &Turns) -> Result<DQ
     })
 }
 
-/// Turns the principal axes (long, middle, short) into the given directions. A second direction
-/// is made perpendicular to the first; where there is none, the next principal axis points along
-/// the next axis of space (x -> y -> z -> x), made perpendicular.
+/// Returns the rotation of the principal axes (long, middle, short) to the given directions. The
+/// second direction is made perpendicular to the first; its default is the next axis of space
+/// (x -> y -> z -> x).
 fn from_axes(axes: &[Option<DVec3>; 3]) -> Result<DQuat, String> {
     let first = axes
         .iter()
@@ -60,9 +59,9 @@ fn from_axes(axes: &[Option<DVec3>; 3]) -> Result<DQuat, String> {
     Ok(DQuat::from_mat3(&DMat3::from_cols(columns[0], columns[1], columns[2])).normalize())
 }
 
-/// Lowest and highest coordinate of a grain's surface along `axis` [m].
-pub(super) fn reach(grain: &Grain, axis: usize) -> (f64, f64) {
-    // The distance to a plane is what contact measures against a wall: the same surface then counts.
+/// Returns the lowest and highest coordinate of a grain's surface along `axis` [m].
+pub(super) fn extent_along(grain: &Grain, axis: usize) -> (f64, f64) {
+    // The wall gap of the contact model measures the surface that contact uses.
     let margin = 2.0 * grain.shape.bounding_radius();
     let centre = grain.pose.position;
     let side = |side: usize| {

@@ -1,51 +1,75 @@
 //! Numbers with units: a bare number is SI, a string carries its unit ("2 mm").
 
 use std::borrow::Cow;
-use std::fmt;
+use std::fmt::Debug;
 use std::marker::PhantomData;
 
 use glam::DVec3;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::{self, SeqAccess, Visitor};
-use serde::ser::SerializeSeq;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::notation::{Notation, Unsupported, deserialize, refusal, schema};
 use super::suggest::nearest;
 use super::units::{Dimension, UnitError, known_symbols, parse_unit};
 
-/// What a quantity measures. `NAME` and `EXAMPLE` go into messages and the schema.
-pub trait Kind: JsonSchema + 'static {
+/// Kind of physical quantity.
+pub trait Kind: Copy + Debug + Default + PartialEq + JsonSchema + 'static {
     /// Dimension of the quantity.
     const DIMENSION: Dimension;
-    /// Name with its article, "a length".
-    const NAME: &'static str;
     /// SI unit, "m".
     const SI: &'static str;
-    /// How to write one with a unit, "2 mm".
+    /// Example with a unit, "2 mm".
     const EXAMPLE: &'static str;
+    /// Accepted notations, completing "expected ...".
+    const EXPECTED: &'static str;
+    /// Accepted notations of a vector.
+    const EXPECTED_VECTOR: &'static str;
+}
+
+/// Notations of a quantity; a plain number has no unit.
+macro_rules! expected {
+    ($prefix:literal, $name:literal, "1", $example:literal) => {
+        concat!($prefix, "a plain number such as ", $example)
+    };
+    ($prefix:literal, $name:literal, $si:literal, $example:literal) => {
+        concat!(
+            $prefix,
+            $name,
+            " as a number in ",
+            $si,
+            " or a string such as \"",
+            $example,
+            "\""
+        )
+    };
 }
 
 macro_rules! kinds {
-    ($($(#[$doc:meta])* $name:ident ($m:expr, $l:expr, $t:expr, $a:expr) $text:literal, $si:literal, $example:literal;)*) => {$(
+    ($($(#[$doc:meta])* $kind:ident ($m:expr, $l:expr, $t:expr, $a:expr) $name:tt, $si:tt, $example:tt;)*) => {$(
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub enum $name {}
-        impl Kind for $name {
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub struct $kind;
+        impl Kind for $kind {
             const DIMENSION: Dimension = Dimension::new($m, $l, $t, $a);
-            const NAME: &'static str = $text;
             const SI: &'static str = $si;
             const EXAMPLE: &'static str = $example;
+            const EXPECTED: &'static str = expected!("", $name, $si, $example);
+            const EXPECTED_VECTOR: &'static str =
+                expected!("three components [x, y, z], each ", $name, $si, $example);
         }
-        // Only the name counts: it tells generic tables of different kinds apart.
-        impl JsonSchema for $name {
+        // Generic tables of different kinds are told apart by the name of the kind.
+        impl JsonSchema for $kind {
             fn schema_name() -> Cow<'static, str> {
-                stringify!($name).into()
+                stringify!($kind).into()
             }
             fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-                Quantity::<$name>::json_schema(generator)
+                Quantity::<$kind>::json_schema(generator)
             }
         }
-    )*};
+    )*
+        /// Dimension and name of every kind.
+        const NAMES: &[(Dimension, &str)] = &[$(($kind::DIMENSION, $name)),*];
+    };
 }
 
 kinds! {
@@ -77,54 +101,88 @@ kinds! {
     Number(0, 0, 0, 0) "a plain number", "1", "0.5";
 }
 
-/// A value in SI units.
-pub struct Quantity<K> {
-    /// The value [SI].
-    pub si: f64,
+/// A value of kind `K`: a number, or a vector ([`Triple`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quantity<K, T = f64> {
+    /// Value [SI].
+    pub si: T,
     kind: PhantomData<K>,
 }
 
-impl<K> Quantity<K> {
-    /// A quantity from its value in SI units.
-    pub const fn new(si: f64) -> Self {
-        Quantity {
-            si,
-            kind: PhantomData,
-        }
-    }
-}
-impl<K> Clone for Quantity<K> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<K> Copy for Quantity<K> {}
-impl<K> Default for Quantity<K> {
-    fn default() -> Self {
-        Quantity::new(0.0)
-    }
-}
-impl<K> PartialEq for Quantity<K> {
-    fn eq(&self, other: &Self) -> bool {
-        self.si == other.si
-    }
-}
-impl<K> fmt::Debug for Quantity<K> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.si.fmt(f)
+/// Three quantities of one kind.
+pub type Triple<K> = Quantity<K, DVec3>;
+
+impl<K, T> Quantity<K, T> {
+    /// Returns the quantity with this value [SI].
+    pub const fn new(si: T) -> Self {
+        let kind = PhantomData;
+        Quantity { si, kind }
     }
 }
 
-fn how_to_write<K: Kind>() -> String {
-    if K::SI == "1" {
-        format!("a plain number such as {}", K::EXAMPLE)
-    } else {
-        format!(
-            "{} as a number in {} or a string such as \"{}\"",
-            K::NAME,
-            K::SI,
-            K::EXAMPLE
-        )
+impl<K: Kind> Notation for Quantity<K> {
+    const EXPECTED: &'static str = K::EXPECTED;
+    type List = Unsupported;
+    type Table = Unsupported;
+    fn from_word(word: &str) -> Result<Self, String> {
+        parse_quantity::<K>(word).and_then(Self::from_number)
+    }
+    fn from_number(number: f64) -> Result<Self, String> {
+        let refused = || format!("found {number}; expected {}", K::EXPECTED);
+        (number.is_finite().then(|| Quantity::new(number))).ok_or_else(refused)
+    }
+    fn scalar_schemas(_: &mut SchemaGenerator) -> Vec<Schema> {
+        let word = json_schema!({ "type": "string", "examples": [K::EXAMPLE] });
+        vec![json_schema!({ "type": "number" }), word]
+    }
+}
+
+impl<K: Kind> Notation for Triple<K> {
+    const EXPECTED: &'static str = K::EXPECTED_VECTOR;
+    type List = Vec<Quantity<K>>;
+    type Table = Unsupported;
+    fn from_list(list: Self::List) -> Result<Self, String> {
+        match list[..] {
+            [x, y, z] => Ok(Triple::new(DVec3::new(x.si, y.si, z.si))),
+            _ => Err(refusal::<Self>(&format!("{} components", list.len()))),
+        }
+    }
+}
+
+impl<K, T: Serialize> Serialize for Quantity<K, T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.si.serialize(serializer)
+    }
+}
+
+impl<'de, K, T> Deserialize<'de> for Quantity<K, T>
+where
+    Quantity<K, T>: Notation,
+{
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserialize(deserializer)
+    }
+}
+
+impl<K: Kind> JsonSchema for Quantity<K> {
+    fn schema_name() -> Cow<'static, str> {
+        K::schema_name()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        schema::<Self>(generator)
+    }
+}
+
+impl<K: Kind> JsonSchema for Triple<K> {
+    fn inline_schema() -> bool {
+        true
+    }
+    fn schema_name() -> Cow<'static, str> {
+        format!("{}Triple", K::schema_name()).into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let item = generator.subschema_for::<Quantity<K>>();
+        json_schema!({ "type": "array", "items": item, "minItems": 3, "maxItems": 3 })
     }
 }
 
@@ -135,7 +193,7 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
     let value: f64 = trimmed[..end].parse().map_err(|_| {
         format!(
             "\"{text}\" does not start with a number; write {}",
-            how_to_write::<K>()
+            K::EXPECTED
         )
     })?;
     let unit = trimmed[end..].trim();
@@ -151,12 +209,12 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
                 .map_or(String::new(), |s| format!(" (did you mean `{s}`?)"));
             format!(
                 "unknown unit `{symbol}` in \"{text}\"{hint}; write {}",
-                how_to_write::<K>()
+                K::EXPECTED
             )
         }
         UnitError::Malformed(unit) => format!(
             "the unit `{unit}` in \"{text}\" cannot be read; write {}",
-            how_to_write::<K>()
+            K::EXPECTED
         ),
     })?;
     let bare_angle = Dimension {
@@ -168,8 +226,8 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
     {
         return Err(format!(
             "\"{text}\" is {}; expected {}",
-            scale.dimension.describe(),
-            how_to_write::<K>()
+            describe(scale.dimension),
+            K::EXPECTED
         ));
     }
     Ok(scale.to_si(value))
@@ -208,149 +266,19 @@ fn number_end(text: &str) -> usize {
     mantissa
 }
 
-impl<'de, K: Kind> Deserialize<'de> for Quantity<K> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct QuantityVisitor<K>(PhantomData<K>);
-        impl<K: Kind> QuantityVisitor<K> {
-            fn finite<E: de::Error>(value: f64) -> Result<Quantity<K>, E> {
-                if value.is_finite() {
-                    Ok(Quantity::new(value))
-                } else {
-                    Err(E::custom(format!(
-                        "found {value}; expected {}",
-                        how_to_write::<K>()
-                    )))
-                }
-            }
-        }
-        impl<K: Kind> Visitor<'_> for QuantityVisitor<K> {
-            type Value = Quantity<K>;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(&how_to_write::<K>())
-            }
-            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Self::Value, E> {
-                Self::finite(value)
-            }
-            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Self::Value, E> {
-                Self::finite(value as f64)
-            }
-            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Self::Value, E> {
-                Self::finite(value as f64)
-            }
-            fn visit_str<E: de::Error>(self, text: &str) -> Result<Self::Value, E> {
-                Self::finite(parse_quantity::<K>(text).map_err(E::custom)?)
-            }
-        }
-        deserializer.deserialize_any(QuantityVisitor(PhantomData))
-    }
-}
-
-impl<K> Serialize for Quantity<K> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_f64(self.si)
-    }
-}
-
-impl<K: Kind> JsonSchema for Quantity<K> {
-    fn schema_name() -> Cow<'static, str> {
-        K::schema_name()
-    }
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "description": how_to_write::<K>(),
-            "anyOf": [{ "type": "number" }, { "type": "string", "examples": [K::EXAMPLE] }],
-        })
-    }
-}
-
-/// Three quantities of one kind.
-pub struct Triple<K> {
-    /// The values [SI].
-    pub si: DVec3,
-    kind: PhantomData<K>,
-}
-
-impl<K> Triple<K> {
-    /// A vector from its values in SI units.
-    pub const fn new(si: DVec3) -> Self {
-        Triple {
-            si,
-            kind: PhantomData,
-        }
-    }
-}
-impl<K> Clone for Triple<K> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<K> Copy for Triple<K> {}
-impl<K> Default for Triple<K> {
-    fn default() -> Self {
-        Triple::new(DVec3::ZERO)
-    }
-}
-impl<K> PartialEq for Triple<K> {
-    fn eq(&self, other: &Self) -> bool {
-        self.si == other.si
-    }
-}
-impl<K> fmt::Debug for Triple<K> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.si.fmt(f)
-    }
-}
-
-struct TripleVisitor<K>(PhantomData<K>);
-
-impl<'de, K: Kind> Visitor<'de> for TripleVisitor<K> {
-    type Value = Triple<K>;
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "three components [x, y, z], each {}",
-            how_to_write::<K>()
-        )
-    }
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self::Value, A::Error> {
-        let mut values = Vec::new();
-        while let Some(value) = seq.next_element::<Quantity<K>>()? {
-            values.push(value.si);
-        }
-        match values[..] {
-            [x, y, z] => Ok(Triple::new(DVec3::new(x, y, z))),
-            _ => Err(de::Error::invalid_length(values.len(), &self)),
-        }
-    }
-}
-
-impl<'de, K: Kind> Deserialize<'de> for Triple<K> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(TripleVisitor(PhantomData))
-    }
-}
-
-impl<K> Serialize for Triple<K> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut seq = serializer.serialize_seq(Some(3))?;
-        for value in self.si.to_array() {
-            seq.serialize_element(&value)?;
-        }
-        seq.end()
-    }
-}
-
-impl<K: Kind> JsonSchema for Triple<K> {
-    fn inline_schema() -> bool {
-        true
-    }
-    fn schema_name() -> Cow<'static, str> {
-        format!("{}Triple", Quantity::<K>::schema_name()).into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let item = generator.subschema_for::<Quantity<K>>();
-        json_schema!({ "type": "array", "items": item, "minItems": 3, "maxItems": 3 })
-    }
+/// Name of a dimension with its article, for messages.
+fn describe(dimension: Dimension) -> String {
+    let others = [
+        (Dimension::new(1, 0, 0, 0), "a mass"),
+        (Dimension::new(0, 2, 0, 0), "an area"),
+        (Dimension::new(0, 3, 0, 0), "a volume"),
+        (Dimension::new(1, 1, -2, 0), "a force"),
+        (Dimension::new(1, -1, -2, 0), "a pressure"),
+    ];
+    let mut known = others.iter().chain(NAMES);
+    known
+        .find(|(candidate, _)| *candidate == dimension)
+        .map_or_else(|| format!("in {dimension}"), |(_, name)| (*name).into())
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Shapes of a case: `.grain` files and closed forms, each built once and shared.
+//! Shapes of a case: `.grain` files and closed forms. Grains of equal shape share it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -6,28 +6,28 @@ use std::sync::Arc;
 
 use grainwake_shape::{Shape, ShapeError, ShapeOptions, analytic};
 
-use super::loc::Loc;
+use super::located::Located;
 use super::quantity::{Length, Quantity};
 use super::raw::{RawShape, ShapeKind};
 
-/// Nodes of a closed form where none are asked for.
+/// Default number of surface nodes of a closed form.
 pub(super) const DEFAULT_NODES: usize = 2000;
 
-/// A `.grain` file that a case uses.
+/// `.grain` file of a case.
 #[derive(Clone, Debug)]
 pub struct ShapeFile {
     /// Name in the run folder, "shapes/x.grain".
     pub name: String,
-    /// Where it was read from.
+    /// Path it was read from.
     pub source: PathBuf,
-    /// Its contents.
+    /// Contents of the file.
     pub bytes: Arc<Vec<u8>>,
 }
 
-/// Why a shape could not be had: what is wrong, and what to do.
+/// Message and help of a shape that cannot be built.
 pub(super) type Refusal = (String, String);
 
-/// Every shape that has been asked for.
+/// Cache of the shapes of a case.
 pub(super) struct Library<'a> {
     folder: &'a Path,
     files: BTreeMap<PathBuf, (ShapeFile, Arc<Shape>)>,
@@ -35,7 +35,7 @@ pub(super) struct Library<'a> {
 }
 
 impl<'a> Library<'a> {
-    /// Files are looked for relative to `folder`.
+    /// Returns an empty cache; files are relative to `folder`.
     pub fn new(folder: &'a Path) -> Library<'a> {
         Library {
             folder,
@@ -44,12 +44,12 @@ impl<'a> Library<'a> {
         }
     }
 
-    /// The files that were read, by name.
+    /// Returns the files that were read, by name.
     pub fn into_files(self) -> Vec<ShapeFile> {
         self.files.into_values().map(|(file, _)| file).collect()
     }
 
-    /// A shape from a file and the file's name in the run folder.
+    /// Returns the shape in a file, and the file's name in the run folder.
     pub fn file(&mut self, name: &str) -> Result<(Arc<Shape>, String), Refusal> {
         let path = self.folder.join(name);
         if let Some((file, shape)) = self.files.get(&path) {
@@ -86,13 +86,8 @@ impl<'a> Library<'a> {
         Ok((shape, name))
     }
 
-    /// A closed form.
-    pub fn closed_form(
-        &mut self,
-        raw: &RawShape,
-        nodes: Option<usize>,
-    ) -> Result<Arc<Shape>, Refusal> {
-        let nodes = nodes.unwrap_or(DEFAULT_NODES);
+    /// Returns a closed form with this number of surface nodes.
+    pub fn closed_form(&mut self, raw: &RawShape, nodes: usize) -> Result<Arc<Shape>, Refusal> {
         let key = format!("{raw:?} {nodes}");
         if let Some(shape) = self.built.get(&key) {
             return Ok(shape.clone());
@@ -102,7 +97,7 @@ impl<'a> Library<'a> {
         Ok(shape)
     }
 
-    /// `shape` rescaled to an equal-volume diameter [m].
+    /// Returns `shape` rescaled to an equal-volume diameter [m].
     pub fn rescaled(&mut self, shape: &Arc<Shape>, diameter: f64) -> Result<Arc<Shape>, Refusal> {
         let key = format!("{:p} {diameter:?}", Arc::as_ptr(shape));
         if let Some(shape) = self.built.get(&key) {
@@ -117,75 +112,48 @@ impl<'a> Library<'a> {
     }
 }
 
-/// Which sizes belong to which kind: diameter, height, size, radius, exponents.
-fn wanted(kind: ShapeKind) -> [bool; 5] {
-    match kind {
-        ShapeKind::Sphere => [true, false, false, false, false],
-        ShapeKind::Ellipsoid => [false, false, true, false, false],
-        ShapeKind::RoundedBox => [false, false, true, true, false],
-        ShapeKind::Cylinder | ShapeKind::Capsule => [true, true, false, false, false],
-        ShapeKind::Superquadric => [false, false, true, false, true],
-    }
-}
-
-const SIZES: [&str; 5] = ["diameter", "height", "size", "radius", "exponents"];
-
-/// Checks that exactly the sizes of this kind are given, and builds it.
+/// Builds a shape; exactly the sizes of its kind must be given.
 fn build(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
-    let given = [
-        raw.diameter.is_some(),
-        raw.height.is_some(),
-        raw.size.is_some(),
-        raw.radius.is_some(),
-        raw.exponents.is_some(),
-    ];
-    let wanted = wanted(raw.kind.value);
-    let list = |which: [bool; 5]| {
-        SIZES
-            .iter()
-            .zip(which)
-            .filter(|(_, w)| *w)
-            .map(|(n, _)| *n)
-            .collect::<Vec<_>>()
-            .join(", ")
+    let kind = raw.kind.value;
+    let expected: &[&str] = match kind {
+        ShapeKind::Sphere => &["diameter"],
+        ShapeKind::Ellipsoid => &["size"],
+        ShapeKind::RoundedBox => &["size", "radius"],
+        ShapeKind::Cylinder | ShapeKind::Capsule => &["diameter", "height"],
+        ShapeKind::Superquadric => &["size", "exponents"],
     };
-    for i in 0..5 {
-        if wanted[i] != given[i] {
-            let message = if wanted[i] {
-                format!("`{}` is missing", SIZES[i])
-            } else {
-                format!("`{}` does not belong to this shape", SIZES[i])
-            };
-            return Err((message, format!("this kind takes: {}", list(wanted))));
-        }
+    for (name, given) in [
+        ("diameter", raw.diameter.is_some()),
+        ("height", raw.height.is_some()),
+        ("size", raw.size.is_some()),
+        ("radius", raw.radius.is_some()),
+        ("exponents", raw.exponents.is_some()),
+    ] {
+        let message = match (expected.contains(&name), given) {
+            (true, false) => format!("`{name}` is missing"),
+            (false, true) => format!("`{name}` does not belong to this shape"),
+            _ => continue,
+        };
+        return Err((message, format!("this kind takes: {}", expected.join(", "))));
     }
-    construct(raw, nodes)
-}
-
-fn construct(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
     let options = ShapeOptions {
         nodes: Some(nodes),
         ..ShapeOptions::default()
     };
-    let length = |value: &Option<Loc<Quantity<Length>>>| value.as_ref().map_or(f64::NAN, |v| v.si);
+    let length =
+        |value: &Option<Located<Quantity<Length>>>| value.as_ref().map_or(f64::NAN, |v| v.si);
+    let (diameter, height) = (length(&raw.diameter), length(&raw.height));
     let [a, b, c] = raw.size.as_ref().map_or([f64::NAN; 3], |v| v.si.to_array());
-    let exponents = raw.exponents.as_ref().map_or([f64::NAN; 2], |e| e.value);
-    let shape = match raw.kind.value {
-        ShapeKind::Sphere => analytic::sphere(0.5 * length(&raw.diameter), &options),
+    let [e1, e2] = raw.exponents.as_ref().map_or([f64::NAN; 2], |e| e.value);
+    let shape = match kind {
+        ShapeKind::Sphere => analytic::sphere(0.5 * diameter, &options),
         ShapeKind::Ellipsoid => analytic::ellipsoid(0.5 * a, 0.5 * b, 0.5 * c, &options),
         ShapeKind::RoundedBox => analytic::rounded_box(a, b, c, length(&raw.radius), &options),
-        ShapeKind::Cylinder => {
-            analytic::cylinder(0.5 * length(&raw.diameter), length(&raw.height), &options)
+        ShapeKind::Cylinder => analytic::cylinder(0.5 * diameter, height, &options),
+        ShapeKind::Capsule => analytic::capsule(0.5 * diameter, height, &options),
+        ShapeKind::Superquadric => {
+            analytic::superquadric([0.5 * a, 0.5 * b, 0.5 * c], e1, e2, &options)
         }
-        ShapeKind::Capsule => {
-            analytic::capsule(0.5 * length(&raw.diameter), length(&raw.height), &options)
-        }
-        ShapeKind::Superquadric => analytic::superquadric(
-            [0.5 * a, 0.5 * b, 0.5 * c],
-            exponents[0],
-            exponents[1],
-            &options,
-        ),
     };
     shape.map_err(|error| {
         let help = match error {

@@ -1,5 +1,7 @@
 //! Units: dimensions, the table of known units, and the parser of unit expressions.
 
+use std::fmt;
+
 /// Exponents of kilogram, metre, second and radian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dimension {
@@ -9,7 +11,7 @@ pub struct Dimension {
     pub length: i8,
     /// Exponent of s.
     pub time: i8,
-    /// Exponent of rad; kept so that an angle is not taken for a plain number.
+    /// Exponent of rad, which tells an angle from a plain number.
     pub angle: i8,
 }
 
@@ -32,50 +34,25 @@ impl Dimension {
             angle: add(self.angle, other.angle)?,
         })
     }
-    /// What a person calls this dimension, for error messages.
-    pub fn describe(self) -> String {
-        let known = [
-            (Dimension::new(0, 0, 0, 0), "a plain number"),
-            (Dimension::new(1, 0, 0, 0), "a mass"),
-            (Dimension::new(0, 1, 0, 0), "a length"),
-            (Dimension::new(0, 2, 0, 0), "an area"),
-            (Dimension::new(0, 3, 0, 0), "a volume"),
-            (Dimension::new(0, 0, 1, 0), "a time"),
-            (Dimension::new(0, 0, 0, 1), "an angle"),
-            (Dimension::new(0, 1, -1, 0), "a velocity"),
-            (Dimension::new(0, 1, -2, 0), "an acceleration"),
-            (Dimension::new(0, 0, -1, 0), "a rate"),
-            (Dimension::new(0, 0, -1, 1), "an angular velocity"),
-            (Dimension::new(1, -3, 0, 0), "a density"),
-            (Dimension::new(1, -1, -1, 0), "a dynamic viscosity"),
-            (Dimension::new(0, 2, -1, 0), "a kinematic viscosity"),
-            (Dimension::new(1, 0, -2, 0), "a stiffness"),
-            (Dimension::new(1, 1, -2, 0), "a force"),
-            (Dimension::new(1, -1, -2, 0), "a pressure"),
+}
+
+impl fmt::Display for Dimension {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let bases = [
+            ("kg", self.mass),
+            ("m", self.length),
+            ("s", self.time),
+            ("rad", self.angle),
         ];
-        known.iter().find(|(d, _)| *d == self).map_or_else(
-            || {
-                let parts = [
-                    ("kg", self.mass),
-                    ("m", self.length),
-                    ("s", self.time),
-                    ("rad", self.angle),
-                ];
-                let text: Vec<String> = parts
-                    .iter()
-                    .filter(|(_, n)| *n != 0)
-                    .map(|(u, n)| {
-                        if *n == 1 {
-                            (*u).to_string()
-                        } else {
-                            format!("{u}^{n}")
-                        }
-                    })
-                    .collect();
-                format!("in {}", text.join(" "))
-            },
-            |(_, name)| (*name).to_string(),
-        )
+        let mut separator = "";
+        for (unit, power) in bases.into_iter().filter(|(_, power)| *power != 0) {
+            write!(f, "{separator}{unit}")?;
+            if power != 1 {
+                write!(f, "^{power}")?;
+            }
+            separator = " ";
+        }
+        Ok(())
     }
 }
 
@@ -155,7 +132,7 @@ impl Scale {
     }
 }
 
-/// Units by their plain symbols, for suggestions.
+/// Symbols of units and of usual prefixed units, for suggestions.
 pub fn known_symbols() -> Vec<String> {
     let common = [
         "mm", "um", "cm", "km", "nm", "mg", "kg", "ms", "us", "mPa", "kPa", "MPa", "GPa", "kN",
@@ -177,37 +154,32 @@ fn split(factor: f64) -> (f64, f64) {
 }
 
 fn lookup(symbol: &str) -> Option<Scale> {
-    if let Some(u) = UNITS.iter().find(|u| u.symbol == symbol) {
-        let (numerator, denominator) = split(u.factor);
-        return Some(Scale {
-            numerator,
-            denominator,
-            dimension: u.dimension,
-        });
+    let named = |name: &str| UNITS.iter().find(|u| u.symbol == name);
+    let prefixed = |(prefix, power): &(&str, i32)| {
+        let unit = named(symbol.strip_prefix(prefix)?)?;
+        unit.prefixes.then_some((unit, *power))
+    };
+    let (unit, power) =
+        (named(symbol).map(|unit| (unit, 0))).or_else(|| PREFIXES.iter().find_map(prefixed))?;
+    let (mut numerator, mut denominator) = split(unit.factor);
+    if power < 0 {
+        denominator *= 10f64.powi(-power);
+    } else {
+        numerator *= 10f64.powi(power);
     }
-    PREFIXES.iter().find_map(|(prefix, power)| {
-        let rest = symbol.strip_prefix(prefix)?;
-        let u = UNITS.iter().find(|u| u.prefixes && u.symbol == rest)?;
-        let (mut numerator, mut denominator) = split(u.factor);
-        if *power < 0 {
-            denominator *= 10f64.powi(-power);
-        } else {
-            numerator *= 10f64.powi(*power);
-        }
-        let common = numerator.min(denominator);
-        if (numerator / common).fract() == 0.0 && (denominator / common).fract() == 0.0 {
-            numerator /= common;
-            denominator /= common;
-        }
-        Some(Scale {
-            numerator,
-            denominator,
-            dimension: u.dimension,
-        })
+    let common = numerator.min(denominator);
+    if (numerator / common).fract() == 0.0 && (denominator / common).fract() == 0.0 {
+        numerator /= common;
+        denominator /= common;
+    }
+    Some(Scale {
+        numerator,
+        denominator,
+        dimension: unit.dimension,
     })
 }
 
-/// Why a unit expression was refused.
+/// Error of a unit expression.
 #[derive(Clone, Debug, PartialEq)]
 pub enum UnitError {
     /// This symbol is not a unit.

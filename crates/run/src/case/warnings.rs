@@ -1,45 +1,60 @@
-//! What may spoil the results of a case, said before it runs.
+//! Warnings about settings that impair the results of a run.
 
 use glam::DVec3;
 
-use super::Case;
-use super::estimate::{Estimate, terminal_speed, time_step};
-use super::readable::quantity;
-use crate::{Plane, PlanePosition, Stop};
+use super::estimate::Estimate;
+use super::expect::{Expectation, Measure};
+use super::number_format::{AXES, SIDES, quantity};
+use super::settling::{is_free, terminal_speed, time_step};
+use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{ContactLawKind, Dof, Grain, outside};
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{Setup, StepRule};
 
-/// Steps over which the roundings of singles, all of one sign, come to .3 %.
+/// Steps over which single-precision rounding errors of one sign add up to 0.3 %.
 const MOST_SINGLE_STEPS: u64 = 50_000;
-/// More steps than any run has: a unit must be wrong.
+/// Number of steps that suggests a wrong unit.
 const ABSURD_STEPS: u64 = 100_000_000;
-/// A grain that settles with a smaller Reynolds number does not move.
+/// Settling Reynolds number below which a grain hardly moves, which suggests a wrong unit.
 const ABSURD_REYNOLDS: f64 = 1e-4;
 
-/// All warnings of a case.
-pub(super) fn all(case: &Case, e: &Estimate) -> Vec<String> {
-    let mut found = of_units(&case.setup, e);
-    found.extend(of_numbers(&case.setup, e));
-    found.extend(of_light_grains(&case.setup, case.plan.stop.as_ref()));
-    found.extend(of_dry(case));
-    found.extend(of_open_faces(&case.setup));
-    found.extend(of_endless_fall(&case.setup));
-    found.extend(of_given_motions(&case.setup, case.plan.end));
-    found.extend(of_flat_boxes(&case.setup));
+/// Returns all warnings of a case.
+pub(super) fn warnings(
+    setup: &Setup,
+    plan: &RunPlan,
+    expect: &[Expectation],
+    e: &Estimate,
+) -> Vec<String> {
+    let mut found = wrong_units(setup, e);
+    found.extend(resolution_and_cost(setup, e));
+    found.extend(light_grains(setup, plan.stop.as_ref()));
+    found.extend(ignored_in_dry_runs(setup, plan, expect));
+    found.extend(open_faces(setup));
+    found.extend(unsupported_weight(setup));
+    found.extend(prescribed_motions(setup, plan.end));
+    found.extend(flat_box(setup));
+    found.extend(output_intervals(setup, e));
     found
 }
 
-fn is_free(grain: &&Grain) -> bool {
-    grain.translation == Dof::Free
+/// Output intervals that shorten the steps.
+fn output_intervals(setup: &Setup, e: &Estimate) -> Option<String> {
+    let allowed = time_step(setup, e.settling_speed_m_per_s.unwrap_or(0.0));
+    (e.time_step_s < 0.5 * allowed).then(|| {
+        format!(
+            "an output every {} makes the steps shorter than the {} they could have: make [output] intervals longer",
+            quantity(e.time_step_s, "s"),
+            quantity(allowed, "s")
+        )
+    })
 }
 
-/// Faces that grains fall, or rise, out through.
-fn of_open_faces(setup: &Setup) -> Vec<String> {
+/// Open faces through which grains may leave.
+fn open_faces(setup: &Setup) -> Vec<String> {
     let density = setup.fluid.as_ref().map_or(0.0, |fluid| fluid.density);
-    let weights = setup.grains.iter().filter(is_free);
+    let weights = setup.grains.iter().filter(|grain| is_free(grain));
     let pulls: Vec<DVec3> = weights
         .map(|grain| setup.gravity * (grain.density - density).signum())
         .collect();
@@ -54,16 +69,16 @@ fn of_open_faces(setup: &Setup) -> Vec<String> {
         if open && falls {
             found.push(format!(
                 "grains may leave through the {} face of {}: outside they go on in free fall, feel no fluid and still count in tables and speeds; make it a \"wall\", or end the run before",
-                ["lower", "upper"][side],
-                ["x", "y", "z"][axis]
+                SIDES[side],
+                AXES[axis]
             ));
         }
     }
     found
 }
 
-/// A box in which nothing holds fluid and grains against gravity.
-fn of_endless_fall(setup: &Setup) -> Option<String> {
+/// Boxes in which neither wall nor grain supports the weight.
+fn unsupported_weight(setup: &Setup) -> Option<String> {
     let fluid = setup.fluid.as_ref()?;
     let holds = |axis: usize| {
         let walls = setup.boundaries.0[axis];
@@ -73,7 +88,7 @@ fn of_endless_fall(setup: &Setup) -> Option<String> {
                     .iter()
                     .any(|wall| !matches!(wall, Boundary::Slip | Boundary::FreeSurface)))
     };
-    let held = setup.grains.iter().any(|grain| !is_free(&grain));
+    let held = setup.grains.iter().any(|grain| !is_free(grain));
     let driven =
         fluid.body_acceleration != DVec3::ZERO || setup.prescription.body_acceleration.is_some();
     if setup.gravity == DVec3::ZERO || held || driven || (0..3).any(holds) {
@@ -98,8 +113,8 @@ fn of_endless_fall(setup: &Setup) -> Option<String> {
     })
 }
 
-/// Given motions that take a grain through a wall.
-fn of_given_motions(setup: &Setup, end: f64) -> Vec<String> {
+/// Prescribed motions through a wall.
+fn prescribed_motions(setup: &Setup, end: f64) -> Vec<String> {
     const STEPS: u32 = 1000;
     let (mut grains, enclosure) = (setup.grains.clone(), setup.enclosure());
     let dt = end / f64::from(STEPS);
@@ -129,8 +144,8 @@ fn of_given_motions(setup: &Setup, end: f64) -> Vec<String> {
                 gone[index] = true;
                 found.push(format!(
                     "the given motion of grain {index} takes it through the {} wall of {} at t = {}: nothing stops a given motion",
-                    ["lower", "upper"][out.side],
-                    ["x", "y", "z"][out.axis],
+                    SIDES[out.side],
+                    AXES[out.axis],
                     quantity(middle + 0.5 * dt, "s")
                 ));
             }
@@ -139,13 +154,13 @@ fn of_given_motions(setup: &Setup, end: f64) -> Vec<String> {
     found
 }
 
-/// Grains in a box one cell thick, where they stand for bodies of its whole depth.
-fn of_flat_boxes(setup: &Setup) -> Option<String> {
+/// Free grains in a box that is one cell thick.
+fn flat_box(setup: &Setup) -> Option<String> {
     setup.fluid.as_ref()?;
     let axis = (0..3).find(|axis| setup.mesh.cells[*axis] == 1)?;
-    let mut free = setup.grains.iter().filter(is_free);
+    let mut free = setup.grains.iter().filter(|grain| is_free(grain));
     free.next().map(|_| {
-        let name = ["x", "y", "z"][axis];
+        let name = AXES[axis];
         format!(
             "the box is one cell thick along {name}: the flow sees a grain as a body of the whole depth, {}, but its weight and inertia are those of its own shape; make it nearly as deep",
             quantity(setup.mesh.extent()[axis], "m")
@@ -153,8 +168,8 @@ fn of_flat_boxes(setup: &Setup) -> Option<String> {
     })
 }
 
-/// Numbers that no run has, from a unit mistaken.
-fn of_units(setup: &Setup, e: &Estimate) -> Vec<String> {
+/// Numbers that suggest a wrong unit.
+fn wrong_units(setup: &Setup, e: &Estimate) -> Vec<String> {
     let mut found = Vec::new();
     if e.steps > ABSURD_STEPS {
         let viscous = matches!(setup.step, StepRule::Limits { .. }) && setup.fluid.is_some();
@@ -182,41 +197,34 @@ fn of_units(setup: &Setup, e: &Estimate) -> Vec<String> {
     found
 }
 
-/// Whether the planes are not those of a case that gives none.
-fn own_planes(case: &Case) -> bool {
-    let mesh = &case.setup.mesh;
-    let middle = mesh.origin + 0.5 * mesh.extent();
-    let usual = |plane: &Plane| match plane.position {
-        PlanePosition::Grain(_) => plane.axis < 2,
-        PlanePosition::At(at) => {
-            plane.axis < 2 && (at - middle[plane.axis]).abs() < 1e-9 * mesh.extent()[plane.axis]
+/// Returns whether a plane differs from the default planes.
+fn is_own(plane: &Plane, setup: &Setup) -> bool {
+    let (origin, extent) = (
+        setup.mesh.origin[plane.axis],
+        setup.mesh.extent()[plane.axis],
+    );
+    plane.axis == 2
+        || match plane.position {
+            PlanePosition::Grain(_) => false,
+            PlanePosition::At(at) => (at - origin - 0.5 * extent).abs() >= 1e-9 * extent,
         }
-    };
-    !case.plan.planes.iter().all(usual)
 }
 
-/// What is asked for of the flow of a case without one.
-fn of_dry(case: &Case) -> Option<String> {
-    if case.setup.fluid.is_some() {
-        return None;
-    }
-    let table: toml::Table = case.resolved.parse().ok()?;
-    let section = |name: &str| table.get(name).and_then(toml::Value::as_table);
-    let asked = [
-        (own_planes(case), "output.planes"),
-        (case.plan.slices > 0.0, "output.slices"),
-        (case.plan.fields > 0.0, "output.fields"),
+/// Requests about the flow of a dry run.
+fn ignored_in_dry_runs(setup: &Setup, plan: &RunPlan, expect: &[Expectation]) -> Option<String> {
+    let of_flow = |e: &Expectation| e.measure == Measure::MaxDivergence;
+    let requests = [
         (
-            section("expect").is_some_and(|e| e.contains_key("max_divergence")),
-            "expect.max_divergence",
+            plan.planes.iter().any(|plane| is_own(plane, setup)),
+            "output.planes",
         ),
+        (plan.slices > 0.0, "output.slices"),
+        (plan.fields > 0.0, "output.fields"),
+        (expect.iter().any(of_flow), "expect.max_divergence"),
     ];
-    let names: Vec<&str> = asked
-        .iter()
-        .filter(|(is, _)| *is)
-        .map(|(_, name)| *name)
-        .collect();
-    (!names.is_empty()).then(|| {
+    let requested = requests.into_iter().filter(|(requested, _)| *requested);
+    let names: Vec<&str> = requested.map(|(_, name)| name).collect();
+    (setup.fluid.is_none() && !names.is_empty()).then(|| {
         format!(
             "there is no [fluid], so the run is dry and {} {} no effect: add [fluid] with density and viscosity if it was forgotten",
             names.join(", "),
@@ -225,7 +233,8 @@ fn of_dry(case: &Case) -> Option<String> {
     })
 }
 
-fn of_numbers(setup: &Setup, e: &Estimate) -> Vec<String> {
+/// Coarse grids, blockage, and costs.
+fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     let mut found = Vec::new();
     if let Some(n) = e.cells_per_diameter.filter(|n| *n < 8.0) {
         found.push(format!("only {n:.1} cells across the smallest grain: below 8 forces are rough; make cell_size smaller"));
@@ -249,25 +258,19 @@ fn of_numbers(setup: &Setup, e: &Estimate) -> Vec<String> {
         };
         found.push(format!("a grain blocks {:.0} % of the cross-section: {what}; widen the box for an unbounded fluid", 100.0 * blockage));
     }
-    // A dry run has nothing but contact to compute.
+    // Contact dominates the cost of a dry run, so that its sub-steps are no reason for a warning.
     let wet = setup.fluid.is_some();
-    // On a small grid it does not matter.
+    // The transform is a small part of the cost of a small grid.
     let large = wet && setup.mesh.cell_count() > 1_000_000;
     for (axis, &n) in setup.mesh.cells.iter().enumerate() {
         if large && largest_prime(n) > LARGEST_CHEAP_PRIME {
-            let near = |step: i64| {
-                let mut m = n as i64;
-                while m > 1 && largest_prime(m as usize) > 5 {
-                    m += step;
-                }
-                m
-            };
+            let fast = |n: &usize| largest_prime(*n) <= 5;
+            let below = (1..n).rev().find(fast).unwrap_or(1);
+            let above = (n..).find(fast).unwrap_or(n);
             found.push(format!(
-                "{n} cells along {} have a large prime factor, {}: a step takes half as long again; {} or {} cells are fast",
-                ["x", "y", "z"][axis],
-                largest_prime(n),
-                near(-1),
-                near(1)
+                "{n} cells along {} have a large prime factor, {}: a step takes half as long again; {below} or {above} cells are fast",
+                AXES[axis],
+                largest_prime(n)
             ));
         }
     }
@@ -315,14 +318,14 @@ fn of_numbers(setup: &Setup, e: &Estimate) -> Vec<String> {
     found
 }
 
-/// Warnings of free grains that are light beside the fluid: they rise.
-fn of_light_grains(setup: &Setup, stop: Option<&Stop>) -> Vec<String> {
+/// Free grains that rise.
+fn light_grains(setup: &Setup, stop: Option<&Stop>) -> Vec<String> {
     let Some(fluid) = &setup.fluid else {
         return Vec::new();
     };
     let grains = setup.grains.iter();
     let free: Vec<f64> = grains
-        .filter(|grain| grain.translation == Dof::Free)
+        .filter(|grain| is_free(grain))
         .map(|grain| grain.density / fluid.density)
         .collect();
     let mut found = Vec::new();
@@ -345,10 +348,10 @@ fn of_light_grains(setup: &Setup, stop: Option<&Stop>) -> Vec<String> {
     found
 }
 
-/// Prime factors of a number of cells up to this one cost no more than others.
+/// Largest prime factor of a number of cells for which the Fourier transform is fast.
 const LARGEST_CHEAP_PRIME: usize = 13;
 
-/// Largest prime factor of `n`; 1 of 1.
+/// Returns the largest prime factor of `n`; 1 for 1.
 fn largest_prime(mut n: usize) -> usize {
     let (mut largest, mut factor) = (1, 2);
     while factor * factor <= n {
@@ -360,7 +363,7 @@ fn largest_prime(mut n: usize) -> usize {
     largest.max(n)
 }
 
-/// Overlap of an impact at the settling speed over the diameter, largest.
+/// Returns the largest overlap of an impact at the settling speed, relative to the diameter.
 fn expected_overlap(setup: &Setup) -> Option<f64> {
     let fluid = setup.fluid.as_ref()?;
     let g = setup.gravity.length();

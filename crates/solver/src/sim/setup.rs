@@ -26,11 +26,17 @@ pub enum StepRule {
     },
 }
 
+impl StepRule {
+    /// Default limits of the CFL number and the viscous number.
+    pub const DEFAULT_LIMITS: (f64, f64) = (0.4, 0.2);
+}
+
 impl Default for StepRule {
     fn default() -> StepRule {
+        let (cfl, viscous) = StepRule::DEFAULT_LIMITS;
         StepRule::Limits {
-            cfl: 0.4,
-            viscous: 0.2,
+            cfl,
+            viscous,
             max_step: f64::INFINITY,
         }
     }

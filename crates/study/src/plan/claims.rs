@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use grainwake_run::case::{Loc, Problem, Source};
+use grainwake_run::case::{Located, Problem, Source};
 use serde::{Deserialize, Serialize};
 
 use super::expand::Model;
@@ -182,9 +182,9 @@ pub struct FigureRequest {
 struct RawAnalysis {
     #[serde(default)]
     claim: Vec<RawClaim>,
-    correlations: Option<Loc<Correlations>>,
-    figures: Option<Loc<FigureRequest>>,
-    resolution: Option<Loc<Resolution>>,
+    correlations: Option<Located<Correlations>>,
+    figures: Option<Located<FigureRequest>>,
+    resolution: Option<Located<Resolution>>,
 }
 
 #[derive(Deserialize)]
@@ -193,10 +193,10 @@ struct RawClaim {
     says: String,
     #[serde(default)]
     part: String,
-    quantity: Loc<String>,
-    test: Loc<Test>,
+    quantity: Located<String>,
+    test: Located<Test>,
     #[serde(rename = "where", default)]
-    when: BTreeMap<String, Loc<Condition>>,
+    when: BTreeMap<String, Located<Condition>>,
     #[serde(default)]
     observed: bool,
 }
@@ -268,7 +268,7 @@ impl NameCheck<'_> {
         self.require("model", name, known, span);
     }
 
-    fn test(&mut self, test: &Loc<Test>) {
+    fn test(&mut self, test: &Located<Test>) {
         let span = test.span.as_ref();
         match &test.value {
             Test::Trend { with, .. } => self.factor(with, span),
@@ -284,7 +284,7 @@ impl NameCheck<'_> {
         }
     }
 
-    fn condition(&mut self, name: &str, condition: &Loc<Condition>) {
+    fn condition(&mut self, name: &str, condition: &Located<Condition>) {
         let span = condition.span.as_ref();
         match &condition.value {
             Condition::Is(level) => self.levels(name, [level], span),
@@ -338,7 +338,7 @@ impl Analysis {
                 check.condition(name, condition);
             }
         }
-        if let Some(Loc { value, span }) = &raw.correlations {
+        if let Some(Located { value, span }) = &raw.correlations {
             let span = span.as_ref();
             value
                 .quantities
@@ -347,7 +347,7 @@ impl Analysis {
             value.factors.iter().for_each(|f| check.factor(f, span));
             check.axis(&value.by, span);
         }
-        if let Some(Loc { value, span }) = &raw.resolution {
+        if let Some(Located { value, span }) = &raw.resolution {
             let quantities = &value.unconverged;
             quantities
                 .iter()

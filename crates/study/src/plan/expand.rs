@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use grainwake_run::case::{Loc, Problem, Source};
+use grainwake_run::case::{Located, Problem, Source};
 use toml::Value;
 
 use super::raw::{Keys, RawAxis, RawModel, RawSet, RawStudy, RawValue};
@@ -121,7 +121,7 @@ impl Problems<'_> {
     }
 
     /// Returns the path of a case file, and reports it if the file does not exist.
-    fn case_file(&mut self, folder: &Path, given: Option<&Loc<PathBuf>>) -> Option<PathBuf> {
+    fn case_file(&mut self, folder: &Path, given: Option<&Located<PathBuf>>) -> Option<PathBuf> {
         let given = given?;
         let path = folder.join(&given.value);
         if !path.is_file() {
@@ -164,7 +164,7 @@ impl Problems<'_> {
     }
 
     /// Checks a name, which becomes the name of a folder.
-    fn check_name(&mut self, name: &Loc<String>) {
+    fn check_name(&mut self, name: &Located<String>) {
         let allowed = |c: char| c.is_ascii_alphanumeric() || "._+-".contains(c);
         let text = &name.value;
         if text.is_empty() || text.starts_with('.') || !text.chars().all(allowed) {
@@ -184,7 +184,7 @@ impl Problems<'_> {
         let names = values
             .map(|v| &v.name)
             .chain(raw.model.iter().map(|m| &m.name));
-        let part_of = |name: &&Loc<String>| {
+        let part_of = |name: &&Located<String>| {
             model.name == name.value || model.name.split('-').any(|part| part == name.value)
         };
         let span = names.rev().find(part_of).and_then(|name| name.span.clone());
@@ -319,7 +319,7 @@ fn single(
 /// If a pattern is invalid or matches no model.
 pub(crate) fn matching(
     source: &Source,
-    patterns: &Loc<Vec<String>>,
+    patterns: &Located<Vec<String>>,
     models: &[Model],
 ) -> Result<Vec<usize>, Problem> {
     let span = patterns.span.as_ref();

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use grainwake_run::case::{Loc, Problem, Source, parse_length};
+use grainwake_run::case::{Located, Problem, Source, parse_length};
 
 use super::claims::Analysis;
 use super::expand::{self, Model};
@@ -100,7 +100,7 @@ impl Study {
 
 fn read_analysis(
     source: &Source,
-    given: &Loc<PathBuf>,
+    given: &Located<PathBuf>,
     folder: &Path,
     models: &[Model],
 ) -> Result<Analysis, StudyError> {

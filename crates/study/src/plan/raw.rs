@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use grainwake_run::case::Loc;
+use grainwake_run::case::Located;
 use serde::Deserialize;
 use toml::Value;
 
 /// Case keys and their values, in order of the keys.
-pub(crate) type RawSet = BTreeMap<String, Loc<Value>>;
+pub(crate) type RawSet = BTreeMap<String, Located<Value>>;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawStudy {
     pub title: String,
-    pub base: Option<Loc<PathBuf>>,
+    pub base: Option<Located<PathBuf>>,
     #[serde(default)]
     pub set: RawSet,
     #[serde(default)]
@@ -24,15 +24,15 @@ pub(crate) struct RawStudy {
     #[serde(default)]
     pub adjust: Vec<RawAdjust>,
     pub ensemble: Option<RawEnsemble>,
-    pub analysis: Option<Loc<PathBuf>>,
+    pub analysis: Option<Located<PathBuf>>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawAxis {
-    pub name: Loc<String>,
-    pub key: Option<Loc<Keys>>,
-    pub values: Loc<Vec<RawValue>>,
+    pub name: Located<String>,
+    pub key: Option<Located<Keys>>,
+    pub values: Located<Vec<RawValue>>,
 }
 
 #[derive(Clone, Deserialize)]
@@ -45,8 +45,8 @@ pub(crate) enum Keys {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawValue {
-    pub name: Loc<String>,
-    pub value: Option<Loc<Value>>,
+    pub name: Located<String>,
+    pub value: Option<Located<Value>>,
     #[serde(default)]
     pub set: RawSet,
     #[serde(default)]
@@ -56,8 +56,8 @@ pub(crate) struct RawValue {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawModel {
-    pub name: Loc<String>,
-    pub base: Option<Loc<PathBuf>>,
+    pub name: Located<String>,
+    pub base: Option<Located<PathBuf>>,
     #[serde(default)]
     pub set: RawSet,
     #[serde(default)]
@@ -67,7 +67,7 @@ pub(crate) struct RawModel {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawAdjust {
-    pub models: Loc<Vec<String>>,
+    pub models: Located<Vec<String>>,
     #[serde(default)]
     pub set: RawSet,
 }
@@ -75,13 +75,13 @@ pub(crate) struct RawAdjust {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawEnsemble {
-    pub members: Loc<usize>,
-    pub offset: Loc<Length>,
+    pub members: Located<usize>,
+    pub offset: Located<Length>,
     #[serde(default)]
     pub grain: Option<usize>,
     #[serde(default)]
     pub seed: u64,
-    pub models: Option<Loc<Vec<String>>>,
+    pub models: Option<Located<Vec<String>>>,
 }
 
 /// Length in metres, or as text with a unit.

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use grainwake_run::case::estimate::Estimate;
 use grainwake_run::case::{Case, CaseError, Problem};
 use grainwake_run::provenance::Provenance;
 use rayon::prelude::*;
@@ -71,7 +70,7 @@ fn runs_of(study: &Study, index: usize, sets: &[String]) -> Result<Vec<Run>, Stu
 }
 
 fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
-    let estimate = Estimate::of(case, 1);
+    let estimate = case.estimate(1);
     let ending = end_condition(&case.resolved);
     let program = Provenance::new(&case.digest);
     let commit = program.commit.unwrap_or_default();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use grainwake_plot::style;
-use grainwake_run::case::{Loc, Problem, Source};
+use grainwake_run::case::{Located, Problem, Source};
 
 use super::raw::{AxisSpec, SliceSpec};
 use super::raw::{
@@ -63,7 +63,7 @@ pub fn build(
 impl Context<'_> {
     fn at<T>(
         &self,
-        value: &Loc<T>,
+        value: &Located<T>,
         message: impl Into<String>,
         help: impl Into<String>,
         label: &str,
@@ -225,7 +225,7 @@ impl Context<'_> {
         &self,
         raw: &RawResults,
         i: usize,
-        name: &Loc<String>,
+        name: &Located<String>,
     ) -> Result<ResultPoint, Problem> {
         let run = self.run(name)?;
         let wanted = |check: &&Check| check.quantity == raw.quantity.value;
@@ -286,7 +286,7 @@ impl Context<'_> {
         Err(self.source.locate(problem, span, "not above `from`"))
     }
 
-    fn run(&self, name: &Loc<String>) -> Result<&SuiteRun, Problem> {
+    fn run(&self, name: &Located<String>) -> Result<&SuiteRun, Problem> {
         let found = self.runs.iter().find(|run| run.name == name.value);
         found.ok_or_else(|| {
             let names: Vec<&str> = self.runs.iter().map(|run| run.name.as_str()).collect();
@@ -297,11 +297,11 @@ impl Context<'_> {
         })
     }
 
-    fn check_syntax(&self, text: &Loc<String>) -> Result<(), Problem> {
+    fn check_syntax(&self, text: &Located<String>) -> Result<(), Problem> {
         expression::check(text).map_err(|what| self.wrong_expression(text, what))
     }
 
-    fn wrong_expression(&self, text: &Loc<String>, what: String) -> Problem {
+    fn wrong_expression(&self, text: &Located<String>, what: String) -> Problem {
         let help = "write an expression of columns and constants, such as \"sqrt(vx^2+vy^2)\"";
         self.at(text, what, help, "this expression")
     }

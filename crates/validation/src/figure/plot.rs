@@ -5,7 +5,7 @@ use grainwake_plot::axis::{Axis, extent};
 use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::{Frame, Marker};
 use grainwake_plot::legend::{Entry, Legend};
-use grainwake_run::case::Loc;
+use grainwake_run::case::Located;
 
 use super::raw::{AxisSpec, Scale};
 
@@ -103,7 +103,8 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
 
 fn axis(plan: &AxisSpec, values: impl Iterator<Item = f64>, count: usize) -> Axis {
     let (low, high) = extent(values).unwrap_or((1.0, 10.0));
-    let end = |given: &Option<Loc<f64>>, default: f64| given.as_ref().map_or(default, |v| v.value);
+    let end =
+        |given: &Option<Located<f64>>, default: f64| given.as_ref().map_or(default, |v| v.value);
     let (low, high) = (end(&plan.from, low), end(&plan.to, high));
     let tight = plan.from.is_some() && plan.to.is_some();
     let axis = if plan.scale == Scale::Log {

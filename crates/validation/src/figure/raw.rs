@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use grainwake_plot::equal_aspect::Window;
 use grainwake_plot::style;
 use grainwake_report::figure::field::Style;
-use grainwake_run::case::Loc;
+use grainwake_run::case::Located;
 use serde::Deserialize;
 
 use crate::columns::TableSource;
@@ -13,7 +13,7 @@ use crate::columns::TableSource;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawFigure {
-    pub name: Loc<String>,
+    pub name: Located<String>,
     pub title: String,
     #[serde(default)]
     pub caption: String,
@@ -40,9 +40,9 @@ pub struct AxisSpec {
     #[serde(default)]
     pub scale: Scale,
     /// Lower end; `None` for that of the data.
-    pub from: Option<Loc<f64>>,
+    pub from: Option<Located<f64>>,
     /// Upper end; `None` for that of the data.
-    pub to: Option<Loc<f64>>,
+    pub to: Option<Located<f64>>,
     /// Positions of the ticks; `None` for round values.
     pub ticks: Option<Vec<f64>>,
 }
@@ -93,8 +93,8 @@ pub enum LineKind {
 pub struct RawReferenceCurve {
     pub label: String,
     pub data: PathBuf,
-    pub x: Loc<String>,
-    pub y: Loc<String>,
+    pub x: Located<String>,
+    pub y: Located<String>,
     pub source: Option<String>,
     pub colour: Option<Colour>,
     pub sign: Option<Symbol>,
@@ -105,13 +105,13 @@ pub struct RawReferenceCurve {
 #[serde(deny_unknown_fields)]
 pub struct RawHistory {
     pub label: String,
-    pub run: Loc<String>,
-    pub of: Loc<String>,
+    pub run: Located<String>,
+    pub of: Located<String>,
     #[serde(default)]
     pub grain: usize,
     #[serde(default)]
     pub table: TableSource,
-    pub against: Option<Loc<String>>,
+    pub against: Option<Located<String>>,
     pub from: Option<f64>,
     pub to: Option<f64>,
     #[serde(default)]
@@ -124,11 +124,11 @@ pub struct RawHistory {
 #[serde(deny_unknown_fields)]
 pub struct RawResults {
     pub label: String,
-    pub runs: Vec<Loc<String>>,
-    pub quantity: Loc<String>,
-    pub x: Loc<Coordinates>,
+    pub runs: Vec<Located<String>>,
+    pub quantity: Located<String>,
+    pub x: Located<Coordinates>,
     #[serde(default)]
-    pub error: Loc<bool>,
+    pub error: Located<bool>,
     pub reference: Option<f64>,
     pub slope: Option<f64>,
     pub colour: Option<Colour>,
@@ -148,7 +148,7 @@ pub enum Coordinates {
 #[serde(deny_unknown_fields)]
 pub struct SliceSpec {
     /// Name of the run.
-    pub run: Loc<String>,
+    pub run: Located<String>,
     /// Name of the plane.
     pub plane: String,
     /// Title, in label markup.
@@ -157,7 +157,7 @@ pub struct SliceSpec {
     /// Lower left corner [m]; `None` for that of the slice.
     pub from: Option<[f64; 2]>,
     /// Upper right corner [m]; `None` for that of the slice.
-    pub to: Option<Loc<[f64; 2]>>,
+    pub to: Option<Located<[f64; 2]>>,
 }
 
 impl SliceSpec {

@@ -1,51 +1,43 @@
 //! `[domain]`: the box, its cells and its faces.
 
-use std::borrow::Cow;
+use std::fmt;
 
 use glam::DVec3;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::forms::{Forms, Never, deserialize_forms};
-use crate::case::loc::Loc;
-use crate::case::quantity::{Kind, Length, Quantity, Triple, Velocity, parse_quantity};
-use crate::case::suggest::nearest;
+use crate::case::located::Located;
+use crate::case::notation::{Notation, Unsupported, notations, variant};
+use crate::case::quantity::{Length, Quantity, Triple, Velocity};
 
 /// The box. Give two of `size`, `cells` and `cell_size`.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawDomain {
     /// Edge lengths of the box along x, y, z [m].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub size: Option<Loc<Triple<Length>>>,
-    /// Number of cells along x, y, z; 1 makes a flat axis, which must be periodic or slip.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub cells: Option<Loc<[usize; 3]>>,
+    pub size: Option<Located<Triple<Length>>>,
+    /// Number of cells along x, y, z; 1 makes a flat axis, which must be periodic.
+    pub cells: Option<Located<[usize; 3]>>,
     /// Cell edge [m]: one length, or one for each axis.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub cell_size: Option<Loc<CellSize>>,
+    pub cell_size: Option<Located<CellSize>>,
     /// Lower corner of the box [m].
-    #[serde(default = "zero_origin")]
-    pub origin: Loc<Triple<Length>>,
+    #[serde(default)]
+    pub origin: Located<Triple<Length>>,
     /// Conditions on the six faces.
     #[serde(default)]
     pub boundaries: RawBoundaries,
 }
 
-fn zero_origin() -> Loc<Triple<Length>> {
-    Loc::none(Triple::new(DVec3::ZERO))
-}
-
-/// One cell edge for all axes, or one for each.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Edges of a cell [m]: one for all axes, or one for each axis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CellSize(pub DVec3);
 
-impl Forms for CellSize {
+impl Notation for CellSize {
     const EXPECTED: &'static str = "a length such as \"0.25 mm\", or three of them";
     type List = [Quantity<Length>; 3];
-    type Table = Never;
+    type Table = Unsupported;
     fn from_word(word: &str) -> Result<Self, String> {
-        parse_quantity::<Length>(word).map(|h| CellSize(DVec3::splat(h)))
+        Quantity::<Length>::from_word(word).and_then(|h| Self::from_number(h.si))
     }
     fn from_number(number: f64) -> Result<Self, String> {
         Ok(CellSize(DVec3::splat(number)))
@@ -53,103 +45,79 @@ impl Forms for CellSize {
     fn from_list(list: Self::List) -> Result<Self, String> {
         Ok(CellSize(DVec3::from_array(list.map(|q| q.si))))
     }
-}
-
-impl Serialize for CellSize {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.0.to_array().serialize(serializer)
+    fn scalar_schemas(generator: &mut SchemaGenerator) -> Vec<Schema> {
+        vec![generator.subschema_for::<Quantity<Length>>()]
     }
 }
 
-impl JsonSchema for CellSize {
-    fn inline_schema() -> bool {
-        true
-    }
-    fn schema_name() -> Cow<'static, str> {
-        "CellSize".into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let (one, three) = (
-            generator.subschema_for::<Quantity<Length>>(),
-            generator.subschema_for::<Triple<Length>>(),
-        );
-        json_schema!({ "anyOf": [one, three] })
-    }
-}
-
-/// Conditions along each axis; no-slip walls at rest where nothing is said.
+/// Conditions along each axis; no-slip walls at rest by default.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawBoundaries {
     /// Faces normal to x.
-    pub x: Loc<AxisFaces>,
+    pub x: Located<AxisFaces>,
     /// Faces normal to y.
-    pub y: Loc<AxisFaces>,
+    pub y: Located<AxisFaces>,
     /// Faces normal to z.
-    pub z: Loc<AxisFaces>,
+    pub z: Located<AxisFaces>,
 }
 
-/// The lower and upper face of one axis.
+/// Faces normal to one axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AxisFaces {
     /// Face at the lower end.
-    pub lower: Loc<Face>,
+    pub lower: Located<Face>,
     /// Face at the upper end.
-    pub upper: Loc<Face>,
+    pub upper: Located<Face>,
 }
 
-/// Table form of `AxisFaces`: both faces, or one condition for both.
-#[derive(Debug, Deserialize)]
+impl AxisFaces {
+    fn both(face: Face) -> AxisFaces {
+        AxisFaces {
+            lower: face.into(),
+            upper: face.into(),
+        }
+    }
+}
+
+/// Table of [`AxisFaces`]: both faces, or one condition for both.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AxisTable {
-    lower: Option<Loc<Face>>,
-    upper: Option<Loc<Face>>,
+    /// Condition on the lower face.
+    lower: Option<Located<Face>>,
+    /// Condition on the upper face.
+    upper: Option<Located<Face>>,
+    /// Kind of condition on both faces.
     kind: Option<FaceKind>,
+    /// Velocity of both walls or of the entering fluid [m/s].
     velocity: Option<Triple<Velocity>>,
 }
 
-impl Forms for AxisFaces {
-    const EXPECTED: &'static str = "a condition for both faces (\"periodic\", \"wall\", ...), a pair [lower, upper], or { lower = ..., upper = ... }";
-    type List = [Loc<Face>; 2];
+impl Notation for AxisFaces {
+    const EXPECTED: &'static str = "a condition for both faces (\"periodic\", \"wall\", ...), \
+        a pair [lower, upper], or { lower = ..., upper = ... }";
+    type List = [Located<Face>; 2];
     type Table = AxisTable;
     fn from_word(word: &str) -> Result<Self, String> {
-        let face = Face::from_word(word)?;
-        Ok(AxisFaces {
-            lower: Loc::none(face),
-            upper: Loc::none(face),
-        })
+        Face::from_word(word).map(AxisFaces::both)
     }
     fn from_list([lower, upper]: Self::List) -> Result<Self, String> {
         Ok(AxisFaces { lower, upper })
     }
     fn from_table(table: AxisTable) -> Result<Self, String> {
-        match table {
-            AxisTable {
-                lower,
-                upper,
-                kind: None,
-                velocity: None,
-            } => Ok(AxisFaces {
-                lower: lower.unwrap_or_default(),
-                upper: upper.unwrap_or_default(),
+        let given = (&table.lower, &table.upper, table.kind, table.velocity);
+        match given {
+            (_, _, None, None) => Ok(AxisFaces {
+                lower: table.lower.unwrap_or_default(),
+                upper: table.upper.unwrap_or_default(),
             }),
-            AxisTable {
-                lower: None,
-                upper: None,
-                kind: Some(kind),
-                velocity,
-            } => {
-                let face = Loc::none(Face {
-                    kind,
-                    velocity: velocity.map(|v| v.si),
-                });
-                Ok(AxisFaces {
-                    lower: face.clone(),
-                    upper: face,
-                })
-            }
+            (None, None, Some(kind), velocity) => Ok(AxisFaces::both(Face { kind, velocity })),
             _ => Err("give either `kind` (for both faces) or `lower` and `upper`".into()),
         }
+    }
+    fn scalar_schemas(generator: &mut SchemaGenerator) -> Vec<Schema> {
+        vec![generator.subschema_for::<FaceKind>()]
     }
 }
 
@@ -159,25 +127,8 @@ impl Serialize for AxisFaces {
     }
 }
 
-impl JsonSchema for AxisFaces {
-    fn schema_name() -> Cow<'static, str> {
-        "AxisFaces".into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let face = generator.subschema_for::<Face>();
-        json_schema!({
-            "description": AxisFaces::EXPECTED,
-            "anyOf": [
-                face,
-                { "type": "array", "items": face, "minItems": 2, "maxItems": 2 },
-                { "type": "object", "properties": { "lower": face, "upper": face }, "additionalProperties": false },
-            ],
-        })
-    }
-}
-
-/// What happens at a face.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+/// Kind of boundary condition.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaceKind {
     /// No-slip wall, at rest or moving in its own plane.
@@ -195,117 +146,56 @@ pub enum FaceKind {
     FreeSurface,
 }
 
-impl FaceKind {
-    const NAMES: [(&'static str, FaceKind); 6] = [
-        ("wall", FaceKind::Wall),
-        ("slip", FaceKind::Slip),
-        ("periodic", FaceKind::Periodic),
-        ("inflow", FaceKind::Inflow),
-        ("outflow", FaceKind::Outflow),
-        ("free-surface", FaceKind::FreeSurface),
-    ];
-    /// The word for this condition in a case file.
-    pub fn name(self) -> &'static str {
-        FaceKind::NAMES
-            .iter()
-            .find(|(_, kind)| *kind == self)
-            .map_or("wall", |(name, _)| name)
-    }
-}
-
-impl Forms for FaceKind {
-    const EXPECTED: &'static str = "wall, slip, periodic, inflow, outflow or free-surface";
-    type List = Never;
-    type Table = Never;
-    fn from_word(word: &str) -> Result<Self, String> {
-        FaceKind::NAMES
-            .iter()
-            .find(|(name, _)| *name == word)
-            .map(|(_, kind)| *kind)
-            .ok_or_else(|| {
-                let hint = nearest(word, FaceKind::NAMES.iter().map(|(name, _)| *name))
-                    .map_or(String::new(), |name| format!(" (did you mean \"{name}\"?)"));
-                format!(
-                    "unknown boundary \"{word}\"{hint}; accepted: {}",
-                    FaceKind::EXPECTED
-                )
-            })
+impl fmt::Display for FaceKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
     }
 }
 
 /// Condition on one face: a word, or a table with the velocity of the wall or inflow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Face {
-    /// What happens there.
+    /// Kind of condition.
     pub kind: FaceKind,
     /// Velocity of a moving wall or of the entering fluid [m/s].
-    pub velocity: Option<DVec3>,
+    pub velocity: Option<Triple<Velocity>>,
 }
 
-/// Table form of `Face`.
-#[derive(Debug, Deserialize)]
+/// Table of [`Face`].
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaceTable {
+    /// Kind of condition.
     kind: FaceKind,
+    /// Velocity of a moving wall or of the entering fluid [m/s].
     velocity: Option<Triple<Velocity>>,
 }
 
-impl Forms for Face {
-    const EXPECTED: &'static str = "wall, slip, periodic, inflow, outflow or free-surface, or { kind = \"wall\", velocity = [...] }";
-    type List = Never;
+impl Notation for Face {
+    const EXPECTED: &'static str = "wall, slip, periodic, inflow, outflow or free-surface, \
+        or { kind = \"wall\", velocity = [...] }";
+    type List = Unsupported;
     type Table = FaceTable;
     fn from_word(word: &str) -> Result<Self, String> {
-        Ok(Face {
-            kind: FaceKind::from_word(word)?,
-            velocity: None,
-        })
+        let (kind, velocity) = (variant(word)?, None);
+        Ok(Face { kind, velocity })
     }
-    fn from_table(table: FaceTable) -> Result<Self, String> {
-        Ok(Face {
-            kind: table.kind,
-            velocity: table.velocity.map(|v| v.si),
-        })
+    fn from_table(FaceTable { kind, velocity }: FaceTable) -> Result<Self, String> {
+        Ok(Face { kind, velocity })
+    }
+    fn scalar_schemas(generator: &mut SchemaGenerator) -> Vec<Schema> {
+        vec![generator.subschema_for::<FaceKind>()]
     }
 }
-
-deserialize_forms!(CellSize, AxisFaces, FaceKind, Face);
 
 impl Serialize for Face {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        #[derive(Serialize)]
-        struct Table {
-            kind: FaceKind,
-            velocity: [f64; 3],
-        }
-        match self.velocity {
-            None => self.kind.serialize(serializer),
-            Some(velocity) => Table {
-                kind: self.kind,
-                velocity: velocity.to_array(),
-            }
-            .serialize(serializer),
+        let Face { kind, velocity } = *self;
+        match velocity {
+            None => kind.serialize(serializer),
+            Some(_) => FaceTable { kind, velocity }.serialize(serializer),
         }
     }
 }
 
-impl JsonSchema for Face {
-    fn schema_name() -> Cow<'static, str> {
-        "Face".into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let kind = generator.subschema_for::<FaceKind>();
-        let velocity = generator.subschema_for::<Triple<Velocity>>();
-        json_schema!({
-            "anyOf": [
-                kind,
-                {
-                    "type": "object",
-                    "properties": { "kind": kind, "velocity": velocity },
-                    "required": ["kind"],
-                    "additionalProperties": false,
-                },
-            ],
-            "examples": ["wall", { "kind": "wall", "velocity": [format!("1 {}", Velocity::SI), 0, 0] }],
-        })
-    }
-}
+notations!(CellSize, AxisFaces, Face);

@@ -1,94 +1,80 @@
 //! `[expect]`: results that the run must give.
 
-use std::borrow::Cow;
-
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::forms::{Forms, Never};
-use crate::case::loc::Loc;
+use crate::case::located::Located;
+use crate::case::notation::{Notation, Unsupported, notations};
 use crate::case::quantity::{Kind, Number, Quantity, Rate, Time, Velocity, parse_quantity};
 
 /// Expected results. A run that misses one ends with exit code 1.
-#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawExpect {
     /// Largest speed along gravity of a grain [m/s].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub peak_settling_speed: Option<OneOrMany<RawExpected<Velocity>>>,
+    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    pub peak_settling_speed: OneOrMany<Velocity>,
     /// First contact of the pair [s].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub kiss_time: Option<OneOrMany<RawExpected<Time>>>,
+    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    pub kiss_time: OneOrMany<Time>,
     /// Start of the tumbling [s].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tumble_time: Option<OneOrMany<RawExpected<Time>>>,
-    /// Last parting of the pair [s].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub separation_time: Option<OneOrMany<RawExpected<Time>>>,
+    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    pub tumble_time: OneOrMany<Time>,
+    /// Last separation of the pair [s].
+    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    pub separation_time: OneOrMany<Time>,
     /// First contact of a grain with the floor [s].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub landing_time: Option<OneOrMany<RawExpected<Time>>>,
+    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    pub landing_time: OneOrMany<Time>,
     /// Number of role changes of the pair.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub role_changes: Option<OneOrMany<RawExpected<Number>>>,
+    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    pub role_changes: OneOrMany<Number>,
     /// Simulated time at the end [s].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub end_time: Option<OneOrMany<RawExpected<Time>>>,
+    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    pub end_time: OneOrMany<Time>,
     /// Largest |div u| after any step [1/s].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_divergence: Option<OneOrMany<RawExpected<Rate>>>,
+    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    pub max_divergence: OneOrMany<Rate>,
 }
 
 impl RawExpect {
-    /// Whether nothing is expected.
+    /// Returns whether nothing is expected.
     pub fn is_empty(&self) -> bool {
-        self.peak_settling_speed.is_none()
-            && self.kiss_time.is_none()
-            && self.tumble_time.is_none()
-            && self.separation_time.is_none()
-            && self.landing_time.is_none()
-            && self.role_changes.is_none()
-            && self.end_time.is_none()
-            && self.max_divergence.is_none()
+        *self == RawExpect::default()
     }
 }
 
 /// One expected result: `value` with `tolerance`, or a bound.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, bound = "")]
 #[schemars(rename = "Expected{K}")]
 pub struct RawExpected<K: Kind> {
     /// Expected value [SI].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub value: Option<Loc<Quantity<K>>>,
+    pub value: Option<Located<Quantity<K>>>,
     /// Largest difference from `value`: in its unit, or relative as in "2 %".
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tolerance: Option<Loc<Tolerance<K>>>,
+    pub tolerance: Option<Located<Tolerance<K>>>,
     /// Lower bound [SI].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub at_least: Option<Loc<Quantity<K>>>,
+    pub at_least: Option<Located<Quantity<K>>>,
     /// Upper bound [SI].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub at_most: Option<Loc<Quantity<K>>>,
-    /// Which grain; any grain (the largest value, or the first to land) if not given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub grain: Option<Loc<usize>>,
+    pub at_most: Option<Located<Quantity<K>>>,
+    /// Index of the grain; by default the grain with the largest value, or the first to land.
+    pub grain: Option<Located<usize>>,
 }
 
 /// A difference: absolute, or relative to the value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance<K> {
-    /// In the unit of the value.
+    /// Difference in the unit of the value.
     Absolute(Quantity<K>),
-    /// As a fraction of the value.
+    /// Fraction of the value.
     Relative(f64),
 }
 
-impl<K: Kind> Forms for Tolerance<K> {
+impl<K: Kind> Notation for Tolerance<K> {
     const EXPECTED: &'static str =
         "a difference in the unit of the value, or a percentage such as \"2 %\"";
-    type List = Never;
-    type Table = Never;
+    type List = Unsupported;
+    type Table = Unsupported;
     fn from_word(word: &str) -> Result<Self, String> {
         if word.trim_end().ends_with('%') {
             return parse_quantity::<Number>(word).map(Tolerance::Relative);
@@ -98,11 +84,9 @@ impl<K: Kind> Forms for Tolerance<K> {
     fn from_number(number: f64) -> Result<Self, String> {
         Ok(Tolerance::Absolute(Quantity::new(number)))
     }
-}
-
-impl<'de, K: Kind> Deserialize<'de> for Tolerance<K> {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        super::forms::deserialize(deserializer)
+    fn scalar_schemas(_: &mut SchemaGenerator) -> Vec<Schema> {
+        let types = ["number", "string"];
+        vec![json_schema!({ "type": types, "examples": ["2 %", K::EXAMPLE] })]
     }
 }
 
@@ -117,56 +101,34 @@ impl<K> Serialize for Tolerance<K> {
     }
 }
 
-impl<K: Kind> JsonSchema for Tolerance<K> {
-    fn inline_schema() -> bool {
-        true
-    }
-    fn schema_name() -> Cow<'static, str> {
-        "Tolerance".into()
-    }
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": ["number", "string"], "description": Tolerance::<K>::EXPECTED, "examples": ["2 %", K::EXAMPLE] })
+/// Expected values of one quantity: none, one or several.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OneOrMany<K: Kind>(pub Vec<Located<RawExpected<K>>>);
+
+impl<K: Kind> OneOrMany<K> {
+    /// Returns whether nothing is expected.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 }
 
-/// One value or a list of them.
-#[derive(Clone, Debug)]
-pub struct OneOrMany<T>(pub Vec<Loc<T>>);
-
-impl<T: for<'de> Deserialize<'de>> Forms for OneOrMany<T> {
+impl<K: Kind> Notation for OneOrMany<K> {
     const EXPECTED: &'static str =
         "a table such as { value = ..., tolerance = \"2 %\" }, or a list of them";
-    type List = Vec<Loc<T>>;
-    type Table = T;
-    fn from_list(list: Vec<Loc<T>>) -> Result<Self, String> {
+    type List = Vec<Located<RawExpected<K>>>;
+    type Table = RawExpected<K>;
+    fn from_list(list: Self::List) -> Result<Self, String> {
         Ok(OneOrMany(list))
     }
-    fn from_table(table: T) -> Result<Self, String> {
-        Ok(OneOrMany(vec![Loc::none(table)]))
+    fn from_table(table: RawExpected<K>) -> Result<Self, String> {
+        Ok(OneOrMany(vec![table.into()]))
     }
 }
 
-impl<'de, T: for<'a> Deserialize<'a>> Deserialize<'de> for OneOrMany<T> {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        super::forms::deserialize(deserializer)
-    }
-}
-
-impl<T: Serialize> Serialize for OneOrMany<T> {
+impl<K: Kind> Serialize for OneOrMany<K> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.0.serialize(serializer)
     }
 }
 
-impl<T: JsonSchema> JsonSchema for OneOrMany<T> {
-    fn inline_schema() -> bool {
-        true
-    }
-    fn schema_name() -> Cow<'static, str> {
-        format!("OneOrMany{}", T::schema_name()).into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let one = generator.subschema_for::<T>();
-        json_schema!({ "anyOf": [one, { "type": "array", "items": one }] })
-    }
-}
+notations!(Tolerance<K: Kind>, OneOrMany<K: Kind>);

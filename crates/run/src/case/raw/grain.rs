@@ -1,14 +1,12 @@
 //! `[[grain]]`: shape, density, placement and motion of one grain.
 
-use std::borrow::Cow;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Serialize, Serializer};
-
-use super::forms::{Forms, Never, deserialize_forms};
-use super::motion::Motion;
+use super::motion::RawMotion;
 use super::orientation::{Orientation, Turns};
-use crate::case::loc::Loc;
+use crate::case::located::Located;
+use crate::case::notation::{Notation, Unsupported, notations, refusal};
 use crate::case::quantity::{
     AngularVelocity, Density, ElasticModulus, Length, Number, Quantity, Triple, Velocity,
 };
@@ -18,54 +16,43 @@ use crate::case::quantity::{
 #[serde(deny_unknown_fields)]
 pub struct RawGrain {
     /// A `.grain` file, relative to the case file. Give either `file` or `shape`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub file: Option<Loc<String>>,
+    pub file: Option<Located<String>>,
     /// A closed form. Give either `file` or `shape`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shape: Option<Loc<RawShape>>,
+    pub shape: Option<Located<RawShape>>,
     /// Rescales the shape to this equal-volume diameter [m]; without it the shape keeps its size.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub equivalent_diameter: Option<Loc<Quantity<Length>>>,
+    pub equivalent_diameter: Option<Located<Quantity<Length>>>,
     /// Surface nodes of a closed form; 2000 if not given. A file brings its own.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub nodes: Option<Loc<usize>>,
+    pub nodes: Option<Located<usize>>,
     /// Density [kg/m3].
-    pub density: Loc<Quantity<Density>>,
+    pub density: Located<Quantity<Density>>,
     /// Young's modulus [Pa], for the contact law "hertz-mindlin"; the one of `[contact]` if not
     /// given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub youngs_modulus: Option<Loc<Quantity<ElasticModulus>>>,
+    pub youngs_modulus: Option<Located<Quantity<ElasticModulus>>>,
     /// Poisson ratio, for the contact law "hertz-mindlin"; the one of `[contact]` if not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub poisson_ratio: Option<Loc<Quantity<Number>>>,
+    pub poisson_ratio: Option<Located<Quantity<Number>>>,
     /// Coefficient of restitution, for the contact law "hertz-mindlin"; the one of `[contact]` if
     /// not given. A pair takes the smaller value.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub restitution: Option<Loc<Quantity<Number>>>,
+    pub restitution: Option<Located<Quantity<Number>>>,
     /// Centroid [m]: `[x, y, z]`; with `gap_above` only the two horizontal components.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position: Option<Loc<Position>>,
+    pub position: Option<Located<Position>>,
     /// Places the grain above another: the vertical distance from the top of that grain's
     /// surface to the bottom of this one's.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gap_above: Option<Loc<RawGapAbove>>,
+    pub gap_above: Option<Located<RawGapAbove>>,
     /// Orientation: a quaternion `[w, x, y, z]`, `{ axis, angle }`, or directions of the
     /// principal axes such as `{ long_axis = "z" }`.
     #[serde(default)]
-    pub orientation: Loc<Orientation>,
+    pub orientation: Located<Orientation>,
     /// Turns applied after `orientation`, about axes of space: one `{ axis, angle }` or a list.
     #[serde(default, skip_serializing_if = "Turns::is_empty")]
     pub rotate: Turns,
     /// Velocity at the start [m/s].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub velocity: Option<Loc<Triple<Velocity>>>,
+    pub velocity: Option<Located<Triple<Velocity>>>,
     /// Angular velocity at the start, axes of space [rad/s].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub angular_velocity: Option<Loc<Triple<AngularVelocity>>>,
+    pub angular_velocity: Option<Located<Triple<AngularVelocity>>>,
     /// "free", "fixed", or `{ velocity = ..., angular_velocity = ... }`, each "free", "fixed" or a
     /// prescribed vector.
     #[serde(default)]
-    pub motion: Loc<Motion>,
+    pub motion: Located<RawMotion>,
 }
 
 /// A closed form. Which sizes belong to it depends on `kind`. In the frame of the body the longest
@@ -73,23 +60,18 @@ pub struct RawGrain {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawShape {
-    /// Which body.
-    pub kind: Loc<ShapeKind>,
+    /// Kind of body.
+    pub kind: Located<ShapeKind>,
     /// Diameter of a sphere, cylinder or capsule [m].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub diameter: Option<Loc<Quantity<Length>>>,
+    pub diameter: Option<Located<Quantity<Length>>>,
     /// Height of a cylinder; length between the cap centres of a capsule [m].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub height: Option<Loc<Quantity<Length>>>,
+    pub height: Option<Located<Quantity<Length>>>,
     /// Full edge lengths of an ellipsoid, rounded box or superquadric [m].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub size: Option<Loc<Triple<Length>>>,
+    pub size: Option<Located<Triple<Length>>>,
     /// Edge radius of a rounded box [m].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub radius: Option<Loc<Quantity<Length>>>,
+    pub radius: Option<Located<Quantity<Length>>>,
     /// Exponents e1, e2 of a superquadric (Barr 1981), 0.1 to 2; 1, 1 is an ellipsoid.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub exponents: Option<Loc<[f64; 2]>>,
+    pub exponents: Option<Located<[f64; 2]>>,
 }
 
 /// Closed forms that can be written in a case file.
@@ -111,37 +93,18 @@ pub enum ShapeKind {
 }
 
 /// Centroid: three components, or the two horizontal ones next to `gap_above`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Position(pub Vec<f64>);
 
-impl Forms for Position {
+impl Notation for Position {
     const EXPECTED: &'static str = "[x, y, z], each a length in m or a string such as \"2 mm\"";
     type List = Vec<Quantity<Length>>;
-    type Table = Never;
+    type Table = Unsupported;
     fn from_list(list: Self::List) -> Result<Self, String> {
         match list.len() {
             2 | 3 => Ok(Position(list.iter().map(|q| q.si).collect())),
-            n => Err(format!("found {n} components; expected {}", Self::EXPECTED)),
+            n => Err(refusal::<Self>(&format!("{n} components"))),
         }
-    }
-}
-
-impl Serialize for Position {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.0.serialize(serializer)
-    }
-}
-
-impl JsonSchema for Position {
-    fn inline_schema() -> bool {
-        true
-    }
-    fn schema_name() -> Cow<'static, str> {
-        "Position".into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let item = generator.subschema_for::<Quantity<Length>>();
-        json_schema!({ "type": "array", "items": item, "minItems": 2, "maxItems": 3 })
     }
 }
 
@@ -150,9 +113,9 @@ impl JsonSchema for Position {
 #[serde(deny_unknown_fields)]
 pub struct RawGapAbove {
     /// Index of the grain below, which must stand earlier in the file.
-    pub grain: Loc<usize>,
+    pub grain: Located<usize>,
     /// Vertical distance between the two surfaces [m].
-    pub gap: Loc<Quantity<Length>>,
+    pub gap: Located<Quantity<Length>>,
 }
 
-deserialize_forms!(Position);
+notations!(Position);

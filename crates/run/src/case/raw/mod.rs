@@ -1,10 +1,9 @@
-//! The case file as written: every key, its forms, its default. No key is checked against
-//! another here; `validate` does that. Resolved values are written back through the same types.
+//! Case file as written: every key with its notations and its default. `validate` checks the keys
+//! against each other. Resolved values are written through the same types.
 
 mod domain;
 mod expect;
-pub(crate) mod forms;
-mod given;
+mod formula;
 mod grain;
 mod motion;
 mod orientation;
@@ -12,20 +11,20 @@ mod packing;
 mod physics;
 mod plan;
 
-pub use domain::{AxisFaces, CellSize, Face, FaceKind, RawDomain};
+pub use domain::{AxisFaces, CellSize, Face, FaceKind, RawBoundaries, RawDomain};
 pub use expect::{OneOrMany, RawExpect, RawExpected, Tolerance};
 pub use grain::{Position, RawGrain, RawShape, ShapeKind};
-pub use motion::Law;
+pub use motion::MotionLaw;
 pub use orientation::{Orientation, Turns};
-pub use packing::{Arrangement, PackingOrientation, RawPacking};
+pub use packing::{Arrangement, Bounds, PackingOrientation, RawPacking};
 pub use physics::{RawContact, RawCoupling, RawFluid};
-pub use plan::{RawOutput, RawRun, RawStop, RawTime};
+pub use plan::{RawOutput, RawPlane, RawRun, RawStop, RawTime};
 
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::loc::Loc;
+use super::located::Located;
 use super::quantity::{Acceleration, Triple};
 
 /// A case: grains, fluid, box and what to write. Bare numbers are SI; strings carry units.
@@ -38,13 +37,13 @@ pub struct RawCase {
     pub title: String,
     /// Gravity [m/s2].
     #[serde(default = "earth")]
-    pub gravity: Loc<Triple<Acceleration>>,
+    pub gravity: Located<Triple<Acceleration>>,
     /// The fluid; without it the run is dry (contact only).
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub fluid: Option<Loc<RawFluid>>,
+    pub fluid: Option<Located<RawFluid>>,
     /// The box.
-    pub domain: Loc<RawDomain>,
-    /// How the grains act on the grid.
+    pub domain: Located<RawDomain>,
+    /// Coupling of grains and fluid.
     #[serde(default)]
     pub coupling: RawCoupling,
     /// Contact law.
@@ -52,10 +51,10 @@ pub struct RawCase {
     pub contact: RawContact,
     /// Clock.
     pub time: RawTime,
-    /// What is written and when.
+    /// Outputs and their intervals.
     #[serde(default)]
     pub output: RawOutput,
-    /// How the run is executed; threads have no effect on the results, precision rounds them.
+    /// Threads, which have no effect on the results, and precision, which decides the rounding.
     #[serde(default)]
     pub run: RawRun,
     /// Expected results, which make the case a test.
@@ -63,12 +62,12 @@ pub struct RawCase {
     pub expect: RawExpect,
     /// The grains.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub grain: Vec<Loc<RawGrain>>,
+    pub grain: Vec<Located<RawGrain>>,
     /// Groups of grains placed by a rule; written out as `[[grain]]` in the resolved case.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub packing: Vec<Loc<RawPacking>>,
+    pub packing: Vec<Located<RawPacking>>,
 }
 
-fn earth() -> Loc<Triple<Acceleration>> {
-    Loc::none(Triple::new(DVec3::new(0.0, 0.0, -9.81)))
+fn earth() -> Located<Triple<Acceleration>> {
+    Triple::new(DVec3::new(0.0, 0.0, -9.81)).into()
 }

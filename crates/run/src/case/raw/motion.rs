@@ -1,171 +1,139 @@
-//! Whether a grain moves freely or as prescribed.
+//! Free and prescribed motion of a grain.
 
-use std::borrow::Cow;
-
-use glam::DVec3;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::forms::{Forms, Never, deserialize_forms};
-use super::given::{FormulaTable, OfTime, formula_schema, write_formula};
-use crate::case::quantity::{AngularVelocity, Quantity, Triple, Velocity};
+use super::formula::{FormulaTable, OfTime, VectorOrFormula};
+use crate::case::notation::{Notation, Unsupported, notations, refusal};
+use crate::case::quantity::{AngularVelocity, Kind, Quantity, Velocity};
+use grainwake_solver::dem::Dof;
 use grainwake_solver::math::Formula;
 
-/// Law of a velocity: free, or prescribed.
+/// Law of a velocity of kind `K`.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub enum Law {
-    /// Follows the dynamics.
+pub enum MotionLaw<K> {
+    /// The velocity follows from the loads.
     #[default]
     Free,
-    /// Held at this value [SI].
-    Prescribed(DVec3),
-    /// A formula in t.
-    Formula(Formula),
+    /// The velocity is given.
+    Prescribed(VectorOrFormula<K, OfTime>),
 }
 
-impl Law {
-    fn word(word: &str) -> Result<Law, String> {
-        match word {
-            "free" => Ok(Law::Free),
-            "fixed" => Ok(Law::Prescribed(DVec3::ZERO)),
-            _ => Err(format!(
-                "found \"{word}\"; expected \"free\", \"fixed\", a vector or a formula"
-            )),
+impl<K: Kind> MotionLaw<K> {
+    /// Returns the degree of freedom at t = 0.
+    pub fn at_start(&self) -> Dof {
+        match self {
+            MotionLaw::Free => Dof::Free,
+            MotionLaw::Prescribed(velocity) => {
+                let (constant, formula) = velocity.parts();
+                Dof::Prescribed(formula.map_or(constant, |formula| formula.at(&[0.0])))
+            }
+        }
+    }
+    /// Returns the formula, if the velocity is given by one.
+    pub fn formula(&self) -> Option<Formula> {
+        match self {
+            MotionLaw::Free => None,
+            MotionLaw::Prescribed(velocity) => velocity.parts().1,
         }
     }
     fn is_fixed(&self) -> bool {
-        *self == Law::Prescribed(DVec3::ZERO)
+        *self == MotionLaw::Prescribed(VectorOrFormula::default())
     }
 }
 
-impl Serialize for Law {
+impl<K: Kind> Notation for MotionLaw<K> {
+    const EXPECTED: &'static str =
+        "\"free\", \"fixed\", a vector [x, y, z] or { formula = [x, y, z] }";
+    type List = Vec<Quantity<K>>;
+    type Table = FormulaTable<OfTime>;
+    fn from_word(word: &str) -> Result<Self, String> {
+        match word {
+            "free" => Ok(MotionLaw::Free),
+            "fixed" => Ok(MotionLaw::Prescribed(VectorOrFormula::default())),
+            _ => Err(refusal::<Self>(&format!("\"{word}\""))),
+        }
+    }
+    fn from_list(list: Self::List) -> Result<Self, String> {
+        VectorOrFormula::from_list(list).map(MotionLaw::Prescribed)
+    }
+    fn from_table(table: FormulaTable<OfTime>) -> Result<Self, String> {
+        VectorOrFormula::from_table(table).map(MotionLaw::Prescribed)
+    }
+    fn scalar_schemas(_: &mut SchemaGenerator) -> Vec<Schema> {
+        vec![json_schema!({ "enum": ["free", "fixed"] })]
+    }
+}
+
+impl<K: Kind> Serialize for MotionLaw<K> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
-            Law::Free => serializer.serialize_str("free"),
-            Law::Prescribed(v) => v.to_array().serialize(serializer),
-            Law::Formula(formula) => write_formula(formula, serializer),
+            MotionLaw::Free => serializer.serialize_str("free"),
+            MotionLaw::Prescribed(velocity) => velocity.serialize(serializer),
         }
     }
 }
-
-macro_rules! law {
-    ($(#[$doc:meta])* $name:ident, $kind:ty) => {
-        $(#[$doc])*
-        #[derive(Clone, Debug, Default, PartialEq)]
-        pub struct $name(pub Law);
-        impl Forms for $name {
-            const EXPECTED: &'static str = "\"free\", \"fixed\", a vector [x, y, z] or { formula = [x, y, z] }";
-            type List = Vec<Quantity<$kind>>;
-            type Table = FormulaTable;
-            fn from_table(table: FormulaTable) -> Result<Self, String> {
-                Ok($name(Law::Formula(table.read::<OfTime>()?)))
-            }
-            fn from_word(word: &str) -> Result<Self, String> {
-                Law::word(word).map($name)
-            }
-            fn from_list(list: Self::List) -> Result<Self, String> {
-                match list[..] {
-                    [x, y, z] => Ok($name(Law::Prescribed(DVec3::new(x.si, y.si, z.si)))),
-                    _ => Err(format!("found {} components; expected {}", list.len(), Self::EXPECTED)),
-                }
-            }
-        }
-        deserialize_forms!($name);
-    };
-}
-law!(
-    /// Law of the translation [m/s].
-    TranslationLaw, Velocity
-);
-law!(
-    /// Law of the rotation [rad/s].
-    RotationLaw, AngularVelocity
-);
 
 /// Laws of translation and rotation.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Motion {
+pub struct RawMotion {
     /// Law of the translation [m/s].
-    pub velocity: Law,
+    pub velocity: MotionLaw<Velocity>,
     /// Law of the rotation [rad/s, axes of space].
-    pub angular_velocity: Law,
+    pub angular_velocity: MotionLaw<AngularVelocity>,
 }
 
-/// Table form of `Motion`; what is not named is free.
-#[derive(Debug, Deserialize)]
+/// Table of [`RawMotion`]; a law that is not given is free.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MotionTable {
+    /// Law of the translation [m/s].
     #[serde(default)]
-    velocity: TranslationLaw,
+    velocity: MotionLaw<Velocity>,
+    /// Law of the rotation [rad/s, axes of space].
     #[serde(default)]
-    angular_velocity: RotationLaw,
+    angular_velocity: MotionLaw<AngularVelocity>,
 }
 
-impl Forms for Motion {
+impl Notation for RawMotion {
     const EXPECTED: &'static str =
         "\"free\", \"fixed\", or { velocity = ..., angular_velocity = ... }";
-    type List = Never;
+    type List = Unsupported;
     type Table = MotionTable;
     fn from_word(word: &str) -> Result<Self, String> {
-        let law = Law::word(word)
-            .map_err(|_| format!("found \"{word}\"; expected {}", Self::EXPECTED))?;
-        Ok(Motion {
-            velocity: law.clone(),
-            angular_velocity: law,
+        let refused = |_| refusal::<Self>(&format!("\"{word}\""));
+        Ok(RawMotion {
+            velocity: MotionLaw::from_word(word).map_err(refused)?,
+            angular_velocity: MotionLaw::from_word(word).map_err(refused)?,
         })
     }
     fn from_table(table: MotionTable) -> Result<Self, String> {
-        Ok(Motion {
-            velocity: table.velocity.0,
-            angular_velocity: table.angular_velocity.0,
+        let MotionTable {
+            velocity,
+            angular_velocity,
+        } = table;
+        Ok(RawMotion {
+            velocity,
+            angular_velocity,
         })
+    }
+    fn scalar_schemas(generator: &mut SchemaGenerator) -> Vec<Schema> {
+        MotionLaw::<Velocity>::scalar_schemas(generator)
     }
 }
 
-impl Serialize for Motion {
+impl Serialize for RawMotion {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        #[derive(Serialize)]
-        struct Table<'a> {
-            velocity: &'a Law,
-            angular_velocity: &'a Law,
-        }
         match (&self.velocity, &self.angular_velocity) {
-            (Law::Free, Law::Free) => serializer.serialize_str("free"),
+            (MotionLaw::Free, MotionLaw::Free) => serializer.serialize_str("free"),
             (v, w) if v.is_fixed() && w.is_fixed() => serializer.serialize_str("fixed"),
-            (velocity, angular_velocity) => Table {
-                velocity,
-                angular_velocity,
+            (velocity, angular_velocity) => MotionTable {
+                velocity: velocity.clone(),
+                angular_velocity: angular_velocity.clone(),
             }
             .serialize(serializer),
         }
     }
 }
 
-impl JsonSchema for Motion {
-    fn schema_name() -> Cow<'static, str> {
-        "Motion".into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let (v, w) = (
-            generator.subschema_for::<Triple<Velocity>>(),
-            generator.subschema_for::<Triple<AngularVelocity>>(),
-        );
-        let words = json_schema!({ "enum": ["free", "fixed"] });
-        json_schema!({
-            "description": Motion::EXPECTED,
-            "anyOf": [
-                words,
-                {
-                    "type": "object",
-                    "properties": {
-                        "velocity": { "anyOf": [words, v, formula_schema()] },
-                        "angular_velocity": { "anyOf": [words, w, formula_schema()] },
-                    },
-                    "additionalProperties": false,
-                },
-            ],
-        })
-    }
-}
-
-deserialize_forms!(Motion);
+notations!(MotionLaw<K: Kind>, RawMotion);

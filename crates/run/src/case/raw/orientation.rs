@@ -1,39 +1,29 @@
-//! Directions, turns and orientations.
-
-use std::borrow::Cow;
+//! Directions, turns and orientations in a case file.
 
 use glam::{DQuat, DVec3};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::forms::{Forms, Never, deserialize_forms};
+use crate::case::notation::{Notation, Unsupported, notations, refusal};
 use crate::case::quantity::{Angle, Quantity};
 
 /// A direction of space: "x", "-z", or a vector.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Direction(pub DVec3);
 
-impl Forms for Direction {
+impl Notation for Direction {
     const EXPECTED: &'static str = "x, y, z, -x, -y, -z or a vector such as [1, 0, 1]";
     type List = [f64; 3];
-    type Table = Never;
+    type Table = Unsupported;
     fn from_word(word: &str) -> Result<Self, String> {
         let (sign, letter) = match word.strip_prefix('-') {
             Some(rest) => (-1.0, rest),
             None => (1.0, word.strip_prefix('+').unwrap_or(word)),
         };
-        let axis = match letter {
-            "x" => DVec3::X,
-            "y" => DVec3::Y,
-            "z" => DVec3::Z,
-            _ => {
-                return Err(format!(
-                    "unknown direction \"{word}\"; expected {}",
-                    Self::EXPECTED
-                ));
-            }
-        };
-        Ok(Direction(axis * sign))
+        let axis = ["x", "y", "z"].iter().position(|name| *name == letter);
+        let refused = || format!("unknown direction \"{word}\"; expected {}", Self::EXPECTED);
+        axis.map(|axis| Direction(DVec3::AXES[axis] * sign))
+            .ok_or_else(refused)
     }
     fn from_list(list: [f64; 3]) -> Result<Self, String> {
         DVec3::from_array(list)
@@ -41,25 +31,8 @@ impl Forms for Direction {
             .map(Direction)
             .ok_or_else(|| "a direction cannot be zero".into())
     }
-}
-
-impl Serialize for Direction {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.0.to_array().serialize(serializer)
-    }
-}
-
-impl JsonSchema for Direction {
-    fn schema_name() -> Cow<'static, str> {
-        "Direction".into()
-    }
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "anyOf": [
-                { "enum": ["x", "y", "z", "-x", "-y", "-z"] },
-                { "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 },
-            ],
-        })
+    fn scalar_schemas(_: &mut SchemaGenerator) -> Vec<Schema> {
+        vec![json_schema!({ "enum": ["x", "y", "z", "-x", "-y", "-z"] })]
     }
 }
 
@@ -74,7 +47,7 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// As a quaternion.
+    /// Returns the quaternion of the turn.
     pub fn quaternion(&self) -> DQuat {
         DQuat::from_axis_angle(self.axis.0, self.angle.si)
     }
@@ -85,13 +58,13 @@ impl Turn {
 pub struct Turns(pub Vec<Turn>);
 
 impl Turns {
-    /// Whether there are none.
+    /// Returns whether there is no turn.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 }
 
-impl Forms for Turns {
+impl Notation for Turns {
     const EXPECTED: &'static str = "{ axis = \"y\", angle = \"45 deg\" } or a list of such turns";
     type List = Vec<Turn>;
     type Table = Turn;
@@ -100,16 +73,6 @@ impl Forms for Turns {
     }
     fn from_table(turn: Turn) -> Result<Self, String> {
         Ok(Turns(vec![turn]))
-    }
-}
-
-impl JsonSchema for Turns {
-    fn schema_name() -> Cow<'static, str> {
-        "Turns".into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let turn = generator.subschema_for::<Turn>();
-        json_schema!({ "anyOf": [turn, { "type": "array", "items": turn }] })
     }
 }
 
@@ -128,28 +91,31 @@ impl Default for Orientation {
     }
 }
 
-/// Table form of `Orientation`.
-#[derive(Debug, Deserialize)]
+/// Table of [`Orientation`].
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OrientationTable {
+    /// Axis of a turn.
     axis: Option<Direction>,
+    /// Angle of the turn, right-handed [rad].
     angle: Option<Quantity<Angle>>,
+    /// Direction of the longest principal axis.
     long_axis: Option<Direction>,
+    /// Direction of the middle principal axis.
     middle_axis: Option<Direction>,
+    /// Direction of the shortest principal axis.
     short_axis: Option<Direction>,
 }
 
-impl Forms for Orientation {
-    const EXPECTED: &'static str = "a quaternion [w, x, y, z], { axis = \"y\", angle = \"45 deg\" }, or one or two of { long_axis, middle_axis, short_axis }";
+impl Notation for Orientation {
+    const EXPECTED: &'static str = "a quaternion [w, x, y, z], \
+        { axis = \"y\", angle = \"45 deg\" }, \
+        or one or two of { long_axis, middle_axis, short_axis }";
     type List = Vec<f64>;
     type Table = OrientationTable;
     fn from_list(list: Vec<f64>) -> Result<Self, String> {
         let [w, x, y, z] = list[..] else {
-            return Err(format!(
-                "found {} numbers; expected {}",
-                list.len(),
-                Self::EXPECTED
-            ));
+            return Err(refusal::<Self>(&format!("{} numbers", list.len())));
         };
         let q = DQuat::from_xyzw(x, y, z, w);
         let norm = q.length_squared();
@@ -184,40 +150,15 @@ impl Serialize for Orientation {
         match self {
             Orientation::Quaternion(q) => [q.w, q.x, q.y, q.z].serialize(serializer),
             Orientation::Axes(axes) => {
-                let names = ["long_axis", "middle_axis", "short_axis"];
+                let names = ["long_axis", "middle_axis", "short_axis"].iter();
                 serializer.collect_map(
                     names
-                        .iter()
                         .zip(axes)
-                        .filter_map(|(n, a)| a.map(|a| (n, a.to_array()))),
+                        .filter_map(|(name, axis)| Some((name, (*axis)?))),
                 )
             }
         }
     }
 }
 
-impl JsonSchema for Orientation {
-    fn schema_name() -> Cow<'static, str> {
-        "Orientation".into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let (turn, direction) = (
-            generator.subschema_for::<Turn>(),
-            generator.subschema_for::<Direction>(),
-        );
-        json_schema!({
-            "description": Orientation::EXPECTED,
-            "anyOf": [
-                { "type": "array", "items": { "type": "number" }, "minItems": 4, "maxItems": 4 },
-                turn,
-                {
-                    "type": "object",
-                    "properties": { "long_axis": direction, "middle_axis": direction, "short_axis": direction },
-                    "additionalProperties": false,
-                },
-            ],
-        })
-    }
-}
-
-deserialize_forms!(Direction, Turns, Orientation);
+notations!(Direction, Turns, Orientation);

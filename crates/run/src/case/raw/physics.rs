@@ -3,8 +3,8 @@
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
-use super::given::{Given, OfPlace, OfTime};
-use crate::case::loc::Loc;
+use super::formula::{OfPosition, OfTime, VectorOrFormula};
+use crate::case::located::Located;
 use crate::case::quantity::{
     Acceleration, Density, DynamicViscosity, ElasticModulus, KinematicViscosity, Length, Number,
     Quantity, Rate, Stiffness, Velocity,
@@ -18,36 +18,34 @@ use grainwake_solver::immersed::Scheme;
 #[serde(deny_unknown_fields)]
 pub struct RawFluid {
     /// Density [kg/m3].
-    pub density: Loc<Quantity<Density>>,
+    pub density: Located<Quantity<Density>>,
     /// Dynamic viscosity [Pa s]. Give either this or `kinematic_viscosity`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub viscosity: Option<Loc<Quantity<DynamicViscosity>>>,
+    pub viscosity: Option<Located<Quantity<DynamicViscosity>>>,
     /// Kinematic viscosity [m2/s].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub kinematic_viscosity: Option<Loc<Quantity<KinematicViscosity>>>,
+    pub kinematic_viscosity: Option<Located<Quantity<KinematicViscosity>>>,
     /// Uniform acceleration that drives the flow, a mean pressure gradient over density [m/s2].
     #[serde(default)]
-    pub body_acceleration: Loc<Given<Acceleration, OfTime>>,
+    pub body_acceleration: Located<VectorOrFormula<Acceleration, OfTime>>,
     /// Velocity at the start [m/s]; it is made free of divergence.
     #[serde(default)]
-    pub initial_velocity: Loc<Given<Velocity, OfPlace>>,
+    pub initial_velocity: Located<VectorOrFormula<Velocity, OfPosition>>,
     /// Advection scheme.
     #[serde(default)]
     #[schemars(schema_with = "advection_schema")]
-    pub advection: Loc<Advection>,
+    pub advection: Located<Advection>,
 }
 
 fn advection_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "enum": [Advection::Central] })
 }
 
-/// How the grains act on the grid.
+/// Coupling of grains and fluid.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawCoupling {
     /// `aperture` (smoothed ghost-Dirichlet drag) or `paper` (Patankar 2000, as the paper does).
     #[schemars(schema_with = "scheme_schema")]
-    pub scheme: Loc<Scheme>,
+    pub scheme: Located<Scheme>,
 }
 
 fn scheme_schema(_: &mut SchemaGenerator) -> Schema {
@@ -63,52 +61,52 @@ pub struct RawContact {
     // The default is not written, so that checkpoints of earlier versions still match their case.
     #[serde(skip_serializing_if = "is_linear")]
     #[schemars(schema_with = "law_schema")]
-    pub law: Loc<ContactLawKind>,
+    pub law: Located<ContactLawKind>,
     /// Normal stiffness k_n [N/m] (Eq. 9). Give either this or `maximum_overlap`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub stiffness: Option<Loc<Quantity<Stiffness>>>,
+    pub stiffness: Option<Located<Quantity<Stiffness>>>,
     /// Derives the stiffness: largest overlap at impact, as a fraction of the smallest equal-volume
     /// diameter. 0.01 where neither is given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub maximum_overlap: Option<Loc<Quantity<Number>>>,
+    pub maximum_overlap: Option<Located<Quantity<Number>>>,
     /// Tangential over normal stiffness (Eq. 14); 2/7 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub tangential_ratio: Option<Loc<Quantity<Number>>>,
+    pub tangential_ratio: Option<Located<Quantity<Number>>>,
     /// Coulomb friction coefficient between grains (Eq. 15).
-    pub friction: Loc<Quantity<Number>>,
+    pub friction: Located<Quantity<Number>>,
     /// Coulomb friction coefficient at walls; that of the grains where it is not given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub wall_friction: Option<Loc<Quantity<Number>>>,
+    pub wall_friction: Option<Located<Quantity<Number>>>,
     /// Coefficient of restitution; 1 has no dashpot.
-    pub restitution: Loc<Quantity<Number>>,
+    pub restitution: Located<Quantity<Number>>,
     /// Tangential over normal dashpot, where `restitution` is below 1; 0.5 if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub tangential_damping: Option<Loc<Quantity<Number>>>,
+    pub tangential_damping: Option<Located<Quantity<Number>>>,
     /// Young's modulus of the grains [Pa], for the law "hertz-mindlin".
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub youngs_modulus: Option<Loc<Quantity<ElasticModulus>>>,
+    pub youngs_modulus: Option<Located<Quantity<ElasticModulus>>>,
     /// Poisson ratio of the grains, 0 to 0.5, for the law "hertz-mindlin".
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub poisson_ratio: Option<Loc<Quantity<Number>>>,
+    pub poisson_ratio: Option<Located<Quantity<Number>>>,
     /// Young's modulus of the walls [Pa], for the law "hertz-mindlin"; rigid walls if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub wall_youngs_modulus: Option<Loc<Quantity<ElasticModulus>>>,
+    pub wall_youngs_modulus: Option<Located<Quantity<ElasticModulus>>>,
     /// Poisson ratio of the walls, for the law "hertz-mindlin"; `poisson_ratio` if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub wall_poisson_ratio: Option<Loc<Quantity<Number>>>,
+    pub wall_poisson_ratio: Option<Located<Quantity<Number>>>,
     /// Global damping xi [1/s] (Eqs 6, 22, 24).
-    pub global_damping: Loc<Quantity<Rate>>,
+    pub global_damping: Located<Quantity<Rate>>,
     /// Lubrication correction below this gap [m]; 0 turns it off.
-    pub lubrication_gap: Loc<Quantity<Length>>,
+    pub lubrication_gap: Located<Quantity<Length>>,
     /// Height of the asperities: the lubrication film is never thinner [m]; three thousandths of
     /// the smallest equal-volume radius where it is not given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub roughness: Option<Loc<Quantity<Length>>>,
+    pub roughness: Option<Located<Quantity<Length>>>,
     /// Sub-steps per contact time.
-    pub substeps_per_contact: Loc<Quantity<Number>>,
+    pub substeps_per_contact: Located<Quantity<Number>>,
 }
 
-fn is_linear(law: &Loc<ContactLawKind>) -> bool {
+fn is_linear(law: &Located<ContactLawKind>) -> bool {
     law.value == ContactLawKind::Linear
 }
 
@@ -120,7 +118,7 @@ impl Default for RawContact {
     fn default() -> Self {
         let params = ContactParams::default();
         RawContact {
-            law: Loc::default(),
+            law: Located::default(),
             stiffness: None,
             maximum_overlap: None,
             tangential_ratio: None,

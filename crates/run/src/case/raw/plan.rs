@@ -1,14 +1,12 @@
 //! `[time]`, `[output]` and `[run]`.
 
-use std::borrow::Cow;
-
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
-use super::forms::{Forms, Never, deserialize_forms};
-use crate::case::loc::Loc;
+use crate::case::located::Located;
+use crate::case::notation::{Notation, Unsupported, notations, variant};
+use crate::case::number_format::AXES;
 use crate::case::quantity::{Length, Number, Quantity, Time};
-use crate::case::suggest::nearest;
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::events::StopWhen;
 
@@ -17,133 +15,92 @@ use grainwake_solver::sim::events::StopWhen;
 #[serde(deny_unknown_fields)]
 pub struct RawTime {
     /// End of the run [s].
-    pub end: Loc<Quantity<Time>>,
-    /// The same step always [s]. Without it the step follows `cfl`, `viscous` and `max_step`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub step: Option<Loc<Quantity<Time>>>,
+    pub end: Located<Quantity<Time>>,
+    /// Fixed step [s]. Without it the step follows `cfl`, `viscous` and `max_step`.
+    pub step: Option<Located<Quantity<Time>>>,
     /// Limit of dt max(sum |u_a| / h_a); 0.4 where no limit or step is given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub cfl: Option<Loc<Quantity<Number>>>,
+    pub cfl: Option<Located<Quantity<Number>>>,
     /// Limit of nu dt sum 1 / h_a^2; 0.2 where it is not given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub viscous: Option<Loc<Quantity<Number>>>,
-    /// Never a longer step than this [s]; from gravity and cell size (dry: diameter) if not given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_step: Option<Loc<Quantity<Time>>>,
+    pub viscous: Option<Located<Quantity<Number>>>,
+    /// Longest step [s]; from gravity and cell size (dry: diameter) if not given.
+    pub max_step: Option<Located<Quantity<Time>>>,
     /// Ends the run before `end`: "landing" (every grain has touched the floor), "rest" (every
     /// grain has landed and lies still) or "separation" (a pair has parted after kissing).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stop: Option<Loc<RawStop>>,
+    pub stop: Option<Located<RawStop>>,
 }
 
-/// When to stop early.
+/// Condition of an early end.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RawStop {
-    /// What must have happened.
+    /// Event that must have happened.
     pub when: StopWhen,
-    /// How long to go on after it [s].
-    pub hold: Loc<Quantity<Time>>,
+    /// Time to continue after the event [s].
+    pub hold: Located<Quantity<Time>>,
 }
 
-fn stop_word(word: &str) -> Result<StopWhen, String> {
-    match word {
-        "landing" => Ok(StopWhen::Landing),
-        "rest" => Ok(StopWhen::Rest),
-        "separation" => Ok(StopWhen::Separation),
-        _ => {
-            let hint = nearest(word, ["landing", "rest", "separation"])
-                .map_or(String::new(), |w| format!(" (did you mean \"{w}\"?)"));
-            Err(format!(
-                "found \"{word}\"{hint}; expected {}",
-                RawStop::EXPECTED
-            ))
-        }
-    }
-}
-
-/// Table form of `RawStop`.
-#[derive(Debug, Deserialize)]
+/// Table of [`RawStop`].
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StopTable {
+    /// Event that must have happened.
+    #[schemars(schema_with = "stop_schema")]
     when: StopWhen,
+    /// Time to continue after the event [s].
     #[serde(default)]
-    hold: Loc<Quantity<Time>>,
+    hold: Located<Quantity<Time>>,
 }
 
-fn no_time() -> Quantity<Time> {
-    Quantity::new(0.0)
+fn stop_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "enum": [StopWhen::Landing, StopWhen::Rest, StopWhen::Separation] })
 }
 
-impl Forms for RawStop {
+impl Notation for RawStop {
     const EXPECTED: &'static str =
         "\"landing\", \"rest\", \"separation\", or { when = \"landing\", hold = \"50 ms\" }";
-    type List = Never;
+    type List = Unsupported;
     type Table = StopTable;
     fn from_word(word: &str) -> Result<Self, String> {
         Ok(RawStop {
-            when: stop_word(word)?,
-            hold: no_time().into(),
+            when: variant(word)?,
+            hold: Located::default(),
         })
     }
-    fn from_table(table: StopTable) -> Result<Self, String> {
-        Ok(RawStop {
-            when: table.when,
-            hold: table.hold,
-        })
+    fn from_table(StopTable { when, hold }: StopTable) -> Result<Self, String> {
+        Ok(RawStop { when, hold })
+    }
+    fn scalar_schemas(generator: &mut SchemaGenerator) -> Vec<Schema> {
+        vec![stop_schema(generator)]
     }
 }
 
-deserialize_forms!(RawStop);
+notations!(RawStop);
 
-impl JsonSchema for RawStop {
-    fn schema_name() -> Cow<'static, str> {
-        "Stop".into()
-    }
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let words =
-            json_schema!({ "enum": [StopWhen::Landing, StopWhen::Rest, StopWhen::Separation] });
-        let hold = generator.subschema_for::<Quantity<Time>>();
-        json_schema!({
-            "description": RawStop::EXPECTED,
-            "anyOf": [
-                words,
-                {
-                    "type": "object",
-                    "properties": { "when": words, "hold": hold },
-                    "required": ["when"],
-                    "additionalProperties": false,
-                },
-            ],
-        })
-    }
-}
-
-/// What is written and when. An interval of 0 turns that output off.
+/// Outputs and their intervals. An interval of 0 turns that output off.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawOutput {
     /// Interval of the rows of `grains.csv` and `diagnostics.csv` [s]; end / 400 if not given, but
     /// not shorter than the step expected at the settling speed.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub tables: Option<Loc<Quantity<Time>>>,
+    pub tables: Option<Located<Quantity<Time>>>,
     /// Interval of the slices [s]; end / 40 if not given (dry: none).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub slices: Option<Loc<Quantity<Time>>>,
+    pub slices: Option<Located<Quantity<Time>>>,
     /// Interval of the full fields [s]; 0 writes none.
-    pub fields: Loc<Quantity<Time>>,
+    pub fields: Located<Quantity<Time>>,
     /// Interval of the posed grain surfaces [s]; that of the slices if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub surfaces: Option<Loc<Quantity<Time>>>,
+    pub surfaces: Option<Located<Quantity<Time>>>,
     /// Slices and surfaces also at a kiss, role change, separation or landing.
     pub at_events: bool,
     /// Slice planes. If not given: normal to y (normal to x if gravity acts along y) through the
     /// centre of each of at most two grains, else through the middle of the box.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub planes: Option<Vec<Loc<RawPlane>>>,
+    pub planes: Option<Vec<Located<RawPlane>>>,
     /// Wall-clock time between checkpoints [s]; 0 writes none by the clock.
-    pub checkpoint_interval: Loc<Quantity<Time>>,
+    pub checkpoint_interval: Located<Quantity<Time>>,
     /// Steps between checkpoints; 0 writes none by steps.
-    pub checkpoint_steps: Loc<u64>,
+    pub checkpoint_steps: Located<u64>,
 }
 
 impl Default for RawOutput {
@@ -151,7 +108,7 @@ impl Default for RawOutput {
         RawOutput {
             tables: None,
             slices: None,
-            fields: no_time().into(),
+            fields: Located::default(),
             surfaces: None,
             at_events: true,
             planes: None,
@@ -166,34 +123,24 @@ impl Default for RawOutput {
 #[serde(deny_unknown_fields)]
 pub struct RawPlane {
     /// Normal of the plane: "x", "y" or "z".
-    pub normal: Loc<String>,
-    /// Where it lies along that axis [m].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub at: Option<Loc<Quantity<Length>>>,
+    pub normal: Located<String>,
+    /// Position along that axis [m].
+    pub at: Option<Located<Quantity<Length>>>,
     /// Follows the centre of this grain.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub grain: Option<Loc<usize>>,
+    pub grain: Option<Located<usize>>,
 }
 
-/// How the run is executed. Threads change no bit of a result; single precision rounds more coarsely.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+/// Threads and precision. Threads change no bit of a result; single precision has larger rounding
+/// errors.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawRun {
-    /// Threads; 0 takes all cores. `--threads` goes before it.
-    pub threads: Loc<usize>,
+    /// Threads; 0 takes all cores. `--threads` overrides it.
+    pub threads: Located<usize>,
     /// Floating-point type of the fields: "f64", or "f32" for half the memory and up to twice the
     /// speed. Grains, contact and sums over the grid are in double precision always.
     #[schemars(schema_with = "precision_schema")]
-    pub precision: Loc<Precision>,
-}
-
-impl Default for RawRun {
-    fn default() -> Self {
-        RawRun {
-            threads: 0.into(),
-            precision: Precision::Double.into(),
-        }
-    }
+    pub precision: Located<Precision>,
 }
 
 fn precision_schema(_: &mut SchemaGenerator) -> Schema {
@@ -207,7 +154,7 @@ impl From<&crate::Plane> for RawPlane {
             crate::PlanePosition::Grain(grain) => (None, Some(grain.into())),
         };
         RawPlane {
-            normal: ["x", "y", "z"][plane.axis].to_string().into(),
+            normal: AXES[plane.axis].to_string().into(),
             at,
             grain,
         }

@@ -1,246 +1,224 @@
-//! Grains must stand in the box and clear of each other.
-
-use std::ops::Range;
+//! Check that grains lie in the box and do not overlap.
 
 use glam::{DQuat, DVec3};
 
 use super::check::Checker;
-use crate::case::loc::Loc;
-use crate::case::placement::reach;
+use crate::case::located::{Located, Span};
+use crate::case::number_format::{AXES, SIDES, length};
+use crate::case::placement::extent_along;
 use crate::case::raw::RawGrain;
-use crate::case::readable::length;
 use grainwake_solver::dem::{Enclosure, Grain, Overlap, Partner, initial_overlaps, outside};
 
-const AXES: [&str; 3] = ["x", "y", "z"];
-/// A coordinate or size of more box lengths than this is taken for a forgotten unit.
+/// Coordinates and sizes of more box lengths than this suggest a forgotten unit.
 const FAR: f64 = 10.0;
 const FORGOTTEN: &str = "; was a unit forgotten? bare numbers are metres";
 
-/// Where the file says where a grain stands and how large it is.
-pub(super) struct Site {
-    key: String,
-    span: Option<Range<usize>>,
-    /// Whether an override has set it.
+/// Positions in the source that place a grain and set its size.
+pub(super) struct Placement {
+    span: Span,
+    /// Whether an override has set the placement.
     overridden: bool,
     /// Keys of the three coordinates.
     coordinates: [String; 3],
-    size: (String, Option<Range<usize>>),
+    size: Span,
 }
 
-impl Site {
-    /// The site of a `[[grain]]`; gaps are measured along the axis `vertical`.
-    pub fn of(check: &Checker, grain: &Loc<RawGrain>, index: usize, vertical: usize) -> Site {
-        let key = |name: &str| format!("grain.{index}.{name}");
-        let overridden =
-            |span: &Option<Range<usize>>| span.as_ref().is_some_and(|s| check.is_overridden(s));
+impl Placement {
+    /// Returns the placement of a `[[grain]]`; gaps are measured along the axis `vertical`.
+    pub fn of(check: &Checker, grain: &Located<RawGrain>, vertical: usize) -> Placement {
         let above = grain.gap_above.as_ref();
         let written = [
-            grain.position.as_ref().map(|p| ("position", &p.span)),
-            above.map(|above| ("gap_above", &above.span)),
-            above.map(|above| ("gap_above.gap", &above.gap.span)),
+            grain.position.as_ref().map(|position| &position.span),
+            above.map(|above| &above.span),
+            above.map(|above| &above.gap.span),
         ];
         let mut written = written.into_iter().flatten();
-        let first = written.clone().next().unwrap_or(("position", &grain.span));
-        let changed = written.find(|(_, span)| overridden(span));
-        let (name, span) = changed.unwrap_or(first);
-        let mut horizontal = 0;
-        let coordinates = [0, 1, 2].map(|axis| {
-            if above.is_none() {
-                return key(&format!("position.{axis}"));
-            }
-            if axis == vertical {
-                return key("gap_above.gap");
-            }
-            horizontal += 1;
-            key(&format!("position.{}", horizontal - 1))
+        let first = written.clone().next().unwrap_or(&grain.span);
+        let changed = written.find(|span| check.is_overridden(span));
+        let position = (grain.position.as_ref()).map_or("", |given| check.key(&given.span));
+        let mut horizontal = 0..2;
+        let coordinates = [0, 1, 2].map(|axis| match above {
+            None => format!("{position}.{axis}"),
+            Some(above) if axis == vertical => check.key(&above.gap.span).to_owned(),
+            Some(_) => format!("{position}.{}", horizontal.next().unwrap_or(1)),
         });
         let size = match (&grain.equivalent_diameter, &grain.shape, &grain.file) {
-            (Some(diameter), ..) => ("equivalent_diameter", &diameter.span),
-            (None, Some(shape), _) => ("shape", &shape.span),
-            (None, None, Some(file)) => ("file", &file.span),
-            (None, None, None) => ("shape", &grain.span),
+            (Some(diameter), ..) => &diameter.span,
+            (None, Some(shape), _) => &shape.span,
+            (None, None, Some(file)) => &file.span,
+            (None, None, None) => &grain.span,
         };
-        Site {
-            key: key(name),
-            span: span.clone(),
+        Placement {
+            span: changed.unwrap_or(first).clone(),
             overridden: changed.is_some(),
             coordinates,
-            size: (key(size.0), size.1.clone()),
+            size: size.clone(),
         }
     }
 
-    /// The site of a grain of a `[[packing]]`.
-    pub fn packed(span: Option<&Range<usize>>, index: usize) -> Site {
-        let key = format!("packing.{index}");
-        Site {
-            span: span.cloned(),
+    /// Returns the placement of a grain of the `[[packing]]` at `span`.
+    pub fn packed(check: &Checker, span: &Span) -> Placement {
+        Placement {
+            span: span.clone(),
             overridden: false,
-            coordinates: [0, 1, 2].map(|_| key.clone()),
-            size: (key.clone(), span.cloned()),
-            key,
+            coordinates: [0, 1, 2].map(|_| check.key(span).to_owned()),
+            size: span.clone(),
         }
     }
 
-    fn fail(&self, check: &mut Checker, message: String, help: String) {
-        check.fail(self.span.as_ref(), &self.key, message, help);
+    /// Returns a request for a unit if a coordinate without one lies far outside the box.
+    fn forgotten_unit(&self, check: &Checker, grain: &Grain, enclosure: &Enclosure) -> &str {
+        let x = grain.pose.position;
+        let away = (enclosure.lower - x).max(x - enclosure.upper);
+        let far = |axis: usize| away[axis] > FAR * enclosure.size()[axis];
+        if (0..3).any(|axis| far(axis) && check.is_bare(&self.coordinates[axis])) {
+            FORGOTTEN
+        } else {
+            ""
+        }
     }
 }
 
-/// Grains must stand in the box and clear of each other.
-pub(super) fn check(check: &mut Checker, grains: &[Grain], sites: &[Site], enclosure: &Enclosure) {
-    let finite = |g: &Grain| g.pose.position.is_finite();
-    if !grains.iter().all(finite) {
-        return;
+/// Reports grains that leave the box or overlap.
+pub(super) fn check(
+    check: &mut Checker,
+    grains: &[Grain],
+    placements: &[Placement],
+    enclosure: &Enclosure,
+) {
+    if grains.iter().all(|grain| grain.pose.position.is_finite()) {
+        check_faces(check, grains, placements, enclosure);
+        check_overlaps(check, grains, placements, enclosure);
     }
-    in_the_box(check, grains, sites, enclosure);
-    apart(check, grains, sites, enclosure);
 }
 
-fn in_the_box(check: &mut Checker, grains: &[Grain], sites: &[Site], enclosure: &Enclosure) {
-    let mut told = vec![false; grains.len()];
+fn check_faces(
+    check: &mut Checker,
+    grains: &[Grain],
+    placements: &[Placement],
+    enclosure: &Enclosure,
+) {
+    let mut reported = vec![false; grains.len()];
     for o in outside(grains, enclosure) {
-        if std::mem::replace(&mut told[o.grain], true) {
+        if std::mem::replace(&mut reported[o.grain], true) {
             continue;
         }
-        let (grain, site) = (&grains[o.grain], &sites[o.grain]);
+        let (grain, placement) = (&grains[o.grain], &placements[o.grain]);
         if let Some((axis, extent)) = too_large(grain, enclosure) {
-            larger_than_the_box(check, o.grain, site, enclosure, axis, extent);
+            report_too_large(check, o.grain, &placement.size, enclosure, axis, extent);
             continue;
         }
-        let (side, face) = (
-            ["lower", "upper"][o.side],
-            [enclosure.lower, enclosure.upper][o.side][o.axis],
-        );
+        let face = [enclosure.lower, enclosure.upper][o.side][o.axis];
+        let (by, axis, side) = (millimetres(o.by), AXES[o.axis], SIDES[o.side]);
         let what = if o.centroid {
             "lies outside the box"
         } else {
             "crosses a face of the box"
         };
         let message = format!(
-            "grain {} {what}: it reaches {} beyond the {side} {} face (at {})",
+            "grain {} {what}: it reaches {by} beyond the {side} {axis} face (at {})",
             o.grain,
-            millimetres(o.by),
-            AXES[o.axis],
             length(face)
         );
         let help = format!(
-            "move it by at least {} along {}{}, or make the box larger{}",
-            millimetres(o.by),
+            "move it by at least {by} along {}{axis}, or make the box larger{}",
             ["", "-"][o.side],
-            AXES[o.axis],
-            forgotten(check, grain, site, enclosure)
+            placement.forgotten_unit(check, grain, enclosure)
         );
-        site.fail(check, message, help);
+        check.fail(&placement.span, message, help);
     }
-    for (i, (grain, site)) in grains.iter().zip(sites).enumerate() {
-        for (axis, name) in AXES.into_iter().enumerate() {
-            let (x, lower, upper) = (
-                grain.pose.position[axis],
-                enclosure.lower[axis],
-                enclosure.upper[axis],
-            );
-            if enclosure.periodic[axis] && !(lower..=upper).contains(&x) {
+    for (i, (grain, placement)) in grains.iter().zip(placements).enumerate() {
+        for axis in (0..3).filter(|axis| enclosure.periodic[*axis]) {
+            let x = grain.pose.position[axis];
+            let (lower, upper) = (enclosure.lower[axis], enclosure.upper[axis]);
+            if !(lower..=upper).contains(&x) {
                 let message = format!(
-                    "grain {i} lies outside the box: {name} = {}, the box goes from {} to {}",
+                    "grain {i} lies outside the box: {} = {}, the box goes from {} to {}",
+                    AXES[axis],
                     length(x),
                     length(lower),
                     length(upper)
                 );
                 let help = format!(
                     "move it into the box (the axis is periodic){}",
-                    forgotten(check, grain, site, enclosure)
+                    placement.forgotten_unit(check, grain, enclosure)
                 );
-                site.fail(check, message, help);
+                check.fail(&placement.span, message, help);
             }
         }
     }
 }
 
-/// The first axis with faces along which the grain does not fit into the box, and its extent there [m].
+/// Returns the first non-periodic axis along which the grain exceeds the box, and its extent [m].
 fn too_large(grain: &Grain, enclosure: &Enclosure) -> Option<(usize, f64)> {
     let extent = |axis: usize| {
-        let (lower, upper) = reach(grain, axis);
-        upper - lower
+        let (lower, upper) = extent_along(grain, axis);
+        (axis, upper - lower)
     };
-    let faces = (0..3).filter(|axis| !enclosure.is_periodic(*axis));
-    faces
-        .map(|axis| (axis, extent(axis)))
+    let axes = (0..3).filter(|axis| !enclosure.is_periodic(*axis));
+    axes.map(extent)
         .find(|(axis, extent)| *extent > enclosure.size()[*axis])
 }
 
-/// No move helps a grain that does not fit.
-fn larger_than_the_box(
+fn report_too_large(
     check: &mut Checker,
     index: usize,
-    site: &Site,
+    size: &Span,
     enclosure: &Enclosure,
     axis: usize,
     extent: f64,
 ) {
-    let room = enclosure.size()[axis];
-    let (key, span) = &site.size;
-    let unit = if extent > FAR * room && check.is_bare(key) {
+    let available = enclosure.size()[axis];
+    let unit = if extent > FAR * available && check.is_bare(check.key(size)) {
         FORGOTTEN
     } else {
         ""
     };
-    check.fail(
-        span.as_ref(),
-        key,
-        format!(
-            "grain {index} is larger than the box: {} along {}, the box has {}",
-            length(extent),
-            AXES[axis],
-            length(room)
-        ),
-        format!("scale it with equivalent_diameter, or make the box larger{unit}"),
+    let message = format!(
+        "grain {index} is larger than the box: {} along {}, the box has {}",
+        length(extent),
+        AXES[axis],
+        length(available)
     );
+    let help = format!("scale it with equivalent_diameter, or make the box larger{unit}");
+    check.fail(size, message, help);
 }
 
-/// Asks for a unit where a coordinate without one lies far outside the box.
-fn forgotten(check: &Checker, grain: &Grain, site: &Site, enclosure: &Enclosure) -> &'static str {
-    let x = grain.pose.position;
-    let away = (enclosure.lower - x).max(x - enclosure.upper);
-    let far = |axis: usize| away[axis] > FAR * enclosure.size()[axis];
-    if (0..3).any(|axis| far(axis) && check.is_bare(&site.coordinates[axis])) {
-        FORGOTTEN
-    } else {
-        ""
-    }
-}
-
-fn apart(check: &mut Checker, grains: &[Grain], sites: &[Site], enclosure: &Enclosure) {
+fn check_overlaps(
+    check: &mut Checker,
+    grains: &[Grain],
+    placements: &[Placement],
+    enclosure: &Enclosure,
+) {
     for overlap in overlaps(grains, enclosure) {
         let i = overlap.grain;
         let Partner::Grain(j) = overlap.partner else {
             continue;
         };
+        let depth = millimetres(overlap.depth);
         if i == j {
-            let message = format!(
-                "grain {i} touches its own image across the periodic box (by {})",
-                millimetres(overlap.depth)
-            );
-            let help = "make the box larger or the grain smaller".to_string();
-            sites[i].fail(check, message, help);
+            let message =
+                format!("grain {i} touches its own image across the periodic box (by {depth})");
+            let help = "make the box larger or the grain smaller";
+            check.fail(&placements[i].span, message, help);
             continue;
         }
         let (first, second) = (i.min(j), i.max(j));
-        let message = format!(
-            "grains {first} and {second} overlap at the start by {}",
-            millimetres(overlap.depth)
-        );
-        let help = "move them apart; contact begins with grains that do not touch".to_string();
-        let to_blame = if sites[first].overridden && !sites[second].overridden {
+        let message = format!("grains {first} and {second} overlap at the start by {depth}");
+        let help = "move them apart; contact begins with grains that do not touch";
+        let moved = if placements[first].overridden && !placements[second].overridden {
             first
         } else {
             second
         };
-        sites[to_blame].fail(check, message, help);
+        check.fail(&placements[moved].span, message, help);
     }
 }
 
-/// Pairs that share space. Where the centre of one grain lies in the other, the depth of surface
-/// points says little, and nothing where both surfaces are the same.
+/// Returns the pairs that overlap.
+///
+/// If a grain contains the centre of another, the overlap depth of the surface nodes is no measure
+/// of the overlap; [`nested`] replaces it.
 fn overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap> {
     let mut found = initial_overlaps(grains, enclosure);
     for (i, a) in grains.iter().enumerate() {
@@ -265,8 +243,8 @@ fn overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap> {
     found
 }
 
-/// Shortest move that surely parts two grains of which one has its centre in the other [m]: along
-/// the line of centres or an axis. Exact for spheres.
+/// Returns the shortest separating displacement of two grains of which one contains the centre of
+/// the other [m], along the line of centres or an axis. Exact for spheres.
 fn nested(a: &Grain, b: &Grain, enclosure: &Enclosure) -> Option<f64> {
     let line = enclosure.nearest_image(b.pose.position - a.pose.position);
     let holds = |grain: &Grain, x: DVec3| {
@@ -283,16 +261,16 @@ fn nested(a: &Grain, b: &Grain, enclosure: &Enclosure) -> Option<f64> {
         .reduce(f64::min)
 }
 
-/// How far the grain reaches from its centre in a direction [m].
+/// Returns the extent of the grain from its centre in a direction [m].
 fn extent(grain: &Grain, direction: DVec3) -> f64 {
     let mut turned = grain.clone();
     turned.pose.position = DVec3::ZERO;
     turned.pose.orientation =
         DQuat::from_rotation_arc(direction, DVec3::Z) * grain.pose.orientation;
-    reach(&turned, 2).1
+    extent_along(&turned, 2).1
 }
 
-/// A length [m] for people who place grains: in millimetres, where it is not far beyond them.
+/// Formats a length [m] in millimetres if it is below one metre.
 fn millimetres(x: f64) -> String {
     if x.abs() < 1.0 {
         format!("{:.4} mm", 1e3 * x)

@@ -1,14 +1,12 @@
-//! Collects the problems of a case, each with its place.
-
-use std::ops::Range;
+//! Collector of the problems of a case.
 
 use crate::case::error::Problem;
-use crate::case::loc::Loc;
+use crate::case::located::{Located, Span};
+use crate::case::number_format::{number, quantity};
 use crate::case::quantity::{Kind, Quantity};
-use crate::case::readable::{number, quantity};
 use crate::case::source::Source;
 
-/// Collects problems; a case is good when there are none.
+/// Collector of problems; a case without problems is valid.
 pub(super) struct Checker<'a> {
     source: &'a Source,
     pub problems: Vec<Problem>,
@@ -16,62 +14,55 @@ pub(super) struct Checker<'a> {
 
 impl<'a> Checker<'a> {
     pub fn new(source: &'a Source) -> Checker<'a> {
-        Checker {
-            source,
-            problems: Vec::new(),
-        }
+        let problems = Vec::new();
+        Checker { source, problems }
     }
 
-    /// Notes a problem of `key`, written at `span` unless it is a default.
-    pub fn fail(
-        &mut self,
-        span: Option<&Range<usize>>,
-        key: &str,
-        message: impl Into<String>,
-        help: impl Into<String>,
-    ) {
-        let problem = Problem::new(message).key(key).help(help);
+    /// Reports a problem of the value at `span`; its key follows from the position.
+    pub fn fail(&mut self, span: &Span, message: impl Into<String>, help: impl Into<String>) {
+        let problem = Problem::new(message).help(help);
+        let located = self.source.locate(problem, span.as_ref(), "here");
+        self.problems.push(located);
+    }
+
+    /// Reports a problem of `key`, which is not written in the file.
+    pub fn fail_key(&mut self, key: &str, message: impl Into<String>, help: impl Into<String>) {
         self.problems
-            .push(self.source.locate(problem, span, "here"));
+            .push(Problem::new(message).key(key).help(help));
     }
 
-    /// Whether a value at `key` or under it is written as a number without a unit.
+    /// Returns the dotted key of the value at `span`; empty for a default.
+    pub fn key(&self, span: &Span) -> &str {
+        let key = span.as_ref().and_then(|span| self.source.key_at(span));
+        key.unwrap_or_default()
+    }
+
+    /// Returns whether a value at `key` or below it is written as a number without a unit.
     pub fn is_bare(&self, key: &str) -> bool {
         self.source.is_bare(key)
     }
 
-    /// Whether an override set what stands at `span`, or a part of it.
-    pub fn is_overridden(&self, span: &Range<usize>) -> bool {
-        self.source.is_overridden(span)
+    /// Returns whether an override set the value at `span` or a part of it.
+    pub fn is_overridden(&self, span: &Span) -> bool {
+        (span.as_ref()).is_some_and(|span| self.source.is_overridden(span))
     }
 
-    /// The value if it is above zero.
-    pub fn positive<K: Kind>(
-        &mut self,
-        value: &Loc<Quantity<K>>,
-        key: &str,
-        what: &str,
-    ) -> Option<f64> {
+    /// Returns the value if it is above zero.
+    pub fn positive<K: Kind>(&mut self, value: &Located<Quantity<K>>, name: &str) -> Option<f64> {
         if value.si > 0.0 {
             return Some(value.si);
         }
-        self.fail(
-            value.span.as_ref(),
-            key,
-            format!(
-                "{what} must be greater than zero, found {}",
-                quantity(value.si, K::SI)
-            ),
-            format!("give a positive `{key}`"),
-        );
+        let found = quantity(value.si, K::SI);
+        let message = format!("{name} must be greater than zero, found {found}");
+        let help = format!("give a positive `{}`", self.key(&value.span));
+        self.fail(&value.span, message, help);
         None
     }
 
-    /// The value if it lies in `low..=high`.
+    /// Returns the value if it lies in `low..=high`.
     pub fn within<K: Kind>(
         &mut self,
-        value: &Loc<Quantity<K>>,
-        key: &str,
+        value: &Located<Quantity<K>>,
         low: f64,
         high: f64,
     ) -> Option<f64> {
@@ -83,12 +74,14 @@ impl<'a> Checker<'a> {
         } else {
             format!("at least {}", number(low))
         };
-        self.fail(
-            value.span.as_ref(),
-            key,
-            format!("found {}, which is out of range", quantity(value.si, K::SI)),
-            format!("`{key}` must be {range}"),
-        );
+        let message = format!("found {}, which is out of range", quantity(value.si, K::SI));
+        let help = format!("`{}` must be {range}", self.key(&value.span));
+        self.fail(&value.span, message, help);
         None
+    }
+
+    /// Returns the value if it is zero or more.
+    pub fn not_negative<K: Kind>(&mut self, value: &Located<Quantity<K>>) -> Option<f64> {
+        self.within(value, 0.0, f64::INFINITY)
     }
 }

@@ -1,187 +1,156 @@
 //! `[[packing]]` -> raw grains.
 
 use super::check::Checker;
-use super::grains::{not_too_light, shape};
-use crate::case::loc::Loc;
-use crate::case::packing::{Ball, Random, Space, orientation};
+use super::grains::{Grains, not_too_light, shape};
+use crate::case::located::Located;
+use crate::case::number_format::vector;
+use crate::case::packing::{Random, Region, Sphere, orientation};
 use crate::case::quantity::Quantity;
 use crate::case::raw::{
-    Arrangement, Orientation, PackingOrientation, Position, RawGrain, RawPacking,
+    Arrangement, Bounds, Orientation, PackingOrientation, Position, RawGrain, RawPacking,
 };
-use crate::case::readable::vector;
-use crate::case::shapes::Library;
-use grainwake_solver::dem::{Enclosure, Grain};
+use grainwake_solver::dem::Enclosure;
 use rand::{RngExt, SeedableRng};
 
-/// Grains of a packing as the raw grains that stand for them.
+/// Largest number of grains of a packing.
+const MOST_GRAINS: usize = 1_000_000;
+
+/// Returns the grains of a packing as raw grains; `None` after a problem.
 pub(super) fn packing(
     check: &mut Checker,
-    library: &mut Library,
-    raw: &Loc<RawPacking>,
-    index: usize,
-    standing: &[Grain],
+    grains: &mut Grains,
+    raw: &Located<RawPacking>,
     enclosure: &Enclosure,
-    vertical: (usize, f64),
     fluid_density: Option<f64>,
-) -> Vec<RawGrain> {
-    let key = |name: &str| format!("packing.{index}.{name}");
+) -> Option<Vec<RawGrain>> {
     let count = raw.count.value;
-    let kinds = raw.files.len() + raw.shapes.len();
-    if kinds == 0 || count == 0 {
-        check.fail(
-            raw.span.as_ref(),
-            &format!("packing.{index}"),
-            "there is nothing to pack",
-            "give a count and files = [...] or shapes = [...]",
-        );
-        return Vec::new();
+    if raw.files.is_empty() && raw.shapes.is_empty() || count == 0 {
+        let help = "give a count and files = [...] or shapes = [...]";
+        check.fail(&raw.span, "there is nothing to pack", help);
+        return None;
     }
-    if count > 1_000_000 {
+    if count > MOST_GRAINS {
+        let message = format!("{count} grains are too many");
         check.fail(
-            raw.count.span.as_ref(),
-            &key("count"),
-            format!("{count} grains are too many"),
-            "at most 1000000 grains",
+            &raw.count.span,
+            message,
+            format!("at most {MOST_GRAINS} grains"),
         );
-        return Vec::new();
+        return None;
     }
-    let (Some(_), Some(jitter), Some(clearance)) = (
-        check.positive(&raw.density, &key("density"), "the density of a grain"),
-        check.within(&raw.jitter, &key("jitter"), 0.0, 1.0),
-        check.within(&raw.clearance, &key("clearance"), 0.0, f64::INFINITY),
-    ) else {
-        return Vec::new();
-    };
-    not_too_light(check, &raw.density, &key("density"), fluid_density);
-    let diameters = raw.equivalent_diameter.as_ref();
-    if let Some(range) = diameters.filter(|r| !(r.from > 0.0 && r.to >= r.from)) {
-        check.fail(
-            range.span.as_ref(),
-            &key("equivalent_diameter"),
-            "the range of diameters is empty or not positive",
-            "write { from = \"1 mm\", to = \"2 mm\" }",
-        );
-        return Vec::new();
-    }
+    let density = check.positive(&raw.density, "the density of a grain");
+    let jitter = check.within(&raw.jitter, 0.0, 1.0);
+    let clearance = check.not_negative(&raw.clearance);
+    density?;
+    let (jitter, clearance) = (jitter?, clearance?);
+    not_too_light(check, &raw.density, fluid_density);
     let mut random = Random::seed_from_u64(raw.seed);
-    let mut grains = Vec::with_capacity(count);
-    let mut radii = Vec::with_capacity(count);
-    for n in 0..count {
-        let kind = n % kinds;
-        let mut grain = RawGrain {
-            density: raw.density.clone(),
-            velocity: Some(raw.velocity.clone()),
-            nodes: if kind < raw.files.len() {
-                None
-            } else {
-                raw.nodes.clone()
-            },
-            ..RawGrain::default()
-        };
-        if kind < raw.files.len() {
-            grain.file = Some(raw.files[kind].clone());
-        } else {
-            grain.shape = Some(raw.shapes[kind - raw.files.len()].clone());
-        }
-        if let Some(range) = diameters {
-            let d = if range.to > range.from {
-                range.from + (range.to - range.from) * random.random::<f64>()
-            } else {
-                range.from
-            };
-            grain.equivalent_diameter = Some(Loc {
-                value: Quantity::new(d),
-                span: range.span.clone(),
-            });
-        }
-        if raw.orientation == PackingOrientation::Random {
-            grain.orientation = Orientation::Quaternion(orientation(&mut random)).into();
-        }
-        let mut scratch = grain.clone();
-        let located = Loc {
-            value: grain.clone(),
-            span: raw.span.clone(),
-        };
-        // The key would name a grain that is not in the file: a packing's shape is its own.
-        let problems = check.problems.len();
-        let Some(shape) = shape(check, library, &located, &mut scratch, n) else {
-            for problem in &mut check.problems[problems..] {
-                problem.key = Some(format!("packing.{index}"));
-            }
-            return Vec::new();
-        };
-        radii.push(shape.bounding_radius());
-        grains.push(grain);
-    }
-    let (lower, upper) = raw
-        .region
-        .as_ref()
-        .map_or((enclosure.lower, enclosure.upper), |r| {
-            (r.lower.si, r.upper.si)
-        });
-    let region_span = raw
-        .region
-        .as_ref()
-        .map_or(raw.span.as_ref(), |r| r.span.as_ref());
+    let (mut packed, radii) = members(check, grains, raw, &mut random)?;
+
+    let (lower, upper) = (raw.region.as_ref()).map_or((enclosure.lower, enclosure.upper), |r| {
+        (r.lower.si, r.upper.si)
+    });
+    let region_span = raw.region.as_ref().map_or(&raw.span, |region| &region.span);
     if (lower.cmplt(enclosure.lower) | upper.cmpgt(enclosure.upper) | upper.cmple(lower)).any() {
+        let (from, to) = (vector(enclosure.lower, "m"), vector(enclosure.upper, "m"));
+        let message = "the region is empty or reaches out of the box";
         check.fail(
             region_span,
-            &key("region"),
-            "the region is empty or reaches out of the box",
-            format!(
-                "the box goes from {} to {}",
-                vector(enclosure.lower, "m"),
-                vector(enclosure.upper, "m")
-            ),
+            message,
+            format!("the box goes from {from} to {to}"),
         );
-        return Vec::new();
+        return None;
     }
-    let taken: Vec<Ball> = standing
-        .iter()
-        .map(|g| Ball {
-            centre: g.pose.position,
-            radius: g.shape.bounding_radius(),
-        })
+    let sphere = |centre, radius| Sphere { centre, radius };
+    let taken: Vec<Sphere> = (grains.built.iter().flatten())
+        .map(|grain| sphere(grain.pose.position, grain.shape.bounding_radius()))
         .collect();
-    let space = Space {
+    let region = Region {
         lower,
         upper,
         clearance,
         enclosure,
         taken: &taken,
     };
+    let vertical = (grains.vertical.axis, grains.vertical.sign);
     let centres = match raw.arrangement {
-        Arrangement::Lattice => space.lattice(&radii, jitter, vertical, &mut random),
-        Arrangement::Random => space.random(&radii, &mut random),
+        Arrangement::Lattice => region.lattice(&radii, jitter, vertical, &mut random),
+        Arrangement::Random => region.random(&radii, &mut random),
     };
-    let centres = match centres {
-        Ok(centres) => centres,
-        Err(fit) => {
-            let count_span = raw.count.span.as_ref();
-            let span = count_span.filter(|span| check.is_overridden(span));
-            check.fail(span.or(region_span), &format!("packing.{index}"), format!("only {fit} of {count} grains find a place without touching"), "take fewer or smaller grains, a larger region, or less clearance; a lattice holds more than random places");
-            return Vec::new();
-        }
+    let refused = |capacity| {
+        let by_count = check.is_overridden(&raw.count.span);
+        let span = if by_count {
+            &raw.count.span
+        } else {
+            region_span
+        };
+        let message = format!("only {capacity} of {count} grains find a place without touching");
+        let help = "take fewer or smaller grains, a larger region, or less clearance; a lattice holds more than random places";
+        check.fail(span, message, help);
     };
-    let balls: Vec<Ball> = centres
-        .iter()
-        .zip(&radii)
-        .map(|(c, r)| Ball {
-            centre: *c,
-            radius: *r,
-        })
+    let centres = centres.map_err(refused).ok()?;
+    let pairs = centres.iter().zip(&radii);
+    let spheres: Vec<Sphere> = pairs
+        .map(|(centre, radius)| sphere(*centre, *radius))
         .collect();
-    if !space.clear(&balls) {
-        check.fail(
-            region_span,
-            &format!("packing.{index}"),
-            "the packing runs into grains that already stand there",
-            "choose a region that is free, or arrangement = \"random\"",
-        );
-        return Vec::new();
+    if !region.clear(&spheres) {
+        let message = "the packing runs into grains that already stand there";
+        let help = "choose a region that is free, or arrangement = \"random\"";
+        check.fail(region_span, message, help);
+        return None;
     }
-    for (grain, centre) in grains.iter_mut().zip(centres) {
+    for (grain, centre) in packed.iter_mut().zip(centres) {
         grain.position = Some(Position(centre.to_array().to_vec()).into());
     }
-    grains
+    Some(packed)
+}
+
+/// Returns the grains of a packing without their positions, and their bounding radii [m].
+fn members(
+    check: &mut Checker,
+    grains: &mut Grains,
+    raw: &Located<RawPacking>,
+    random: &mut Random,
+) -> Option<(Vec<RawGrain>, Vec<f64>)> {
+    let diameters = raw.equivalent_diameter.as_ref().map(|range| {
+        let Bounds { from, to } = range.value.0;
+        (from.si, to.si, &range.span)
+    });
+    if let Some((_, _, span)) = diameters.filter(|(from, to, _)| !(*from > 0.0 && to >= from)) {
+        let message = "the range of diameters is empty or not positive";
+        check.fail(span, message, "write { from = \"1 mm\", to = \"2 mm\" }");
+        return None;
+    }
+    let files = raw.files.len();
+    let mut packed = Vec::with_capacity(raw.count.value);
+    let mut radii = Vec::with_capacity(raw.count.value);
+    for n in 0..raw.count.value {
+        let kind = n % (files + raw.shapes.len());
+        let mut grain = RawGrain {
+            density: raw.density.clone(),
+            velocity: Some(raw.velocity.clone()),
+            file: raw.files.get(kind).cloned(),
+            ..RawGrain::default()
+        };
+        if kind >= files {
+            grain.shape = Some(raw.shapes[kind - files].clone());
+            grain.nodes = raw.nodes.clone();
+        }
+        if let Some((from, to, span)) = diameters {
+            let d = if to > from {
+                from + (to - from) * random.random::<f64>()
+            } else {
+                from
+            };
+            grain.equivalent_diameter = Some(Located::at(Quantity::new(d), span.clone()));
+        }
+        if raw.orientation == PackingOrientation::Random {
+            grain.orientation = Orientation::Quaternion(orientation(random)).into();
+        }
+        let located = Located::at(grain.clone(), raw.span.clone());
+        let shape = shape(check, &mut grains.library, &located, &mut grain.clone())?;
+        radii.push(shape.bounding_radius());
+        packed.push(grain);
+    }
+    Some((packed, radii))
 }

@@ -4,64 +4,56 @@ use glam::DVec3;
 
 use super::check::Checker;
 use super::materials::restitution;
-use crate::case::estimate::impact_speed;
-use crate::case::loc::Loc;
-use crate::case::quantity::Quantity;
+use crate::case::located::{Located, Span};
+use crate::case::number_format::length;
+use crate::case::quantity::{Number, Quantity};
 use crate::case::raw::{RawContact, RawFluid};
-use crate::case::readable::length;
+use crate::case::settling::{impact_speed, smallest_diameter};
 use grainwake_solver::dem::{ContactLawKind, ContactParams, Grain, Material};
 use grainwake_solver::flow::FluidParams;
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::Prescription;
 
-/// Largest overlap at impact where neither stiffness nor overlap is given [diameters].
+/// Default of the largest overlap at impact [diameters].
 const MAXIMUM_OVERLAP: f64 = 0.01;
-/// Roughness over the smallest equal-volume radius, where none is given.
+/// Default of the roughness, relative to the smallest equal-volume radius.
 const ROUGHNESS: f64 = 3e-3;
-/// Added mass of a sphere in contact over the mass of the displaced fluid.
+/// Added mass of a sphere in contact, relative to the displaced fluid.
 ///
-/// Potential flow gives 0.5 far from a wall and 0.803 at it (Hicks 1879), the grid 0.75. With 0.7,
-/// undamped impacts conserve the speed (`docs/decisions/0014-contact-with-the-fluid-response.md`).
+/// Potential flow gives 0.5 far from a wall and 0.803 at it (Hicks 1879); the grid gives 0.75. With
+/// 0.7 an undamped impact conserves the speed
+/// (`docs/decisions/0014-contact-with-the-fluid-response.md`).
 const ADDED_MASS: f64 = 0.7;
 
-/// The fluid; the viscosity is kept as a kinematic one.
+/// Returns the fluid and its formulas; writes the viscosity as a kinematic one.
 pub(super) fn fluid(
     check: &mut Checker,
-    raw: &mut Loc<RawFluid>,
-    given: &mut Prescription,
+    raw: &mut Located<RawFluid>,
+    prescription: &mut Prescription,
 ) -> Option<FluidParams> {
-    let density = check.positive(&raw.density, "fluid.density", "the density of the fluid");
-    let span = raw.span.clone();
-    let fluid = &mut raw.value;
-    let kinematic_viscosity = match (&fluid.viscosity, &fluid.kinematic_viscosity) {
+    let density = check.positive(&raw.density, "the density of the fluid");
+    let kinematic_viscosity = match (&raw.viscosity, &raw.kinematic_viscosity) {
         (Some(mu), None) => check
-            .positive(mu, "fluid.viscosity", "the viscosity")
+            .positive(mu, "the viscosity")
             .zip(density)
             .map(|(mu, rho)| mu / rho),
-        (None, Some(nu)) => check.positive(nu, "fluid.kinematic_viscosity", "the viscosity"),
+        (None, Some(nu)) => check.positive(nu, "the viscosity"),
         (Some(mu), Some(_)) => {
-            check.fail(
-                mu.span.as_ref(),
-                "fluid.viscosity",
-                "both viscosity and kinematic_viscosity are given",
-                "keep one of them",
-            );
+            let message = "both viscosity and kinematic_viscosity are given";
+            check.fail(&mu.span, message, "keep one of them");
             None
         }
         (None, None) => {
-            check.fail(
-                span.as_ref(),
-                "fluid",
-                "the viscosity is missing",
-                "add viscosity = \"1 mPa s\" or kinematic_viscosity = \"1 cSt\"",
-            );
+            let help = "add viscosity = \"1 mPa s\" or kinematic_viscosity = \"1 cSt\"";
+            check.fail(&raw.span, "the viscosity is missing", help);
             None
         }
     };
+    let fluid = &mut raw.value;
     let (body_acceleration, formula) = fluid.body_acceleration.parts();
-    given.body_acceleration = formula;
+    prescription.body_acceleration = formula;
     let (initial_velocity, formula) = fluid.initial_velocity.parts();
-    given.initial_velocity = formula;
+    prescription.initial_velocity = formula;
     let params = FluidParams {
         density: density?,
         kinematic_viscosity: kinematic_viscosity?,
@@ -74,37 +66,31 @@ pub(super) fn fluid(
     Some(params)
 }
 
-/// Refuses formulas of the fluid that give no number.
-pub(super) fn defined(check: &mut Checker, raw: &RawFluid, given: &Prescription, mesh: &Mesh) {
-    let nowhere = given.initial_speed(mesh).is_some_and(f64::is_nan);
-    let never = given.body_acceleration(0.0).is_some_and(DVec3::is_nan);
-    let found = [
-        (
-            nowhere,
-            &raw.initial_velocity.span,
-            "initial_velocity",
-            "everywhere in the box",
-        ),
-        (
-            never,
-            &raw.body_acceleration.span,
-            "body_acceleration",
-            "at t = 0",
-        ),
-    ];
-    for (undefined, span, name, place) in found {
+/// Refuses formulas of the fluid without a finite value.
+pub(super) fn formulas(check: &mut Checker, raw: &RawFluid, given: &Prescription, mesh: &Mesh) {
+    let mut refuse = |undefined: bool, span: &Span, place: &str| {
         if undefined {
-            check.fail(
-                span.as_ref(),
-                &format!("fluid.{name}"),
-                format!("the formula does not give a finite number {place}"),
-                "avoid divisions by zero and roots or logarithms of negative numbers",
-            );
+            let message = format!("the formula does not give a finite number {place}");
+            let help = "avoid divisions by zero and roots or logarithms of negative numbers";
+            check.fail(span, message, help);
         }
-    }
+    };
+    let speed = given.initial_speed(mesh);
+    let everywhere = "everywhere in the box";
+    refuse(
+        speed.is_some_and(f64::is_nan),
+        &raw.initial_velocity.span,
+        everywhere,
+    );
+    let acceleration = given.body_acceleration(0.0);
+    refuse(
+        acceleration.is_some_and(DVec3::is_nan),
+        &raw.body_acceleration.span,
+        "at t = 0",
+    );
 }
 
-/// The contact law; a stiffness that is not given follows from the largest overlap.
+/// Returns the contact parameters. A stiffness that is not given follows from the largest overlap.
 pub(super) fn contact(
     check: &mut Checker,
     raw: &mut RawContact,
@@ -115,66 +101,39 @@ pub(super) fn contact(
     mesh: &Mesh,
 ) -> Option<ContactParams> {
     let before = check.problems.len();
-    let infinite = f64::INFINITY;
     let defaults = ContactParams::default();
-    let law = raw.law.value;
-    let tangential_ratio = match &raw.tangential_ratio {
-        Some(ratio) => check.within(ratio, "contact.tangential_ratio", 0.0, infinite),
-        None => Some(defaults.tangential_ratio),
+    let mut or_default = |value: &Option<Located<Quantity<Number>>>, default| match value {
+        Some(value) => check.not_negative(value),
+        None => Some(default),
     };
-    let friction = check.within(&raw.friction, "contact.friction", 0.0, infinite);
-    let wall_friction = match &raw.wall_friction {
-        Some(wall) => check.within(wall, "contact.wall_friction", 0.0, infinite),
-        None => friction,
-    };
-    let restitution = restitution(check, &raw.restitution, "contact.restitution");
-    let tangential_damping = match &raw.tangential_damping {
-        Some(damping) => check.within(damping, "contact.tangential_damping", 0.0, infinite),
-        None => Some(defaults.tangential_damping),
-    };
-    let global_damping = check.within(&raw.global_damping, "contact.global_damping", 0.0, infinite);
-    let lubrication_gap = check.within(
-        &raw.lubrication_gap,
-        "contact.lubrication_gap",
-        0.0,
-        infinite,
-    );
+    let tangential_ratio = or_default(&raw.tangential_ratio, defaults.tangential_ratio);
+    let tangential_damping = or_default(&raw.tangential_damping, defaults.tangential_damping);
+    let wall_friction = or_default(&raw.wall_friction, raw.friction.si);
+    let friction = check.not_negative(&raw.friction);
+    let restitution = restitution(check, &raw.restitution);
+    let global_damping = check.not_negative(&raw.global_damping);
+    let lubrication_gap = check.not_negative(&raw.lubrication_gap);
     let roughness = match &raw.roughness {
-        Some(given) => check.positive(given, "contact.roughness", "the roughness"),
+        Some(given) => check.positive(given, "the roughness"),
         None => Some(ROUGHNESS * 0.5 * smallest_diameter(grains)),
     };
-    let substeps = check.within(
-        &raw.substeps_per_contact,
-        "contact.substeps_per_contact",
-        5.0,
-        1e6,
-    );
-    let viscosity = fluid.map_or(0.0, |f| f.density * f.kinematic_viscosity);
+    let substeps = check.within(&raw.substeps_per_contact, 5.0, 1e6);
     if let Some(gap) = lubrication_gap.filter(|gap| *gap > 0.0 && fluid.is_none()) {
-        check.fail(
-            raw.lubrication_gap.span.as_ref(),
-            "contact.lubrication_gap",
-            format!("a lubrication gap of {} needs a fluid", length(gap)),
-            "add [fluid] or set lubrication_gap = 0",
-        );
+        let message = format!("a lubrication gap of {} needs a fluid", length(gap));
+        let help = "add [fluid] or set lubrication_gap = 0";
+        check.fail(&raw.lubrication_gap.span, message, help);
     }
+    let law = raw.law.value;
+    let for_overlap = |overlap| stiffness_for(overlap, grains, fluid, gravity, mesh);
     let stiffness = match (&raw.stiffness, &raw.maximum_overlap) {
         (Some(k), Some(_)) => {
-            check.fail(
-                k.span.as_ref(),
-                "contact.stiffness",
-                "both stiffness and maximum_overlap are given",
-                "keep one of them",
-            );
+            let message = "both stiffness and maximum_overlap are given";
+            check.fail(&k.span, message, "keep one of them");
             None
         }
-        (Some(k), None) => check.positive(k, "contact.stiffness", "the stiffness"),
-        (None, Some(overlap)) => check
-            .within(overlap, "contact.maximum_overlap", 1e-6, 0.2)
-            .map(|overlap| stiffness_for(overlap, grains, fluid, gravity, mesh)),
-        (None, None) if law == ContactLawKind::Linear => {
-            Some(stiffness_for(MAXIMUM_OVERLAP, grains, fluid, gravity, mesh))
-        }
+        (Some(k), None) => check.positive(k, "the stiffness"),
+        (None, Some(overlap)) => check.within(overlap, 1e-6, 0.2).map(for_overlap),
+        (None, None) if law == ContactLawKind::Linear => Some(for_overlap(MAXIMUM_OVERLAP)),
         (None, None) => Some(defaults.normal_stiffness),
     };
     if check.problems.len() > before {
@@ -191,7 +150,7 @@ pub(super) fn contact(
         wall_material: wall_material?,
         global_damping: global_damping?,
         lubrication_gap: lubrication_gap?,
-        lubrication_viscosity: viscosity,
+        lubrication_viscosity: fluid.map_or(0.0, |f| f.density * f.kinematic_viscosity),
         roughness: roughness?,
         added_density: fluid.map_or(0.0, |f| ADDED_MASS * f.density),
         substeps_per_contact: substeps?,
@@ -207,14 +166,6 @@ pub(super) fn contact(
     }
     raw.wall_friction = Some(Quantity::new(params.wall_friction).into());
     Some(params)
-}
-
-/// Smallest equal-volume diameter [m]; infinite without grains.
-fn smallest_diameter(grains: &[Grain]) -> f64 {
-    grains
-        .iter()
-        .map(|g| g.shape.equivalent_diameter())
-        .fold(f64::INFINITY, f64::min)
 }
 
 /// Stiffness [N/m] for which no grain that meets a wall at 1.5 times its settling speed (dry: after

@@ -1,73 +1,63 @@
-//! A value and where in the case file it was written.
+//! Values with their position in the case file.
 
 use std::borrow::Cow;
-use std::fmt;
 use std::ops::{Deref, Range};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_spanned::Spanned;
 
-/// A value with its place in the source; a default has no place.
-#[derive(Clone)]
-pub struct Loc<T> {
+/// Range of bytes in the source; none for a default.
+pub type Span = Option<Range<usize>>;
+
+/// Value with its position in the source. Comparison ignores the position.
+#[derive(Clone, Debug, Default)]
+pub struct Located<T> {
     /// The value.
     pub value: T,
     /// Bytes of the source it was read from.
-    pub span: Option<Range<usize>>,
+    pub span: Span,
 }
 
-impl<T> Loc<T> {
-    /// A value that was not written by the user.
-    pub const fn none(value: T) -> Loc<T> {
-        Loc { value, span: None }
+impl<T> Located<T> {
+    /// Returns a value of the program at the position of a value of the file.
+    pub const fn at(value: T, span: Span) -> Located<T> {
+        Located { value, span }
     }
 }
 
-impl<T> From<T> for Loc<T> {
+impl<T> From<T> for Located<T> {
     fn from(value: T) -> Self {
-        Loc::none(value)
+        Located::at(value, None)
     }
 }
-impl<T: Default> Default for Loc<T> {
-    fn default() -> Self {
-        Loc::none(T::default())
-    }
-}
-impl<T> Deref for Loc<T> {
+impl<T> Deref for Located<T> {
     type Target = T;
     fn deref(&self) -> &T {
         &self.value
     }
 }
-impl<T: PartialEq> PartialEq for Loc<T> {
+impl<T: PartialEq> PartialEq for Located<T> {
     fn eq(&self, other: &Self) -> bool {
         self.value == other.value
     }
 }
-impl<T: fmt::Debug> fmt::Debug for Loc<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.value.fmt(f)
-    }
-}
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Loc<T> {
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Located<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let spanned = Spanned::<T>::deserialize(deserializer)?;
-        Ok(Loc {
-            span: Some(spanned.span()),
-            value: spanned.into_inner(),
-        })
+        let span = Some(spanned.span());
+        Ok(Located::at(spanned.into_inner(), span))
     }
 }
 
-impl<T: Serialize> Serialize for Loc<T> {
+impl<T: Serialize> Serialize for Located<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.value.serialize(serializer)
     }
 }
 
-impl<T: JsonSchema> JsonSchema for Loc<T> {
+impl<T: JsonSchema> JsonSchema for Located<T> {
     fn inline_schema() -> bool {
         T::inline_schema()
     }

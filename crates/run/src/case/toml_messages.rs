@@ -1,6 +1,6 @@
-//! Messages of the TOML reader in the words of a case file.
+//! Messages of the TOML reader in terms of a case file.
 
-/// "integer `3`, expected struct RawFluid" in the words of a case file.
+/// Rewords "integer `3`, expected struct RawFluid".
 pub(super) fn wrong_kind(text: &str) -> String {
     let (found, expected) = text.split_once(", expected ").unwrap_or((text, ""));
     let found = match found.split_once(' ') {
@@ -19,7 +19,7 @@ pub(super) fn wrong_kind(text: &str) -> String {
     }
 }
 
-/// A kind of value of the TOML reader in the words of a case file.
+/// Rewords a type of the TOML reader.
 fn kind_of(expected: &str) -> String {
     let first = expected.split(' ').next().unwrap_or_default();
     match (first, expected) {
@@ -37,7 +37,7 @@ fn kind_of(expected: &str) -> String {
     }
 }
 
-/// Other messages of the TOML reader that name what only it knows.
+/// Rewords other messages of the TOML reader.
 pub(super) fn plainly(message: &str) -> String {
     let message = message.trim_end().replace('\n', "; ");
     if let Some((count, expected)) = message

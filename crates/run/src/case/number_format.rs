@@ -1,14 +1,19 @@
-//! Numbers as people write them, for messages.
+//! Number formatting of messages.
 
 use glam::DVec3;
 
+/// Names of the axes.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+/// Names of the two faces of an axis.
+pub(super) const SIDES: [&str; 2] = ["lower", "upper"];
+
 /// Units that take a prefix: those whose first part is not a power.
 const PREFIXED: [&str; 7] = ["m", "s", "m/s", "m/s2", "Pa s", "N/m", "L/s"];
-/// Prefixes, their powers of ten and the least number that takes them: "0.25 mm", but not "0.3 m".
-/// Beyond a thousand a plain number reads better than "1.2 ks".
+/// Prefixes with their powers of ten and the smallest number that takes them: "0.25 mm", but not
+/// "0.3 m". Numbers above one thousand take no prefix.
 const PREFIXES: [(&str, i32, f64); 4] = [("", 0, 1.0), ("m", 3, 0.1), ("u", 6, 0.1), ("n", 9, 0.1)];
 
-/// Six digits at most; powers of ten only where there would be many zeros.
+/// Formats a number with at most six digits; a power of ten replaces many zeros.
 pub fn number(value: f64) -> String {
     let rounded = six_digits(value);
     if rounded == 0.0 || (1e-4..1e9).contains(&rounded.abs()) {
@@ -18,7 +23,7 @@ pub fn number(value: f64) -> String {
     }
 }
 
-/// A value [SI] with its unit, "1" where it has none: "2.5 mm".
+/// Formats a value [SI] with its unit ("1" for none): "2.5 mm".
 pub fn quantity(value: f64, unit: &str) -> String {
     if unit == "1" {
         return number(value);
@@ -33,12 +38,12 @@ pub fn quantity(value: f64, unit: &str) -> String {
     format!("{} {prefix}{unit}", number(scaled(power)))
 }
 
-/// A length [m].
+/// Formats a length [m].
 pub fn length(value: f64) -> String {
     quantity(value, "m")
 }
 
-/// Three values [SI] with their unit: "[25 mm, 25 mm, 0 m]".
+/// Formats a vector [SI] with its unit: "[25 mm, 25 mm, 0 m]".
 pub(super) fn vector(value: DVec3, unit: &str) -> String {
     let parts = value.to_array().map(|x| quantity(x, unit));
     format!("[{}]", parts.join(", "))

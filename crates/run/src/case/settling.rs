@@ -1,0 +1,165 @@
+//! Settling of grains in closed form: Galileo number, settling speed, impact speed, time step.
+
+use glam::DVec3;
+
+use grainwake_solver::dem::{Dof, Grain};
+use grainwake_solver::flow::{Boundary, FluidParams};
+use grainwake_solver::grid::Mesh;
+use grainwake_solver::sim::{Setup, StepRule};
+
+/// Smallest density ratio of a free grain and the fluid, tested for spheres, flat and long grains.
+/// At a tenth of this ratio some grains become unstable.
+pub(super) const LIGHTEST_FREE: f64 = 0.01;
+
+/// Returns the Galileo number sqrt(|rho_p / rho_f - 1| g d^3) / nu of a grain.
+pub fn galileo(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
+    let d = grain.shape.equivalent_diameter();
+    ((grain.density / fluid.density - 1.0).abs() * g * d.powi(3)).sqrt() / fluid.kinematic_viscosity
+}
+
+/// Returns the drag coefficient of a sphere by Schiller and Naumann (0.44 from Re 1000 on).
+pub fn sphere_drag(reynolds: f64) -> f64 {
+    if reynolds >= 1000.0 {
+        0.44
+    } else {
+        24.0 / reynolds * (1.0 + 0.15 * reynolds.powf(0.687))
+    }
+}
+
+/// Returns the settling Reynolds number of an unbounded sphere of this Galileo number:
+/// C_D Re^2 = 4/3 Ga^2.
+pub fn settling_reynolds(galileo: f64) -> f64 {
+    let wanted = 4.0 / 3.0 * galileo * galileo;
+    if wanted <= 0.0 {
+        return 0.0;
+    }
+    let (mut low, mut high) = (1e-12_f64, 1e9_f64);
+    for _ in 0..200 {
+        let middle = (low * high).sqrt();
+        if sphere_drag(middle) * middle * middle < wanted {
+            low = middle
+        } else {
+            high = middle
+        }
+    }
+    (low * high).sqrt()
+}
+
+/// Returns the settling speed of the equal-volume sphere [m/s].
+pub fn terminal_speed(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
+    settling_reynolds(galileo(grain, fluid, g)) * fluid.kinematic_viscosity
+        / grain.shape.equivalent_diameter()
+}
+
+/// Returns the speed at which a grain may hit a wall [m/s]: 1.5 times its settling speed, without
+/// fluid the speed after falling through the box; at least its speed at the start.
+pub(super) fn impact_speed(
+    grain: &Grain,
+    fluid: Option<&FluidParams>,
+    gravity: DVec3,
+    mesh: &Mesh,
+) -> f64 {
+    let g = gravity.length();
+    let height = (mesh.extent() * gravity.normalize_or_zero()).length();
+    let falling = match fluid {
+        Some(fluid) => 1.5 * terminal_speed(grain, fluid, g),
+        None => (2.0 * g * height).sqrt(),
+    };
+    falling.max(grain.velocity.length())
+}
+
+/// Returns the step that the rule allows at the largest settling speed [s].
+pub(super) fn settled_time_step(setup: &Setup) -> f64 {
+    let g = setup.gravity.length();
+    let speed = setup.fluid.as_ref().map_or(0.0, |fluid| {
+        let free = setup.grains.iter().filter(|grain| is_free(grain));
+        let speeds = free.map(|grain| terminal_speed(grain, fluid, g));
+        speeds.fold(0.0, f64::max)
+    });
+    time_step(setup, speed)
+}
+
+/// Returns the step that the rule allows at `speed` [s].
+pub(super) fn time_step(setup: &Setup, speed: f64) -> f64 {
+    let resolved = (0..3).filter(|axis| setup.mesh.cells[*axis] > 1);
+    let h: Vec<f64> = resolved.map(|axis| setup.mesh.spacing[axis]).collect();
+    match setup.step {
+        StepRule::Fixed(step) => step,
+        StepRule::Limits {
+            cfl,
+            viscous,
+            max_step,
+        } => {
+            let Some(fluid) = &setup.fluid else {
+                return max_step;
+            };
+            let lids = setup.boundaries.0.iter().flatten().map(|b| match b {
+                Boundary::Wall { velocity } | Boundary::Inflow { velocity } => {
+                    velocity.abs().element_sum()
+                }
+                _ => 0.0,
+            });
+            let given = setup
+                .prescription
+                .initial_speed(&setup.mesh)
+                .unwrap_or(fluid.initial_velocity.abs().element_sum());
+            // The fluid beside a settling grain exceeds the speed of the grain.
+            let speed = lids.fold((1.4 * speed).max(given), f64::max);
+            let smallest = h.iter().copied().fold(f64::INFINITY, f64::min);
+            let inverse_squares: f64 = h.iter().map(|h| h.powi(-2)).sum();
+            (cfl * smallest / speed)
+                .min(viscous / (fluid.kinematic_viscosity * inverse_squares))
+                .min(max_step)
+        }
+    }
+}
+
+/// Returns the default of the longest step [s]: gravity moves a grain by one cell (dry: a fiftieth
+/// of its diameter) from rest in this time.
+pub(super) fn default_max_step(
+    mesh_spacing: DVec3,
+    grains: &[Grain],
+    gravity: DVec3,
+    dry: bool,
+    end: f64,
+) -> f64 {
+    let g = gravity.length();
+    let length = if dry {
+        smallest_diameter(grains) / 50.0
+    } else {
+        mesh_spacing.min_element()
+    };
+    let step = if g > 0.0 && length.is_finite() {
+        (2.0 * length / g).sqrt()
+    } else {
+        end / 100.0
+    };
+    step.min(end)
+}
+
+/// Returns whether the grain moves freely.
+pub(super) fn is_free(grain: &Grain) -> bool {
+    grain.translation == Dof::Free
+}
+
+/// Returns the smallest equal-volume diameter [m]; infinite without grains.
+pub(super) fn smallest_diameter(grains: &[Grain]) -> f64 {
+    let diameters = grains.iter().map(|grain| grain.shape.equivalent_diameter());
+    diameters.fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settling_numbers_of_the_paper() {
+        // Ga 198 settles at Re 271 by Schiller and Naumann.
+        let re = settling_reynolds(198.1);
+        assert!((re - 271.0).abs() < 3.0, "{re}");
+        // Stokes limit: Re = Ga^2 / 18.
+        let re = settling_reynolds(0.1);
+        assert!((re / (0.01 / 18.0) - 1.0).abs() < 0.01, "{re}");
+        assert_eq!(settling_reynolds(0.0), 0.0);
+    }
+}
