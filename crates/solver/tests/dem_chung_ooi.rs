@@ -4,8 +4,8 @@
 //! A bound is the measured deviation, stated beside it, rounded up. The digitised points have an
 //! error of about 0.01 of their axes.
 //!
-//! In the sliding regime all curves agree with closed forms. Where the contact sticks for most of its
-//! duration, the result depends on the tangential force during unloading and on the tangential
+//! In the sliding regime all curves agree with closed forms. Where the contact sticks for most of
+//! its duration, the result depends on the tangential force during unloading and on the tangential
 //! dashpot. The published codes keep k_t times displacement; here the force falls with k_t, so that
 //! no energy is created. Those points are left out, with their deviation stated.
 
