@@ -5,7 +5,7 @@
 //! the surface is a closed manifold if the border of the grid is outside.
 
 use crate::field::SampledField;
-use crate::triangles::TriangleMesh;
+use crate::triangles::{FACES, TriangleMesh};
 use glam::DVec3;
 use std::sync::LazyLock;
 
@@ -16,17 +16,6 @@ pub(crate) struct Samples<'a> {
     pub spacing: f64,
     pub values: &'a [f32],
 }
-
-/// Corner indices of the six faces, counter-clockwise seen from outside the cell; bits 0, 1 and 2
-/// of a corner are its x, y and z.
-pub(crate) const FACES: [[u8; 4]; 6] = [
-    [0, 4, 6, 2],
-    [1, 3, 7, 5],
-    [0, 1, 5, 4],
-    [2, 6, 7, 3],
-    [0, 2, 3, 1],
-    [4, 5, 7, 6],
-];
 
 /// Returns the index of the cell edge between two adjacent corners: 4 * axis + position.
 fn edge(a: u8, b: u8) -> usize {

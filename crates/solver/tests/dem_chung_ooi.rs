@@ -152,9 +152,9 @@ fn test_1_elastic_normal_impact_of_two_spheres() {
             open_box(0.1),
             expected.duration,
         );
-        // Measured: 1.6e-3, 6e-4, two steps in 2000, 1.5e-4. At an overlap of 2.5 % of the radius,
-        // friction between the tilted normals of the patch adds to the force.
-        check(&result, &expected, speed, [2e-3, 1e-3, 1.5e-3, 3e-4]);
+        // Measured, the larger of two materials: 2.3e-3, 9e-4, three steps in 2000, 2.3e-4. At an
+        // overlap of 2.5 % of the radius, friction between the tilted normals adds to the force.
+        check(&result, &expected, speed, [3e-3, 1.2e-3, 2.2e-3, 3e-4]);
     }
 }
 

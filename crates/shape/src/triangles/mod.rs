@@ -11,11 +11,22 @@ pub(crate) use cube_sphere::cube_sphere;
 
 use glam::{DMat3, DVec3};
 
+/// Corner indices of the six faces, counter-clockwise seen from outside the cell; bits 0, 1 and 2
+/// of a corner are its x, y and z.
+pub(crate) const FACES: [[u8; 4]; 6] = [
+    [0, 4, 6, 2],
+    [1, 3, 7, 5],
+    [0, 1, 5, 4],
+    [2, 6, 7, 3],
+    [0, 2, 3, 1],
+    [4, 5, 7, 6],
+];
+
 /// The unit cube with a corner at the origin, for tests.
 #[cfg(test)]
 pub(crate) fn unit_cube() -> TriangleMesh {
     let corner = |c: usize| DVec3::from_array([c & 1, c >> 1 & 1, c >> 2].map(|n| n as f64));
-    let quads = crate::surface::FACES.map(|quad| quad.map(u32::from));
+    let quads = FACES.map(|quad| quad.map(u32::from));
     TriangleMesh {
         vertices: (0..8).map(corner).collect(),
         triangles: quads
