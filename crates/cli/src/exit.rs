@@ -2,8 +2,8 @@
 
 use std::process::ExitCode;
 
-use grainwake_run::RunError;
 use grainwake_run::case::{CaseError, Problem};
+use grainwake_run::{FailureKind, RunError};
 use grainwake_shape::ShapeError;
 use miette::{GraphicalReportHandler, GraphicalTheme};
 
@@ -11,10 +11,21 @@ use miette::{GraphicalReportHandler, GraphicalTheme};
 pub const MISSED: u8 = 1;
 /// Invalid input; nothing was written.
 pub const BAD_INPUT: u8 = 2;
+/// The numerics became unstable, or the program has an internal error.
+pub const COMPUTATION: u8 = 3;
 /// Input or output failed.
 pub const IO: u8 = 4;
 /// Interrupted after writing a checkpoint.
 pub const INTERRUPTED: u8 = 130;
+
+/// Returns the exit code of a failed run.
+pub fn exit_code(kind: FailureKind) -> u8 {
+    match kind {
+        FailureKind::Input => BAD_INPUT,
+        FailureKind::Computation => COMPUTATION,
+        FailureKind::InputOutput => IO,
+    }
+}
 
 /// Failure of a command.
 #[derive(Debug)]
@@ -113,7 +124,7 @@ impl From<RunError> for Exit {
             }
             _ => None,
         };
-        Exit::with_hint(error.exit_code(), error, help)
+        Exit::with_hint(exit_code(error.kind()), error, help)
     }
 }
 

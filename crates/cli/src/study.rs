@@ -4,13 +4,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use comfy_table::{CellAlignment, Table, presets};
+use grainwake_run::FailureKind;
 use grainwake_study::{
     Analysis, Options, Outcome, Plan, Run, RunRecord, RunState, Selection, StudyError, execute,
     records, run_state, write_tables,
 };
 
 use crate::args::StudyArgs;
-use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO};
+use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, exit_code};
 use crate::progress::{clock, count, first_line};
 use crate::study_board::Board;
 use crate::{kind, print, run, tell, threads};
@@ -128,10 +129,10 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
 
 /// Reports the failed runs; the exit code is that of the worst failure.
 fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(), Exit> {
-    let failed: Vec<(&str, &str, u8)> = ended
+    let failed: Vec<(&str, &str, FailureKind)> = ended
         .iter()
         .filter_map(|(i, outcome)| match outcome {
-            Outcome::Failed(why, code) => Some((runs[*i].name.as_str(), why.as_str(), *code)),
+            Outcome::Failed(why, kind) => Some((runs[*i].name.as_str(), why.as_str(), *kind)),
             _ => None,
         })
         .collect();
@@ -149,7 +150,7 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
     if ended.iter().any(|(_, o)| *o == Outcome::Locked) {
         tell!("note: some runs are locked by another program");
     }
-    let Some(code) = failed.iter().map(|(.., code)| *code).max() else {
+    let Some(worst) = failed.iter().map(|(.., kind)| *kind).max() else {
         return Ok(());
     };
     let lines: Vec<String> = failed
@@ -157,7 +158,7 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
         .map(|(name, why, _)| format!("{name}: {}", first_line(why)))
         .collect();
     Err(Exit::with_help(
-        code,
+        exit_code(worst),
         format!(
             "{} of {} runs failed:\n{}",
             failed.len(),
@@ -177,7 +178,7 @@ fn list(runs: &[Run], states: &[(usize, RunState)]) -> String {
             "{:>4}  {:width$}  {:10}  {}",
             i + 1,
             run.name,
-            state.name(),
+            state.kind(),
             run.id
         )
     };
@@ -190,7 +191,7 @@ fn listed(runs: &[Run], states: &[(usize, RunState)]) -> serde_json::Value {
         let run = &runs[*i];
         serde_json::json!({
             "number": i + 1, "name": run.name, "model": run.model, "member": run.member,
-            "state": state.name(), "id": run.id, "set": run.set, "base": run.base,
+            "state": state.kind(), "id": run.id, "set": run.set, "base": run.base,
             "memory_bytes": run.memory_bytes, "wall_s": run.wall_s,
         })
     };
@@ -274,7 +275,7 @@ fn pretty(rows: &[&RunRecord]) -> Table {
         .chain(columns.iter().map(|c| c.0));
     table.set_header(header.chain(["wall"]));
     for row in rows {
-        let mut cells = vec![row.name.clone(), row.state.clone()];
+        let mut cells = vec![row.name.clone(), row.state.to_string()];
         cells.extend(columns.iter().map(|(_, name)| match row.measured(name) {
             Some(v) if v.fract() == 0.0 => format!("{v:.0}"),
             Some(v) if v.abs() < 0.1 => format!("{v:.5}"),

@@ -52,9 +52,8 @@ pub fn read_text(file: &Path) -> Result<String, FormatError> {
     })
 }
 
-/// Returns the file name without its folder.
-pub(crate) fn file_name(file: &Path) -> String {
-    file.file_name()
-        .map(|name| name.to_string_lossy().into_owned())
-        .unwrap_or_default()
+/// Returns the note on an unfinished last line of a file.
+pub(crate) fn unfinished_line(file: &Path, line: usize) -> String {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    format!("{name}: the last line (line {line}) is unfinished and was left out")
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{FormatError, file_name, read_text};
+use crate::error::{FormatError, read_text, unfinished_line};
 
 /// Name of the file in a run folder.
 pub const FILE: &str = "events.jsonl";
@@ -108,10 +108,7 @@ pub fn read(file: &Path, notes: &mut Vec<String>) -> Result<Vec<Event>, FormatEr
         }
         match serde_json::from_str(line) {
             Ok(event) => events.push(event),
-            Err(_) if i + 1 == count && !complete => notes.push(format!(
-                "{}: the last line (line {count}) is unfinished and was left out",
-                file_name(file)
-            )),
+            Err(_) if i + 1 == count && !complete => notes.push(unfinished_line(file, count)),
             Err(error) => return Err(FormatError::line(file, i + 1, error.to_string())),
         }
     }

@@ -31,19 +31,20 @@ pub struct GrainRow {
     pub orientation: DQuat,
     /// Angular velocity [rad/s].
     pub angular_velocity: DVec3,
-    /// Hydrodynamic force [N], buoyancy excluded; NaN if the table has none.
-    pub force: DVec3,
-    /// Hydrodynamic torque about the centroid [N m]; NaN if the table has none.
-    pub torque: DVec3,
-    /// Number of contacts; NaN if the table has none.
-    pub contacts: f64,
+    /// Hydrodynamic force [N], buoyancy excluded, if the table has it.
+    pub force: Option<DVec3>,
+    /// Hydrodynamic torque about the centroid [N m], if the table has it.
+    pub torque: Option<DVec3>,
+    /// Number of contacts, if the table has it.
+    pub contacts: Option<u32>,
 }
 
 impl GrainRow {
-    /// Appends the row to a text; numbers read back bit for bit.
+    /// Appends the row to a text; numbers read back bit for bit, missing ones are NaN.
     pub fn append_to(&self, text: &mut String) {
         let q = self.orientation;
-        let vectors = [self.angular_velocity, self.force, self.torque];
+        let [force, torque] = [self.force, self.torque].map(|v| v.unwrap_or(DVec3::NAN));
+        let vectors = [self.angular_velocity, force, torque];
         let numbers = [self.position, self.velocity]
             .into_iter()
             .flat_map(|v| v.to_array())
@@ -54,7 +55,10 @@ impl GrainRow {
         for number in numbers {
             let _ = write!(text, ",{number:?}");
         }
-        let _ = writeln!(text, ",{}", self.contacts);
+        let _ = match self.contacts {
+            Some(contacts) => writeln!(text, ",{contacts}"),
+            None => writeln!(text, ",NaN"),
+        };
     }
 }
 
@@ -110,10 +114,16 @@ pub fn read(file: &Path, notes: &mut Vec<String>) -> Result<Vec<GrainRow>, Forma
                     DQuat::IDENTITY
                 },
                 angular_velocity: at(angular_velocity, row),
-                force: force.map_or(DVec3::NAN, |columns| at(columns, row)),
-                torque: torque.map_or(DVec3::NAN, |columns| at(columns, row)),
-                contacts: contacts.map_or(f64::NAN, |column| column[row]),
+                force: force.map(|columns| at(columns, row)),
+                torque: torque.map(|columns| at(columns, row)),
+                contacts: contacts.and_then(|column| count(column[row])),
             })
         })
         .collect()
+}
+
+/// Returns a number of the table as a count; none for NaN, fractions and negative numbers.
+fn count(number: f64) -> Option<u32> {
+    let valid = number.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&number);
+    valid.then_some(number as u32)
 }

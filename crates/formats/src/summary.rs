@@ -1,5 +1,6 @@
 //! Results of a run (`summary.json`).
 
+use std::fmt;
 use std::io;
 use std::path::Path;
 
@@ -26,13 +27,38 @@ pub struct Summary {
     pub max_divergence: f64,
     /// Largest CFL number of any step.
     pub max_cfl: f64,
-    /// Reason of the end: "end", "landing", "rest" or "separation".
-    pub ended_by: String,
+    /// Reason of the end.
+    pub ended_by: EndReason,
     /// Results of a pair.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub pair: Option<PairSummary>,
     /// Each grain.
     pub grains: Vec<GrainSummary>,
+}
+
+/// Reason of the end of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EndReason {
+    /// The end time was reached.
+    End,
+    /// The grains landed.
+    Landing,
+    /// The grains came to rest.
+    Rest,
+    /// The grains separated.
+    Separation,
+}
+
+impl fmt::Display for EndReason {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.pad(match self {
+            EndReason::End => "end",
+            EndReason::Landing => "landing",
+            EndReason::Rest => "rest",
+            EndReason::Separation => "separation",
+        })
+    }
 }
 
 /// Results of a pair.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::error::{FormatError, file_name, read_text};
+use crate::error::{FormatError, read_text, unfinished_line};
 
 /// Table of numbers; an empty cell is NaN.
 #[derive(Clone, Debug, Default)]
@@ -21,11 +21,7 @@ impl Table {
         let complete = text.rfind('\n').map_or(0, |end| end + 1);
         let unfinished = !text[complete..].trim().is_empty() && complete > 0;
         if unfinished {
-            let lines = text.lines().count();
-            notes.push(format!(
-                "{}: the last line (line {lines}) is unfinished and was left out",
-                file_name(file)
-            ));
+            notes.push(unfinished_line(file, text.lines().count()));
             text.truncate(complete);
         }
         let mut reader = csv::ReaderBuilder::new()

@@ -58,11 +58,10 @@ pub fn write(path: &Path, surface: &Surface) -> io::Result<()> {
         let ends = elements.next("Int32", "offsets", 1, of_triangles);
         writeln!(out, "<Polys>{corners}{ends}</Polys>\n</Piece>\n</PolyData>")?;
         open_appended(out)?;
-        for vectors in [Some(&surface.points), surface.velocity.as_ref()] {
-            if let Some(vectors) = vectors {
-                write_length(out, of_points)?;
-                write_singles(out, vectors)?;
-            }
+        let vectors = [Some(&surface.points), surface.velocity.as_ref()];
+        for vectors in vectors.into_iter().flatten() {
+            write_length(out, of_points)?;
+            write_singles(out, vectors)?;
         }
         if let Some(grains) = &surface.grains {
             write_length(out, of_triangles)?;

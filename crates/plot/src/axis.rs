@@ -9,6 +9,15 @@ pub enum Scale {
     Log,
 }
 
+/// End values of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisRange {
+    /// The given values.
+    Tight,
+    /// Values extended outwards to round ones.
+    Rounded,
+}
+
 /// One axis of a plot.
 #[derive(Clone, Debug)]
 pub struct Axis {
@@ -22,17 +31,17 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Creates a linear axis from `low` to `high` with about `count` round steps; unless `tight`,
-    /// the range is extended towards whole steps.
-    pub fn linear(label: &str, low: f64, high: f64, count: usize, tight: bool) -> Axis {
+    /// Creates a linear axis from `low` to `high` with about `count` round steps; a
+    /// rounded range is extended towards whole steps.
+    pub fn linear(label: &str, low: f64, high: f64, count: usize, range: AxisRange) -> Axis {
         let (mut low, mut high) = drawable_range(low, high);
         let mut step = round_step((high - low) / count.max(1) as f64);
         // A tight range needs at least two ticks to show its scale.
         let within = |step: f64| (high / step + 1e-6).floor() - (low / step - 1e-6).ceil();
-        while tight && within(step) < 1.0 {
+        while range == AxisRange::Tight && within(step) < 1.0 {
             step = round_step(0.4 * step);
         }
-        if !tight {
+        if range == AxisRange::Rounded {
             // A value slightly beyond a tick extends the range by 0.2 steps only.
             let grow = |value: f64, out: f64| {
                 let inner = (value / step * out + 1e-6).floor() * out * step;
@@ -133,9 +142,9 @@ impl Axis {
     }
 
     /// Creates a logarithmic axis that covers `low` to `high` (positive), extended to the next 1, 2
-    /// or 5 times a power of ten unless `tight`. Ranges up to about two decades have labels at
+    /// or 5 times a power of ten if rounded. Ranges up to about two decades have labels at
     /// these values, longer ones at the decades.
-    pub fn log_rounded(label: &str, low: f64, high: f64, tight: bool) -> Axis {
+    pub fn log_rounded(label: &str, low: f64, high: f64, range: AxisRange) -> Axis {
         let whole = Axis::log(label, low, high);
         let leads = [1.0, 2.0, 5.0];
         let marks = |leads: &[f64]| -> Vec<f64> {
@@ -152,7 +161,7 @@ impl Axis {
         let ends = marks(&leads);
         let below = ends.iter().copied().rfind(|v| *v <= low * (1.0 + 1e-9));
         let above = ends.iter().copied().find(|v| *v >= high * (1.0 - 1e-9));
-        let (low, high) = match (tight, below, above) {
+        let (low, high) = match (range == AxisRange::Tight, below, above) {
             (false, Some(below), Some(above)) => (below, above),
             _ => (low, high),
         };

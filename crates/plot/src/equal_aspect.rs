@@ -1,6 +1,6 @@
 //! A frame with equal scale along both axes, for maps, side views and sections; colour bars.
 
-use crate::axis::Axis;
+use crate::axis::{Axis, AxisRange};
 use crate::drawing::{Anchor, Drawing, path_data};
 use crate::style::{self, HAIR, INK, SMALL, TICK};
 use crate::ticks;
@@ -98,7 +98,7 @@ impl EqualAspectFrame {
         let (_, factor) = length_unit(self.window.width().max(self.window.height()));
         let axis = |low: f64, high: f64, length: f64, spacing: f64| {
             let count = ((length / spacing) as usize).clamp(2, 8);
-            Axis::linear("", low * factor, high * factor, count, true)
+            Axis::linear("", low * factor, high * factor, count, AxisRange::Tight)
         };
         let Window { low, high } = self.window;
         let across = axis(low.0, high.0, width, 18.0);

@@ -51,16 +51,22 @@ impl Frame {
         }
     }
 
-    /// Draws the outline, the ticks and the labels; `labelled` selects the axes that have labels.
-    pub fn outline(&self, drawing: &mut Drawing, labelled: (bool, bool)) {
+    /// Draws the outline, the ticks, and the labels of the selected axes.
+    pub fn outline(&self, drawing: &mut Drawing, labelled: Labelled) {
         let (x, y, width, height) = (self.x, self.y, self.width, self.height);
-        ticks::horizontal(drawing, &self.across, (x, y + height), width, labelled.0);
-        let widest = ticks::vertical(drawing, &self.up, (x, y), height, labelled.1, None);
+        ticks::horizontal(
+            drawing,
+            &self.across,
+            (x, y + height),
+            width,
+            labelled.across,
+        );
+        let widest = ticks::vertical(drawing, &self.up, (x, y), height, labelled.up, None);
         drawing.outline(x, y, width, height);
-        if labelled.0 {
+        if labelled.across {
             self.horizontal_label(drawing);
         }
-        if labelled.1 {
+        if labelled.up {
             let middle = (x - TICK - widest - 7.0, y + 0.5 * height);
             drawing.upward_text(middle, &self.up.label);
         }
@@ -98,6 +104,39 @@ impl Frame {
     }
 }
 
+/// Axes of a frame that have labels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Labelled {
+    /// Horizontal axis.
+    pub across: bool,
+    /// Vertical axis.
+    pub up: bool,
+}
+
+impl Labelled {
+    /// Labels on both axes.
+    pub const BOTH: Labelled = Labelled {
+        across: true,
+        up: true,
+    };
+}
+
+/// Fill of a marker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fill {
+    /// Filled with its colour.
+    Solid,
+    /// An outline; usually marks a bound.
+    Hollow,
+}
+
+impl Fill {
+    /// Returns the fill of a marker that is a bound or not.
+    pub fn of_bound(bound: bool) -> Fill {
+        if bound { Fill::Hollow } else { Fill::Solid }
+    }
+}
+
 /// Shapes of data points that differ without colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
@@ -128,14 +167,14 @@ impl Marker {
         ][n % 6]
     }
 
-    /// Draws the marker around `(x, y)` [pt]; a hollow one usually marks a bound.
+    /// Draws the marker around `(x, y)` [pt].
     pub fn draw(
         self,
         drawing: &mut Drawing,
         (x, y): (f64, f64),
         size: f64,
         colour: &str,
-        hollow: bool,
+        fill: Fill,
     ) {
         let ring = |n: i32, radius: f64| -> Vec<(f64, f64)> {
             (0..n)
@@ -158,9 +197,9 @@ impl Marker {
             Marker::Triangle => polygon(size, &[(-1.1, 0.8), (1.1, 0.8), (0.0, -1.2)]),
             Marker::Diamond => polygon(size, &[(-1.2, 0.0), (0.0, -1.2), (1.2, 0.0), (0.0, 1.2)]),
         };
-        let (fill, stroke, width) = match hollow {
-            true => ("none", colour, "0.9"),
-            false => (colour, "#ffffff", "0.5"),
+        let (fill, stroke, width) = match fill {
+            Fill::Hollow => ("none", colour, "0.9"),
+            Fill::Solid => (colour, "#ffffff", "0.5"),
         };
         let style = format!("fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"{width}\"");
         drawing.path(&path_data(&corners, true), &style);

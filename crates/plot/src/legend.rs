@@ -1,7 +1,7 @@
 //! Legends: samples of lines and symbols with their names, in rows.
 
 use crate::drawing::{Anchor, Drawing};
-use crate::frame::Marker;
+use crate::frame::{Fill, Marker};
 use crate::style::{LINE, SMALL};
 use crate::text;
 
@@ -19,8 +19,8 @@ pub struct Entry {
     pub colour: &'static str,
     /// SVG dash pattern of the line, empty for a solid line; `None` for no line.
     pub line: Option<&'static str>,
-    /// Symbol, and whether it is hollow.
-    pub symbol: Option<(Marker, bool)>,
+    /// Symbol and its fill.
+    pub symbol: Option<(Marker, Fill)>,
 }
 
 impl Entry {
@@ -74,9 +74,9 @@ impl Legend {
                     let dash = Some(dash).filter(|dash| !dash.is_empty());
                     drawing.line(&[(x, y), (x + sample, y)], entry.colour, LINE, dash);
                 }
-                if let Some((marker, hollow)) = entry.symbol {
+                if let Some((marker, fill)) = entry.symbol {
                     let place = (x + 0.5 * sample, y);
-                    marker.draw(drawing, place, SYMBOL, entry.colour, hollow);
+                    marker.draw(drawing, place, SYMBOL, entry.colour, fill);
                 }
                 drawing.note((x + sample + 3.0, y), Anchor::Start, &entry.name);
                 x += entry.width();

@@ -1,7 +1,7 @@
 //! Kiss and separation events between three to twelve grains. A pair has its own event tracker, and
 //! a heap has too many contacts to list.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
@@ -31,13 +31,12 @@ impl ContactEvents {
     /// Updates the pairs with the contacts after a step and returns the new events. Grains are
     /// separated after `hold` [s] without contact.
     pub(crate) fn update(&mut self, time: f64, contacts: &[Contact], hold: f64) -> Vec<Event> {
-        let mut touching: BTreeMap<[usize; 2], bool> = BTreeMap::new();
+        let mut touching: BTreeSet<[usize; 2]> = BTreeSet::new();
         for contact in contacts {
             if let Partner::Grain(other) = contact.partner
                 && other != contact.grain
             {
-                let pair = [contact.grain.min(other), contact.grain.max(other)];
-                touching.insert(pair, true);
+                touching.insert([contact.grain.min(other), contact.grain.max(other)]);
             }
         }
         let first = self.events.len();
@@ -49,7 +48,7 @@ impl ContactEvents {
             });
         };
         self.open.retain_mut(|pair| {
-            if touching.remove(&pair.grains).is_some() {
+            if touching.remove(&pair.grains) {
                 pair.apart_since = None;
                 return true;
             }
@@ -60,7 +59,7 @@ impl ContactEvents {
             }
             !parted
         });
-        for grains in touching.into_keys() {
+        for grains in touching {
             record(EventKind::Kiss, time, grains);
             self.open.push(ContactPair {
                 grains,

@@ -5,6 +5,17 @@ use std::path::{Path, PathBuf};
 
 use grainwake_solver::sim::{SetupError, StepError};
 
+/// Kind of a failure, from the mildest to the worst.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FailureKind {
+    /// The case or the command is invalid.
+    Input,
+    /// The numerics became unstable, or the program has an internal error.
+    Computation,
+    /// Reading or writing failed.
+    InputOutput,
+}
+
 /// Error of a run.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
@@ -28,10 +39,12 @@ pub enum RunError {
         process: Option<u32>,
     },
     /// The numerics failed.
-    #[error("{source}\nThe last good checkpoint, at t = {time:.6e} s, is kept in {}", folder.display())]
+    #[error("{}\nThe last good checkpoint, at t = {time:.6e} s, is kept in {}", source.message(smaller_step), folder.display())]
     Unstable {
         /// Symptom.
         source: StepError,
+        /// Key of the case for a smaller time step.
+        smaller_step: &'static str,
         /// Time of the last good checkpoint [s].
         time: f64,
         /// Folder of the checkpoints.
@@ -66,15 +79,15 @@ pub enum RunError {
 }
 
 impl RunError {
-    /// Returns the exit code of the command line: 2 bad input, 3 numerics, 4 input/output.
-    pub fn exit_code(&self) -> u8 {
+    /// Returns the kind of the failure.
+    pub fn kind(&self) -> FailureKind {
         match self {
             RunError::Setup(_)
             | RunError::Occupied { .. }
             | RunError::InUse { .. }
-            | RunError::OtherCase { .. } => 2,
-            RunError::Unstable { .. } => 3,
-            RunError::Io { .. } | RunError::NoCheckpoint { .. } => 4,
+            | RunError::OtherCase { .. } => FailureKind::Input,
+            RunError::Unstable { .. } => FailureKind::Computation,
+            RunError::Io { .. } | RunError::NoCheckpoint { .. } => FailureKind::InputOutput,
         }
     }
 }

@@ -15,7 +15,7 @@ mod recorder;
 mod run_folder;
 mod run_loop;
 
-pub use error::RunError;
+pub use error::{FailureKind, RunError};
 pub use plan::{Plane, PlanePosition, RunPlan, Stop};
 pub use run_folder::{Existing, RESOLVED, checkpoint, lock, provenance};
 pub use run_loop::{Ending, Job, Observer, Options, Progress, Silent, run};

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use grainwake_formats::events::{Event, EventKind};
 use grainwake_formats::pvd::{self, Entry};
-use grainwake_formats::summary::{GrainSummary, PairSummary, Summary};
+use grainwake_formats::summary::{EndReason, GrainSummary, PairSummary, Summary};
 use grainwake_solver::dem::{Enclosure, surface_gap};
-use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::{EventParams, Tracker};
+use grainwake_solver::sim::{SAME_TIME, Simulation};
 
 use crate::contact_events::{ContactEvents, MAX_GRAINS};
 use crate::error::{Context, RunError};
@@ -18,8 +18,6 @@ use crate::run_folder::{Tables, VtkOutput};
 
 /// Outputs closer than this fraction of a time step are written together.
 const SHORTEST_STEP: f64 = 0.1;
-/// Times that differ by less than this fraction of the interval are equal.
-const SAME_TIME: f64 = 1e-9;
 
 /// Series of outputs.
 #[derive(Clone, Copy, PartialEq)]
@@ -274,7 +272,7 @@ impl Recorder {
     }
 
     /// Returns the results so far.
-    pub fn summary(&self, sim: &Simulation, wall_s: f64, ended_by: &str) -> Summary {
+    pub fn summary(&self, sim: &Simulation, wall_s: f64, ended_by: EndReason) -> Summary {
         let tracker = &self.tracker;
         let grains = sim
             .grains()
@@ -294,7 +292,7 @@ impl Recorder {
             events: self.events(),
             max_divergence: self.max_divergence,
             max_cfl: self.max_cfl,
-            ended_by: ended_by.into(),
+            ended_by,
             pair: tracker.phase().map(|phase| PairSummary {
                 kiss_time_s: tracker.kiss_time(),
                 tumble_time_s: tracker.tumble_time(),

@@ -6,9 +6,9 @@ use std::time::Instant;
 
 use grainwake_formats::atomic_file::write_atomically;
 use grainwake_formats::events::Event;
-use grainwake_formats::summary::{self, Summary};
+use grainwake_formats::summary::{self, EndReason, Summary};
 use grainwake_solver::sim::events::{Phase, StopWhen};
-use grainwake_solver::sim::{Setup, Simulation, StepError, StepRule};
+use grainwake_solver::sim::{Remedy, SAME_TIME, Setup, Simulation, StepError, StepRule};
 
 use crate::error::{Context, RunError};
 use crate::plan::RunPlan;
@@ -128,7 +128,9 @@ pub fn run(
     }
     if content == Content::Finished && resuming {
         let summary = Summary::read(out).context("read", &out.join(summary::FILE))?;
-        if summary.end_time_s >= job.plan.end * (1.0 - 1e-9) || summary.ended_by != "end" {
+        if summary.end_time_s >= job.plan.end * (1.0 - SAME_TIME)
+            || summary.ended_by != EndReason::End
+        {
             return Ok(Ending::AlreadyFinished(summary));
         }
         observer.note(&format!(
@@ -254,15 +256,15 @@ impl Running {
                 "the time step has collapsed to {dt:.1e} s: somewhere the fluid is far faster than \
                  any grain should settle"
             ),
-            remedy: "a finer grid, a smaller [time] cfl, or a look at the last slices".into(),
+            remedy: Remedy::GridOrStepOrSlices,
         })
     }
 
     /// Returns the reason of the end, if the run is at its end.
-    fn ended(&self) -> Option<&'static str> {
+    fn ended(&self) -> Option<EndReason> {
         let time = self.sim.time();
-        if time >= self.plan.end * (1.0 - 1e-9) {
-            return Some("end");
+        if time >= self.plan.end * (1.0 - SAME_TIME) {
+            return Some(EndReason::End);
         }
         let stop = self.plan.stop?;
         let since = self
@@ -270,9 +272,9 @@ impl Running {
             .tracker()
             .holds_since(stop.when, self.sim.grains())?;
         (time - since >= stop.hold).then_some(match stop.when {
-            StopWhen::Landing => "landing",
-            StopWhen::Rest => "rest",
-            StopWhen::Separation => "separation",
+            StopWhen::Landing => EndReason::Landing,
+            StopWhen::Rest => EndReason::Rest,
+            StopWhen::Separation => EndReason::Separation,
         })
     }
 
@@ -288,7 +290,7 @@ impl Running {
         self.write_wall_time()
     }
 
-    fn finish(mut self, why: &str) -> Result<Ending, RunError> {
+    fn finish(mut self, why: EndReason) -> Result<Ending, RunError> {
         self.recorder.finish(&self.sim)?;
         self.checkpoint()?;
         let summary = self
@@ -300,27 +302,24 @@ impl Running {
         Ok(Ending::Finished(summary))
     }
 
-    /// Returns advice that names the key of the case for its time step.
-    fn advice(&self, remedy: &str) -> String {
-        let key = match self.sim.setup().step {
+    /// Returns the advice of a smaller time step with the key of the case.
+    fn smaller_step(&self) -> &'static str {
+        match self.sim.setup().step {
             StepRule::Fixed(_) => "a smaller [time] step",
             StepRule::Limits { .. } => "a smaller [time] cfl",
-        };
-        remedy
-            .replace("a smaller [time] cfl, a smaller fixed step", key)
-            .replace("a smaller [time] cfl", key)
-            .replace("a smaller time step", key)
+        }
     }
 
     /// Writes `failure.json`; the last valid checkpoint is kept.
-    fn failed(&mut self, mut source: StepError, time: f64) -> RunError {
+    fn failed(&mut self, source: StepError, time: f64) -> RunError {
         let StepError::Unstable {
             time: at,
             step,
             what,
             remedy,
-        } = &mut source;
-        *remedy = self.advice(remedy);
+        } = &source;
+        let smaller_step = self.smaller_step();
+        let remedy = remedy.advice(smaller_step);
         let failure = serde_json::json!({
             "time": at, "step": step, "what": what, "remedy": remedy, "checkpoint_time": time
         });
@@ -330,6 +329,7 @@ impl Running {
         match kept {
             Ok(()) => RunError::Unstable {
                 source,
+                smaller_step,
                 time,
                 folder: self.out.join(checkpoint::FOLDER),
             },

@@ -35,5 +35,5 @@ pub use plan::expand::{Model, Setting};
 pub use plan::file::{Ensemble, Study};
 pub use plan::selection::Selection;
 pub use plan::{MANIFEST, Plan, RUNS, Run};
-pub use run::state::{RunState, run_state};
+pub use run::state::{RunState, StateKind, run_state};
 pub use run::{Options, Outcome, StudyObserver, execute};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use grainwake_study::correlation::correlations;
 use grainwake_study::observation::observations;
 use grainwake_study::verdict::evaluate;
-use grainwake_study::{Analysis, Model, PairMeasures, RunRecord};
+use grainwake_study::{Analysis, Model, PairMeasures, RunRecord, StateKind};
 
 /// 16 grains in four orientations and a sphere; `fill` returns the measured values.
 fn rows(fill: impl Fn(f64, f64, usize) -> PairMeasures) -> Vec<RunRecord> {
@@ -49,7 +49,7 @@ fn row(
         model: name.into(),
         levels,
         factors,
-        state: "finished".into(),
+        state: StateKind::Finished,
         diameter_m: Some(2e-3),
         gravity_m_per_s2: Some([0.0, 0.0, -9.81]),
         pair: Some(pair),
@@ -91,7 +91,7 @@ fn verdict(rows: &[RunRecord], claim: &str) -> (String, String) {
     let text = format!("[[claim]]\nsays = \"a claim\"\n{claim}\n");
     let analysis = Analysis::parse("analysis.toml", &text, &models(rows)).unwrap();
     let found = evaluate(&analysis, rows).remove(0);
-    (found.verdict.to_owned(), found.says)
+    (found.verdict.to_string(), found.says)
 }
 
 const ORDER: &str = "quantity = \"kiss_time\"\ntest.order = { axis = \"orientation\", more = \"o1\", less = \"o3\" }";
@@ -239,7 +239,7 @@ fn events_after_the_landing_are_right_censored() {
         "the roundest column and the sphere have not parted"
     );
     let mut unfinished = parts.clone();
-    unfinished[0].state = "unfinished".into();
+    unfinished[0].state = StateKind::Unfinished;
     assert_eq!(
         observations(&unfinished, "kiss_time", &BTreeMap::new()).len(),
         64

@@ -23,8 +23,8 @@ fn history(place: impl Fn(f64) -> DVec3, turn: impl Fn(f64) -> DQuat, end: f64) 
         h.velocity.push((place(t + 1e-6) - place(t - 1e-6)) / 2e-6);
         h.orientation.push(turn(t));
         h.angular_velocity.push(DVec3::ZERO);
-        h.force.push(DVec3::ZERO);
-        h.contacts.push(0.0);
+        h.force.push(Some(DVec3::ZERO));
+        h.contacts.push(Some(0));
     }
     h
 }

@@ -6,10 +6,10 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use common::{STUDY, folder, plan};
-use grainwake_run::Progress;
+use grainwake_run::{FailureKind, Progress};
 use grainwake_study::{
-    Options, Outcome, Plan, RunState, Study, StudyObserver, execute, records, run_state, to_csv,
-    write_tables,
+    Options, Outcome, Plan, RunState, StateKind, Study, StudyObserver, execute, records, run_state,
+    to_csv, write_tables,
 };
 
 struct Quiet;
@@ -100,11 +100,10 @@ fn finished_runs_are_kept_and_stale_ones_repeated() {
     // One model changes: only this one is stale and repeated.
     std::fs::write(&path, STUDY.replace("friction = 0.6", "friction = 0.3")).unwrap();
     let second = plan(&path).unwrap();
-    let stale: Vec<&str> = states(&second, &study).iter().map(RunState::name).collect();
-    assert_eq!(
-        stale,
-        ["finished", "stale", "finished", "stale", "finished"]
-    );
+    let found = states(&second, &study);
+    let stale: Vec<StateKind> = found.iter().map(RunState::kind).collect();
+    let (finished, changed) = (StateKind::Finished, StateKind::Stale);
+    assert_eq!(stale, [finished, changed, finished, changed, finished]);
     let ended = run(&second, &study, &Quiet, &options(1));
     let again: Vec<bool> = ended
         .iter()
@@ -196,8 +195,8 @@ fn a_failed_run_does_not_stop_the_others() {
     let ended = run(&plan, &study, &Quiet, &options(2));
     for (i, outcome) in ended.iter().enumerate() {
         match outcome {
-            Outcome::Failed(why, code) => assert!(
-                i == 1 && why.contains("is not empty") && *code == 2,
+            Outcome::Failed(why, kind) => assert!(
+                i == 1 && why.contains("is not empty") && *kind == FailureKind::Input,
                 "{why}"
             ),
             other => assert!(i != 1 && matches!(other, Outcome::Finished(_))),
@@ -220,7 +219,9 @@ fn a_failed_run_does_not_stop_the_others() {
         RunState::Failed("it blew up".into())
     );
     let ended = run(&plan, &study, &Quiet, &options(1));
-    assert!(matches!(&ended[4], Outcome::Failed(why, 3) if why.contains("it blew up")));
+    assert!(
+        matches!(&ended[4], Outcome::Failed(why, FailureKind::Computation) if why.contains("it blew up"))
+    );
     assert_eq!(
         records(&plan, &study)[4].remark.as_deref(),
         Some("it blew up")
@@ -293,7 +294,7 @@ fn the_table_has_every_run_and_survives_removal_of_the_run_folders() {
     execute(&plan.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
     let rows = records(&plan, &study);
     write_tables(&rows, &study).unwrap();
-    let words: Vec<&str> = rows.iter().map(|r| r.state.as_str()).collect();
+    let words: Vec<String> = rows.iter().map(|r| r.state.to_string()).collect();
     assert_eq!(
         words,
         ["finished", "missing", "missing", "missing", "finished"]

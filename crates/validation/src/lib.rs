@@ -2,10 +2,11 @@
 //!
 //! A [`Suite`] is a folder with `validation.toml`: runs of case files, and for each run checks of
 //! values measured in its tables ([`Measure`]) against references and bounds. [`Suite::evaluate`]
-//! measures a run folder and returns [`Verdict`]s; each [`FigureSpec`] shows results beside the
+//! measures a run folder and returns [`CheckResult`]s; each [`FigureSpec`] shows results beside the
 //! reference data. `validation/README.md` describes the keys of the file.
 
 mod check;
+mod check_result;
 mod columns;
 mod expression;
 mod figure;
@@ -13,11 +14,10 @@ mod measurement;
 mod problem;
 mod signal;
 mod suite;
-mod verdict;
 
 pub use check::{Bounds, Check, Level, Reference, SuiteRun};
+pub use check_result::CheckResult;
 pub use columns::TableSource;
 pub use figure::{DrawnFigure, FigureSpec};
 pub use measurement::{Measure, Sampling};
 pub use suite::{Suite, SuiteError};
-pub use verdict::Verdict;

@@ -54,7 +54,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     let stop = Arc::new(AtomicBool::new(false));
     run::watch_for_interrupt(stop.clone());
     let started = std::time::Instant::now();
-    let mut verdicts = Vec::new();
+    let mut results = Vec::new();
     for suite in &suites {
         let mut known = BTreeMap::new();
         for run in suite.runs.iter().filter(|run| run.level <= level) {
@@ -69,15 +69,15 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
             };
             let found = match ending {
                 Ok(()) => suite.evaluate(run, &folder, &mut known),
-                Err(why) => suite.verdicts_of_failed_run(run, &why),
+                Err(why) => suite.results_of_failed_run(run, &why),
             };
             if !args.quiet {
                 found.iter().for_each(|v| tell!("  {}", line(v)));
             }
-            verdicts.extend(found);
+            results.extend(found);
         }
     }
-    if args.judge && verdicts.is_empty() {
+    if args.judge && results.is_empty() {
         return Err(Exit::with_help(
             BAD_INPUT,
             format!(
@@ -88,37 +88,37 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         ));
     }
     if args.json {
-        print(&serde_json::to_string_pretty(&verdicts)?)?;
+        print(&serde_json::to_string_pretty(&results)?)?;
     } else {
-        print(&table(&verdicts).to_string())?;
+        print(&table(&results).to_string())?;
     }
     if let Some(folder) = &args.save {
         let all = Suite::read_all(&args.suites)?;
-        let saved = saved::add(folder, &args.level, &verdicts, &args.output, &all)?;
+        let saved = saved::add(folder, &args.level, &results, &args.output, &all)?;
         let drawn = pictures::add(folder, &suites, &args.output, &saved)?;
         pictures::list(folder, &all)?;
         if !args.quiet {
             tell!("{drawn} figures in {}", folder.join("figures").display());
         }
     }
-    let short = verdicts.iter().filter(|v| !v.pass).count();
+    let short = results.iter().filter(|v| !v.pass).count();
     if !args.quiet {
         tell!(
             "{} of {} hold, in {}",
-            verdicts.len() - short,
-            verdicts.len(),
+            results.len() - short,
+            results.len(),
             clock(started.elapsed().as_secs_f64())
         );
     }
     if short == 0 {
         return Ok(());
     }
-    let missed: Vec<String> = verdicts.iter().filter(|v| !v.pass).map(line).collect();
+    let missed: Vec<String> = results.iter().filter(|v| !v.pass).map(line).collect();
     Err(Exit::new(
         MISSED,
         format!(
             "{short} of {} fall short:\n{}",
-            verdicts.len(),
+            results.len(),
             missed.join("\n")
         ),
     ))

@@ -5,7 +5,7 @@ use std::path::Path;
 use grainwake_formats::summary::Summary;
 use grainwake_run::case::Case;
 use grainwake_run::provenance::Provenance;
-use grainwake_validation::{Suite, Verdict};
+use grainwake_validation::{CheckResult, Suite};
 use serde::{Deserialize, Serialize};
 
 use super::table::table;
@@ -14,14 +14,14 @@ use crate::exit::{Exit, IO};
 /// Contents of `LEVEL.json`.
 #[derive(Default, Serialize, Deserialize)]
 pub struct Saved {
-    results: Vec<Verdict>,
+    results: Vec<CheckResult>,
     runs: Vec<Source>,
 }
 
 impl Saved {
     /// Returns the value of a quantity of a run.
     pub fn value(&self, name: &str, run: &str, quantity: &str) -> Option<f64> {
-        let of = |v: &&Verdict| v.name == name && v.run == run && v.quantity == quantity;
+        let of = |v: &&CheckResult| v.name == name && v.run == run && v.quantity == quantity;
         self.results.iter().find(of)?.value
     }
 }
@@ -49,13 +49,13 @@ impl Source {
     }
 }
 
-/// Adds the `verdicts` of runs below `output` to the results in `folder`, and returns all results.
+/// Adds the `results` of runs below `output` to the results in `folder`, and returns all results.
 ///
-/// Earlier verdicts of the same runs are replaced; the results are in the order of the `suites`.
+/// Earlier results of the same runs are replaced; the results are in the order of the `suites`.
 pub fn add(
     folder: &Path,
     level: &str,
-    verdicts: &[Verdict],
+    results: &[CheckResult],
     output: &Path,
     suites: &[Suite],
 ) -> Result<Saved, Exit> {
@@ -68,10 +68,10 @@ pub fn add(
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Saved::default(),
         Err(error) => return Err(failed(&json, &error)),
     };
-    let key = |v: &Verdict| (v.name.clone(), v.run.clone());
-    let new: Vec<_> = verdicts.iter().map(key).collect();
+    let key = |v: &CheckResult| (v.name.clone(), v.run.clone());
+    let new: Vec<_> = results.iter().map(key).collect();
     saved.results.retain(|v| !new.contains(&key(v)));
-    saved.results.extend(verdicts.iter().cloned());
+    saved.results.extend(results.iter().cloned());
     saved
         .results
         .sort_by_key(|v| place(suites, &v.name, &v.run));

@@ -1,7 +1,7 @@
-//! Text form of verdicts.
+//! Text form of the results of checks.
 
 use comfy_table::{CellAlignment, Table, presets};
-use grainwake_validation::Verdict;
+use grainwake_validation::CheckResult;
 
 fn number(value: Option<f64>) -> String {
     match value {
@@ -14,14 +14,14 @@ fn number(value: Option<f64>) -> String {
     }
 }
 
-fn error(v: &Verdict) -> String {
+fn error(v: &CheckResult) -> String {
     match v.error {
         Some(e) if v.bound.contains('%') || v.bound.is_empty() => format!("{:+.2} %", 100.0 * e),
         e => number(e),
     }
 }
 
-fn verdict(v: &Verdict) -> &'static str {
+fn verdict(v: &CheckResult) -> &'static str {
     match (v.pass, v.bound.is_empty()) {
         (false, _) => "SHORT",
         (true, true) => "context",
@@ -29,8 +29,8 @@ fn verdict(v: &Verdict) -> &'static str {
     }
 }
 
-/// Returns a verdict on one line.
-pub fn line(v: &Verdict) -> String {
+/// Returns a result on one line.
+pub fn line(v: &CheckResult) -> String {
     let mut text = format!("{}/{} {}: {}", v.name, v.run, v.quantity, number(v.value));
     if v.reference.is_some() {
         text += &format!(", reference {}, error {}", number(v.reference), error(v));
@@ -45,8 +45,8 @@ pub fn line(v: &Verdict) -> String {
     }
 }
 
-/// Returns verdicts as a Markdown table.
-pub fn table(verdicts: &[Verdict]) -> Table {
+/// Returns results as a Markdown table.
+pub fn table(results: &[CheckResult]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
     table.set_header([
@@ -59,7 +59,7 @@ pub fn table(verdicts: &[Verdict]) -> Table {
         "bound",
         "",
     ]);
-    for v in verdicts {
+    for v in results {
         table.add_row([
             v.name.clone(),
             v.run.clone(),

@@ -96,10 +96,11 @@ fn centre_and_half_width(name: &str, at: f64, width: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::axis::AxisRange;
 
     #[test]
     fn names_of_marks_do_not_overlap() {
-        let x = Axis::linear("t", 0.0, 10.0, 5, true);
+        let x = Axis::linear("t", 0.0, 10.0, 5, AxisRange::Tight);
         let mark = |at, name: &str| VerticalMark {
             at,
             name: name.to_owned(),

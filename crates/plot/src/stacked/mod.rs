@@ -2,7 +2,7 @@
 
 mod marks;
 
-use crate::axis::{Axis, extent};
+use crate::axis::{Axis, AxisRange, extent};
 use crate::curve;
 use crate::drawing::{Anchor, Drawing};
 use crate::frame::Frame;
@@ -87,7 +87,11 @@ impl Panel {
     pub fn linear(label: &str, series: Vec<Series>, also: &[f64], height: f64) -> Panel {
         let values = series.iter().flat_map(Series::values);
         let (low, high) = extent(values.chain(also.iter().copied())).unwrap_or((0.0, 1.0));
-        Panel::with_axis(Axis::linear(label, low, high, 5, false), series, height)
+        Panel::with_axis(
+            Axis::linear(label, low, high, 5, AxisRange::Rounded),
+            series,
+            height,
+        )
     }
 
     /// Creates a panel with a logarithmic axis; `None` if no value is positive.
@@ -222,11 +226,11 @@ mod tests {
 
     #[test]
     fn notes_keep_off_the_curves() {
-        let x = Axis::linear("t", 0.0, 10.0, 5, true);
+        let x = Axis::linear("t", 0.0, 10.0, 5, AxisRange::Tight);
         let points = (0..=100)
             .map(|i| (0.1 * f64::from(i), if i < 60 { 1.0 } else { 5.5 }))
             .collect();
-        let y = Axis::linear("y", 0.0, 10.0, 5, true);
+        let y = Axis::linear("y", 0.0, 10.0, 5, AxisRange::Tight);
         let panel = Panel::with_axis(y, vec![Series::new(points, FAINT)], 100.0);
         let frame = Frame {
             across: x,

@@ -24,7 +24,7 @@ pub fn many(scene: &Scene) -> Option<Figure> {
     };
     let squares = mean(&|h, row| h.velocity[row].length_squared());
     let speed: Points = squares.into_iter().map(|(t, v)| (t, v.sqrt())).collect();
-    let contacts = mean(&|h, row| h.contacts[row]);
+    let contacts = mean(&|h, row| h.contacts[row].map_or(f64::NAN, f64::from));
     let height = mean(&|h, row| 1e3 * h.position[row].dot(up));
     let (last_speed, last_contacts) = (speed.last()?.1, contacts.last()?.1);
     let curve = |points, colour| vec![Series::new(points, colour)];
@@ -99,7 +99,9 @@ pub fn force(scene: &Scene) -> Option<Figure> {
     let component = |(axis, colour): (usize, &'static str)| Series {
         name: Some(format!("*F*_{{{}}}", AXES[axis])),
         colour,
-        ..scene.curve(grain, |h, row| h.force[row][axis])
+        ..scene.curve(grain, |h, row| {
+            h.force[row].map_or(f64::NAN, |force| force[axis])
+        })
     };
     let colours = [style::BLUE, style::VERMILION, style::GREEN];
     let curves: Vec<Series> = colours.into_iter().enumerate().map(component).collect();
@@ -108,6 +110,8 @@ pub fn force(scene: &Scene) -> Option<Figure> {
     let last = history
         .force
         .last()
+        .copied()
+        .flatten()
         .filter(|_| known)?
         .to_array()
         .map(short);

@@ -1,7 +1,7 @@
 //! Final positions of many grains, from the side and from above.
 
 use grainwake_plot::Figure;
-use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::colormap::{hex, sequential};
 use grainwake_plot::drawing::Drawing;
 use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_unit};
@@ -105,7 +105,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     }
     let palette: Vec<[u8; 3]> = (0..256).map(|i| sequential(f64::from(i) / 255.0)).collect();
     let label = format!("height of the centre  [{unit}]");
-    let axis = Axis::linear(&label, low * factor, high * factor, 5, true);
+    let axis = Axis::linear(&label, low * factor, high * factor, 5, AxisRange::Tight);
     let corner = (0.5 * total - 90.0, TOP + bottom + 30.0);
     colour_bar(&mut drawing, corner, 180.0, &palette, &axis, (false, false));
     let time = run.grains[grains[0]].time[last(grains[0])];

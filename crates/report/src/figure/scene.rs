@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use grainwake_plot::Figure;
-use grainwake_plot::axis::Axis;
+use grainwake_plot::axis::{Axis, AxisRange};
 use grainwake_plot::stacked::{Panel, Series, VerticalMark, stacked_panels};
 use grainwake_plot::style::series_colour;
 
@@ -36,7 +36,7 @@ impl Scene<'_> {
     /// Returns the time axis of all curves.
     fn time(&self) -> Axis {
         let (label, factor) = self.features.time_axis();
-        Axis::linear(label, 0.0, self.features.end * factor, 6, true)
+        Axis::linear(label, 0.0, self.features.end * factor, 6, AxisRange::Tight)
     }
 
     /// Returns the events as marks on the time axis.

@@ -1,6 +1,6 @@
 //! Slices in columns (instants) and rows (planes) on one colour scale.
 
-use grainwake_plot::axis::Axis;
+use grainwake_plot::axis::{Axis, AxisRange};
 use grainwake_plot::colormap::ColorMap;
 use grainwake_plot::drawing::{Anchor, Drawing, path_data};
 use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_unit};
@@ -110,9 +110,13 @@ impl ColourScale {
     pub fn new(style: &Style, columns: &[Column]) -> ColourScale {
         let quantity = style.quantity;
         let values = || shown_values(columns, quantity);
+        let range = match style.limit {
+            Some(_) => AxisRange::Tight,
+            None => AxisRange::Rounded,
+        };
         let scale = |label: &str, low: f64, high: f64, steps: usize| {
             let label = style.label.as_deref().unwrap_or(label);
-            Axis::linear(label, low, high, steps, style.limit.is_some())
+            Axis::linear(label, low, high, steps, range)
         };
         let (map, axis, largest) = match quantity {
             Quantity::Speed => {

@@ -20,10 +20,10 @@ pub struct History {
     pub orientation: Vec<DQuat>,
     /// Angular velocity [rad/s].
     pub angular_velocity: Vec<DVec3>,
-    /// Hydrodynamic force [N].
-    pub force: Vec<DVec3>,
-    /// Number of contacts.
-    pub contacts: Vec<f64>,
+    /// Hydrodynamic force [N], if known.
+    pub force: Vec<Option<DVec3>>,
+    /// Number of contacts, if known.
+    pub contacts: Vec<Option<u32>>,
 }
 
 impl History {

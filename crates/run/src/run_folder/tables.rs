@@ -121,9 +121,9 @@ fn grain_rows(sim: &Simulation) -> String {
             velocity: grain.velocity,
             orientation: grain.pose.orientation,
             angular_velocity: grain.angular_velocity,
-            force: load.force,
-            torque: load.torque,
-            contacts: f64::from(contacts[index]),
+            force: Some(load.force),
+            torque: Some(load.torque),
+            contacts: Some(contacts[index]),
         };
         row.append_to(&mut text);
     }

@@ -1,8 +1,8 @@
 //! The shape of one grain of a volume.
 
-use super::build::Segments;
 use super::regions::{Region, crop, cuts};
 use super::runs::{fill_cavities, pieces};
+use super::segments::Segments;
 use super::{Mask, ScanOptions, smooth, transform};
 use crate::Shape;
 use crate::error::{Result, ShapeError, first_few};

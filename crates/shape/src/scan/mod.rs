@@ -21,8 +21,10 @@ mod grey;
 mod header;
 mod npy;
 mod npz;
+mod options;
 mod regions;
 mod runs;
+mod segments;
 mod slices;
 mod smooth;
 mod threshold;
@@ -31,9 +33,13 @@ mod transform;
 mod volume;
 mod watershed;
 
-pub use build::{Progress, Scan, ScanOptions, ScannedGrain, scan_volume, shapes_from_volume};
+pub use build::{Scan, ScannedGrain, scan_volume, shapes_from_volume};
+pub use options::ScanOptions;
 pub use threshold::Threshold;
 pub use volume::{Volume, Voxels, read_volume};
+
+/// Callback for progress: stage, completed steps, total steps.
+pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) + Sync);
 
 /// Solid voxels of one grain in a box of background.
 pub(crate) struct Mask {

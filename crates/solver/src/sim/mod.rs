@@ -31,7 +31,8 @@ pub use diagnostics::Diagnostics;
 pub use fields::{AnyFieldView, CELL_FIELDS, CellField};
 pub use prescription::{PrescribedMotion, Prescription};
 pub use setup::{Setup, SetupError, StepRule};
-pub use stability::StepError;
+pub use stability::{Remedy, StepError};
+pub use step::SAME_TIME;
 
 /// Simulation of grains in a fluid, or of grains alone.
 ///

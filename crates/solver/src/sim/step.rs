@@ -4,7 +4,7 @@ use super::stages::Start;
 use super::{Simulation, StepError};
 
 /// Relative difference below which two times count as equal.
-const SAME_TIME: f64 = 1e-9;
+pub const SAME_TIME: f64 = 1e-9;
 
 impl Simulation {
     /// Advances the simulation to `time` [s], in steps of which the last ends there.

@@ -1,6 +1,7 @@
 //! Verdicts on claims, from rank tests on the observations.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use serde::Serialize;
 
@@ -12,6 +13,28 @@ use crate::format::{p_value, percent, significant, title};
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Claim, Sign, Test};
 
+/// Verdict on a claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// The confidence interval shows the claim.
+    Holds,
+    /// The confidence interval shows the opposite.
+    Contradicted,
+    /// The confidence interval shows neither.
+    Open,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.pad(match self {
+            Verdict::Holds => "holds",
+            Verdict::Contradicted => "contradicted",
+            Verdict::Open => "open",
+        })
+    }
+}
+
 /// Claim and the result of its test. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
@@ -21,8 +44,8 @@ pub struct Finding {
     pub part: String,
     /// Quantity.
     pub quantity: String,
-    /// "holds", "contradicted" or "open".
-    pub verdict: &'static str,
+    /// Verdict.
+    pub verdict: Verdict,
     /// Result of the test in words.
     pub says: String,
     /// Number of models or pairs of models.
@@ -49,8 +72,8 @@ pub fn evaluate(analysis: &Analysis, records: &[RunRecord]) -> Vec<Finding> {
         let mut finding = test(claim, records);
         if unconverged(claim) {
             finding.says += "; not converged with the grid";
-            if finding.verdict == "contradicted" {
-                finding.verdict = "open";
+            if finding.verdict == Verdict::Contradicted {
+                finding.verdict = Verdict::Open;
             }
         }
         finding
@@ -65,7 +88,7 @@ struct Outcome {
     estimate: Option<Estimate>,
     /// Result in words; without meaning if there is no estimate.
     says: String,
-    verdict: &'static str,
+    verdict: Verdict,
 }
 
 impl Outcome {
@@ -74,13 +97,13 @@ impl Outcome {
         censored: usize,
         estimate: Option<Estimate>,
         says: impl FnOnce(&Estimate) -> String,
-        verdict: impl FnOnce(&Estimate) -> &'static str,
+        verdict: impl FnOnce(&Estimate) -> Verdict,
     ) -> Outcome {
         Outcome {
             n,
             censored,
             says: estimate.as_ref().map_or(String::new(), says),
-            verdict: estimate.as_ref().map_or("open", verdict),
+            verdict: estimate.as_ref().map_or(Verdict::Open, verdict),
             estimate,
         }
     }
@@ -236,7 +259,7 @@ fn near(
     name: &str,
 ) -> Outcome {
     let Some(reference) = reference else {
-        return Outcome::new(0, 0, None, |_| String::new(), |_| "open");
+        return Outcome::new(0, 0, None, |_| String::new(), |_| Verdict::Open);
     };
     let others: Vec<&Observation> = all.iter().filter(|o| o.model != model).collect();
     let relative = |o: &&Observation| o.value / reference.value - 1.0;
@@ -278,16 +301,16 @@ fn interval(e: &Estimate, form: fn(f64) -> String) -> String {
     format!("95 % interval {} to {}", form(e.low), form(e.high))
 }
 
-fn verdict(holds: bool, contradicted: bool) -> &'static str {
+fn verdict(holds: bool, contradicted: bool) -> Verdict {
     match (holds, contradicted) {
-        (true, _) => "holds",
-        (_, true) => "contradicted",
-        _ => "open",
+        (true, _) => Verdict::Holds,
+        (_, true) => Verdict::Contradicted,
+        _ => Verdict::Open,
     }
 }
 
 /// Verdict on equality: whether the interval lies inside or outside of ± `within`.
-fn inside(e: &Estimate, within: f64) -> &'static str {
+fn inside(e: &Estimate, within: f64) -> Verdict {
     let equal = e.low >= -within && e.high <= within;
     verdict(equal, e.low > within || e.high < -within)
 }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::pair::PairMeasures;
 use super::settling::SettlingMeasures;
 use crate::plan::{Plan, Run};
-use crate::run::state::{RunState, run_state_for};
+use crate::run::state::{RunState, StateKind, run_state_for};
 
 /// A run and its measured values. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -28,8 +28,8 @@ pub struct RunRecord {
     pub levels: BTreeMap<String, String>,
     /// Numerical factors.
     pub factors: BTreeMap<String, f64>,
-    /// "finished", "unfinished", "missing", "failed" or "stale".
-    pub state: String,
+    /// State.
+    pub state: StateKind,
     /// Reason of a failed or stale run.
     pub remark: Option<String>,
     /// Hash of the case, the end condition and the program.
@@ -68,7 +68,7 @@ impl RunRecord {
             member: run.member,
             levels: run.levels.clone(),
             factors: run.factors.clone(),
-            state: state.name().into(),
+            state: state.kind(),
             id: run.id.clone(),
             ..RunRecord::default()
         };
@@ -114,7 +114,7 @@ impl RunRecord {
 
     /// Returns whether the run reached its end.
     pub fn finished(&self) -> bool {
-        self.state == RunState::Finished.name()
+        self.state == StateKind::Finished
     }
 
     /// Returns a measured quantity or a factor by name.
@@ -146,7 +146,7 @@ pub fn records(plan: &Plan, study: &Path) -> Vec<RunRecord> {
         let record = RunRecord::read(run, plan, study);
         let same = |old: &RunRecord| old.name == record.name && old.id == record.id;
         let old = kept.iter().find(|old| same(old) && old.finished());
-        let missing = record.state == RunState::Missing.name();
+        let missing = record.state == StateKind::Missing;
         old.filter(|_| missing).cloned().unwrap_or(record)
     };
     plan.runs.par_iter().map(read).collect()

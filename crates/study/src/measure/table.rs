@@ -111,7 +111,7 @@ fn rows(records: &[RunRecord]) -> Vec<Vec<String>> {
     header.extend(["max_divergence", "id", "remark"]);
     let row = |r: &RunRecord| {
         let member = r.member.to_string();
-        let mut cells = vec![r.name.clone(), r.model.clone(), member, r.state.clone()];
+        let mut cells = vec![r.name.clone(), r.model.clone(), member, r.state.to_string()];
         cells.extend(
             axes.iter()
                 .map(|a| r.levels.get(*a).cloned().unwrap_or_default()),

@@ -132,7 +132,7 @@ pub fn write_thinned_history(
             ];
             let mut row = vec![cell(time), grain.to_string()];
             row.extend(values.map(cell));
-            row.push(h.contacts[i].to_string());
+            row.push(h.contacts[i].map_or("NaN".into(), |n| n.to_string()));
             out.push(row);
         }
     }

@@ -5,7 +5,9 @@ use maud::{Markup, html};
 
 use super::content::Content;
 use super::{pairs, settling, tables};
+use crate::analysis::verdict::Verdict;
 use crate::measure::record::RunRecord;
+use crate::run::state::StateKind;
 
 impl Content<'_> {
     /// Returns the page.
@@ -53,14 +55,14 @@ impl Content<'_> {
     fn lead(&self) -> Markup {
         let finished = self.records.iter().filter(|record| record.finished());
         let finished = finished.count();
-        let verdicts = |v: &str| self.findings.iter().filter(|f| f.verdict == v).count();
+        let verdicts = |v: Verdict| self.findings.iter().filter(|f| f.verdict == v).count();
         html! {
             (finished) " of " (self.records.len()) " runs are finished"
             (settling::lead(self.records))
             @if finished > 0 && self.has_pairs() { (pairs::lead(self.records)) }
             @if !self.findings.is_empty() {
-                ". Of " (self.findings.len()) " claims, " (verdicts("holds")) " hold, "
-                (verdicts("contradicted")) " are contradicted and " (verdicts("open")) " are open"
+                ". Of " (self.findings.len()) " claims, " (verdicts(Verdict::Holds)) " hold, "
+                (verdicts(Verdict::Contradicted)) " are contradicted and " (verdicts(Verdict::Open)) " are open"
             }
             ". Times are in √(d/g), lengths in the equal-volume diameter d, speeds in √(d g)."
         }
@@ -69,14 +71,15 @@ impl Content<'_> {
     /// Lists runs without results and omitted parts.
     fn omissions(&self) -> Vec<String> {
         let mut out = Vec::new();
-        for state in ["missing", "unfinished", "failed", "stale"] {
+        use StateKind::{Failed, Missing, Stale, Unfinished};
+        for state in [Missing, Unfinished, Failed, Stale] {
             let runs = self.records.iter().filter(|r| r.state == state);
             let names: Vec<&str> = runs.map(|r| r.name.as_str()).collect();
             if !names.is_empty() {
                 out.push(format!("{state}: {}", names.join(", ")));
             }
         }
-        let failed = self.records.iter().filter(|r| r.state == "failed");
+        let failed = self.records.iter().filter(|r| r.state == Failed);
         let reason = |r: &RunRecord| Some(format!("{}: {}", r.name, r.remark.as_ref()?));
         out.extend(failed.filter_map(reason));
         out.extend(self.notes.iter().cloned());

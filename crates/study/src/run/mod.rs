@@ -12,7 +12,7 @@ use grainwake_formats::events::Event;
 use grainwake_formats::summary::Summary;
 use grainwake_run::checkpoint;
 use grainwake_run::lock::{self, Attempt};
-use grainwake_run::{Ending, Existing, Observer, Progress, RunError};
+use grainwake_run::{Ending, Existing, FailureKind, Observer, Progress, RunError};
 
 use self::state::{RunState, run_state};
 use crate::error::{At, StudyError};
@@ -40,8 +40,8 @@ pub enum Outcome {
     Finished(Box<Summary>),
     /// The run had finished in an earlier session.
     AlreadyFinished,
-    /// The run failed: reason and exit code.
-    Failed(String, u8),
+    /// The run failed, with the reason.
+    Failed(String, FailureKind),
     /// The run was interrupted, or not started because the study was interrupted.
     Interrupted,
     /// Another program holds the lock of the run.
@@ -109,7 +109,7 @@ pub fn execute(
                 let guarded = AssertUnwindSafe(|| pool.install(|| job.outcome(&disk_full)));
                 std::panic::catch_unwind(guarded).unwrap_or_else(|_| {
                     let what = "internal error of the program: please report it with the case";
-                    Outcome::Failed(what.into(), 3)
+                    Outcome::Failed(what.into(), FailureKind::Computation)
                 })
             };
             observer.ended(index, &outcome);
@@ -149,7 +149,7 @@ impl Job<'_> {
                 {
                     disk_full.store(true, Ordering::Relaxed);
                 }
-                Outcome::Failed(error.to_string(), error.exit_code())
+                Outcome::Failed(error.to_string(), error.kind())
             }
         }
     }
@@ -165,7 +165,8 @@ impl Job<'_> {
                 return Ok(Outcome::AlreadyFinished);
             }
             RunState::Failed(why) if !self.options.retry => {
-                return Ok(Outcome::Failed(format!("failed before: {why}"), 3));
+                let reason = format!("failed before: {why}");
+                return Ok(Outcome::Failed(reason, FailureKind::Computation));
             }
             RunState::Missing => Existing::Refuse,
             RunState::Unfinished => Existing::Resume,
@@ -177,12 +178,12 @@ impl Job<'_> {
         };
         let case = match self.run.case() {
             Ok(case) => case,
-            Err(error) => return Ok(Outcome::Failed(error.to_string(), 2)),
+            Err(error) => return Ok(Outcome::Failed(error.to_string(), FailureKind::Input)),
         };
         if case.digest != self.run.case_sha256 {
             let what = "the files of the case have changed since the study was started; \
                         start the study again";
-            return Ok(Outcome::Failed(what.into(), 2));
+            return Ok(Outcome::Failed(what.into(), FailureKind::Input));
         }
         self.observer.started(self.index);
         let simulate = |existing: Existing| {

@@ -1,10 +1,12 @@
 //! State of a run in a study folder.
 
+use std::fmt;
 use std::path::Path;
 
 use grainwake_formats::summary;
 use grainwake_run::RESOLVED;
 use grainwake_run::provenance::Provenance;
+use serde::{Deserialize, Serialize};
 
 use crate::plan::{Run, end_condition};
 
@@ -24,15 +26,44 @@ pub enum RunState {
 }
 
 impl RunState {
-    /// Returns the name of the state as in the tables.
-    pub fn name(&self) -> &'static str {
+    /// Returns the kind of the state, without the reason.
+    pub fn kind(&self) -> StateKind {
         match self {
-            RunState::Missing => "missing",
-            RunState::Unfinished => "unfinished",
-            RunState::Finished => "finished",
-            RunState::Failed(_) => "failed",
-            RunState::Stale(_) => "stale",
+            RunState::Missing => StateKind::Missing,
+            RunState::Unfinished => StateKind::Unfinished,
+            RunState::Finished => StateKind::Finished,
+            RunState::Failed(_) => StateKind::Failed,
+            RunState::Stale(_) => StateKind::Stale,
         }
+    }
+}
+
+/// Kind of a [`RunState`], as in the tables.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StateKind {
+    /// [`RunState::Missing`].
+    #[default]
+    Missing,
+    /// [`RunState::Unfinished`].
+    Unfinished,
+    /// [`RunState::Finished`].
+    Finished,
+    /// [`RunState::Failed`].
+    Failed,
+    /// [`RunState::Stale`].
+    Stale,
+}
+
+impl fmt::Display for StateKind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.pad(match self {
+            StateKind::Missing => "missing",
+            StateKind::Unfinished => "unfinished",
+            StateKind::Finished => "finished",
+            StateKind::Failed => "failed",
+            StateKind::Stale => "stale",
+        })
     }
 }
 

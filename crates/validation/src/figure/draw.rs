@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use grainwake_plot::drawing::Drawing;
+use grainwake_plot::frame::Fill;
 use grainwake_plot::style::FAINT;
 use grainwake_plot::{minus, plain};
 use grainwake_report::figure::field::{self, Panel};
@@ -163,7 +164,7 @@ impl SeriesSpec {
             label: self.label.clone(),
             colour: self.colour,
             sign: Some(self.sign),
-            hollow: false,
+            fill: Fill::Solid,
             line: self.line,
             points: Vec::new(),
         };
@@ -179,7 +180,7 @@ impl SeriesSpec {
                 let y = expression::evaluate(y, &columns, constants)?;
                 shown.points = x.into_iter().zip(y).collect();
                 shown.sign = self.line.is_none().then_some(self.sign);
-                shown.hollow = true;
+                shown.fill = Fill::Hollow;
             }
             Data::History {
                 run,
@@ -270,7 +271,7 @@ fn guide(points: &[(f64, f64)], slope: f64) -> Option<DataSet> {
         label: minus(&format!("slope {slope}")),
         colour: FAINT,
         sign: None,
-        hollow: false,
+        fill: Fill::Solid,
         line: Some("4.5 2"),
         points: points.iter().map(|(x, _)| along(*x)).collect(),
     })

@@ -1,9 +1,9 @@
 //! Plots of points and curves with a legend.
 
 use grainwake_plot::COLUMN;
-use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::Drawing;
-use grainwake_plot::frame::{Frame, Marker};
+use grainwake_plot::frame::{Fill, Frame, Labelled, Marker};
 use grainwake_plot::legend::{Entry, Legend};
 use grainwake_run::case::Located;
 
@@ -24,8 +24,8 @@ pub struct DataSet {
     pub colour: &'static str,
     /// Number of the symbol of its points, if any.
     pub sign: Option<usize>,
-    /// Whether the symbols are hollow.
-    pub hollow: bool,
+    /// Fill of the symbols.
+    pub fill: Fill,
     /// SVG dash pattern of the line through its points ("" for a solid line), if any.
     pub line: Option<&'static str>,
     /// Points.
@@ -39,7 +39,7 @@ impl DataSet {
 
     fn mark(&self, drawing: &mut Drawing, at: (f64, f64)) {
         if let Some(sign) = self.sign {
-            Marker::nth(sign).draw(drawing, at, SIGN, self.colour, self.hollow);
+            Marker::nth(sign).draw(drawing, at, SIGN, self.colour, self.fill);
         }
     }
 
@@ -49,7 +49,7 @@ impl DataSet {
             name: self.label.clone(),
             colour: self.colour,
             line: self.line,
-            symbol: self.sign.map(|sign| (Marker::nth(sign), self.hollow)),
+            symbol: self.sign.map(|sign| (Marker::nth(sign), self.fill)),
         })
     }
 }
@@ -88,7 +88,7 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
             frame.curve(&mut drawing, &one.points, one.colour, one.dash(), &clip);
         }
     }
-    frame.outline(&mut drawing, (true, true));
+    frame.outline(&mut drawing, Labelled::BOTH);
     for one in sets {
         for (x, y) in &one.points {
             let places = frame.across.fraction(*x).zip(frame.up.fraction(*y));
@@ -106,11 +106,14 @@ fn axis(plan: &AxisSpec, values: impl Iterator<Item = f64>, count: usize) -> Axi
     let end =
         |given: &Option<Located<f64>>, default: f64| given.as_ref().map_or(default, |v| v.value);
     let (low, high) = (end(&plan.from, low), end(&plan.to, high));
-    let tight = plan.from.is_some() && plan.to.is_some();
+    let range = match (&plan.from, &plan.to) {
+        (Some(_), Some(_)) => AxisRange::Tight,
+        _ => AxisRange::Rounded,
+    };
     let axis = if plan.scale == Scale::Log {
-        Axis::log_rounded(&plan.label, low, high, tight)
+        Axis::log_rounded(&plan.label, low, high, range)
     } else {
-        Axis::linear(&plan.label, low, high, count, tight)
+        Axis::linear(&plan.label, low, high, count, range)
     };
     match &plan.ticks {
         Some(ticks) => axis.with_ticks(ticks),
@@ -136,7 +139,7 @@ mod tests {
             label: label.into(),
             colour: INK,
             sign: Some(1),
-            hollow: true,
+            fill: Fill::Hollow,
             line: Some(""),
             points: points.to_vec(),
         };

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_plot::frame::Marker;
+use grainwake_plot::frame::{Fill, Marker};
 use grainwake_plot::legend::Entry;
 use grainwake_plot::text;
 use grainwake_run::RESOLVED;
@@ -109,6 +109,6 @@ pub fn symbol_entry(name: &str, n: usize, colour: &'static str) -> Entry {
         name: text::literal(name),
         colour,
         line: None,
-        symbol: Some((Marker::nth(n), false)),
+        symbol: Some((Marker::nth(n), Fill::Solid)),
     }
 }

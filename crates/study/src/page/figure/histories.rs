@@ -1,8 +1,8 @@
 //! Figs 15 to 18: gap and vertical velocity in one orientation, by row and by column of grains.
 
-use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
-use grainwake_plot::frame::Frame;
+use grainwake_plot::frame::{Frame, Labelled};
 use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
 use grainwake_plot::{Figure, letter, text};
@@ -127,8 +127,8 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
             y: LEGEND + TITLE + row as f64 * (HEIGHT + TITLE),
             width: WIDTH,
             height: HEIGHT,
-            across: Axis::linear(TIME, 0.0, end, 6, true),
-            up: Axis::linear(label, low, high.max(0.0), 5, false),
+            across: Axis::linear(TIME, 0.0, end, 6, AxisRange::Tight),
+            up: Axis::linear(label, low, high.max(0.0), 5, AxisRange::Rounded),
         };
         frame.grid(&mut drawing);
         let title = format!("{}  {}", letter(i), factor_label(by, *value));
@@ -157,7 +157,13 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
             let n = lines.iter().position(|v| own == Some(v)).unwrap_or(0);
             draw(trajectory, COLOURS[n % 4], &run.name);
         }
-        frame.outline(&mut drawing, (row + 1 == rows, column == 0));
+        frame.outline(
+            &mut drawing,
+            Labelled {
+                across: row + 1 == rows,
+                up: column == 0,
+            },
+        );
     }
     let entry = |name: String, colour: &'static str, dash: Option<&'static str>| Entry {
         name,

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
-use grainwake_plot::frame::{Frame, Marker};
+use grainwake_plot::frame::{Fill, Frame, Labelled, Marker};
 use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::{BLUE, GREEN, HAIR, INK, ORANGE, PAGE, TEXT, VERMILION};
 use grainwake_plot::{Figure, text};
@@ -43,7 +43,7 @@ fn layout<'a>(data: &'a FigureData, height: f64, top: f64) -> Option<Layout<'a>>
         .cloned();
     let (_, high) = extent(all.iter().flat_map(|o| [o.range.0, o.range.1, o.value]))?;
     let count = grains.len() + usize::from(reference.is_some());
-    let mut across = Axis::linear("grain", 0.0, count as f64, 4, true);
+    let mut across = Axis::linear("grain", 0.0, count as f64, 4, AxisRange::Tight);
     let number = |name: &str| {
         let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
         digits.trim_start_matches('0').to_owned()
@@ -76,7 +76,7 @@ fn layout<'a>(data: &'a FigureData, height: f64, top: f64) -> Option<Layout<'a>>
             height,
             across,
             // Room for the labels of the blocks.
-            up: Axis::linear(LABEL, 0.0, 1.12 * high, 5, false),
+            up: Axis::linear(LABEL, 0.0, 1.12 * high, 5, AxisRange::Rounded),
         },
         blocks,
     })
@@ -128,7 +128,13 @@ impl Layout<'_> {
             let bar = [(x, f.py(o.range.0)), (x, f.py(o.range.1))];
             drawing.line(&bar, colour, 0.9, None);
         }
-        sign.draw(drawing, (x, f.py(o.value)), 2.9, colour, o.censored);
+        sign.draw(
+            drawing,
+            (x, f.py(o.value)),
+            2.9,
+            colour,
+            Fill::of_bound(o.censored),
+        );
     }
 
     fn censored(&self) -> usize {
@@ -153,7 +159,7 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
             name: "hollow: landed before kissing; the landing is shown".into(),
             colour: INK,
             line: None,
-            symbol: Some((Marker::Circle, true)),
+            symbol: Some((Marker::Circle, Fill::Hollow)),
         });
     }
     Legend::new(entries, PAGE - LEFT).draw(&mut drawing, (LEFT, LEGEND));
@@ -178,7 +184,7 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
         let at = layout.reference_position();
         layout.mark(&mut drawing, at, reference, Marker::nth(0), INK);
     }
-    layout.frame.outline(&mut drawing, (true, true));
+    layout.frame.outline(&mut drawing, Labelled::BOTH);
     let count = layout.all.len();
     let mut caption = format!("First contact of {count} models, by grain and initial orientation.");
     if let Some(rows) = &request.rows {
@@ -240,9 +246,15 @@ pub fn box_plot(data: &FigureData) -> Option<Figure> {
     }
     if let Some(reference) = &layout.reference {
         let place = (f.px(layout.reference_position()), f.py(reference.value));
-        Marker::Circle.draw(&mut drawing, place, 2.9, INK, reference.censored);
+        Marker::Circle.draw(
+            &mut drawing,
+            place,
+            2.9,
+            INK,
+            Fill::of_bound(reference.censored),
+        );
     }
-    f.outline(&mut drawing, (true, true));
+    f.outline(&mut drawing, Labelled::BOTH);
     let (width, grain) = widest?;
     let mut caption = format!(
         "Kissing times over the orientations of each grain: minimum, lower quartile, median, upper \

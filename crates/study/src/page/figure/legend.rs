@@ -1,6 +1,6 @@
 //! Line styles of runs in the overview figures, and their legend.
 
-use grainwake_plot::frame::Marker;
+use grainwake_plot::frame::{Fill, Marker};
 use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::{INK, PAGE, SERIES_COLOURS, series_colour};
 use grainwake_plot::text;
@@ -107,7 +107,7 @@ impl LineStyles {
             name: text::literal(&name),
             colour: style.colour,
             line: (!symbols).then_some(style.dash.unwrap_or_default()),
-            symbol: symbols.then_some((style.sign, false)),
+            symbol: symbols.then_some((style.sign, Fill::Solid)),
         };
         Legend::new(self.entries().into_iter().map(entry), PAGE - left)
     }

@@ -2,9 +2,9 @@
 //! varied parameters.
 
 use grainwake_plot::Figure;
-use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::Drawing;
-use grainwake_plot::frame::Frame;
+use grainwake_plot::frame::{Frame, Labelled};
 use grainwake_plot::style::{LINE, PAGE};
 
 use super::data::FigureData;
@@ -118,8 +118,8 @@ fn against_time(data: &FigureData, curves: &Curves, time: &str, texts: Texts) ->
         y: top,
         width: PAGE - LEFT - 8.0,
         height: 200.0,
-        across: Axis::linear(time, 0.0, end, 8, true),
-        up: Axis::linear(texts.up, low, high, 6, false),
+        across: Axis::linear(time, 0.0, end, 8, AxisRange::Tight),
+        up: Axis::linear(texts.up, low, high, 6, AxisRange::Rounded),
     };
     let mut drawing = Drawing::new(PAGE, top + frame.height + 26.0);
     legend.draw(&mut drawing, (LEFT, 5.0));
@@ -135,6 +135,6 @@ fn against_time(data: &FigureData, curves: &Curves, time: &str, texts: Texts) ->
             drawing.line(&placed, style.colour, 0.6 * LINE, style.dash);
         }
     }
-    frame.outline(&mut drawing, (true, true));
+    frame.outline(&mut drawing, Labelled::BOTH);
     Some(texts.figure(drawing))
 }

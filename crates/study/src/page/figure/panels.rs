@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use grainwake_plot::axis::{Axis, extent};
+use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::Drawing;
-use grainwake_plot::frame::Frame;
+use grainwake_plot::frame::{Fill, Frame, Labelled};
 use grainwake_plot::style::PAGE;
 use grainwake_plot::{Figure, text};
 
@@ -146,7 +146,7 @@ pub(super) fn against_parameters(
         let label = text::literal(&title(&parameter.name));
         let across = match &parameter.names {
             Some(names) => {
-                let mut axis = Axis::linear(&label, 0.0, names.len() as f64, 4, true);
+                let mut axis = Axis::linear(&label, 0.0, names.len() as f64, 4, AxisRange::Tight);
                 let tick = |(i, name): (usize, &String)| (i as f64 + 0.5, text::literal(name));
                 axis.ticks = names.iter().enumerate().map(tick).collect();
                 axis
@@ -154,7 +154,7 @@ pub(super) fn against_parameters(
             None => {
                 let (a, b) = extent(parameter.coordinates.values().copied())?;
                 let margin = 0.06 * (b - a);
-                Axis::linear(&label, a - margin, b + margin, 5, true)
+                Axis::linear(&label, a - margin, b + margin, 5, AxisRange::Tight)
             }
         };
         let frame = Frame {
@@ -163,11 +163,17 @@ pub(super) fn against_parameters(
             width,
             height: HEIGHT,
             across,
-            up: Axis::linear(texts.up, low, high, 5, false),
+            up: Axis::linear(texts.up, low, high, 5, AxisRange::Rounded),
         };
         frame.grid(&mut drawing);
         draw_panel(&mut drawing, &frame, parameter, &all, data, &styles);
-        frame.outline(&mut drawing, (true, i % 2 == 0));
+        frame.outline(
+            &mut drawing,
+            Labelled {
+                across: true,
+                up: i % 2 == 0,
+            },
+        );
     }
     let mut caption = texts.caption.clone();
     let models = data.plan.runs.iter().filter(|r| r.member == 0).count();
@@ -219,8 +225,12 @@ fn draw_panel(
             let bar = [(x, frame.py(low)), (x, frame.py(high))];
             drawing.line(&bar, style.colour, 0.9, None);
         }
-        style
-            .sign
-            .draw(drawing, (x, y), 3.0, style.colour, observation.censored);
+        style.sign.draw(
+            drawing,
+            (x, y),
+            3.0,
+            style.colour,
+            Fill::of_bound(observation.censored),
+        );
     }
 }

@@ -7,6 +7,7 @@ use grainwake_report::features::RunKind;
 use grainwake_report::{RunReport, read_report};
 
 use super::data::{FigureData, numbered_as_in_paper};
+use crate::run::state::StateKind;
 
 /// Number of the first of these figures in the paper.
 const FIRST: usize = 8;
@@ -19,7 +20,7 @@ pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
         let numbers = (FIRST + n, FIRST + models.len() + n);
         let usable = |run: &str| {
             let mut records = data.records.iter().filter(|r| r.name == run);
-            records.any(|r| r.state != "stale" && r.state != "missing")
+            records.any(|r| !matches!(r.state, StateKind::Stale | StateKind::Missing))
         };
         let run = data.run(name).filter(|run| usable(&run.name));
         let which = if numbered_as_in_paper(data) {

@@ -1,8 +1,8 @@
 //! Rank correlations with their confidence intervals.
 
-use grainwake_plot::axis::Axis;
+use grainwake_plot::axis::{Axis, AxisRange};
 use grainwake_plot::drawing::{Anchor, Drawing};
-use grainwake_plot::frame::{Frame, Marker};
+use grainwake_plot::frame::{Fill, Frame, Labelled, Marker};
 use grainwake_plot::legend::Legend;
 use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
 use grainwake_plot::{Figure, text};
@@ -31,7 +31,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let width = (PAGE - LEFT - 8.0 - GAP * (panels - 1.0)) / panels;
     let mut drawing = Drawing::new(PAGE, TOP + height + 26.0);
     for (i, factor) in request.factors.iter().enumerate() {
-        let mut up = Axis::linear("", 0.0, height, 1, true);
+        let mut up = Axis::linear("", 0.0, height, 1, AxisRange::Tight);
         up.ticks.clear();
         let label = format!("rank correlation with {}", text::literal(factor));
         let frame = Frame {
@@ -39,7 +39,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
             y: TOP,
             width,
             height,
-            across: Axis::linear(&label, -1.0, 1.0, 4, true),
+            across: Axis::linear(&label, -1.0, 1.0, 4, AxisRange::Tight),
             up,
         };
         for (q, quantity) in request.quantities.iter().enumerate() {
@@ -62,13 +62,19 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
                 let colour = COLOURS[l % 4];
                 let interval = [(frame.px(low), y), (frame.px(high), y)];
                 drawing.line(&interval, colour, 1.2, None);
-                Marker::nth(l).draw(&mut drawing, (frame.px(rho), y), 2.7, colour, false);
+                Marker::nth(l).draw(&mut drawing, (frame.px(rho), y), 2.7, colour, Fill::Solid);
             }
         }
         let zero = frame.px(0.0);
         let zero = [(zero, frame.y), (zero, frame.y + height)];
         drawing.line(&zero, INK, 0.6, Some("2 2"));
-        frame.outline(&mut drawing, (true, false));
+        frame.outline(
+            &mut drawing,
+            Labelled {
+                across: true,
+                up: false,
+            },
+        );
     }
     let entry = |(l, level): (usize, &String)| symbol_entry(level, l, COLOURS[l % 4]);
     let legend = Legend::new(levels.iter().enumerate().map(entry), PAGE - LEFT);

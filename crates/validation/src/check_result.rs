@@ -10,7 +10,7 @@ use crate::suite::Suite;
 
 /// Result of one check. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Verdict {
+pub struct CheckResult {
     /// Name of the suite.
     pub name: String,
     /// Name of the run.
@@ -41,7 +41,7 @@ impl Suite {
         run: &SuiteRun,
         folder: &Path,
         known: &mut BTreeMap<(String, String), f64>,
-    ) -> Vec<Verdict> {
+    ) -> Vec<CheckResult> {
         let evaluate = |check: &Check| {
             let measured = check.measure(folder);
             let key = |run: &String| (run.clone(), check.quantity.clone());
@@ -55,24 +55,24 @@ impl Suite {
                     Reference::Number(number) => Some(*number),
                     Reference::Run(other) => known.get(&key(other)).copied(),
                 });
-            self.verdict(run, check, measured, reference)
+            self.result(run, check, measured, reference)
         };
         run.checks.iter().map(evaluate).collect()
     }
 
-    /// Returns the verdicts of a run that did not reach its end.
-    pub fn verdicts_of_failed_run(&self, run: &SuiteRun, reason: &str) -> Vec<Verdict> {
-        let failed = |check: &Check| self.verdict(run, check, Err(reason.into()), None);
+    /// Returns the results of a run that did not reach its end.
+    pub fn results_of_failed_run(&self, run: &SuiteRun, reason: &str) -> Vec<CheckResult> {
+        let failed = |check: &Check| self.result(run, check, Err(reason.into()), None);
         run.checks.iter().map(failed).collect()
     }
 
-    fn verdict(
+    fn result(
         &self,
         run: &SuiteRun,
         check: &Check,
         measured: Result<f64, String>,
         reference: Option<f64>,
-    ) -> Verdict {
+    ) -> CheckResult {
         let (value, problem) = match measured {
             Ok(value) if value.is_finite() => (Some(value), None),
             Ok(value) => (None, Some(format!("the measured value is {value}"))),
@@ -81,7 +81,7 @@ impl Suite {
         let error = value.zip(reference).map(|(v, r)| check.bounds.error(v, r));
         let missing = check.reference.is_some() && reference.is_none();
         let no_reference = || missing.then(|| "the reference run has no value".to_string());
-        Verdict {
+        CheckResult {
             name: self.name.clone(),
             run: run.name.clone(),
             quantity: check.quantity.clone(),

@@ -1,0 +1,113 @@
+//! Segmentation: labels of the grains, and grey values for their surfaces.
+
+use super::field_of_view::FieldOfView;
+use super::grey::{Grey, LAYERS};
+use super::runs::{fill_cavities, pieces};
+use super::threshold::median;
+use super::volume::{Volume, Voxels};
+use super::watershed::{HALO, add_halo, separate};
+use super::{Mask, Progress, ScanOptions, transform};
+use crate::error::{Result, ShapeError};
+use crate::limits::SourceFile;
+use std::collections::BTreeSet;
+
+/// Result of the segmentation.
+pub(super) struct Segments {
+    pub labels: Vec<u32>,
+    /// Grey values, if surfaces are located by them.
+    pub grey: Option<Grey>,
+    pub threshold: Option<f64>,
+    /// Labels at the edge of the field of view.
+    pub cut_by_view: BTreeSet<u32>,
+}
+
+/// Determines the grain of each voxel.
+pub(super) fn segment(
+    volume: &Volume,
+    source: &SourceFile,
+    options: &ScanOptions,
+    progress: Progress,
+) -> Result<Segments> {
+    let dims = volume.dims;
+    let values = match (&volume.voxels, options.threshold) {
+        (Voxels::Labels(labels), None) => {
+            let divided = match options.label.filter(|_| options.divides()) {
+                None => divide(labels, dims, options, progress)?,
+                Some(phase) => {
+                    let phase: Vec<u32> = labels.iter().map(|l| u32::from(*l == phase)).collect();
+                    divide(&phase, dims, options, progress)?
+                }
+            };
+            return Ok(Segments {
+                labels: divided,
+                grey: None,
+                threshold: None,
+                cut_by_view: BTreeSet::new(),
+            });
+        }
+        (Voxels::Grey(_), None) => {
+            let reason = "the image has grey values, not labels; give a threshold (--threshold \
+                          otsu, otsu3, or a grey value)";
+            return Err(ShapeError::unsupported(source.name.as_ref(), reason));
+        }
+        (Voxels::Labels(v), _) => v.iter().map(|v| *v as f32).collect(),
+        (Voxels::Grey(v), _) => v.clone(),
+    };
+    progress("threshold", 0, 1);
+    let clean = options.median.then(|| median(&values, dims));
+    let filtered = clean.as_ref().unwrap_or(&values);
+    let cut = options.threshold.and_then(|t| t.of(filtered));
+    let Some(cut) = cut else {
+        // All values are equal: black counts as empty.
+        return Err(ShapeError::EmptyVolume);
+    };
+    let binary: Vec<u32> = filtered
+        .iter()
+        .map(|v| u32::from(f64::from(*v) >= cut))
+        .collect();
+    drop(clean);
+    let labels = divide(&binary, dims, options, progress)?;
+    let view = FieldOfView::of(&values, dims, cut);
+    let mut segments = Segments {
+        cut_by_view: view.map_or_else(BTreeSet::new, |view| view.cuts(&labels)),
+        labels,
+        grey: None,
+        threshold: Some(cut),
+    };
+    // A binary image has no intermediate grey values.
+    let two = values
+        .iter()
+        .all(|v| *v == values[0] || *v == 0.0 || *v == 1.0 || *v == 255.0);
+    if options.sub_voxel && !two && segments.labels.iter().all(|l| *l < HALO) {
+        let mut owner = segments.labels.clone();
+        add_halo(&mut owner, dims, LAYERS);
+        segments.grey = Some(Grey::new(dims, values, owner));
+    }
+    Ok(segments)
+}
+
+/// Fills cavities, splits and separates according to the options.
+fn divide(
+    labels: &[u32],
+    dims: [usize; 3],
+    options: &ScanOptions,
+    progress: Progress,
+) -> Result<Vec<u32>> {
+    let Some(neck) = options.separate else {
+        return Ok(if options.split {
+            pieces(dims, |n| labels[n] != 0).0
+        } else {
+            labels.to_vec()
+        });
+    };
+    progress("separate", 0, 1);
+    let mut mask = Mask {
+        dims,
+        solid: labels.iter().map(|l| *l != 0).collect(),
+    };
+    if mask.solid.iter().all(|s| *s) {
+        return Err(ShapeError::SolidVolume);
+    }
+    fill_cavities(&mut mask);
+    Ok(separate(&transform::to_void(&mask), dims, neck))
+}
