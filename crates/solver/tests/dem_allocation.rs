@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use dem_support::{cloud, step};
 use glam::DVec3;
-use grainwake_solver::dem::{ContactParams, Dynamics, Enclosure};
+use grainwake_solver::dem::{ContactDynamics, ContactParams, Enclosure};
 use grainwake_solver::math::Load;
 
 struct Counting;
@@ -47,7 +47,7 @@ fn a_heap_at_rest_steps_without_allocating() {
         ..Default::default()
     };
     let mut grains = cloud(80, 0.043, 0.007, 0.1, 3);
-    let mut dynamics = Dynamics::new(params, tank);
+    let mut dynamics = ContactDynamics::new(params, tank);
     let gravity = DVec3::new(0.0, 0.0, -9.81);
     for _ in 0..800 {
         step(&mut dynamics, &mut grains, gravity, 1e-3);

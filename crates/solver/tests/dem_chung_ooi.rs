@@ -15,7 +15,9 @@ use std::ops::Range;
 
 use dem_support::{floor, open_box, sphere};
 use glam::DVec3;
-use grainwake_solver::dem::{ContactLawKind, ContactParams, Dynamics, Enclosure, Grain, Material};
+use grainwake_solver::dem::{
+    ContactDynamics, ContactLawKind, ContactParams, Enclosure, Grain, Material,
+};
 use grainwake_solver::math::Load;
 
 /// Material, density [kg/m^3] and restitution 1.
@@ -76,7 +78,7 @@ fn impact(
     enclosure: Enclosure,
     duration: f64,
 ) -> Impact {
-    let mut dynamics = Dynamics::new(params, enclosure);
+    let mut dynamics = ContactDynamics::new(params, enclosure);
     let mut mean = vec![Load::default(); grains.len()];
     let (mut largest, dt) = ([0.0f64; 3], 1.5 * duration / 3000.0);
     for _ in 0..3000 {
@@ -331,8 +333,8 @@ fn test_8_two_spheres_of_different_size() {
         let mut small = grain(RADIUS, ALLOY_DENSITY, alloy(), DVec3::X * -RADIUS);
         small.velocity.x = SPEED;
         small.angular_velocity.y = -surface / RADIUS;
-        let center = DVec3::X * 5.0 * RADIUS;
-        let large = grain(5.0 * RADIUS, other_density, alloy(), center);
+        let centre = DVec3::X * 5.0 * RADIUS;
+        let large = grain(5.0 * RADIUS, other_density, alloy(), centre);
         let after = spinning_impact([small, large]);
         // Velocity of the first surface relative to the second, at the contact.
         let at = |g: &Grain, side: f64, radius: f64| {

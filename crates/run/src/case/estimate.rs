@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::readable::quantity;
 use super::{Case, warnings};
-use grainwake_solver::dem::{Dof, Grain};
+use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::{Setup, StepRule};
@@ -119,7 +119,7 @@ impl Estimate {
         let setup = &case.setup;
         let g = setup.gravity.length();
         let fluid = setup.fluid.as_ref();
-        let moving = |grain: &Grain| grain.translation == Dof::Free;
+        let moving = |grain: &Grain| grain.translation == MotionConstraint::Free;
         let fastest = fluid.and_then(|f| {
             let grains = setup.grains.iter().enumerate();
             // Of equal ones the first.
@@ -195,7 +195,10 @@ impl Estimate {
 /// The step that the rule allows once the grains settle [s].
 pub(super) fn settled_time_step(setup: &Setup) -> f64 {
     let g = setup.gravity.length();
-    let speeds = setup.grains.iter().filter(|g| g.translation == Dof::Free);
+    let speeds = setup
+        .grains
+        .iter()
+        .filter(|g| g.translation == MotionConstraint::Free);
     let speed = setup.fluid.as_ref().map_or(0.0, |f| {
         speeds
             .map(|grain| terminal_speed(grain, f, g))

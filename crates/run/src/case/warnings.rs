@@ -6,7 +6,7 @@ use super::Case;
 use super::estimate::{Estimate, terminal_speed, time_step};
 use super::readable::quantity;
 use crate::{Plane, PlanePosition, Stop};
-use grainwake_solver::dem::{ContactLawKind, Dof, Grain, outside};
+use grainwake_solver::dem::{ContactLawKind, Grain, MotionConstraint, outside};
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::events::StopWhen;
@@ -33,7 +33,7 @@ pub(super) fn all(case: &Case, e: &Estimate) -> Vec<String> {
 }
 
 fn is_free(grain: &&Grain) -> bool {
-    grain.translation == Dof::Free
+    grain.translation == MotionConstraint::Free
 }
 
 /// Faces that grains fall, or rise, out through.
@@ -106,8 +106,8 @@ fn of_given_motions(setup: &Setup, end: f64) -> Vec<String> {
     let motions = setup.prescription.motions.iter();
     let driven: Vec<usize> = motions.map(|motion| motion.grain).collect();
     let moves = |index: &usize| match grains[*index].translation {
-        Dof::Prescribed(velocity) => velocity != DVec3::ZERO || driven.contains(index),
-        Dof::Free => false,
+        MotionConstraint::Prescribed(velocity) => velocity != DVec3::ZERO || driven.contains(index),
+        MotionConstraint::Free => false,
     };
     let moving: Vec<usize> = (0..grains.len()).filter(moves).collect();
     let mut found = Vec::new();
@@ -120,7 +120,7 @@ fn of_given_motions(setup: &Setup, end: f64) -> Vec<String> {
                 continue;
             }
             let grain = &mut grains[index];
-            if let Dof::Prescribed(velocity) = grain.translation {
+            if let MotionConstraint::Prescribed(velocity) = grain.translation {
                 grain.pose.position += dt * velocity;
             }
             let out = outside(std::slice::from_ref(grain), &enclosure);
@@ -322,7 +322,7 @@ fn of_light_grains(setup: &Setup, stop: Option<&Stop>) -> Vec<String> {
     };
     let grains = setup.grains.iter();
     let free: Vec<f64> = grains
-        .filter(|grain| grain.translation == Dof::Free)
+        .filter(|grain| grain.translation == MotionConstraint::Free)
         .map(|grain| grain.density / fluid.density)
         .collect();
     let mut found = Vec::new();

@@ -65,7 +65,7 @@ impl GrainUpdate {
         contact: Load,
         dt: f64,
     ) {
-        let touched = contact != Load::default();
+        let touched = !contact.is_zero();
         let velocity = match self.imposed {
             Some(imposed) if !touched => imposed,
             _ => self.system.velocities(grain, previous, contact, dt),
@@ -188,7 +188,7 @@ impl<R: Real> CouplingStep<'_, R> {
         scratch: &mut LocateScratch,
     ) {
         let (params, grain) = (&self.params, &self.input.grains[index]);
-        locate_and_weigh(self.locator, params, index, grain, body, forced, scratch);
+        locate_and_compute_weights(self.locator, params, index, grain, body, forced, scratch);
     }
 
     /// Sums the impulse of the fluid and assembles the equations of motion.
@@ -207,8 +207,8 @@ impl<R: Real> CouplingStep<'_, R> {
     }
 }
 
-/// Locates a grain and weighs the faces that it forces.
-pub fn locate_and_weigh(
+/// Locates a grain and computes the weights of the faces that it forces.
+pub fn locate_and_compute_weights(
     locator: &Locator,
     params: &ForcingParams,
     index: usize,
@@ -219,5 +219,5 @@ pub fn locate_and_weigh(
 ) {
     locator.locate(index, grain, body, &mut forced.runs, scratch);
     let neighbours = locator.neighbours(index);
-    forced.weigh(params, &mut scratch.band, neighbours, locator.shapes());
+    forced.compute_weights(params, &mut scratch.band, neighbours, locator.shapes());
 }

@@ -7,7 +7,7 @@ use super::fluid::Fluid;
 use super::prescription::Prescription;
 use super::timing::{PassTimes, timed};
 use super::{GrainData, Simulation};
-use crate::dem::{Dof, Dynamics, Grain, RigidState, TrialStep};
+use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
 use crate::immersed::{
     CoupledGrains, GrainKinematics, RigidStep, RigidVelocity, Scheme, StepInput,
 };
@@ -16,7 +16,7 @@ use crate::math::Load;
 /// Grains of a step, with or without fluid.
 struct GrainStep<'a> {
     grains: &'a mut [Grain],
-    dynamics: &'a mut Dynamics,
+    dynamics: &'a mut ContactDynamics,
     /// Hydrodynamic loads; zero without fluid.
     loads: &'a mut [Load],
     data: &'a mut GrainData,
@@ -194,7 +194,7 @@ impl<'a> Coupled<'a> {
         let Coupled(mut step, coupled, trial) = self;
         let solid = &mut step.solid;
         let (grains, data, dt) = (&mut *solid.grains, &mut *solid.data, solid.dt);
-        if data.contact.iter().all(|load| *load == Load::default()) {
+        if data.contact.iter().all(Load::is_zero) {
             solid.dynamics.accept(trial);
             return Resolved(step, coupled, Substeps::Explicit);
         }
@@ -255,7 +255,7 @@ impl Projected<'_> {
             let change = RigidVelocity::of(grain) - previous.velocity;
             // The fluid lost what it gave the grain, the displaced fluid included.
             residual -= density * grain.shape.volume() * change.linear - dt * load.force;
-            let touched = data.contact[i] != Load::default();
+            let touched = !data.contact[i].is_zero();
             // The acceleration of an impact does not continue in the next step; its added mass
             // does.
             (previous.acceleration, previous.pending_added_mass_velocity) = if touched {
@@ -275,9 +275,9 @@ impl Projected<'_> {
 fn beyond_substeps(grain: &Grain, end: &RigidState) -> RigidVelocity {
     let [linear, angular] = end.velocities;
     let beyond = RigidVelocity::of(grain) - RigidVelocity { linear, angular };
-    let free = |dof: Dof, velocity: DVec3| match dof {
-        Dof::Free => velocity,
-        Dof::Prescribed(_) => DVec3::ZERO,
+    let free = |dof: MotionConstraint, velocity: DVec3| match dof {
+        MotionConstraint::Free => velocity,
+        MotionConstraint::Prescribed(_) => DVec3::ZERO,
     };
     RigidVelocity {
         linear: free(grain.translation, beyond.linear),

@@ -14,7 +14,7 @@ use crate::case::quantity::{Density, Quantity, Triple};
 use crate::case::raw::{Law, Orientation, Position, RawGrain, Turns};
 use crate::case::readable::{number, quantity, vector};
 use crate::case::shapes::Library;
-use grainwake_solver::dem::{Dof, Grain};
+use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::sim::PrescribedMotion;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -59,9 +59,9 @@ pub(super) fn grain(
     let [velocity, angular_velocity] = velocities(check, raw, &key);
     let (shape, density, orientation) = (shape?, density?, turn.ok()?);
     let law = |law: &Law| match law {
-        Law::Free => Dof::Free,
-        Law::Prescribed(v) => Dof::Prescribed(*v),
-        Law::Formula(formula) => Dof::Prescribed(formula.at(&[0.0])),
+        Law::Free => MotionConstraint::Free,
+        Law::Prescribed(v) => MotionConstraint::Prescribed(*v),
+        Law::Formula(formula) => MotionConstraint::Prescribed(formula.at(&[0.0])),
     };
     // `materials` sets the material for the contact laws that use it.
     let mut grain = Grain::new(shape, density)

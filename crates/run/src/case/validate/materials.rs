@@ -114,7 +114,7 @@ pub(super) fn restitution(
     value: &Loc<Quantity<Number>>,
     key: &str,
 ) -> Option<f64> {
-    check.within(value, key, ContactParams::SMALLEST_RESTITUTION, 1.0)
+    check.within(value, key, ContactParams::MIN_RESTITUTION, 1.0)
 }
 
 /// Refuses keys that the contact law does not use.

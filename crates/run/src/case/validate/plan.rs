@@ -174,7 +174,7 @@ fn stop_rule(
         );
     } else if !grains
         .iter()
-        .any(|g| g.translation == grainwake_solver::dem::Dof::Free)
+        .any(|g| g.translation == grainwake_solver::dem::MotionConstraint::Free)
     {
         check.fail(
             span,

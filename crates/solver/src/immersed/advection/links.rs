@@ -17,7 +17,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::box_velocity::BoxVelocity;
-use super::weights::{LinkPlanes, listed_faces, weigh_links};
+use super::weights::{LinkPlanes, compute_link_weights, listed_faces};
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::immersed::geometry::LocatedBody;
 use crate::immersed::kinematics::GrainKinematics;
@@ -117,12 +117,12 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         correction: &mut [f64],
     ) {
         planes.reset(self.body);
-        let weigh = |k, planes: &mut LinkPlanes| {
-            weigh_links(&self.dofs, self.body, self.component, self.eps, k, planes);
+        let compute_weights = |k, planes: &mut LinkPlanes| {
+            compute_link_weights(&self.dofs, self.body, self.component, self.eps, k, planes);
         };
-        weigh(-1, planes);
+        compute_weights(-1, planes);
         for k in 0..self.body.size.z {
-            weigh(k, planes);
+            compute_weights(k, planes);
             for j in 0..self.body.size.y {
                 self.correct_row::<V>([j, k], planes, correction);
             }

@@ -83,10 +83,10 @@ pub fn listed_faces(
     })
 }
 
-/// Weighs the links whose lower faces are in plane `k`. Must be called for the planes -1, 0, 1, ...
+/// Computes the weights of the links whose lower faces are in plane `k`. Must be called for the planes -1, 0, 1, ...
 /// in order; `dofs` are the indices of the unknowns along each axis, `eps` [m] the half-width of
 /// the band.
-pub fn weigh_links(
+pub fn compute_link_weights(
     dofs: &[Range<i32>; 3],
     body: &LocatedBody,
     component: usize,
@@ -94,7 +94,7 @@ pub fn weigh_links(
     k: i32,
     planes: &mut LinkPlanes,
 ) {
-    dispatch(WeighLinks {
+    dispatch(ComputeLinkWeights {
         dofs,
         body,
         component,
@@ -104,7 +104,7 @@ pub fn weigh_links(
     });
 }
 
-struct WeighLinks<'a> {
+struct ComputeLinkWeights<'a> {
     dofs: &'a [Range<i32>; 3],
     body: &'a LocatedBody,
     component: usize,
@@ -113,18 +113,18 @@ struct WeighLinks<'a> {
     planes: &'a mut LinkPlanes,
 }
 
-impl Kernel for WeighLinks<'_> {
+impl Kernel for ComputeLinkWeights<'_> {
     type Number = f32;
     #[inline(always)]
     fn run<V: Vector<Number = f32>>(mut self) {
         self.read_next_plane::<V>();
         if self.k >= 0 {
-            self.weigh::<V>();
+            self.compute_weights::<V>();
         }
     }
 }
 
-impl WeighLinks<'_> {
+impl ComputeLinkWeights<'_> {
     /// Copies the distances of the plane above from the list.
     #[inline(always)]
     fn read_next_plane<V: Vector<Number = f32>>(&mut self) {
@@ -154,9 +154,9 @@ impl WeighLinks<'_> {
         }
     }
 
-    /// Weighs the links of this plane.
+    /// Computes the weights of the links of this plane.
     #[inline(always)]
-    fn weigh<V: Vector<Number = f32>>(&mut self) {
+    fn compute_weights<V: Vector<Number = f32>>(&mut self) {
         let LinkPlanes {
             row_length,
             distance,

@@ -55,17 +55,17 @@ impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
         let part = self.prediction.range().clone();
         let runs = forced.runs[axis].iter();
         for run in runs.filter(|run| part.contains(&run.at)) {
-            let velocity = RigidRun::new(self.velocity, run.arm, self.spacing);
-            let change = RigidRun::new(self.change, run.arm, self.spacing);
+            let velocity = RigidRun::new(self.velocity, run.lever_arm, self.spacing);
+            let change = RigidRun::new(self.change, run.lever_arm, self.spacing);
             let predicted = self.prediction.velocity_mut(run.at, run.count);
             for n in (0..run.count).step_by(V::WIDTH) {
                 let entry = run.first + n;
                 let weight = V::load_from(&forced.weight[entry..]);
-                let solid_fraction = V::load_from(&forced.solid_fraction[entry..]);
+                let closed_fraction = V::load_from(&forced.closed_fraction[entry..]);
                 let index = lane_indices(n);
                 let gain = V::load(&forced.rest_gain[entry..])
                     + weight * velocity.component(axis, index)
-                    + change_weight(weight, solid_fraction, self.closure_dt)
+                    + change_weight(weight, closed_fraction, self.closure_dt)
                         * change.component(axis, index);
                 gain.add_partial(&mut predicted[n..]);
             }

@@ -10,7 +10,7 @@ use crate::math::Real;
 
 /// Degrees of freedom of the grid: the faces and cells that are unknowns, and their storage.
 #[derive(Clone, Copy)]
-pub struct DofMask {
+pub struct UnknownFaces {
     cells: IVec3,
     strides: [usize; 3],
     periodic: [bool; 3],
@@ -21,10 +21,10 @@ pub const PAD: i32 = 3;
 /// Offset of faces and cells that are not unknown: larger than any position, also in sums.
 const NONE: usize = 1 << 60;
 
-impl DofMask {
-    pub fn new(mesh: &Mesh, boundaries: &Boundaries) -> DofMask {
+impl UnknownFaces {
+    pub fn new(mesh: &Mesh, boundaries: &Boundaries) -> UnknownFaces {
         let [x, y, z] = mesh.cells.map(|n| n as i32);
-        DofMask {
+        UnknownFaces {
             cells: IVec3::new(x, y, z),
             strides: mesh.layout().strides(),
             periodic: [0, 1, 2].map(|axis| boundaries.is_periodic(axis)),
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn walls_bound_the_unknowns_and_periodic_edges_wrap() {
-        let mask = DofMask {
+        let mask = UnknownFaces {
             cells: IVec3::new(8, 6, 1),
             strides: [1, 10, 80],
             periodic: [true, false, true],

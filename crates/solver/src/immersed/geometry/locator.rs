@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::distances::{DistanceScratch, FillLists};
-use super::index_map::DofMask;
+use super::index_map::UnknownFaces;
 use super::lists::{BandFaces, FaceRun, LocatedBody};
 use super::narrow_band::NarrowBandShapes;
 use super::neighbours::{NeighbourGrain, NeighbourSearch};
@@ -23,7 +23,7 @@ pub struct LocateScratch {
 /// Geometry of all grains on one grid.
 pub struct Locator {
     mesh: Mesh,
-    mask: DofMask,
+    mask: UnknownFaces,
     /// Half-width of the band around the surface, the mean spacing of the grid [m].
     eps: f64,
     /// Distance from the surface up to which a grain affects faces [m].
@@ -42,7 +42,7 @@ impl Locator {
         let reach = 2.0 * eps + 0.5 * resolved.iter().copied().fold(0.0, f64::max);
         Locator {
             mesh: *mesh,
-            mask: DofMask::new(mesh, boundaries),
+            mask: UnknownFaces::new(mesh, boundaries),
             eps,
             reach,
             shapes: NarrowBandShapes::new(grains, eps, reach),

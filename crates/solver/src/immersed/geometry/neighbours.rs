@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::index_map::DofMask;
+use super::index_map::UnknownFaces;
 use super::narrow_band::NarrowBandShapes;
 use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};
 use crate::grid::Mesh;
@@ -65,7 +65,7 @@ pub fn nearest_distance(
 #[derive(Default)]
 pub struct NeighbourSearch {
     search: BroadPhase,
-    balls: Vec<BoundingSphere>,
+    spheres: Vec<BoundingSphere>,
     pairs: Vec<NeighbourPair>,
     /// Neighbours of grain 0, then of grain 1, ...
     neighbours: Vec<NeighbourGrain>,
@@ -83,12 +83,12 @@ struct NeighbourPair {
 }
 
 impl NeighbourSearch {
-    /// Finds the pairs whose balls overlap. A ball contains all faces within `reach` [m] of the
+    /// Finds the pairs whose spheres overlap. A sphere contains all faces within `reach` [m] of the
     /// surface of grain i, and `displacement(i)` [m] extends it to the last pose of the grain.
     pub fn update(
         &mut self,
         mesh: &Mesh,
-        mask: &DofMask,
+        mask: &UnknownFaces,
         reach: f64,
         grains: &[Grain],
         displacement: impl Fn(usize) -> f64,
@@ -99,16 +99,16 @@ impl NeighbourSearch {
             periodic: [0, 1, 2].map(|axis| mask.is_periodic(axis) && mesh.cells[axis] > 1),
             solid: [[false; 2]; 3],
         };
-        self.balls.clear();
-        let balls = grains
+        self.spheres.clear();
+        let spheres = grains
             .iter()
             .enumerate()
             .map(|(index, grain)| BoundingSphere {
-                center: grain.pose.position,
+                centre: grain.pose.position,
                 radius: grain.shape.bounding_radius() + reach + displacement(index),
             });
-        self.balls.extend(balls);
-        self.search.search(&self.balls, &enclosure);
+        self.spheres.extend(spheres);
+        self.search.search(&self.spheres, &enclosure);
         self.pairs.clear();
         for pair in &self.search.pairs {
             let Partner::Grain(other) = pair.partner else {
@@ -180,7 +180,7 @@ mod tests {
             origin: DVec3::new(-1.0, 0.0, 0.0),
         };
         let boundaries = Boundaries([[Boundary::Periodic; 2]; 3]);
-        let mask = DofMask::new(&mesh, &boundaries);
+        let mask = UnknownFaces::new(&mesh, &boundaries);
         let shape = Arc::new(Shape::sphere(0.5, 100));
         // The first and the last are 1.1 apart across x; the second has no neighbours.
         let at = |x: f64| Grain::new(shape.clone(), 2.0).with_position(DVec3::new(x, 2.0, 2.0));

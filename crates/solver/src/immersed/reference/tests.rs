@@ -9,13 +9,13 @@ use super::Reference;
 use crate::dem::Grain;
 use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
-use crate::immersed::advection::{LinkPlanes, find_correction, weigh_links};
+use crate::immersed::advection::{LinkPlanes, compute_link_weights, find_correction};
 use crate::immersed::forcing::{ForcedFaces, ForcingParams, impose_rigidity, sum_impulse};
 use crate::immersed::geometry::{LocateScratch, LocatedBody, Locator};
 use crate::immersed::kinematics::{GrainKinematics, PreviousStep, RigidVelocity};
 use crate::immersed::rigid_body::RigidBodySystem;
 use crate::immersed::scheme::Scheme;
-use crate::immersed::update::locate_and_weigh;
+use crate::immersed::update::locate_and_compute_weights;
 use crate::math::Load;
 
 const DT: f64 = 0.004;
@@ -78,7 +78,7 @@ impl Case {
         let scratch = &mut LocateScratch::default();
         let located = grains.iter().enumerate().map(|(index, grain)| {
             let (mut body, mut forced) = Default::default();
-            locate_and_weigh(
+            locate_and_compute_weights(
                 &locator,
                 &params,
                 index,
@@ -207,22 +207,22 @@ fn weights_of_forced_faces_match_the_reference() {
                 let runs = forced.runs[component].iter();
                 let runs = runs.map(|run| (run.at, run.first, run.count));
                 let weights = case.by_position(runs.clone(), &forced.weight, 0.0);
-                let solid_fraction = case.by_position(runs.clone(), &forced.solid_fraction, 0.0);
-                let by_all = case.by_position(runs, forced.total_solid_fraction(), 0.0);
+                let closed_fraction = case.by_position(runs.clone(), &forced.closed_fraction, 0.0);
+                let by_all = case.by_position(runs, forced.total_closed_fraction(), 0.0);
                 for face in reference.faces(component) {
                     let x = reference.position(component, face);
                     let (at, expected) = (reference.at(face), reference.weights(index, x));
                     assert_close(weights[at], expected.weight, 2e-5, "weight");
                     assert_close(
-                        solid_fraction[at],
-                        expected.solid_fraction,
+                        closed_fraction[at],
+                        expected.closed_fraction,
                         2e-5,
                         "solid fraction",
                     );
                     if expected.weight > 0.0 {
                         assert_close(
                             by_all[at],
-                            expected.total_solid_fraction,
+                            expected.total_closed_fraction,
                             2e-5,
                             "total solid fraction",
                         );
@@ -250,7 +250,7 @@ fn weights_of_links_match_the_reference() {
             let mut planes = LinkPlanes::default();
             planes.reset(body);
             for k in -1..body.size.z {
-                weigh_links(&dofs, body, component, eps, k, &mut planes);
+                compute_link_weights(&dofs, body, component, eps, k, &mut planes);
                 let rows = if k < 0 { 0 } else { body.size.y };
                 for (j, i) in (0..rows).flat_map(|j| (0..body.size.x).map(move |i| (j, i))) {
                     let face = body.lowest + IVec3::new(i, j, k);
