@@ -20,7 +20,7 @@ use grainwake_solver::dem::{
 };
 use grainwake_solver::math::Load;
 
-/// Material, density [kg/m^3] and restitution 1.
+/// Material with the restitution 1.
 fn material(youngs_modulus: f64, poisson_ratio: f64) -> Material {
     Material {
         youngs_modulus,
@@ -40,10 +40,7 @@ fn hertz_mindlin(friction: f64) -> ContactParams {
 }
 
 fn grain(radius: f64, density: f64, material: Material, position: DVec3) -> Grain {
-    Grain {
-        material,
-        ..sphere(radius, density, 500, position)
-    }
+    sphere(radius, density, 500, position).with_material(material)
 }
 
 /// Hertz impact between two bodies.

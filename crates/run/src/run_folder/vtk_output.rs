@@ -113,9 +113,10 @@ fn write_image(
         origin: mesh.origin + mesh.spacing * corner,
         time: sim.time(),
     };
-    let values = CELL_FIELDS
-        .each_ref()
-        .map(|field| move |c: [usize; 3]| field.at(sim, cell(c)).as_vec3().to_array());
+    let values: Vec<_> = CELL_FIELDS
+        .iter()
+        .map(|field| move |c: [usize; 3]| field.at(sim, cell(c)).as_vec3().to_array())
+        .collect();
     let sources: Vec<Source> = (CELL_FIELDS.iter().zip(&values))
         .map(|(field, value)| Source {
             name: field.name,

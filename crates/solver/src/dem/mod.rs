@@ -7,8 +7,9 @@
 //! 3. `search`: broad phase, narrow phase, gaps between surfaces;
 //! 4. `grain`, `material`, `enclosure`: the bodies and the box.
 //!
-//! [`ContactDynamics::advance`] takes one step: list the pairs that may touch, find their penetrating
-//! points, evaluate the contact forces and integrate the motion, in sub-steps of the contact time.
+//! [`ContactDynamics::advance`] takes one step: list the pairs that may touch, find their
+//! penetrating points, evaluate the contact forces and integrate the motion, in sub-steps of the
+//! contact time.
 
 mod contact;
 mod enclosure;

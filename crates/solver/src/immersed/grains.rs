@@ -58,7 +58,8 @@ impl<R: Real> ImmersedGrains<R> {
         self.release_forcing();
     }
 
-    /// Lists the faces near the grains and computes the weights of the forced faces for a step of `dt` [s].
+    /// Lists the faces near the grains and computes the weights of the forced faces for a step of
+    /// `dt` [s].
     pub(super) fn locate_with_forcing(&mut self, grains: &[Grain], dt: f64) {
         self.locator.find_neighbours(grains, |_| 0.0);
         let params = self.forcing_params(dt);
@@ -81,15 +82,6 @@ impl<R: Real> ImmersedGrains<R> {
     pub(super) fn forcing_params(&self, dt: f64) -> ForcingParams {
         let (eps, spacing) = (self.locator.eps(), self.mesh.spacing);
         ForcingParams::new(self.scheme, eps, spacing, self.kinematic_viscosity, dt)
-    }
-
-    /// Length `dt` of a step if faces are closed to the pressure gradient [s]; 0 in the paper's
-    /// scheme, which does not close faces.
-    pub(super) fn closure_dt(&self, dt: f64) -> f64 {
-        match self.scheme {
-            Scheme::Aperture => dt,
-            Scheme::Paper => 0.0,
-        }
     }
 
     /// Memory held without the buffers of threads [bytes].

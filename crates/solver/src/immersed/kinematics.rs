@@ -64,7 +64,8 @@ impl Div<f64> for RigidVelocity {
     }
 }
 
-/// Position and velocities of a grain when the flow was predicted.
+/// Position at the last time level, and velocities that the grain has during the step: a prescribed
+/// velocity is set before the flow is predicted.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GrainKinematics {
     /// Centroid [m].

@@ -88,7 +88,6 @@ impl<R: Real> ImmersedGrains<R> {
             known,
             corrects_advection,
             fluid_density: self.fluid_density,
-            closure_dt: self.closure_dt(input.dt),
             access: &self.access,
         };
         let scratch = &self.scratch;
@@ -207,17 +206,12 @@ impl<R: Real> ImmersedGrains<R> {
                 forced.rest_gain.resize(forced.weight.len(), 0.0);
             }
         }
-        self.impose_pending(flow, &updates, self.closure_dt(dt));
+        self.impose_pending(flow, &updates);
         self.updates = updates;
     }
 
     /// Imposes the pending rigid velocities, by slabs of the grid.
-    pub(super) fn impose_pending(
-        &self,
-        flow: &mut Flow<R>,
-        updates: &[GrainUpdate],
-        closure_dt: f64,
-    ) {
+    pub(super) fn impose_pending(&self, flow: &mut Flow<R>, updates: &[GrainUpdate]) {
         if updates.iter().all(|update| update.pending.is_none()) {
             return;
         }
@@ -229,15 +223,7 @@ impl<R: Real> ImmersedGrains<R> {
                 };
                 if grain.body.overlaps(prediction.range(), mesh.layout()) {
                     let (h, forced) = (mesh.spacing, &grain.forced);
-                    impose_rigidity(
-                        axis,
-                        h,
-                        forced,
-                        velocity,
-                        change,
-                        closure_dt,
-                        &mut prediction,
-                    );
+                    impose_rigidity(axis, h, forced, velocity, change, &mut prediction);
                 }
             }
         });

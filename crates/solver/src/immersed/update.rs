@@ -105,24 +105,31 @@ pub struct StepInput<'a> {
 /// Buffers of one thread.
 #[derive(Default)]
 pub struct ThreadScratch<R> {
+    /// Buffers of the advection correction.
     pub advection: AdvectionScratch<R>,
+    /// Buffers of the location of a grain.
     pub locate: LocateScratch,
-    /// Lists of the isolated grain that the thread updates.
+    /// Correction of the advection next to an isolated grain.
     correction: AdvectionCorrection,
+    /// Forced faces of an isolated grain.
     forced: ForcedFaces,
 }
 
 /// Fields and parameters of a step, shared by all grains.
 pub struct CouplingStep<'a, R> {
+    /// Geometry of the grains on the grid.
     pub locator: &'a Locator,
+    /// Parameters of the forcing.
     pub params: ForcingParams,
+    /// Grains and loads.
     pub input: StepInput<'a>,
+    /// Fields of the last step.
     pub known: Known<'a, R>,
+    /// Whether the advection next to the grains is corrected: in the aperture scheme.
     pub corrects_advection: bool,
-    /// [kg/m^3]
+    /// Density of the fluid [kg/m^3].
     pub fluid_density: f64,
-    /// Length of the step if faces are closed to the pressure gradient, else 0 [s].
-    pub closure_dt: f64,
+    /// Log of the faces that the grains read and write.
     pub access: &'a AccessLog,
 }
 
@@ -159,9 +166,9 @@ impl<R: Real> CouplingStep<'_, R> {
         let no_contact = Load::default();
         let velocity = (update.system).velocities(grain, previous, no_contact, self.input.dt);
         let change = velocity - previous.velocity;
-        let (h, dt) = (self.known.mesh.spacing, self.closure_dt);
+        let h = self.known.mesh.spacing;
         for (axis, prediction) in predictions.iter_mut().enumerate() {
-            impose_rigidity(axis, h, forced, velocity, change, dt, prediction);
+            impose_rigidity(axis, h, forced, velocity, change, prediction);
         }
         update.imposed = Some(velocity);
     }
@@ -201,7 +208,7 @@ impl<R: Real> CouplingStep<'_, R> {
         let (known, density, dt) = (&self.known, self.fluid_density, self.input.dt);
         let (grain, previous) = (&self.input.grains[index], &self.input.previous[index]);
         let old = previous.velocity;
-        let impulse = sum_impulse(known, predictions, density, forced, old, self.closure_dt);
+        let impulse = sum_impulse(known, predictions, density, forced, old, dt);
         let applied = self.input.applied[index];
         RigidBodySystem::new(grain, previous, impulse, density, applied, dt)
     }

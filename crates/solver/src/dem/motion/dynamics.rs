@@ -30,8 +30,8 @@ pub struct ContactDynamics {
 }
 
 impl ContactDynamics {
-    /// Contact dynamics of grains in `enclosure` that have not touched yet. The grains themselves are
-    /// passed to each step.
+    /// Contact dynamics in `enclosure` of grains that have not touched yet. The grains themselves
+    /// are passed to each step.
     pub fn new(params: ContactParams, enclosure: Enclosure) -> ContactDynamics {
         ContactDynamics {
             model: ContactModel::new(params),

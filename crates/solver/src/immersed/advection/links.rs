@@ -1,10 +1,12 @@
 //! Fluxes through the links next to one grain, plane by plane.
 //!
 //! A link joins two neighbouring faces of the same component. The correction adds to its flux over
-//! h
+//! h the two terms
 //!
-//! (1/A - 1) (q_mean - U_q)(c - U_c) / h + c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60
-//! h).
+//! ```text
+//! (1/A - 1) (q_mean - U_q) (c - U_c) / h
+//! c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60 h)
+//! ```
 //!
 //! The second term is the sixth-order mean of six faces less the mean of two. It is left out at the
 //! ends of the grid, where fewer than six faces are in line.

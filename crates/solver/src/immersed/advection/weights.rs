@@ -83,9 +83,9 @@ pub fn listed_faces(
     })
 }
 
-/// Computes the weights of the links whose lower faces are in plane `k`. Must be called for the planes -1, 0, 1, ...
-/// in order; `dofs` are the indices of the unknowns along each axis, `eps` [m] the half-width of
-/// the band.
+/// Computes the weights of the links whose lower faces are in plane `k`. Must be called for the
+/// planes -1, 0, 1, ... in order; `dofs` are the indices of the unknowns along each axis, `eps` [m]
+/// the half-width of the band.
 pub fn compute_link_weights(
     dofs: &[Range<i32>; 3],
     body: &LocatedBody,

@@ -1,4 +1,5 @@
-//! Forcing of a face near a surface: strength of the drag, and solid fraction.
+//! Forcing of a face near a surface: strength of the drag, and fraction closed to the
+//! pressure gradient.
 //!
 //! Legend: d signed distance, eps half-width of the band, A aperture.
 
@@ -16,8 +17,8 @@ use grainwake_simd::{Kernel, Scalar, Vector, dispatch};
 pub struct FaceForcing {
     /// Drag coefficient times dt; the weight of the rigid velocity is strength / (1 + strength).
     pub strength: f64,
-    /// Solid fraction of the face, 1 - A(d), which the pressure gradient does not reach; zero in
-    /// the paper's scheme, which blends by the weight alone.
+    /// Fraction of the face closed to the pressure gradient: its solid fraction 1 - A(d), zero in
+    /// the paper's scheme, which blends by the weight.
     pub closed_fraction: f64,
 }
 
@@ -92,7 +93,7 @@ impl ForcingParams {
         }
     }
 
-    /// Strength of the drag as numerator and positive denominator, and solid fraction.
+    /// Strength of the drag as numerator and positive denominator, and closed fraction.
     #[inline(always)]
     pub fn aperture_forcing<V: Vector>(&self, d: V, normal: [V; 3]) -> ([V; 2], V) {
         let [drag, depth] = drag(d, normal, self.spacing.to_array(), self.eps);
@@ -108,9 +109,9 @@ impl ForcingParams {
     /// cell cut by a plane.
     fn blend(&self, d: f64, normal: DVec3) -> FaceForcing {
         let width = normal.abs().dot(self.spacing);
-        let closed_fraction = (0.5 - d / width).clamp(0.0, 1.0);
+        let solid_fraction = (0.5 - d / width).clamp(0.0, 1.0);
         FaceForcing {
-            strength: closed_fraction / (1.0 - closed_fraction),
+            strength: solid_fraction / (1.0 - solid_fraction),
             closed_fraction: 0.0,
         }
     }

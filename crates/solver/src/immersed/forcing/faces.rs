@@ -14,8 +14,7 @@ pub struct ForcedFaces {
     pub runs: [Vec<FaceRun>; 3],
     /// Weight of the rigid velocity, 0 to 1.
     pub weight: Vec<f32>,
-    /// Fraction of a face that the grain closes to the pressure gradient (its solid fraction), 0 to
-    /// 1.
+    /// Fraction of a face that the grain closes to the pressure gradient, 0 to 1.
     pub closed_fraction: Vec<f32>,
     /// Fraction of a face that all grains together close; empty if the grain shares no face.
     total_closed_fraction: Vec<f32>,

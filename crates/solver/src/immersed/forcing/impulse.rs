@@ -14,9 +14,9 @@
 //! fluid mass times gain over the faces, J = constant + matrix (V, Omega). The grain loses what the
 //! fluid gains ([`crate::immersed::rigid_body`]). `immersed::reference` has the scalar form.
 //!
-//! Legend: s weight, c solid fraction, C total solid fraction, f weight of the
-//! change of velocity, u* predicted velocity, h spacing along the component, l and m lever arms of
-//! the face about the two other axes.
+//! Legend: s weight, c closed fraction, C total closed fraction (both zero in the paper's scheme),
+//! f weight of the change of velocity, u* predicted velocity, h spacing along the component, l and
+//! m lever arms of the face about the two other axes.
 
 use super::faces::ForcedFaces;
 use super::rigid_run::{RigidRun, change_weight, lane_indices};
@@ -37,15 +37,15 @@ pub struct Impulse {
 }
 
 /// Sums the impulse over the faces of `forced` for a grain that had the velocity `old`, and fills
-/// their `rest_gain`. `closure_dt` [s] is the length of the step; 0 if faces are not closed to the
-/// pressure gradient, as in the paper's scheme.
+/// their `rest_gain`. `dt` [s] is the length of the step; 0 leaves out the pressure gradient and
+/// the body acceleration.
 pub fn sum_impulse<R: Real>(
     known: &Known<R>,
     predictions: &[Prediction<R>; 3],
     fluid_density: f64,
     forced: &mut ForcedFaces,
     old: RigidVelocity,
-    closure_dt: f64,
+    dt: f64,
 ) -> Impulse {
     let mut sums = [Moments::default(); 3];
     dispatch(SumImpulse {
@@ -53,7 +53,7 @@ pub fn sum_impulse<R: Real>(
         predictions,
         forced,
         old,
-        closure_dt,
+        dt,
         sums: &mut sums,
     });
     let w = fluid_density * known.mesh.cell_volume();
@@ -114,7 +114,7 @@ struct SumImpulse<'a, R> {
     predictions: &'a [Prediction<'a, R>; 3],
     forced: &'a mut ForcedFaces,
     old: RigidVelocity,
-    closure_dt: f64,
+    dt: f64,
     sums: &'a mut [Moments; 3],
 }
 
@@ -147,10 +147,9 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
                     stencil,
                     rigid,
                     cells: [above, -above].map(|offset| rigid.shifted(offset)),
-                    dt_per_2h: (0.5 * self.closure_dt / spacing).to_array(),
-                    dt_per_h: self.closure_dt / spacing[axis],
-                    dt_g: self.closure_dt * self.known.body_acceleration[axis],
-                    closure_dt: self.closure_dt,
+                    dt_per_2h: (0.5 * self.dt / spacing).to_array(),
+                    dt_per_h: self.dt / spacing[axis],
+                    dt_g: self.dt * self.known.body_acceleration[axis],
                     spacing: spacing.x,
                 };
                 for n in (0..run.count).step_by(V::WIDTH) {
@@ -189,7 +188,6 @@ struct RunImpulse<'a, R> {
     dt_per_h: f64,
     /// dt g along the component [m/s].
     dt_g: f64,
-    closure_dt: f64,
     /// h along x [m].
     spacing: f64,
 }
@@ -226,7 +224,7 @@ impl<R: Real> RunImpulse<'_, R> {
         let e = rise.mul_add(V::constant(self.dt_per_h), V::constant(-self.dt_g));
         let without_drag = total_closed_fraction.mul_add(e, predicted);
         let rest_gain = (zero - weight).mul_add(without_drag, closed_fraction * e);
-        let f = change_weight(weight, closed_fraction, self.closure_dt);
+        let f = change_weight(weight, closed_fraction);
         let constant = rest_gain - f * self.rigid.component(self.axis, index);
         let derivative = weight + f;
         let lever_arm = self.run.lever_arm;

@@ -16,14 +16,13 @@ use grainwake_simd::{Kernel, Vector, dispatch};
 
 /// Adds the gain of the forced faces to component `axis` of a part of the prediction, for a grain
 /// with the new `velocity` that changed by `change` in the step. [`super::sum_impulse`] has filled
-/// the lists of `forced`; `closure_dt` [s] is the one passed there.
+/// the lists of `forced`.
 pub fn impose_rigidity<R: Real>(
     axis: usize,
     spacing: DVec3,
     forced: &ForcedFaces,
     velocity: RigidVelocity,
     change: RigidVelocity,
-    closure_dt: f64,
     prediction: &mut Prediction<R>,
 ) {
     dispatch(ImposeRigidity {
@@ -32,7 +31,6 @@ pub fn impose_rigidity<R: Real>(
         forced,
         velocity,
         change,
-        closure_dt,
         prediction,
     });
 }
@@ -43,7 +41,6 @@ struct ImposeRigidity<'a, 'b, R> {
     forced: &'a ForcedFaces,
     velocity: RigidVelocity,
     change: RigidVelocity,
-    closure_dt: f64,
     prediction: &'a mut Prediction<'b, R>,
 }
 
@@ -65,8 +62,7 @@ impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
                 let index = lane_indices(n);
                 let gain = V::load(&forced.rest_gain[entry..])
                     + weight * velocity.component(axis, index)
-                    + change_weight(weight, closed_fraction, self.closure_dt)
-                        * change.component(axis, index);
+                    + change_weight(weight, closed_fraction) * change.component(axis, index);
                 gain.add_partial(&mut predicted[n..]);
             }
         }

@@ -34,19 +34,27 @@ pub struct DistanceScratch {
 
 /// Kernel that fills the lists of one grain.
 pub struct FillLists<'a> {
+    /// Grid.
     pub mesh: &'a Mesh,
     /// Half-width of the band [m].
     pub eps: f64,
     /// Distance from the surface up to which faces are listed [m].
     pub reach: f64,
+    /// Grain at its new pose.
     pub grain: &'a Grain,
     /// Index of the grain.
     pub index: usize,
+    /// Narrow-band shapes of all grains.
     pub shapes: &'a NarrowBandShapes,
+    /// Grains whose faces may be shared with this grain.
     pub neighbours: &'a [NeighbourGrain],
+    /// Receives the faces within `reach`; its box is set.
     pub body: &'a mut LocatedBody,
+    /// Receives the faces in the forcing band, by component.
     pub runs: &'a mut [Vec<FaceRun>; 3],
+    /// Receives the distances and normals of the faces in the forcing band.
     pub band: &'a mut BandFaces,
+    /// Buffers of the thread.
     pub scratch: &'a mut DistanceScratch,
 }
 

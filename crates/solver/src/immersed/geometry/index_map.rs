@@ -8,7 +8,7 @@ use crate::flow::Boundaries;
 use crate::grid::Mesh;
 use crate::math::Real;
 
-/// Degrees of freedom of the grid: the faces and cells that are unknowns, and their storage.
+/// Faces and cells of the grid that are unknowns, and their positions in memory.
 #[derive(Clone, Copy)]
 pub struct UnknownFaces {
     cells: IVec3,
@@ -22,6 +22,7 @@ pub const PAD: i32 = 3;
 const NONE: usize = 1 << 60;
 
 impl UnknownFaces {
+    /// Unknowns of the grid `mesh`, periodic along the axes of the periodic `boundaries`.
     pub fn new(mesh: &Mesh, boundaries: &Boundaries) -> UnknownFaces {
         let [x, y, z] = mesh.cells.map(|n| n as i32);
         UnknownFaces {

@@ -108,8 +108,8 @@ impl NarrowBandShape {
 
     /// Fills the distances [m] at the first `count` of `points` [m], in single precision, and
     /// replaces the points by the gradients; both in the frame of the grain. Infinite distances are
-    /// at least [`INFINITE_DISTANCE`] here. The lists must be `MAX_LANES` entries longer than `count`; these are
-    /// overwritten.
+    /// at least [`INFINITE_DISTANCE`] here. The lists must be `MAX_LANES` entries longer than
+    /// `count`; these are overwritten.
     #[inline(always)]
     pub fn fill_distances<V: Vector<Number = f32>>(
         &self,

@@ -1,8 +1,8 @@
 //! Weights of forced faces, their gain of velocity, and the impulse on the fluid.
 //!
 //! Legend: d signed distance, n normal, m open depth, A aperture, s weight of the rigid velocity, c
-//! solid fraction, C total solid fraction, U and U_old new and old rigid
-//! velocity, J impulse, h spacing, nu kinematic viscosity, p pressure, g body acceleration.
+//! closed fraction, C total closed fraction, U and U_old new and old rigid velocity, J impulse,
+//! h spacing, nu kinematic viscosity, p pressure, g body acceleration.
 
 use glam::{DVec3, IVec3};
 
@@ -24,7 +24,7 @@ pub struct Weights {
 }
 
 impl Reference {
-    /// Drag coefficient times dt, and solid fraction 1 - A(d), of a face at the distance `d` [m]
+    /// Drag coefficient times dt, and closed fraction 1 - A(d), of a face at the distance `d` [m]
     /// from a surface with the normal `n`.
     ///
     /// drag = nu sum_a (m(d + h_a n_a) + m(d - h_a n_a) - 2 m(d)) / h_a^2 / m(d) in the aperture
@@ -33,8 +33,8 @@ impl Reference {
     fn drag(&self, d: f64, n: DVec3) -> [f64; 2] {
         let (eps, h) = (self.eps, self.mesh.spacing);
         if self.scheme == Scheme::Paper {
-            let closed_fraction = (0.5 - d / n.abs().dot(h)).clamp(0.0, 1.0);
-            return [closed_fraction / (1.0 - closed_fraction), 0.0];
+            let solid_fraction = (0.5 - d / n.abs().dot(h)).clamp(0.0, 1.0);
+            return [solid_fraction / (1.0 - solid_fraction), 0.0];
         }
         let m = |d| open_depth(d, eps);
         let second =

@@ -107,15 +107,6 @@ impl Case {
         }
     }
 
-    /// Step for which the kernels close faces [s].
-    fn closure_dt(&self) -> f64 {
-        if self.reference.scheme == Scheme::Aperture {
-            DT
-        } else {
-            0.0
-        }
-    }
-
     /// Velocities of a grain before and after the step.
     fn velocities(&self, index: usize) -> [RigidVelocity; 2] {
         let new = RigidVelocity {
@@ -217,14 +208,14 @@ fn weights_of_forced_faces_match_the_reference() {
                         closed_fraction[at],
                         expected.closed_fraction,
                         2e-5,
-                        "solid fraction",
+                        "closed fraction",
                     );
                     if expected.weight > 0.0 {
                         assert_close(
                             by_all[at],
                             expected.total_closed_fraction,
                             2e-5,
-                            "total solid fraction",
+                            "total closed fraction",
                         );
                         forced_faces += 1;
                         let other = reference.weights(1 - index, x).weight;
@@ -305,12 +296,12 @@ fn impulse_and_imposed_rigidity_match_the_reference() {
     for scheme in [Scheme::Aperture, Scheme::Paper] {
         let mut case = Case::new(scheme);
         for index in SPHERES {
-            let ([old, new], closure_dt) = (case.velocities(index), case.closure_dt());
+            let [old, new] = case.velocities(index);
             let predicted = case.predicted();
             let u = predicted.each_ref().map(|list| &list[..]);
             let (known, predictions) = case.flow.prediction();
             let forced = &mut case.located[index].1;
-            let impulse = sum_impulse(&known, &predictions, DENSITY, forced, old, closure_dt);
+            let impulse = sum_impulse(&known, &predictions, DENSITY, forced, old, DT);
             let expected = (case.reference).impulse(index, &known, u, [old, new], DENSITY);
             let expected = [expected[0].to_array(), expected[1].to_array()].concat();
             for (row, expected) in expected.into_iter().enumerate() {
@@ -322,7 +313,7 @@ fn impulse_and_imposed_rigidity_match_the_reference() {
             }
             let (forced, h) = (&case.located[index].1, case.reference.mesh.spacing);
             case.flow.for_predictions(|axis, mut prediction| {
-                impose_rigidity(axis, h, forced, new, new - old, closure_dt, &mut prediction);
+                impose_rigidity(axis, h, forced, new, new - old, &mut prediction);
             });
             let imposed = case.predicted();
             let (known, _) = case.flow.prediction();
