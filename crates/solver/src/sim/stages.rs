@@ -284,7 +284,7 @@ impl Projected<'_> {
 fn beyond_substeps(grain: &Grain, end: &RigidState) -> RigidVelocity {
     let [linear, angular] = end.velocities;
     let beyond = RigidVelocity::of(grain) - RigidVelocity { linear, angular };
-    let free = |dof: MotionConstraint, velocity: DVec3| match dof {
+    let free = |constraint: MotionConstraint, velocity: DVec3| match constraint {
         MotionConstraint::Free => velocity,
         MotionConstraint::Prescribed(_) => DVec3::ZERO,
     };

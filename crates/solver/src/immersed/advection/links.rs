@@ -34,7 +34,7 @@ pub struct ComponentLinks<'a, R> {
     /// Half-width of the band [m].
     eps: f64,
     /// Indices of the unknown faces along each axis.
-    dofs: [Range<i32>; 3],
+    unknowns: [Range<i32>; 3],
     axes: [LinkAxis; 3],
     /// Rigid velocity [m/s] at the middle of link (0, 0, 0), then its change from a link to the
     /// next along x, y and z. Entries 2 a and 2 a + 1 are U_q and U_c of the links along axis a;
@@ -105,7 +105,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             velocity,
             component,
             eps,
-            dofs: [0, 1, 2].map(|axis| body.index_map.dof_range(component, axis)),
+            unknowns: [0, 1, 2].map(|axis| body.index_map.unknown_range(component, axis)),
             axes,
             rigid,
         }
@@ -120,7 +120,14 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
     ) {
         planes.reset(self.body);
         let compute_weights = |k, planes: &mut LinkPlanes| {
-            compute_link_weights(&self.dofs, self.body, self.component, self.eps, k, planes);
+            compute_link_weights(
+                &self.unknowns,
+                self.body,
+                self.component,
+                self.eps,
+                k,
+                planes,
+            );
         };
         compute_weights(-1, planes);
         for k in 0..self.body.size.z {
@@ -140,7 +147,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         planes: &mut LinkPlanes,
         correction: &mut [f64],
     ) {
-        let Some(listed) = listed_faces(self.body, &self.dofs, self.component, [j, k]) else {
+        let Some(listed) = listed_faces(self.body, &self.unknowns, self.component, [j, k]) else {
             return;
         };
         let (at, first) = (self.velocity.row([j, k]), planes.first_entry(j));
@@ -207,7 +214,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
 
     /// Returns the links along an axis of the row with `index` that have six faces in line.
     fn sixth_order_links(&self, along: usize, index: [i32; 3]) -> SixthOrderLinks<'_> {
-        let (axis, range, index) = (&self.axes[along], &self.dofs[along], index[along]);
+        let (axis, range, index) = (&self.axes[along], &self.unknowns[along], index[along]);
         let (start, end) = (range.start + 2 - index, range.end - 3 - index);
         let (start, end, advected) = if along == 0 {
             (f64::from(start), f64::from(end), &axis.six_faces)

@@ -84,10 +84,10 @@ pub fn listed_faces(
 }
 
 /// Computes the weights of the links whose lower faces are in plane `k`. Must be called for the
-/// planes -1, 0, 1, ... in order; `dofs` are the indices of the unknowns along each axis, `eps` [m]
+/// planes -1, 0, 1, ... in order; `unknowns` are the indices of the unknowns along each axis, `eps` [m]
 /// the half-width of the band.
 pub fn compute_link_weights(
-    dofs: &[Range<i32>; 3],
+    unknowns: &[Range<i32>; 3],
     body: &LocatedBody,
     component: usize,
     eps: f64,
@@ -95,7 +95,7 @@ pub fn compute_link_weights(
     planes: &mut LinkPlanes,
 ) {
     dispatch(ComputeLinkWeights {
-        dofs,
+        unknowns,
         body,
         component,
         eps,
@@ -105,7 +105,7 @@ pub fn compute_link_weights(
 }
 
 struct ComputeLinkWeights<'a> {
-    dofs: &'a [Range<i32>; 3],
+    unknowns: &'a [Range<i32>; 3],
     body: &'a LocatedBody,
     component: usize,
     eps: f64,
@@ -139,7 +139,7 @@ impl ComputeLinkWeights<'_> {
         let list = &body.distance[self.component][..];
         let rows = if k < body.size.z { body.size.y } else { 0 };
         for j in 0..rows {
-            let Some(listed) = listed_faces(body, self.dofs, self.component, [j, k]) else {
+            let Some(listed) = listed_faces(body, self.unknowns, self.component, [j, k]) else {
                 continue;
             };
             let count = listed.end - listed.start;

@@ -237,11 +237,11 @@ fn weights_of_links_match_the_reference() {
     for index in SPHERES {
         let (body, _) = &case.located[index];
         for component in 0..3 {
-            let dofs = [0, 1, 2].map(|axis| body.index_map.dof_range(component, axis));
+            let unknowns = [0, 1, 2].map(|axis| body.index_map.unknown_range(component, axis));
             let mut planes = LinkPlanes::default();
             planes.reset(body);
             for k in -1..body.size.z {
-                compute_link_weights(&dofs, body, component, eps, k, &mut planes);
+                compute_link_weights(&unknowns, body, component, eps, k, &mut planes);
                 let rows = if k < 0 { 0 } else { body.size.y };
                 for (j, i) in (0..rows).flat_map(|j| (0..body.size.x).map(move |i| (j, i))) {
                     let face = body.lowest + IVec3::new(i, j, k);

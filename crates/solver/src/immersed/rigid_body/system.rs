@@ -144,7 +144,8 @@ impl RigidBodySystem {
         let mut a = self.matrix;
         let least = grain.mass() + added_density * grain.shape.volume();
         let mean = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
-        let free = [grain.translation, grain.rotation].map(|dof| dof == MotionConstraint::Free);
+        let free = [grain.translation, grain.rotation]
+            .map(|constraint| constraint == MotionConstraint::Free);
         if free[0] {
             for (axis, row) in a.iter_mut().take(3).enumerate() {
                 row[axis] += (least - mean).max(0.0);

@@ -32,8 +32,8 @@ impl VirtualMass {
     pub fn new(grain: &Grain, previous: &PreviousStep, fluid_density: f64, dt: f64) -> VirtualMass {
         let ratio = grain.density / fluid_density;
         let part = ((1.0 - ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0) / ratio;
-        let free = |dof: MotionConstraint| {
-            if dof == MotionConstraint::Free {
+        let free = |constraint: MotionConstraint| {
+            if constraint == MotionConstraint::Free {
                 part
             } else {
                 0.0
