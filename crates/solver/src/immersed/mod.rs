@@ -1,4 +1,5 @@
-//! Coupling of flow and grains: rigidity is imposed on the grid, the grains get their loads.
+//! Coupling of flow and grains: the grid takes the rigid velocities, the grains take their loads.
+//!
 //! The loads follow Eq. 5.
 //!
 //! # Layers

@@ -84,8 +84,8 @@ pub fn listed_faces(
 }
 
 /// Computes the weights of the links whose lower faces are in plane `k`. Must be called for the
-/// planes -1, 0, 1, ... in order; `unknowns` are the indices of the unknowns along each axis, `eps` [m]
-/// the half-width of the band.
+/// planes -1, 0, 1, ... in order; `unknowns` are the indices of the unknowns along each axis, `eps`
+/// [m] the half-width of the band.
 pub fn compute_link_weights(
     unknowns: &[Range<i32>; 3],
     body: &LocatedBody,
