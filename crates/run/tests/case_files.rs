@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 use grainwake_run::case::{Case, CaseError, Problem};
 use grainwake_run::{Plane, PlanePosition};
-use grainwake_solver::dem::{ContactLawKind, Dof, Material, surface_gap};
+use grainwake_solver::dem::{ContactLawKind, Material, MotionConstraint, surface_gap};
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::sim::StepRule;
 
@@ -104,7 +104,10 @@ fn the_papers_pair_is_understood() {
     );
     let gap = surface_gap(a, b, &case.setup.enclosure());
     assert!((gap - 3e-3).abs() < 1e-8, "{gap}");
-    assert_eq!((a.translation, a.rotation), (Dof::Free, Dof::Free));
+    assert_eq!(
+        (a.translation, a.rotation),
+        (MotionConstraint::Free, MotionConstraint::Free)
+    );
     assert_eq!(case.setup.boundaries.0, [[Boundary::WALL; 2]; 3]);
     assert!(matches!(case.setup.step, StepRule::Limits { .. }));
     assert_eq!(
@@ -634,12 +637,15 @@ fn motion_and_orientation_have_several_forms() {
     let fixed = with("motion = \"fixed\"");
     assert_eq!(
         (fixed.translation, fixed.rotation),
-        (Dof::Prescribed(DVec3::ZERO), Dof::Prescribed(DVec3::ZERO))
+        (
+            MotionConstraint::Prescribed(DVec3::ZERO),
+            MotionConstraint::Prescribed(DVec3::ZERO)
+        )
     );
     let spun = with("motion = { velocity = \"fixed\", angular_velocity = [0, 0, \"60 rpm\"] }");
     assert_eq!(
         spun.rotation,
-        Dof::Prescribed(DVec3::new(0.0, 0.0, std::f64::consts::TAU))
+        MotionConstraint::Prescribed(DVec3::new(0.0, 0.0, std::f64::consts::TAU))
     );
     assert_eq!(
         spun.angular_velocity,
@@ -648,7 +654,10 @@ fn motion_and_orientation_have_several_forms() {
     let pulled = with("motion = { velocity = [0, 0, \"-1 cm/s\"] }");
     assert_eq!(
         (pulled.translation, pulled.rotation),
-        (Dof::Prescribed(DVec3::new(0.0, 0.0, -0.01)), Dof::Free)
+        (
+            MotionConstraint::Prescribed(DVec3::new(0.0, 0.0, -0.01)),
+            MotionConstraint::Free
+        )
     );
     refused(
         "density = \"1500 kg/m3\"",
@@ -678,7 +687,7 @@ fn vectors_may_be_formulas() {
     let setup = &case.setup;
     assert_eq!(
         setup.grains[0].translation,
-        Dof::Prescribed(DVec3::new(0.0, 0.0, 1.0))
+        MotionConstraint::Prescribed(DVec3::new(0.0, 0.0, 1.0))
     );
     assert_eq!(setup.grains[0].velocity, DVec3::new(0.0, 0.0, 1.0));
     let start = setup.prescription.initial_velocity.as_ref().unwrap();

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
-use grainwake_solver::dem::{ContactParams, Dynamics, Enclosure, Grain};
+use grainwake_solver::dem::{ContactDynamics, ContactParams, Enclosure, Grain};
 use grainwake_solver::math::Load;
 
 const DIAMETER: f64 = 2e-3;
@@ -57,7 +57,7 @@ fn distances(c: &mut Criterion) {
 }
 
 /// Grains on a cubic lattice, turned at random and pressed together.
-fn heap() -> (Dynamics, Vec<Grain>) {
+fn heap() -> (ContactDynamics, Vec<Grain>) {
     let shape = Arc::new(grain());
     let size = EDGE as f64 * APART * DIAMETER;
     let mut grains = Vec::new();
@@ -78,7 +78,10 @@ fn heap() -> (Dynamics, Vec<Grain>) {
         periodic: [true; 3],
         solid: [[false; 2]; 3],
     };
-    (Dynamics::new(ContactParams::default(), enclosure), grains)
+    (
+        ContactDynamics::new(ContactParams::default(), enclosure),
+        grains,
+    )
 }
 
 /// Nodes of both grains of every pair in touch count as tested, in every sub-step.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use grainwake_shape::Shape;
 use grainwake_shape::analytic::ellipsoid;
-use grainwake_solver::dem::{ContactParams, Dof, Grain};
+use grainwake_solver::dem::{ContactParams, Grain, MotionConstraint};
 use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
@@ -24,7 +24,7 @@ const fn limits(cfl: f64) -> StepRule {
 const LIMITS: StepRule = limits(0.3);
 const PERIODIC: [Boundary; 2] = [Boundary::Periodic; 2];
 const WALLS: [Boundary; 2] = [Boundary::WALL; 2];
-const HELD: Dof = Dof::Prescribed(DVec3::ZERO);
+const HELD: MotionConstraint = MotionConstraint::Prescribed(DVec3::ZERO);
 
 fn sphere(diameter: f64, position: DVec3, density: f64) -> Grain {
     Grain::new(Shape::sphere(0.5 * diameter, 600), density).with_position(position)
@@ -375,7 +375,10 @@ fn undamped_impacts_give_the_speed_back() {
 #[test]
 fn a_grain_thrown_out_of_the_world_is_no_panic() {
     let mut ball = sphere(1.0, DVec3::splat(1.5), 2.0);
-    (ball.translation, ball.rotation) = (Dof::Prescribed(DVec3::new(1e12, 0.0, 0.0)), HELD);
+    (ball.translation, ball.rotation) = (
+        MotionConstraint::Prescribed(DVec3::new(1e12, 0.0, 0.0)),
+        HELD,
+    );
     let mut case = setup([12, 12, 12], 0.25, [PERIODIC; 3], 0.05, vec![ball]);
     case.step = StepRule::Fixed(0.01);
     let mut sim = Simulation::new(case).unwrap();
@@ -522,7 +525,7 @@ fn a_spinning_sphere_feels_the_stokes_torque() {
     let spin = 0.01;
     let mut ball = sphere(1.0, DVec3::new(2.02, 2.04, 2.05), 1.0);
     ball.translation = HELD;
-    ball.rotation = Dof::Prescribed(DVec3::new(0.0, spin, 0.0));
+    ball.rotation = MotionConstraint::Prescribed(DVec3::new(0.0, spin, 0.0));
     let mut sim = Simulation::new(setup([32; 3], 1.0 / 8.0, [WALLS; 3], 1.0, vec![ball])).unwrap();
     run(&mut sim, 0.6);
     let free = 8.0 * PI * 0.125 * spin;
@@ -541,7 +544,7 @@ fn torque_of_a_fast_spinning_sphere_does_not_depend_on_the_step() {
     // inside is convected away.
     let torque = |cfl: f64| {
         let mut ball = sphere(1.0, DVec3::new(1.513, 1.487, 1.504), 1.0);
-        (ball.translation, ball.rotation) = (HELD, Dof::Prescribed(2.0 * DVec3::Z));
+        (ball.translation, ball.rotation) = (HELD, MotionConstraint::Prescribed(2.0 * DVec3::Z));
         let mut case = setup([36; 3], 1.0 / 12.0, [WALLS; 3], 0.005, vec![ball]);
         case.step = limits(cfl);
         let mut sim = Simulation::new(case).unwrap();
@@ -603,7 +606,7 @@ fn drag_of_a_fixed_sphere_at_re_100() {
 #[test]
 fn force_on_a_carried_sphere_is_quiet() {
     let mut ball = sphere(1.0, DVec3::new(2.0, 2.026, 2.046), 1.0);
-    ball.translation = Dof::Prescribed(DVec3::X);
+    ball.translation = MotionConstraint::Prescribed(DVec3::X);
     ball.rotation = HELD;
     let mut case = setup(
         [48, 32, 32],
@@ -646,7 +649,7 @@ fn drag_hardly_depends_on_the_step_and_little_on_the_frame() {
             false => (3.5, DVec3::ZERO, -DVec3::X),
         };
         let mut ball = sphere(1.0, DVec3::new(start, 2.026, 2.046), 1.0);
-        (ball.translation, ball.velocity) = (Dof::Prescribed(velocity), velocity);
+        (ball.translation, ball.velocity) = (MotionConstraint::Prescribed(velocity), velocity);
         ball.rotation = HELD;
         let mut case = setup(
             [56, 32, 32],

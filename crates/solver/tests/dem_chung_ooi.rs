@@ -15,10 +15,12 @@ use std::ops::Range;
 
 use dem_support::{floor, open_box, sphere};
 use glam::DVec3;
-use grainwake_solver::dem::{ContactLawKind, ContactParams, Dynamics, Enclosure, Grain, Material};
+use grainwake_solver::dem::{
+    ContactDynamics, ContactLawKind, ContactParams, Enclosure, Grain, Material,
+};
 use grainwake_solver::math::Load;
 
-/// Material, density [kg/m^3] and restitution 1.
+/// Material with the restitution 1.
 fn material(youngs_modulus: f64, poisson_ratio: f64) -> Material {
     Material {
         youngs_modulus,
@@ -38,10 +40,7 @@ fn hertz_mindlin(friction: f64) -> ContactParams {
 }
 
 fn grain(radius: f64, density: f64, material: Material, position: DVec3) -> Grain {
-    Grain {
-        material,
-        ..sphere(radius, density, 500, position)
-    }
+    sphere(radius, density, 500, position).with_material(material)
 }
 
 /// Hertz impact between two bodies.
@@ -76,7 +75,7 @@ fn impact(
     enclosure: Enclosure,
     duration: f64,
 ) -> Impact {
-    let mut dynamics = Dynamics::new(params, enclosure);
+    let mut dynamics = ContactDynamics::new(params, enclosure);
     let mut mean = vec![Load::default(); grains.len()];
     let (mut largest, dt) = ([0.0f64; 3], 1.5 * duration / 3000.0);
     for _ in 0..3000 {
@@ -331,8 +330,8 @@ fn test_8_two_spheres_of_different_size() {
         let mut small = grain(RADIUS, ALLOY_DENSITY, alloy(), DVec3::X * -RADIUS);
         small.velocity.x = SPEED;
         small.angular_velocity.y = -surface / RADIUS;
-        let center = DVec3::X * 5.0 * RADIUS;
-        let large = grain(5.0 * RADIUS, other_density, alloy(), center);
+        let centre = DVec3::X * 5.0 * RADIUS;
+        let large = grain(5.0 * RADIUS, other_density, alloy(), centre);
         let after = spinning_impact([small, large]);
         // Velocity of the first surface relative to the second, at the contact.
         let at = |g: &Grain, side: f64, radius: f64| {

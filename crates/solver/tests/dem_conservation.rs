@@ -8,7 +8,9 @@ use std::sync::Arc;
 use dem_support::{cloud, kinetic, open_box, smooth, sphere, step};
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, Partner};
+use grainwake_solver::dem::{
+    ContactDynamics, ContactParams, Enclosure, Grain, MotionConstraint, Partner,
+};
 use grainwake_solver::math::Load;
 
 fn momenta(grains: &[Grain]) -> (DVec3, DVec3) {
@@ -26,7 +28,7 @@ fn a_colliding_cloud_keeps_momentum_and_angular_momentum() {
         restitution: 0.8,
         ..Default::default()
     };
-    let mut dynamics = Dynamics::new(params, open_box(1.0));
+    let mut dynamics = ContactDynamics::new(params, open_box(1.0));
     let (p0, l0) = momenta(&grains);
     let speeds: f64 = grains.iter().map(|g| g.momentum().length()).sum();
     let spins: f64 = grains
@@ -61,7 +63,7 @@ fn elastic_collisions_keep_the_energy() {
         substeps_per_contact: 60.0,
         ..smooth(1e3)
     };
-    let mut dynamics = Dynamics::new(params, open_box(1.0));
+    let mut dynamics = ContactDynamics::new(params, open_box(1.0));
     let start = kinetic(&grains);
     let mut worst: f64 = 0.0;
     for _ in 0..300 {
@@ -81,7 +83,7 @@ fn both_bodies_get_opposite_loads_to_round_off() {
         restitution: 0.7,
         ..Default::default()
     };
-    let mut dynamics = Dynamics::new(params, open_box(10.0));
+    let mut dynamics = ContactDynamics::new(params, open_box(10.0));
     let mut grains = [
         sphere(1.0, 100.0, 500, DVec3::new(0.1, 0.2, 0.3)),
         sphere(0.6, 300.0, 200, DVec3::new(1.0, 1.2, 1.1)),
@@ -140,7 +142,7 @@ fn contact_across_a_periodic_face_equals_contact_in_the_interior() {
         for grain in &mut grains {
             grain.pose.position = enclosure.wrap(grain.pose.position + offset);
         }
-        let mut dynamics = Dynamics::new(params, enclosure);
+        let mut dynamics = ContactDynamics::new(params, enclosure);
         let mut touched = 0;
         for _ in 0..300 {
             step(&mut dynamics, &mut grains, DVec3::ZERO, 1e-3);
@@ -198,7 +200,7 @@ fn a_grain_that_fills_a_periodic_box_presses_on_its_own_image() {
     // z.
     let enclosure = periodic(DVec3::new(0.98, 3.0, 3.0));
     let mut grains = [sphere(0.5, 1000.0, 500, DVec3::new(0.1, 0.2, 0.3))];
-    let mut dynamics = Dynamics::new(smooth(1e5), enclosure);
+    let mut dynamics = ContactDynamics::new(smooth(1e5), enclosure);
     let mut mean = [Load::default()];
     dynamics.advance(&mut grains, &[], 1e-4, &mut mean);
     let [contact] = dynamics.contacts() else {
@@ -220,7 +222,7 @@ fn pairs_touch_through_several_images() {
         sphere(0.26, 1000.0, 500, DVec3::new(0.0, 1.0, 1.0)),
         sphere(0.26, 1000.0, 500, DVec3::new(0.5, 1.0, 1.0)),
     ];
-    let mut dynamics = Dynamics::new(smooth(1e5), enclosure);
+    let mut dynamics = ContactDynamics::new(smooth(1e5), enclosure);
     let mut mean = [Load::default(); 2];
     dynamics.advance(&mut grains, &[], 1e-4, &mut mean);
     assert_eq!(dynamics.contacts().len(), 2);
@@ -237,15 +239,15 @@ fn a_prescribed_grain_moves_exactly_and_pushes_others() {
         sphere(0.5, 1000.0, 500, DVec3::new(1.01, 0.0, 0.0)),
     ];
     let omega = DVec3::new(0.3, -0.2, 0.9);
-    grains[0].translation = Dof::Prescribed(DVec3::new(0.2, 0.0, 0.1));
-    grains[0].rotation = Dof::Prescribed(omega);
+    grains[0].translation = MotionConstraint::Prescribed(DVec3::new(0.2, 0.0, 0.1));
+    grains[0].rotation = MotionConstraint::Prescribed(omega);
     let start = grains[0].pose;
     let params = ContactParams {
         normal_stiffness: 1e6,
         restitution: 0.5,
         ..Default::default()
     };
-    let mut dynamics = Dynamics::new(params, open_box(10.0));
+    let mut dynamics = ContactDynamics::new(params, open_box(10.0));
     let mut pushed = Load::default();
     for _ in 0..100 {
         let mut mean = [Load::default(); 2];
@@ -271,7 +273,7 @@ fn a_step_without_any_partner_takes_one_sub_step() {
         sphere(0.1, 1000.0, 100, DVec3::ZERO),
         sphere(0.1, 1000.0, 100, DVec3::new(1.0, 0.0, 0.0)),
     ];
-    let mut dynamics = Dynamics::new(smooth(1e6), open_box(10.0));
+    let mut dynamics = ContactDynamics::new(smooth(1e6), open_box(10.0));
     assert_eq!(step(&mut dynamics, &mut grains, DVec3::ZERO, 0.1), 1);
     grains[0].velocity.x = 7.0;
     // The grains travel 0.7 of the distance in this step; the bounding spheres keep a gap of 0.1.
@@ -293,7 +295,7 @@ fn bad_input_does_not_panic() {
             let mut grains = grains.clone();
             grains[0].pose.position = axes * bad;
             grains[1].velocity = axes * bad;
-            let mut dynamics = Dynamics::new(smooth(1e3), periodic(DVec3::ONE));
+            let mut dynamics = ContactDynamics::new(smooth(1e3), periodic(DVec3::ONE));
             let mut mean = [Load::default(); 1];
             for dt in [1e-3, 0.0, -1.0, f64::NAN] {
                 dynamics.advance(&mut grains, &[], dt, &mut mean);
@@ -306,7 +308,7 @@ fn bad_input_does_not_panic() {
         sphere(0.1, 1000.0, 100, DVec3::ZERO),
     ];
     step(
-        &mut Dynamics::new(smooth(1e3), open_box(1.0)),
+        &mut ContactDynamics::new(smooth(1e3), open_box(1.0)),
         &mut same,
         DVec3::ZERO,
         1e-3,

@@ -4,7 +4,7 @@ mod dem_support;
 
 use dem_support::{floor, sphere, step};
 use glam::DVec3;
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics};
+use grainwake_solver::dem::{ContactDynamics, ContactParams, MotionConstraint};
 
 #[test]
 fn dem04_slip_becomes_rolling_at_two_sevenths() {
@@ -24,7 +24,7 @@ fn dem04_slip_becomes_rolling_at_two_sevenths() {
             ..Default::default()
         };
         let mut grains = [grain];
-        let mut dynamics = Dynamics::new(params, floor());
+        let mut dynamics = ContactDynamics::new(params, floor());
         let end = 2.0 / 7.0 * v0 / (friction * g);
         let dt = end / 400.0;
         let (mut rolling, mut time) = (None, 0.0);
@@ -69,7 +69,7 @@ fn kharaz(angle: f64) -> (f64, f64, f64) {
     );
     grain.velocity = speed * DVec3::new(s, 0.0, -c);
     let mut grains = [grain];
-    let mut dynamics = Dynamics::new(params, floor());
+    let mut dynamics = ContactDynamics::new(params, floor());
     for _ in 0..100 {
         step(&mut dynamics, &mut grains, DVec3::ZERO, 5e-7);
     }
@@ -175,7 +175,7 @@ fn slide(friction: f64, may_turn: bool) -> f64 {
     let mut grain = sphere(radius, 2500.0, 4000, DVec3::ZERO);
     grain.pose.position.z = radius - grain.mass() * g * c / k;
     if !may_turn {
-        grain.rotation = Dof::Prescribed(DVec3::ZERO);
+        grain.rotation = MotionConstraint::Prescribed(DVec3::ZERO);
     }
     let params = ContactParams {
         normal_stiffness: k,
@@ -184,7 +184,7 @@ fn slide(friction: f64, may_turn: bool) -> f64 {
         ..Default::default()
     };
     let mut grains = [grain];
-    let mut dynamics = Dynamics::new(params, floor());
+    let mut dynamics = ContactDynamics::new(params, floor());
     let gravity = g * DVec3::new(s, 0.0, -c);
     let mut at_half = 0.0;
     for i in 0..400 {

@@ -8,7 +8,9 @@ use dem_support::{Random, floor, kinetic, open_box, smooth, step};
 use glam::{DQuat, DVec3};
 use grainwake_shape::mesh::{MeshOptions, TriangleMesh, shape_from_mesh};
 use grainwake_shape::{Shape, ShapeOptions, SourceFile, analytic};
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, surface_gap};
+use grainwake_solver::dem::{
+    ContactDynamics, ContactParams, Enclosure, Grain, MotionConstraint, surface_gap,
+};
 use grainwake_solver::math::Load;
 
 /// A rounded box of 40 x 30 x 20 mm with edges rounded to 4 mm.
@@ -89,7 +91,7 @@ fn third_law_holds_to_round_off_for_two_irregular_grains() {
             grain.velocity = random.vector() * 0.1;
             grain.angular_velocity = random.vector() * 5.0;
         }
-        let mut dynamics = Dynamics::new(params, open_box(1.0));
+        let mut dynamics = ContactDynamics::new(params, open_box(1.0));
         let mut mean = [Load::default(); 2];
         dynamics.advance(&mut grains, &[], 1e-15, &mut mean);
         assert_eq!(dynamics.contacts().len(), 1);
@@ -139,7 +141,7 @@ fn colliding_irregular_grains_keep_momentum_and_angular_momentum() {
         .iter()
         .map(|g| g.angular_momentum(DVec3::ZERO).length())
         .sum();
-    let mut dynamics = Dynamics::new(params, open_box(1.0));
+    let mut dynamics = ContactDynamics::new(params, open_box(1.0));
     let mut met = 0;
     for _ in 0..200 {
         step(&mut dynamics, &mut grains, DVec3::ZERO, 2e-4);
@@ -179,10 +181,10 @@ fn stiffness_of_an_irregular_pair_does_not_depend_on_its_nodes() {
         press(&a, &mut b, depth);
         let mut grains = [a, b];
         for grain in &mut grains {
-            grain.translation = Dof::Prescribed(DVec3::ZERO);
-            grain.rotation = Dof::Prescribed(DVec3::ZERO);
+            grain.translation = MotionConstraint::Prescribed(DVec3::ZERO);
+            grain.rotation = MotionConstraint::Prescribed(DVec3::ZERO);
         }
-        let mut dynamics = Dynamics::new(smooth(1e4), open_box(1.0));
+        let mut dynamics = ContactDynamics::new(smooth(1e4), open_box(1.0));
         let mut mean = [Load::default(); 2];
         dynamics.advance(&mut grains, &[], 1e-6, &mut mean);
         mean[0].force
@@ -222,7 +224,7 @@ fn block_on_incline(friction: f64, time: f64) -> (Grain, f64) {
     let mut block = grain(&BLOCK, DVec3::ZERO, DQuat::IDENTITY);
     block.pose.position.z = 0.01 - block.mass() * g * c / k;
     let mut grains = [block];
-    let mut dynamics = Dynamics::new(params, floor());
+    let mut dynamics = ContactDynamics::new(params, floor());
     let gravity = g * DVec3::new(s, 0.0, -c);
     let (dt, mut half) = (5e-4, 0.0);
     let steps = (time / dt) as usize;
@@ -275,7 +277,7 @@ fn a_dropped_block_comes_to_rest_on_a_face() {
         DVec3::new(0.0, 0.0, 0.035),
         DQuat::from_scaled_axis(DVec3::new(0.5, 0.4, 0.3)),
     )];
-    let mut dynamics = Dynamics::new(params, floor());
+    let mut dynamics = ContactDynamics::new(params, floor());
     for _ in 0..1600 {
         step(
             &mut dynamics,
@@ -310,7 +312,7 @@ fn a_spinning_top_on_its_face_is_stopped_by_the_friction_of_its_whole_face() {
     block.pose.position.z = 0.01 - block.mass() * 9.81 / 2e4;
     block.angular_velocity.z = 10.0;
     let mut grains = [block];
-    let mut dynamics = Dynamics::new(params, floor());
+    let mut dynamics = ContactDynamics::new(params, floor());
     let mut brakes: Vec<f64> = Vec::new();
     for _ in 0..25 {
         let before = grains[0].angular_velocity.z;
@@ -347,7 +349,7 @@ fn elastic_irregular_bounces_keep_their_energy_on_average() {
         )];
         grains[0].velocity.z = -0.3;
         let start = kinetic(&grains);
-        let mut dynamics = Dynamics::new(params, floor());
+        let mut dynamics = ContactDynamics::new(params, floor());
         let mut touched = false;
         for _ in 0..400 {
             step(&mut dynamics, &mut grains, DVec3::ZERO, 5e-4);
@@ -381,7 +383,7 @@ fn irregular_contact_across_a_periodic_face_is_the_same() {
             grain(&BLOCK, DVec3::new(0.12 + offset, 0.11, 0.1), turn.inverse()),
         ];
         grains[0].velocity.x = 0.5;
-        let mut dynamics = Dynamics::new(
+        let mut dynamics = ContactDynamics::new(
             ContactParams {
                 normal_stiffness: 2e4,
                 ..Default::default()
@@ -430,7 +432,7 @@ fn pairs_that_are_not_looked_at_do_not_miss_a_contact() {
     params.substeps_per_contact = 100.0 * contact_time / 1e-2 * 0.9999;
     let run = |steps: u32| {
         let mut grains = start.clone();
-        let mut dynamics = Dynamics::new(params, open_box(1.0));
+        let mut dynamics = ContactDynamics::new(params, open_box(1.0));
         for _ in 0..2 * steps {
             step(
                 &mut dynamics,

@@ -4,16 +4,16 @@
 use std::fs;
 use std::path::Path;
 
-/// Rooms from the top down; files of the last one lie directly in `dem`.
+/// Modules from the top down; files of the last one lie directly in `dem`.
 const ORDER: [&str; 4] = ["motion", "contact", "search", ""];
 
 #[test]
-fn rooms_of_dem_import_downwards_only() {
+fn modules_of_dem_import_downwards_only() {
     let dem = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/dem");
     let mut imports = 0;
-    for (rank, room) in ORDER.iter().enumerate() {
-        for entry in fs::read_dir(dem.join(room))
-            .expect("a room of dem")
+    for (rank, module) in ORDER.iter().enumerate() {
+        for entry in fs::read_dir(dem.join(module))
+            .expect("a module of dem")
             .flatten()
         {
             let path = entry.path();
@@ -23,9 +23,9 @@ fn rooms_of_dem_import_downwards_only() {
             let text = fs::read_to_string(&path).expect("a readable source");
             imports += text.matches("use crate::dem::").count();
             for above in &ORDER[..rank] {
-                for path_to_room in [format!("dem::{above}"), format!("super::{above}::")] {
+                for path_to_module in [format!("dem::{above}"), format!("super::{above}::")] {
                     assert!(
-                        !text.contains(&path_to_room),
+                        !text.contains(&path_to_module),
                         "{} imports {above}",
                         path.display()
                     );

@@ -4,7 +4,9 @@ mod dem_support;
 
 use dem_support::{floor, open_box, smooth, sphere, step};
 use glam::DVec3;
-use grainwake_solver::dem::{ContactParams, Dof, Dynamics, Enclosure, Grain, Partner};
+use grainwake_solver::dem::{
+    ContactDynamics, ContactParams, Enclosure, Grain, MotionConstraint, Partner,
+};
 use grainwake_solver::math::Load;
 
 const G: f64 = 9.80665;
@@ -24,7 +26,7 @@ fn dem01_free_fall_and_damped_contact() {
         ..smooth(k)
     };
     let mut grains = [mfix_ball()];
-    let mut dynamics = Dynamics::new(params, floor());
+    let mut dynamics = ContactDynamics::new(params, floor());
     let gravity = DVec3::new(0.0, 0.0, -G);
     let dt = 2e-5;
 
@@ -92,7 +94,7 @@ fn dem02_bounce_heights_fall_with_restitution_squared() {
             ..smooth(5e10)
         };
         let mut grains = [mfix_ball()];
-        let mut dynamics = Dynamics::new(params, floor());
+        let mut dynamics = ContactDynamics::new(params, floor());
         let mut tops = Vec::new();
         let mut rising = false;
         for _ in 0..40_000 {
@@ -139,7 +141,7 @@ fn dem03_two_stacked_compressed_spheres() {
         substeps_per_contact: 100.0,
         ..smooth(k)
     };
-    let mut dynamics = Dynamics::new(params, enclosure);
+    let mut dynamics = ContactDynamics::new(params, enclosure);
     let masses = [grains[0].mass(), grains[1].mass()];
     let rate = |[y1, y2, v1, v2]: [f64; 4]| {
         let between = k * (2.0 * r - (y2 - y1)).max(0.0);
@@ -202,7 +204,7 @@ fn head_on_collision_lasts_pi_sqrt_of_mass_over_two_k() {
         substeps_per_contact: 200.0,
         ..smooth(1e5)
     };
-    let mut dynamics = Dynamics::new(params, open_box(1.0));
+    let mut dynamics = ContactDynamics::new(params, open_box(1.0));
     let dt = 1e-5;
     let (mut began, mut ended, mut deepest) = (None, None, 0.0f64);
     for i in 0..2000 {
@@ -266,10 +268,10 @@ fn stiffness_does_not_depend_on_the_number_of_nodes() {
                 sphere(1.0, 1.0, nodes, DVec3::new(4.0, 4.0, 1.0 - depth)),
             ];
             for grain in &mut grains {
-                grain.translation = Dof::Prescribed(DVec3::ZERO);
-                grain.rotation = Dof::Prescribed(DVec3::ZERO);
+                grain.translation = MotionConstraint::Prescribed(DVec3::ZERO);
+                grain.rotation = MotionConstraint::Prescribed(DVec3::ZERO);
             }
-            let mut dynamics = Dynamics::new(
+            let mut dynamics = ContactDynamics::new(
                 smooth(1000.0),
                 Enclosure {
                     lower: DVec3::new(-9.0, -9.0, 0.0),
@@ -308,7 +310,7 @@ fn global_damping_is_an_exponential() {
         global_damping: 1.0,
         ..smooth(1e4)
     };
-    let mut dynamics = Dynamics::new(params, open_box(10.0));
+    let mut dynamics = ContactDynamics::new(params, open_box(10.0));
     for _ in 0..1000 {
         step(&mut dynamics, &mut grains, DVec3::ZERO, 1e-3);
     }
@@ -343,7 +345,7 @@ fn mean_contact_is_the_impulse_of_the_step() {
         normal_stiffness: 1e6,
         ..Default::default()
     };
-    let mut dynamics = Dynamics::new(params, floor());
+    let mut dynamics = ContactDynamics::new(params, floor());
     let gravity = DVec3::new(1.0, 0.0, -G);
     let mut most = 0;
     for _ in 0..50 {
@@ -394,12 +396,12 @@ fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
                 DVec3::new(0.0, 0.0, 2.0 * radius + gap),
             ),
         ];
-        grains[0].rotation = Dof::Prescribed(DVec3::ZERO);
-        grains[0].translation = Dof::Prescribed(DVec3::ZERO);
-        grains[1].rotation = Dof::Prescribed(DVec3::ZERO);
-        grains[1].translation = Dof::Prescribed(DVec3::new(0.01, 0.0, -speed));
+        grains[0].rotation = MotionConstraint::Prescribed(DVec3::ZERO);
+        grains[0].translation = MotionConstraint::Prescribed(DVec3::ZERO);
+        grains[1].rotation = MotionConstraint::Prescribed(DVec3::ZERO);
+        grains[1].translation = MotionConstraint::Prescribed(DVec3::new(0.01, 0.0, -speed));
         let mut mean = [Load::default(); 2];
-        Dynamics::new(params, open_box(1.0)).advance(&mut grains, &[], 1e-9, &mut mean);
+        ContactDynamics::new(params, open_box(1.0)).advance(&mut grains, &[], 1e-9, &mut mean);
         assert!((mean[0].force + mean[1].force).length() <= 1e-12 * mean[1].force.length());
         mean[1].force
     };
@@ -434,7 +436,7 @@ fn a_contact_turns_the_added_mass_as_well() {
         };
         let mut grains = [sphere(0.1, 2600.0, 400, DVec3::new(0.0, 0.0, 0.1001))];
         grains[0].velocity = DVec3::new(0.0, 0.0, -1.0);
-        let mut dynamics = Dynamics::new(params, floor());
+        let mut dynamics = ContactDynamics::new(params, floor());
         let mut mean = [Load::default()];
         let dt = 1e-3;
         for _ in 0..200 {
@@ -467,7 +469,7 @@ fn a_film_takes_its_speed_whatever_the_step() {
         )];
         grains[0].velocity = DVec3::new(0.0, 0.0, -0.5);
         let mass = grains[0].mass();
-        let mut dynamics = Dynamics::new(params, floor());
+        let mut dynamics = ContactDynamics::new(params, floor());
         let mut mean = [Load::default()];
         let mut time = 0.0;
         while time < 8e-3 {

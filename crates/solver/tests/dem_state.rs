@@ -4,7 +4,9 @@ mod dem_support;
 
 use dem_support::{Random, bits, cloud, step};
 use glam::DVec3;
-use grainwake_solver::dem::{ContactLawKind, ContactParams, Dynamics, Enclosure, Grain, Material};
+use grainwake_solver::dem::{
+    ContactDynamics, ContactLawKind, ContactParams, Enclosure, Grain, Material,
+};
 
 fn params() -> ContactParams {
     ContactParams {
@@ -23,7 +25,7 @@ fn tank() -> Enclosure {
     }
 }
 
-fn settle(dynamics: &mut Dynamics, grains: &mut [Grain], steps: usize) {
+fn settle(dynamics: &mut ContactDynamics, grains: &mut [Grain], steps: usize) {
     for _ in 0..steps {
         step(dynamics, grains, DVec3::new(0.3, 0.0, -9.81), 1e-3);
     }
@@ -38,7 +40,7 @@ fn one_two_and_three_threads_give_the_same_bits() {
             .unwrap();
         pool.install(|| {
             let mut grains = cloud(80, 0.045, 0.007, 0.3, 3);
-            let mut dynamics = Dynamics::new(params(), tank());
+            let mut dynamics = ContactDynamics::new(params(), tank());
             settle(&mut dynamics, &mut grains, 150);
             assert!(
                 dynamics.contacts().len() > 30,
@@ -75,12 +77,12 @@ fn continues_with_the_same_bits(params: ContactParams, material: Material) {
     grains
         .iter_mut()
         .for_each(|grain| grain.material = material);
-    let mut dynamics = Dynamics::new(params, tank());
+    let mut dynamics = ContactDynamics::new(params, tank());
     settle(&mut dynamics, &mut grains, 120);
     for _ in 0..10 {
         let mut file = Vec::new();
         dynamics.save(&mut file).unwrap();
-        let mut other = Dynamics::new(params, tank());
+        let mut other = ContactDynamics::new(params, tank());
         other.restore(&mut file.as_slice()).unwrap();
         assert_eq!(other.contacts(), dynamics.contacts());
         assert_eq!(
@@ -95,7 +97,7 @@ fn continues_with_the_same_bits(params: ContactParams, material: Material) {
     }
     // Without the history the tangential springs start from zero, and the bits differ.
     let mut copy = grains.clone();
-    let mut fresh = Dynamics::new(params, tank());
+    let mut fresh = ContactDynamics::new(params, tank());
     settle(&mut dynamics, &mut grains, 3);
     settle(&mut fresh, &mut copy, 3);
     assert!(bits(&grains) != bits(&copy));
@@ -104,7 +106,7 @@ fn continues_with_the_same_bits(params: ContactParams, material: Material) {
 #[test]
 fn damaged_history_is_an_error_and_leaves_the_state_alone() {
     let mut grains = cloud(40, 0.045, 0.007, 0.3, 5);
-    let mut dynamics = Dynamics::new(params(), tank());
+    let mut dynamics = ContactDynamics::new(params(), tank());
     settle(&mut dynamics, &mut grains, 120);
     let mut file = Vec::new();
     dynamics.save(&mut file).unwrap();

@@ -1,4 +1,5 @@
-//! Imports point downwards only (ARCHITECTURE.md): this test reads the `use` lines.
+//! Imports point downwards only (ARCHITECTURE.md), and modules of a folder form no circles. The
+//! tests read the paths in the sources.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -161,14 +162,24 @@ fn paths(tree: &str, prefix: &str, found: &mut Vec<String>) {
     }
 }
 
-/// Code of a source file: no comments, no unit tests at its end.
-fn code(file: &Path) -> String {
-    let text = fs::read_to_string(file).expect("a readable source");
-    let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or("");
-    let lines = text
+/// Code without comments and without items that are compiled for unit tests only.
+fn product_code(text: &str) -> String {
+    let mut lines = text
         .lines()
-        .map(|line| line.split("//").next().unwrap_or(""));
-    lines.collect::<Vec<_>>().join("\n")
+        .map(|line| line.split("//").next().unwrap_or("").trim_end());
+    let mut kept = Vec::new();
+    while let Some(line) = lines.next() {
+        if line == "#[cfg(test)]" {
+            // A formatted item at the top of a file ends at a semicolon or at a brace in column 0.
+            let ends = |line: &&str| {
+                line.starts_with('}') || !line.starts_with(' ') && line.ends_with(';')
+            };
+            lines.find(ends);
+        } else {
+            kept.push(line);
+        }
+    }
+    kept.join("\n")
 }
 
 /// End of the path or use tree at the start of `code`.
@@ -187,71 +198,143 @@ fn path_end(code: &str) -> usize {
     code.len()
 }
 
-/// First segments of the paths below `crate::` in `code`.
-fn roots(code: &str) -> BTreeSet<String> {
+/// Module path, from the root of the crate.
+type Module = Vec<String>;
+
+/// Paths in `code` that begin with `crate::`, `super::` or `self::`, as text.
+fn internal_paths(code: &str) -> Vec<String> {
     let mut found = Vec::new();
-    for (at, word) in code.match_indices("crate::") {
-        if !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_') {
-            let tree = &code[at + word.len()..];
-            paths(&tree[..path_end(tree)], "", &mut found);
+    for root in ["crate::", "super::", "self::"] {
+        for (at, _) in code.match_indices(root) {
+            if !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':') {
+                let tree = &code[at..];
+                paths(&tree[..path_end(tree)], "", &mut found);
+            }
         }
     }
-    let first = |path: &String| path.split("::").next().unwrap_or("").trim().to_owned();
-    found.iter().map(first).collect()
+    found
 }
 
-/// Top-level module that the crate root re-exports each name from.
-fn exports(root: &str) -> BTreeMap<String, String> {
+/// Segments of a path in the code of `module`, counted from the root of the crate.
+fn absolute(module: &[String], path: &str) -> Module {
+    let path = path.split(" as ").next().unwrap_or("");
+    let mut segments = module.to_vec();
+    for (n, segment) in path.split("::").map(str::trim).enumerate() {
+        match segment {
+            "crate" if n == 0 => segments.clear(),
+            "super" => drop(segments.pop()),
+            "self" => {}
+            name => segments.push(name.to_owned()),
+        }
+    }
+    segments
+}
+
+/// Modules of a crate, without its tests.
+struct Crate {
+    /// Code of each module.
+    code: BTreeMap<Module, String>,
+    /// Paths that each module imports or re-exports by name.
+    names: BTreeMap<Module, BTreeMap<String, Module>>,
+}
+
+impl Crate {
+    fn read(src: &Path) -> Crate {
+        let mut files = Vec::new();
+        sources(src, &mut files);
+        let module = |file: &PathBuf| -> Module {
+            let inside = file.strip_prefix(src).expect("a file of the crate");
+            let name = |part: &std::ffi::OsStr| part.to_string_lossy().into_owned();
+            let mut module: Module = inside.with_extension("").iter().map(name).collect();
+            let last = module.last().map(String::as_str);
+            if matches!(last, Some("mod" | "lib" | "main")) {
+                module.pop();
+            }
+            module
+        };
+        let mut code: BTreeMap<Module, String> = BTreeMap::new();
+        let mut tests = Vec::new();
+        for file in &files {
+            let module = module(file);
+            let text = fs::read_to_string(file).expect("a readable source");
+            for after in text.split("#[cfg(test)]\nmod ").skip(1) {
+                let name = after.split([';', ' ']).next().unwrap_or("");
+                tests.push([&module[..], &[name.to_owned()]].concat());
+            }
+            (code.entry(module).or_default()).push_str(&product_code(&text));
+        }
+        code.retain(|module, _| !tests.iter().any(|test| module.starts_with(test)));
+        let names = (code.iter())
+            .map(|(module, code)| (module.clone(), names(module, code)))
+            .collect();
+        Crate { code, names }
+    }
+
+    /// Replaces re-exported names in a path by the paths that they stand for.
+    fn resolve(&self, mut path: Module) -> Module {
+        let mut known = 0;
+        // A path has few segments, and each of them few re-exports.
+        for _ in 0..20 {
+            if known == path.len() {
+                break;
+            }
+            if self.code.contains_key(&path[..=known]) {
+                known += 1;
+                continue;
+            }
+            let names = self.names.get(&path[..known]);
+            let Some(target) = names.and_then(|names| names.get(&path[known])) else {
+                break;
+            };
+            path = [&target[..], &path[known + 1..]].concat();
+            known = 0;
+        }
+        path
+    }
+
+    /// Modules directly below `parent`, each with its siblings that it imports. The `mod.rs` of a
+    /// folder belongs to the parent.
+    fn imports(&self, parent: &[String]) -> BTreeMap<String, BTreeSet<String>> {
+        let depth = parent.len();
+        let mut imports: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        let below = (self.code.iter())
+            .filter(|(module, _)| module.len() > depth && module.starts_with(parent));
+        for (module, code) in below {
+            let own = imports.entry(module[depth].clone()).or_default();
+            for path in internal_paths(code) {
+                let path = self.resolve(absolute(module, &path));
+                if path.len() > depth
+                    && path.starts_with(parent)
+                    && path[depth] != module[depth]
+                    && self.code.contains_key(&path[..=depth])
+                {
+                    own.insert(path[depth].clone());
+                }
+            }
+        }
+        imports
+    }
+
+    /// Modules that have modules below them, the root included.
+    fn parents(&self) -> BTreeSet<Module> {
+        let parent = |module: &Module| Some(module.split_last()?.1.to_vec());
+        self.code.keys().filter_map(parent).collect()
+    }
+}
+
+/// Paths that `code` of `module` imports or re-exports, by name.
+fn names(module: &[String], code: &str) -> BTreeMap<String, Module> {
     let mut found = Vec::new();
-    for statement in root.split(';') {
+    for statement in code.split(';') {
         if let Some((_, tree)) = statement.split_once("use ") {
-            paths(tree.trim().trim_start_matches("crate::"), "", &mut found);
+            paths(tree.trim(), "", &mut found);
         }
     }
     let pair = |path: &String| {
         let name = path.rsplit("::").next()?.rsplit(" as ").next()?.trim();
-        Some((name.to_owned(), path.split("::").next()?.trim().to_owned()))
+        Some((name.to_owned(), absolute(module, path)))
     };
     found.iter().filter_map(pair).collect()
-}
-
-/// Top-level modules of a crate, each with the modules it imports.
-fn imports(src: &Path) -> BTreeMap<String, BTreeSet<String>> {
-    let module = |path: &Path| -> String {
-        let first = path.strip_prefix(src).ok().and_then(|p| p.iter().next());
-        let first = first.unwrap_or_default().to_string_lossy();
-        first.trim_end_matches(".rs").to_owned()
-    };
-    let mut files = Vec::new();
-    sources(src, &mut files);
-    let roots_of = |file: &PathBuf| (module(file), roots(&code(file)));
-    let of_root = |name: &str| name == "lib" || name == "main" || name == "bin";
-    let root: String = files
-        .iter()
-        .filter(|f| of_root(&module(f)))
-        .map(|f| code(f))
-        .collect();
-    let exports = exports(&root);
-    let named: Vec<_> = files
-        .iter()
-        .map(roots_of)
-        .filter(|(m, _)| !of_root(m))
-        .collect();
-    let modules: BTreeSet<String> = named.iter().map(|(module, _)| module.clone()).collect();
-    let mut out: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for (module, names) in named {
-        let own = out.entry(module.clone()).or_default();
-        for name in names {
-            let target = exports
-                .get(&name)
-                .filter(|_| !modules.contains(&name))
-                .unwrap_or(&name);
-            if modules.contains(target) && *target != module {
-                own.insert(target.clone());
-            }
-        }
-    }
-    out
 }
 
 /// Groups of modules that reach each other, each in order of name.
@@ -283,34 +366,61 @@ fn circles(imports: &BTreeMap<String, BTreeSet<String>>) -> BTreeSet<Vec<String>
         .collect()
 }
 
+/// Known circles, which remain to be removed: folder and modules. Do not add to this list; a module
+/// or an entry leaves it when its circle is gone.
+const KNOWN_CIRCLES: [(&str, &[&str]); 8] = [
+    ("run/case", &["estimate", "warnings"]),
+    ("shape/mesh", &["distance", "nearest_cache", "propagate"]),
+    ("shape/mesh", &["obj", "ply", "read", "stl"]),
+    ("shape/scan", &["build", "grain"]),
+    (
+        "shape/scan",
+        &["header", "npy", "npz", "slices", "tiff", "volume"],
+    ),
+    // `Real` names its `Registers`, which `dispatch` defines from the vectors.
+    ("simd", &["dispatch", "plain", "real", "vector", "x86"]),
+    ("solver/flow", &["project", "solver"]),
+    ("solver/grid", &["field", "mesh", "view"]),
+];
+
 #[test]
 fn modules_form_no_circles() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .expect("the folder of crates");
-    let mut seen = 0;
-    let mut found = BTreeSet::new();
+    let (mut seen, mut found) = (0, Vec::new());
     for entry in fs::read_dir(crates).expect("the crates").flatten() {
-        let imports = imports(&entry.path().join("src"));
-        seen += imports.values().map(BTreeSet::len).sum::<usize>();
         let name = entry.file_name().to_string_lossy().into_owned();
-        found.extend(
-            circles(&imports)
-                .into_iter()
-                .map(|group| (name.clone(), group)),
-        );
+        let read = Crate::read(&entry.path().join("src"));
+        for parent in read.parents() {
+            let imports = read.imports(&parent);
+            seen += imports.values().map(BTreeSet::len).sum::<usize>();
+            let folder = [&[name.clone()], &parent[..]].concat().join("/");
+            let is_known = |circle: &Vec<String>| {
+                let mut known = KNOWN_CIRCLES.iter().filter(|known| known.0 == folder);
+                known.any(|known| circle.iter().all(|m| known.1.contains(&m.as_str())))
+            };
+            let new = circles(&imports).into_iter().filter(|c| !is_known(c));
+            found.extend(new.map(|circle| (folder.clone(), circle)));
+        }
     }
     assert!(
-        seen > 100,
+        seen > 400,
         "only {seen} imports found: has the layout changed?"
     );
-    assert!(found.is_empty(), "modules import each other: {found:?}");
+    assert!(found.is_empty(), "modules import each other: {found:#?}");
 }
 
 #[test]
 fn use_trees_are_read_whole() {
-    let code = "use crate::{a, b::{c, d}};\nfn f() { crate::e::g(); grainwake_crate::h(); }";
-    assert_eq!(roots(code).into_iter().collect::<Vec<_>>(), ["a", "b", "e"]);
-    let exports = exports("pub use x::{Y, z::W as V};\nmod x;");
-    assert_eq!((exports["Y"].as_str(), exports["V"].as_str()), ("x", "x"));
+    let module = ["m", "n"].map(str::to_owned);
+    let code = "use crate::{a, b::{c, d}};\nfn f() { super::e::g(); grainwake_crate::h(); }";
+    let found = internal_paths(code);
+    let found: Vec<_> = (found.iter())
+        .map(|path| absolute(&module, path).join("::"))
+        .collect();
+    assert_eq!(found, ["a", "b::c", "b::d", "m::e::g"]);
+    let names = names(&module, "pub use x::{Y, z::W as V};\nmod x;");
+    assert_eq!(names["Y"].join("::"), "m::n::x::Y");
+    assert_eq!(names["V"].join("::"), "m::n::x::z::W");
 }

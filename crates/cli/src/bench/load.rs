@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3};
 use grainwake_shape::ShapeOptions;
 use grainwake_shape::analytic::ellipsoid;
-use grainwake_solver::dem::{ContactParams, Dof, Grain};
+use grainwake_solver::dem::{ContactParams, MotionConstraint, Grain};
 use grainwake_solver::flow::{Advection, Boundaries, Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
@@ -89,8 +89,8 @@ pub fn setup(load: &Load) -> Result<Setup, Exit> {
         },
         velocity: DVec3::ZERO,
         angular_velocity: DVec3::ZERO,
-        translation: Dof::Free,
-        rotation: Dof::Free,
+        translation: MotionConstraint::Free,
+        rotation: MotionConstraint::Free,
     };
     Ok(Setup {
         prescription: Default::default(),

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use grainwake_solver::dem::{Dof, Grain};
+use grainwake_solver::dem::{MotionConstraint, Grain};
 use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::{Setup, StepRule};
@@ -139,7 +139,7 @@ pub(super) fn default_max_step(
 
 /// Returns whether the grain moves freely.
 pub(super) fn is_free(grain: &Grain) -> bool {
-    grain.translation == Dof::Free
+    grain.translation == MotionConstraint::Free
 }
 
 /// Returns the smallest equal-volume diameter [m]; infinite without grains.

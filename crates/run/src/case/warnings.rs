@@ -7,7 +7,7 @@ use super::expect::{Expectation, Measure};
 use super::number_format::{AXES, SIDES, quantity};
 use super::settling::{is_free, terminal_speed, time_step};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
-use grainwake_solver::dem::{ContactLawKind, Dof, Grain, outside};
+use grainwake_solver::dem::{ContactLawKind, MotionConstraint, Grain, outside};
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::events::StopWhen;
@@ -121,8 +121,8 @@ fn prescribed_motions(setup: &Setup, end: f64) -> Vec<String> {
     let motions = setup.prescription.motions.iter();
     let driven: Vec<usize> = motions.map(|motion| motion.grain).collect();
     let moves = |index: &usize| match grains[*index].translation {
-        Dof::Prescribed(velocity) => velocity != DVec3::ZERO || driven.contains(index),
-        Dof::Free => false,
+        MotionConstraint::Prescribed(velocity) => velocity != DVec3::ZERO || driven.contains(index),
+        MotionConstraint::Free => false,
     };
     let moving: Vec<usize> = (0..grains.len()).filter(moves).collect();
     let mut found = Vec::new();
@@ -135,7 +135,7 @@ fn prescribed_motions(setup: &Setup, end: f64) -> Vec<String> {
                 continue;
             }
             let grain = &mut grains[index];
-            if let Dof::Prescribed(velocity) = grain.translation {
+            if let MotionConstraint::Prescribed(velocity) = grain.translation {
                 grain.pose.position += dt * velocity;
             }
             let out = outside(std::slice::from_ref(grain), &enclosure);

@@ -11,7 +11,7 @@ use crate::math::Pose;
 
 /// Whether the three components of a velocity follow the equations of motion or are prescribed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Dof {
+pub enum MotionConstraint {
     /// Newton's or Euler's equation determines the velocity.
     Free,
     /// Velocity [m/s] or angular velocity [rad/s, space frame] over the next step; zero holds the
@@ -35,9 +35,9 @@ pub struct Grain {
     /// Angular velocity, space frame [rad/s].
     pub angular_velocity: DVec3,
     /// Translational degrees of freedom.
-    pub translation: Dof,
+    pub translation: MotionConstraint,
     /// Rotational degrees of freedom.
-    pub rotation: Dof,
+    pub rotation: MotionConstraint,
 }
 
 impl Grain {
@@ -53,8 +53,8 @@ impl Grain {
             },
             velocity: DVec3::ZERO,
             angular_velocity: DVec3::ZERO,
-            translation: Dof::Free,
-            rotation: Dof::Free,
+            translation: MotionConstraint::Free,
+            rotation: MotionConstraint::Free,
         }
     }
     /// Replaces the position of the centroid [m].
@@ -85,8 +85,10 @@ impl Grain {
     /// Holds the grain still.
     pub fn held(mut self) -> Grain {
         (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
-        (self.translation, self.rotation) =
-            (Dof::Prescribed(DVec3::ZERO), Dof::Prescribed(DVec3::ZERO));
+        (self.translation, self.rotation) = (
+            MotionConstraint::Prescribed(DVec3::ZERO),
+            MotionConstraint::Prescribed(DVec3::ZERO),
+        );
         self
     }
     /// Mass [kg].
@@ -106,8 +108,8 @@ impl Grain {
     /// zero if the translation is prescribed [1/kg].
     pub(super) fn inverse_mass(&self, added_density: f64) -> f64 {
         match self.translation {
-            Dof::Free => 1.0 / (self.mass() + added_density * self.shape.volume()),
-            Dof::Prescribed(_) => 0.0,
+            MotionConstraint::Free => 1.0 / (self.mass() + added_density * self.shape.volume()),
+            MotionConstraint::Prescribed(_) => 0.0,
         }
     }
     /// Kinetic energy of translation and rotation [J].

@@ -43,7 +43,7 @@ impl Material {
 }
 
 /// Restitution below which the dashpot grows no further.
-pub(super) const SMALLEST_RESTITUTION: f64 = 0.05;
+pub(super) const MIN_RESTITUTION: f64 = 0.05;
 
 /// Damping ratio zeta = c / (2 sqrt(k m)) of a spring and dashpot that give the coefficient of
 /// restitution e if the contact ends where its force vanishes (Schwager & Poeschel 2007).
@@ -51,7 +51,7 @@ pub(super) const SMALLEST_RESTITUTION: f64 = 0.05;
 /// A dry contact cannot pull. With zeta = sin(theta), e = exp(-tan(theta) (pi - 2 theta)); with
 /// zeta = cosh(u), e = exp(-2 u / tanh(u)).
 pub(super) fn damping_ratio(restitution: f64) -> f64 {
-    let log_loss = -restitution.clamp(SMALLEST_RESTITUTION, 1.0).ln();
+    let log_loss = -restitution.clamp(MIN_RESTITUTION, 1.0).ln();
     if log_loss == 0.0 {
         return 0.0;
     }

@@ -7,8 +7,9 @@
 //! 3. `search`: broad phase, narrow phase, gaps between surfaces;
 //! 4. `grain`, `material`, `enclosure`: the bodies and the box.
 //!
-//! [`Dynamics::advance`] takes one step: list the pairs that may touch, find their penetrating
-//! points, evaluate the contact forces and integrate the motion, in sub-steps of the contact time.
+//! [`ContactDynamics::advance`] takes one step: list the pairs that may touch, find their
+//! penetrating points, evaluate the contact forces and integrate the motion, in sub-steps of the
+//! contact time.
 
 mod contact;
 mod enclosure;
@@ -19,8 +20,8 @@ mod search;
 
 pub use contact::{Contact, ContactLawKind, ContactParams};
 pub use enclosure::Enclosure;
-pub use grain::{Dof, Grain};
+pub use grain::{Grain, MotionConstraint};
 pub use material::Material;
-pub use motion::{Dynamics, Response, RigidState, TrialStep, rotation};
+pub use motion::{ContactDynamics, GrainResponse, RigidState, TrialStep, rotation};
 pub(crate) use search::{BoundingSphere, BroadPhase};
 pub use search::{Outside, Overlap, Partner, initial_overlaps, outside, surface_gap, wall_gap};

@@ -7,7 +7,7 @@ use super::forcing::{ForcedFaces, ForcingParams};
 use super::geometry::Locator;
 use super::scheme::Scheme;
 use super::scratch::ScratchPool;
-use super::update::{GrainUpdate, ImmersedGrain, ThreadScratch, locate_and_weigh};
+use super::update::{GrainUpdate, ImmersedGrain, ThreadScratch, locate_and_compute_weights};
 use crate::dem::Grain;
 use crate::flow::Flow;
 use crate::grid::Mesh;
@@ -58,7 +58,8 @@ impl<R: Real> ImmersedGrains<R> {
         self.release_forcing();
     }
 
-    /// Lists the faces near the grains and weighs the forced faces for a step of `dt` [s].
+    /// Lists the faces near the grains and computes the weights of the forced faces for a step of
+    /// `dt` [s].
     pub(super) fn locate_with_forcing(&mut self, grains: &[Grain], dt: f64) {
         self.locator.find_neighbours(grains, |_| 0.0);
         let params = self.forcing_params(dt);
@@ -66,7 +67,7 @@ impl<R: Real> ImmersedGrains<R> {
         let each = self.grains.par_iter_mut().enumerate();
         each.for_each(|(index, ImmersedGrain { body, forced, .. })| {
             let (grain, scratch) = (&grains[index], &mut scratch.borrow().locate);
-            locate_and_weigh(locator, &params, index, grain, body, forced, scratch);
+            locate_and_compute_weights(locator, &params, index, grain, body, forced, scratch);
         });
     }
 
@@ -81,15 +82,6 @@ impl<R: Real> ImmersedGrains<R> {
     pub(super) fn forcing_params(&self, dt: f64) -> ForcingParams {
         let (eps, spacing) = (self.locator.eps(), self.mesh.spacing);
         ForcingParams::new(self.scheme, eps, spacing, self.kinematic_viscosity, dt)
-    }
-
-    /// Length `dt` of a step if faces are closed to the pressure gradient [s]; 0 in the paper's
-    /// scheme, which does not close faces.
-    pub(super) fn closure_dt(&self, dt: f64) -> f64 {
-        match self.scheme {
-            Scheme::Aperture => dt,
-            Scheme::Paper => 0.0,
-        }
     }
 
     /// Memory held without the buffers of threads [bytes].

@@ -35,12 +35,13 @@ impl<R: Real> ImmersedGrains<R> {
             updates.push(GrainUpdate {
                 pending: Some(PendingRigidity {
                     velocity,
-                    change: velocity,
+                    // The change has a weight only if the pressure gradient is removed, in a step.
+                    change: RigidVelocity::default(),
                 }),
                 ..Default::default()
             });
         }
-        self.impose_pending(flow, &updates, 0.0);
+        self.impose_pending(flow, &updates);
         self.updates = updates;
         self.release_forcing();
         for axis in 0..3 {

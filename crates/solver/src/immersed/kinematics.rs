@@ -25,10 +25,10 @@ impl RigidVelocity {
             angular: grain.angular_velocity,
         }
     }
-    /// Velocity V + Omega x r [m/s] at the vector `arm` r [m] from the centroid.
+    /// Velocity V + Omega x r [m/s] at the vector `lever_arm` r [m] from the centroid.
     #[inline(always)]
-    pub fn at(self, arm: DVec3) -> DVec3 {
-        self.linear + self.angular.cross(arm)
+    pub fn at(self, lever_arm: DVec3) -> DVec3 {
+        self.linear + self.angular.cross(lever_arm)
     }
     /// Vector (V, Omega) of the six unknowns of the equations of motion.
     pub fn to_vector(self) -> Vector6 {
@@ -64,7 +64,8 @@ impl Div<f64> for RigidVelocity {
     }
 }
 
-/// Position and velocities of a grain when the flow was predicted.
+/// Position at the last time level, and velocities that the grain has during the step: a prescribed
+/// velocity is set before the flow is predicted.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GrainKinematics {
     /// Centroid [m].

@@ -18,9 +18,10 @@ use super::grains::ImmersedGrains;
 use super::kinematics::PreviousStep;
 use super::scheme::Scheme;
 use super::update::{
-    CouplingStep, GrainUpdate, ImmersedGrain, PendingRigidity, StepInput, locate_and_weigh,
+    CouplingStep, GrainUpdate, ImmersedGrain, PendingRigidity, StepInput,
+    locate_and_compute_weights,
 };
-use crate::dem::{Grain, Response};
+use crate::dem::{Grain, GrainResponse};
 use crate::flow::Flow;
 use crate::math::{Load, Real};
 
@@ -38,7 +39,7 @@ impl CoupledGrains {
         previous: &[PreviousStep],
         added_density: f64,
         dt: f64,
-        responses: &mut Vec<Response>,
+        responses: &mut Vec<GrainResponse>,
     ) {
         responses.clear();
         let each = self.updates.iter().zip(grains).zip(previous);
@@ -87,7 +88,6 @@ impl<R: Real> ImmersedGrains<R> {
             known,
             corrects_advection,
             fluid_density: self.fluid_density,
-            closure_dt: self.closure_dt(input.dt),
             access: &self.access,
         };
         let scratch = &self.scratch;
@@ -134,7 +134,7 @@ impl<R: Real> ImmersedGrains<R> {
         updates.clear();
         updates.extend((0..grains.len()).map(|index| GrainUpdate {
             isolated: stayed(index)
-                && input.contact[index] == Load::default()
+                && input.contact[index].is_zero()
                 && locator.neighbours(index).is_empty(),
             ..Default::default()
         }));
@@ -193,22 +193,25 @@ impl<R: Real> ImmersedGrains<R> {
             if update.isolated && update.pending.is_some() {
                 let ImmersedGrain { body, forced, .. } = &mut self.grains[index];
                 let (grain, scratch) = (&step.grains[index], &mut self.scratch.borrow().locate);
-                locate_and_weigh(&self.locator, &params, index, grain, body, forced, scratch);
+                locate_and_compute_weights(
+                    &self.locator,
+                    &params,
+                    index,
+                    grain,
+                    body,
+                    forced,
+                    scratch,
+                );
                 forced.rest_gain.clear();
                 forced.rest_gain.resize(forced.weight.len(), 0.0);
             }
         }
-        self.impose_pending(flow, &updates, self.closure_dt(dt));
+        self.impose_pending(flow, &updates);
         self.updates = updates;
     }
 
     /// Imposes the pending rigid velocities, by slabs of the grid.
-    pub(super) fn impose_pending(
-        &self,
-        flow: &mut Flow<R>,
-        updates: &[GrainUpdate],
-        closure_dt: f64,
-    ) {
+    pub(super) fn impose_pending(&self, flow: &mut Flow<R>, updates: &[GrainUpdate]) {
         if updates.iter().all(|update| update.pending.is_none()) {
             return;
         }
@@ -220,15 +223,7 @@ impl<R: Real> ImmersedGrains<R> {
                 };
                 if grain.body.overlaps(prediction.range(), mesh.layout()) {
                     let (h, forced) = (mesh.spacing, &grain.forced);
-                    impose_rigidity(
-                        axis,
-                        h,
-                        forced,
-                        velocity,
-                        change,
-                        closure_dt,
-                        &mut prediction,
-                    );
+                    impose_rigidity(axis, h, forced, velocity, change, &mut prediction);
                 }
             }
         });

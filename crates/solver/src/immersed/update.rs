@@ -65,7 +65,7 @@ impl GrainUpdate {
         contact: Load,
         dt: f64,
     ) {
-        let touched = contact != Load::default();
+        let touched = !contact.is_zero();
         let velocity = match self.imposed {
             Some(imposed) if !touched => imposed,
             _ => self.system.velocities(grain, previous, contact, dt),
@@ -105,24 +105,31 @@ pub struct StepInput<'a> {
 /// Buffers of one thread.
 #[derive(Default)]
 pub struct ThreadScratch<R> {
+    /// Buffers of the advection correction.
     pub advection: AdvectionScratch<R>,
+    /// Buffers of the location of a grain.
     pub locate: LocateScratch,
-    /// Lists of the isolated grain that the thread updates.
+    /// Correction of the advection next to an isolated grain.
     correction: AdvectionCorrection,
+    /// Forced faces of an isolated grain.
     forced: ForcedFaces,
 }
 
 /// Fields and parameters of a step, shared by all grains.
 pub struct CouplingStep<'a, R> {
+    /// Geometry of the grains on the grid.
     pub locator: &'a Locator,
+    /// Parameters of the forcing.
     pub params: ForcingParams,
+    /// Grains and loads.
     pub input: StepInput<'a>,
+    /// Fields of the last step.
     pub known: Known<'a, R>,
+    /// Whether the advection next to the grains is corrected: in the aperture scheme.
     pub corrects_advection: bool,
-    /// [kg/m^3]
+    /// Density of the fluid [kg/m^3].
     pub fluid_density: f64,
-    /// Length of the step if faces are closed to the pressure gradient, else 0 [s].
-    pub closure_dt: f64,
+    /// Log of the faces that the grains read and write.
     pub access: &'a AccessLog,
 }
 
@@ -159,9 +166,9 @@ impl<R: Real> CouplingStep<'_, R> {
         let no_contact = Load::default();
         let velocity = (update.system).velocities(grain, previous, no_contact, self.input.dt);
         let change = velocity - previous.velocity;
-        let (h, dt) = (self.known.mesh.spacing, self.closure_dt);
+        let h = self.known.mesh.spacing;
         for (axis, prediction) in predictions.iter_mut().enumerate() {
-            impose_rigidity(axis, h, forced, velocity, change, dt, prediction);
+            impose_rigidity(axis, h, forced, velocity, change, prediction);
         }
         update.imposed = Some(velocity);
     }
@@ -188,7 +195,7 @@ impl<R: Real> CouplingStep<'_, R> {
         scratch: &mut LocateScratch,
     ) {
         let (params, grain) = (&self.params, &self.input.grains[index]);
-        locate_and_weigh(self.locator, params, index, grain, body, forced, scratch);
+        locate_and_compute_weights(self.locator, params, index, grain, body, forced, scratch);
     }
 
     /// Sums the impulse of the fluid and assembles the equations of motion.
@@ -201,14 +208,14 @@ impl<R: Real> CouplingStep<'_, R> {
         let (known, density, dt) = (&self.known, self.fluid_density, self.input.dt);
         let (grain, previous) = (&self.input.grains[index], &self.input.previous[index]);
         let old = previous.velocity;
-        let impulse = sum_impulse(known, predictions, density, forced, old, self.closure_dt);
+        let impulse = sum_impulse(known, predictions, density, forced, old, dt);
         let applied = self.input.applied[index];
         RigidBodySystem::new(grain, previous, impulse, density, applied, dt)
     }
 }
 
-/// Locates a grain and weighs the faces that it forces.
-pub fn locate_and_weigh(
+/// Locates a grain and computes the weights of the faces that it forces.
+pub fn locate_and_compute_weights(
     locator: &Locator,
     params: &ForcingParams,
     index: usize,
@@ -219,5 +226,5 @@ pub fn locate_and_weigh(
 ) {
     locator.locate(index, grain, body, &mut forced.runs, scratch);
     let neighbours = locator.neighbours(index);
-    forced.weigh(params, &mut scratch.band, neighbours, locator.shapes());
+    forced.compute_weights(params, &mut scratch.band, neighbours, locator.shapes());
 }

@@ -32,6 +32,13 @@ pub struct Load {
     pub torque: DVec3,
 }
 
+impl Load {
+    /// Whether force and torque are both zero.
+    pub fn is_zero(&self) -> bool {
+        *self == Load::default()
+    }
+}
+
 impl std::ops::Add for Load {
     type Output = Load;
     fn add(self, other: Load) -> Load {

@@ -19,7 +19,7 @@ pub(super) struct Clock {
 }
 
 /// Largest ratio of successive steps: Adams-Bashforth extrapolates over the previous step.
-const LARGEST_GROWTH: f64 = 1.2;
+const MAX_GROWTH: f64 = 1.2;
 /// Fraction of the stability limit up to which one step fewer to the next output is taken; this
 /// hysteresis keeps the number of steps from alternating.
 const HYSTERESIS: f64 = 0.95;
@@ -75,7 +75,7 @@ impl Clock {
                 let next = if self.steps == 0 {
                     self.first_step
                 } else {
-                    LARGEST_GROWTH * self.last_step
+                    MAX_GROWTH * self.last_step
                 };
                 (largest, next.min(largest))
             }
@@ -85,7 +85,7 @@ impl Clock {
         }
         let count = (horizon / preferred * (1.0 - 1e-12)).ceil().max(1.0);
         // If the last step was a `count`-th of the horizon, one step fewer is tried: growth by
-        // LARGEST_GROWTH alone never reaches a fourth of an interval from a fifth.
+        // MAX_GROWTH alone never reaches a fourth of an interval from a fifth.
         let fewer = horizon / (count - 1.0);
         let as_before = self.last_step * count >= horizon * (1.0 - 1e-9);
         if count > 1.0 && as_before && fewer <= HYSTERESIS * largest {

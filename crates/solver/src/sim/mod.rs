@@ -17,7 +17,7 @@ mod step;
 mod tests;
 mod timing;
 
-use crate::dem::{Contact, Dynamics, Grain, Response, RigidState};
+use crate::dem::{Contact, ContactDynamics, Grain, GrainResponse, RigidState};
 use crate::grid::Mesh;
 use crate::immersed::{GrainKinematics, PreviousStep};
 use crate::math::{Load, Pose};
@@ -45,7 +45,7 @@ pub struct Simulation {
     setup: Setup,
     clock: Clock,
     fluid: Option<Box<dyn Fluid>>,
-    dynamics: Dynamics,
+    dynamics: ContactDynamics,
     /// Mean hydrodynamic load on each grain over the last step.
     loads: Vec<Load>,
     /// Change of momentum in the last step not explained by forces [kg m/s].
@@ -64,7 +64,7 @@ struct GrainData {
     driving: Vec<Load>,
     /// Mean contact loads over the step.
     contact: Vec<Load>,
-    responses: Vec<Response>,
+    responses: Vec<GrainResponse>,
     /// States at the end of the contact sub-steps with the fluid's response.
     ends: Vec<RigidState>,
     /// Poses at which the grains were located on the grid.
@@ -102,7 +102,7 @@ impl Simulation {
             .as_ref()
             .map_or(Stages::default(), |fluid| fluid.poisson_stages());
         Ok(Simulation {
-            dynamics: Dynamics::new(setup.contact, enclosure),
+            dynamics: ContactDynamics::new(setup.contact, enclosure),
             clock: Clock::new(&setup),
             loads: vec![Load::default(); setup.grains.len()],
             momentum_residual: glam::DVec3::ZERO,

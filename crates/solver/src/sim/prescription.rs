@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::dem::{Dof, Grain};
+use crate::dem::{Grain, MotionConstraint};
 use crate::grid::Mesh;
 use crate::math::Formula;
 
@@ -17,7 +17,7 @@ pub struct Prescription {
     pub motions: Vec<PrescribedMotion>,
 }
 
-/// Prescribed motion of one grain; components without a formula keep their [`Dof`].
+/// Prescribed motion of one grain; components without a formula keep their [`MotionConstraint`].
 #[derive(Clone, Debug)]
 pub struct PrescribedMotion {
     /// Index of the grain.
@@ -36,10 +36,10 @@ impl Prescription {
         for motion in &self.motions {
             let grain = &mut grains[motion.grain];
             if motion.velocity.is_some() {
-                grain.translation = Dof::Prescribed(grain.velocity);
+                grain.translation = MotionConstraint::Prescribed(grain.velocity);
             }
             if motion.angular_velocity.is_some() {
-                grain.rotation = Dof::Prescribed(grain.angular_velocity);
+                grain.rotation = MotionConstraint::Prescribed(grain.angular_velocity);
             }
         }
     }

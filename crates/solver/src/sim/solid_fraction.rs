@@ -37,9 +37,9 @@ impl Simulation {
             .flat_map(|i| (0..counts[1]).flat_map(move |j| (0..counts[2]).map(move |k| (i, j, k))))
         {
             let offset = DVec3::new(offset(i, 0), offset(j, 1), offset(k, 2));
-            let fractions = near.iter().map(|(grain, arm)| {
+            let fractions = near.iter().map(|(grain, lever_arm)| {
                 let orientation = grain.pose.orientation;
-                let point = orientation.conjugate() * (*arm + offset);
+                let point = orientation.conjugate() * (*lever_arm + offset);
                 let (distance, gradient) = grain.shape.distance_and_gradient(point);
                 let normal = orientation * gradient.normalize_or_zero();
                 let width = normal.abs().dot(subcell).max(thinnest);
@@ -57,24 +57,24 @@ impl Simulation {
         let extent = mesh.extent();
         let mut near = Vec::new();
         for grain in &self.setup.grains {
-            let mut arm = centre - grain.pose.position;
+            let mut lever_arm = centre - grain.pose.position;
             for axis in 0..3 {
                 if self.setup.boundaries.is_periodic(axis) && mesh.cells[axis] > 1 {
-                    arm[axis] -= (arm[axis] / extent[axis]).round() * extent[axis];
+                    lever_arm[axis] -= (lever_arm[axis] / extent[axis]).round() * extent[axis];
                 }
             }
             let reach = grain.shape.bounding_radius() + mesh.spacing.length();
-            if arm.length_squared() > reach * reach {
+            if lever_arm.length_squared() > reach * reach {
                 continue;
             }
             let to_body = grain.pose.orientation.conjugate();
-            let (distance, _) = grain.shape.distance_and_gradient(to_body * arm);
+            let (distance, _) = grain.shape.distance_and_gradient(to_body * lever_arm);
             // From the centre to a corner, the distance changes by at most half the diagonal.
             if distance <= -0.5 * edge.length() {
                 return Near::Inside;
             }
             if distance < 0.5 * edge.length() {
-                near.push((grain, arm));
+                near.push((grain, lever_arm));
             }
         }
         Near::Cut(near)

@@ -7,7 +7,7 @@ use super::fluid::Fluid;
 use super::prescription::Prescription;
 use super::timing::{PassTimes, timed};
 use super::{GrainData, Simulation};
-use crate::dem::{Dof, Dynamics, Grain, RigidState, TrialStep};
+use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
 use crate::immersed::{
     CoupledGrains, GrainKinematics, RigidStep, RigidVelocity, Scheme, StepInput,
 };
@@ -16,7 +16,7 @@ use crate::math::Load;
 /// Grains of a step, with or without fluid.
 struct GrainStep<'a> {
     grains: &'a mut [Grain],
-    dynamics: &'a mut Dynamics,
+    dynamics: &'a mut ContactDynamics,
     /// Hydrodynamic loads; zero without fluid.
     loads: &'a mut [Load],
     data: &'a mut GrainData,
@@ -60,19 +60,24 @@ pub(super) struct Moved<'a>(Context<'a>, TrialStep);
 /// Grains located, with their equations of motion.
 pub(super) struct Coupled<'a>(Context<'a>, CoupledGrains, TrialStep);
 /// Contact loads known.
-pub(super) struct Resolved<'a>(Context<'a>, CoupledGrains, Substeps);
+pub(super) struct Resolved<'a>(Context<'a>, CoupledGrains, FinalPoses);
 /// Rigid velocities imposed on the prediction.
-pub(super) struct Rigid<'a>(Context<'a>, Substeps);
-/// Divergence-free velocity; with the momentum of the fluid before the projection.
-pub(super) struct Projected<'a>(Context<'a>, Substeps, DVec3);
+pub(super) struct Rigid<'a>(Context<'a>, FinalPoses);
+/// Flow with a divergence-free velocity.
+pub(super) struct Projected<'a> {
+    context: Context<'a>,
+    final_poses: FinalPoses,
+    /// Momentum of the fluid over its density before the projection [m^4/s].
+    momentum_before: DVec3,
+}
 
-/// Contact sub-steps that determine the poses at the end of a step.
+/// Contact sub-steps that give the poses at the end of a step.
 #[derive(Clone, Copy)]
-enum Substeps {
-    /// Sub-steps under the hydrodynamic load of the last step, if no contact load acts.
-    Explicit,
-    /// Repeated sub-steps with the response of the fluid in this step.
-    WithResponse,
+enum FinalPoses {
+    /// Poses of the trial step, under the hydrodynamic load of the last step: no contact acts.
+    TrialStep,
+    /// Poses of the repeated step, with the response of the fluid in this step.
+    Resolved,
 }
 
 impl<'a> Start<'a> {
@@ -194,9 +199,9 @@ impl<'a> Coupled<'a> {
         let Coupled(mut step, coupled, trial) = self;
         let solid = &mut step.solid;
         let (grains, data, dt) = (&mut *solid.grains, &mut *solid.data, solid.dt);
-        if data.contact.iter().all(|load| *load == Load::default()) {
+        if data.contact.iter().all(Load::is_zero) {
             solid.dynamics.accept(trial);
-            return Resolved(step, coupled, Substeps::Explicit);
+            return Resolved(step, coupled, FinalPoses::TrialStep);
         }
         let added_density = solid.dynamics.params().added_density;
         let (previous, responses) = (&data.previous, &mut data.responses);
@@ -205,14 +210,14 @@ impl<'a> Coupled<'a> {
             let (contact, ends) = (&mut data.contact, &mut data.ends);
             (solid.dynamics).resolve_with_response(trial, grains, &data.responses, contact, ends)
         });
-        Resolved(step, coupled, Substeps::WithResponse)
+        Resolved(step, coupled, FinalPoses::Resolved)
     }
 }
 
 impl<'a> Resolved<'a> {
     /// Gives the grains their new velocities and imposes them on the forced faces.
     pub fn impose_rigidity(self) -> Rigid<'a> {
-        let Resolved(mut step, coupled, substeps) = self;
+        let Resolved(mut step, coupled, final_poses) = self;
         let Context { solid, flow } = &mut step;
         let rigid = RigidStep {
             grains: solid.grains,
@@ -224,38 +229,42 @@ impl<'a> Resolved<'a> {
         timed(&mut solid.times.coupling, || {
             flow.fluid.impose_rigidity(coupled, rigid)
         });
-        Rigid(step, substeps)
+        Rigid(step, final_poses)
     }
 }
 
 impl<'a> Rigid<'a> {
     /// Projects the velocity onto the divergence-free fields.
     pub fn project(self) -> Projected<'a> {
-        let Rigid(mut step, substeps) = self;
-        let Context { solid, flow } = &mut step;
-        let momentum = flow.fluid.measures().momentum;
+        let Rigid(mut context, final_poses) = self;
+        let Context { solid, flow } = &mut context;
+        let momentum_before = flow.fluid.measures().momentum;
         timed(&mut solid.times.project, || flow.fluid.project(solid.dt));
-        Projected(step, substeps, momentum)
+        Projected {
+            context,
+            final_poses,
+            momentum_before,
+        }
     }
 }
 
 impl Projected<'_> {
     /// Balances the momentum and records what the next step needs.
     pub fn finish(self) {
-        let Projected(Context { solid, flow }, substeps, momentum) = self;
+        let Context { solid, flow } = self.context;
         let (density, dt, data) = (flow.density, solid.dt, solid.data);
-        let gain = flow.fluid.measures().momentum - momentum;
+        let gain = flow.fluid.measures().momentum - self.momentum_before;
         let mut residual = density * (gain - flow.fluid.boundary_impulse(dt));
         for (i, (grain, load)) in solid.grains.iter_mut().zip(&*solid.loads).enumerate() {
             data.located[i] = grain.pose;
-            if let Substeps::WithResponse = substeps {
+            if let FinalPoses::Resolved = self.final_poses {
                 grain.pose = data.ends[i].pose;
             }
             let previous = &mut data.previous[i];
             let change = RigidVelocity::of(grain) - previous.velocity;
             // The fluid lost what it gave the grain, the displaced fluid included.
             residual -= density * grain.shape.volume() * change.linear - dt * load.force;
-            let touched = data.contact[i] != Load::default();
+            let touched = !data.contact[i].is_zero();
             // The acceleration of an impact does not continue in the next step; its added mass
             // does.
             (previous.acceleration, previous.pending_added_mass_velocity) = if touched {
@@ -275,9 +284,9 @@ impl Projected<'_> {
 fn beyond_substeps(grain: &Grain, end: &RigidState) -> RigidVelocity {
     let [linear, angular] = end.velocities;
     let beyond = RigidVelocity::of(grain) - RigidVelocity { linear, angular };
-    let free = |dof: Dof, velocity: DVec3| match dof {
-        Dof::Free => velocity,
-        Dof::Prescribed(_) => DVec3::ZERO,
+    let free = |constraint: MotionConstraint, velocity: DVec3| match constraint {
+        MotionConstraint::Free => velocity,
+        MotionConstraint::Prescribed(_) => DVec3::ZERO,
     };
     RigidVelocity {
         linear: free(grain.translation, beyond.linear),

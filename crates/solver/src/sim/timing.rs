@@ -9,9 +9,13 @@ use super::Simulation;
 /// Wall time spent in each pass since the start.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PassTimes {
+    /// Prediction of the flow without the grains.
     pub predict: Duration,
+    /// Contact sub-steps.
     pub contact: Duration,
+    /// Location of the grains, impulse and rigidity.
     pub coupling: Duration,
+    /// Projection, with the Poisson solver.
     pub project: Duration,
     /// Wall time of the Poisson solver before the first step.
     pub initial: Stages,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
-use grainwake_solver::dem::{ContactParams, Dynamics, Enclosure, Grain};
+use grainwake_solver::dem::{ContactDynamics, ContactParams, Enclosure, Grain};
 use grainwake_solver::math::Load;
 
 /// A sphere at rest.
@@ -59,7 +59,12 @@ pub fn weights(grains: &[Grain], gravity: DVec3) -> Vec<Load> {
 }
 
 /// One step under gravity.
-pub fn step(dynamics: &mut Dynamics, grains: &mut [Grain], gravity: DVec3, dt: f64) -> usize {
+pub fn step(
+    dynamics: &mut ContactDynamics,
+    grains: &mut [Grain],
+    gravity: DVec3,
+    dt: f64,
+) -> usize {
     let loads = weights(grains, gravity);
     let mut mean = vec![Load::default(); grains.len()];
     dynamics.advance(grains, &loads, dt, &mut mean)

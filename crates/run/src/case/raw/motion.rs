@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use super::formula::{FormulaTable, OfTime, VectorOrFormula};
 use crate::case::notation::{Notation, Unsupported, notations, refusal};
 use crate::case::quantity::{AngularVelocity, Kind, Quantity, Velocity};
-use grainwake_solver::dem::Dof;
+use grainwake_solver::dem::MotionConstraint;
 use grainwake_solver::math::Formula;
 
 /// Law of a velocity of kind `K`.
@@ -21,12 +21,12 @@ pub enum MotionLaw<K> {
 
 impl<K: Kind> MotionLaw<K> {
     /// Returns the degree of freedom at t = 0.
-    pub fn at_start(&self) -> Dof {
+    pub fn at_start(&self) -> MotionConstraint {
         match self {
-            MotionLaw::Free => Dof::Free,
+            MotionLaw::Free => MotionConstraint::Free,
             MotionLaw::Prescribed(velocity) => {
                 let (constant, formula) = velocity.parts();
-                Dof::Prescribed(formula.map_or(constant, |formula| formula.at(&[0.0])))
+                MotionConstraint::Prescribed(formula.map_or(constant, |formula| formula.at(&[0.0])))
             }
         }
     }

@@ -14,7 +14,7 @@ use crate::case::quantity::{Density, Kind, Quantity, Triple};
 use crate::case::raw::{MotionLaw, Orientation, Position, RawGrain, Turns};
 use crate::case::settling::LIGHTEST_FREE;
 use crate::case::shapes::{DEFAULT_NODES, Library};
-use grainwake_solver::dem::{Dof, Grain};
+use grainwake_solver::dem::{MotionConstraint, Grain};
 use grainwake_solver::sim::PrescribedMotion;
 
 /// Vertical axis, and the sign of the upward direction along it.
@@ -278,7 +278,7 @@ fn initial<K: Kind>(
     law: &MotionLaw<K>,
     given: &Option<Located<Triple<K>>>,
 ) -> DVec3 {
-    let Dof::Prescribed(prescribed) = law.at_start() else {
+    let MotionConstraint::Prescribed(prescribed) = law.at_start() else {
         return given.as_ref().map_or(DVec3::ZERO, |given| given.si);
     };
     if let Some(given) = given.as_ref().filter(|given| given.si != prescribed) {

@@ -75,7 +75,7 @@ fn material(
 
 /// Returns a coefficient of restitution in its range.
 pub(super) fn restitution(check: &mut Checker, value: &Located<Quantity<Number>>) -> Option<f64> {
-    check.within(value, ContactParams::SMALLEST_RESTITUTION, 1.0)
+    check.within(value, ContactParams::MIN_RESTITUTION, 1.0)
 }
 
 /// Refuses keys that the contact law does not use.

@@ -7,7 +7,7 @@ use crate::case::quantity::{Quantity, Time};
 use crate::case::raw::{RawOutput, RawPlane, RawRun, RawStop, RawTime};
 use crate::case::settling::{default_max_step, settled_time_step};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
-use grainwake_solver::dem::{Dof, Grain};
+use grainwake_solver::dem::{MotionConstraint, Grain};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{Setup, StepRule};
@@ -139,7 +139,7 @@ fn stop_rule(check: &mut Checker, raw: &Located<RawStop>, grains: &[Grain]) -> S
         let message = format!("separation is an event of a pair, but there are {count} grains");
         let help = "use stop = \"landing\" or \"rest\", or two grains";
         check.fail(&raw.span, message, help);
-    } else if grains.iter().all(|grain| grain.translation != Dof::Free) {
+    } else if grains.iter().all(|grain| grain.translation != MotionConstraint::Free) {
         let message = "no grain moves freely, so this never happens";
         check.fail(&raw.span, message, "leave out `stop`");
     }

@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::model::{PairKinematics, relative_velocity};
+use super::kinematics::{PairKinematics, relative_velocity};
 use super::record::TangentialHistory;
 use crate::dem::search::ContactPoint;
 

@@ -6,10 +6,13 @@
 
 use super::law::{ContactCoefficients, ContactLaw, PairProperties};
 
-/// Duration of a Hertz impact over pi sqrt(m / S_n), with S_n at the largest overlap: the duration
-/// is
-/// 2.9432 overlap / speed (Timoshenko & Goodier 1970, section 142), and pi sqrt(m / S_n) is
-/// pi sqrt(8/15) overlap / speed.
+/// Duration T of a Hertz impact over pi sqrt(m / S_n), with the stiffness S_n at the largest
+/// overlap (Timoshenko & Goodier 1970, section 142).
+///
+/// ```text
+/// T                = 2.9432 overlap / speed
+/// pi sqrt(m / S_n) = pi sqrt(8/15) overlap / speed
+/// ```
 const HERTZ_DURATION: f64 = 2.943_275 / (std::f64::consts::PI * 0.730_296_743_340_221_5);
 
 /// Hertz-Mindlin law. Moduli, radius and restitution come from the pair.
@@ -17,9 +20,15 @@ const HERTZ_DURATION: f64 = 2.943_275 / (std::f64::consts::PI * 0.730_296_743_34
 pub(in crate::dem) struct HertzMindlin;
 
 impl ContactLaw for HertzMindlin {
-    /// With the contact radius a = sqrt(R* delta): normal force 4/3 E* a delta, tangential
-    /// stiffness 8 G* a (Mindlin 1949), dashpots 2 zeta sqrt(5/6) sqrt(S m*) with S = 2 E* a or 8
-    /// G* a.
+    /// Coefficients at the overlap delta, with the tangential stiffness of Mindlin (1949).
+    ///
+    /// ```text
+    /// a   = sqrt(R* delta)                contact radius
+    /// F_n = 4/3 E* a delta                normal force
+    /// S_n = 2 E* a                        normal stiffness dF_n / d delta
+    /// S_t = 8 G* a                        tangential stiffness
+    /// c   = 2 zeta sqrt(5/6) sqrt(S m*)   dashpot, S = S_n or S_t
+    /// ```
     ///
     /// The dashpot is Tsuji's (1992). In the variable delta^(5/4) the damped Hertz impact is a
     /// damped linear oscillator (Antypov & Elliott 2011), with the same end of contact at zero
@@ -43,9 +52,12 @@ impl ContactLaw for HertzMindlin {
         }
     }
 
-    /// Hertz duration of the impact that reaches the overlap at which the kinetic energy and the
-    /// energy of the present overlap are stored; 2.87 (m^2 / (R* E*^2 speed))^(1/5) from zero
-    /// overlap.
+    /// Hertz duration of the impact whose largest overlap stores the kinetic energy and the energy
+    /// of the present overlap. An impact that begins at zero overlap takes
+    ///
+    /// ```text
+    /// 2.87 (m^2 / (R* E*^2 speed))^(1/5)
+    /// ```
     fn contact_time(&self, pair: &PairProperties, speed: f64, overlap: f64) -> f64 {
         let largest = (self.impact_overlap(pair, speed).powf(2.5) + overlap.powf(2.5)).powf(0.4);
         let contact_radius = (pair.reduced_radius * largest).sqrt();
@@ -73,7 +85,7 @@ mod tests {
             effective_youngs_modulus: 2.5e10,
             effective_shear_modulus: 8e9,
             damping_ratio: 0.0,
-            wall: false,
+            partner_is_wall: false,
         };
         let (mut overlap, mut speed, mut time, dt) = (0.0, 3.0, 0.0, 1e-9);
         let expected = HertzMindlin.contact_time(&pair, speed, 0.0);

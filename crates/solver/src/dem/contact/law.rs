@@ -1,8 +1,5 @@
-//! Interface of the contact force laws, and the choice among them.
+//! Interface of the contact force laws: properties of a pair, and coefficients at an overlap.
 
-use super::hertz_mindlin::HertzMindlin;
-use super::linear::Linear;
-use super::params::{ContactLawKind, ContactParams};
 use crate::dem::material::{Material, damping_ratio};
 
 /// Elastic constants of one body as contact laws use them.
@@ -41,29 +38,50 @@ pub(in crate::dem) struct PairProperties {
     /// Damping ratio: the larger one of the two bodies.
     pub damping_ratio: f64,
     /// Whether the partner is a wall.
-    pub wall: bool,
+    pub partner_is_wall: bool,
+}
+
+/// Properties of one body of a pair.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::dem) struct BodyProperties {
+    /// Inverse of the mass, with added mass [1/kg].
+    pub inverse_mass: f64,
+    /// Radius of the equal-volume sphere [m].
+    pub radius: f64,
+    /// Elastic constants.
+    pub material: ContactMaterial,
 }
 
 impl PairProperties {
-    /// Properties of two bodies with the given inverse masses [1/kg] and radii [m].
-    pub fn new(
-        inverse_mass: [f64; 2],
-        radius: [f64; 2],
-        material: [&ContactMaterial; 2],
-        wall: bool,
-    ) -> PairProperties {
-        let [a, b] = material;
+    /// Properties of two grains.
+    pub fn of_grains(a: &BodyProperties, b: &BodyProperties) -> PairProperties {
         PairProperties {
-            inverse_mass: inverse_mass[0] + inverse_mass[1],
-            reduced_radius: if wall {
-                radius[0]
-            } else {
-                radius[0] * radius[1] / (radius[0] + radius[1])
-            },
+            inverse_mass: a.inverse_mass + b.inverse_mass,
+            reduced_radius: a.radius * b.radius / (a.radius + b.radius),
+            partner_is_wall: false,
+            ..PairProperties::of_materials(&a.material, &b.material)
+        }
+    }
+
+    /// Properties of a grain and a plane wall, whose mass and radius are infinite.
+    pub fn with_wall(grain: &BodyProperties, wall: &ContactMaterial) -> PairProperties {
+        PairProperties {
+            inverse_mass: grain.inverse_mass,
+            reduced_radius: grain.radius,
+            partner_is_wall: true,
+            ..PairProperties::of_materials(&grain.material, wall)
+        }
+    }
+
+    /// Elastic constants of a pair; mass and radius are zero.
+    fn of_materials(a: &ContactMaterial, b: &ContactMaterial) -> PairProperties {
+        PairProperties {
+            inverse_mass: 0.0,
+            reduced_radius: 0.0,
             effective_youngs_modulus: 1.0 / (a.normal_compliance + b.normal_compliance),
             effective_shear_modulus: 1.0 / (a.tangential_compliance + b.tangential_compliance),
             damping_ratio: a.damping_ratio.max(b.damping_ratio),
-            wall,
+            partner_is_wall: false,
         }
     }
 }
@@ -102,47 +120,4 @@ pub(in crate::dem) trait ContactLaw {
 
     /// Largest overlap [m] of an undamped impact at `speed` [m/s].
     fn impact_overlap(&self, pair: &PairProperties, speed: f64) -> f64;
-}
-
-/// Law selected by the parameters.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::dem) enum SelectedLaw {
-    /// Linear spring and dashpot.
-    Linear(Linear),
-    /// Hertz-Mindlin.
-    HertzMindlin(HertzMindlin),
-}
-
-impl SelectedLaw {
-    /// Law of these parameters.
-    pub fn new(params: &ContactParams) -> SelectedLaw {
-        match params.law {
-            ContactLawKind::Linear => SelectedLaw::Linear(Linear::new(params)),
-            ContactLawKind::HertzMindlin => SelectedLaw::HertzMindlin(HertzMindlin),
-        }
-    }
-}
-
-macro_rules! delegate {
-    ($law:expr, $method:ident($($argument:expr),*)) => {
-        match $law {
-            SelectedLaw::Linear(law) => law.$method($($argument),*),
-            SelectedLaw::HertzMindlin(law) => law.$method($($argument),*),
-        }
-    };
-}
-
-impl ContactLaw for SelectedLaw {
-    fn coefficients(&self, pair: &PairProperties, overlap: f64) -> ContactCoefficients {
-        delegate!(self, coefficients(pair, overlap))
-    }
-    fn normal_force(&self, at: &ContactCoefficients, damping: f64, approach: f64) -> f64 {
-        delegate!(self, normal_force(at, damping, approach))
-    }
-    fn contact_time(&self, pair: &PairProperties, speed: f64, overlap: f64) -> f64 {
-        delegate!(self, contact_time(pair, speed, overlap))
-    }
-    fn impact_overlap(&self, pair: &PairProperties, speed: f64) -> f64 {
-        delegate!(self, impact_overlap(pair, speed))
-    }
 }

@@ -1,7 +1,7 @@
 //! Lubrication force of a pair whose surfaces are close but do not touch.
 
+use super::kinematics::PairKinematics;
 use super::law::PairProperties;
-use super::model::PairKinematics;
 use super::params::ContactParams;
 use super::record::PairLoads;
 use crate::dem::search::ClosestPoint;

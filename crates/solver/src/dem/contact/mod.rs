@@ -1,26 +1,29 @@
 //! Contact forces (Eqs 9-18): force laws, friction history and lubrication.
 //!
 //! A further force law is one file beside `linear.rs` that implements `ContactLaw`, one variant of
-//! [`ContactLawKind`] and of `law::SelectedLaw`, and its keys in the case file. A cohesive law
+//! [`ContactLawKind`] and of `selected::SelectedLaw`, and its keys in the case file. A cohesive law
 //! overrides `ContactLaw::normal_force`, which is never negative by default; a force across a gap
 //! belongs beside `lubrication.rs`.
 
 mod friction;
 mod hertz_mindlin;
+mod kinematics;
 mod law;
 mod linear;
 mod lubrication;
 mod model;
 mod params;
 mod record;
+mod selected;
 
 use glam::DVec3;
 
 use super::search::Partner;
 use crate::math::Load;
 
-pub(super) use law::{ContactMaterial, PairProperties};
-pub(super) use model::{ContactModel, PairKinematics, PointMotion};
+pub(super) use kinematics::{PairKinematics, PointMotion};
+pub(super) use law::{BodyProperties, ContactMaterial, PairProperties};
+pub(super) use model::ContactModel;
 pub use params::{ContactLawKind, ContactParams};
 pub(super) use record::{ContactRecord, TangentialHistory, update_records};
 

@@ -7,48 +7,14 @@
 use glam::DVec3;
 
 use super::friction::{FrictionStep, rotate_tangential};
-use super::law::{ContactCoefficients, ContactLaw, PairProperties, SelectedLaw};
+use super::kinematics::{PairKinematics, relative_velocity};
+use super::law::{ContactCoefficients, ContactLaw, PairProperties};
 use super::lubrication::{lubrication, range};
 use super::params::ContactParams;
 use super::record::{ContactRecord, PairLoads, TangentialHistory};
+use super::selected::SelectedLaw;
 use crate::dem::search::{ClosestPoint, ContactPoint};
 use crate::math::Load;
-
-/// Velocities of a body that give the velocity of a material point.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in crate::dem) struct PointMotion {
-    /// Velocity of the centroid [m/s].
-    pub linear: DVec3,
-    /// Angular velocity [rad/s].
-    pub angular: DVec3,
-}
-
-impl PointMotion {
-    /// Velocity at a lever arm from the centroid [m/s].
-    pub fn at(&self, lever_arm: DVec3) -> DVec3 {
-        self.linear + self.angular.cross(lever_arm)
-    }
-}
-
-/// Relative position and velocities of the two bodies of a pair, space frame.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::dem) struct PairKinematics {
-    /// Branch vector from the centroid of the partner (its image) to that of the first grain [m].
-    pub branch: DVec3,
-    /// Velocities in the middle of the sub-step, for the displacement increment (Eqs 12-13).
-    pub mid_step: [PointMotion; 2],
-    /// Velocities expected at the end of the sub-step, for the dashpots.
-    pub end_of_step: [PointMotion; 2],
-}
-
-/// Velocity of the first body relative to the second at a contact point (Eq. 12) [m/s].
-pub(super) fn relative_velocity(
-    motion: &[PointMotion; 2],
-    point: &ContactPoint,
-    branch: DVec3,
-) -> DVec3 {
-    motion[0].at(point.lever_arm) - motion[1].at(point.lever_arm + branch)
-}
 
 /// Averages over a contact patch, weighted with area times overlap.
 #[derive(Clone, Copy, Debug)]
@@ -138,7 +104,7 @@ impl ContactModel {
         let time_in_contact = begin_or_continue(record, &mean, step);
         let damping = record.dashpot_fraction * at.normal_damping;
         let friction = FrictionStep {
-            coefficient: if properties.wall {
+            coefficient: if properties.partner_is_wall {
                 self.params.wall_friction
             } else {
                 self.params.friction

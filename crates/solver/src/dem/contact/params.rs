@@ -2,9 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::law::{ContactLaw, ContactMaterial, PairProperties, SelectedLaw};
-use crate::dem::grain::Grain;
-use crate::dem::material::{Material, SMALLEST_RESTITUTION, damping_ratio};
+use crate::dem::material::{MIN_RESTITUTION, Material, damping_ratio};
 
 /// Force laws of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,7 +30,7 @@ pub struct ContactParams {
     /// Coulomb friction coefficient at walls.
     pub wall_friction: f64,
     /// Coefficient of restitution; 1 has no dashpot (the paper's setting). Values below
-    /// `SMALLEST_RESTITUTION` act as that value, at which a contact hardly rebounds.
+    /// `MIN_RESTITUTION` act as that value, at which a contact hardly rebounds.
     pub restitution: f64,
     /// Tangential over normal dashpot, for `restitution` < 1.
     pub tangential_damping: f64,
@@ -76,36 +74,11 @@ impl Default for ContactParams {
 
 impl ContactParams {
     /// Restitution below which the dashpot grows no further.
-    pub const SMALLEST_RESTITUTION: f64 = SMALLEST_RESTITUTION;
+    pub const MIN_RESTITUTION: f64 = MIN_RESTITUTION;
 
     /// Damping ratio of the linear law, c / (2 sqrt(k m)), that gives `restitution`.
     pub fn damping_ratio(&self) -> f64 {
         damping_ratio(self.restitution)
-    }
-
-    /// Duration of an undamped impact at `speed` [m/s] between two grains equal to `grain` [s].
-    pub fn contact_time(&self, grain: &Grain, speed: f64) -> f64 {
-        let pair = self.pair(grain, false);
-        SelectedLaw::new(self).contact_time(&pair, speed, 0.0)
-    }
-
-    /// Largest overlap of an undamped impact of `grain` on a wall at `speed` [m/s], without added
-    /// mass [m].
-    pub fn impact_overlap(&self, grain: &Grain, speed: f64) -> f64 {
-        let pair = self.pair(grain, true);
-        SelectedLaw::new(self).impact_overlap(&pair, speed)
-    }
-
-    fn pair(&self, grain: &Grain, wall: bool) -> PairProperties {
-        let inverse = 1.0 / grain.mass();
-        let radius = 0.5 * grain.shape.equivalent_diameter();
-        let material = ContactMaterial::new(&grain.material);
-        let (partner, other) = if wall {
-            (ContactMaterial::new(&self.wall_material), 0.0)
-        } else {
-            (material, inverse)
-        };
-        PairProperties::new([inverse, other], [radius; 2], [&material, &partner], wall)
     }
 
     /// Stiffness [N/m] at which two bodies of reduced mass `mass` [kg] that meet at `speed` [m/s]

@@ -9,7 +9,7 @@ use std::io::{self, Read, Write};
 use glam::IVec3;
 use grainwake_formats::codec::{Decoder, Encoder, invalid};
 
-use super::dynamics::Dynamics;
+use super::dynamics::ContactDynamics;
 use crate::dem::contact::{Contact, ContactRecord, TangentialHistory};
 use crate::dem::search::{PairKey, Partner};
 use crate::math::Load;
@@ -56,7 +56,7 @@ fn decode_grain(input: &mut Decoder, grains: usize) -> io::Result<usize> {
     }
 }
 
-impl Dynamics {
+impl ContactDynamics {
     /// Writes the contact history and the contacts, bit for bit.
     pub fn save(&self, writer: &mut dyn Write) -> io::Result<()> {
         let mut out = Encoder::new(writer);

@@ -6,9 +6,10 @@ use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 
 use super::integrator::{EffectiveInertia, HalfStepVelocity};
-use super::response::Response;
+use super::response::GrainResponse;
 use crate::dem::contact::{
-    ContactMaterial, ContactModel, ContactRecord, PairKinematics, PairProperties, PointMotion,
+    BodyProperties, ContactMaterial, ContactModel, ContactRecord, PairKinematics, PairProperties,
+    PointMotion,
 };
 use crate::dem::enclosure::Enclosure;
 use crate::dem::grain::Grain;
@@ -36,7 +37,7 @@ pub(super) struct ContactBody {
     /// Contact load at the last evaluation.
     pub contact: Load,
     /// Response to contact with the fluid of the present step, if known.
-    pub response: Option<Response>,
+    pub response: Option<GrainResponse>,
     /// Inverse of the mass in a contact, added mass included [1/kg].
     pub inverse_mass: f64,
     /// Inverse of the grain's mass [1/kg].
@@ -148,6 +149,15 @@ impl ContactBody {
         }
     }
 
+    /// Properties in a pair.
+    fn properties(&self) -> BodyProperties {
+        BodyProperties {
+            inverse_mass: self.inverse_mass,
+            radius: 0.5 * self.shape.equivalent_diameter(),
+            material: self.contact_material,
+        }
+    }
+
     fn posed_shape(&self, position: DVec3) -> PosedShape<'_> {
         PosedShape {
             shape: &self.shape,
@@ -164,24 +174,10 @@ pub(super) fn pair_properties(
     bodies: &[ContactBody],
     wall: &ContactMaterial,
 ) -> PairProperties {
-    let radius = |body: &ContactBody| 0.5 * body.shape.equivalent_diameter();
-    let a = &bodies[key.grain as usize];
+    let a = bodies[key.grain as usize].properties();
     match key.partner {
-        Partner::Grain(j) => {
-            let b = &bodies[j];
-            PairProperties::new(
-                [a.inverse_mass, b.inverse_mass],
-                [radius(a), radius(b)],
-                [&a.contact_material, &b.contact_material],
-                false,
-            )
-        }
-        Partner::Wall { .. } => PairProperties::new(
-            [a.inverse_mass, 0.0],
-            [radius(a); 2],
-            [&a.contact_material, wall],
-            true,
-        ),
+        Partner::Grain(j) => PairProperties::of_grains(&a, &bodies[j].properties()),
+        Partner::Wall { .. } => PairProperties::with_wall(&a, wall),
     }
 }
 

@@ -3,16 +3,16 @@
 use glam::{DVec3, IVec3};
 
 use super::contact_body::ContactBody;
-use super::trial_step::StateBefore;
+use super::state_before::StateBefore;
 use crate::dem::contact::{Contact, ContactMaterial, ContactModel, ContactParams, ContactRecord};
 use crate::dem::enclosure::Enclosure;
-use crate::dem::grain::{Dof, Grain};
+use crate::dem::grain::{Grain, MotionConstraint};
 use crate::dem::search::{BoundingSphere, BroadPhase, Partner};
 use crate::math::Load;
 
 /// Contact model, contact history and integrator of all grains.
 #[derive(Clone, Debug)]
-pub struct Dynamics {
+pub struct ContactDynamics {
     pub(super) model: ContactModel,
     pub(super) wall: ContactMaterial,
     pub(super) enclosure: Enclosure,
@@ -29,10 +29,11 @@ pub struct Dynamics {
     pub(super) state_before: StateBefore,
 }
 
-impl Dynamics {
-    /// System without contact history.
-    pub fn new(params: ContactParams, enclosure: Enclosure) -> Dynamics {
-        Dynamics {
+impl ContactDynamics {
+    /// Contact dynamics in `enclosure` of grains that have not touched yet. The grains themselves
+    /// are passed to each step.
+    pub fn new(params: ContactParams, enclosure: Enclosure) -> ContactDynamics {
+        ContactDynamics {
             model: ContactModel::new(params),
             wall: ContactMaterial::new(&params.wall_material),
             enclosure,
@@ -94,10 +95,10 @@ impl Dynamics {
     /// whose grains were wrapped by whole periods since the last step.
     pub(super) fn begin_step(&mut self, grains: &mut [Grain]) {
         for grain in grains.iter_mut() {
-            if let Dof::Prescribed(velocity) = grain.translation {
+            if let MotionConstraint::Prescribed(velocity) = grain.translation {
                 grain.velocity = velocity;
             }
-            if let Dof::Prescribed(omega) = grain.rotation {
+            if let MotionConstraint::Prescribed(omega) = grain.rotation {
                 grain.angular_velocity = omega;
             }
         }

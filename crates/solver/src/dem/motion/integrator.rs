@@ -6,9 +6,9 @@
 
 use glam::DVec3;
 
-use super::response::Response;
+use super::response::GrainResponse;
 use super::rotation::{half_step_explicit, half_step_implicit, rotate_by_cayley, rotate_exactly};
-use crate::dem::grain::{Dof, Grain};
+use crate::dem::grain::{Grain, MotionConstraint};
 use crate::math::Load;
 
 /// Velocities in the middle of a sub-step, space frame.
@@ -30,7 +30,7 @@ pub(super) enum EffectiveInertia<'a> {
     /// Inverse mass [1/kg], and the grain's own moments of inertia.
     Grain(f64),
     /// Response with the fluid; the load is the contact load only.
-    WithFluid(&'a Response),
+    WithFluid(&'a GrainResponse),
 }
 
 /// First half step: velocities to n+1/2 and pose to n+1.
@@ -44,7 +44,7 @@ pub(super) fn first_half_step(
     let half = 0.5 * step;
     let mut mid = HalfStepVelocity::default();
     match grain.translation {
-        Dof::Free => {
+        MotionConstraint::Free => {
             let acceleration = match inertia {
                 EffectiveInertia::Grain(inverse_mass) => load.force * inverse_mass,
                 EffectiveInertia::WithFluid(response) => response.acceleration(load)[0],
@@ -53,7 +53,7 @@ pub(super) fn first_half_step(
             mid.velocity = grain.velocity + change;
             mid.predicted_velocity = mid.velocity + change;
         }
-        Dof::Prescribed(velocity) => {
+        MotionConstraint::Prescribed(velocity) => {
             grain.velocity = velocity;
             mid.velocity = velocity;
             mid.predicted_velocity = velocity;
@@ -61,7 +61,7 @@ pub(super) fn first_half_step(
     }
     grain.pose.position += step * mid.velocity;
     match grain.rotation {
-        Dof::Free => {
+        MotionConstraint::Free => {
             let to_body = grain.pose.orientation.conjugate();
             let omega = to_body * grain.angular_velocity;
             let omega_mid = match inertia {
@@ -78,7 +78,7 @@ pub(super) fn first_half_step(
             mid.angular_velocity = grain.pose.orientation * omega_mid;
             mid.predicted_angular_velocity = 2.0 * mid.angular_velocity - grain.angular_velocity;
         }
-        Dof::Prescribed(omega) => {
+        MotionConstraint::Prescribed(omega) => {
             grain.angular_velocity = omega;
             grain.pose.orientation = rotate_exactly(grain.pose.orientation, omega, step);
             mid.angular_velocity = omega;
@@ -100,14 +100,14 @@ pub(super) fn second_half_step(
     let half = 0.5 * step;
     let damping_factor = 1.0 + damping * half;
     let (force, torque) = (load.force, load.torque);
-    if grain.translation == Dof::Free {
+    if grain.translation == MotionConstraint::Free {
         let acceleration = match inertia {
             EffectiveInertia::Grain(inverse_mass) => force * inverse_mass,
             EffectiveInertia::WithFluid(response) => response.acceleration(load)[0],
         };
         grain.velocity = (mid.velocity + half * acceleration) / damping_factor;
     }
-    if grain.rotation == Dof::Free {
+    if grain.rotation == MotionConstraint::Free {
         grain.angular_velocity = match inertia {
             EffectiveInertia::Grain(_) => {
                 let to_body = grain.pose.orientation.conjugate();

@@ -7,9 +7,11 @@ mod dynamics;
 mod integrator;
 mod response;
 pub mod rotation;
+mod state_before;
 mod substeps;
 mod trial_step;
 
-pub use dynamics::Dynamics;
-pub use response::Response;
-pub use trial_step::{RigidState, TrialStep};
+pub use dynamics::ContactDynamics;
+pub use response::GrainResponse;
+pub use state_before::RigidState;
+pub use trial_step::TrialStep;

@@ -6,7 +6,7 @@ use crate::math::{Load, Matrix6, Vector6};
 
 /// Acceleration of a grain in a fluid as an affine function of the contact load, over one step.
 #[derive(Clone, Copy, Debug)]
-pub struct Response {
+pub struct GrainResponse {
     /// Velocity [m/s] and angular velocity [rad/s] at the start, space frame.
     pub(super) start: [DVec3; 2],
     /// Acceleration [m/s^2] and angular acceleration [rad/s^2] without contact, space frame.
@@ -16,11 +16,11 @@ pub struct Response {
     inverse: Matrix6,
 }
 
-impl Response {
+impl GrainResponse {
     /// Response from the velocities at the start, the loads without contact [N] and [N m], and the
     /// columns of the inverse 6 x 6 mass.
-    pub fn new(start: [DVec3; 2], load: Vector6, inverse: Matrix6) -> Response {
-        let mut response = Response {
+    pub fn new(start: [DVec3; 2], load: Vector6, inverse: Matrix6) -> GrainResponse {
+        let mut response = GrainResponse {
             start,
             free: Default::default(),
             inverse,

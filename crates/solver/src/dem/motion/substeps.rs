@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::contact_body::{PairContext, evaluate_pair, pair_properties};
-use super::dynamics::Dynamics;
+use super::dynamics::ContactDynamics;
 use super::integrator::{first_half_step, second_half_step};
 use crate::dem::contact::{ContactRecord, update_records};
-use crate::dem::grain::{Dof, Grain};
+use crate::dem::grain::{Grain, MotionConstraint};
 use crate::dem::search::{BoundingSphere, PairKey, Partner};
 use crate::math::Load;
 
@@ -16,9 +16,9 @@ const SKIN: f64 = 0.01;
 /// Number of pairs below which the evaluation stays on one thread.
 const PARALLEL_PAIRS: usize = 16;
 /// Largest number of sub-steps in a step; more indicate an error in the input.
-const MOST_SUBSTEPS: f64 = 1e7;
+const MAX_SUBSTEPS: f64 = 1e7;
 
-impl Dynamics {
+impl ContactDynamics {
     /// Integrates poses and velocities over `dt` [s]; returns the number of sub-steps.
     pub(super) fn integrate(
         &mut self,
@@ -101,14 +101,14 @@ impl Dynamics {
             };
             body.speed_gain = dt * acceleration;
             let speed = match grain.translation {
-                Dof::Free => grain.velocity.length() + 0.5 * dt * acceleration,
-                Dof::Prescribed(velocity) => velocity.length(),
+                MotionConstraint::Free => grain.velocity.length() + 0.5 * dt * acceleration,
+                MotionConstraint::Prescribed(velocity) => velocity.length(),
             };
             let radius = grain.shape.bounding_radius();
             body.search_position = grain.pose.position;
             body.search_margin = speed * dt + SKIN * radius;
             self.spheres.push(BoundingSphere {
-                center: grain.pose.position,
+                centre: grain.pose.position,
                 radius: radius + body.search_margin + reach,
             });
         }
@@ -148,7 +148,7 @@ impl Dynamics {
         let longest_step = shortest / self.model.params.substeps_per_contact;
         let count = (dt / longest_step.min(self.film_time())).ceil();
         if count.is_finite() {
-            count.clamp(1.0, MOST_SUBSTEPS) as usize
+            count.clamp(1.0, MAX_SUBSTEPS) as usize
         } else {
             1
         }

@@ -1,41 +1,15 @@
 //! Trial step of the contact sub-steps, and its repetition with the response of the fluid
 //! (`docs/decisions/0014-contact-with-the-fluid-response.md`).
 
-use glam::DVec3;
-
-use super::dynamics::Dynamics;
-use super::response::Response;
-use crate::dem::contact::ContactRecord;
+use super::dynamics::ContactDynamics;
+use super::response::GrainResponse;
+use super::state_before::{RigidState, StateBefore, TrialEnd};
 use crate::dem::grain::Grain;
-use crate::math::{Load, Pose};
+use crate::math::Load;
 
-/// Pose and velocities of a grain.
-#[derive(Clone, Copy, Debug)]
-pub struct RigidState {
-    /// Position and orientation.
-    pub pose: Pose,
-    /// Velocity [m/s] and angular velocity [rad/s], space frame.
-    pub velocities: [DVec3; 2],
-}
-
-impl RigidState {
-    /// Present state of a grain.
-    pub fn of(grain: &Grain) -> RigidState {
-        RigidState {
-            pose: grain.pose,
-            velocities: [grain.velocity, grain.angular_velocity],
-        }
-    }
-
-    fn apply_to(&self, grain: &mut Grain) {
-        grain.pose = self.pose;
-        [grain.velocity, grain.angular_velocity] = self.velocities;
-    }
-}
-
-/// Step that [`Dynamics::trial_step`] has taken, with the state from before it.
+/// Step that [`ContactDynamics::trial_step`] has taken, with the state from before it.
 ///
-/// Either [`Dynamics::accept`] or [`Dynamics::resolve_with_response`] consumes it.
+/// Either [`ContactDynamics::accept`] or [`ContactDynamics::resolve_with_response`] consumes it.
 #[must_use = "accept the step or resolve it with the response of the fluid"]
 #[derive(Debug)]
 pub struct TrialStep {
@@ -43,16 +17,8 @@ pub struct TrialStep {
     before: StateBefore,
 }
 
-/// Contact history and poses before a step.
-#[derive(Clone, Debug, Default)]
-pub(super) struct StateBefore {
-    records: Vec<ContactRecord>,
-    last_positions: Vec<DVec3>,
-    poses: Vec<Pose>,
-}
-
-impl Dynamics {
-    /// Takes a step as [`Dynamics::advance`] does, and keeps the state from before it.
+impl ContactDynamics {
+    /// Takes a step as [`ContactDynamics::advance`] does, and keeps the state from before it.
     pub fn trial_step(
         &mut self,
         grains: &mut [Grain],
@@ -84,16 +50,17 @@ impl Dynamics {
         &mut self,
         trial: TrialStep,
         grains: &mut [Grain],
-        responses: &[Response],
+        responses: &[GrainResponse],
         mean_contact: &mut [Load],
         ends: &mut [RigidState],
     ) {
-        let TrialStep { dt, before } = trial;
-        let touches = |load: &Load| *load != Load::default();
-        let trial_states = grains.iter().zip(&*mean_contact);
-        let trial_states: Vec<_> = trial_states
-            .map(|(grain, load)| (RigidState::of(grain), touches(load)))
-            .collect();
+        let TrialStep { dt, mut before } = trial;
+        before.trial_ends.clear();
+        let trial_ends = grains.iter().zip(&*mean_contact);
+        (before.trial_ends).extend(trial_ends.map(|(grain, load)| TrialEnd {
+            state: RigidState::of(grain),
+            touched: !load.is_zero(),
+        }));
         mean_contact.fill(Load::default());
         self.records.clone_from(&before.records);
         self.last_positions.clone_from(&before.last_positions);
@@ -103,22 +70,22 @@ impl Dynamics {
             (grain.pose, grain.velocity, grain.angular_velocity) =
                 (*pose, velocity, angular_velocity);
         }
-        self.state_before = before;
         self.begin_step(grains);
         for (body, response) in self.bodies.iter_mut().zip(responses) {
             body.response = Some(*response);
         }
         self.integrate(grains, &[], dt, mean_contact);
         for (n, grain) in grains.iter_mut().enumerate() {
-            let (state, touched) = &trial_states[n];
-            if !(*touched || touches(&mean_contact[n])) {
-                grain.pose = state.pose;
+            let trial_end = &before.trial_ends[n];
+            if !trial_end.touched && mean_contact[n].is_zero() {
+                grain.pose = trial_end.state.pose;
             }
             ends[n] = RigidState::of(grain);
         }
         self.end_step(grains);
-        for (grain, (state, _)) in grains.iter_mut().zip(&trial_states) {
-            state.apply_to(grain);
+        for (grain, trial_end) in grains.iter_mut().zip(&before.trial_ends) {
+            trial_end.state.apply_to(grain);
         }
+        self.state_before = before;
     }
 }

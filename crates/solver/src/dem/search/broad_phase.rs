@@ -8,13 +8,13 @@ use crate::dem::enclosure::Enclosure;
 
 /// Largest image distance in the search [periods]. Grains several times larger than a periodic box
 /// are not supported.
-const MOST_PERIODS: i32 = 4;
+const MAX_PERIODS: i32 = 4;
 
 /// Bounding sphere of a grain with a margin, such as its displacement until the next search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundingSphere {
     /// Centre [m].
-    pub center: DVec3,
+    pub centre: DVec3,
     /// Radius with margin [m].
     pub radius: f64,
 }
@@ -97,7 +97,7 @@ impl BroadPhase {
                 self.pair_with_neighbours(grain as u32, centre as usize, spheres, &cells);
             }
             for face in enclosure.faces() {
-                if face.distance(sphere.center) <= sphere.radius {
+                if face.distance(sphere.centre) <= sphere.radius {
                     self.pairs.push(PairKey::wall(grain as u32, &face));
                 }
             }
@@ -149,12 +149,12 @@ impl BroadPhase {
         self.inside.clear();
         let period = enclosure.period();
         for (grain, sphere) in spheres.iter().enumerate() {
-            if !(sphere.center.is_finite() && sphere.radius.is_finite()) {
+            if !(sphere.centre.is_finite() && sphere.radius.is_finite()) {
                 self.inside.push(None);
                 continue;
             }
-            let wrap = -enclosure.periods_outside(sphere.center);
-            let inside = sphere.center + wrap.as_dvec3() * period;
+            let wrap = -enclosure.periods_outside(sphere.centre);
+            let inside = sphere.centre + wrap.as_dvec3() * period;
             let reach = sphere.radius + largest;
             let range = [0, 1, 2].map(|axis| {
                 let l = period[axis];
@@ -163,7 +163,7 @@ impl BroadPhase {
                 }
                 let down = ((inside[axis] - (enclosure.lower[axis] - reach)) / l).floor();
                 let up = ((enclosure.upper[axis] + reach - inside[axis]) / l).floor();
-                let limit = f64::from(MOST_PERIODS);
+                let limit = f64::from(MAX_PERIODS);
                 (
                     -(down.clamp(0.0, limit) as i32),
                     up.clamp(0.0, limit) as i32,
@@ -225,7 +225,7 @@ mod tests {
         };
         (0..count)
             .map(|_| BoundingSphere {
-                center: DVec3::new(3.0 * next() - 1.0, 3.0 * next() - 1.0, next()),
+                centre: DVec3::new(3.0 * next() - 1.0, 3.0 * next() - 1.0, next()),
                 radius: 0.02 + 0.2 * next().powi(3),
             })
             .collect()
@@ -238,7 +238,7 @@ mod tests {
                 for code in 0..9 * 9 * 9 {
                     let image = IVec3::new(code % 9 - 4, code / 9 % 9 - 4, code / 81 - 4);
                     let periodic = (0..3).all(|axis| enclosure.periodic[axis] || image[axis] == 0);
-                    let apart = a.center - b.center - image.as_dvec3() * enclosure.size();
+                    let apart = a.centre - b.centre - image.as_dvec3() * enclosure.size();
                     let listed = i < j || image.to_array() > [0, 0, 0];
                     if periodic && listed && apart.length() <= a.radius + b.radius {
                         pairs.push(PairKey {
@@ -282,7 +282,7 @@ mod tests {
             solid: [[false; 2]; 3],
         };
         let mut spheres = scatter(10, 5);
-        spheres[3].center.x = f64::NAN;
+        spheres[3].centre.x = f64::NAN;
         let mut broad = BroadPhase::default();
         broad.search(&spheres, &enclosure);
         assert!(

@@ -117,8 +117,8 @@ fn compass_search(
     stride: f64,
 ) -> SurfacePoint {
     const DIRECTIONS: usize = 6;
-    const MOST_MOVES: usize = 40;
-    const FINEST: f64 = 0.2;
+    const MAX_MOVES: usize = 40;
+    const MIN_RADIUS: f64 = 0.2;
     let (_, gradient) = surface.distance_and_gradient(point.position);
     let (u, v) = gradient.normalize_or(DVec3::Z).any_orthonormal_pair();
     let around: [DVec3; DIRECTIONS] = std::array::from_fn(|k| {
@@ -126,7 +126,7 @@ fn compass_search(
         c * u + s * v
     });
     let (mut radius, mut moves) = (stride, 0);
-    while radius > FINEST * stride && moves < MOST_MOVES {
+    while radius > MIN_RADIUS * stride && moves < MAX_MOVES {
         let better = around.iter().find_map(|direction| {
             let position = project_to_surface(surface, point.position + radius * *direction);
             let next = SurfacePoint::at(partner, position)?;

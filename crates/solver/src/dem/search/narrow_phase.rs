@@ -147,7 +147,7 @@ fn scan_nodes(
     let mut cluster_index = 0;
     while let Some(cluster) = tree.clusters.get(cluster_index) {
         // Only penetrating nodes and nodes nearer than the nearest one so far are of interest.
-        if partner.is_beyond(cluster.center, cluster.radius, nearest.distance.max(0.0)) {
+        if partner.is_beyond(cluster.centre, cluster.radius, nearest.distance.max(0.0)) {
             cluster_index = cluster.skip as usize;
             continue;
         }
@@ -184,16 +184,16 @@ fn scan_nodes(
 fn add_mirror_points(
     surface: &Shape,
     partner: &PartnerField,
-    center: DVec3,
+    centre: DVec3,
     found: &mut Vec<PenetratingPoint>,
 ) {
-    let (_, gradient) = surface.distance_and_gradient(center);
+    let (_, gradient) = surface.distance_and_gradient(centre);
     let axis = gradient.normalize_or_zero();
     for index in 0..found.len() {
         let node = found[index];
-        let offset = node.point.position - center;
+        let offset = node.point.position - centre;
         // Half a turn about the normal maps a surface of revolution onto itself.
-        let image = center + 2.0 * offset.dot(axis) * axis - offset;
+        let image = centre + 2.0 * offset.dot(axis) * axis - offset;
         let position = project_to_surface(surface, image);
         let off_surface = position.distance_squared(image)
             > (MIRROR_TOLERANCE * MIRROR_TOLERANCE) * offset.length_squared();

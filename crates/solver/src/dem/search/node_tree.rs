@@ -11,7 +11,7 @@ const LEAF: usize = 8;
 #[derive(Clone, Copy, Debug)]
 pub(in crate::dem) struct NodeCluster {
     /// Centre, principal frame [m].
-    pub center: DVec3,
+    pub centre: DVec3,
     /// Radius [m].
     pub radius: f64,
     /// Range of nodes: first, and one past the last.
@@ -61,14 +61,14 @@ impl NodeTree {
         let (lower, upper) = nodes.iter().fold((start, start), |(lower, upper), n| {
             (lower.min(n.position), upper.max(n.position))
         });
-        let center = 0.5 * (lower + upper);
+        let centre = 0.5 * (lower + upper);
         let radius = nodes
             .iter()
-            .map(|n| n.position.distance(center))
+            .map(|n| n.position.distance(centre))
             .fold(0.0, f64::max);
         let index = self.clusters.len();
         self.clusters.push(NodeCluster {
-            center,
+            centre,
             radius,
             nodes: (from as u32, to as u32),
             skip: 0,
@@ -104,7 +104,7 @@ mod tests {
             let run = &tree.nodes[cluster.nodes.0 as usize..cluster.nodes.1 as usize];
             assert!(
                 run.iter()
-                    .all(|n| n.position.distance(cluster.center) <= cluster.radius * (1.0 + 1e-12))
+                    .all(|n| n.position.distance(cluster.centre) <= cluster.radius * (1.0 + 1e-12))
             );
             if cluster.is_leaf(index) {
                 assert_eq!(cluster.nodes.0, seen);

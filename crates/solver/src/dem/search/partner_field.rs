@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use grainwake_shape::{Field, Shape};
 
 /// Safety factor on a distance from a sampled field, whose gradient may slightly exceed one.
-const SLACK: f64 = 1.1;
+const GRADIENT_MARGIN: f64 = 1.1;
 
 /// Signed distance field of a grain or a wall in the principal frame of another grain.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +89,7 @@ impl<'a> PartnerField<'a> {
         }
     }
     /// Whether a bound shows that every point of the sphere is farther away than `reach` [m].
-    pub fn is_beyond(&self, center: DVec3, radius: f64, reach: f64) -> bool {
+    pub fn is_beyond(&self, centre: DVec3, radius: f64, reach: f64) -> bool {
         match self {
             PartnerField::Shape {
                 shape,
@@ -97,19 +97,19 @@ impl<'a> PartnerField<'a> {
                 translation,
                 exact,
             } => {
-                let y = *rotation * center + *translation;
+                let y = *rotation * centre + *translation;
                 let far = radius + reach;
                 if y.length_squared() > (shape.bounding_radius() + far).powi(2) {
                     return true;
                 }
                 if y.cmpge(exact.0).all() && y.cmple(exact.1).all() {
-                    return shape.distance(y) > SLACK * far;
+                    return shape.distance(y) > GRADIENT_MARGIN * far;
                 }
                 let outside = (shape.lower() - y).max(y - shape.upper()).max(DVec3::ZERO);
                 outside.length_squared() > far * far
             }
             PartnerField::HalfSpace { normal, offset } => {
-                normal.dot(center) + offset > radius + reach
+                normal.dot(centre) + offset > radius + reach
             }
         }
     }

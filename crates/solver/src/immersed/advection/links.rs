@@ -1,10 +1,12 @@
 //! Fluxes through the links next to one grain, plane by plane.
 //!
 //! A link joins two neighbouring faces of the same component. The correction adds to its flux over
-//! h
+//! h the two terms
 //!
-//! (1/A - 1) (q_mean - U_q)(c - U_c) / h + c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60
-//! h).
+//! ```text
+//! (1/A - 1) (q_mean - U_q) (c - U_c) / h
+//! c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60 h)
+//! ```
 //!
 //! The second term is the sixth-order mean of six faces less the mean of two. It is left out at the
 //! ends of the grid, where fewer than six faces are in line.
@@ -17,7 +19,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::box_velocity::BoxVelocity;
-use super::weights::{LinkPlanes, listed_faces, weigh_links};
+use super::weights::{LinkPlanes, compute_link_weights, listed_faces};
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::immersed::geometry::LocatedBody;
 use crate::immersed::kinematics::GrainKinematics;
@@ -32,7 +34,7 @@ pub struct ComponentLinks<'a, R> {
     /// Half-width of the band [m].
     eps: f64,
     /// Indices of the unknown faces along each axis.
-    dofs: [Range<i32>; 3],
+    unknowns: [Range<i32>; 3],
     axes: [LinkAxis; 3],
     /// Rigid velocity [m/s] at the middle of link (0, 0, 0), then its change from a link to the
     /// next along x, y and z. Entries 2 a and 2 a + 1 are U_q and U_c of the links along axis a;
@@ -103,7 +105,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             velocity,
             component,
             eps,
-            dofs: [0, 1, 2].map(|axis| body.index_map.dof_range(component, axis)),
+            unknowns: [0, 1, 2].map(|axis| body.index_map.unknown_range(component, axis)),
             axes,
             rigid,
         }
@@ -117,12 +119,19 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         correction: &mut [f64],
     ) {
         planes.reset(self.body);
-        let weigh = |k, planes: &mut LinkPlanes| {
-            weigh_links(&self.dofs, self.body, self.component, self.eps, k, planes);
+        let compute_weights = |k, planes: &mut LinkPlanes| {
+            compute_link_weights(
+                &self.unknowns,
+                self.body,
+                self.component,
+                self.eps,
+                k,
+                planes,
+            );
         };
-        weigh(-1, planes);
+        compute_weights(-1, planes);
         for k in 0..self.body.size.z {
-            weigh(k, planes);
+            compute_weights(k, planes);
             for j in 0..self.body.size.y {
                 self.correct_row::<V>([j, k], planes, correction);
             }
@@ -138,7 +147,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         planes: &mut LinkPlanes,
         correction: &mut [f64],
     ) {
-        let Some(listed) = listed_faces(self.body, &self.dofs, self.component, [j, k]) else {
+        let Some(listed) = listed_faces(self.body, &self.unknowns, self.component, [j, k]) else {
             return;
         };
         let (at, first) = (self.velocity.row([j, k]), planes.first_entry(j));
@@ -205,7 +214,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
 
     /// Returns the links along an axis of the row with `index` that have six faces in line.
     fn sixth_order_links(&self, along: usize, index: [i32; 3]) -> SixthOrderLinks<'_> {
-        let (axis, range, index) = (&self.axes[along], &self.dofs[along], index[along]);
+        let (axis, range, index) = (&self.axes[along], &self.unknowns[along], index[along]);
         let (start, end) = (range.start + 2 - index, range.end - 3 - index);
         let (start, end, advected) = if along == 0 {
             (f64::from(start), f64::from(end), &axis.six_faces)

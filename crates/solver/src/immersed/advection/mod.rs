@@ -7,4 +7,4 @@ mod weights;
 
 pub use correction::{AdvectionCorrection, AdvectionScratch, add_correction, find_correction};
 #[cfg(test)]
-pub use weights::{LinkPlanes, weigh_links};
+pub use weights::{LinkPlanes, compute_link_weights};

@@ -83,19 +83,19 @@ pub fn listed_faces(
     })
 }
 
-/// Weighs the links whose lower faces are in plane `k`. Must be called for the planes -1, 0, 1, ...
-/// in order; `dofs` are the indices of the unknowns along each axis, `eps` [m] the half-width of
-/// the band.
-pub fn weigh_links(
-    dofs: &[Range<i32>; 3],
+/// Computes the weights of the links whose lower faces are in plane `k`. Must be called for the
+/// planes -1, 0, 1, ... in order; `unknowns` are the indices of the unknowns along each axis, `eps`
+/// [m] the half-width of the band.
+pub fn compute_link_weights(
+    unknowns: &[Range<i32>; 3],
     body: &LocatedBody,
     component: usize,
     eps: f64,
     k: i32,
     planes: &mut LinkPlanes,
 ) {
-    dispatch(WeighLinks {
-        dofs,
+    dispatch(ComputeLinkWeights {
+        unknowns,
         body,
         component,
         eps,
@@ -104,8 +104,8 @@ pub fn weigh_links(
     });
 }
 
-struct WeighLinks<'a> {
-    dofs: &'a [Range<i32>; 3],
+struct ComputeLinkWeights<'a> {
+    unknowns: &'a [Range<i32>; 3],
     body: &'a LocatedBody,
     component: usize,
     eps: f64,
@@ -113,18 +113,18 @@ struct WeighLinks<'a> {
     planes: &'a mut LinkPlanes,
 }
 
-impl Kernel for WeighLinks<'_> {
+impl Kernel for ComputeLinkWeights<'_> {
     type Number = f32;
     #[inline(always)]
     fn run<V: Vector<Number = f32>>(mut self) {
         self.read_next_plane::<V>();
         if self.k >= 0 {
-            self.weigh::<V>();
+            self.compute_weights::<V>();
         }
     }
 }
 
-impl WeighLinks<'_> {
+impl ComputeLinkWeights<'_> {
     /// Copies the distances of the plane above from the list.
     #[inline(always)]
     fn read_next_plane<V: Vector<Number = f32>>(&mut self) {
@@ -139,7 +139,7 @@ impl WeighLinks<'_> {
         let list = &body.distance[self.component][..];
         let rows = if k < body.size.z { body.size.y } else { 0 };
         for j in 0..rows {
-            let Some(listed) = listed_faces(body, self.dofs, self.component, [j, k]) else {
+            let Some(listed) = listed_faces(body, self.unknowns, self.component, [j, k]) else {
                 continue;
             };
             let count = listed.end - listed.start;
@@ -154,9 +154,9 @@ impl WeighLinks<'_> {
         }
     }
 
-    /// Weighs the links of this plane.
+    /// Computes the weights of the links of this plane.
     #[inline(always)]
-    fn weigh<V: Vector<Number = f32>>(&mut self) {
+    fn compute_weights<V: Vector<Number = f32>>(&mut self) {
         let LinkPlanes {
             row_length,
             distance,

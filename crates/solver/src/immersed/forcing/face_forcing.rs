@@ -1,4 +1,5 @@
-//! Forcing of a face near a surface: strength of the drag, and solid fraction.
+//! Forcing of a face near a surface: strength of the drag, and fraction closed to the
+//! pressure gradient.
 //!
 //! Legend: d signed distance, eps half-width of the band, A aperture.
 
@@ -16,9 +17,9 @@ use grainwake_simd::{Kernel, Scalar, Vector, dispatch};
 pub struct FaceForcing {
     /// Drag coefficient times dt; the weight of the rigid velocity is strength / (1 + strength).
     pub strength: f64,
-    /// Solid fraction of the face, 1 - A(d), which the pressure gradient does not reach; zero in
-    /// the paper's scheme, which blends by the weight alone.
-    pub solid_fraction: f64,
+    /// Fraction of the face closed to the pressure gradient: its solid fraction 1 - A(d), zero in
+    /// the paper's scheme, which blends by the weight.
+    pub closed_fraction: f64,
 }
 
 impl FaceForcing {
@@ -37,7 +38,7 @@ impl Add for FaceForcing {
     fn add(self, other: FaceForcing) -> FaceForcing {
         FaceForcing {
             strength: self.strength + other.strength,
-            solid_fraction: self.solid_fraction + other.solid_fraction,
+            closed_fraction: self.closed_fraction + other.closed_fraction,
         }
     }
 }
@@ -78,7 +79,7 @@ impl ForcingParams {
             Scheme::Aperture => {
                 let mut forcing = FaceForcing {
                     strength: 0.0,
-                    solid_fraction: 0.0,
+                    closed_fraction: 0.0,
                 };
                 dispatch(OneFace {
                     params: self,
@@ -92,7 +93,7 @@ impl ForcingParams {
         }
     }
 
-    /// Strength of the drag as numerator and positive denominator, and solid fraction.
+    /// Strength of the drag as numerator and positive denominator, and closed fraction.
     #[inline(always)]
     pub fn aperture_forcing<V: Vector>(&self, d: V, normal: [V; 3]) -> ([V; 2], V) {
         let [drag, depth] = drag(d, normal, self.spacing.to_array(), self.eps);
@@ -100,8 +101,8 @@ impl ForcingParams {
         // Zero outside the band: a concave grain may enclose such faces.
         let outside = V::constant(2.0 * self.eps);
         let strength = d.select_below(outside, strength, V::constant(0.0));
-        let solid_fraction = V::constant(1.0) - aperture(d, self.eps);
-        ([strength, depth], solid_fraction)
+        let closed_fraction = V::constant(1.0) - aperture(d, self.eps);
+        ([strength, depth], closed_fraction)
     }
 
     /// Forcing of the paper's scheme: the weight of the rigid velocity is the solid fraction of a
@@ -111,7 +112,7 @@ impl ForcingParams {
         let solid_fraction = (0.5 - d / width).clamp(0.0, 1.0);
         FaceForcing {
             strength: solid_fraction / (1.0 - solid_fraction),
-            solid_fraction: 0.0,
+            closed_fraction: 0.0,
         }
     }
 }
@@ -129,11 +130,11 @@ impl Kernel for OneFace<'_> {
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
         let normal = self.normal.to_array().map(Scalar);
-        let ([strength, depth], solid_fraction) =
+        let ([strength, depth], closed_fraction) =
             self.params.aperture_forcing(Scalar(self.d), normal);
         *self.forcing = FaceForcing {
             strength: strength.0 / depth.0,
-            solid_fraction: solid_fraction.0,
+            closed_fraction: closed_fraction.0,
         };
     }
 }

@@ -14,18 +14,17 @@ pub struct ForcedFaces {
     pub runs: [Vec<FaceRun>; 3],
     /// Weight of the rigid velocity, 0 to 1.
     pub weight: Vec<f32>,
-    /// Fraction of a face that the grain closes to the pressure gradient (its solid fraction), 0 to
-    /// 1.
-    pub solid_fraction: Vec<f32>,
+    /// Fraction of a face that the grain closes to the pressure gradient, 0 to 1.
+    pub closed_fraction: Vec<f32>,
     /// Fraction of a face that all grains together close; empty if the grain shares no face.
-    total_solid_fraction: Vec<f32>,
+    total_closed_fraction: Vec<f32>,
     /// Velocity that a face gains next to a grain at rest [m/s]; filled by [`super::sum_impulse`].
     pub rest_gain: Vec<f64>,
 }
 
 impl ForcedFaces {
     /// Computes the weights of the faces in `band`, which `neighbours` may force too.
-    pub fn weigh(
+    pub fn compute_weights(
         &mut self,
         params: &ForcingParams,
         band: &mut BandFaces,
@@ -35,9 +34,9 @@ impl ForcedFaces {
         let count = band.count();
         let padded = band.pad(params.eps);
         self.weight.resize(padded, 0.0);
-        self.solid_fraction.resize(padded, 0.0);
+        self.closed_fraction.resize(padded, 0.0);
         match params.scheme {
-            Scheme::Aperture => dispatch(WeighFaces {
+            Scheme::Aperture => dispatch(ComputeFaceWeights {
                 params,
                 band,
                 forced: self,
@@ -47,18 +46,18 @@ impl ForcedFaces {
                     let (d, normal) = band.face(entry);
                     let forcing = params.of(d, normal);
                     self.weight[entry] = forcing.weight(forcing) as f32;
-                    self.solid_fraction[entry] = forcing.solid_fraction as f32;
+                    self.closed_fraction[entry] = forcing.closed_fraction as f32;
                 }
             }
         }
-        for list in [&mut self.weight, &mut self.solid_fraction] {
+        for list in [&mut self.weight, &mut self.closed_fraction] {
             list.truncate(count);
             list.resize(count + MAX_LANES, 0.0);
         }
-        self.total_solid_fraction.clear();
+        self.total_closed_fraction.clear();
         if !band.shared.is_empty() {
-            self.total_solid_fraction
-                .extend_from_slice(&self.solid_fraction);
+            self.total_closed_fraction
+                .extend_from_slice(&self.closed_fraction);
             self.share_faces(params, band, neighbours, shapes);
         }
     }
@@ -88,18 +87,18 @@ impl ForcedFaces {
                 }
             }
             self.weight[entry] = forcing.weight(all) as f32;
-            self.solid_fraction[entry] =
-                (forcing.solid_fraction / all.solid_fraction.max(1.0)) as f32;
-            self.total_solid_fraction[entry] = all.solid_fraction.min(1.0) as f32;
+            self.closed_fraction[entry] =
+                (forcing.closed_fraction / all.closed_fraction.max(1.0)) as f32;
+            self.total_closed_fraction[entry] = all.closed_fraction.min(1.0) as f32;
         }
     }
 
     /// Fraction of each face that all grains together close, 0 to 1.
-    pub fn total_solid_fraction(&self) -> &[f32] {
-        if self.total_solid_fraction.is_empty() {
-            &self.solid_fraction
+    pub fn total_closed_fraction(&self) -> &[f32] {
+        if self.total_closed_fraction.is_empty() {
+            &self.closed_fraction
         } else {
-            &self.total_solid_fraction
+            &self.total_closed_fraction
         }
     }
 
@@ -107,8 +106,8 @@ impl ForcedFaces {
     pub fn bytes(&self) -> usize {
         let lists = [
             &self.weight,
-            &self.solid_fraction,
-            &self.total_solid_fraction,
+            &self.closed_fraction,
+            &self.total_closed_fraction,
         ];
         let runs: usize = self.runs.iter().map(Vec::capacity).sum();
         let values: usize = lists.iter().map(|list| list.capacity()).sum();
@@ -119,13 +118,13 @@ impl ForcedFaces {
 }
 
 /// Weights of the faces of a grain without neighbours, aperture scheme.
-struct WeighFaces<'a> {
+struct ComputeFaceWeights<'a> {
     params: &'a ForcingParams,
     band: &'a BandFaces,
     forced: &'a mut ForcedFaces,
 }
 
-impl Kernel for WeighFaces<'_> {
+impl Kernel for ComputeFaceWeights<'_> {
     type Number = f32;
     #[inline(always)]
     fn run<V: Vector<Number = f32>>(self) {
@@ -134,7 +133,7 @@ impl Kernel for WeighFaces<'_> {
         } = self.band;
         let ForcedFaces {
             weight,
-            solid_fraction,
+            closed_fraction,
             ..
         } = self.forced;
         let one = V::constant(1.0);
@@ -148,7 +147,7 @@ impl Kernel for WeighFaces<'_> {
             inside.select_below(d, s, one).store(&mut weight[at..]);
             inside
                 .select_below(d, c, one)
-                .store(&mut solid_fraction[at..]);
+                .store(&mut closed_fraction[at..]);
         }
     }
 }

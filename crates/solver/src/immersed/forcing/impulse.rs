@@ -14,9 +14,9 @@
 //! fluid mass times gain over the faces, J = constant + matrix (V, Omega). The grain loses what the
 //! fluid gains ([`crate::immersed::rigid_body`]). `immersed::reference` has the scalar form.
 //!
-//! Legend: s weight, c solid fraction, C total solid fraction, f weight of the
-//! change of velocity, u* predicted velocity, h spacing along the component, l and m lever arms of
-//! the face about the two other axes.
+//! Legend: s weight, c closed fraction, C total closed fraction (both zero in the paper's scheme),
+//! f weight of the change of velocity, u* predicted velocity, h spacing along the component, l and
+//! m lever arms of the face about the two other axes.
 
 use super::faces::ForcedFaces;
 use super::rigid_run::{RigidRun, change_weight, lane_indices};
@@ -37,15 +37,15 @@ pub struct Impulse {
 }
 
 /// Sums the impulse over the faces of `forced` for a grain that had the velocity `old`, and fills
-/// their `rest_gain`. `closure_dt` [s] is the length of the step; 0 if faces are not closed to the
-/// pressure gradient, as in the paper's scheme.
+/// their `rest_gain`. `dt` [s] is the length of the step; 0 leaves out the pressure gradient and
+/// the body acceleration.
 pub fn sum_impulse<R: Real>(
     known: &Known<R>,
     predictions: &[Prediction<R>; 3],
     fluid_density: f64,
     forced: &mut ForcedFaces,
     old: RigidVelocity,
-    closure_dt: f64,
+    dt: f64,
 ) -> Impulse {
     let mut sums = [Moments::default(); 3];
     dispatch(SumImpulse {
@@ -53,7 +53,7 @@ pub fn sum_impulse<R: Real>(
         predictions,
         forced,
         old,
-        closure_dt,
+        dt,
         sums: &mut sums,
     });
     let w = fluid_density * known.mesh.cell_volume();
@@ -83,17 +83,20 @@ struct Moments {
 }
 
 impl Moments {
-    /// Adds the faces from face `n` of a run on, at `arm` [m] from the centroid.
+    /// Adds the faces from face `n` of a run on, at `lever_arm` [m] from the centroid.
     #[inline(always)]
     fn add<V: Vector<Number = f64>>(
         &mut self,
         axis: usize,
         n: usize,
-        arm: [V; 3],
+        lever_arm: [V; 3],
         constant: V,
         derivative: V,
     ) {
-        let (l, m) = (arm[(axis + 2) % 3], V::constant(0.0) - arm[(axis + 1) % 3]);
+        let (l, m) = (
+            lever_arm[(axis + 2) % 3],
+            V::constant(0.0) - lever_arm[(axis + 1) % 3],
+        );
         let [by_l, by_m] = [derivative * l, derivative * m];
         let constants = [constant, constant * l, constant * m];
         let derivatives = [derivative, by_l, by_m, by_l * l, by_l * m, by_m * m];
@@ -111,7 +114,7 @@ struct SumImpulse<'a, R> {
     predictions: &'a [Prediction<'a, R>; 3],
     forced: &'a mut ForcedFaces,
     old: RigidVelocity,
-    closure_dt: f64,
+    dt: f64,
     sums: &'a mut [Moments; 3],
 }
 
@@ -126,16 +129,16 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
         let spacing = mesh.spacing;
         let [x, y, z] = mesh.layout().strides().map(|stride| stride as isize);
         let stencil = Stencil::new([0, x, -x, y, -y, z, -z]);
-        let (weights, solid_fraction, total_solid_fraction) = (
+        let (weights, closed_fraction, total_closed_fraction) = (
             &forced.weight,
-            &forced.solid_fraction,
-            forced.total_solid_fraction(),
+            &forced.closed_fraction,
+            forced.total_closed_fraction(),
         );
         for (axis, runs) in forced.runs.iter().enumerate() {
             let half_cell = 0.5 * spacing[axis] * DVec3::AXES[axis];
             let above = self.old.angular.cross(half_cell);
             for run in runs {
-                let rigid = RigidRun::new(self.old, run.arm, spacing);
+                let rigid = RigidRun::new(self.old, run.lever_arm, spacing);
                 let faces = RunImpulse {
                     axis,
                     run,
@@ -144,19 +147,18 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
                     stencil,
                     rigid,
                     cells: [above, -above].map(|offset| rigid.shifted(offset)),
-                    dt_per_2h: (0.5 * self.closure_dt / spacing).to_array(),
-                    dt_per_h: self.closure_dt / spacing[axis],
-                    dt_g: self.closure_dt * self.known.body_acceleration[axis],
-                    closure_dt: self.closure_dt,
+                    dt_per_2h: (0.5 * self.dt / spacing).to_array(),
+                    dt_per_h: self.dt / spacing[axis],
+                    dt_g: self.dt * self.known.body_acceleration[axis],
                     spacing: spacing.x,
                 };
                 for n in (0..run.count).step_by(V::WIDTH) {
                     let entry = run.first + n;
                     let weight = V::load_from(&weights[entry..]);
-                    let solid_fraction = V::load_from(&solid_fraction[entry..]);
-                    let total_solid_fraction = V::load_from(&total_solid_fraction[entry..]);
+                    let closed_fraction = V::load_from(&closed_fraction[entry..]);
+                    let total_closed_fraction = V::load_from(&total_closed_fraction[entry..]);
                     let sums = &mut self.sums[axis];
-                    let gain = faces.add(n, weight, [solid_fraction, total_solid_fraction], sums);
+                    let gain = faces.add(n, weight, [closed_fraction, total_closed_fraction], sums);
                     // Entries beyond the run are overwritten by the next run.
                     gain.store(&mut rest_gain[entry..]);
                 }
@@ -186,7 +188,6 @@ struct RunImpulse<'a, R> {
     dt_per_h: f64,
     /// dt g along the component [m/s].
     dt_g: f64,
-    closure_dt: f64,
     /// h along x [m].
     spacing: f64,
 }
@@ -214,25 +215,25 @@ impl<R: Real> RunImpulse<'_, R> {
         &self,
         n: usize,
         weight: V,
-        [solid_fraction, total_solid_fraction]: [V; 2],
+        [closed_fraction, total_closed_fraction]: [V; 2],
         sums: &mut Moments,
     ) -> V {
         let (zero, index) = (V::constant(0.0), lane_indices::<V>(n));
         let predicted = V::load_partial(&self.predicted[n..]);
         let rise = self.moved_pressure::<V>(0, n) - self.moved_pressure(1, n);
         let e = rise.mul_add(V::constant(self.dt_per_h), V::constant(-self.dt_g));
-        let without_drag = total_solid_fraction.mul_add(e, predicted);
-        let rest_gain = (zero - weight).mul_add(without_drag, solid_fraction * e);
-        let f = change_weight(weight, solid_fraction, self.closure_dt);
+        let without_drag = total_closed_fraction.mul_add(e, predicted);
+        let rest_gain = (zero - weight).mul_add(without_drag, closed_fraction * e);
+        let f = change_weight(weight, closed_fraction);
         let constant = rest_gain - f * self.rigid.component(self.axis, index);
         let derivative = weight + f;
-        let arm = self.run.arm;
-        let x = V::constant(arm.x) + V::constant(self.spacing) * index;
-        let arm = [x, V::constant(arm.y), V::constant(arm.z)];
+        let lever_arm = self.run.lever_arm;
+        let x = V::constant(lever_arm.x) + V::constant(self.spacing) * index;
+        let lever_arm = [x, V::constant(lever_arm.y), V::constant(lever_arm.z)];
         let end = V::constant(self.run.count as f64);
         let constant = index.select_below(end, constant, zero);
         let derivative = index.select_below(end, derivative, zero);
-        sums.add(self.axis, n, arm, constant, derivative);
+        sums.add(self.axis, n, lever_arm, constant, derivative);
         rest_gain
     }
 }

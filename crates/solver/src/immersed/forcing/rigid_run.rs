@@ -15,11 +15,11 @@ pub struct RigidRun {
 }
 
 impl RigidRun {
-    /// Velocity along the run of faces that begins at `arm` from the centroid [m].
+    /// Velocity along the run of faces that begins at `lever_arm` from the centroid [m].
     #[inline(always)]
-    pub fn new(velocity: RigidVelocity, arm: DVec3, spacing: DVec3) -> RigidRun {
+    pub fn new(velocity: RigidVelocity, lever_arm: DVec3, spacing: DVec3) -> RigidRun {
         RigidRun {
-            first: velocity.at(arm),
+            first: velocity.at(lever_arm),
             change: velocity.angular.cross(DVec3::X * spacing.x),
         }
     }
@@ -46,9 +46,8 @@ pub fn lane_indices<V: Vector<Number = f64>>(n: usize) -> V {
 }
 
 /// Weight f = (1 - s) c of the change U - U_old of the rigid velocity, with the weight s of the
-/// velocity and the solid fraction c; zero unless `closure_dt` is positive.
+/// velocity and the closed fraction c.
 #[inline(always)]
-pub fn change_weight<V: Vector<Number = f64>>(weight: V, solid_fraction: V, closure_dt: f64) -> V {
-    let switch = if closure_dt > 0.0 { 1.0 } else { 0.0 };
-    V::constant(switch) * (V::constant(1.0) - weight) * solid_fraction
+pub fn change_weight<V: Vector<Number = f64>>(weight: V, closed_fraction: V) -> V {
+    (V::constant(1.0) - weight) * closed_fraction
 }

@@ -16,14 +16,13 @@ use grainwake_simd::{Kernel, Vector, dispatch};
 
 /// Adds the gain of the forced faces to component `axis` of a part of the prediction, for a grain
 /// with the new `velocity` that changed by `change` in the step. [`super::sum_impulse`] has filled
-/// the lists of `forced`; `closure_dt` [s] is the one passed there.
+/// the lists of `forced`.
 pub fn impose_rigidity<R: Real>(
     axis: usize,
     spacing: DVec3,
     forced: &ForcedFaces,
     velocity: RigidVelocity,
     change: RigidVelocity,
-    closure_dt: f64,
     prediction: &mut Prediction<R>,
 ) {
     dispatch(ImposeRigidity {
@@ -32,7 +31,6 @@ pub fn impose_rigidity<R: Real>(
         forced,
         velocity,
         change,
-        closure_dt,
         prediction,
     });
 }
@@ -43,7 +41,6 @@ struct ImposeRigidity<'a, 'b, R> {
     forced: &'a ForcedFaces,
     velocity: RigidVelocity,
     change: RigidVelocity,
-    closure_dt: f64,
     prediction: &'a mut Prediction<'b, R>,
 }
 
@@ -55,18 +52,17 @@ impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
         let part = self.prediction.range().clone();
         let runs = forced.runs[axis].iter();
         for run in runs.filter(|run| part.contains(&run.at)) {
-            let velocity = RigidRun::new(self.velocity, run.arm, self.spacing);
-            let change = RigidRun::new(self.change, run.arm, self.spacing);
+            let velocity = RigidRun::new(self.velocity, run.lever_arm, self.spacing);
+            let change = RigidRun::new(self.change, run.lever_arm, self.spacing);
             let predicted = self.prediction.velocity_mut(run.at, run.count);
             for n in (0..run.count).step_by(V::WIDTH) {
                 let entry = run.first + n;
                 let weight = V::load_from(&forced.weight[entry..]);
-                let solid_fraction = V::load_from(&forced.solid_fraction[entry..]);
+                let closed_fraction = V::load_from(&forced.closed_fraction[entry..]);
                 let index = lane_indices(n);
                 let gain = V::load(&forced.rest_gain[entry..])
                     + weight * velocity.component(axis, index)
-                    + change_weight(weight, solid_fraction, self.closure_dt)
-                        * change.component(axis, index);
+                    + change_weight(weight, closed_fraction) * change.component(axis, index);
                 gain.add_partial(&mut predicted[n..]);
             }
         }

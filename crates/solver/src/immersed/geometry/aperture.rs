@@ -37,7 +37,7 @@ const COSINE: [f64; 7] = [
 ];
 
 /// Lower limit of the aperture in 1 / A - 1. Without the limit an impulsive start is unstable.
-const LEAST_APERTURE: f64 = 0.4;
+const MIN_APERTURE: f64 = 0.4;
 
 /// sin(pi s) for |s| <= 1, within 1e-14 or single-precision rounding.
 #[inline(always)]
@@ -80,7 +80,7 @@ pub fn aperture<V: Vector>(d: V, eps: f64) -> V {
 /// Inverse-aperture excess 1 / max(A, 0.4) - 1 at distances `d` [m].
 #[inline(always)]
 pub fn inverse_aperture_excess<V: Vector>(d: V, eps: f64) -> V {
-    let open = aperture(d, eps).max(V::constant(LEAST_APERTURE));
+    let open = aperture(d, eps).max(V::constant(MIN_APERTURE));
     (V::constant(1.0) - open).div(open)
 }
 

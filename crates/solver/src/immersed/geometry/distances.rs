@@ -2,7 +2,7 @@
 //!
 //! Plane by plane:
 //!
-//! 1. list the candidate faces of each row, which lie in a ball around the grain;
+//! 1. list the candidate faces of each row, which lie in a sphere around the grain;
 //! 2. evaluate the distances and normals of all candidates in full registers;
 //! 3. keep the faces within reach, and of these list the faces in the forcing band.
 //!
@@ -34,19 +34,27 @@ pub struct DistanceScratch {
 
 /// Kernel that fills the lists of one grain.
 pub struct FillLists<'a> {
+    /// Grid.
     pub mesh: &'a Mesh,
     /// Half-width of the band [m].
     pub eps: f64,
     /// Distance from the surface up to which faces are listed [m].
     pub reach: f64,
+    /// Grain at its new pose.
     pub grain: &'a Grain,
     /// Index of the grain.
     pub index: usize,
+    /// Narrow-band shapes of all grains.
     pub shapes: &'a NarrowBandShapes,
+    /// Grains whose faces may be shared with this grain.
     pub neighbours: &'a [NeighbourGrain],
+    /// Receives the faces within `reach`; its box is set.
     pub body: &'a mut LocatedBody,
+    /// Receives the faces in the forcing band, by component.
     pub runs: &'a mut [Vec<FaceRun>; 3],
+    /// Receives the distances and normals of the faces in the forcing band.
     pub band: &'a mut BandFaces,
+    /// Buffers of the thread.
     pub scratch: &'a mut DistanceScratch,
 }
 
@@ -100,14 +108,14 @@ impl FillLists<'_> {
         let mut count = 0;
         for j in 0..self.body.size.y {
             let row = h * DVec3::new(0.0, f64::from(j), f64::from(k));
-            let arm = corner - self.grain.pose.position + row;
-            let Range { start, end } = indices_in_ball(arm, h.x, radius, self.body.size.x);
+            let lever_arm = corner - self.grain.pose.position + row;
+            let Range { start, end } = indices_in_sphere(lever_arm, h.x, radius, self.body.size.x);
             let span = RowSpan {
                 start,
                 end,
                 first: count,
             };
-            let first = (to_body * arm).as_vec3();
+            let first = (to_body * lever_arm).as_vec3();
             for i in (start..end).step_by(V::WIDTH) {
                 let index = V::constant(f64::from(i)) + V::ramp();
                 let mut x = [V::constant(0.0); 3];
@@ -186,7 +194,7 @@ impl FillLists<'_> {
                 self.runs[component].push(FaceRun {
                     at: part.at + skipped,
                     below: part.below + skipped,
-                    arm: start - self.grain.pose.position + f64::from(forced.start) * step,
+                    lever_arm: start - self.grain.pose.position + f64::from(forced.start) * step,
                     first: first_forced,
                     count: forced.len(),
                 });
@@ -259,16 +267,16 @@ impl SharedRow<'_> {
     }
 }
 
-/// Indices, less than `count`, of the faces of a row along x that lie in a ball around the grain.
-/// `arm` [m] leads from the centroid to face 0; `spacing` and `radius` in [m].
-fn indices_in_ball(arm: DVec3, spacing: f64, radius: f64, count: i32) -> Range<i32> {
-    let square = radius * radius - arm.y * arm.y - arm.z * arm.z;
+/// Indices, less than `count`, of the faces of a row along x that lie in a sphere around the grain.
+/// `lever_arm` [m] leads from the centroid to face 0; `spacing` and `radius` in [m].
+fn indices_in_sphere(lever_arm: DVec3, spacing: f64, radius: f64, count: i32) -> Range<i32> {
+    let square = radius * radius - lever_arm.y * lever_arm.y - lever_arm.z * lever_arm.z;
     if square < 0.0 {
         return 0..0;
     }
     let half_chord = square.sqrt();
-    let start = ((-half_chord - arm.x) / spacing).ceil() as i32;
-    let end = ((half_chord - arm.x) / spacing).floor() as i32 + 1;
+    let start = ((-half_chord - lever_arm.x) / spacing).ceil() as i32;
+    let end = ((half_chord - lever_arm.x) / spacing).floor() as i32 + 1;
     let start = start.clamp(0, count);
     start..end.clamp(start, count)
 }

@@ -8,9 +8,9 @@ use crate::flow::Boundaries;
 use crate::grid::Mesh;
 use crate::math::Real;
 
-/// Degrees of freedom of the grid: the faces and cells that are unknowns, and their storage.
+/// Faces and cells of the grid that are unknowns, and their positions in memory.
 #[derive(Clone, Copy)]
-pub struct DofMask {
+pub struct UnknownFaces {
     cells: IVec3,
     strides: [usize; 3],
     periodic: [bool; 3],
@@ -21,10 +21,11 @@ pub const PAD: i32 = 3;
 /// Offset of faces and cells that are not unknown: larger than any position, also in sums.
 const NONE: usize = 1 << 60;
 
-impl DofMask {
-    pub fn new(mesh: &Mesh, boundaries: &Boundaries) -> DofMask {
+impl UnknownFaces {
+    /// Unknowns of the grid `mesh`, periodic along the axes of the periodic `boundaries`.
+    pub fn new(mesh: &Mesh, boundaries: &Boundaries) -> UnknownFaces {
         let [x, y, z] = mesh.cells.map(|n| n as i32);
-        DofMask {
+        UnknownFaces {
             cells: IVec3::new(x, y, z),
             strides: mesh.layout().strides(),
             periodic: [0, 1, 2].map(|axis| boundaries.is_periodic(axis)),
@@ -41,7 +42,7 @@ impl DofMask {
         for axis in 0..3 {
             let (n, stride) = (self.cells[axis], self.strides[axis]);
             let padded = first[axis] - PAD..first[axis] + size[axis] + PAD;
-            for (normal, offsets) in map.dof_offsets[axis].iter_mut().enumerate() {
+            for (normal, offsets) in map.unknown_offsets[axis].iter_mut().enumerate() {
                 let offset = |i: i32| {
                     if self.periodic[axis] {
                         ((i - 1).rem_euclid(n) + 1) as usize * stride
@@ -73,7 +74,7 @@ impl DofMask {
 pub struct IndexMap {
     /// Offsets of unknowns by axis, `[0]` for cells and faces parallel to the axis, `[1]` for faces
     /// normal to it; `NONE` elsewhere. Entry 0 is the offset of cell `-PAD` of the box.
-    dof_offsets: [[Vec<usize>; 2]; 3],
+    unknown_offsets: [[Vec<usize>; 2]; 3],
     /// Offsets of all entries of a field by axis, ghost cells beyond walls included.
     offsets: [Vec<usize>; 3],
 }
@@ -92,8 +93,8 @@ pub struct RowPart {
 impl IndexMap {
     /// Indices along `axis` of the unknown faces of `component` in the padded box. They are
     /// contiguous, since only the ends of the grid exclude faces.
-    pub fn dof_range(&self, component: usize, axis: usize) -> Range<i32> {
-        let offsets = &self.dof_offsets[axis][usize::from(axis == component)];
+    pub fn unknown_range(&self, component: usize, axis: usize) -> Range<i32> {
+        let offsets = &self.unknown_offsets[axis][usize::from(axis == component)];
         let excluded = |offset: &&usize| **offset == NONE;
         let first = offsets.iter().take_while(excluded).count();
         let last = offsets.iter().rev().take_while(excluded).count();
@@ -114,7 +115,7 @@ impl IndexMap {
             return;
         }
         let offset = |axis: usize, normal: bool, index: i32| {
-            self.dof_offsets[axis][usize::from(normal)][(index + PAD) as usize]
+            self.unknown_offsets[axis][usize::from(normal)][(index + PAD) as usize]
         };
         let down = IVec3::AXES[component];
         let row = offset(1, component == 1, j) + offset(2, component == 2, k);
@@ -142,7 +143,7 @@ impl IndexMap {
 
     /// Positions in memory from the first plane of the box to the last.
     pub fn plane_range(&self) -> Range<usize> {
-        let offsets = self.dof_offsets[2].iter();
+        let offsets = self.unknown_offsets[2].iter();
         let offsets = offsets.flat_map(|table| &table[PAD as usize..table.len() - PAD as usize]);
         let offsets = offsets.copied().filter(|offset| *offset != NONE);
         let (first, last) = offsets.fold((usize::MAX, 0), |(first, last), offset| {
@@ -169,7 +170,7 @@ impl IndexMap {
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let tables = self.dof_offsets.iter().flatten().chain(&self.offsets);
+        let tables = self.unknown_offsets.iter().flatten().chain(&self.offsets);
         tables
             .map(|table| size_of::<usize>() * table.capacity())
             .sum()
@@ -182,17 +183,17 @@ mod tests {
 
     #[test]
     fn walls_bound_the_unknowns_and_periodic_edges_wrap() {
-        let mask = DofMask {
+        let unknown_faces = UnknownFaces {
             cells: IVec3::new(8, 6, 1),
             strides: [1, 10, 80],
             periodic: [true, false, true],
         };
         let mut map = IndexMap::default();
-        mask.map(IVec3::new(6, 1, 1), IVec3::new(5, 3, 1), &mut map);
+        unknown_faces.map(IVec3::new(6, 1, 1), IVec3::new(5, 3, 1), &mut map);
         // Position in memory of a face, or of a cell if the component is 3.
         let at = |component, i, j| {
             let offset = |axis: usize, index: i32| {
-                map.dof_offsets[axis][usize::from(axis == component)][(index + PAD) as usize]
+                map.unknown_offsets[axis][usize::from(axis == component)][(index + PAD) as usize]
             };
             let at = offset(0, i) + offset(1, j) + offset(2, 0);
             (at < NONE).then_some(at)
@@ -206,8 +207,11 @@ mod tests {
         assert_eq!(at(3, 0, -1), None);
         assert_eq!(at(3, 0, 5), Some(6 + 60 + 80));
         assert_eq!(at(3, -3, 5), Some(3 + 60 + 80));
-        assert_eq!(map.dof_range(1, 0), -3..8);
-        assert_eq!([map.dof_range(1, 1), map.dof_range(0, 1)], [1..6, 0..6]);
+        assert_eq!(map.unknown_range(1, 0), -3..8);
+        assert_eq!(
+            [map.unknown_range(1, 1), map.unknown_range(0, 1)],
+            [1..6, 0..6]
+        );
         // A field whose values are its memory positions; ghost cells beyond the wall included.
         let field: Vec<f64> = (0..240).map(f64::from).collect();
         let mut copy = Vec::new();

@@ -49,7 +49,7 @@ pub struct FaceRun {
     /// Position in memory of the cell below the first face, across a periodic edge if need be.
     pub below: usize,
     /// Vector from the grain's centroid to the first face, space frame [m].
-    pub arm: DVec3,
+    pub lever_arm: DVec3,
     /// Entry of the first face in [`BandFaces`] and in the lists made from it.
     pub first: usize,
     /// Number of faces.

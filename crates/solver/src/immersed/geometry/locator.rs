@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::distances::{DistanceScratch, FillLists};
-use super::index_map::DofMask;
+use super::index_map::UnknownFaces;
 use super::lists::{BandFaces, FaceRun, LocatedBody};
 use super::narrow_band::NarrowBandShapes;
 use super::neighbours::{NeighbourGrain, NeighbourSearch};
@@ -23,7 +23,7 @@ pub struct LocateScratch {
 /// Geometry of all grains on one grid.
 pub struct Locator {
     mesh: Mesh,
-    mask: DofMask,
+    unknown_faces: UnknownFaces,
     /// Half-width of the band around the surface, the mean spacing of the grid [m].
     eps: f64,
     /// Distance from the surface up to which a grain affects faces [m].
@@ -42,7 +42,7 @@ impl Locator {
         let reach = 2.0 * eps + 0.5 * resolved.iter().copied().fold(0.0, f64::max);
         Locator {
             mesh: *mesh,
-            mask: DofMask::new(mesh, boundaries),
+            unknown_faces: UnknownFaces::new(mesh, boundaries),
             eps,
             reach,
             shapes: NarrowBandShapes::new(grains, eps, reach),
@@ -73,8 +73,13 @@ impl Locator {
     /// Finds the neighbours of all grains, before [`Locator::locate`]. `displacement(i)` [m] leads
     /// from the last pose of grain i, whose faces count as well; 0 if they do not.
     pub fn find_neighbours(&mut self, grains: &[Grain], displacement: impl Fn(usize) -> f64) {
-        self.neighbours
-            .update(&self.mesh, &self.mask, self.reach, grains, displacement);
+        self.neighbours.update(
+            &self.mesh,
+            &self.unknown_faces,
+            self.reach,
+            grains,
+            displacement,
+        );
     }
 
     /// Neighbours of grain `index`.
@@ -131,7 +136,8 @@ impl Locator {
             body.lowest[axis] = from + 1;
             body.size[axis] = to + 2 - body.lowest[axis];
         }
-        self.mask.map(body.lowest, body.size, &mut body.index_map);
+        self.unknown_faces
+            .map(body.lowest, body.size, &mut body.index_map);
         body.planes = body.index_map.plane_range();
     }
 }

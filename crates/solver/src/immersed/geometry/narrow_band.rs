@@ -10,7 +10,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use grainwake_shape::{Field, SampledField, Shape};
 
-use super::samples::{FAR, SampleGrid, load_all, store_all};
+use super::samples::{INFINITE_DISTANCE, SampleGrid, load_all, store_all};
 use crate::dem::Grain;
 use grainwake_simd::{MAX_LANES, MAX_SINGLE_INDEX, Vector};
 
@@ -19,7 +19,7 @@ const SAMPLES_PER_BAND: f64 = 4.0;
 /// Least number of samples across the thinnest side of a grain.
 const SAMPLES_ACROSS: f64 = 12.0;
 /// Largest number of samples per half-width of the band; the flow does not resolve a thinner grain.
-const MOST_SAMPLES_PER_BAND: f64 = 16.0;
+const MAX_SAMPLES_PER_BAND: f64 = 16.0;
 
 /// Narrow-band shapes of all grains; equal shapes share their samples.
 pub struct NarrowBandShapes {
@@ -78,7 +78,7 @@ impl NarrowBandShape {
                 let thickness = (shape.upper() - shape.lower()).min_element();
                 let spacing = (eps / SAMPLES_PER_BAND)
                     .min(thickness / SAMPLES_ACROSS)
-                    .max(eps / MOST_SAMPLES_PER_BAND);
+                    .max(eps / MAX_SAMPLES_PER_BAND);
                 // Doubled until single precision represents the indices of all samples.
                 let mut spacings = (0..20).map(|n| spacing * f64::from(1 << n));
                 let field = spacings.find_map(|spacing| {
@@ -108,8 +108,8 @@ impl NarrowBandShape {
 
     /// Fills the distances [m] at the first `count` of `points` [m], in single precision, and
     /// replaces the points by the gradients; both in the frame of the grain. Infinite distances are
-    /// at least [`FAR`] here. The lists must be `MAX_LANES` entries longer than `count`; these are
-    /// overwritten.
+    /// at least [`INFINITE_DISTANCE`] here. The lists must be `MAX_LANES` entries longer than
+    /// `count`; these are overwritten.
     #[inline(always)]
     pub fn fill_distances<V: Vector<Number = f32>>(
         &self,
@@ -148,7 +148,7 @@ impl NarrowBandShape {
         for n in 0..V::WIDTH {
             let x = DVec3::from_array(points.map(|lanes| f64::from(lanes[n])));
             let (d, gradient) = self.distance_and_gradient(x);
-            distances[n] = d.min(FAR) as f32;
+            distances[n] = d.min(INFINITE_DISTANCE) as f32;
             for axis in 0..3 {
                 points[axis][n] = gradient[axis] as f32;
             }
@@ -161,7 +161,7 @@ impl NarrowBandShape {
 #[inline(always)]
 fn sphere_distance<V: Vector>(radius: f64, [x, y, z]: [V; 3]) -> (V, [V; 3]) {
     let length = (x * x + y * y + z * z).sqrt();
-    let divisor = length.max(V::constant(1.0 / FAR));
+    let divisor = length.max(V::constant(1.0 / INFINITE_DISTANCE));
     let normal = [x.div(divisor), y.div(divisor), z.div(divisor)];
     (length - V::constant(radius), normal)
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::index_map::DofMask;
+use super::index_map::UnknownFaces;
 use super::narrow_band::NarrowBandShapes;
 use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};
 use crate::grid::Mesh;
@@ -65,7 +65,7 @@ pub fn nearest_distance(
 #[derive(Default)]
 pub struct NeighbourSearch {
     search: BroadPhase,
-    balls: Vec<BoundingSphere>,
+    spheres: Vec<BoundingSphere>,
     pairs: Vec<NeighbourPair>,
     /// Neighbours of grain 0, then of grain 1, ...
     neighbours: Vec<NeighbourGrain>,
@@ -83,12 +83,12 @@ struct NeighbourPair {
 }
 
 impl NeighbourSearch {
-    /// Finds the pairs whose balls overlap. A ball contains all faces within `reach` [m] of the
+    /// Finds the pairs whose spheres overlap. A sphere contains all faces within `reach` [m] of the
     /// surface of grain i, and `displacement(i)` [m] extends it to the last pose of the grain.
     pub fn update(
         &mut self,
         mesh: &Mesh,
-        mask: &DofMask,
+        unknown_faces: &UnknownFaces,
         reach: f64,
         grains: &[Grain],
         displacement: impl Fn(usize) -> f64,
@@ -96,19 +96,19 @@ impl NeighbourSearch {
         let enclosure = Enclosure {
             lower: mesh.origin,
             upper: mesh.upper(),
-            periodic: [0, 1, 2].map(|axis| mask.is_periodic(axis) && mesh.cells[axis] > 1),
+            periodic: [0, 1, 2].map(|axis| unknown_faces.is_periodic(axis) && mesh.cells[axis] > 1),
             solid: [[false; 2]; 3],
         };
-        self.balls.clear();
-        let balls = grains
+        self.spheres.clear();
+        let spheres = grains
             .iter()
             .enumerate()
             .map(|(index, grain)| BoundingSphere {
-                center: grain.pose.position,
+                centre: grain.pose.position,
                 radius: grain.shape.bounding_radius() + reach + displacement(index),
             });
-        self.balls.extend(balls);
-        self.search.search(&self.balls, &enclosure);
+        self.spheres.extend(spheres);
+        self.search.search(&self.spheres, &enclosure);
         self.pairs.clear();
         for pair in &self.search.pairs {
             let Partner::Grain(other) = pair.partner else {
@@ -180,7 +180,7 @@ mod tests {
             origin: DVec3::new(-1.0, 0.0, 0.0),
         };
         let boundaries = Boundaries([[Boundary::Periodic; 2]; 3]);
-        let mask = DofMask::new(&mesh, &boundaries);
+        let unknown_faces = UnknownFaces::new(&mesh, &boundaries);
         let shape = Arc::new(Shape::sphere(0.5, 100));
         // The first and the last are 1.1 apart across x; the second has no neighbours.
         let at = |x: f64| Grain::new(shape.clone(), 2.0).with_position(DVec3::new(x, 2.0, 2.0));
@@ -190,7 +190,7 @@ mod tests {
             let neighbours = search.of(index).iter();
             neighbours.map(|n| (n.shift, n.tie_breaker)).collect()
         };
-        search.update(&mesh, &mask, 0.6, &grains, |_| 0.0);
+        search.update(&mesh, &unknown_faces, 0.6, &grains, |_| 0.0);
         let tie = 2.2 * TIE;
         let along_x = DVec3::new(8.0, 0.0, 0.0);
         assert_eq!(found(&search, 0), [(-along_x, tie)]);
@@ -201,14 +201,16 @@ mod tests {
             [false, true, false]
         );
         // The second is 3.4 from the third, both with a reach of 1.1, and moved by 1.25.
-        search.update(&mesh, &mask, 0.6, &grains, |index| [0.0, 1.25, 0.0][index]);
+        search.update(&mesh, &unknown_faces, 0.6, &grains, |index| {
+            [0.0, 1.25, 0.0][index]
+        });
         assert!(!search.of(1).is_empty());
         let others = found(&search, 1).into_iter();
         let others = others.filter(|(shift, _)| *shift == DVec3::ZERO);
         assert_eq!(others.count(), 1, "the others are its own images");
         assert_eq!(found(&search, 0), [(-along_x, tie)]);
         // With a reach of more than half a period a grain neighbours its own images.
-        search.update(&mesh, &mask, 1.6, &grains[1..2], |_| 0.0);
+        search.update(&mesh, &unknown_faces, 1.6, &grains[1..2], |_| 0.0);
         let tie = 4.2 * TIE;
         let along_y = DVec3::new(0.0, 4.0, 0.0);
         let along_z = DVec3::new(0.0, 0.0, 4.0);

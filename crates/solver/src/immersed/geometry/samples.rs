@@ -5,8 +5,8 @@ use std::ops::Deref;
 use grainwake_shape::SampledField;
 use grainwake_simd::Vector;
 
-/// Stands for infinity in single precision [m].
-pub const FAR: f64 = 1e30;
+/// Distance that stands for infinity in single precision [m].
+pub const INFINITE_DISTANCE: f64 = 1e30;
 
 /// Loads a vector from each list. Kernels use no closures on vectors, which would not be inlined.
 #[inline(always)]
@@ -60,7 +60,7 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
     }
 
     /// Interpolates signed distance [m] and gradient at `x`, in the frame of the grain. Off the
-    /// grid the distance is [`FAR`].
+    /// grid the distance is [`INFINITE_DISTANCE`].
     #[inline(always)]
     pub fn distance_and_gradient(&self, x: [V; 3]) -> (V, [V; 3]) {
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
@@ -91,7 +91,7 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
         ];
         let distance = self.quantum * (low + fz * (high - low));
         (
-            zero.select_below(off_grid, V::constant(FAR), distance),
+            zero.select_below(off_grid, V::constant(INFINITE_DISTANCE), distance),
             gradient,
         )
     }

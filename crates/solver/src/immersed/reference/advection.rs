@@ -80,7 +80,7 @@ impl Reference {
             false => 0.0,
         };
         let x_0 = self.position(component, lower);
-        let middle = self.nearest_image(index, x_0).arm + 0.5 * h * e.as_dvec3();
+        let middle = self.nearest_image(index, x_0).lever_arm + 0.5 * h * e.as_dvec3();
         let rigid = kinematics.velocity.at(middle);
         let relative = (0.5 * (q(0) + q(1)) - rigid[component]) * (c - rigid[axis]);
         (weight * relative + c / 60.0 * sixth_order) / h

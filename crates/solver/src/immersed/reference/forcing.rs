@@ -1,8 +1,8 @@
 //! Weights of forced faces, their gain of velocity, and the impulse on the fluid.
 //!
 //! Legend: d signed distance, n normal, m open depth, A aperture, s weight of the rigid velocity, c
-//! solid fraction, C total solid fraction, U and U_old new and old rigid
-//! velocity, J impulse, h spacing, nu kinematic viscosity, p pressure, g body acceleration.
+//! closed fraction, C total closed fraction, U and U_old new and old rigid velocity, J impulse,
+//! h spacing, nu kinematic viscosity, p pressure, g body acceleration.
 
 use glam::{DVec3, IVec3};
 
@@ -18,13 +18,13 @@ pub struct Weights {
     /// Weight s of the rigid velocity.
     pub weight: f64,
     /// Closed fraction c.
-    pub solid_fraction: f64,
+    pub closed_fraction: f64,
     /// Closed fraction C of all grains together.
-    pub total_solid_fraction: f64,
+    pub total_closed_fraction: f64,
 }
 
 impl Reference {
-    /// Drag coefficient times dt, and solid fraction 1 - A(d), of a face at the distance `d` [m]
+    /// Drag coefficient times dt, and closed fraction 1 - A(d), of a face at the distance `d` [m]
     /// from a surface with the normal `n`.
     ///
     /// drag = nu sum_a (m(d + h_a n_a) + m(d - h_a n_a) - 2 m(d)) / h_a^2 / m(d) in the aperture
@@ -50,7 +50,7 @@ impl Reference {
     pub fn weights(&self, index: usize, x: DVec3) -> Weights {
         let eps = self.eps;
         let d = self.nearest_image(index, x).distance;
-        let (mut all_drag, mut total_solid_fraction) = (0.0, 0.0);
+        let (mut all_drag, mut total_closed_fraction) = (0.0, 0.0);
         let mut forcing = [0.0; 2];
         for other in 0..self.grains.len() {
             let image = self.nearest_image(other, x);
@@ -59,20 +59,20 @@ impl Reference {
                 return Weights::default();
             }
             if image.distance < 2.0 * eps {
-                let [drag, solid_fraction] = self.drag(image.distance, image.normal);
+                let [drag, closed_fraction] = self.drag(image.distance, image.normal);
                 all_drag += drag;
-                total_solid_fraction += solid_fraction;
+                total_closed_fraction += closed_fraction;
                 if other == index {
-                    forcing = [drag, solid_fraction];
+                    forcing = [drag, closed_fraction];
                 }
             }
         }
-        let [drag, solid_fraction] = forcing;
+        let [drag, closed_fraction] = forcing;
         if d <= -eps && self.scheme == Scheme::Aperture {
             return Weights {
                 weight: 1.0,
-                solid_fraction: 1.0,
-                total_solid_fraction: 1.0,
+                closed_fraction: 1.0,
+                total_closed_fraction: 1.0,
             };
         }
         Weights {
@@ -81,8 +81,8 @@ impl Reference {
             } else {
                 1.0
             },
-            solid_fraction: solid_fraction / total_solid_fraction.max(1.0),
-            total_solid_fraction: total_solid_fraction.min(1.0),
+            closed_fraction: closed_fraction / total_closed_fraction.max(1.0),
+            total_closed_fraction: total_closed_fraction.min(1.0),
         }
     }
 
@@ -104,15 +104,15 @@ impl Reference {
             0.0
         };
         let x = self.position(component, face);
-        let arm = self.nearest_image(index, x).arm;
+        let lever_arm = self.nearest_image(index, x).lever_arm;
         let Weights {
             weight: s,
-            solid_fraction: c,
-            total_solid_fraction: all,
+            closed_fraction: c,
+            total_closed_fraction: all,
         } = self.weights(index, x);
         // p~ = p - dt U_old . grad p, at half a spacing above and below the face.
-        let moved = |cell: IVec3, arm: DVec3| {
-            let (at, velocity) = (self.at(cell), old.at(arm));
+        let moved = |cell: IVec3, lever_arm: DVec3| {
+            let (at, velocity) = (self.at(cell), old.at(lever_arm));
             let along = |a: usize| {
                 let stride = self.mesh.layout().strides()[a];
                 velocity[a] * (known.pressure[at + stride] - known.pressure[at - stride])
@@ -121,15 +121,15 @@ impl Reference {
             known.pressure[at] - dt * (0..3).map(along).sum::<f64>()
         };
         let half = 0.5 * h * DVec3::AXES[component];
-        let rise = moved(face, arm + half) - moved(face - e, arm - half);
+        let rise = moved(face, lever_arm + half) - moved(face - e, lever_arm - half);
         let removed = dt / h[component] * rise - dt * known.body_acceleration[component];
         let rest_gain = c * removed - s * (predicted + all * removed);
         let change = if dt > 0.0 {
-            (1.0 - s) * c * (new - old).at(arm)[component]
+            (1.0 - s) * c * (new - old).at(lever_arm)[component]
         } else {
             0.0
         };
-        rest_gain + s * new.at(arm)[component] + change
+        rest_gain + s * new.at(lever_arm)[component] + change
     }
 
     /// Impulse J on the fluid by grain `index`, linear [N s] and angular [N m s]: the sum over the
@@ -152,7 +152,7 @@ impl Reference {
                     let gain = self.gain(index, known, u, velocities, component, face);
                     let impulse = fluid_mass * gain * DVec3::AXES[component];
                     linear += impulse;
-                    angular += image.arm.cross(impulse);
+                    angular += image.lever_arm.cross(impulse);
                 }
             }
         }

@@ -11,7 +11,7 @@ pub struct NearestImage {
     /// Unit normal n out of the grain, space frame.
     pub normal: DVec3,
     /// Vector from the centroid of the image to the point [m].
-    pub arm: DVec3,
+    pub lever_arm: DVec3,
 }
 
 impl Reference {
@@ -20,14 +20,14 @@ impl Reference {
         let grain = &self.grains[index];
         let mut nearest: Option<NearestImage> = None;
         for shift in self.shifts() {
-            let arm = x - grain.pose.position - shift;
-            let in_body = grain.pose.orientation.inverse() * arm;
+            let lever_arm = x - grain.pose.position - shift;
+            let in_body = grain.pose.orientation.inverse() * lever_arm;
             let (distance, gradient) = grain.shape.distance_and_gradient(in_body);
             if nearest.as_ref().is_none_or(|n| distance < n.distance) {
                 nearest = Some(NearestImage {
                     distance,
                     normal: grain.pose.orientation * gradient.normalize(),
-                    arm,
+                    lever_arm,
                 });
             }
         }

@@ -9,13 +9,13 @@ use super::Reference;
 use crate::dem::Grain;
 use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
-use crate::immersed::advection::{LinkPlanes, find_correction, weigh_links};
+use crate::immersed::advection::{LinkPlanes, compute_link_weights, find_correction};
 use crate::immersed::forcing::{ForcedFaces, ForcingParams, impose_rigidity, sum_impulse};
 use crate::immersed::geometry::{LocateScratch, LocatedBody, Locator};
 use crate::immersed::kinematics::{GrainKinematics, PreviousStep, RigidVelocity};
 use crate::immersed::rigid_body::RigidBodySystem;
 use crate::immersed::scheme::Scheme;
-use crate::immersed::update::locate_and_weigh;
+use crate::immersed::update::locate_and_compute_weights;
 use crate::math::Load;
 
 const DT: f64 = 0.004;
@@ -78,7 +78,7 @@ impl Case {
         let scratch = &mut LocateScratch::default();
         let located = grains.iter().enumerate().map(|(index, grain)| {
             let (mut body, mut forced) = Default::default();
-            locate_and_weigh(
+            locate_and_compute_weights(
                 &locator,
                 &params,
                 index,
@@ -104,15 +104,6 @@ impl Case {
             reference,
             locator,
             located,
-        }
-    }
-
-    /// Step for which the kernels close faces [s].
-    fn closure_dt(&self) -> f64 {
-        if self.reference.scheme == Scheme::Aperture {
-            DT
-        } else {
-            0.0
         }
     }
 
@@ -215,24 +206,24 @@ fn weights_of_forced_faces_match_the_reference() {
                 let runs = forced.runs[component].iter();
                 let runs = runs.map(|run| (run.at, run.first, run.count));
                 let weights = case.by_position(runs.clone(), &forced.weight, 0.0);
-                let solid_fraction = case.by_position(runs.clone(), &forced.solid_fraction, 0.0);
-                let by_all = case.by_position(runs, forced.total_solid_fraction(), 0.0);
+                let closed_fraction = case.by_position(runs.clone(), &forced.closed_fraction, 0.0);
+                let by_all = case.by_position(runs, forced.total_closed_fraction(), 0.0);
                 for face in reference.faces(component) {
                     let x = reference.position(component, face);
                     let (at, expected) = (reference.at(face), reference.weights(index, x));
                     assert_close(weights[at], expected.weight, 2e-5, "weight");
                     assert_close(
-                        solid_fraction[at],
-                        expected.solid_fraction,
+                        closed_fraction[at],
+                        expected.closed_fraction,
                         2e-5,
-                        "solid fraction",
+                        "closed fraction",
                     );
                     if expected.weight > 0.0 {
                         assert_close(
                             by_all[at],
-                            expected.total_solid_fraction,
+                            expected.total_closed_fraction,
                             2e-5,
-                            "total solid fraction",
+                            "total closed fraction",
                         );
                         forced_faces += 1;
                         let other = reference.weights(1 - index, x).weight;
@@ -254,11 +245,11 @@ fn weights_of_links_match_the_reference() {
     for index in SPHERES {
         let (body, _) = &case.located[index];
         for component in 0..3 {
-            let dofs = [0, 1, 2].map(|axis| body.index_map.dof_range(component, axis));
+            let unknowns = [0, 1, 2].map(|axis| body.index_map.unknown_range(component, axis));
             let mut planes = LinkPlanes::default();
             planes.reset(body);
             for k in -1..body.size.z {
-                weigh_links(&dofs, body, component, eps, k, &mut planes);
+                compute_link_weights(&unknowns, body, component, eps, k, &mut planes);
                 let rows = if k < 0 { 0 } else { body.size.y };
                 for (j, i) in (0..rows).flat_map(|j| (0..body.size.x).map(move |i| (j, i))) {
                     let face = body.lowest + IVec3::new(i, j, k);
@@ -315,12 +306,12 @@ fn impulse_and_imposed_rigidity_match_the_reference() {
     for scheme in [Scheme::Aperture, Scheme::Paper] {
         let mut case = Case::new(scheme);
         for index in SPHERES {
-            let ([old, new], closure_dt) = (case.velocities(index), case.closure_dt());
+            let [old, new] = case.velocities(index);
             let predicted = case.predicted();
             let u = predicted.each_ref().map(|list| &list[..]);
             let (known, predictions) = case.flow.prediction();
             let forced = &mut case.located[index].1;
-            let impulse = sum_impulse(&known, &predictions, DENSITY, forced, old, closure_dt);
+            let impulse = sum_impulse(&known, &predictions, DENSITY, forced, old, DT);
             let expected = (case.reference).impulse(index, &known, u, [old, new], DENSITY);
             let expected = [expected[0].to_array(), expected[1].to_array()].concat();
             for (row, expected) in expected.into_iter().enumerate() {
@@ -332,7 +323,7 @@ fn impulse_and_imposed_rigidity_match_the_reference() {
             }
             let (forced, h) = (&case.located[index].1, case.reference.mesh.spacing);
             case.flow.for_predictions(|axis, mut prediction| {
-                impose_rigidity(axis, h, forced, new, new - old, closure_dt, &mut prediction);
+                impose_rigidity(axis, h, forced, new, new - old, &mut prediction);
             });
             let imposed = case.predicted();
             let (known, _) = case.flow.prediction();

@@ -9,7 +9,7 @@
 use glam::DVec3;
 
 use super::virtual_mass::VirtualMass;
-use crate::dem::{Dof, Grain, Response};
+use crate::dem::{Grain, GrainResponse, MotionConstraint};
 use crate::immersed::forcing::Impulse;
 use crate::immersed::kinematics::{PreviousStep, RigidVelocity};
 use crate::math::{Load, Matrix6, Vector6, solve6};
@@ -55,10 +55,10 @@ impl RigidBodySystem {
                 a[3 + row][3 + column] += (inertia + virtual_mass.inertia).col(column)[row];
             }
         }
-        if grain.translation != Dof::Free {
+        if grain.translation != MotionConstraint::Free {
             prescribe(&mut a, &mut b, 0, grain.velocity);
         }
-        if grain.rotation != Dof::Free {
+        if grain.rotation != MotionConstraint::Free {
             prescribe(&mut a, &mut b, 3, grain.angular_velocity);
         }
         RigidBodySystem {
@@ -79,10 +79,10 @@ impl RigidBodySystem {
     ) -> RigidVelocity {
         let mut right = self.right;
         for axis in 0..3 {
-            if grain.translation == Dof::Free {
+            if grain.translation == MotionConstraint::Free {
                 right[axis] += dt * contact.force[axis];
             }
-            if grain.rotation == Dof::Free {
+            if grain.rotation == MotionConstraint::Free {
                 right[3 + axis] += dt * contact.torque[axis];
             }
         }
@@ -133,7 +133,7 @@ impl RigidBodySystem {
         previous: &PreviousStep,
         added_density: f64,
         dt: f64,
-    ) -> Response {
+    ) -> GrainResponse {
         let start = previous.velocity - previous.pending_added_mass_velocity;
         let x = start.to_vector();
         // Load that changes the initial velocities over dt, with the matrix before mass is added.
@@ -144,7 +144,8 @@ impl RigidBodySystem {
         let mut a = self.matrix;
         let least = grain.mass() + added_density * grain.shape.volume();
         let mean = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
-        let free = [grain.translation, grain.rotation].map(|dof| dof == Dof::Free);
+        let free = [grain.translation, grain.rotation]
+            .map(|constraint| constraint == MotionConstraint::Free);
         if free[0] {
             for (axis, row) in a.iter_mut().take(3).enumerate() {
                 row[axis] += (least - mean).max(0.0);
@@ -161,7 +162,7 @@ impl RigidBodySystem {
                 drive[3 * n..3 * n + 3].fill(0.0);
             }
         }
-        Response::new([start.linear, start.angular], drive, columns)
+        GrainResponse::new([start.linear, start.angular], drive, columns)
     }
 }
 

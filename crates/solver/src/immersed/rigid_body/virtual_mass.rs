@@ -7,7 +7,7 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::dem::{Dof, Grain};
+use crate::dem::{Grain, MotionConstraint};
 use crate::immersed::kinematics::PreviousStep;
 
 /// Inertia of the fluid that a light grain accelerates with itself.
@@ -32,7 +32,13 @@ impl VirtualMass {
     pub fn new(grain: &Grain, previous: &PreviousStep, fluid_density: f64, dt: f64) -> VirtualMass {
         let ratio = grain.density / fluid_density;
         let part = ((1.0 - ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0) / ratio;
-        let free = |dof: Dof| if dof == Dof::Free { part } else { 0.0 };
+        let free = |constraint: MotionConstraint| {
+            if constraint == MotionConstraint::Free {
+                part
+            } else {
+                0.0
+            }
+        };
         let mass = grain.mass() * free(grain.translation);
         let inertia = grain.inertia() * free(grain.rotation);
         let PreviousStep {

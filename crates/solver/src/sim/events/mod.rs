@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 pub use grainwake_formats::events::{Event, EventKind};
 
-use crate::dem::{Dof, Grain};
+use crate::dem::{Grain, MotionConstraint};
 
 pub use tracker::{Tracker, TrackerState};
 
@@ -90,7 +90,7 @@ impl EventParams {
     ) -> EventParams {
         let mut free = grains
             .iter()
-            .filter(|grain| grain.translation == Dof::Free)
+            .filter(|grain| grain.translation == MotionConstraint::Free)
             .peekable();
         let rise = free.peek().is_some() && free.all(|grain| grain.density < fluid_density);
         let down = gravity.try_normalize().unwrap_or(DVec3::NEG_Z);

@@ -160,7 +160,7 @@ fn level_grains_do_not_chatter() {
 #[test]
 fn landing_and_rest_need_all_free_grains() {
     let mut grains = [grain(0.0, 0.5), grain(3.0, 0.5), grain(6.0, 5.0)];
-    grains[2].translation = Dof::Prescribed(DVec3::ZERO);
+    grains[2].translation = MotionConstraint::Prescribed(DVec3::ZERO);
     let params = EventParams::for_grains(&grains, DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
     let mut tracker = Tracker::new(params, &grains, None);
     let floor = Partner::Wall { axis: 2, side: 0 };

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::pair::{Encounter, Pair};
 use super::{Event, EventKind, EventParams, Phase, StopWhen};
-use crate::dem::{Contact, Dof, Grain, Partner};
+use crate::dem::{Contact, Grain, MotionConstraint, Partner};
 
 /// Detects events of the grains from step to step; its state is part of a checkpoint.
 #[derive(Clone, Debug)]
@@ -98,7 +98,7 @@ impl Tracker {
         let still = grains
             .iter()
             .zip(supported)
-            .filter(|(g, _)| g.translation == Dof::Free)
+            .filter(|(g, _)| g.translation == MotionConstraint::Free)
             .all(|(g, supported)| {
                 let spin = g.angular_velocity.length() * g.shape.bounding_radius();
                 supported && g.velocity.length() + spin < self.params.rest_speed
@@ -119,7 +119,7 @@ impl Tracker {
                     .landed
                     .iter()
                     .zip(grains)
-                    .filter(|(_, g)| g.translation == Dof::Free)
+                    .filter(|(_, g)| g.translation == MotionConstraint::Free)
                     .peekable();
                 free.peek()?;
                 free.try_fold(0.0_f64, |last, (landed, _)| landed.map(|t| last.max(t)))
