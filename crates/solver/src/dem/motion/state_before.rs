@@ -33,8 +33,7 @@ impl RigidState {
 
 /// Contact history and poses before a trial step.
 ///
-/// [`super::ContactDynamics`] keeps the buffers between steps, so that only the first step
-/// allocates.
+/// [`super::ContactDynamics`] keeps the buffers between steps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct StateBefore {
     pub records: Vec<ContactRecord>,
