@@ -103,7 +103,7 @@ impl<R: Real> Axis<R> {
     #[inline(always)]
     fn join<V: Vector<Number = R>>(&self, modes: &mut [Complex<V>]) {
         let n = self.n;
-        modes[0] = modes[0].exchanged();
+        modes[0] = modes[0].swap_parts();
         let (low, high) = mirrored(modes);
         let (pairs, turn) = (low.len(), &self.turn[1..]);
         let (high, turn) = (&mut high[..pairs], &turn[..pairs]);
@@ -116,7 +116,7 @@ impl<R: Real> Axis<R> {
             (y.re, y.im) = (r - q, p + t);
         }
         if n.is_multiple_of(2) {
-            modes[n / 2] = modes[n / 2].scale(self.middle[1]).exchanged();
+            modes[n / 2] = modes[n / 2].scale(self.middle[1]).swap_parts();
         }
     }
 }
