@@ -206,8 +206,8 @@ pub(super) fn settled_time_step(setup: &Setup) -> f64 {
 
 /// The step that the rule allows at `speed` [s].
 pub(super) fn time_step(setup: &Setup, speed: f64) -> f64 {
-    let resolved = (0..3).filter(|axis| setup.mesh.cells[*axis] > 1);
-    let h: Vec<f64> = resolved.map(|axis| setup.mesh.spacing[axis]).collect();
+    let axes = setup.mesh.resolved_axes();
+    let h: Vec<f64> = axes.map(|axis| setup.mesh.spacing[axis]).collect();
     match setup.step {
         StepRule::Fixed(step) => step,
         StepRule::Limits {

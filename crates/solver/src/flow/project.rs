@@ -126,7 +126,7 @@ pub struct Correct<'a, R> {
     pub k: usize,
     pub inverse: [f64; 3],
     /// dt/h along each axis [s/m].
-    pub pull: [f64; 3],
+    pub dt_per_h: [f64; 3],
     /// Whether the velocity is written with non-temporal stores.
     pub non_temporal: bool,
     pub velocity: [&'a mut [R]; 3],
@@ -166,7 +166,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 lower: [&f.row(j - 1)[..n + 2], &fb.row(j)[..n + 2]],
                 upper: [&f.row(j + 1)[..n + 2], &ft.row(j)[..n + 2]],
                 inverse: self.inverse,
-                pull: self.pull,
+                dt_per_h: self.dt_per_h,
                 out: [
                     layout.row_of_mut(x, j),
                     layout.row_of_mut(y, j),
@@ -175,7 +175,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 pressure: layout.row_of_mut(p, j),
                 streamed: if self.non_temporal { n } else { 0 },
                 partial: &mut partial,
-                given: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
+                prescribed: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
             };
             if periodic[0] {
                 // The upper face of the last cell is the lower face of the first.
@@ -184,8 +184,8 @@ impl<R: Real> Kernel for Correct<'_, R> {
             } else {
                 along_row::<V>(n, &mut work);
                 // The sum contains the lower boundary face, which is no unknown.
-                let given = -work.out[0][1].wide();
-                work.partial.momentum[0].add(1, Scalar::<R>::constant(given));
+                let prescribed = -work.out[0][1].wide();
+                work.partial.momentum[0].add(1, Scalar::<R>::constant(prescribed));
             }
             rise[0] += work.pressure[n].wide() - work.pressure[1].wide();
         }
@@ -229,14 +229,14 @@ struct CorrectRow<'a, R> {
     lower: [&'a [R]; 2],
     upper: [&'a [R]; 2],
     inverse: [f64; 3],
-    pull: [f64; 3],
+    dt_per_h: [f64; 3],
     out: [&'a mut [R]; 3],
     pressure: &'a mut [R],
     /// Entries of the row if written with non-temporal stores, else 0.
     streamed: usize,
     partial: &'a mut CorrectPartial<R>,
-    /// Components whose faces on the whole row have a given velocity.
-    given: [bool; 3],
+    /// Components whose faces on the whole row have a prescribed velocity.
+    prescribed: [bool; 3],
 }
 
 impl<R: Real> CorrectRow<'_, R> {
@@ -255,12 +255,12 @@ impl<R: Real> CorrectRow<'_, R> {
         // The ghosts are filled from the ends of a row, which therefore stay in the cache.
         let streamed = inside_row(i, V::WIDTH, self.streamed);
         for axis in 0..3 {
-            let (pull, inverse) = (
-                V::constant(self.pull[axis]),
+            let (dt_per_h, inverse) = (
+                V::constant(self.dt_per_h[axis]),
                 V::constant(self.inverse[axis]),
             );
-            let q = here(self.q[axis]) - pull * (f - lower[axis]);
-            let next = above[axis] - pull * (upper[axis] - f);
+            let q = here(self.q[axis]) - dt_per_h * (f - lower[axis]);
+            let next = above[axis] - dt_per_h * (upper[axis] - f);
             let to = window_mut::<V>(self.out[axis], i);
             if streamed {
                 q.store_non_temporal(to);
@@ -270,7 +270,7 @@ impl<R: Real> CorrectRow<'_, R> {
             square = square + q * q;
             rate = rate + q.abs() * inverse;
             divergence = divergence + (next - q) * inverse;
-            if !self.given[axis] {
+            if !self.prescribed[axis] {
                 self.partial.momentum[axis].add(i, q);
             }
         }

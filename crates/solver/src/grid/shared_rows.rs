@@ -1,23 +1,28 @@
-//! Part of a field that several threads may write at disjoint rows.
+//! Part of a field whose disjoint rows several threads may write.
 
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Contiguous part of a field, read and written by rows.
-pub struct Part<'a, R> {
+/// Contiguous part of a field, read and written by rows; aliases share its entries.
+pub struct SharedRows<'a, R> {
     range: Range<usize>,
     first: *mut R,
     entries: PhantomData<&'a mut [R]>,
 }
 
-// SAFETY: a part is the slice it was made of, or an alias whose maker guarantees disjoint writes.
-unsafe impl<R: Send> Send for Part<'_, R> {}
-unsafe impl<R: Sync> Sync for Part<'_, R> {}
+// SAFETY: the only handle to a slice acts as the exclusive borrow it was made of, which may move to
+// another thread if its entries may. The maker of an alias guarantees that no entry written through
+// one handle is used through the other, so two threads never access an entry that one of them
+// writes. Entries that both read are shared; the numbers of fields are `Sync`.
+unsafe impl<R: Send + Sync> Send for SharedRows<'_, R> {}
+// SAFETY: a shared handle only reads (`row`), and `row_mut` borrows the handle exclusively. Hence
+// sharing a handle shares entries for reading, as `&[R]` does, which is `Sync` if `R` is.
+unsafe impl<R: Sync> Sync for SharedRows<'_, R> {}
 
-impl<'a, R> Part<'a, R> {
-    /// Part of a field whose entries start at position `start`.
-    pub fn new(start: usize, entries: &'a mut [R]) -> Part<'a, R> {
-        Part {
+impl<'a, R> SharedRows<'a, R> {
+    /// Rows of `entries`, which start at position `start` of their field.
+    pub fn new(start: usize, entries: &'a mut [R]) -> SharedRows<'a, R> {
+        SharedRows {
             range: start..start + entries.len(),
             first: entries.as_mut_ptr(),
             entries: PhantomData,
@@ -28,8 +33,8 @@ impl<'a, R> Part<'a, R> {
     ///
     /// # Safety
     /// While both exist, no entry of a mutable row of one is in a row of the other.
-    pub unsafe fn alias(&self) -> Part<'a, R> {
-        Part {
+    pub unsafe fn alias(&self) -> SharedRows<'a, R> {
+        SharedRows {
             range: self.range.clone(),
             ..*self
         }
@@ -40,17 +45,18 @@ impl<'a, R> Part<'a, R> {
         &self.range
     }
 
-    /// Row of `count` entries from position `at` on. Panics outside the part.
+    /// Row of `count` entries from position `at` on. Panics outside the entries.
     #[inline(always)]
     pub fn row(&self, at: usize, count: usize) -> &[R] {
-        // SAFETY: `find` checked the bounds; no other handle writes the entries, see `alias`.
+        // SAFETY: `find` checked the bounds. No other handle writes the entries, see `alias`.
         unsafe { std::slice::from_raw_parts(self.find(at, count), count) }
     }
 
-    /// Mutable row of `count` entries from position `at` on. Panics outside the part.
+    /// Mutable row of `count` entries from position `at` on. Panics outside the entries.
     #[inline(always)]
     pub fn row_mut(&mut self, at: usize, count: usize) -> &mut [R] {
-        // SAFETY: `find` checked the bounds; no other handle borrows the entries, see `alias`.
+        // SAFETY: `find` checked the bounds. No other handle borrows the entries, see `alias`; the
+        // row borrows this handle exclusively.
         unsafe { std::slice::from_raw_parts_mut(self.find(at, count), count) }
     }
 
@@ -59,9 +65,9 @@ impl<'a, R> Part<'a, R> {
         let Range { start, end } = self.range;
         assert!(
             start <= at && at <= end && count <= end - at,
-            "a row lies within its part"
+            "a row lies within its entries"
         );
-        // SAFETY: the position lies in the part or at its end.
+        // SAFETY: the position lies in the slice or at its end.
         unsafe { self.first.add(at - start) }
     }
 }
@@ -73,15 +79,15 @@ mod tests {
     #[test]
     fn rows_are_those_of_the_field() {
         let mut field: Vec<usize> = (0..40).collect();
-        let mut part = Part::new(20, &mut field[20..]);
-        assert_eq!(part.row(22, 3), [22, 23, 24]);
-        assert!(part.row(40, 0).is_empty());
-        part.row_mut(38, 2).fill(7);
+        let mut shared = SharedRows::new(20, &mut field[20..]);
+        assert_eq!(shared.row(22, 3), [22, 23, 24]);
+        assert!(shared.row(40, 0).is_empty());
+        shared.row_mut(38, 2).fill(7);
         // SAFETY: the mutable rows are disjoint.
-        let mut alias = unsafe { part.alias() };
+        let mut alias = unsafe { shared.alias() };
         std::thread::scope(|scope| {
             scope.spawn(|| alias.row_mut(21, 4).fill(8));
-            part.row_mut(25, 4).fill(9);
+            shared.row_mut(25, 4).fill(9);
         });
         assert_eq!(field[20..30], [20, 8, 8, 8, 8, 9, 9, 9, 9, 29]);
         assert_eq!(field[37..], [37, 7, 7]);
@@ -90,9 +96,9 @@ mod tests {
     #[test]
     fn a_row_beyond_the_part_is_refused() {
         let mut field = [0; 40];
-        let part = Part::new(10, &mut field[10..30]);
+        let shared = SharedRows::new(10, &mut field[10..30]);
         for (at, count) in [(9, 1), (29, 2), (31, 0), (12, usize::MAX), (usize::MAX, 2)] {
-            let row = || part.row(at, count).len();
+            let row = || shared.row(at, count).len();
             assert!(
                 std::panic::catch_unwind(std::panic::AssertUnwindSafe(row)).is_err(),
                 "{at}"

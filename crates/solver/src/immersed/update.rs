@@ -8,7 +8,7 @@ use super::geometry::{LocateScratch, LocatedBody, Locator};
 use super::kinematics::{GrainKinematics, PreviousStep, RigidVelocity};
 use super::rigid_body::RigidBodySystem;
 use crate::dem::Grain;
-use crate::flow::{Known, Prediction};
+use crate::flow::{OldState, Prediction};
 use crate::math::{Load, Real};
 
 /// Lists of the faces near one grain, kept from one step to the next.
@@ -117,7 +117,7 @@ pub struct CouplingStep<'a, R> {
     pub locator: &'a Locator,
     pub params: ForcingParams,
     pub input: StepInput<'a>,
-    pub known: Known<'a, R>,
+    pub known: OldState<'a, R>,
     pub corrects_advection: bool,
     /// [kg/m^3]
     pub fluid_density: f64,

@@ -14,7 +14,7 @@ use crate::math::Real;
 use grainwake_simd::{Complex, Kernel, Vector, as_complex};
 
 /// Transforms of one axis and the eigenvalues of minus the second difference.
-pub struct Axis<R> {
+pub struct AxisTransform<R> {
     /// Number of cells.
     pub n: usize,
     /// Position of cell i in the input of the transform.
@@ -29,8 +29,8 @@ pub struct Axis<R> {
     middle: [R; 2],
 }
 
-impl<R: Real> Axis<R> {
-    pub fn new(n: usize, ends: Ends, spacing: f64) -> Axis<R> {
+impl<R: Real> AxisTransform<R> {
+    pub fn new(n: usize, ends: Ends, spacing: f64) -> AxisTransform<R> {
         let neumann = ends == Ends::Neumann;
         let order = |i: usize| match i {
             _ if !neumann => i,
@@ -52,7 +52,7 @@ impl<R: Real> Axis<R> {
             };
             (2.0 * angle.sin() / spacing).powi(2)
         };
-        Axis {
+        AxisTransform {
             n,
             order: (0..n).map(order).collect(),
             eigenvalues: (0..n).map(eigenvalue).collect(),
@@ -133,7 +133,7 @@ fn mirrored<T>(modes: &mut [T]) -> (&mut [T], &mut [T]) {
 /// Transform of a block of lines. It is a kernel of its own, so that its loops are compiled once
 /// per instruction set and not once per caller.
 pub struct Lines<'a, R> {
-    pub axis: &'a Axis<R>,
+    pub axis: &'a AxisTransform<R>,
     /// Both buffers, one after the other; the first holds the lines.
     ///
     /// Forward: entry i at `order[i]` -> modes. Inverse: modes -> entry i at `order[i]`, with real

@@ -1,6 +1,6 @@
 //! Loads and stores of blocks of lines before and after the transforms.
 
-use super::axis::{self, Axis};
+use super::axis::{self, AxisTransform};
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Complex, MAX_LANES, Vector, as_complex, dispatch};
 
@@ -8,7 +8,7 @@ use grainwake_simd::{Complex, MAX_LANES, Vector, as_complex, dispatch};
 pub struct Buffers<R>(Aligned<R>);
 
 impl<R: Real> Buffers<R> {
-    pub fn new(axes: [&Axis<R>; 2]) -> Buffers<R> {
+    pub fn new(axes: [&AxisTransform<R>; 2]) -> Buffers<R> {
         let longest = axes[0].buffer_len().max(axes[1].buffer_len());
         Buffers(Aligned::zeros(4 * R::LANES * longest))
     }
@@ -17,14 +17,14 @@ impl<R: Real> Buffers<R> {
     }
     /// Input lines of a transform along `axis`.
     #[inline(always)]
-    pub fn lines<V: Vector<Number = R>>(&mut self, axis: &Axis<R>) -> &mut [Complex<V>] {
+    pub fn lines<V: Vector<Number = R>>(&mut self, axis: &AxisTransform<R>) -> &mut [Complex<V>] {
         &mut as_complex::<V>(&mut self.0)[..axis.n]
     }
     /// Transforms the input lines and returns the result.
     #[inline(always)]
     pub fn transform<V: Vector<Number = R>>(
         &mut self,
-        axis: &Axis<R>,
+        axis: &AxisTransform<R>,
         inverse: bool,
     ) -> &[Complex<V>] {
         let len = axis.buffer_len();
@@ -94,7 +94,7 @@ impl Lines {
     #[inline(always)]
     pub fn forward<V: Vector>(
         &self,
-        axis: &Axis<V::Number>,
+        axis: &AxisTransform<V::Number>,
         values: &mut [V::Number],
         buffers: &mut Buffers<V::Number>,
     ) {
@@ -107,7 +107,7 @@ impl Lines {
     #[inline(always)]
     pub fn inverse<V: Vector>(
         &self,
-        axis: &Axis<V::Number>,
+        axis: &AxisTransform<V::Number>,
         values: &mut [V::Number],
         buffers: &mut Buffers<V::Number>,
     ) {
