@@ -35,8 +35,8 @@ const TRAFFIC: [(&str, f64); 4] = [
 const CUBES: [usize; 14] = [
     32, 48, 64, 67, 80, 96, 97, 100, 128, 131, 160, 192, 200, 256,
 ];
-/// Smallest number of doubles in each array of the triad, 64 MiB. The three arrays are as large as the
-/// fields, so that caches act alike, and large enough to hide the scheduling of threads.
+/// Smallest number of doubles in each array of the triad, 64 MiB. The three arrays are as large as
+/// the fields, so that caches act alike, and large enough to hide the scheduling of threads.
 const MIN_TRIAD_LENGTH: usize = 1 << 23;
 const TRIAD_REPEATS: usize = 8;
 

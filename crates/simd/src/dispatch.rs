@@ -9,8 +9,10 @@ use super::sealed::Sealed;
 use super::x86::{Avx2F32x8, Avx2F64x4, Avx512F32x16, Avx512F64x8, Sse2F32x8, Sse2F64x4};
 use super::{Real, Vector};
 
-/// Kernels of a number with the vectors of each instruction set. Only the vector of the baseline has
-/// a name outside this crate: safe code cannot execute instructions that the machine lacks.
+/// Kernels of a number with the vectors of each instruction set.
+///
+/// Only the vector of the baseline has a name outside this crate: safe code cannot execute
+/// instructions that the machine lacks.
 pub trait Registers: Sealed + Sized {
     /// Vector of [`InstructionSet::Baseline`].
     type Baseline: Vector<Number = Self>;

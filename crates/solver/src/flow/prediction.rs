@@ -11,7 +11,9 @@ use grainwake_simd::Vector;
 
 /// State at t^n from which the prediction was computed.
 pub struct OldState<'a, R> {
+    /// Grid of the box.
     pub mesh: &'a Mesh,
+    /// Conditions on the faces of the box.
     pub boundaries: &'a Boundaries,
     /// Velocity u^n [m/s].
     pub velocity: &'a FaceVector<R>,

@@ -17,6 +17,7 @@ use grainwake_simd::{
 /// Contribution of one plane to the measures of the flow.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PlaneMeasures {
+    /// Measures of the plane alone; `max_velocity` is squared, integrals are sums over cells.
     pub flow: FlowMeasures,
     /// Sum of the tendencies over the unknown faces [m/s^2].
     pub tendency: DVec3,
@@ -26,13 +27,19 @@ pub struct PlaneMeasures {
 
 /// Divergence of one plane of the prediction over dt, the right-hand side of the Poisson equation.
 pub struct Divergence<'a, R> {
+    /// Layout of all fields.
     pub layout: Layout,
+    /// Whether each axis is periodic.
     pub periodic: [bool; 3],
+    /// Prediction u* [m/s].
     pub predicted: &'a FaceVector<R>,
+    /// Index of the plane.
     pub k: usize,
     /// 1/h along each axis [1/m].
     pub inverse: [f64; 3],
+    /// Time step [s].
     pub dt: f64,
+    /// Divergence over dt [1/s^2], overwritten.
     pub out: &'a mut Plane<R>,
 }
 
@@ -119,18 +126,27 @@ impl<R: Real> RowWork for DivergenceRow<'_, R> {
 
 /// Correction of one plane: u = u* - dt grad f, p += f; the caller fills the ghosts.
 pub struct Correct<'a, R> {
+    /// Layout of all fields.
     pub layout: Layout,
+    /// Prediction u* [m/s].
     pub predicted: &'a FaceVector<R>,
+    /// Pressure increment over density f [m^2/s^2].
     pub solution: Solution<'a, R>,
+    /// Whether each axis is periodic.
     pub periodic: [bool; 3],
+    /// Index of the plane.
     pub k: usize,
+    /// 1/h along each axis [1/m].
     pub inverse: [f64; 3],
     /// dt/h along each axis [s/m].
     pub dt_per_h: [f64; 3],
     /// Whether the velocity is written with non-temporal stores.
     pub non_temporal: bool,
+    /// Plane of the corrected velocity [m/s], overwritten.
     pub velocity: [&'a mut [R]; 3],
+    /// Plane of the pressure over density [m^2/s^2], to which f is added.
     pub pressure: &'a mut [R],
+    /// Measures of the plane, overwritten except for `tendency`.
     pub measures: &'a mut PlaneMeasures,
 }
 

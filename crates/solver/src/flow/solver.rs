@@ -30,10 +30,13 @@ pub struct FlowMeasures {
 
 /// State of the fluid.
 pub struct Flow<R = f64> {
+    /// Grid of the box.
     pub(super) mesh: Mesh,
     /// Planes whose fields this flow holds, the whole box.
     slab: Slab,
+    /// Conditions on the faces of the box.
     pub(super) boundaries: Boundaries,
+    /// Constants of the tendency.
     pub(super) coefficients: Coefficients,
     /// Velocity u^n [m/s].
     pub velocity: FaceVector<R>,
@@ -41,15 +44,20 @@ pub struct Flow<R = f64> {
     pub predicted: FaceVector<R>,
     /// Dynamic pressure over density p^n [m^2/s^2].
     pub pressure: Field<Centre, R>,
+    /// Tendency H of the last prediction [m/s^2].
     pub(super) tendency: FaceVector<R>,
     poisson: Poisson<R>,
     /// Whether fields are written with non-temporal stores.
     non_temporal: bool,
+    /// Measures of each plane.
     partial: Vec<PlaneMeasures>,
+    /// Length of the last step [s]; none before the first.
     previous_step: Option<f64>,
+    /// Weight of H^n in the last prediction [s].
     pub(super) weight: f64,
     /// Sums of H over the unknown faces: three of the previous step, then three of the last one.
     tendency_sums: [f64; 6],
+    /// Sum over the unknown faces of the weighted tendencies of the last prediction [m/s].
     impulse: DVec3,
     /// Pressure difference between upper and lower end, summed over the lines along each axis.
     pressure_rise: DVec3,

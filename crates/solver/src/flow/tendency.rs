@@ -21,7 +21,9 @@ use grainwake_simd::{
 pub struct Coefficients {
     /// 1/(4 h) along each axis [1/m]: value and velocity of a link are means of two.
     quarter_inverse: [f64; 3],
+    /// nu/h^2 along each axis [1/s].
     nu_inverse_square: [f64; 3],
+    /// Uniform acceleration that drives the flow [m/s^2].
     pub(super) acceleration: DVec3,
 }
 
@@ -71,18 +73,25 @@ pub struct Weights {
 
 /// One plane of the prediction u* = u + now H + before H_old - dt grad p.
 pub struct PredictPlane<'a, R> {
+    /// Layout of all fields.
     pub layout: Layout,
+    /// Constants of the tendency.
     pub coefficients: &'a Coefficients,
+    /// Weights of the terms.
     pub weights: Weights,
+    /// Velocity u^n with ghosts [m/s].
     pub velocity: &'a FaceVector<R>,
+    /// Pressure over density p^n with ghosts [m^2/s^2].
     pub pressure: &'a [R],
-    /// Axes that are periodic; the boundary faces of the others have a prescribed velocity.
+    /// Whether each axis is periodic; the boundary faces of the others are no unknowns.
     pub periodic: [bool; 3],
+    /// Index of the plane.
     pub k: usize,
     /// Whether the prediction is written with non-temporal stores.
     pub non_temporal: bool,
     /// H_old, overwritten by H.
     pub tendency: [&'a mut [R]; 3],
+    /// Plane of u* [m/s], overwritten.
     pub predicted: [&'a mut [R]; 3],
     /// Sum of H over the unknown faces of the plane [m/s^2], to be set.
     pub sum: &'a mut DVec3,

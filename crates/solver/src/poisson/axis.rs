@@ -30,6 +30,7 @@ pub struct AxisTransform<R> {
 }
 
 impl<R: Real> AxisTransform<R> {
+    /// Transforms of `n` cells, `spacing` [m] apart, with the conditions `ends`.
     pub fn new(n: usize, ends: Ends, spacing: f64) -> AxisTransform<R> {
         let neumann = ends == Ends::Neumann;
         let order = |i: usize| match i {
@@ -133,12 +134,14 @@ fn mirrored<T>(modes: &mut [T]) -> (&mut [T], &mut [T]) {
 /// Transform of a block of lines. It is a kernel of its own, so that its loops are compiled once
 /// per instruction set and not once per caller.
 pub struct Lines<'a, R> {
+    /// Transforms of the axis of the lines.
     pub axis: &'a AxisTransform<R>,
     /// Both buffers, one after the other; the first holds the lines.
     ///
     /// Forward: entry i at `order[i]` -> modes. Inverse: modes -> entry i at `order[i]`, with real
     /// and imaginary parts exchanged, unnormalised.
     pub buffers: &'a mut [R],
+    /// Whether modes are transformed to entries.
     pub inverse: bool,
     /// Whether the block has half the lanes of the widest register.
     pub half: bool,

@@ -12,11 +12,17 @@ pub trait Butterfly<const R: usize> {
     fn apply<V: Vector>(x: [Complex<V>; R]) -> [Complex<V>; R];
 }
 
+/// Transform of length two.
 pub struct Two;
+/// Transform of length three.
 pub struct Three;
+/// Transform of length four.
 pub struct Four;
+/// Transform of length five.
 pub struct Five;
+/// Transform of length seven.
 pub struct Seven;
+/// Transform of length eight.
 pub struct Eight;
 
 impl Butterfly<2> for Two {

@@ -25,6 +25,7 @@ pub struct PlaneLayout {
 }
 
 impl PlaneLayout {
+    /// Layout of `nx` x `ny` cells.
     pub fn new<R: Real>(nx: usize, ny: usize) -> PlaneLayout {
         let line = R::LANES;
         PlaneLayout {
@@ -78,12 +79,14 @@ pub struct Plane<R> {
 }
 
 impl<R: Real> Plane<R> {
+    /// Plane of zeros.
     pub(super) fn new(layout: PlaneLayout) -> Plane<R> {
         Plane {
             layout,
             values: Aligned::zeros(layout.pitch * (layout.lines() + 2)),
         }
     }
+    /// Memory held [bytes].
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.values)
     }
@@ -131,9 +134,13 @@ impl<R: Real> Plane<R> {
 
 /// Forward transform: cells of `plane` to `modes`; the plane is overwritten.
 pub struct Forward<'a, R> {
+    /// Transforms along x and y.
     pub axes: [&'a AxisTransform<R>; 2],
+    /// Cells, overwritten by modes along y.
     pub plane: &'a mut Plane<R>,
+    /// Plane of modes, overwritten.
     pub modes: &'a mut [R],
+    /// Buffers of the thread.
     pub buffers: &'a mut Buffers<R>,
     /// Whether the modes are written with non-temporal stores.
     pub non_temporal: bool,
@@ -219,10 +226,15 @@ impl<R: Real> Kernel for Forward<'_, R> {
 
 /// Inverse transform: `modes` to cells of `plane` and its ghosts.
 pub struct Inverse<'a, R> {
+    /// Transforms along x and y.
     pub axes: [&'a AxisTransform<R>; 2],
+    /// Whether x and y are periodic.
     pub periodic: [bool; 2],
+    /// Cells and ghosts, overwritten.
     pub plane: &'a mut Plane<R>,
+    /// Plane of modes.
     pub modes: &'a [R],
+    /// Buffers of the thread.
     pub buffers: &'a mut Buffers<R>,
 }
 

@@ -1,8 +1,8 @@
 //! Conditions on the six faces of the box (Eq. 4a).
 //!
-//! `velocity.rs`: prescribed normal velocities and ghosts of the velocity. `pressure.rs`: conditions on
-//! the pressure. `outflow.rs`: convective outflow. `ghosts.rs`: how a ghost layer follows from the
-//! interior.
+//! `velocity.rs`: prescribed normal velocities and ghosts of the velocity. `pressure.rs`:
+//! conditions on the pressure. `outflow.rs`: convective outflow. `ghosts.rs`: rules by which a
+//! ghost layer follows from the interior.
 
 mod ghosts;
 mod outflow;
@@ -57,8 +57,8 @@ impl Boundaries {
         self.0[axis][0] == Boundary::Periodic
     }
 
-    /// Whether each axis is periodic. The lower boundary face of the others has a prescribed normal
-    /// velocity.
+    /// Whether each axis is periodic. On the other axes the normal velocity of the boundary faces
+    /// is known before the projection.
     pub fn periodic(&self) -> [bool; 3] {
         [0, 1, 2].map(|axis| self.is_periodic(axis))
     }
