@@ -20,8 +20,8 @@ const CACHE: usize = 1 << 19;
 
 /// Width of a block of columns: a multiple of two cache lines.
 pub fn block_width<R: Real>(nz: usize) -> usize {
-    let least = 2 * R::LANES;
-    (CACHE / size_of::<f64>() / 2 / nz / least * least).max(least)
+    let unit = 2 * R::LANES;
+    (CACHE / size_of::<f64>() / 2 / nz / unit * unit).max(unit)
 }
 
 /// Scratch for one block of columns.
