@@ -1,23 +1,19 @@
 //! `grainwake bench`: time and memory per cell, compared with the memory bandwidth.
 
-use std::sync::Arc;
+mod case;
+
 use std::time::Instant;
 
-use glam::{DQuat, DVec3};
-use grainwake_shape::ShapeOptions;
-use grainwake_shape::analytic::ellipsoid;
-use grainwake_solver::dem::Grain;
-use grainwake_solver::flow::FluidParams;
-use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
 use grainwake_solver::math::{InstructionSet, Precision, instructions, limit_instructions};
-use grainwake_solver::sim::{Setup, Simulation, StepRule};
+use grainwake_solver::sim::Simulation;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::args::BenchArgs;
 use crate::exit::{BAD_INPUT, Exit};
 use crate::{print, threads};
+use case::BenchCase;
 
 /// Numbers per cell that each pass reads from and writes to memory (write-allocate traffic is not
 /// counted, as in the triad):
@@ -39,19 +35,10 @@ const TRAFFIC: [(&str, f64); 4] = [
 const CUBES: [usize; 14] = [
     32, 48, 64, 67, 80, 96, 97, 100, 128, 131, 160, 192, 200, 256,
 ];
-/// Least number of doubles in each array of the triad, 64 MiB. The three arrays are as large as the
-/// fields, so that caches act alike, and large enough to hide the scheduling of threads.
-const LEAST_TRIAD_LENGTH: usize = 1 << 23;
+/// Smallest number of doubles in each array of the triad, 64 MiB. The three arrays are as large as
+/// the fields, so that caches act alike, and large enough to hide the scheduling of threads.
+const MIN_TRIAD_LENGTH: usize = 1 << 23;
 const TRIAD_REPEATS: usize = 8;
-
-/// Benchmark case.
-#[derive(Clone, Copy)]
-struct Load {
-    cells: [usize; 3],
-    grains: usize,
-    scheme: Scheme,
-    precision: Precision,
-}
 
 /// Measurement of one case. The JSON names are stable.
 #[derive(Debug, Serialize)]
@@ -120,13 +107,13 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     let measured: Vec<Measured> = threads::on(threads, || {
         let each = sizes.into_iter();
         each.map(|cells| {
-            let load = Load {
+            let case = BenchCase {
                 cells,
                 grains: args.grains,
                 scheme,
                 precision: args.precision,
             };
-            measure(&load, args.steps, threads)
+            measure(&case, args.steps, threads)
         })
         .collect::<Result<_, Exit>>()
     })??;
@@ -138,15 +125,16 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     }
 }
 
-fn measure(load: &Load, steps: u64, threads: usize) -> Result<Measured, Exit> {
-    let Load {
+fn measure(case: &BenchCase, steps: u64, threads: usize) -> Result<Measured, Exit> {
+    let BenchCase {
         cells,
         grains,
         precision,
         ..
-    } = *load;
+    } = *case;
     let count = cells.iter().product::<usize>() as f64;
-    let mut sim = Simulation::new(setup(load)?).map_err(|e| Exit::new(BAD_INPUT, e.to_string()))?;
+    let mut sim =
+        Simulation::new(case.setup()?).map_err(|e| Exit::new(BAD_INPUT, e.to_string()))?;
     let advance = |sim: &mut Simulation| {
         sim.step(f64::INFINITY)
             .map_err(|e| Exit::new(3, e.to_string()))
@@ -217,78 +205,10 @@ fn median(mut values: Vec<f64>) -> f64 {
     0.5 * (values[(n - 1) / 2] + values[n / 2])
 }
 
-/// Least number of cells per grain along each axis: its longest axis and two.
-const ROOM: usize = 11;
-
-/// Positions of grains on the widest lattice with enough sites, as fractions of the box.
-fn places(cells: [usize; 3], grains: usize) -> Result<Vec<DVec3>, Exit> {
-    let narrowest = cells.iter().copied().fold(usize::MAX, usize::min);
-    let across = |pitch: usize| cells.map(|n| n / pitch);
-    let pitch = (ROOM..=narrowest)
-        .rev()
-        .find(|pitch| across(*pitch).iter().product::<usize>() >= grains);
-    let Some(pitch) = pitch else {
-        let most = across(ROOM).iter().product::<usize>();
-        return Err(Exit::new(
-            BAD_INPUT,
-            format!(
-                "--grains {grains}: at most {most} fit into {cells:?} cells; a larger --size takes more"
-            ),
-        ));
-    };
-    let [nx, ny, nz] = across(pitch);
-    let total = nx * ny * nz;
-    let middle = |n: usize, of: usize| (n as f64 + 0.5) / of as f64;
-    // Grains are spread evenly over the sites.
-    let all = (0..grains).map(|n| (2 * n + 1) * total / (2 * grains));
-    let all = all.map(|n| {
-        DVec3::new(
-            middle(n % nx, nx),
-            middle(n / nx % ny, ny),
-            middle(n / nx / ny, nz),
-        )
-    });
-    Ok(all.collect())
-}
-
-/// Set-up: sampled grains of eight cells diameter in water.
-fn setup(load: &Load) -> Result<Setup, Exit> {
-    let Load {
-        cells,
-        grains,
-        scheme,
-        precision,
-    } = *load;
-    let spacing = 0.25e-3;
-    let mesh = Mesh::cubic(cells, spacing);
-    let radius = 4.0 * spacing;
-    let axes = [1.1 * radius, radius, radius / 1.1];
-    let shape = ellipsoid(axes[0], axes[1], axes[2], &ShapeOptions::default());
-    let shape = Arc::new(shape.expect("a plain ellipsoid"));
-    let grain = |place: DVec3| {
-        // Every grain has its own orientation.
-        let orientation = DQuat::from_scaled_axis(7.0 * place);
-        Grain::new(shape.clone(), 1500.0)
-            .with_position(mesh.extent() * place)
-            .with_orientation(orientation)
-    };
-    Ok(Setup::new(mesh)
-        .with_fluid(FluidParams::new(1000.0, 1e-6))
-        .with_precision(precision)
-        .with_scheme(scheme)
-        .with_gravity(DVec3::new(0.0, 0.0, -9.81))
-        .with_grains(places(cells, grains)?.into_iter().map(grain))
-        .with_step(StepRule::Limits {
-            cfl: 0.3,
-            viscous: 0.2,
-            max_step: 1e-3,
-        }))
-}
-
 /// Bandwidth of a = b + s c over three arrays of `length` doubles, best of several [bytes/s].
 fn triad_bandwidth(length: usize) -> f64 {
     const CHUNK: usize = 1 << 16;
-    let length = length.max(LEAST_TRIAD_LENGTH);
+    let length = length.max(MIN_TRIAD_LENGTH);
     let make = |value: f64| {
         let mut array = vec![0.0; length];
         array
@@ -372,27 +292,4 @@ fn scaling(all: &[Measured]) -> String {
         before = m.ns_per_cell_step;
     }
     lines.join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn grains_have_room_and_are_spread_evenly() {
-        for (cells, grains) in [([100, 100, 390], 2), ([64, 64, 64], 100), ([200; 3], 1000)] {
-            let Ok(places) = places(cells, grains) else {
-                panic!("no room for {grains} in {cells:?}");
-            };
-            let size = DVec3::from_array(cells.map(|n| n as f64));
-            assert_eq!(places.len(), grains);
-            for (n, p) in places.iter().enumerate() {
-                let others = places[..n].iter().map(|q| ((*p - *q) * size).length());
-                assert!(others.fold(f64::INFINITY, f64::min) >= ROOM as f64);
-            }
-            let mean = places.iter().sum::<DVec3>() / grains as f64;
-            assert!((mean - DVec3::splat(0.5)).length() < 0.06, "{mean}");
-        }
-        assert!(places([24, 24, 48], 17).is_err());
-    }
 }

@@ -32,9 +32,9 @@ impl<V: Vector> Complex<V> {
             im: self.re * im + self.im * re,
         }
     }
-    /// Real and imaginary parts exchanged.
+    /// Number with real and imaginary part swapped.
     #[inline(always)]
-    pub fn exchanged(self) -> Self {
+    pub fn swap_parts(self) -> Self {
         Complex {
             re: self.im,
             im: self.re,
@@ -72,9 +72,9 @@ impl<V: Vector> Sub for Complex<V> {
     }
 }
 
-/// Complex numbers a - i b and a + i b.
+/// Butterfly of `a` and of `b` rotated by a quarter turn: a - i b and a + i b.
 #[inline(always)]
-pub fn turned<V: Vector>(a: Complex<V>, b: Complex<V>) -> [Complex<V>; 2] {
+pub fn rotated_butterfly<V: Vector>(a: Complex<V>, b: Complex<V>) -> [Complex<V>; 2] {
     [
         Complex {
             re: a.re + b.im,
@@ -90,7 +90,8 @@ pub fn turned<V: Vector>(a: Complex<V>, b: Complex<V>) -> [Complex<V>; 2] {
 /// View of `values`, aligned to a cache line, as complex vectors.
 #[inline(always)]
 pub fn as_complex<V: Vector>(values: &mut [V::Number]) -> &mut [Complex<V>] {
-    // SAFETY: every `Vector` is `WIDTH` numbers without padding, for which all bits are valid.
+    // SAFETY: `Vector` is sealed, and every implementation is `repr(C)` or `repr(transparent)`,
+    // `WIDTH` numbers without padding. `Complex` is two such vectors. All bits are valid numbers.
     let (head, lanes, _) = unsafe { values.align_to_mut::<Complex<V>>() };
     assert!(head.is_empty(), "lanes start on a cache line");
     lanes

@@ -4,43 +4,59 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 #[cfg(not(target_arch = "x86_64"))]
 use super::plain::Plain;
+use super::sealed::Sealed;
 #[cfg(target_arch = "x86_64")]
 use super::x86::{Avx2F32x8, Avx2F64x4, Avx512F32x16, Avx512F64x8, Sse2F32x8, Sse2F64x4};
 use super::{Real, Vector};
 
-/// Widest vectors of a number for each instruction set.
-pub trait Registers: Sized {
+/// Kernels of a number with the vectors of each instruction set.
+///
+/// Only the vector of the baseline has a name outside this crate: safe code cannot execute
+/// instructions that the machine lacks.
+pub trait Registers: Sealed + Sized {
     /// Vector of [`InstructionSet::Baseline`].
     type Baseline: Vector<Number = Self>;
-    /// Vector of [`InstructionSet::Avx2`].
-    type Avx2: Vector<Number = Self>;
-    /// Vector of [`InstructionSet::Avx512`].
-    type Avx512: Vector<Number = Self>;
+    /// Runs `kernel` with the vectors of [`InstructionSet::Avx2`].
+    ///
+    /// # Safety
+    /// The machine must have AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    unsafe fn with_avx2<K: Kernel<Number = Self>>(kernel: K);
+    /// Runs `kernel` with the vectors of [`InstructionSet::Avx512`].
+    ///
+    /// # Safety
+    /// The machine must have AVX2, FMA, AVX-512F and AVX-512VL.
+    #[cfg(target_arch = "x86_64")]
+    unsafe fn with_avx512<K: Kernel<Number = Self>>(kernel: K);
 }
 
 #[cfg(target_arch = "x86_64")]
-impl Registers for f64 {
-    type Baseline = Sse2F64x4;
-    type Avx2 = Avx2F64x4;
-    type Avx512 = Avx512F64x8;
+macro_rules! registers {
+    ($number:ident, $baseline:ident, $avx2:ident, $avx512:ident) => {
+        impl Registers for $number {
+            type Baseline = $baseline;
+            #[target_feature(enable = "avx2,fma")]
+            unsafe fn with_avx2<K: Kernel<Number = Self>>(kernel: K) {
+                kernel.run::<$avx2>();
+            }
+            #[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
+            unsafe fn with_avx512<K: Kernel<Number = Self>>(kernel: K) {
+                kernel.run::<$avx512>();
+            }
+        }
+    };
 }
 #[cfg(target_arch = "x86_64")]
-impl Registers for f32 {
-    type Baseline = Sse2F32x8;
-    type Avx2 = Avx2F32x8;
-    type Avx512 = Avx512F32x16;
-}
+registers!(f64, Sse2F64x4, Avx2F64x4, Avx512F64x8);
+#[cfg(target_arch = "x86_64")]
+registers!(f32, Sse2F32x8, Avx2F32x8, Avx512F32x16);
 #[cfg(not(target_arch = "x86_64"))]
 impl Registers for f64 {
     type Baseline = Plain<f64, 4>;
-    type Avx2 = Self::Baseline;
-    type Avx512 = Self::Baseline;
 }
 #[cfg(not(target_arch = "x86_64"))]
 impl Registers for f32 {
     type Baseline = Plain<f32, 8>;
-    type Avx2 = Self::Baseline;
-    type Avx512 = Self::Baseline;
 }
 
 /// Computation compiled for every instruction set.
@@ -129,20 +145,10 @@ pub fn dispatch<K: Kernel>(kernel: K) {
     match instructions() {
         // SAFETY: `instructions` never exceeds the sets detected on this machine.
         #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx512 => unsafe { with_avx512(kernel) },
+        InstructionSet::Avx512 => unsafe { K::Number::with_avx512(kernel) },
+        // SAFETY: see above.
         #[cfg(target_arch = "x86_64")]
-        InstructionSet::Avx2 => unsafe { with_avx2(kernel) },
+        InstructionSet::Avx2 => unsafe { K::Number::with_avx2(kernel) },
         _ => kernel.run::<<K::Number as Registers>::Baseline>(),
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
-fn with_avx512<K: Kernel>(kernel: K) {
-    kernel.run::<<K::Number as Registers>::Avx512>();
-}
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-pub(crate) fn with_avx2<K: Kernel>(kernel: K) {
-    kernel.run::<<K::Number as Registers>::Avx2>();
 }

@@ -18,6 +18,7 @@ mod prefetch;
 mod real;
 mod rows;
 mod scalar;
+mod sealed;
 mod stencil;
 #[cfg(test)]
 mod tests;
@@ -26,7 +27,7 @@ mod vector;
 mod x86;
 
 pub use aligned::Aligned;
-pub use complex::{Complex, as_complex, turned};
+pub use complex::{Complex, as_complex, rotated_butterfly};
 pub use dispatch::{InstructionSet, Kernel, Registers, dispatch, instructions, limit_instructions};
 pub use prefetch::{prefetch, prefetch_ahead};
 pub use real::{Precision, Real};

@@ -2,6 +2,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
+use super::sealed::Sealed;
 use super::{Real, Vector};
 
 /// Vector of `N` numbers whose registers the compiler chooses.
@@ -40,6 +41,7 @@ impl<R: Real, const N: usize> Mul for Plain<R, N> {
         self.zip(other, |a, b| a * b)
     }
 }
+impl<R: Real, const N: usize> Sealed for Plain<R, N> {}
 impl<R: Real, const N: usize> Vector for Plain<R, N> {
     const WIDTH: usize = N;
     type Number = R;

@@ -6,6 +6,7 @@ use std::ops::{Add, Div, Mul, Sub};
 use serde::{Deserialize, Serialize};
 
 use super::Registers;
+use super::sealed::Sealed;
 
 /// Precision of the fields of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,9 +51,10 @@ impl Precision {
 }
 
 /// Number of a field, `f64` or `f32`. Sums over the grid and the motion of grains are doubles for
-/// either.
+/// either. Sealed: unsafe code relies on `f64` or `f32`.
 pub trait Real:
-    Registers
+    Sealed
+    + Registers
     + Copy
     + Debug
     + Default

@@ -2,6 +2,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
+use super::sealed::Sealed;
 use super::{Real, Vector};
 
 /// Vector of one number.
@@ -30,6 +31,7 @@ impl<R: Real> Mul for Scalar<R> {
         Scalar(self.0 * other.0)
     }
 }
+impl<R: Real> Sealed for Scalar<R> {}
 impl<R: Real> Vector for Scalar<R> {
     const WIDTH: usize = 1;
     type Number = R;

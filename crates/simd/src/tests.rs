@@ -1,6 +1,5 @@
 //! Every vector against plain numbers.
 
-use super::dispatch::with_avx2;
 use super::plain::Plain;
 use super::*;
 
@@ -145,7 +144,7 @@ fn each_level<R: Real>() {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // SAFETY: just detected.
-        unsafe { with_avx2(Check::<R>::new()) };
+        unsafe { R::with_avx2(Check::<R>::new()) };
     }
 }
 
@@ -197,7 +196,7 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
             // SAFETY: just detected.
-            assert_eq!(one, sum(|work| unsafe { with_avx2(work) }));
+            assert_eq!(one, sum(|work| unsafe { R::with_avx2(work) }));
         }
         let plain: f64 = row[1..].iter().map(|x| x.wide()).sum();
         assert!((one - plain).abs() < 1e-12, "{one} {plain}");
@@ -264,8 +263,10 @@ fn lists_may_end_within_a_vector() {
     fn ends<R: Real>() {
         let ends = || Ends(R::default());
         dispatch(ends());
+        #[cfg(target_arch = "x86_64")]
         if instructions() >= InstructionSet::Avx2 {
-            ends().run::<<f64 as Registers>::Avx2>();
+            // SAFETY: `instructions` never exceeds the sets detected on this machine.
+            unsafe { f64::with_avx2(ends()) };
         }
         ends().run::<<f64 as Registers>::Baseline>();
         ends().run::<Scalar<f64>>();

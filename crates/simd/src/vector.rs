@@ -2,11 +2,16 @@
 
 use std::ops::{Add, Mul, Sub};
 
+use super::sealed::Sealed;
 use super::{MAX_LANES, Real};
 
 /// A register of `WIDTH` numbers.
+///
+/// Sealed: unsafe code relies on `WIDTH` numbers without padding, for which all bits are valid.
+/// [`super::dispatch`] alone names vectors wider than the baseline, inside a kernel and on a
+/// machine that has their instructions. Hence the safe functions of a vector may execute them.
 pub trait Vector:
-    Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+    Sealed + Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
     /// Number of lanes: 8, 4 or 1 doubles, 16, 8, 4 or 1 singles.
     const WIDTH: usize;

@@ -5,6 +5,7 @@ use std::ops::{Add, Mul, Sub};
 
 use super::{Sse2F32x4, same, transpose};
 use crate::real::{RSQRT_MAGIC_F32, RSQRT_MAGIC_F64};
+use crate::sealed::Sealed;
 use crate::{Real, Vector};
 
 vector! {
@@ -157,25 +158,31 @@ fn at_most_four(count: usize) -> i32 {
 /// The numbers of the lanes.
 #[inline(always)]
 unsafe fn ramp256() -> __m256i {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { _mm256_setr_epi64x(0, 1, 2, 3) }
 }
 #[inline(always)]
 unsafe fn ramp128() -> __m128i {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { _mm_setr_epi32(0, 1, 2, 3) }
 }
 #[inline(always)]
 unsafe fn widen_lower_four(v: Avx2F32x8) -> Avx2F64x4 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { Avx2F64x4(_mm256_cvtps_pd(_mm256_castps256_ps128(v.0))) }
 }
 #[inline(always)]
 unsafe fn widen_upper_four(v: Avx2F32x8) -> Avx2F64x4 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { Avx2F64x4(_mm256_cvtps_pd(_mm256_extractf128_ps::<1>(v.0))) }
 }
 #[inline(always)]
 unsafe fn select256_pd(a: __m256d, limit: __m256d, yes: __m256d, no: __m256d) -> __m256d {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { _mm256_blendv_pd(no, yes, _mm256_cmp_pd::<_CMP_LT_OQ>(a, limit)) }
 }
 #[inline(always)]
 unsafe fn select256_ps(a: __m256, limit: __m256, yes: __m256, no: __m256) -> __m256 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { _mm256_blendv_ps(no, yes, _mm256_cmp_ps::<_CMP_LT_OQ>(a, limit)) }
 }

@@ -5,6 +5,7 @@ use std::ops::{Add, Mul, Sub};
 
 use super::{Avx2F32x8, Avx2F64x4, Sse2F32x4, same, transpose};
 use crate::real::{RSQRT_MAGIC_F32, RSQRT_MAGIC_F64};
+use crate::sealed::Sealed;
 use crate::{Real, Vector};
 
 /// Rounding to the whole number below.
@@ -143,10 +144,12 @@ fn first_of_eight(count: usize) -> u8 {
 }
 #[inline(always)]
 unsafe fn widen_lower_eight(v: Avx512F32x16) -> Avx512F64x8 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { Avx512F64x8(_mm512_cvtps_pd(_mm512_castps512_ps256(v.0))) }
 }
 #[inline(always)]
 unsafe fn widen_upper_eight(v: Avx512F32x16) -> Avx512F64x8 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         let upper = _mm512_extractf64x4_pd::<1>(_mm512_castps_pd(v.0));
         Avx512F64x8(_mm512_cvtps_pd(_mm256_castpd_ps(upper)))
@@ -154,9 +157,11 @@ unsafe fn widen_upper_eight(v: Avx512F32x16) -> Avx512F64x8 {
 }
 #[inline(always)]
 unsafe fn select512_pd(a: __m512d, limit: __m512d, yes: __m512d, no: __m512d) -> __m512d {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, limit), no, yes) }
 }
 #[inline(always)]
 unsafe fn select512_ps(a: __m512, limit: __m512, yes: __m512, no: __m512) -> __m512 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, limit), no, yes) }
 }

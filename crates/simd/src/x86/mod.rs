@@ -1,8 +1,14 @@
 //! Vectors of x86-64: SSE2 (on every machine), AVX2 with FMA, AVX-512.
 //!
-//! SAFETY of every block here: only kernels make these vectors, [`super::dispatch`] runs them after
-//! it has found the instruction set on the machine, and every load and store cuts its slice to the
-//! width first.
+//! SAFETY of every block here:
+//!
+//! - Instructions: no other crate can name these types. Generic code gets AVX2 and AVX-512 from
+//!   [`crate::dispatch`] alone, after detection of the instruction set on the machine. `Half`,
+//!   `Tail` and the vector of doubles need no more than the vector itself. The unsafe functions
+//!   require the instruction set of their vector.
+//! - Memory: every load and store cuts its slice to the width first, or masks the lanes beyond it.
+//!   [`crate::Real`] and [`crate::Vector`] are sealed: a number is `f32` or `f64`, a vector is
+//!   `WIDTH` numbers without padding.
 
 /// A vector of one register, or of two side by side.
 macro_rules! vector {
@@ -44,6 +50,7 @@ macro_rules! vector {
                 unsafe { $name($($mul(self.$i, other.$i)),+) }
             }
         }
+        impl Sealed for $name {}
         impl Vector for $name {
             const WIDTH: usize = $width;
             type Number = $number;
@@ -145,7 +152,7 @@ pub use avx2::{Avx2F32x8, Avx2F64x4};
 pub use avx512::{Avx512F32x16, Avx512F64x8};
 pub use sse2::{Sse2F32x4, Sse2F32x8, Sse2F64x4};
 
-/// A vector of doubles, unchanged.
+/// Vector of doubles, unchanged. Unsafe like the conversions that stand in its place.
 #[inline(always)]
 unsafe fn same<V>(v: V) -> V {
     v

@@ -5,6 +5,7 @@ use std::ops::{Add, Mul, Sub};
 
 use super::{same, transpose};
 use crate::Vector;
+use crate::sealed::Sealed;
 
 vector! {
     /// Four doubles in two registers.
@@ -33,22 +34,27 @@ vector! {
 
 #[inline(always)]
 unsafe fn pairs(v: __m128) -> Sse2F64x4 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { Sse2F64x4(_mm_cvtps_pd(v), _mm_cvtps_pd(_mm_movehl_ps(v, v))) }
 }
 #[inline(always)]
 unsafe fn widen_four(v: Sse2F32x4) -> Sse2F64x4 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { pairs(v.0) }
 }
 #[inline(always)]
 unsafe fn widen_first(v: Sse2F32x8) -> Sse2F64x4 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { pairs(v.0) }
 }
 #[inline(always)]
 unsafe fn widen_second(v: Sse2F32x8) -> Sse2F64x4 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe { pairs(v.1) }
 }
 #[inline(always)]
 unsafe fn select128_pd(a: __m128d, limit: __m128d, yes: __m128d, no: __m128d) -> __m128d {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         let below = _mm_cmplt_pd(a, limit);
         _mm_or_pd(_mm_and_pd(below, yes), _mm_andnot_pd(below, no))
@@ -56,6 +62,7 @@ unsafe fn select128_pd(a: __m128d, limit: __m128d, yes: __m128d, no: __m128d) ->
 }
 #[inline(always)]
 unsafe fn select128_ps(a: __m128, limit: __m128, yes: __m128, no: __m128) -> __m128 {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         let below = _mm_cmplt_ps(a, limit);
         _mm_or_ps(_mm_and_ps(below, yes), _mm_andnot_ps(below, no))
@@ -65,6 +72,7 @@ unsafe fn select128_ps(a: __m128, limit: __m128, yes: __m128, no: __m128) -> __m
 #[inline(always)]
 unsafe fn fused128_pd(a: __m128d, factor: __m128d, term: __m128d) -> __m128d {
     let (mut lanes, mut factors, mut terms) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         _mm_storeu_pd(lanes.as_mut_ptr(), a);
         _mm_storeu_pd(factors.as_mut_ptr(), factor);
@@ -78,6 +86,7 @@ unsafe fn fused128_pd(a: __m128d, factor: __m128d, term: __m128d) -> __m128d {
 #[inline(always)]
 unsafe fn fused128_ps(a: __m128, factor: __m128, term: __m128) -> __m128 {
     let (mut lanes, mut factors, mut terms) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         _mm_storeu_ps(lanes.as_mut_ptr(), a);
         _mm_storeu_ps(factors.as_mut_ptr(), factor);

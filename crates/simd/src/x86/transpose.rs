@@ -1,16 +1,17 @@
-//! Rows and columns swapped in registers, for the lanes of x86-64: pairs of numbers are exchanged
-//! first, then pairs of pairs, then quarters of a register.
+//! Transposes of square blocks in registers of x86-64: pairs of numbers are swapped first, then
+//! pairs of pairs, then quarters of a register.
+//!
+//! Every function requires the instruction set of its vector.
 
 use std::arch::x86_64::*;
 
 use super::*;
 
-/// # Safety
-/// The machine must have the instruction set of the vector, here and below.
 #[inline(always)]
 pub unsafe fn sse2_f64x4(block: &mut [Sse2F64x4]) {
     let block = &mut block[..4];
     let [a, b, c, d] = [block[0], block[1], block[2], block[3]];
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         block[0] = Sse2F64x4(_mm_unpacklo_pd(a.0, b.0), _mm_unpacklo_pd(c.0, d.0));
         block[1] = Sse2F64x4(_mm_unpackhi_pd(a.0, b.0), _mm_unpackhi_pd(c.0, d.0));
@@ -23,6 +24,7 @@ pub unsafe fn sse2_f64x4(block: &mut [Sse2F64x4]) {
 pub unsafe fn avx2_f64x4(block: &mut [Avx2F64x4]) {
     let block = &mut block[..4];
     let [a, b, c, d] = [block[0].0, block[1].0, block[2].0, block[3].0];
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         let (e, f) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
         let (g, h) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
@@ -36,6 +38,7 @@ pub unsafe fn avx2_f64x4(block: &mut [Avx2F64x4]) {
 #[inline(always)]
 pub unsafe fn avx512_f64x8(block: &mut [Avx512F64x8]) {
     let block = &mut block[..8];
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         let mut pairs = [block[0].0; 8];
         for i in 0..4 {
@@ -64,6 +67,7 @@ pub unsafe fn avx512_f64x8(block: &mut [Avx512F64x8]) {
 /// Columns of four rows of four singles.
 #[inline(always)]
 unsafe fn square([a, b, c, d]: [__m128; 4]) -> [__m128; 4] {
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         let (e, f) = (_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b));
         let (g, h) = (_mm_unpacklo_ps(c, d), _mm_unpackhi_ps(c, d));
@@ -79,6 +83,7 @@ unsafe fn square([a, b, c, d]: [__m128; 4]) -> [__m128; 4] {
 #[inline(always)]
 pub unsafe fn sse2_f32x4(block: &mut [Sse2F32x4]) {
     let block = &mut block[..4];
+    // SAFETY: see the head of `x86/mod.rs`.
     let columns = unsafe { square([block[0].0, block[1].0, block[2].0, block[3].0]) };
     for i in 0..4 {
         block[i] = Sse2F32x4(columns[i]);
@@ -89,6 +94,7 @@ pub unsafe fn sse2_f32x4(block: &mut [Sse2F32x4]) {
 pub unsafe fn sse2_f32x8(block: &mut [Sse2F32x8]) {
     let block = &mut block[..8];
     let [upper, lower] = [0, 4].map(|at| [block[at], block[at + 1], block[at + 2], block[at + 3]]);
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         let (a, b) = (
             square([upper[0].0, upper[1].0, upper[2].0, upper[3].0]),
@@ -108,6 +114,7 @@ pub unsafe fn sse2_f32x8(block: &mut [Sse2F32x8]) {
 #[inline(always)]
 pub unsafe fn avx2_f32x8(block: &mut [Avx2F32x8]) {
     let block = &mut block[..8];
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         // Columns c and 4 + c of the rows 4 i to 4 i + 3.
         let mut quarters = [block[0].0; 8];
@@ -137,6 +144,7 @@ pub unsafe fn avx2_f32x8(block: &mut [Avx2F32x8]) {
 #[inline(always)]
 pub unsafe fn avx512_f32x16(block: &mut [Avx512F32x16]) {
     let block = &mut block[..16];
+    // SAFETY: see the head of `x86/mod.rs`.
     unsafe {
         // Columns c, 4 + c, 8 + c and 12 + c of the rows 4 i to 4 i + 3.
         let mut quarters = [block[0].0; 16];

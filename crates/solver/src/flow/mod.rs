@@ -11,6 +11,6 @@ mod solver;
 mod tendency;
 
 pub use boundary::{Boundaries, Boundary};
-pub use params::{Advection, FluidParams};
-pub(crate) use prediction::{Known, Prediction};
+pub use params::FluidParams;
+pub(crate) use prediction::{OldState, Prediction};
 pub(crate) use solver::{Flow, FlowMeasures};

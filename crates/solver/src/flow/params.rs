@@ -1,16 +1,6 @@
 //! Parameters of the fluid.
 
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
-
-/// Advection scheme.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Advection {
-    /// Conservative second-order central differences: no numerical dissipation.
-    #[default]
-    Central,
-}
 
 /// Properties of the fluid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,8 +13,6 @@ pub struct FluidParams {
     pub body_acceleration: DVec3,
     /// Uniform velocity at the start [m/s].
     pub initial_velocity: DVec3,
-    /// Advection scheme.
-    pub advection: Advection,
 }
 
 impl FluidParams {
@@ -35,7 +23,6 @@ impl FluidParams {
             kinematic_viscosity,
             body_acceleration: DVec3::ZERO,
             initial_velocity: DVec3::ZERO,
-            advection: Advection::default(),
         }
     }
 }

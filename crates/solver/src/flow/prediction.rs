@@ -5,13 +5,15 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::{Boundaries, Flow};
-use crate::grid::{Centre, FaceVector, Field, Mesh, Part, for_slabs};
+use crate::grid::{Centre, FaceVector, Field, Mesh, SharedRows, for_slabs};
 use crate::math::Real;
 use grainwake_simd::Vector;
 
 /// State at t^n from which the prediction was computed.
-pub struct Known<'a, R> {
+pub struct OldState<'a, R> {
+    /// Grid of the box.
     pub mesh: &'a Mesh,
+    /// Conditions on the faces of the box.
     pub boundaries: &'a Boundaries,
     /// Velocity u^n [m/s].
     pub velocity: &'a FaceVector<R>,
@@ -25,15 +27,15 @@ pub struct Known<'a, R> {
 pub struct Prediction<'a, R> {
     /// Weight of H^n in u* [s].
     weight: f64,
-    tendency: Part<'a, R>,
-    velocity: Part<'a, R>,
+    tendency: SharedRows<'a, R>,
+    velocity: SharedRows<'a, R>,
 }
 
 impl<R: Real> Flow<R> {
     /// State at t^n, and the prediction of each component.
-    pub fn prediction(&mut self) -> (Known<'_, R>, [Prediction<'_, R>; 3]) {
+    pub fn prediction(&mut self) -> (OldState<'_, R>, [Prediction<'_, R>; 3]) {
         let weight = self.weight;
-        let known = Known {
+        let old = OldState {
             mesh: &self.mesh,
             boundaries: &self.boundaries,
             velocity: &self.velocity,
@@ -43,7 +45,7 @@ impl<R: Real> Flow<R> {
         let predictions = fields(&mut self.tendency, &mut self.predicted);
         let predictions =
             predictions.map(|[tendency, velocity]| Prediction::new(weight, 0, tendency, velocity));
-        (known, predictions)
+        (old, predictions)
     }
 
     /// Calls `each(component, prediction)` for slabs of all components in parallel.
@@ -82,8 +84,8 @@ impl<'a, R: Real> Prediction<'a, R> {
     ) -> Prediction<'a, R> {
         Prediction {
             weight,
-            tendency: Part::new(start, tendency),
-            velocity: Part::new(start, velocity),
+            tendency: SharedRows::new(start, tendency),
+            velocity: SharedRows::new(start, velocity),
         }
     }
 

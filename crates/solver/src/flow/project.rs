@@ -17,6 +17,7 @@ use grainwake_simd::{
 /// Contribution of one plane to the measures of the flow.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PlaneMeasures {
+    /// Measures of the plane alone; `max_velocity` is squared, integrals are sums over cells.
     pub flow: FlowMeasures,
     /// Sum of the tendencies over the unknown faces [m/s^2].
     pub tendency: DVec3,
@@ -26,13 +27,19 @@ pub struct PlaneMeasures {
 
 /// Divergence of one plane of the prediction over dt, the right-hand side of the Poisson equation.
 pub struct Divergence<'a, R> {
+    /// Layout of all fields.
     pub layout: Layout,
+    /// Whether each axis is periodic.
     pub periodic: [bool; 3],
+    /// Prediction u* [m/s].
     pub predicted: &'a FaceVector<R>,
+    /// Index of the plane.
     pub k: usize,
     /// 1/h along each axis [1/m].
     pub inverse: [f64; 3],
+    /// Time step [s].
     pub dt: f64,
+    /// Divergence over dt [1/s^2], overwritten.
     pub out: &'a mut Plane<R>,
 }
 
@@ -119,18 +126,27 @@ impl<R: Real> RowWork for DivergenceRow<'_, R> {
 
 /// Correction of one plane: u = u* - dt grad f, p += f; the caller fills the ghosts.
 pub struct Correct<'a, R> {
+    /// Layout of all fields.
     pub layout: Layout,
+    /// Prediction u* [m/s].
     pub predicted: &'a FaceVector<R>,
+    /// Pressure increment over density f [m^2/s^2].
     pub solution: Solution<'a, R>,
+    /// Whether each axis is periodic.
     pub periodic: [bool; 3],
+    /// Index of the plane.
     pub k: usize,
+    /// 1/h along each axis [1/m].
     pub inverse: [f64; 3],
     /// dt/h along each axis [s/m].
-    pub pull: [f64; 3],
+    pub dt_per_h: [f64; 3],
     /// Whether the velocity is written with non-temporal stores.
     pub non_temporal: bool,
+    /// Plane of the corrected velocity [m/s], overwritten.
     pub velocity: [&'a mut [R]; 3],
+    /// Plane of the pressure over density [m^2/s^2], to which f is added.
     pub pressure: &'a mut [R],
+    /// Measures of the plane, overwritten except for `tendency`.
     pub measures: &'a mut PlaneMeasures,
 }
 
@@ -166,7 +182,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 lower: [&f.row(j - 1)[..n + 2], &fb.row(j)[..n + 2]],
                 upper: [&f.row(j + 1)[..n + 2], &ft.row(j)[..n + 2]],
                 inverse: self.inverse,
-                pull: self.pull,
+                dt_per_h: self.dt_per_h,
                 out: [
                     layout.row_of_mut(x, j),
                     layout.row_of_mut(y, j),
@@ -175,7 +191,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 pressure: layout.row_of_mut(p, j),
                 streamed: if self.non_temporal { n } else { 0 },
                 partial: &mut partial,
-                given: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
+                prescribed: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
             };
             if periodic[0] {
                 // The upper face of the last cell is the lower face of the first.
@@ -184,8 +200,8 @@ impl<R: Real> Kernel for Correct<'_, R> {
             } else {
                 along_row::<V>(n, &mut work);
                 // The sum contains the lower boundary face, which is no unknown.
-                let given = -work.out[0][1].wide();
-                work.partial.momentum[0].add(1, Scalar::<R>::constant(given));
+                let prescribed = -work.out[0][1].wide();
+                work.partial.momentum[0].add(1, Scalar::<R>::constant(prescribed));
             }
             rise[0] += work.pressure[n].wide() - work.pressure[1].wide();
         }
@@ -229,14 +245,14 @@ struct CorrectRow<'a, R> {
     lower: [&'a [R]; 2],
     upper: [&'a [R]; 2],
     inverse: [f64; 3],
-    pull: [f64; 3],
+    dt_per_h: [f64; 3],
     out: [&'a mut [R]; 3],
     pressure: &'a mut [R],
     /// Entries of the row if written with non-temporal stores, else 0.
     streamed: usize,
     partial: &'a mut CorrectPartial<R>,
-    /// Components whose faces on the whole row have a given velocity.
-    given: [bool; 3],
+    /// Components whose faces on the whole row have a prescribed velocity.
+    prescribed: [bool; 3],
 }
 
 impl<R: Real> CorrectRow<'_, R> {
@@ -255,12 +271,12 @@ impl<R: Real> CorrectRow<'_, R> {
         // The ghosts are filled from the ends of a row, which therefore stay in the cache.
         let streamed = inside_row(i, V::WIDTH, self.streamed);
         for axis in 0..3 {
-            let (pull, inverse) = (
-                V::constant(self.pull[axis]),
+            let (dt_per_h, inverse) = (
+                V::constant(self.dt_per_h[axis]),
                 V::constant(self.inverse[axis]),
             );
-            let q = here(self.q[axis]) - pull * (f - lower[axis]);
-            let next = above[axis] - pull * (upper[axis] - f);
+            let q = here(self.q[axis]) - dt_per_h * (f - lower[axis]);
+            let next = above[axis] - dt_per_h * (upper[axis] - f);
             let to = window_mut::<V>(self.out[axis], i);
             if streamed {
                 q.store_non_temporal(to);
@@ -270,7 +286,7 @@ impl<R: Real> CorrectRow<'_, R> {
             square = square + q * q;
             rate = rate + q.abs() * inverse;
             divergence = divergence + (next - q) * inverse;
-            if !self.given[axis] {
+            if !self.prescribed[axis] {
                 self.partial.momentum[axis].add(i, q);
             }
         }

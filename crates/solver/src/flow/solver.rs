@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, Slab, for_planes_of};
 use crate::math::{Real, last_cache};
-use crate::poisson::{Plane, Poisson, Stages};
+use crate::poisson::{Plane, Poisson, PoissonTimes};
 use grainwake_simd::dispatch;
 
 use super::project::{Correct, Divergence, PlaneMeasures};
@@ -30,10 +30,13 @@ pub struct FlowMeasures {
 
 /// State of the fluid.
 pub struct Flow<R = f64> {
+    /// Grid of the box.
     pub(super) mesh: Mesh,
-    /// Planes whose fields this flow holds: today the whole box.
+    /// Planes whose fields this flow holds, the whole box.
     slab: Slab,
+    /// Conditions on the faces of the box.
     pub(super) boundaries: Boundaries,
+    /// Constants of the tendency.
     pub(super) coefficients: Coefficients,
     /// Velocity u^n [m/s].
     pub velocity: FaceVector<R>,
@@ -41,15 +44,20 @@ pub struct Flow<R = f64> {
     pub predicted: FaceVector<R>,
     /// Dynamic pressure over density p^n [m^2/s^2].
     pub pressure: Field<Centre, R>,
+    /// Tendency H of the last prediction [m/s^2].
     pub(super) tendency: FaceVector<R>,
     poisson: Poisson<R>,
     /// Whether fields are written with non-temporal stores.
     non_temporal: bool,
+    /// Measures of each plane.
     partial: Vec<PlaneMeasures>,
+    /// Length of the last step [s]; none before the first.
     previous_step: Option<f64>,
+    /// Weight of H^n in the last prediction [s].
     pub(super) weight: f64,
     /// Sums of H over the unknown faces: three of the previous step, then three of the last one.
     tendency_sums: [f64; 6],
+    /// Sum over the unknown faces of the weighted tendencies of the last prediction [m/s].
     impulse: DVec3,
     /// Pressure difference between upper and lower end, summed over the lines along each axis.
     pressure_rise: DVec3,
@@ -83,9 +91,7 @@ impl<R: Real> Flow<R> {
         };
         flow.non_temporal = flow.bytes() > last_cache() / 4 * 3;
         flow.poisson.non_temporal = flow.non_temporal;
-        flow.velocity.x.fill(R::of(params.initial_velocity.x));
-        flow.velocity.y.fill(R::of(params.initial_velocity.y));
-        flow.velocity.z.fill(R::of(params.initial_velocity.z));
+        flow.velocity.fill(params.initial_velocity);
         flow.make_solenoidal();
         flow
     }
@@ -93,9 +99,7 @@ impl<R: Real> Flow<R> {
     /// Sets the velocity to `component(axis, position)` [m/s, m] and projects.
     pub fn start_from(&mut self, component: impl Fn(usize, DVec3) -> f64) {
         let slab = self.slab;
-        self.velocity.x.fill_with(&slab, |at| component(0, at));
-        self.velocity.y.fill_with(&slab, |at| component(1, at));
-        self.velocity.z.fill_with(&slab, |at| component(2, at));
+        self.velocity.fill_with(&slab, component);
         self.make_solenoidal();
     }
 
@@ -107,11 +111,7 @@ impl<R: Real> Flow<R> {
     /// Projects the velocity onto the divergence-free fields and keeps the pressure; for initial
     /// states.
     pub fn make_solenoidal(&mut self) -> FlowMeasures {
-        for axis in 0..3 {
-            self.predicted
-                .component_mut(axis)
-                .copy_from_slice(self.velocity.component(axis));
-        }
+        self.predicted.copy_from(&self.velocity);
         self.boundaries.set_normal(&mut self.predicted);
         self.boundaries
             .convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, 0.0);
@@ -129,9 +129,9 @@ impl<R: Real> Flow<R> {
         let weights = Weights {
             now,
             before,
-            push: self.mesh.spacing.to_array().map(|h| dt / h),
+            dt_per_h: self.mesh.spacing.to_array().map(|h| dt / h),
         };
-        let (layout, walled) = (self.mesh.layout(), self.boundaries.walled());
+        let (layout, periodic) = (self.mesh.layout(), self.boundaries.periodic());
         let (velocity, pressure, boundaries) = (&self.velocity, &self.pressure, &self.boundaries);
         let (coefficients, non_temporal) = (&self.coefficients, self.non_temporal);
         let FaceVector { x, y, z } = &mut self.tendency;
@@ -151,7 +151,7 @@ impl<R: Real> Flow<R> {
                     weights,
                     velocity,
                     pressure,
-                    walled,
+                    periodic,
                     k,
                     non_temporal,
                     tendency: [x, y, z],
@@ -161,7 +161,7 @@ impl<R: Real> Flow<R> {
                 boundaries.set_normal_of_plane(layout, [px, py]);
             },
         );
-        for (face, value) in boundaries.given_faces(2, layout.cells[2]) {
+        for (face, value) in boundaries.prescribed_faces(2, layout.cells[2]) {
             let plane = layout.plane();
             pz[face * plane..(face + 1) * plane].fill(R::of(value));
         }
@@ -184,8 +184,7 @@ impl<R: Real> Flow<R> {
         let [row, plane] = [layout.row(), layout.plane()];
         let [nx, ny, nz] = layout.cells;
         let inverse = self.mesh.spacing.to_array().map(|h| 1.0 / h);
-        let walled = self.boundaries.walled();
-        let periodic = walled.map(|walled| !walled);
+        let periodic = self.boundaries.periodic();
         let (predicted, boundaries) = (&self.predicted, &self.boundaries);
         let non_temporal = self.non_temporal;
         let divergence = |k: usize, out: &mut Plane<R>| {
@@ -203,8 +202,8 @@ impl<R: Real> Flow<R> {
         let fields = [&mut **x, &mut **y, &mut **z, &mut *self.pressure];
         let partial = &mut self.partial;
         self.poisson
-            .solve(divergence, fields, partial, |k, solution, run| {
-                let ([x, y, z, p], measures) = run.plane(k);
+            .solve(divergence, fields, partial, |k, solution, range| {
+                let ([x, y, z, p], measures) = range.plane(k);
                 dispatch(Correct {
                     layout,
                     predicted,
@@ -212,20 +211,20 @@ impl<R: Real> Flow<R> {
                     periodic,
                     k,
                     inverse,
-                    pull: inverse.map(|inverse| dt * inverse),
+                    dt_per_h: inverse.map(|inverse| dt * inverse),
                     non_temporal,
                     velocity: [&mut *x, &mut *y, &mut *z],
                     pressure: &mut *p,
                     measures,
                 });
                 // The upper boundary faces keep the predicted velocity.
-                if walled[0] {
+                if !periodic[0] {
                     for j in 1..=ny {
                         let at = j * row + nx + 1;
                         x[at] = predicted.x[k * plane + at];
                     }
                 }
-                if walled[1] {
+                if !periodic[1] {
                     let upper = (ny + 1) * row..(ny + 2) * row;
                     y[upper.clone()].copy_from_slice(&predicted.y[k * plane..][upper]);
                 }
@@ -234,7 +233,7 @@ impl<R: Real> Flow<R> {
                 }
                 boundaries.fill_pressure_of_plane(layout, p);
             });
-        if walled[2] {
+        if !periodic[2] {
             let upper = (nz + 1) * plane..;
             z[upper.clone()].copy_from_slice(&predicted.z[upper]);
         }
@@ -291,11 +290,7 @@ impl<R: Real> Flow<R> {
     /// and p is incremented.
     pub fn project_prediction(&mut self, dt: f64) {
         self.project(dt);
-        for axis in 0..3 {
-            self.predicted
-                .component_mut(axis)
-                .copy_from_slice(self.velocity.component(axis));
-        }
+        self.predicted.copy_from(&self.velocity);
     }
 
     /// State on which later steps depend: fields, and sums over them.
@@ -304,7 +299,7 @@ impl<R: Real> Flow<R> {
         let fields = [&*u.x, &u.y, &u.z, &h.x, &h.y, &h.z, &self.pressure];
         (fields, &self.tendency_sums)
     }
-    /// State to be overwritten by one whose last step was `last_step` [s] long.
+    /// Mutable [`Self::state`], to be overwritten by a state whose last step took `last_step` [s].
     pub fn state_mut(&mut self, last_step: f64) -> ([&mut [R]; 7], &mut [f64]) {
         self.previous_step = (last_step > 0.0).then_some(last_step);
         let (u, h) = (&mut self.velocity, &mut self.tendency);
@@ -328,7 +323,7 @@ impl<R: Real> Flow<R> {
     pub fn pressure_view(&self) -> FieldView<'_, R> {
         self.pressure.view(&self.slab)
     }
-    /// The grid.
+    /// Grid of the box.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
@@ -341,8 +336,8 @@ impl<R: Real> Flow<R> {
         R::BYTES * 10 * self.mesh.layout().len() + self.poisson.bytes()
     }
     /// Time spent in each stage of the Poisson solves, divergence and correction included.
-    pub fn poisson_stages(&self) -> Stages {
-        self.poisson.stages()
+    pub fn poisson_times(&self) -> PoissonTimes {
+        self.poisson.times()
     }
 }
 

@@ -21,7 +21,9 @@ use grainwake_simd::{
 pub struct Coefficients {
     /// 1/(4 h) along each axis [1/m]: value and velocity of a link are means of two.
     quarter_inverse: [f64; 3],
+    /// nu/h^2 along each axis [1/s].
     nu_inverse_square: [f64; 3],
+    /// Uniform acceleration that drives the flow [m/s^2].
     pub(super) acceleration: DVec3,
 }
 
@@ -65,24 +67,31 @@ pub struct Weights {
     pub now: f64,
     /// Weight of the old tendency [s].
     pub before: f64,
-    /// Weight of the pressure difference along each axis [s/m].
-    pub push: [f64; 3],
+    /// Weight dt/h of the pressure difference along each axis [s/m].
+    pub dt_per_h: [f64; 3],
 }
 
 /// One plane of the prediction u* = u + now H + before H_old - dt grad p.
 pub struct PredictPlane<'a, R> {
+    /// Layout of all fields.
     pub layout: Layout,
+    /// Constants of the tendency.
     pub coefficients: &'a Coefficients,
+    /// Weights of the terms.
     pub weights: Weights,
+    /// Velocity u^n with ghosts [m/s].
     pub velocity: &'a FaceVector<R>,
+    /// Pressure over density p^n with ghosts [m^2/s^2].
     pub pressure: &'a [R],
-    /// Axes whose boundary faces have a given velocity.
-    pub walled: [bool; 3],
+    /// Whether each axis is periodic; the boundary faces of the others are no unknowns.
+    pub periodic: [bool; 3],
+    /// Index of the plane.
     pub k: usize,
     /// Whether the prediction is written with non-temporal stores.
     pub non_temporal: bool,
     /// H_old, overwritten by H.
     pub tendency: [&'a mut [R]; 3],
+    /// Plane of u* [m/s], overwritten.
     pub predicted: [&'a mut [R]; 3],
     /// Sum of H over the unknown faces of the plane [m/s^2], to be set.
     pub sum: &'a mut DVec3,
@@ -120,14 +129,18 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
                     layout.row_of_mut(pz, j),
                 ],
                 sums: &mut sums,
-                given: [false, self.walled[1] && j == 1, self.walled[2] && k == 1],
+                prescribed: [
+                    false,
+                    !self.periodic[1] && j == 1,
+                    !self.periodic[2] && k == 1,
+                ],
                 streamed: if self.non_temporal { n } else { 0 },
             };
             along_row::<V>(n, &mut work);
-            if self.walled[0] {
+            if !self.periodic[0] {
                 // The sum contains the lower boundary face, which is no unknown.
-                let given = -work.tendency[0][1].wide();
-                work.sums[0].add(1, Scalar::<R>::constant(given));
+                let prescribed = -work.tendency[0][1].wide();
+                work.sums[0].add(1, Scalar::<R>::constant(prescribed));
             }
         }
         V::fence();
@@ -178,8 +191,8 @@ struct PredictRow<'a, R> {
     tendency: [&'a mut [R]; 3],
     predicted: [&'a mut [R]; 3],
     sums: &'a mut [Partial; 3],
-    /// Components whose faces on the whole row have a given velocity.
-    given: [bool; 3],
+    /// Components whose faces on the whole row have a prescribed velocity.
+    prescribed: [bool; 3],
     /// Entries of the row if written with non-temporal stores, else 0.
     streamed: usize,
 }
@@ -235,9 +248,9 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
         let streamed = inside_row(i, V::WIDTH, self.streamed);
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
             let old = window_mut::<V>(self.tendency[axis], i);
-            let push = V::constant(self.weights.push[axis]) * (pc - lower[axis]);
+            let pressure = V::constant(self.weights.dt_per_h[axis]) * (pc - lower[axis]);
             // Small terms are summed before q is added: fewer of their digits are lost.
-            let gain = now * h + before * V::load(old) - push;
+            let gain = now * h + before * V::load(old) - pressure;
             let to = window_mut::<V>(self.predicted[axis], i);
             if streamed {
                 (q + gain).store_non_temporal(to);
@@ -245,7 +258,7 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
                 (q + gain).store(to);
             }
             h.store(old);
-            if !self.given[axis] {
+            if !self.prescribed[axis] {
                 self.sums[axis].add(i, h);
             }
         }

@@ -119,7 +119,7 @@ impl Layout {
     pub fn row_of<'a, T>(&self, plane: &'a [T], j: usize) -> &'a [T] {
         &plane[j * self.row()..][..self.cells[0] + 2]
     }
-    /// Row `j` of a plane, to be overwritten.
+    /// Mutable row `j` of a plane.
     #[inline(always)]
     pub fn row_of_mut<'a, T>(&self, plane: &'a mut [T], j: usize) -> &'a mut [T] {
         &mut plane[j * self.row()..][..self.cells[0] + 2]
@@ -290,6 +290,25 @@ impl<R: Real> FaceVector<R> {
             y: Field::zeros(slab),
             z: Field::zeros(slab),
         }
+    }
+    /// Copies all values of `other`, ghosts included.
+    pub fn copy_from(&mut self, other: &FaceVector<R>) {
+        for axis in 0..3 {
+            self.component_mut(axis)
+                .copy_from_slice(other.component(axis));
+        }
+    }
+    /// Sets every value to one vector.
+    pub fn fill(&mut self, value: DVec3) {
+        for axis in 0..3 {
+            self.component_mut(axis).fill(R::of(value[axis]));
+        }
+    }
+    /// Sets every interior value to `component(axis, position)` [m].
+    pub fn fill_with(&mut self, slab: &Slab, component: impl Fn(usize, DVec3) -> f64) {
+        self.x.fill_with(slab, |at| component(0, at));
+        self.y.fill_with(slab, |at| component(1, at));
+        self.z.fill_with(slab, |at| component(2, at));
     }
     /// Read-only view of one component without ghosts.
     pub fn view<'a>(&'a self, axis: Axis, slab: &Slab) -> FieldView<'a, R> {

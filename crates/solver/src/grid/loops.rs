@@ -53,14 +53,14 @@ pub fn for_slabs<const N: usize, R: Send>(
         .for_each(|(component, start, parts)| f(component, start, parts));
 }
 
-/// Consecutive planes of several fields that one thread holds during [`for_runs`].
-pub struct Run<'a, const N: usize, R, T> {
+/// Consecutive planes of several fields that one thread holds during [`for_plane_ranges`].
+pub struct PlaneRange<'a, const N: usize, R, T> {
     range: Range<usize>,
-    fields: &'a [Pieces<R>; N],
-    partial: &'a Pieces<T>,
+    fields: &'a [Pieces<'a, R>; N],
+    partial: &'a Pieces<'a, T>,
 }
 
-impl<const N: usize, R, T> Run<'_, N, R, T> {
+impl<const N: usize, R, T> PlaneRange<'_, N, R, T> {
     /// Indices k of the planes.
     pub fn range(&self) -> Range<usize> {
         self.range.clone()
@@ -69,7 +69,8 @@ impl<const N: usize, R, T> Run<'_, N, R, T> {
     #[inline]
     pub fn plane(&mut self, k: usize) -> ([&mut [R]; N], &mut T) {
         assert!(self.range.contains(&k));
-        // SAFETY: runs are disjoint, and the result borrows this one as a whole.
+        // SAFETY: `for_plane_ranges` makes disjoint ranges, and the result borrows this range as a
+        // whole, so each plane is borrowed once.
         unsafe {
             let fields = self.fields.each_ref().map(|field| field.get(k - 1));
             (fields, &mut self.partial.get(k - 1)[0])
@@ -77,14 +78,14 @@ impl<const N: usize, R, T> Run<'_, N, R, T> {
     }
 }
 
-/// Calls `f(run, scratch)` for one run of consecutive interior planes per scratch slot, in
+/// Calls `f(range, scratch)` for one range of consecutive interior planes per scratch slot, in
 /// parallel.
-pub fn for_runs<const N: usize, R: Send, T: Send, S: Send>(
+pub fn for_plane_ranges<const N: usize, R: Send, T: Send, S: Send>(
     layout: Layout,
     fields: [&mut [R]; N],
     partial: &mut [T],
     scratch: &mut [S],
-    f: impl Fn(&mut Run<N, R, T>, &mut S) + Sync,
+    f: impl Fn(&mut PlaneRange<N, R, T>, &mut S) + Sync,
 ) {
     let fields = fields.map(|field| Pieces::interior(layout, field));
     let (planes, slots) = (layout.cells[2], scratch.len());
@@ -92,17 +93,17 @@ pub fn for_runs<const N: usize, R: Send, T: Send, S: Send>(
     let partial = Pieces::new(partial, 1);
     let slots_with_ends = scratch.par_iter_mut().enumerate();
     slots_with_ends.for_each(|(slot, scratch)| {
-        let mut run = Run {
+        let mut range = PlaneRange {
             range: 1 + planes * slot / slots..1 + planes * (slot + 1) / slots,
             fields: &fields,
             partial: &partial,
         };
-        f(&mut run, scratch);
+        f(&mut range, scratch);
     });
 }
 
 /// Calls `f(k, chunk, scratch)` for the chunks k = 0.. of `values` in parallel; each scratch slot
-/// serves a run of k.
+/// serves a range of k.
 pub fn for_chunks<R: Send, S: Send>(
     values: &mut [R],
     chunk: usize,
@@ -141,14 +142,15 @@ impl<R> Columns<'_, R> {
     #[inline(always)]
     pub fn row(&mut self, k: usize) -> &mut [R] {
         assert!(k < self.planes);
-        // SAFETY: blocks of columns are disjoint, and the result borrows `self` as a whole.
+        // SAFETY: `for_columns` makes disjoint blocks of columns inside the planes, and the result
+        // borrows `self` as a whole.
         unsafe { std::slice::from_raw_parts_mut(self.start.add(k * self.stride), self.width) }
     }
 }
 
 /// Cuts the first `len` entries of the planes of `values`, `stride` apart, into blocks of `width`
-/// columns and calls `f(first column, block, scratch)` in parallel; each scratch slot serves a run
-/// of blocks.
+/// columns and calls `f(first column, block, scratch)` in parallel; each scratch slot serves a
+/// range of blocks.
 pub fn for_columns<R: Send, S: Send>(
     values: &mut [R],
     stride: usize,
@@ -157,7 +159,10 @@ pub fn for_columns<R: Send, S: Send>(
     scratch: &mut [S],
     f: impl Fn(usize, &mut Columns<R>, &mut S) + Sync,
 ) {
-    assert!(len <= stride);
+    assert!(
+        len <= stride && stride <= values.len(),
+        "columns lie within a plane, and one plane within the values"
+    );
     let (slots, blocks, planes) = (scratch.len(), len.div_ceil(width), values.len() / stride);
     let whole = Pieces::new(values, stride);
     scratch
@@ -168,7 +173,8 @@ pub fn for_columns<R: Send, S: Send>(
             for block in blocks * slot / slots..blocks * (slot + 1) / slots {
                 let at = block * width;
                 let mut columns = Columns {
-                    // SAFETY: inside the first plane; every block belongs to one slot.
+                    // SAFETY: `at < len <= stride <= values.len()`, so the block starts inside the
+                    // first plane. Every block belongs to one slot.
                     start: unsafe { whole.start.add(at) },
                     stride,
                     planes,
@@ -180,39 +186,45 @@ pub fn for_columns<R: Send, S: Send>(
         });
 }
 
-/// A slice cut into equal pieces that threads may hold one at a time.
-struct Pieces<T> {
+/// A slice cut into equal pieces, each of which one thread may hold.
+struct Pieces<'a, T> {
     start: *mut T,
     size: usize,
     count: usize,
+    slice: PhantomData<&'a mut [T]>,
 }
 
-// SAFETY: the callers of `get` guarantee that no piece is borrowed twice.
-unsafe impl<T: Send> Send for Pieces<T> {}
-unsafe impl<T: Send> Sync for Pieces<T> {}
+// SAFETY: a piece is an exclusive borrow of entries that may move to another thread. The callers of
+// `get` guarantee that no piece is borrowed twice, so a shared `Pieces` gives no shared entry.
+unsafe impl<T: Send> Send for Pieces<'_, T> {}
+// SAFETY: see `Send`.
+unsafe impl<T: Send> Sync for Pieces<'_, T> {}
 
-impl<T> Pieces<T> {
-    fn new(values: &mut [T], size: usize) -> Pieces<T> {
+impl<'a, T> Pieces<'a, T> {
+    fn new(values: &'a mut [T], size: usize) -> Pieces<'a, T> {
         Pieces {
             start: values.as_mut_ptr(),
             size,
             count: values.len() / size,
+            slice: PhantomData,
         }
     }
     /// Returns piece `k`.
     ///
     /// # Safety
-    /// No two live borrows may have the same `k`, and the slice must outlive them.
+    /// No two live borrows may have the same `k`.
     #[allow(clippy::mut_from_ref)]
     unsafe fn get(&self, k: usize) -> &mut [T] {
         assert!(k < self.count);
+        // SAFETY: the first `count * size` entries belong to the slice, which is borrowed for `'a`.
+        // The caller guarantees that no other borrow of the piece is live.
         unsafe { std::slice::from_raw_parts_mut(self.start.add(k * self.size), self.size) }
     }
 }
 
-impl<R> Pieces<R> {
+impl<'a, R> Pieces<'a, R> {
     /// Cuts a field into its interior planes.
-    fn interior(layout: Layout, field: &mut [R]) -> Pieces<R> {
+    fn interior(layout: Layout, field: &'a mut [R]) -> Pieces<'a, R> {
         assert_eq!(field.len(), layout.len());
         let plane = layout.plane();
         Pieces::new(&mut field[plane..plane * (layout.cells[2] + 1)], plane)

@@ -1,7 +1,7 @@
 //! Geometry of the uniform grid: cells of constant spacing, axis order x, y, z, x fastest.
 //!
 //! Positions depend on the index of a cell in the box ([`GlobalCell`]); fields are indexed by the
-//! cells of their own slab ([`LocalCell`]). Today one slab is the whole box.
+//! cells of their own slab ([`LocalCell`]).
 
 use glam::DVec3;
 
@@ -54,6 +54,15 @@ impl Mesh {
                 self.cells[1] as f64,
                 self.cells[2] as f64,
             )
+    }
+    /// Axes that are not flat: more than one cell.
+    pub fn resolved_axes(&self) -> impl Iterator<Item = usize> + Clone + use<> {
+        let mesh = *self;
+        (0..3).filter(move |&axis| mesh.is_resolved(axis))
+    }
+    /// Whether `axis` is not flat: more than one cell.
+    pub fn is_resolved(&self, axis: usize) -> bool {
+        self.cells[axis] > 1
     }
     /// Upper corner of the box [m].
     pub fn upper(&self) -> DVec3 {

@@ -3,13 +3,15 @@
 mod field;
 mod loops;
 mod mesh;
-mod part;
+mod shared_rows;
 mod view;
 
 pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field, Layout};
 #[cfg(test)]
 pub(crate) use field::{FaceZ, Location};
-pub(crate) use loops::{Columns, Run, for_chunks, for_columns, for_planes_of, for_runs, for_slabs};
+pub(crate) use loops::{
+    Columns, PlaneRange, for_chunks, for_columns, for_plane_ranges, for_planes_of, for_slabs,
+};
 pub use mesh::{Axis, GlobalCell, LocalCell, Mesh, Slab};
-pub(crate) use part::Part;
+pub(crate) use shared_rows::SharedRows;
 pub use view::FieldView;

@@ -12,10 +12,7 @@ impl<R: Real> ImmersedGrains<R> {
     /// Imposes the rigid velocities of the grains on the forced faces and makes the flow
     /// solenoidal.
     pub fn initialise(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> FlowMeasures {
-        for axis in 0..3 {
-            let velocity = flow.velocity.component(axis);
-            flow.predicted.component_mut(axis).copy_from_slice(velocity);
-        }
+        flow.predicted.copy_from(&flow.velocity);
         // In the limit of a long step every forced face takes the rigid velocity.
         self.locate_with_forcing(grains, f64::MAX.sqrt());
         let (known, predictions) = flow.prediction();
@@ -44,10 +41,7 @@ impl<R: Real> ImmersedGrains<R> {
         self.impose_pending(flow, &updates);
         self.updates = updates;
         self.release_forcing();
-        for axis in 0..3 {
-            let predicted = flow.predicted.component(axis);
-            flow.velocity.component_mut(axis).copy_from_slice(predicted);
-        }
+        flow.velocity.copy_from(&flow.predicted);
         flow.make_solenoidal()
     }
 }

@@ -96,8 +96,8 @@ impl<R: Real> ImmersedGrains<R> {
             let scratch = &mut *scratch.borrow();
             if update.isolated {
                 // SAFETY: `find_isolated` found no other grain that uses the faces which this grain
-                // reads or writes. The access log asserts it below in debug builds. `Part` checks
-                // the bounds of every row.
+                // reads or writes. The access log asserts it below in debug builds. `SharedRows`
+                // checks the bounds of every row.
                 let mut aliases = predictions.each_ref().map(|one| unsafe { one.alias() });
                 step.update_isolated(index, grain, update, &mut aliases, scratch);
             } else {

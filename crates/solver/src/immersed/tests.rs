@@ -5,7 +5,7 @@ use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::*;
 use crate::dem::Grain;
-use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
+use crate::flow::{Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
 use crate::math::{Load, Real};
 
@@ -37,7 +37,6 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
         kinematic_viscosity: 0.01,
         body_acceleration: DVec3::new(0.0, 0.3, 0.0),
         initial_velocity: DVec3::ZERO,
-        advection: Advection::Central,
     };
     let mut boundaries = Boundaries([[Boundary::WALL; 2]; 3]);
     boundaries.0[1] = [Boundary::Periodic; 2];
@@ -149,7 +148,6 @@ fn padding_of_rows_affects_no_link() {
         kinematic_viscosity: 0.01,
         body_acceleration: DVec3::ZERO,
         initial_velocity: DVec3::ZERO,
-        advection: Advection::Central,
     };
     // Close to corners of the box, where links have fewer than six faces in line.
     let grain = |x: f64| {

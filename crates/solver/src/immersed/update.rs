@@ -8,7 +8,7 @@ use super::geometry::{LocateScratch, LocatedBody, Locator};
 use super::kinematics::{GrainKinematics, PreviousStep, RigidVelocity};
 use super::rigid_body::RigidBodySystem;
 use crate::dem::Grain;
-use crate::flow::{Known, Prediction};
+use crate::flow::{OldState, Prediction};
 use crate::math::{Load, Real};
 
 /// Lists of the faces near one grain, kept from one step to the next.
@@ -124,7 +124,7 @@ pub struct CouplingStep<'a, R> {
     /// Grains and loads.
     pub input: StepInput<'a>,
     /// Fields of the last step.
-    pub known: Known<'a, R>,
+    pub known: OldState<'a, R>,
     /// Whether the advection next to the grains is corrected: in the aperture scheme.
     pub corrects_advection: bool,
     /// Density of the fluid [kg/m^3].

@@ -10,11 +10,12 @@ use glam::DVec3;
 pub struct Formula {
     text: [String; 3],
     /// Boxed: an expression takes tens of kilobytes.
-    parts: Arc<[Part]>,
+    components: Arc<[Component]>,
 }
 
+/// One parsed formula.
 #[derive(Debug)]
-struct Part {
+struct Component {
     expression: Box<exmex::FlatEx<f64>>,
     /// Indices of the variables that the expression uses, in its own order.
     takes: Vec<usize>,
@@ -26,17 +27,17 @@ impl Formula {
     /// # Errors
     /// Names the component and the error.
     pub fn parse(text: [String; 3], variables: &[&str]) -> Result<Formula, String> {
-        let part = |axis: usize| -> Result<Part, String> {
-            let component = &text[axis];
+        let component = |axis: usize| -> Result<Component, String> {
+            let formula = &text[axis];
             let wrong = |what: String| {
                 let names = variables.join(", ");
                 format!(
-                    "the {} component \"{component}\": {what}; a formula may use {names}, PI, + - * / ^ and functions such as sin, cos, exp, sqrt, tanh",
+                    "the {} component \"{formula}\": {what}; a formula may use {names}, PI, + - * / ^ and functions such as sin, cos, exp, sqrt, tanh",
                     ["x", "y", "z"][axis]
                 )
             };
             let expression =
-                exmex::parse::<f64>(component).map_err(|error| wrong(error.msg().to_string()))?;
+                exmex::parse::<f64>(formula).map_err(|error| wrong(error.msg().to_string()))?;
             let takes = expression
                 .var_names()
                 .iter()
@@ -48,10 +49,10 @@ impl Formula {
                 })
                 .collect::<Result<Vec<usize>, String>>()?;
             let expression = Box::new(expression);
-            Ok(Part { expression, takes })
+            Ok(Component { expression, takes })
         };
-        let parts = (0..3).map(part).collect::<Result<_, String>>()?;
-        Ok(Formula { text, parts })
+        let components = (0..3).map(component).collect::<Result<_, String>>()?;
+        Ok(Formula { text, components })
     }
 
     /// Text of the formulas.
@@ -61,7 +62,7 @@ impl Formula {
 
     /// Value of one component at `values` of the variables; NaN where undefined.
     pub fn component(&self, axis: usize, values: &[f64]) -> f64 {
-        let Part { expression, takes } = &self.parts[axis];
+        let Component { expression, takes } = &self.components[axis];
         let mut taken = [0.0; 4];
         for (slot, &which) in taken.iter_mut().zip(takes) {
             *slot = values[which];

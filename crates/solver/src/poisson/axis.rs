@@ -14,7 +14,7 @@ use crate::math::Real;
 use grainwake_simd::{Complex, Kernel, Vector, as_complex};
 
 /// Transforms of one axis and the eigenvalues of minus the second difference.
-pub struct Axis<R> {
+pub struct AxisTransform<R> {
     /// Number of cells.
     pub n: usize,
     /// Position of cell i in the input of the transform.
@@ -29,8 +29,9 @@ pub struct Axis<R> {
     middle: [R; 2],
 }
 
-impl<R: Real> Axis<R> {
-    pub fn new(n: usize, ends: Ends, spacing: f64) -> Axis<R> {
+impl<R: Real> AxisTransform<R> {
+    /// Transforms of `n` cells, `spacing` [m] apart, with the conditions `ends`.
+    pub fn new(n: usize, ends: Ends, spacing: f64) -> AxisTransform<R> {
         let neumann = ends == Ends::Neumann;
         let order = |i: usize| match i {
             _ if !neumann => i,
@@ -52,7 +53,7 @@ impl<R: Real> Axis<R> {
             };
             (2.0 * angle.sin() / spacing).powi(2)
         };
-        Axis {
+        AxisTransform {
             n,
             order: (0..n).map(order).collect(),
             eigenvalues: (0..n).map(eigenvalue).collect(),
@@ -103,7 +104,7 @@ impl<R: Real> Axis<R> {
     #[inline(always)]
     fn join<V: Vector<Number = R>>(&self, modes: &mut [Complex<V>]) {
         let n = self.n;
-        modes[0] = modes[0].exchanged();
+        modes[0] = modes[0].swap_parts();
         let (low, high) = mirrored(modes);
         let (pairs, turn) = (low.len(), &self.turn[1..]);
         let (high, turn) = (&mut high[..pairs], &turn[..pairs]);
@@ -116,7 +117,7 @@ impl<R: Real> Axis<R> {
             (y.re, y.im) = (r - q, p + t);
         }
         if n.is_multiple_of(2) {
-            modes[n / 2] = modes[n / 2].scale(self.middle[1]).exchanged();
+            modes[n / 2] = modes[n / 2].scale(self.middle[1]).swap_parts();
         }
     }
 }
@@ -133,12 +134,14 @@ fn mirrored<T>(modes: &mut [T]) -> (&mut [T], &mut [T]) {
 /// Transform of a block of lines. It is a kernel of its own, so that its loops are compiled once
 /// per instruction set and not once per caller.
 pub struct Lines<'a, R> {
-    pub axis: &'a Axis<R>,
+    /// Transforms of the axis of the lines.
+    pub axis: &'a AxisTransform<R>,
     /// Both buffers, one after the other; the first holds the lines.
     ///
     /// Forward: entry i at `order[i]` -> modes. Inverse: modes -> entry i at `order[i]`, with real
     /// and imaginary parts exchanged, unnormalised.
     pub buffers: &'a mut [R],
+    /// Whether modes are transformed to entries.
     pub inverse: bool,
     /// Whether the block has half the lanes of the widest register.
     pub half: bool,

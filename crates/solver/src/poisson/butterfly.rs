@@ -4,7 +4,7 @@
 //! over x_t - x_{r-t} they are e_k - i o_k and e_k + i o_k.
 
 use crate::math::Real;
-use grainwake_simd::{Complex, Vector, turned};
+use grainwake_simd::{Complex, Vector, rotated_butterfly};
 
 /// Fourier transform of fixed length `R`.
 pub trait Butterfly<const R: usize> {
@@ -12,11 +12,17 @@ pub trait Butterfly<const R: usize> {
     fn apply<V: Vector>(x: [Complex<V>; R]) -> [Complex<V>; R];
 }
 
+/// Transform of length two.
 pub struct Two;
+/// Transform of length three.
 pub struct Three;
+/// Transform of length four.
 pub struct Four;
+/// Transform of length five.
 pub struct Five;
+/// Transform of length seven.
 pub struct Seven;
+/// Transform of length eight.
 pub struct Eight;
 
 impl Butterfly<2> for Two {
@@ -31,7 +37,7 @@ impl Butterfly<3> for Three {
     fn apply<V: Vector>([a, b, c]: [Complex<V>; 3]) -> [Complex<V>; 3] {
         const SIN: f64 = 0.866_025_403_784_438_6;
         let sum = b + c;
-        let [y, z] = turned(
+        let [y, z] = rotated_butterfly(
             a - sum.scale(V::Number::of(0.5)),
             (b - c).scale(V::Number::of(SIN)),
         );
@@ -43,7 +49,7 @@ impl Butterfly<4> for Four {
     #[inline(always)]
     fn apply<V: Vector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
         let (s, t, u) = (a + c, a - c, b + d);
-        let [y, z] = turned(t, b - d);
+        let [y, z] = rotated_butterfly(t, b - d);
         [s + u, y, s - u, z]
     }
 }
@@ -54,11 +60,11 @@ impl Butterfly<5> for Five {
         const COS: [f64; 2] = [0.309_016_994_374_947_45, -0.809_016_994_374_947_5];
         const SIN: [f64; 2] = [0.951_056_516_295_153_5, 0.587_785_252_292_473_1];
         let (p, q, r, s) = (b + e, c + d, b - e, c - d);
-        let [y1, y4] = turned(
+        let [y1, y4] = rotated_butterfly(
             a + p.scale(V::Number::of(COS[0])) + q.scale(V::Number::of(COS[1])),
             r.scale(V::Number::of(SIN[0])) + s.scale(V::Number::of(SIN[1])),
         );
-        let [y2, y3] = turned(
+        let [y2, y3] = rotated_butterfly(
             a + p.scale(V::Number::of(COS[1])) + q.scale(V::Number::of(COS[0])),
             r.scale(V::Number::of(SIN[1])) - s.scale(V::Number::of(SIN[0])),
         );
@@ -81,7 +87,7 @@ impl Butterfly<7> for Seven {
         ];
         let (p, q, r) = (b + g, c + f, d + e);
         let (u, v, w) = (b - g, c - f, d - e);
-        let [y1, y6] = turned(
+        let [y1, y6] = rotated_butterfly(
             a + p.scale(V::Number::of(COS[0]))
                 + q.scale(V::Number::of(COS[1]))
                 + r.scale(V::Number::of(COS[2])),
@@ -89,7 +95,7 @@ impl Butterfly<7> for Seven {
                 + v.scale(V::Number::of(SIN[1]))
                 + w.scale(V::Number::of(SIN[2])),
         );
-        let [y2, y5] = turned(
+        let [y2, y5] = rotated_butterfly(
             a + p.scale(V::Number::of(COS[1]))
                 + q.scale(V::Number::of(COS[2]))
                 + r.scale(V::Number::of(COS[0])),
@@ -97,7 +103,7 @@ impl Butterfly<7> for Seven {
                 - v.scale(V::Number::of(SIN[2]))
                 - w.scale(V::Number::of(SIN[0])),
         );
-        let [y3, y4] = turned(
+        let [y3, y4] = rotated_butterfly(
             a + p.scale(V::Number::of(COS[2]))
                 + q.scale(V::Number::of(COS[0]))
                 + r.scale(V::Number::of(COS[1])),
@@ -127,7 +133,7 @@ impl Butterfly<8> for Eight {
             im: V::constant(0.0) - (w.re + w.im),
         }
         .scale(half);
-        let [y2, y6] = turned(r, v);
+        let [y2, y6] = rotated_butterfly(r, v);
         [p + t, q + u, y2, s + w, p - t, q - u, y6, s - w]
     }
 }

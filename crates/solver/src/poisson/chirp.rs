@@ -89,12 +89,12 @@ impl<R: Real> Fourier<R> {
             match chirp {
                 Some(plan) if time == 0 => {
                     for (x, turn) in buffers[0].iter_mut().zip(&plan.spectrum) {
-                        *x = x.times(*turn).exchanged();
+                        *x = x.times(*turn).swap_parts();
                     }
                 }
                 Some(plan) => {
                     for (x, turn) in buffers[0].iter_mut().zip(&plan.chirp) {
-                        *x = x.exchanged().times(*turn);
+                        *x = x.swap_parts().times(*turn);
                     }
                 }
                 None => {}

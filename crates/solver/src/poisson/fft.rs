@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 
 use super::butterfly::{Butterfly, Eight, Five, Four, Seven, Three, Two};
 use crate::math::Real;
-use grainwake_simd::{Complex, Vector, turned};
+use grainwake_simd::{Complex, Vector, rotated_butterfly};
 
 /// Largest prime factor that is transformed by its definition (measured: decision 0005).
 pub const LARGEST_PRIME: usize = 113;
@@ -256,7 +256,7 @@ fn modes<V: Vector, const K: usize>(
     let turn = &pass.turn[at / stride * (r - 1)..][..r - 1];
     for m in 0..K {
         let k = k + m;
-        let [y, z] = turned(even[m], odd[m]);
+        let [y, z] = rotated_butterfly(even[m], odd[m]);
         target[to + stride * k] = y.times(turn[k - 1]);
         target[to + stride * (r - k)] = z.times(turn[r - k - 1]);
     }

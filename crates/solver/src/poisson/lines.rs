@@ -1,6 +1,6 @@
 //! Loads and stores of blocks of lines before and after the transforms.
 
-use super::axis::{self, Axis};
+use super::axis::{self, AxisTransform};
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Complex, MAX_LANES, Vector, as_complex, dispatch};
 
@@ -8,23 +8,25 @@ use grainwake_simd::{Complex, MAX_LANES, Vector, as_complex, dispatch};
 pub struct Buffers<R>(Aligned<R>);
 
 impl<R: Real> Buffers<R> {
-    pub fn new(axes: [&Axis<R>; 2]) -> Buffers<R> {
+    /// Buffers for the transforms along x and y.
+    pub fn new(axes: [&AxisTransform<R>; 2]) -> Buffers<R> {
         let longest = axes[0].buffer_len().max(axes[1].buffer_len());
         Buffers(Aligned::zeros(4 * R::LANES * longest))
     }
+    /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.0)
     }
     /// Input lines of a transform along `axis`.
     #[inline(always)]
-    pub fn lines<V: Vector<Number = R>>(&mut self, axis: &Axis<R>) -> &mut [Complex<V>] {
+    pub fn lines<V: Vector<Number = R>>(&mut self, axis: &AxisTransform<R>) -> &mut [Complex<V>] {
         &mut as_complex::<V>(&mut self.0)[..axis.n]
     }
     /// Transforms the input lines and returns the result.
     #[inline(always)]
     pub fn transform<V: Vector<Number = R>>(
         &mut self,
-        axis: &Axis<R>,
+        axis: &AxisTransform<R>,
         inverse: bool,
     ) -> &[Complex<V>] {
         let len = axis.buffer_len();
@@ -45,8 +47,11 @@ impl<R: Real> Buffers<R> {
 /// `second` further.
 #[derive(Clone, Copy)]
 pub struct Lines {
+    /// Position of entry 0 of the first lines.
     pub at: usize,
+    /// Distance of successive entries of a line.
     pub step: usize,
+    /// Distance of the second lines from the first.
     pub second: usize,
 }
 
@@ -69,12 +74,14 @@ impl Lines {
     ) -> (&'a mut [V::Number], &'a mut [V::Number]) {
         values[self.at + i * self.step..][..self.second + V::WIDTH].split_at_mut(self.second)
     }
+    /// Loads all entries of the lines.
     #[inline(always)]
     pub fn load<V: Vector>(&self, values: &[V::Number], a: &mut [Complex<V>]) {
         for (i, x) in a.iter_mut().enumerate() {
             *x = self.entry(values, i);
         }
     }
+    /// Stores all entries of the lines.
     #[inline(always)]
     pub fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
         for (i, x) in a.iter().enumerate() {
@@ -83,6 +90,7 @@ impl Lines {
             x.im.store(second);
         }
     }
+    /// Stores all entries of the lines with non-temporal stores.
     #[inline(always)]
     pub fn store_non_temporal<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
         for (i, x) in a.iter().enumerate() {
@@ -91,10 +99,11 @@ impl Lines {
             x.im.store_non_temporal(second);
         }
     }
+    /// Replaces the lines by their modes along `axis`.
     #[inline(always)]
     pub fn forward<V: Vector>(
         &self,
-        axis: &Axis<V::Number>,
+        axis: &AxisTransform<V::Number>,
         values: &mut [V::Number],
         buffers: &mut Buffers<V::Number>,
     ) {
@@ -104,10 +113,11 @@ impl Lines {
         }
         self.store(buffers.transform::<V>(axis, false), values);
     }
+    /// Replaces modes along `axis` by the lines, unnormalised.
     #[inline(always)]
     pub fn inverse<V: Vector>(
         &self,
-        axis: &Axis<V::Number>,
+        axis: &AxisTransform<V::Number>,
         values: &mut [V::Number],
         buffers: &mut Buffers<V::Number>,
     ) {
@@ -125,12 +135,16 @@ impl Lines {
 /// Pairs of rows of a plane: the first rows start at `at`, the second rows `second` rows further.
 #[derive(Clone, Copy)]
 pub struct Rows {
+    /// Position of entry 0 of the first row.
     pub at: usize,
+    /// Distance of successive rows.
     pub pitch: usize,
+    /// Number of rows from the first rows to the second rows.
     pub second: usize,
 }
 
 impl Rows {
+    /// Loads the rows transposed, entry i at `order[i]`.
     #[inline(always)]
     pub fn load<V: Vector>(&self, order: &[usize], values: &[V::Number], a: &mut [Complex<V>]) {
         for (group, order) in order.chunks(V::WIDTH).enumerate() {
@@ -147,6 +161,8 @@ impl Rows {
             }
         }
     }
+    /// Stores the rows from their transpose, entry i from `order[i]`; real and imaginary parts are
+    /// swapped.
     #[inline(always)]
     pub fn store<V: Vector>(&self, order: &[usize], a: &[Complex<V>], values: &mut [V::Number]) {
         let groups = order.chunks_exact(V::WIDTH);

@@ -20,12 +20,12 @@ use std::time::{Duration, Instant};
 
 #[cfg(test)]
 use crate::grid::{Centre, Field};
-use crate::grid::{Mesh, Run, for_chunks, for_columns, for_runs};
+use crate::grid::{Mesh, PlaneRange, for_chunks, for_columns, for_plane_ranges};
 use crate::math::{Aligned, Real};
-use axis::Axis;
+use axis::AxisTransform;
 use grainwake_simd::dispatch;
 use lines::Buffers;
-use plane::{Forward, Inverse, Shape};
+use plane::{Forward, Inverse, PlaneLayout};
 use tridiagonal::{ColumnScratch, Solve, Tridiagonal, block_width};
 
 pub use plane::Plane;
@@ -39,9 +39,9 @@ pub enum Ends {
     Neumann,
 }
 
-/// Time spent in each stage since the start.
+/// Time spent in the stages of all solves.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Stages {
+pub struct PoissonTimes {
     /// Right-hand side and its transforms.
     pub forward: Duration,
     /// Tridiagonal systems.
@@ -65,66 +65,67 @@ pub struct Solution<'a, R> {
 pub struct Poisson<R = f64> {
     mesh: Mesh,
     ends: [Ends; 3],
-    axes: [Axis<R>; 2],
+    axes: [AxisTransform<R>; 2],
     along_z: Tridiagonal,
-    shape: Shape,
+    layout: PlaneLayout,
     modes: Aligned<R>,
     /// Eigenvalue along x and y of each mode of a plane.
     eigenvalues: Vec<f64>,
     slots: Vec<Slot<R>>,
     columns: Vec<ColumnScratch>,
-    stages: Stages,
+    times: PoissonTimes,
     /// Whether the forward transform writes the modes with non-temporal stores.
     pub non_temporal: bool,
 }
 
-/// Scratch of one run of planes.
+/// Scratch of one range of planes.
 struct Slot<R> {
     planes: [Plane<R>; 3],
     buffers: Buffers<R>,
 }
 
-/// Number of runs of planes and of blocks of columns, enough for many threads.
+/// Largest number of ranges of planes and of ranges of columns, enough for many threads.
 const SLOTS: usize = 32;
-/// Least number of planes of a run: the planes below and above each run are transformed twice.
-const LEAST_RUN: usize = 16;
+/// Smallest number of planes of a range: the planes below and above each range are transformed
+/// twice.
+const MIN_PLANES_PER_SLOT: usize = 16;
 
 impl<R: Real> Poisson<R> {
     /// Plans the solver for `mesh` with the given ends along x, y, z.
     pub fn new(mesh: &Mesh, ends: [Ends; 3]) -> Poisson<R> {
         let [nx, ny, nz] = mesh.cells;
-        let axes = [0, 1].map(|a| Axis::new(mesh.cells[a], ends[a], mesh.spacing[a]));
+        let axes = [0, 1].map(|a| AxisTransform::new(mesh.cells[a], ends[a], mesh.spacing[a]));
         let scale = 1.0 / (axes[0].norm() * axes[1].norm());
-        let shape = Shape::new::<R>(nx, ny);
-        let mut eigenvalues = vec![0.0; shape.modes()];
+        let layout = PlaneLayout::new::<R>(nx, ny);
+        let mut eigenvalues = vec![0.0; layout.modes()];
         // Padding lines of a block hold round-off of their partners; a singular system would turn
         // it into infinities that return to the partners.
         let filler = mesh.spacing.y.powi(-2);
-        shape.each_mode(|at, i, j| {
+        layout.each_mode(|at, i, j| {
             let along_y = axes[1].eigenvalues.get(j).unwrap_or(&filler);
             eigenvalues[at] = axes[0].eigenvalues[i] + along_y;
         });
         let slot = || Slot {
-            planes: [(); 3].map(|()| Plane::new(shape)),
+            planes: [(); 3].map(|()| Plane::new(layout)),
             buffers: Buffers::new([&axes[0], &axes[1]]),
         };
-        let width = block_width::<R>(nz).min(shape.modes());
-        let blocks = shape.modes().div_ceil(width);
+        let width = block_width::<R>(nz).min(layout.modes());
+        let blocks = layout.modes().div_ceil(width);
         Poisson {
             mesh: *mesh,
             ends,
             along_z: Tridiagonal::new(nz, ends[2], mesh.spacing.z, scale),
-            shape,
-            modes: Aligned::zeros(shape.stride() * nz),
+            layout,
+            modes: Aligned::zeros(layout.stride() * nz),
             eigenvalues,
-            slots: (0..(nz / LEAST_RUN).clamp(1, SLOTS))
+            slots: (0..(nz / MIN_PLANES_PER_SLOT).clamp(1, SLOTS))
                 .map(|_| slot())
                 .collect(),
             columns: (0..SLOTS.min(blocks))
                 .map(|_| ColumnScratch::new(width, nz, ends[2]))
                 .collect(),
             axes,
-            stages: Stages::default(),
+            times: PoissonTimes::default(),
             non_temporal: false,
         }
     }
@@ -138,11 +139,11 @@ impl<R: Real> Poisson<R> {
         source: impl Fn(usize, &mut Plane<R>) + Sync,
         fields: [&mut [R]; N],
         partial: &mut [T],
-        sink: impl Fn(usize, Solution<R>, &mut Run<N, R, T>) + Sync,
+        sink: impl Fn(usize, Solution<R>, &mut PlaneRange<N, R, T>) + Sync,
     ) {
         let start = Instant::now();
         let non_temporal = self.non_temporal;
-        let (axes, stride) = ([&self.axes[0], &self.axes[1]], self.shape.stride());
+        let (axes, stride) = ([&self.axes[0], &self.axes[1]], self.layout.stride());
         for_chunks(
             &mut self.modes,
             stride,
@@ -191,16 +192,16 @@ impl<R: Real> Poisson<R> {
                 axes,
                 periodic: [periodic[0], periodic[1]],
                 plane,
-                modes: &modes[(k - 1) * stride..][..self.shape.modes()],
+                modes: &modes[(k - 1) * stride..][..self.layout.modes()],
                 buffers,
             });
         };
-        for_runs(
+        for_plane_ranges(
             self.mesh.layout(),
             fields,
             partial,
             &mut self.slots,
-            |run, slot| {
+            |range, slot| {
                 let Slot { planes, buffers } = slot;
                 // Plane k, wrapped on a periodic axis; none beyond another end.
                 let across = |k: usize| match k {
@@ -208,13 +209,13 @@ impl<R: Real> Poisson<R> {
                     k if k > nz => periodic[2].then_some(1),
                     k => Some(k),
                 };
-                let start = run.range().start;
+                let start = range.range().start;
                 let [below, here, _] = planes;
                 if let Some(k) = across(start - 1) {
                     invert(k, below, buffers);
                 }
                 invert(start, here, buffers);
-                for k in run.range() {
+                for k in range.range() {
                     let [below, here, above] = planes;
                     if let Some(k) = across(k + 1) {
                         invert(k, above, buffers);
@@ -225,14 +226,14 @@ impl<R: Real> Poisson<R> {
                         below: if end(k - 1) { here } else { below },
                         above: if end(k + 1) { here } else { above },
                     };
-                    sink(k, solution, run);
+                    sink(k, solution, range);
                     planes.rotate_left(1);
                 }
             },
         );
-        self.stages.forward += forward - start;
-        self.stages.columns += columns - forward;
-        self.stages.inverse += columns.elapsed();
+        self.times.forward += forward - start;
+        self.times.columns += columns - forward;
+        self.times.inverse += columns.elapsed();
     }
 
     /// Replaces the right-hand side in the interior of `field` by the solution; ghosts keep
@@ -247,8 +248,8 @@ impl<R: Real> Poisson<R> {
                 plane.row_mut(j)[1..=nx].copy_from_slice(&given.row(j, k)[1..=nx]);
             }
         };
-        self.solve(source, [field], &mut vec![(); nz], |k, solution, run| {
-            let ([plane], ()) = run.plane(k);
+        self.solve(source, [field], &mut vec![(); nz], |k, solution, range| {
+            let ([plane], ()) = range.plane(k);
             for j in 1..=ny {
                 let at = layout.row() * j;
                 plane[at + 1..=at + nx].copy_from_slice(&solution.here.row(j)[1..=nx]);
@@ -257,8 +258,8 @@ impl<R: Real> Poisson<R> {
     }
 
     /// Time spent in each stage.
-    pub fn stages(&self) -> Stages {
-        self.stages
+    pub fn times(&self) -> PoissonTimes {
+        self.times
     }
 
     /// Memory held [bytes].

@@ -8,14 +8,14 @@
 //!
 //! Legend: L count of numbers in a cache line.
 
-use super::axis::Axis;
+use super::axis::AxisTransform;
 use super::lines::{Buffers, Lines, Rows};
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Kernel, Vector};
 
-/// Sizes of a plane of cells and of a plane of modes.
+/// Memory layout of a plane of cells and of a plane of modes.
 #[derive(Clone, Copy, Debug)]
-pub struct Shape {
+pub struct PlaneLayout {
     nx: usize,
     ny: usize,
     /// Count of numbers in a cache line, and position of i = 1 in a row of a [`Plane`]: rows start
@@ -24,10 +24,11 @@ pub struct Shape {
     pitch: usize,
 }
 
-impl Shape {
-    pub fn new<R: Real>(nx: usize, ny: usize) -> Shape {
+impl PlaneLayout {
+    /// Layout of `nx` x `ny` cells.
+    pub fn new<R: Real>(nx: usize, ny: usize) -> PlaneLayout {
         let line = R::LANES;
-        Shape {
+        PlaneLayout {
             nx,
             ny,
             line,
@@ -73,34 +74,36 @@ impl Shape {
 
 /// Plane of cells with one layer of ghosts, rows aligned to cache lines.
 pub struct Plane<R> {
-    shape: Shape,
+    layout: PlaneLayout,
     values: Aligned<R>,
 }
 
 impl<R: Real> Plane<R> {
-    pub(super) fn new(shape: Shape) -> Plane<R> {
+    /// Plane of zeros.
+    pub(super) fn new(layout: PlaneLayout) -> Plane<R> {
         Plane {
-            shape,
-            values: Aligned::zeros(shape.pitch * (shape.lines() + 2)),
+            layout,
+            values: Aligned::zeros(layout.pitch * (layout.lines() + 2)),
         }
     }
+    /// Memory held [bytes].
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.values)
     }
     /// Row j, ghosts included: entries 0 to nx + 1.
     #[inline(always)]
     pub fn row(&self, j: usize) -> &[R] {
-        &self.values[j * self.shape.pitch + R::LANES - 1..][..self.shape.nx + 2]
+        &self.values[j * self.layout.pitch + R::LANES - 1..][..self.layout.nx + 2]
     }
     /// Mutable row j, ghosts included.
     #[inline(always)]
     pub fn row_mut(&mut self, j: usize) -> &mut [R] {
-        &mut self.values[j * self.shape.pitch + R::LANES - 1..][..self.shape.nx + 2]
+        &mut self.values[j * self.layout.pitch + R::LANES - 1..][..self.layout.nx + 2]
     }
     /// Sets the ghosts: periodic, or equal to the adjacent cells.
     #[inline(always)]
     fn fill_ghosts(&mut self, [periodic_x, periodic_y]: [bool; 2]) {
-        let Shape { nx, ny, pitch, .. } = self.shape;
+        let PlaneLayout { nx, ny, pitch, .. } = self.layout;
         for j in 1..=ny {
             let row = self.row_mut(j);
             let ends = [row[1], row[nx]];
@@ -116,7 +119,7 @@ impl<R: Real> Plane<R> {
     /// partners.
     #[inline(always)]
     fn clear_columns(&mut self) {
-        let Shape { nx, pitch, .. } = self.shape;
+        let PlaneLayout { nx, pitch, .. } = self.layout;
         for row in self.values.chunks_exact_mut(pitch) {
             row[R::LANES + nx..R::LANES + nx.next_multiple_of(R::LANES)].fill(R::default());
         }
@@ -124,16 +127,20 @@ impl<R: Real> Plane<R> {
     /// Clears the padding lines along x.
     #[inline(always)]
     fn clear_rows(&mut self) {
-        let Shape { ny, pitch, .. } = self.shape;
-        self.values[(ny + 1) * pitch..(self.shape.lines() + 1) * pitch].fill(R::default());
+        let PlaneLayout { ny, pitch, .. } = self.layout;
+        self.values[(ny + 1) * pitch..(self.layout.lines() + 1) * pitch].fill(R::default());
     }
 }
 
 /// Forward transform: cells of `plane` to `modes`; the plane is overwritten.
 pub struct Forward<'a, R> {
-    pub axes: [&'a Axis<R>; 2],
+    /// Transforms along x and y.
+    pub axes: [&'a AxisTransform<R>; 2],
+    /// Cells, overwritten by modes along y.
     pub plane: &'a mut Plane<R>,
+    /// Plane of modes, overwritten.
     pub modes: &'a mut [R],
+    /// Buffers of the thread.
     pub buffers: &'a mut Buffers<R>,
     /// Whether the modes are written with non-temporal stores.
     pub non_temporal: bool,
@@ -150,17 +157,17 @@ impl<R: Real> Kernel for Forward<'_, R> {
             buffers,
             non_temporal,
         } = self;
-        let shape = plane.shape;
+        let layout = plane.layout;
         plane.clear_columns();
         plane.clear_rows();
         let values = &mut plane.values[..];
-        for (first, width) in shape.blocks(shape.nx) {
-            let at = shape.pitch + R::LANES + first;
+        for (first, width) in layout.blocks(layout.nx) {
+            let at = layout.pitch + R::LANES + first;
             if width == 2 * R::LANES {
                 for lane in (0..R::LANES).step_by(V::WIDTH) {
                     let lines = Lines {
                         at: at + lane,
-                        step: shape.pitch,
+                        step: layout.pitch,
                         second: R::LANES,
                     };
                     lines.forward::<V>(along_y, values, buffers);
@@ -168,20 +175,20 @@ impl<R: Real> Kernel for Forward<'_, R> {
             } else {
                 let lines = Lines {
                     at,
-                    step: shape.pitch,
+                    step: layout.pitch,
                     second: R::LANES / 2,
                 };
                 lines.forward::<V::Half>(along_y, values, buffers);
             }
         }
-        for (first, width) in shape.blocks(shape.ny) {
-            let at = (first + 1) * shape.pitch + R::LANES;
-            let to = first * shape.nx;
+        for (first, width) in layout.blocks(layout.ny) {
+            let at = (first + 1) * layout.pitch + R::LANES;
+            let to = first * layout.nx;
             if width == 2 * R::LANES {
                 for lane in (0..R::LANES).step_by(V::WIDTH) {
                     let rows = Rows {
-                        at: at + lane * shape.pitch,
-                        pitch: shape.pitch,
+                        at: at + lane * layout.pitch,
+                        pitch: layout.pitch,
                         second: R::LANES,
                     };
                     let lines = Lines {
@@ -201,7 +208,7 @@ impl<R: Real> Kernel for Forward<'_, R> {
             } else {
                 let rows = Rows {
                     at,
-                    pitch: shape.pitch,
+                    pitch: layout.pitch,
                     second: R::LANES / 2,
                 };
                 let lines = Lines {
@@ -219,10 +226,15 @@ impl<R: Real> Kernel for Forward<'_, R> {
 
 /// Inverse transform: `modes` to cells of `plane` and its ghosts.
 pub struct Inverse<'a, R> {
-    pub axes: [&'a Axis<R>; 2],
+    /// Transforms along x and y.
+    pub axes: [&'a AxisTransform<R>; 2],
+    /// Whether x and y are periodic.
     pub periodic: [bool; 2],
+    /// Cells and ghosts, overwritten.
     pub plane: &'a mut Plane<R>,
+    /// Plane of modes.
     pub modes: &'a [R],
+    /// Buffers of the thread.
     pub buffers: &'a mut Buffers<R>,
 }
 
@@ -237,16 +249,16 @@ impl<R: Real> Kernel for Inverse<'_, R> {
             modes,
             buffers,
         } = self;
-        let shape = plane.shape;
+        let layout = plane.layout;
         let values = &mut plane.values[..];
-        for (first, width) in shape.blocks(shape.ny) {
-            let at = (first + 1) * shape.pitch + R::LANES;
-            let from = first * shape.nx;
+        for (first, width) in layout.blocks(layout.ny) {
+            let at = (first + 1) * layout.pitch + R::LANES;
+            let from = first * layout.nx;
             if width == 2 * R::LANES {
                 for lane in (0..R::LANES).step_by(V::WIDTH) {
                     let rows = Rows {
-                        at: at + lane * shape.pitch,
-                        pitch: shape.pitch,
+                        at: at + lane * layout.pitch,
+                        pitch: layout.pitch,
                         second: R::LANES,
                     };
                     let lines = Lines {
@@ -264,7 +276,7 @@ impl<R: Real> Kernel for Inverse<'_, R> {
             } else {
                 let rows = Rows {
                     at,
-                    pitch: shape.pitch,
+                    pitch: layout.pitch,
                     second: R::LANES / 2,
                 };
                 let lines = Lines {
@@ -282,13 +294,13 @@ impl<R: Real> Kernel for Inverse<'_, R> {
         }
         plane.clear_columns();
         let values = &mut plane.values[..];
-        for (first, width) in shape.blocks(shape.nx) {
-            let at = shape.pitch + R::LANES + first;
+        for (first, width) in layout.blocks(layout.nx) {
+            let at = layout.pitch + R::LANES + first;
             if width == 2 * R::LANES {
                 for lane in (0..R::LANES).step_by(V::WIDTH) {
                     let lines = Lines {
                         at: at + lane,
-                        step: shape.pitch,
+                        step: layout.pitch,
                         second: R::LANES,
                     };
                     lines.inverse::<V>(along_y, values, buffers);
@@ -296,7 +308,7 @@ impl<R: Real> Kernel for Inverse<'_, R> {
             } else {
                 let lines = Lines {
                     at,
-                    step: shape.pitch,
+                    step: layout.pitch,
                     second: R::LANES / 2,
                 };
                 lines.inverse::<V::Half>(along_y, values, buffers);

@@ -20,8 +20,8 @@ const CACHE: usize = 1 << 19;
 
 /// Width of a block of columns: a multiple of two cache lines.
 pub fn block_width<R: Real>(nz: usize) -> usize {
-    let least = 2 * R::LANES;
-    (CACHE / size_of::<f64>() / 2 / nz / least * least).max(least)
+    let unit = 2 * R::LANES;
+    (CACHE / size_of::<f64>() / 2 / nz / unit * unit).max(unit)
 }
 
 /// Scratch for one block of columns.
@@ -35,6 +35,7 @@ pub struct ColumnScratch {
 }
 
 impl ColumnScratch {
+    /// Scratch for `width` columns through `nz` planes with the conditions `ends`.
     pub fn new(width: usize, nz: usize, ends: Ends) -> ColumnScratch {
         let periodic = ends == Ends::Periodic && nz > 1;
         ColumnScratch {
@@ -45,6 +46,7 @@ impl ColumnScratch {
             mean: [(); 2].map(|()| vec![0.0; nz]),
         }
     }
+    /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
         let Self {
             values,
@@ -57,6 +59,7 @@ impl ColumnScratch {
     }
 }
 
+/// Tridiagonal systems along z, one for each pair of modes along x and y.
 #[derive(Clone, Copy)]
 pub struct Tridiagonal {
     n: usize,
@@ -66,7 +69,8 @@ pub struct Tridiagonal {
 }
 
 impl Tridiagonal {
-    /// `scale` multiplies the right-hand side (the normalisation of the transforms).
+    /// Systems of `n` cells, `spacing` [m] apart, with the conditions `ends`; `scale` multiplies
+    /// the right-hand side (the normalisation of the transforms).
     pub fn new(n: usize, ends: Ends, spacing: f64, scale: f64) -> Tridiagonal {
         Tridiagonal {
             n,
@@ -77,13 +81,17 @@ impl Tridiagonal {
     }
 }
 
-/// Solves all columns of a block with the eigenvalues `lambda`; `singular` if the first of them is
-/// the mean mode, which is defined up to a constant.
+/// Solves all columns of a block.
 pub struct Solve<'a, 'b, R> {
+    /// Systems along z.
     pub system: Tridiagonal,
+    /// Right-hand sides, overwritten by the solutions.
     pub columns: &'a mut Columns<'b, R>,
+    /// Sum of the eigenvalues along x and y of each column [1/m^2].
     pub lambda: &'a [f64],
+    /// Whether the first column is the mean mode of a system defined up to a constant.
     pub singular: bool,
+    /// Scratch of the thread.
     pub scratch: &'a mut ColumnScratch,
 }
 

@@ -28,12 +28,12 @@ impl Clock {
     /// Clock at t = 0.
     pub fn new(setup: &Setup) -> Clock {
         let mesh = &setup.mesh;
-        let resolved = (0..3).filter(|&axis| mesh.cells[axis] > 1);
-        let inverse_squares: f64 = resolved
-            .clone()
+        let inverse_squares: f64 = mesh
+            .resolved_axes()
             .map(|axis| mesh.spacing[axis].powi(-2))
             .sum();
-        let smallest = resolved
+        let smallest = mesh
+            .resolved_axes()
             .map(|axis| mesh.spacing[axis])
             .fold(f64::INFINITY, f64::min);
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);

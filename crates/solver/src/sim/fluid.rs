@@ -13,7 +13,7 @@ use crate::flow::{Flow, FlowMeasures, FluidParams};
 use crate::grid::{Axis, FieldView};
 use crate::immersed::{CoupledGrains, ImmersedGrains, RigidStep, StepInput};
 use crate::math::{Precision, Real};
-use crate::poisson::Stages;
+use crate::poisson::PoissonTimes;
 
 /// Flow and coupling in either precision; called in order by the stages of a step (`stages.rs`).
 pub(super) trait Fluid: Send + Sync {
@@ -46,7 +46,7 @@ pub(super) trait Fluid: Send + Sync {
     /// Velocity [m/s] at a point; `None` outside the box.
     fn interpolate_velocity(&self, x: DVec3) -> Option<DVec3>;
     /// Wall time that the Poisson solver has spent in each of its stages.
-    fn poisson_stages(&self) -> Stages;
+    fn poisson_times(&self) -> PoissonTimes;
     /// Memory held [bytes].
     fn bytes(&self) -> usize;
     /// Writes measures and fields.
@@ -139,8 +139,8 @@ where
     fn interpolate_velocity(&self, x: DVec3) -> Option<DVec3> {
         self.probe().interpolate_velocity(x)
     }
-    fn poisson_stages(&self) -> Stages {
-        self.flow.poisson_stages()
+    fn poisson_times(&self) -> PoissonTimes {
+        self.flow.poisson_times()
     }
     fn bytes(&self) -> usize {
         self.flow.bytes() + self.grains.bytes()

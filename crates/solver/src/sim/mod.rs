@@ -21,7 +21,7 @@ use crate::dem::{Contact, ContactDynamics, Grain, GrainResponse, RigidState};
 use crate::grid::Mesh;
 use crate::immersed::{GrainKinematics, PreviousStep};
 use crate::math::{Load, Pose};
-use crate::poisson::Stages;
+use crate::poisson::PoissonTimes;
 
 use clock::Clock;
 use fluid::Fluid;
@@ -100,7 +100,7 @@ impl Simulation {
         let fluid = setup.fluid.map(|params| fluid::start(&setup, &params));
         let initial = fluid
             .as_ref()
-            .map_or(Stages::default(), |fluid| fluid.poisson_stages());
+            .map_or(PoissonTimes::default(), |fluid| fluid.poisson_times());
         Ok(Simulation {
             dynamics: ContactDynamics::new(setup.contact, enclosure),
             clock: Clock::new(&setup),

@@ -147,7 +147,7 @@ impl Setup {
         Enclosure {
             lower: self.mesh.origin,
             upper: self.mesh.upper(),
-            periodic: [0, 1, 2].map(|axis| self.boundaries.is_periodic(axis)),
+            periodic: self.boundaries.periodic(),
             solid: self
                 .boundaries
                 .0

@@ -15,10 +15,13 @@ impl Simulation {
     pub fn solid_fraction_at(&self, cell: [usize; 3]) -> f64 {
         let mesh = &self.setup.mesh;
         // An axis of one cell is evaluated in its middle plane.
-        let counts = mesh.cells.map(|n| if n > 1 { SUBCELLS } else { 1 });
+        let counts = [0, 1, 2].map(|axis| if mesh.is_resolved(axis) { SUBCELLS } else { 1 });
         let edge = DVec3::from_array([0, 1, 2].map(|axis| {
-            let resolved = mesh.cells[axis] > 1;
-            if resolved { mesh.spacing[axis] } else { 0.0 }
+            if mesh.is_resolved(axis) {
+                mesh.spacing[axis]
+            } else {
+                0.0
+            }
         }));
         let near = match self.grains_near(cell, edge) {
             Near::Inside => return 1.0,
@@ -59,7 +62,7 @@ impl Simulation {
         for grain in &self.setup.grains {
             let mut lever_arm = centre - grain.pose.position;
             for axis in 0..3 {
-                if self.setup.boundaries.is_periodic(axis) && mesh.cells[axis] > 1 {
+                if self.setup.boundaries.is_periodic(axis) && mesh.is_resolved(axis) {
                     lever_arm[axis] -= (lever_arm[axis] / extent[axis]).round() * extent[axis];
                 }
             }

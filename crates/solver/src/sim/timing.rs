@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::poisson::Stages;
+use crate::poisson::PoissonTimes;
 
 use super::Simulation;
 
@@ -18,7 +18,7 @@ pub(super) struct PassTimes {
     /// Projection, with the Poisson solver.
     pub project: Duration,
     /// Wall time of the Poisson solver before the first step.
-    pub initial: Stages,
+    pub initial: PoissonTimes,
 }
 
 /// Runs `work` and adds its wall time to `total`.
@@ -35,11 +35,11 @@ impl Simulation {
     /// correction, ghost cells and sums.
     pub fn pass_times(&self) -> [(&'static str, f64); 7] {
         let times = &self.times;
-        let stages = (self.fluid.as_ref()).map_or(times.initial, |fluid| fluid.poisson_stages());
+        let poisson = (self.fluid.as_ref()).map_or(times.initial, |fluid| fluid.poisson_times());
         let [forward, columns, inverse] = [
-            stages.forward - times.initial.forward,
-            stages.columns - times.initial.columns,
-            stages.inverse - times.initial.inverse,
+            poisson.forward - times.initial.forward,
+            poisson.columns - times.initial.columns,
+            poisson.inverse - times.initial.inverse,
         ];
         let solve = forward + columns + inverse;
         [

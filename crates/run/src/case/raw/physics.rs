@@ -10,7 +10,6 @@ use crate::case::quantity::{
     Quantity, Rate, Stiffness, Velocity,
 };
 use grainwake_solver::dem::{ContactLawKind, ContactParams};
-use grainwake_solver::flow::Advection;
 use grainwake_solver::immersed::Scheme;
 
 /// The fluid.
@@ -37,6 +36,15 @@ pub struct RawFluid {
 
 fn advection_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "enum": [Advection::Central] })
+}
+
+/// Advection scheme. The solver has one; the key states it in the case file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Advection {
+    /// Conservative second-order central differences: no numerical dissipation.
+    #[default]
+    Central,
 }
 
 /// Coupling of grains and fluid.

@@ -77,7 +77,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     let enclosure = Enclosure {
         lower: mesh.origin,
         upper: mesh.upper(),
-        periodic: [0, 1, 2].map(|axis| boundaries.is_periodic(axis)),
+        periodic: boundaries.periodic(),
         solid: boundaries.0.map(|sides| sides.map(|b| b.is_solid())),
     };
     let before_packings = check.problems.len();

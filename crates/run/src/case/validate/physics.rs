@@ -59,7 +59,6 @@ pub(super) fn fluid(
         kinematic_viscosity: kinematic_viscosity?,
         body_acceleration,
         initial_velocity,
-        advection: fluid.advection.value,
     };
     fluid.viscosity = None;
     fluid.kinematic_viscosity = Some(Quantity::new(params.kinematic_viscosity).into());

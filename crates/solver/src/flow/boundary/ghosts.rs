@@ -4,15 +4,15 @@ use crate::math::Real;
 
 /// Rule by which a ghost layer follows from the interior.
 #[derive(Clone, Copy)]
-pub(super) enum Mirror {
-    /// The ghost layer is not read.
-    None,
+pub(super) enum GhostRule {
+    /// No stencil reads the ghost layer.
+    Unused,
     /// Copy of the outermost layer at the opposite end of the box.
-    Wrap,
-    /// Copy of the adjacent interior layer: zero normal gradient.
-    Copy,
-    /// Extrapolation through this value at the wall.
-    About(f64),
+    Periodic,
+    /// Copy of the adjacent interior layer.
+    ZeroGradient,
+    /// Extrapolation through this velocity at the wall [m/s].
+    Wall(f64),
 }
 
 /// Second interior layer from the end at which `inner` is the first, of layers 1..=n.
@@ -31,19 +31,19 @@ pub(super) fn beyond_wall<R: Real>(wall: f64, near: R, next: R, n: usize) -> R {
 }
 
 /// Fills the layer `ghost` of `layer` entries; `inner` is adjacent, 1..=n are interior.
-pub(super) fn reflect<R: Real>(
+pub(super) fn fill_ghost_layer<R: Real>(
     values: &mut [R],
     layer: usize,
-    mirror: Mirror,
+    rule: GhostRule,
     ghost: usize,
     inner: usize,
     n: usize,
 ) {
-    let from = match mirror {
-        Mirror::None => return,
-        Mirror::Wrap => n + 1 - inner,
-        Mirror::Copy => inner,
-        Mirror::About(wall) => {
+    let from = match rule {
+        GhostRule::Unused => return,
+        GhostRule::Periodic => n + 1 - inner,
+        GhostRule::ZeroGradient => inner,
+        GhostRule::Wall(wall) => {
             let next = second(inner, n);
             for i in 0..layer {
                 let [near, next] = [inner, next].map(|from| values[from * layer + i]);

@@ -1,8 +1,8 @@
 //! Conditions on the six faces of the box (Eq. 4a).
 //!
-//! `velocity.rs`: given normal velocities and ghosts of the velocity. `pressure.rs`: conditions on
-//! the pressure. `outflow.rs`: convective outflow. `ghosts.rs`: how a ghost layer follows from the
-//! interior.
+//! `velocity.rs`: prescribed normal velocities and ghosts of the velocity. `pressure.rs`:
+//! conditions on the pressure. `outflow.rs`: convective outflow. `ghosts.rs`: rules by which a
+//! ghost layer follows from the interior.
 
 mod ghosts;
 mod outflow;
@@ -26,7 +26,7 @@ pub enum Boundary {
     Slip,
     /// Flat stress-free lid: `Slip` for the flow, no contact for grains.
     FreeSurface,
-    /// Inflow of given velocity.
+    /// Inflow of prescribed velocity.
     Inflow {
         /// Velocity of the entering fluid [m/s].
         velocity: DVec3,
@@ -57,14 +57,15 @@ impl Boundaries {
         self.0[axis][0] == Boundary::Periodic
     }
 
-    /// Axes whose lower boundary face has a given velocity, all that are not periodic.
-    pub(crate) fn walled(&self) -> [bool; 3] {
-        [0, 1, 2].map(|axis| !self.is_periodic(axis))
+    /// Whether each axis is periodic. On the other axes the normal velocity of the boundary faces
+    /// is known before the projection.
+    pub fn periodic(&self) -> [bool; 3] {
+        [0, 1, 2].map(|axis| self.is_periodic(axis))
     }
 
-    /// Layers of faces normal to `axis` with `n` cells whose normal velocity is given, and that
-    /// velocity [m/s].
-    pub fn given_faces(&self, axis: usize, n: usize) -> impl Iterator<Item = (usize, f64)> {
+    /// Layers of faces normal to `axis` with `n` cells whose normal velocity is prescribed, and
+    /// that velocity [m/s].
+    pub fn prescribed_faces(&self, axis: usize, n: usize) -> impl Iterator<Item = (usize, f64)> {
         let sides = self.0[axis];
         [1, n + 1]
             .into_iter()

@@ -1,10 +1,10 @@
 //! Pressure at the boundary: periodic, or zero normal gradient.
 //!
 //! The normal velocity of every face that is not periodic is known before the projection: walls and
-//! inflows have it given, outflows get it by convection (`outflow.rs`). The projection must not
+//! inflows prescribe it, outflows get it by convection (`outflow.rs`). The projection must not
 //! change it, hence the zero normal gradient of the pressure increment, and of the pressure.
 
-use super::ghosts::{Mirror, reflect};
+use super::ghosts::{GhostRule, fill_ghost_layer};
 use super::{Boundaries, Boundary};
 use crate::grid::{Centre, Field, Layout};
 use crate::math::Real;
@@ -47,12 +47,12 @@ impl Boundaries {
 
     fn fill_pressure_ends<R: Real>(&self, values: &mut [R], layer: usize, axis: usize, n: usize) {
         for (ghost, inner) in [(0, 1), (n + 1, n)] {
-            let mirror = if self.is_periodic(axis) {
-                Mirror::Wrap
+            let rule = if self.is_periodic(axis) {
+                GhostRule::Periodic
             } else {
-                Mirror::Copy
+                GhostRule::ZeroGradient
             };
-            reflect(values, layer, mirror, ghost, inner, n);
+            fill_ghost_layer(values, layer, rule, ghost, inner, n);
         }
     }
 }

@@ -1,13 +1,13 @@
-//! Velocity at the boundary: given normal components and ghost layers.
+//! Velocity at the boundary: prescribed normal components and ghost layers.
 
-use super::ghosts::{Mirror, beyond_wall, reflect, second};
+use super::ghosts::{GhostRule, beyond_wall, fill_ghost_layer, second};
 use super::{Boundaries, Boundary};
 use crate::grid::{FaceVector, Layout};
 use crate::math::Real;
 
 impl Boundaries {
-    /// Sets the normal velocity on every face where it is given, and the upper faces of periodic
-    /// axes; outflow faces keep theirs.
+    /// Sets the normal velocity on every face where it is prescribed, and the upper faces of
+    /// periodic axes; outflow faces keep theirs.
     pub(crate) fn set_normal<R: Real>(&self, velocity: &mut FaceVector<R>) {
         let layout = velocity.x.layout();
         for axis in 0..3 {
@@ -15,20 +15,20 @@ impl Boundaries {
             if self.is_periodic(axis) {
                 layout.wrap(normal, axis);
             }
-            for (face, value) in self.given_faces(axis, layout.cells[axis]) {
+            for (face, value) in self.prescribed_faces(axis, layout.cells[axis]) {
                 layout.map_layer(normal, axis, face, face, |_| R::of(value));
             }
         }
     }
 
-    /// Sets the given x and y faces of one plane.
+    /// Sets the normal velocity on the prescribed x and y faces of one plane.
     pub(crate) fn set_normal_of_plane<R: Real>(&self, layout: Layout, [x, y]: [&mut [R]; 2]) {
         let row = layout.row();
-        for (face, value) in self.given_faces(0, layout.cells[0]) {
+        for (face, value) in self.prescribed_faces(0, layout.cells[0]) {
             x.chunks_exact_mut(row)
                 .for_each(|row| row[face] = R::of(value));
         }
-        for (face, value) in self.given_faces(1, layout.cells[1]) {
+        for (face, value) in self.prescribed_faces(1, layout.cells[1]) {
             y[face * row..(face + 1) * row].fill(R::of(value));
         }
     }
@@ -43,15 +43,15 @@ impl Boundaries {
         let (row, [nx, ny, _]) = (layout.row(), layout.cells);
         for side in 0..2 {
             let (ghost, inner) = if side == 0 { (0, 1) } else { (nx + 1, nx) };
-            match self.mirror(0, side, component) {
-                Mirror::None => {}
-                Mirror::Wrap => plane.chunks_exact_mut(row).for_each(|row| {
+            match self.ghost_rule(0, side, component) {
+                GhostRule::Unused => {}
+                GhostRule::Periodic => plane.chunks_exact_mut(row).for_each(|row| {
                     (row[0], row[nx + 1]) = (row[nx], row[1]);
                 }),
-                Mirror::Copy => plane
+                GhostRule::ZeroGradient => plane
                     .chunks_exact_mut(row)
                     .for_each(|row| row[ghost] = row[inner]),
-                Mirror::About(wall) => {
+                GhostRule::Wall(wall) => {
                     let next = second(inner, nx);
                     plane
                         .chunks_exact_mut(row)
@@ -61,10 +61,10 @@ impl Boundaries {
         }
         for side in 0..2 {
             let (ghost, inner) = if side == 0 { (0, 1) } else { (ny + 1, ny) };
-            reflect(
+            fill_ghost_layer(
                 plane,
                 row,
-                self.mirror(1, side, component),
+                self.ghost_rule(1, side, component),
                 ghost,
                 inner,
                 ny,
@@ -82,25 +82,25 @@ impl Boundaries {
         for component in 0..3 {
             for side in 0..2 {
                 let (ghost, inner) = if side == 0 { (0, 1) } else { (nz + 1, nz) };
-                let mirror = self.mirror(2, side, component);
+                let rule = self.ghost_rule(2, side, component);
                 let q = velocity.component_mut(component);
-                reflect(q, plane, mirror, ghost, inner, nz);
+                fill_ghost_layer(q, plane, rule, ghost, inner, nz);
             }
         }
     }
 
     /// Rule for the ghosts of a velocity component on one side of the box.
-    fn mirror(&self, axis: usize, side: usize, component: usize) -> Mirror {
+    fn ghost_rule(&self, axis: usize, side: usize, component: usize) -> GhostRule {
         match self.0[axis][side] {
-            Boundary::Periodic => Mirror::Wrap,
+            Boundary::Periodic => GhostRule::Periodic,
             // The boundary face itself is set; only the lower side has a ghost beyond it, and no
             // interior face reads that.
-            _ if component == axis && side == 1 => Mirror::None,
-            _ if component == axis => Mirror::Copy,
+            _ if component == axis && side == 1 => GhostRule::Unused,
+            _ if component == axis => GhostRule::ZeroGradient,
             Boundary::Wall { velocity } | Boundary::Inflow { velocity } => {
-                Mirror::About(velocity[component])
+                GhostRule::Wall(velocity[component])
             }
-            Boundary::Slip | Boundary::FreeSurface | Boundary::Outflow => Mirror::Copy,
+            Boundary::Slip | Boundary::FreeSurface | Boundary::Outflow => GhostRule::ZeroGradient,
         }
     }
 }

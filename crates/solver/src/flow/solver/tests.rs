@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::super::{Advection, Boundary};
+use super::super::Boundary;
 use super::*;
 
 const PERIODIC: Boundaries = Boundaries([[Boundary::Periodic; 2]; 3]);
@@ -15,7 +15,6 @@ fn params(nu: f64) -> FluidParams {
         kinematic_viscosity: nu,
         body_acceleration: DVec3::ZERO,
         initial_velocity: DVec3::ZERO,
-        advection: Advection::Central,
     }
 }
 

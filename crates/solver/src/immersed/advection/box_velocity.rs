@@ -1,6 +1,6 @@
 //! Velocity in the padded box around a grain, with constant strides even across periodic edges.
 
-use crate::flow::Known;
+use crate::flow::OldState;
 use crate::immersed::geometry::{LocatedBody, PAD};
 use crate::math::Real;
 use grainwake_simd::MAX_LANES;
@@ -17,17 +17,17 @@ pub struct BoxVelocity<'a, R> {
 impl<'a, R: Real> BoxVelocity<'a, R> {
     /// Refers to the fields if they hold the padded box with constant strides, else fills `copies`.
     pub fn new(
-        known: &Known<'a, R>,
+        known: &OldState<'a, R>,
         body: &LocatedBody,
         copies: &'a mut [Vec<R>; 3],
     ) -> BoxVelocity<'a, R> {
         let (layout, velocity) = (known.mesh.layout(), known.velocity);
-        let walled = known.boundaries.walled();
+        let periodic = known.boundaries.periodic();
         // Links end at walls, so only periodic edges and rows shorter than a register need a copy.
         let direct = layout.cells[0] >= MAX_LANES
             && (0..3).all(|axis| {
                 let high = body.lowest[axis] + body.size[axis] + PAD - 1;
-                walled[axis] || body.lowest[axis] >= PAD && high <= layout.cells[axis] as i32 + 1
+                !periodic[axis] || body.lowest[axis] >= PAD && high <= layout.cells[axis] as i32 + 1
             });
         if direct {
             let strides = layout.strides();

@@ -16,7 +16,7 @@
 use super::box_velocity::BoxVelocity;
 use super::links::ComponentLinks;
 use super::weights::LinkPlanes;
-use crate::flow::{Known, Prediction};
+use crate::flow::{OldState, Prediction};
 use crate::grid::Mesh;
 use crate::immersed::geometry::{FaceRow, LocatedBody};
 use crate::immersed::kinematics::GrainKinematics;
@@ -38,7 +38,7 @@ pub struct AdvectionScratch<R> {
 /// [m] is the half-width of the band.
 pub fn find_correction<R: Real>(
     eps: f64,
-    known: &Known<R>,
+    known: &OldState<R>,
     kinematics: &GrainKinematics,
     body: &LocatedBody,
     scratch: &mut AdvectionScratch<R>,

@@ -90,7 +90,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let axes = [0, 1, 2].map(|along| {
             let [next, across] = [along, component].map(|axis| velocity.strides[axis] as isize);
             LinkAxis {
-                exists: mesh.cells[along] > 1,
+                exists: mesh.is_resolved(along),
                 six_faces: Stencil::new([0, next, -next, 2 * next, -2 * next, 3 * next]),
                 two_faces: Stencil::new([0, next, 0, next, 0, next]),
                 advecting: match along == component {

@@ -20,7 +20,7 @@
 
 use super::faces::ForcedFaces;
 use super::rigid_run::{RigidRun, change_weight, lane_indices};
-use crate::flow::{Known, Prediction};
+use crate::flow::{OldState, Prediction};
 use crate::immersed::geometry::FaceRun;
 use crate::immersed::kinematics::RigidVelocity;
 use crate::math::{Matrix6, Real, Vector6};
@@ -40,7 +40,7 @@ pub struct Impulse {
 /// their `rest_gain`. `dt` [s] is the length of the step; 0 leaves out the pressure gradient and
 /// the body acceleration.
 pub fn sum_impulse<R: Real>(
-    known: &Known<R>,
+    known: &OldState<R>,
     predictions: &[Prediction<R>; 3],
     fluid_density: f64,
     forced: &mut ForcedFaces,
@@ -110,7 +110,7 @@ impl Moments {
 }
 
 struct SumImpulse<'a, R> {
-    known: &'a Known<'a, R>,
+    known: &'a OldState<'a, R>,
     predictions: &'a [Prediction<'a, R>; 3],
     forced: &'a mut ForcedFaces,
     old: RigidVelocity,

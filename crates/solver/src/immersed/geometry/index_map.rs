@@ -28,7 +28,7 @@ impl UnknownFaces {
         UnknownFaces {
             cells: IVec3::new(x, y, z),
             strides: mesh.layout().strides(),
-            periodic: [0, 1, 2].map(|axis| boundaries.is_periodic(axis)),
+            periodic: boundaries.periodic(),
         }
     }
 

@@ -35,11 +35,11 @@ pub struct Locator {
 impl Locator {
     /// Samples the shapes of `grains` for a grid.
     pub fn new(mesh: &Mesh, boundaries: &Boundaries, grains: &[Grain]) -> Locator {
-        let resolved = (0..3).filter(|&axis| mesh.cells[axis] > 1);
-        let resolved: Vec<f64> = resolved.map(|axis| mesh.spacing[axis]).collect();
-        let eps = resolved.iter().sum::<f64>() / resolved.len().max(1) as f64;
+        let axes = mesh.resolved_axes();
+        let spacings: Vec<f64> = axes.map(|axis| mesh.spacing[axis]).collect();
+        let eps = spacings.iter().sum::<f64>() / spacings.len().max(1) as f64;
         // Two band half-widths, and half a link along the axis of the largest spacing.
-        let reach = 2.0 * eps + 0.5 * resolved.iter().copied().fold(0.0, f64::max);
+        let reach = 2.0 * eps + 0.5 * spacings.iter().copied().fold(0.0, f64::max);
         Locator {
             mesh: *mesh,
             unknown_faces: UnknownFaces::new(mesh, boundaries),

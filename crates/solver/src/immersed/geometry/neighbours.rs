@@ -96,7 +96,7 @@ impl NeighbourSearch {
         let enclosure = Enclosure {
             lower: mesh.origin,
             upper: mesh.upper(),
-            periodic: [0, 1, 2].map(|axis| unknown_faces.is_periodic(axis) && mesh.cells[axis] > 1),
+            periodic: [0, 1, 2].map(|axis| unknown_faces.is_periodic(axis) && mesh.is_resolved(axis)),
             solid: [[false; 2]; 3],
         };
         self.spheres.clear();

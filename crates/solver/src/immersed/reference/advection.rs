@@ -6,7 +6,7 @@
 use glam::IVec3;
 
 use super::Reference;
-use crate::flow::Known;
+use crate::flow::OldState;
 use crate::immersed::geometry::aperture::reference::inverse_aperture_excess;
 use crate::immersed::kinematics::GrainKinematics;
 
@@ -16,7 +16,7 @@ impl Reference {
     pub fn correction(
         &self,
         index: usize,
-        known: &Known<f64>,
+        known: &OldState<f64>,
         kinematics: &GrainKinematics,
         component: usize,
         face: IVec3,
@@ -58,7 +58,7 @@ impl Reference {
     fn flux(
         &self,
         index: usize,
-        known: &Known<f64>,
+        known: &OldState<f64>,
         kinematics: &GrainKinematics,
         component: usize,
         axis: usize,

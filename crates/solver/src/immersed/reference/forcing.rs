@@ -7,7 +7,7 @@
 use glam::{DVec3, IVec3};
 
 use super::Reference;
-use crate::flow::Known;
+use crate::flow::OldState;
 use crate::immersed::geometry::aperture::reference::{aperture, open_depth};
 use crate::immersed::kinematics::RigidVelocity;
 use crate::immersed::scheme::Scheme;
@@ -91,7 +91,7 @@ impl Reference {
     pub fn gain(
         &self,
         index: usize,
-        known: &Known<f64>,
+        known: &OldState<f64>,
         predicted: f64,
         [old, new]: [RigidVelocity; 2],
         component: usize,
@@ -137,7 +137,7 @@ impl Reference {
     pub fn impulse(
         &self,
         index: usize,
-        known: &Known<f64>,
+        known: &OldState<f64>,
         predicted: [&[f64]; 3],
         velocities: [RigidVelocity; 2],
         fluid_density: f64,

@@ -7,7 +7,7 @@ use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::Reference;
 use crate::dem::Grain;
-use crate::flow::{Advection, Boundaries, Boundary, Flow, FluidParams};
+use crate::flow::{Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
 use crate::immersed::advection::{LinkPlanes, compute_link_weights, find_correction};
 use crate::immersed::forcing::{ForcedFaces, ForcingParams, impose_rigidity, sum_impulse};
@@ -46,7 +46,6 @@ impl Case {
             kinematic_viscosity: NU,
             body_acceleration: DVec3::new(0.2, 0.3, -0.1),
             initial_velocity: DVec3::ZERO,
-            advection: Advection::Central,
         };
         let mut boundaries = Boundaries([[Boundary::WALL; 2]; 3]);
         boundaries.0[1] = [Boundary::Periodic; 2];
