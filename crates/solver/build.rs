@@ -5,22 +5,14 @@ use std::path::Path;
 use std::process::Command;
 
 /// Looks without touching the index.
-const STATUS: [&str; 5] = [
-    "--no-optional-locks",
-    "status",
-    "--porcelain",
-    "--untracked-files=all",
-    "--",
-];
+const STATUS: [&str; 5] =
+    ["--no-optional-locks", "status", "--porcelain", "--untracked-files=all", "--"];
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     let git = |arguments: &[&str]| {
-        let output = Command::new("git")
-            .args(arguments)
-            .output()
-            .ok()
-            .filter(|o| o.status.success())?;
+        let output =
+            Command::new("git").args(arguments).output().ok().filter(|o| o.status.success())?;
         Some(String::from_utf8(output.stdout).ok()?.trim().to_string())
     };
     let Some(commit) = git(&["rev-parse", "--short=12", "HEAD"]) else {

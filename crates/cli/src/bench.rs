@@ -25,16 +25,10 @@ use case::BenchCase;
 ///
 /// The passes cannot be merged: rigidity changes u* between the first two, every column needs all
 /// planes of modes, and every plane needs all columns.
-const TRAFFIC: [(&str, f64); 4] = [
-    ("predict", 13.0),
-    ("divergence", 4.0),
-    ("columns", 2.0),
-    ("correct", 9.0),
-];
+const TRAFFIC: [(&str, f64); 4] =
+    [("predict", 13.0), ("divergence", 4.0), ("columns", 2.0), ("correct", 9.0)];
 /// Cells along each edge of the cubes of `--scaling`: powers of two, round numbers, and primes.
-const CUBES: [usize; 14] = [
-    32, 48, 64, 67, 80, 96, 97, 100, 128, 131, 160, 192, 200, 256,
-];
+const CUBES: [usize; 14] = [32, 48, 64, 67, 80, 96, 97, 100, 128, 131, 160, 192, 200, 256];
 /// Smallest number of doubles in each array of the triad, 64 MiB. The three arrays are as large as
 /// the fields, so that caches act alike, and large enough to hide the scheduling of threads.
 const MIN_TRIAD_LENGTH: usize = 1 << 23;
@@ -94,25 +88,12 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
         limit_instructions(set);
     }
     let threads = threads::resolve(args.threads);
-    let scheme = if args.scheme == "paper" {
-        Scheme::Paper
-    } else {
-        Scheme::Aperture
-    };
-    let sizes = if args.scaling {
-        CUBES.map(|n| [n; 3]).to_vec()
-    } else {
-        vec![[nx, ny, nz]]
-    };
+    let scheme = if args.scheme == "paper" { Scheme::Paper } else { Scheme::Aperture };
+    let sizes = if args.scaling { CUBES.map(|n| [n; 3]).to_vec() } else { vec![[nx, ny, nz]] };
     let measured: Vec<Measured> = threads::on(threads, || {
         let each = sizes.into_iter();
         each.map(|cells| {
-            let case = BenchCase {
-                cells,
-                grains: args.grains,
-                scheme,
-                precision: args.precision,
-            };
+            let case = BenchCase { cells, grains: args.grains, scheme, precision: args.precision };
             measure(&case, args.steps, threads)
         })
         .collect::<Result<_, Exit>>()
@@ -126,19 +107,12 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
 }
 
 fn measure(case: &BenchCase, steps: u64, threads: usize) -> Result<Measured, Exit> {
-    let BenchCase {
-        cells,
-        grains,
-        precision,
-        ..
-    } = *case;
+    let BenchCase { cells, grains, precision, .. } = *case;
     let count = cells.iter().product::<usize>() as f64;
     let mut sim =
         Simulation::new(case.setup()?).map_err(|e| Exit::new(BAD_INPUT, e.to_string()))?;
-    let advance = |sim: &mut Simulation| {
-        sim.step(f64::INFINITY)
-            .map_err(|e| Exit::new(3, e.to_string()))
-    };
+    let advance =
+        |sim: &mut Simulation| sim.step(f64::INFINITY).map_err(|e| Exit::new(3, e.to_string()));
     for _ in 0..2 {
         advance(&mut sim)?;
     }
@@ -211,9 +185,7 @@ fn triad_bandwidth(length: usize) -> f64 {
     let length = length.max(MIN_TRIAD_LENGTH);
     let make = |value: f64| {
         let mut array = vec![0.0; length];
-        array
-            .par_chunks_mut(CHUNK)
-            .for_each(|chunk| chunk.fill(value));
+        array.par_chunks_mut(CHUNK).for_each(|chunk| chunk.fill(value));
         array
     };
     let (mut a, b, c) = (make(0.0), make(1.0), make(2.0));
@@ -221,14 +193,13 @@ fn triad_bandwidth(length: usize) -> f64 {
     for repeat in 0..TRIAD_REPEATS {
         let s = std::hint::black_box(repeat as f64);
         let start = Instant::now();
-        a.par_chunks_mut(CHUNK)
-            .zip(b.par_chunks(CHUNK))
-            .zip(c.par_chunks(CHUNK))
-            .for_each(|((a, b), c)| {
+        a.par_chunks_mut(CHUNK).zip(b.par_chunks(CHUNK)).zip(c.par_chunks(CHUNK)).for_each(
+            |((a, b), c)| {
                 for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
                     *a = b + s * c;
                 }
-            });
+            },
+        );
         best = best.min(start.elapsed().as_secs_f64());
         std::hint::black_box(&a);
     }
@@ -248,20 +219,14 @@ fn table(m: &Measured) -> String {
             m.steps,
             m.instructions
         ),
-        format!(
-            "time        {:8.2} ns per cell per step",
-            m.ns_per_cell_step
-        ),
+        format!("time        {:8.2} ns per cell per step", m.ns_per_cell_step),
     ];
     for p in &m.passes {
         let limit = p.limit_ns_per_cell_step;
         let limit = limit.map_or(String::new(), |ns| format!("   limit {ns:6.2}"));
         lines.push(format!("  {:10}{:8.2}{limit}", p.name, p.ns_per_cell_step));
     }
-    lines.push(format!(
-        "memory      {:8.1} bytes per cell",
-        m.bytes_per_cell
-    ));
+    lines.push(format!("memory      {:8.1} bytes per cell", m.bytes_per_cell));
     lines.push(format!("triad       {:8.2} GB/s", m.triad_gb_per_s));
     lines.push(format!(
         "limit       {:8.2} ns per cell per step ({:.0} bytes per cell at that bandwidth)",

@@ -57,18 +57,12 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     rows.extend(with_unit("blockage", e.blockage.map(|b| 100.0 * b), "%"));
     let contact = &case.setup.contact;
     rows.push(match contact.law {
-        ContactLawKind::Linear => (
-            "contact stiffness",
-            quantity(contact.normal_stiffness, "N/m"),
-        ),
+        ContactLawKind::Linear => ("contact stiffness", quantity(contact.normal_stiffness, "N/m")),
         ContactLawKind::HertzMindlin => ("contact law", "Hertz-Mindlin".into()),
     });
     if let (Some(time), Some(substeps)) = (e.contact_time_s, e.contact_substeps) {
         let time = quantity(time, "s");
-        rows.push((
-            "contact time",
-            format!("{time} ({substeps:.0} sub-steps per time step)"),
-        ));
+        rows.push(("contact time", format!("{time} ({substeps:.0} sub-steps per time step)")));
     }
     rows.push(("time step", quantity(e.time_step_s, "s")));
     rows.push(("steps", format!("{} to t = {} s", e.steps, case.plan.end)));
@@ -100,11 +94,7 @@ fn differ(case: &Case) -> bool {
 }
 
 fn grains(case: &Case) -> String {
-    let diameters = case
-        .setup
-        .grains
-        .iter()
-        .map(|g| 1e3 * g.shape.equivalent_diameter());
+    let diameters = case.setup.grains.iter().map(|g| 1e3 * g.shape.equivalent_diameter());
     let (least, most) = diameters.fold((f64::INFINITY, 0.0_f64), |(a, b), d| (a.min(d), b.max(d)));
     match case.setup.grains.len() {
         0 => "none".into(),

@@ -37,17 +37,11 @@ pub struct Exit {
 impl Exit {
     /// Creates a failure with one message.
     pub fn new(code: u8, message: impl Into<String>) -> Exit {
-        Exit {
-            code,
-            problems: vec![Problem::new(message)],
-        }
+        Exit { code, problems: vec![Problem::new(message)] }
     }
     /// Creates a failure with one message and its remedy.
     pub fn with_help(code: u8, message: impl Into<String>, help: impl Into<String>) -> Exit {
-        Exit {
-            code,
-            problems: vec![Problem::new(message).help(help)],
-        }
+        Exit { code, problems: vec![Problem::new(message).help(help)] }
     }
     /// Creates a failure with one message and its remedy if there is one.
     pub fn with_hint(code: u8, message: impl ToString, help: Option<impl Into<String>>) -> Exit {
@@ -70,16 +64,11 @@ impl Exit {
     pub fn messages(&self) -> String {
         let terminal = std::io::IsTerminal::is_terminal(&std::io::stderr())
             && std::env::var_os("NO_COLOR").is_none();
-        let theme = if terminal {
-            GraphicalTheme::unicode()
-        } else {
-            GraphicalTheme::none()
-        };
+        let theme = if terminal { GraphicalTheme::unicode() } else { GraphicalTheme::none() };
         // A narrow report breaks paths and numbers; files and pipes have no width.
         let width = if terminal { 100 } else { 400 };
-        let handler = GraphicalReportHandler::new_themed(theme)
-            .with_width(width)
-            .with_context_lines(1);
+        let handler =
+            GraphicalReportHandler::new_themed(theme).with_width(width).with_context_lines(1);
         let message = |problem: &Problem| {
             let mut text = String::new();
             match handler.render_report(&mut text, problem) {

@@ -7,11 +7,7 @@ use grainwake_run::case::{Problem, Verdict};
 pub fn line(v: &Verdict) -> String {
     let verdict = if v.pass { "met" } else { "missed" };
     let (value, error) = (value(v), error(v));
-    format!(
-        "{}: {value}{error}, expected {}: {verdict}",
-        v.quantity,
-        range(v)
-    )
+    format!("{}: {value}{error}, expected {}: {verdict}", v.quantity, range(v))
 }
 
 /// Returns the message of a missed expectation.
@@ -27,8 +23,7 @@ pub fn missed(v: &Verdict) -> Problem {
 }
 
 fn value(v: &Verdict) -> String {
-    v.value
-        .map_or("did not happen".into(), |x| with_unit(x, &v.quantity))
+    v.value.map_or("did not happen".into(), |x| with_unit(x, &v.quantity))
 }
 
 /// Returns the accepted range in words.
@@ -86,11 +81,7 @@ mod tests {
         let speed = Verdict {
             reference: Some(0.2),
             error: Some(-0.004),
-            ..verdict(
-                "peak_settling_speed of grain 0",
-                Some(0.196),
-                [Some(0.198), Some(0.202)],
-            )
+            ..verdict("peak_settling_speed of grain 0", Some(0.196), [Some(0.198), Some(0.202)])
         };
         assert_eq!(
             line(&speed),
@@ -105,15 +96,10 @@ mod tests {
             missed(&kiss).to_string(),
             "expected kiss_time: at least 170 ms, but it did not happen"
         );
-        let roles = Verdict {
-            pass: true,
-            ..verdict("role_changes", Some(3.0), [None, Some(10.0)])
-        };
+        let roles =
+            Verdict { pass: true, ..verdict("role_changes", Some(3.0), [None, Some(10.0)]) };
         assert_eq!(line(&roles), "role_changes: 3, expected at most 10: met");
         let still = verdict("max_divergence", Some(2.5e-14), [None, Some(0.0)]);
-        assert_eq!(
-            line(&still),
-            "max_divergence: 2.5e-14 1/s, expected at most 0 1/s: missed"
-        );
+        assert_eq!(line(&still), "max_divergence: 2.5e-14 1/s, expected at most 0 1/s: missed");
     }
 }

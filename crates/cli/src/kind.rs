@@ -46,10 +46,7 @@ pub fn case(path: &Path, set: &[String]) -> Result<Case, Exit> {
             return Exit::with_help(
                 BAD_INPUT,
                 format!("{} is a study file, not a case", path.display()),
-                format!(
-                    "use: grainwake study {}; --dry-run lists its runs",
-                    path.display()
-                ),
+                format!("use: grainwake study {}; --dry-run lists its runs", path.display()),
             );
         }
         error.into()

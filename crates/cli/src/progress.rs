@@ -38,13 +38,7 @@ impl ProgressDisplay {
             }
             bar
         });
-        ProgressDisplay {
-            bar,
-            quiet,
-            last_line: Instant::now(),
-            stop,
-            diameter,
-        }
+        ProgressDisplay { bar, quiet, last_line: Instant::now(), stop, diameter }
     }
 
     /// Removes the bar.
@@ -73,9 +67,9 @@ impl ProgressDisplay {
             clock(left)
         );
         if let (Some(gap), Some(phase)) = (p.gap, p.phase) {
-            let gap = self.diameter.map_or(format!("{:.3} mm", 1e3 * gap), |d| {
-                format!("{:.2} d", gap / d)
-            });
+            let gap = self
+                .diameter
+                .map_or(format!("{:.3} mm", 1e3 * gap), |d| format!("{:.2} d", gap / d));
             text += &format!("  gap {gap}  {}", phase.name());
         } else if p.contacts > 0 {
             text += &format!("  {}", count(p.contacts, "contact"));

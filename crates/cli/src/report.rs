@@ -9,11 +9,7 @@ use crate::{print, tell};
 
 impl From<ReportError> for Exit {
     fn from(error: ReportError) -> Exit {
-        let code = if error.is_input_output() {
-            IO
-        } else {
-            BAD_INPUT
-        };
+        let code = if error.is_input_output() { IO } else { BAD_INPUT };
         Exit::new(code, error.to_string())
     }
 }
@@ -39,9 +35,5 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
     for note in &done.notes {
         tell!("note: {note}");
     }
-    print(&format!(
-        "{} ({} figures)",
-        done.page.display(),
-        done.png.len()
-    ))
+    print(&format!("{} ({} figures)", done.page.display(), done.png.len()))
 }

@@ -16,21 +16,14 @@ use crate::{check, expect, kind, print, tell, threads};
 /// Runs a case.
 pub fn run(args: &RunArgs) -> Result<(), Exit> {
     let case = kind::case(&args.case, &args.set)?;
-    let out = args
-        .output
-        .clone()
-        .unwrap_or_else(|| default_folder(&args.case));
+    let out = args.output.clone().unwrap_or_else(|| default_folder(&args.case));
     let threads = threads::resolve(args.threads.unwrap_or(case.threads));
     let existing = match (args.resume, args.force) {
         (true, _) => Existing::Resume,
         (_, true) => Existing::Replace,
         _ => Existing::Refuse,
     };
-    let options = Options {
-        existing,
-        command: std::env::args().collect(),
-        threads,
-    };
+    let options = Options { existing, command: std::env::args().collect(), threads };
     let stop = Arc::new(AtomicBool::new(false));
     watch_for_interrupt(stop.clone());
     if !args.quiet {
@@ -49,11 +42,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         );
         check::warnings(&case.estimate(threads)).for_each(|w| tell!("{w}"));
     }
-    let diameter = case
-        .setup
-        .grains
-        .first()
-        .map(|g| g.shape.equivalent_diameter());
+    let diameter = case.setup.grains.first().map(|g| g.shape.equivalent_diameter());
     let mut shown = ProgressDisplay::new(args.quiet, stop, diameter);
     let ending = threads::on(threads, || {
         let ending = grainwake_run::run(case.job(), &out, &options, &mut shown);
@@ -69,8 +58,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
                 format!(
                     "continue with: grainwake run {} --resume{}",
                     out.join(RESOLVED).display(),
-                    args.threads
-                        .map_or(String::new(), |n| format!(" --threads {n}"))
+                    args.threads.map_or(String::new(), |n| format!(" --threads {n}"))
                 ),
             ))
         }
@@ -119,16 +107,8 @@ fn conclude(args: &RunArgs, case: &Case, summary: &Summary, out: &Path) -> Resul
     if !args.quiet {
         verdicts.iter().for_each(|v| tell!("{}", expect::line(v)));
     }
-    let missed: Vec<Problem> = verdicts
-        .iter()
-        .filter(|v| !v.pass)
-        .map(expect::missed)
-        .collect();
-    if missed.is_empty() {
-        Ok(())
-    } else {
-        Err(Exit::problems(MISSED, missed))
-    }
+    let missed: Vec<Problem> = verdicts.iter().filter(|v| !v.pass).map(expect::missed).collect();
+    if missed.is_empty() { Ok(()) } else { Err(Exit::problems(MISSED, missed)) }
 }
 
 fn describe(s: &Summary, wet: bool, out: &Path) -> String {
@@ -202,18 +182,9 @@ mod tests {
         let case = folder.path().join("dkt-pair");
         std::fs::create_dir(&case).unwrap();
         std::fs::write(case.join("case.toml"), "").unwrap();
-        assert_eq!(
-            default_folder(&case.join("case.toml")),
-            Path::new("runs/dkt-pair")
-        );
-        assert_eq!(
-            default_folder(&case.join("quick.toml")),
-            Path::new("runs/dkt-pair-quick")
-        );
-        assert_eq!(
-            default_folder(&folder.path().join("mine.toml")),
-            Path::new("runs/mine")
-        );
+        assert_eq!(default_folder(&case.join("case.toml")), Path::new("runs/dkt-pair"));
+        assert_eq!(default_folder(&case.join("quick.toml")), Path::new("runs/dkt-pair-quick"));
+        assert_eq!(default_folder(&folder.path().join("mine.toml")), Path::new("runs/mine"));
         assert_eq!(default_folder(&case.join(RESOLVED)), case);
         assert_eq!(default_folder(Path::new(RESOLVED)), Path::new("."));
     }

@@ -30,9 +30,7 @@ impl From<StudyError> for Exit {
                 error.to_string(),
                 "start the study again: it rewrites the file and keeps finished runs",
             ),
-            StudyError::Io {
-                action, ref source, ..
-            } => {
+            StudyError::Io { action, ref source, .. } => {
                 use std::io::ErrorKind::{InvalidData, NotFound};
                 let bad = action == "read" && matches!(source.kind(), NotFound | InvalidData);
                 let help = if bad {
@@ -49,33 +47,19 @@ impl From<StudyError> for Exit {
 /// Executes a study, or lists its runs.
 pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let study = kind::study(&args.study)?;
-    let selection = args
-        .only
-        .as_deref()
-        .map_or(Ok(Selection::All), Selection::parse);
+    let selection = args.only.as_deref().map_or(Ok(Selection::All), Selection::parse);
     let selection = selection.map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
     let plan = Plan::resolve(&study, &args.set)?;
     let runs = &plan.runs;
-    let chosen = selection
-        .choose(runs)
-        .map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
-    let folder = args
-        .output
-        .clone()
-        .unwrap_or_else(|| study.default_folder());
+    let chosen = selection.choose(runs).map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
+    let folder = args.output.clone().unwrap_or_else(|| study.default_folder());
     let jobs = args.jobs.clamp(1, chosen.len().max(1));
     let all = threads::resolve(0);
-    let each = if args.threads > 0 {
-        args.threads
-    } else {
-        (all / jobs).max(1)
-    };
+    let each = if args.threads > 0 { args.threads } else { (all / jobs).max(1) };
     if args.list || args.dry_run {
         plan.check_folder(&folder)?;
-        let states: Vec<(usize, RunState)> = chosen
-            .iter()
-            .map(|i| (*i, run_state(&runs[*i], &folder)))
-            .collect();
+        let states: Vec<(usize, RunState)> =
+            chosen.iter().map(|i| (*i, run_state(&runs[*i], &folder))).collect();
         if args.json {
             return print(&serde_json::to_string_pretty(&listed(runs, &states))?);
         }
@@ -136,10 +120,7 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
             _ => None,
         })
         .collect();
-    let open = ended
-        .iter()
-        .filter(|(_, o)| *o == Outcome::Interrupted)
-        .count();
+    let open = ended.iter().filter(|(_, o)| *o == Outcome::Interrupted).count();
     if stopped {
         return Err(Exit::with_help(
             INTERRUPTED,
@@ -153,18 +134,11 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
     let Some(worst) = failed.iter().map(|(.., kind)| *kind).max() else {
         return Ok(());
     };
-    let lines: Vec<String> = failed
-        .iter()
-        .map(|(name, why, _)| format!("{name}: {}", first_line(why)))
-        .collect();
+    let lines: Vec<String> =
+        failed.iter().map(|(name, why, _)| format!("{name}: {}", first_line(why))).collect();
     Err(Exit::with_help(
         exit_code(worst),
-        format!(
-            "{} of {} runs failed:\n{}",
-            failed.len(),
-            ended.len(),
-            lines.join("\n")
-        ),
+        format!("{} of {} runs failed:\n{}", failed.len(), ended.len(), lines.join("\n")),
         "the other runs are finished; --retry restarts failed runs",
     ))
 }
@@ -174,13 +148,7 @@ fn list(runs: &[Run], states: &[(usize, RunState)]) -> String {
     let width = runs.iter().map(|r| r.name.len()).max().unwrap_or(0);
     let line = |(i, state): &(usize, RunState)| {
         let run = &runs[*i];
-        format!(
-            "{:>4}  {:width$}  {:10}  {}",
-            i + 1,
-            run.name,
-            state.kind(),
-            run.id
-        )
+        format!("{:>4}  {:width$}  {:10}  {}", i + 1, run.name, state.kind(), run.id)
     };
     states.iter().map(line).collect::<Vec<_>>().join("\n")
 }
@@ -224,11 +192,7 @@ fn dry_run(
         to_do += 1;
         lines.push(format!("{}: {doing}", runs[*i].name));
     }
-    let largest = states
-        .iter()
-        .map(|(i, _)| runs[*i].memory_bytes)
-        .max()
-        .unwrap_or(0);
+    let largest = states.iter().map(|(i, _)| runs[*i].memory_bytes).max().unwrap_or(0);
     lines.push(format!(
         "{to_do} of {} to do; at most {} with {jobs} at once, {} each (an estimate; runs that stop early take less), {:.1} GB of memory",
         states.len(),
@@ -270,9 +234,7 @@ fn pretty(rows: &[&RunRecord]) -> Table {
         .collect();
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
-    let header = ["run", "state"]
-        .into_iter()
-        .chain(columns.iter().map(|c| c.0));
+    let header = ["run", "state"].into_iter().chain(columns.iter().map(|c| c.0));
     table.set_header(header.chain(["wall"]));
     for row in rows {
         let mut cells = vec![row.name.clone(), row.state.to_string()];

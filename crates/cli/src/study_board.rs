@@ -62,9 +62,8 @@ impl<'a> Board<'a> {
         stop: Arc<AtomicBool>,
     ) -> Board<'a> {
         let bars = (!quiet && std::io::stderr().is_terminal()).then(MultiProgress::new);
-        let whole = bars
-            .as_ref()
-            .map(|bars| bars.add(bar("{bar:30.green/blue} {percent:>3} % {msg}")));
+        let whole =
+            bars.as_ref().map(|bars| bars.add(bar("{bar:30.green/blue} {percent:>3} % {msg}")));
         Board {
             runs,
             total: chosen.len(),
@@ -123,27 +122,16 @@ impl Inner {
             (!self.ends.is_empty()).then(|| self.ends.iter().sum::<f64>() / self.ends.len() as f64);
         let expected = |end: f64| typical.map_or(end, |t| t.min(end));
         let running: f64 = self.active.values().map(|a| a.time - a.from).sum();
-        let left_running: f64 = self
-            .active
-            .values()
-            .map(|a| (expected(a.end) - a.time).max(0.02 * a.end))
-            .sum();
+        let left_running: f64 =
+            self.active.values().map(|a| (expected(a.end) - a.time).max(0.02 * a.end)).sum();
         let left_waiting: f64 = self.waiting.values().map(|end| expected(*end)).sum();
         let simulated = self.simulated + running;
         let rate = simulated / self.started.elapsed().as_secs_f64().max(1e-9);
         // At the end there are fewer runs than jobs: the last run has only its share of the rate.
         let busy = self.active.len().clamp(1, jobs) as f64;
-        let last = self
-            .active
-            .values()
-            .map(|a| expected(a.end) - a.time)
-            .fold(0.0, f64::max);
+        let last = self.active.values().map(|a| expected(a.end) - a.time).fold(0.0, f64::max);
         let left = ((left_running + left_waiting) / rate).max(last * busy / rate);
-        let done: f64 = self
-            .active
-            .values()
-            .map(|a| (a.time / expected(a.end)).min(1.0))
-            .sum();
+        let done: f64 = self.active.values().map(|a| (a.time / expected(a.end)).min(1.0)).sum();
         ((self.ended as f64 + done) / total.max(1) as f64, left)
     }
 }
@@ -158,13 +146,7 @@ impl StudyObserver for Board<'_> {
         });
         self.with(|inner| {
             let end = inner.waiting.remove(&run).unwrap_or(self.runs[run].end_s);
-            let active = Active {
-                bar,
-                time: 0.0,
-                from: 0.0,
-                end,
-                doing: "starting",
-            };
+            let active = Active { bar, time: 0.0, from: 0.0, end, doing: "starting" };
             inner.active.insert(run, active);
         });
         if !self.quiet && self.bars.is_none() {
@@ -206,11 +188,7 @@ impl StudyObserver for Board<'_> {
                 .active
                 .iter()
                 .map(|(i, a)| format!("{} t {:.3} s {}", self.runs[*i].name, a.time, a.doing));
-            Some(format!(
-                "{:3.0} %  {text}; {}",
-                100.0 * done,
-                each.collect::<Vec<_>>().join("; ")
-            ))
+            Some(format!("{:3.0} %  {text}; {}", 100.0 * done, each.collect::<Vec<_>>().join("; ")))
         });
         if let Some(text) = text.flatten() {
             self.line(&text);
@@ -271,11 +249,7 @@ impl StudyObserver for Board<'_> {
             Outcome::Interrupted => "interrupted".into(),
             Outcome::Locked => "locked by another program".into(),
         };
-        self.line(&format!(
-            "{}: {how} {}",
-            self.runs[run].name,
-            text.unwrap_or_default()
-        ));
+        self.line(&format!("{}: {how} {}", self.runs[run].name, text.unwrap_or_default()));
     }
 
     fn interrupted(&self) -> bool {

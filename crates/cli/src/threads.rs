@@ -7,10 +7,8 @@ pub fn resolve(threads: usize) -> usize {
     if threads > 0 {
         return threads;
     }
-    let from_environment = std::env::var("RAYON_NUM_THREADS")
-        .ok()
-        .and_then(|n| n.parse().ok())
-        .filter(|n| *n > 0);
+    let from_environment =
+        std::env::var("RAYON_NUM_THREADS").ok().and_then(|n| n.parse().ok()).filter(|n| *n > 0);
     from_environment.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
 }
 

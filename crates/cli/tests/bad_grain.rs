@@ -38,12 +38,7 @@ fn cube() -> Vec<Face> {
                 x[(axis + 2) % 3] = v;
                 x
             };
-            let side = [
-                corner(0.0, 0.0),
-                corner(1.0, 0.0),
-                corner(1.0, 1.0),
-                corner(0.0, 1.0),
-            ];
+            let side = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
             let [a, b, c, d] = side;
             faces.extend(match upper {
                 true => [[a, b, c], [a, c, d]],
@@ -82,10 +77,7 @@ fn the_cube_itself_is_taken_with_a_bare_unit() {
     let out = folder.path().join("cube.grain");
     let make = |more: &[&str]| {
         let mut program = grainwake();
-        program
-            .args(["grain", "from-mesh"])
-            .arg(&mesh)
-            .args(["--unit", "mm"]);
+        program.args(["grain", "from-mesh"]).arg(&mesh).args(["--unit", "mm"]);
         program.args(more).arg("-o").arg(&out).assert()
     };
     // A length that is no unit of a file needs its number.
@@ -117,26 +109,11 @@ fn outputs_that_are_inputs_or_have_the_name_of_something_else() {
     };
     let mesh = ["from-mesh", "--unit", "mm", "--force"];
     run(&mesh, "cube.stl", "cube.stl", "is an input of this command");
-    run(
-        &mesh,
-        "cube.stl",
-        "slices/../cube.stl",
-        "is an input of this command",
-    );
+    run(&mesh, "cube.stl", "slices/../cube.stl", "is an input of this command");
     run(&mesh, "cube.stl", "e2.stl", "e2.grain");
-    run(
-        &["make", "sphere", "2 mm"],
-        "",
-        "ball",
-        "does not end in .grain",
-    );
+    run(&["make", "sphere", "2 mm"], "", "ball", "does not end in .grain");
     let scan = ["from-scan", "--voxel", "10 um", "--force"];
-    run(
-        &scan,
-        "ball.nrrd",
-        "ball.nrrd",
-        "is an input of this command",
-    );
+    run(&scan, "ball.nrrd", "ball.nrrd", "is an input of this command");
     run(&scan, "slices", "slices", "is an input of this command");
     run(&scan, "ball.nrrd", "s.grian", "the extension of a file");
     let family = ["family", "--sphericity", "0.7", "--roundness", "0.5"];
@@ -145,25 +122,14 @@ fn outputs_that_are_inputs_or_have_the_name_of_something_else() {
 
 #[test]
 fn a_mesh_with_a_hole() {
-    refused_mesh(
-        &cube()[1..],
-        "1 mm",
-        &["the mesh is open: 3 edges", "near (", "Close Holes"],
-    );
+    refused_mesh(&cube()[1..], "1 mm", &["the mesh is open: 3 edges", "near (", "Close Holes"]);
 }
 
 #[test]
 fn a_mesh_with_a_face_without_area() {
     let mut faces = cube();
     faces.push([[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]);
-    refused_mesh(
-        &faces,
-        "1 mm",
-        &[
-            "face 12 near (0, 0, 0) has no area",
-            "Remove Zero Area Faces",
-        ],
-    );
+    refused_mesh(&faces, "1 mm", &["face 12 near (0, 0, 0) has no area", "Remove Zero Area Faces"]);
 }
 
 #[test]
@@ -177,37 +143,20 @@ fn a_mesh_inside_out() {
 fn a_mesh_through_itself() {
     let mut faces = cube();
     // One corner is pulled through the opposite side.
-    let moved = faces
-        .iter_mut()
-        .flatten()
-        .filter(|p| **p == [1.0, 1.0, 1.0]);
+    let moved = faces.iter_mut().flatten().filter(|p| **p == [1.0, 1.0, 1.0]);
     moved.for_each(|p| *p = [0.3, 0.4, -0.5]);
-    refused_mesh(
-        &faces,
-        "1 mm",
-        &["cross near (", "pairs cross", "repair the mesh"],
-    );
+    refused_mesh(&faces, "1 mm", &["cross near (", "pairs cross", "repair the mesh"]);
 }
 
 #[test]
 fn millimetres_for_metres() {
-    let large: Vec<Face> = cube()
-        .iter()
-        .map(|f| f.map(|p| p.map(|x| 2.0 * x)))
-        .collect();
+    let large: Vec<Face> = cube().iter().map(|f| f.map(|p| p.map(|x| 2.0 * x))).collect();
     refused_mesh(
         &large,
         "1 m",
-        &[
-            "equivalent diameter of 2.481",
-            "check the unit of --unit",
-            "1 um to 1 m",
-        ],
+        &["equivalent diameter of 2.481", "check the unit of --unit", "1 um to 1 m"],
     );
-    let small: Vec<Face> = cube()
-        .iter()
-        .map(|f| f.map(|p| p.map(|x| 2e-4 * x)))
-        .collect();
+    let small: Vec<Face> = cube().iter().map(|f| f.map(|p| p.map(|x| 2e-4 * x))).collect();
     refused_mesh(&small, "1 mm", &["of 0.2481", "check the unit of --unit"]);
 }
 
@@ -225,9 +174,7 @@ fn image(value: impl Fn(f64) -> u8) -> Vec<u8> {
     for k in 0..24 {
         for j in 0..24 {
             for i in 0..24 {
-                bytes.push(value(
-                    (at(i).powi(2) + at(j).powi(2) + at(k).powi(2)).sqrt(),
-                ));
+                bytes.push(value((at(i).powi(2) + at(j).powi(2) + at(k).powi(2)).sqrt()));
             }
         }
     }
@@ -277,20 +224,13 @@ fn a_grain_cut_by_every_border() {
     refused_image(
         "cut.nrrd",
         &file,
-        &[
-            "touches the image border (low x, high x, low y, high y, low z, high z)",
-            "--pad",
-        ],
+        &["touches the image border (low x, high x, low y, high y, low z, high z)", "--pad"],
     );
 }
 
 #[test]
 fn two_pieces_of_one_label() {
-    let file = nrrd(
-        "uint8",
-        [24; 3],
-        &image(|r| u8::from(r < 3.0 || (6.0..10.0).contains(&r))),
-    );
+    let file = nrrd("uint8", [24; 3], &image(|r| u8::from(r < 3.0 || (6.0..10.0).contains(&r))));
     refused_image("two.nrrd", &file, &["2 separate pieces", "--largest-piece"]);
 }
 
@@ -309,12 +249,7 @@ fn two_grains_for_one_file() {
     refused_image(
         "two.nrrd",
         &nrrd("uint8", [24; 3], &two_balls()),
-        &[
-            "two.nrrd holds 2 grains",
-            "two.grain",
-            "labels are 7, 9",
-            "--label N",
-        ],
+        &["two.nrrd holds 2 grains", "two.grain", "labels are 7, 9", "--label N"],
     );
 }
 
@@ -337,10 +272,7 @@ fn a_threshold_in_hounsfield_units() {
     for threshold in ["-500", "-1.5e2"] {
         let message = all_grains(&file, &["--threshold", threshold], 0);
         let number: f64 = threshold.parse().unwrap();
-        assert!(
-            message.contains(&format!("threshold {number}")),
-            "{message}"
-        );
+        assert!(message.contains(&format!("threshold {number}")), "{message}");
     }
 }
 
@@ -357,21 +289,13 @@ fn a_header_that_tells_of_less_than_its_file_holds_or_of_no_file() {
     };
     let path = folder.path().join("ball.nhdr");
     std::fs::write(&path, header("ball.raw")).unwrap();
-    refused(
-        &command,
-        &path,
-        &["ball.nhdr", "11520 bytes", "ball.raw", "13824", "byte skip"],
-    );
+    refused(&command, &path, &["ball.nhdr", "11520 bytes", "ball.raw", "13824", "byte skip"]);
     std::fs::write(&path, header("none.raw")).unwrap();
     refused(&command, &path, &["ball.nhdr", "none.raw", "not there"]);
     let path = folder.path().join("ball.mhd");
     let header = "NDims = 3\nDimSize = 24 24 20\nElementType = MET_UCHAR\nElementDataFile = ";
     std::fs::write(&path, format!("{header}ball.raw\n")).unwrap();
-    refused(
-        &command,
-        &path,
-        &["ball.mhd", "11520", "13824", "HeaderSize"],
-    );
+    refused(&command, &path, &["ball.mhd", "11520", "13824", "HeaderSize"]);
 }
 
 #[test]
@@ -422,10 +346,7 @@ fn grains_of_an_earlier_run_do_not_stay() {
     }
     // Other numbers than before: the old ones belong to no table.
     let message = run(&["--split"], 2);
-    assert!(
-        message.contains("label-00007.grain exists already"),
-        "{message}"
-    );
+    assert!(message.contains("label-00007.grain exists already"), "{message}");
     // What gives no grain removes none.
     run(&["--threshold", "200", "--force"], 2);
     assert_eq!(grains().len(), 5);
@@ -447,14 +368,7 @@ fn a_flatness_that_the_sphericity_does_not_allow() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let mut program = grainwake();
-    program.args([
-        "grain",
-        "family",
-        "--sphericity",
-        "0.9",
-        "--roundness",
-        "0.5",
-    ]);
+    program.args(["grain", "family", "--sphericity", "0.9", "--roundness", "0.5"]);
     program.args(["--flatness", "0.5", "-o"]).arg(&out);
     let done = program.assert().code(2);
     let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
@@ -496,11 +410,8 @@ fn a_grey_image_taken_for_labels() {
     );
     assert!(message.lines().count() < 8, "{message}");
     // With it the grain is there and no hint at grey values is printed.
-    let message = all_grains(
-        &nrrd("uint8", [24; 3], &grey),
-        &["--threshold", "otsu", "--largest-piece"],
-        0,
-    );
+    let message =
+        all_grains(&nrrd("uint8", [24; 3], &grey), &["--threshold", "otsu", "--largest-piece"], 0);
     assert!(!message.contains("grey image"), "{message}");
 }
 
@@ -528,11 +439,7 @@ fn an_image_with_a_value_that_is_no_number() {
     refused_image(
         "nan.nrrd",
         &file,
-        &[
-            "nan.nrrd",
-            "x 5, y 4, z 3 is NaN, not a finite number",
-            "value of the void",
-        ],
+        &["nan.nrrd", "x 5, y 4, z 3 is NaN, not a finite number", "value of the void"],
     );
 }
 
@@ -550,11 +457,7 @@ fn millimetres_for_micrometres() {
     let all = folder.path().join("all");
     let mut program = grainwake();
     program.args(["grain", "from-scan"]).arg(&path);
-    program
-        .args(["--voxel", "100 mm", "-o"])
-        .arg(&all)
-        .assert()
-        .code(2);
+    program.args(["--voxel", "100 mm", "-o"]).arg(&all).assert().code(2);
     assert!(!all.exists());
 }
 
@@ -606,18 +509,10 @@ fn a_truncated_tiff() {
     std::fs::write(&path, &whole).unwrap();
     let out = folder.path().join("ball.grain");
     let mut taken = grainwake();
-    taken
-        .args(["grain", "from-scan", "--voxel", "10 um"])
-        .arg(&path)
-        .arg("-o")
-        .arg(&out);
+    taken.args(["grain", "from-scan", "--voxel", "10 um"]).arg(&path).arg("-o").arg(&out);
     taken.assert().success();
     for part in [whole.len() / 2, 100, 7] {
-        refused_image(
-            "part.tif",
-            &whole[..part],
-            &["part.tif: damaged", "export the file again"],
-        );
+        refused_image("part.tif", &whole[..part], &["part.tif: damaged", "export the file again"]);
     }
 }
 

@@ -19,10 +19,7 @@ fn refused(from: &str, to: &str, words: &[&str]) {
         let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
         assert!(done.get_output().stdout.is_empty());
         for word in words {
-            assert!(
-                message.contains(word),
-                "{command}: `{word}` is missing in:\n{message}"
-            );
+            assert!(message.contains(word), "{command}: `{word}` is missing in:\n{message}");
         }
     }
     assert!(!out.exists(), "nothing may be written");
@@ -33,12 +30,7 @@ fn a_wrong_key() {
     refused(
         "viscosity =",
         "viscossity =",
-        &[
-            "case.toml:5:1",
-            "fluid.viscossity",
-            "unknown key",
-            "did you mean `viscosity`?",
-        ],
+        &["case.toml:5:1", "fluid.viscossity", "unknown key", "did you mean `viscosity`?"],
     );
 }
 
@@ -47,12 +39,7 @@ fn a_wrong_unit() {
     refused(
         "\"5 mPa s\"",
         "\"5 mPa\"",
-        &[
-            "case.toml:5:13",
-            "fluid.viscosity",
-            "is a pressure",
-            "\"1 mPa s\"",
-        ],
+        &["case.toml:5:13", "fluid.viscosity", "is a pressure", "\"1 mPa s\""],
     );
 }
 
@@ -77,12 +64,7 @@ fn grains_that_overlap() {
     refused(
         "gap = \"1 mm\"",
         "gap = \"-0.5 mm\"",
-        &[
-            "case.toml:26:12",
-            "grain.1.position",
-            "overlap at the start by 0.4",
-            "move them apart",
-        ],
+        &["case.toml:26:12", "grain.1.position", "overlap at the start by 0.4", "move them apart"],
     );
 }
 
@@ -91,22 +73,12 @@ fn a_grain_outside() {
     refused(
         "\"3 mm\"]",
         "\"30 mm\"]",
-        &[
-            "case.toml:21:12",
-            "grain.0.position",
-            "outside the box",
-            "larger",
-        ],
+        &["case.toml:21:12", "grain.0.position", "outside the box", "larger"],
     );
     refused(
         "\"3 mm\"]",
         "\"0.5 mm\"]",
-        &[
-            "case.toml:21:12",
-            "crosses a face",
-            "lower z",
-            "0.5000 mm along z",
-        ],
+        &["case.toml:21:12", "crosses a face", "lower z", "0.5000 mm along z"],
     );
 }
 
@@ -115,12 +87,7 @@ fn a_periodic_mismatch() {
     refused(
         "x = \"periodic\"",
         "x = [\"periodic\", \"wall\"]",
-        &[
-            "case.toml:9:20",
-            "domain.boundaries.x",
-            "one side only",
-            "x = \"periodic\"",
-        ],
+        &["case.toml:9:20", "domain.boundaries.x", "one side only", "x = \"periodic\""],
     );
 }
 
@@ -148,11 +115,7 @@ fn a_study_file_for_a_case() {
 #[test]
 fn what_is_not_there_and_what_is_no_case() {
     let folder = tempfile::tempdir().unwrap();
-    let done = grainwake()
-        .arg("run")
-        .arg(folder.path().join("nowhere.toml"))
-        .assert()
-        .code(2);
+    let done = grainwake().arg("run").arg(folder.path().join("nowhere.toml")).assert().code(2);
     assert!(String::from_utf8_lossy(&done.get_output().stderr).contains("nowhere.toml"));
     let path = folder.path().join("broken.toml");
     std::fs::write(&path, "[fluid\n").unwrap();
@@ -171,11 +134,7 @@ fn a_damaged_grain_file_is_told_of_with_its_place() {
         1,
     ));
     let grain = folder.path().join("a.grain");
-    grainwake()
-        .args(["grain", "make", "sphere", "2 mm", "-o"])
-        .arg(&grain)
-        .assert()
-        .success();
+    grainwake().args(["grain", "make", "sphere", "2 mm", "-o"]).arg(&grain).assert().success();
     grainwake().arg("check").arg(&case).assert().success();
     let mut bytes = std::fs::read(&grain).unwrap();
     let middle = bytes.len() / 2;
@@ -183,8 +142,5 @@ fn a_damaged_grain_file_is_told_of_with_its_place() {
     std::fs::write(&grain, bytes).unwrap();
     let done = grainwake().arg("check").arg(&case).assert().code(2);
     let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
-    assert!(
-        message.contains("case.toml:18:8") && message.contains("checksum"),
-        "{message}"
-    );
+    assert!(message.contains("case.toml:18:8") && message.contains("checksum"), "{message}");
 }

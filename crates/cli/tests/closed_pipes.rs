@@ -54,10 +54,6 @@ fn a_reader_that_has_gone_is_no_error() {
     for (words, paths) in calls {
         let done = program(words, paths).stdout(closed()).output().unwrap();
         let message = String::from_utf8_lossy(&done.stderr).into_owned();
-        assert_eq!(
-            (done.status.code(), message.as_str()),
-            (Some(0), ""),
-            "{words:?}"
-        );
+        assert_eq!((done.status.code(), message.as_str()), (Some(0), ""), "{words:?}");
     }
 }

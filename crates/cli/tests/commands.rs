@@ -66,9 +66,8 @@ fn a_run_folder_holds_what_the_reference_says() {
         lines.next(),
         Some("time,grain,x,y,z,vx,vy,vz,qw,qx,qy,qz,wx,wy,wz,fx,fy,fz,tx,ty,tz,contacts")
     );
-    let rows: Vec<Vec<f64>> = lines
-        .map(|l| l.split(',').map(|v| v.parse().unwrap()).collect())
-        .collect();
+    let rows: Vec<Vec<f64>> =
+        lines.map(|l| l.split(',').map(|v| v.parse().unwrap()).collect()).collect();
     assert_eq!(rows.len(), 2 * 31);
     for (n, row) in rows.iter().enumerate() {
         assert!(
@@ -79,12 +78,8 @@ fn a_run_folder_holds_what_the_reference_says() {
     let field = grainwake_formats::vti::read(&out.join("fields/fields_000001.vti")).unwrap();
     assert_eq!(field.frame.cells, [8, 8, 24]);
     let array = |name: &str| field.arrays.iter().find(|a| a.name == name).unwrap();
-    let solid: f64 = array("solid_fraction")
-        .data
-        .iter()
-        .map(|f| f64::from(*f))
-        .sum::<f64>()
-        * 0.125e-9;
+    let solid: f64 =
+        array("solid_fraction").data.iter().map(|f| f64::from(*f)).sum::<f64>() * 0.125e-9;
     let spheres = 2.0 * std::f64::consts::PI / 6.0 * 8e-9;
     // Four cells across a sphere.
     assert!((solid / spheres - 1.0).abs() < 0.01, "{solid} {spheres}");
@@ -94,33 +89,18 @@ fn a_run_folder_holds_what_the_reference_says() {
     assert!((slice.frame.time - 0.02).abs() < 1e-12);
     // The slice is a layer of the field.
     let layer = (slice.frame.origin.y / 0.5e-3).round() as usize;
-    let pressure = &slice
-        .arrays
-        .iter()
-        .find(|a| a.name == "pressure")
-        .unwrap()
-        .data;
+    let pressure = &slice.arrays.iter().find(|a| a.name == "pressure").unwrap().data;
     for k in 0..24 {
         for i in 0..8 {
-            assert_eq!(
-                pressure[k * 8 + i],
-                array("pressure").data[(k * 8 + layer) * 8 + i]
-            );
+            assert_eq!(pressure[k * 8 + i], array("pressure").data[(k * 8 + layer) * 8 + i]);
         }
     }
     let collection = std::fs::read_to_string(out.join("run.pvd")).unwrap();
-    for file in collection
-        .split("file=\"")
-        .skip(1)
-        .map(|rest| rest.split('"').next().unwrap())
-    {
+    for file in collection.split("file=\"").skip(1).map(|rest| rest.split('"').next().unwrap()) {
         assert!(out.join(file).is_file(), "{file}");
     }
     let events = std::fs::read_to_string(out.join("events.jsonl")).unwrap();
-    let kinds: Vec<Value> = events
-        .lines()
-        .map(|l| json(l.as_bytes())["event"].clone())
-        .collect();
+    let kinds: Vec<Value> = events.lines().map(|l| json(l.as_bytes())["event"].clone()).collect();
     assert!(kinds.contains(&"landing".into()), "{events}");
     assert!(collection.contains("landing-1"), "a picture of the landing");
 }
@@ -128,12 +108,7 @@ fn a_run_folder_holds_what_the_reference_says() {
 #[test]
 fn check_gives_the_derived_numbers() {
     let (_folder, case) = folder_with(WET);
-    let done = grainwake()
-        .arg("check")
-        .arg(&case)
-        .arg("--json")
-        .assert()
-        .success();
+    let done = grainwake().arg("check").arg(&case).arg("--json").assert().success();
     let numbers = json(&done.get_output().stdout);
     for key in [
         "cells",
@@ -147,10 +122,7 @@ fn check_gives_the_derived_numbers() {
         assert!(numbers.get(key).is_some(), "{key}");
     }
     assert_eq!(
-        (
-            numbers["cells"].as_u64(),
-            numbers["cells_per_diameter"].as_f64()
-        ),
+        (numbers["cells"].as_u64(), numbers["cells_per_diameter"].as_f64()),
         (Some(1536), Some(4.0))
     );
     assert!(numbers["warnings"].to_string().contains("cells across"));
@@ -166,10 +138,7 @@ fn a_run_says_what_check_warns_of() {
     check.arg("check").arg(&case).args(short);
     let check = check.assert().success();
     let message = String::from_utf8_lossy(&check.get_output().stdout).into_owned();
-    let warnings: Vec<&str> = message
-        .lines()
-        .filter(|l| l.starts_with("warning"))
-        .collect();
+    let warnings: Vec<&str> = message.lines().filter(|l| l.starts_with("warning")).collect();
     assert!(!warnings.is_empty(), "{message}");
     let run = |out: &str, more: &[&str]| {
         let mut command = grainwake();
@@ -201,22 +170,13 @@ fn expectations_are_told_with_their_units() {
     let message = run("a", &[]);
     let line = |start: &str, end: &str| {
         let mut lines = message.lines();
-        assert!(
-            lines.any(|l| l.starts_with(start) && l.ends_with(end)),
-            "{message}"
-        );
+        assert!(lines.any(|l| l.starts_with(start) && l.ends_with(end)), "{message}");
     };
     line("landing_time of grain 0: 2", " ms: met");
-    line(
-        "landing_time of grain 0: 2",
-        ", expected 49 ms to 51 ms: missed",
-    );
+    line("landing_time of grain 0: 2", ", expected 49 ms to 51 ms: missed");
     line("end_time: 120 ms, expected at least 100 ms: met", "");
     let miss = "expected landing_time of grain 0: 49 ms to 51 ms, but it is 2";
-    assert!(
-        message.contains(miss) && message.contains(" ms (error -4"),
-        "{message}"
-    );
+    assert!(message.contains(miss) && message.contains(" ms (error -4"), "{message}");
     // Missed expectations are printed even with --quiet.
     let quiet = run("b", &["--quiet"]);
     assert!(quiet.contains(miss) && !quiet.contains(": met"), "{quiet}");
@@ -235,9 +195,7 @@ fn an_expectation_makes_a_case_a_test() {
         .arg("--quiet")
         .assert()
         .success();
-    let wrong = std::fs::read_to_string(&case)
-        .unwrap()
-        .replace("0.0286", "0.05");
+    let wrong = std::fs::read_to_string(&case).unwrap().replace("0.0286", "0.05");
     std::fs::write(&case, wrong).unwrap();
     let done = grainwake()
         .arg("run")
@@ -264,13 +222,8 @@ fn a_stop_rule_ends_a_run() {
         .replace("end = \"120 ms\"", "end = \"1 s\""),
     );
     let out = folder.path().join("run");
-    let done = grainwake()
-        .arg("run")
-        .arg(&case)
-        .arg("-o")
-        .arg(&out)
-        .args(["--json", "--quiet"])
-        .assert();
+    let done =
+        grainwake().arg("run").arg(&case).arg("-o").arg(&out).args(["--json", "--quiet"]).assert();
     let summary = json(&done.success().get_output().stdout);
     assert_eq!(summary["ended_by"], "landing");
     let last = summary["grains"]
@@ -286,10 +239,7 @@ fn a_stop_rule_ends_a_run() {
 #[test]
 fn schema_and_completions_are_printed() {
     let schema = grainwake().arg("schema").assert().success();
-    assert_eq!(
-        json(&schema.get_output().stdout)["title"],
-        "Grainwake case file"
-    );
+    assert_eq!(json(&schema.get_output().stdout)["title"], "Grainwake case file");
     let script = grainwake().args(["completions", "bash"]).assert().success();
     assert!(String::from_utf8_lossy(&script.get_output().stdout).contains("grainwake"));
 }
@@ -297,22 +247,12 @@ fn schema_and_completions_are_printed() {
 #[test]
 fn bench_measures_time_memory_and_the_limit() {
     let done = grainwake()
-        .args([
-            "bench", "--size", "24", "24", "48", "--grains", "7", "--steps", "2", "--json",
-        ])
+        .args(["bench", "--size", "24", "24", "48", "--grains", "7", "--steps", "2", "--json"])
         .assert()
         .success();
     let measured = json(&done.get_output().stdout);
-    for key in [
-        "ns_per_cell_step",
-        "bytes_per_cell",
-        "triad_gb_per_s",
-        "limit_ns_per_cell_step",
-    ] {
-        assert!(
-            measured[key].as_f64().is_some_and(|v| v > 0.0),
-            "{key} in {measured}"
-        );
+    for key in ["ns_per_cell_step", "bytes_per_cell", "triad_gb_per_s", "limit_ns_per_cell_step"] {
+        assert!(measured[key].as_f64().is_some_and(|v| v > 0.0), "{key} in {measured}");
     }
     assert!(measured["passes"].as_array().is_some_and(|p| p.len() >= 7));
     assert_eq!(measured["grains"], 7);
@@ -331,30 +271,19 @@ fn bench_measures_time_memory_and_the_limit() {
         .args(["--instructions", "baseline", "--json"])
         .assert()
         .success();
-    assert_eq!(
-        json(&baseline.get_output().stdout)["instructions"],
-        "baseline"
-    );
-    let unknown = grainwake()
-        .args(["bench", "--instructions", "sse9"])
-        .assert()
-        .code(2);
+    assert_eq!(json(&baseline.get_output().stdout)["instructions"], "baseline");
+    let unknown = grainwake().args(["bench", "--instructions", "sse9"]).assert().code(2);
     assert!(
         String::from_utf8_lossy(&unknown.get_output().stderr).contains("baseline, avx2, avx512")
     );
     if InstructionSet::widest() < InstructionSet::Avx512 {
-        let lacking = grainwake()
-            .args(["bench", "--instructions", "avx512"])
-            .assert()
-            .code(2);
+        let lacking = grainwake().args(["bench", "--instructions", "avx512"]).assert().code(2);
         let message = String::from_utf8_lossy(&lacking.get_output().stderr).into_owned();
         assert!(message.contains("this processor has at most"), "{message}");
     }
     // Two by two by four places of eleven cells.
-    let many = grainwake()
-        .args(["bench", "--size", "24", "24", "48", "--grains", "17"])
-        .assert()
-        .code(2);
+    let many =
+        grainwake().args(["bench", "--size", "24", "24", "48", "--grains", "17"]).assert().code(2);
     assert!(String::from_utf8_lossy(&many.get_output().stderr).contains("at most 16"));
 }
 
@@ -367,11 +296,7 @@ fn grains_are_made_and_described() {
         .arg(&path)
         .assert()
         .success();
-    let done = grainwake()
-        .args(["grain", "info", "--json"])
-        .arg(&path)
-        .assert()
-        .success();
+    let done = grainwake().args(["grain", "info", "--json"]).arg(&path).assert().success();
     let record = json(&done.get_output().stdout);
     for key in [
         "volume_m3",
@@ -388,11 +313,8 @@ fn grains_are_made_and_described() {
         assert!(record.get(key).is_some(), "{key}");
     }
     assert!((record["equivalent_diameter_m"].as_f64().unwrap() - 2e-3).abs() < 1e-9);
-    let again = grainwake()
-        .args(["grain", "make", "sphere", "2 mm", "-o"])
-        .arg(&path)
-        .assert()
-        .code(2);
+    let again =
+        grainwake().args(["grain", "make", "sphere", "2 mm", "-o"]).arg(&path).assert().code(2);
     assert!(String::from_utf8_lossy(&again.get_output().stderr).contains("--force"));
     let bad = grainwake()
         .args(["grain", "make", "sphere", "2 kg", "-o"])
@@ -406,10 +328,9 @@ fn grains_are_made_and_described() {
 fn grains_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    for (name, axes) in [
-        ("long.grain", ["3 mm", "2 mm", "1 mm"]),
-        ("flat.grain", ["4 mm", "4 mm", "2 mm"]),
-    ] {
+    for (name, axes) in
+        [("long.grain", ["3 mm", "2 mm", "1 mm"]), ("flat.grain", ["4 mm", "4 mm", "2 mm"])]
+    {
         let mut make = grainwake();
         make.args(["grain", "make", "ellipsoid"])
             .args(axes)
@@ -435,29 +356,18 @@ fn grains_are_compared() {
     let same = json(&compare(&["--json", "--same-size"]));
     let diameter = |which: &str| same[which]["equivalent_diameter_m"].as_f64().unwrap();
     assert!((diameter("first") / diameter("second") - 1.0).abs() < 1e-9);
-    assert!(
-        same["comparison"]["mean_distance_m"]
-            .as_f64()
-            .unwrap()
-            .abs()
-            < 1e-4
-    );
+    assert!(same["comparison"]["mean_distance_m"].as_f64().unwrap().abs() < 1e-4);
     let picture = path("both.png");
     let text = compare(&["--picture", picture.to_str().unwrap()]);
     let text = String::from_utf8_lossy(&text);
-    assert!(
-        text.contains("Krumbein sphericity") && text.contains("root mean square"),
-        "{text}"
-    );
+    assert!(text.contains("Krumbein sphericity") && text.contains("root mean square"), "{text}");
     assert!(picture.exists());
     let mut over = grainwake();
     over.args(["grain", "compare"])
         .args([path("long.grain"), path("flat.grain")])
         .arg("--picture")
         .arg(path("long.grain"));
-    over.assert()
-        .code(2)
-        .stderr(contains("is an input of this command"));
+    over.assert().code(2).stderr(contains("is an input of this command"));
 }
 
 #[test]
@@ -477,20 +387,14 @@ fn a_run_can_be_reported() {
     assert!(!out.join("report.html").exists());
     grainwake().arg("report").arg(&out).assert().success();
     assert!(out.join("report.html").is_file());
-    grainwake()
-        .arg("report")
-        .arg(folder.path())
-        .assert()
-        .code(2);
+    grainwake().arg("report").arg(folder.path()).assert().code(2);
 }
 
 /// Set `GRAINWAKE_PYTHON` to a Python that has PyVista; without one the test says so and passes.
 #[test]
 fn pictures_open_in_pyvista() {
     let python = std::env::var("GRAINWAKE_PYTHON").unwrap_or_else(|_| "python3".into());
-    let has = std::process::Command::new(&python)
-        .args(["-c", "import pyvista"])
-        .output();
+    let has = std::process::Command::new(&python).args(["-c", "import pyvista"]).output();
     if !has.is_ok_and(|o| o.status.success()) {
         eprintln!(
             "SKIPPED pictures_open_in_pyvista: {python} has no pyvista (set GRAINWAKE_PYTHON)"
@@ -499,45 +403,16 @@ fn pictures_open_in_pyvista() {
     }
     let (folder, case) = folder_with(WET);
     let out = folder.path().join("run");
-    let quick = [
-        "--quiet",
-        "--set",
-        "output.checkpoint_steps=0",
-        "--set",
-        "time.end=20 ms",
-    ];
-    grainwake()
-        .arg("run")
-        .arg(&case)
-        .arg("-o")
-        .arg(&out)
-        .args(quick)
-        .assert()
-        .success();
+    let quick = ["--quiet", "--set", "output.checkpoint_steps=0", "--set", "time.end=20 ms"];
+    grainwake().arg("run").arg(&case).arg("-o").arg(&out).args(quick).assert().success();
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/read_pictures.py");
-    let done = std::process::Command::new(&python)
-        .arg(script)
-        .arg(&out)
-        .output()
-        .unwrap();
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    let done = std::process::Command::new(&python).arg(script).arg(&out).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let found = json(&done.stdout);
     assert_eq!(found["fields"]["dimensions"], serde_json::json!([9, 9, 25]));
-    assert_eq!(
-        found["fields"]["arrays"]["velocity"],
-        serde_json::json!([1536, 3])
-    );
+    assert_eq!(found["fields"]["arrays"]["velocity"], serde_json::json!([1536, 3]));
     let ours = grainwake_formats::vti::read(&out.join("fields/fields_000001.vti")).unwrap();
-    let pressure = &ours
-        .arrays
-        .iter()
-        .find(|a| a.name == "pressure")
-        .unwrap()
-        .data;
+    let pressure = &ours.arrays.iter().find(|a| a.name == "pressure").unwrap().data;
     assert_eq!(
         found["fields"]["pressure_at_5_3_7"].as_f64(),
         Some(f64::from(pressure[(7 * 8 + 3) * 8 + 5]))
@@ -545,19 +420,10 @@ fn pictures_open_in_pyvista() {
     assert_eq!(found["fields"]["time"].as_f64(), Some(ours.frame.time));
     assert_eq!(found["grains"]["closed"], true);
     let volume = found["grains"]["volume_of_0"].as_f64().unwrap();
-    assert!(
-        (volume / (std::f64::consts::PI / 6.0 * 8e-9) - 1.0).abs() < 0.01,
-        "{volume}"
-    );
+    assert!((volume / (std::f64::consts::PI / 6.0 * 8e-9) - 1.0).abs() < 0.01, "{volume}");
     let grains = std::fs::read_to_string(out.join("grains.csv")).unwrap();
-    let last: Vec<f64> = grains
-        .lines()
-        .rev()
-        .nth(1)
-        .unwrap()
-        .split(',')
-        .map(|v| v.parse().unwrap())
-        .collect();
+    let last: Vec<f64> =
+        grains.lines().rev().nth(1).unwrap().split(',').map(|v| v.parse().unwrap()).collect();
     assert!((found["grains"]["centre_of_0"][2].as_f64().unwrap() - last[4]).abs() < 1e-6);
     assert_eq!(found["times"], serde_json::json!([0.0, 0.01, 0.02]));
     // The field, the grains and a slice through each of them.

@@ -13,10 +13,7 @@ use predicates::str::contains;
 fn run(case: &Path, out: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
     let mut command = grainwake();
     command.arg("run").arg(case).arg("-o").arg(out);
-    command
-        .args(["--quiet", "--threads", "1"])
-        .args(more)
-        .assert()
+    command.args(["--quiet", "--threads", "1"]).args(more).assert()
 }
 
 #[test]
@@ -35,10 +32,7 @@ fn a_folder_in_use_is_refused_until_its_run_is_dead() {
         .unwrap();
     let begun = Instant::now();
     while !out.join("events.jsonl").is_file() {
-        assert!(
-            begun.elapsed() < Duration::from_secs(60),
-            "it does not start"
-        );
+        assert!(begun.elapsed() < Duration::from_secs(60), "it does not start");
         std::thread::sleep(Duration::from_millis(10));
     }
     let number = format!("process {}", first.id());
@@ -46,11 +40,7 @@ fn a_folder_in_use_is_refused_until_its_run_is_dead() {
         let refused = run(&case, &out, more).code(2);
         if !more.is_empty() {
             let place = out.display().to_string();
-            refused.stderr(
-                contains("is writing into")
-                    .and(contains(place))
-                    .and(contains(&number)),
-            );
+            refused.stderr(contains("is writing into").and(contains(place)).and(contains(&number)));
         }
     }
     assert!(first.try_wait().unwrap().is_none(), "the first run goes on");
@@ -81,15 +71,10 @@ fn a_few_grains_tell_whom_they_meet() {
     let out = folder.path().join("out");
     run(&case, &out, &[]).success();
     let log = std::fs::read_to_string(out.join("events.jsonl")).unwrap();
-    let events: Vec<serde_json::Value> = log
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let events: Vec<serde_json::Value> =
+        log.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     // The large grain falls on the one below it; both were apart.
-    let kiss = events
-        .iter()
-        .find(|e| e["event"] == "kiss")
-        .expect("a meeting");
+    let kiss = events.iter().find(|e| e["event"] == "kiss").expect("a meeting");
     assert_eq!(kiss["grains"], serde_json::json!([0, 1]));
     let summary = std::fs::read_to_string(out.join("summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();

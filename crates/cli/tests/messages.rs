@@ -16,10 +16,7 @@ fn wrong_nodes_are_shown_where_they_are_written() {
     for nodes in ["5", "2000000"] {
         let wrong = WET.replacen("nodes = 200", &format!("nodes = {nodes}"), 1);
         let line = 1 + wrong[..wrong.find("nodes").unwrap()].matches('\n').count();
-        let wrong = wrong.replace(
-            "kind = \"sphere\"",
-            "kind = \"cylinder\", height = \"2 mm\"",
-        );
+        let wrong = wrong.replace("kind = \"sphere\"", "kind = \"cylinder\", height = \"2 mm\"");
         check(&wrong)
             .code(2)
             .stderr(contains(format!("case.toml:{line}:")).and(contains("grain.0.nodes")))
@@ -47,9 +44,7 @@ fn absurd_viscosities_are_warned_of() {
         .success()
         .stdout(contains("warning").and(contains("more than can be run")))
         .stdout(contains("they will hardly move").and(contains("units of viscosity")));
-    check(WET)
-        .success()
-        .stdout(contains("more than can be run").not());
+    check(WET).success().stdout(contains("more than can be run").not());
 }
 
 #[test]
@@ -68,9 +63,7 @@ fn a_dry_case_that_asks_for_the_flow_is_warned() {
 fn check_names_the_grain_of_its_galileo_number() {
     let (head, tail) = WET.rsplit_once("diameter = \"2 mm\"").unwrap();
     let uneven = format!("{head}diameter = \"2.4 mm\"{tail}");
-    check(&uneven)
-        .success()
-        .stdout(contains("(grain 1, the largest)"));
+    check(&uneven).success().stdout(contains("(grain 1, the largest)"));
     check(WET).success().stdout(contains("the largest").not());
 }
 
@@ -81,26 +74,13 @@ fn another_case_is_told_by_its_keys() {
     let run = |more: &[&str]| {
         let mut command = grainwake();
         command.arg("run").arg(&case).arg("-o").arg(&out);
-        command
-            .args(["--threads", "1", "--set", "time.end=4 ms"])
-            .args(more)
-            .assert()
+        command.args(["--threads", "1", "--set", "time.end=4 ms"]).args(more).assert()
     };
-    run(&[])
-        .success()
-        .stderr(contains("2 grains").and(contains("1 thread ->")));
-    run(&[
-        "--resume",
-        "--set",
-        "fluid.viscosity=6 mPa s",
-        "--set",
-        "grain.1.density=2600",
-    ])
-    .code(2)
-    .stderr(contains(
-        "fluid.kinematic_viscosity: 0.000005 there, 0.000006 here",
-    ))
-    .stderr(contains("grain.1.density: 2500.0 there, 2600.0 here"));
+    run(&[]).success().stderr(contains("2 grains").and(contains("1 thread ->")));
+    run(&["--resume", "--set", "fluid.viscosity=6 mPa s", "--set", "grain.1.density=2600"])
+        .code(2)
+        .stderr(contains("fluid.kinematic_viscosity: 0.000005 there, 0.000006 here"))
+        .stderr(contains("grain.1.density: 2500.0 there, 2600.0 here"));
 }
 
 #[test]
@@ -121,15 +101,9 @@ fn a_file_is_no_run_folder() {
 fn a_dry_run_has_no_divergence() {
     let (folder, case) = folder_with(DRY);
     let mut command = grainwake();
-    command
-        .arg("run")
-        .arg(&case)
-        .arg("-o")
-        .arg(folder.path().join("out"));
+    command.arg("run").arg(&case).arg("-o").arg(folder.path().join("out"));
     let done = command.args(["--set", "time.end=2 ms", "--no-report"]);
-    done.assert()
-        .success()
-        .stdout(contains("done at").and(contains("div").not()));
+    done.assert().success().stdout(contains("done at").and(contains("div").not()));
 }
 
 #[test]

@@ -11,21 +11,12 @@ use std::time::Duration;
 use common::{DRY, WET, assert_same_run, folder_with, grainwake};
 
 fn run(case: &Path, out: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
-    grainwake()
-        .arg("run")
-        .arg(case)
-        .arg("-o")
-        .arg(out)
-        .arg("--quiet")
-        .args(more)
-        .assert()
+    grainwake().arg("run").arg(case).arg("-o").arg(out).arg("--quiet").args(more).assert()
 }
 
 fn checkpoints(run: &Path) -> Vec<PathBuf> {
-    let mut found: Vec<PathBuf> = std::fs::read_dir(run.join("checkpoint"))
-        .unwrap()
-        .map(|e| e.unwrap().path())
-        .collect();
+    let mut found: Vec<PathBuf> =
+        std::fs::read_dir(run.join("checkpoint")).unwrap().map(|e| e.unwrap().path()).collect();
     found.sort();
     found
 }
@@ -41,21 +32,12 @@ fn survives_kills(case_text: &str, seed: u64) {
     let mut kills = 0;
     for attempt in 0..200 {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin("grainwake"));
-        command
-            .arg("run")
-            .arg(&case)
-            .arg("-o")
-            .arg(&killed)
-            .args(["--quiet", "--threads", "1"]);
+        command.arg("run").arg(&case).arg("-o").arg(&killed).args(["--quiet", "--threads", "1"]);
         // Before its first file is written there is nothing to resume.
         if killed.join("provenance.json").is_file() {
             command.arg("--resume");
         }
-        let mut child = command
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         if attempt < 10 {
             std::thread::sleep(Duration::from_millis(
                 random.random_range(0..length.max(20) * 2 / 3),
@@ -97,22 +79,10 @@ fn checkpoints_and_threads_do_not_change_the_results() {
     run(
         &case,
         &a,
-        &[
-            "--threads",
-            "1",
-            "--set",
-            "output.checkpoint_steps=0",
-            "--set",
-            "run.threads=3",
-        ],
+        &["--threads", "1", "--set", "output.checkpoint_steps=0", "--set", "run.threads=3"],
     )
     .success();
-    run(
-        &case,
-        &b,
-        &["--threads", "3", "--set", "output.checkpoint_steps=1"],
-    )
-    .success();
+    run(&case, &b, &["--threads", "3", "--set", "output.checkpoint_steps=1"]).success();
     for file in [
         "grains.csv",
         "diagnostics.csv",
@@ -166,9 +136,7 @@ fn a_damaged_checkpoint_gives_way_to_the_one_before() {
     let (folder, case) = folder_with(WET);
     let whole = folder.path().join("whole");
     run(&case, &whole, &["--set", "time.end=30 ms"]).success();
-    for harm in [damage as fn(&Path), |p| {
-        std::fs::write(p, b"short").unwrap()
-    }] {
+    for harm in [damage as fn(&Path), |p| std::fs::write(p, b"short").unwrap()] {
         let out = unfinished(folder.path(), &case);
         harm(&checkpoints(&out)[1]);
         let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).success();
@@ -216,18 +184,9 @@ fn a_finished_run_is_not_overwritten() {
     run(&case, &out, &["--set", "time.end=2 ms", "--resume"]).success();
     assert_eq!(before, common::contents(&out));
     run(&case, &out, &["--set", "time.end=2 ms", "--force"]).success();
-    let other = run(
-        &case,
-        &out,
-        &[
-            "--set",
-            "time.end=2 ms",
-            "--set",
-            "grain.0.density=2000",
-            "--resume",
-        ],
-    )
-    .code(2);
+    let other =
+        run(&case, &out, &["--set", "time.end=2 ms", "--set", "grain.0.density=2000", "--resume"])
+            .code(2);
     assert!(String::from_utf8_lossy(&other.get_output().stderr).contains("another case"));
 }
 
@@ -262,25 +221,12 @@ fn an_interrupt_writes_a_checkpoint_and_exits_with_130() {
     let long = ["--set", "output.checkpoint_steps=0"];
     run(&case, &whole, &long).success();
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("grainwake"));
-    command
-        .arg("run")
-        .arg(&case)
-        .arg("-o")
-        .arg(&out)
-        .arg("--quiet")
-        .args(long);
-    let child = command
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    command.arg("run").arg(&case).arg("-o").arg(&out).arg("--quiet").args(long);
+    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     while !out.join("slices/y-grain0_000000.vti").is_file() {
         std::thread::sleep(Duration::from_millis(1));
     }
-    Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     let output = child.wait_with_output().unwrap();
     let message = String::from_utf8_lossy(&output.stderr);
     if output.status.success() {
@@ -355,11 +301,7 @@ fn a_run_that_was_killed_in_its_first_moments_can_be_started_again() {
 fn outputs_that_nearly_coincide_do_not_end_a_run() {
     let (folder, case) = folder_with(WET);
     let out = folder.path().join("out");
-    let more = [
-        "time.end=20 ms",
-        "output.tables=5 ms",
-        "output.slices=5.000001 ms",
-    ];
+    let more = ["time.end=20 ms", "output.tables=5 ms", "output.slices=5.000001 ms"];
     let more: Vec<&str> = more.iter().flat_map(|set| ["--set", set]).collect();
     run(&case, &out, &more).success();
 }

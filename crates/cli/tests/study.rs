@@ -57,11 +57,7 @@ fn killed_studies_give_the_same_table() {
         command
     };
     let start = std::time::Instant::now();
-    run(&whole)
-        .args(["--threads", "1", "--quiet"])
-        .assert()
-        .success()
-        .stdout(contains("heavy"));
+    run(&whole).args(["--threads", "1", "--quiet"]).assert().success().stdout(contains("heavy"));
     let length = start.elapsed().as_millis() as u64;
     let mut kills = 0;
     for attempt in 1..=5 {
@@ -84,10 +80,7 @@ fn killed_studies_give_the_same_table() {
     }
     // All five together leave a half of the work undone, on a machine as fast as in the first run.
     assert!(kills >= 3, "killed {kills} times");
-    run(&killed)
-        .args(["--jobs", "2", "--quiet"])
-        .assert()
-        .success();
+    run(&killed).args(["--jobs", "2", "--quiet"]).assert().success();
     assert_eq!(table(&whole), table(&killed));
     assert!(
         table(&whole)
@@ -101,31 +94,17 @@ fn killed_studies_give_the_same_table() {
         }
     }
     // Once more: nothing is left to do.
-    run(&whole)
-        .assert()
-        .success()
-        .stderr(contains("had finished before"));
+    run(&whole).assert().success().stderr(contains("had finished before"));
 }
 
 #[test]
 fn lists_and_dry_runs_write_nothing() {
     let (folder, path) = study();
     let out = folder.path().join("out");
-    let run = |more: &[&str]| {
-        grainwake()
-            .arg("study")
-            .arg(&path)
-            .arg("-o")
-            .arg(&out)
-            .args(more)
-            .assert()
-    };
-    run(&["--list"])
-        .success()
-        .stdout(contains("   2  heavy  missing"));
-    run(&["--dry-run", "--only", "2/2"])
-        .success()
-        .stdout(contains("heavy: run\n1 of 1 to do"));
+    let run =
+        |more: &[&str]| grainwake().arg("study").arg(&path).arg("-o").arg(&out).args(more).assert();
+    run(&["--list"]).success().stdout(contains("   2  heavy  missing"));
+    run(&["--dry-run", "--only", "2/2"]).success().stdout(contains("heavy: run\n1 of 1 to do"));
     let listed = run(&["--list", "--json", "--only", "light"]).success();
     let json: serde_json::Value = serde_json::from_slice(&listed.get_output().stdout).unwrap();
     assert_eq!(
@@ -168,12 +147,7 @@ fn a_study_without_an_analysis_has_figures_all_the_same() {
     };
     run(&[]).stderr(contains("`analysis` file"));
     run(&["--quiet"]).stderr("");
-    grainwake()
-        .arg("report")
-        .arg(&out)
-        .assert()
-        .success()
-        .stdout(contains("1 figures"));
+    grainwake().arg("report").arg(&out).assert().success().stdout(contains("1 figures"));
     assert!(out.join("figures/fig01-gap.png").is_file());
 }
 
@@ -196,14 +170,7 @@ fn wrong_studies_end_with_2_and_a_place() {
     let out = folder.path().join("out");
     let run = |text: &str, more: &[&str]| {
         std::fs::write(&path, text).unwrap();
-        grainwake()
-            .arg("study")
-            .arg(&path)
-            .arg("-o")
-            .arg(&out)
-            .args(more)
-            .assert()
-            .code(2)
+        grainwake().arg("study").arg(&path).arg("-o").arg(&out).args(more).assert().code(2)
     };
     run(&STUDY.replace("grain.1.density", "grain.1.densty"), &[])
         .stderr(contains("study.toml:").and(contains("did you mean `density`?")));

@@ -87,11 +87,7 @@ fn suites(text: &str) -> (tempfile::TempDir, PathBuf) {
 }
 
 fn validate(folder: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
-    grainwake()
-        .current_dir(folder)
-        .args(["validate", "--quiet"])
-        .args(more)
-        .assert()
+    grainwake().current_dir(folder).args(["validate", "--quiet"]).args(more).assert()
 }
 
 #[test]
@@ -102,34 +98,20 @@ fn what_holds_is_said_and_json_has_the_stable_names() {
     let list = list.as_array().unwrap();
     assert_eq!(list.len(), 4, "{list:?}");
     for verdict in list {
-        for key in [
-            "name",
-            "quantity",
-            "value",
-            "reference",
-            "error",
-            "bound",
-            "pass",
-        ] {
+        for key in ["name", "quantity", "value", "reference", "error", "bound", "pass"] {
             assert!(verdict.get(key).is_some(), "{key} in {verdict}");
         }
         assert_eq!(verdict["pass"], true, "{verdict}");
     }
-    validate(folder.path(), &[])
-        .success()
-        .stdout(contains("| fall "));
+    validate(folder.path(), &[]).success().stdout(contains("| fall "));
 }
 
 #[test]
 fn a_value_can_be_changed_in_every_case() {
     let (folder, _) = suites(SUITE);
     let moon = ["--set", "gravity=[0,0,-1.62]"];
-    validate(folder.path(), &moon)
-        .code(1)
-        .stderr(contains("acceleration: -1.62"));
-    validate(folder.path(), &["--set", "gravitas=1"])
-        .code(2)
-        .stderr(contains("gravity"));
+    validate(folder.path(), &moon).code(1).stderr(contains("acceleration: -1.62"));
+    validate(folder.path(), &["--set", "gravitas=1"]).code(2).stderr(contains("gravity"));
 }
 
 #[test]
@@ -145,10 +127,7 @@ fn saved_results_are_replaced_run_by_run() {
     let steps = saved["runs"][0]["steps"].as_u64().unwrap();
     let cells = saved["runs"][0]["cells"].as_u64().unwrap();
     let page = std::fs::read_to_string(folder.path().join("kept/ci.md")).unwrap();
-    assert!(
-        page.contains(&format!("| fall/fall | {cells} | {steps} |")),
-        "{page}"
-    );
+    assert!(page.contains(&format!("| fall/fall | {cells} | {steps} |")), "{page}");
 }
 
 #[test]
@@ -185,16 +164,10 @@ of = "z"
     let png = std::fs::read(figures.join("fall-height.png")).unwrap();
     assert!(png.starts_with(b"\x89PNG"));
     let svg = std::fs::read_to_string(figures.join("fall-height.svg")).unwrap();
-    assert!(
-        svg.contains(">on the earth<") && svg.contains("Galilei"),
-        "{svg}"
-    );
+    assert!(svg.contains(">on the earth<") && svg.contains("Galilei"), "{svg}");
     assert!(!svg.contains("moon"), "a run that is not there is left out");
     let page = std::fs::read_to_string(figures.join("README.md")).unwrap();
-    assert!(
-        page.contains("![Height of the ball](fall-height.png)"),
-        "{page}"
-    );
+    assert!(page.contains("![Height of the ball](fall-height.png)"), "{page}");
     // A figure that is there is not replaced by one that lacks a run.
     std::fs::write(figures.join("fall-height.png"), "of more runs").unwrap();
     validate(folder.path(), &["--save", "kept"])
@@ -220,9 +193,7 @@ fn what_falls_short_is_exit_code_1_and_another_run_can_be_the_reference() {
 #[test]
 fn a_run_asked_for_brings_those_it_is_compared_with_and_theirs() {
     let (_, slow) = SUITE.split_once("[[run]]\nname = \"slow\"").unwrap();
-    let slow = slow
-        .replace("-1.62", "-1.5")
-        .replace("\"fall\"", "\"slow\"");
+    let slow = slow.replace("-1.62", "-1.5").replace("\"fall\"", "\"slow\"");
     let slower = format!("\n[[run]]\nname = \"slower\"{slow}");
     let (folder, _) = suites(&format!("{SUITE}{slower}"));
     let done = validate(folder.path(), &["fall/slower", "--level", "full", "--json"]).code(1);
@@ -243,18 +214,12 @@ fn finished_runs_are_kept_only_if_asked() {
     let mark = folder.path().join("runs/validation/fall/fall/grains.csv");
     let before = std::fs::metadata(&mark).unwrap().modified().unwrap();
     validate(folder.path(), &["--resume"]).success();
-    assert_eq!(
-        std::fs::metadata(&mark).unwrap().modified().unwrap(),
-        before
-    );
+    assert_eq!(std::fs::metadata(&mark).unwrap().modified().unwrap(), before);
     // Of another case nothing is kept.
     let heavier = CASE.replace("density = 1000", "density = 1100");
     std::fs::write(suite.join("case.toml"), heavier).unwrap();
     validate(folder.path(), &["--resume"]).success();
-    assert_ne!(
-        std::fs::metadata(&mark).unwrap().modified().unwrap(),
-        before
-    );
+    assert_ne!(std::fs::metadata(&mark).unwrap().modified().unwrap(), before);
     validate(folder.path(), &[]).success();
 }
 
@@ -263,40 +228,27 @@ fn runs_of_another_program_can_be_judged_but_not_those_of_another_case() {
     let (folder, suite) = suites(SUITE);
     let kept = folder.path().join("kept");
     let judge = ["--judge", "--save", kept.to_str().unwrap()];
-    validate(folder.path(), &judge)
-        .code(2)
-        .stderr(contains("no finished run"));
+    validate(folder.path(), &judge).code(2).stderr(contains("no finished run"));
     validate(folder.path(), &[]).success();
-    let file = folder
-        .path()
-        .join("runs/validation/fall/fall/provenance.json");
+    let file = folder.path().join("runs/validation/fall/fall/provenance.json");
     let mut provenance: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
     provenance["commit"] = "elsewhere".into();
     std::fs::write(&file, provenance.to_string()).unwrap();
     validate(folder.path(), &judge).success();
-    assert_eq!(
-        std::fs::read_to_string(&file).unwrap(),
-        provenance.to_string()
-    );
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), provenance.to_string());
     let page = std::fs::read_to_string(kept.join("ci.md")).unwrap();
     assert!(page.contains("| elsewhere |"), "{page}");
     let heavier = CASE.replace("density = 1000", "density = 1100");
     std::fs::write(suite.join("case.toml"), heavier).unwrap();
-    validate(folder.path(), &judge)
-        .code(2)
-        .stderr(contains("its case has changed"));
+    validate(folder.path(), &judge).code(2).stderr(contains("its case has changed"));
 }
 
 #[test]
 fn wrong_names_and_keys_are_exit_code_2() {
     let (folder, suite) = suites(SUITE);
-    validate(folder.path(), &["fal"])
-        .code(2)
-        .stderr(contains("did you mean \"fall\""));
-    validate(folder.path(), &["--suites", "nowhere"])
-        .code(2)
-        .stderr(contains("--suites"));
+    validate(folder.path(), &["fal"]).code(2).stderr(contains("did you mean \"fall\""));
+    validate(folder.path(), &["--suites", "nowhere"]).code(2).stderr(contains("--suites"));
     for (from, to, word) in [
         ("take = \"last\"", "take = \"latest\"", "last"),
         ("quantity = \"height\"", "quantty = \"height\"", "quantity"),
@@ -314,9 +266,7 @@ fn wrong_names_and_keys_are_exit_code_2() {
 #[test]
 fn a_column_that_is_not_there_is_a_missed_check() {
     let (folder, _) = suites(&SUITE.replace("of = \"-vz/(g*0.1)\"", "of = \"speed\""));
-    validate(folder.path(), &[])
-        .code(1)
-        .stderr(contains("there is no column or constant"));
+    validate(folder.path(), &[]).code(1).stderr(contains("there is no column or constant"));
 }
 
 #[test]

@@ -179,9 +179,7 @@ impl<'a> Decoder<'a> {
         if found == count as u64 {
             return Ok(());
         }
-        Err(invalid(format!(
-            "the checkpoint has {found} {what}, this case has {count}"
-        )))
+        Err(invalid(format!("the checkpoint has {found} {what}, this case has {count}")))
     }
     /// Reads a 64-bit count of `what` that is at most `limit`.
     pub fn count(&mut self, limit: u64, what: &str) -> io::Result<usize> {
@@ -222,10 +220,7 @@ mod tests {
         let vector = input.vector().unwrap();
         assert_eq!(vector.y.to_bits(), (-0.0f64).to_bits());
         assert_eq!((vector.x, vector.z), (0.1, f64::MIN_POSITIVE));
-        assert_eq!(
-            input.quaternion().unwrap().to_array(),
-            [0.5, -0.5, 0.5, -0.5]
-        );
+        assert_eq!(input.quaternion().unwrap().to_array(), [0.5, -0.5, 0.5, -0.5]);
         assert_eq!(input.option().unwrap(), Some(1.0 / 3.0));
         assert_eq!(input.option().unwrap(), None);
         assert_eq!(input.text().unwrap(), "grain");

@@ -28,11 +28,7 @@ pub enum FormatError {
 impl FormatError {
     /// Returns the error of a damaged line.
     pub fn line(file: &Path, line: usize, what: impl Into<String>) -> FormatError {
-        FormatError::Line {
-            file: file.to_owned(),
-            line,
-            what: what.into(),
-        }
+        FormatError::Line { file: file.to_owned(), line, what: what.into() }
     }
 }
 
@@ -41,10 +37,8 @@ impl FormatError {
 /// # Errors
 /// [`FormatError::Line`] with the first line that is not UTF-8, or [`FormatError::Read`].
 pub fn read_text(file: &Path) -> Result<String, FormatError> {
-    let bytes = std::fs::read(file).map_err(|source| FormatError::Read {
-        file: file.to_owned(),
-        source,
-    })?;
+    let bytes = std::fs::read(file)
+        .map_err(|source| FormatError::Read { file: file.to_owned(), source })?;
     String::from_utf8(bytes).map_err(|error| {
         let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = 1 + valid.iter().filter(|byte| **byte == b'\n').count();

@@ -74,14 +74,7 @@ pub struct Event {
 impl Event {
     /// Returns an event that was certain at once.
     pub fn new(kind: EventKind, time: f64, grains: &[usize]) -> Event {
-        Event {
-            time,
-            kind,
-            grains: grains.to_vec(),
-            confirmed: time,
-            gap: None,
-            tilt: None,
-        }
+        Event { time, kind, grains: grains.to_vec(), confirmed: time, gap: None, tilt: None }
     }
 
     /// Returns the line of the log, with its line break.

@@ -108,11 +108,7 @@ pub fn read(file: &Path, notes: &mut Vec<String>) -> Result<Vec<GrainRow>, Forma
                 grain: index as usize,
                 position,
                 velocity: at(velocity, row),
-                orientation: if valid {
-                    orientation.normalize()
-                } else {
-                    DQuat::IDENTITY
-                },
+                orientation: if valid { orientation.normalize() } else { DQuat::IDENTITY },
                 angular_velocity: at(angular_velocity, row),
                 force: force.map(|columns| at(columns, row)),
                 torque: torque.map(|columns| at(columns, row)),

@@ -57,9 +57,7 @@ pub fn write(path: &Path, entries: &[Entry]) -> io::Result<()> {
 pub fn read(path: &Path) -> Result<Vec<Entry>, String> {
     let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
     let document = Document::parse(&text).map_err(|error| format!("not XML: {error}"))?;
-    let elements = document
-        .descendants()
-        .filter(|node| node.has_tag_name("DataSet"));
+    let elements = document.descendants().filter(|node| node.has_tag_name("DataSet"));
     Ok(elements
         .filter_map(|node| {
             Some(Entry {

@@ -80,15 +80,10 @@ pub fn write(path: &Path, image: &Image) -> io::Result<()> {
         value[..array.components].copy_from_slice(&array.data[first..first + array.components]);
         value
     };
-    let values: Vec<_> = (image.arrays.iter())
-        .map(|array| move |cell| value_of(array, cell))
-        .collect();
+    let values: Vec<_> =
+        (image.arrays.iter()).map(|array| move |cell| value_of(array, cell)).collect();
     let sources: Vec<Source> = (image.arrays.iter().zip(&values))
-        .map(|(array, value)| Source {
-            name: &array.name,
-            components: array.components,
-            value,
-        })
+        .map(|(array, value)| Source { name: &array.name, components: array.components, value })
         .collect();
     write_from(path, &image.frame, &sources)
 }
@@ -161,11 +156,7 @@ fn parse(bytes: &[u8]) -> Result<Image, String> {
             let fault = format!("array {name} has {found} numbers");
             return Err(format!("{fault} for {count} cells of {components}"));
         }
-        Ok(Array {
-            name,
-            components,
-            data: array.values,
-        })
+        Ok(Array { name, components, data: array.values })
     });
     Ok(Image {
         arrays: arrays.collect::<Result<_, _>>()?,
@@ -180,10 +171,7 @@ fn parse(bytes: &[u8]) -> Result<Image, String> {
 
 fn numbers<T: std::str::FromStr, const N: usize>(node: Node, name: &str) -> Result<[T; N], String> {
     let value = node.attribute(name).ok_or_else(|| format!("no {name}"))?;
-    let list: Vec<T> = value
-        .split_whitespace()
-        .filter_map(|v| v.parse().ok())
-        .collect();
+    let list: Vec<T> = value.split_whitespace().filter_map(|v| v.parse().ok()).collect();
     list.try_into().map_err(|_| format!("{name}=\"{value}\""))
 }
 
@@ -221,11 +209,7 @@ mod tests {
         let path = folder.path().join("a.vti");
         write(&path, &sample()).unwrap();
         assert_eq!(read(&path).unwrap(), sample());
-        assert_eq!(
-            std::fs::read_dir(folder.path()).unwrap().count(),
-            1,
-            "no temporary file stays"
-        );
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
     }
 
     #[test]
@@ -253,9 +237,7 @@ mod tests {
         image.arrays[0].data.pop();
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(
-            write(&folder.path().join("a.vti"), &image)
-                .unwrap_err()
-                .kind(),
+            write(&folder.path().join("a.vti"), &image).unwrap_err().kind(),
             io::ErrorKind::InvalidInput
         );
     }

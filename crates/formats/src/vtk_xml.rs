@@ -56,10 +56,7 @@ impl ArrayElements {
 /// Splits a file into its XML, closed, and the raw bytes after the underscore.
 pub fn split(bytes: &[u8]) -> Result<(String, &[u8]), String> {
     let find = |from: usize, what: &[u8]| {
-        bytes[from..]
-            .windows(what.len())
-            .position(|window| window == what)
-            .map(|i| from + i)
+        bytes[from..].windows(what.len()).position(|window| window == what).map(|i| from + i)
     };
     let Some(tag) = find(0, b"<AppendedData") else {
         let text =
@@ -73,10 +70,7 @@ pub fn split(bytes: &[u8]) -> Result<(String, &[u8]), String> {
     if !head[tag..].contains("raw") {
         return Err("the appended data are not raw".to_owned());
     }
-    Ok((
-        format!("{head}</AppendedData></VTKFile>"),
-        &bytes[mark + 1..],
-    ))
+    Ok((format!("{head}</AppendedData></VTKFile>"), &bytes[mark + 1..]))
 }
 
 /// Values of one array.
@@ -108,23 +102,17 @@ impl<'a> ArrayReader<'a> {
         if root.attribute("compressor").is_some() {
             return Err("compressed data are not read".to_owned());
         }
-        Ok(ArrayReader {
-            data,
-            wide_lengths: root.attribute("header_type") == Some("UInt64"),
-        })
+        Ok(ArrayReader { data, wide_lengths: root.attribute("header_type") == Some("UInt64") })
     }
 
     /// Reads all arrays below `node` in the order of the file, with their names.
     pub fn arrays<T: Value>(&self, node: Node) -> Result<Vec<(String, DataArray<T>)>, String> {
-        let elements = node
-            .children()
-            .filter(|child| child.has_tag_name("DataArray"));
+        let elements = node.children().filter(|child| child.has_tag_name("DataArray"));
         elements
             .map(|element| {
                 let name = element.attribute("Name").unwrap_or("").to_owned();
-                let values = self
-                    .values(element)
-                    .map_err(|what| format!("array '{name}': {what}"))?;
+                let values =
+                    self.values(element).map_err(|what| format!("array '{name}': {what}"))?;
                 let components = element
                     .attribute("NumberOfComponents")
                     .map_or(Ok(1), str::parse)
@@ -147,9 +135,7 @@ impl<'a> ArrayReader<'a> {
             return Ok(None);
         };
         let arrays = self.by_name::<f64>(node)?;
-        let time = arrays
-            .get("TimeValue")
-            .and_then(|array| array.values.first());
+        let time = arrays.get("TimeValue").and_then(|array| array.values.first());
         Ok(time.copied().filter(|time| time.is_finite()))
     }
 
@@ -166,18 +152,13 @@ impl<'a> ArrayReader<'a> {
             Some("appended") => {}
             _ => return Err("neither appended nor ascii".to_owned()),
         }
-        let offset: usize = element
-            .attribute("offset")
-            .and_then(|v| v.parse().ok())
-            .ok_or("no offset")?;
+        let offset: usize =
+            element.attribute("offset").and_then(|v| v.parse().ok()).ok_or("no offset")?;
         let cut = || "its data are cut off".to_owned();
         let rest = self.data.get(offset..).ok_or_else(cut)?;
         let head = if self.wide_lengths { 8 } else { 4 };
         let length = rest.get(..head).ok_or_else(cut)?;
-        let length = length
-            .iter()
-            .rev()
-            .fold(0u64, |sum, byte| (sum << 8) | u64::from(*byte));
+        let length = length.iter().rev().fold(0u64, |sum, byte| (sum << 8) | u64::from(*byte));
         let bytes = usize::try_from(length)
             .ok()
             .and_then(|n| rest.get(head..head.checked_add(n)?))
@@ -224,9 +205,7 @@ impl Value for f32 {
 
 /// Returns the first child element with this name.
 pub fn child<'a, 'b>(node: Node<'a, 'b>, name: &str) -> Result<Node<'a, 'b>, String> {
-    node.children()
-        .find(|child| child.has_tag_name(name))
-        .ok_or_else(|| format!("no <{name}>"))
+    node.children().find(|child| child.has_tag_name(name)).ok_or_else(|| format!("no <{name}>"))
 }
 
 /// Returns an error of kind `InvalidData` that names the file.

@@ -106,21 +106,15 @@ pub fn read(file: &Path) -> Result<Surface, String> {
         return Err("a point is not finite".to_owned());
     }
     let polygons = reader.by_name::<f64>(child(piece, "Polys")?)?;
-    let list = |name: &str| {
-        polygons
-            .get(name)
-            .ok_or_else(|| format!("the polygons have no '{name}'"))
-    };
+    let list =
+        |name: &str| polygons.get(name).ok_or_else(|| format!("the polygons have no '{name}'"));
     let (corners, ends) = (list("connectivity")?, list("offsets")?);
     let mut triangles = Vec::new();
     let mut polygon_of = Vec::new();
     let mut start = 0;
     for (polygon, end) in ends.values.iter().enumerate() {
         let end = *end as usize;
-        let ring = corners
-            .values
-            .get(start..end)
-            .ok_or("polygon offsets point outside")?;
+        let ring = corners.values.get(start..end).ok_or("polygon offsets point outside")?;
         let ring: Vec<usize> = ring.iter().map(|i| *i as usize).collect();
         if ring.iter().any(|i| *i >= points.len()) {
             return Err("a polygon names a point that is not there".to_owned());
@@ -193,10 +187,7 @@ mod tests {
     fn appended_arrays_are_read() {
         let surface = with_file(&appended(), read).unwrap();
         assert_eq!(surface.points[1], DVec3::new(3.0, 4.0, 5.0));
-        assert_eq!(
-            (surface.triangles.as_slice(), surface.time),
-            (&[[0, 1, 2]][..], Some(0.75))
-        );
+        assert_eq!((surface.triangles.as_slice(), surface.time), (&[[0, 1, 2]][..], Some(0.75)));
         assert!(surface.grains.is_none());
     }
 
@@ -225,10 +216,6 @@ mod tests {
         assert_eq!(surface.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 3]]);
         assert_eq!(surface.grains, Some(vec![5, 5, 6]));
         let outside = text.replace("0 1 2 3 0 1 3", "0 1 2 9 0 1 3");
-        assert!(
-            with_file(outside.as_bytes(), read)
-                .unwrap_err()
-                .contains("not there")
-        );
+        assert!(with_file(outside.as_bytes(), read).unwrap_err().contains("not there"));
     }
 }

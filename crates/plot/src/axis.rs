@@ -65,27 +65,11 @@ impl Axis {
         let ticks = (first..=last)
             .map(|i| {
                 let value = i as f64 * step;
-                (
-                    value,
-                    minus(&format!(
-                        "{:.decimals$}",
-                        if i == 0 { 0.0 } else { value / unit }
-                    )),
-                )
+                (value, minus(&format!("{:.decimals$}", if i == 0 { 0.0 } else { value / unit })))
             })
             .collect();
-        let label = if power == 0 {
-            label.to_owned()
-        } else {
-            scaled_label(label, power)
-        };
-        Axis {
-            label,
-            scale: Scale::Linear,
-            low,
-            high,
-            ticks,
-        }
+        let label = if power == 0 { label.to_owned() } else { scaled_label(label, power) };
+        Axis { label, scale: Scale::Linear, low, high, ticks }
     }
 
     /// Creates an axis for angles [deg], with ticks every 30 up to 90, every 45 up to 360 and every
@@ -105,19 +89,14 @@ impl Axis {
             scale: Scale::Linear,
             low: value(first),
             high: value(last),
-            ticks: (first..=last)
-                .map(|i| (value(i), minus(&value(i).to_string())))
-                .collect(),
+            ticks: (first..=last).map(|i| (value(i), minus(&value(i).to_string()))).collect(),
         }
     }
 
     /// Creates a logarithmic axis that covers `low` to `high` (positive) in whole decades.
     pub fn log(label: &str, low: f64, high: f64) -> Axis {
         let positive = |v: f64| if v.is_finite() && v > 0.0 { v } else { 1.0 };
-        let (low, high) = (
-            positive(low).min(positive(high)),
-            positive(low).max(positive(high)),
-        );
+        let (low, high) = (positive(low).min(positive(high)), positive(low).max(positive(high)));
         let first = (low.log10() + 1e-9).floor() as i32;
         let last = ((high.log10() - 1e-9).ceil() as i32).max(first + 1);
         let every = ((last - first) / 5 + 1).max(1);
@@ -169,23 +148,14 @@ impl Axis {
         let few = (high / low).log10() < 2.2 && low >= 9e-5 && high <= 2e5;
         if !few {
             let ticks = whole.ticks.into_iter().filter(|(v, _)| inside(v)).collect();
-            return Axis {
-                low,
-                high,
-                ticks,
-                ..whole
-            };
+            return Axis { low, high, ticks, ..whole };
         }
         let all: Vec<f64> = (1..10).map(f64::from).collect();
         let text = |value: f64| {
             let lead = value / 10f64.powf((value.log10() + 1e-9).floor());
             let shown = leads.iter().any(|l| (lead - l).abs() < 1e-6);
             let digits = decimals(value);
-            if shown {
-                format!("{value:.digits$}")
-            } else {
-                String::new()
-            }
+            if shown { format!("{value:.digits$}") } else { String::new() }
         };
         let inner = marks(&all).into_iter().filter(inside);
         Axis {
@@ -230,13 +200,10 @@ impl Axis {
 
 /// Returns the smallest and largest finite value.
 pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
-    values
-        .into_iter()
-        .filter(|v| v.is_finite())
-        .fold(None, |range, v| match range {
-            None => Some((v, v)),
-            Some((low, high)) => Some((low.min(v), high.max(v))),
-        })
+    values.into_iter().filter(|v| v.is_finite()).fold(None, |range, v| match range {
+        None => Some((v, v)),
+        Some((low, high)) => Some((low.min(v), high.max(v))),
+    })
 }
 
 /// Returns a finite, ordered, non-empty range.

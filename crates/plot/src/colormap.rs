@@ -37,9 +37,7 @@ impl ColorMap {
 
     /// Returns 256 evenly spaced colours.
     pub fn palette(self) -> Vec<[u8; 3]> {
-        (0..256)
-            .map(|i| self.colour(f64::from(i) / 255.0))
-            .collect()
+        (0..256).map(|i| self.colour(f64::from(i) / 255.0)).collect()
     }
 }
 
@@ -57,15 +55,9 @@ pub fn hex([r, g, b]: [u8; 3]) -> String {
 /// Converts Oklab lightness, chroma and hue [deg] to sRGB; reduces the chroma to the gamut.
 fn from_oklch(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     let shown = |chroma: f64| {
-        linear_from_oklch(lightness, chroma, hue)
-            .iter()
-            .all(|v| (-1e-4..=1.0001).contains(v))
+        linear_from_oklch(lightness, chroma, hue).iter().all(|v| (-1e-4..=1.0001).contains(v))
     };
-    let (mut low, mut high) = if shown(chroma) {
-        (chroma, chroma)
-    } else {
-        (0.0, chroma)
-    };
+    let (mut low, mut high) = if shown(chroma) { (chroma, chroma) } else { (0.0, chroma) };
     for _ in 0..30 {
         let middle = 0.5 * (low + high);
         if shown(middle) {
@@ -78,10 +70,7 @@ fn from_oklch(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
 }
 
 fn linear_from_oklch(lightness: f64, chroma: f64, hue: f64) -> [f64; 3] {
-    let (a, b) = (
-        chroma * hue.to_radians().cos(),
-        chroma * hue.to_radians().sin(),
-    );
+    let (a, b) = (chroma * hue.to_radians().cos(), chroma * hue.to_radians().sin());
     let l = (lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b).powi(3);
     let m = (lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b).powi(3);
     let s = (lightness - 0.089_484_177_5 * a - 1.291_485_548 * b).powi(3);
@@ -94,11 +83,7 @@ fn linear_from_oklch(lightness: f64, chroma: f64, hue: f64) -> [f64; 3] {
 
 fn gamma(linear: f64) -> u8 {
     let v = linear.clamp(0.0, 1.0);
-    let v = if v <= 0.003_130_8 {
-        12.92 * v
-    } else {
-        1.055 * v.powf(1.0 / 2.4) - 0.055
-    };
+    let v = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
     (255.0 * v).round() as u8
 }
 
@@ -109,11 +94,7 @@ mod tests {
     fn lightness([r, g, b]: [u8; 3]) -> f64 {
         let linear = |v: u8| {
             let v = f64::from(v) / 255.0;
-            if v <= 0.04045 {
-                v / 12.92
-            } else {
-                ((v + 0.055) / 1.055).powf(2.4)
-            }
+            if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
         };
         let (r, g, b) = (linear(r), linear(g), linear(b));
         let l = (0.412_221_470_8 * r + 0.536_332_536_3 * g + 0.051_445_992_9 * b).cbrt();
@@ -124,31 +105,19 @@ mod tests {
 
     #[test]
     fn magnitude_darkens_in_equal_steps() {
-        let steps: Vec<f64> = (0..=16)
-            .map(|i| lightness(ColorMap::Magnitude.colour(f64::from(i) / 16.0)))
-            .collect();
+        let steps: Vec<f64> =
+            (0..=16).map(|i| lightness(ColorMap::Magnitude.colour(f64::from(i) / 16.0))).collect();
         for pair in steps.windows(2) {
-            assert!(
-                (pair[0] - pair[1] - 0.715 / 16.0).abs() < 0.008,
-                "step {}",
-                pair[0] - pair[1]
-            );
+            assert!((pair[0] - pair[1] - 0.715 / 16.0).abs() < 0.008, "step {}", pair[0] - pair[1]);
         }
     }
 
     #[test]
     fn no_map_has_kinks() {
         let sequential: Vec<_> = (0..256).map(|i| sequential(f64::from(i) / 255.0)).collect();
-        for palette in [
-            ColorMap::Magnitude.palette(),
-            ColorMap::Signed.palette(),
-            sequential,
-        ] {
+        for palette in [ColorMap::Magnitude.palette(), ColorMap::Signed.palette(), sequential] {
             let step = |a: &[u8; 3], b: &[u8; 3]| (0..3).map(|c| a[c].abs_diff(b[c])).max();
-            let steps: Vec<_> = palette
-                .windows(2)
-                .map(|pair| step(&pair[0], &pair[1]))
-                .collect();
+            let steps: Vec<_> = palette.windows(2).map(|pair| step(&pair[0], &pair[1])).collect();
             assert!(steps.iter().all(|s| *s <= Some(5)), "{steps:?}");
         }
     }
@@ -159,10 +128,7 @@ mod tests {
         assert!(middle.iter().all(|&v| v > 245), "{middle:?}");
         for i in 1..=8 {
             let s = f64::from(i) / 16.0;
-            let (low, high) = (
-                ColorMap::Signed.colour(0.5 - s),
-                ColorMap::Signed.colour(0.5 + s),
-            );
+            let (low, high) = (ColorMap::Signed.colour(0.5 - s), ColorMap::Signed.colour(0.5 + s));
             assert!((lightness(low) - lightness(high)).abs() < 0.012);
             assert!(low[2] > low[0] && high[0] > high[2], "{low:?} {high:?}");
         }
@@ -170,10 +136,7 @@ mod tests {
 
     #[test]
     fn values_outside_are_clamped() {
-        assert_eq!(
-            ColorMap::Magnitude.colour(-3.0),
-            ColorMap::Magnitude.colour(0.0)
-        );
+        assert_eq!(ColorMap::Magnitude.colour(-3.0), ColorMap::Magnitude.colour(0.0));
         assert_eq!(ColorMap::Signed.colour(7.0), ColorMap::Signed.colour(1.0));
         assert_eq!(hex([1, 171, 255]), "#01abff");
     }

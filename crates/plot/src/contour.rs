@@ -14,21 +14,13 @@ pub fn closed_contours(
     // A layer of outside values surrounds the grid.
     let at = |i: usize, j: usize| {
         let inside = i > 0 && j > 0 && i <= nx && j <= ny;
-        let v = if inside {
-            value(i - 1, j - 1)
-        } else {
-            f64::NEG_INFINITY
-        };
+        let v = if inside { value(i - 1, j - 1) } else { f64::NEG_INFINITY };
         if v.is_nan() { f64::NEG_INFINITY } else { v }
     };
     let cross = |a: f64, b: f64| {
         let t = (level - a) / (b - a);
         // Next to the outside layer the contour lies half a cell from the last value.
-        if t.is_finite() && a.is_finite() && b.is_finite() {
-            t.clamp(0.0, 1.0)
-        } else {
-            0.5
-        }
+        if t.is_finite() && a.is_finite() && b.is_finite() { t.clamp(0.0, 1.0) } else { 0.5 }
     };
     // Key of an edge: its lower left node, and whether it is vertical; crossed at most once.
     let mut next: HashMap<(usize, usize, bool), (usize, usize, bool)> = HashMap::new();
@@ -40,18 +32,10 @@ pub fn closed_contours(
                 .iter()
                 .enumerate()
                 .fold(0, |bits, (n, v)| bits | (usize::from(*v >= level) << n));
-            let edges = [
-                (i, j, false),
-                (i + 1, j, true),
-                (i, j + 1, false),
-                (i, j, true),
-            ];
-            let middle = corners
-                .iter()
-                .map(|v| v.max(level - 1e3 * level.abs() - 1.0))
-                .sum::<f64>()
-                / 4.0
-                >= level;
+            let edges = [(i, j, false), (i + 1, j, true), (i, j + 1, false), (i, j, true)];
+            let middle =
+                corners.iter().map(|v| v.max(level - 1e3 * level.abs() - 1.0)).sum::<f64>() / 4.0
+                    >= level;
             for (from, to) in segments(bits, middle) {
                 next.insert(edges[*from], edges[*to]);
                 order.push(edges[*from]);
@@ -120,11 +104,7 @@ mod tests {
         let got = closed_contours(32, 30, value, 0.0);
         assert_eq!(got.len(), 1);
         let exact = std::f64::consts::PI * 64.0;
-        assert!(
-            (area(&got[0]) / exact - 1.0).abs() < 0.01,
-            "{}",
-            area(&got[0])
-        );
+        assert!((area(&got[0]) / exact - 1.0).abs() < 0.01, "{}", area(&got[0]));
     }
 
     #[test]
@@ -144,11 +124,7 @@ mod tests {
     #[test]
     fn saddles_and_broken_values_do_not_break_loops() {
         let checker = |i: usize, j: usize| if (i + j).is_multiple_of(2) { 1.0 } else { 0.0 };
-        assert!(
-            closed_contours(6, 6, checker, 0.5)
-                .iter()
-                .all(|ring| ring.len() > 2)
-        );
+        assert!(closed_contours(6, 6, checker, 0.5).iter().all(|ring| ring.len() > 2));
         assert!(closed_contours(6, 6, |_, _| f64::NAN, 0.5).is_empty());
         assert!(closed_contours(0, 0, |_, _| 1.0, 0.5).is_empty());
     }

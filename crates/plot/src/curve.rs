@@ -8,10 +8,9 @@ pub fn segments(
     let mut out = vec![Vec::new()];
     for point in points {
         match position(*point) {
-            Some(at) => out
-                .last_mut()
-                .into_iter()
-                .for_each(|segment: &mut Vec<_>| segment.push(at)),
+            Some(at) => {
+                out.last_mut().into_iter().for_each(|segment: &mut Vec<_>| segment.push(at))
+            }
             None => out.push(Vec::new()),
         }
     }
@@ -23,9 +22,7 @@ pub fn segments(
 pub fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut out: Vec<(f64, f64)> = Vec::with_capacity(points.len());
     for (i, p) in points.iter().enumerate() {
-        let far = out
-            .last()
-            .is_none_or(|last| (p.0 - last.0).hypot(p.1 - last.1) > 0.2);
+        let far = out.last().is_none_or(|last| (p.0 - last.0).hypot(p.1 - last.1) > 0.2);
         if far || i + 1 == points.len() {
             out.push(*p);
         }
@@ -43,11 +40,8 @@ pub fn simplified(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut start = 0;
     while start < points.len() {
         let column = (2.0 * points[start].0).floor();
-        let length = points[start..]
-            .iter()
-            .take_while(|p| (2.0 * p.0).floor() == column)
-            .count()
-            .max(1);
+        let length =
+            points[start..].iter().take_while(|p| (2.0 * p.0).floor() == column).count().max(1);
         let bucket = &points[start..start + length];
         let by_height = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
         let mut keep = [
@@ -85,17 +79,8 @@ mod tests {
 
     #[test]
     fn curves_break_where_nothing_was_measured() {
-        let points = [
-            (0.0, 1.0),
-            (1.0, 2.0),
-            (2.0, f64::NAN),
-            (3.0, 1.0),
-            (4.0, 2.0),
-        ];
+        let points = [(0.0, 1.0), (1.0, 2.0), (2.0, f64::NAN), (3.0, 1.0), (4.0, 2.0)];
         let split = segments(&points, |(x, y)| y.is_finite().then_some((x, y)));
-        assert_eq!(
-            split,
-            [vec![(0.0, 1.0), (1.0, 2.0)], vec![(3.0, 1.0), (4.0, 2.0)]]
-        );
+        assert_eq!(split, [vec![(0.0, 1.0), (1.0, 2.0)], vec![(3.0, 1.0), (4.0, 2.0)]]);
     }
 }

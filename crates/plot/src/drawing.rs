@@ -56,12 +56,7 @@ pub fn path_data(points: &[(f64, f64)], closed: bool) -> String {
 impl Drawing {
     /// Creates an empty drawing of the given size [pt].
     pub fn new(width: f64, height: f64) -> Drawing {
-        Drawing {
-            width,
-            height,
-            rasters: Vec::new(),
-            vectors: String::new(),
-        }
+        Drawing { width, height, rasters: Vec::new(), vectors: String::new() }
     }
 
     /// Width [pt].
@@ -95,15 +90,12 @@ impl Drawing {
 
     /// Adds a path with SVG attributes `style`.
     pub fn path(&mut self, data: &str, style: &str) {
-        self.vectors
-            .push_str(&format!("<path d=\"{data}\" {style}/>\n"));
+        self.vectors.push_str(&format!("<path d=\"{data}\" {style}/>\n"));
     }
 
     /// Adds a stroked line through `points` [pt]; `dash` is an SVG dash pattern.
     pub fn line(&mut self, points: &[(f64, f64)], colour: &str, width: f64, dash: Option<&str>) {
-        let dash = dash
-            .map(|dash| format!(" stroke-dasharray=\"{dash}\""))
-            .unwrap_or_default();
+        let dash = dash.map(|dash| format!(" stroke-dasharray=\"{dash}\"")).unwrap_or_default();
         let style = format!(
             "fill=\"none\" stroke=\"{colour}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{dash}",
             number(width)
@@ -229,10 +221,8 @@ impl Drawing {
     /// The reason, if the drawing has no pixels or cannot be rendered.
     pub fn to_png(&self) -> Result<Vec<u8>, String> {
         let scale = style::PIXELS_PER_POINT;
-        let (width, height) = (
-            (self.width * scale).round() as u32,
-            (self.height * scale).round() as u32,
-        );
+        let (width, height) =
+            ((self.width * scale).round() as u32, (self.height * scale).round() as u32);
         let mut pixmap =
             tiny_skia::Pixmap::new(width, height).ok_or("the drawing has no pixels")?;
         pixmap.fill(tiny_skia::Color::WHITE);
@@ -286,11 +276,7 @@ fn options() -> usvg::Options<'static> {
         Arc::new(fonts)
     });
     let font_family = "DejaVu Sans".to_owned();
-    usvg::Options {
-        font_family,
-        fontdb: fonts.clone(),
-        ..Default::default()
-    }
+    usvg::Options { font_family, fontdb: fonts.clone(), ..Default::default() }
 }
 
 #[cfg(test)]
@@ -314,9 +300,7 @@ mod tests {
         drawing.label((5.0, 14.0), Anchor::Start, 10.0, "#000000", label);
         let png = drawing.to_png().unwrap();
         let ink = |png: &[u8]| {
-            let mut reader = png::Decoder::new(std::io::Cursor::new(png))
-                .read_info()
-                .unwrap();
+            let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
             let mut data = vec![0; reader.output_buffer_size().unwrap()];
             reader.next_frame(&mut data).unwrap();
             data.iter().filter(|&&v| v < 128).count()
@@ -336,18 +320,12 @@ mod tests {
         };
         drawing.raster(0.0, 0.0, 20.0, 10.0, raster);
         let png = drawing.to_png().unwrap();
-        let mut reader = png::Decoder::new(std::io::Cursor::new(&png))
-            .read_info()
-            .unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().unwrap();
         let mut data = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut data).unwrap();
         let row = &data[3 * (info.width * (info.height / 2)) as usize..][..3 * info.width as usize];
         assert_eq!(&row[3 * 4..][..3], &[255, 0, 0]);
         assert_eq!(&row[row.len() - 3 * 4..][..3], &[0, 0, 255]);
-        assert!(
-            drawing
-                .to_svg("f", "t", "d")
-                .contains("data:image/png;base64,iVBOR")
-        );
+        assert!(drawing.to_svg("f", "t", "d").contains("data:image/png;base64,iVBOR"));
     }
 }

@@ -27,10 +27,7 @@ impl Window {
     pub fn intersection(&self, other: Window) -> Window {
         let larger = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
         let smaller = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.min(b.1));
-        Window {
-            low: larger(self.low, other.low),
-            high: smaller(self.high, other.high),
-        }
+        Window { low: larger(self.low, other.low), high: smaller(self.high, other.high) }
     }
 }
 

@@ -54,13 +54,7 @@ impl Frame {
     /// Draws the outline, the ticks, and the labels of the selected axes.
     pub fn outline(&self, drawing: &mut Drawing, labelled: Labelled) {
         let (x, y, width, height) = (self.x, self.y, self.width, self.height);
-        ticks::horizontal(
-            drawing,
-            &self.across,
-            (x, y + height),
-            width,
-            labelled.across,
-        );
+        ticks::horizontal(drawing, &self.across, (x, y + height), width, labelled.across);
         let widest = ticks::vertical(drawing, &self.up, (x, y), height, labelled.up, None);
         drawing.outline(x, y, width, height);
         if labelled.across {
@@ -115,10 +109,7 @@ pub struct Labelled {
 
 impl Labelled {
     /// Labels on both axes.
-    pub const BOTH: Labelled = Labelled {
-        across: true,
-        up: true,
-    };
+    pub const BOTH: Labelled = Labelled { across: true, up: true };
 }
 
 /// Fill of a marker.
@@ -190,10 +181,9 @@ impl Marker {
             Marker::Circle => ring(24, 1.0),
             Marker::Pentagon => ring(5, 1.1),
             Marker::TriangleDown => polygon(size, &[(-1.1, -0.8), (1.1, -0.8), (0.0, 1.2)]),
-            Marker::Square => polygon(
-                0.88 * size,
-                &[(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)],
-            ),
+            Marker::Square => {
+                polygon(0.88 * size, &[(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+            }
             Marker::Triangle => polygon(size, &[(-1.1, 0.8), (1.1, 0.8), (0.0, -1.2)]),
             Marker::Diamond => polygon(size, &[(-1.2, 0.0), (0.0, -1.2), (1.2, 0.0), (0.0, 1.2)]),
         };

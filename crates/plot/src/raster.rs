@@ -19,18 +19,9 @@ impl Raster {
     /// Converts to full colours; `None` if there are no pixels or too few indices.
     pub fn to_pixmap(&self) -> Option<tiny_skia::Pixmap> {
         let size = tiny_skia::IntSize::from_wh(self.width as u32, self.height as u32)?;
-        let colour = |index: &u8| {
-            self.palette
-                .get(usize::from(*index))
-                .copied()
-                .unwrap_or([255; 3])
-        };
-        let data = self
-            .pixels
-            .iter()
-            .map(colour)
-            .flat_map(|[r, g, b]| [r, g, b, 255])
-            .collect();
+        let colour =
+            |index: &u8| self.palette.get(usize::from(*index)).copied().unwrap_or([255; 3]);
+        let data = self.pixels.iter().map(colour).flat_map(|[r, g, b]| [r, g, b, 255]).collect();
         tiny_skia::Pixmap::from_vec(data, size)
     }
 
@@ -58,11 +49,7 @@ impl Raster {
 /// # Errors
 /// The reason, if the encoder refuses the image.
 pub fn encode_png(width: u32, height: u32, pixmap: &tiny_skia::Pixmap) -> Result<Vec<u8>, String> {
-    let pixels: Vec<u8> = pixmap
-        .data()
-        .chunks_exact(4)
-        .flat_map(|p| [p[0], p[1], p[2]])
-        .collect();
+    let pixels: Vec<u8> = pixmap.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, width, height);
     encoder.set_color(png::ColorType::Rgb);
@@ -74,9 +61,7 @@ pub fn encode_png(width: u32, height: u32, pixmap: &tiny_skia::Pixmap) -> Result
         unit: png::Unit::Meter,
     }));
     let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
-    writer
-        .write_image_data(&pixels)
-        .map_err(|error| error.to_string())?;
+    writer.write_image_data(&pixels).map_err(|error| error.to_string())?;
     writer.finish().map_err(|error| error.to_string())?;
     Ok(out)
 }

@@ -28,11 +28,7 @@ pub fn pieces(label: &str) -> Vec<Piece> {
     let mut chars = label.chars().peekable();
     let mut push = |c: char, italic: bool, level: i8| match out.last_mut() {
         Some(last) if last.italic == italic && last.level == level => last.text.push(c),
-        _ => out.push(Piece {
-            text: c.to_string(),
-            italic,
-            level,
-        }),
+        _ => out.push(Piece { text: c.to_string(), italic, level }),
     };
     while let Some(c) = chars.next() {
         match c {
@@ -137,11 +133,8 @@ pub fn width(label: &str, size: f64) -> f64 {
         .iter()
         .map(|piece| {
             let scale = size / 1000.0 * if piece.level == 0 { 1.0 } else { SMALL };
-            let advance = |c| {
-                map.map(c)
-                    .and_then(|glyph| metrics.advance_width(glyph))
-                    .unwrap_or(600.0)
-            };
+            let advance =
+                |c| map.map(c).and_then(|glyph| metrics.advance_width(glyph)).unwrap_or(600.0);
             let advances = piece.text.chars().map(|c| f64::from(advance(c)));
             scale * advances.sum::<f64>()
         })
@@ -158,10 +151,7 @@ mod tests {
         assert!(svg.starts_with(
             "<tspan font-style=\"italic\">v</tspan><tspan dy=\"2.20\" font-size=\"7.20\">z</tspan>"
         ));
-        assert!(
-            svg.contains("dy=\"-2.20\""),
-            "the line comes back up after a subscript: {svg}"
-        );
+        assert!(svg.contains("dy=\"-2.20\""), "the line comes back up after a subscript: {svg}");
         assert_eq!(plain("*v*_{z} / √(*d* *g*)"), "vz / √(d g)");
     }
 

@@ -28,9 +28,6 @@ impl ReportError {
     /// Returns whether reading or writing failed (exit code 4) rather than the contents being wrong
     /// (exit code 2).
     pub fn is_input_output(&self) -> bool {
-        matches!(
-            self,
-            ReportError::Format(FormatError::Read { .. }) | ReportError::Write { .. }
-        )
+        matches!(self, ReportError::Format(FormatError::Read { .. }) | ReportError::Write { .. })
     }
 }

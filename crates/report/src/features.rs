@@ -78,10 +78,7 @@ impl RunFeatures {
         let gravity = run.facts.gravity.unwrap_or(DVec3::ZERO);
         let up = (-gravity).try_normalize().unwrap_or(DVec3::Z);
         let diameter = run.facts.diameter().filter(|_| gravity.length() > 0.0);
-        let scales = diameter.map(|diameter| Scales {
-            diameter,
-            gravity: gravity.length(),
-        });
+        let scales = diameter.map(|diameter| Scales { diameter, gravity: gravity.length() });
         let end = run.end();
         let height = |i: usize| run.grains[i].position[0].dot(up);
         let pair = match moving[..] {
@@ -100,12 +97,7 @@ impl RunFeatures {
             positions.any(|p| p.distance(history.position[0]) > least)
         };
         let travels = run.grains.iter().any(moves);
-        let last = || {
-            vec![Instant {
-                time: end,
-                name: "",
-            }]
-        };
+        let last = || vec![Instant { time: end, name: "" }];
         let instants = match kind {
             RunKind::Flow => last(),
             RunKind::Single if !travels => last(),
@@ -179,9 +171,7 @@ impl RunFeatures {
 fn closest(run: &RunFolder, pair: Option<[usize; 2]>) -> f64 {
     let least = |points: &mut dyn Iterator<Item = (f64, f64)>| {
         let known = points.filter(|(time, gap)| time.is_finite() && gap.is_finite());
-        known
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(time, _)| time)
+        known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(time, _)| time)
     };
     let surfaces = run.diagnostics.as_ref().and_then(|table| {
         let (time, gap) = (table.column("time")?, table.column("gap")?);
@@ -227,17 +217,8 @@ mod tests {
 
     #[test]
     fn numbers_have_three_digits() {
-        let texts = [
-            0.0,
-            18.234,
-            0.99999,
-            -0.002_346,
-            123_456.0,
-            1.0e-9,
-            -4.2e7,
-            f64::NAN,
-        ]
-        .map(short);
+        let texts =
+            [0.0, 18.234, 0.99999, -0.002_346, 123_456.0, 1.0e-9, -4.2e7, f64::NAN].map(short);
         assert_eq!(
             texts,
             [
@@ -265,19 +246,12 @@ mod tests {
         }
         assert_eq!(RunFeatures::of(&run).pair, Some([1, 0]));
         run.facts.gravity = Some(DVec3::new(0.0, 0.0, 9.81));
-        assert_eq!(
-            RunFeatures::of(&run).pair,
-            Some([0, 1]),
-            "down is where gravity points"
-        );
+        assert_eq!(RunFeatures::of(&run).pair, Some([0, 1]), "down is where gravity points");
     }
 
     #[test]
     fn galileo_number_of_the_paper() {
-        let scales = Scales {
-            diameter: 2e-3,
-            gravity: 9.81,
-        };
+        let scales = Scales { diameter: 2e-3, gravity: 9.81 };
         assert!((galileo(scales, 1.5, 1e-6) - 198.1).abs() < 0.1);
         assert!(
             (scales.time() - 0.014_28).abs() < 1e-5 && (scales.velocity() - 0.140_07).abs() < 1e-5

@@ -48,10 +48,5 @@ pub fn write_figure(folder: &Path, figure: Figure) -> Result<WrittenFigure, Repo
     let png_file = write("png", png)?;
     let svg = figure.svg();
     let svg_file = write("svg", Ok(svg.clone().into_bytes()))?;
-    Ok(WrittenFigure {
-        figure,
-        svg,
-        png_file,
-        svg_file,
-    })
+    Ok(WrittenFigure { figure, svg, png_file, svg_file })
 }

@@ -65,16 +65,10 @@ pub fn read_report(run_dir: &Path) -> Result<RunReport, ReportError> {
     let surfaces = figure::surfaces(&run, &mut notes);
     let diameter =
         |(grain, body): (&usize, &figure::GrainSurface)| Some((*grain, body.diameter()?));
-    run.facts
-        .add_diameters(surfaces.iter().filter_map(diameter));
+    run.facts.add_diameters(surfaces.iter().filter_map(diameter));
     let features = RunFeatures::of(&run);
     let figures = figure::all(&run, &features, surfaces, &mut notes);
-    Ok(RunReport {
-        run,
-        features,
-        figures,
-        notes,
-    })
+    Ok(RunReport { run, features, figures, notes })
 }
 
 /// Writes the figures and the page of a run folder.
@@ -82,12 +76,7 @@ pub fn read_report(run_dir: &Path) -> Result<RunReport, ReportError> {
 /// # Errors
 /// If the folder holds no run, a table or log cannot be read, or a file cannot be written.
 pub fn render(run_dir: &Path) -> Result<ReportFiles, ReportError> {
-    let RunReport {
-        run,
-        features,
-        figures,
-        notes,
-    } = read_report(run_dir)?;
+    let RunReport { run, features, figures, notes } = read_report(run_dir)?;
     let folder = run_dir.join("figures");
     let failed = |file: &Path| {
         let file = file.to_owned();

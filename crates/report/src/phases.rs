@@ -67,19 +67,11 @@ pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
         };
         if next != state {
             let renewed = state == Separated && next == Kissing;
-            out.push(Phase {
-                kind: if renewed { Drafting } else { state },
-                start,
-                end: time,
-            });
+            out.push(Phase { kind: if renewed { Drafting } else { state }, start, end: time });
             (state, start) = (next, time);
         }
     }
-    out.push(Phase {
-        kind: state,
-        start,
-        end: end.max(start),
-    });
+    out.push(Phase { kind: state, start, end: end.max(start) });
     out.retain(|phase| phase.end > phase.start);
     out
 }
@@ -143,9 +135,7 @@ pub fn pair_instants(phases: &[Phase], events: &[Event], closest: f64, end: f64)
     let of = |kind| phases.iter().find(|phase| phase.kind == kind);
     let landing = of(PhaseKind::Landed).map_or(end, |phase| phase.start);
     let role_change_after = |start: f64| {
-        let mut changes = events
-            .iter()
-            .filter(|event| event.kind == EventKind::RoleChange);
+        let mut changes = events.iter().filter(|event| event.kind == EventKind::RoleChange);
         let change = changes.find(|event| event.time >= start && event.time < landing)?;
         Some(instant(change.time, "role change"))
     };
@@ -192,9 +182,7 @@ pub fn snap(instants: &[Instant], available: &[f64]) -> Vec<Instant> {
     let mut out: Vec<Instant> = Vec::new();
     for Instant { time, name } in instants {
         let distance = |at: &f64| (at - time).abs();
-        let nearest = available
-            .iter()
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let nearest = available.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
         if let Some(time) = nearest.filter(|time| out.iter().all(|other| other.time != **time)) {
             out.push(instant(*time, name));
         }

@@ -17,11 +17,7 @@ fn page(rendered: &ReportFiles) -> String {
 }
 
 fn svg(rendered: &ReportFiles, name: &str) -> String {
-    let file = rendered
-        .svg
-        .iter()
-        .find(|file| file.file_stem().unwrap() == name)
-        .expect(name);
+    let file = rendered.svg.iter().find(|file| file.file_stem().unwrap() == name).expect(name);
     std::fs::read_to_string(file).unwrap()
 }
 
@@ -29,24 +25,16 @@ fn svg(rendered: &ReportFiles, name: &str) -> String {
 fn text_of(svg: &str) -> String {
     let document = roxmltree::Document::parse(svg).unwrap();
     let texts = document.descendants().filter(|node| node.is_text());
-    texts
-        .filter_map(|node| node.text())
-        .collect::<Vec<_>>()
-        .join("")
+    texts.filter_map(|node| node.text()).collect::<Vec<_>>().join("")
 }
 
 /// Width, and share of pixels that are not white.
 fn picture(file: &Path) -> (u32, f64) {
     let bytes = std::fs::read(file).unwrap();
-    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes))
-        .read_info()
-        .unwrap();
+    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
     let mut data = vec![0; reader.output_buffer_size().unwrap()];
     let info = reader.next_frame(&mut data).unwrap();
-    let inked = data
-        .chunks_exact(3)
-        .filter(|p| p.iter().any(|v| *v < 250))
-        .count();
+    let inked = data.chunks_exact(3).filter(|p| p.iter().any(|v| *v < 250)).count();
     (info.width, inked as f64 / (info.width * info.height) as f64)
 }
 
@@ -64,41 +52,19 @@ fn remove(folder: &Path) {
 fn a_pair_gets_all_its_figures() {
     let folder = small_pair(0.9);
     let rendered = render(&folder).unwrap();
-    let expected = [
-        "trajectories",
-        "gap",
-        "velocity",
-        "orientation",
-        "speed",
-        "vorticity",
-        "diagnostics",
-    ];
+    let expected =
+        ["trajectories", "gap", "velocity", "orientation", "speed", "vorticity", "diagnostics"];
     assert_eq!(names(&rendered), expected);
-    assert!(
-        rendered.finished && rendered.notes.is_empty(),
-        "{:?}",
-        rendered.notes
-    );
+    assert!(rendered.finished && rendered.notes.is_empty(), "{:?}", rendered.notes);
     for file in &rendered.png {
         let (width, ink) = picture(file);
         assert!(width >= 1000, "{} is {width} pixels wide", file.display());
-        assert!(
-            (0.02..0.98).contains(&ink),
-            "{}: {ink} of it is inked",
-            file.display()
-        );
+        assert!((0.02..0.98).contains(&ink), "{}: {ink} of it is inked", file.display());
     }
     for (name, texts) in [
         (
             "trajectories",
-            vec![
-                "x  [mm]",
-                "y  [mm]",
-                "z  [mm]",
-                "(a)",
-                "(d)",
-                "grain 0 (trailing at the start)",
-            ],
+            vec!["x  [mm]", "y  [mm]", "z  [mm]", "(a)", "(d)", "grain 0 (trailing at the start)"],
         ),
         (
             "gap",
@@ -112,28 +78,11 @@ fn a_pair_gets_all_its_figures() {
                 "landing",
             ],
         ),
-        (
-            "velocity",
-            vec!["vz / √(d g)  [–]", "grain 1 (leading at the start)"],
-        ),
-        (
-            "orientation",
-            vec!["long axis  [°]", "short axis  [°]", "|ω| √(d/g)  [–]"],
-        ),
-        (
-            "speed",
-            vec![
-                "speed |u|  [m/s]",
-                "plane of grain 0",
-                "(b) kiss",
-                "t √(g/d) = 17.9",
-            ],
-        ),
+        ("velocity", vec!["vz / √(d g)  [–]", "grain 1 (leading at the start)"]),
+        ("orientation", vec!["long axis  [°]", "short axis  [°]", "|ω| √(d/g)  [–]"]),
+        ("speed", vec!["speed |u|  [m/s]", "plane of grain 0", "(b) kiss", "t √(g/d) = 17.9"]),
         ("vorticity", vec!["vorticity ωy  [1/s]", "(c) role change"]),
-        (
-            "diagnostics",
-            vec!["max |div u|  [1/s]", "CFL  [–]", "energy  [10−9 J]"],
-        ),
+        ("diagnostics", vec!["max |div u|  [1/s]", "CFL  [–]", "energy  [10−9 J]"]),
     ] {
         let seen = text_of(&svg(&rendered, name));
         for text in texts {
@@ -141,20 +90,14 @@ fn a_pair_gets_all_its_figures() {
         }
     }
     let images = svg(&rendered, "speed").matches("<image").count();
-    assert_eq!(
-        images,
-        8 + 1,
-        "a row for the plane of each grain, and the colour bar"
-    );
+    assert_eq!(images, 8 + 1, "a row for the plane of each grain, and the colour bar");
     remove(&folder);
 }
 
 /// Whether this place of the page lies inside base64 data.
 fn in_picture(page: &str, at: usize) -> bool {
     let plain = |c: char| !(c.is_ascii_alphanumeric() || "+/=".contains(c));
-    page[..at]
-        .rfind(plain)
-        .is_some_and(|start| page[..start].ends_with(";base64"))
+    page[..at].rfind(plain).is_some_and(|start| page[..start].ends_with(";base64"))
 }
 
 #[test]
@@ -162,27 +105,18 @@ fn the_page_stands_alone_and_can_be_read_aloud() {
     let folder = small_pair(0.0);
     let rendered = render(&folder).unwrap();
     let images = svg(&rendered, "speed").matches("<image").count();
-    assert_eq!(
-        images,
-        4 + 1,
-        "one row while the grains share a plane, and the colour bar"
-    );
+    assert_eq!(images, 4 + 1, "one row while the grains share a plane, and the colour bar");
     let page = page(&rendered);
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
-    for forbidden in [
-        "<script", "<link", "@import", "src=", "url(http", "NaN", "inf ",
-    ] {
+    for forbidden in ["<script", "<link", "@import", "src=", "url(http", "NaN", "inf "] {
         // Letters of an embedded picture spell anything.
-        let around = page
-            .match_indices(forbidden)
-            .find(|(at, _)| !in_picture(&page, *at));
+        let around = page.match_indices(forbidden).find(|(at, _)| !in_picture(&page, *at));
         let around =
             around.map(|(at, _)| page.get(at.saturating_sub(60)..at + 20).unwrap_or("here"));
         assert_eq!(around, None, "the page holds '{forbidden}'");
     }
-    let outside = page
-        .match_indices("http")
-        .filter(|(at, _)| !page[*at..].starts_with("http://www.w3.org/"));
+    let outside =
+        page.match_indices("http").filter(|(at, _)| !page[*at..].starts_with("http://www.w3.org/"));
     assert_eq!(outside.count(), 0, "the page points outside");
     assert_eq!(page.matches("<svg").count(), 7);
     assert_eq!(
@@ -221,11 +155,7 @@ fn the_page_stands_alone_and_can_be_read_aloud() {
 fn the_same_folder_gives_the_same_bytes() {
     let folder = small_pair(0.9);
     let read = |rendered: &ReportFiles| -> Vec<Vec<u8>> {
-        let files = rendered
-            .png
-            .iter()
-            .chain(&rendered.svg)
-            .chain([&rendered.page]);
+        let files = rendered.png.iter().chain(&rendered.svg).chain([&rendered.page]);
         files.map(|file| std::fs::read(file).unwrap()).collect()
     };
     let first = read(&render(&folder).unwrap());
@@ -236,12 +166,7 @@ fn the_same_folder_gives_the_same_bytes() {
 #[test]
 fn an_interrupted_run_still_gets_a_report() {
     let folder = small_pair(0.9);
-    for name in [
-        "summary.json",
-        "run.pvd",
-        "provenance.json",
-        "diagnostics.csv",
-    ] {
+    for name in ["summary.json", "run.pvd", "provenance.json", "diagnostics.csv"] {
         std::fs::remove_file(folder.join(name)).unwrap();
     }
     let table = std::fs::read_to_string(folder.join("grains.csv")).unwrap();
@@ -261,10 +186,7 @@ fn an_interrupted_run_still_gets_a_report() {
     assert!(!rendered.finished);
     let page = page(&rendered);
     assert!(page.contains("This run has not finished"));
-    assert!(
-        page.contains("Galileo number"),
-        "diameters are found from the surfaces"
-    );
+    assert!(page.contains("Galileo number"), "diameters are found from the surfaces");
     for text in [
         "grains.csv: the last line",
         "events.jsonl: the last line",
@@ -290,44 +212,16 @@ fn pictures_may_be_missing_but_tables_may_not_be_damaged() {
     std::fs::remove_dir_all(folder.join("slices")).unwrap();
     std::fs::remove_dir_all(folder.join("grains")).unwrap();
     let rendered = render(&folder).unwrap();
-    assert_eq!(
-        names(&rendered),
-        [
-            "trajectories",
-            "gap",
-            "velocity",
-            "orientation",
-            "diagnostics"
-        ]
-    );
+    assert_eq!(names(&rendered), ["trajectories", "gap", "velocity", "orientation", "diagnostics"]);
     assert!(page(&rendered).contains("circles of equal volume"));
-    assert!(
-        rendered.notes.iter().any(|note| note.contains("no slices")),
-        "{:?}",
-        rendered.notes
-    );
+    assert!(rendered.notes.iter().any(|note| note.contains("no slices")), "{:?}", rendered.notes);
     std::fs::remove_file(&rendered.page).unwrap();
 
     let table = std::fs::read_to_string(folder.join("grains.csv")).unwrap();
-    std::fs::write(
-        folder.join("grains.csv"),
-        table.replacen(",0.0125,", ",0.01.25,", 1),
-    )
-    .unwrap();
+    std::fs::write(folder.join("grains.csv"), table.replacen(",0.0125,", ",0.01.25,", 1)).unwrap();
     let error = render(&folder).unwrap_err();
-    assert!(
-        matches!(
-            &error,
-            ReportError::Format(FormatError::Line { line: 2, .. })
-        ),
-        "{error}"
-    );
-    assert!(
-        error
-            .to_string()
-            .contains("'0.01.25' under 'x' is not a number"),
-        "{error}"
-    );
+    assert!(matches!(&error, ReportError::Format(FormatError::Line { line: 2, .. })), "{error}");
+    assert!(error.to_string().contains("'0.01.25' under 'x' is not a number"), "{error}");
     assert!(!error.is_input_output() && !folder.join("report.html").exists());
     remove(&folder);
 }
@@ -336,11 +230,7 @@ fn pictures_may_be_missing_but_tables_may_not_be_damaged() {
 fn damage_to_any_file_is_an_error_or_a_note() {
     let folder = small_pair(0.9);
     let damage = [
-        (
-            "case.resolved.toml",
-            "[domain\nsize = 3\n",
-            "case.resolved.toml, line 1",
-        ),
+        ("case.resolved.toml", "[domain\nsize = 3\n", "case.resolved.toml, line 1"),
         ("summary.json", "{\"steps\": 12", "summary.json, line 1"),
         ("provenance.json", "[1,", "provenance.json, line 1"),
         (
@@ -363,16 +253,8 @@ fn damage_to_any_file_is_an_error_or_a_note() {
     }
     std::fs::write(folder.join("run.pvd"), "<VTKFile").unwrap();
     let rendered = render(&folder).unwrap();
-    assert!(
-        rendered
-            .notes
-            .iter()
-            .any(|note| note.contains("run.pvd could not be read"))
-    );
-    assert!(
-        names(&rendered).contains(&"speed".to_owned()),
-        "times are found inside the slices"
-    );
+    assert!(rendered.notes.iter().any(|note| note.contains("run.pvd could not be read")));
+    assert!(names(&rendered).contains(&"speed".to_owned()), "times are found inside the slices");
     remove(&folder);
 }
 
@@ -390,18 +272,12 @@ fn empty_tables_and_strange_numbers_do_not_panic() {
     let rest = "1,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0";
     for (grains, diagnostics) in [
         (header.clone(), "time,cfl\n".to_owned()),
-        (
-            format!("{header}0,0,0,0,0,{rest}\n"),
-            "time,cfl\n0,NaN\n".to_owned(),
-        ),
+        (format!("{header}0,0,0,0,0,{rest}\n"), "time,cfl\n0,NaN\n".to_owned()),
         (
             format!("{header}0,0,1e300,0,0,{rest}\n0,1,-1e300,0,0,{rest}\n"),
             "time,cfl\n-5,inf\n1e300,1e300\n".to_owned(),
         ),
-        (
-            format!("{header}0,1,0,0,0,{rest}\n2,1,0,0,0,{rest}\n"),
-            "cfl\n1\n".to_owned(),
-        ),
+        (format!("{header}0,1,0,0,0,{rest}\n2,1,0,0,0,{rest}\n"), "cfl\n1\n".to_owned()),
     ] {
         std::fs::write(folder.join("grains.csv"), grains).unwrap();
         std::fs::write(folder.join("diagnostics.csv"), diagnostics).unwrap();
@@ -418,13 +294,7 @@ fn other_runs_get_their_own_figures() {
     let rendered = render(&folder).unwrap();
     assert_eq!(
         names(&rendered),
-        [
-            "trajectories",
-            "velocity",
-            "speed",
-            "vorticity",
-            "diagnostics"
-        ],
+        ["trajectories", "velocity", "speed", "vorticity", "diagnostics"],
         "a sphere that does not turn has no orientation to show"
     );
     let seen = text_of(&svg(&rendered, "velocity"));
@@ -457,16 +327,7 @@ fn few_grains_are_shown_one_by_one() {
     let folder = synthetic::folder("few");
     synthetic::heap(&folder, 12, true);
     let rendered = render(&folder).unwrap();
-    assert_eq!(
-        names(&rendered),
-        [
-            "positions",
-            "trajectories",
-            "grains",
-            "history",
-            "diagnostics"
-        ]
-    );
+    assert_eq!(names(&rendered), ["positions", "trajectories", "grains", "history", "diagnostics"]);
     let seen = text_of(&svg(&rendered, "grains"));
     for grain in 0..12 {
         assert!(seen.contains(&format!("grain {grain}")), "{seen}");
@@ -510,10 +371,7 @@ fn round_off_is_not_a_turn_and_the_summary_knows_all_steps() {
     std::fs::write(&summary, value.to_string()).unwrap();
     let rendered = render(&folder).unwrap();
     let seen = text_of(&svg(&rendered, "orientation"));
-    assert!(
-        seen.contains("long axis  [°]") && !seen.contains("ω"),
-        "{seen}"
-    );
+    assert!(seen.contains("long axis  [°]") && !seen.contains("ω"), "{seen}");
     let said = page(&rendered);
     assert!(said.contains("at most 0.789 in any step"), "{said}");
     assert!(said.matches("4.56×10<sup>−9</sup>").count() >= 2);
@@ -575,12 +433,8 @@ fn headline_and_figures_agree_on_kiss_and_separation() {
 
 #[test]
 fn tumbling_after_the_separation_stays_in_the_table() {
-    let (page, _) = report(&[
-        (13.2, "kiss"),
-        (13.6, "separation"),
-        (13.8, "tumble"),
-        (44.0, "landing"),
-    ]);
+    let (page, _) =
+        report(&[(13.2, "kiss"), (13.6, "separation"), (13.8, "tumble"), (44.0, "landing")]);
     let spoken = page.split("aria-label=\"Phases: ").nth(1).unwrap();
     let phases: Vec<&str> = spoken
         .split('"')
@@ -589,10 +443,7 @@ fn tumbling_after_the_separation_stays_in_the_table() {
         .split("; ")
         .filter_map(|phase| phase.split(' ').next())
         .collect();
-    assert_eq!(
-        phases,
-        ["drafting", "kissing", "separated", "tumbling", "landed"]
-    );
+    assert_eq!(phases, ["drafting", "kissing", "separated", "tumbling", "landed"]);
     let lead = page.split("<p class=\"lead\">").nth(1).unwrap();
     let [parted, tumbled] = ["separated at", "tumbled from"].map(|text| lead.find(text).unwrap());
     assert!(parted < tumbled);
@@ -628,9 +479,6 @@ fn grains_that_do_not_turn_have_no_angular_speed() {
     };
     std::fs::write(&file, table.lines().map(still).collect::<String>()).unwrap();
     let seen = text_of(&svg(&render(&folder).unwrap(), "orientation"));
-    assert!(
-        seen.contains("long axis  [°]") && !seen.contains("ω"),
-        "{seen}"
-    );
+    assert!(seen.contains("long axis  [°]") && !seen.contains("ω"), "{seen}");
     remove(&folder);
 }

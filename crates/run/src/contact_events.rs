@@ -42,10 +42,7 @@ impl ContactEvents {
         let first = self.events.len();
         let mut record = |kind, start, grains: [usize; 2]| {
             let event = Event::new(kind, start, &grains);
-            self.events.push(Event {
-                confirmed: time,
-                ..event
-            });
+            self.events.push(Event { confirmed: time, ..event });
         };
         self.open.retain_mut(|pair| {
             if touching.remove(&pair.grains) {
@@ -61,10 +58,7 @@ impl ContactEvents {
         });
         for grains in touching {
             record(EventKind::Kiss, time, grains);
-            self.open.push(ContactPair {
-                grains,
-                apart_since: None,
-            });
+            self.open.push(ContactPair { grains, apart_since: None });
         }
         self.events[first..].to_vec()
     }
@@ -92,10 +86,7 @@ mod tests {
     fn grains_touch_part_and_touch_again() {
         let mut contacts_of_grains = ContactEvents::default();
         let mut events: Vec<(EventKind, f64, Vec<usize>)> = Vec::new();
-        let floor = Contact {
-            partner: Partner::Wall { axis: 2, side: 0 },
-            ..touch(1, 0)
-        };
+        let floor = Contact { partner: Partner::Wall { axis: 2, side: 0 }, ..touch(1, 0) };
         let steps = [
             vec![floor],
             vec![touch(2, 0), touch(0, 2)],

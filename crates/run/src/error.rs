@@ -99,10 +99,6 @@ pub(crate) trait Context<T> {
 
 impl<T> Context<T> for io::Result<T> {
     fn context(self, action: &'static str, path: &Path) -> Result<T, RunError> {
-        self.map_err(|source| RunError::Io {
-            action,
-            path: path.into(),
-            source,
-        })
+        self.map_err(|source| RunError::Io { action, path: path.into(), source })
     }
 }

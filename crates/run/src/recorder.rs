@@ -29,12 +29,7 @@ enum Series {
 }
 
 /// All series, in the order of their indices.
-const SERIES: [Series; 4] = [
-    Series::Tables,
-    Series::Slices,
-    Series::Fields,
-    Series::Surfaces,
-];
+const SERIES: [Series; 4] = [Series::Tables, Series::Slices, Series::Fields, Series::Surfaces];
 
 /// Recorder of a run: tables, VTK files, events, checkpoints.
 pub(crate) struct Recorder {
@@ -112,13 +107,8 @@ impl Recorder {
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let mut recorder = Recorder::build(
-            run,
-            &record.digest,
-            plan,
-            sim,
-            Tables::reopen(run, record.lengths)?,
-        );
+        let mut recorder =
+            Recorder::build(run, &record.digest, plan, sim, Tables::reopen(run, record.lengths)?);
         recorder.tracker.restore(record.tracker);
         recorder.contact_events = record.contact_events;
         recorder.next = record.next;
@@ -144,10 +134,7 @@ impl Recorder {
         };
         let first = times().fold(f64::INFINITY, f64::min);
         let together = first + SHORTEST_STEP * step;
-        times()
-            .filter(|time| *time <= together)
-            .fold(first, f64::max)
-            - now
+        times().filter(|time| *time <= together).fold(first, f64::max) - now
     }
 
     /// Updates the record with the state after a step, writes the outputs that are due, and returns
@@ -157,9 +144,7 @@ impl Recorder {
         self.max_cfl = self.max_cfl.max(sim.cfl());
         let gap = pair_gap(sim, &self.enclosure);
         let before = self.tracker.events().len();
-        let mut events = self
-            .tracker
-            .update(sim.time(), sim.grains(), sim.contacts(), gap);
+        let mut events = self.tracker.update(sim.time(), sim.grains(), sim.contacts(), gap);
         if (3..=MAX_GRAINS).contains(&sim.grains().len()) {
             let hold = self.separation_hold;
             events.extend((self.contact_events).update(sim.time(), sim.contacts(), hold));
@@ -180,10 +165,7 @@ impl Recorder {
         kind: EventKind,
         index: usize,
     ) -> Result<(), RunError> {
-        let earlier = self.tracker.events()[..index]
-            .iter()
-            .filter(|e| e.kind == kind)
-            .count();
+        let earlier = self.tracker.events()[..index].iter().filter(|e| e.kind == kind).count();
         let tag = format!("{}-{}", kind.name(), earlier + 1);
         let slices = self.vtk.slices(&self.run, sim, &tag)?;
         let grains = self.vtk.grains(&self.run, sim, &tag)?;
@@ -210,11 +192,7 @@ impl Recorder {
             }
             self.next[index] += 1;
         }
-        if files.is_empty() {
-            Ok(())
-        } else {
-            self.add(files)
-        }
+        if files.is_empty() { Ok(()) } else { self.add(files) }
     }
 
     fn add(&mut self, files: impl IntoIterator<Item = Entry>) -> Result<(), RunError> {
@@ -274,17 +252,13 @@ impl Recorder {
     /// Returns the results so far.
     pub fn summary(&self, sim: &Simulation, wall_s: f64, ended_by: EndReason) -> Summary {
         let tracker = &self.tracker;
-        let grains = sim
-            .grains()
-            .iter()
-            .enumerate()
-            .map(|(i, grain)| GrainSummary {
-                equivalent_diameter_m: grain.shape.equivalent_diameter(),
-                density: grain.density,
-                peak_settling_speed_m_per_s: tracker.peak_settling_speeds()[i],
-                landing_time_s: tracker.landing_times()[i],
-                position_m: grain.pose.position.to_array(),
-            });
+        let grains = sim.grains().iter().enumerate().map(|(i, grain)| GrainSummary {
+            equivalent_diameter_m: grain.shape.equivalent_diameter(),
+            density: grain.density,
+            peak_settling_speed_m_per_s: tracker.peak_settling_speeds()[i],
+            landing_time_s: tracker.landing_times()[i],
+            position_m: grain.pose.position.to_array(),
+        });
         Summary {
             steps: sim.steps(),
             end_time_s: sim.time(),

@@ -120,10 +120,7 @@ pub fn run(
         provenance = Provenance::read(out).unwrap_or(provenance);
         if provenance.case_sha256 != job.digest {
             let what = differing(out, &job.resolved);
-            return Err(RunError::OtherCase {
-                folder: out.into(),
-                what,
-            });
+            return Err(RunError::OtherCase { folder: out.into(), what });
         }
     }
     if content == Content::Finished && resuming {
@@ -145,10 +142,9 @@ pub fn run(
         None
     };
     match &record {
-        Some(record) => observer.note(&format!(
-            "resuming at t = {:.6e} s, step {}",
-            record.time, record.steps
-        )),
+        Some(record) => {
+            observer.note(&format!("resuming at t = {:.6e} s, step {}", record.time, record.steps))
+        }
         None if resuming => observer.note("there is no checkpoint: starting from the beginning"),
         None => {}
     }
@@ -156,9 +152,7 @@ pub fn run(
         run_folder::clear(out)?;
     }
     run_folder::create(out)?;
-    provenance
-        .sessions
-        .push(Session::now(&options.command, options.threads, sim.steps()));
+    provenance.sessions.push(Session::now(&options.command, options.threads, sim.steps()));
     provenance.write(out)?;
     write(&out.join(RESOLVED), job.resolved.as_bytes())?;
     for (name, bytes) in &job.files {
@@ -172,15 +166,8 @@ pub fn run(
         Some(record) => Recorder::resume(out, record, &job.plan, &sim)?,
         None => Recorder::start(out, &job.digest, &job.plan, &sim)?,
     };
-    Running {
-        out: out.into(),
-        plan: job.plan,
-        sim,
-        recorder,
-        provenance,
-        started: Instant::now(),
-    }
-    .advance(observer)
+    Running { out: out.into(), plan: job.plan, sim, recorder, provenance, started: Instant::now() }
+        .advance(observer)
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
@@ -206,9 +193,7 @@ impl Running {
             if let Some(why) = self.ended() {
                 return self.finish(why);
             }
-            let limit = self
-                .recorder
-                .until_next(self.sim.time(), self.sim.time_step());
+            let limit = self.recorder.until_next(self.sim.time(), self.sim.time_step());
             let stepped = self.sim.step(limit).and_then(|()| self.collapsed(limit));
             if let Err(source) = stepped {
                 return Err(self.failed(source, saved_time));
@@ -267,10 +252,7 @@ impl Running {
             return Some(EndReason::End);
         }
         let stop = self.plan.stop?;
-        let since = self
-            .recorder
-            .tracker()
-            .holds_since(stop.when, self.sim.grains())?;
+        let since = self.recorder.tracker().holds_since(stop.when, self.sim.grains())?;
         (time - since >= stop.hold).then_some(match stop.when {
             StopWhen::Landing => EndReason::Landing,
             StopWhen::Rest => EndReason::Rest,
@@ -293,9 +275,7 @@ impl Running {
     fn finish(mut self, why: EndReason) -> Result<Ending, RunError> {
         self.recorder.finish(&self.sim)?;
         self.checkpoint()?;
-        let summary = self
-            .recorder
-            .summary(&self.sim, self.provenance.wall_s(), why);
+        let summary = self.recorder.summary(&self.sim, self.provenance.wall_s(), why);
         (summary.write(&self.out)).context("write", &self.out.join(summary::FILE))?;
         // One checkpoint suffices to continue to a later end.
         checkpoint::keep(&self.out, 1)?;
@@ -312,12 +292,7 @@ impl Running {
 
     /// Writes `failure.json`; the last valid checkpoint is kept.
     fn failed(&mut self, source: StepError, time: f64) -> RunError {
-        let StepError::Unstable {
-            time: at,
-            step,
-            what,
-            remedy,
-        } = &source;
+        let StepError::Unstable { time: at, step, what, remedy } = &source;
         let smaller_step = self.smaller_step();
         let remedy = remedy.advice(smaller_step);
         let failure = serde_json::json!({

@@ -57,13 +57,9 @@ fn refused(from: &str, to: &str, key: &str, words: &[&str]) {
     let text = PAIR.replacen(from, to, 1);
     let found = problems(&text);
     let line = PAIR[..PAIR.find(from).unwrap()].matches('\n').count() + 1;
-    let all: String = found
-        .iter()
-        .map(|p| format!("{p} | {}\n", p.help.clone().unwrap_or_default()))
-        .collect();
-    let hit = found
-        .iter()
-        .find(|p| p.key.as_deref().is_some_and(|k| k.starts_with(key)));
+    let all: String =
+        found.iter().map(|p| format!("{p} | {}\n", p.help.clone().unwrap_or_default())).collect();
+    let hit = found.iter().find(|p| p.key.as_deref().is_some_and(|k| k.starts_with(key)));
     let hit = hit.unwrap_or_else(|| panic!("no problem of {key}:\n{all}"));
     let (file, at, _) = hit.place().unwrap_or_else(|| panic!("no place:\n{all}"));
     assert_eq!(file, "case.toml");
@@ -92,35 +88,20 @@ fn the_papers_pair_is_understood() {
     assert_eq!(case.setup.mesh.spacing, DVec3::splat(0.25e-3));
     let fluid = case.setup.fluid.unwrap();
     assert_eq!((fluid.density, fluid.kinematic_viscosity), (1000.0, 1e-6));
-    let [a, b] = &case.setup.grains[..] else {
-        panic!()
-    };
+    let [a, b] = &case.setup.grains[..] else { panic!() };
     assert_eq!(a.pose.position, DVec3::new(0.0125, 0.0125, 0.08));
     assert_eq!((b.pose.position.x, b.density), (0.0125, 1500.0));
-    assert!(
-        (b.pose.position.z - 0.085).abs() < 1e-9,
-        "{}",
-        b.pose.position.z
-    );
+    assert!((b.pose.position.z - 0.085).abs() < 1e-9, "{}", b.pose.position.z);
     let gap = surface_gap(a, b, &case.setup.enclosure());
     assert!((gap - 3e-3).abs() < 1e-8, "{gap}");
-    assert_eq!(
-        (a.translation, a.rotation),
-        (MotionConstraint::Free, MotionConstraint::Free)
-    );
+    assert_eq!((a.translation, a.rotation), (MotionConstraint::Free, MotionConstraint::Free));
     assert_eq!(case.setup.boundaries.0, [[Boundary::WALL; 2]; 3]);
     assert!(matches!(case.setup.step, StepRule::Limits { .. }));
     assert_eq!(
         case.plan.planes,
         [
-            Plane {
-                axis: 1,
-                position: PlanePosition::Grain(0)
-            },
-            Plane {
-                axis: 1,
-                position: PlanePosition::Grain(1)
-            }
+            Plane { axis: 1, position: PlanePosition::Grain(0) },
+            Plane { axis: 1, position: PlanePosition::Grain(1) }
         ]
     );
     let estimate = case.estimate(2);
@@ -141,10 +122,7 @@ fn a_resolved_case_resolves_to_itself() {
         assert_eq!(first.resolved, second.resolved);
         assert_eq!(first.digest, second.digest);
         for (a, b) in first.setup.grains.iter().zip(&second.setup.grains) {
-            assert_eq!(
-                (a.pose, a.velocity, a.translation),
-                (b.pose, b.velocity, b.translation)
-            );
+            assert_eq!((a.pose, a.velocity, a.translation), (b.pose, b.velocity, b.translation));
         }
         assert_eq!(
             (first.setup.contact, first.setup.step, first.plan),
@@ -175,36 +153,17 @@ fn the_digest_follows_what_decides_the_results() {
     let original = good(PAIR).digest;
     assert_eq!(digest("\"pair\"", "\"another title\""), original);
     assert_eq!(digest("[time]", "[run]\nthreads = 3\n[time]"), original);
-    assert_eq!(
-        digest("[time]", "[output]\ncheckpoint_steps = 3\n[time]"),
-        original
-    );
-    assert_ne!(
-        digest("[time]", "[run]\nprecision = \"f32\"\n[time]"),
-        original
-    );
+    assert_eq!(digest("[time]", "[output]\ncheckpoint_steps = 3\n[time]"), original);
+    assert_ne!(digest("[time]", "[run]\nprecision = \"f32\"\n[time]"), original);
     assert_ne!(digest("1500 kg/m3", "1501 kg/m3"), original);
     assert_ne!(digest("1 mPa s", "1.1 mPa s"), original);
-    assert_ne!(
-        digest("[time]", "[output]\nslices = \"1 ms\"\n[time]"),
-        original
-    );
+    assert_ne!(digest("[time]", "[output]\nslices = \"1 ms\"\n[time]"), original);
 }
 
 #[test]
 fn mistyped_keys_and_words_are_corrected() {
-    refused(
-        "viscosity =",
-        "visocsity =",
-        "fluid",
-        &["unknown key", "did you mean `viscosity`"],
-    );
-    refused(
-        "position =",
-        "positon =",
-        "grain.0",
-        &["did you mean `position`"],
-    );
+    refused("viscosity =", "visocsity =", "fluid", &["unknown key", "did you mean `viscosity`"]);
+    refused("position =", "positon =", "grain.0", &["did you mean `position`"]);
     refused("[time]\n", "[tme]\n", "tme", &["did you mean `time`"]);
     refused(
         "cell_size = \"0.25 mm\"",
@@ -212,96 +171,46 @@ fn mistyped_keys_and_words_are_corrected() {
         "domain.boundaries",
         &["did you mean \"periodic\"", "free-surface"],
     );
-    refused(
-        "kind = \"sphere\"",
-        "kind = \"spere\"",
-        "grain.0.shape",
-        &["sphere"],
-    );
-    refused(
-        "gap = \"3 mm\"",
-        "gpa = \"3 mm\"",
-        "grain.1.gap_above",
-        &["did you mean `gap`"],
-    );
+    refused("kind = \"sphere\"", "kind = \"spere\"", "grain.0.shape", &["sphere"]);
+    refused("gap = \"3 mm\"", "gpa = \"3 mm\"", "grain.1.gap_above", &["did you mean `gap`"]);
 }
 
 #[test]
 fn wrong_units_name_the_right_one() {
-    refused(
-        "\"1 mPa s\"",
-        "\"1 mm\"",
-        "fluid.viscosity",
-        &["is a length", "1 mPa s"],
-    );
+    refused("\"1 mPa s\"", "\"1 mm\"", "fluid.viscosity", &["is a length", "1 mPa s"]);
     refused(
         "\"2 mm\"",
         "\"2 mmm\"",
         "grain.0.shape.diameter",
         &["unknown unit", "did you mean `mm`"],
     );
-    refused(
-        "\"1500 kg/m3\"",
-        "\"1500 kg\"",
-        "grain.0.density",
-        &["is a mass", "kg/m3"],
-    );
+    refused("\"1500 kg/m3\"", "\"1500 kg\"", "grain.0.density", &["is a mass", "kg/m3"]);
     refused("\"1 s\"", "\"1 m\"", "time.end", &["is a length", "a time"]);
-    refused(
-        "\"1 mPa s\"",
-        "\"1 mPas\"",
-        "fluid.viscosity",
-        &["did you mean `mPa s`"],
-    );
+    refused("\"1 mPa s\"", "\"1 mPas\"", "fluid.viscosity", &["did you mean `mPa s`"]);
     refused(
         "[\"12.5 mm\", \"12.5 mm\", \"80 mm\"]",
         "[\"12.5 mm\", \"12.5 kg\", \"80 mm\"]",
         "grain.0.position",
         &["is a mass"],
     );
-    refused(
-        "density = 1000",
-        "density = true",
-        "fluid.density",
-        &["density"],
-    );
+    refused("density = 1000", "density = true", "fluid.density", &["density"]);
     refused("density = 1000", "density = nan", "fluid.density", &["NaN"]);
 }
 
 #[test]
 fn values_out_of_range_are_refused() {
-    refused(
-        "density = 1000",
-        "density = 0",
-        "fluid.density",
-        &["greater than zero"],
-    );
-    refused(
-        "\"1500 kg/m3\"",
-        "-1500",
-        "grain.0.density",
-        &["greater than zero"],
-    );
+    refused("density = 1000", "density = 0", "fluid.density", &["greater than zero"]);
+    refused("\"1500 kg/m3\"", "-1500", "grain.0.density", &["greater than zero"]);
     refused("\"1 s\"", "0", "time.end", &["greater than zero"]);
     refused("\"2 mm\"", "\"-2 mm\"", "grain.0.shape", &["positive"]);
-    refused(
-        "[time]",
-        "[contact]\nrestitution = 1.5\n[time]",
-        "contact.restitution",
-        &["between"],
-    );
+    refused("[time]", "[contact]\nrestitution = 1.5\n[time]", "contact.restitution", &["between"]);
     refused(
         "[time]",
         "[run]\nprecision = \"f16\"\n[time]",
         "run.precision",
         &["f16", "f32", "f64"],
     );
-    refused(
-        "[time]",
-        "[output]\ntables = \"1 ns\"\n[time]",
-        "output.tables",
-        &["unit forgotten"],
-    );
+    refused("[time]", "[output]\ntables = \"1 ns\"\n[time]", "output.tables", &["unit forgotten"]);
 }
 
 #[test]
@@ -312,18 +221,8 @@ fn boxes_that_do_not_fit_say_what_would() {
         "domain.cell_size",
         &["whole number of cells", "84 cells"],
     );
-    refused(
-        "\"0.25 mm\"",
-        "\"0.25 nm\"",
-        "domain.cell_size",
-        &["unit forgotten"],
-    );
-    refused(
-        "cell_size = \"0.25 mm\"",
-        "cells = [0, 10, 10]",
-        "domain.cells",
-        &["1 to"],
-    );
+    refused("\"0.25 mm\"", "\"0.25 nm\"", "domain.cell_size", &["unit forgotten"]);
+    refused("cell_size = \"0.25 mm\"", "cells = [0, 10, 10]", "domain.cells", &["1 to"]);
     refused(
         "cell_size = \"0.25 mm\"",
         "cell_size = \"0.25 mm\"\ncells = [100, 100, 100]",
@@ -345,26 +244,14 @@ fn boundaries_must_belong_together() {
         let to = format!("cell_size = \"0.25 mm\"\nboundaries = {{ {faces} }}");
         refused("cell_size = \"0.25 mm\"", &to, key, words);
     };
-    with(
-        "x = [\"periodic\", \"wall\"]",
-        "domain.boundaries.x",
-        &["one side only"],
-    );
-    with(
-        "x = { lower = \"periodic\" }",
-        "domain.boundaries.x",
-        &["one side only"],
-    );
+    with("x = [\"periodic\", \"wall\"]", "domain.boundaries.x", &["one side only"]);
+    with("x = { lower = \"periodic\" }", "domain.boundaries.x", &["one side only"]);
     with(
         "x = [{ kind = \"inflow\", velocity = [0.1, 0, 0] }, \"wall\"]",
         "domain.boundaries.x",
         &["outflow"],
     );
-    with(
-        "x = [\"inflow\", \"outflow\"]",
-        "domain.boundaries.x",
-        &["velocity"],
-    );
+    with("x = [\"inflow\", \"outflow\"]", "domain.boundaries.x", &["velocity"]);
     with(
         "x = [{ kind = \"inflow\", velocity = [-0.1, 0, 0] }, \"outflow\"]",
         "domain.boundaries.x",
@@ -385,9 +272,7 @@ fn boundaries_must_belong_together() {
     assert_eq!(case.setup.boundaries.0[0], [Boundary::Periodic; 2]);
     assert_eq!(
         case.setup.boundaries.0[2][1],
-        Boundary::Wall {
-            velocity: DVec3::new(0.01, 0.0, 0.0)
-        }
+        Boundary::Wall { velocity: DVec3::new(0.01, 0.0, 0.0) }
     );
 }
 
@@ -399,12 +284,7 @@ fn grains_must_stand_clear_and_inside() {
         "grain.1",
         &["overlap at the start by 1.0000 mm", "move them apart"],
     );
-    refused(
-        "\"80 mm\"]",
-        "\"97 mm\"]",
-        "grain.0.position",
-        &["crosses a face", "0.5000 mm"],
-    );
+    refused("\"80 mm\"]", "\"97 mm\"]", "grain.0.position", &["crosses a face", "0.5000 mm"]);
     refused(
         "[\"12.5 mm\", \"12.5 mm\", \"80 mm\"]",
         "[\"12.5 mm\", \"40 mm\", \"80 mm\"]",
@@ -438,10 +318,7 @@ fn grains_beyond_the_box_say_what_helps() {
         position,
         "[\"12.5 mm\", \"12.5 mm\", 80]",
         "grain.0.position",
-        &[
-            "beyond the upper z face (at 97.5 mm)",
-            "unit forgotten? bare numbers are metres",
-        ],
+        &["beyond the upper z face (at 97.5 mm)", "unit forgotten? bare numbers are metres"],
     );
     let far = problems(&PAIR.replace("\"80 mm\"]", "\"80 m\"]"));
     assert!(!far[0].help.as_ref().unwrap().contains("metres"), "{far:?}");
@@ -450,10 +327,7 @@ fn grains_beyond_the_box_say_what_helps() {
             "diameter = \"2 mm\" }",
             "diameter = \"30 mm\" }",
             "grain.0.shape",
-            [
-                "larger than the box: 30 mm along x, the box has 25 mm",
-                "equivalent_diameter",
-            ],
+            ["larger than the box: 30 mm along x, the box has 25 mm", "equivalent_diameter"],
         ),
         (
             "density = \"1500 kg/m3\"",
@@ -529,26 +403,17 @@ fn light_grains_are_warned_of() {
     assert!(light.contains("1 of 2 free grains"), "{light}");
     let rising = warnings(["600", "700"], landing);
     assert!(rising.contains("they rise"), "{rising}");
-    assert!(
-        rising.contains("upwards") && !rising.contains("never"),
-        "{rising}"
-    );
+    assert!(rising.contains("upwards") && !rising.contains("never"), "{rising}");
     assert!(warnings(["600", "2000"], landing).contains("may never be met"));
     let heavy = warnings(["1500", "2000"], landing);
-    assert!(
-        !heavy.contains("rise") && !heavy.contains("landing"),
-        "{heavy}"
-    );
+    assert!(!heavy.contains("rise") && !heavy.contains("landing"), "{heavy}");
 }
 
 #[test]
 fn ways_out_are_warned_of() {
     let warnings = |from: &str, to: &str| {
         assert!(PAIR.contains(from), "{from}");
-        good(&PAIR.replacen(from, to, 1))
-            .estimate(1)
-            .warnings
-            .join("\n")
+        good(&PAIR.replacen(from, to, 1)).estimate(1).warnings.join("\n")
     };
     let walls = |z: &str| {
         let cell = "cell_size = \"0.25 mm\"";
@@ -556,12 +421,7 @@ fn ways_out_are_warned_of() {
             format!("{cell}\nboundaries = {{ x = \"periodic\", y = \"periodic\", z = {z} }}");
         warnings(cell, &walls)
     };
-    let none = [
-        "leave through",
-        "faster and faster",
-        "given motion",
-        "one cell thick",
-    ];
+    let none = ["leave through", "faster and faster", "given motion", "one cell thick"];
     let quiet = walls("\"wall\"");
     assert!(none.iter().all(|text| !quiet.contains(text)), "{quiet}");
     let open = walls("[\"outflow\", \"wall\"]");
@@ -570,15 +430,10 @@ fn ways_out_are_warned_of() {
     assert!(!up.contains("leave through"), "{up}");
     // 2 x 500 kg/m^3 x 4.19 mm^3 g over 1000 kg/m^3 x 60.9 cm^3.
     let fall = walls("\"periodic\"");
-    assert!(
-        fall.contains("body_acceleration = [0, 0, 6.7442e-4]"),
-        "{fall}"
-    );
+    assert!(fall.contains("body_acceleration = [0, 0, 6.7442e-4]"), "{fall}");
     let position = "position = [\"12.5 mm\", \"12.5 mm\", \"80 mm\"]";
-    let given = warnings(
-        position,
-        &format!("{position}\nmotion = {{ velocity = [0, 0, \"-0.1 m/s\"] }}"),
-    );
+    let given =
+        warnings(position, &format!("{position}\nmotion = {{ velocity = [0, 0, \"-0.1 m/s\"] }}"));
     assert!(
         given.contains("grain 0") && given.contains("lower wall of z at t = 790 ms"),
         "{given}"
@@ -605,12 +460,7 @@ fn shapes_must_be_whole() {
         "grain.0.shape",
         &["does not belong"],
     );
-    refused(
-        "shape = { kind = \"sphere\", diameter = \"2 mm\" }\n",
-        "\n",
-        "grain.0",
-        &["no shape"],
-    );
+    refused("shape = { kind = \"sphere\", diameter = \"2 mm\" }\n", "\n", "grain.0", &["no shape"]);
 }
 
 #[test]
@@ -637,27 +487,18 @@ fn motion_and_orientation_have_several_forms() {
     let fixed = with("motion = \"fixed\"");
     assert_eq!(
         (fixed.translation, fixed.rotation),
-        (
-            MotionConstraint::Prescribed(DVec3::ZERO),
-            MotionConstraint::Prescribed(DVec3::ZERO)
-        )
+        (MotionConstraint::Prescribed(DVec3::ZERO), MotionConstraint::Prescribed(DVec3::ZERO))
     );
     let spun = with("motion = { velocity = \"fixed\", angular_velocity = [0, 0, \"60 rpm\"] }");
     assert_eq!(
         spun.rotation,
         MotionConstraint::Prescribed(DVec3::new(0.0, 0.0, std::f64::consts::TAU))
     );
-    assert_eq!(
-        spun.angular_velocity,
-        DVec3::new(0.0, 0.0, std::f64::consts::TAU)
-    );
+    assert_eq!(spun.angular_velocity, DVec3::new(0.0, 0.0, std::f64::consts::TAU));
     let pulled = with("motion = { velocity = [0, 0, \"-1 cm/s\"] }");
     assert_eq!(
         (pulled.translation, pulled.rotation),
-        (
-            MotionConstraint::Prescribed(DVec3::new(0.0, 0.0, -0.01)),
-            MotionConstraint::Free
-        )
+        (MotionConstraint::Prescribed(DVec3::new(0.0, 0.0, -0.01)), MotionConstraint::Free)
     );
     refused(
         "density = \"1500 kg/m3\"",
@@ -692,23 +533,14 @@ fn vectors_may_be_formulas() {
     assert_eq!(setup.grains[0].velocity, DVec3::new(0.0, 0.0, 1.0));
     let start = setup.prescription.initial_velocity.as_ref().unwrap();
     assert_eq!(start.at(&[1.0, 2.0, 3.0]), DVec3::new(3.0, 0.0, 0.0));
-    assert_eq!(
-        setup.prescription.body_acceleration(0.0),
-        Some(DVec3::new(1.0, 0.0, 0.0))
-    );
+    assert_eq!(setup.prescription.body_acceleration(0.0), Some(DVec3::new(1.0, 0.0, 0.0)));
     let again = good(&case.resolved);
     assert_eq!(case.resolved, again.resolved);
     let fluid = |to: &str, words: &[&str]| {
         refused("[fluid]", &format!("[fluid]\n{to}"), "fluid", words);
     };
-    fluid(
-        "initial_velocity = { formula = [\"t\", 0, 0] }",
-        &["unknown name \"t\"", "x, y, z"],
-    );
-    fluid(
-        "initial_velocity = { formula = [\"1/(x - 0.0125)\", 0, 0] }",
-        &["finite number"],
-    );
+    fluid("initial_velocity = { formula = [\"t\", 0, 0] }", &["unknown name \"t\"", "x, y, z"]);
+    fluid("initial_velocity = { formula = [\"1/(x - 0.0125)\", 0, 0] }", &["finite number"]);
     fluid("body_acceleration = { formula = [\"t\", 0] }", &["three"]);
     for (formula, words) in [
         ("2*(t", "its brackets do not match; a formula may use t,"),
@@ -720,10 +552,7 @@ fn vectors_may_be_formulas() {
             &["the x component", words],
         );
     }
-    fluid(
-        "body_acceleration = { formula = [\"sqrt(t - 1)\", 0, 0] }",
-        &["finite number"],
-    );
+    fluid("body_acceleration = { formula = [\"sqrt(t - 1)\", 0, 0] }", &["finite number"]);
     refused(
         "density = \"1500 kg/m3\"",
         "density = \"1500 kg/m3\"\nmotion = { velocity = { formula = [0, 0, \"x\"] } }",
@@ -757,19 +586,10 @@ fn packings_become_grains() {
     for (a, b) in case.setup.grains.iter().zip(&resolved.setup.grains) {
         assert_eq!((a.pose, a.shape.volume()), (b.pose, b.shape.volume()));
     }
-    let d: Vec<f64> = case
-        .setup
-        .grains
-        .iter()
-        .map(|g| g.shape.equivalent_diameter())
-        .collect();
+    let d: Vec<f64> = case.setup.grains.iter().map(|g| g.shape.equivalent_diameter()).collect();
     assert!(d.iter().all(|d| (2e-3..4e-3).contains(d)) && d[0] != d[1]);
     let crowded = problems(&text.replace("count = 60", "count = 60000"));
-    assert!(
-        crowded[0].message.contains("of 60000 grains find a place"),
-        "{}",
-        crowded[0]
-    );
+    assert!(crowded[0].message.contains("of 60000 grains find a place"), "{}", crowded[0]);
     assert_eq!(crowded.len(), 1, "{crowded:?}");
     let random = good(&text.replace("seed = 3", "seed = 3\narrangement = \"random\""));
     assert_eq!(random.setup.grains.len(), 60);
@@ -779,11 +599,7 @@ fn packings_become_grains() {
 fn expectations_need_a_meaning() {
     let with = |text: &str| PAIR.replace("[time]", &format!("[expect]\n{text}\n[time]"));
     assert_eq!(good(&with("kiss_time = { value = \"0.2 s\", tolerance = \"5 %\" }\npeak_settling_speed = [{ at_least = 0.1, grain = 0 }, { at_most = 0.2, grain = 1 }]")).expect.len(), 3);
-    assert!(
-        problems(&with("kiss_time = { value = 0.2 }"))[0]
-            .message
-            .contains("what is expected")
-    );
+    assert!(problems(&with("kiss_time = { value = 0.2 }"))[0].message.contains("what is expected"));
     assert!(
         problems(&with("kiss_tme = { value = 0.2 }"))[0]
             .help
@@ -812,20 +628,12 @@ fn overrides_are_located_too() {
     let formula = set("domain.size={ formula = [0, 0, 0] }");
     assert!(formula.is_err_and(|e| e.to_string().contains("three components")));
     assert!(set("domain.size.0=30 mm").is_ok_and(|c| c.setup.mesh.cells[0] == 120));
-    let Err(error) = Case::parse(
-        PAIR,
-        "case.toml",
-        Path::new("."),
-        &["grain.1.density=2 kg".into()],
-    ) else {
+    let Err(error) =
+        Case::parse(PAIR, "case.toml", Path::new("."), &["grain.1.density=2 kg".into()])
+    else {
         panic!()
     };
-    assert_eq!(
-        error.problems()[0]
-            .place()
-            .map(|(name, line, _)| (name, line)),
-        Some(("--set", 1))
-    );
+    assert_eq!(error.problems()[0].place().map(|(name, line, _)| (name, line)), Some(("--set", 1)));
 }
 
 #[test]
@@ -887,20 +695,14 @@ fn hertz_mindlin_takes_materials_from_the_grain_or_from_contact() {
     let steel = (materials[0].youngs_modulus, materials[0].poisson_ratio);
     let glass = (materials[1].youngs_modulus, materials[1].poisson_ratio);
     assert_eq!((steel, glass), ((208e9, 0.3), (48e9, 0.2)));
-    assert_eq!(
-        (materials[0].restitution, materials[1].restitution),
-        (0.9, 1.0)
-    );
+    assert_eq!((materials[0].restitution, materials[1].restitution), (0.9, 1.0));
     let contact = case.setup.contact;
     assert_eq!(contact.law, ContactLawKind::HertzMindlin);
     let wall = contact.wall_material;
     assert_eq!((wall.youngs_modulus, wall.poisson_ratio), (70e9, 0.2));
     // The resolved case gives the same run.
     let again = good(&case.resolved);
-    assert_eq!(
-        (again.digest, again.setup.contact),
-        (case.digest.clone(), contact)
-    );
+    assert_eq!((again.digest, again.setup.contact), (case.digest.clone(), contact));
     let time = case.estimate(1).contact_time_s.unwrap();
     // Hertz duration of two steel spheres at sqrt(2 g 40 mm), which is shorter than that of glass.
     let mass = 7850.0 * std::f64::consts::PI / 6.0 * 0.004f64.powi(3) / 2.0;
@@ -916,62 +718,19 @@ fn hertz_mindlin_takes_materials_from_the_grain_or_from_contact() {
 fn keys_of_the_other_contact_law_are_refused_where_they_stand() {
     let hertz = |from: &str, to: &str| problems(&HERTZ.replacen(from, to, 1));
     for (from, to, key, words) in [
-        (
-            "law =",
-            "stiffness = 100\nlaw =",
-            "contact.stiffness",
-            "does not use stiffness",
-        ),
-        (
-            "\"hertz-mindlin\"",
-            "\"linear\"",
-            "contact.youngs_modulus",
-            "does not use",
-        ),
-        (
-            "\"48 GPa\"",
-            "\"-48 GPa\"",
-            "contact.youngs_modulus",
-            "greater than zero",
-        ),
-        (
-            "\"208 GPa\"",
-            "\"208 kg\"",
-            "grain.0.youngs_modulus",
-            "an elastic modulus",
-        ),
-        (
-            "poisson_ratio = 0.3",
-            "poisson_ratio = 0.6",
-            "grain.0.poisson_ratio",
-            "out of range",
-        ),
-        (
-            "youngs_modulus = \"48 GPa\"\n",
-            "",
-            "contact.law",
-            "needs the youngs_modulus",
-        ),
-        (
-            "youngs_modulus = \"48",
-            "youngs_modulos = \"48",
-            "contact.youngs_modulos",
-            "unknown",
-        ),
-        (
-            "\"hertz-mindlin\"",
-            "\"hertz\"",
-            "contact.law",
-            "hertz-mindlin",
-        ),
+        ("law =", "stiffness = 100\nlaw =", "contact.stiffness", "does not use stiffness"),
+        ("\"hertz-mindlin\"", "\"linear\"", "contact.youngs_modulus", "does not use"),
+        ("\"48 GPa\"", "\"-48 GPa\"", "contact.youngs_modulus", "greater than zero"),
+        ("\"208 GPa\"", "\"208 kg\"", "grain.0.youngs_modulus", "an elastic modulus"),
+        ("poisson_ratio = 0.3", "poisson_ratio = 0.6", "grain.0.poisson_ratio", "out of range"),
+        ("youngs_modulus = \"48 GPa\"\n", "", "contact.law", "needs the youngs_modulus"),
+        ("youngs_modulus = \"48", "youngs_modulos = \"48", "contact.youngs_modulos", "unknown"),
+        ("\"hertz-mindlin\"", "\"hertz\"", "contact.law", "hertz-mindlin"),
     ] {
         let found = hertz(from, to);
         let problem = found.iter().find(|p| p.key.as_deref() == Some(key));
         let problem = problem.unwrap_or_else(|| panic!("{key}: {found:?}"));
         let help = problem.help.clone().unwrap_or_default();
-        assert!(
-            format!("{problem} {help}").contains(words),
-            "{problem} {help}"
-        );
+        assert!(format!("{problem} {help}").contains(words), "{problem} {help}");
     }
 }

@@ -18,34 +18,20 @@ fn keys(value: &Value, found: &mut Vec<String>) {
 
 #[test]
 fn every_key_is_described() {
-    let page = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../docs/reference/case-file.md"
-    );
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/case-file.md");
     let text = std::fs::read_to_string(page).expect("the reference page");
     let mut found = Vec::new();
     keys(&schema(), &mut found);
     found.sort();
     found.dedup();
-    assert!(
-        found.len() > 60,
-        "only {} keys: has the schema changed?",
-        found.len()
-    );
+    assert!(found.len() > 60, "only {} keys: has the schema changed?", found.len());
     let missing: Vec<&String> = found
         .iter()
         .filter(|key| {
-            let named = [
-                format!("`{key}`"),
-                format!("{key} ="),
-                format!("[{key}]"),
-                format!("[[{key}]]"),
-            ];
+            let named =
+                [format!("`{key}`"), format!("{key} ="), format!("[{key}]"), format!("[[{key}]]")];
             !named.iter().any(|form| text.contains(form))
         })
         .collect();
-    assert!(
-        missing.is_empty(),
-        "not in docs/reference/case-file.md: {missing:?}"
-    );
+    assert!(missing.is_empty(), "not in docs/reference/case-file.md: {missing:?}");
 }

@@ -37,14 +37,8 @@ fn aggregate(from: &Path) -> Result<Shape> {
 fn rock(from: &Path) -> Result<Shape> {
     let path = from.join("scans/tsquare_rock/rock_115x105x73.npy");
     let (volume, source) = read_volume(&path, &ReadLimits::default())?;
-    let options = ScanOptions {
-        pad: true,
-        label: Some(1),
-        ..ScanOptions::new(5e-6)
-    };
-    shapes_from_volume(&volume, &source, &options)?
-        .remove(0)
-        .shape
+    let options = ScanOptions { pad: true, label: Some(1), ..ScanOptions::new(5e-6) };
+    shapes_from_volume(&volume, &source, &options)?.remove(0).shape
 }
 
 fn keep(shape: &Shape, path: &Path) -> Result<()> {

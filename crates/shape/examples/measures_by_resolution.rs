@@ -31,9 +31,7 @@ fn main() {
             let scan = Scan::new(&body, 1, across, 1.0);
             let mut sums = [0.0; 5];
             for seed in 0..SEEDS {
-                let record = scan
-                    .shape_with(0.05, seed, false, ShapeOptions::default())
-                    .record();
+                let record = scan.shape_with(0.05, seed, false, ShapeOptions::default()).record();
                 let measures = [
                     Some(record.krumbein_sphericity),
                     record.krumbein_sphericity_feret,

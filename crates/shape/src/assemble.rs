@@ -128,23 +128,14 @@ pub(crate) fn assemble<D: Distance>(
         };
         let (_, inscribed) = inscribed::sphere(&body.distance, &about, body.lower, body.upper);
         morphology.inscribed_radius = Some(inscribed);
-        let reading = roundness::measure(
-            &body.distance,
-            body.lower,
-            body.upper,
-            inscribed,
-            &body.surface,
-        );
+        let reading =
+            roundness::measure(&body.distance, body.lower, body.upper, inscribed, &body.surface);
         morphology.wadell_roundness = reading.map(|reading| reading.roundness);
         if let Some(lost) = reading.and_then(|reading| reading.lost) {
             morphology.set_area(lost.restored(area), mass.volume);
         }
     }
-    let second = DVec3::new(
-        mass.second.x_axis.x,
-        mass.second.y_axis.y,
-        mass.second.z_axis.z,
-    );
+    let second = DVec3::new(mass.second.x_axis.x, mass.second.y_axis.y, mass.second.z_axis.z);
     Ok(Shape {
         nodes,
         volume: mass.volume,
@@ -166,12 +157,8 @@ fn bounds(field: &SampledField, mesh: &TriangleMesh, nodes: &[SurfaceNode]) -> (
         let middle = mesh.corners(f).iter().sum::<DVec3>() / 3.0;
         nodes::project(field, middle)
     });
-    let on_surface = mesh
-        .vertices
-        .iter()
-        .copied()
-        .chain(middles)
-        .chain(nodes.iter().map(|n| n.position));
+    let on_surface =
+        mesh.vertices.iter().copied().chain(middles).chain(nodes.iter().map(|n| n.position));
     let start = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0.0f64);
     let (lower, upper, squared) = on_surface.fold(start, |(lower, upper, squared), x| {
         (lower.min(x), upper.max(x), squared.max(x.length_squared()))

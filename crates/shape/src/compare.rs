@@ -31,14 +31,8 @@ impl Comparison {
 
     fn at(first: &Shape, second: &Shape, turn: DMat3) -> Comparison {
         let back = turn.transpose();
-        let there = first
-            .nodes()
-            .iter()
-            .map(|n| second.distance(turn * n.position));
-        let here = second
-            .nodes()
-            .iter()
-            .map(|n| -first.distance(back * n.position));
+        let there = first.nodes().iter().map(|n| second.distance(turn * n.position));
+        let here = second.nodes().iter().map(|n| -first.distance(back * n.position));
         // Both shapes have half the weight, regardless of their node counts.
         let [mut mean, mut square, mut largest] = [0.0; 3];
         for (distances, count) in [
@@ -62,14 +56,7 @@ impl Comparison {
 
 /// Returns the 24 rotations of a cube onto itself.
 fn turns() -> Vec<DMat3> {
-    let axes = [
-        DVec3::X,
-        DVec3::Y,
-        DVec3::Z,
-        DVec3::NEG_X,
-        DVec3::NEG_Y,
-        DVec3::NEG_Z,
-    ];
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
     let pairs = axes.iter().flat_map(|x| axes.iter().map(move |y| (*x, *y)));
     pairs
         .filter(|(x, y)| x.dot(*y) == 0.0)
@@ -95,11 +82,7 @@ mod tests {
         let ball = |radius| sphere(radius, &ShapeOptions::default()).unwrap();
         let (large, small) = (ball(1.1e-3), ball(1e-3));
         let found = Comparison::of(&large, &small);
-        for value in [
-            found.mean_distance_m,
-            found.rms_distance_m,
-            found.largest_distance_m,
-        ] {
+        for value in [found.mean_distance_m, found.rms_distance_m, found.largest_distance_m] {
             assert!((value - 1e-4).abs() < 1e-12, "{found:?}");
         }
         assert!((Comparison::of(&small, &large).mean_distance_m + 1e-4).abs() < 1e-12);
@@ -109,10 +92,7 @@ mod tests {
     fn the_same_body_is_found_whatever_the_order_of_its_axes() {
         let body = ellipsoid(1.5e-3, 1e-3, 5e-4, &ShapeOptions::default()).unwrap();
         let found = Comparison::of(&body, &body);
-        assert!(
-            found.rms_distance_m < 2e-3 * body.equivalent_diameter(),
-            "{found:?}"
-        );
+        assert!(found.rms_distance_m < 2e-3 * body.equivalent_diameter(), "{found:?}");
         let rounder = ellipsoid(1e-3, 1e-3, 1e-3, &ShapeOptions::default()).unwrap();
         let found = Comparison::of(&body, &rounder);
         // The poles protrude by 0.5 mm; the short axis recedes by 0.5 mm.

@@ -133,11 +133,7 @@ impl ShapeError {
     }
     pub(crate) fn parameter(name: &'static str, value: f64, reason: &str) -> ShapeError {
         let reason = reason.to_owned();
-        ShapeError::BadParameter {
-            name,
-            value,
-            reason,
-        }
+        ShapeError::BadParameter { name, value, reason }
     }
     pub(crate) fn bad_mesh(defect: impl Into<String>) -> ShapeError {
         let defect = defect.into();

@@ -91,10 +91,7 @@ mod tests {
         assert!((long - 21f64.sqrt()).abs() < 1e-12);
         // Reference for the largest width perpendicular to the diagonal d, by exhaustive search.
         let d = turn * DVec3::new(4.0, 2.0, 1.0).normalize();
-        let (e, f) = (
-            d.any_orthonormal_vector(),
-            d.cross(d.any_orthonormal_vector()),
-        );
+        let (e, f) = (d.any_orthonormal_vector(), d.cross(d.any_orthonormal_vector()));
         let width = |u: DVec3| {
             let (low, high) = ends(&corners, u);
             (high - low).dot(u)

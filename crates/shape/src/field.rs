@@ -107,19 +107,13 @@ impl SampledField {
         dims: [usize; 3],
         values: &[f64],
     ) -> Result<SampledField> {
-        let largest = values
-            .iter()
-            .fold(0.0f64, |m, v| if v.is_nan() { *v } else { m.max(v.abs()) });
+        let largest =
+            values.iter().fold(0.0f64, |m, v| if v.is_nan() { *v } else { m.max(v.abs()) });
         if !(largest.is_finite() && largest > 0.0) {
-            return Err(ShapeError::quality(
-                "a sampled distance is not a finite number",
-            ));
+            return Err(ShapeError::quality("a sampled distance is not a finite number"));
         }
         let quantum = (largest / LEVELS).log2().ceil().exp2();
-        let levels = values
-            .iter()
-            .map(|v| (v / quantum).round() as f32)
-            .collect();
+        let levels = values.iter().map(|v| (v / quantum).round() as f32).collect();
         Ok(Self::from_levels(lower, spacing, dims, quantum, levels))
     }
 
@@ -227,8 +221,7 @@ impl SampledField {
     /// Returns signed distance [m] and gradient at `x`.
     #[inline]
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
-        self.distance_and_gradient_on_grid(x)
-            .unwrap_or_else(|| self.beyond(x))
+        self.distance_and_gradient_on_grid(x).unwrap_or_else(|| self.beyond(x))
     }
 
     /// Returns the cell around `x`, or `None` if `x` lies off the grid (or is NaN).
@@ -251,11 +244,7 @@ impl SampledField {
         let [i, j, k] = [cell(0), cell(1), cell(2)];
         let fraction = s - DVec3::new(f64::from(i), f64::from(j), f64::from(k));
         let cell = [i as usize, j as usize, k as usize];
-        Place {
-            cell,
-            index: self.index(cell[0], cell[1], cell[2]),
-            fraction,
-        }
+        Place { cell, index: self.index(cell[0], cell[1], cell[2]), fraction }
     }
 
     /// Returns the two levels along x at each of the four cell edges parallel to x.
@@ -273,9 +262,7 @@ impl SampledField {
     #[inline(always)]
     fn interpolate(&self, place: &Place) -> f64 {
         let f = place.fraction;
-        let [a, b, c, d] = self
-            .corners(place.index)
-            .map(|p| p[0] + f.x * (p[1] - p[0]));
+        let [a, b, c, d] = self.corners(place.index).map(|p| p[0] + f.x * (p[1] - p[0]));
         let low = a + f.y * (b - a);
         let high = c + f.y * (d - c);
         self.quantum * (low + f.z * (high - low))

@@ -16,9 +16,7 @@ pub(crate) fn gaussian(field: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f32> 
     let mut scratch = vec![0.0f32; field.len()];
     let mut dims = dims;
     for _ in 0..3 {
-        field
-            .par_chunks_mut(dims[0])
-            .for_each(|line| convolve(line, &kernel));
+        field.par_chunks_mut(dims[0]).for_each(|line| convolve(line, &kernel));
         transpose(&field, &mut scratch, dims);
         std::mem::swap(&mut field, &mut scratch);
         dims.rotate_left(1);
@@ -29,9 +27,8 @@ pub(crate) fn gaussian(field: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f32> 
 fn convolve(line: &mut [f32], kernel: &[f32]) {
     let reach = kernel.len() - 1;
     let last = line.len() - 1;
-    let padded: Vec<f32> = (0..line.len() + 2 * reach)
-        .map(|i| line[i.saturating_sub(reach).min(last)])
-        .collect();
+    let padded: Vec<f32> =
+        (0..line.len() + 2 * reach).map(|i| line[i.saturating_sub(reach).min(last)]).collect();
     line.iter_mut().for_each(|out| *out *= kernel[0]);
     for (n, weight) in kernel.iter().enumerate().skip(1) {
         let sides = padded[reach - n..].iter().zip(&padded[reach + n..]);

@@ -34,11 +34,7 @@ impl<'a> Hull<'a> {
         if !(size.is_finite() && size > 0.0) {
             return None;
         }
-        let mut hull = Hull {
-            points,
-            facets: Vec::new(),
-            tolerance: 1e-9 * size,
-        };
+        let mut hull = Hull { points, facets: Vec::new(), tolerance: 1e-9 * size };
         hull.start()?;
         let mut pending: Vec<u32> = (0..4).collect();
         while let Some(facet) = pending.pop() {
@@ -47,9 +43,7 @@ impl<'a> Hull<'a> {
                 continue;
             }
             let eye = *f.outside.iter().max_by(|a, b| {
-                hull.height(facet, **a)
-                    .total_cmp(&hull.height(facet, **b))
-                    .then(b.cmp(a))
+                hull.height(facet, **a).total_cmp(&hull.height(facet, **b)).then(b.cmp(a))
             })?;
             pending.extend(hull.add(facet, eye)?);
         }
@@ -82,9 +76,7 @@ impl<'a> Hull<'a> {
         let all = 0..p.len() as u32;
         let farthest = |score: &dyn Fn(DVec3) -> f64| {
             all.clone().max_by(|a, b| {
-                score(p[*a as usize])
-                    .total_cmp(&score(p[*b as usize]))
-                    .then(b.cmp(a))
+                score(p[*a as usize]).total_cmp(&score(p[*b as usize])).then(b.cmp(a))
             })
         };
         let a = farthest(&|x| -x.x)?;
@@ -266,9 +258,8 @@ mod tests {
     #[test]
     fn flat_and_empty_sets_have_no_volume() {
         assert_eq!(volume(&[]), None);
-        let flat: Vec<DVec3> = (0..50)
-            .map(|i| DVec3::new(f64::from(i % 7), f64::from(i / 7), 1.0))
-            .collect();
+        let flat: Vec<DVec3> =
+            (0..50).map(|i| DVec3::new(f64::from(i % 7), f64::from(i / 7), 1.0)).collect();
         assert_eq!(volume(&flat), None);
     }
 }

@@ -66,9 +66,8 @@ pub(crate) fn sphere(
         let at = place(dims, n);
         (0..27usize).all(|m| {
             let to = [m % 3, m / 3 % 3, m / 9];
-            let other: Option<Vec<usize>> = (0..3)
-                .map(|a| (at[a] + to[a]).checked_sub(1).filter(|i| *i < dims[a]))
-                .collect();
+            let other: Option<Vec<usize>> =
+                (0..3).map(|a| (at[a] + to[a]).checked_sub(1).filter(|i| *i < dims[a])).collect();
             other.is_none_or(|o| depths[index(dims, [o[0], o[1], o[2]])] <= depths[n])
         })
     };
@@ -119,12 +118,8 @@ mod tests {
             let left = (x + 1.2 * DVec3::X).length() - 0.99;
             left.min((x - 1.2 * DVec3::X).length() - 1.0)
         };
-        let (centre, radius) = sphere(
-            &balls,
-            &balls,
-            DVec3::new(-2.2, -1.0, -1.0),
-            DVec3::new(2.2, 1.0, 1.0),
-        );
+        let (centre, radius) =
+            sphere(&balls, &balls, DVec3::new(-2.2, -1.0, -1.0), DVec3::new(2.2, 1.0, 1.0));
         assert!((radius - 1.0).abs() < 1e-5 && centre.distance(1.2 * DVec3::X) < 1e-4);
     }
 }

@@ -37,12 +37,7 @@ impl Memory {
 
 impl Default for ReadLimits {
     fn default() -> ReadLimits {
-        ReadLimits {
-            file_bytes: 4 << 30,
-            voxels: 1 << 29,
-            mesh_elements: 20_000_000,
-            memory: None,
-        }
+        ReadLimits { file_bytes: 4 << 30, voxels: 1 << 29, mesh_elements: 20_000_000, memory: None }
     }
 }
 
@@ -63,10 +58,7 @@ impl ReadLimits {
             file_bytes: self.file_bytes.min(available),
             // Voxel indices share 32 bits with a flag.
             voxels: (1 << 31) - 1,
-            memory: Some(Memory {
-                available,
-                per_voxel,
-            }),
+            memory: Some(Memory { available, per_voxel }),
             ..self
         }
     }
@@ -96,9 +88,7 @@ impl ReadLimits {
 
 /// Parses the available memory [bytes] from the text of /proc/meminfo.
 fn mem_available(meminfo: &str) -> Option<u64> {
-    let line = meminfo
-        .lines()
-        .find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    let line = meminfo.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
     let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kib.checked_mul(1024)
 }
@@ -115,10 +105,7 @@ pub struct SourceFile {
 impl SourceFile {
     pub(crate) fn new(path: &Path, content: Sha256) -> SourceFile {
         let name = path.file_name().unwrap_or_default();
-        SourceFile {
-            name: name.to_string_lossy().into_owned(),
-            sha256: hex(&content.finalize()),
-        }
+        SourceFile { name: name.to_string_lossy().into_owned(), sha256: hex(&content.finalize()) }
     }
 }
 
@@ -148,9 +135,7 @@ pub(crate) fn read_bytes(path: &Path, limits: &ReadLimits) -> Result<(Vec<u8>, S
 
 /// Returns the lower-case extension of a file name.
 pub(crate) fn extension(path: &Path) -> String {
-    path.extension()
-        .map(|e| e.to_string_lossy().to_ascii_lowercase())
-        .unwrap_or_default()
+    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
 
 pub(crate) fn hex(bytes: &[u8]) -> String {

@@ -123,9 +123,7 @@ pub(crate) fn of_field(field: &SampledField) -> Mass {
             raw
         })
         .collect();
-    let raw = layers
-        .into_iter()
-        .fold(Raw::default(), |sum, layer| sum + layer);
+    let raw = layers.into_iter().fold(Raw::default(), |sum, layer| sum + layer);
     raw.finish(field.lower() + field.spacing() * middle, field.spacing())
 }
 
@@ -153,10 +151,7 @@ fn cell(v: &[f64; 8], corner: DVec3) -> Raw {
         };
     }
     let slope: [f64; 3] = std::array::from_fn(|axis| {
-        (0..8)
-            .map(|c| if c >> axis & 1 == 1 { v[c] } else { -v[c] })
-            .sum::<f64>()
-            .abs()
+        (0..8).map(|c| if c >> axis & 1 == 1 { v[c] } else { -v[c] }).sum::<f64>().abs()
     });
     let along = if slope[0] >= slope[1] && slope[0] >= slope[2] {
         0
@@ -224,9 +219,7 @@ mod tests {
         let size = DVec3::new(3.0, 2.0, 1.0);
         let place = DVec3::new(10.0, -4.0, 7.0);
         let mut mesh = crate::triangles::unit_cube();
-        mesh.vertices
-            .iter_mut()
-            .for_each(|v| *v = place + *v * size);
+        mesh.vertices.iter_mut().for_each(|v| *v = place + *v * size);
         let mass = of_mesh(&mesh);
         assert!((mass.volume - 6.0).abs() < 1e-12);
         assert!((mass.centroid - (place + 0.5 * size)).length() < 1e-12);

@@ -50,10 +50,8 @@ pub(crate) fn spread(field: &SampledField, mesh: &TriangleMesh, count: usize) ->
     let slack = DVec3::splat(field.spacing());
     let bounds = (lower - slack, upper + slack);
     let chosen = choose(&samples, bounds, spacing, count);
-    let mut positions: Vec<DVec3> = chosen
-        .iter()
-        .map(|s| project(field, samples[*s as usize].position))
-        .collect();
+    let mut positions: Vec<DVec3> =
+        chosen.iter().map(|s| project(field, samples[*s as usize].position)).collect();
     for _ in 0..ROUNDS {
         let owner = assign(field, &samples, &positions, bounds, spacing);
         let mut sums = vec![(DVec3::ZERO, 0.0); positions.len()];
@@ -74,10 +72,7 @@ pub(crate) fn spread(field: &SampledField, mesh: &TriangleMesh, count: usize) ->
         areas[*owner as usize] += sample.area;
     }
     let nodes = positions.into_iter().zip(areas);
-    nodes
-        .map(|(position, area)| SurfaceNode { position, area })
-        .filter(|n| n.area > 0.0)
-        .collect()
+    nodes.map(|(position, area)| SurfaceNode { position, area }).filter(|n| n.area > 0.0).collect()
 }
 
 /// Projects the point onto the zero set along the gradient.
@@ -103,11 +98,7 @@ fn samples(mesh: &TriangleMesh, largest: f64) -> Vec<Sample> {
         let cross = mesh.twice_area(face);
         let normal = cross.normalize_or_zero();
         let area = 0.5 * cross.length();
-        let levels = if area > largest {
-            (area / largest).log(4.0).ceil() as u32
-        } else {
-            0
-        };
+        let levels = if area > largest { (area / largest).log(4.0).ceil() as u32 } else { 0 };
         let n = 1usize << levels.min(12);
         let share = area / (n * n) as f64;
         let at = |i: usize, j: usize, third: f64| {
@@ -118,11 +109,7 @@ fn samples(mesh: &TriangleMesh, largest: f64) -> Vec<Sample> {
             for j in 0..n - i {
                 let inner = (i + j + 1 < n).then_some(2.0 / 3.0);
                 for third in [1.0 / 3.0].into_iter().chain(inner) {
-                    samples.push(Sample {
-                        position: at(i, j, third),
-                        normal,
-                        area: share,
-                    });
+                    samples.push(Sample { position: at(i, j, third), normal, area: share });
                 }
             }
         }
@@ -177,9 +164,8 @@ fn shuffled(n: usize) -> Vec<u32> {
     // grains depend on this order.
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     for i in (1..n).rev() {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let other = ((u128::from(state) * (i as u128 + 1)) >> 64) as usize;
         order.swap(i, other);
     }
@@ -195,10 +181,7 @@ fn assign(
     spacing: f64,
 ) -> Vec<u32> {
     let mut grid = Buckets::new(bounds, 1.2 * spacing);
-    let normals: Vec<DVec3> = positions
-        .iter()
-        .map(|x| field.distance_and_gradient(*x).1)
-        .collect();
+    let normals: Vec<DVec3> = positions.iter().map(|x| field.distance_and_gradient(*x).1).collect();
     for (n, x) in positions.iter().enumerate() {
         grid.insert(*x, n as u32);
     }
@@ -248,13 +231,7 @@ impl Buckets {
         let lower = bounds.0 - DVec3::splat(size);
         let cells = (bounds.1 - lower) / size;
         let dims = cells.to_array().map(|n| n as usize + 2);
-        Buckets {
-            lower,
-            size,
-            dims,
-            heads: vec![NONE; dims.iter().product()],
-            chain: Vec::new(),
-        }
+        Buckets { lower, size, dims, heads: vec![NONE; dims.iter().product()], chain: Vec::new() }
     }
 
     fn key(&self, x: DVec3) -> [usize; 3] {

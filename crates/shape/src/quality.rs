@@ -26,10 +26,7 @@ pub struct QualityBounds {
 
 impl Default for QualityBounds {
     fn default() -> QualityBounds {
-        QualityBounds {
-            gradient_error: 0.15,
-            volume_error: 0.01,
-        }
+        QualityBounds { gradient_error: 0.15, volume_error: 0.01 }
     }
 }
 
@@ -58,10 +55,7 @@ pub(crate) fn gradient_error(field: &SampledField, nodes: &[SurfaceNode]) -> f64
     let mut errors: Vec<f64> = nodes
         .iter()
         .flat_map(|node| {
-            let normal = field
-                .distance_and_gradient(node.position)
-                .1
-                .normalize_or_zero();
+            let normal = field.distance_and_gradient(node.position).1.normalize_or_zero();
             [-1.0, 0.0, 1.0].map(|s| {
                 let x: DVec3 = node.position + s * field.spacing() * normal;
                 (field.distance_and_gradient(x).1.length() - 1.0).abs()
@@ -69,20 +63,12 @@ pub(crate) fn gradient_error(field: &SampledField, nodes: &[SurfaceNode]) -> f64
         })
         .collect();
     errors.sort_by(f64::total_cmp);
-    errors
-        .get(errors.len() * 9 / 10)
-        .copied()
-        .unwrap_or(f64::NAN)
+    errors.get(errors.len() * 9 / 10).copied().unwrap_or(f64::NAN)
 }
 
 /// Refuses a frame with off-diagonal second moments, hence not the principal frame.
 pub(crate) fn check_axes(second: &DMat3) -> Result<()> {
-    let off = second
-        .y_axis
-        .x
-        .abs()
-        .max(second.z_axis.x.abs())
-        .max(second.z_axis.y.abs());
+    let off = second.y_axis.x.abs().max(second.z_axis.x.abs()).max(second.z_axis.y.abs());
     let share = off / second.x_axis.x;
     if share < 5e-3 {
         return Ok(());

@@ -29,9 +29,6 @@ mod tests {
         let mut random = Random::seed_from_u64(1477776061723855037);
         assert_eq!(random.next_u64(), 1985237415132408290);
         let unit: f64 = random.random();
-        assert_eq!(
-            unit,
-            (2979275885539914483u64 >> 11) as f64 / (1u64 << 53) as f64
-        );
+        assert_eq!(unit, (2979275885539914483u64 >> 11) as f64 / (1u64 << 53) as f64);
     }
 }

@@ -54,30 +54,17 @@ pub struct View {
 
 impl View {
     /// View along the short axis: the broadest side, long axis to the right.
-    pub const BROAD: View = View {
-        right: DVec3::X,
-        up: DVec3::Y,
-    };
+    pub const BROAD: View = View { right: DVec3::X, up: DVec3::Y };
     /// View along the intermediate axis: long axis to the right, short axis up.
-    pub const SIDE: View = View {
-        right: DVec3::X,
-        up: DVec3::Z,
-    };
+    pub const SIDE: View = View { right: DVec3::X, up: DVec3::Z };
     /// View along the long axis.
-    pub const END: View = View {
-        right: DVec3::Y,
-        up: DVec3::Z,
-    };
+    pub const END: View = View { right: DVec3::Y, up: DVec3::Z };
 }
 
 impl Picture {
     /// Returns an empty image.
     pub fn blank(width: usize, height: usize) -> Picture {
-        Picture {
-            width,
-            height,
-            pixels: vec![PAPER; width * height],
-        }
+        Picture { width, height, pixels: vec![PAPER; width * height] }
     }
 
     /// Copies another image into this one, with its upper left corner at column `x`, row `y`.
@@ -98,9 +85,7 @@ impl Picture {
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         let bytes: Vec<u8> = self.pixels.iter().flatten().copied().collect();
-        let written = encoder
-            .write_header()
-            .and_then(|mut writer| writer.write_image_data(&bytes));
+        let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&bytes));
         written.map_err(|e| io(std::io::Error::other(e)))
     }
 
@@ -146,10 +131,7 @@ impl Picture {
     pub fn sides(shape: &Shape, turn: DMat3, pixels: usize, width: f64, nodes: bool) -> Picture {
         let mut picture = Picture::blank(3 * pixels, pixels);
         for (n, view) in [View::BROAD, View::SIDE, View::END].into_iter().enumerate() {
-            let view = View {
-                right: turn * view.right,
-                up: turn * view.up,
-            };
+            let view = View { right: turn * view.right, up: turn * view.up };
             let side = Picture::of(shape, view, pixels, width, nodes);
             picture.paste(&side, n * pixels, 0);
         }
@@ -246,8 +228,7 @@ mod tests {
         let shown: Vec<String> = (0..7)
             .map(|j| {
                 let row = (0..9).map(|i| picture.pixels[DOT * i + 30 * DOT * j]);
-                row.map(|pixel| if pixel == INK { '#' } else { '.' })
-                    .collect()
+                row.map(|pixel| if pixel == INK { '#' } else { '.' }).collect()
             })
             .collect();
         let wanted = [

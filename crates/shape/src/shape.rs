@@ -63,11 +63,7 @@ impl Shape {
         match &self.field {
             Field::Sphere(radius) => {
                 let length = x.length();
-                let normal = if length > 0.0 {
-                    x / length
-                } else {
-                    DVec3::ZERO
-                };
+                let normal = if length > 0.0 { x / length } else { DVec3::ZERO };
                 (length - radius, normal)
             }
             Field::Sampled(field) => field.distance_and_gradient(x),

@@ -70,9 +70,7 @@ pub(crate) fn extract(samples: &Samples) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let mut on_edges = OnEdges::new(strides[2]);
     let offset = |corner: u8| {
-        (0..3)
-            .map(|axis| usize::from(corner >> axis & 1) * strides[axis])
-            .sum::<usize>()
+        (0..3).map(|axis| usize::from(corner >> axis & 1) * strides[axis]).sum::<usize>()
     };
     let offsets: [usize; 8] = std::array::from_fn(|c| offset(c as u8));
     for k in 0..nz.saturating_sub(1) {
@@ -129,10 +127,7 @@ struct OnEdges {
 
 impl OnEdges {
     fn new(plane: usize) -> OnEdges {
-        OnEdges {
-            planes: [vec![None; 3 * plane], vec![None; 3 * plane]],
-            first: 0,
-        }
+        OnEdges { planes: [vec![None; 3 * plane], vec![None; 3 * plane]], first: 0 }
     }
 
     /// Returns the vertex on the edge from sample `low` along `axis`.
@@ -182,8 +177,7 @@ fn fill(mesh: &mut TriangleMesh, polygon: &[u32]) {
             mesh.vertices.push(sum / polygon.len() as f64);
             let centre = (mesh.vertices.len() - 1) as u32;
             for (n, &a) in polygon.iter().enumerate() {
-                mesh.triangles
-                    .push([a, polygon[(n + 1) % polygon.len()], centre]);
+                mesh.triangles.push([a, polygon[(n + 1) % polygon.len()], centre]);
             }
         }
     }
@@ -222,19 +216,12 @@ mod tests {
     #[test]
     fn the_surface_of_a_ball_is_closed_and_faces_outwards() {
         let (values, spacing) = ball(40);
-        let samples = Samples {
-            dims: [40; 3],
-            lower: DVec3::splat(-1.25),
-            spacing,
-            values: &values,
-        };
+        let samples =
+            Samples { dims: [40; 3], lower: DVec3::splat(-1.25), spacing, values: &values };
         let mesh = extract(&samples);
         mesh.check_closed().unwrap();
         let volume = mesh.signed_volume();
-        assert!(
-            (volume / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 0.01,
-            "{volume}"
-        );
+        assert!((volume / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 0.01, "{volume}");
     }
 
     /// All sign patterns, including ambiguous ones.
@@ -250,12 +237,7 @@ mod tests {
                 }
             }
         }
-        let samples = Samples {
-            dims: [n; 3],
-            lower: DVec3::ZERO,
-            spacing: 1.0,
-            values: &values,
-        };
+        let samples = Samples { dims: [n; 3], lower: DVec3::ZERO, spacing: 1.0, values: &values };
         let mesh = extract(&samples);
         assert!(mesh.triangles.len() > 1000);
         mesh.check_edges().unwrap();

@@ -40,17 +40,13 @@ pub fn write_table(
     let mut writer = csv::Writer::from_path(path).map_err(failed)?;
     for (row, (name, record)) in rows.iter().enumerate() {
         let columns = columns(record).into_iter();
-        let more = more
-            .iter()
-            .map(|(name, values)| (*name, values.get(row).copied()));
+        let more = more.iter().map(|(name, values)| (*name, values.get(row).copied()));
         let (names, values): (Vec<_>, Vec<_>) = columns.chain(more).unzip();
         if row == 0 {
             let header = std::iter::once("grain").chain(names);
             writer.write_record(header).map_err(failed)?;
         }
-        let values = values
-            .into_iter()
-            .map(|v| v.map_or(String::new(), |v| format!("{v:.7e}")));
+        let values = values.into_iter().map(|v| v.map_or(String::new(), |v| format!("{v:.7e}")));
         let cells = std::iter::once(name.clone()).chain(values);
         writer.write_record(cells).map_err(failed)?;
     }

@@ -39,20 +39,12 @@ fn the_studys_grains_are_what_their_place_in_the_chart_says() {
             assert!(std::fs::metadata(&path).unwrap().len() < 200_000);
             let shape = Shape::load(&path).unwrap();
             let m = shape.morphology();
-            assert!(
-                (m.krumbein_sphericity - sphericity).abs() < 0.005,
-                "{}",
-                path.display()
-            );
+            assert!((m.krumbein_sphericity - sphericity).abs() < 0.005, "{}", path.display());
             close(shape.equivalent_diameter(), 2e-3, 1e-9);
             // The inscribed sphere is the body's before it was worn, and the edges have the radius
             // that makes R.
             let inscribed = parameter(&shape, "inscribed_radius_m");
-            close(
-                parameter(&shape, "edge_radius_m"),
-                roundness * inscribed,
-                1e-12,
-            );
+            close(parameter(&shape, "edge_radius_m"), roundness * inscribed, 1e-12);
             let measured = m.wadell_roundness.unwrap();
             println!(
                 "{}: S {:.4}, R {measured:.3}, caliper S {:.3}",
@@ -60,10 +52,7 @@ fn the_studys_grains_are_what_their_place_in_the_chart_says() {
                 m.krumbein_sphericity,
                 shape.record().krumbein_sphericity_feret.unwrap()
             );
-            assert!(
-                (measured - roundness).abs() < 0.04,
-                "{measured} for {roundness}"
-            );
+            assert!((measured - roundness).abs() < 0.04, "{measured} for {roundness}");
             close(m.inscribed_radius.unwrap(), inscribed, 1e-4);
             assert!(m.convexity.unwrap() > 0.99);
             assert!(shape.quality().unwrap().gradient_error < 0.05);
@@ -74,59 +63,30 @@ fn the_studys_grains_are_what_their_place_in_the_chart_says() {
 
 #[test]
 fn equal_targets_and_seeds_give_equal_grains_and_other_seeds_others() {
-    let options = ShapeOptions {
-        cells: 24,
-        least_cells: 12,
-        nodes: Some(200),
-        ..Default::default()
-    };
+    let options =
+        ShapeOptions { cells: 24, least_cells: 12, nodes: Some(200), ..Default::default() };
     let target = FamilyTarget::new(0.7, 0.5, 1e-3);
     let one = family_grain(&target, 7, &options).unwrap();
-    assert_eq!(
-        one.digest(),
-        family_grain(&target, 7, &options).unwrap().digest()
-    );
-    assert_ne!(
-        one.digest(),
-        family_grain(&target, 8, &options).unwrap().digest()
-    );
+    assert_eq!(one.digest(), family_grain(&target, 7, &options).unwrap().digest());
+    assert_ne!(one.digest(), family_grain(&target, 8, &options).unwrap().digest());
 }
 
 #[test]
 fn targets_at_the_edge_of_the_chart_are_met_or_refused() {
-    let options = ShapeOptions {
-        cells: 40,
-        least_cells: 20,
-        nodes: Some(300),
-        ..Default::default()
-    };
-    for (sphericity, roundness, flatness) in [
-        (0.3, 0.3, 1.0),
-        (0.5, 0.9, 0.4),
-        (0.95, 0.3, 0.9),
-        (0.97, 0.9, 1.0),
-    ] {
-        let target = FamilyTarget {
-            flatness,
-            ..FamilyTarget::new(sphericity, roundness, 1e-3)
-        };
+    let options =
+        ShapeOptions { cells: 40, least_cells: 20, nodes: Some(300), ..Default::default() };
+    for (sphericity, roundness, flatness) in
+        [(0.3, 0.3, 1.0), (0.5, 0.9, 0.4), (0.95, 0.3, 0.9), (0.97, 0.9, 1.0)]
+    {
+        let target = FamilyTarget { flatness, ..FamilyTarget::new(sphericity, roundness, 1e-3) };
         let shape = family_grain(&target, 3, &options).unwrap();
         let m = shape.morphology();
-        assert!(
-            (m.krumbein_sphericity - sphericity).abs() < 0.01,
-            "{}",
-            m.krumbein_sphericity
-        );
+        assert!((m.krumbein_sphericity - sphericity).abs() < 0.01, "{}", m.krumbein_sphericity);
         close(m.flatness(), flatness, 0.02);
     }
-    for (sphericity, roundness) in [
-        (0.1, 0.5),
-        (1.0, 0.5),
-        (f64::NAN, 0.5),
-        (0.5, 0.0),
-        (0.5, 1.0),
-        (0.5, f64::INFINITY),
-    ] {
+    for (sphericity, roundness) in
+        [(0.1, 0.5), (1.0, 0.5), (f64::NAN, 0.5), (0.5, 0.0), (0.5, 1.0), (0.5, f64::INFINITY)]
+    {
         let target = FamilyTarget::new(sphericity, roundness, 1e-3);
         assert!(family_grain(&target, 1, &family_options()).is_err());
     }
@@ -164,9 +124,8 @@ fn the_four_orientations_show_the_areas_they_should() {
     for grain in 1..=16 {
         let shape = Shape::load(&kept(grain)).unwrap();
         // What the flow along z meets: the shadow along z, taken in the body's frame.
-        let seen: Vec<f64> = (1..=4)
-            .map(|n| shadow(&shape, study_orientation(n).inverse() * DVec3::Z))
-            .collect();
+        let seen: Vec<f64> =
+            (1..=4).map(|n| shadow(&shape, study_orientation(n).inverse() * DVec3::Z)).collect();
         close(seen[0], shadow(&shape, DVec3::X), 1e-9);
         close(seen[2], shadow(&shape, DVec3::Z), 1e-9);
         // The mean of all four about y must lie between the ends; an ellipsoid of these extents
@@ -178,19 +137,11 @@ fn the_four_orientations_show_the_areas_they_should() {
         let between = (0.5 * (seen[0] * seen[0] + seen[2] * seen[2])).sqrt();
         close(seen[1], between, 0.15);
         close(seen[3], between, 0.15);
-        assert!(
-            seen[0] < seen[1] && seen[0] < seen[3],
-            "grain {grain}: {seen:?}"
-        );
-        assert!(
-            seen[2] > seen[1] && seen[2] > seen[3],
-            "grain {grain}: {seen:?}"
-        );
+        assert!(seen[0] < seen[1] && seen[0] < seen[3], "grain {grain}: {seen:?}");
+        assert!(seen[2] > seen[1] && seen[2] > seen[3], "grain {grain}: {seen:?}");
         println!(
             "{grain:2} {:?}",
-            seen.iter()
-                .map(|a| (a * 1e8).round() / 100.0)
-                .collect::<Vec<_>>()
+            seen.iter().map(|a| (a * 1e8).round() / 100.0).collect::<Vec<_>>()
         );
     }
 }

@@ -77,10 +77,7 @@ fn sound() -> Vec<(&'static str, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.tif");
     let labels = (0..60).map(|n| n % 7).collect();
-    Volume::from_labels([5, 4, 3], labels)
-        .unwrap()
-        .save_labels(&path)
-        .unwrap();
+    Volume::from_labels([5, 4, 3], labels).unwrap().save_labels(&path).unwrap();
     let tiff = std::fs::read(&path).unwrap();
     let data: Vec<u8> = (0..60).collect();
     let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (3, 4, 5), }\n";

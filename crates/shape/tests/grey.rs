@@ -27,11 +27,7 @@ fn ellipsoid(axes: DVec3, turn: DQuat, centre: DVec3) -> impl Fn(DVec3) -> f64 {
         let gradient = (y / (axes * axes)).length();
         let level = (y / axes).length();
         // First order off the surface, exact on it.
-        if gradient > 0.0 {
-            (level - 1.0) * level / gradient
-        } else {
-            -axes.min_element()
-        }
+        if gradient > 0.0 { (level - 1.0) * level / gradient } else { -axes.min_element() }
     }
 }
 
@@ -39,11 +35,7 @@ fn errors(shape: &Shape, axes: DVec3, body: &dyn Fn(DVec3) -> f64) -> Errors {
     let exact = 4.0 / 3.0 * PI * axes.element_product();
     let squares = axes * axes;
     let moments = exact / 5.0
-        * DVec3::new(
-            squares.y + squares.z,
-            squares.z + squares.x,
-            squares.x + squares.y,
-        );
+        * DVec3::new(squares.y + squares.z, squares.z + squares.x, squares.x + squares.y);
     let place = shape.provenance();
     let (mut sum, mut total) = (0.0, 0.0);
     for node in shape.nodes() {
@@ -91,10 +83,8 @@ fn both(axes: DVec3, turn: DQuat, off: DVec3, [blur, noise]: [f64; 2], seed: u64
 #[test]
 fn a_blurred_noisy_body_of_twenty_voxels_is_found_to_a_twentieth_of_a_voxel() {
     let turn = DQuat::from_scaled_axis(DVec3::new(0.7, -0.4, 1.1));
-    let places = [
-        (DQuat::IDENTITY, DVec3::splat(0.5)),
-        (turn.inverse(), DVec3::new(-0.4, 0.13, 0.29)),
-    ];
+    let places =
+        [(DQuat::IDENTITY, DVec3::splat(0.5)), (turn.inverse(), DVec3::new(-0.4, 0.13, 0.29))];
     for axes in [DVec3::splat(10.0), DVec3::new(13.0, 10.0, 7.7)] {
         for (seed, (turn, off)) in places.into_iter().enumerate() {
             let [grey, mask] = both(axes, turn, off, [1.0, 0.05], seed as u64);
@@ -113,13 +103,8 @@ fn a_blurred_noisy_body_of_twenty_voxels_is_found_to_a_twentieth_of_a_voxel() {
 fn the_blur_need_not_be_known() {
     for (radius, blur) in [(10.0, 0.6), (10.0, 1.5)] {
         let axes = DVec3::new(1.2, 1.0, 0.85) * radius;
-        let [grey, mask] = both(
-            axes,
-            DQuat::from_rotation_x(0.4),
-            DVec3::new(0.2, 0.1, 0.4),
-            [blur, 0.05],
-            5,
-        );
+        let [grey, mask] =
+            both(axes, DQuat::from_rotation_x(0.4), DVec3::new(0.2, 0.1, 0.4), [blur, 0.05], 5);
         println!("{radius} {blur}: {grey:?} {mask:?}");
         assert!(grey.volume.abs() < 4e-3 && grey.surface < 0.06, "{grey:?}");
     }

@@ -35,10 +35,7 @@ fn ball(n: usize, centre: DVec3) -> TriangleMesh {
         }
         triangles.push([at(n as u32 - 1, j), last, at(n as u32 - 1, j + 1)]);
     }
-    TriangleMesh {
-        vertices,
-        triangles,
-    }
+    TriangleMesh { vertices, triangles }
 }
 
 fn stl(mesh: &TriangleMesh) -> Vec<u8> {
@@ -64,12 +61,7 @@ fn ascii_stl(mesh: &TriangleMesh) -> Vec<u8> {
         text += " facet normal 0 0 0\n  outer loop\n";
         for v in t {
             let p = mesh.vertices[*v as usize];
-            writeln!(
-                text,
-                "   vertex {:e} {:e} {:e}",
-                p.x as f32, p.y as f32, p.z as f32
-            )
-            .unwrap();
+            writeln!(text, "   vertex {:e} {:e} {:e}", p.x as f32, p.y as f32, p.z as f32).unwrap();
         }
         text += "  endloop\n endfacet\n";
     }
@@ -88,11 +80,7 @@ fn obj(mesh: &TriangleMesh) -> Vec<u8> {
 }
 
 fn ply(mesh: &TriangleMesh, ascii: bool) -> Vec<u8> {
-    let format = if ascii {
-        "ascii"
-    } else {
-        "binary_little_endian"
-    };
+    let format = if ascii { "ascii" } else { "binary_little_endian" };
     let mut bytes = format!(
         "ply\nformat {format} 1.0\nelement vertex {}\nproperty double x\nproperty double y\n\
          property double z\nproperty uchar red\nelement face {}\n\
@@ -105,9 +93,7 @@ fn ply(mesh: &TriangleMesh, ascii: bool) -> Vec<u8> {
         if ascii {
             bytes.extend_from_slice(format!("{} {} {} 7\n", v.x, v.y, v.z).as_bytes());
         } else {
-            v.to_array()
-                .iter()
-                .for_each(|x| bytes.extend_from_slice(&x.to_le_bytes()));
+            v.to_array().iter().for_each(|x| bytes.extend_from_slice(&x.to_le_bytes()));
             bytes.push(7);
         }
     }
@@ -116,9 +102,7 @@ fn ply(mesh: &TriangleMesh, ascii: bool) -> Vec<u8> {
             bytes.extend_from_slice(format!("3 {a} {b} {c}\n").as_bytes());
         } else {
             bytes.push(3);
-            [a, b, c]
-                .iter()
-                .for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()));
+            [a, b, c].iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()));
         }
     }
     bytes
@@ -146,11 +130,7 @@ impl Folder {
 }
 
 fn options() -> MeshOptions {
-    let shape = ShapeOptions {
-        cells: 32,
-        nodes: Some(400),
-        ..Default::default()
-    };
+    let shape = ShapeOptions { cells: 32, nodes: Some(400), ..Default::default() };
     MeshOptions { shape, flip: false }
 }
 
@@ -166,9 +146,7 @@ fn every_format_gives_the_same_mesh() {
         ("e.ply", ply(&mesh, false)),
     ];
     for (name, bytes) in files {
-        let read = folder
-            .read(name, &bytes)
-            .unwrap_or_else(|e| panic!("{name}: {e}"));
+        let read = folder.read(name, &bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(read.vertices.len(), mesh.vertices.len(), "{name}");
         assert_eq!(read.triangles.len(), mesh.triangles.len(), "{name}");
         close(read.signed_volume(), 1e-9 * mesh.signed_volume(), 1e-6);
@@ -211,21 +189,14 @@ fn a_turned_and_moved_mesh_gives_the_same_shape() {
     let stretch = |u: DVec3| {
         // Lopsided along every axis, so that the directions of the axes are decided by the body.
         let v = u * DVec3::new(1.6, 1.2, 0.8);
-        v + DVec3::new(
-            0.15 * v.x * v.x,
-            0.2 * v.y * v.y,
-            0.1 * v.z * v.z + 0.1 * v.x * v.y,
-        )
+        v + DVec3::new(0.15 * v.x * v.x, 0.2 * v.y * v.y, 0.1 * v.z * v.z + 0.1 * v.x * v.y)
     };
     let mut mesh = ball(40, DVec3::ZERO);
     mesh.vertices.iter_mut().for_each(|v| *v = stretch(*v));
     let mut moved = mesh.clone();
     let turn = glam::DQuat::from_scaled_axis(DVec3::new(0.4, 2.0, -1.1));
     let shift = DVec3::new(10.0, 4.0, -7.0);
-    moved
-        .vertices
-        .iter_mut()
-        .for_each(|v| *v = turn * *v + shift);
+    moved.vertices.iter_mut().for_each(|v| *v = turn * *v + shift);
     let one = shape_from_mesh(&mesh, &SourceFile::default(), &options()).unwrap();
     let two = shape_from_mesh(&moved, &SourceFile::default(), &options()).unwrap();
     for i in 1..300 {
@@ -249,10 +220,8 @@ fn a_hole_is_refused_with_its_place_in_file_units() {
     let message = folder.refusal("hole.ply", &ply(&mesh, false));
     assert!(message.contains("24 edges"), "{message}");
     let (_, place) = message.split_once("near (").unwrap();
-    let place: Vec<f64> = place[..place.find(')').unwrap()]
-        .split(", ")
-        .map(|x| x.parse().unwrap())
-        .collect();
+    let place: Vec<f64> =
+        place[..place.find(')').unwrap()].split(", ").map(|x| x.parse().unwrap()).collect();
     let at = DVec3::from_slice(&place);
     assert!(at.distance(DVec3::new(30.0, 0.0, 1.0)) < 0.3, "{at}");
     let mut mesh = ball(12, DVec3::ZERO);
@@ -270,14 +239,7 @@ fn an_inside_out_mesh_is_turned_only_on_request() {
     let source = SourceFile::default();
     let refused = shape_from_mesh(&read, &source, &options());
     assert!(matches!(refused, Err(ShapeError::InsideOut { .. })));
-    let flipped = shape_from_mesh(
-        &read,
-        &source,
-        &MeshOptions {
-            flip: true,
-            ..options()
-        },
-    );
+    let flipped = shape_from_mesh(&read, &source, &MeshOptions { flip: true, ..options() });
     close(flipped.unwrap().volume(), 4e-9 / 3.0 * PI, 0.02);
 }
 
@@ -297,10 +259,7 @@ fn damaged_files_are_refused() {
     for (name, good) in files {
         folder.read(name, &good).unwrap();
         for length in (0..good.len() - 12).step_by(good.len() / 60) {
-            assert!(
-                folder.read(name, &good[..length]).is_err(),
-                "{name} cut to {length}"
-            );
+            assert!(folder.read(name, &good[..length]).is_err(), "{name} cut to {length}");
         }
         for _ in 0..300 {
             let mut bad = good.clone();
@@ -317,10 +276,7 @@ fn absurd_headers_are_refused() {
     let mut bytes = stl(&ball(4, DVec3::ZERO));
     bytes[0] = b'x';
     bytes[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
-    assert!(matches!(
-        folder.read("a.stl", &bytes),
-        Err(ShapeError::Malformed { .. })
-    ));
+    assert!(matches!(folder.read("a.stl", &bytes), Err(ShapeError::Malformed { .. })));
     for (count, large) in [("999999999999", true), ("1000000", false), ("-3", false)] {
         for properties in ["property float x\nproperty float y\nproperty float z\n", ""] {
             let header = format!(
@@ -333,10 +289,7 @@ fn absurd_headers_are_refused() {
             }
         }
     }
-    let nan = obj(&ball(4, DVec3::ZERO))
-        .iter()
-        .map(|b| char::from(*b))
-        .collect::<String>();
+    let nan = obj(&ball(4, DVec3::ZERO)).iter().map(|b| char::from(*b)).collect::<String>();
     let nan = nan.replacen("v 0 0 1", "v NaN 0 1", 1);
     let message = folder.refusal("nan.obj", nan.as_bytes());
     assert!(message.contains("not a finite number"), "{message}");
@@ -352,22 +305,10 @@ fn absurd_headers_are_refused() {
     for unit in [0.0, f64::NAN, -1.0] {
         assert!(read_mesh(&good, unit, &ReadLimits::default()).is_err());
     }
-    let small = ReadLimits {
-        mesh_elements: 10,
-        ..Default::default()
-    };
-    assert!(matches!(
-        read_mesh(&good, 1.0, &small),
-        Err(ShapeError::TooLarge { .. })
-    ));
-    let small = ReadLimits {
-        file_bytes: 10,
-        ..Default::default()
-    };
-    assert!(matches!(
-        read_mesh(&good, 1.0, &small),
-        Err(ShapeError::TooLarge { .. })
-    ));
+    let small = ReadLimits { mesh_elements: 10, ..Default::default() };
+    assert!(matches!(read_mesh(&good, 1.0, &small), Err(ShapeError::TooLarge { .. })));
+    let small = ReadLimits { file_bytes: 10, ..Default::default() };
+    assert!(matches!(read_mesh(&good, 1.0, &small), Err(ShapeError::TooLarge { .. })));
 }
 
 /// Real meshes pass the quality check. They match their exact volume and the independent morphology
@@ -380,15 +321,10 @@ fn real_grains_agree_with_the_table() {
     };
     let table = std::fs::read_to_string(table).unwrap();
     let mut seen = 0;
-    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|e| e.unwrap().path())
-        .collect();
+    let mut paths: Vec<PathBuf> =
+        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
     paths.sort();
-    for path in paths
-        .iter()
-        .filter(|p| p.extension().is_some_and(|e| e == "ply"))
-    {
+    for path in paths.iter().filter(|p| p.extension().is_some_and(|e| e == "ply")) {
         let name = path.file_stem().unwrap().to_str().unwrap();
         let (mesh, source) = read_mesh(path, 1e-3, &ReadLimits::default()).unwrap();
         // The table holds no roundness, which takes longest.
@@ -401,11 +337,7 @@ fn real_grains_agree_with_the_table() {
         let mut loss: Vec<f64> = mesh
             .vertices
             .iter()
-            .map(|v| {
-                shape
-                    .distance(p.rotation.inverse() * (*v - p.centroid))
-                    .abs()
-            })
+            .map(|v| shape.distance(p.rotation.inverse() * (*v - p.centroid)).abs())
             .map(|d| d / shape.equivalent_diameter())
             .collect();
         loss.sort_by(f64::total_cmp);
@@ -425,21 +357,11 @@ fn real_grains_agree_with_the_table() {
         assert!(rms < 4e-4 && most < 1.2e-3, "{rms} {most}");
         assert!(shape.to_bytes().len() < 400_000);
         check_nodes(&shape);
-        let row = table
-            .lines()
-            .find(|l| l.starts_with(&format!("{name},")))
-            .unwrap();
+        let row = table.lines().find(|l| l.starts_with(&format!("{name},"))).unwrap();
         // The source column is quoted and holds commas.
-        let numbers: Vec<f64> = row
-            .rsplit('"')
-            .next()
-            .unwrap()
-            .split(',')
-            .filter_map(|v| v.parse().ok())
-            .collect();
-        let [diameter, a, b, c, s, _, psi, convexity, ..] = numbers[..] else {
-            panic!("{row}")
-        };
+        let numbers: Vec<f64> =
+            row.rsplit('"').next().unwrap().split(',').filter_map(|v| v.parse().ok()).collect();
+        let [diameter, a, b, c, s, _, psi, convexity, ..] = numbers[..] else { panic!("{row}") };
         close(shape.equivalent_diameter(), diameter * 1e-3, 2e-3);
         close(m.a, a * 1e-3, 5e-3);
         close(m.b, b * 1e-3, 5e-3);
@@ -454,10 +376,7 @@ fn real_grains_agree_with_the_table() {
 
 fn mesh_area(shape: &Shape) -> f64 {
     let (vertices, triangles) = shape.surface_mesh();
-    let mesh = TriangleMesh {
-        vertices,
-        triangles,
-    };
+    let mesh = TriangleMesh { vertices, triangles };
     mesh.area()
 }
 
@@ -469,22 +388,10 @@ fn check_nodes(shape: &Shape) {
     let mut nearest_sum = 0.0;
     for node in shape.nodes() {
         assert!(shape.distance(node.position).abs() < 1e-6 * size);
-        assert!(
-            node.area > 0.2 * mean && node.area < 2.5 * mean,
-            "{} of {mean}",
-            node.area
-        );
+        assert!(node.area > 0.2 * mean && node.area < 2.5 * mean, "{} of {mean}", node.area);
         assert!(node.position.length() <= shape.bounding_radius());
-        assert!(
-            node.position
-                .cmpge(shape.lower() - DVec3::splat(1e-4 * size))
-                .all()
-        );
-        assert!(
-            node.position
-                .cmple(shape.upper() + DVec3::splat(1e-4 * size))
-                .all()
-        );
+        assert!(node.position.cmpge(shape.lower() - DVec3::splat(1e-4 * size)).all());
+        assert!(node.position.cmple(shape.upper() + DVec3::splat(1e-4 * size)).all());
         let nearest = shape
             .nodes()
             .iter()
@@ -492,11 +399,7 @@ fn check_nodes(shape: &Shape) {
             .filter(|d| *d > 0.0)
             .fold(f64::INFINITY, f64::min)
             .sqrt();
-        assert!(
-            nearest > 0.4 * mean.sqrt(),
-            "two nodes {nearest} apart, spacing {}",
-            mean.sqrt()
-        );
+        assert!(nearest > 0.4 * mean.sqrt(), "two nodes {nearest} apart, spacing {}", mean.sqrt());
         nearest_sum += nearest;
     }
     // A hexagonal pattern has its nearest neighbours 1.07 spacings apart.
@@ -506,10 +409,7 @@ fn check_nodes(shape: &Shape) {
 
 #[test]
 fn nodes_and_surface_meshes_of_simple_bodies() {
-    let options = ShapeOptions {
-        cells: 32,
-        ..Default::default()
-    };
+    let options = ShapeOptions { cells: 32, ..Default::default() };
     let bodies = [
         analytic::ellipsoid(1.0, 1.0, 1.0, &options).unwrap(),
         analytic::rounded_box(2.0, 1.5, 1.0, 0.1, &options).unwrap(),
@@ -519,10 +419,7 @@ fn nodes_and_surface_meshes_of_simple_bodies() {
     for shape in &bodies {
         check_nodes(shape);
         let (vertices, triangles) = shape.surface_mesh();
-        let mesh = TriangleMesh {
-            vertices,
-            triangles,
-        };
+        let mesh = TriangleMesh { vertices, triangles };
         mesh.check_closed().unwrap();
         close(mesh.signed_volume(), shape.volume(), 0.02);
         // Area is exact where it is known; the mesh cuts sharp edges off.
@@ -530,17 +427,11 @@ fn nodes_and_surface_meshes_of_simple_bodies() {
     }
     close(mesh_area(&bodies[0]), bodies[0].surface_area(), 1e-9);
     close(bodies[0].nodes().len() as f64, 1257.0, 0.01);
-    let asked = ShapeOptions {
-        nodes: Some(300),
-        ..options
-    };
+    let asked = ShapeOptions { nodes: Some(300), ..options };
     let few = analytic::ellipsoid(1.0, 0.8, 0.7, &asked).unwrap();
     close(few.nodes().len() as f64, 300.0, 0.03);
     let (vertices, triangles) = Shape::sphere(1.0, 10).surface_mesh();
-    let mesh = TriangleMesh {
-        vertices,
-        triangles,
-    };
+    let mesh = TriangleMesh { vertices, triangles };
     mesh.check_closed().unwrap();
     close(mesh.signed_volume(), 4.0 / 3.0 * PI, 5e-3);
 }
@@ -549,10 +440,7 @@ fn nodes_and_surface_meshes_of_simple_bodies() {
 #[test]
 fn threads_do_not_matter_and_scaling_is_exact() {
     let build = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             shape_from_mesh(&ball(24, DVec3::X), &SourceFile::default(), &options()).unwrap()
         })
@@ -561,9 +449,7 @@ fn threads_do_not_matter_and_scaling_is_exact() {
     for threads in [2, 3] {
         assert_eq!(build(threads).to_bytes(), one.to_bytes());
     }
-    let half = one
-        .scaled_to_equivalent_diameter(0.5 * one.equivalent_diameter())
-        .unwrap();
+    let half = one.scaled_to_equivalent_diameter(0.5 * one.equivalent_diameter()).unwrap();
     close(half.volume(), one.volume() / 8.0, 1e-12);
     close(half.inertia().x, one.inertia().x / 32.0, 1e-12);
     close(half.surface_area(), one.surface_area() / 4.0, 1e-12);

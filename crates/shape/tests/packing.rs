@@ -35,12 +35,7 @@ fn grains() -> Vec<Shape> {
 }
 
 fn turn(random: &mut Noise) -> DQuat {
-    let q = [
-        random.normal(),
-        random.normal(),
-        random.normal(),
-        random.normal(),
-    ];
+    let q = [random.normal(), random.normal(), random.normal(), random.normal()];
     DQuat::from_array(q).normalize()
 }
 
@@ -67,12 +62,7 @@ fn heap(shapes: &[Shape], count: usize, width: f64, diameter: f64, seed: u64) ->
         let mut best: Option<Placed> = None;
         for _ in 0..5 {
             let shape = &shapes[n % shapes.len()];
-            let mut grain = Placed {
-                shape,
-                centre: DVec3::ZERO,
-                turn: turn(&mut random),
-                scale,
-            };
+            let mut grain = Placed { shape, centre: DVec3::ZERO, turn: turn(&mut random), scale };
             let room = width - 2.0 * grain.reach() - 4.0;
             let place = DVec3::new(random.unit(), random.unit(), 0.0) * room;
             grain.centre = place + DVec3::splat(grain.reach() + 2.0);
@@ -85,10 +75,8 @@ fn heap(shapes: &[Shape], count: usize, width: f64, diameter: f64, seed: u64) ->
                 })
                 .collect();
             // The highest height at which it touches: down from above in steps, then halved.
-            let top = near
-                .iter()
-                .map(|p| p.centre.z + p.reach() + grain.reach())
-                .fold(floor, f64::max);
+            let top =
+                near.iter().map(|p| p.centre.z + p.reach() + grain.reach()).fold(floor, f64::max);
             let touches = |grain: &Placed| near.iter().any(|p| overlap(p, grain, 0.15));
             grain.centre.z = top;
             let mut step = 1.0;
@@ -163,20 +151,14 @@ fn separated(seed: u64, noise: f64) -> (usize, f64) {
     let started = std::time::Instant::now();
     let shapes = grains();
     let placed = heap(&shapes, 200, 112.0, 21.0, seed);
-    let highest = placed
-        .iter()
-        .map(|p| p.centre.z + p.reach())
-        .fold(0.0, f64::max);
+    let highest = placed.iter().map(|p| p.centre.z + p.reach()).fold(0.0, f64::max);
     let dims = [112, 112, highest.ceil() as usize + 4];
     let touching = placed
         .iter()
         .enumerate()
         .map(|(n, a)| placed[..n].iter().filter(|b| overlap(a, b, -0.5)).count())
         .sum::<usize>();
-    let bodies: Vec<_> = placed
-        .iter()
-        .map(|p| move |x: DVec3| p.distance(x))
-        .collect();
+    let bodies: Vec<_> = placed.iter().map(|p| move |x: DVec3| p.distance(x)).collect();
     let bodies: Vec<&dyn Fn(DVec3) -> f64> = bodies.iter().map(|b| b as _).collect();
     let boxes: Vec<(DVec3, f64)> = placed.iter().map(|p| (p.centre, p.reach())).collect();
     let exact = shares(dims, &bodies, &boxes);
@@ -190,23 +172,13 @@ fn separated(seed: u64, noise: f64) -> (usize, f64) {
         threshold: Some(Threshold::Otsu),
         median: true,
         separate: Some(0.87),
-        shape: ShapeOptions {
-            cells: 16,
-            nodes: Some(60),
-            roundness: false,
-            ..Default::default()
-        },
+        shape: ShapeOptions { cells: 16, nodes: Some(60), roundness: false, ..Default::default() },
         ..ScanOptions::new(1.0)
     };
     // All labels, the shape of one grain only: shapes take longest.
-    let one = ScanOptions {
-        label: Some(1),
-        ..options.clone()
-    };
+    let one = ScanOptions { label: Some(1), ..options.clone() };
     let scan = scan_volume(&volume, &SourceFile::default(), &one, &|_, _, _| {}).unwrap();
-    let Voxels::Labels(labels) = &scan.labels.voxels else {
-        panic!()
-    };
+    let Voxels::Labels(labels) = &scan.labels.voxels else { panic!() };
     // One to one: a grain and a label share four fifths of the voxels that either has.
     let mut shared: HashMap<(usize, u32), usize> = HashMap::new();
     let mut own = vec![0usize; placed.len()];
@@ -225,17 +197,12 @@ fn separated(seed: u64, noise: f64) -> (usize, f64) {
     let same = |(g, label): &(usize, u32), common: usize| {
         *label != 0 && 5 * common > 4 * (own[*g] + sizes[label] - common)
     };
-    let found = shared
-        .iter()
-        .filter(|(pair, common)| same(pair, **common))
-        .count();
+    let found = shared.iter().filter(|(pair, common)| same(pair, **common)).count();
     println!("{found} of 200 found in {} labels", sizes.len() - 1);
 
     // Shapes of the lower part of the heap.
     let height = 75;
-    let Voxels::Labels(image) = &volume.voxels else {
-        panic!()
-    };
+    let Voxels::Labels(image) = &volume.voxels else { panic!() };
     let lower = image[..dims[0] * dims[1] * height].to_vec();
     let volume = Volume::from_labels([dims[0], dims[1], height], lower).unwrap();
     let scan = scan_volume(&volume, &SourceFile::default(), &options, &|_, _, _| {}).unwrap();
@@ -247,15 +214,9 @@ fn separated(seed: u64, noise: f64) -> (usize, f64) {
             truth.map(|p| (shape.volume() / (p.shape.volume() * p.scale.powi(3)) - 1.0).abs()),
         );
     }
-    let whole = placed
-        .iter()
-        .filter(|p| p.centre.z + p.reach() < height as f64)
-        .count();
+    let whole = placed.iter().filter(|p| p.centre.z + p.reach() < height as f64).count();
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-    println!(
-        "{} of about {whole} shapes, mean volume error {mean:.4}",
-        errors.len()
-    );
+    println!("{} of about {whole} shapes, mean volume error {mean:.4}", errors.len());
     assert!(errors.len() * 10 >= whole * 9 && whole > 25);
     (found, mean)
 }

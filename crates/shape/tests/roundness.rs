@@ -30,9 +30,7 @@ fn noise_makes_no_corners_on_a_scanned_sphere() {
 /// The roundness lies within the bounds of exact bodies at both resolutions.
 #[test]
 fn scanned_bodies_have_the_roundness_of_their_edges() {
-    let names = [
-        "cube0", "cube.1", "cube.2", "cube.3", "cube.4", "cylinder", "rim", "spheroid",
-    ];
+    let names = ["cube0", "cube.1", "cube.2", "cube.3", "cube.4", "cylinder", "rim", "spheroid"];
     let missed: Vec<String> = names
         .par_iter()
         .filter_map(|name| {

@@ -25,15 +25,8 @@ fn voxelised(axes: DVec3, turn: DQuat, shift: DVec3) -> Volume {
 }
 
 fn options() -> ScanOptions {
-    let shape = ShapeOptions {
-        cells: 32,
-        nodes: Some(400),
-        ..Default::default()
-    };
-    ScanOptions {
-        shape,
-        ..ScanOptions::new(VOXEL)
-    }
+    let shape = ShapeOptions { cells: 32, nodes: Some(400), ..Default::default() };
+    ScanOptions { shape, ..ScanOptions::new(VOXEL) }
 }
 
 fn only(volume: &Volume, options: &ScanOptions) -> Result<Shape, ShapeError> {
@@ -72,11 +65,7 @@ fn check_ellipsoid(axes: DVec3) {
             sum += node.area * normal.angle_between(gradient).powi(2);
             total += node.area;
         }
-        assert!(
-            (sum / total).sqrt() < 0.12,
-            "normals off by {} rad",
-            (sum / total).sqrt()
-        );
+        assert!((sum / total).sqrt() < 0.12, "normals off by {} rad", (sum / total).sqrt());
     }
 }
 
@@ -106,11 +95,7 @@ fn the_centroid_is_told_in_the_images_frame() {
 fn a_labelled_volume_gives_one_shape_each_and_skips_what_the_border_cuts() {
     let n = 48;
     let mut labels = vec![0u32; n * n * n];
-    let balls = [
-        (3, [12, 12, 12], 7.0),
-        (5, [34, 34, 30], 9.0),
-        (8, [2, 40, 10], 6.0),
-    ];
+    let balls = [(3, [12, 12, 12], 7.0), (5, [34, 34, 30], 9.0), (8, [2, 40, 10], 6.0)];
     for (label, centre, radius) in balls {
         let centre = DVec3::from_array(centre.map(f64::from)) + DVec3::new(0.21, 0.37, 0.11);
         for (i, voxel) in labels.iter_mut().enumerate() {
@@ -123,96 +108,40 @@ fn a_labelled_volume_gives_one_shape_each_and_skips_what_the_border_cuts() {
     let volume = Volume::from_labels([n; 3], labels).unwrap();
     let source = SourceFile::default();
     let grains = shapes_from_volume(&volume, &source, &options()).unwrap();
-    assert_eq!(
-        grains.iter().map(|g| g.label).collect::<Vec<_>>(),
-        [3, 5, 8]
-    );
-    close(
-        grains[0].shape.as_ref().unwrap().volume(),
-        4.0 / 3.0 * PI * (7.0 * VOXEL).powi(3),
-        0.02,
-    );
-    close(
-        grains[1].shape.as_ref().unwrap().volume(),
-        4.0 / 3.0 * PI * (9.0 * VOXEL).powi(3),
-        0.02,
-    );
+    assert_eq!(grains.iter().map(|g| g.label).collect::<Vec<_>>(), [3, 5, 8]);
+    close(grains[0].shape.as_ref().unwrap().volume(), 4.0 / 3.0 * PI * (7.0 * VOXEL).powi(3), 0.02);
+    close(grains[1].shape.as_ref().unwrap().volume(), 4.0 / 3.0 * PI * (9.0 * VOXEL).powi(3), 0.02);
     match &grains[2].shape {
         Err(ShapeError::CutByBorder { label: 8, faces }) => assert_eq!(faces, "low x"),
         other => panic!("{other:?}"),
     }
-    let one = ScanOptions {
-        label: Some(5),
-        ..options()
-    };
+    let one = ScanOptions { label: Some(5), ..options() };
     assert_eq!(shapes_from_volume(&volume, &source, &one).unwrap().len(), 1);
-    let none = ScanOptions {
-        label: Some(4),
-        ..options()
-    };
+    let none = ScanOptions { label: Some(4), ..options() };
     let error = shapes_from_volume(&volume, &source, &none).unwrap_err();
     assert!(error.to_string().contains("3, 5, 8"), "{error}");
-    let padded = ScanOptions {
-        label: Some(8),
-        pad: true,
-        ..options()
-    };
-    shapes_from_volume(&volume, &source, &padded)
-        .unwrap()
-        .remove(0)
-        .shape
-        .unwrap();
+    let padded = ScanOptions { label: Some(8), pad: true, ..options() };
+    shapes_from_volume(&volume, &source, &padded).unwrap().remove(0).shape.unwrap();
     // The same volume as one binary image, split into its pieces.
-    let binary = ScanOptions {
-        threshold: Some(Threshold::Value(1.0)),
-        split: true,
-        ..options()
-    };
-    assert_eq!(
-        shapes_from_volume(&volume, &source, &binary).unwrap().len(),
-        3
-    );
+    let binary = ScanOptions { threshold: Some(Threshold::Value(1.0)), split: true, ..options() };
+    assert_eq!(shapes_from_volume(&volume, &source, &binary).unwrap().len(), 3);
     // Without splitting, three pieces under one label, one of them cut.
-    let lumped = ScanOptions {
-        threshold: Some(Threshold::Value(1.0)),
-        pad: true,
-        ..options()
-    };
-    assert!(matches!(
-        only(&volume, &lumped),
-        Err(ShapeError::SeveralPieces { count: 3, .. })
-    ));
-    let largest = ScanOptions {
-        largest_piece: true,
-        ..lumped
-    };
-    close(
-        only(&volume, &largest).unwrap().volume(),
-        4.0 / 3.0 * PI * (9.0 * VOXEL).powi(3),
-        0.02,
-    );
+    let lumped = ScanOptions { threshold: Some(Threshold::Value(1.0)), pad: true, ..options() };
+    assert!(matches!(only(&volume, &lumped), Err(ShapeError::SeveralPieces { count: 3, .. })));
+    let largest = ScanOptions { largest_piece: true, ..lumped };
+    close(only(&volume, &largest).unwrap().volume(), 4.0 / 3.0 * PI * (9.0 * VOXEL).powi(3), 0.02);
 }
 
 #[test]
 fn cavities_are_filled_and_counted() {
-    let mut volume = voxelised(
-        DVec3::splat(10.0),
-        DQuat::IDENTITY,
-        DVec3::new(0.21, 0.37, 0.11),
-    );
+    let mut volume = voxelised(DVec3::splat(10.0), DQuat::IDENTITY, DVec3::new(0.21, 0.37, 0.11));
     let n = volume.dims[0];
-    let Voxels::Labels(labels) = &mut volume.voxels else {
-        panic!()
-    };
+    let Voxels::Labels(labels) = &mut volume.voxels else { panic!() };
     for k in 11..13 {
         labels[12 + n * (12 + n * k)] = 0;
     }
     let shape = only(&volume, &options()).unwrap();
-    close(
-        shape.volume(),
-        4.0 / 3.0 * PI * (10.0 * VOXEL).powi(3),
-        0.005,
-    );
+    close(shape.volume(), 4.0 / 3.0 * PI * (10.0 * VOXEL).powi(3), 0.005);
     let filled = ("cavity_voxels_filled".to_owned(), "2".to_owned());
     assert!(shape.provenance().parameters.contains(&filled));
 }
@@ -223,40 +152,19 @@ fn hopeless_volumes_are_refused() {
         let volume = Volume::from_labels([10, 10, 10], labels).unwrap();
         only(&volume, options)
     };
-    assert!(matches!(
-        run(vec![0; 1000], &options()),
-        Err(ShapeError::EmptyVolume)
-    ));
-    assert!(matches!(
-        run(vec![1; 1000], &options()),
-        Err(ShapeError::SolidVolume)
-    ));
+    assert!(matches!(run(vec![0; 1000], &options()), Err(ShapeError::EmptyVolume)));
+    assert!(matches!(run(vec![1; 1000], &options()), Err(ShapeError::SolidVolume)));
     let mut speck = vec![0; 1000];
     speck[555] = 1;
-    assert!(matches!(
-        run(speck.clone(), &options()),
-        Err(ShapeError::TooFewVoxels { .. })
-    ));
+    assert!(matches!(run(speck.clone(), &options()), Err(ShapeError::TooFewVoxels { .. })));
     for voxel in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let bad = ScanOptions { voxel, ..options() };
-        assert!(matches!(
-            run(speck.clone(), &bad),
-            Err(ShapeError::BadParameter { .. })
-        ));
+        assert!(matches!(run(speck.clone(), &bad), Err(ShapeError::BadParameter { .. })));
     }
-    let bad = ScanOptions {
-        smoothing: Some(f64::NAN),
-        ..options()
-    };
-    assert!(matches!(
-        run(speck, &bad),
-        Err(ShapeError::BadParameter { .. })
-    ));
+    let bad = ScanOptions { smoothing: Some(f64::NAN), ..options() };
+    assert!(matches!(run(speck, &bad), Err(ShapeError::BadParameter { .. })));
     assert!(Volume::from_labels([10, 10, 11], vec![0; 1000]).is_err());
-    let grey = Volume {
-        dims: [2, 1, 1],
-        voxels: Voxels::Grey(vec![0.1, 0.2]),
-    };
+    let grey = Volume { dims: [2, 1, 1], voxels: Voxels::Grey(vec![0.1, 0.2]) };
     let error = only(&grey, &options()).unwrap_err();
     assert!(error.to_string().contains("threshold"), "{error}");
 }
@@ -267,20 +175,12 @@ fn a_real_rock_becomes_a_shape() {
         return;
     };
     let (volume, source) = read_volume(&path, &ReadLimits::default()).unwrap();
-    let Voxels::Labels(labels) = &volume.voxels else {
-        panic!("not labels")
-    };
+    let Voxels::Labels(labels) = &volume.voxels else { panic!("not labels") };
     let solid = labels.iter().filter(|l| **l != 0).count();
     // It is cropped tightly: without padding it counts as cut.
     let tight = shapes_from_volume(&volume, &source, &ScanOptions::new(1e-4)).unwrap();
-    assert!(matches!(
-        tight[0].shape,
-        Err(ShapeError::CutByBorder { .. })
-    ));
-    let options = ScanOptions {
-        pad: true,
-        ..ScanOptions::new(1e-4)
-    };
+    assert!(matches!(tight[0].shape, Err(ShapeError::CutByBorder { .. })));
+    let options = ScanOptions { pad: true, ..ScanOptions::new(1e-4) };
     let shape = only(&volume, &options).unwrap();
     close(shape.volume(), solid as f64 * 1e-12, 0.005);
     let m = shape.morphology();
@@ -295,10 +195,7 @@ fn a_real_labelled_ct_grain_becomes_a_shape() {
         return;
     };
     let (volume, source) = read_volume(&path, &ReadLimits::default()).unwrap();
-    let options = ScanOptions {
-        pad: true,
-        ..ScanOptions::new(1e-6)
-    };
+    let options = ScanOptions { pad: true, ..ScanOptions::new(1e-6) };
     for grain in shapes_from_volume(&volume, &source, &options).unwrap() {
         let shape = grain.shape.unwrap();
         close(shape.volume(), grain.voxels as f64 * 1e-18, 0.02);
@@ -313,9 +210,7 @@ fn a_real_packing_is_separated_as_others_do() {
         return;
     };
     let (mut volume, source) = read_volume(&path, &ReadLimits::default()).unwrap();
-    let Voxels::Labels(labels) = &mut volume.voxels else {
-        panic!("not labels")
-    };
+    let Voxels::Labels(labels) = &mut volume.voxels else { panic!("not labels") };
     // Label 2 is a phase that was made up.
     labels.iter_mut().filter(|l| **l == 2).for_each(|l| *l = 0);
     for neck in [0.8, 0.87] {
@@ -327,9 +222,7 @@ fn a_real_packing_is_separated_as_others_do() {
             ..options()
         };
         let scan = scan_volume(&volume, &source, &options, &|_, _, _| {}).unwrap();
-        let Voxels::Labels(labels) = &scan.labels.voxels else {
-            panic!()
-        };
+        let Voxels::Labels(labels) = &scan.labels.voxels else { panic!() };
         let dims = volume.dims;
         let most = *labels.iter().max().unwrap() as usize;
         let (mut sizes, mut cut) = (vec![0usize; most + 1], vec![false; most + 1]);

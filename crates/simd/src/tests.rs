@@ -72,20 +72,15 @@ fn check<V: Vector>() {
         assert_eq!(x.mask_below(y) >> i & 1 == 1, a < b);
     }
     let signed: [V::Number; MAX_LANES] = std::array::from_fn(|i| number(1.7 * i as f64 - 5.0));
-    let (mut floors, mut roots) = (
-        [V::Number::default(); MAX_LANES],
-        [V::Number::default(); MAX_LANES],
-    );
+    let (mut floors, mut roots) =
+        ([V::Number::default(); MAX_LANES], [V::Number::default(); MAX_LANES]);
     V::load(&signed).floor().store(&mut floors);
     V::load(&signed).abs().sqrt().store(&mut roots);
     let entry = |n: usize| 100.5 * (n * n) as f32 - 32768.0;
     let table: Vec<f32> = (0..40).map(entry).collect();
     let places: [V::Number; MAX_LANES] = std::array::from_fn(|i| number((7 * i % 39) as f64));
     let mut pairs = [[V::Number::default(); MAX_LANES]; 2];
-    for (lanes, found) in pairs
-        .iter_mut()
-        .zip(V::gather_pairs(&table, V::load(&places)))
-    {
+    for (lanes, found) in pairs.iter_mut().zip(V::gather_pairs(&table, V::load(&places))) {
         found.store(lanes);
     }
     let mut inverses = [V::Number::default(); MAX_LANES];
@@ -94,10 +89,7 @@ fn check<V: Vector>() {
         assert_eq!(floors[i].wide(), signed[i].wide().floor());
         assert_eq!(roots[i], number(signed[i].wide().abs().sqrt()));
         let at = 7 * i % 39;
-        assert_eq!(
-            pairs.map(|p| p[i].wide()),
-            [at, at + 1].map(|n| f64::from(entry(n)))
-        );
+        assert_eq!(pairs.map(|p| p[i].wide()), [at, at + 1].map(|n| f64::from(entry(n))));
         let square = a[i].wide() * a[i].wide();
         let within = if V::Number::BYTES == 4 { 1e-6 } else { 2e-10 };
         assert!((square * inverses[i].wide().powi(2) - 1.0).abs() < within);
@@ -179,12 +171,7 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
         let sum = |run: fn(Sum<R>)| {
             let (mut sum, mut maximum) = (Partial::default(), Maximum::default());
             let mut seen = Vec::new();
-            run(Sum {
-                row: &row,
-                sum: &mut sum,
-                maximum: &mut maximum,
-                seen: &mut seen,
-            });
+            run(Sum { row: &row, sum: &mut sum, maximum: &mut maximum, seen: &mut seen });
             assert_eq!(seen, (1..=n).collect::<Vec<_>>());
             let largest = row[1..].iter().fold(0.0, |top, x| x.wide().max(top));
             assert_eq!(maximum.get(), largest);
@@ -211,11 +198,7 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
 fn vectors_inside_a_row_contain_neither_end() {
     for n in 0..20 {
         for (i, width) in (1..25).flat_map(|i| [1, 4, 8].map(|width| (i, width))) {
-            assert_eq!(
-                inside_row(i, width, n),
-                i > 1 && i + width <= n,
-                "{i} {width} {n}"
-            );
+            assert_eq!(inside_row(i, width, n), i > 1 && i + width <= n, "{i} {width} {n}");
         }
     }
 }

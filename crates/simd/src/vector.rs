@@ -120,9 +120,7 @@ pub trait Vector:
         let mut lanes = [Self::Number::default(); MAX_LANES];
         self.is_below(limit).store(&mut lanes);
         let lanes = lanes[..Self::WIDTH].iter().enumerate();
-        lanes.fold(0, |mask, (n, lane)| {
-            mask | u32::from(lane.wide() > 0.0) << n
-        })
+        lanes.fold(0, |mask, (n, lane)| mask | u32::from(lane.wide() > 0.0) << n)
     }
     /// Lane-wise `self * factor + term`, rounded once.
     fn mul_add(self, factor: Self, term: Self) -> Self;

@@ -25,9 +25,7 @@ fn grain() -> Shape {
 /// Points that fill a cube about the origin evenly.
 fn points(half: f64, count: usize) -> Vec<DVec3> {
     let step = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779);
-    (0..count)
-        .map(|i| half * (2.0 * (step * i as f64).fract() - 1.0))
-        .collect()
+    (0..count).map(|i| half * (2.0 * (step * i as f64).fract() - 1.0)).collect()
 }
 
 fn distances(c: &mut Criterion) {
@@ -47,9 +45,7 @@ fn distances(c: &mut Criterion) {
     });
     group.bench_function("around it, up to a third of d", |b| {
         b.iter(|| {
-            let all = around
-                .iter()
-                .map(|x| shape.distance_within(*x, DIAMETER / 3.0));
+            let all = around.iter().map(|x| shape.distance_within(*x, DIAMETER / 3.0));
             all.filter(|d| d.is_finite()).sum::<f64>()
         })
     });
@@ -62,11 +58,8 @@ fn heap() -> (ContactDynamics, Vec<Grain>) {
     let size = EDGE as f64 * APART * DIAMETER;
     let mut grains = Vec::new();
     for (n, u) in points(1.0, EDGE.pow(3)).into_iter().enumerate() {
-        let cell = DVec3::new(
-            (n % EDGE) as f64,
-            (n / EDGE % EDGE) as f64,
-            (n / EDGE / EDGE) as f64,
-        );
+        let cell =
+            DVec3::new((n % EDGE) as f64, (n / EDGE % EDGE) as f64, (n / EDGE / EDGE) as f64);
         let grain = Grain::new(shape.clone(), 2500.0)
             .with_position((cell + 0.5) * APART * DIAMETER)
             .with_orientation(DQuat::from_scaled_axis(3.0 * u));
@@ -78,10 +71,7 @@ fn heap() -> (ContactDynamics, Vec<Grain>) {
         periodic: [true; 3],
         solid: [[false; 2]; 3],
     };
-    (
-        ContactDynamics::new(ContactParams::default(), enclosure),
-        grains,
-    )
+    (ContactDynamics::new(ContactParams::default(), enclosure), grains)
 }
 
 /// Nodes of both grains of every pair in touch count as tested, in every sub-step.

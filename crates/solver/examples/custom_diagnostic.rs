@@ -14,11 +14,7 @@ const VISCOSITY: f64 = 0.01;
 const DENSITY: f64 = 1.0;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let vortex = [
-        "sin(2*PI*x) * cos(2*PI*y)",
-        "-cos(2*PI*x) * sin(2*PI*y)",
-        "0",
-    ];
+    let vortex = ["sin(2*PI*x) * cos(2*PI*y)", "-cos(2*PI*x) * sin(2*PI*y)", "0"];
     let velocity = Formula::parse(vortex.map(String::from), &["x", "y", "z"])?;
     // One cell along z makes the flow two-dimensional.
     let setup = Setup::new(Mesh::cubic([64, 64, 1], 1.0 / 64.0))
@@ -37,11 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         let energy = kinetic_energy(&sim);
         let exact = (-16.0 * VISCOSITY * PI.powi(2) * sim.time()).exp();
-        println!(
-            "{:8.4}  {energy:.6e}  {:16.6}  {exact:.6}",
-            sim.time(),
-            energy / initial
-        );
+        println!("{:8.4}  {energy:.6e}  {:16.6}  {exact:.6}", sim.time(), energy / initial);
     }
     Ok(())
 }

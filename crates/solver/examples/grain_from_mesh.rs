@@ -21,19 +21,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let shape = shape_from_mesh(&surface, &source, &MeshOptions::default())?;
     println!("volume of the mesh  {:.6e} m3", surface.signed_volume());
     println!("volume of the shape {:.6e} m3", shape.volume());
-    println!(
-        "equivalent diameter {:.4} mm",
-        1e3 * shape.equivalent_diameter()
-    );
+    println!("equivalent diameter {:.4} mm", 1e3 * shape.equivalent_diameter());
 
     let size = 8.0 * shape.bounding_radius();
     let grain = Grain::new(shape, 2650.0)
         .with_position(DVec3::new(0.5, 0.5, 0.4) * size)
         .with_orientation(DQuat::from_rotation_x(0.5));
-    let contact = ContactParams {
-        restitution: 0.5,
-        ..ContactParams::default()
-    };
+    let contact = ContactParams { restitution: 0.5, ..ContactParams::default() };
     let setup = Setup::new(Mesh::cubic([8; 3], size / 8.0))
         .with_boundaries([[Boundary::WALL; 2]; 3])
         .with_gravity(DVec3::new(0.0, 0.0, -9.81))
@@ -67,8 +61,5 @@ fn octahedron([a, b, c]: [f64; 3]) -> TriangleMesh {
         let mirrored = octant.count_ones() % 2 == 1;
         triangles.push(if mirrored { [x, z, y] } else { [x, y, z] });
     }
-    TriangleMesh {
-        vertices: vertices.into_iter().chain(vertices.map(|v| -v)).collect(),
-        triangles,
-    }
+    TriangleMesh { vertices: vertices.into_iter().chain(vertices.map(|v| -v)).collect(), triangles }
 }

@@ -41,10 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let speed = -sim.grains()[0].velocity.z;
     println!("Reynolds number {:.1}", speed * DIAMETER / VISCOSITY);
-    println!(
-        "velocity over that in an unbounded fluid {:.3}",
-        speed / terminal_speed()
-    );
+    println!("velocity over that in an unbounded fluid {:.3}", speed / terminal_speed());
     Ok(())
 }
 

@@ -15,11 +15,7 @@ use grainwake_solver::sim::{PrescribedMotion, Setup, Simulation, StepRule};
 
 /// Rule for steps of at most this CFL number.
 const fn limits(cfl: f64) -> StepRule {
-    StepRule::Limits {
-        cfl,
-        viscous: 0.2,
-        max_step: f64::INFINITY,
-    }
+    StepRule::Limits { cfl, viscous: 0.2, max_step: f64::INFINITY }
 }
 const LIMITS: StepRule = limits(0.3);
 const PERIODIC: [Boundary; 2] = [Boundary::Periodic; 2];
@@ -45,10 +41,7 @@ fn setup(
         .with_boundaries(boundaries)
         .with_fluid(water(nu))
         .with_grains(grains)
-        .with_contact(ContactParams {
-            normal_stiffness: 50.0,
-            ..ContactParams::default()
-        })
+        .with_contact(ContactParams { normal_stiffness: 50.0, ..ContactParams::default() })
         .with_step(LIMITS)
 }
 
@@ -75,11 +68,7 @@ fn momentum_of_fluid_and_grains_is_conserved_in_a_periodic_box() {
             sim.step(f64::INFINITY).unwrap();
             touched |= !sim.contacts().is_empty();
             let d = sim.diagnostics();
-            assert!(
-                d.momentum_residual < 1e-13,
-                "{scheme:?}: residual {:e}",
-                d.momentum_residual
-            );
+            assert!(d.momentum_residual < 1e-13, "{scheme:?}: residual {:e}", d.momentum_residual);
             assert!(d.max_divergence < 1e-10 * d.max_velocity / 0.125, "{d:?}");
         }
         let after = sim.diagnostics().momentum;
@@ -96,13 +85,7 @@ fn momentum_of_fluid_and_grains_is_conserved_in_a_periodic_box() {
 fn momentum_balances_between_walls() {
     let mut grains = vec![sphere(1.0, DVec3::new(1.5, 1.4, 2.0), 1.5)];
     grains[0].velocity = DVec3::new(0.3, 0.0, -0.5);
-    let mut case = setup(
-        [24, 24, 32],
-        1.0 / 8.0,
-        [WALLS, PERIODIC, WALLS],
-        0.02,
-        grains,
-    );
+    let mut case = setup([24, 24, 32], 1.0 / 8.0, [WALLS, PERIODIC, WALLS], 0.02, grains);
     case.gravity = DVec3::new(0.0, 0.0, -1.0);
     let mut sim = Simulation::new(case).unwrap();
     for _ in 0..80 {
@@ -152,11 +135,7 @@ fn rising(shape: Shape, ratio: f64, cells: usize, nu: f64) -> Setup {
     let box_of = [3 * cells, 3 * cells, 6 * cells];
     let mut case = setup(box_of, h, [WALLS; 3], nu, vec![grain]);
     case.gravity = DVec3::new(0.0, 0.0, -1.0 / (1.0 - ratio).abs());
-    case.step = StepRule::Limits {
-        cfl: 0.3,
-        viscous: 0.2,
-        max_step: 0.01,
-    };
+    case.step = StepRule::Limits { cfl: 0.3, viscous: 0.2, max_step: 0.01 };
     case
 }
 
@@ -175,10 +154,7 @@ fn light_grains_rise_as_fast_as_heavy_ones_sink() {
     let heavy = speed(1.01);
     for ratio in [0.01, 0.1, 0.5, 0.99] {
         let light = speed(ratio);
-        assert!(
-            (light / heavy - 1.0).abs() < 0.01,
-            "ratio {ratio}: {light}, {heavy}"
-        );
+        assert!((light / heavy - 1.0).abs() < 0.01, "ratio {ratio}: {light}, {heavy}");
     }
 }
 
@@ -202,10 +178,7 @@ fn light_grains_start_with_their_added_mass_and_stay_stable() {
         for ratio in [0.01, 0.3] {
             let (mut sim, speed) = start(ratio);
             let expected = 0.1 / (ratio + added);
-            assert!(
-                (speed / expected - 1.0).abs() < 0.05,
-                "{name} {ratio}: {speed}, {expected}"
-            );
+            assert!((speed / expected - 1.0).abs() < 0.05, "{name} {ratio}: {speed}, {expected}");
             let mut fastest: f64 = 0.0;
             while sim.time() < 0.7 {
                 sim.step(f64::INFINITY).unwrap();
@@ -310,10 +283,7 @@ fn repeated_impacts_create_no_energy() {
         }
         // If the pending added-mass velocity were part of the initial velocities, the energy of the
         // first case would rise to 4.3 times its initial value.
-        assert!(
-            most < 1.02 * first,
-            "{lower} under {upper}: {first} to {most}"
-        );
+        assert!(most < 1.02 * first, "{lower} under {upper}: {first} to {most}");
     }
 }
 
@@ -322,13 +292,7 @@ fn rebound(density: f64, length: f64, phase: f64) -> f64 {
     let dt = 0.01;
     let mut ball = sphere(1.0, DVec3::new(1.51, 1.52, 0.7 + phase * dt), density);
     ball.velocity.z = -1.0;
-    let mut case = setup(
-        [24, 24, 32],
-        0.125,
-        [PERIODIC, PERIODIC, WALLS],
-        5e-4,
-        vec![ball],
-    );
+    let mut case = setup([24, 24, 32], 0.125, [PERIODIC, PERIODIC, WALLS], 5e-4, vec![ball]);
     case.contact.added_density = 0.7;
     let mass = (density + 0.7) * PI / 6.0;
     case.contact.normal_stiffness = mass * (PI / (length * dt)).powi(2);
@@ -357,17 +321,11 @@ fn undamped_impacts_give_the_speed_back() {
     for density in [8.0, 2.5] {
         for length in [0.2, 1.0, 2.0, 5.0] {
             let phases = [0.0, 0.35, 0.7];
-            let sum: f64 = phases
-                .map(|phase| rebound(density, length, phase))
-                .iter()
-                .sum();
+            let sum: f64 = phases.map(|phase| rebound(density, length, phase)).iter().sum();
             let mean = sum / phases.len() as f64;
             // With added mass in the first step of a contact only, a contact of one step gives 0.90
             // at density ratio 8 and 0.67 at 2.5.
-            assert!(
-                (0.9..1.03).contains(&mean),
-                "{density}, {length} steps: {mean}"
-            );
+            assert!((0.9..1.03).contains(&mean), "{density}, {length} steps: {mean}");
         }
     }
 }
@@ -375,10 +333,8 @@ fn undamped_impacts_give_the_speed_back() {
 #[test]
 fn a_grain_thrown_out_of_the_world_is_no_panic() {
     let mut ball = sphere(1.0, DVec3::splat(1.5), 2.0);
-    (ball.translation, ball.rotation) = (
-        MotionConstraint::Prescribed(DVec3::new(1e12, 0.0, 0.0)),
-        HELD,
-    );
+    (ball.translation, ball.rotation) =
+        (MotionConstraint::Prescribed(DVec3::new(1e12, 0.0, 0.0)), HELD);
     let mut case = setup([12, 12, 12], 0.25, [PERIODIC; 3], 0.05, vec![ball]);
     case.step = StepRule::Fixed(0.01);
     let mut sim = Simulation::new(case).unwrap();
@@ -455,10 +411,7 @@ fn load_of_a_prescribed_grain_does_not_depend_on_its_density() {
         sim.loads()[0].force
     };
     let (light, heavy) = (loads(0.02), loads(7.0));
-    assert!(
-        (light - heavy).length() < 1e-12 * heavy.length(),
-        "{light} {heavy}"
-    );
+    assert!((light - heavy).length() < 1e-12 * heavy.length(), "{light} {heavy}");
 }
 
 #[test]
@@ -512,11 +465,7 @@ fn a_shaken_sphere_moves_as_its_formula_says() {
     let (t, grain) = (sim.time(), &sim.grains()[0]);
     let rise = 2.0 + 0.4 / 3.0 * (1.0 - (3.0 * t).cos());
     assert!((grain.velocity.z - 0.4 * (3.0 * t).sin()).abs() < 1e-14);
-    assert!(
-        (grain.pose.position.z - rise).abs() < 2e-4,
-        "{}",
-        grain.pose.position.z - rise
-    );
+    assert!((grain.pose.position.z - rise).abs() < 2e-4, "{}", grain.pose.position.z - rise);
     assert!((grain.angular_velocity.z - 0.2 * (3.0 * t).cos()).abs() < 1e-14);
 }
 
@@ -532,10 +481,7 @@ fn a_spinning_sphere_feels_the_stokes_torque() {
     let ratio = -sim.loads()[0].torque.y / free;
     // Inside a concentric sphere of the box's half-width (corners: 1.73 of it) the torque is
     // raised by 1 / (1 - (R/R_box)^3): 1.6 % (0.3 %).
-    assert!(
-        (0.985..1.035).contains(&ratio),
-        "torque over 8 pi mu R^3 Omega: {ratio}"
-    );
+    assert!((0.985..1.035).contains(&ratio), "torque over 8 pi mu R^3 Omega: {ratio}");
 }
 
 #[test]
@@ -553,10 +499,7 @@ fn torque_of_a_fast_spinning_sphere_does_not_depend_on_the_step() {
     };
     let ((long, _), (short, steps)) = (torque(0.4), torque(0.1));
     assert!(steps > 500, "{steps} steps");
-    assert!(
-        short < 0.0 && (long / short - 1.0).abs() < 0.01,
-        "{long}, {short}"
-    );
+    assert!(short < 0.0 && (long / short - 1.0).abs() < 0.01, "{long}, {short}");
 }
 
 #[test]
@@ -564,16 +507,9 @@ fn a_free_sphere_in_shear_turns_at_half_the_shear_rate() {
     let shear = 0.05;
     let mut ball = sphere(1.0, DVec3::splat(1.5), 1.0);
     ball.translation = HELD;
-    let lid = |sign: f64| Boundary::Wall {
-        velocity: DVec3::new(sign * 1.5 * shear, 0.0, 0.0),
-    };
-    let case = setup(
-        [24; 3],
-        1.0 / 8.0,
-        [PERIODIC, PERIODIC, [lid(-1.0), lid(1.0)]],
-        1.0,
-        vec![ball],
-    );
+    let lid = |sign: f64| Boundary::Wall { velocity: DVec3::new(sign * 1.5 * shear, 0.0, 0.0) };
+    let case =
+        setup([24; 3], 1.0 / 8.0, [PERIODIC, PERIODIC, [lid(-1.0), lid(1.0)]], 1.0, vec![ball]);
     let mut sim = Simulation::new(case).unwrap();
     run(&mut sim, 3.0);
     let spin = sim.grains()[0].angular_velocity.y / shear;
@@ -588,13 +524,7 @@ fn drag_of_a_fixed_sphere_at_re_100() {
     (ball.translation, ball.rotation) = (HELD, HELD);
     let sides = [Boundary::Slip; 2];
     let flow = [Boundary::Inflow { velocity: stream }, Boundary::Outflow];
-    let mut case = setup(
-        [120, 24, 24],
-        1.0 / 8.0,
-        [flow, sides, sides],
-        0.01,
-        vec![ball],
-    );
+    let mut case = setup([120, 24, 24], 1.0 / 8.0, [flow, sides, sides], 0.01, vec![ball]);
     case.fluid.as_mut().unwrap().initial_velocity = stream;
     let mut sim = Simulation::new(case).unwrap();
     run(&mut sim, 14.0);
@@ -608,13 +538,7 @@ fn force_on_a_carried_sphere_is_quiet() {
     let mut ball = sphere(1.0, DVec3::new(2.0, 2.026, 2.046), 1.0);
     ball.translation = MotionConstraint::Prescribed(DVec3::X);
     ball.rotation = HELD;
-    let mut case = setup(
-        [48, 32, 32],
-        1.0 / 8.0,
-        [PERIODIC, WALLS, WALLS],
-        0.02,
-        vec![ball],
-    );
+    let mut case = setup([48, 32, 32], 1.0 / 8.0, [PERIODIC, WALLS, WALLS], 0.02, vec![ball]);
     case.step = StepRule::Fixed(0.02);
     let mut sim = Simulation::new(case).unwrap();
     run(&mut sim, 3.0);
@@ -627,13 +551,8 @@ fn force_on_a_carried_sphere_is_quiet() {
     let mean = samples.iter().map(|s| s.1).sum::<f64>() / n;
     let slope = samples.iter().map(|s| s.0 * (s.1 - mean)).sum::<f64>()
         / samples.iter().map(|s| s.0 * s.0).sum::<f64>();
-    let noise = (samples
-        .iter()
-        .map(|s| (s.1 - mean - slope * s.0).powi(2))
-        .sum::<f64>()
-        / n)
-        .sqrt()
-        / mean;
+    let noise =
+        (samples.iter().map(|s| (s.1 - mean - slope * s.0).powi(2)).sum::<f64>() / n).sqrt() / mean;
     assert!(noise < 0.01, "force noise {noise}");
     assert!(mean > 0.0);
 }
@@ -651,13 +570,7 @@ fn drag_hardly_depends_on_the_step_and_little_on_the_frame() {
         let mut ball = sphere(1.0, DVec3::new(start, 2.026, 2.046), 1.0);
         (ball.translation, ball.velocity) = (MotionConstraint::Prescribed(velocity), velocity);
         ball.rotation = HELD;
-        let mut case = setup(
-            [56, 32, 32],
-            1.0 / 8.0,
-            [PERIODIC; 3],
-            1.0 / 300.0,
-            vec![ball],
-        );
+        let mut case = setup([56, 32, 32], 1.0 / 8.0, [PERIODIC; 3], 1.0 / 300.0, vec![ball]);
         case.fluid.as_mut().unwrap().initial_velocity = stream;
         case.step = limits(cfl);
         let mut sim = Simulation::new(case).unwrap();
@@ -673,10 +586,7 @@ fn drag_hardly_depends_on_the_step_and_little_on_the_frame() {
     let frames = carried / held - 1.0;
     assert!(frames.abs() < 0.04, "carried {carried}, held {held}");
     let steps = carried / short_steps - 1.0;
-    assert!(
-        steps.abs() < 0.01,
-        "{carried}, with a quarter of the step {short_steps}"
-    );
+    assert!(steps.abs() < 0.01, "{carried}, with a quarter of the step {short_steps}");
 }
 
 #[test]
@@ -703,19 +613,13 @@ fn ten_cate_e4_on_the_coarse_mesh() {
         sim.step(f64::INFINITY).unwrap();
         peak = peak.max(-sim.grains()[0].velocity.z);
     }
-    assert!(
-        (peak / 0.12224 - 1.0).abs() < 0.04,
-        "peak speed {peak} m/s, experiment 0.12224"
-    );
+    assert!((peak / 0.12224 - 1.0).abs() < 0.04, "peak speed {peak} m/s, experiment 0.12224");
 }
 
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
     let bits = |threads, precision| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let grains = vec![
                 sphere(1.0, DVec3::new(1.5, 1.5, 1.2), 1.5),
@@ -777,10 +681,7 @@ fn restores(precision: Precision) {
         resumed.step(f64::INFINITY).unwrap();
     }
     assert!(state(&straight) == state(&resumed));
-    assert!(
-        make().restore(&mut &middle[..middle.len() / 2]).is_err(),
-        "a cut state must not pass"
-    );
+    assert!(make().restore(&mut &middle[..middle.len() / 2]).is_err(), "a cut state must not pass");
 }
 
 #[test]
@@ -813,10 +714,7 @@ fn settles_alike(scheme: Scheme) {
     for (a, b) in double.grains().iter().zip(single.grains()) {
         let change = (a.velocity - b.velocity).length() / a.velocity.length();
         let moved = (a.pose.position - b.pose.position).length();
-        println!(
-            "velocity {} differs by {change:.1e}, place {moved:.1e} d",
-            a.velocity
-        );
+        println!("velocity {} differs by {change:.1e}, place {moved:.1e} d", a.velocity);
         assert!(change < 1e-6 && moved < 1e-6, "{change:e}, {moved:e}");
     }
     for (a, b) in double.loads().iter().zip(single.loads()) {

@@ -60,13 +60,7 @@ fn a_heap_at_rest_steps_without_allocating() {
         substeps += dynamics.advance(&mut grains, &loads, 1e-3, &mut mean);
     }
     let count = COUNT.load(Ordering::Relaxed) - before;
-    println!(
-        "{count} allocations in {substeps} sub-steps, {} contacts",
-        dynamics.contacts().len()
-    );
+    println!("{count} allocations in {substeps} sub-steps, {} contacts", dynamics.contacts().len());
     assert!(dynamics.contacts().len() > 80);
-    assert!(
-        count * 20 < substeps,
-        "{count} allocations in {substeps} sub-steps"
-    );
+    assert!(count * 20 < substeps, "{count} allocations in {substeps} sub-steps");
 }

@@ -22,11 +22,7 @@ use grainwake_solver::math::Load;
 
 /// Material with the restitution 1.
 fn material(youngs_modulus: f64, poisson_ratio: f64) -> Material {
-    Material {
-        youngs_modulus,
-        poisson_ratio,
-        restitution: 1.0,
-    }
+    Material { youngs_modulus, poisson_ratio, restitution: 1.0 }
 }
 
 fn hertz_mindlin(friction: f64) -> ContactParams {
@@ -54,11 +50,7 @@ struct Hertz {
 fn hertz(mass: f64, radius: f64, modulus: f64, speed: f64) -> Hertz {
     let stiffness = 4.0 / 3.0 * modulus * radius.sqrt();
     let overlap = (1.25 * mass * speed * speed / stiffness).powf(0.4);
-    Hertz {
-        overlap,
-        force: stiffness * overlap.powf(1.5),
-        duration: 2.943_275 * overlap / speed,
-    }
+    Hertz { overlap, force: stiffness * overlap.powf(1.5), duration: 2.943_275 * overlap / speed }
 }
 
 /// Outcome of an impact.
@@ -82,11 +74,7 @@ fn impact(
         dynamics.advance(&mut grains, &[], dt, &mut mean);
         for contact in dynamics.contacts().iter().filter(|c| c.overlap > 0.0) {
             let force = contact.load.force.length();
-            largest = [
-                largest[0].max(force),
-                largest[1].max(contact.overlap),
-                largest[2] + dt,
-            ];
+            largest = [largest[0].max(force), largest[1].max(contact.overlap), largest[2] + dt];
         }
     }
     assert!(dynamics.contacts().is_empty(), "the grains have separated");
@@ -145,12 +133,7 @@ fn test_1_elastic_normal_impact_of_two_spheres() {
         });
         let effective = 0.5 * modulus / (1.0 - ratio * ratio);
         let expected = hertz(0.5 * grains[0].mass(), 0.5 * radius, effective, 2.0 * speed);
-        let result = impact(
-            grains.to_vec(),
-            hertz_mindlin(0.35),
-            open_box(0.1),
-            expected.duration,
-        );
+        let result = impact(grains.to_vec(), hertz_mindlin(0.35), open_box(0.1), expected.duration);
         // Measured, the larger of two materials: 2.3e-3, 9e-4, three steps in 2000, 2.3e-4. At an
         // overlap of 2.5 % of the radius, friction between the tilted normals adds to the force.
         check(&result, &expected, speed, [3e-3, 1.2e-3, 2.2e-3, 3e-4]);
@@ -189,10 +172,7 @@ fn check(result: &Impact, expected: &Hertz, speed: f64, bounds: [f64; 4]) {
 fn test_3_normal_impact_with_restitution() {
     for (modulus, ratio, density) in [(3.8e11, 0.23, 4000.0), (1.0e11, 0.25, 7000.0)] {
         for restitution in [0.2, 0.4, 0.6, 0.8, 1.0] {
-            let material = Material {
-                restitution,
-                ..material(modulus, ratio)
-            };
+            let material = Material { restitution, ..material(modulus, ratio) };
             let velocity = DVec3::Z * -3.9;
             let ball = plane_impact((0.0025, density, material), 0.0, velocity, 0.0);
             let found = ball.velocity.z / 3.9;
@@ -208,10 +188,7 @@ fn test_4_oblique_impact_at_constant_speed() {
     let oxide = (material(3.8e11, 0.23), 4000.0, "Test4_al_oxide");
     let alloy = (material(7.0e10, 0.33), 2700.0, "Test4_al_alloy");
     for (elastic, density, test) in [oxide, alloy] {
-        let material = Material {
-            restitution: 0.98,
-            ..elastic
-        };
+        let material = Material { restitution: 0.98, ..elastic };
         let mu: f64 = 0.092;
         // Measured: 0.024. At 5 degrees, which is left out, 0.09.
         compare(test, 9.0..90.0, 0.03, |angle| {
@@ -245,10 +222,7 @@ fn test_5_oblique_impact_at_constant_normal_speed() {
         }
         let energy = |velocity: DVec3| 0.5 * ball.mass() * velocity.length_squared();
         // Undamped springs and friction create no energy.
-        assert!(
-            ball.kinetic_energy() < energy(velocity) * (1.0 + 1e-5),
-            "{x}"
-        );
+        assert!(ball.kinetic_energy() < energy(velocity) * (1.0 + 1e-5), "{x}");
         found
     });
 }
@@ -260,10 +234,7 @@ const FRICTION: f64 = 0.4;
 const ALLOY_DENSITY: f64 = 2700.0;
 
 fn alloy() -> Material {
-    Material {
-        restitution: 0.5,
-        ..material(7.0e10, 0.33)
-    }
+    Material { restitution: 0.5, ..material(7.0e10, 0.33) }
 }
 
 fn surface_speed(x: f64) -> f64 {
@@ -293,13 +264,7 @@ fn spinning_impact(grains: [Grain; 2]) -> Vec<Grain> {
     let modulus = 0.5 * 7.0e10 / (1.0 - 0.33 * 0.33);
     let speed = grains[0].velocity.x - grains[1].velocity.x;
     let duration = hertz(1.0 / inverse, radius, modulus, speed).duration;
-    impact(
-        grains.to_vec(),
-        hertz_mindlin(FRICTION),
-        open_box(10.0),
-        1.3 * duration,
-    )
-    .grains
+    impact(grains.to_vec(), hertz_mindlin(FRICTION), open_box(10.0), 1.3 * duration).grains
 }
 
 #[test]
@@ -315,11 +280,7 @@ fn test_7_two_spheres_with_opposite_spins() {
         // Measured: 1e-4 or less of the spin, and of the surface speed.
         assert!((a.angular_velocity.y / spin - 1.0).abs() < 1e-3);
         assert!((b.angular_velocity.y / spin + 1.0).abs() < 1e-3);
-        assert!(
-            a.velocity.z.abs() < 1e-3 * spin * RADIUS,
-            "{}",
-            a.velocity.z
-        );
+        assert!(a.velocity.z.abs() < 1e-3 * spin * RADIUS, "{}", a.velocity.z);
     }
 }
 
@@ -342,9 +303,7 @@ fn test_8_two_spheres_of_different_size() {
     };
     // A large sphere of very high density acts as a plane.
     // Measured: 0.016.
-    compare("Test8_case_a", 0.0..2.2, 0.02, |x| {
-        run(x, 1e6 * ALLOY_DENSITY)
-    });
+    compare("Test8_case_a", 0.0..2.2, 0.02, |x| run(x, 1e6 * ALLOY_DENSITY));
     // While the contact slides throughout, masses and radii have no effect.
     for x in [0.2, 0.5, 0.85] {
         let found = run(x, ALLOY_DENSITY);

@@ -31,10 +31,7 @@ fn a_colliding_cloud_keeps_momentum_and_angular_momentum() {
     let mut dynamics = ContactDynamics::new(params, open_box(1.0));
     let (p0, l0) = momenta(&grains);
     let speeds: f64 = grains.iter().map(|g| g.momentum().length()).sum();
-    let spins: f64 = grains
-        .iter()
-        .map(|g| g.angular_momentum(DVec3::ZERO).length())
-        .sum();
+    let spins: f64 = grains.iter().map(|g| g.angular_momentum(DVec3::ZERO).length()).sum();
     let energy = kinetic(&grains);
     let mut met = 0;
     for _ in 0..400 {
@@ -50,19 +47,13 @@ fn a_colliding_cloud_keeps_momentum_and_angular_momentum() {
     assert!(met > 200);
     assert!((p - p0).length() <= 1e-13 * speeds);
     assert!((l - l0).length() <= 1e-12 * spins);
-    assert!(
-        kinetic(&grains) < 0.9 * energy,
-        "friction and dashpots take energy"
-    );
+    assert!(kinetic(&grains) < 0.9 * energy, "friction and dashpots take energy");
 }
 
 #[test]
 fn elastic_collisions_keep_the_energy() {
     let mut grains = cloud(60, 0.05, 0.008, 0.3, 11);
-    let params = ContactParams {
-        substeps_per_contact: 60.0,
-        ..smooth(1e3)
-    };
+    let params = ContactParams { substeps_per_contact: 60.0, ..smooth(1e3) };
     let mut dynamics = ContactDynamics::new(params, open_box(1.0));
     let start = kinetic(&grains);
     let mut worst: f64 = 0.0;
@@ -116,22 +107,13 @@ fn both_bodies_get_opposite_loads_to_round_off() {
 }
 
 fn periodic(size: DVec3) -> Enclosure {
-    Enclosure {
-        lower: DVec3::ZERO,
-        upper: size,
-        periodic: [true; 3],
-        solid: [[false; 2]; 3],
-    }
+    Enclosure { lower: DVec3::ZERO, upper: size, periodic: [true; 3], solid: [[false; 2]; 3] }
 }
 
 #[test]
 fn contact_across_a_periodic_face_equals_contact_in_the_interior() {
     let size = DVec3::new(1.0, 1.5, 2.0);
-    let params = ContactParams {
-        normal_stiffness: 1e3,
-        friction: 0.4,
-        ..Default::default()
-    };
+    let params = ContactParams { normal_stiffness: 1e3, friction: 0.4, ..Default::default() };
     let run = |offset: DVec3, wrap: bool| {
         let enclosure = periodic(size);
         let mut grains = [
@@ -154,41 +136,18 @@ fn contact_across_a_periodic_face_equals_contact_in_the_interior() {
             }
         }
         assert!(touched > 10);
-        grains.map(|g| {
-            (
-                g.velocity,
-                g.angular_velocity,
-                enclosure.wrap(g.pose.position - offset),
-            )
-        })
+        grains.map(|g| (g.velocity, g.angular_velocity, enclosure.wrap(g.pose.position - offset)))
     };
     let inside = run(DVec3::ZERO, false);
-    for offset in [
-        DVec3::new(0.5, 0.0, 0.0),
-        DVec3::new(0.52, 0.75, 0.95),
-        DVec3::new(-3.45, 6.7, 0.0),
-    ] {
+    for offset in
+        [DVec3::new(0.5, 0.0, 0.0), DVec3::new(0.52, 0.75, 0.95), DVec3::new(-3.45, 6.7, 0.0)]
+    {
         for wrap in [false, true] {
             let across = run(offset, wrap);
             for (a, b) in inside.iter().zip(&across) {
-                assert!(
-                    (a.0 - b.0).length() < 1e-9,
-                    "{offset} {wrap}: {} {}",
-                    a.0,
-                    b.0
-                );
-                assert!(
-                    (a.1 - b.1).length() < 1e-8,
-                    "{offset} {wrap}: {} {}",
-                    a.1,
-                    b.1
-                );
-                assert!(
-                    (a.2 - b.2).length() < 1e-10,
-                    "{offset} {wrap}: {} {}",
-                    a.2,
-                    b.2
-                );
+                assert!((a.0 - b.0).length() < 1e-9, "{offset} {wrap}: {} {}", a.0, b.0);
+                assert!((a.1 - b.1).length() < 1e-8, "{offset} {wrap}: {} {}", a.1, b.1);
+                assert!((a.2 - b.2).length() < 1e-10, "{offset} {wrap}: {} {}", a.2, b.2);
             }
         }
     }
@@ -203,9 +162,7 @@ fn a_grain_that_fills_a_periodic_box_presses_on_its_own_image() {
     let mut dynamics = ContactDynamics::new(smooth(1e5), enclosure);
     let mut mean = [Load::default()];
     dynamics.advance(&mut grains, &[], 1e-4, &mut mean);
-    let [contact] = dynamics.contacts() else {
-        panic!("one contact: {:?}", dynamics.contacts())
-    };
+    let [contact] = dynamics.contacts() else { panic!("one contact: {:?}", dynamics.contacts()) };
     assert_eq!((contact.grain, contact.partner), (0, Partner::Grain(0)));
     assert!((contact.overlap - 0.02).abs() < 1e-4 * 0.02);
     assert!((contact.load.force.length() / (1e5 * 0.02) - 1.0).abs() < 1e-3);
@@ -242,11 +199,7 @@ fn a_prescribed_grain_moves_exactly_and_pushes_others() {
     grains[0].translation = MotionConstraint::Prescribed(DVec3::new(0.2, 0.0, 0.1));
     grains[0].rotation = MotionConstraint::Prescribed(omega);
     let start = grains[0].pose;
-    let params = ContactParams {
-        normal_stiffness: 1e6,
-        restitution: 0.5,
-        ..Default::default()
-    };
+    let params = ContactParams { normal_stiffness: 1e6, restitution: 0.5, ..Default::default() };
     let mut dynamics = ContactDynamics::new(params, open_box(10.0));
     let mut pushed = Load::default();
     for _ in 0..100 {
@@ -261,10 +214,7 @@ fn a_prescribed_grain_moves_exactly_and_pushes_others() {
     assert!((grains[0].pose.orientation - turned).length() < 1e-12);
     assert_eq!(grains[0].velocity, DVec3::new(0.2, 0.0, 0.1));
     assert!(grains[1].velocity.x > 0.19, "{}", grains[1].velocity);
-    assert!(
-        pushed.force.x < 0.0,
-        "the load on a prescribed grain is reported"
-    );
+    assert!(pushed.force.x < 0.0, "the load on a prescribed grain is reported");
 }
 
 #[test]
@@ -285,10 +235,8 @@ fn a_step_without_any_partner_takes_one_sub_step() {
 #[test]
 fn bad_input_does_not_panic() {
     let shape = Arc::new(Shape::sphere(0.1, 50));
-    let mut grains = [
-        sphere(0.1, 1000.0, 100, DVec3::ZERO),
-        sphere(0.1, 1000.0, 100, DVec3::splat(0.1)),
-    ];
+    let mut grains =
+        [sphere(0.1, 1000.0, 100, DVec3::ZERO), sphere(0.1, 1000.0, 100, DVec3::splat(0.1))];
     grains[1].shape = shape;
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
         for axes in [DVec3::X, DVec3::ONE] {
@@ -303,18 +251,7 @@ fn bad_input_does_not_panic() {
         }
     }
     // Two grains at one position have no contact normal; 0/0 must not produce one.
-    let mut same = [
-        sphere(0.1, 1000.0, 100, DVec3::ZERO),
-        sphere(0.1, 1000.0, 100, DVec3::ZERO),
-    ];
-    step(
-        &mut ContactDynamics::new(smooth(1e3), open_box(1.0)),
-        &mut same,
-        DVec3::ZERO,
-        1e-3,
-    );
-    assert!(
-        same.iter()
-            .all(|g| g.pose.position.is_finite() && g.velocity.is_finite())
-    );
+    let mut same = [sphere(0.1, 1000.0, 100, DVec3::ZERO), sphere(0.1, 1000.0, 100, DVec3::ZERO)];
+    step(&mut ContactDynamics::new(smooth(1e3), open_box(1.0)), &mut same, DVec3::ZERO, 1e-3);
+    assert!(same.iter().all(|g| g.pose.position.is_finite() && g.velocity.is_finite()));
 }

@@ -38,10 +38,7 @@ fn dem04_slip_becomes_rolling_at_two_sevenths() {
             }
         }
         let scaled = rolling.unwrap() * friction * g / v0;
-        let (v, w) = (
-            grains[0].velocity.x / v0,
-            grains[0].angular_velocity.y * radius / v0,
-        );
+        let (v, w) = (grains[0].velocity.x / v0, grains[0].angular_velocity.y * radius / v0);
         println!("DEM04: mu {friction}: time {scaled:.5}, v {v:.5}, omega {w:.5}");
         assert!((scaled - 2.0 / 7.0).abs() < 0.01 * 2.0 / 7.0, "{scaled}");
         assert!((v - 5.0 / 7.0).abs() < 0.005, "{v}");
@@ -61,12 +58,7 @@ fn kharaz(angle: f64) -> (f64, f64, f64) {
         ..Default::default()
     };
     let (s, c) = angle.to_radians().sin_cos();
-    let mut grain = sphere(
-        radius,
-        4000.0,
-        10_000,
-        DVec3::new(0.0, 0.0, radius * 1.0001),
-    );
+    let mut grain = sphere(radius, 4000.0, 10_000, DVec3::new(0.0, 0.0, radius * 1.0001));
     grain.velocity = speed * DVec3::new(s, 0.0, -c);
     let mut grains = [grain];
     let mut dynamics = ContactDynamics::new(params, floor());
@@ -75,11 +67,7 @@ fn kharaz(angle: f64) -> (f64, f64, f64) {
     }
     assert!(dynamics.contacts().is_empty());
     let v = grains[0].velocity;
-    (
-        v.x.atan2(v.z).to_degrees(),
-        v.x / (speed * s),
-        grains[0].angular_velocity.length(),
-    )
+    (v.x.atan2(v.z).to_degrees(), v.x / (speed * s), grains[0].angular_velocity.length())
 }
 
 #[test]
@@ -127,10 +115,7 @@ fn dem05_agrees_with_the_experiment_as_far_as_a_linear_spring_can() {
     ];
     for (angle, expected) in measured {
         let (rebound, _, _) = kharaz(angle);
-        assert!(
-            (rebound - expected).abs() < 2.0,
-            "{angle}: {rebound} v {expected}"
-        );
+        assert!((rebound - expected).abs() < 2.0, "{angle}: {rebound} v {expected}");
     }
     // Restitution of the tangential velocity, and spin, of an impact that slides throughout.
     for (angle, restitution, spin) in [(49.6, 0.8469, 452.9444), (59.9, 0.9019, 381.3185)] {
@@ -141,12 +126,9 @@ fn dem05_agrees_with_the_experiment_as_far_as_a_linear_spring_can() {
         assert!((e_t - restitution).abs() < 0.02, "{angle}: {e_t}");
         assert!((omega / spin - 1.0).abs() < 0.2, "{angle}: {omega}");
     }
-    for (angle, restitution) in [
-        (9.6304, 0.6728),
-        (20.0845, 0.5964),
-        (30.2218, 0.6883),
-        (39.3031, 0.7719),
-    ] {
+    for (angle, restitution) in
+        [(9.6304, 0.6728), (20.0845, 0.5964), (30.2218, 0.6883), (39.3031, 0.7719)]
+    {
         let (_, e_t, _) = kharaz(angle);
         println!("Kharaz {angle}: e_t {e_t:.4} (measured {restitution})");
         assert!((e_t - restitution).abs() < 0.03, "{angle}: {e_t}");
@@ -158,14 +140,8 @@ fn gross_sliding_takes_mu_one_plus_e_of_the_normal_velocity() {
     let (s, c) = 60f64.to_radians().sin_cos();
     let (_, e_t, omega) = kharaz(60.0);
     let lost = 3.9 * s * (1.0 - e_t);
-    assert!(
-        (lost / (0.092 * 2.0 * 3.9 * c) - 1.0).abs() < 2e-3,
-        "{lost}"
-    );
-    assert!(
-        (omega / (2.5 * 0.092 * 2.0 * 3.9 * c / 2.5e-3) - 1.0).abs() < 5e-3,
-        "{omega}"
-    );
+    assert!((lost / (0.092 * 2.0 * 3.9 * c) - 1.0).abs() < 2e-3, "{lost}");
+    assert!((omega / (2.5 * 0.092 * 2.0 * 3.9 * c / 2.5e-3) - 1.0).abs() < 5e-3, "{omega}");
 }
 
 /// Mean acceleration down a plane of 30 degrees; gravity is inclined instead of the plane.

@@ -18,15 +18,8 @@ fn gap_of_spheres_is_exact_at_any_distance() {
             continue;
         }
         let gap = surface_gap(&a, &b, &open_box(10.0));
-        assert!(
-            (gap - (apart - radii)).abs() < 1e-9,
-            "{gap} v {}",
-            apart - radii
-        );
-        assert_eq!(
-            gap.to_bits(),
-            surface_gap(&a, &b, &open_box(10.0)).to_bits()
-        );
+        assert!((gap - (apart - radii)).abs() < 1e-9, "{gap} v {}", apart - radii);
+        assert_eq!(gap.to_bits(), surface_gap(&a, &b, &open_box(10.0)).to_bits());
         assert!((gap - surface_gap(&b, &a, &open_box(10.0))).abs() < 1e-9);
     }
 }
@@ -68,16 +61,11 @@ fn initial_overlaps_are_found_with_their_depth() {
         sphere(0.5, 1.0, 100, DVec3::new(5.0, 0.0, 2.0)),
     ];
     let found = initial_overlaps(&grains, &floor());
-    let [pair, wall] = found[..] else {
-        panic!("{found:?}")
-    };
+    let [pair, wall] = found[..] else { panic!("{found:?}") };
     assert_eq!((pair.grain, pair.partner), (0, Partner::Grain(1)));
     let apart = DVec3::new(0.6, 0.0, 0.78).length();
     assert!((pair.depth - (1.0 - apart)).abs() < 1e-6, "{}", pair.depth);
-    assert_eq!(
-        (wall.grain, wall.partner),
-        (0, Partner::Wall { axis: 2, side: 0 })
-    );
+    assert_eq!((wall.grain, wall.partner), (0, Partner::Wall { axis: 2, side: 0 }));
     assert!((wall.depth - 0.01).abs() < 1e-9);
     // The own periodic image counts as a partner.
     let narrow = Enclosure {
@@ -94,10 +82,7 @@ fn initial_overlaps_are_found_with_their_depth() {
 
 #[test]
 fn grains_outside_the_box_are_named_with_the_face() {
-    let enclosure = Enclosure {
-        periodic: [false, true, false],
-        ..open_box(1.0)
-    };
+    let enclosure = Enclosure { periodic: [false, true, false], ..open_box(1.0) };
     let grains = [
         sphere(0.2, 1.0, 60, DVec3::new(0.9, 5.0, 0.0)),
         sphere(0.2, 1.0, 60, DVec3::new(0.0, 0.0, -1.5)),
@@ -105,25 +90,9 @@ fn grains_outside_the_box_are_named_with_the_face() {
         sphere(0.2, 1.0, 60, DVec3::new(f64::NAN, 0.0, 0.0)),
     ];
     let found = outside(&grains, &enclosure);
-    assert_eq!(
-        (
-            found[0].grain,
-            found[0].axis,
-            found[0].side,
-            found[0].centroid
-        ),
-        (0, 0, 1, false)
-    );
+    assert_eq!((found[0].grain, found[0].axis, found[0].side, found[0].centroid), (0, 0, 1, false));
     assert!((found[0].by - 0.1).abs() < 1e-9);
-    assert_eq!(
-        (
-            found[1].grain,
-            found[1].axis,
-            found[1].side,
-            found[1].centroid
-        ),
-        (1, 2, 0, true)
-    );
+    assert_eq!((found[1].grain, found[1].axis, found[1].side, found[1].centroid), (1, 2, 0, true));
     assert!((found[1].by - 0.7).abs() < 1e-9);
     assert!(found.iter().all(|o| o.grain != 2));
     assert!(found.iter().any(|o| o.grain == 3));

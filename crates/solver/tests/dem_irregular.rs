@@ -47,17 +47,12 @@ static PEBBLE: LazyLock<Arc<Shape>> = LazyLock::new(|| {
             triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
         }
     }
-    let mesh = TriangleMesh {
-        vertices,
-        triangles,
-    };
+    let mesh = TriangleMesh { vertices, triangles };
     Arc::new(shape_from_mesh(&mesh, &SourceFile::default(), &MeshOptions::default()).unwrap())
 });
 
 fn grain(shape: &Arc<Shape>, position: DVec3, orientation: DQuat) -> Grain {
-    Grain::new(shape.clone(), 2500.0)
-        .with_position(position)
-        .with_orientation(orientation)
+    Grain::new(shape.clone(), 2500.0).with_position(position).with_orientation(orientation)
 }
 
 /// Moves `b` towards `a` until the surfaces overlap by `depth` [m].
@@ -72,19 +67,12 @@ fn press(a: &Grain, b: &mut Grain, depth: f64) {
 #[test]
 fn third_law_holds_to_round_off_for_two_irregular_grains() {
     let mut random = Random(3);
-    let params = ContactParams {
-        normal_stiffness: 1e4,
-        restitution: 0.8,
-        ..Default::default()
-    };
+    let params = ContactParams { normal_stiffness: 1e4, restitution: 0.8, ..Default::default() };
     for _ in 0..10 {
         let turn = |random: &mut Random| DQuat::from_scaled_axis(random.vector() * 3.0);
         let a = grain(&PEBBLE, DVec3::new(0.01, 0.02, 0.03), turn(&mut random));
-        let mut b = grain(
-            &BLOCK,
-            a.pose.position + random.vector().normalize() * 0.05,
-            turn(&mut random),
-        );
+        let mut b =
+            grain(&BLOCK, a.pose.position + random.vector().normalize() * 0.05, turn(&mut random));
         press(&a, &mut b, 2e-4);
         let mut grains = [a, b];
         for grain in &mut grains {
@@ -99,32 +87,21 @@ fn third_law_holds_to_round_off_for_two_irregular_grains() {
         assert!(scale > 0.1, "{scale}");
         assert!((mean[0].force + mean[1].force).length() <= 1e-15 * scale);
         let about = |i: usize| mean[i].torque + grains[i].pose.position.cross(mean[i].force);
-        assert!(
-            (about(0) + about(1)).length() <= 1e-14 * scale * 0.1,
-            "{}",
-            about(0) + about(1)
-        );
+        assert!((about(0) + about(1)).length() <= 1e-14 * scale * 0.1, "{}", about(0) + about(1));
     }
 }
 
 #[test]
 fn colliding_irregular_grains_keep_momentum_and_angular_momentum() {
     let mut random = Random(17);
-    let params = ContactParams {
-        normal_stiffness: 2e4,
-        restitution: 0.8,
-        ..Default::default()
-    };
+    let params = ContactParams { normal_stiffness: 2e4, restitution: 0.8, ..Default::default() };
     let mut grains: Vec<Grain> = (0..8)
         .map(|i| {
             let corner =
                 DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) - 0.5;
             let shape = if i % 3 == 0 { &BLOCK } else { &PEBBLE };
-            let mut g = grain(
-                shape,
-                corner * 0.055,
-                DQuat::from_scaled_axis(random.vector() * 3.0),
-            );
+            let mut g =
+                grain(shape, corner * 0.055, DQuat::from_scaled_axis(random.vector() * 3.0));
             g.velocity = -corner * 1.0 + random.vector() * 0.1;
             g.angular_velocity = random.vector() * 10.0;
             g
@@ -137,10 +114,7 @@ fn colliding_irregular_grains_keep_momentum_and_angular_momentum() {
     };
     let (p0, l0) = sums(&grains);
     let scale: f64 = grains.iter().map(|g| g.momentum().length()).sum();
-    let spins: f64 = grains
-        .iter()
-        .map(|g| g.angular_momentum(DVec3::ZERO).length())
-        .sum();
+    let spins: f64 = grains.iter().map(|g| g.angular_momentum(DVec3::ZERO).length()).sum();
     let mut dynamics = ContactDynamics::new(params, open_box(1.0));
     let mut met = 0;
     for _ in 0..200 {
@@ -157,20 +131,13 @@ fn colliding_irregular_grains_keep_momentum_and_angular_momentum() {
     assert!((p - p0).length() <= 1e-14 * scale);
     // The rotation scheme conserves L of a tumbling body to second order in the step, not to
     // round-off.
-    assert!(
-        (l - l0).length() <= 1e-5 * spins,
-        "{}",
-        (l - l0).length() / spins
-    );
+    assert!((l - l0).length() <= 1e-5 * spins, "{}", (l - l0).length() / spins);
 }
 
 #[test]
 fn stiffness_of_an_irregular_pair_does_not_depend_on_its_nodes() {
     let block = |nodes| {
-        let options = ShapeOptions {
-            nodes: Some(nodes),
-            ..Default::default()
-        };
+        let options = ShapeOptions { nodes: Some(nodes), ..Default::default() };
         Arc::new(analytic::rounded_box(0.04, 0.03, 0.02, 0.004, &options).unwrap())
     };
     let turn = DQuat::from_scaled_axis(DVec3::new(0.5, 0.3, -0.2));
@@ -203,10 +170,7 @@ fn stiffness_of_an_irregular_pair_does_not_depend_on_its_nodes() {
                 "{nodes} {depth}: {}",
                 f.length()
             );
-            assert!(
-                (f - reference).length() < 0.1 * reference.length(),
-                "{nodes} {depth}"
-            );
+            assert!((f - reference).length() < 0.1 * reference.length(), "{nodes} {depth}");
         }
     }
 }
@@ -242,14 +206,8 @@ fn block_on_incline(friction: f64, time: f64) -> (Grain, f64) {
 #[test]
 fn a_block_on_an_incline_slides_at_the_coulomb_rate_or_rests() {
     let (block, acceleration) = block_on_incline(0.3, 0.2);
-    println!(
-        "block, mu .3: a {acceleration:.5} (2.35629), omega {}",
-        block.angular_velocity
-    );
-    assert!(
-        (acceleration / 2.35629 - 1.0).abs() < 1e-3,
-        "{acceleration}"
-    );
+    println!("block, mu .3: a {acceleration:.5} (2.35629), omega {}", block.angular_velocity);
+    assert!((acceleration / 2.35629 - 1.0).abs() < 1e-3, "{acceleration}");
     let up = block.pose.orientation * DVec3::Z;
     assert!(
         up.z > 0.9999 && block.angular_velocity.length() < 0.02,
@@ -257,21 +215,14 @@ fn a_block_on_an_incline_slides_at_the_coulomb_rate_or_rests() {
         block.angular_velocity
     );
     let (block, acceleration) = block_on_incline(0.7, 0.2);
-    println!(
-        "block, mu .7: a {acceleration:.1e}, v {:.1e}",
-        block.velocity.length()
-    );
+    println!("block, mu .7: a {acceleration:.1e}, v {:.1e}", block.velocity.length());
     assert!(block.velocity.length() < 1e-4, "{}", block.velocity);
     assert!(block.pose.position.x < 1e-3, "{}", block.pose.position);
 }
 
 #[test]
 fn a_dropped_block_comes_to_rest_on_a_face() {
-    let params = ContactParams {
-        normal_stiffness: 2e4,
-        restitution: 0.5,
-        ..Default::default()
-    };
+    let params = ContactParams { normal_stiffness: 2e4, restitution: 0.5, ..Default::default() };
     let mut grains = [grain(
         &BLOCK,
         DVec3::new(0.0, 0.0, 0.035),
@@ -279,12 +230,7 @@ fn a_dropped_block_comes_to_rest_on_a_face() {
     )];
     let mut dynamics = ContactDynamics::new(params, floor());
     for _ in 0..1600 {
-        step(
-            &mut dynamics,
-            &mut grains,
-            DVec3::new(0.0, 0.0, -9.81),
-            5e-4,
-        );
+        step(&mut dynamics, &mut grains, DVec3::new(0.0, 0.0, -9.81), 5e-4);
     }
     let up = grains[0].pose.orientation.conjugate() * DVec3::Z;
     println!(
@@ -303,11 +249,7 @@ fn a_dropped_block_comes_to_rest_on_a_face() {
 fn a_spinning_top_on_its_face_is_stopped_by_the_friction_of_its_whole_face() {
     // Only contact points off the axis brake the spin: mu m g times a lever arm of some
     // millimetres.
-    let params = ContactParams {
-        normal_stiffness: 2e4,
-        restitution: 0.5,
-        ..Default::default()
-    };
+    let params = ContactParams { normal_stiffness: 2e4, restitution: 0.5, ..Default::default() };
     let mut block = grain(&BLOCK, DVec3::ZERO, DQuat::IDENTITY);
     block.pose.position.z = 0.01 - block.mass() * 9.81 / 2e4;
     block.angular_velocity.z = 10.0;
@@ -316,12 +258,7 @@ fn a_spinning_top_on_its_face_is_stopped_by_the_friction_of_its_whole_face() {
     let mut brakes: Vec<f64> = Vec::new();
     for _ in 0..25 {
         let before = grains[0].angular_velocity.z;
-        step(
-            &mut dynamics,
-            &mut grains,
-            DVec3::new(0.0, 0.0, -9.81),
-            1e-3,
-        );
+        step(&mut dynamics, &mut grains, DVec3::new(0.0, 0.0, -9.81), 1e-3);
         brakes.push((before - grains[0].angular_velocity.z) / 1e-3);
     }
     // Uniform pressure on the flat face of 32 x 22 mm: mean distance from its centre 10.4 mm.
@@ -336,10 +273,7 @@ fn a_spinning_top_on_its_face_is_stopped_by_the_friction_of_its_whole_face() {
 fn elastic_irregular_bounces_keep_their_energy_on_average() {
     // Not to round-off: total force and lever arm are different estimates from one patch.
     let mut random = Random(23);
-    let params = ContactParams {
-        substeps_per_contact: 50.0,
-        ..smooth(2e5)
-    };
+    let params = ContactParams { substeps_per_contact: 50.0, ..smooth(2e5) };
     let (mut sum, mut square, count) = (0.0, 0.0, 16);
     for _ in 0..count {
         let mut grains = [grain(
@@ -384,10 +318,7 @@ fn irregular_contact_across_a_periodic_face_is_the_same() {
         ];
         grains[0].velocity.x = 0.5;
         let mut dynamics = ContactDynamics::new(
-            ContactParams {
-                normal_stiffness: 2e4,
-                ..Default::default()
-            },
+            ContactParams { normal_stiffness: 2e4, ..Default::default() },
             enclosure,
         );
         for _ in 0..100 {
@@ -401,10 +332,7 @@ fn irregular_contact_across_a_periodic_face_is_the_same() {
     let (inside, across) = (run(0.0), run(0.1));
     assert!(inside[1].0.length() > 0.05, "they met");
     for (a, b) in inside.iter().zip(&across) {
-        assert!(
-            (a.0 - b.0).length() < 1e-6 && (a.1 - b.1).length() < 1e-4,
-            "{a:?} {b:?}"
-        );
+        assert!((a.0 - b.0).length() < 1e-6 && (a.1 - b.1).length() < 1e-4, "{a:?} {b:?}");
     }
 }
 
@@ -422,11 +350,7 @@ fn pairs_that_are_not_looked_at_do_not_miss_a_contact() {
         [a, b]
     };
     let mass = 1.0 / start.iter().map(|g| 1.0 / g.mass()).sum::<f64>();
-    let mut params = ContactParams {
-        normal_stiffness: 1e5,
-        friction: 0.3,
-        ..Default::default()
-    };
+    let mut params = ContactParams { normal_stiffness: 1e5, friction: 0.3, ..Default::default() };
     // A hundredth of the step is one sub-step.
     let contact_time = std::f64::consts::PI * (mass / params.normal_stiffness).sqrt();
     params.substeps_per_contact = 100.0 * contact_time / 1e-2 * 0.9999;
@@ -434,21 +358,13 @@ fn pairs_that_are_not_looked_at_do_not_miss_a_contact() {
         let mut grains = start.clone();
         let mut dynamics = ContactDynamics::new(params, open_box(1.0));
         for _ in 0..2 * steps {
-            step(
-                &mut dynamics,
-                &mut grains,
-                DVec3::ZERO,
-                1e-2 / f64::from(steps),
-            );
+            step(&mut dynamics, &mut grains, DVec3::ZERO, 1e-2 / f64::from(steps));
         }
         grains.map(|g| (g.velocity, g.angular_velocity))
     };
     let (long, short) = (run(1), run(100));
     assert!(long[1].0.length() > 0.1, "they met: {}", long[1].0);
     for (a, b) in long.iter().zip(&short) {
-        assert!(
-            (a.0 - b.0).length() < 1e-9 && (a.1 - b.1).length() < 1e-6,
-            "{a:?} {b:?}"
-        );
+        assert!((a.0 - b.0).length() < 1e-9 && (a.1 - b.1).length() < 1e-6, "{a:?} {b:?}");
     }
 }

@@ -12,10 +12,7 @@ fn modules_of_dem_import_downwards_only() {
     let dem = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/dem");
     let mut imports = 0;
     for (rank, module) in ORDER.iter().enumerate() {
-        for entry in fs::read_dir(dem.join(module))
-            .expect("a module of dem")
-            .flatten()
-        {
+        for entry in fs::read_dir(dem.join(module)).expect("a module of dem").flatten() {
             let path = entry.path();
             if path.extension().is_none_or(|e| e != "rs") || path.ends_with("dem/mod.rs") {
                 continue;
@@ -24,11 +21,7 @@ fn modules_of_dem_import_downwards_only() {
             imports += text.matches("use crate::dem::").count();
             for above in &ORDER[..rank] {
                 for path_to_module in [format!("dem::{above}"), format!("super::{above}::")] {
-                    assert!(
-                        !text.contains(&path_to_module),
-                        "{} imports {above}",
-                        path.display()
-                    );
+                    assert!(!text.contains(&path_to_module), "{} imports {above}", path.display());
                 }
             }
         }

@@ -20,11 +20,7 @@ fn mfix_ball() -> Grain {
 fn dem01_free_fall_and_damped_contact() {
     let k = 1e4;
     let restitution = 0.9;
-    let params = ContactParams {
-        restitution,
-        substeps_per_contact: 100.0,
-        ..smooth(k)
-    };
+    let params = ContactParams { restitution, substeps_per_contact: 100.0, ..smooth(k) };
     let mut grains = [mfix_ball()];
     let mut dynamics = ContactDynamics::new(params, floor());
     let gravity = DVec3::new(0.0, 0.0, -G);
@@ -61,10 +57,7 @@ fn dem01_free_fall_and_damped_contact() {
             (0.1 + y, v)
         } else {
             let s = t - landing - release;
-            (
-                0.1 + leaving.0 + leaving.1 * s - 0.5 * G * s * s,
-                leaving.1 - G * s,
-            )
+            (0.1 + leaving.0 + leaving.1 * s - 0.5 * G * s * s, leaving.1 - G * s)
         }
     };
     let mut worst = (0.0f64, 0.0f64);
@@ -74,10 +67,7 @@ fn dem01_free_fall_and_damped_contact() {
         worst.0 = worst.0.max((grains[0].pose.position.z - y).abs());
         worst.1 = worst.1.max((grains[0].velocity.z - v).abs());
     }
-    println!(
-        "DEM01: height {:.2e} m, velocity {:.2e} m/s",
-        worst.0, worst.1
-    );
+    println!("DEM01: height {:.2e} m, velocity {:.2e} m/s", worst.0, worst.1);
     assert!(worst.0 < 1e-6, "height {}", worst.0);
     assert!(worst.1 < 1e-4 * speed, "velocity {}", worst.1);
 }
@@ -88,11 +78,7 @@ fn dem02_bounce_heights_fall_with_restitution_squared() {
     for restitution in [1.0, 0.9, 0.7, 0.5] {
         // The hard-sphere height is not reached: a damped contact ends with an overlap.
 
-        let params = ContactParams {
-            restitution,
-            substeps_per_contact: 100.0,
-            ..smooth(5e10)
-        };
+        let params = ContactParams { restitution, substeps_per_contact: 100.0, ..smooth(5e10) };
         let mut grains = [mfix_ball()];
         let mut dynamics = ContactDynamics::new(params, floor());
         let mut tops = Vec::new();
@@ -114,10 +100,7 @@ fn dem02_bounce_heights_fall_with_restitution_squared() {
             let error = top / expected - 1.0;
             println!("DEM02: e {restitution}, bounce {}: {error:.2e}", n + 1);
             // The bound grows as the fall becomes shorter.
-            assert!(
-                error.abs() < 2e-3 * (n as f64 + 1.0),
-                "e {restitution}: {top} v {expected}"
-            );
+            assert!(error.abs() < 2e-3 * (n as f64 + 1.0), "e {restitution}: {top} v {expected}");
         }
     }
 }
@@ -137,22 +120,14 @@ fn dem03_two_stacked_compressed_spheres() {
         periodic: [false; 3],
         solid: [[false; 2], [false; 2], [true, true]],
     };
-    let params = ContactParams {
-        substeps_per_contact: 100.0,
-        ..smooth(k)
-    };
+    let params = ContactParams { substeps_per_contact: 100.0, ..smooth(k) };
     let mut dynamics = ContactDynamics::new(params, enclosure);
     let masses = [grains[0].mass(), grains[1].mass()];
     let rate = |[y1, y2, v1, v2]: [f64; 4]| {
         let between = k * (2.0 * r - (y2 - y1)).max(0.0);
         let bottom = k * (r - y1).max(0.0);
         let top = k * (r - (height - y2)).max(0.0);
-        [
-            v1,
-            v2,
-            (bottom - between) / masses[0] - G,
-            (between - top) / masses[1] - G,
-        ]
+        [v1, v2, (bottom - between) / masses[0] - G, (between - top) / masses[1] - G]
     };
     let add = |a: [f64; 4], b: [f64; 4], h: f64| std::array::from_fn(|i| a[i] + h * b[i]);
     let mut state = [start[0], start[1], 0.0, 0.0];
@@ -174,10 +149,9 @@ fn dem03_two_stacked_compressed_spheres() {
             worst = worst.max((grains[j].pose.position.z - state[j]).abs() / start[j]);
         }
         // Anchors from the published table of the case (analytic column).
-        for (time, low, high) in [
-            (2.25e-5, 4.4881e-4, 1.35237e-3),
-            (1.0288e-4, 4.3201e-4, 1.38237e-3),
-        ] {
+        for (time, low, high) in
+            [(2.25e-5, 4.4881e-4, 1.35237e-3), (1.0288e-4, 4.3201e-4, 1.38237e-3)]
+        {
             if (f64::from(i) * dt - time).abs() < 0.5 * dt {
                 assert!(
                     (state[0] / low - 1.0).abs() < 1e-3 && (state[1] / high - 1.0).abs() < 1e-3
@@ -200,10 +174,7 @@ fn head_on_collision_lasts_pi_sqrt_of_mass_over_two_k() {
     ];
     grains[0].velocity = DVec3::new(0.5, 0.0, 0.0);
     grains[1].velocity = DVec3::new(-0.5, 0.0, 0.0);
-    let params = ContactParams {
-        substeps_per_contact: 200.0,
-        ..smooth(1e5)
-    };
+    let params = ContactParams { substeps_per_contact: 200.0, ..smooth(1e5) };
     let mut dynamics = ContactDynamics::new(params, open_box(1.0));
     let dt = 1e-5;
     let (mut began, mut ended, mut deepest) = (None, None, 0.0f64);
@@ -231,30 +202,12 @@ fn head_on_collision_lasts_pi_sqrt_of_mass_over_two_k() {
     }
     let duration = ended.unwrap() - began.unwrap();
     println!("head-on: duration {duration:.6e} s, overlap {deepest:.6e} m");
-    assert!(
-        (duration - 7.02481e-3).abs() < 1e-3 * 7.02481e-3,
-        "{duration}"
-    );
+    assert!((duration - 7.02481e-3).abs() < 1e-3 * 7.02481e-3, "{duration}");
     // v sqrt(m_eff / k) with v = 1 m/s.
-    assert!(
-        (deepest - (0.5f64 / 1e5).sqrt()).abs() < 1e-3 * deepest,
-        "{deepest}"
-    );
+    assert!((deepest - (0.5f64 / 1e5).sqrt()).abs() < 1e-3 * deepest, "{deepest}");
     for (grain, expected) in grains.iter().zip([-0.5, 0.5]) {
-        assert!(
-            (grain.velocity.x - expected).abs() < 1e-3 * 0.5,
-            "{}",
-            grain.velocity
-        );
-        assert!(
-            grain
-                .velocity
-                .truncate()
-                .y
-                .abs()
-                .max(grain.velocity.z.abs())
-                < 1e-4
-        );
+        assert!((grain.velocity.x - expected).abs() < 1e-3 * 0.5, "{}", grain.velocity);
+        assert!(grain.velocity.truncate().y.abs().max(grain.velocity.z.abs()) < 1e-4);
     }
 }
 
@@ -273,10 +226,7 @@ fn stiffness_does_not_depend_on_the_number_of_nodes() {
             }
             let mut dynamics = ContactDynamics::new(
                 smooth(1000.0),
-                Enclosure {
-                    lower: DVec3::new(-9.0, -9.0, 0.0),
-                    ..floor()
-                },
+                Enclosure { lower: DVec3::new(-9.0, -9.0, 0.0), ..floor() },
             );
             grains[0].pose.position.z += 5.0;
             grains[1].pose.position.z += 5.0;
@@ -306,28 +256,16 @@ fn stiffness_does_not_depend_on_the_number_of_nodes() {
 fn global_damping_is_an_exponential() {
     let mut grains = [sphere(0.1, 1000.0, 100, DVec3::ZERO)];
     grains[0].velocity = DVec3::new(3.0, 0.0, -1.0);
-    let params = ContactParams {
-        global_damping: 1.0,
-        ..smooth(1e4)
-    };
+    let params = ContactParams { global_damping: 1.0, ..smooth(1e4) };
     let mut dynamics = ContactDynamics::new(params, open_box(10.0));
     for _ in 0..1000 {
         step(&mut dynamics, &mut grains, DVec3::ZERO, 1e-3);
     }
     let expected = DVec3::new(3.0, 0.0, -1.0) * (-1.0f64).exp();
-    assert!(
-        (grains[0].velocity - expected).length() < 1e-6,
-        "{}",
-        grains[0].velocity
-    );
+    assert!((grains[0].velocity - expected).length() < 1e-6, "{}", grains[0].velocity);
     // Terminal velocity g / xi.
     for _ in 0..30_000 {
-        step(
-            &mut dynamics,
-            &mut grains,
-            DVec3::new(0.0, 0.0, -9.81),
-            1e-3,
-        );
+        step(&mut dynamics, &mut grains, DVec3::new(0.0, 0.0, -9.81), 1e-3);
     }
     assert!((grains[0].velocity.z + 9.81).abs() < 1e-9);
 }
@@ -340,20 +278,14 @@ fn mean_contact_is_the_impulse_of_the_step() {
     ];
     grains[0].velocity.z = -1.0;
     grains[1].velocity = DVec3::new(0.5, 0.1, -3.0);
-    let params = ContactParams {
-        restitution: 0.7,
-        normal_stiffness: 1e6,
-        ..Default::default()
-    };
+    let params = ContactParams { restitution: 0.7, normal_stiffness: 1e6, ..Default::default() };
     let mut dynamics = ContactDynamics::new(params, floor());
     let gravity = DVec3::new(1.0, 0.0, -G);
     let mut most = 0;
     for _ in 0..50 {
         let loads = dem_support::weights(&grains, gravity);
-        let before: Vec<_> = grains
-            .iter()
-            .map(|g| (g.momentum(), g.inertia() * g.angular_velocity))
-            .collect();
+        let before: Vec<_> =
+            grains.iter().map(|g| (g.momentum(), g.inertia() * g.angular_velocity)).collect();
         let mut mean = [Load::default(); 2];
         let dt = 1e-3;
         let substeps = dynamics.advance(&mut grains, &loads, dt, &mut mean);
@@ -362,10 +294,7 @@ fn mean_contact_is_the_impulse_of_the_step() {
             let kicked = grains[i].momentum() - before[i].0;
             let expected = dt * (loads[i].force + mean[i].force);
             let scale = grains[i].momentum().length() + before[i].0.length();
-            assert!(
-                (kicked - expected).length() < 1e-12 * scale,
-                "{kicked} {expected}"
-            );
+            assert!((kicked - expected).length() < 1e-12 * scale, "{kicked} {expected}");
             let turned = grains[i].inertia() * grains[i].angular_velocity - before[i].1;
             assert!(
                 (turned - dt * mean[i].torque).length() < 1e-10 * (turned.length() + 1e-3),
@@ -389,12 +318,7 @@ fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
     let force = |gap: f64, speed: f64| {
         let mut grains = [
             sphere(radius, 2500.0, 1000, DVec3::ZERO),
-            sphere(
-                radius,
-                2500.0,
-                1000,
-                DVec3::new(0.0, 0.0, 2.0 * radius + gap),
-            ),
+            sphere(radius, 2500.0, 1000, DVec3::new(0.0, 0.0, 2.0 * radius + gap)),
         ];
         grains[0].rotation = MotionConstraint::Prescribed(DVec3::ZERO);
         grains[0].translation = MotionConstraint::Prescribed(DVec3::ZERO);
@@ -412,10 +336,7 @@ fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
     for gap in [5e-6, 2e-5, 8e-5] {
         for speed in [0.01, -0.02] {
             let f = force(gap, speed);
-            assert!(
-                (f.z / expected(gap, speed) - 1.0).abs() < 1e-3,
-                "{gap} {speed}: {f}"
-            );
+            assert!((f.z / expected(gap, speed) - 1.0).abs() < 1e-3, "{gap} {speed}: {f}");
             assert!(f.truncate().length() < 1e-3 * f.z.abs());
         }
     }
@@ -430,10 +351,7 @@ fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
 fn a_contact_turns_the_added_mass_as_well() {
     let mut impulses = [0.0; 2];
     for (impulse, added_density) in impulses.iter_mut().zip([0.0, 900.0]) {
-        let params = ContactParams {
-            added_density,
-            ..smooth(1e5)
-        };
+        let params = ContactParams { added_density, ..smooth(1e5) };
         let mut grains = [sphere(0.1, 2600.0, 400, DVec3::new(0.0, 0.0, 0.1001))];
         grains[0].velocity = DVec3::new(0.0, 0.0, -1.0);
         let mut dynamics = ContactDynamics::new(params, floor());
@@ -461,12 +379,7 @@ fn a_film_takes_its_speed_whatever_the_step() {
         ..smooth(1e4)
     };
     for dt in [2e-5, 1e-3] {
-        let mut grains = [sphere(
-            radius,
-            7800.0,
-            1000,
-            DVec3::new(0.0, 0.0, radius + 1.2 * range),
-        )];
+        let mut grains = [sphere(radius, 7800.0, 1000, DVec3::new(0.0, 0.0, radius + 1.2 * range))];
         grains[0].velocity = DVec3::new(0.0, 0.0, -0.5);
         let mass = grains[0].mass();
         let mut dynamics = ContactDynamics::new(params, floor());
@@ -480,9 +393,6 @@ fn a_film_takes_its_speed_whatever_the_step() {
             * ((range / roughness).ln() - 1.0 + roughness / range + 1.0 - roughness / range);
         let expected = 0.5 - 2.0 * once;
         let rebound = grains[0].velocity.z;
-        assert!(
-            (rebound / expected - 1.0).abs() < 0.02,
-            "dt {dt}: {rebound} against {expected}"
-        );
+        assert!((rebound / expected - 1.0).abs() < 0.02, "dt {dt}: {rebound} against {expected}");
     }
 }

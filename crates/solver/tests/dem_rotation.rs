@@ -43,12 +43,7 @@ fn printed_b(omega: DVec3, dt: f64) -> DMat4 {
 fn printed_q(phi: f64, theta: f64, psi: f64) -> [f64; 4] {
     let (s, c) = (0.5 * theta).sin_cos();
     let (minus, plus) = (0.5 * (psi - phi), 0.5 * (psi + phi));
-    [
-        s * minus.sin(),
-        s * minus.cos(),
-        c * plus.sin(),
-        c * plus.cos(),
-    ]
+    [s * minus.sin(), s * minus.cos(), c * plus.sin(), c * plus.cos()]
 }
 
 fn sample() -> DQuat {
@@ -58,12 +53,7 @@ fn sample() -> DQuat {
 #[test]
 fn printed_eq_30_is_a_proper_rotation_from_space_to_body() {
     let a = printed_a(to_paper_quaternion(sample()));
-    assert!(
-        (a * a.transpose() - DMat3::IDENTITY)
-            .to_cols_array()
-            .iter()
-            .all(|x| x.abs() < 1e-15)
-    );
+    assert!((a * a.transpose() - DMat3::IDENTITY).to_cols_array().iter().all(|x| x.abs() < 1e-15));
     assert!((a.determinant() - 1.0).abs() < 1e-14);
     // A is the transpose of the matrix from body to space: it maps space vectors to the body frame.
     let space_to_body = DMat3::from_quat(sample()).transpose();
@@ -93,10 +83,7 @@ fn printed_eq_32_is_the_rate_of_eq_30_for_body_frame_rates() {
     let turned = |h: f64| to_paper_quaternion(rotate_exactly(sample(), sample() * omega, h));
     let (ahead, behind) = (turned(h), turned(-h));
     for i in 0..4 {
-        assert!(
-            (rate[i] - (ahead[i] - behind[i]) / (2.0 * h)).abs() < 1e-9,
-            "component {i}"
-        );
+        assert!((rate[i] - (ahead[i] - behind[i]) / (2.0 * h)).abs() < 1e-9, "component {i}");
     }
 }
 
@@ -122,10 +109,7 @@ fn printed_eq_37_turns_the_torque_the_wrong_way() {
     let orientation = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
     let a = printed_a(to_paper_quaternion(orientation));
     let torque = DVec3::Y;
-    assert!(
-        (a * torque - DVec3::X).length() < 1e-15,
-        "A takes the torque to the body"
-    );
+    assert!((a * torque - DVec3::X).length() < 1e-15, "A takes the torque to the body");
     assert!(
         (a.transpose() * torque + DVec3::X).length() < 1e-15,
         "A^T, as printed, reverses it here"
@@ -174,16 +158,8 @@ fn symmetric_top_precesses_at_the_analytic_rates() {
         space += from.cross(to).dot(momentum.normalize()).atan2(from.dot(to));
     }
     let time = dt * f64::from(steps);
-    assert!(
-        (body / time - 1.0).abs() < 1e-5,
-        "body rate {}",
-        body / time
-    );
-    assert!(
-        (space / time - 2.0025).abs() < 1e-5 * 2.0025 + 5e-6,
-        "space rate {}",
-        space / time
-    );
+    assert!((body / time - 1.0).abs() < 1e-5, "body rate {}", body / time);
+    assert!((space / time - 2.0025).abs() < 1e-5 * 2.0025 + 5e-6, "space rate {}", space / time);
     let across = rotor.omega.truncate().length();
     assert!((across - 0.1).abs() < 1e-10, "{across}");
     assert!((rotor.angular_momentum() - momentum).length() < 1e-5 * momentum.length());
@@ -208,16 +184,10 @@ fn dzhanibekov_period_within_a_thousandth() {
         time += dt;
     }
     let first: f64 = crossings[0];
-    assert!(
-        (first - 10.9170).abs() < 1e-3 * 10.917,
-        "first change of sign {first}"
-    );
+    assert!((first - 10.9170).abs() < 1e-3 * 10.917, "first change of sign {first}");
     for pair in crossings.windows(3) {
         let period = pair[2] - pair[0];
-        assert!(
-            (period - 39.105734).abs() < 1e-3 * 39.105734,
-            "period {period}"
-        );
+        assert!((period - 39.105734).abs() < 1e-3 * 39.105734, "period {period}");
     }
 }
 
@@ -252,9 +222,7 @@ fn order_of_the_rotation_is_two() {
             omega: DVec3::new(0.5, 1.0, -0.7),
         };
         for _ in 0..steps {
-            rotor.step(4.0 / f64::from(steps), 0.0, |q| {
-                q * DVec3::new(0.1, 0.2, 0.0)
-            });
+            rotor.step(4.0 / f64::from(steps), 0.0, |q| q * DVec3::new(0.1, 0.2, 0.0));
         }
         rotor
     };
@@ -278,9 +246,5 @@ fn damped_spin_decays_as_an_exponential() {
         rotor.step(1e-3, 1.5, |_| DVec3::ZERO);
     }
     let expected = 2.0 * (-1.5f64).exp();
-    assert!(
-        (rotor.omega.z / expected - 1.0).abs() < 1e-6,
-        "{}",
-        rotor.omega.z / expected
-    );
+    assert!((rotor.omega.z / expected - 1.0).abs() < 1e-6, "{}", rotor.omega.z / expected);
 }

@@ -9,11 +9,7 @@ use grainwake_solver::dem::{
 };
 
 fn params() -> ContactParams {
-    ContactParams {
-        normal_stiffness: 500.0,
-        restitution: 0.8,
-        ..Default::default()
-    }
+    ContactParams { normal_stiffness: 500.0, restitution: 0.8, ..Default::default() }
 }
 
 fn tank() -> Enclosure {
@@ -34,19 +30,12 @@ fn settle(dynamics: &mut ContactDynamics, grains: &mut [Grain], steps: usize) {
 #[test]
 fn one_two_and_three_threads_give_the_same_bits() {
     let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let mut grains = cloud(80, 0.045, 0.007, 0.3, 3);
             let mut dynamics = ContactDynamics::new(params(), tank());
             settle(&mut dynamics, &mut grains, 150);
-            assert!(
-                dynamics.contacts().len() > 30,
-                "{}",
-                dynamics.contacts().len()
-            );
+            assert!(dynamics.contacts().len() > 30, "{}", dynamics.contacts().len());
             let mut history = Vec::new();
             dynamics.save(&mut history).unwrap();
             (bits(&grains), history)
@@ -60,23 +49,14 @@ fn one_two_and_three_threads_give_the_same_bits() {
 #[test]
 fn saved_and_restored_history_continues_with_the_same_bits() {
     continues_with_the_same_bits(params(), Material::default());
-    let hertz = ContactParams {
-        law: ContactLawKind::HertzMindlin,
-        ..params()
-    };
-    let soft = Material {
-        youngs_modulus: 1e5,
-        poisson_ratio: 0.3,
-        restitution: 0.8,
-    };
+    let hertz = ContactParams { law: ContactLawKind::HertzMindlin, ..params() };
+    let soft = Material { youngs_modulus: 1e5, poisson_ratio: 0.3, restitution: 0.8 };
     continues_with_the_same_bits(hertz, soft);
 }
 
 fn continues_with_the_same_bits(params: ContactParams, material: Material) {
     let mut grains = cloud(60, 0.045, 0.007, 0.3, 5);
-    grains
-        .iter_mut()
-        .for_each(|grain| grain.material = material);
+    grains.iter_mut().for_each(|grain| grain.material = material);
     let mut dynamics = ContactDynamics::new(params, tank());
     settle(&mut dynamics, &mut grains, 120);
     for _ in 0..10 {
@@ -85,10 +65,7 @@ fn continues_with_the_same_bits(params: ContactParams, material: Material) {
         let mut other = ContactDynamics::new(params, tank());
         other.restore(&mut file.as_slice()).unwrap();
         assert_eq!(other.contacts(), dynamics.contacts());
-        assert_eq!(
-            other.elastic_energy().to_bits(),
-            dynamics.elastic_energy().to_bits()
-        );
+        assert_eq!(other.elastic_energy().to_bits(), dynamics.elastic_energy().to_bits());
         let mut copy = grains.clone();
         settle(&mut dynamics, &mut grains, 3);
         settle(&mut other, &mut copy, 3);

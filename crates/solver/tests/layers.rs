@@ -13,10 +13,7 @@ const ALLOWED: [(&str, &[&str]); 7] = [
     ("dem", &["math"]),
     ("flow", &["math", "grid", "poisson"]),
     ("immersed", &["math", "grid", "dem", "flow"]),
-    (
-        "sim",
-        &["math", "grid", "poisson", "dem", "flow", "immersed"],
-    ),
+    ("sim", &["math", "grid", "poisson", "dem", "flow", "immersed"]),
 ];
 
 /// Crates of the workspace that each crate may depend on.
@@ -28,33 +25,14 @@ const CRATES: [(&str, &[&str]); 10] = [
     ("run", &["formats", "shape", "solver"]),
     ("plot", &[]),
     ("report", &["formats", "plot"]),
-    (
-        "study",
-        &["formats", "plot", "report", "run", "shape", "solver"],
-    ),
-    (
-        "validation",
-        &["formats", "plot", "report", "run", "shape", "solver"],
-    ),
-    (
-        "cli",
-        &[
-            "formats",
-            "plot",
-            "report",
-            "run",
-            "shape",
-            "solver",
-            "study",
-            "validation",
-        ],
-    ),
+    ("study", &["formats", "plot", "report", "run", "shape", "solver"]),
+    ("validation", &["formats", "plot", "report", "run", "shape", "solver"]),
+    ("cli", &["formats", "plot", "report", "run", "shape", "solver", "study", "validation"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder)
-        .expect("a source folder")
-        .map(|entry| entry.expect("an entry").path())
+    for entry in
+        fs::read_dir(folder).expect("a source folder").map(|entry| entry.expect("an entry").path())
     {
         if entry.is_dir() {
             sources(&entry, found);
@@ -101,22 +79,15 @@ fn imports_point_downwards() {
             }
         }
     }
-    assert!(
-        seen > 50,
-        "the test found only {seen} imports: has the layout changed?"
-    );
+    assert!(seen > 50, "the test found only {seen} imports: has the layout changed?");
 }
 
 #[test]
 fn libraries_depend_downwards() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .expect("the folder of crates");
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the folder of crates");
     for (name, allowed) in CRATES {
         let text = fs::read_to_string(crates.join(name).join("Cargo.toml")).expect("a manifest");
-        let sections = text
-            .split("\n[")
-            .filter(|part| part.starts_with("dependencies]"));
+        let sections = text.split("\n[").filter(|part| part.starts_with("dependencies]"));
         for line in sections.flat_map(str::lines) {
             let Some(dependency) = line.strip_prefix("grainwake-") else {
                 continue;
@@ -164,9 +135,7 @@ fn paths(tree: &str, prefix: &str, found: &mut Vec<String>) {
 
 /// Code without comments and without items that are compiled for unit tests only.
 fn product_code(text: &str) -> String {
-    let mut lines = text
-        .lines()
-        .map(|line| line.split("//").next().unwrap_or("").trim_end());
+    let mut lines = text.lines().map(|line| line.split("//").next().unwrap_or("").trim_end());
     let mut kept = Vec::new();
     while let Some(line) = lines.next() {
         if line == "#[cfg(test)]" {
@@ -264,9 +233,8 @@ impl Crate {
             (code.entry(module).or_default()).push_str(&product_code(&text));
         }
         code.retain(|module, _| !tests.iter().any(|test| module.starts_with(test)));
-        let names = (code.iter())
-            .map(|(module, code)| (module.clone(), names(module, code)))
-            .collect();
+        let names =
+            (code.iter()).map(|(module, code)| (module.clone(), names(module, code))).collect();
         Crate { code, names }
     }
 
@@ -342,28 +310,18 @@ fn circles(imports: &BTreeMap<String, BTreeSet<String>>) -> BTreeSet<Vec<String>
     let reached = |start: &String| {
         let (mut seen, mut open) = (BTreeSet::new(), vec![start]);
         while let Some(module) = open.pop() {
-            open.extend(
-                imports[module]
-                    .iter()
-                    .filter(|next| seen.insert((*next).clone())),
-            );
+            open.extend(imports[module].iter().filter(|next| seen.insert((*next).clone())));
         }
         seen
     };
-    let reach: BTreeMap<&String, BTreeSet<String>> = imports
-        .keys()
-        .map(|module| (module, reached(module)))
-        .collect();
+    let reach: BTreeMap<&String, BTreeSet<String>> =
+        imports.keys().map(|module| (module, reached(module))).collect();
     let group = |module: &String| -> Vec<String> {
         let both =
             |other: &&String| reach[module].contains(*other) && reach[other].contains(module);
         imports.keys().filter(both).cloned().collect()
     };
-    imports
-        .keys()
-        .map(group)
-        .filter(|group| group.len() > 1)
-        .collect()
+    imports.keys().map(group).filter(|group| group.len() > 1).collect()
 }
 
 /// Known circles, which remain to be removed: folder and modules. Do not add to this list; a module
@@ -373,10 +331,7 @@ const KNOWN_CIRCLES: [(&str, &[&str]); 8] = [
     ("shape/mesh", &["distance", "nearest_cache", "propagate"]),
     ("shape/mesh", &["obj", "ply", "read", "stl"]),
     ("shape/scan", &["build", "grain"]),
-    (
-        "shape/scan",
-        &["header", "npy", "npz", "slices", "tiff", "volume"],
-    ),
+    ("shape/scan", &["header", "npy", "npz", "slices", "tiff", "volume"]),
     // `Real` names its `Registers`, which `dispatch` defines from the vectors.
     ("simd", &["dispatch", "plain", "real", "vector", "x86"]),
     ("solver/flow", &["project", "solver"]),
@@ -385,9 +340,7 @@ const KNOWN_CIRCLES: [(&str, &[&str]); 8] = [
 
 #[test]
 fn modules_form_no_circles() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .expect("the folder of crates");
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the folder of crates");
     let (mut seen, mut found) = (0, Vec::new());
     for entry in fs::read_dir(crates).expect("the crates").flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
@@ -404,10 +357,7 @@ fn modules_form_no_circles() {
             found.extend(new.map(|circle| (folder.clone(), circle)));
         }
     }
-    assert!(
-        seen > 400,
-        "only {seen} imports found: has the layout changed?"
-    );
+    assert!(seen > 400, "only {seen} imports found: has the layout changed?");
     assert!(found.is_empty(), "modules import each other: {found:#?}");
 }
 
@@ -416,9 +366,7 @@ fn use_trees_are_read_whole() {
     let module = ["m", "n"].map(str::to_owned);
     let code = "use crate::{a, b::{c, d}};\nfn f() { super::e::g(); grainwake_crate::h(); }";
     let found = internal_paths(code);
-    let found: Vec<_> = (found.iter())
-        .map(|path| absolute(&module, path).join("::"))
-        .collect();
+    let found: Vec<_> = (found.iter()).map(|path| absolute(&module, path).join("::")).collect();
     assert_eq!(found, ["a", "b::c", "b::d", "m::e::g"]);
     let names = names(&module, "pub use x::{Y, z::W as V};\nmod x;");
     assert_eq!(names["Y"].join("::"), "m::n::x::Y");

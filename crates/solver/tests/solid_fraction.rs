@@ -13,18 +13,12 @@ const PERIODIC: [Boundary; 2] = [Boundary::Periodic; 2];
 const WALLS: [Boundary; 2] = [Boundary::WALL; 2];
 
 fn grain(shape: Shape, position: DVec3, orientation: DQuat) -> Grain {
-    Grain::new(shape, 2.0)
-        .with_position(position)
-        .with_orientation(orientation)
+    Grain::new(shape, 2.0).with_position(position).with_orientation(orientation)
 }
 
 /// Sum of the solid fractions times the cell volume [m^3].
 fn solid(cells: [usize; 3], spacing: DVec3, sides: [Boundary; 2], grains: Vec<Grain>) -> f64 {
-    let mesh = Mesh {
-        cells,
-        spacing,
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells, spacing, origin: DVec3::ZERO };
     let setup = Setup::new(mesh)
         .with_boundaries([sides, WALLS, WALLS])
         .with_grains(grains)
@@ -68,12 +62,7 @@ fn fractions_of_a_turned_ellipsoid_sum_to_its_volume() {
     let shape = || analytic::ellipsoid(a, b, c, &Default::default()).unwrap();
     let exact = 4.0 / 3.0 * PI * a * b * c;
     let middle = DVec3::new(0.63, 0.7, 0.68);
-    let found = solid(
-        [14; 3],
-        DVec3::splat(H),
-        WALLS,
-        vec![grain(shape(), middle, turn)],
-    );
+    let found = solid([14; 3], DVec3::splat(H), WALLS, vec![grain(shape(), middle, turn)]);
     assert_volume(found, exact, "ellipsoid");
     // Anisotropic cells, and the grain across a periodic boundary.
     let found = solid(
@@ -87,28 +76,12 @@ fn fractions_of_a_turned_ellipsoid_sum_to_its_volume() {
 
 #[test]
 fn grains_that_overlap_are_not_counted_twice() {
-    let ball = |x: f64| {
-        grain(
-            Shape::sphere(0.4, 200),
-            DVec3::new(x, 0.6, 0.6),
-            DQuat::IDENTITY,
-        )
-    };
+    let ball = |x: f64| grain(Shape::sphere(0.4, 200), DVec3::new(x, 0.6, 0.6), DQuat::IDENTITY);
     let one = solid([14, 12, 12], DVec3::splat(H), WALLS, vec![ball(0.6)]);
-    let both = solid(
-        [14, 12, 12],
-        DVec3::splat(H),
-        WALLS,
-        vec![ball(0.6), ball(0.6)],
-    );
+    let both = solid([14, 12, 12], DVec3::splat(H), WALLS, vec![ball(0.6), ball(0.6)]);
     assert!((both / one - 1.0).abs() < 1e-12);
     let (r, half): (f64, f64) = (0.4, 0.1);
     let lens = PI / 12.0 * (4.0 * r + 2.0 * half) * (2.0 * r - 2.0 * half).powi(2);
-    let found = solid(
-        [14, 12, 12],
-        DVec3::splat(H),
-        WALLS,
-        vec![ball(0.6), ball(0.8)],
-    );
+    let found = solid([14, 12, 12], DVec3::splat(H), WALLS, vec![ball(0.6), ball(0.8)]);
     assert_volume(found, 8.0 / 3.0 * PI * r.powi(3) - lens, "two spheres");
 }

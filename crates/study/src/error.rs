@@ -63,11 +63,7 @@ pub(crate) trait At<T> {
 
 impl<T> At<T> for std::io::Result<T> {
     fn at(self, action: &'static str, path: &Path) -> Result<T, StudyError> {
-        self.map_err(|source| StudyError::Io {
-            action,
-            path: path.into(),
-            source,
-        })
+        self.map_err(|source| StudyError::Io { action, path: path.into(), source })
     }
 }
 
@@ -85,9 +81,8 @@ pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(
 /// Refers to the page with the keys of studies; `grainwake schema` lists the keys of cases.
 pub(crate) fn refer_to_study_keys(mut problem: Problem) -> Problem {
     let here = "docs/reference/study-file.md lists the keys of study and analysis files";
-    problem.help = problem
-        .help
-        .map(|help| help.replace("`grainwake schema` lists every key", here));
+    problem.help =
+        problem.help.map(|help| help.replace("`grainwake schema` lists every key", here));
     problem
 }
 

@@ -35,11 +35,7 @@ pub fn percent(value: f64) -> String {
 
 /// Probability with four decimals, as in "0.0152" and "< 0.0001".
 pub fn p_value(p: f64) -> String {
-    if p < 1e-4 {
-        "< 0.0001".into()
-    } else {
-        format!("{p:.4}")
-    }
+    if p < 1e-4 { "< 0.0001".into() } else { format!("{p:.4}") }
 }
 
 /// Value rounded to six significant digits, for tables.

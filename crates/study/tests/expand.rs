@@ -7,37 +7,18 @@ use grainwake_study::{Selection, Study};
 
 fn names(study: &str) -> Vec<String> {
     let (_folder, path) = folder(study);
-    plan(&path)
-        .unwrap()
-        .runs
-        .into_iter()
-        .map(|r| r.name)
-        .collect()
+    plan(&path).unwrap().runs.into_iter().map(|r| r.name).collect()
 }
 
 #[test]
 fn axes_multiply_and_models_follow() {
-    let expected = [
-        "light-smooth",
-        "light-rough",
-        "heavy-smooth",
-        "heavy-rough",
-        "alone",
-    ];
+    let expected = ["light-smooth", "light-rough", "heavy-smooth", "heavy-rough", "alone"];
     assert_eq!(names(STUDY), expected);
     let (_folder, path) = folder(STUDY);
     let runs = plan(&path).unwrap().runs;
     let case = |i: usize| runs[i].case().unwrap();
     let heavy = case(3);
-    assert_eq!(
-        heavy
-            .setup
-            .grains
-            .iter()
-            .map(|g| g.density)
-            .collect::<Vec<_>>(),
-        [4000.0, 4000.0]
-    );
+    assert_eq!(heavy.setup.grains.iter().map(|g| g.density).collect::<Vec<_>>(), [4000.0, 4000.0]);
     assert_eq!(heavy.plan.end, 0.05, "adjusted");
     assert_eq!(case(1).plan.end, 0.06, "not adjusted");
     assert_eq!(case(0).setup.grains[0].density, 2000.0);
@@ -48,10 +29,7 @@ fn axes_multiply_and_models_follow() {
     assert_eq!(case(4).setup.grains[1].velocity.z, 0.0);
     assert_eq!(runs[3].factors["density"], 4000.0);
     assert_eq!(
-        (
-            runs[3].levels["weight"].as_str(),
-            runs[3].levels["grip"].as_str()
-        ),
+        (runs[3].levels["weight"].as_str(), runs[3].levels["grip"].as_str()),
         ("heavy", "rough")
     );
     assert!(runs[4].levels.is_empty());
@@ -75,9 +53,8 @@ fn hashes_depend_on_everything_that_affects_the_results() {
     let ids = |study: &str, sets: &[&str]| {
         let (_folder, path) = folder(study);
         let sets: Vec<String> = sets.iter().map(|s| (*s).to_string()).collect();
-        let runs = grainwake_study::Plan::resolve(&Study::read(&path).unwrap(), &sets)
-            .unwrap()
-            .runs;
+        let runs =
+            grainwake_study::Plan::resolve(&Study::read(&path).unwrap(), &sets).unwrap().runs;
         runs.into_iter().map(|r| r.id).collect::<Vec<_>>()
     };
     let first = ids(STUDY, &[]);
@@ -85,22 +62,10 @@ fn hashes_depend_on_everything_that_affects_the_results() {
     distinct.sort();
     distinct.dedup();
     assert_eq!(distinct.len(), 5);
-    assert_eq!(
-        first,
-        ids(
-            STUDY,
-            &["title=other", "run.threads=3", "output.checkpoint_steps=11"]
-        )
-    );
+    assert_eq!(first, ids(STUDY, &["title=other", "run.threads=3", "output.checkpoint_steps=11"]));
     let later = ids(STUDY, &["time.end=0.07"]);
     let softer = ids(STUDY, &["contact.stiffness=100"]);
-    assert!(
-        first
-            .iter()
-            .zip(&later)
-            .zip(&softer)
-            .all(|((a, b), c)| a != b && a != c)
-    );
+    assert!(first.iter().zip(&later).zip(&softer).all(|((a, b), c)| a != b && a != c));
 }
 
 #[test]
@@ -113,13 +78,7 @@ fn an_ensemble_offsets_all_but_the_first_member() {
     let named: Vec<&str> = runs.iter().map(|r| r.name.as_str()).collect();
     assert_eq!(
         named[..5],
-        [
-            "light-smooth",
-            "light-smooth-m1",
-            "light-smooth-m2",
-            "light-smooth-m3",
-            "light-rough"
-        ]
+        ["light-smooth", "light-smooth-m1", "light-smooth-m2", "light-smooth-m3", "light-rough"]
     );
     assert_eq!(runs.len(), 2 * 4 + 3);
     let place = |i: usize| runs[i].case().unwrap().setup.grains[1].pose.position;
@@ -148,28 +107,18 @@ fn problems_are_located() {
     let one = |study: &str| {
         let found = problems(study);
         let p = found.first().unwrap().clone();
-        let place = p
-            .place()
-            .map(|(name, line, _)| (name.ends_with("study.toml"), line));
+        let place = p.place().map(|(name, line, _)| (name.ends_with("study.toml"), line));
         (p.to_string(), p.help.clone().unwrap_or_default(), place)
     };
     let (message, help, place) =
         one(&STUDY.replace("key = [\"grain.0.density\"", "keys = [\"grain.0.density\""));
-    assert!(
-        message.contains("unknown key `keys`") && help.contains("`key`"),
-        "{message} {help}"
-    );
+    assert!(message.contains("unknown key `keys`") && help.contains("`key`"), "{message} {help}");
     assert_eq!(place, Some((true, 6)));
     let (message, _, place) = one(&STUDY.replace("case.toml", "cases.toml"));
     assert!(message.contains("no case file"), "{message}");
     assert_eq!(place, Some((true, 3)));
-    let (message, ..) = one(&STUDY
-        .replace("\"heavy\"", "\"light\"")
-        .replace("heavy-*", "light-*"));
-    assert!(
-        message.contains("two models called \"light-smooth\""),
-        "{message}"
-    );
+    let (message, ..) = one(&STUDY.replace("\"heavy\"", "\"light\"").replace("heavy-*", "light-*"));
+    assert!(message.contains("two models called \"light-smooth\""), "{message}");
     let (message, help, _) = one(&STUDY.replace("heavy-*", "haevy-rough"));
     assert!(
         message.contains("no model is called") && help.contains("heavy-rough"),
@@ -181,13 +130,8 @@ fn problems_are_located() {
     assert!(message.contains("two axes"), "{message}");
     let (message, ..) = one(&format!("{STUDY}[ensemble]\nmembers = 0\noffset = 1\n"));
     assert!(message.contains("1 to 1000"), "{message}");
-    let (message, ..) = one(&format!(
-        "{STUDY}[ensemble]\nmembers = 2\noffset = \"1 s\"\n"
-    ));
-    assert!(
-        message.contains("length") || message.contains("time"),
-        "{message}"
-    );
+    let (message, ..) = one(&format!("{STUDY}[ensemble]\nmembers = 2\noffset = \"1 s\"\n"));
+    assert!(message.contains("length") || message.contains("time"), "{message}");
     let (message, ..) = one("title = \"empty\"\n");
     assert!(message.contains("no models"), "{message}");
 }
@@ -215,9 +159,7 @@ fn selection_accepts_patterns_and_shares() {
     assert_eq!(chosen("light-*,alone").unwrap(), [0, 1, 4]);
     assert_eq!(chosen("*-rough").unwrap(), [1, 3]);
     assert_eq!(chosen("1/2").unwrap(), [0, 2, 4]);
-    let mut all: Vec<usize> = (1..=3)
-        .flat_map(|i| chosen(&format!("{i}/3")).unwrap())
-        .collect();
+    let mut all: Vec<usize> = (1..=3).flat_map(|i| chosen(&format!("{i}/3")).unwrap()).collect();
     all.sort_unstable();
     assert_eq!(all, [0, 1, 2, 3, 4]);
     assert!(chosen("7/9").unwrap().is_empty());

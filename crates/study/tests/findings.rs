@@ -11,30 +11,17 @@ use grainwake_study::{Analysis, Model, PairMeasures, RunRecord, StateKind};
 fn rows(fill: impl Fn(f64, f64, usize) -> PairMeasures) -> Vec<RunRecord> {
     let mut out = Vec::new();
     for grain in 0..16 {
-        let (s, r) = (
-            0.45 + 0.15 * (grain / 4) as f64,
-            0.2 + 0.2 * (grain % 4) as f64,
-        );
+        let (s, r) = (0.45 + 0.15 * (grain / 4) as f64, 0.2 + 0.2 * (grain % 4) as f64);
         for o in 1..=4 {
             let levels = BTreeMap::from([
                 ("grain".into(), format!("g{grain:02}")),
                 ("orientation".into(), format!("o{o}")),
             ]);
             let factors = BTreeMap::from([("sphericity".into(), s), ("roundness".into(), r)]);
-            out.push(row(
-                &format!("g{grain:02}-o{o}"),
-                levels,
-                factors,
-                fill(s, r, o),
-            ));
+            out.push(row(&format!("g{grain:02}-o{o}"), levels, factors, fill(s, r, o)));
         }
     }
-    out.push(row(
-        "sphere",
-        BTreeMap::new(),
-        BTreeMap::new(),
-        fill(1.0, 1.0, 3),
-    ));
+    out.push(row("sphere", BTreeMap::new(), BTreeMap::new(), fill(1.0, 1.0, 3)));
     out
 }
 
@@ -63,11 +50,7 @@ fn noise(s: f64, r: f64, o: usize) -> f64 {
 }
 
 fn kiss(time: f64) -> PairMeasures {
-    PairMeasures {
-        kiss_time: Some(time),
-        landing_time: Some(60.0),
-        ..PairMeasures::default()
-    }
+    PairMeasures { kiss_time: Some(time), landing_time: Some(60.0), ..PairMeasures::default() }
 }
 
 /// Kissing times as in the paper: order 1 > 2 = 4 > 3, with an effect of shape in 1 only.
@@ -108,63 +91,38 @@ fn orders_hold_are_contradicted_or_stay_open() {
     let paper = rows(as_in_the_paper);
     let (found, says) = verdict(&paper, ORDER);
     assert_eq!(found, "holds");
-    assert!(
-        says.contains("for 16 of 16 grains") && says.contains("p < 0.0001"),
-        "{says}"
-    );
-    let reversed = ORDER
-        .replace("\"o1\"", "\"x\"")
-        .replace("\"o3\"", "\"o1\"")
-        .replace("\"x\"", "\"o3\"");
+    assert!(says.contains("for 16 of 16 grains") && says.contains("p < 0.0001"), "{says}");
+    let reversed =
+        ORDER.replace("\"o1\"", "\"x\"").replace("\"o3\"", "\"o1\"").replace("\"x\"", "\"o3\"");
     assert_eq!(verdict(&paper, &reversed).0, "contradicted");
     let chance = rows(|s, r, o| kiss(10.0 + noise(s, r, o)));
     assert_eq!(verdict(&chance, ORDER).0, "open");
     let equal = "quantity = \"kiss_time\"\ntest.equal = { axis = \"orientation\", values = [\"o2\", \"o4\"], within = 0.05 }";
     assert_eq!(verdict(&paper, equal).0, "holds");
-    assert_eq!(
-        verdict(&paper, &equal.replace("\"o4\"", "\"o3\"")).0,
-        "contradicted"
-    );
+    assert_eq!(verdict(&paper, &equal.replace("\"o4\"", "\"o3\"")).0, "contradicted");
     let few: Vec<RunRecord> = paper
         .iter()
         .filter(|r| r.levels.get("grain").is_none_or(|g| g == "g03"))
         .cloned()
         .collect();
     let (found, says) = verdict(&few, ORDER);
-    assert!(
-        found == "open" && says.contains("too few for a test"),
-        "{says}"
-    );
+    assert!(found == "open" && says.contains("too few for a test"), "{says}");
 }
 
 #[test]
 fn trends_and_ranges_follow_the_factors() {
     let paper = rows(as_in_the_paper);
-    assert_eq!(
-        verdict(&paper, &trend("sphericity", "falls", "o1")).0,
-        "holds"
-    );
-    assert_eq!(
-        verdict(&paper, &trend("sphericity", "rises", "o1")).0,
-        "contradicted"
-    );
-    assert_eq!(
-        verdict(&paper, &trend("sphericity", "none", "o1")).0,
-        "contradicted"
-    );
-    assert_eq!(
-        verdict(&paper, &trend("sphericity", "falls", "o3")).0,
-        "open"
-    );
+    assert_eq!(verdict(&paper, &trend("sphericity", "falls", "o1")).0, "holds");
+    assert_eq!(verdict(&paper, &trend("sphericity", "rises", "o1")).0, "contradicted");
+    assert_eq!(verdict(&paper, &trend("sphericity", "none", "o1")).0, "contradicted");
+    assert_eq!(verdict(&paper, &trend("sphericity", "falls", "o3")).0, "open");
     assert_eq!(
         verdict(&paper, &trend("sphericity", "none", "o3")).0,
         "open",
         "no trend seen is no proof of none"
     );
-    let low = trend("sphericity", "falls", "o1").replace(
-        "orientation = \"o1\"",
-        "orientation = \"o1\", sphericity = { at_most = 0.7 }",
-    );
+    let low = trend("sphericity", "falls", "o1")
+        .replace("orientation = \"o1\"", "orientation = \"o1\", sphericity = { at_most = 0.7 }");
     let (found, says) = verdict(&paper, &low);
     assert!(found == "holds" && says.contains("n = 8"), "{found} {says}");
     let range = "quantity = \"kiss_time\"\ntest.range = { over = \"orientation\", with = \"sphericity\", sign = \"falls\" }";
@@ -173,10 +131,7 @@ fn trends_and_ranges_follow_the_factors() {
     assert_eq!(verdict(&paper, spread).0, "holds");
     let near = "quantity = \"kiss_time\"\ntest.near = { model = \"sphere\", within = 0.05 }\nwhere = { orientation = \"o3\" }";
     assert_eq!(verdict(&paper, near).0, "holds");
-    assert_eq!(
-        verdict(&paper, &near.replace("\"o3\"", "\"o1\"")).0,
-        "contradicted"
-    );
+    assert_eq!(verdict(&paper, &near.replace("\"o3\"", "\"o1\"")).0, "contradicted");
 }
 
 #[test]
@@ -220,10 +175,7 @@ fn events_after_the_landing_are_right_censored() {
     assert!(says.contains("n = 12"), "{says}");
     let range = "observed = true\nquantity = \"kiss_time\"\ntest.range = { over = \"orientation\", with = \"sphericity\", sign = \"falls\" }";
     let (_, says) = verdict(&early, range);
-    assert!(
-        says.contains("n = 12"),
-        "ranges with a gap do not count: {says}"
-    );
+    assert!(says.contains("n = 12"), "ranges with a gap do not count: {says}");
     let parts = rows(|s, r, o| PairMeasures {
         contact_stage: Some(5.0 * r),
         parted: Some(r < 0.7),
@@ -233,17 +185,10 @@ fn events_after_the_landing_are_right_censored() {
         .iter()
         .filter(|s| s.censored)
         .count();
-    assert_eq!(
-        bounds,
-        16 + 1,
-        "the roundest column and the sphere have not parted"
-    );
+    assert_eq!(bounds, 16 + 1, "the roundest column and the sphere have not parted");
     let mut unfinished = parts.clone();
     unfinished[0].state = StateKind::Unfinished;
-    assert_eq!(
-        observations(&unfinished, "kiss_time", &BTreeMap::new()).len(),
-        64
-    );
+    assert_eq!(observations(&unfinished, "kiss_time", &BTreeMap::new()).len(), 64);
 }
 
 #[test]
@@ -259,10 +204,7 @@ fn members_count_as_one_model() {
     }
     let found = observations(&all, "kiss_time", &BTreeMap::new());
     assert_eq!(found.len(), 65);
-    assert_eq!(
-        (found[0].value, found[0].range),
-        (time, (time - 0.2, time + 0.4))
-    );
+    assert_eq!((found[0].value, found[0].range), (time, (time - 0.2, time + 0.4)));
 }
 
 #[test]
@@ -274,10 +216,7 @@ fn correlations_are_listed_by_level() {
     assert_eq!(found.len(), 8);
     assert!(found.iter().all(|c| c.n == 16));
     let first = &found[0];
-    assert_eq!(
-        (first.factor.as_str(), first.level.as_str()),
-        ("sphericity", "o1")
-    );
+    assert_eq!((first.factor.as_str(), first.level.as_str()), ("sphericity", "o1"));
     assert!(
         first.rho.unwrap() < -0.8 && first.interval.unwrap()[1] < -0.5 && first.p.unwrap() < 1e-3
     );
@@ -286,30 +225,18 @@ fn correlations_are_listed_by_level() {
 #[test]
 fn wrong_names_are_located() {
     let paper = rows(as_in_the_paper);
-    let problem = |text: &str| {
-        Analysis::parse("analysis.toml", text, &models(&paper))
-            .unwrap_err()
-            .remove(0)
-    };
-    let p = problem(&format!(
-        "[[claim]]\nsays = \"a\"\n{}",
-        ORDER.replace("kiss_time", "kis_time")
-    ));
+    let problem =
+        |text: &str| Analysis::parse("analysis.toml", text, &models(&paper)).unwrap_err().remove(0);
+    let p =
+        problem(&format!("[[claim]]\nsays = \"a\"\n{}", ORDER.replace("kiss_time", "kis_time")));
     assert!(
         p.to_string().contains("no quantity \"kis_time\"")
             && p.help.as_deref().unwrap().contains("\"kiss_time\""),
         "{p}"
     );
     assert_eq!(p.place().unwrap().1, 3);
-    let p = problem(&format!(
-        "[[claim]]\nsays = \"a\"\n{}",
-        ORDER.replace("\"o3\"", "\"o5\"")
-    ));
-    assert!(
-        p.to_string()
-            .contains("value of \"orientation\" called \"o5\""),
-        "{p}"
-    );
+    let p = problem(&format!("[[claim]]\nsays = \"a\"\n{}", ORDER.replace("\"o3\"", "\"o5\"")));
+    assert!(p.to_string().contains("value of \"orientation\" called \"o5\""), "{p}");
     let p = problem(&format!(
         "[[claim]]\nsays = \"a\"\n{ORDER}\nwhere = {{ sphericty = {{ at_most = 1 }} }}"
     ));

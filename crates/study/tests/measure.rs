@@ -8,10 +8,7 @@ use grainwake_study::plan::quantities::PAIR_QUANTITIES;
 use grainwake_study::{PairHistory, PairMeasures};
 
 /// d = 2 mm and g = 8 m/s2: the units are 1/63.2 s and 0.1265 m/s.
-const SCALES: Scales = Scales {
-    diameter: 2e-3,
-    gravity: 8.0,
-};
+const SCALES: Scales = Scales { diameter: 2e-3, gravity: 8.0 };
 
 fn history(place: impl Fn(f64) -> DVec3, turn: impl Fn(f64) -> DQuat, end: f64) -> History {
     let mut h = History::default();
@@ -37,19 +34,9 @@ fn log(events: &[(f64, EventKind)]) -> Vec<Event> {
 fn measures(events: &[(f64, EventKind)], oblong: bool) -> PairMeasures {
     // The leading grain falls at 0.1 m/s; the trailing one, 10 mm above it, at 0.15 m/s until
     // they touch at 0.16 s.
-    let ahead = history(
-        |t| DVec3::Z * -0.1 * t,
-        |_| DQuat::from_rotation_y(-1.0),
-        1.0,
-    );
+    let ahead = history(|t| DVec3::Z * -0.1 * t, |_| DQuat::from_rotation_y(-1.0), 1.0);
     let behind = history(
-        |t| {
-            DVec3::new(
-                0.0,
-                0.0,
-                0.010 - 0.15 * t.min(0.16) - 0.1 * (t - 0.16).max(0.0),
-            )
-        },
+        |t| DVec3::new(0.0, 0.0, 0.010 - 0.15 * t.min(0.16) - 0.1 * (t - 0.16).max(0.0)),
         |_| DQuat::IDENTITY,
         1.0,
     );
@@ -80,10 +67,7 @@ fn times_speeds_and_angles_are_those_of_the_history() {
     let t = (2e-3_f64 / 8.0).sqrt();
     let v = (2e-3_f64 * 8.0).sqrt();
     let near = |got: Option<f64>, wanted: f64| {
-        assert!(
-            (got.unwrap() - wanted).abs() < 1e-3 * wanted.abs().max(1e-3),
-            "{got:?} {wanted}"
-        )
+        assert!((got.unwrap() - wanted).abs() < 1e-3 * wanted.abs().max(1e-3), "{got:?} {wanted}")
     };
     near(m.kiss_time, 0.16 / t);
     near(m.kissing_stage, 0.08 / t);
@@ -113,31 +97,15 @@ fn times_speeds_and_angles_are_those_of_the_history() {
 fn pairs_that_do_not_separate_or_kiss_give_bounds_or_nothing() {
     let t = (2e-3_f64 / 8.0).sqrt();
     let m = measures(
-        &[
-            (0.16, EventKind::Kiss),
-            (0.8, EventKind::Landing),
-            (0.9, EventKind::Separation),
-        ],
+        &[(0.16, EventKind::Kiss), (0.8, EventKind::Landing), (0.9, EventKind::Separation)],
         false,
     );
-    assert_eq!(
-        (m.parted, m.separation_time, m.tumble_time),
-        (Some(false), None, None)
-    );
-    assert!(
-        (m.contact_stage.unwrap() - 0.64 / t).abs() < 1e-9,
-        "a lower bound: until the landing"
-    );
+    assert_eq!((m.parted, m.separation_time, m.tumble_time), (Some(false), None, None));
+    assert!((m.contact_stage.unwrap() - 0.64 / t).abs() < 1e-9, "a lower bound: until the landing");
     assert_eq!(m.long_axis_leading, None, "a sphere has no long axis");
     let m = measures(&[(0.05, EventKind::RoleChange)], true);
     assert_eq!(
-        (
-            m.kiss_time,
-            m.contact_stage,
-            m.parted,
-            m.draft_speed_leading,
-            m.landing_time
-        ),
+        (m.kiss_time, m.contact_stage, m.parted, m.draft_speed_leading, m.landing_time),
         (None, None, None, None, None)
     );
     assert_eq!((m.role_changes, m.kisses), (Some(1.0), Some(0.0)));
@@ -152,17 +120,10 @@ fn pairs_that_do_not_separate_or_kiss_give_bounds_or_nothing() {
         true,
     );
     assert_eq!((m.repeated, m.kisses), (Some(true), Some(2.0)));
-    assert!(
-        (m.separation_time.unwrap() - 0.2 / t).abs() < 1e-9,
-        "the first one"
-    );
+    assert!((m.separation_time.unwrap() - 0.2 / t).abs() < 1e-9, "the first one");
     // If the line of centres reaches 45 degrees after the contact, kissing ends with the contact.
     let m = measures(
-        &[
-            (0.1, EventKind::Kiss),
-            (0.2, EventKind::Separation),
-            (0.21, EventKind::Tumble),
-        ],
+        &[(0.1, EventKind::Kiss), (0.2, EventKind::Separation), (0.21, EventKind::Tumble)],
         true,
     );
     assert_eq!(m.kissing_stage, m.contact_stage);
@@ -171,12 +132,7 @@ fn pairs_that_do_not_separate_or_kiss_give_bounds_or_nothing() {
 #[test]
 fn every_quantity_has_a_column() {
     let object = serde_json::to_value(PairMeasures::default()).unwrap();
-    let mut names: Vec<&str> = object
-        .as_object()
-        .unwrap()
-        .keys()
-        .map(String::as_str)
-        .collect();
+    let mut names: Vec<&str> = object.as_object().unwrap().keys().map(String::as_str).collect();
     let mut listed = PAIR_QUANTITIES.to_vec();
     names.sort_unstable();
     listed.sort_unstable();

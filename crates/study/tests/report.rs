@@ -96,11 +96,7 @@ fn study(root: &Path, wanted: impl Fn(&Run) -> bool) -> PathBuf {
         }
     }
     std::fs::create_dir_all(folder.join(RUNS)).unwrap();
-    std::fs::write(
-        folder.join("study.json"),
-        serde_json::to_string(&plan).unwrap(),
-    )
-    .unwrap();
+    std::fs::write(folder.join("study.json"), serde_json::to_string(&plan).unwrap()).unwrap();
     folder
 }
 
@@ -161,19 +157,11 @@ fn a_complete_study_has_all_figures() {
     assert_eq!(rendered.runs, (65, 65));
     assert!(rendered.notes.is_empty(), "{:?}", rendered.notes);
     for png in &rendered.png {
-        assert!(
-            std::fs::metadata(png).unwrap().len() > 5000,
-            "{}",
-            png.display()
-        );
+        assert!(std::fs::metadata(png).unwrap().len() > 5000, "{}", png.display());
         let svg = std::fs::read_to_string(png.with_extension("svg")).unwrap();
         let drawn: Vec<&str> = svg.lines().filter(|l| !l.contains("base64")).collect();
         for wrong in ["NaN", "Minf", "Linf", "\"inf"] {
-            assert!(
-                !drawn.iter().any(|l| l.contains(wrong)),
-                "{}: {wrong}",
-                png.display()
-            );
+            assert!(!drawn.iter().any(|l| l.contains(wrong)), "{}: {wrong}", png.display());
         }
     }
     let page = std::fs::read_to_string(&rendered.page).unwrap();
@@ -189,25 +177,12 @@ fn a_complete_study_has_all_figures() {
     assert_eq!(gaps["g01-o1"], None, "without diagnostics");
     let found = findings(&folder);
     let verdict = |claim: &str| {
-        found
-            .iter()
-            .find(|(c, _)| c.contains(claim))
-            .map(|(_, v)| v.as_str())
-            .unwrap()
+        found.iter().find(|(c, _)| c.contains(claim)).map(|(_, v)| v.as_str()).unwrap()
     };
-    assert_eq!(
-        verdict("longer in orientation 1 than in orientation 2"),
-        "holds"
-    );
+    assert_eq!(verdict("longer in orientation 1 than in orientation 2"), "holds");
     assert_eq!(verdict("same in orientations 2 and 4"), "holds");
-    assert_eq!(
-        verdict("Lower sphericity prolongs the drafting in orientation 1"),
-        "holds"
-    );
-    assert_eq!(
-        verdict("orientation 3 sphericity does not change the drafting"),
-        "open"
-    );
+    assert_eq!(verdict("Lower sphericity prolongs the drafting in orientation 1"), "holds");
+    assert_eq!(verdict("orientation 3 sphericity does not change the drafting"), "open");
     let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
     assert!(page.contains("not converged at 8 cells per diameter"));
     // The thinned histories are small, and sufficient to draw the curves without the run folders.
@@ -222,10 +197,7 @@ fn a_complete_study_has_all_figures() {
     std::fs::rename(folder.join(RUNS), root.join("elsewhere")).unwrap();
     let again = render(&folder).unwrap();
     std::fs::rename(root.join("elsewhere"), folder.join(RUNS)).unwrap();
-    assert_eq!(
-        (table, analysis),
-        (kept("table.csv"), kept("analysis.json"))
-    );
+    assert_eq!((table, analysis), (kept("table.csv"), kept("analysis.json")));
     let drawn = names(&again);
     assert!(drawn.contains(&"fig15-gap-by-row".into()) && !drawn.contains(&"fig08-g04-o1".into()));
 }
@@ -244,10 +216,7 @@ fn ask_only(folder: &Path, figures: serde_json::Value) {
 fn figures_of_other_studies_are_numbered_from_one() {
     let root = tempfile::tempdir().unwrap();
     let folder = study(root.path(), |run| run.name.starts_with("g04"));
-    ask_only(
-        &folder,
-        serde_json::json!({ "stories": ["g04-o1", "g05-o1"] }),
-    );
+    ask_only(&folder, serde_json::json!({ "stories": ["g04-o1", "g05-o1"] }));
     let rendered = render(&folder).unwrap();
     assert_eq!(names(&rendered), ["fig01-g04-o1", "fig02-vorticity-g04-o1"]);
     let page = std::fs::read_to_string(&rendered.page).unwrap();
@@ -260,30 +229,20 @@ fn figures_of_other_studies_are_numbered_from_one() {
     let svg = std::fs::read_to_string(rendered.png[1].with_extension("svg")).unwrap();
     assert!(svg.contains("kissing time") && svg.contains("orientation"));
     let page = std::fs::read_to_string(&rendered.page).unwrap();
-    assert!(
-        page.contains("<td class=\"number\">1</td>"),
-        "kisses are counted"
-    );
+    assert!(page.contains("<td class=\"number\">1</td>"), "kisses are counted");
 }
 
 #[test]
 fn an_incomplete_study_is_drawn_and_missing_runs_are_listed() {
     let root = tempfile::tempdir().unwrap();
-    let some = |run: &Run| {
-        ["g01", "g06"]
-            .iter()
-            .any(|g| run.levels.get("grain").is_some_and(|l| l == g))
-    };
+    let some =
+        |run: &Run| ["g01", "g06"].iter().any(|g| run.levels.get("grain").is_some_and(|l| l == g));
     let folder = study(root.path(), some);
     // One run has failed, one is unfinished.
     let place = |name: &str| folder.join(RUNS).join(name);
     std::fs::remove_file(place("g06-o3").join("summary.json")).unwrap();
     std::fs::remove_file(place("g01-o1").join("summary.json")).unwrap();
-    std::fs::write(
-        place("g01-o1").join("failure.json"),
-        "{\"what\":\"it blew up\"}",
-    )
-    .unwrap();
+    std::fs::write(place("g01-o1").join("failure.json"), "{\"what\":\"it blew up\"}").unwrap();
     let rendered = render(&folder).unwrap();
     assert_eq!(rendered.runs, (6, 65));
     let drawn = names(&rendered);
@@ -309,16 +268,7 @@ fn an_empty_study_has_a_page_and_a_damaged_one_is_an_error() {
     let folder = study(root.path(), |_| false);
     let rendered = render(&folder).unwrap();
     assert_eq!(rendered.runs, (0, 65));
-    assert!(
-        std::fs::read_to_string(&rendered.page)
-            .unwrap()
-            .contains("0 of 65 runs are finished")
-    );
+    assert!(std::fs::read_to_string(&rendered.page).unwrap().contains("0 of 65 runs are finished"));
     std::fs::write(folder.join("study.json"), "{").unwrap();
-    assert!(
-        render(&folder)
-            .unwrap_err()
-            .to_string()
-            .contains("study.json is damaged")
-    );
+    assert!(render(&folder).unwrap_err().to_string().contains("study.json is damaged"));
 }

@@ -40,11 +40,7 @@ fn run(plan: &Plan, study: &Path, watcher: &dyn StudyObserver, options: &Options
     plan.create_folder(study).unwrap();
     let runs = &plan.runs;
     let all: Vec<usize> = (0..runs.len()).collect();
-    execute(runs, &all, study, options, watcher)
-        .unwrap()
-        .into_iter()
-        .map(|(_, o)| o)
-        .collect()
+    execute(runs, &all, study, options, watcher).unwrap().into_iter().map(|(_, o)| o).collect()
 }
 
 fn states(plan: &Plan, study: &Path) -> Vec<RunState> {
@@ -58,12 +54,7 @@ fn results(plan: &Plan, study: &Path) -> Vec<Vec<u8>> {
             .map(|r| std::fs::read(r.folder(study).join(name)).unwrap())
             .collect::<Vec<_>>()
     };
-    [
-        file("grains.csv"),
-        file("events.jsonl"),
-        file("case.resolved.toml"),
-    ]
-    .concat()
+    [file("grains.csv"), file("events.jsonl"), file("case.resolved.toml")].concat()
 }
 
 #[test]
@@ -71,32 +62,16 @@ fn finished_runs_are_kept_and_stale_ones_repeated() {
     let (folder, path) = folder(STUDY);
     let study = folder.path().join("out");
     let first = plan(&path).unwrap();
-    assert!(
-        states(&first, &study)
-            .iter()
-            .all(|s| *s == RunState::Missing)
-    );
+    assert!(states(&first, &study).iter().all(|s| *s == RunState::Missing));
     let ended = run(&first, &study, &Quiet, &options(2));
-    assert!(
-        ended.iter().all(|o| matches!(o, Outcome::Finished(_))),
-        "{ended:?}"
-    );
-    assert!(
-        !study.join("runs/alone/checkpoint").exists(),
-        "checkpoints of finished runs go"
-    );
+    assert!(ended.iter().all(|o| matches!(o, Outcome::Finished(_))), "{ended:?}");
+    assert!(!study.join("runs/alone/checkpoint").exists(), "checkpoints of finished runs go");
     assert_eq!(Plan::read(&study).unwrap(), first);
     let kept = std::fs::read(study.join("runs/alone/provenance.json")).unwrap();
     assert!(
-        run(&first, &study, &Quiet, &options(1))
-            .iter()
-            .all(|o| *o == Outcome::AlreadyFinished)
+        run(&first, &study, &Quiet, &options(1)).iter().all(|o| *o == Outcome::AlreadyFinished)
     );
-    assert_eq!(
-        std::fs::read(study.join("runs/alone/provenance.json")).unwrap(),
-        kept,
-        "untouched"
-    );
+    assert_eq!(std::fs::read(study.join("runs/alone/provenance.json")).unwrap(), kept, "untouched");
     // One model changes: only this one is stale and repeated.
     std::fs::write(&path, STUDY.replace("friction = 0.6", "friction = 0.3")).unwrap();
     let second = plan(&path).unwrap();
@@ -105,26 +80,15 @@ fn finished_runs_are_kept_and_stale_ones_repeated() {
     let (finished, changed) = (StateKind::Finished, StateKind::Stale);
     assert_eq!(stale, [finished, changed, finished, changed, finished]);
     let ended = run(&second, &study, &Quiet, &options(1));
-    let again: Vec<bool> = ended
-        .iter()
-        .map(|o| matches!(o, Outcome::Finished(_)))
-        .collect();
+    let again: Vec<bool> = ended.iter().map(|o| matches!(o, Outcome::Finished(_))).collect();
     assert_eq!(again, [false, true, false, true, false]);
     // A changed end time is stale too, although the case hash does not include it.
     let longer = Plan::resolve(&Study::read(&path).unwrap(), &["time.end=0.07".into()]).unwrap();
-    assert!(
-        states(&longer, &study)
-            .iter()
-            .all(|s| matches!(s, RunState::Stale(_)))
-    );
+    assert!(states(&longer, &study).iter().all(|s| matches!(s, RunState::Stale(_))));
     // Another version of the program.
     let file = study.join("runs/alone/provenance.json");
     let text = std::fs::read_to_string(&file).unwrap();
-    std::fs::write(
-        &file,
-        text.replace("\"version\": \"", "\"version\": \"0.0."),
-    )
-    .unwrap();
+    std::fs::write(&file, text.replace("\"version\": \"", "\"version\": \"0.0.")).unwrap();
     assert!(matches!(states(&second, &study)[4], RunState::Stale(why) if why.contains("version")));
 }
 
@@ -138,30 +102,21 @@ fn resumed_studies_give_identical_bits() {
     loop {
         let ended = run(&plan, &broken, &After(AtomicU64::new(0), 333), &options(2));
         rounds += 1;
-        if ended
-            .iter()
-            .all(|o| matches!(o, Outcome::Finished(_) | Outcome::AlreadyFinished))
-        {
+        if ended.iter().all(|o| matches!(o, Outcome::Finished(_) | Outcome::AlreadyFinished)) {
             break;
         }
-        assert!(
-            ended.contains(&Outcome::Interrupted) && rounds < 50,
-            "{ended:?}"
-        );
+        assert!(ended.contains(&Outcome::Interrupted) && rounds < 50, "{ended:?}");
         assert!(states(&plan, &broken).contains(&RunState::Unfinished) || rounds > 1);
     }
     assert!(rounds > 3, "it was interrupted {rounds} times");
     assert_eq!(results(&plan, &whole), results(&plan, &broken));
     let (a, b) = (records(&plan, &whole), records(&plan, &broken));
     let measured = |rows: &[grainwake_study::RunRecord]| {
-        rows.iter()
-            .map(|r| (r.pair.clone(), r.steps))
-            .collect::<Vec<_>>()
+        rows.iter().map(|r| (r.pair.clone(), r.steps)).collect::<Vec<_>>()
     };
     assert_eq!(measured(&a), measured(&b));
     assert!(
-        a.iter()
-            .all(|r| r.pair.as_ref().unwrap().kiss_time.is_some() || r.name == "alone"),
+        a.iter().all(|r| r.pair.as_ref().unwrap().kiss_time.is_some() || r.name == "alone"),
         "they do collide"
     );
 }
@@ -178,10 +133,7 @@ fn a_run_without_a_usable_checkpoint_restarts() {
         std::fs::write(file.path(), b"nonsense").unwrap();
     }
     let ended = run(&plan, &broken, &Quiet, &options(1));
-    assert!(
-        ended.iter().all(|o| matches!(o, Outcome::Finished(_))),
-        "{ended:?}"
-    );
+    assert!(ended.iter().all(|o| matches!(o, Outcome::Finished(_))), "{ended:?}");
     assert_eq!(results(&plan, &whole), results(&plan, &broken));
 }
 
@@ -209,32 +161,14 @@ fn a_failed_run_does_not_stop_the_others() {
     // An unstable run is not repeated unless requested.
     let alone = study.join("runs/alone");
     std::fs::remove_file(alone.join("summary.json")).unwrap();
-    std::fs::write(
-        alone.join("failure.json"),
-        "{\"time\":0.1,\"what\":\"it blew up\"}",
-    )
-    .unwrap();
-    assert_eq!(
-        states(&plan, &study)[4],
-        RunState::Failed("it blew up".into())
-    );
+    std::fs::write(alone.join("failure.json"), "{\"time\":0.1,\"what\":\"it blew up\"}").unwrap();
+    assert_eq!(states(&plan, &study)[4], RunState::Failed("it blew up".into()));
     let ended = run(&plan, &study, &Quiet, &options(1));
     assert!(
         matches!(&ended[4], Outcome::Failed(why, FailureKind::Computation) if why.contains("it blew up"))
     );
-    assert_eq!(
-        records(&plan, &study)[4].remark.as_deref(),
-        Some("it blew up")
-    );
-    let ended = run(
-        &plan,
-        &study,
-        &Quiet,
-        &Options {
-            retry: true,
-            ..options(1)
-        },
-    );
+    assert_eq!(records(&plan, &study)[4].remark.as_deref(), Some("it blew up"));
+    let ended = run(&plan, &study, &Quiet, &Options { retry: true, ..options(1) });
     assert!(matches!(ended[4], Outcome::Finished(_)));
 }
 
@@ -252,10 +186,7 @@ fn a_locked_run_is_skipped() {
     assert_eq!(ended[4], Outcome::Locked);
     assert!(matches!(ended[0], Outcome::Finished(_)));
     drop(lock);
-    assert!(matches!(
-        run(&plan, &study, &Quiet, &options(1))[4],
-        Outcome::Finished(_)
-    ));
+    assert!(matches!(run(&plan, &study, &Quiet, &options(1))[4], Outcome::Finished(_)));
 }
 
 #[test]
@@ -265,24 +196,14 @@ fn folders_with_other_contents_are_refused() {
     let study = folder.path().join("out");
     first.create_folder(&study).unwrap();
     let other = folder.path().join("other.toml");
-    std::fs::write(
-        &other,
-        STUDY.replace("title = \"test\"", "title = \"another\""),
-    )
-    .unwrap();
+    std::fs::write(&other, STUDY.replace("title = \"test\"", "title = \"another\"")).unwrap();
     let second = plan(&other).unwrap();
     let error = second.create_folder(&study).unwrap_err().to_string();
     assert!(error.contains("holds another study, \"test\""), "{error}");
     let foreign = folder.path().join("foreign");
     std::fs::create_dir_all(&foreign).unwrap();
     std::fs::write(foreign.join("thesis.tex"), "").unwrap();
-    assert!(
-        first
-            .create_folder(&foreign)
-            .unwrap_err()
-            .to_string()
-            .contains("holds no study")
-    );
+    assert!(first.create_folder(&foreign).unwrap_err().to_string().contains("holds no study"));
 }
 
 #[test]
@@ -295,30 +216,17 @@ fn the_table_has_every_run_and_survives_removal_of_the_run_folders() {
     let rows = records(&plan, &study);
     write_tables(&rows, &study).unwrap();
     let words: Vec<String> = rows.iter().map(|r| r.state.to_string()).collect();
-    assert_eq!(
-        words,
-        ["finished", "missing", "missing", "missing", "finished"]
-    );
+    assert_eq!(words, ["finished", "missing", "missing", "missing", "finished"]);
     let mut csv = csv::Reader::from_path(study.join("table.csv")).unwrap();
     let header = csv.headers().unwrap().clone();
-    let column = |name: &str| {
-        header
-            .iter()
-            .position(|h| h == name)
-            .unwrap_or_else(|| panic!("{name}"))
-    };
+    let column =
+        |name: &str| header.iter().position(|h| h == name).unwrap_or_else(|| panic!("{name}"));
     let lines: Vec<_> = csv.records().map(Result::unwrap).collect();
     assert_eq!(lines.len(), 5);
-    assert_eq!(
-        (&lines[0][column("weight")], &lines[0][column("density")]),
-        ("light", "2000")
-    );
+    assert_eq!((&lines[0][column("weight")], &lines[0][column("density")]), ("light", "2000"));
     let kiss: f64 = lines[0][column("kiss_time")].parse().unwrap();
     let seconds: f64 = lines[0][column("kiss_time_s")].parse().unwrap();
-    assert!(
-        (kiss - seconds / (2e-3_f64 / 9.81).sqrt()).abs() < 1e-4 * kiss,
-        "{kiss} {seconds}"
-    );
+    assert!((kiss - seconds / (2e-3_f64 / 9.81).sqrt()).abs() < 1e-4 * kiss, "{kiss} {seconds}");
     assert_eq!(&lines[1][column("kiss_time")], "");
     assert_eq!(to_csv(&rows).lines().count(), 6);
     std::fs::remove_dir_all(study.join("runs")).unwrap();

@@ -81,20 +81,14 @@ fn single_grains_have_results_figures_and_text() {
         let value = |name: &str| row.measured(name).unwrap_or_else(|| panic!("no {name}"));
         let within = |bound: f64, name: &str, expected: f64| {
             let found = value(name);
-            assert!(
-                (found / expected - 1.0).abs() < bound,
-                "{name}: {found}, not {expected}"
-            );
+            assert!((found / expected - 1.0).abs() < bound, "{name}: {found}, not {expected}");
         };
         let close = |name: &str, expected: f64| within(0.01, name, expected);
         let speed = |fallen: f64| (2.0 * g * fallen).sqrt();
         close("landing_time_s", (2.0 * 0.02 / g).sqrt());
         close("peak_speed_m_per_s", speed(0.02));
         close("final_speed_m_per_s", 0.5 * (speed(0.016) + speed(0.018)));
-        close(
-            "final_speed",
-            value("final_speed_m_per_s") / (2e-3 * g).sqrt(),
-        );
+        close("final_speed", value("final_speed_m_per_s") / (2e-3 * g).sqrt());
         close("mean_speed", 0.5 * speed(0.02) / (2e-3 * g).sqrt());
         // Difference of speeds from rows at intervals of 1 ms.
         within(
@@ -107,11 +101,7 @@ fn single_grains_have_results_figures_and_text() {
         assert!(row.measured("kiss_time").is_none());
     }
     let done = render(&out).unwrap();
-    let names: Vec<_> = done
-        .png
-        .iter()
-        .map(|p| p.file_stem().unwrap().to_owned())
-        .collect();
+    let names: Vec<_> = done.png.iter().map(|p| p.file_stem().unwrap().to_owned()).collect();
     assert_eq!(names, ["fig01-velocity", "fig02-settling-speed"]);
     let text = page(&out);
     assert!(text.contains("Figure 1. Settling speed") && text.contains("2 of 2 grains landed"));
@@ -120,19 +110,10 @@ fn single_grains_have_results_figures_and_text() {
     }
     let table = std::fs::read_to_string(out.join("table.csv")).unwrap();
     let header = table.lines().next().unwrap();
-    assert!(
-        header.contains("final_speed_m_per_s") && !header.contains("kiss"),
-        "{header}"
-    );
+    assert!(header.contains("final_speed_m_per_s") && !header.contains("kiss"), "{header}");
     let width = |line: &str| line.split(',').count();
     assert!(table.lines().all(|line| width(line) == width(header)));
-    assert_eq!(
-        std::fs::read_to_string(out.join("settling.csv"))
-            .unwrap()
-            .lines()
-            .count(),
-        3
-    );
+    assert_eq!(std::fs::read_to_string(out.join("settling.csv")).unwrap().lines().count(), 3);
     // Without the run folders the figures are the same.
     let before = std::fs::read(&done.png[0]).unwrap();
     std::fs::remove_dir_all(out.join("runs")).unwrap();
@@ -158,21 +139,12 @@ fn three_grains_have_means_and_individual_landings() {
     for (i, grain) in full.each.iter().enumerate() {
         let expected = (2.0 * (0.02 + 1e-3 * i as f64) / 10.0).sqrt();
         let found = grain.landing_time_s.unwrap();
-        assert!(
-            (found / expected - 1.0).abs() < 0.01,
-            "grain {i}: {found}, not {expected}"
-        );
+        assert!((found / expected - 1.0).abs() < 0.01, "grain {i}: {found}, not {expected}");
     }
     assert_eq!(full.landing_time_s, full.each[0].landing_time_s);
     render(&out).unwrap();
     assert!(page(&out).contains("6 of 6 grains landed"));
-    assert_eq!(
-        std::fs::read_to_string(out.join("settling.csv"))
-            .unwrap()
-            .lines()
-            .count(),
-        7
-    );
+    assert_eq!(std::fs::read_to_string(out.join("settling.csv")).unwrap().lines().count(), 7);
 }
 
 #[test]
@@ -204,11 +176,7 @@ fn a_changed_analysis_is_used_and_a_wrong_one_is_an_error() {
     let case = folder.path().join("case.toml");
     std::fs::rename(&case, folder.path().join("gone")).unwrap();
     let done = render(&out).unwrap();
-    assert!(
-        done.notes[0].contains("there is no case file"),
-        "{:?}",
-        done.notes
-    );
+    assert!(done.notes[0].contains("there is no case file"), "{:?}", done.notes);
     // Without the study file, the stored analysis is used.
     std::fs::remove_file(folder.path().join("study.toml")).unwrap();
     render(&out).unwrap();

@@ -13,18 +13,13 @@ fn ties_share_their_mean_rank() {
 #[test]
 fn spearman_of_known_samples() {
     // The textbook example of intelligence and hours of television: rho = -29/165.
-    let iq = [
-        106.0, 100.0, 86.0, 101.0, 99.0, 103.0, 97.0, 113.0, 112.0, 110.0,
-    ];
+    let iq = [106.0, 100.0, 86.0, 101.0, 99.0, 103.0, 97.0, 113.0, 112.0, 110.0];
     let hours = [7.0, 27.0, 2.0, 50.0, 28.0, 29.0, 20.0, 12.0, 6.0, 17.0];
     let found = spearman(&iq, &hours).unwrap();
     assert!((found.value + 29.0 / 165.0).abs() < 1e-12);
     assert!((found.p - 0.627_188).abs() < 1e-5, "{}", found.p);
     // Fisher: atanh(-0.17576) -+ 1.96 sqrt((1 + 0.0154) / 7)
-    assert!(
-        (found.low + 0.729).abs() < 2e-3 && (found.high - 0.513).abs() < 2e-3,
-        "{found:?}"
-    );
+    assert!((found.low + 0.729).abs() < 2e-3 && (found.high - 0.513).abs() < 2e-3, "{found:?}");
     let rising: Vec<f64> = (0..16).map(f64::from).collect();
     let cubes: Vec<f64> = rising.iter().map(|x| x.powi(3)).collect();
     let perfect = spearman(&rising, &cubes).unwrap();
@@ -52,11 +47,7 @@ fn signed_ranks_of_known_samples() {
     }
     means.sort_by(f64::total_cmp);
     let found = signed_rank(&d).unwrap();
-    assert_eq!(
-        (found.low, found.high),
-        (means[3], means[32]),
-        "the tables' fourth from each end"
-    );
+    assert_eq!((found.low, found.high), (means[3], means[32]), "the tables' fourth from each end");
     // Sixteen differences: the tables' critical value is 29.
     let d: Vec<f64> = (1..=16).map(|i| 3.0f64.powi(i)).collect();
     let mut means: Vec<f64> = Vec::new();
@@ -77,9 +68,8 @@ fn intervals_have_the_nominal_coverage() {
     // Differences distributed about 0.3: about 95 of 100 intervals contain it.
     let mut state = 1u64;
     let mut random = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
     let (mut held, mut correlated) = (0, 0);
@@ -105,9 +95,7 @@ fn quartiles_and_spreads() {
     assert_eq!(quantile(&v, 0.25), Some(1.75));
     assert_eq!(median(&[]), None);
     assert!((coefficient_of_variation(&[9.0, 11.0]).unwrap() - 2f64.sqrt() / 10.0).abs() < 1e-12);
-    let narrow: Vec<f64> = (0..12)
-        .map(|i| 10.0 + 0.1 * f64::from(i * 5 % 12))
-        .collect();
+    let narrow: Vec<f64> = (0..12).map(|i| 10.0 + 0.1 * f64::from(i * 5 % 12)).collect();
     let wide: Vec<f64> = (0..12).map(|i| 10.0 + f64::from(i * 7 % 12)).collect();
     assert!(relative_spread_test(&wide, &narrow).unwrap().low > 0.0);
     assert!(relative_spread_test(&narrow, &wide).unwrap().high < 0.0);

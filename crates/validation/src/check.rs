@@ -104,9 +104,7 @@ impl Bounds {
 
     /// Returns the bounds as text, as in "± 2 %".
     pub(crate) fn text(&self) -> String {
-        let relative = self
-            .relative
-            .map(|limit| format!("± {} %", rounded(100.0 * limit)));
+        let relative = self.relative.map(|limit| format!("± {} %", rounded(100.0 * limit)));
         let absolute = self.absolute.map(|limit| format!("± {}", rounded(limit)));
         let range = match self.range {
             [Some(low), Some(high)] => Some(format!("{} ... {}", rounded(low), rounded(high))),

@@ -48,13 +48,10 @@ impl Suite {
             if let Ok(value) = measured {
                 known.insert(key(&run.name), value);
             }
-            let reference = check
-                .reference
-                .as_ref()
-                .and_then(|reference| match reference {
-                    Reference::Number(number) => Some(*number),
-                    Reference::Run(other) => known.get(&key(other)).copied(),
-                });
+            let reference = check.reference.as_ref().and_then(|reference| match reference {
+                Reference::Number(number) => Some(*number),
+                Reference::Run(other) => known.get(&key(other)).copied(),
+            });
             self.result(run, check, measured, reference)
         };
         run.checks.iter().map(evaluate).collect()

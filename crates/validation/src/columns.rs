@@ -110,10 +110,7 @@ impl Columns {
             columns.push(name, Vec::new());
         }
         let mut record = csv::StringRecord::new();
-        while reader
-            .read_record(&mut record)
-            .map_err(|e| problem(e.to_string()))?
-        {
+        while reader.read_record(&mut record).map_err(|e| problem(e.to_string()))? {
             // The position of the record itself is that of the comments before it.
             let end = reader.position().byte() as usize;
             let line = || text.get(..end).unwrap_or(&text).trim_end().lines().count();
@@ -123,9 +120,7 @@ impl Columns {
                 return Err(wrong(format!("{values} values under {names} names")));
             }
             for (field, column) in record.iter().zip(&mut columns.values) {
-                let value = field
-                    .parse()
-                    .map_err(|_| wrong(format!("'{field}' is not a number")));
+                let value = field.parse().map_err(|_| wrong(format!("'{field}' is not a number")));
                 column.push(value?);
             }
         }
@@ -136,9 +131,7 @@ impl Columns {
 /// Separates the rows of the grains into numbered columns; the chosen grain also has unnumbered
 /// columns.
 fn split_by_grain(table: &Table, chosen: usize) -> Result<Columns, String> {
-    let index = table
-        .column("grain")
-        .ok_or("grains.csv has no column \"grain\"")?;
+    let index = table.column("grain").ok_or("grains.csv has no column \"grain\"")?;
     let count = index.iter().fold(0.0, |a: f64, b| a.max(*b)) as usize + 1;
     if chosen >= count || index.is_empty() {
         return Err(format!("grains.csv has no grain {chosen}"));
@@ -147,10 +140,7 @@ fn split_by_grain(table: &Table, chosen: usize) -> Result<Columns, String> {
     for name in table.names().iter().filter(|name| *name != "grain") {
         let values = table.column(name).unwrap_or_default();
         for grain in 0..count {
-            let rows = values
-                .iter()
-                .zip(index)
-                .filter(|(_, i)| **i == grain as f64);
+            let rows = values.iter().zip(index).filter(|(_, i)| **i == grain as f64);
             let own: Vec<f64> = rows.map(|(value, _)| *value).collect();
             if grain == chosen {
                 columns.push(name, own.clone());
@@ -172,10 +162,7 @@ pub(crate) fn last_slice(folder: &Path, plane: &str) -> Result<Image, String> {
             continue;
         }
         let image = vti::read(&entry.path()).map_err(|e| format!("{name}: {e}"))?;
-        if latest
-            .as_ref()
-            .is_none_or(|l| l.frame.time < image.frame.time)
-        {
+        if latest.as_ref().is_none_or(|l| l.frame.time < image.frame.time) {
             latest = Some(image);
         }
     }
@@ -189,19 +176,12 @@ fn sample_line(folder: &Path, line: &Line) -> Result<Columns, String> {
     let through = DVec3::from(line.through);
     // Offsets and weights of the cells around the line.
     let mut weights = vec![(0usize, 1.0f64)];
-    let strides = [
-        1,
-        image.frame.cells[0],
-        image.frame.cells[0] * image.frame.cells[1],
-    ];
+    let strides = [1, image.frame.cells[0], image.frame.cells[0] * image.frame.cells[1]];
     for other in (0..3).filter(|a| *a != axis && image.frame.cells[*a] > 1) {
         let n = image.frame.cells[other];
         let s = (through[other] - image.frame.origin[other]) / image.frame.spacing[other] - 0.5;
         if s < -0.5 || s > n as f64 - 0.5 {
-            return Err(format!(
-                "the line lies outside the slice \"{}\"",
-                line.plane
-            ));
+            return Err(format!("the line lies outside the slice \"{}\"", line.plane));
         }
         let low = s.clamp(0.0, n as f64 - 1.0).floor() as usize;
         let high = (low + 1).min(n - 1);

@@ -35,11 +35,7 @@ pub(crate) fn evaluate(
             columns.names.join(", ")
         )),
     };
-    let names: Vec<Values> = parsed
-        .var_names()
-        .iter()
-        .map(values)
-        .collect::<Result<_, _>>()?;
+    let names: Vec<Values> = parsed.var_names().iter().map(values).collect::<Result<_, _>>()?;
     let mut row = vec![0.0; names.len()];
     let at = |i: usize| {
         for (slot, values) in row.iter_mut().zip(&names) {
@@ -55,9 +51,6 @@ pub(crate) fn evaluate(
 
 /// Evaluates an expression of constants only.
 pub(crate) fn constant(text: &str, constants: &BTreeMap<String, f64>) -> Result<f64, String> {
-    let one_row = Columns {
-        names: vec![String::new()],
-        values: vec![vec![0.0]],
-    };
+    let one_row = Columns { names: vec![String::new()], values: vec![vec![0.0]] };
     evaluate(text, &one_row, constants).map(|values| values[0])
 }

@@ -131,16 +131,11 @@ impl Sampling {
         constants: &BTreeMap<String, f64>,
     ) -> Result<Samples, String> {
         let ((x, y), against) = self.rows(folder, constants)?;
-        let (x, y): Samples = x
-            .into_iter()
-            .zip(y)
-            .filter(|(x, _)| self.contains(*x) && !x.is_nan())
-            .unzip();
+        let (x, y): Samples =
+            x.into_iter().zip(y).filter(|(x, _)| self.contains(*x) && !x.is_nan()).unzip();
         if x.is_empty() {
-            let (low, high) = (
-                self.from.unwrap_or(-f64::INFINITY),
-                self.to.unwrap_or(f64::INFINITY),
-            );
+            let (low, high) =
+                (self.from.unwrap_or(-f64::INFINITY), self.to.unwrap_or(f64::INFINITY));
             return Err(format!("no rows with {low} <= {against} <= {high}"));
         }
         Ok((x, y))
@@ -206,10 +201,7 @@ impl Sampling {
             TableSource::Slice(_) => signal::interpolate_smooth,
             _ => signal::interpolate,
         };
-        let inside = positions
-            .iter()
-            .zip(&expected)
-            .filter(|(at, _)| self.contains(**at));
+        let inside = positions.iter().zip(&expected).filter(|(at, _)| self.contains(**at));
         let distance = |(at, expected): (&f64, &f64)| {
             let value = interpolate(&x, &y, *at);
             let value = value

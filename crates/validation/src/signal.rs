@@ -11,9 +11,7 @@ pub fn mean(x: &[f64], y: &[f64]) -> Option<f64> {
 /// Returns the integral by the trapezoidal rule.
 fn integral(x: &[f64], y: &[f64]) -> f64 {
     let pairs = x.windows(2).zip(y.windows(2));
-    pairs
-        .map(|(x, y)| 0.5 * (x[1] - x[0]) * (y[0] + y[1]))
-        .sum()
+    pairs.map(|(x, y)| 0.5 * (x[1] - x[0]) * (y[0] + y[1])).sum()
 }
 
 /// Returns dy/dx at the samples: parabolas through three neighbours, one-sided at the ends.
@@ -81,10 +79,8 @@ pub fn crossings(x: &[f64], y: &[f64]) -> Vec<(f64, bool)> {
 pub fn frequency(x: &[f64], y: &[f64]) -> Option<f64> {
     let middle = mean(x, y)?;
     let shifted: Vec<f64> = y.iter().map(|v| v - middle).collect();
-    let ups: Vec<f64> = crossings(x, &shifted)
-        .into_iter()
-        .filter_map(|(at, up)| up.then_some(at))
-        .collect();
+    let ups: Vec<f64> =
+        crossings(x, &shifted).into_iter().filter_map(|(at, up)| up.then_some(at)).collect();
     let span = ups.last()? - ups.first()?;
     (ups.len() > 1).then(|| (ups.len() - 1) as f64 / span)
 }
@@ -99,11 +95,7 @@ pub fn line_fit(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     let sxx: f64 = x.iter().map(|v| (v - mx).powi(2)).sum();
     let sxy: f64 = x.iter().zip(y).map(|(a, b)| (a - mx) * (b - my)).sum();
     let slope = sxy / sxx;
-    let residual: f64 = x
-        .iter()
-        .zip(y)
-        .map(|(a, b)| (b - my - slope * (a - mx)).powi(2))
-        .sum();
+    let residual: f64 = x.iter().zip(y).map(|(a, b)| (b - my - slope * (a - mx)).powi(2)).sum();
     sxx.gt(&0.0).then(|| (slope, (residual / n).sqrt()))
 }
 
@@ -158,19 +150,10 @@ mod tests {
 
     #[test]
     fn uneven_samples_are_weighted_by_their_interval() {
-        assert_eq!(
-            mean(&[0.0, 1.0, 4.0], &[2.0, 2.0, 4.0]),
-            Some((2.0 + 9.0) / 4.0)
-        );
-        assert_eq!(
-            interpolate(&[0.0, 1.0, 4.0], &[2.0, 2.0, 4.0], 2.5),
-            Some(3.0)
-        );
+        assert_eq!(mean(&[0.0, 1.0, 4.0], &[2.0, 2.0, 4.0]), Some((2.0 + 9.0) / 4.0));
+        assert_eq!(interpolate(&[0.0, 1.0, 4.0], &[2.0, 2.0, 4.0], 2.5), Some(3.0));
         assert_eq!(interpolate(&[0.0, 1.0], &[2.0, 2.0], 1.5), None);
-        assert_eq!(
-            crossings(&[0.0, 1.0, 2.0], &[-1.0, 1.0, -3.0]),
-            [(0.5, true), (1.25, false)]
-        );
+        assert_eq!(crossings(&[0.0, 1.0, 2.0], &[-1.0, 1.0, -3.0]), [(0.5, true), (1.25, false)]);
         assert_eq!(frequency(&[0.0, 1.0], &[1.0, 1.0]), None);
     }
 }

@@ -132,15 +132,10 @@ impl Suite {
     /// [`SuiteError`] with file, line, key and remedy.
     pub fn read(folder: &Path) -> Result<Suite, SuiteError> {
         let path = folder.join(FILE);
-        let text = std::fs::read_to_string(&path).map_err(|source| SuiteError::Unreadable {
-            path: path.clone(),
-            source,
-        })?;
+        let text = std::fs::read_to_string(&path)
+            .map_err(|source| SuiteError::Unreadable { path: path.clone(), source })?;
         let (source, raw) = Source::parse(&path.display().to_string(), &text, &[])?;
-        let builder = Builder {
-            source: &source,
-            folder,
-        };
+        let builder = Builder { source: &source, folder };
         Ok(builder.suite(raw)?)
     }
 
@@ -151,10 +146,7 @@ impl Suite {
         for run in self.runs.iter().rev() {
             if wanted(&run.name) || needed.contains(&run.name) {
                 needed.insert(run.name.clone());
-                let references = run
-                    .checks
-                    .iter()
-                    .filter_map(|check| check.reference.as_ref());
+                let references = run.checks.iter().filter_map(|check| check.reference.as_ref());
                 needed.extend(references.filter_map(|reference| match reference {
                     Reference::Run(name) => Some(name.clone()),
                     Reference::Number(_) => None,
@@ -170,10 +162,8 @@ impl Suite {
     /// # Errors
     /// An unreadable folder, or the first invalid suite.
     pub fn read_all(root: &Path) -> Result<Vec<Suite>, SuiteError> {
-        let entries = std::fs::read_dir(root).map_err(|source| SuiteError::Unreadable {
-            path: root.into(),
-            source,
-        })?;
+        let entries = std::fs::read_dir(root)
+            .map_err(|source| SuiteError::Unreadable { path: root.into(), source })?;
         let folders = entries.flatten().map(|entry| entry.path());
         let mut folders: Vec<PathBuf> = folders.filter(|path| path.join(FILE).is_file()).collect();
         folders.sort();
@@ -223,20 +213,11 @@ impl Builder<'_> {
         if !case.is_file() {
             let message = format!("there is no case file {}", case.display());
             let help = "paths are relative to validation.toml";
-            return Err(problem::at(
-                self.source,
-                &raw.case,
-                message,
-                help,
-                "not found",
-            ));
+            return Err(problem::at(self.source, &raw.case, message, help, "not found"));
         }
         let mut constants = constants.clone();
         constants.extend(raw.constants);
-        let checks = raw
-            .check
-            .into_iter()
-            .map(|check| self.check(check, &constants));
+        let checks = raw.check.into_iter().map(|check| self.check(check, &constants));
         Ok(SuiteRun {
             name,
             case,
@@ -266,17 +247,12 @@ impl Builder<'_> {
             let message = format!("\"{quantity}\": {message}");
             problem::at(self.source, &raw.take, message, help, "this measure")
         })?;
-        let mut bounds = Bounds {
-            range: [raw.at_least, raw.at_most],
-            ..Bounds::default()
-        };
+        let mut bounds = Bounds { range: [raw.at_least, raw.at_most], ..Bounds::default() };
         if let Some(tolerance) = &raw.tolerance {
             match &tolerance.value {
                 Tolerance::Absolute(value) => bounds.absolute = Some(*value),
                 Tolerance::Relative(text) => {
-                    let number = text
-                        .strip_suffix('%')
-                        .and_then(|n| n.trim().parse::<f64>().ok());
+                    let number = text.strip_suffix('%').and_then(|n| n.trim().parse::<f64>().ok());
                     let percent = number.ok_or_else(|| {
                         let message = format!("tolerance \"{text}\" is not a percentage");
                         let help = "write a number, or a percentage such as \"2 %\"";

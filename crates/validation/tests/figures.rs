@@ -100,11 +100,7 @@ to = [1, 1]
 fn suite(text: &str) -> (PathBuf, Result<Suite, SuiteError>) {
     let folder = synthetic::folder("suite");
     std::fs::write(folder.join("case.toml"), "").unwrap();
-    std::fs::write(
-        folder.join("speed.csv"),
-        "t,part\n0.1,0.4\n0.5,0.75\n1.2,0.78\n",
-    )
-    .unwrap();
+    std::fs::write(folder.join("speed.csv"), "t,part\n0.1,0.4\n0.5,0.75\n1.2,0.78\n").unwrap();
     std::fs::write(folder.join("validation.toml"), text).unwrap();
     let runs = folder.join("runs");
     std::fs::create_dir_all(&runs).unwrap();
@@ -142,11 +138,8 @@ fn all_kinds_of_series_are_drawn() {
     let (runs, suite) = suite(SUITE);
     let suite = suite.unwrap();
     fill(&runs);
-    let drawn: Vec<DrawnFigure> = suite
-        .figures
-        .iter()
-        .map(|f| f.draw(&runs, |_, _| None))
-        .collect();
+    let drawn: Vec<DrawnFigure> =
+        suite.figures.iter().map(|f| f.draw(&runs, |_, _| None)).collect();
     for one in &drawn {
         assert!(one.notes.is_empty(), "{:?}", one.notes);
     }
@@ -194,64 +187,19 @@ fn missing_data_are_left_out_and_listed() {
 fn problems_are_located() {
     let line = |text: &str, key: &str| 1 + text[..text.find(key).unwrap()].matches('\n').count();
     for (from, to, at, word) in [
-        (
-            "run = \"sphere\"",
-            "run = \"spher\"",
-            "\"spher\"",
-            "did you mean \"sphere\"",
-        ),
+        ("run = \"sphere\"", "run = \"spher\"", "\"spher\"", "did you mean \"sphere\""),
         ("of = \"-vz\"", "off = \"-vz\"", "off =", "`of`"),
         ("of = \"-vz\"", "of = \"-vz*\"", "\"-vz*\"", "expression"),
-        (
-            "y = \"c*part\"",
-            "y = \"c*whole\"",
-            "\"c*whole\"",
-            "expression",
-        ),
-        (
-            "scale = \"log\", ticks",
-            "scale = \"logs\", ticks",
-            "\"logs\"",
-            "log",
-        ),
-        (
-            "quantity = \"z\"\nx",
-            "quantity = \"y\"\nx",
-            "\"y\"\nx",
-            "it measures: z",
-        ),
-        (
-            "x = \"n\"",
-            "x = \"m\"",
-            "\"m\"",
-            "constants of this run: c, n",
-        ),
-        (
-            "x = \"n\"",
-            "x = [8, 16]",
-            "[8, 16]\n",
-            "one number for each run",
-        ),
+        ("y = \"c*part\"", "y = \"c*whole\"", "\"c*whole\"", "expression"),
+        ("scale = \"log\", ticks", "scale = \"logs\", ticks", "\"logs\"", "log"),
+        ("quantity = \"z\"\nx", "quantity = \"y\"\nx", "\"y\"\nx", "it measures: z"),
+        ("x = \"n\"", "x = \"m\"", "\"m\"", "constants of this run: c, n"),
+        ("x = \"n\"", "x = [8, 16]", "[8, 16]\n", "one number for each run"),
         ("\"vorticity\"", "\"vortex\"", "\"vortex\"", "vorticity"),
-        (
-            "name = \"order\"",
-            "name = \"speed\"",
-            "\"speed\"\ntitle = \"Order\"",
-            "name of its own",
-        ),
-        (
-            "name = \"order\"",
-            "name = \"a/b\"",
-            "\"a/b\"",
-            "letters, digits",
-        ),
+        ("name = \"order\"", "name = \"speed\"", "\"speed\"\ntitle = \"Order\"", "name of its own"),
+        ("name = \"order\"", "name = \"a/b\"", "\"a/b\"", "letters, digits"),
         ("to = [1, 1]", "to = [1, 0]", "[1, 0]", "lower left"),
-        (
-            "field = {",
-            "y = { label = \"\" }\nfield = {",
-            "\"lid\"",
-            "pictures have",
-        ),
+        ("field = {", "y = { label = \"\" }\nfield = {", "\"lid\"", "pictures have"),
     ] {
         let text = SUITE.replace(from, to);
         assert_ne!(text, SUITE, "{from}");
@@ -266,9 +214,5 @@ fn problems_are_located() {
         assert!(help.contains(word), "{to}: {help}");
     }
     let (_, read) = suite(&SUITE.replace("reference = 2", ""));
-    assert!(
-        read.unwrap_err()
-            .to_string()
-            .contains("no nonzero reference")
-    );
+    assert!(read.unwrap_err().to_string().contains("no nonzero reference"));
 }

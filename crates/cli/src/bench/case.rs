@@ -51,25 +51,15 @@ fn positions(cells: [usize; 3], grains: usize) -> Result<Vec<DVec3>, Exit> {
     let middle = |n: usize, of: usize| (n as f64 + 0.5) / of as f64;
     // Grains are spread evenly over the lattice points.
     let all = (0..grains).map(|n| (2 * n + 1) * total / (2 * grains));
-    let all = all.map(|n| {
-        DVec3::new(
-            middle(n % nx, nx),
-            middle(n / nx % ny, ny),
-            middle(n / nx / ny, nz),
-        )
-    });
+    let all = all
+        .map(|n| DVec3::new(middle(n % nx, nx), middle(n / nx % ny, ny), middle(n / nx / ny, nz)));
     Ok(all.collect())
 }
 
 impl BenchCase {
     /// Set-up: sampled grains of eight cells diameter in water.
     pub fn setup(&self) -> Result<Setup, Exit> {
-        let BenchCase {
-            cells,
-            grains,
-            scheme,
-            precision,
-        } = *self;
+        let BenchCase { cells, grains, scheme, precision } = *self;
         let spacing = 0.25e-3;
         let mesh = Mesh::cubic(cells, spacing);
         let radius = 4.0 * spacing;
@@ -89,11 +79,7 @@ impl BenchCase {
             .with_scheme(scheme)
             .with_gravity(DVec3::new(0.0, 0.0, -9.81))
             .with_grains(positions(cells, grains)?.into_iter().map(grain))
-            .with_step(StepRule::Limits {
-                cfl: 0.3,
-                viscous: 0.2,
-                max_step: 1e-3,
-            }))
+            .with_step(StepRule::Limits { cfl: 0.3, viscous: 0.2, max_step: 1e-3 }))
     }
 }
 

@@ -44,10 +44,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Exit> {
 fn measures(first: &Record, second: &Record) -> Table {
     let rows = |r: &Record| {
         [
-            (
-                "equivalent diameter [mm]",
-                Some(1e3 * r.equivalent_diameter_m),
-            ),
+            ("equivalent diameter [mm]", Some(1e3 * r.equivalent_diameter_m)),
             ("a [mm]", Some(1e3 * r.a_m)),
             ("b [mm]", Some(1e3 * r.b_m)),
             ("c [mm]", Some(1e3 * r.c_m)),

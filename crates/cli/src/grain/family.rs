@@ -57,10 +57,7 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
 
 /// Adds the admissible range to an error about the flatness.
 fn refused(error: ShapeError, sphericity: f64) -> Exit {
-    let ShapeError::BadParameter {
-        name: "flatness", ..
-    } = error
-    else {
+    let ShapeError::BadParameter { name: "flatness", .. } = error else {
         return error.into();
     };
     let least = (1e3 * sphericity.powi(3).max(0.2) - 1e-3).ceil() / 1e3;

@@ -45,21 +45,15 @@ fn build(body: &Body, options: &ShapeOptions) -> Result<Shape, Exit> {
             let [a, b, c] = three("edges", edges)?;
             analytic::rounded_box(a, b, c, length("--radius", radius)?, options)?
         }
-        Body::Cylinder {
-            diameter, height, ..
-        } => {
+        Body::Cylinder { diameter, height, .. } => {
             let (radius, height) = round(diameter, height)?;
             analytic::cylinder(radius, height, options)?
         }
-        Body::Capsule {
-            diameter, height, ..
-        } => {
+        Body::Capsule { diameter, height, .. } => {
             let (radius, height) = round(diameter, height)?;
             analytic::capsule(radius, height, options)?
         }
-        Body::Superquadric {
-            axes, exponents, ..
-        } => {
+        Body::Superquadric { axes, exponents, .. } => {
             let semi_axes = three("axes", axes)?.map(|x| 0.5 * x);
             analytic::superquadric(semi_axes, exponents[0], exponents[1], options)?
         }

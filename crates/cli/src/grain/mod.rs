@@ -58,10 +58,7 @@ fn plausible(shape: &Shape, new: &NewGrain, option: &str) -> Result<(), Exit> {
 }
 
 fn options(new: &NewGrain) -> ShapeOptions {
-    let mut options = ShapeOptions {
-        nodes: new.common.nodes,
-        ..ShapeOptions::default()
-    };
+    let mut options = ShapeOptions { nodes: new.common.nodes, ..ShapeOptions::default() };
     if let Some(cells) = new.common.cells {
         options.cells = cells;
     }
@@ -110,9 +107,7 @@ fn grain_file(path: &Path) -> Result<(), Exit> {
 
 /// Extensions of other files that are read or written here. Those of grain files, also misspelled
 /// ones, begin with "gr".
-const FILES: [&str; 10] = [
-    "stl", "ply", "obj", "tif", "tiff", "npy", "npz", "nrrd", "mha", "png",
-];
+const FILES: [&str; 10] = ["stl", "ply", "obj", "tif", "tiff", "npy", "npz", "nrrd", "mha", "png"];
 
 /// Refuses a new folder with the extension of a file, which indicates a mistake.
 fn folder(path: &Path) -> Result<(), Exit> {
@@ -123,10 +118,7 @@ fn folder(path: &Path) -> Result<(), Exit> {
     }
     Err(Exit::with_help(
         BAD_INPUT,
-        format!(
-            "{} is a folder with the extension of a file",
-            path.display()
-        ),
+        format!("{} is a folder with the extension of a file", path.display()),
         "use a name without this extension; from-scan writes a single grain to NAME.grain",
     ))
 }

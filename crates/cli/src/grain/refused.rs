@@ -36,12 +36,8 @@ pub fn lines(refused: &[Refused]) -> Vec<String> {
         if group.len() > FEW {
             return vec![together(reason, group)];
         }
-        let alone = |r: &&Refused| {
-            format!(
-                "label {} ({} voxels) rejected: {}",
-                r.label, r.voxels, r.why
-            )
-        };
+        let alone =
+            |r: &&Refused| format!("label {} ({} voxels) rejected: {}", r.label, r.voxels, r.why);
         group.iter().map(alone).collect()
     });
     lines.collect()

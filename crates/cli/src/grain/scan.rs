@@ -123,16 +123,9 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     let Scan { grains, labels, .. } = scan;
     let place = &args.new.output;
     let path = |label: u32| -> PathBuf { place.join(format!("label-{label:05}.grain")) };
-    let (table, sheet, image) = (
-        place.join("table.csv"),
-        place.join("sheet.png"),
-        place.join("labels.tif"),
-    );
-    let usable = || {
-        grains
-            .iter()
-            .filter_map(|g| Some((g.label, g.shape.as_ref().ok()?)))
-    };
+    let (table, sheet, image) =
+        (place.join("table.csv"), place.join("sheet.png"), place.join("labels.tif"));
+    let usable = || grains.iter().filter_map(|g| Some((g.label, g.shape.as_ref().ok()?)));
     let earlier = earlier(place);
     for file in &earlier {
         may_write(file, args.new.common.force)?;
@@ -193,11 +186,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
         }
     }
     lines(&refused).iter().for_each(|line| tell!("{line}"));
-    tell!(
-        "{} written, {} rejected",
-        count(rows.len(), "grain"),
-        refused.len()
-    );
+    tell!("{} written, {} rejected", count(rows.len(), "grain"), refused.len());
     let advice = advice(&refused, rows.len(), &labels, args);
     if rows.is_empty() {
         let message = "no label of the image gives a valid grain";

@@ -19,9 +19,7 @@ pub fn of(r: &Record, path: &Path) -> String {
     let extents = lengths([r.a_m, r.b_m, r.c_m]);
     let feret = r.krumbein_sphericity_feret;
     let feret = feret.map_or(String::new(), |s| format!(", by Feret diameters {s:.4}"));
-    let cutoff = r
-        .roundness_cutoff_m
-        .filter(|_| r.wadell_roundness.is_some());
+    let cutoff = r.roundness_cutoff_m.filter(|_| r.wadell_roundness.is_some());
     let cutoff = cutoff.map_or(String::new(), |c| format!(" (cut-off {})", mm(c)));
     let radius = |x: f64| format!("radius {}", mm(x));
     let [ix, iy, iz] = r.inertia_m5.map(|i| format!("{i:.5e}"));
@@ -34,22 +32,13 @@ pub fn of(r: &Record, path: &Path) -> String {
         ("Feret diameters", r.feret_m.map_or_else(missing, lengths)),
         ("elongation b/a", format!("{:.4}", r.elongation)),
         ("flatness c/b", format!("{:.4}", r.flatness)),
-        (
-            "Krumbein sphericity",
-            format!("{:.4}{feret}", r.krumbein_sphericity),
-        ),
+        ("Krumbein sphericity", format!("{:.4}{feret}", r.krumbein_sphericity)),
         ("Wadell sphericity", format!("{:.4}", r.wadell_sphericity)),
         ("Wadell roundness", optional(r.wadell_roundness) + &cutoff),
-        (
-            "inscribed sphere",
-            r.inscribed_radius_m.map_or_else(missing, radius),
-        ),
+        ("inscribed sphere", r.inscribed_radius_m.map_or_else(missing, radius)),
         ("convexity", optional(r.convexity)),
         ("surface area", format!("{:.6e} m2", r.surface_area_m2)),
-        (
-            "principal moments",
-            format!("{ix}, {iy}, {iz} m5 (per unit density)"),
-        ),
+        ("principal moments", format!("{ix}, {iy}, {iz} m5 (per unit density)")),
         ("surface nodes", r.surface_nodes.to_string()),
     ];
     if let (Some([nx, ny, nz]), Some(spacing)) = (r.field_samples, r.field_spacing_m) {

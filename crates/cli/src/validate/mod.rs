@@ -62,11 +62,8 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
             if args.judge && !is_finished(run, &folder)? {
                 continue;
             }
-            let ending = if args.judge {
-                Ok(())
-            } else {
-                execute(args, suite, run, &folder, stop.clone())?
-            };
+            let ending =
+                if args.judge { Ok(()) } else { execute(args, suite, run, &folder, stop.clone())? };
             let found = match ending {
                 Ok(()) => suite.evaluate(run, &folder, &mut known),
                 Err(why) => suite.results_of_failed_run(run, &why),
@@ -80,10 +77,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     if args.judge && results.is_empty() {
         return Err(Exit::with_help(
             BAD_INPUT,
-            format!(
-                "{}: no finished run of these validations",
-                args.output.display()
-            ),
+            format!("{}: no finished run of these validations", args.output.display()),
             "omit --judge to execute them, or give their folder with -o",
         ));
     }
@@ -116,11 +110,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     let missed: Vec<String> = results.iter().filter(|v| !v.pass).map(line).collect();
     Err(Exit::new(
         MISSED,
-        format!(
-            "{short} of {} fall short:\n{}",
-            results.len(),
-            missed.join("\n")
-        ),
+        format!("{short} of {} fall short:\n{}", results.len(), missed.join("\n")),
     ))
 }
 
@@ -195,29 +185,14 @@ fn execute(
     let threads = threads::resolve(args.threads);
     if !args.quiet {
         let cells = case.setup.mesh.cells;
-        tell!(
-            "{}/{}: {} x {} x {} cells",
-            suite.name,
-            run.name,
-            cells[0],
-            cells[1],
-            cells[2]
-        );
+        tell!("{}/{}: {} x {} x {} cells", suite.name, run.name, cells[0], cells[1], cells[2]);
     }
     let options = Options {
-        existing: if args.resume {
-            Existing::Reuse
-        } else {
-            Existing::Replace
-        },
+        existing: if args.resume { Existing::Reuse } else { Existing::Replace },
         command: std::env::args().collect(),
         threads,
     };
-    let diameter = case
-        .setup
-        .grains
-        .first()
-        .map(|g| g.shape.equivalent_diameter());
+    let diameter = case.setup.grains.first().map(|g| g.shape.equivalent_diameter());
     let mut shown = ProgressDisplay::new(args.quiet, stop.clone(), diameter);
     let ending = threads::on(threads, || {
         let ending = grainwake_run::run(case.job(), folder, &options, &mut shown);
@@ -245,11 +220,7 @@ fn listing(suites: &[Suite]) -> String {
     for suite in suites {
         lines.push(format!("{}: {}", suite.name, suite.title));
         for run in &suite.runs {
-            let level = if run.level == Level::Full {
-                " (full)"
-            } else {
-                ""
-            };
+            let level = if run.level == Level::Full { " (full)" } else { "" };
             let checks: Vec<&str> = run.checks.iter().map(|c| c.quantity.as_str()).collect();
             lines.push(format!("  {}{level}: {}", run.name, checks.join(", ")));
         }

@@ -39,10 +39,7 @@ pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Res
                 continue;
             };
             let title = figure.title.as_str();
-            write_figure(
-                &place,
-                Figure::new(name, title, figure.description(), drawing),
-            )?;
+            write_figure(&place, Figure::new(name, title, figure.description(), drawing))?;
             count += 1;
         }
     }

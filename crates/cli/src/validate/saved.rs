@@ -72,12 +72,8 @@ pub fn add(
     let new: Vec<_> = results.iter().map(key).collect();
     saved.results.retain(|v| !new.contains(&key(v)));
     saved.results.extend(results.iter().cloned());
-    saved
-        .results
-        .sort_by_key(|v| place(suites, &v.name, &v.run));
-    saved
-        .runs
-        .retain(|r| !new.contains(&(r.name.clone(), r.run.clone())));
+    saved.results.sort_by_key(|v| place(suites, &v.name, &v.run));
+    saved.runs.retain(|r| !new.contains(&(r.name.clone(), r.run.clone())));
     let mut seen = Vec::new();
     for (name, run) in new {
         if seen.contains(&(name.clone(), run.clone())) {
@@ -145,8 +141,7 @@ fn markdown(level: &str, saved: &Saved) -> String {
             run.cells.map_or_else(|| "-".into(), |n| n.to_string()),
             run.steps,
             run.wall_s,
-            run.cost()
-                .map_or_else(|| "-".into(), |ns| format!("{ns:.0}")),
+            run.cost().map_or_else(|| "-".into(), |ns| format!("{ns:.0}")),
             run.threads,
             run.commit.as_deref().unwrap_or("unknown"),
             run.cpu

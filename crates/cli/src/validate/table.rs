@@ -49,16 +49,7 @@ pub fn line(v: &CheckResult) -> String {
 pub fn table(results: &[CheckResult]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header([
-        "validation",
-        "run",
-        "quantity",
-        "value",
-        "reference",
-        "error",
-        "bound",
-        "",
-    ]);
+    table.set_header(["validation", "run", "quantity", "value", "reference", "error", "bound", ""]);
     for v in results {
         table.add_row([
             v.name.clone(),

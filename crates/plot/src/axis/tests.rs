@@ -7,10 +7,7 @@ fn texts(axis: &Axis) -> Vec<&str> {
 #[test]
 fn ticks_are_round() {
     let axis = Axis::linear("t [s]", -0.13, 0.43, 6, AxisRange::Rounded);
-    assert_eq!(
-        texts(&axis),
-        ["−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]
-    );
+    assert_eq!(texts(&axis), ["−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
     assert_eq!((axis.low(), axis.high()), (-0.2, 0.5));
     let tight = Axis::linear("t [s]", 0.0, 0.97, 5, AxisRange::Tight);
     assert_eq!(texts(&tight), ["0.0", "0.2", "0.4", "0.6", "0.8"]);
@@ -31,20 +28,10 @@ fn a_little_beyond_a_round_value_costs_a_little() {
 
 #[test]
 fn a_tight_axis_has_two_ticks_at_least() {
-    for (low, high) in [
-        (3.1, 8.9),
-        (0.6, 1.9),
-        (11.0, 14.0),
-        (-0.4, 0.9),
-        (52.0, 61.0),
-    ] {
+    for (low, high) in [(3.1, 8.9), (0.6, 1.9), (11.0, 14.0), (-0.4, 0.9), (52.0, 61.0)] {
         for count in [1, 2, 3] {
             let axis = Axis::linear("x", low, high, count, AxisRange::Tight);
-            assert!(
-                axis.ticks.len() >= 2,
-                "{low} {high} {count}: {:?}",
-                texts(&axis)
-            );
+            assert!(axis.ticks.len() >= 2, "{low} {high} {count}: {:?}", texts(&axis));
             let inside = |v: &f64| *v > low - 1e-5 && *v < high + 1e-5;
             assert!(axis.ticks.iter().all(|(v, _)| inside(v)));
         }
@@ -58,10 +45,7 @@ fn angles_have_ticks_of_their_own() {
     let half = Axis::degrees("tilt", 0.0, 133.7);
     assert_eq!(texts(&half), ["0", "45", "90", "135"]);
     assert_eq!((half.low(), half.high()), (0.0, 135.0));
-    assert_eq!(
-        texts(&Axis::degrees("tilt", 0.0, 180.0)).last(),
-        Some(&"180")
-    );
+    assert_eq!(texts(&Axis::degrees("tilt", 0.0, 180.0)).last(), Some(&"180"));
 }
 
 #[test]
@@ -109,14 +93,8 @@ fn close_log_axes_end_and_are_labelled_between_decades() {
 fn empty_or_broken_ranges_can_be_drawn() {
     for (low, high) in [(1.0, 1.0), (0.0, 0.0), (f64::NAN, 2.0), (5.0, -5.0)] {
         let axis = Axis::linear("x", low, high, 5, AxisRange::Rounded);
-        assert!(
-            axis.high() > axis.low() && axis.ticks.len() >= 2,
-            "{low} {high}"
-        );
+        assert!(axis.high() > axis.low() && axis.ticks.len() >= 2, "{low} {high}");
     }
-    assert_eq!(
-        extent([f64::NAN, 2.0, -1.0, f64::INFINITY]),
-        Some((-1.0, 2.0))
-    );
+    assert_eq!(extent([f64::NAN, 2.0, -1.0, f64::INFINITY]), Some((-1.0, 2.0)));
     assert_eq!(extent([f64::NAN]), None);
 }

@@ -82,8 +82,7 @@ pub fn name_positions<'a>(
 
 /// Returns the position of a mark along the axis, if it lies inside its range.
 fn fraction_inside(axis: &Axis, mark: &VerticalMark) -> Option<f64> {
-    axis.fraction(mark.at)
-        .filter(|fraction| (0.0..=1.0).contains(fraction))
+    axis.fraction(mark.at).filter(|fraction| (0.0..=1.0).contains(fraction))
 }
 
 /// Returns the centre, kept on the drawing, and half the width of a name at `at` [pt].
@@ -101,10 +100,7 @@ mod tests {
     #[test]
     fn names_of_marks_do_not_overlap() {
         let x = Axis::linear("t", 0.0, 10.0, 5, AxisRange::Tight);
-        let mark = |at, name: &str| VerticalMark {
-            at,
-            name: name.to_owned(),
-        };
+        let mark = |at, name: &str| VerticalMark { at, name: name.to_owned() };
         let marks = [
             mark(5.0, "kiss"),
             mark(5.1, "role change"),
@@ -117,17 +113,8 @@ mod tests {
         ];
         let placed = name_positions(&x, &marks, 200.0);
         assert_eq!(
-            placed
-                .iter()
-                .map(|(row, _, name)| (*row, *name))
-                .collect::<Vec<_>>(),
-            [
-                (0, "kiss"),
-                (1, "role change"),
-                (2, "separation"),
-                (3, "landing"),
-                (4, "rest")
-            ]
+            placed.iter().map(|(row, _, name)| (*row, *name)).collect::<Vec<_>>(),
+            [(0, "kiss"), (1, "role change"), (2, "separation"), (3, "landing"), (4, "rest")]
         );
     }
 }

@@ -30,12 +30,7 @@ pub struct Series {
 impl Series {
     /// Creates a solid curve without an entry in the legend.
     pub fn new(points: Vec<(f64, f64)>, colour: &'static str) -> Series {
-        Series {
-            name: None,
-            points,
-            colour,
-            dash: None,
-        }
+        Series { name: None, points, colour, dash: None }
     }
 
     /// Sets the name in the legend.
@@ -87,32 +82,19 @@ impl Panel {
     pub fn linear(label: &str, series: Vec<Series>, also: &[f64], height: f64) -> Panel {
         let values = series.iter().flat_map(Series::values);
         let (low, high) = extent(values.chain(also.iter().copied())).unwrap_or((0.0, 1.0));
-        Panel::with_axis(
-            Axis::linear(label, low, high, 5, AxisRange::Rounded),
-            series,
-            height,
-        )
+        Panel::with_axis(Axis::linear(label, low, high, 5, AxisRange::Rounded), series, height)
     }
 
     /// Creates a panel with a logarithmic axis; `None` if no value is positive.
     pub fn log(label: &str, series: Vec<Series>, height: f64) -> Option<Panel> {
         let values = series.iter().flat_map(Series::values);
         let (low, high) = extent(values.filter(|v| *v > 0.0))?;
-        Some(Panel::with_axis(
-            Axis::log(label, low, high),
-            series,
-            height,
-        ))
+        Some(Panel::with_axis(Axis::log(label, low, high), series, height))
     }
 
     /// Creates a panel with a given vertical axis.
     pub fn with_axis(y: Axis, series: Vec<Series>, height: f64) -> Panel {
-        Panel {
-            y,
-            series,
-            levels: Vec::new(),
-            height,
-        }
+        Panel { y, series, levels: Vec::new(), height }
     }
 }
 
@@ -138,11 +120,7 @@ pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) ->
     };
     // A long label makes its panel taller.
     let height = |panel: &Panel| panel.height.max(text::width(&panel.y.label, TEXT) + 4.0);
-    let heights: f64 = panels
-        .iter()
-        .enumerate()
-        .map(|(i, panel)| top(i) + height(panel))
-        .sum();
+    let heights: f64 = panels.iter().enumerate().map(|(i, panel)| top(i) + height(panel)).sum();
     let mut drawing = Drawing::new(COLUMN, heights + 26.0);
     let mut y = 0.0;
     for (i, panel) in panels.iter().enumerate() {
@@ -214,9 +192,7 @@ fn note_position(frame: &Frame, panel: &Panel, y: f64, width: f64) -> (f64, f64)
     let places = ends.iter().flat_map(|left| bases.map(|base| (*left, base)));
     let inside =
         |(_, base): &(f64, f64)| *base > frame.y + SMALL && *base < frame.y + frame.height - 1.0;
-    let best = places
-        .filter(inside)
-        .min_by_key(|(left, base)| covered(*left, *base));
+    let best = places.filter(inside).min_by_key(|(left, base)| covered(*left, *base));
     best.unwrap_or((ends[0], bases[0]))
 }
 
@@ -227,23 +203,13 @@ mod tests {
     #[test]
     fn notes_keep_off_the_curves() {
         let x = Axis::linear("t", 0.0, 10.0, 5, AxisRange::Tight);
-        let points = (0..=100)
-            .map(|i| (0.1 * f64::from(i), if i < 60 { 1.0 } else { 5.5 }))
-            .collect();
+        let points =
+            (0..=100).map(|i| (0.1 * f64::from(i), if i < 60 { 1.0 } else { 5.5 })).collect();
         let y = Axis::linear("y", 0.0, 10.0, 5, AxisRange::Tight);
         let panel = Panel::with_axis(y, vec![Series::new(points, FAINT)], 100.0);
-        let frame = Frame {
-            across: x,
-            up: panel.y.clone(),
-            x: 40.0,
-            y: 10.0,
-            width: 200.0,
-            height: 100.0,
-        };
+        let frame =
+            Frame { across: x, up: panel.y.clone(), x: 40.0, y: 10.0, width: 200.0, height: 100.0 };
         let (left, base) = note_position(&frame, &panel, 60.0, 30.0);
-        assert!(
-            left > 200.0 && base > 60.0,
-            "to the right, below the line: {left} {base}"
-        );
+        assert!(left > 200.0 && base > 60.0, "to the right, below the line: {left} {base}");
     }
 }

@@ -22,10 +22,7 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
     let mut curves = vec![Series::new(centres, style::INK).named("centres, *D*_{r}")];
     let surfaces = scene.diagnostic(&["surface_gap", "gap", "min_gap"]);
     if let Some(surfaces) = surfaces.filter(|gap| gap.iter().any(|p| p.1.is_finite())) {
-        let points = surfaces
-            .into_iter()
-            .map(|(time, gap)| (time, gap / unit))
-            .collect();
+        let points = surfaces.into_iter().map(|(time, gap)| (time, gap / unit)).collect();
         let curve = Series::new(points, style::BLUE).named("surfaces");
         curves.push(curve.dashed("4 1.5"));
     }
@@ -50,25 +47,13 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
         short(closest),
         short(last)
     );
-    let role_change = scene
-        .run
-        .events
-        .iter()
-        .find(|event| event.kind == EventKind::RoleChange);
+    let role_change = scene.run.events.iter().find(|event| event.kind == EventKind::RoleChange);
     for (text, time) in [
-        (
-            "First contact at",
-            features.kiss.map(|kiss| features.pair_event_text(kiss)),
-        ),
-        (
-            "Role change at",
-            role_change.map(|event| features.time_text(event.time)),
-        ),
+        ("First contact at", features.kiss.map(|kiss| features.pair_event_text(kiss))),
+        ("Role change at", role_change.map(|event| features.time_text(event.time))),
         (
             "Separation at",
-            features
-                .separation
-                .map(|separation| features.pair_event_text(separation)),
+            features.separation.map(|separation| features.pair_event_text(separation)),
         ),
     ] {
         if let Some(time) = time {
@@ -86,19 +71,10 @@ pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
     let vertical = pair.map(|grain| scene.curve(grain, |h, row| h.velocity[row].dot(up) / unit));
     let speed = |h: &History, row: usize| h.velocity[row].reject_from_normalized(up).length();
     let horizontal = pair.map(|grain| scene.curve(grain, |h, row| speed(h, row) / unit));
-    let fastest = vertical
-        .each_ref()
-        .map(|curve| curve.values().fold(0.0, f64::min));
-    let sideways = horizontal
-        .iter()
-        .flat_map(Series::values)
-        .fold(0.0, f64::max);
+    let fastest = vertical.each_ref().map(|curve| curve.values().fold(0.0, f64::min));
+    let sideways = horizontal.iter().flat_map(Series::values).fold(0.0, f64::max);
     let (v, h, unit) = match scene.features.scales {
-        Some(_) => (
-            "*v*_{z} / √(*d* *g*)  [–]",
-            "|*v*_{h}| / √(*d* *g*)  [–]",
-            " √(d g)",
-        ),
+        Some(_) => ("*v*_{z} / √(*d* *g*)  [–]", "|*v*_{h}| / √(*d* *g*)  [–]", " √(d g)"),
         None => ("*v*_{z}  [m/s]", "|*v*_{h}|  [m/s]", " m/s"),
     };
     let caption = format!(
@@ -119,10 +95,8 @@ pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
 pub fn single_velocity(scene: &Scene) -> Option<Figure> {
     let grain = *scene.moving().first()?;
     let (up, facts) = (scene.features.up, &scene.run.facts);
-    let curve = |value: &dyn Fn(&History, usize) -> f64| Series {
-        name: None,
-        ..scene.curve(grain, value)
-    };
+    let curve =
+        |value: &dyn Fn(&History, usize) -> f64| Series { name: None, ..scene.curve(grain, value) };
     let vertical = curve(&|h, row| h.velocity[row].dot(up));
     let points = vertical.points.iter().copied();
     let peak = points.min_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -131,12 +105,7 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
         short(peak.1),
         short(peak.0)
     );
-    let mut panels = vec![Panel::linear(
-        "*v*_{z}  [m/s]",
-        vec![vertical],
-        &[0.0],
-        100.0,
-    )];
+    let mut panels = vec![Panel::linear("*v*_{z}  [m/s]", vec![vertical], &[0.0], 100.0)];
     if let Some(scales) = scene.features.scales {
         let scaled = curve(&|h, row| h.velocity[row].dot(up) / scales.velocity());
         let label = "*v*_{z} / √(*d* *g*)  [–]";
@@ -151,10 +120,7 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
         panels.push(Panel::linear(label, vec![reynolds], &[0.0], 65.0));
         caption += &match scene.features.scales.zip(facts.density_ratio()) {
             Some((scales, ratio)) => {
-                format!(
-                    " (Galileo number {}).",
-                    short(galileo(scales, ratio, viscosity))
-                )
+                format!(" (Galileo number {}).", short(galileo(scales, ratio, viscosity)))
             }
             None => ".".to_owned(),
         };

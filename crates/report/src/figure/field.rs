@@ -48,9 +48,7 @@ pub fn draw(panels: &[Panel], style: &Style) -> Result<Drawing, String> {
 fn column(panel: &Panel) -> Result<Column, String> {
     let section = Section::of(panel.image, 2)?;
     let whole = section.whole();
-    let window = panel
-        .window
-        .map_or(whole, |wanted| wanted.intersection(whole));
+    let window = panel.window.map_or(whole, |wanted| wanted.intersection(whole));
     if !(window.width() > 0.0 && window.height() > 0.0) {
         return Err("the window lies outside the slice".to_owned());
     }
@@ -98,11 +96,8 @@ mod tests {
             let (x, z) = ((i % 20) as f64 + 0.5, (i / 20) as f64 + 0.5);
             (4.5 - (x - 10.0).hypot(z - 5.0)).clamp(0.0, 1.0) as f32
         };
-        let array = |name: &str, components, data| Array {
-            name: name.to_owned(),
-            components,
-            data,
-        };
+        let array =
+            |name: &str, components, data| Array { name: name.to_owned(), components, data };
         Image {
             frame: Frame {
                 cells: [20, 1, 10],
@@ -112,11 +107,7 @@ mod tests {
             },
             arrays: vec![
                 array("solid_fraction", 1, (0..200).map(inside).collect()),
-                array(
-                    "velocity",
-                    3,
-                    (0..600).map(|i| f32::from(u8::from(i % 3 == 0))).collect(),
-                ),
+                array("velocity", 3, (0..600).map(|i| f32::from(u8::from(i % 3 == 0))).collect()),
             ],
         }
     }
@@ -130,10 +121,7 @@ mod tests {
             window,
             run: None,
         };
-        let window = Window {
-            low: (5.0, -1.0),
-            high: (15.0, 10.0),
-        };
+        let window = Window { low: (5.0, -1.0), high: (15.0, 10.0) };
         let style = |quantity| Style {
             length: Some("d".to_owned()),
             arrows: false,
@@ -144,17 +132,11 @@ mod tests {
             let drawing = draw(&both, &style(quantity)).unwrap();
             let svg = drawing.to_svg("f", "t", "d");
             assert!(svg.contains(">whole<") && svg.contains(">part<"));
-            assert!(
-                svg.contains("/<tspan font-style=\"italic\">d</tspan>"),
-                "{svg}"
-            );
+            assert!(svg.contains("/<tspan font-style=\"italic\">d</tspan>"), "{svg}");
         }
         let problem = draw(&both, &style(Quantity::Vorticity)).unwrap_err();
         assert!(problem.contains("no such quantity"));
-        let outside = Window {
-            low: (30.0, 0.0),
-            high: (40.0, 5.0),
-        };
+        let outside = Window { low: (30.0, 0.0), high: (40.0, 5.0) };
         assert!(draw(&[panel("out", Some(outside))], &style(Quantity::Speed)).is_err());
     }
 }

@@ -116,10 +116,7 @@ impl GrainSurface {
         let by_size = |i: &usize, j: &usize| moments[*i].total_cmp(&moments[*j]);
         let (long, short) = ((0..3).max_by(by_size)?, (0..3).min_by(by_size)?);
         let clear = moments[long] > 1.04 * moments[short];
-        clear.then_some(PrincipalAxes {
-            long: DVec3::AXES[long],
-            short: DVec3::AXES[short],
-        })
+        clear.then_some(PrincipalAxes { long: DVec3::AXES[long], short: DVec3::AXES[short] })
     }
 }
 
@@ -157,10 +154,7 @@ fn add_surfaces(
     let only = (histories.len() == 1).then_some(0);
     let mut parts: BTreeMap<usize, Vec<[usize; 3]>> = BTreeMap::new();
     for (i, triangle) in surface.triangles.iter().enumerate() {
-        let listed = surface
-            .grains
-            .as_ref()
-            .and_then(|grains| grains.get(i).copied());
+        let listed = surface.grains.as_ref().and_then(|grains| grains.get(i).copied());
         if let Some(grain) = listed.or(grain_of_file).or(only) {
             parts.entry(grain).or_default().push(*triangle);
         }
@@ -179,8 +173,7 @@ fn add_surfaces(
             })
         };
         let triangles = triangles.into_iter().map(|t| t.map(&mut number)).collect();
-        out.entry(grain)
-            .or_insert(GrainSurface { points, triangles });
+        out.entry(grain).or_insert(GrainSurface { points, triangles });
     }
 }
 
@@ -205,9 +198,7 @@ fn largest_outline(points: &[(f64, f64)], triangles: &[[usize; 3]]) -> Outline {
         return Outline::new();
     }
     let (x0, y0) = (x0 - 4.5 * step, y0 - 4.5 * step);
-    let local = points
-        .iter()
-        .map(|(x, y)| ((x - x0) / step, (y - y0) / step));
+    let local = points.iter().map(|(x, y)| ((x - x0) / step, (y - y0) / step));
     let local: Vec<(f64, f64)> = local.collect();
     let mut mask = vec![0.0; SAMPLES * SAMPLES];
     for triangle in triangles {
@@ -262,22 +253,11 @@ mod tests {
             let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
             DVec3::new(a * sign(0), b * sign(1), c * sign(2))
         };
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|[p, q, r, s]| [[*p, *q, *r], [*p, *r, *s]])
-            .collect();
-        GrainSurface {
-            points: (0..8).map(corner).collect(),
-            triangles,
-        }
+        let quads =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles =
+            quads.iter().flat_map(|[p, q, r, s]| [[*p, *q, *r], [*p, *r, *s]]).collect();
+        GrainSurface { points: (0..8).map(corner).collect(), triangles }
     }
 
     fn area(ring: &[(f64, f64)]) -> f64 {
@@ -295,17 +275,8 @@ mod tests {
         let at = DVec3::new(0.1, 0.2, 0.3);
         let side = body.outline(at, DQuat::IDENTITY, 0, 2);
         assert!((area(&side) / 4e-6 - 1.0).abs() < 0.03, "{}", area(&side));
-        let turned = body.outline(
-            at,
-            DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),
-            0,
-            2,
-        );
-        assert!(
-            (area(&turned) / 2e-6 - 1.0).abs() < 0.03,
-            "{}",
-            area(&turned)
-        );
+        let turned = body.outline(at, DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2), 0, 2);
+        assert!((area(&turned) / 2e-6 - 1.0).abs() < 0.03, "{}", area(&turned));
         let centre = side.iter().map(|p| p.0).sum::<f64>() / side.len() as f64;
         assert!((centre - 0.1).abs() < 1e-4);
     }
@@ -332,10 +303,7 @@ mod tests {
 
     #[test]
     fn flat_or_empty_bodies_have_no_outline() {
-        let body = GrainSurface {
-            points: vec![DVec3::ZERO; 3],
-            triangles: vec![[0, 1, 2]],
-        };
+        let body = GrainSurface { points: vec![DVec3::ZERO; 3], triangles: vec![[0, 1, 2]] };
         assert!(body.outline(DVec3::ZERO, DQuat::IDENTITY, 0, 2).is_empty());
         assert_eq!(circle((1.0, 2.0), 0.5).len(), 48);
     }

@@ -40,12 +40,7 @@ pub fn many(scene: &Scene) -> Option<Figure> {
     );
     if last_contacts.is_finite() {
         let contacts = curve(contacts, style::GREEN);
-        panels.push(Panel::linear(
-            "contacts per grain  [–]",
-            contacts,
-            &[0.0],
-            70.0,
-        ));
+        panels.push(Panel::linear("contacts per grain  [–]", contacts, &[0.0], 70.0));
         let last = short(last_contacts);
         caption += &format!(" (c) Mean number of contacts of a grain, {last} at the end.");
     }
@@ -99,26 +94,15 @@ pub fn force(scene: &Scene) -> Option<Figure> {
     let component = |(axis, colour): (usize, &'static str)| Series {
         name: Some(format!("*F*_{{{}}}", AXES[axis])),
         colour,
-        ..scene.curve(grain, |h, row| {
-            h.force[row].map_or(f64::NAN, |force| force[axis])
-        })
+        ..scene.curve(grain, |h, row| h.force[row].map_or(f64::NAN, |force| force[axis]))
     };
     let colours = [style::BLUE, style::VERMILION, style::GREEN];
     let curves: Vec<Series> = colours.into_iter().enumerate().map(component).collect();
     let known = |v: f64| v.is_finite() && v != 0.0;
     let known = curves.iter().flat_map(Series::values).any(known);
-    let last = history
-        .force
-        .last()
-        .copied()
-        .flatten()
-        .filter(|_| known)?
-        .to_array()
-        .map(short);
-    let caption = format!(
-        "Force of the fluid on grain {grain}: ({}) N at the end.",
-        last.join(", ")
-    );
+    let last = history.force.last().copied().flatten().filter(|_| known)?.to_array().map(short);
+    let caption =
+        format!("Force of the fluid on grain {grain}: ({}) N at the end.", last.join(", "));
     let panels = [Panel::linear("force  [N]", curves, &[0.0], 110.0)];
     Some(scene.with_events("force", "Force of the fluid", caption, &panels))
 }
@@ -180,9 +164,7 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
         return None;
     }
     let parts = parts.iter().enumerate();
-    let parts: Vec<String> = parts
-        .map(|(i, part)| format!("{} {part}", letter(i)))
-        .collect();
+    let parts: Vec<String> = parts.map(|(i, part)| format!("{} {part}", letter(i))).collect();
     let caption = format!("Conservation checks: {}.", parts.join("; "));
     Some(scene.without_events("diagnostics", "Diagnostics", caption, &panels))
 }

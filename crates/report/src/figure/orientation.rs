@@ -27,9 +27,7 @@ pub fn figure(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
     let moving = scene.moving();
     let up = scene.features.up;
     let angle = |axis: DVec3| axis.dot(up).abs().min(1.0).acos().to_degrees();
-    let known = moving
-        .iter()
-        .filter_map(|g| Some((*g, scene.surfaces.get(g)?.axes()?)));
+    let known = moving.iter().filter_map(|g| Some((*g, scene.surfaces.get(g)?.axes()?)));
     let axes: Vec<(usize, PrincipalAxes)> = known.collect();
     let mut panels = Vec::new();
     let mut caption = String::new();

@@ -39,18 +39,11 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
             return Some((a, b));
         };
         let (l, h) = (run.facts.lower[axis], run.facts.lower[axis] + size[axis]);
-        let least = if axis == up {
-            a + margin
-        } else {
-            f64::NEG_INFINITY
-        };
+        let least = if axis == up { a + margin } else { f64::NEG_INFINITY };
         Some((a.max(l), b.min(h).max(least)))
     };
     let (x, y, z) = (span(across)?, span(depth)?, span(up)?);
-    let window = |h: (f64, f64), v: (f64, f64)| Window {
-        low: (h.0, v.0),
-        high: (h.1, v.1),
-    };
+    let window = |h: (f64, f64), v: (f64, f64)| Window { low: (h.0, v.0), high: (h.1, v.1) };
     let (side, top) = (window(x, z), window(x, y));
     // The view from above lies below the side view, or beside that of a tall column.
     let tall = side.height() > 1.2 * side.width();
@@ -78,11 +71,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         (top, (corner.0, TOP + corner.1), [across, depth, up], 1.0),
     ];
     for (i, (window, corner, [h, v, hidden], direction)) in views.into_iter().enumerate() {
-        let frame = EqualAspectFrame {
-            window,
-            corner,
-            scale,
-        };
+        let frame = EqualAspectFrame { window, corner, scale };
         // Grains nearer to the viewer cover others.
         let nearness = |g: &usize| direction * place(*g)[hidden];
         let mut order = grains.clone();
@@ -119,10 +108,5 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         short(1e3 * (high - run.facts.lower[up])),
         scene.left_out(&grains)
     );
-    Some(Figure::new(
-        "positions",
-        "Positions of the grains",
-        caption,
-        drawing,
-    ))
+    Some(Figure::new("positions", "Positions of the grains", caption, drawing))
 }

@@ -69,12 +69,7 @@ impl Scene<'_> {
         caption: String,
         panels: &[Panel],
     ) -> Figure {
-        Figure::new(
-            name,
-            title,
-            caption,
-            stacked_panels(&self.time(), panels, &[]),
-        )
+        Figure::new(name, title, caption, stacked_panels(&self.time(), panels, &[]))
     }
 
     /// Returns a curve of a grain against time.
@@ -119,28 +114,17 @@ impl Scene<'_> {
         let position = self.run.wrapped(history.position[row]);
         let body = self.surfaces.get(&grain);
         let traced = body.map(|body| body.outline(position, history.orientation[row], across, up));
-        traced
-            .filter(|outline| !outline.is_empty())
-            .unwrap_or_else(|| {
-                let own = self
-                    .run
-                    .facts
-                    .grains
-                    .get(grain)
-                    .and_then(|facts| facts.diameter);
-                let diameter = own.or(self.run.facts.diameter()).unwrap_or(0.0);
-                grain_surface::circle((position[across], position[up]), 0.5 * diameter)
-            })
+        traced.filter(|outline| !outline.is_empty()).unwrap_or_else(|| {
+            let own = self.run.facts.grains.get(grain).and_then(|facts| facts.diameter);
+            let diameter = own.or(self.run.facts.diameter()).unwrap_or(0.0);
+            grain_surface::circle((position[across], position[up]), 0.5 * diameter)
+        })
     }
 
     /// Returns the diameter of a grain that is a sphere [m].
     pub fn sphere_diameter(&self, grain: usize) -> Option<f64> {
         let facts = &self.run.facts;
-        facts
-            .grains
-            .get(grain)?
-            .diameter
-            .filter(|_| facts.is_sphere(grain))
+        facts.grains.get(grain)?.diameter.filter(|_| facts.is_sphere(grain))
     }
 
     /// Returns the representation of the grains in words.
@@ -166,11 +150,7 @@ impl Scene<'_> {
             let last = last.map(|x| self.run.wrapped(*x));
             last.is_some_and(|x| x.cmplt(low).any() || x.cmpgt(high).any())
         };
-        let names: Vec<String> = grains
-            .iter()
-            .filter(outside)
-            .map(usize::to_string)
-            .collect();
+        let names: Vec<String> = grains.iter().filter(outside).map(usize::to_string).collect();
         match names.as_slice() {
             [] => String::new(),
             [one] => format!(" Grain {one} has left the box and is not shown there."),
@@ -214,10 +194,7 @@ impl Scene<'_> {
     /// normal of a view.
     pub fn out_of_plane(&self, time: f64, view: SliceView) -> bool {
         let distance = || {
-            let [a, b] = self
-                .features
-                .pair?
-                .map(|grain| self.run.grains[grain].pose(time));
+            let [a, b] = self.features.pair?.map(|grain| self.run.grains[grain].pose(time));
             Some(self.run.nearest(a?.0 - b?.0)[view.normal].abs())
         };
         let diameter = self.run.facts.diameter().unwrap_or(0.0);

@@ -34,11 +34,7 @@ impl SliceView {
             (true, 2) => 1,
             (true, _) => 2,
         };
-        SliceView {
-            normal,
-            across: 3 - normal - up,
-            up,
-        }
+        SliceView { normal, across: 3 - normal - up, up }
     }
 
     /// Projects a point to the plane.
@@ -76,12 +72,7 @@ impl Section {
     /// # Errors
     /// If the image is thicker, or its spacing or origin is unusable.
     pub fn of(image: &Image, vertical: usize) -> Result<Section, String> {
-        let Frame {
-            cells,
-            spacing,
-            origin,
-            ..
-        } = image.frame;
+        let Frame { cells, spacing, origin, .. } = image.frame;
         let [nx, ny, nz] = cells;
         let thin = [1, 0, 2].into_iter().find(|axis| cells[*axis] == 1);
         let normal = thin.ok_or_else(|| {
@@ -98,10 +89,8 @@ impl Section {
             return Err("its spacing or origin cannot be used".to_owned());
         }
         let array = |name: &str, components: usize| {
-            let found = image
-                .arrays
-                .iter()
-                .find(|a| a.name == name && a.components == components)?;
+            let found =
+                image.arrays.iter().find(|a| a.name == name && a.components == components)?;
             Some(&found.data)
         };
         let velocity = array("velocity", 3).map(|data| {
@@ -111,11 +100,8 @@ impl Section {
             };
             order().map(value).collect()
         });
-        let vorticity = array("vorticity", 3).map(|data| {
-            order()
-                .map(|cell| f64::from(data[3 * cell + normal]))
-                .collect()
-        });
+        let vorticity = array("vorticity", 3)
+            .map(|data| order().map(|cell| f64::from(data[3 * cell + normal])).collect());
         let solid = array("solid_fraction", 1)
             .map(|data| order().map(|cell| f64::from(data[cell])).collect());
         Ok(Section {
@@ -136,10 +122,7 @@ impl Section {
         let (x, z) = self.lower;
         Window {
             low: (x, z),
-            high: (
-                x + self.step.0 * self.nx as f64,
-                z + self.step.1 * self.nz as f64,
-            ),
+            high: (x + self.step.0 * self.nx as f64, z + self.step.1 * self.nz as f64),
         }
     }
 
@@ -199,15 +182,9 @@ impl Section {
         };
         let loops = contour::closed_contours(self.nx, self.nz, |i, k| solid[i + self.nx * k], 0.5);
         let place = |(i, k): (f64, f64)| {
-            (
-                self.lower.0 + (i + 0.5) * self.step.0,
-                self.lower.1 + (k + 0.5) * self.step.1,
-            )
+            (self.lower.0 + (i + 0.5) * self.step.0, self.lower.1 + (k + 0.5) * self.step.1)
         };
-        loops
-            .into_iter()
-            .map(|ring| ring.into_iter().map(place).collect())
-            .collect()
+        loops.into_iter().map(|ring| ring.into_iter().map(place).collect()).collect()
     }
 
     /// Returns the window as a raster of `width` x `height` pixels; `position` maps a value to a
@@ -233,12 +210,7 @@ impl Section {
                 pixels.push((255.0 * place.clamp(0.0, 1.0)).round() as u8);
             }
         }
-        Raster {
-            width,
-            height,
-            pixels,
-            palette,
-        }
+        Raster { width, height, pixels, palette }
     }
 }
 
@@ -256,18 +228,10 @@ mod tests {
         let centre = |i: usize| (i % 8) as f32 + 0.5;
         let height = |i: usize| (i / 8) as f32 + 0.5;
         let inside = |i: usize| (centre(i) - 4.0).hypot(height(i) - 3.0) < 1.6;
-        let array = |name: &str, components, data| Array {
-            name: name.to_owned(),
-            components,
-            data,
-        };
+        let array =
+            |name: &str, components, data| Array { name: name.to_owned(), components, data };
         Image {
-            frame: Frame {
-                cells: [8, ny, 6],
-                spacing: DVec3::ONE,
-                origin: DVec3::ZERO,
-                time: 0.0,
-            },
+            frame: Frame { cells: [8, ny, 6], spacing: DVec3::ONE, origin: DVec3::ZERO, time: 0.0 },
             arrays: vec![
                 array(
                     "solid_fraction",
@@ -277,9 +241,7 @@ mod tests {
                 array(
                     "velocity",
                     3,
-                    (0..48)
-                        .flat_map(|i| [height(i), 0.0, 2.0 * centre(i)])
-                        .collect(),
+                    (0..48).flat_map(|i| [height(i), 0.0, 2.0 * centre(i)]).collect(),
                 ),
             ],
         }
@@ -293,11 +255,7 @@ mod tests {
             (section.sample(|i| velocity[i][0], (3.3, 2.9)) - 2.9).abs() < 1e-12,
             "linear fields are exact"
         );
-        assert_eq!(
-            section.sample(|i| velocity[i][1], (-9.0, 3.0)),
-            1.0,
-            "held at the edge"
-        );
+        assert_eq!(section.sample(|i| velocity[i][1], (-9.0, 3.0)), 1.0, "held at the edge");
         assert_eq!(section.place, 0.5);
         assert!(section.vorticity.is_none());
         let step = section.sample(|i| if i % 8 < 4 { 0.0 } else { 1.0 }, (4.9, 2.0));
@@ -309,57 +267,25 @@ mod tests {
         let section = Section::of(&image(1), 2).unwrap();
         let rings = section.outlines();
         assert_eq!(rings.len(), 1);
-        let middle = rings[0]
-            .iter()
-            .fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
+        let middle = rings[0].iter().fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
         let n = rings[0].len() as f64;
         assert!((middle.0 / n - 4.0).abs() < 0.1 && (middle.1 / n - 3.0).abs() < 0.1);
-        let window = Window {
-            low: (0.0, 0.0),
-            high: (4.0, 6.0),
-        };
+        let window = Window { low: (0.0, 0.0), high: (4.0, 6.0) };
         assert_eq!(section.cells_in(window).count(), 24);
         let raster = |size: [usize; 2], shading: Shading| {
             let values = section.solid_fraction().unwrap();
             section.raster(window, size, vec![[0; 3]; 256], values, |v| v, shading)
         };
-        let (flat, raster) = (
-            raster([8, 12], Shading::Flat),
-            raster([4, 6], Shading::Smooth),
-        );
-        assert!(
-            flat.pixels.iter().all(|v| [0, 255].contains(v)),
-            "cells are not blended"
-        );
+        let (flat, raster) = (raster([8, 12], Shading::Flat), raster([4, 6], Shading::Smooth));
+        assert!(flat.pixels.iter().all(|v| [0, 255].contains(v)), "cells are not blended");
         assert_eq!((raster.pixels.len(), raster.pixels[3 + 4 * 3]), (24, 255));
     }
 
     #[test]
     fn every_normal_has_its_view() {
-        assert_eq!(
-            SliceView::along(1, 2),
-            SliceView {
-                normal: 1,
-                across: 0,
-                up: 2
-            }
-        );
-        assert_eq!(
-            SliceView::along(0, 1),
-            SliceView {
-                normal: 0,
-                across: 2,
-                up: 1
-            }
-        );
-        assert_eq!(
-            SliceView::along(2, 2),
-            SliceView {
-                normal: 2,
-                across: 0,
-                up: 1
-            }
-        );
+        assert_eq!(SliceView::along(1, 2), SliceView { normal: 1, across: 0, up: 2 });
+        assert_eq!(SliceView::along(0, 1), SliceView { normal: 0, across: 2, up: 1 });
+        assert_eq!(SliceView::along(2, 2), SliceView { normal: 2, across: 0, up: 1 });
         assert!(SliceView::along(1, 2).clockwise() && !SliceView::along(0, 2).clockwise());
         let mut turned = image(1);
         turned.frame.cells = [1, 8, 6];
@@ -374,10 +300,6 @@ mod tests {
     fn thick_images_are_no_slices() {
         let mut thick = image(1);
         thick.frame.cells[1] = 2;
-        assert!(
-            Section::of(&thick, 2)
-                .unwrap_err()
-                .contains("8 x 2 x 6 cells are no slice")
-        );
+        assert!(Section::of(&thick, 2).unwrap_err().contains("8 x 2 x 6 cells are no slice"));
     }
 }

@@ -129,9 +129,7 @@ impl ColourScale {
                 let (end, largest) = signed_range(values()).unwrap_or((1.0, 0.0));
                 let end = style.limit.unwrap_or(end);
                 let mut sections = columns.iter().flat_map(|c| c.sections.iter().flatten());
-                let normal = sections
-                    .next()
-                    .map_or("", |section| AXES[section.view.normal]);
+                let normal = sections.next().map_or("", |section| AXES[section.view.normal]);
                 let label = format!("vorticity *ω*_{{{normal}}}  [1/s]");
                 (ColorMap::Signed, scale(&label, -end, end, 4), largest)
             }
@@ -202,11 +200,8 @@ pub fn draw(
         drawing.text((middle, 8.5), Anchor::Middle, column.title.trim());
         drawing.label((middle, 18.0), Anchor::Middle, SMALL, INK, &column.time);
         for (r, section) in column.sections.iter().enumerate() {
-            let frame = EqualAspectFrame {
-                window: column.window,
-                corner: (x, row_top(r)),
-                scale: zoom,
-            };
+            let frame =
+                EqualAspectFrame { window: column.window, corner: (x, row_top(r)), scale: zoom };
             match section {
                 Some(section) => {
                     let outlines = column.outlines.get(r).map_or(&[][..], Vec::as_slice);
@@ -230,14 +225,7 @@ pub fn draw(
     let length = 180.0_f64.min(total - 40.0);
     let corner = (0.5 * (total - length), bottom + 28.0);
     let palette = scale.map.palette();
-    colour_bar(
-        &mut drawing,
-        corner,
-        length,
-        &palette,
-        &scale.axis,
-        scale.beyond(),
-    );
+    colour_bar(&mut drawing, corner, length, &palette, &scale.axis, scale.beyond());
     Some(drawing)
 }
 
@@ -305,10 +293,7 @@ fn draw_arrows(
         let (tail, tip) = (end(-0.5), end(0.5));
         let head = 0.35 * length.min(5.0);
         let barb = |side: f64| {
-            (
-                tip.0 - head * (dx - 0.5 * side * dy),
-                tip.1 - head * (dy + 0.5 * side * dx),
-            )
+            (tip.0 - head * (dx - 0.5 * side * dy), tip.1 - head * (dy + 0.5 * side * dx))
         };
         data += &path_data(&[tail, tip], false);
         data += &path_data(&[barb(1.0), tip, barb(-1.0)], false);
@@ -327,19 +312,10 @@ fn shown_values(columns: &[Column], quantity: Quantity) -> impl Iterator<Item = 
     let of_column = move |column: &Column| {
         let of_section = |section: &Section| {
             let values = quantity.values(section).unwrap_or_default();
-            let cells = section
-                .cells_in(column.window)
-                .filter(|c| section.solid(*c) < 0.5);
-            cells
-                .filter_map(|c| values.get(c).copied())
-                .collect::<Vec<f64>>()
+            let cells = section.cells_in(column.window).filter(|c| section.solid(*c) < 0.5);
+            cells.filter_map(|c| values.get(c).copied()).collect::<Vec<f64>>()
         };
-        column
-            .sections
-            .iter()
-            .flatten()
-            .flat_map(of_section)
-            .collect::<Vec<f64>>()
+        column.sections.iter().flatten().flat_map(of_section).collect::<Vec<f64>>()
     };
     columns.iter().flat_map(of_column).filter(|v| v.is_finite())
 }

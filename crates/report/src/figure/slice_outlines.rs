@@ -14,9 +14,7 @@ pub fn of_column(scene: &Scene, column: &Column) -> Vec<Vec<(&'static str, Outli
         (grain.map_or(INK, colour), ring)
     };
     let of_section = |section: &Option<Section>| {
-        let rings = section
-            .iter()
-            .flat_map(|section| rings(scene, column, section));
+        let rings = section.iter().flat_map(|section| rings(scene, column, section));
         rings.map(coloured).collect()
     };
     column.sections.iter().map(of_section).collect()

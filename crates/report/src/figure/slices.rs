@@ -32,9 +32,7 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
         let image = scene.run.slice(frame);
         let section = image.and_then(|image| Section::of(&image, vertical));
         let name = scene.run.short_name(&frame.file);
-        section
-            .map_err(|what| notes.push(format!("{name} was left out: {what}")))
-            .ok()
+        section.map_err(|what| notes.push(format!("{name} was left out: {what}"))).ok()
     };
     let mut out: Vec<Column> = Vec::new();
     let mut apart = false;
@@ -43,9 +41,9 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
         let frames: Vec<&FrameFile> = frames.collect();
         let through = |grain: usize| frames.iter().find(|frame| frame.grain == Some(grain));
         let sections = match scene.features.pair {
-            Some(pair) if through(pair[0]).is_some() => pair
-                .map(|grain| through(grain).and_then(|frame| read(frame)))
-                .to_vec(),
+            Some(pair) if through(pair[0]).is_some() => {
+                pair.map(|grain| through(grain).and_then(|frame| read(frame))).to_vec()
+            }
             _ => vec![frames.first().and_then(|frame| read(frame))],
         };
         let Some(first) = sections.iter().flatten().next() else {
@@ -107,17 +105,11 @@ fn crop(scene: &Scene, columns: &mut [Column]) {
     };
     let widths = columns.iter().map(|c| c.window.width());
     let box_width = widths.fold(f64::INFINITY, f64::min);
-    let width = (8.0 * diameter)
-        .max(widest(|p| p.0) + 4.0 * diameter)
-        .min(box_width);
+    let width = (8.0 * diameter).max(widest(|p| p.0) + 4.0 * diameter).min(box_width);
     let height = (1.9 * width).max(widest(|p| p.1) + 5.0 * diameter);
     // Shifts a range of a given size into the whole range.
     let fit = |low: f64, size: f64, from: f64, to: f64| {
-        let low = if size >= to - from {
-            from
-        } else {
-            low.clamp(from, to - size)
-        };
+        let low = if size >= to - from { from } else { low.clamp(from, to - size) };
         (low, (low + size).min(to))
     };
     for column in columns {
@@ -126,10 +118,7 @@ fn crop(scene: &Scene, columns: &mut [Column]) {
         let left = 0.5 * (x.0 + x.1) - 0.5 * width;
         let (x0, x1) = fit(left, width, low.0, high.0);
         let (z0, z1) = fit(z.0 - 2.5 * diameter, height, low.1, high.1);
-        column.window = Window {
-            low: (x0, z0),
-            high: (x1, z1),
-        };
+        column.window = Window { low: (x0, z0), high: (x1, z1) };
     }
 }
 
@@ -154,16 +143,8 @@ fn vorticity(scene: &Scene, columns: &[Column]) -> Option<Figure> {
         return None;
     }
     let drawing = slice_grid::draw(columns, &row_names(scene, columns), &scale, None)?;
-    let view = columns
-        .iter()
-        .flat_map(|c| c.sections.iter().flatten())
-        .next()?
-        .view;
-    let sense = if view.clockwise() {
-        "clockwise"
-    } else {
-        "anticlockwise"
-    };
+    let view = columns.iter().flat_map(|c| c.sections.iter().flatten()).next()?.view;
+    let sense = if view.clockwise() { "clockwise" } else { "anticlockwise" };
     let mut caption = format!(
         "{} Colour is the vorticity about {} (positive, red, turns {sense} in this view), at most \
          {} 1/s.",
@@ -175,12 +156,7 @@ fn vorticity(scene: &Scene, columns: &[Column]) -> Option<Figure> {
     if scale.largest > end {
         caption += &format!(" Values beyond ±{} 1/s have the end colours.", short(end));
     }
-    Some(Figure::new(
-        "vorticity",
-        "Vorticity of the fluid",
-        caption,
-        drawing,
-    ))
+    Some(Figure::new("vorticity", "Vorticity of the fluid", caption, drawing))
 }
 
 /// Returns the planes and their times in words.
@@ -197,11 +173,7 @@ fn planes(scene: &Scene, columns: &[Column]) -> String {
         return String::new();
     };
     let normal = AXES[first.view.normal];
-    let follows = if scene.features.travels {
-        " The window follows the motion."
-    } else {
-        ""
-    };
+    let follows = if scene.features.travels { " The window follows the motion." } else { "" };
     let several = columns.iter().any(|column| column.sections.len() > 1);
     match (scene.features.kind, scene.features.pair) {
         (_, Some(pair)) if several => {

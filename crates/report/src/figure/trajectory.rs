@@ -45,11 +45,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         let y = 8.0 + 10.0 * (i / columns) as f64;
         let colour = series_colour(scene.features.grain_rank(*grain));
         drawing.line(&[(x, y), (x + 14.0, y)], colour, style::LINE, dash(i));
-        drawing.note(
-            (x + 17.0, y),
-            Anchor::Start,
-            &scene.features.grain_name(*grain),
-        );
+        drawing.note((x + 17.0, y), Anchor::Start, &scene.features.grain_name(*grain));
     }
     let (unit, _) = length_unit(first.width().max(first.height()));
     for (i, (frame, side)) in frames.iter().zip(sides).enumerate() {
@@ -68,11 +64,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
             "" => String::new(),
             name => format!("{name}, "),
         };
-        format!(
-            "{} {name}{}",
-            letter(i),
-            scene.features.time_text(instant.time)
-        )
+        format!("{} {name}{}", letter(i), scene.features.time_text(instant.time))
     };
     let named: Vec<String> = scene.instants.iter().enumerate().map(name).collect();
     let mut caption = format!(
@@ -110,10 +102,7 @@ fn window(scene: &Scene, grains: &[usize], side: usize, up: usize) -> Option<Win
     let ((x0, x1), (z0, z1)) = (range(side)?, range(up)?);
     let default = 0.1 * (z1 - z0).max(x1 - x0);
     let margin = 2.0 * scene.run.facts.diameter().unwrap_or(default).max(1e-9);
-    let tight = Window {
-        low: (x0 - margin, z0 - margin),
-        high: (x1 + margin, z1 + margin),
-    };
+    let tight = Window { low: (x0 - margin, z0 - margin), high: (x1 + margin, z1 + margin) };
     let Some(size) = scene.run.facts.size else {
         return Some(tight);
     };
@@ -141,10 +130,7 @@ fn draw_path(
 ) {
     let history = &scene.run.grains[grain];
     let colour = series_colour(scene.features.grain_rank(grain));
-    let rows = scene
-        .instants
-        .iter()
-        .filter_map(|instant| history.nearest(instant.time));
+    let rows = scene.instants.iter().filter_map(|instant| history.nearest(instant.time));
     for (row, strength) in [(0, 0.35)].into_iter().chain(rows.map(|row| (row, 1.0))) {
         let outline = frame.path(&scene.outline(grain, row, side, up), true);
         drawing.path(&outline, &outline_style(colour, strength));
@@ -157,9 +143,7 @@ fn draw_path(
     let crosses = |a: &(f64, f64), b: &(f64, f64)| jump(side, a.0, b.0) || jump(up, a.1, b.1);
     let every = (history.len() / 1500).max(1);
     let kept = (0..history.len()).filter(|i| i % every == 0 || i + 1 == history.len());
-    let points = kept
-        .map(|i| scene.run.wrapped(history.position[i]))
-        .map(|p| (p[side], p[up]));
+    let points = kept.map(|i| scene.run.wrapped(history.position[i])).map(|p| (p[side], p[up]));
     let points: Vec<(f64, f64)> = points.collect();
     for part in points.chunk_by(|a, b| !crosses(a, b)) {
         let placed: Vec<(f64, f64)> = part.iter().map(|p| frame.at(*p)).collect();
@@ -200,9 +184,7 @@ fn largest_drift(scene: &Scene, grains: &[usize], up: usize) -> Option<f64> {
         let positions = &scene.run.grains[*grain].position;
         let start = *positions.first()?;
         let horizontal = DVec3::ONE - DVec3::AXES[up];
-        let distances = positions
-            .iter()
-            .map(|p| ((*p - start) * horizontal).length());
+        let distances = positions.iter().map(|p| ((*p - start) * horizontal).length());
         Some(distances.fold(0.0, f64::max))
     };
     grains.iter().filter_map(drift).reduce(f64::max)

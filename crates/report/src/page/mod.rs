@@ -32,12 +32,7 @@ pub fn page(
         "Produced by Grainwake from the tables of this run folder. Figures as PNG and SVG: "
         code { "figures/" } "."
     };
-    html::page(
-        title(run, features),
-        &lead(run, features),
-        &content,
-        &footer,
-    )
+    html::page(title(run, features), &lead(run, features), &content, &footer)
 }
 
 fn title<'a>(run: &'a RunFolder, features: &RunFeatures) -> &'a str {
@@ -59,27 +54,20 @@ fn lead(run: &RunFolder, features: &RunFeatures) -> Markup {
         RunKind::Flow => String::new(),
     };
     let wall = run.summary_number("wall_s");
-    let wall = wall.map_or(String::new(), |s| {
-        format!(" and took {}", tables::duration(s))
-    });
+    let wall = wall.map_or(String::new(), |s| format!(" and took {}", tables::duration(s)));
     let summary = run.summary.as_ref();
     let reason = summary.and_then(|s| s.get("ended_by")?.as_str());
     let reason = reason.filter(|reason| *reason != "end");
     let reason = reason.map_or(String::new(), |r| format!("; it ended by {}", literal(r)));
     let end = short(features.end);
-    label(&format!(
-        "{result}The run covers {end} s of simulated time{wall}{reason}."
-    ))
+    label(&format!("{result}The run covers {end} s of simulated time{wall}{reason}."))
 }
 
 fn pair_sentence(features: &RunFeatures) -> String {
     let Some(kiss) = features.kiss else {
         return "The two grains did not touch. ".to_owned();
     };
-    let mut events = vec![(
-        kiss.time,
-        format!("kissed at {}", features.pair_event_text(kiss)),
-    )];
+    let mut events = vec![(kiss.time, format!("kissed at {}", features.pair_event_text(kiss)))];
     let tumbling = |phase: &&Phase| phase.kind == PhaseKind::Tumbling;
     if let Some(phase) = features.phases.iter().find(tumbling) {
         let text = format!("tumbled from {}", features.time_text(phase.start));
@@ -148,11 +136,8 @@ fn phases(features: &RunFeatures) -> Markup {
     };
     let spoken: Vec<String> = features.phases.iter().map(spoken).collect();
     let scaled = tables::scaled_time(features);
-    let mut columns = vec![
-        name_column("phase"),
-        number_column("from [s]"),
-        number_column("to [s]"),
-    ];
+    let mut columns =
+        vec![name_column("phase"), number_column("from [s]"), number_column("to [s]")];
     if let Some((label, _)) = scaled {
         columns.extend(["from", "to"].map(|end| number_column(&format!("{end}, {label}"))));
     }

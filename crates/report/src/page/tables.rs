@@ -50,48 +50,23 @@ fn physics(run: &RunFolder, features: &RunFeatures) -> Rows {
     let (diameter, viscosity) = (facts.diameter(), facts.viscosity);
     let mut rows = Rows::default();
     let with_unit = |unit: &'static str| move |value: f64| format!("{} {unit}", short(value));
-    rows.add(
-        "fluid density *ρ*_{f}",
-        facts.fluid_density.map(with_unit("kg/m^{3}")),
-    );
-    rows.add(
-        "kinematic viscosity *ν*",
-        viscosity.map(with_unit("m^{2}/s")),
-    );
+    rows.add("fluid density *ρ*_{f}", facts.fluid_density.map(with_unit("kg/m^{3}")));
+    rows.add("kinematic viscosity *ν*", viscosity.map(with_unit("m^{2}/s")));
     let gravity = facts.gravity.map(|g| g.to_array().map(short).join(", "));
     rows.add("gravity *g*", gravity.map(|g| format!("({g}) m/s^{{2}}")));
     add_grains(&mut rows, run);
     let ratio = facts.density_ratio();
     rows.add("density ratio *ρ*_{p}/*ρ*_{f}", ratio.map(short));
     let first = facts.grains.first().map(|g| (g.diameter, g.density));
-    let differ = facts
-        .grains
-        .iter()
-        .any(|g| Some((g.diameter, g.density)) != first);
-    let suffix = if differ {
-        ", of the mean diameter and density"
-    } else {
-        ""
-    };
+    let differ = facts.grains.iter().any(|g| Some((g.diameter, g.density)) != first);
+    let suffix = if differ { ", of the mean diameter and density" } else { "" };
     let name = format!("Galileo number √(|*ρ*_{{p}}/*ρ*_{{f}} − 1| *g* *d*^{{3}}) / *ν*{suffix}");
     let known = features.scales.zip(ratio).zip(viscosity);
-    rows.add(
-        &name,
-        known.map(|((scales, ratio), nu)| short(galileo(scales, ratio, nu))),
-    );
-    let speeds = run
-        .grains
-        .iter()
-        .flat_map(|h| &h.velocity)
-        .map(|v| v.length());
+    rows.add(&name, known.map(|((scales, ratio), nu)| short(galileo(scales, ratio, nu))));
+    let speeds = run.grains.iter().flat_map(|h| &h.velocity).map(|v| v.length());
     let fastest = speeds.filter(|v| v.is_finite()).fold(0.0, f64::max);
-    let reynolds = diameter
-        .zip(viscosity)
-        .map(|(d, nu)| short(fastest * d / nu));
-    rows.add(
-        "Reynolds number at the largest speed, |*v*| *d* / *ν*",
-        reynolds,
-    );
+    let reynolds = diameter.zip(viscosity).map(|(d, nu)| short(fastest * d / nu));
+    rows.add("Reynolds number at the largest speed, |*v*| *d* / *ν*", reynolds);
     let (time, velocity) = features.scales.map(|s| (s.time(), s.velocity())).unzip();
     rows.add("time scale √(*d*/*g*)", time.map(with_unit("s")));
     rows.add("velocity scale √(*d* *g*)", velocity.map(with_unit("m/s")));
@@ -111,16 +86,10 @@ fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
         rows.add("fields", "single precision".to_owned());
     }
     let cell = facts.cell();
-    rows.add(
-        "cell edge *h*",
-        cell.map(|h| format!("{} mm", short(1e3 * h))),
-    );
+    rows.add("cell edge *h*", cell.map(|h| format!("{} mm", short(1e3 * h))));
     let resolution = facts.diameter().zip(cell).map(|(d, h)| short(d / h));
     rows.add("cells per diameter *d*/*h*", resolution);
-    for (axis, [lower, upper]) in ["x", "y", "z"]
-        .iter()
-        .zip(facts.boundaries.iter().flatten())
-    {
+    for (axis, [lower, upper]) in ["x", "y", "z"].iter().zip(facts.boundaries.iter().flatten()) {
         let text = match lower == upper {
             true => literal(lower),
             false => format!("{} below, {} above", literal(lower), literal(upper)),
@@ -129,14 +98,9 @@ fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
     }
     rows.add("coupling", facts.scheme.as_deref().map(literal));
     rows.add("simulated time", format!("{} s", short(features.end)));
-    let scaled = features
-        .scales
-        .map(|scales| short(features.end / scales.time()));
+    let scaled = features.scales.map(|scales| short(features.end / scales.time()));
     rows.add("simulated time *t* √(*g*/*d*)", scaled);
-    rows.add(
-        "steps",
-        run.summary_number("steps").map(|steps| steps.to_string()),
-    );
+    rows.add("steps", run.summary_number("steps").map(|steps| steps.to_string()));
     rows.add("wall time", run.summary_number("wall_s").map(duration));
     let divergence = run.summary_number("max_divergence");
     let divergence = divergence.map(|d| format!("{} 1/s", short(d)));
@@ -169,10 +133,7 @@ fn add_grains(rows: &mut Rows, run: &RunFolder) {
         rows.add(&name, text);
     }
     if rest > 0 {
-        rows.add(
-            "grains",
-            format!("and {rest} more kinds; see case.resolved.toml"),
-        );
+        rows.add("grains", format!("and {rest} more kinds; see case.resolved.toml"));
     }
 }
 
@@ -270,9 +231,7 @@ fn flatten(rows: &mut Rows, name: &str, value: &Value, depth: usize) {
 }
 
 fn text(value: &Value) -> String {
-    value
-        .as_str()
-        .map_or_else(|| value.to_string(), str::to_owned)
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 /// Returns a wall time in seconds, minutes or hours.

@@ -29,27 +29,13 @@ fn a_plain_pair() {
             (Landed, 5.0, 6.0)
         ]
     );
-    let names: Vec<_> = pair_instants(&got, &events, 1.2, 6.0)
-        .iter()
-        .map(|i| (i.name, i.time))
-        .collect();
-    assert_eq!(
-        names,
-        [
-            ("drafting", 0.6),
-            ("kiss", 1.0),
-            ("role change", 2.0),
-            ("separated", 4.0)
-        ]
-    );
+    let names: Vec<_> =
+        pair_instants(&got, &events, 1.2, 6.0).iter().map(|i| (i.name, i.time)).collect();
+    assert_eq!(names, [("drafting", 0.6), ("kiss", 1.0), ("role change", 2.0), ("separated", 4.0)]);
     let got = phases(&events, None, 6.0);
     assert_eq!(
         got[2],
-        Phase {
-            kind: Tumbling,
-            start: 2.0,
-            end: 3.0
-        },
+        Phase { kind: Tumbling, start: 2.0, end: 3.0 },
         "a role change begins the tumbling"
     );
 }
@@ -85,10 +71,8 @@ fn tumbling_after_the_separation_is_kept() {
             (Landed, 5.0, 6.0)
         ]
     );
-    let instants: Vec<_> = pair_instants(&got, &events, 1.2, 6.0)
-        .iter()
-        .map(|i| (i.name, i.time))
-        .collect();
+    let instants: Vec<_> =
+        pair_instants(&got, &events, 1.2, 6.0).iter().map(|i| (i.name, i.time)).collect();
     assert_eq!(instants[2..], [("in contact", 1.5), ("tumbling", 3.75)]);
 }
 
@@ -102,13 +86,7 @@ fn kiss_and_separation_before_and_after_the_landing() {
     let (touch, part, land) = (EventKind::Kiss, EventKind::Separation, EventKind::Landing);
     assert_eq!(of(&[(1.0, part)]), (None, None));
     // A bounce is not the final separation.
-    let bounce = [
-        (1.0, touch),
-        (1.1, part),
-        (2.0, touch),
-        (3.0, part),
-        (5.0, land),
-    ];
+    let bounce = [(1.0, touch), (1.1, part), (2.0, touch), (3.0, part), (5.0, land)];
     assert_eq!(of(&bounce), (Some((1.0, false)), Some((3.0, false))));
     assert_eq!(of(&bounce[..3]), (Some((1.0, false)), None));
     // A separation before the landing takes precedence over later ones.
@@ -118,10 +96,7 @@ fn kiss_and_separation_before_and_after_the_landing() {
     let late = [(1.0, land), (2.0, touch), (3.0, part)];
     assert_eq!(of(&late), (Some((2.0, true)), Some((3.0, true))));
     let landed_in_touch = [(1.0, touch), (2.0, land), (3.0, part)];
-    assert_eq!(
-        of(&landed_in_touch),
-        (Some((1.0, false)), Some((3.0, true)))
-    );
+    assert_eq!(of(&landed_in_touch), (Some((1.0, false)), Some((3.0, true))));
 }
 
 #[test]
@@ -136,19 +111,9 @@ fn no_kiss_and_interrupted_runs() {
     let events = log(&[(1.0, EventKind::Kiss)]);
     let got = phases(&events, None, 2.0);
     assert_eq!(kinds(&got), [(Drafting, 0.0, 1.0), (Kissing, 1.0, 2.0)]);
-    let names: Vec<_> = pair_instants(&got, &events, 1.2, 2.0)
-        .iter()
-        .map(|i| (i.name, i.time))
-        .collect();
-    assert_eq!(
-        names,
-        [
-            ("drafting", 0.6),
-            ("kiss", 1.0),
-            ("in contact", 1.5),
-            ("end", 2.0)
-        ]
-    );
+    let names: Vec<_> =
+        pair_instants(&got, &events, 1.2, 2.0).iter().map(|i| (i.name, i.time)).collect();
+    assert_eq!(names, [("drafting", 0.6), ("kiss", 1.0), ("in contact", 1.5), ("end", 2.0)]);
     assert!(phases(&[], None, 0.0).is_empty());
 }
 
@@ -162,23 +127,12 @@ fn instants_follow_events() {
     let events = log(&[(2.0, EventKind::RoleChange), (8.0, EventKind::Landing)]);
     assert_eq!(
         names(&events, 4.0, 9.0),
-        [
-            ("drafting", 1.2),
-            ("role change", 2.0),
-            ("closest", 4.0),
-            ("apart", 6.0)
-        ]
+        [("drafting", 1.2), ("role change", 2.0), ("closest", 4.0), ("apart", 6.0)]
     );
-    assert_eq!(
-        names(&[], 5.0, 9.0),
-        [("drafting", 3.0), ("closest", 5.0), ("apart", 7.0)]
-    );
+    assert_eq!(names(&[], 5.0, 9.0), [("drafting", 3.0), ("closest", 5.0), ("apart", 7.0)]);
     // A pair that lands in contact, long before the end.
     let events = log(&[(1.0, EventKind::Kiss), (3.0, EventKind::Landing)]);
-    assert_eq!(
-        names(&events, 1.0, 9.0)[2..],
-        [("in contact", 2.0), ("landing", 3.0)]
-    );
+    assert_eq!(names(&events, 1.0, 9.0)[2..], [("in contact", 2.0), ("landing", 3.0)]);
     // A role change after the separation.
     let events = log(&[
         (1.0, EventKind::Kiss),
@@ -189,22 +143,14 @@ fn instants_follow_events() {
     ]);
     assert_eq!(
         names(&events, 1.0, 5.0),
-        [
-            ("drafting", 0.6),
-            ("kiss", 1.0),
-            ("role change", 2.0),
-            ("separated", 3.0)
-        ]
+        [("drafting", 0.6), ("kiss", 1.0), ("role change", 2.0), ("separated", 3.0)]
     );
 }
 
 #[test]
 fn instants_move_to_what_was_written() {
     let instants = even_instants(4.0);
-    let got: Vec<f64> = snap(&instants, &[0.0, 1.1, 3.8])
-        .iter()
-        .map(|i| i.time)
-        .collect();
+    let got: Vec<f64> = snap(&instants, &[0.0, 1.1, 3.8]).iter().map(|i| i.time).collect();
     assert_eq!(got, [1.1, 3.8], "two instants on one file are shown once");
     assert!(snap(&instants, &[]).is_empty());
 }

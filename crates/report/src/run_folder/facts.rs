@@ -146,11 +146,7 @@ fn list<T>(value: &Value, path: &str, entry: fn(&Value) -> Option<T>) -> Option<
 fn conditions(axis: Option<&Value>) -> [String; 2] {
     let kind = |value: &Value| {
         let name = value.as_str().or_else(|| value.get("kind")?.as_str());
-        let moving = if value.get("velocity").is_some() {
-            " (moving)"
-        } else {
-            ""
-        };
+        let moving = if value.get("velocity").is_some() { " (moving)" } else { "" };
         format!("{}{moving}", name.unwrap_or("?"))
     };
     match axis {

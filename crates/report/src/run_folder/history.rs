@@ -52,10 +52,7 @@ impl History {
         let before = after - 1;
         let part = (time - self.time[before]) / (self.time[after] - self.time[before]);
         let position = self.position[before].lerp(self.position[after], part);
-        Some((
-            position,
-            self.orientation[before].slerp(self.orientation[after], part),
-        ))
+        Some((position, self.orientation[before].slerp(self.orientation[after], part)))
     }
 
     /// Returns the number of rows.
@@ -157,11 +154,7 @@ mod tests {
 
     #[test]
     fn an_unfinished_last_line_is_left_out_and_noted() {
-        let (out, notes) = read(&format!(
-            "{HEADER}\n{}{}",
-            row(0.0, 0, 3.0),
-            "0.1,0,0.0,0.0,2."
-        ));
+        let (out, notes) = read(&format!("{HEADER}\n{}{}", row(0.0, 0, 3.0), "0.1,0,0.0,0.0,2."));
         assert_eq!(out.unwrap()[0].len(), 1);
         assert!(notes[0].contains("line 3"), "{notes:?}");
     }
@@ -169,30 +162,14 @@ mod tests {
     #[test]
     fn damage_is_named_with_its_line() {
         let message = |content: &str| read(content).0.unwrap_err().to_string();
-        let text = message(&format!(
-            "{HEADER}\n{}1,2,3\n{}",
-            row(0.0, 0, 3.0),
-            row(0.2, 0, 3.0)
-        ));
-        assert!(
-            text.contains("grains.csv, line 3: 3 values under 22 columns"),
-            "{text}"
-        );
-        let text = message(&format!(
-            "{HEADER}\n{}",
-            row(0.0, 0, 3.0).replace("-1", "fast")
-        ));
-        assert!(
-            text.contains("line 2: 'fast' under 'vz' is not a number"),
-            "{text}"
-        );
+        let text = message(&format!("{HEADER}\n{}1,2,3\n{}", row(0.0, 0, 3.0), row(0.2, 0, 3.0)));
+        assert!(text.contains("grains.csv, line 3: 3 values under 22 columns"), "{text}");
+        let text = message(&format!("{HEADER}\n{}", row(0.0, 0, 3.0).replace("-1", "fast")));
+        assert!(text.contains("line 2: 'fast' under 'vz' is not a number"), "{text}");
         let text = message("time,grain,x\n");
         assert!(text.contains("line 1: the column 'y' is missing"), "{text}");
         let text = message(&format!("{HEADER}\n{}", row(f64::NAN, 0, 3.0)));
-        assert!(
-            text.contains("line 2: time or position is not finite"),
-            "{text}"
-        );
+        assert!(text.contains("line 2: time or position is not finite"), "{text}");
         let text = message(&format!("{HEADER}\n{}", row(0.0, 4_000_000, 3.0)));
         assert!(text.contains("line 2: grain 4000000"), "{text}");
         assert!(message("").contains("line 1: no header"));

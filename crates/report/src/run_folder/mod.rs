@@ -64,25 +64,17 @@ impl RunFolder {
     /// # Errors
     /// If the folder holds no run, or a table or log is damaged.
     pub fn open(path: &Path) -> Result<RunFolder, ReportError> {
-        let mut run = RunFolder {
-            path: path.to_owned(),
-            ..RunFolder::default()
-        };
+        let mut run = RunFolder { path: path.to_owned(), ..RunFolder::default() };
         let present = |name: &str| Some(path.join(name)).filter(|file| file.is_file());
-        let known = [
-            "case.resolved.toml",
-            "grains.csv",
-            "diagnostics.csv",
-            "summary.json",
-        ];
+        let known = ["case.resolved.toml", "grains.csv", "diagnostics.csv", "summary.json"];
         if !known.iter().any(|name| present(name).is_some()) {
             return Err(ReportError::NotARun(path.to_owned()));
         }
         match present("case.resolved.toml") {
             Some(file) => run.facts = facts::read_case(&file)?,
-            None => run
-                .notes
-                .push("case.resolved.toml is missing: the set-up is not known".to_owned()),
+            None => {
+                run.notes.push("case.resolved.toml is missing: the set-up is not known".to_owned())
+            }
         }
         if let Some(file) = present("summary.json") {
             let summary = facts::read_json(&file)?;
@@ -152,10 +144,7 @@ impl RunFolder {
 
     /// Returns the path of a file relative to the folder.
     pub fn short_name(&self, file: &Path) -> String {
-        file.strip_prefix(&self.path)
-            .unwrap_or(file)
-            .display()
-            .to_string()
+        file.strip_prefix(&self.path).unwrap_or(file).display().to_string()
     }
 
     /// Returns the length of the box along a periodic axis [m]; `None` for other axes.
@@ -193,8 +182,7 @@ impl RunFolder {
         pvd::read(&file)
             .map(|entries| entries.into_iter().map(|e| (e.file, e.time)).collect())
             .unwrap_or_else(|what| {
-                self.notes
-                    .push(format!("run.pvd could not be read ({what})"));
+                self.notes.push(format!("run.pvd could not be read ({what})"));
                 BTreeMap::new()
             })
     }
@@ -209,9 +197,8 @@ impl RunFolder {
         let Ok(entries) = std::fs::read_dir(self.path.join(folder)) else {
             return Vec::new();
         };
-        let mut files: Vec<PathBuf> = entries
-            .filter_map(|entry| entry.ok().map(|entry| entry.path()))
-            .collect();
+        let mut files: Vec<PathBuf> =
+            entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
         files.retain(|file| file.extension().is_some_and(|e| e == extension));
         files.sort();
         let mut out = Vec::new();
@@ -221,18 +208,10 @@ impl RunFolder {
                 .map(|name| name.to_string_lossy().into_owned())
                 .unwrap_or_default();
             let listed = times.get(&format!("{folder}/{name}")).copied();
-            let time = listed
-                .map(Ok)
-                .unwrap_or_else(|| time_inside(&file, extension));
+            let time = listed.map(Ok).unwrap_or_else(|| time_inside(&file, extension));
             match time {
-                Ok(time) => out.push(FrameFile {
-                    grain: grain_of_name(&name),
-                    file,
-                    time,
-                }),
-                Err(what) => self
-                    .notes
-                    .push(format!("{folder}/{name} was left out: {what}")),
+                Ok(time) => out.push(FrameFile { grain: grain_of_name(&name), file, time }),
+                Err(what) => self.notes.push(format!("{folder}/{name} was left out: {what}")),
             }
         }
         out.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.grain.cmp(&b.grain)));
@@ -245,8 +224,7 @@ fn time_inside(file: &Path, extension: &str) -> Result<f64, String> {
         "vti" => Some(read_image(file)?.frame.time),
         _ => vtp::read(file)?.time,
     };
-    time.filter(|t| t.is_finite())
-        .ok_or_else(|| "it holds no time".to_owned())
+    time.filter(|t| t.is_finite()).ok_or_else(|| "it holds no time".to_owned())
 }
 
 fn read_image(file: &Path) -> Result<Image, String> {
@@ -255,10 +233,7 @@ fn read_image(file: &Path) -> Result<Image, String> {
 
 /// Returns the number after "grain" in a file name such as `grain1_000040.vti`.
 fn grain_of_name(name: &str) -> Option<usize> {
-    let rest = name
-        .split("grain")
-        .nth(1)?
-        .trim_start_matches(['_', '-', '.']);
+    let rest = name.split("grain").nth(1)?.trim_start_matches(['_', '-', '.']);
     let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
     digits.parse().ok()
 }
@@ -282,14 +257,8 @@ mod tests {
         run.facts.lower = DVec3::new(-1.0, 0.0, 0.0);
         let faces = |word: &str| [word.to_owned(), word.to_owned()];
         run.facts.boundaries = Some([faces("periodic"), faces("wall"), faces("periodic")]);
-        assert_eq!(
-            run.wrapped(DVec3::new(1.5, 3.5, -0.5)),
-            DVec3::new(-0.5, 3.5, 3.5)
-        );
-        assert_eq!(
-            run.nearest(DVec3::new(1.5, 3.5, -0.5)),
-            DVec3::new(-0.5, 3.5, -0.5)
-        );
+        assert_eq!(run.wrapped(DVec3::new(1.5, 3.5, -0.5)), DVec3::new(-0.5, 3.5, 3.5));
+        assert_eq!(run.nearest(DVec3::new(1.5, 3.5, -0.5)), DVec3::new(-0.5, 3.5, -0.5));
         assert_eq!((run.period(0), run.period(1)), (Some(2.0), None));
     }
 

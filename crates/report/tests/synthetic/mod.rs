@@ -15,11 +15,8 @@ pub const G: f64 = 9.81;
 /// A fresh empty folder.
 pub fn folder(name: &str) -> PathBuf {
     static COUNT: AtomicUsize = AtomicUsize::new(0);
-    let unique = format!(
-        "grainwake-{}-{}",
-        std::process::id(),
-        COUNT.fetch_add(1, Ordering::Relaxed)
-    );
+    let unique =
+        format!("grainwake-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
     let path = std::env::temp_dir().join(unique).join(name);
     std::fs::create_dir_all(&path).unwrap();
     path
@@ -40,11 +37,7 @@ fn pair_position(grain: usize, s: f64, swing: f64) -> DVec3 {
     let distance = D * (2.6 - 1.6 * ramp(s, 0.0, 18.0) + 2.2 * ramp(s, 29.0, 46.0));
     let tilt = 2.45 * ramp(s, 17.0, 33.0);
     let azimuth = swing * ramp(s, 18.0, 30.0);
-    let line = DVec3::new(
-        tilt.sin() * azimuth.cos(),
-        tilt.sin() * azimuth.sin(),
-        tilt.cos(),
-    );
+    let line = DVec3::new(tilt.sin() * azimuth.cos(), tilt.sin() * azimuth.sin(), tilt.cos());
     let fallen = 1.5e-3 * (s - 4.0 * (1.0 - (-s / 4.0).exp()));
     let middle = DVec3::new(
         12.5e-3 + 0.6e-3 * (s / 5.0).sin() * ramp(s, 10.0, 30.0),
@@ -69,11 +62,7 @@ fn bumpy() -> (Vec<DVec3>, Vec<[usize; 3]>) {
         let theta = PI * i as f64 / rows as f64;
         for j in 0..columns {
             let phi = TAU * j as f64 / columns as f64;
-            let n = DVec3::new(
-                theta.sin() * phi.cos(),
-                theta.sin() * phi.sin(),
-                theta.cos(),
-            );
+            let n = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
             let bump = 1.0
                 + theta.sin()
                     * (0.07 * (3.0 * phi + 1.0).sin()
@@ -110,10 +99,7 @@ struct Appended {
 
 impl Appended {
     fn new() -> Appended {
-        Appended {
-            heads: String::new(),
-            data: Vec::new(),
-        }
+        Appended { heads: String::new(), data: Vec::new() }
     }
     fn head(&mut self, kind: &str, name: &str, components: usize, bytes: Vec<u8>) -> String {
         let offset = self.data.len();
@@ -128,22 +114,11 @@ impl Appended {
             "Float32",
             name,
             components,
-            values
-                .iter()
-                .flat_map(|v| (*v as f32).to_le_bytes())
-                .collect(),
+            values.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect(),
         )
     }
     fn integers(&mut self, name: &str, values: &[usize]) -> String {
-        self.head(
-            "Int32",
-            name,
-            1,
-            values
-                .iter()
-                .flat_map(|v| (*v as i32).to_le_bytes())
-                .collect(),
-        )
+        self.head("Int32", name, 1, values.iter().flat_map(|v| (*v as i32).to_le_bytes()).collect())
     }
     fn file(&self, kind: &str, body: &str) -> Vec<u8> {
         let mut out = format!(
@@ -168,17 +143,10 @@ fn write_slice(
     value: impl Fn(DVec3) -> Cell,
 ) {
     let [nx, nz] = cells;
-    let mut arrays = [
-        ("velocity", 3),
-        ("vorticity", 3),
-        ("pressure", 1),
-        ("solid_fraction", 1),
-    ]
-    .map(|(name, components)| vti::Array {
-        name: name.to_owned(),
-        components,
-        data: Vec::new(),
-    });
+    let mut arrays =
+        [("velocity", 3), ("vorticity", 3), ("pressure", 1), ("solid_fraction", 1)].map(
+            |(name, components)| vti::Array { name: name.to_owned(), components, data: Vec::new() },
+        );
     for k in 0..nz {
         for i in 0..nx {
             let (u, w, p, s) = value(DVec3::new((i as f64 + 0.5) * h, y, (k as f64 + 0.5) * h));
@@ -206,11 +174,7 @@ fn write_surfaces(file: &Path, grains: &[(DVec3, DQuat)], time: f64) {
         (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (grain, (position, turn)) in grains.iter().enumerate() {
         let first = all.len() / 3;
-        all.extend(
-            points
-                .iter()
-                .flat_map(|p| (*position + *turn * *p).to_array()),
-        );
+        all.extend(points.iter().flat_map(|p| (*position + *turn * *p).to_array()));
         for triangle in &triangles {
             corners.extend(triangle.map(|i| i + first));
             ends.push(corners.len());
@@ -335,11 +299,7 @@ pub fn pair(folder: &Path, swing: f64, h: f64) {
                 time(row),
                 grain,
                 place(grain, s),
-                if row == 0 {
-                    DVec3::ZERO
-                } else {
-                    speed(grain, s)
-                },
+                if row == 0 { DVec3::ZERO } else { speed(grain, s) },
                 pair_turn(grain, s),
                 spin(grain, s),
                 touch,
@@ -360,11 +320,7 @@ pub fn pair(folder: &Path, swing: f64, h: f64) {
         let s = t / unit;
         Some(((place(0, s) - place(1, s)).length() - 1.02 * D).max(-1e-6))
     };
-    write(
-        folder,
-        "diagnostics.csv",
-        &diagnostics(time(rows), 600, gap),
-    );
+    write(folder, "diagnostics.csv", &diagnostics(time(rows), 600, gap));
     let event = |s: f64, name: &str, grains: &str| {
         let t = s * unit;
         format!(
@@ -399,24 +355,14 @@ pub fn pair(folder: &Path, swing: f64, h: f64) {
     for row in [0, 107, 179, 264, 371, 460] {
         let s = 0.1 * row as f64;
         let poses = [0, 1].map(|grain| (place(grain, s), pair_turn(grain, s)));
-        let moving = [0, 1].map(|grain| {
-            (
-                place(grain, s),
-                if row == 0 {
-                    DVec3::ZERO
-                } else {
-                    speed(grain, s)
-                },
-            )
-        });
+        let moving = [0, 1]
+            .map(|grain| (place(grain, s), if row == 0 { DVec3::ZERO } else { speed(grain, s) }));
         for grain in 0..2 {
             let name = format!("slices/y-grain{grain}_{row:06}.vti");
             let field = |x: DVec3| {
                 let (u, w) = wake(x, &moving);
-                let solid: f64 = poses
-                    .iter()
-                    .map(|(p, q)| inside_bumpy(q.conjugate() * (x - *p)))
-                    .sum();
+                let solid: f64 =
+                    poses.iter().map(|(p, q)| inside_bumpy(q.conjugate() * (x - *p))).sum();
                 (
                     u * (1.0 - solid) + moving[grain].1 * solid,
                     w * (1.0 - solid),
@@ -425,14 +371,7 @@ pub fn pair(folder: &Path, swing: f64, h: f64) {
                 )
             };
             let cells = [(0.025 / h).round() as usize, (0.0975 / h).round() as usize];
-            write_slice(
-                &folder.join(&name),
-                cells,
-                h,
-                poses[grain].0.y,
-                time(row),
-                field,
-            );
+            write_slice(&folder.join(&name), cells, h, poses[grain].0.y, time(row), field);
             writeln!(
                 collection,
                 "<DataSet timestep=\"{:?}\" part=\"{grain}\" file=\"{name}\"/>",
@@ -442,18 +381,10 @@ pub fn pair(folder: &Path, swing: f64, h: f64) {
         }
         let name = format!("grains/grains_{row:06}.vtp");
         write_surfaces(&folder.join(&name), &poses, time(row));
-        writeln!(
-            collection,
-            "<DataSet timestep=\"{:?}\" part=\"2\" file=\"{name}\"/>",
-            time(row)
-        )
-        .unwrap();
+        writeln!(collection, "<DataSet timestep=\"{:?}\" part=\"2\" file=\"{name}\"/>", time(row))
+            .unwrap();
     }
-    write(
-        folder,
-        "run.pvd",
-        &(collection + "</Collection></VTKFile>\n"),
-    );
+    write(folder, "run.pvd", &(collection + "</Collection></VTKFile>\n"));
 }
 
 /// A sphere that settles alone, in a wide box; no surfaces.
@@ -461,25 +392,12 @@ pub fn single(folder: &Path) {
     let (rows, end) = (300, 1.3);
     let mut table = String::from(HEADER);
     let place = |t: f64| {
-        DVec3::new(
-            0.05,
-            0.05,
-            0.1275 - 0.128 * (t - 0.15 * (1.0 - (-t / 0.15).exp())) * 0.78,
-        )
+        DVec3::new(0.05, 0.05, 0.1275 - 0.128 * (t - 0.15 * (1.0 - (-t / 0.15).exp())) * 0.78)
     };
     for row in 0..=rows {
         let t = end * row as f64 / rows as f64;
         let v = DVec3::Z * -0.128 * 0.78 * (1.0 - (-t / 0.15).exp());
-        grain_row(
-            &mut table,
-            t,
-            0,
-            place(t),
-            v,
-            DQuat::IDENTITY,
-            DVec3::ZERO,
-            0,
-        );
+        grain_row(&mut table, t, 0, place(t), v, DQuat::IDENTITY, DVec3::ZERO, 0);
     }
     write(folder, "grains.csv", &table);
     write(
@@ -537,10 +455,7 @@ pub fn cavity(folder: &Path) {
     );
     std::fs::create_dir_all(folder.join("slices")).unwrap();
     let field = |x: DVec3| {
-        let (a, b) = (
-            (PI * x.x).sin().powi(2),
-            x.z * x.z * (2.0 * PI * x.z * 0.5).cos(),
-        );
+        let (a, b) = ((PI * x.x).sin().powi(2), x.z * x.z * (2.0 * PI * x.z * 0.5).cos());
         let velocity = DVec3::new(
             a * (3.0 * x.z * x.z - 2.0 * x.z),
             0.0,
@@ -548,14 +463,7 @@ pub fn cavity(folder: &Path) {
         );
         (velocity, DVec3::Y * (6.0 * x.z - 2.0) * a, b, 0.0)
     };
-    write_slice(
-        &folder.join("slices/y-plane0_000030.vti"),
-        [64, 64],
-        1.0 / 64.0,
-        0.5,
-        30.0,
-        field,
-    );
+    write_slice(&folder.join("slices/y-plane0_000030.vti"), [64, 64], 1.0 / 64.0, 0.5, 30.0, field);
 }
 
 /// A dry heap of bumpy grains.
@@ -564,9 +472,8 @@ pub fn heap(folder: &Path, count: usize, surfaces: bool) {
     let mut table = String::from(HEADER);
     let mut state = 12345u64;
     let mut random = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
     let rest: Vec<(DVec3, DQuat)> = (0..count)
@@ -575,10 +482,7 @@ pub fn heap(folder: &Path, count: usize, surfaces: bool) {
             let height = (9e-3 - 0.7 * r).max(1e-3) * random() + 1e-3;
             let turn =
                 DQuat::from_rotation_z(TAU * random()) * DQuat::from_rotation_x(TAU * random());
-            (
-                DVec3::new(20e-3 + r * phi.cos(), 20e-3 + r * phi.sin(), height),
-                turn,
-            )
+            (DVec3::new(20e-3 + r * phi.cos(), 20e-3 + r * phi.sin(), height), turn)
         })
         .collect();
     for row in 0..=rows {

@@ -29,12 +29,7 @@ struct Excerpt {
 impl Problem {
     /// Returns a problem without a position.
     pub fn new(message: impl Into<String>) -> Problem {
-        Problem {
-            key: None,
-            message: message.into(),
-            help: None,
-            excerpt: None,
-        }
+        Problem { key: None, message: message.into(), help: None, excerpt: None }
     }
     /// Adds the dotted key.
     #[must_use]
@@ -58,11 +53,7 @@ impl Problem {
         label: impl Into<String>,
     ) -> Problem {
         let source = NamedSource::new(name, text.to_string());
-        self.excerpt = Some(Box::new(Excerpt {
-            source,
-            label: label.into(),
-            span,
-        }));
+        self.excerpt = Some(Box::new(Excerpt { source, label: label.into(), span }));
         self
     }
     /// Returns file, line and column of the position; lines and columns count from 1.

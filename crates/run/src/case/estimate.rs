@@ -53,11 +53,7 @@ impl Estimate {
         let g = setup.gravity.length();
         let fluid = setup.fluid.as_ref();
         let largest = fluid.and_then(|fluid| {
-            let free = setup
-                .grains
-                .iter()
-                .enumerate()
-                .filter(|(_, grain)| is_free(grain));
+            let free = setup.grains.iter().enumerate().filter(|(_, grain)| is_free(grain));
             let numbers = free.map(|(index, grain)| (index, grain, galileo(grain, fluid, g)));
             // The first of equal grains.
             numbers.rev().max_by(|a, b| a.2.total_cmp(&b.2))

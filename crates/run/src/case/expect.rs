@@ -88,9 +88,9 @@ impl Expectation {
             chosen.map(|(_, grain)| grain)
         };
         match self.measure {
-            Measure::PeakSettlingSpeed => grains()
-                .map(|g| g.peak_settling_speed_m_per_s)
-                .reduce(f64::max),
+            Measure::PeakSettlingSpeed => {
+                grains().map(|g| g.peak_settling_speed_m_per_s).reduce(f64::max)
+            }
             Measure::LandingTime => grains().filter_map(|g| g.landing_time_s).reduce(f64::min),
             Measure::KissTime => summary.pair.as_ref()?.kiss_time_s,
             Measure::TumbleTime => summary.pair.as_ref()?.tumble_time_s,

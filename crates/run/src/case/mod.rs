@@ -79,10 +79,8 @@ impl Case {
     /// # Errors
     /// [`CaseError`] with every problem found and its place.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Case, CaseError> {
-        let text = std::fs::read_to_string(path).map_err(|source| CaseError::Unreadable {
-            path: path.into(),
-            source,
-        })?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| CaseError::Unreadable { path: path.into(), source })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Case::parse(&text, &path.display().to_string(), folder, overrides)
     }

@@ -60,9 +60,7 @@ mod tests {
     #[test]
     fn numbers_are_short_and_have_prefixes() {
         let texts = [14.25, 2e-3, 0.25e-3, 0.1 + 0.2, 12e-6, -0.05, 0.0, 8e3].map(length);
-        let wanted = [
-            "14.25 m", "2 mm", "0.25 mm", "300 mm", "12 um", "-50 mm", "0 m", "8000 m",
-        ];
+        let wanted = ["14.25 m", "2 mm", "0.25 mm", "300 mm", "12 um", "-50 mm", "0 m", "8000 m"];
         assert_eq!(texts, wanted);
         assert_eq!(quantity(1e-3, "Pa s"), "1 mPa s");
         assert_eq!(quantity(1500.0, "kg/m3"), "1500 kg/m3");

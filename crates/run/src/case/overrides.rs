@@ -14,10 +14,7 @@ pub(super) fn override_line(item: &str) -> Result<String, Problem> {
         .ok_or_else(|| Problem::new(format!("--set {item}: there is no `=`")).help(usage))?;
     let (key, value) = (key.trim(), value.trim());
     let plain = |part: &str| {
-        !part.is_empty()
-            && part
-                .chars()
-                .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+        !part.is_empty() && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
     };
     if !key.split('.').all(plain) {
         return Err(Problem::new(format!("--set {item}: `{key}` is not a key")).help(usage));
@@ -29,11 +26,7 @@ pub(super) fn override_line(item: &str) -> Result<String, Problem> {
     let escaped: String = value.chars().flat_map(char::escape_default).collect();
     Ok(format!(
         "{key} = \"{}\"",
-        if value.is_ascii() {
-            escaped
-        } else {
-            value.replace('\\', "\\\\").replace('"', "\\\"")
-        }
+        if value.is_ascii() { escaped } else { value.replace('\\', "\\\\").replace('"', "\\\"") }
     ))
 }
 
@@ -74,9 +67,7 @@ fn is_of_tables(items: &DeArray) -> bool {
 }
 
 fn has_index(table: &DeTable) -> bool {
-    table
-        .keys()
-        .any(|key| key.get_ref().parse::<usize>().is_ok())
+    table.keys().any(|key| key.get_ref().parse::<usize>().is_ok())
 }
 
 /// Applies an override to elements of the list `name`.

@@ -67,13 +67,11 @@ impl Region<'_> {
             self.enclosure.periodic[axis]
                 && (self.upper - self.lower)[axis] >= self.enclosure.size()[axis] * (1.0 - 1e-9)
         };
-        DVec3::from_array([0, 1, 2].map(|axis| {
-            if spans(axis) {
-                0.0
-            } else {
-                radius + self.clearance
-            }
-        }))
+        DVec3::from_array([0, 1, 2].map(
+            |axis| {
+                if spans(axis) { 0.0 } else { radius + self.clearance }
+            },
+        ))
     }
 
     /// Returns random centres without overlap [m]; the error is the number of spheres placed.
@@ -86,10 +84,7 @@ impl Region<'_> {
                 return Err(placed.len());
             }
             let found = (0..20_000).find_map(|_| {
-                let sphere = Sphere {
-                    centre: self.lower + margin + room * point(random),
-                    radius,
-                };
+                let sphere = Sphere { centre: self.lower + margin + room * point(random), radius };
                 self.free(sphere, &placed).then_some(sphere)
             });
             placed.push(found.ok_or(placed.len())?);
@@ -117,11 +112,7 @@ impl Region<'_> {
         let sites: [usize; 3] = std::array::from_fn(|axis| {
             // A periodic axis has as many gaps as sites.
             let whole = (sites[axis] * (1.0 + 1e-12)).floor() as usize;
-            if margin[axis] == 0.0 {
-                whole
-            } else {
-                whole + 1
-            }
+            if margin[axis] == 0.0 { whole } else { whole + 1 }
         });
         let capacity: usize = sites.iter().product();
         if capacity < radii.len() {
@@ -137,32 +128,17 @@ impl Region<'_> {
         let layers = radii.len().div_ceil(layer);
         let mut pitch = DVec3::ZERO;
         for a in 0..3 {
-            let gaps = if margin[a] == 0.0 {
-                sites[a]
-            } else {
-                sites[a] - 1
-            };
-            pitch[a] = if gaps == 0 {
-                0.0
-            } else {
-                room[a] / gaps as f64
-            };
+            let gaps = if margin[a] == 0.0 { sites[a] } else { sites[a] - 1 };
+            pitch[a] = if gaps == 0 { 0.0 } else { room[a] / gaps as f64 };
         }
         // Stacked tightly along the vertical, spread evenly across.
-        pitch[axis] = if layers > 1 {
-            pitch[axis].min(1.2 * smallest_pitch)
-        } else {
-            0.0
-        };
+        pitch[axis] = if layers > 1 { pitch[axis].min(1.2 * smallest_pitch) } else { 0.0 };
         let mut centres = Vec::with_capacity(radii.len());
         for (n, &radius) in radii.iter().enumerate() {
             let (level, rest) = (n / layer, n % layer);
             let mut site = [0.0; 3];
-            (site[across], site[along], site[axis]) = (
-                (rest % sites[across]) as f64,
-                (rest / sites[across]) as f64,
-                level as f64,
-            );
+            (site[across], site[along], site[axis]) =
+                ((rest % sites[across]) as f64, (rest / sites[across]) as f64, level as f64);
             let free = (pitch - smallest_pitch).max(DVec3::ZERO) + 2.0 * (largest - radius);
             let offset =
                 pitch * DVec3::from_array(site) + jitter * 0.5 * free * (2.0 * point(random) - 1.0);
@@ -181,10 +157,7 @@ impl Region<'_> {
 
     /// Returns whether no sphere overlaps another one or a placed one.
     pub fn clear(&self, spheres: &[Sphere]) -> bool {
-        spheres
-            .iter()
-            .enumerate()
-            .all(|(i, sphere)| self.free(*sphere, &spheres[..i]))
+        spheres.iter().enumerate().all(|(i, sphere)| self.free(*sphere, &spheres[..i]))
     }
 }
 
@@ -216,38 +189,26 @@ mod tests {
         centres
             .iter()
             .zip(radii)
-            .map(|(centre, radius)| Sphere {
-                centre: *centre,
-                radius: *radius,
-            })
+            .map(|(centre, radius)| Sphere { centre: *centre, radius: *radius })
             .collect()
     }
 
     #[test]
     fn lattices_keep_clear_and_inside() {
         for periodic in [false, true] {
-            let enclosure = Enclosure {
-                periodic: [periodic; 3],
-                ..closed()
-            };
+            let enclosure = Enclosure { periodic: [periodic; 3], ..closed() };
             let space = space(&enclosure, &[]);
             let radii: Vec<f64> = (0..150).map(|i| 0.06 + 0.0002 * f64::from(i)).collect();
             for jitter in [0.0, 0.5, 1.0] {
-                let centres = space
-                    .lattice(&radii, jitter, (2, 1.0), &mut Random::seed_from_u64(7))
-                    .unwrap();
+                let centres =
+                    space.lattice(&radii, jitter, (2, 1.0), &mut Random::seed_from_u64(7)).unwrap();
                 assert!(
                     space.clear(&spheres(&centres, &radii)),
                     "periodic {periodic}, jitter {jitter}"
                 );
                 if !periodic {
-                    assert!(
-                        centres
-                            .iter()
-                            .zip(&radii)
-                            .all(|(c, r)| (*c - r).min_element() >= 0.0
-                                && (*c + *r).cmple(space.upper).all())
-                    );
+                    assert!(centres.iter().zip(&radii).all(|(c, r)| (*c - r).min_element() >= 0.0
+                        && (*c + *r).cmple(space.upper).all()));
                 }
             }
         }
@@ -255,38 +216,21 @@ mod tests {
 
     #[test]
     fn random_places_are_clear_and_repeat() {
-        let (enclosure, taken) = (
-            closed(),
-            [Sphere {
-                centre: DVec3::splat(0.5),
-                radius: 0.3,
-            }],
-        );
+        let (enclosure, taken) = (closed(), [Sphere { centre: DVec3::splat(0.5), radius: 0.3 }]);
         let space = space(&enclosure, &taken);
         let radii = [0.1; 60];
         let centres = space.random(&radii, &mut Random::seed_from_u64(3)).unwrap();
         assert!(space.clear(&spheres(&centres, &radii)));
-        assert_eq!(
-            centres,
-            space.random(&radii, &mut Random::seed_from_u64(3)).unwrap()
-        );
-        assert_ne!(
-            centres,
-            space.random(&radii, &mut Random::seed_from_u64(4)).unwrap()
-        );
+        assert_eq!(centres, space.random(&radii, &mut Random::seed_from_u64(3)).unwrap());
+        assert_ne!(centres, space.random(&radii, &mut Random::seed_from_u64(4)).unwrap());
     }
 
     #[test]
     fn too_many_are_refused_with_the_capacity() {
         let enclosure = closed();
         let space = space(&enclosure, &[]);
-        assert_eq!(
-            space.lattice(&[0.4; 9], 0.0, (2, 1.0), &mut Random::seed_from_u64(0)),
-            Err(3)
-        );
-        let placed = space
-            .random(&[0.4; 9], &mut Random::seed_from_u64(0))
-            .unwrap_err();
+        assert_eq!(space.lattice(&[0.4; 9], 0.0, (2, 1.0), &mut Random::seed_from_u64(0)), Err(3));
+        let placed = space.random(&[0.4; 9], &mut Random::seed_from_u64(0)).unwrap_err();
         assert!((1..4).contains(&placed));
     }
 

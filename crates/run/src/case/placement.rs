@@ -15,31 +15,20 @@ pub(super) fn orientation(orientation: &Orientation, turns: &Turns) -> Result<DQ
         Orientation::Axes(axes) => from_axes(axes)?,
     };
     let turned = turns.0.iter().fold(start, |q, turn| turn.quaternion() * q);
-    Ok(if (turned.length_squared() - 1.0).abs() < 1e-14 {
-        turned
-    } else {
-        turned.normalize()
-    })
+    Ok(if (turned.length_squared() - 1.0).abs() < 1e-14 { turned } else { turned.normalize() })
 }
 
 /// Returns the rotation of the principal axes (long, middle, short) to the given directions. The
 /// second direction is made perpendicular to the first; its default is the next axis of space
 /// (x -> y -> z -> x).
 fn from_axes(axes: &[Option<DVec3>; 3]) -> Result<DQuat, String> {
-    let first = axes
-        .iter()
-        .position(Option::is_some)
-        .ok_or("no direction is given")?;
-    let a = axes[first]
-        .and_then(DVec3::try_normalize)
-        .ok_or("a direction cannot be zero")?;
+    let first = axes.iter().position(Option::is_some).ok_or("no direction is given")?;
+    let a = axes[first].and_then(DVec3::try_normalize).ok_or("a direction cannot be zero")?;
     let second = (0..3).find(|i| *i != first && axes[*i].is_some());
     let (other, toward) = match second {
         Some(i) => (i, axes[i].unwrap_or(DVec3::ZERO)),
         None => {
-            let largest = (0..3)
-                .max_by(|i, j| a[*i].abs().total_cmp(&a[*j].abs()))
-                .unwrap_or(0);
+            let largest = (0..3).max_by(|i, j| a[*i].abs().total_cmp(&a[*j].abs())).unwrap_or(0);
             ((first + 1) % 3, DVec3::AXES[(largest + 1) % 3])
         }
     };
@@ -49,11 +38,7 @@ fn from_axes(axes: &[Option<DVec3>; 3]) -> Result<DQuat, String> {
     let b = b.ok_or("the two directions are parallel; principal axes are perpendicular")?;
     let third = 3 - first - other;
     // Right-handed: axis i x axis i+1 = axis i+2.
-    let c = if other == (first + 1) % 3 {
-        a.cross(b)
-    } else {
-        b.cross(a)
-    };
+    let c = if other == (first + 1) % 3 { a.cross(b) } else { b.cross(a) };
     let mut columns = [DVec3::ZERO; 3];
     (columns[first], columns[other], columns[third]) = (a, b, c);
     Ok(DQuat::from_mat3(&DMat3::from_cols(columns[0], columns[1], columns[2])).normalize())
@@ -75,10 +60,7 @@ pub(super) fn extent_along(grain: &Grain, axis: usize) -> (f64, f64) {
         };
         wall_gap(grain, &box_around).map_or(margin, |(gap, _)| gap)
     };
-    (
-        centre[axis] - margin + side(0),
-        centre[axis] + margin - side(1),
-    )
+    (centre[axis] - margin + side(0), centre[axis] + margin - side(1))
 }
 
 #[cfg(test)]

@@ -32,15 +32,7 @@ macro_rules! expected {
         concat!($prefix, "a plain number such as ", $example)
     };
     ($prefix:literal, $name:literal, $si:literal, $example:literal) => {
-        concat!(
-            $prefix,
-            $name,
-            " as a number in ",
-            $si,
-            " or a string such as \"",
-            $example,
-            "\""
-        )
+        concat!($prefix, $name, " as a number in ", $si, " or a string such as \"", $example, "\"")
     };
 }
 
@@ -190,12 +182,9 @@ impl<K: Kind> JsonSchema for Triple<K> {
 pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
     let trimmed = text.trim();
     let end = number_end(trimmed);
-    let value: f64 = trimmed[..end].parse().map_err(|_| {
-        format!(
-            "\"{text}\" does not start with a number; write {}",
-            K::EXPECTED
-        )
-    })?;
+    let value: f64 = trimmed[..end]
+        .parse()
+        .map_err(|_| format!("\"{text}\" does not start with a number; write {}", K::EXPECTED))?;
     let unit = trimmed[end..].trim();
     if unit.is_empty() {
         return Ok(value);
@@ -207,20 +196,13 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
             let hint = parted(unit, &symbol, K::DIMENSION)
                 .or_else(near)
                 .map_or(String::new(), |s| format!(" (did you mean `{s}`?)"));
-            format!(
-                "unknown unit `{symbol}` in \"{text}\"{hint}; write {}",
-                K::EXPECTED
-            )
+            format!("unknown unit `{symbol}` in \"{text}\"{hint}; write {}", K::EXPECTED)
         }
-        UnitError::Malformed(unit) => format!(
-            "the unit `{unit}` in \"{text}\" cannot be read; write {}",
-            K::EXPECTED
-        ),
+        UnitError::Malformed(unit) => {
+            format!("the unit `{unit}` in \"{text}\" cannot be read; write {}", K::EXPECTED)
+        }
     })?;
-    let bare_angle = Dimension {
-        angle: 0,
-        ..K::DIMENSION
-    };
+    let bare_angle = Dimension { angle: 0, ..K::DIMENSION };
     if scale.dimension != K::DIMENSION
         && !(K::DIMENSION.angle != 0 && scale.dimension == bare_angle)
     {
@@ -307,16 +289,10 @@ mod tests {
         let message = parse_quantity::<Length>("2 mmm").unwrap_err();
         assert!(message.contains("did you mean `mm`"), "{message}");
         let message = parse_quantity::<KinematicViscosity>("1 mPa s").unwrap_err();
-        assert!(
-            message.contains("dynamic viscosity") && message.contains("1 cSt"),
-            "{message}"
-        );
+        assert!(message.contains("dynamic viscosity") && message.contains("1 cSt"), "{message}");
         for (text, wanted) in [("1 mPas", "`mPa s`"), ("1 mPaS", "`mPa`")] {
             let message = parse_quantity::<DynamicViscosity>(text).unwrap_err();
-            assert!(
-                message.contains(&format!("did you mean {wanted}?")),
-                "{message}"
-            );
+            assert!(message.contains(&format!("did you mean {wanted}?")), "{message}");
         }
         let message = parse_quantity::<Density>("2 kgm3").unwrap_err();
         assert!(message.contains("did you mean `kg/m3`?"), "{message}");

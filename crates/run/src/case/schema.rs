@@ -14,11 +14,7 @@ mod tests {
         let schema = super::schema();
         let contact = &schema["$defs"]["RawContact"]["properties"];
         assert_eq!(contact["friction"]["default"], 0.5);
-        assert!(
-            contact["friction"]["description"]
-                .as_str()
-                .is_some_and(|d| d.contains("Coulomb"))
-        );
+        assert!(contact["friction"]["description"].as_str().is_some_and(|d| d.contains("Coulomb")));
         for (name, table) in schema["$defs"].as_object().unwrap() {
             for (key, value) in table["properties"].as_object().into_iter().flatten() {
                 let described = value["description"].is_string()

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use grainwake_solver::dem::{MotionConstraint, Grain};
+use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::{Setup, StepRule};
@@ -19,11 +19,7 @@ pub fn galileo(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
 
 /// Returns the drag coefficient of a sphere by Schiller and Naumann (0.44 from Re 1000 on).
 pub fn sphere_drag(reynolds: f64) -> f64 {
-    if reynolds >= 1000.0 {
-        0.44
-    } else {
-        24.0 / reynolds * (1.0 + 0.15 * reynolds.powf(0.687))
-    }
+    if reynolds >= 1000.0 { 0.44 } else { 24.0 / reynolds * (1.0 + 0.15 * reynolds.powf(0.687)) }
 }
 
 /// Returns the settling Reynolds number of an unbounded sphere of this Galileo number:
@@ -36,11 +32,7 @@ pub fn settling_reynolds(galileo: f64) -> f64 {
     let (mut low, mut high) = (1e-12_f64, 1e9_f64);
     for _ in 0..200 {
         let middle = (low * high).sqrt();
-        if sphere_drag(middle) * middle * middle < wanted {
-            low = middle
-        } else {
-            high = middle
-        }
+        if sphere_drag(middle) * middle * middle < wanted { low = middle } else { high = middle }
     }
     (low * high).sqrt()
 }
@@ -85,11 +77,7 @@ pub(super) fn time_step(setup: &Setup, speed: f64) -> f64 {
     let h: Vec<f64> = resolved.map(|axis| setup.mesh.spacing[axis]).collect();
     match setup.step {
         StepRule::Fixed(step) => step,
-        StepRule::Limits {
-            cfl,
-            viscous,
-            max_step,
-        } => {
+        StepRule::Limits { cfl, viscous, max_step } => {
             let Some(fluid) = &setup.fluid else {
                 return max_step;
             };
@@ -124,16 +112,8 @@ pub(super) fn default_max_step(
     end: f64,
 ) -> f64 {
     let g = gravity.length();
-    let length = if dry {
-        smallest_diameter(grains) / 50.0
-    } else {
-        mesh_spacing.min_element()
-    };
-    let step = if g > 0.0 && length.is_finite() {
-        (2.0 * length / g).sqrt()
-    } else {
-        end / 100.0
-    };
+    let length = if dry { smallest_diameter(grains) / 50.0 } else { mesh_spacing.min_element() };
+    let step = if g > 0.0 && length.is_finite() { (2.0 * length / g).sqrt() } else { end / 100.0 };
     step.min(end)
 }
 

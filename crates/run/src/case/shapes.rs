@@ -37,11 +37,7 @@ pub(super) struct Library<'a> {
 impl<'a> Library<'a> {
     /// Returns an empty cache; files are relative to `folder`.
     pub fn new(folder: &'a Path) -> Library<'a> {
-        Library {
-            folder,
-            files: BTreeMap::new(),
-            built: BTreeMap::new(),
-        }
+        Library { folder, files: BTreeMap::new(), built: BTreeMap::new() }
     }
 
     /// Returns the files that were read, by name.
@@ -66,9 +62,8 @@ impl<'a> Library<'a> {
             let help = "a case takes .grain files; make one with `grainwake grain from-scan`, `from-mesh` or `make`";
             (error.to_string(), help.to_string())
         })?;
-        let stem = path
-            .file_stem()
-            .map_or_else(|| "grain".into(), |s| s.to_string_lossy().into_owned());
+        let stem =
+            path.file_stem().map_or_else(|| "grain".into(), |s| s.to_string_lossy().into_owned());
         let taken = |candidate: &str| self.files.values().any(|(f, _)| f.name == candidate);
         let mut name = format!("shapes/{stem}.grain");
         let mut count = 1;
@@ -77,11 +72,7 @@ impl<'a> Library<'a> {
             name = format!("shapes/{stem}-{count}.grain");
         }
         let shape = Arc::new(shape);
-        let file = ShapeFile {
-            name: name.clone(),
-            source: path.clone(),
-            bytes: Arc::new(bytes),
-        };
+        let file = ShapeFile { name: name.clone(), source: path.clone(), bytes: Arc::new(bytes) };
         self.files.insert(path, (file, shape.clone()));
         Ok((shape, name))
     }
@@ -136,10 +127,7 @@ fn build(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
         };
         return Err((message, format!("this kind takes: {}", expected.join(", "))));
     }
-    let options = ShapeOptions {
-        nodes: Some(nodes),
-        ..ShapeOptions::default()
-    };
+    let options = ShapeOptions { nodes: Some(nodes), ..ShapeOptions::default() };
     let length =
         |value: &Option<Located<Quantity<Length>>>| value.as_ref().map_or(f64::NAN, |v| v.si);
     let (diameter, height) = (length(&raw.diameter), length(&raw.height));

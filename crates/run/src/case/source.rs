@@ -77,17 +77,11 @@ impl Source {
         let mut table = DeTable::parse(text).map_err(|e| source.located(&e))?;
         // Each override is parsed after as many blanks as there is text before it, which makes its
         // spans count from the start of the file.
-        let padded: Vec<String> = source
-            .overrides
-            .iter()
-            .map(|o| format!("{}{}", " ".repeat(o.start), o.line))
-            .collect();
+        let padded: Vec<String> =
+            source.overrides.iter().map(|o| format!("{}{}", " ".repeat(o.start), o.line)).collect();
         for (item, line) in padded.iter().zip(overrides) {
             let extra = DeTable::parse(item).map_err(|e| source.located(&e))?;
-            let parts = line
-                .split('=')
-                .next()
-                .map_or(1, |key| key.split('.').count());
+            let parts = line.split('=').next().map_or(1, |key| key.split('.').count());
             override_table(table.get_mut(), extra.into_inner(), parts)
                 .map_err(|m| Problem::new(format!("--set {line}: {m}")))?;
         }
@@ -110,12 +104,9 @@ impl Source {
     /// Returns whether a value at `key` or below it is a number without a unit.
     pub(super) fn is_bare(&self, key: &str) -> bool {
         let under = |path: &str| {
-            path.strip_prefix(key)
-                .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+            path.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         };
-        self.entries
-            .iter()
-            .any(|p| p.kind == EntryKind::Bare && under(&p.path))
+        self.entries.iter().any(|p| p.kind == EntryKind::Bare && under(&p.path))
     }
 
     /// Returns whether an override set the value at `span` or a part of it.
@@ -133,10 +124,8 @@ impl Source {
     fn changed_part(&self, span: &Range<usize>) -> Option<Range<usize>> {
         let is_whole = |p: &&Entry| p.span == *span && p.kind == EntryKind::Inline;
         let under = format!("{}.", self.entries.iter().find(is_whole)?.path);
-        let parts = self
-            .entries
-            .iter()
-            .filter(|p| p.kind != EntryKind::Key && p.path.starts_with(&under));
+        let parts =
+            self.entries.iter().filter(|p| p.kind != EntryKind::Key && p.path.starts_with(&under));
         let last = parts
             .filter_map(|p| Some((self.override_at(p.span.start)?.start, p)))
             .max_by_key(|(start, p)| (*start, Reverse(p.path.len())));
@@ -155,12 +144,9 @@ impl Source {
             None => (span.clone(), label),
         };
         match self.override_at(span.start) {
-            Some(o) => problem.at(
-                "--set",
-                &o.line,
-                span.start - o.start..span.end - o.start,
-                label,
-            ),
+            Some(o) => {
+                problem.at("--set", &o.line, span.start - o.start..span.end - o.start, label)
+            }
             None => problem.at(&self.name, &self.text, span, label),
         }
     }
@@ -176,11 +162,7 @@ impl Source {
         {
             return self.missing_in_file(key);
         }
-        let owner = span
-            .as_ref()
-            .and_then(|s| self.key_at(s))
-            .unwrap_or_default()
-            .to_string();
+        let owner = span.as_ref().and_then(|s| self.key_at(s)).unwrap_or_default().to_string();
         let (text, label, help) = match words[..] {
             [key, ref known @ ..] if message.starts_with("unknown field") => {
                 let parent = (owner.rsplit_once('.'))
@@ -191,27 +173,20 @@ impl Source {
                     Some(hint) => format!("did you mean `{hint}`? Keys of {parent}: {known}"),
                     None => format!("keys of {parent}: {known}"),
                 };
-                let label = hint.map_or("not a key here".into(), |hint| {
-                    format!("did you mean `{hint}`?")
-                });
+                let label =
+                    hint.map_or("not a key here".into(), |hint| format!("did you mean `{hint}`?"));
                 (format!("unknown key `{key}`"), label, Some(help))
             }
             [key, ..] if message.starts_with("missing field") => (
                 format!("the key `{key}` is missing"),
                 format!("`{key}` is needed here"),
-                Some(format!(
-                    "add `{key} = ...`; `grainwake schema` lists every key"
-                )),
+                Some(format!("add `{key} = ...`; `grainwake schema` lists every key")),
             ),
             [word, ref known @ ..] if message.starts_with("unknown variant") => {
                 let hint = nearest(word, known.iter().copied())
                     .map_or(String::new(), |hint| format!("did you mean \"{hint}\"? "));
                 let help = format!("{hint}Accepted: {}", known.join(", "));
-                (
-                    format!("unknown value \"{word}\""),
-                    "not accepted".into(),
-                    Some(help),
-                )
+                (format!("unknown value \"{word}\""), "not accepted".into(), Some(help))
             }
             _ => {
                 let kind = (message.strip_prefix("invalid type: "))
@@ -247,11 +222,7 @@ fn collect_keys(table: &DeTable<'_>, prefix: &str, text: &str, entries: &mut Vec
         } else {
             format!("{prefix}.{}", key.get_ref())
         };
-        entries.push(Entry {
-            span: key.span(),
-            path: path.clone(),
-            kind: EntryKind::Key,
-        });
+        entries.push(Entry { span: key.span(), path: path.clone(), kind: EntryKind::Key });
         collect_value(value, &path, text, entries);
     }
 }
@@ -262,11 +233,7 @@ fn collect_value(
     text: &str,
     entries: &mut Vec<Entry>,
 ) {
-    entries.push(Entry {
-        span: value.span(),
-        path: path.to_string(),
-        kind: kind(value, text),
-    });
+    entries.push(Entry { span: value.span(), path: path.to_string(), kind: kind(value, text) });
     match value.get_ref() {
         DeValue::Table(table) => collect_keys(table, path, text, entries),
         DeValue::Array(items) => {

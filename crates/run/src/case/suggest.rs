@@ -7,12 +7,7 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     let reach = (wanted.chars().count() / 3).max(1);
     let (distance, best) = candidates
         .into_iter()
-        .map(|c| {
-            (
-                strsim::damerau_levenshtein(&wanted, &c.to_lowercase().replace('-', "_")),
-                c,
-            )
-        })
+        .map(|c| (strsim::damerau_levenshtein(&wanted, &c.to_lowercase().replace('-', "_")), c))
         .min_by_key(|(distance, _)| *distance)?;
     (distance <= reach).then_some(best)
 }
@@ -26,10 +21,7 @@ mod tests {
         let keys = ["density", "viscosity", "kinematic_viscosity"];
         assert_eq!(nearest("densty", keys), Some("density"));
         assert_eq!(nearest("visocsity", keys), Some("viscosity"));
-        assert_eq!(
-            nearest("kinematic-viscosity", keys),
-            Some("kinematic_viscosity")
-        );
+        assert_eq!(nearest("kinematic-viscosity", keys), Some("kinematic_viscosity"));
         assert_eq!(nearest("colour", keys), None);
     }
 }

@@ -40,9 +40,8 @@ fn kind_of(expected: &str) -> String {
 /// Rewords other messages of the TOML reader.
 pub(super) fn plainly(message: &str) -> String {
     let message = message.trim_end().replace('\n', "; ");
-    if let Some((count, expected)) = message
-        .strip_prefix("invalid length ")
-        .and_then(|rest| rest.split_once(", expected "))
+    if let Some((count, expected)) =
+        message.strip_prefix("invalid length ").and_then(|rest| rest.split_once(", expected "))
     {
         return format!("found {count} values, expected {}", kind_of(expected));
     }

@@ -18,12 +18,7 @@ pub struct Dimension {
 impl Dimension {
     /// A dimension from its exponents of kg, m, s and rad.
     pub const fn new(mass: i8, length: i8, time: i8, angle: i8) -> Dimension {
-        Dimension {
-            mass,
-            length,
-            time,
-            angle,
-        }
+        Dimension { mass, length, time, angle }
     }
     fn plus(self, other: Dimension, times: i8) -> Option<Dimension> {
         let add = |a: i8, b: i8| b.checked_mul(times).and_then(|b| a.checked_add(b));
@@ -38,12 +33,7 @@ impl Dimension {
 
 impl fmt::Display for Dimension {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let bases = [
-            ("kg", self.mass),
-            ("m", self.length),
-            ("s", self.time),
-            ("rad", self.angle),
-        ];
+        let bases = [("kg", self.mass), ("m", self.length), ("s", self.time), ("rad", self.angle)];
         let mut separator = "";
         for (unit, power) in bases.into_iter().filter(|(_, power)| *power != 0) {
             write!(f, "{separator}{unit}")?;
@@ -64,12 +54,7 @@ struct Unit {
 }
 
 const fn unit(symbol: &'static str, factor: f64, d: (i8, i8, i8, i8), prefixes: bool) -> Unit {
-    Unit {
-        symbol,
-        factor,
-        dimension: Dimension::new(d.0, d.1, d.2, d.3),
-        prefixes,
-    }
+    Unit { symbol, factor, dimension: Dimension::new(d.0, d.1, d.2, d.3), prefixes }
 }
 
 const UNITS: &[Unit] = &[
@@ -120,11 +105,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    const ONE: Scale = Scale {
-        numerator: 1.0,
-        denominator: 1.0,
-        dimension: Dimension::new(0, 0, 0, 0),
-    };
+    const ONE: Scale =
+        Scale { numerator: 1.0, denominator: 1.0, dimension: Dimension::new(0, 0, 0, 0) };
 
     /// `value` of this unit in SI.
     pub fn to_si(self, value: f64) -> f64 {
@@ -146,11 +128,7 @@ pub fn known_symbols() -> Vec<String> {
 }
 
 fn split(factor: f64) -> (f64, f64) {
-    if factor < 1.0 && (1.0 / factor).fract() == 0.0 {
-        (1.0, 1.0 / factor)
-    } else {
-        (factor, 1.0)
-    }
+    if factor < 1.0 && (1.0 / factor).fract() == 0.0 { (1.0, 1.0 / factor) } else { (factor, 1.0) }
 }
 
 fn lookup(symbol: &str) -> Option<Scale> {
@@ -172,11 +150,7 @@ fn lookup(symbol: &str) -> Option<Scale> {
         numerator /= common;
         denominator /= common;
     }
-    Some(Scale {
-        numerator,
-        denominator,
-        dimension: unit.dimension,
-    })
+    Some(Scale { numerator, denominator, dimension: unit.dimension })
 }
 
 /// Error of a unit expression.
@@ -232,18 +206,14 @@ fn split_power(token: &str) -> Option<(&str, i8)> {
             return (!symbol.is_empty()).then_some((symbol, power));
         }
     }
-    let end = token
-        .find(|c: char| c.is_ascii_digit() || c == '^' || c == '-')
-        .unwrap_or(token.len());
+    let end =
+        token.find(|c: char| c.is_ascii_digit() || c == '^' || c == '-').unwrap_or(token.len());
     let (symbol, tail) = token.split_at(end);
     let digits = tail.strip_prefix('^').unwrap_or(tail);
     let power = if tail.is_empty() {
         1
     } else {
-        digits
-            .parse::<i8>()
-            .ok()
-            .filter(|p| (1..=9).contains(&p.abs()))?
+        digits.parse::<i8>().ok().filter(|p| (1..=9).contains(&p.abs()))?
     };
     (!symbol.is_empty()).then_some((symbol, power))
 }
@@ -275,34 +245,16 @@ mod tests {
 
     #[test]
     fn dimensions_add_up() {
-        assert_eq!(
-            parse_unit("mPa s").unwrap().dimension,
-            Dimension::new(1, -1, -1, 0)
-        );
-        assert_eq!(
-            parse_unit("kg/m/s").unwrap().dimension,
-            Dimension::new(1, -1, -1, 0)
-        );
-        assert_eq!(
-            parse_unit("kg/m s").unwrap().dimension,
-            Dimension::new(1, -1, -1, 0)
-        );
-        assert_eq!(
-            parse_unit("deg/s").unwrap().dimension,
-            Dimension::new(0, 0, -1, 1)
-        );
-        assert_eq!(
-            parse_unit("N/m").unwrap().dimension,
-            Dimension::new(1, 0, -2, 0)
-        );
+        assert_eq!(parse_unit("mPa s").unwrap().dimension, Dimension::new(1, -1, -1, 0));
+        assert_eq!(parse_unit("kg/m/s").unwrap().dimension, Dimension::new(1, -1, -1, 0));
+        assert_eq!(parse_unit("kg/m s").unwrap().dimension, Dimension::new(1, -1, -1, 0));
+        assert_eq!(parse_unit("deg/s").unwrap().dimension, Dimension::new(0, 0, -1, 1));
+        assert_eq!(parse_unit("N/m").unwrap().dimension, Dimension::new(1, 0, -2, 0));
     }
 
     #[test]
     fn nonsense_is_named() {
-        assert_eq!(
-            parse_unit("mmm").unwrap_err(),
-            UnitError::Unknown("mmm".into())
-        );
+        assert_eq!(parse_unit("mmm").unwrap_err(), UnitError::Unknown("mmm".into()));
         assert!(parse_unit("m99").is_err());
         assert!(parse_unit("m^").is_err());
         assert!(parse_unit("m/").is_err());

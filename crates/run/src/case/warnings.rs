@@ -7,7 +7,7 @@ use super::expect::{Expectation, Measure};
 use super::number_format::{AXES, SIDES, quantity};
 use super::settling::{is_free, terminal_speed, time_step};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
-use grainwake_solver::dem::{ContactLawKind, MotionConstraint, Grain, outside};
+use grainwake_solver::dem::{ContactLawKind, Grain, MotionConstraint, outside};
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::events::StopWhen;
@@ -55,9 +55,8 @@ fn output_intervals(setup: &Setup, e: &Estimate) -> Option<String> {
 fn open_faces(setup: &Setup) -> Vec<String> {
     let density = setup.fluid.as_ref().map_or(0.0, |fluid| fluid.density);
     let weights = setup.grains.iter().filter(|grain| is_free(grain));
-    let pulls: Vec<DVec3> = weights
-        .map(|grain| setup.gravity * (grain.density - density).signum())
-        .collect();
+    let pulls: Vec<DVec3> =
+        weights.map(|grain| setup.gravity * (grain.density - density).signum()).collect();
     let mut found = Vec::new();
     for (axis, side) in (0..6).map(|k| (k / 2, k % 2)) {
         let outward = if side == 0 { -1.0 } else { 1.0 };
@@ -84,9 +83,7 @@ fn unsupported_weight(setup: &Setup) -> Option<String> {
         let walls = setup.boundaries.0[axis];
         !setup.boundaries.is_periodic(axis)
             && (setup.gravity[axis] != 0.0
-                || walls
-                    .iter()
-                    .any(|wall| !matches!(wall, Boundary::Slip | Boundary::FreeSurface)))
+                || walls.iter().any(|wall| !matches!(wall, Boundary::Slip | Boundary::FreeSurface)))
     };
     let held = setup.grains.iter().any(|grain| !is_free(grain));
     let driven =
@@ -199,10 +196,7 @@ fn wrong_units(setup: &Setup, e: &Estimate) -> Vec<String> {
 
 /// Returns whether a plane differs from the default planes.
 fn is_own(plane: &Plane, setup: &Setup) -> bool {
-    let (origin, extent) = (
-        setup.mesh.origin[plane.axis],
-        setup.mesh.extent()[plane.axis],
-    );
+    let (origin, extent) = (setup.mesh.origin[plane.axis], setup.mesh.extent()[plane.axis]);
     plane.axis == 2
         || match plane.position {
             PlanePosition::Grain(_) => false,
@@ -214,10 +208,7 @@ fn is_own(plane: &Plane, setup: &Setup) -> bool {
 fn ignored_in_dry_runs(setup: &Setup, plan: &RunPlan, expect: &[Expectation]) -> Option<String> {
     let of_flow = |e: &Expectation| e.measure == Measure::MaxDivergence;
     let requests = [
-        (
-            plan.planes.iter().any(|plane| is_own(plane, setup)),
-            "output.planes",
-        ),
+        (plan.planes.iter().any(|plane| is_own(plane, setup)), "output.planes"),
         (plan.slices > 0.0, "output.slices"),
         (plan.fields > 0.0, "output.fields"),
         (expect.iter().any(of_flow), "expect.max_divergence"),
@@ -251,11 +242,8 @@ fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     if let Some(blockage) = e.blockage.filter(|b| *b > 0.05) {
         let closed =
             (0..3).any(|axis| !setup.boundaries.is_periodic(axis) && setup.gravity[axis] == 0.0);
-        let what = if closed {
-            "the walls slow the grains"
-        } else {
-            "the grain feels its own images"
-        };
+        let what =
+            if closed { "the walls slow the grains" } else { "the grain feels its own images" };
         found.push(format!("a grain blocks {:.0} % of the cross-section: {what}; widen the box for an unbounded fluid", 100.0 * blockage));
     }
     // Contact dominates the cost of a dry run, so that its sub-steps are no reason for a warning.
@@ -286,9 +274,7 @@ fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
             ContactLawKind::Linear => "a lower [contact] stiffness or a larger maximum_overlap",
             ContactLawKind::HertzMindlin => "a lower youngs_modulus",
         };
-        found.push(format!(
-            "contacts need {substeps:.0} sub-steps a step: {remedy} is cheaper"
-        ));
+        found.push(format!("contacts need {substeps:.0} sub-steps a step: {remedy} is cheaper"));
     }
     if let Some(overlap) = expected_overlap(setup).filter(|overlap| *overlap > 0.05) {
         let remedy = match setup.contact.law {
@@ -324,10 +310,8 @@ fn light_grains(setup: &Setup, stop: Option<&Stop>) -> Vec<String> {
         return Vec::new();
     };
     let grains = setup.grains.iter();
-    let free: Vec<f64> = grains
-        .filter(|grain| is_free(grain))
-        .map(|grain| grain.density / fluid.density)
-        .collect();
+    let free: Vec<f64> =
+        grains.filter(|grain| is_free(grain)).map(|grain| grain.density / fluid.density).collect();
     let mut found = Vec::new();
     let rising = free.iter().filter(|ratio| **ratio < 1.0).count();
     if rising == 0 || setup.gravity == DVec3::ZERO {

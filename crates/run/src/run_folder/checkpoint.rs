@@ -80,14 +80,9 @@ fn name(steps: u64) -> String {
 
 /// Returns the checkpoints in a run folder, newest first.
 pub fn list(run: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(run.join(FOLDER))
-        .into_iter()
-        .flatten()
-        .flatten();
-    let mut paths: Vec<PathBuf> = entries
-        .map(|e| e.path())
-        .filter(|p| p.extension().is_some_and(|e| e == "ckpt"))
-        .collect();
+    let entries = std::fs::read_dir(run.join(FOLDER)).into_iter().flatten().flatten();
+    let mut paths: Vec<PathBuf> =
+        entries.map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "ckpt")).collect();
     paths.sort_by(|a, b| b.cmp(a));
     paths
 }
@@ -96,14 +91,9 @@ pub fn list(run: &Path) -> Vec<PathBuf> {
 pub(crate) fn write(run: &Path, record: &Record, sim: &Simulation) -> Result<(), RunError> {
     let folder = run.join(FOLDER);
     let path = folder.join(name(record.steps));
-    let json = serde_json::to_vec(record)
-        .map_err(io::Error::from)
-        .context("write", &path)?;
+    let json = serde_json::to_vec(record).map_err(io::Error::from).context("write", &path)?;
     write_atomically(&path, true, |out| {
-        let mut hashed = HashWriter {
-            out,
-            hash: Sha256::new(),
-        };
+        let mut hashed = HashWriter { out, hash: Sha256::new() };
         let mut encoder = Encoder::new(&mut hashed);
         encoder.raw(SIGNATURE)?;
         encoder.u32(VERSION)?;
@@ -138,9 +128,7 @@ fn read(path: &Path, digest: &str, sim: &mut Simulation) -> Result<Record, Strin
     let mut buffer = vec![0; 1 << 18];
     let mut left = body;
     while left > 0 {
-        let part = buffer
-            .len()
-            .min(usize::try_from(left).unwrap_or(usize::MAX));
+        let part = buffer.len().min(usize::try_from(left).unwrap_or(usize::MAX));
         file.read_exact(&mut buffer[..part]).map_err(text)?;
         hash.update(&buffer[..part]);
         left -= part as u64;
@@ -199,9 +187,6 @@ pub(crate) fn restore(
     if reasons.is_empty() {
         Ok(None)
     } else {
-        Err(RunError::NoCheckpoint {
-            folder: run.join(FOLDER),
-            reasons,
-        })
+        Err(RunError::NoCheckpoint { folder: run.join(FOLDER), reasons })
     }
 }

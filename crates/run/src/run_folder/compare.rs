@@ -8,14 +8,8 @@ use toml::Value;
 use super::RESOLVED;
 
 /// Keys that do not affect the results up to a given time.
-const IGNORED: [&str; 6] = [
-    "title",
-    "expect",
-    "run.threads",
-    "time.end",
-    "time.stop",
-    "output.checkpoint",
-];
+const IGNORED: [&str; 6] =
+    ["title", "expect", "run.threads", "time.end", "time.stop", "output.checkpoint"];
 /// Largest number of differences that are named.
 const MAX_NAMED: usize = 4;
 /// Longest value that is quoted [characters].
@@ -24,10 +18,8 @@ const MAX_VALUE: usize = 40;
 /// Describes how the case of a run folder differs from a resolved case.
 pub fn differing(folder: &Path, resolved: &str) -> String {
     let there = std::fs::read_to_string(folder.join(RESOLVED)).unwrap_or_default();
-    let (Ok(there), Ok(here)) = (
-        there.parse::<toml::Table>(),
-        resolved.parse::<toml::Table>(),
-    ) else {
+    let (Ok(there), Ok(here)) = (there.parse::<toml::Table>(), resolved.parse::<toml::Table>())
+    else {
         return "its case.resolved.toml cannot be read".into();
     };
     let (there, here) = (flatten(there), flatten(here));
@@ -47,21 +39,13 @@ pub fn differing(folder: &Path, resolved: &str) -> String {
         .into_iter()
         .filter(|key| !IGNORED.iter().any(|free| key.starts_with(free)))
         .filter(|key| there.get(*key) != here.get(*key))
-        .map(|key| {
-            format!(
-                "{key}: {} there, {} here",
-                side(&there, key),
-                side(&here, key)
-            )
-        })
+        .map(|key| format!("{key}: {} there, {} here", side(&there, key), side(&here, key)))
         .collect();
     match differ.len() {
         0 => "a grain file has other contents, or another version of the program wrote it".into(),
-        n if n > MAX_NAMED => format!(
-            "{}; and {} more",
-            differ[..MAX_NAMED].join("; "),
-            n - MAX_NAMED
-        ),
+        n if n > MAX_NAMED => {
+            format!("{}; and {} more", differ[..MAX_NAMED].join("; "), n - MAX_NAMED)
+        }
         _ => differ.join("; "),
     }
 }
@@ -103,13 +87,9 @@ mod tests {
         std::fs::create_dir_all(&folder).unwrap();
         let there = "title = \"a\"\n[fluid]\nviscosity = 0.001\n[time]\nend = 1.0\n[[grain]]\ndensity = 2500.0\n[grain.shape]\nkind = \"sphere\"\n";
         std::fs::write(folder.join(RESOLVED), there).unwrap();
-        let same = there
-            .replace("end = 1.0", "end = 2.0")
-            .replace("\"a\"", "\"b\"");
+        let same = there.replace("end = 1.0", "end = 2.0").replace("\"a\"", "\"b\"");
         assert!(differing(&folder, &same).contains("grain file"));
-        let other = same
-            .replace("0.001", "0.005")
-            .replace("\"sphere\"", "\"cube\"");
+        let other = same.replace("0.001", "0.005").replace("\"sphere\"", "\"cube\"");
         assert_eq!(
             differing(&folder, &other),
             "fluid.viscosity: 0.001 there, 0.005 here; grain.0.shape.kind: \"sphere\" there, \"cube\" here"

@@ -78,11 +78,7 @@ fn content(folder: &Path) -> Result<Content, RunError> {
         let empty = std::fs::read_dir(entry.path()).is_ok_and(|mut inside| inside.next().is_none());
         !empty && !is_temporary(&entry.path()) && entry.file_name() != lock::FILE
     });
-    Ok(if foreign {
-        Content::Foreign
-    } else {
-        Content::Empty
-    })
+    Ok(if foreign { Content::Foreign } else { Content::Empty })
 }
 
 /// Checks that a run may use the folder; writes nothing.
@@ -101,10 +97,9 @@ pub(crate) fn admit(folder: &Path, existing: Existing) -> Result<Content, RunErr
         })
     };
     match (present, existing) {
-        (Content::Foreign, _) => occupied(
-            "is not empty and holds no run of this program",
-            "give another folder with -o",
-        ),
+        (Content::Foreign, _) => {
+            occupied("is not empty and holds no run of this program", "give another folder with -o")
+        }
         (Content::Finished, Existing::Refuse) => occupied(
             "holds a finished run",
             "give another folder with -o, or --force to replace it",
@@ -113,10 +108,9 @@ pub(crate) fn admit(folder: &Path, existing: Existing) -> Result<Content, RunErr
             "holds a run that has not finished",
             "continue it with --resume, give another folder with -o, or --force to start over",
         ),
-        (Content::Empty, Existing::Resume) => occupied(
-            "holds no run to resume",
-            "leave out --resume, or give the run folder with -o",
-        ),
+        (Content::Empty, Existing::Resume) => {
+            occupied("holds no run to resume", "leave out --resume, or give the run folder with -o")
+        }
         _ => Ok(present),
     }
 }
@@ -127,10 +121,7 @@ pub(crate) fn lock_folder(folder: &Path) -> Result<Lock, RunError> {
     let path = folder.join(lock::FILE);
     match lock::acquire(&path).context("lock", &path)? {
         Attempt::Acquired(lock) => Ok(lock),
-        Attempt::HeldByOther(process) => Err(RunError::InUse {
-            folder: folder.into(),
-            process,
-        }),
+        Attempt::HeldByOther(process) => Err(RunError::InUse { folder: folder.into(), process }),
     }
 }
 
@@ -138,18 +129,9 @@ pub(crate) fn lock_folder(folder: &Path) -> Result<Lock, RunError> {
 pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
     // The provenance marks a run folder. It is removed last, so that an interrupted removal can be
     // repeated.
-    let files = [
-        summary::FILE,
-        "failure.json",
-        "run.pvd",
-        "report.html",
-        RESOLVED,
-        provenance::FILE,
-    ];
-    for name in vtk_output::FOLDERS
-        .iter()
-        .chain(&[checkpoint::FOLDER, "shapes", "figures"])
-    {
+    let files =
+        [summary::FILE, "failure.json", "run.pvd", "report.html", RESOLVED, provenance::FILE];
+    for name in vtk_output::FOLDERS.iter().chain(&[checkpoint::FOLDER, "shapes", "figures"]) {
         remove(&folder.join(name), |p| std::fs::remove_dir_all(p))?;
     }
     for name in tables::FILES.into_iter().chain(files) {
@@ -180,11 +162,7 @@ pub(crate) fn create(folder: &Path) -> Result<(), RunError> {
     for path in std::iter::once(PathBuf::from(folder)).chain(inner) {
         std::fs::create_dir_all(&path).context("create", &path)?;
         let entries = std::fs::read_dir(&path).context("read", &path)?;
-        for file in entries
-            .flatten()
-            .map(|e| e.path())
-            .filter(|p| is_temporary(p))
-        {
+        for file in entries.flatten().map(|e| e.path()).filter(|p| is_temporary(p)) {
             std::fs::remove_file(&file).context("remove", &file)?;
         }
     }

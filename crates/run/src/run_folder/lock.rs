@@ -38,12 +38,7 @@ pub enum Attempt {
 /// If the file cannot be created.
 pub fn acquire(path: &Path) -> io::Result<Attempt> {
     let mut open = OpenOptions::new();
-    let mut file = open
-        .read(true)
-        .write(true)
-        .create(true)
-        .truncate(false)
-        .open(path)?;
+    let mut file = open.read(true).write(true).create(true).truncate(false).open(path)?;
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => {
             let mut text = String::new();
@@ -53,9 +48,7 @@ pub fn acquire(path: &Path) -> io::Result<Attempt> {
         }
         Ok(()) | Err(TryLockError::Error(_)) => {
             // The process number is information for users only.
-            let _ = file
-                .set_len(0)
-                .and_then(|()| writeln!(file, "{}", std::process::id()));
+            let _ = file.set_len(0).and_then(|()| writeln!(file, "{}", std::process::id()));
             Ok(Attempt::Acquired(Lock { file }))
         }
     }

@@ -66,9 +66,7 @@ impl Provenance {
     /// Reads the provenance of a run folder; none if it is absent or damaged.
     pub fn read(run: &Path) -> Option<Provenance> {
         let text = std::fs::read_to_string(run.join(FILE)).ok()?;
-        serde_json::from_str(&text)
-            .ok()
-            .filter(|p: &Provenance| p.program == PROGRAM)
+        serde_json::from_str(&text).ok().filter(|p: &Provenance| p.program == PROGRAM)
     }
     /// Writes the provenance into the folder of a run.
     pub(crate) fn write(&self, run: &Path) -> Result<(), RunError> {
@@ -85,9 +83,7 @@ impl Session {
     /// Returns a session that starts now.
     pub fn now(command: &[String], threads: usize, from_step: u64) -> Session {
         Session {
-            started: jiff::Zoned::now()
-                .strftime("%Y-%m-%dT%H:%M:%S%:z")
-                .to_string(),
+            started: jiff::Zoned::now().strftime("%Y-%m-%dT%H:%M:%S%:z").to_string(),
             command: command.to_vec(),
             cpu: cpu(),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
@@ -101,9 +97,7 @@ impl Session {
 fn cpu() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name = text.lines().find_map(|line| {
-        line.strip_prefix("model name")?
-            .split_once(':')
-            .map(|(_, n)| n.trim().to_string())
+        line.strip_prefix("model name")?.split_once(':').map(|(_, n)| n.trim().to_string())
     });
     name.unwrap_or_else(|| "unknown".into())
 }

@@ -50,10 +50,7 @@ impl Surfaces {
 
     /// Returns the surfaces at the poses of the grains, with their velocities [m/s].
     pub fn at(&self, grains: &[Grain], time: f64) -> Surface {
-        let mut surface = Surface {
-            time: Some(time),
-            ..Surface::default()
-        };
+        let mut surface = Surface { time: Some(time), ..Surface::default() };
         let (mut velocity, mut owners) = (Vec::new(), Vec::new());
         for (index, (grain, body)) in grains.iter().zip(&self.by_grain).enumerate() {
             let first = surface.points.len();
@@ -104,10 +101,7 @@ impl BodySurface {
                 triangles.push(key);
             }
         }
-        BodySurface {
-            points: sums.iter().map(|(sum, n)| *sum / *n).collect(),
-            triangles,
-        }
+        BodySurface { points: sums.iter().map(|(sum, n)| *sum / *n).collect(), triangles }
     }
 }
 

@@ -48,16 +48,11 @@ impl Tables {
     pub fn reopen(folder: &Path, lengths: Lengths) -> Result<Tables, RunError> {
         let open = |index: usize| {
             let path = folder.join(FILES[index]);
-            let mut file = OpenOptions::new()
-                .write(true)
-                .open(&path)
-                .context("open", &path)?;
+            let mut file = OpenOptions::new().write(true).open(&path).context("open", &path)?;
             let found = file.metadata().context("read", &path)?.len();
             if found < lengths.0[index] {
-                let message = format!(
-                    "it has {found} bytes; at the checkpoint it had {}",
-                    lengths.0[index]
-                );
+                let message =
+                    format!("it has {found} bytes; at the checkpoint it had {}", lengths.0[index]);
                 return Err(io::Error::new(io::ErrorKind::UnexpectedEof, message))
                     .context("continue", &path);
             }
@@ -65,10 +60,7 @@ impl Tables {
             file.seek(SeekFrom::End(0)).context("continue", &path)?;
             Ok((path, file))
         };
-        Ok(Tables {
-            files: [open(0)?, open(1)?, open(2)?],
-            lengths,
-        })
+        Ok(Tables { files: [open(0)?, open(1)?, open(2)?], lengths })
     }
 
     fn append(&mut self, index: usize, text: &str) -> Result<(), RunError> {

@@ -41,11 +41,7 @@ impl VtkOutput {
             (first[plane.axis], count[plane.axis]) = (layer(plane, sim), 1);
             let file = format!("slices/{name}_{tag}.vti");
             write_image(&run.join(&file), sim, first, count)?;
-            written.push(Entry {
-                time: sim.time(),
-                group: format!("slice {name}"),
-                file,
-            });
+            written.push(Entry { time: sim.time(), group: format!("slice {name}"), file });
         }
         Ok(written)
     }
@@ -57,11 +53,7 @@ impl VtkOutput {
         }
         let file = format!("fields/fields_{tag}.vti");
         write_image(&run.join(&file), sim, [0; 3], sim.mesh().cells)?;
-        Ok(vec![Entry {
-            time: sim.time(),
-            group: "fields".into(),
-            file,
-        }])
+        Ok(vec![Entry { time: sim.time(), group: "fields".into(), file }])
     }
 
     /// Writes the surfaces of the grains.
@@ -73,11 +65,7 @@ impl VtkOutput {
         let path = run.join(&file);
         let surface = self.surfaces.at(sim.grains(), sim.time());
         vtp::write(&path, &surface).context("write", &path)?;
-        Ok(vec![Entry {
-            time: sim.time(),
-            group: "grains".into(),
-            file,
-        }])
+        Ok(vec![Entry { time: sim.time(), group: "grains".into(), file }])
     }
 }
 
@@ -118,11 +106,7 @@ fn write_image(
         .map(|field| move |c: [usize; 3]| field.at(sim, cell(c)).as_vec3().to_array())
         .collect();
     let sources: Vec<Source> = (CELL_FIELDS.iter().zip(&values))
-        .map(|(field, value)| Source {
-            name: field.name,
-            components: field.components,
-            value,
-        })
+        .map(|(field, value)| Source { name: field.name, components: field.components, value })
         .collect();
     vti::write_from(path, &frame, &sources).context("write", path)
 }

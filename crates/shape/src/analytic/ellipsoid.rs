@@ -42,11 +42,7 @@ pub(crate) fn distance(axes: DVec3, x: DVec3) -> f64 {
     if level == 0.0 {
         return 0.0;
     }
-    let nearest = if y.z > 0.0 {
-        foot(axes, y, r, z)
-    } else {
-        foot_in_plane(axes, y)
-    };
+    let nearest = if y.z > 0.0 { foot(axes, y, r, z) } else { foot_in_plane(axes, y) };
     sign * nearest.distance(y)
 }
 
@@ -58,11 +54,7 @@ fn foot(axes: DVec3, y: DVec3, r: DVec3, z: DVec3) -> DVec3 {
     let nearest = r * y / (DVec3::splat(s) + r);
     // Rescale onto the surface: bisection stops one rounding step away from it.
     let length = (nearest / axes).length();
-    if length > 0.0 {
-        nearest / length
-    } else {
-        DVec3::new(0.0, 0.0, axes.z)
-    }
+    if length > 0.0 { nearest / length } else { DVec3::new(0.0, 0.0, axes.z) }
 }
 
 /// Returns the foot of a point in the plane of the two longer axes, z = 0. Within the focal region
@@ -149,18 +141,11 @@ mod tests {
             4.0 * u.fract() - DVec3::splat(2.0)
         });
         for x in queries.into_iter().chain(spread) {
-            let brute = mesh
-                .vertices
-                .iter()
-                .map(|v| v.distance(x))
-                .fold(f64::INFINITY, f64::min);
+            let brute = mesh.vertices.iter().map(|v| v.distance(x)).fold(f64::INFINITY, f64::min);
             let signed = distance(axes, x);
             assert_eq!(signed < 0.0, (x / axes).length() < 1.0, "at {x}");
             let off = brute - signed.abs();
-            assert!(
-                (-1e-12..4e-4).contains(&off),
-                "at {x}: {signed} against {brute}"
-            );
+            assert!((-1e-12..4e-4).contains(&off), "at {x}: {signed} against {brute}");
         }
     }
 

@@ -64,11 +64,8 @@ pub fn cylinder(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shap
         .with("body", "cylinder")
         .with("radius_m", radius)
         .with("length_m", length);
-    let extent = if long {
-        DVec3::new(half, radius, radius)
-    } else {
-        DVec3::new(radius, radius, half)
-    };
+    let extent =
+        if long { DVec3::new(half, radius, radius) } else { DVec3::new(radius, radius, half) };
     let body = Body {
         distance: |x: DVec3, _: &mut u32| {
             let (along, across) = if long { (x.x, x.yz()) } else { (x.z, x.xy()) };
@@ -150,19 +147,12 @@ mod tests {
     use crate::Field;
 
     fn options() -> ShapeOptions {
-        ShapeOptions {
-            cells: 40,
-            nodes: Some(300),
-            ..Default::default()
-        }
+        ShapeOptions { cells: 40, nodes: Some(300), ..Default::default() }
     }
 
     #[track_caller]
     fn close(found: f64, exact: f64, relative: f64) {
-        assert!(
-            (found / exact - 1.0).abs() < relative,
-            "{found} for {exact}"
-        );
+        assert!((found / exact - 1.0).abs() < relative, "{found} for {exact}");
     }
 
     #[test]
@@ -232,10 +222,7 @@ mod tests {
         assert!(rounded_box(1.0, 1.0, 1.0, f64::NAN, &o).is_err());
         assert!(superquadric([1.0; 3], 0.01, 1.0, &o).is_err());
         assert!(rounded_box(1.0, 1.0, 1e-9, 0.0, &o).is_err());
-        let few = ShapeOptions {
-            cells: 2,
-            ..Default::default()
-        };
+        let few = ShapeOptions { cells: 2, ..Default::default() };
         assert!(cylinder(1.0, 1.0, &few).is_err());
     }
 }

@@ -13,16 +13,12 @@ impl Shape {
         let volume = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
         let area = 4.0 * std::f64::consts::PI * radius * radius;
         let share = area / nodes as f64;
-        let provenance = Provenance::new("analytic")
-            .with("body", "sphere")
-            .with("radius_m", radius);
+        let provenance =
+            Provenance::new("analytic").with("body", "sphere").with("radius_m", radius);
         let nodes = (0..nodes)
             .map(|i| {
                 let z = 1.0 - (2.0 * i as f64 + 1.0) / nodes as f64;
-                SurfaceNode {
-                    position: radius * golden_spiral(i, z),
-                    area: share,
-                }
+                SurfaceNode { position: radius * golden_spiral(i, z), area: share }
             })
             .collect();
         let mut morphology = Morphology::new(DVec3::splat(2.0 * radius), area, volume, Some(1.0));

@@ -89,12 +89,8 @@ impl Circle {
 impl Core {
     pub(super) fn new(balls: Vec<Ball>) -> Core {
         let largest = balls.iter().fold(0.0f64, |m, b| m.max(b.radius));
-        let mut core = Core {
-            balls,
-            edges: Vec::new(),
-            corners: Vec::new(),
-            slack: TOLERANCE * largest,
-        };
+        let mut core =
+            Core { balls, edges: Vec::new(), corners: Vec::new(), slack: TOLERANCE * largest };
         let n = core.balls.len();
         for i in 0..n {
             for j in i + 1..n {
@@ -248,11 +244,7 @@ mod tests {
                     *kept = y - p;
                 }
             }
-            assert!(
-                (found - p.distance(x)).abs() < 1e-4,
-                "{found} {}",
-                p.distance(x)
-            );
+            assert!((found - p.distance(x)).abs() < 1e-4, "{found} {}", p.distance(x));
             assert!((outward - (x - p).normalize()).length() < 1e-2);
         }
     }
@@ -263,10 +255,8 @@ mod tests {
         let core = Core::new(balls.clone());
         let (centre, radius) = inscribed(&balls, DVec3::ZERO, 2.0);
         assert!((core.distance(centre).0 + radius).abs() < 1e-9);
-        let mut depths: Vec<f64> = balls
-            .iter()
-            .map(|b| b.radius - centre.distance(b.centre))
-            .collect();
+        let mut depths: Vec<f64> =
+            balls.iter().map(|b| b.radius - centre.distance(b.centre)).collect();
         depths.sort_by(f64::total_cmp);
         assert!(depths[2] - radius < 1e-7, "{depths:?}");
         // No random point nearby is deeper.
@@ -284,11 +274,7 @@ mod tests {
             let u = direction(&mut random);
             let far = 1e5;
             let limit = far - core.distance(far * u).0;
-            assert!(
-                (core.support(u) - limit).abs() < 2e-5,
-                "{} {limit}",
-                core.support(u)
-            );
+            assert!((core.support(u) - limit).abs() < 2e-5, "{} {limit}", core.support(u));
         }
     }
 }

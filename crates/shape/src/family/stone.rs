@@ -71,10 +71,8 @@ pub(super) fn stone(shape: DVec3, roundness: f64, random: &mut Random) -> Option
         let wrong = extent.x * shape / extent;
         if fine && (wrong - DVec3::ONE).abs().max_element() < CLOSE {
             // The principal frame is known to this accuracy: transform the planes to it.
-            let planes: Vec<Plane> = planes
-                .iter()
-                .map(|p| p.mapped(mass.centroid, axes, DVec3::ONE))
-                .collect();
+            let planes: Vec<Plane> =
+                planes.iter().map(|p| p.mapped(mass.centroid, axes, DVec3::ONE)).collect();
             let built = Built::new(&planes, roundness)?;
             return Some(Stone {
                 faces: built.faces,
@@ -121,10 +119,7 @@ impl Plane {
     fn mapped(self, origin: DVec3, axes: DMat3, stretch: DVec3) -> Plane {
         let normal = (axes.transpose() * self.normal) / stretch;
         let length = normal.length();
-        Plane {
-            normal: normal / length,
-            offset: (self.offset - self.normal.dot(origin)) / length,
-        }
+        Plane { normal: normal / length, offset: (self.offset - self.normal.dot(origin)) / length }
     }
 }
 
@@ -143,33 +138,23 @@ impl Built {
         let corners = corners(planes);
         let mut bulged = Vec::new();
         let start = corners.iter().map(|c| c.0).sum::<DVec3>() / corners.len().max(1) as f64;
-        let reach = corners
-            .iter()
-            .fold(0.0f64, |m, c| m.max(c.0.distance(start)));
-        let shallow = planes
-            .iter()
-            .fold(f64::INFINITY, |m, p| m.min(p.offset - p.normal.dot(start)));
+        let reach = corners.iter().fold(0.0f64, |m, c| m.max(c.0.distance(start)));
+        let shallow =
+            planes.iter().fold(f64::INFINITY, |m, p| m.min(p.offset - p.normal.dot(start)));
         if shallow <= 0.0 {
             return None;
         }
         for (n, plane) in planes.iter().enumerate() {
-            let own: Vec<DVec3> = corners
-                .iter()
-                .filter(|c| c.1.contains(&n))
-                .map(|c| c.0)
-                .collect();
+            let own: Vec<DVec3> =
+                corners.iter().filter(|c| c.1.contains(&n)).map(|c| c.0).collect();
             if own.len() < 3 {
                 continue;
             }
             let middle = own.iter().sum::<DVec3>() / own.len() as f64;
             let width = own.iter().fold(0.0f64, |m, c| m.max(c.distance(middle)));
-            let radius = (FLATNESS * width)
-                .max(width * width / (BULGE * shallow))
-                .max(LEAST * reach);
-            bulged.push(Ball {
-                centre: middle - radius * plane.normal,
-                radius,
-            });
+            let radius =
+                (FLATNESS * width).max(width * width / (BULGE * shallow)).max(LEAST * reach);
+            bulged.push(Ball { centre: middle - radius * plane.normal, radius });
         }
         if bulged.len() < 4 {
             return None;
@@ -223,11 +208,7 @@ impl Built {
         }
         let off = first / volume;
         let outer = DMat3::from_cols(off * off.x, off * off.y, off * off.z);
-        Mass {
-            volume,
-            centroid: self.centre + off,
-            second: second - outer * volume,
-        }
+        Mass { volume, centroid: self.centre + off, second: second - outer * volume }
     }
 
     /// Returns the integrals of (x . axis)^3 about `origin`. Low accuracy suffices to distinguish

@@ -25,10 +25,7 @@ fn points(half: f64, count: usize) -> impl Iterator<Item = DVec3> {
 fn trilinear_value_is_second_order_close() {
     let field = ball();
     for x in points(1.2, 2000).filter(|x| x.length() > 0.3) {
-        assert!(
-            (field.distance(x) - (x.length() - 1.0)).abs() < 2e-3,
-            "at {x}"
-        );
+        assert!((field.distance(x) - (x.length() - 1.0)).abs() < 2e-3, "at {x}");
     }
 }
 
@@ -108,9 +105,7 @@ fn the_border_of_the_grid_is_no_jump() {
 fn an_extended_field_has_its_samples_and_more_about_them() {
     let field = ball();
     let far = |x: DVec3| field.distance(x);
-    let wide = field
-        .extended(far, DVec3::splat(-1.0), DVec3::splat(1.0), 1.5)
-        .unwrap();
+    let wide = field.extended(far, DVec3::splat(-1.0), DVec3::splat(1.0), 1.5).unwrap();
     assert!(wide.lower().max_element() <= -2.5 && wide.upper().min_element() >= 2.5);
     for x in points(2.4, 2000) {
         let (d, _) = wide.distance_and_gradient_on_grid(x).unwrap();

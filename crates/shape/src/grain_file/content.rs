@@ -116,12 +116,8 @@ pub(super) fn decode(from: &mut Decoder, version: u32) -> io::Result<Shape> {
     let (inertia, lower, upper) = (from.vector()?, from.vector()?, from.vector()?);
     let bounding_radius = from.f64()?;
     let count = from.u32()? as usize;
-    let nodes = from.list(count, |from| {
-        Ok(SurfaceNode {
-            position: from.vector()?,
-            area: from.f64()?,
-        })
-    })?;
+    let nodes =
+        from.list(count, |from| Ok(SurfaceNode { position: from.vector()?, area: from.f64()? }))?;
     let mut morphology = Morphology {
         a: from.f64()?,
         b: from.f64()?,
@@ -161,10 +157,7 @@ pub(super) fn decode(from: &mut Decoder, version: u32) -> io::Result<Shape> {
         upper,
         bounding_radius,
         morphology,
-        quality: gradient_error.map(|gradient_error| Quality {
-            gradient_error,
-            volume_error,
-        }),
+        quality: gradient_error.map(|gradient_error| Quality { gradient_error, volume_error }),
         provenance,
     })
 }
@@ -190,7 +183,5 @@ fn decode_grid(from: &mut Decoder) -> io::Result<SampledField> {
         false => None,
     };
     let levels = levels.ok_or_else(|| invalid("the distance field"))?;
-    Ok(SampledField::from_levels(
-        lower, spacing, dims, quantum, levels,
-    ))
+    Ok(SampledField::from_levels(lower, spacing, dims, quantum, levels))
 }

@@ -50,10 +50,7 @@ pub(super) fn unpack(packed: &[u8], dims: [usize; 3]) -> Option<Vec<f32>> {
     let count = dims.iter().product::<usize>();
     let mut bytes = Vec::new();
     // Five bytes hold any admissible difference; one more detects an overlong stream.
-    ZlibDecoder::new(packed)
-        .take(5 * count as u64 + 1)
-        .read_to_end(&mut bytes)
-        .ok()?;
+    ZlibDecoder::new(packed).take(5 * count as u64 + 1).read_to_end(&mut bytes).ok()?;
     let mut stream = bytes.into_iter();
     let mut values: Vec<i64> = Vec::with_capacity(count);
     for (i, j, k) in places(dims) {
@@ -75,10 +72,7 @@ pub(super) fn unpack(packed: &[u8], dims: [usize; 3]) -> Option<Vec<f32>> {
         }
         values.push(value);
     }
-    stream
-        .next()
-        .is_none()
-        .then(|| values.into_iter().map(|v| v as f32).collect())
+    stream.next().is_none().then(|| values.into_iter().map(|v| v as f32).collect())
 }
 
 #[cfg(test)]

@@ -35,10 +35,7 @@ impl Shape {
 
     /// Reads a shape, bit for bit as saved.
     pub fn load(path: &Path) -> Result<Shape> {
-        let limits = crate::ReadLimits {
-            file_bytes: LARGEST,
-            ..Default::default()
-        };
+        let limits = crate::ReadLimits { file_bytes: LARGEST, ..Default::default() };
         let (bytes, _) = crate::limits::read_bytes(path, &limits)?;
         Shape::from_bytes(&bytes, path)
     }

@@ -7,11 +7,7 @@ use crate::{ShapeOptions, analytic};
 const HEAD: usize = 8 + 4 + 8;
 
 fn egg() -> Shape {
-    let options = ShapeOptions {
-        cells: 16,
-        nodes: Some(100),
-        ..Default::default()
-    };
+    let options = ShapeOptions { cells: 16, nodes: Some(100), ..Default::default() };
     analytic::ellipsoid(2e-3, 1.5e-3, 1e-3, &options).unwrap()
 }
 
@@ -33,20 +29,13 @@ fn files_round_trip_bit_for_bit() {
 fn every_flipped_byte_is_noticed() {
     let path = Path::new("egg.grain");
     let good = egg().to_bytes();
-    for at in (0..good.len())
-        .step_by(97)
-        .chain(0..40)
-        .chain(good.len() - 40..good.len())
-    {
+    for at in (0..good.len()).step_by(97).chain(0..40).chain(good.len() - 40..good.len()) {
         let mut bad = good.clone();
         bad[at] ^= 0x10;
         assert!(Shape::from_bytes(&bad, path).is_err(), "byte {at}");
     }
     for length in (0..good.len()).step_by(101).chain([good.len() - 1]) {
-        assert!(
-            Shape::from_bytes(&good[..length], path).is_err(),
-            "length {length}"
-        );
+        assert!(Shape::from_bytes(&good[..length], path).is_err(), "length {length}");
     }
 }
 

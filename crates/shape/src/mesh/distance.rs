@@ -85,11 +85,7 @@ impl MeshDistance {
     /// Returns the point of face `face` nearest to `x`.
     pub(super) fn on_face(&self, x: DVec3, face: u32) -> Nearest {
         let (point, feature) = nearest_on_triangle(x, self.corners(face));
-        Nearest {
-            point,
-            face,
-            feature,
-        }
+        Nearest { point, face, feature }
     }
 
     /// Returns a local minimum of the distance to `x`, by descent from face `face`.

@@ -85,11 +85,7 @@ impl Series {
     /// Returns the radius along the unit vector `u`.
     fn radius(&self, u: DVec3) -> f64 {
         let (cos, sin) = (u.z, u.truncate().length());
-        let (c1, s1) = if sin > 0.0 {
-            (u.x / sin, u.y / sin)
-        } else {
-            (1.0, 0.0)
-        };
+        let (c1, s1) = if sin > 0.0 { (u.x / sin, u.y / sin) } else { (1.0, 0.0) };
         let top = self.coefficients.len();
         let mut sum = 0.0;
         // Normalised Legendre functions by their stable recurrence in n, for one m at a time.
@@ -132,11 +128,7 @@ mod tests {
         let text = "# first\n0 0 3.0 0\n1 0 0.3 0\n1 1 0.2 -0.1\n1 -1 -0.2 -0.1\n2 1 0.05 0.02\n";
         let series = Series::parse(Path::new("a.anm"), text).unwrap();
         let weight = |n: f64| (PI * n / 3.0).sin() / (PI * n / 3.0);
-        for u in [
-            DVec3::Z,
-            DVec3::new(0.6, 0.0, 0.8),
-            DVec3::new(-0.3, 0.5, 0.4).normalize(),
-        ] {
+        for u in [DVec3::Z, DVec3::new(0.6, 0.0, 0.8), DVec3::new(-0.3, 0.5, 0.4).normalize()] {
             let y00 = (0.25 / PI).sqrt();
             let y10 = (0.75 / PI).sqrt() * u.z;
             let along = -(0.375 / PI).sqrt();
@@ -152,16 +144,9 @@ mod tests {
         let mesh = open("0 0 3.5449077018 0\n").unwrap();
         assert!((mesh.signed_volume() / (4.0 / 3.0 * PI) - 1.0).abs() < 2e-3);
         mesh.check_closed().unwrap();
-        for bad in [
-            "",
-            "0 0 3.5",
-            "0 1 1 1",
-            "5000 0 1 1",
-            "0 0 NaN 0",
-            "a b c d",
-            "0 0 -1 0",
-            "0 0 0 0",
-        ] {
+        for bad in
+            ["", "0 0 3.5", "0 1 1 1", "5000 0 1 1", "0 0 NaN 0", "a b c d", "0 0 -1 0", "0 0 0 0"]
+        {
             assert!(open(bad).is_err(), "{bad:?}");
         }
         let error = open("0 0 3 0\n1 0 x 0\n").unwrap_err();

@@ -26,12 +26,7 @@ pub(super) struct About<'a> {
 
 impl<'a> About<'a> {
     pub(super) fn new(mesh: &'a MeshDistance) -> About<'a> {
-        About {
-            mesh,
-            centre: DVec3::ZERO,
-            faces: Vec::new(),
-            missed: 0,
-        }
+        About { mesh, centre: DVec3::ZERO, faces: Vec::new(), missed: 0 }
     }
 
     /// Returns the nearest point of the mesh to `x`.

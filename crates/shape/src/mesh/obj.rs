@@ -21,17 +21,11 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
     for model in models {
         let first = mesh.vertices.len() as u32;
         let positions = model.mesh.positions.chunks_exact(3);
-        mesh.vertices
-            .extend(positions.map(|p| DVec3::new(p[0], p[1], p[2])));
+        mesh.vertices.extend(positions.map(|p| DVec3::new(p[0], p[1], p[2])));
         let faces = model.mesh.indices.chunks_exact(3);
-        mesh.triangles
-            .extend(faces.map(|t| [first + t[0], first + t[1], first + t[2]]));
+        mesh.triangles.extend(faces.map(|t| [first + t[0], first + t[1], first + t[2]]));
         if mesh.vertices.len().max(mesh.triangles.len()) as u64 > limits.mesh_elements {
-            return Err(super::read::too_many(
-                path,
-                "more faces or vertices",
-                limits,
-            ));
+            return Err(super::read::too_many(path, "more faces or vertices", limits));
         }
     }
     Ok(mesh)

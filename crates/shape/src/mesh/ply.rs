@@ -65,9 +65,7 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
     let parser = Parser::<Element>::new();
     let header = parser.read_header(&mut reader).map_err(malformed)?;
     check_header(path, &header, size, limits)?;
-    let payload = parser
-        .read_payload(&mut reader, &header)
-        .map_err(malformed)?;
+    let payload = parser.read_payload(&mut reader, &header).map_err(malformed)?;
     let mut mesh = TriangleMesh::default();
     for (name, elements) in payload {
         match name.as_str() {
@@ -153,9 +151,5 @@ fn least_bytes(element: &ElementDef, header: &Header) -> u64 {
         })
         .sum();
     // The last line of a text file may lack its line ending.
-    if text {
-        sum.saturating_sub(1).max(1)
-    } else {
-        sum.max(1)
-    }
+    if text { sum.saturating_sub(1).max(1) } else { sum.max(1) }
 }

@@ -26,11 +26,7 @@ pub(super) fn on_grid(
     band: f64,
     [least, most]: [f64; 2],
 ) -> Vec<f64> {
-    let grid = Grid {
-        first: first - DVec3::splat(spacing),
-        spacing,
-        dims: dims.map(|n| n + 2),
-    };
+    let grid = Grid { first: first - DVec3::splat(spacing), spacing, dims: dims.map(|n| n + 2) };
     let mut front = Front::new(mesh, &grid);
     front.settle_band(band);
     // No required sample is reached from one that is not required.
@@ -54,11 +50,7 @@ pub(super) fn on_grid(
         }
     }
     let value = |n: usize| {
-        if front.open[n] == SETTLED {
-            front.values[n]
-        } else {
-            f64::NAN
-        }
+        if front.open[n] == SETTLED { front.values[n] } else { f64::NAN }
     };
     grid.samples().map(value).collect()
 }
@@ -140,10 +132,7 @@ impl<'a> Front<'a> {
     fn settle(&mut self, n: usize, nearest: &Nearest, value: f64) {
         self.values[n] = value;
         self.open[n] = SETTLED;
-        self.origins[n] = Origin {
-            point: nearest.point.as_vec3(),
-            face: nearest.face,
-        };
+        self.origins[n] = Origin { point: nearest.point.as_vec3(), face: nearest.face };
     }
 
     /// Settles the samples within `band` [cells] of the mesh: every face is tested against the
@@ -227,20 +216,14 @@ impl<'a> Front<'a> {
         let strides = [1, grid.dims[0], grid.dims[0] * grid.dims[1]];
         let neighbours = (0..3).flat_map(|axis| {
             let step = grid.spacing * DVec3::AXES[axis];
-            [
-                (n - strides[axis], at - step),
-                (n + strides[axis], at + step),
-            ]
+            [(n - strides[axis], at - step), (n + strides[axis], at + step)]
         });
         for (m, x) in neighbours {
             if self.open[m] == SETTLED {
                 continue;
             }
-            let point = if self.fine {
-                from.point.as_dvec3()
-            } else {
-                mesh.on_face(x, from.face).point
-            };
+            let point =
+                if self.fine { from.point.as_dvec3() } else { mesh.on_face(x, from.face).point };
             let distance = point.distance(x);
             if distance as f32 >= self.open[m] {
                 continue;
@@ -296,10 +279,7 @@ mod tests {
                 let worst = &mut worst[usize::from(exact.abs() >= band * spacing)];
                 *worst = worst.max((value - exact).abs() / spacing);
             }
-            assert!(
-                worst[0] < 1e-9 && worst[1] < 0.1,
-                "{worst:?} cells with {faces}, band {band}"
-            );
+            assert!(worst[0] < 1e-9 && worst[1] < 0.1, "{worst:?} cells with {faces}, band {band}");
         }
     }
 }

@@ -48,13 +48,7 @@ pub(crate) fn weld(mesh: &TriangleMesh) -> (TriangleMesh, usize) {
     let before = triangles.len();
     triangles.retain(|[a, b, c]| a != b && b != c && c != a);
     let dropped = before - triangles.len();
-    (
-        TriangleMesh {
-            vertices,
-            triangles,
-        },
-        dropped,
-    )
+    (TriangleMesh { vertices, triangles }, dropped)
 }
 
 #[cfg(test)]
@@ -65,14 +59,10 @@ mod tests {
     fn a_triangle_soup_becomes_a_closed_tetrahedron() {
         let p = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
         let mut soup = TriangleMesh::default();
-        for (n, face) in [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
-            .iter()
-            .enumerate()
-        {
+        for (n, face) in [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]].iter().enumerate() {
             let first = soup.vertices.len() as u32;
             // The copies differ by rounding, as in text files.
-            soup.vertices
-                .extend(face.map(|v: usize| p[v] + DVec3::splat(1e-8 * n as f64)));
+            soup.vertices.extend(face.map(|v: usize| p[v] + DVec3::splat(1e-8 * n as f64)));
             soup.triangles.push([first, first + 1, first + 2]);
         }
         assert!(soup.check_closed().is_err());

@@ -56,12 +56,7 @@ impl Band {
             let at = place(inner, n).map(|i| i + left_out);
             values[index(dims, at)] = (exact - level) as f32;
         }
-        Some(Band {
-            dims,
-            lower: first,
-            spacing,
-            values,
-        })
+        Some(Band { dims, lower: first, spacing, values })
     }
 
     /// Samples the body to `reach` [samples] around the level set; blocks of samples farther away
@@ -97,27 +92,19 @@ impl Band {
             .map_init(|| 0, |hint, n| distance(centre(n), hint) - level)
             .collect();
         let mut values = vec![0.0f32; dims.iter().product()];
-        values
-            .par_chunks_mut(dims[0])
-            .enumerate()
-            .for_each(|(row, line)| {
-                let (j, k) = (row % dims[1], row / dims[1]);
-                let mut hint = 0;
-                for (i, value) in line.iter_mut().enumerate() {
-                    let centre = near[index(blocks, [i, j, k].map(|i| i / BLOCK))];
-                    *value = if centre.abs() > needed {
-                        centre as f32
-                    } else {
-                        (distance(at([i, j, k]), &mut hint) - level) as f32
-                    };
-                }
-            });
-        Some(Band {
-            dims,
-            lower: first,
-            spacing,
-            values,
-        })
+        values.par_chunks_mut(dims[0]).enumerate().for_each(|(row, line)| {
+            let (j, k) = (row % dims[1], row / dims[1]);
+            let mut hint = 0;
+            for (i, value) in line.iter_mut().enumerate() {
+                let centre = near[index(blocks, [i, j, k].map(|i| i / BLOCK))];
+                *value = if centre.abs() > needed {
+                    centre as f32
+                } else {
+                    (distance(at([i, j, k]), &mut hint) - level) as f32
+                };
+            }
+        });
+        Some(Band { dims, lower: first, spacing, values })
     }
 
     /// Extracts the level set as a closed mesh.
@@ -153,9 +140,7 @@ impl Band {
                 })
                 .collect()
         });
-        let total: f64 = (0..3)
-            .map(|axis| taps[axis].iter().map(|t| t[0]).sum::<f64>())
-            .product();
+        let total: f64 = (0..3).map(|axis| taps[axis].iter().map(|t| t[0]).sum::<f64>()).product();
         let start: [usize; 3] =
             std::array::from_fn(|axis| (s[axis].round() as i64 - reach).max(0) as usize);
         let [mut gx, mut gy, mut gz] = [0.0; 3];

@@ -122,11 +122,7 @@ impl Chain {
         let turn = 0.5 * angle - tilt;
         turns.push((place + 0.5 * self.level * turn, turn));
         let own = 0.5 * angle * radius + FLAT * widest;
-        Section {
-            turns,
-            shorter: 2.0 * (own - length),
-            outside: 2.0 * outside,
-        }
+        Section { turns, shorter: 2.0 * (own - length), outside: 2.0 * outside }
     }
 
     /// Returns area and turning of the corner region, both per length of an edge with this section,
@@ -193,10 +189,7 @@ const MISFIT: f64 = 0.01;
 /// Prior standard deviation of the turning angle about a right angle.
 const ANGLES: f64 = 0.4;
 /// Sharp right-angled edges.
-const RIGHT: Edges = Edges {
-    radius: 0.0,
-    angle: FRAC_PI_2,
-};
+const RIGHT: Edges = Edges { radius: 0.0, angle: FRAC_PI_2 };
 /// First turning angle of the model table and its increment; the table includes a right angle.
 const BLUNTEST: f64 = 0.25 * PI;
 const APART: f64 = 0.05 * PI;
@@ -259,13 +252,7 @@ fn bell(x: f64) -> f64 {
 /// which every caller has at hand.
 fn error_function(x: f64, falling: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
-    let series = [
-        1.061_405_429,
-        -1.453_152_027,
-        1.421_413_741,
-        -0.284_496_736,
-        0.254_829_592,
-    ];
+    let series = [1.061_405_429, -1.453_152_027, 1.421_413_741, -0.284_496_736, 0.254_829_592];
     let sum = series.iter().fold(0.0, |sum, c| sum * t + c) * t;
     (1.0 - sum * falling).copysign(x)
 }
@@ -286,10 +273,7 @@ mod tests {
     #[test]
     fn an_edge_that_hardly_anything_widens_has_its_radius() {
         for radius in [0.1, 0.4, 0.8] {
-            let chain = Chain {
-                widths: [0.02, 0.03],
-                ..chain(0.0)
-            };
+            let chain = Chain { widths: [0.02, 0.03], ..chain(0.0) };
             let [found, _] = chain.of_body(Edges { radius, ..RIGHT });
             assert!((found - radius).abs() < 0.03, "{found} for {radius}");
         }
@@ -365,10 +349,7 @@ mod tests {
         let chain = chain(s);
         let found = chain.section(RIGHT);
         let shorter = 2.0 * (middle + 3000.0 * step - length);
-        println!(
-            "{shorter:.5} {:.5}, {outside:.6} {:.6}",
-            found.shorter, found.outside
-        );
+        println!("{shorter:.5} {:.5}, {outside:.6} {:.6}", found.shorter, found.outside);
         assert!((found.shorter / shorter - 1.0).abs() < 0.02);
         assert!((found.outside / (2.0 * outside) - 1.0).abs() < 0.05);
     }
@@ -376,10 +357,7 @@ mod tests {
     #[test]
     fn the_error_function_is_right() {
         for (x, exact) in [(0.0, 0.0), (0.5, 0.520_499_877_8), (-1.5, -0.966_105_146_5)] {
-            assert!(
-                (error_function(x, (-x * x).exp()) - exact).abs() < 2e-7,
-                "{x}"
-            );
+            assert!((error_function(x, (-x * x).exp()) - exact).abs() < 2e-7, "{x}");
         }
     }
 }

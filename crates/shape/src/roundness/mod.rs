@@ -49,11 +49,7 @@ pub(crate) enum Surface {
 /// Returns the smallest resolved detail relative to R_in, the width of the wider Gaussian, for the
 /// `method` of a provenance.
 pub(crate) fn cutoff(method: &str) -> f64 {
-    if method == "scan" {
-        scan::WIDTHS[1]
-    } else {
-        WIDTHS[1] / CELLS
-    }
+    if method == "scan" { scan::WIDTHS[1] } else { WIDTHS[1] / CELLS }
 }
 
 /// Result of a roundness measurement.
@@ -66,10 +62,7 @@ pub(crate) struct Reading {
 
 impl Reading {
     fn of(roundness: f64) -> Reading {
-        Reading {
-            roundness,
-            lost: None,
-        }
+        Reading { roundness, lost: None }
     }
 }
 
@@ -137,11 +130,7 @@ fn of_exact(distance: &impl Distance, lower: DVec3, upper: DVec3, inscribed: f64
     }
     // Surface radius below a vertex from the larger curvature of the level set.
     let radius = |k1: f64| {
-        if k1 > 0.0 {
-            1.0 / k1 - level
-        } else {
-            f64::INFINITY
-        }
+        if k1 > 0.0 { 1.0 / k1 - level } else { f64::INFINITY }
     };
     let [narrow, wide] = WIDTHS.map(|width| {
         let turned: Vec<(f64, f64)> = mesh
@@ -159,9 +148,7 @@ fn of_exact(distance: &impl Distance, lower: DVec3, upper: DVec3, inscribed: f64
                 }
             })
             .collect();
-        let (weight, sum) = turned
-            .iter()
-            .fold((0.0, 0.0), |s, t| (s.0 + t.0, s.1 + t.1));
+        let (weight, sum) = turned.iter().fold((0.0, 0.0), |s, t| (s.0 + t.0, s.1 + t.1));
         if weight > 0.0 {
             sum / weight
         } else {
@@ -232,15 +219,10 @@ mod tests {
             [1.0, 1.0, 0.5],
         ] {
             let axes = DVec3::from_array(axes);
-            let exact = if axes.z < 1.0 {
-                of_spheroid(axes.z, 1.0)
-            } else {
-                of_spheroid(axes.x, 1.0)
-            };
+            let exact =
+                if axes.z < 1.0 { of_spheroid(axes.z, 1.0) } else { of_spheroid(axes.x, 1.0) };
             let body = |x: DVec3, _: &mut u32| crate::analytic::ellipsoid_distance(axes, x);
-            let found = measure(&body, -axes, axes, axes.z, &Surface::Exact)
-                .unwrap()
-                .roundness;
+            let found = measure(&body, -axes, axes, axes.z, &Surface::Exact).unwrap().roundness;
             println!("ellipsoid {axes}: {found:.4}, exact {exact:.4}");
             assert!((found - exact).abs() < 0.02, "{axes}: {found} for {exact}");
         }
@@ -265,9 +247,7 @@ mod tests {
             };
             let inscribed = 1f64.min(0.5 * length);
             let half = DVec3::splat(2.5);
-            let found = measure(&body, -half, half, inscribed, &Surface::Exact)
-                .unwrap()
-                .roundness;
+            let found = measure(&body, -half, half, inscribed, &Surface::Exact).unwrap().roundness;
             println!("cylinder {length} {rounding}: {found:.4}");
             assert!((found - exact).abs() < 0.08, "{found} for {exact}");
         }

@@ -65,13 +65,7 @@ pub(super) fn measure(
     let reach = spacing * (4.0 * COARSE * CELLS + REACH).ceil();
     // Only the coarse Gaussian extends farther.
     let near = inscribed * REACH * WIDTHS[1];
-    let band = Band::whole(
-        distance,
-        lower,
-        upper,
-        spacing,
-        [LEVEL * inscribed, reach, near],
-    )?;
+    let band = Band::whole(distance, lower, upper, spacing, [LEVEL * inscribed, reach, near])?;
     let mesh = band.surface();
     let (natural, left) = natural(&mesh, inscribed, cuts);
     if left < LEAST_LEFT {
@@ -79,10 +73,7 @@ pub(super) fn measure(
     }
     let bends = |width: f64| -> Vec<Bend> {
         let before = (width * CELLS).powi(2) - LAST * LAST;
-        let smooth = Band {
-            values: gaussian(&band.values, band.dims, before.sqrt()),
-            ..band
-        };
+        let smooth = Band { values: gaussian(&band.values, band.dims, before.sqrt()), ..band };
         mesh.vertices
             .par_iter()
             .map(|x| {
@@ -153,10 +144,7 @@ fn natural(mesh: &TriangleMesh, inscribed: f64, cuts: &[DVec3]) -> (Vec<bool>, f
     let clear: Vec<bool> = mesh
         .vertices
         .par_iter()
-        .map(|x| {
-            cuts.iter()
-                .all(|cut| x.distance_squared(*cut) > near * near)
-        })
+        .map(|x| cuts.iter().all(|cut| x.distance_squared(*cut) > near * near))
         .collect();
     let left = clear.iter().filter(|clear| **clear).count();
     let part = left as f64 / clear.len().max(1) as f64;
@@ -263,14 +251,9 @@ mod tests {
                 ball.max(x.z - 0.66)
             }
         };
-        let cut: Vec<DVec3> = on_sphere(0.66)
-            .into_iter()
-            .map(|x| DVec3::new(x.x, x.y, 0.66))
-            .collect();
-        let (whole, own) = (
-            roundness(body, &[]).unwrap(),
-            roundness(body, &cut).unwrap(),
-        );
+        let cut: Vec<DVec3> =
+            on_sphere(0.66).into_iter().map(|x| DVec3::new(x.x, x.y, 0.66)).collect();
+        let (whole, own) = (roundness(body, &[]).unwrap(), roundness(body, &cut).unwrap());
         println!("with the cut {whole:.3}, without {own:.3}");
         assert!(whole < 0.7 && own > 0.98, "{whole}, {own}");
         // Without enough remaining surface the result is `None`.
@@ -294,10 +277,7 @@ mod tests {
             };
             let found = [roundness(cylinder, &[]), roundness(cube, &[])].map(Option::unwrap);
             println!("{radius}: rim {:.3}, cube {:.3}", found[0], found[1]);
-            assert!(
-                found.iter().all(|r| (r - radius).abs() < 0.025),
-                "{found:?}"
-            );
+            assert!(found.iter().all(|r| (r - radius).abs() < 0.025), "{found:?}");
         }
     }
 }

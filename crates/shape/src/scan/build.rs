@@ -79,12 +79,7 @@ pub fn scan_volume(
             }
         },
     };
-    let context = Context {
-        dims,
-        segments: &segments,
-        source,
-        options,
-    };
+    let context = Context { dims, segments: &segments, source, options };
     let shared = shared_surfaces(dims, labels);
     let done = AtomicU64::new(0);
     let total = selected.len() as u64;
@@ -104,10 +99,7 @@ pub fn scan_volume(
         .collect();
     Ok(Scan {
         grains,
-        labels: Volume {
-            dims,
-            voxels: Voxels::Labels(segments.labels),
-        },
+        labels: Volume { dims, voxels: Voxels::Labels(segments.labels) },
         threshold: segments.threshold,
     })
 }

@@ -29,11 +29,7 @@ impl FieldOfView {
         let [nx, ny, nz] = dims;
         let outside = values[0];
         let corner = |n: usize| {
-            let [i, j, k] = [
-                (n & 1) * (nx - 1),
-                (n >> 1 & 1) * (ny - 1),
-                (n >> 2) * (nz - 1),
-            ];
+            let [i, j, k] = [(n & 1) * (nx - 1), (n >> 1 & 1) * (ny - 1), (n >> 2) * (nz - 1)];
             values[i + nx * (j + ny * k)]
         };
         if (0..8).any(|n| corner(n) != outside) {
@@ -43,11 +39,7 @@ impl FieldOfView {
         let mut rows = Vec::with_capacity(ny * nz);
         for row in values.chunks(nx) {
             let from = row.iter().take_while(|v| **v == outside).count();
-            let behind = row[from..]
-                .iter()
-                .rev()
-                .take_while(|v| **v == outside)
-                .count();
+            let behind = row[from..].iter().rev().take_while(|v| **v == outside).count();
             let to = nx - behind;
             rows.push([from, to]);
             inside += to - from;
@@ -89,11 +81,7 @@ impl FieldOfView {
                 within = [within[0].max(a.min(nx)), within[1].min(b)];
             }
             let low = if within[0] > 0 { within[0] + NEAR } else { 0 };
-            let high = if within[1] < nx {
-                within[1].saturating_sub(NEAR)
-            } else {
-                nx
-            };
+            let high = if within[1] < nx { within[1].saturating_sub(NEAR) } else { nx };
             cut(0..low.min(nx));
             cut(high.max(low.min(nx))..nx);
         }

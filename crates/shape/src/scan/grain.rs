@@ -37,12 +37,7 @@ pub(super) struct Context<'a> {
 
 /// Builds the shape of the grain `label`, which lies in `region`.
 pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Shape> {
-    let Context {
-        dims,
-        segments,
-        source,
-        options,
-    } = *context;
+    let Context { dims, segments, source, options } = *context;
     let labels = &segments.labels;
     let faces = region.faces(dims);
     if !faces.is_empty() && !options.pad {
@@ -58,20 +53,11 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
     let largest = options.largest_piece || options.separate.is_some();
     let voxels = one_piece(&mut mask, label, largest)?;
     if voxels < FEWEST {
-        return Err(ShapeError::TooFewVoxels {
-            label,
-            voxels,
-            needed: FEWEST,
-        });
+        return Err(ShapeError::TooFewVoxels { label, voxels, needed: FEWEST });
     }
     let filled = fill_cavities(&mut mask);
-    let longest = (0..3)
-        .map(|a| region.upper[a] - region.lower[a] + 1)
-        .max()
-        .unwrap_or(1);
-    let factor = FINE[usize::from(segments.grey.is_none())]
-        .div_ceil(longest)
-        .clamp(1, 4);
+    let longest = (0..3).map(|a| region.upper[a] - region.lower[a] + 1).max().unwrap_or(1);
+    let factor = FINE[usize::from(segments.grey.is_none())].div_ceil(longest).clamp(1, 4);
     let mut provenance = Provenance::new("scan")
         .with("voxel_m", options.voxel)
         .with("label", label)
@@ -90,9 +76,8 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
         Some(grey) => {
             let low = region.lower.map(|n| n as isize - margin as isize);
             let cut = grey.cut(&mask, low, label, smoothing);
-            provenance = provenance
-                .with("surface", "grey")
-                .with("blur_voxels", format!("{:.3}", cut.blur));
+            provenance =
+                provenance.with("surface", "grey").with("blur_voxels", format!("{:.3}", cut.blur));
             (cut.field, cut.volume, cut.kernel)
         }
         None => {
@@ -150,12 +135,7 @@ fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Resul
     let mut mesh = TriangleMesh::default();
     // Newton's method: the derivative of the volume with respect to the level is the area.
     for _ in 0..5 {
-        let samples = Samples {
-            dims,
-            lower,
-            spacing,
-            values: &fine,
-        };
+        let samples = Samples { dims, lower, spacing, values: &fine };
         mesh = extract(&samples).largest_piece(CRUMBS).ok_or_else(|| {
             ShapeError::quality(
                 "smoothing leaves no single surface (a neck of a voxel or two breaks); reduce \

@@ -68,13 +68,7 @@ impl Grey {
             grey = mean_grey(dims, &values, is_solid, 1);
         }
         let [(void, _), (solid, _)] = grey;
-        Grey {
-            dims,
-            values,
-            owner,
-            void,
-            solid,
-        }
+        Grey { dims, values, owner, void, solid }
     }
 
     /// Returns the grain `label`. Its mask contains its solid voxels with cavities filled; `low` is
@@ -116,11 +110,8 @@ impl Grey {
         // Second moment of a G + (1 - a) G G: s^2 (2 - a) = -blur^2.
         let a = (2.0 + (blur / sigma).powi(2)) as f32;
         let twice = gaussian(&once, dims, sigma);
-        let field: Vec<f32> = once
-            .iter()
-            .zip(&twice)
-            .map(|(g, gg)| 0.5 - (a * g + (1.0 - a) * gg))
-            .collect();
+        let field: Vec<f32> =
+            once.iter().zip(&twice).map(|(g, gg)| 0.5 - (a * g + (1.0 - a) * gg)).collect();
         let slope = steepness(&field, dims).max(0.05) as f32;
         Cut {
             field: field.iter().map(|v| v / slope).collect(),
@@ -240,10 +231,7 @@ fn blur(steepness: f64, sigma: f64) -> f64 {
         let n = 64;
         let density =
             |x: f64| (-0.5 * (x / w).powi(2)).exp() / (w * (2.0 * std::f64::consts::PI).sqrt());
-        (0..n)
-            .map(|i| density((f64::from(i) + 0.5) / f64::from(n)))
-            .sum::<f64>()
-            / f64::from(n)
+        (0..n).map(|i| density((f64::from(i) + 0.5) / f64::from(n))).sum::<f64>() / f64::from(n)
     };
     let (mut low, mut high) = (sigma, sigma + 4.0);
     for _ in 0..50 {
@@ -279,11 +267,7 @@ mod tests {
         for share in [1, 4] {
             let [void, solid] = mean_grey(dims, &values, inside, share);
             assert!((void.0 - 1.0).abs() < 0.01, "{}", void.0);
-            assert!(
-                (solid.0 - 3.0).abs() < 0.01,
-                "deep voxels alone: {}",
-                solid.0
-            );
+            assert!((solid.0 - 3.0).abs() < 0.01, "deep voxels alone: {}", solid.0);
             // 16^3 voxels are deep.
             assert_eq!(solid.1 as usize, 4096 / share);
         }

@@ -44,15 +44,8 @@ pub(super) fn read_nrrd(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
     }
     // The header ends at the first empty line, or at the end of a detached header file.
     let head = &bytes[..bytes.len().min(LONGEST)];
-    let end = head
-        .windows(2)
-        .position(|w| w == b"\n\n")
-        .map(|n| (n, n + 2));
-    let end = end.or_else(|| {
-        head.windows(4)
-            .position(|w| w == b"\r\n\r\n")
-            .map(|n| (n, n + 4))
-    });
+    let end = head.windows(2).position(|w| w == b"\n\n").map(|n| (n, n + 2));
+    let end = end.or_else(|| head.windows(4).position(|w| w == b"\r\n\r\n").map(|n| (n, n + 4)));
     let (text_end, start) = end.unwrap_or((head.len(), head.len()));
     let text = String::from_utf8_lossy(&bytes[..text_end]);
     let mut fields = Fields::default();
@@ -124,10 +117,7 @@ pub(super) fn read_meta(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Resul
 
 fn sizes(value: &str) -> Vec<u64> {
     // An unreadable number becomes 0 and is refused as an empty axis.
-    value
-        .split_whitespace()
-        .map(|n| n.parse().unwrap_or(0))
-        .collect()
+    value.split_whitespace().map(|n| n.parse().unwrap_or(0)).collect()
 }
 
 fn skip(value: &str) -> Option<i64> {
@@ -167,10 +157,7 @@ fn meta_type(value: &str) -> Option<(u8, usize)> {
 fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Result<Volume> {
     let unsupported = |reason: String| ShapeError::unsupported(path, reason);
     let [nx, ny, nz] = fields.sizes[..] else {
-        return Err(unsupported(format!(
-            "the image has sizes {:?}; a volume has 3",
-            fields.sizes
-        )));
+        return Err(unsupported(format!("the image has sizes {:?}; a volume has 3", fields.sizes)));
     };
     let voxels = count(path, [nx, ny, nz], limits)? as u64;
     let Some((kind, width)) = fields.number else {
@@ -178,11 +165,7 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
                       numbers";
         return Err(unsupported(reason.into()));
     };
-    let number = Number {
-        big: fields.big,
-        kind,
-        width,
-    };
+    let number = Number { big: fields.big, kind, width };
     let apart;
     let data = match &fields.data_file {
         None => own,
@@ -211,14 +194,9 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
         -1 => return Err(unsupported("a byte skip of -1 is for raw voxels".into())),
         skip => skip as u64,
     };
-    let data = data
-        .get(usize::try_from(skip).unwrap_or(usize::MAX)..)
-        .unwrap_or(&[]);
+    let data = data.get(usize::try_from(skip).unwrap_or(usize::MAX)..).unwrap_or(&[]);
     // Surplus data indicates slices that would be lost without notice.
-    if let Some(name) = fields
-        .data_file
-        .filter(|_| raw && data.len() as u64 > needed)
-    {
+    if let Some(name) = fields.data_file.filter(|_| raw && data.len() as u64 > needed) {
         return Err(unsupported(format!(
             "the header states {nx} x {ny} x {nz} voxels of {} bytes, {needed} bytes; {name:?} \
              has {} after a byte skip of {skip}; correct the sizes (DimSize), or the byte skip \
@@ -249,10 +227,7 @@ mod tests {
     use std::io::Write;
 
     fn limits() -> ReadLimits {
-        ReadLimits {
-            voxels: 1 << 20,
-            ..Default::default()
-        }
+        ReadLimits { voxels: 1 << 20, ..Default::default() }
     }
 
     #[test]
@@ -276,49 +251,27 @@ mod tests {
         ] {
             let mut bytes = nrrd(more).into_bytes();
             bytes.extend_from_slice(data);
-            assert_eq!(
-                read_nrrd(&path, &bytes, &limits()).unwrap(),
-                expect,
-                "{more}"
-            );
+            assert_eq!(read_nrrd(&path, &bytes, &limits()).unwrap(), expect, "{more}");
             for cut in 0..bytes.len() {
-                assert!(
-                    read_nrrd(&path, &bytes[..cut], &limits()).is_err(),
-                    "{more} {cut}"
-                );
+                assert!(read_nrrd(&path, &bytes[..cut], &limits()).is_err(), "{more} {cut}");
             }
         }
         std::fs::write(folder.path().join("a.raw"), [&[9; 5], &little[..]].concat()).unwrap();
         let apart = nrrd("endian: little\nencoding: raw\nbyte skip: 5\ndata file: a.raw\n");
-        assert_eq!(
-            read_nrrd(&path, apart.as_bytes(), &limits()).unwrap(),
-            expect
-        );
+        assert_eq!(read_nrrd(&path, apart.as_bytes(), &limits()).unwrap(), expect);
         let meta = "ObjectType = Image\nNDims = 3\nDimSize = 3 2 1\nElementType = MET_USHORT\n\
                     HeaderSize = 5\nElementDataFile = a.raw\n";
-        assert_eq!(
-            read_meta(&path, meta.as_bytes(), &limits()).unwrap(),
-            expect
-        );
-        let mut local = meta
-            .replace("HeaderSize = 5\n", "")
-            .replace("a.raw", "LOCAL")
-            .into_bytes();
+        assert_eq!(read_meta(&path, meta.as_bytes(), &limits()).unwrap(), expect);
+        let mut local = meta.replace("HeaderSize = 5\n", "").replace("a.raw", "LOCAL").into_bytes();
         local.extend_from_slice(&little);
         assert_eq!(read_meta(&path, &local, &limits()).unwrap(), expect);
         // Bytes before the voxels are skipped only if the header declares them; undeclared slices
         // are never dropped silently.
         let ending = apart.replace("skip: 5", "skip: -1");
-        assert_eq!(
-            read_nrrd(&path, ending.as_bytes(), &limits()).unwrap(),
-            expect
-        );
+        assert_eq!(read_nrrd(&path, ending.as_bytes(), &limits()).unwrap(), expect);
         let message = |read: Result<Volume>| read.unwrap_err().to_string();
-        let fewer = message(read_nrrd(
-            &path,
-            apart.replace("3 2 1", "3 1 1").as_bytes(),
-            &limits(),
-        ));
+        let fewer =
+            message(read_nrrd(&path, apart.replace("3 2 1", "3 1 1").as_bytes(), &limits()));
         for word in ["3 x 1 x 1", "6 bytes", "a.raw", "has 12", "skip of 5"] {
             assert!(fewer.contains(word), "`{word}` is missing in: {fewer}");
         }
@@ -327,10 +280,7 @@ mod tests {
         assert!(fewer.contains("has 14"), "{fewer}");
         let none = apart.replace("a.raw", "none.raw");
         let none = message(read_nrrd(&path, none.as_bytes(), &limits()));
-        assert!(
-            none.contains("a.nrrd") && none.contains("none.raw"),
-            "{none}"
-        );
+        assert!(none.contains("a.nrrd") && none.contains("none.raw"), "{none}");
         // Files in other folders are refused.
         let away = apart.replace("a.raw", "../a.raw");
         assert!(matches!(

@@ -77,12 +77,7 @@ pub(super) fn header(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<A
         let (descr, remedy) = (&header.descr, "save integers or floating-point numbers");
         ShapeError::unsupported(path, format!("values of type {descr:?}; {remedy}"))
     })?;
-    Ok(Array {
-        number,
-        dims,
-        fortran: header.fortran,
-        start: start + length,
-    })
+    Ok(Array { number, dims, fortran: header.fortran, start: start + length })
 }
 
 impl Number {
@@ -105,11 +100,7 @@ impl Number {
         // Index of voxel n (x fastest) in the file.
         let index = |n: usize| {
             let [i, j, k] = place(dims, n);
-            if fortran {
-                k + dims[2] * (j + dims[1] * i)
-            } else {
-                n
-            }
+            if fortran { k + dims[2] * (j + dims[1] * i) } else { n }
         };
         let values = (0..voxels).map(|n| self.value(&data[self.width * index(n)..]));
         let label = |v: f64| (v >= 0.0 && v <= f64::from(u32::MAX)).then_some(v as u32);
@@ -132,9 +123,7 @@ impl Header {
     /// Parses a line such as {'descr': '<u2', 'fortran_order': False, 'shape': (4, 3, 2), }.
     fn parse(text: &str) -> Option<Header> {
         let after = |key: &str| {
-            let at = text
-                .find(&format!("'{key}'"))
-                .or_else(|| text.find(&format!("\"{key}\"")))?;
+            let at = text.find(&format!("'{key}'")).or_else(|| text.find(&format!("\"{key}\"")))?;
             let rest = text[at + key.len() + 2..].trim_start();
             Some(rest.strip_prefix(':')?.trim_start())
         };
@@ -153,11 +142,7 @@ impl Header {
             .filter(|n| !n.is_empty())
             .map(|n| n.trim_end_matches('L').parse().ok())
             .collect::<Option<Vec<u64>>>()?;
-        Some(Header {
-            descr,
-            fortran,
-            shape,
-        })
+        Some(Header { descr, fortran, shape })
     }
 }
 
@@ -229,40 +214,20 @@ mod tests {
             format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': (1, 2, 3), }}\n")
         };
         let expect = Volume::from_labels([3, 2, 1], vec![0, 1, 2, 3, 4, 5]).unwrap();
-        assert_eq!(
-            open(&file(&header("|u1", "False"), &[0, 1, 2, 3, 4, 5])).unwrap(),
-            expect
-        );
-        assert_eq!(
-            open(&file(&header("|u1", "True"), &[0, 3, 1, 4, 2, 5])).unwrap(),
-            expect
-        );
+        assert_eq!(open(&file(&header("|u1", "False"), &[0, 1, 2, 3, 4, 5])).unwrap(), expect);
+        assert_eq!(open(&file(&header("|u1", "True"), &[0, 3, 1, 4, 2, 5])).unwrap(), expect);
         let big: Vec<u8> = (0..6u16).flat_map(u16::to_be_bytes).collect();
         assert_eq!(open(&file(&header(">u2", "False"), &big)).unwrap(), expect);
         let signed: Vec<u8> = (0..6i64).flat_map(i64::to_le_bytes).collect();
-        assert_eq!(
-            open(&file(&header("<i8", "False"), &signed)).unwrap(),
-            expect
-        );
+        assert_eq!(open(&file(&header("<i8", "False"), &signed)).unwrap(), expect);
         let whole: Vec<u8> = (0..6).flat_map(|v| (v as f32).to_le_bytes()).collect();
-        assert_eq!(
-            open(&file(&header("<f4", "False"), &whole)).unwrap(),
-            expect
-        );
-        let grey: Vec<u8> = (0..6)
-            .flat_map(|v| (f64::from(v) - 0.5).to_le_bytes())
-            .collect();
+        assert_eq!(open(&file(&header("<f4", "False"), &whole)).unwrap(), expect);
+        let grey: Vec<u8> = (0..6).flat_map(|v| (f64::from(v) - 0.5).to_le_bytes()).collect();
         let read = open(&file(&header("<f8", "False"), &grey)).unwrap();
-        assert_eq!(
-            read.voxels,
-            Voxels::Grey(vec![-0.5, 0.5, 1.5, 2.5, 3.5, 4.5])
-        );
+        assert_eq!(read.voxels, Voxels::Grey(vec![-0.5, 0.5, 1.5, 2.5, 3.5, 4.5]));
         let negative: Vec<u8> = (-3..3i16).flat_map(i16::to_le_bytes).collect();
         let read = open(&file(&header("<i2", "False"), &negative)).unwrap();
-        assert_eq!(
-            read.voxels,
-            Voxels::Grey(vec![-3.0, -2.0, -1.0, 0.0, 1.0, 2.0])
-        );
+        assert_eq!(read.voxels, Voxels::Grey(vec![-3.0, -2.0, -1.0, 0.0, 1.0, 2.0]));
     }
 
     #[test]
@@ -274,10 +239,7 @@ mod tests {
         let overflow = open(&file(&header("(4294967296, 4294967296, 4294967296)"), &[]));
         assert!(matches!(overflow, Err(ShapeError::TooLarge { .. })));
         let short = open(&file(&header("(2, 2, 2)"), &[0; 31]));
-        assert!(
-            matches!(short, Err(ShapeError::Malformed { .. })),
-            "{short:?}"
-        );
+        assert!(matches!(short, Err(ShapeError::Malformed { .. })), "{short:?}");
         let empty = open(&file(&header("(2, 0, 2)"), &[]));
         assert!(matches!(empty, Err(ShapeError::Malformed { .. })));
         let flat = open(&file(&header("(2, 2)"), &[0; 16]));

@@ -23,10 +23,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
     let mut file = archive.by_name(name).map_err(damaged)?;
     let mut plain = Vec::new();
     // The header is decompressed first, so that an oversized array is refused before allocation.
-    file.by_ref()
-        .take(npy::HEAD)
-        .read_to_end(&mut plain)
-        .map_err(unreadable)?;
+    file.by_ref().take(npy::HEAD).read_to_end(&mut plain).map_err(unreadable)?;
     let array = npy::header(path, &plain, limits)?;
     if array.bytes() > limits.file_bytes {
         let claimed = format!("{} bytes unpacked", array.bytes());
@@ -35,9 +32,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
     }
     // One additional byte: the archive's checksum is compared at the end of the data.
     let rest = (array.bytes() + 1).saturating_sub(plain.len() as u64);
-    file.take(rest)
-        .read_to_end(&mut plain)
-        .map_err(unreadable)?;
+    file.take(rest).read_to_end(&mut plain).map_err(unreadable)?;
     array.volume(path, &plain)
 }
 
@@ -58,9 +53,7 @@ mod tests {
             let header =
                 format!("{{'descr': '|u1', 'fortran_order': False, 'shape': {shape}, }}\n");
             writer.write_all(b"\x93NUMPY\x01\x00").unwrap();
-            writer
-                .write_all(&(header.len() as u16).to_le_bytes())
-                .unwrap();
+            writer.write_all(&(header.len() as u16).to_le_bytes()).unwrap();
             writer.write_all(header.as_bytes()).unwrap();
             writer.write_all(data).unwrap();
         }
@@ -88,25 +81,17 @@ mod tests {
 
     #[test]
     fn what_the_header_states_is_refused_before_it_is_unpacked() {
-        let limits = ReadLimits {
-            file_bytes: 1 << 20,
-            voxels: 1 << 21,
-            ..Default::default()
-        };
+        let limits = ReadLimits { file_bytes: 1 << 20, voxels: 1 << 21, ..Default::default() };
         let data = vec![0; 3 << 20];
-        for (shape, stated) in [
-            ("(128, 128, 192)", "192 x 128 x 128 voxels"),
-            ("(128, 128, 96)", "bytes unpacked"),
-        ] {
+        for (shape, stated) in
+            [("(128, 128, 192)", "192 x 128 x 128 voxels"), ("(128, 128, 96)", "bytes unpacked")]
+        {
             let file = packed(&["a.npy"], shape, &data);
             let error = read(Path::new("a.npz"), &file, &limits).unwrap_err();
             assert!(error.to_string().contains(stated), "{error}");
         }
         // At most one byte after the array is decompressed.
         let file = packed(&["a.npy"], "(1, 2, 3)", &data);
-        assert_eq!(
-            read(Path::new("a.npz"), &file, &limits).unwrap().dims,
-            [3, 2, 1]
-        );
+        assert_eq!(read(Path::new("a.npz"), &file, &limits).unwrap().dims, [3, 2, 1]);
     }
 }

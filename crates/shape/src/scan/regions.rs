@@ -124,10 +124,7 @@ pub(crate) fn shared_surfaces(dims: [usize; 3], labels: &[u32]) -> HashMap<u32, 
         }
     }
     let part = |[all, shared]: [u64; 2]| shared as f64 / all as f64;
-    faces
-        .into_iter()
-        .map(|(label, n)| (label, part(n)))
-        .collect()
+    faces.into_iter().map(|(label, n)| (label, part(n))).collect()
 }
 
 #[cfg(test)]
@@ -151,14 +148,7 @@ mod tests {
         labels[at(5, 0, 4)] = 9;
         let found = regions(dims, &labels);
         assert_eq!(found.len(), 2);
-        assert_eq!(
-            found[&7],
-            Region {
-                voxels: 26,
-                lower: [1; 3],
-                upper: [3; 3]
-            }
-        );
+        assert_eq!(found[&7], Region { voxels: 26, lower: [1; 3], upper: [3; 3] });
         assert_eq!(found[&7].faces(dims), "");
         assert_eq!(found[&9].faces(dims), "high x, low y, high z");
         let mut mask = crop(dims, &labels, 7, &found[&7], 2);

@@ -42,12 +42,7 @@ impl Runs {
         }));
         let runs = by_row.concat();
         let parent = (0..runs.len() as u32).collect();
-        let mut all = Runs {
-            dims,
-            runs,
-            rows,
-            parent,
-        };
+        let mut all = Runs { dims, runs, rows, parent };
         for row in 0..ny * nz {
             let (j, k) = (row % ny, row / ny);
             if j > 0 {
@@ -209,9 +204,8 @@ mod tests {
                     (0..3).any(|a| at[a] == 0 || at[a] + 1 == dims[a])
                 })
             };
-            let expected: Vec<bool> = (0..504)
-                .map(|n| solid[n] || !reaches_border(regions[n]))
-                .collect();
+            let expected: Vec<bool> =
+                (0..504).map(|n| solid[n] || !reaches_border(regions[n])).collect();
             let mut mask = Mask { dims, solid };
             let before = mask.solid.iter().filter(|s| **s).count() as u64;
             let filled = fill_cavities(&mut mask);

@@ -61,10 +61,7 @@ pub(super) fn segment(
         // All values are equal: black counts as empty.
         return Err(ShapeError::EmptyVolume);
     };
-    let binary: Vec<u32> = filtered
-        .iter()
-        .map(|v| u32::from(f64::from(*v) >= cut))
-        .collect();
+    let binary: Vec<u32> = filtered.iter().map(|v| u32::from(f64::from(*v) >= cut)).collect();
     drop(clean);
     let labels = divide(&binary, dims, options, progress)?;
     let view = FieldOfView::of(&values, dims, cut);
@@ -75,9 +72,7 @@ pub(super) fn segment(
         threshold: Some(cut),
     };
     // A binary image has no intermediate grey values.
-    let two = values
-        .iter()
-        .all(|v| *v == values[0] || *v == 0.0 || *v == 1.0 || *v == 255.0);
+    let two = values.iter().all(|v| *v == values[0] || *v == 0.0 || *v == 1.0 || *v == 255.0);
     if options.sub_voxel && !two && segments.labels.iter().all(|l| *l < HALO) {
         let mut owner = segments.labels.clone();
         add_halo(&mut owner, dims, LAYERS);
@@ -101,10 +96,7 @@ fn divide(
         });
     };
     progress("separate", 0, 1);
-    let mut mask = Mask {
-        dims,
-        solid: labels.iter().map(|l| *l != 0).collect(),
-    };
+    let mut mask = Mask { dims, solid: labels.iter().map(|l| *l != 0).collect() };
     if mask.solid.iter().all(|s| *s) {
         return Err(ShapeError::SolidVolume);
     }

@@ -79,12 +79,8 @@ fn gap(files: &[PathBuf]) -> Option<String> {
         std::iter::successors(Some(low + step), move |m| Some(m + step))
             .take_while(move |m| *m < high)
     };
-    let missing: Vec<String> = pairs
-        .iter()
-        .flat_map(between)
-        .take(11)
-        .map(|m| m.to_string())
-        .collect();
+    let missing: Vec<String> =
+        pairs.iter().flat_map(between).take(11).map(|m| m.to_string()).collect();
     let more = if missing.len() > 10 { ", ..." } else { "" };
     Some(format!(
         "slices are missing after {}: numbers {}{more}; add them, or rename the slices so that they \
@@ -97,11 +93,7 @@ fn gap(files: &[PathBuf]) -> Option<String> {
 /// Sort key that orders slice 9 before slice 10: digit sequences compare as numbers, the rest as
 /// text.
 fn by_number(path: &Path) -> Vec<(u128, String)> {
-    let name = path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut key = vec![(0, String::new())];
     let mut digits = String::new();
     for c in name.chars().chain(['.']) {
@@ -139,10 +131,7 @@ mod tests {
         write("slice_9.tif", 2, &[3, 4]);
         write("slice_8.tif", 2, &[1, 2]);
         let (volume, source) = read(folder.path(), &limits).unwrap();
-        assert_eq!(
-            volume,
-            Volume::from_labels([2, 1, 3], vec![1, 2, 3, 4, 5, 6]).unwrap()
-        );
+        assert_eq!(volume, Volume::from_labels([2, 1, 3], vec![1, 2, 3, 4, 5, 6]).unwrap());
         assert_eq!(source.sha256.len(), 64);
         write("slice_11.tif", 1, &[7]);
         let error = read(folder.path(), &limits).unwrap_err();
@@ -155,23 +144,14 @@ mod tests {
         let all: Vec<PathBuf> = (0..40).map(|n| format!("s{n}.tif").into()).collect();
         assert_eq!(gap(&all), None);
         let some = |keep: fn(usize) -> bool| -> Vec<PathBuf> {
-            (0..40)
-                .filter(|n| keep(*n))
-                .map(|n| all[n].clone())
-                .collect()
+            (0..40).filter(|n| keep(*n)).map(|n| all[n].clone()).collect()
         };
         let message = gap(&some(|n| n != 17)).unwrap();
         assert!(message.contains("after s16.tif: numbers 17;"), "{message}");
         let message = gap(&some(|n| n != 17 && n != 30)).unwrap();
-        assert!(
-            message.contains("after s16.tif: numbers 17, 30;"),
-            "{message}"
-        );
+        assert!(message.contains("after s16.tif: numbers 17, 30;"), "{message}");
         let message = gap(&some(|n| !(5..=35).contains(&n))).unwrap();
-        assert!(
-            message.contains("5, 6, 7, 8, 9, 10, 11, 12, 13, 14, ...;"),
-            "{message}"
-        );
+        assert!(message.contains("5, 6, 7, 8, 9, 10, 11, 12, 13, 14, ...;"), "{message}");
         // Increment of ten, with other constant numbers, and with several varying numbers.
         assert_eq!(gap(&some(|n| n % 10 == 0)), None);
         let message = gap(&some(|n| n % 4 == 0 && n != 8)).unwrap();

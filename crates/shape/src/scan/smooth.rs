@@ -9,10 +9,7 @@ use rayon::prelude::*;
 pub(crate) fn unshrinking(field: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f32> {
     let once = gaussian(field, dims, sigma);
     let twice = gaussian(&once, dims, sigma);
-    once.par_iter()
-        .zip(&twice)
-        .map(|(g, gg)| 2.0 * g - gg)
-        .collect()
+    once.par_iter().zip(&twice).map(|(g, gg)| 2.0 * g - gg).collect()
 }
 
 /// Returns the kernel of [`unshrinking`].

@@ -31,10 +31,8 @@ impl Threshold {
 /// Returns counts by bin, the lowest value and the bin width.
 fn histogram(values: &[f32], bins: usize) -> Option<(Vec<f64>, f64, f64)> {
     let start = || (f32::INFINITY, f32::NEG_INFINITY);
-    let (low, high) = values
-        .par_iter()
-        .map(|v| (*v, *v))
-        .reduce(start, |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (low, high) =
+        values.par_iter().map(|v| (*v, *v)).reduce(start, |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let (low, high) = (f64::from(low), f64::from(high));
     let width = (high - low) / bins as f64;
     if width.is_nan() || width <= 0.0 {
@@ -61,11 +59,7 @@ fn sums(counts: &[f64]) -> Vec<(f64, f64)> {
 /// Returns the between-class variance (up to constants) of the bins from `a` to `b`.
 fn share(sums: &[(f64, f64)], a: usize, b: usize) -> f64 {
     let (count, moment) = (sums[b].0 - sums[a].0, sums[b].1 - sums[a].1);
-    if count > 0.0 {
-        moment * moment / count
-    } else {
-        0.0
-    }
+    if count > 0.0 { moment * moment / count } else { 0.0 }
 }
 
 fn otsu(values: &[f32]) -> Option<f64> {
@@ -75,9 +69,7 @@ fn otsu(values: &[f32]) -> Option<f64> {
     // All thresholds in an empty interval between the classes are equivalent; its middle is
     // returned.
     let best = (1..BINS).map(score).fold(0.0, f64::max);
-    let good: Vec<usize> = (1..BINS)
-        .filter(|b| score(*b) >= best * (1.0 - 1e-12))
-        .collect();
+    let good: Vec<usize> = (1..BINS).filter(|b| score(*b) >= best * (1.0 - 1e-12)).collect();
     let middle = 0.5 * (good[0] + good[good.len() - 1]) as f64;
     Some(low + width * middle)
 }
@@ -112,9 +104,8 @@ pub(crate) fn median(values: &[f32], dims: [usize; 3]) -> Vec<f32> {
         for (i, out) in line.iter_mut().enumerate() {
             let columns = around(i, nx - 1);
             let mut window = [0.0f32; 27];
-            for (slot, value) in window
-                .iter_mut()
-                .zip(rows.iter().flat_map(|r| columns.map(|a| r[a])))
+            for (slot, value) in
+                window.iter_mut().zip(rows.iter().flat_map(|r| columns.map(|a| r[a])))
             {
                 *slot = value;
             }
@@ -160,9 +151,7 @@ mod tests {
     #[test]
     fn the_median_takes_single_voxels_out_and_leaves_a_plane() {
         let dims = [9, 8, 7];
-        let mut values: Vec<f32> = (0..504)
-            .map(|n| if n % 9 < 4 { 0.0 } else { 1.0 })
-            .collect();
+        let mut values: Vec<f32> = (0..504).map(|n| if n % 9 < 4 { 0.0 } else { 1.0 }).collect();
         let plane = values.clone();
         values[4 + 9 * (4 + 8 * 3)] = 50.0;
         values[2 + 9 * (2 + 8 * 2)] = -50.0;

@@ -48,9 +48,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
         own.intermediate_buffer_size = 1 << 30;
         own.ifd_value_size = bytes.len();
         decoder = decoder.with_limits(own);
-        let decoded = decoder
-            .read_image()
-            .map_err(|e| malformed(&format!("page {pages}: {e}")))?;
+        let decoded = decoder.read_image().map_err(|e| malformed(&format!("page {pages}: {e}")))?;
         let voxels = voxels(decoded);
         if voxels.len() as u64 != u64::from(width) * u64::from(height) {
             return Err(malformed(&format!("page {pages} is incomplete")));
@@ -77,9 +75,7 @@ fn check_claimed_slices(
     if pages > 1 {
         return Ok(());
     }
-    let description = decoder
-        .get_tag_ascii_string(Tag::ImageDescription)
-        .unwrap_or_default();
+    let description = decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default();
     let claimed = description
         .lines()
         .find_map(|line| line.trim().strip_prefix("images="))
@@ -101,10 +97,7 @@ fn voxels(page: DecodingResult) -> Voxels {
     use DecodingResult as Page;
     fn integers<T: Copy + TryInto<u32>>(page: Vec<T>, grey: fn(T) -> f32) -> Voxels {
         let labels: Option<Vec<u32>> = page.iter().map(|v| (*v).try_into().ok()).collect();
-        labels.map_or_else(
-            || Voxels::Grey(page.into_iter().map(grey).collect()),
-            Voxels::Labels,
-        )
+        labels.map_or_else(|| Voxels::Grey(page.into_iter().map(grey).collect()), Voxels::Labels)
     }
     match page {
         Page::U8(v) => integers(v, f32::from),
@@ -150,18 +143,9 @@ mod tests {
     #[test]
     fn all_depths_are_read_page_by_page() {
         let expect = Volume::from_labels([3, 1, 2], vec![0, 1, 2, 3, 4, 5]).unwrap();
-        assert_eq!(
-            open(&write::<Gray8>(&[&[0, 1, 2], &[3, 4, 5]], 3, 1)).unwrap(),
-            expect
-        );
-        assert_eq!(
-            open(&write::<Gray16>(&[&[0, 1, 2], &[3, 4, 5]], 3, 1)).unwrap(),
-            expect
-        );
-        assert_eq!(
-            open(&write::<Gray32>(&[&[0, 1, 2], &[3, 4, 5]], 3, 1)).unwrap(),
-            expect
-        );
+        assert_eq!(open(&write::<Gray8>(&[&[0, 1, 2], &[3, 4, 5]], 3, 1)).unwrap(), expect);
+        assert_eq!(open(&write::<Gray16>(&[&[0, 1, 2], &[3, 4, 5]], 3, 1)).unwrap(), expect);
+        assert_eq!(open(&write::<Gray32>(&[&[0, 1, 2], &[3, 4, 5]], 3, 1)).unwrap(), expect);
         let whole: [&[f32]; 2] = [&[0.0, 1.0, 2.0], &[3.0, 4.0, 5.0]];
         assert_eq!(open(&write::<Gray32Float>(&whole, 3, 1)).unwrap(), expect);
         let grey = open(&write::<Gray32Float>(&[&[0.5, 1.0]], 2, 1)).unwrap();
@@ -171,10 +155,7 @@ mod tests {
     #[test]
     fn damaged_and_absurd_files_are_refused() {
         let colour = open(&write::<RGB8>(&[&[1, 2, 3]], 1, 1));
-        assert!(
-            matches!(colour, Err(ShapeError::Unsupported { .. })),
-            "{colour:?}"
-        );
+        assert!(matches!(colour, Err(ShapeError::Unsupported { .. })), "{colour:?}");
         let nan = open(&write::<Gray32Float>(&[&[f32::NAN, 1.0]], 2, 1));
         let message = nan.unwrap_err().to_string();
         assert!(message.contains("not a finite number"), "{message}");

@@ -13,11 +13,7 @@ const FAR: f32 = 1e30;
 pub(crate) fn signed(mask: &Mask) -> Vec<f32> {
     let (to_solid, to_void) = (squared(mask, true), squared(mask, false));
     let distance = |(to_solid, to_void): (&f32, &f32)| {
-        if *to_void > 0.0 {
-            0.5 - to_void.sqrt()
-        } else {
-            to_solid.sqrt() - 0.5
-        }
+        if *to_void > 0.0 { 0.5 - to_void.sqrt() } else { to_solid.sqrt() - 0.5 }
     };
     to_solid.par_iter().zip(&to_void).map(distance).collect()
 }
@@ -31,11 +27,8 @@ pub(crate) fn to_void(mask: &Mask) -> Vec<f32> {
 /// Returns the squared distance of every voxel to the nearest voxel with mask value `target`.
 fn squared(mask: &Mask, target: bool) -> Vec<f32> {
     let [nx, ny, nz] = mask.dims;
-    let mut field: Vec<f32> = mask
-        .solid
-        .iter()
-        .map(|s| if *s == target { 0.0 } else { FAR })
-        .collect();
+    let mut field: Vec<f32> =
+        mask.solid.iter().map(|s| if *s == target { 0.0 } else { FAR }).collect();
     let mut scratch = vec![0.0f32; field.len()];
     lower_lines(&mut field, nx);
     // Lines along y and z are made contiguous first.
@@ -75,11 +68,7 @@ fn lower(line: &mut [f32], envelope: &mut Vec<Parabola>) {
             start = f64::NEG_INFINITY;
         }
         let centre = q;
-        envelope.push(Parabola {
-            centre,
-            foot,
-            start,
-        });
+        envelope.push(Parabola { centre, foot, start });
     }
     let mut lowest = envelope.iter().copied().peekable();
     let Some(mut now) = lowest.next() else {
@@ -115,9 +104,8 @@ mod tests {
     fn the_transform_is_exact() {
         let dims = [9, 7, 8];
         let mut random = Random::seed_from_u64(5);
-        let solid: Vec<bool> = (0..dims.iter().product())
-            .map(|_| random.random_bool(0.2))
-            .collect();
+        let solid: Vec<bool> =
+            (0..dims.iter().product()).map(|_| random.random_bool(0.2)).collect();
         let mask = Mask { dims, solid };
         let found = signed(&mask);
         let at = |n: usize| [n % 9, n / 9 % 7, n / 63].map(|v| v as f64);
@@ -129,11 +117,7 @@ mod tests {
                     (0..3).map(|i| (p[i] - q[i]).powi(2)).sum::<f64>().sqrt()
                 })
                 .fold(f64::INFINITY, f64::min);
-            let exact = if mask.solid[n] {
-                0.5 - nearest
-            } else {
-                nearest - 0.5
-            };
+            let exact = if mask.solid[n] { 0.5 - nearest } else { nearest - 0.5 };
             assert!((f64::from(found[n]) - exact).abs() < 1e-5, "voxel {n}");
         }
     }

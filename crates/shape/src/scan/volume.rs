@@ -58,10 +58,7 @@ impl Volume {
             let reason = "does not equal the product of the dimensions";
             return Err(ShapeError::parameter(name, count, reason));
         }
-        Ok(Volume {
-            dims,
-            voxels: Voxels::Labels(labels),
-        })
+        Ok(Volume { dims, voxels: Voxels::Labels(labels) })
     }
 
     /// Creates a volume, of labels if all values are non-negative integers; refuses values that are
@@ -129,13 +126,9 @@ impl Volume {
         for page in labels.chunks(self.dims[0] * self.dims[1]) {
             if small {
                 let page: Vec<u16> = page.iter().map(|l| *l as u16).collect();
-                encoder
-                    .write_image::<Gray16>(width, height, &page)
-                    .map_err(failed)?;
+                encoder.write_image::<Gray16>(width, height, &page).map_err(failed)?;
             } else {
-                encoder
-                    .write_image::<Gray32>(width, height, page)
-                    .map_err(failed)?;
+                encoder.write_image::<Gray32>(width, height, page).map_err(failed)?;
             }
         }
         Ok(())
@@ -162,10 +155,7 @@ mod tests {
             let volume = Volume::from_labels([3, 2, 2], labels).unwrap();
             let path = folder.path().join("labels.tif");
             volume.save_labels(&path).unwrap();
-            assert_eq!(
-                read_volume(&path, &ReadLimits::default()).unwrap().0,
-                volume
-            );
+            assert_eq!(read_volume(&path, &ReadLimits::default()).unwrap().0, volume);
         }
     }
 }

@@ -20,11 +20,8 @@ impl Hills {
         if p == q {
             return;
         }
-        let (high, low) = if self.top[p as usize] >= self.top[q as usize] {
-            (p, q)
-        } else {
-            (q, p)
-        };
+        let (high, low) =
+            if self.top[p as usize] >= self.top[q as usize] { (p, q) } else { (q, p) };
         let top = self.top[low as usize];
         if f64::from(height) >= neck * f64::from(top) || top - height < 1.0 {
             self.parent[low as usize] = high;
@@ -37,10 +34,7 @@ impl Hills {
 /// maximum, or less than a voxel below it.
 pub(crate) fn separate(squared: &[f32], dims: [usize; 3], neck: f64) -> Vec<u32> {
     let (mut labels, top) = basins(squared, dims);
-    let mut hills = Hills {
-        parent: (0..top.len() as u32).collect(),
-        top,
-    };
+    let mut hills = Hills { parent: (0..top.len() as u32).collect(), top };
     let around = Around::new(dims);
     // Voxels at which basins meet, in descending order of height.
     for at in borders(squared, dims, &labels) {
@@ -58,9 +52,8 @@ pub(crate) fn separate(squared: &[f32], dims: [usize; 3], neck: f64) -> Vec<u32>
             last = labels[n];
         });
     }
-    let roots: Vec<u32> = (0..hills.parent.len() as u32)
-        .map(|n| root(&mut hills.parent, n))
-        .collect();
+    let roots: Vec<u32> =
+        (0..hills.parent.len() as u32).map(|n| root(&mut hills.parent, n)).collect();
     let mut names = vec![0u32; roots.len()];
     let mut next = 0;
     for label in labels.iter_mut().filter(|l| **l != 0) {
@@ -93,10 +86,7 @@ struct Around {
 
 impl Around {
     fn new(dims: [usize; 3]) -> Around {
-        Around {
-            dims,
-            offsets: offsets(dims),
-        }
+        Around { dims, offsets: offsets(dims) }
     }
 
     /// Calls `see` for every neighbour of voxel `at`, in index order.
@@ -187,10 +177,7 @@ fn borders(squared: &[f32], dims: [usize; 3], labels: &[u32]) -> Vec<u32> {
         }
         met
     };
-    let mut borders: Vec<u32> = (0..labels.len() as u32)
-        .into_par_iter()
-        .filter(meet)
-        .collect();
+    let mut borders: Vec<u32> = (0..labels.len() as u32).into_par_iter().filter(meet).collect();
     borders.par_sort_unstable_by(|p, q| {
         let [a, b] = [p, q].map(|n| squared[*n as usize]);
         b.total_cmp(&a).then(p.cmp(q))
@@ -239,9 +226,7 @@ mod tests {
                     (n / dims[0] % dims[1]) as f64,
                     (n / dims[0] / dims[1]) as f64,
                 );
-                balls
-                    .iter()
-                    .any(|(c, r)| x.distance(DVec3::from_array(*c)) < *r)
+                balls.iter().any(|(c, r)| x.distance(DVec3::from_array(*c)) < *r)
             })
             .collect();
         transform::to_void(&Mask { dims, solid })
@@ -251,13 +236,8 @@ mod tests {
     fn two_balls_that_touch_are_two_and_a_peanut_is_one() {
         let dims = [60, 30, 30];
         let count = |apart: f64| {
-            let field = balls(
-                &[
-                    ([15.0, 15.0, 15.0], 10.0),
-                    ([15.0 + apart, 15.3, 14.8], 10.0),
-                ],
-                dims,
-            );
+            let field =
+                balls(&[([15.0, 15.0, 15.0], 10.0), ([15.0 + apart, 15.3, 14.8], 10.0)], dims);
             let labels = separate(&field, dims, 0.8);
             *labels.iter().max().unwrap()
         };

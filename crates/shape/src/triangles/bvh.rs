@@ -48,21 +48,13 @@ impl Bvh {
         let centres: Vec<DVec3> = triangles.iter().map(middle).collect();
         let mut nodes = Vec::new();
         split(triangles, &centres, &mut faces, 0, &mut nodes);
-        Bvh {
-            nodes,
-            corners: faces.iter().map(|f| triangles[*f as usize]).collect(),
-            faces,
-        }
+        Bvh { nodes, corners: faces.iter().map(|f| triangles[*f as usize]).collect(), faces }
     }
 
     /// Returns the nearest point to `x` on triangle `n` in leaf order.
     fn on_leaf(&self, x: DVec3, n: u32) -> Nearest {
         let (point, feature) = nearest_on_triangle(x, &self.corners[n as usize]);
-        Nearest {
-            point,
-            face: self.faces[n as usize],
-            feature,
-        }
+        Nearest { point, face: self.faces[n as usize], feature }
     }
 
     /// Calls `visit` with the index of every face with a bounding box that overlaps that of a
@@ -132,10 +124,7 @@ impl Bvh {
 
 impl Node {
     fn squared_distance(&self, x: DVec3) -> f64 {
-        (self.lower - x)
-            .max(x - self.upper)
-            .max(DVec3::ZERO)
-            .length_squared()
+        (self.lower - x).max(x - self.upper).max(DVec3::ZERO).length_squared()
     }
 }
 
@@ -159,12 +148,7 @@ fn split(
         high = high.max(centres[*f as usize]);
     }
     let number = nodes.len();
-    nodes.push(Node {
-        lower,
-        upper,
-        first: first as u32,
-        count: faces.len() as u32,
-    });
+    nodes.push(Node { lower, upper, first: first as u32, count: faces.len() as u32 });
     if faces.len() <= LEAF {
         return;
     }

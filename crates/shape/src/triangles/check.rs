@@ -45,10 +45,8 @@ impl TriangleMesh {
                 return Err(ShapeError::bad_mesh(defect));
             }
             let [a, b, c] = self.corners(face);
-            let longest = a
-                .distance_squared(b)
-                .max(b.distance_squared(c))
-                .max(c.distance_squared(a));
+            let longest =
+                a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
             let twice_area = self.twice_area(face).length();
             if twice_area.is_nan() || twice_area <= FLAT * longest {
                 return Err(ShapeError::bad_mesh(format!(
@@ -69,9 +67,7 @@ impl TriangleMesh {
             (a.min(b), a.max(b), face as u32, i as u8, a < b)
         };
         let faces = 0..self.triangles.len();
-        let mut edges: Vec<_> = faces
-            .flat_map(|face| [0, 1, 2].map(|i| edge(face, i)))
-            .collect();
+        let mut edges: Vec<_> = faces.flat_map(|face| [0, 1, 2].map(|i| edge(face, i))).collect();
         edges.par_sort_unstable();
         let mut neighbours = vec![[0u32; 3]; self.triangles.len()];
         let mut open = (0usize, None);
@@ -146,12 +142,7 @@ impl TriangleMesh {
         }
         let mut renamed = vec![None; self.vertices.len()];
         let mut mesh = TriangleMesh::default();
-        for (triangle, _) in self
-            .triangles
-            .iter()
-            .zip(number)
-            .filter(|(_, n)| *n == largest)
-        {
+        for (triangle, _) in self.triangles.iter().zip(number).filter(|(_, n)| *n == largest) {
             mesh.triangles.push(triangle.map(|v| {
                 *renamed[v as usize].get_or_insert_with(|| {
                     mesh.vertices.push(self.vertices[v as usize]);
@@ -243,17 +234,12 @@ mod tests {
         for t in &mut mesh.triangles {
             t.swap(0, 1);
         }
-        assert!(matches!(
-            mesh.check_closed(),
-            Err(ShapeError::InsideOut { .. })
-        ));
+        assert!(matches!(mesh.check_closed(), Err(ShapeError::InsideOut { .. })));
 
         let mut mesh = cube();
         let second = cube();
-        mesh.vertices
-            .extend(second.vertices.iter().map(|v| *v + DVec3::splat(5.0)));
-        mesh.triangles
-            .extend(second.triangles.iter().map(|t| t.map(|v| v + 8)));
+        mesh.vertices.extend(second.vertices.iter().map(|v| *v + DVec3::splat(5.0)));
+        mesh.triangles.extend(second.triangles.iter().map(|t| t.map(|v| v + 8)));
         assert_refused(&mesh, &["2 separate surfaces of 12, 12 faces"]);
 
         let mut mesh = cube();

@@ -28,12 +28,8 @@ pub(crate) fn cube_sphere(n: usize, map: impl Fn(DVec3) -> DVec3) -> TriangleMes
         let mut quads = Vec::with_capacity(n * n);
         for j in 0..n {
             for i in 0..n {
-                let mut quad = [
-                    vertex(i, j),
-                    vertex(i + 1, j),
-                    vertex(i + 1, j + 1),
-                    vertex(i, j + 1),
-                ];
+                let mut quad =
+                    [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
                 if side == 0 {
                     quad.reverse();
                 }

@@ -42,10 +42,7 @@ impl TriangleMesh {
     /// Returns a point where the interior of an edge of one face crosses the interior of the other
     /// face.
     fn crossing(&self, face: u32, other: u32) -> Option<DVec3> {
-        let (t, o) = (
-            self.triangles[face as usize],
-            self.triangles[other as usize],
-        );
+        let (t, o) = (self.triangles[face as usize], self.triangles[other as usize]);
         if t.iter().filter(|v| o.contains(v)).count() >= 2 {
             return None;
         }
@@ -57,11 +54,7 @@ impl TriangleMesh {
                 if to.contains(&p) || to.contains(&q) {
                     return None;
                 }
-                passes(
-                    self.vertices[p as usize],
-                    self.vertices[q as usize],
-                    corners,
-                )
+                passes(self.vertices[p as usize], self.vertices[q as usize], corners)
             })
         };
         through(t, o).or_else(|| through(o, t))
@@ -87,18 +80,16 @@ mod tests {
 
     #[test]
     fn a_dented_ball_passes() {
-        let mesh = cube_sphere(12, |u| {
-            u * (1.0 - 0.5 * (-8.0 * u.distance_squared(DVec3::X)).exp())
-        });
+        let mesh =
+            cube_sphere(12, |u| u * (1.0 - 0.5 * (-8.0 * u.distance_squared(DVec3::X)).exp()));
         mesh.check_crossings().unwrap();
     }
 
     #[test]
     fn a_ball_pushed_through_itself_is_located() {
         // The cap at +x emerges on the opposite side.
-        let mesh = cube_sphere(12, |u| {
-            u - DVec3::X * 2.5 * (-20.0 * u.distance_squared(DVec3::X)).exp()
-        });
+        let mesh =
+            cube_sphere(12, |u| u - DVec3::X * 2.5 * (-20.0 * u.distance_squared(DVec3::X)).exp());
         mesh.check_closed().unwrap();
         let message = mesh.check_crossings().unwrap_err().to_string();
         assert!(message.contains("cross near (-"), "{message}");

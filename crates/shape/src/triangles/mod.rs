@@ -13,14 +13,8 @@ use glam::{DMat3, DVec3};
 
 /// Corner indices of the six faces, counter-clockwise seen from outside the cell; bits 0, 1 and 2
 /// of a corner are its x, y and z.
-pub(crate) const FACES: [[u8; 4]; 6] = [
-    [0, 4, 6, 2],
-    [1, 3, 7, 5],
-    [0, 1, 5, 4],
-    [2, 6, 7, 3],
-    [0, 2, 3, 1],
-    [4, 5, 7, 6],
-];
+pub(crate) const FACES: [[u8; 4]; 6] =
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
 /// The unit cube with a corner at the origin, for tests.
 #[cfg(test)]
@@ -29,10 +23,7 @@ pub(crate) fn unit_cube() -> TriangleMesh {
     let quads = FACES.map(|quad| quad.map(u32::from));
     TriangleMesh {
         vertices: (0..8).map(corner).collect(),
-        triangles: quads
-            .iter()
-            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-            .collect(),
+        triangles: quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect(),
     }
 }
 
@@ -83,9 +74,7 @@ impl TriangleMesh {
 
     /// Returns the surface area [m^2].
     pub fn area(&self) -> f64 {
-        let twice: f64 = (0..self.triangles.len())
-            .map(|f| self.twice_area(f).length())
-            .sum();
+        let twice: f64 = (0..self.triangles.len()).map(|f| self.twice_area(f).length()).sum();
         0.5 * twice
     }
 
@@ -106,11 +95,7 @@ impl TriangleMesh {
     pub(crate) fn in_frame(&self, origin: DVec3, axes: DMat3) -> TriangleMesh {
         let to_frame = axes.transpose();
         TriangleMesh {
-            vertices: self
-                .vertices
-                .iter()
-                .map(|v| to_frame * (*v - origin))
-                .collect(),
+            vertices: self.vertices.iter().map(|v| to_frame * (*v - origin)).collect(),
             triangles: self.triangles.clone(),
         }
     }

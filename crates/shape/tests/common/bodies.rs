@@ -78,9 +78,7 @@ impl Body {
             "box.1" => Body::brick(0.2),
             // Edges that turn by 71, 110, and 60 and 90 degrees.
             "octahedron" => Body::polyhedron(
-                (0..8)
-                    .map(|n| DVec3::new(sign(n), sign(n >> 1), sign(n >> 2)))
-                    .collect(),
+                (0..8).map(|n| DVec3::new(sign(n), sign(n >> 1), sign(n >> 2))).collect(),
                 3f64.sqrt(),
             ),
             "tetrahedron" => Body::polyhedron(
@@ -103,11 +101,7 @@ impl Body {
                     let axes = DVec3::new(1.5, 1.0, 1.0);
                     let gradient = (x / (axes * axes)).length();
                     let level = (x / axes).length();
-                    if gradient > 0.0 {
-                        (level - 1.0) * level / gradient
-                    } else {
-                        -1.0
-                    }
+                    if gradient > 0.0 { (level - 1.0) * level / gradient } else { -1.0 }
                 }),
                 reach: 1.5,
                 roundness: 0.874,
@@ -120,11 +114,7 @@ impl Body {
 
     /// Half side 1, edges of this radius.
     fn cube(radius: f64) -> Body {
-        let bounds = if radius > 0.0 {
-            [radius - 0.05, radius + 0.05]
-        } else {
-            [0.0, 0.08]
-        };
+        let bounds = if radius > 0.0 { [radius - 0.05, radius + 0.05] } else { [0.0, 0.08] };
         Body {
             distance: Box::new(move |x| {
                 let q = x.abs() - DVec3::splat(1.0 - radius);
@@ -166,10 +156,7 @@ impl Body {
         let normals: Vec<DVec3> = normals.into_iter().map(DVec3::normalize).collect();
         Body {
             distance: Box::new(move |x| {
-                normals
-                    .iter()
-                    .map(|n| n.dot(x) - 1.0)
-                    .fold(f64::NEG_INFINITY, f64::max)
+                normals.iter().map(|n| n.dot(x) - 1.0).fold(f64::NEG_INFINITY, f64::max)
             }),
             reach,
             roundness: 0.0,
@@ -193,11 +180,7 @@ fn sphericity(volume: f64, area: f64) -> f64 {
 fn of_spheroid(a: f64) -> [f64; 3] {
     let eccentricity = (1.0 - 1.0 / (a * a)).sqrt();
     let area = 2.0 * PI * (1.0 + a / eccentricity * eccentricity.asin());
-    [
-        (a * a).recip().cbrt(),
-        sphericity(4.0 / 3.0 * PI * a, area),
-        1.0,
-    ]
+    [(a * a).recip().cbrt(), sphericity(4.0 / 3.0 * PI * a, area), 1.0]
 }
 
 /// Returns sphericities and convexity of two unit spheres with their centres `half` on either side.
@@ -207,11 +190,7 @@ fn of_peanut(half: f64) -> [f64; 3] {
     let volume = 2.0 * (4.0 / 3.0 * PI - cap);
     let area = 2.0 * (4.0 * PI - 2.0 * PI * height);
     let hull = 4.0 / 3.0 * PI + 2.0 * PI * half;
-    [
-        (1.0 + half).powi(2).recip().cbrt(),
-        sphericity(volume, area),
-        volume / hull,
-    ]
+    [(1.0 + half).powi(2).recip().cbrt(), sphericity(volume, area), volume / hull]
 }
 
 fn sign(bit: u32) -> f64 {
@@ -252,10 +231,7 @@ impl Scan {
             cells: 24,
             nodes: Some(60),
             // The roundness comes from the finer surface of the scan.
-            bounds: QualityBounds {
-                gradient_error: 1.0,
-                volume_error: 1.0,
-            },
+            bounds: QualityBounds { gradient_error: 1.0, volume_error: 1.0 },
             ..Default::default()
         };
         self.shape_with(noise, seed, from_mask, options)

@@ -14,10 +14,7 @@ pub fn shared(below: &str) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    eprintln!(
-        "SKIPPED: {} is absent (set GRAINWAKE_SHARED)",
-        path.display()
-    );
+    eprintln!("SKIPPED: {} is absent (set GRAINWAKE_SHARED)", path.display());
     None
 }
 
@@ -25,8 +22,5 @@ pub fn shared(below: &str) -> Option<PathBuf> {
 #[track_caller]
 pub fn close(found: f64, exact: f64, relative: f64) {
     let error = found / exact - 1.0;
-    assert!(
-        error.abs() <= relative,
-        "{found} for {exact}: off by {error:.5}"
-    );
+    assert!(error.abs() <= relative, "{found} for {exact}: off by {error:.5}");
 }

@@ -18,10 +18,7 @@ pub struct Placed<'a> {
 
 impl Placed<'_> {
     pub fn distance(&self, x: DVec3) -> f64 {
-        self.scale
-            * self
-                .shape
-                .distance(self.turn.inverse() * (x - self.centre) / self.scale)
+        self.scale * self.shape.distance(self.turn.inverse() * (x - self.centre) / self.scale)
     }
     pub fn reach(&self) -> f64 {
         self.scale * self.shape.bounding_radius()
@@ -37,14 +34,8 @@ pub fn shares(
 ) -> Vec<f32> {
     let mut out = vec![0.0f32; dims.iter().product()];
     for (body, (centre, reach)) in bodies.iter().zip(boxes) {
-        let low = (*centre - *reach - 2.0)
-            .max(DVec3::ZERO)
-            .as_usizevec3()
-            .to_array();
-        let high = (*centre + *reach + 2.0)
-            .max(DVec3::ZERO)
-            .as_usizevec3()
-            .to_array();
+        let low = (*centre - *reach - 2.0).max(DVec3::ZERO).as_usizevec3().to_array();
+        let high = (*centre + *reach + 2.0).max(DVec3::ZERO).as_usizevec3().to_array();
         for k in low[2]..=high[2].min(dims[2] - 1) {
             for j in low[1]..=high[1].min(dims[1] - 1) {
                 for i in low[0]..=high[0].min(dims[0] - 1) {
@@ -72,9 +63,8 @@ pub fn shares(
 /// Gaussian blur of standard deviation `sigma` [voxels], the border continued.
 pub fn blurred(values: &[f32], dims: [usize; 3], sigma: f64) -> Vec<f32> {
     let reach = (4.0 * sigma).ceil() as isize;
-    let weights: Vec<f64> = (-reach..=reach)
-        .map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp())
-        .collect();
+    let weights: Vec<f64> =
+        (-reach..=reach).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp()).collect();
     let sum: f64 = weights.iter().sum();
     let strides = [1, dims[0], dims[0] * dims[1]];
     let mut values = values.to_vec();
@@ -112,9 +102,5 @@ impl Noise {
 pub fn greys(shares: &[f32], noise: f64, seed: u64) -> Vec<u32> {
     let mut random = Noise::new(seed);
     let grey = |s: &f32| 9000.0 + 21000.0 * (f64::from(*s) + noise * random.normal());
-    shares
-        .iter()
-        .map(grey)
-        .map(|g| g.round().clamp(0.0, 65535.0) as u32)
-        .collect()
+    shares.iter().map(grey).map(|g| g.round().clamp(0.0, 65535.0) as u32).collect()
 }

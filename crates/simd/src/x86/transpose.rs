@@ -71,12 +71,7 @@ unsafe fn square([a, b, c, d]: [__m128; 4]) -> [__m128; 4] {
     unsafe {
         let (e, f) = (_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b));
         let (g, h) = (_mm_unpacklo_ps(c, d), _mm_unpackhi_ps(c, d));
-        [
-            _mm_movelh_ps(e, g),
-            _mm_movehl_ps(g, e),
-            _mm_movelh_ps(f, h),
-            _mm_movehl_ps(h, f),
-        ]
+        [_mm_movelh_ps(e, g), _mm_movehl_ps(g, e), _mm_movelh_ps(f, h), _mm_movehl_ps(h, f)]
     }
 }
 

@@ -46,13 +46,9 @@ impl Enclosure {
     }
     /// Periods along the three axes [m], zero along axes that are not periodic.
     pub(super) fn period(&self) -> DVec3 {
-        DVec3::from_array([0, 1, 2].map(|axis| {
-            if self.is_periodic(axis) {
-                self.size()[axis]
-            } else {
-                0.0
-            }
-        }))
+        DVec3::from_array(
+            [0, 1, 2].map(|axis| if self.is_periodic(axis) { self.size()[axis] } else { 0.0 }),
+        )
     }
     /// Face `side` of `axis`, if it is a wall for grains.
     pub(super) fn face(&self, axis: usize, side: usize) -> Option<WallFace> {
@@ -63,12 +59,7 @@ impl Enclosure {
     pub(super) fn plane(&self, axis: usize, side: usize) -> WallFace {
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let corner = if side == 0 { self.lower } else { self.upper };
-        WallFace {
-            axis,
-            side,
-            inward: sign * DVec3::AXES[axis],
-            coordinate: corner[axis],
-        }
+        WallFace { axis, side, inward: sign * DVec3::AXES[axis], coordinate: corner[axis] }
     }
     /// All faces that are walls for grains.
     pub(super) fn faces(&self) -> impl Iterator<Item = WallFace> + '_ {
@@ -81,9 +72,7 @@ impl Enclosure {
         let period = self.period();
         IVec3::from_array([0, 1, 2].map(|axis| {
             if period[axis] > 0.0 {
-                ((x[axis] - self.lower[axis]) / period[axis])
-                    .floor()
-                    .clamp(-1e6, 1e6) as i32
+                ((x[axis] - self.lower[axis]) / period[axis]).floor().clamp(-1e6, 1e6) as i32
             } else {
                 0
             }
@@ -119,14 +108,8 @@ mod tests {
     #[test]
     fn wraps_only_periodic_axes() {
         let box_ = channel();
-        assert_eq!(
-            box_.wrap(DVec3::new(1.5, 5.0, -1.0)),
-            DVec3::new(-0.5, 5.0, -1.0)
-        );
-        assert_eq!(
-            box_.nearest_image(DVec3::new(1.5, 1.5, 0.0)),
-            DVec3::new(-0.5, 1.5, 0.0)
-        );
+        assert_eq!(box_.wrap(DVec3::new(1.5, 5.0, -1.0)), DVec3::new(-0.5, 5.0, -1.0));
+        assert_eq!(box_.nearest_image(DVec3::new(1.5, 1.5, 0.0)), DVec3::new(-0.5, 1.5, 0.0));
     }
 
     #[test]

@@ -47,10 +47,7 @@ impl Grain {
             shape: shape.into(),
             density,
             material: Material::default(),
-            pose: Pose {
-                position: DVec3::ZERO,
-                orientation: DQuat::IDENTITY,
-            },
+            pose: Pose { position: DVec3::ZERO, orientation: DQuat::IDENTITY },
             velocity: DVec3::ZERO,
             angular_velocity: DVec3::ZERO,
             translation: MotionConstraint::Free,
@@ -85,10 +82,8 @@ impl Grain {
     /// Holds the grain still.
     pub fn held(mut self) -> Grain {
         (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
-        (self.translation, self.rotation) = (
-            MotionConstraint::Prescribed(DVec3::ZERO),
-            MotionConstraint::Prescribed(DVec3::ZERO),
-        );
+        (self.translation, self.rotation) =
+            (MotionConstraint::Prescribed(DVec3::ZERO), MotionConstraint::Prescribed(DVec3::ZERO));
         self
     }
     /// Mass [kg].

@@ -14,21 +14,14 @@ pub struct Material {
 impl Default for Material {
     /// Quartz without dissipation.
     fn default() -> Self {
-        Material {
-            youngs_modulus: 7e10,
-            poisson_ratio: 0.17,
-            restitution: 1.0,
-        }
+        Material { youngs_modulus: 7e10, poisson_ratio: 0.17, restitution: 1.0 }
     }
 }
 
 impl Material {
     /// Undeformable body: the contact takes the elasticity and the restitution of its partner.
-    pub const RIGID: Material = Material {
-        youngs_modulus: f64::INFINITY,
-        poisson_ratio: 0.0,
-        restitution: 1.0,
-    };
+    pub const RIGID: Material =
+        Material { youngs_modulus: f64::INFINITY, poisson_ratio: 0.0, restitution: 1.0 };
 
     /// Share of this body in the normal compliance of a contact, (1 - nu^2) / E [1/Pa].
     pub(super) fn normal_compliance(&self) -> f64 {
@@ -58,20 +51,13 @@ pub(super) fn damping_ratio(restitution: f64) -> f64 {
     let bisect = |mut low: f64, mut high: f64, exponent: &dyn Fn(f64) -> f64| {
         for _ in 0..200 {
             let middle = 0.5 * (low + high);
-            if exponent(middle) < log_loss {
-                low = middle
-            } else {
-                high = middle
-            }
+            if exponent(middle) < log_loss { low = middle } else { high = middle }
         }
         0.5 * (low + high)
     };
     let pi = std::f64::consts::PI;
     if log_loss < 2.0 {
-        bisect(0.0, 0.5 * pi - 1e-9, &|theta| {
-            theta.tan() * (pi - 2.0 * theta)
-        })
-        .sin()
+        bisect(0.0, 0.5 * pi - 1e-9, &|theta| theta.tan() * (pi - 2.0 * theta)).sin()
     } else {
         bisect(1e-9, 20.0, &|u| 2.0 * u / u.tanh()).cosh()
     }
@@ -100,10 +86,7 @@ mod tests {
     fn damping_ratio_gives_the_restitution_of_a_contact_that_cannot_pull() {
         for restitution in [0.97, 0.9, 0.5, 0.2, 0.08] {
             let measured = rebound(damping_ratio(restitution));
-            assert!(
-                (measured - restitution).abs() < 1e-4,
-                "{restitution}: {measured}"
-            );
+            assert!((measured - restitution).abs() < 1e-4, "{restitution}: {measured}");
         }
         assert_eq!(damping_ratio(1.0), 0.0);
     }

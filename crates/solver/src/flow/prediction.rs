@@ -53,10 +53,7 @@ impl<R: Real> Flow<R> {
         let (weight, layout) = (self.weight, self.mesh.layout());
         let fields = fields(&mut self.tendency, &mut self.predicted);
         for_slabs(layout, fields, |component, start, [tendency, velocity]| {
-            each(
-                component,
-                Prediction::new(weight, start, tendency, velocity),
-            );
+            each(component, Prediction::new(weight, start, tendency, velocity));
         });
     }
 }
@@ -67,11 +64,7 @@ fn fields<'a, R>(
     other: &'a mut FaceVector<R>,
 ) -> [[&'a mut [R]; 2]; 3] {
     let FaceVector { x, y, z } = one;
-    let FaceVector {
-        x: ox,
-        y: oy,
-        z: oz,
-    } = other;
+    let FaceVector { x: ox, y: oy, z: oz } = other;
     [[&mut **x, &mut **ox], [y, oy], [z, oz]]
 }
 
@@ -130,10 +123,8 @@ impl<'a, R: Real> Prediction<'a, R> {
         count: usize,
         extra: &[f64],
     ) {
-        let (tendency, velocity) = (
-            self.tendency.row_mut(at, count),
-            self.velocity.row_mut(at, count),
-        );
+        let (tendency, velocity) =
+            (self.tendency.row_mut(at, count), self.velocity.row_mut(at, count));
         let weight = V::constant(self.weight);
         for n in (0..count).step_by(V::WIDTH) {
             let extra = V::load(&extra[n..]);

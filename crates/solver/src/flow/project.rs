@@ -47,15 +47,7 @@ impl<R: Real> Kernel for Divergence<'_, R> {
     type Number = R;
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
-        let Divergence {
-            layout,
-            periodic,
-            predicted,
-            k,
-            inverse,
-            dt,
-            out,
-        } = self;
+        let Divergence { layout, periodic, predicted, k, inverse, dt, out } = self;
         let [n, ny, nz] = layout.cells;
         let u = layout.plane_of(&predicted.x, k);
         let v = layout.plane_of(&predicted.y, k);
@@ -110,8 +102,7 @@ impl<R: Real> DivergenceRow<'_, R> {
         let sum = (ur - here(self.u)) * x
             + (here(self.vp) - here(self.v)) * y
             + (here(self.wt) - here(self.w)) * z;
-        sum.div(V::constant(self.dt))
-            .store(window_mut::<V>(self.out, i));
+        sum.div(V::constant(self.dt)).store(window_mut::<V>(self.out, i));
     }
 }
 
@@ -162,20 +153,12 @@ impl<R: Real> Kernel for Correct<'_, R> {
         let wt = layout.plane_of(&self.predicted.z, next(k, nz, periodic[2]));
         let [x, y, z] = self.velocity.map(|plane| &mut plane[..layout.plane()]);
         let p = &mut self.pressure[..layout.plane()];
-        let Solution {
-            here: f,
-            below: fb,
-            above: ft,
-        } = self.solution;
+        let Solution { here: f, below: fb, above: ft } = self.solution;
         let mut partial = CorrectPartial::<R>::default();
         let mut rise = [0.0; 2];
         for j in 1..=ny {
             let mut work = CorrectRow {
-                q: [
-                    layout.row_of(u, j),
-                    layout.row_of(v, j),
-                    layout.row_of(w, j),
-                ],
+                q: [layout.row_of(u, j), layout.row_of(v, j), layout.row_of(w, j)],
                 vp: layout.row_of(v, next(j, ny, periodic[1])),
                 wt: layout.row_of(wt, j),
                 f: &f.row(j)[..n + 2],
@@ -183,11 +166,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 upper: [&f.row(j + 1)[..n + 2], &ft.row(j)[..n + 2]],
                 inverse: self.inverse,
                 dt_per_h: self.dt_per_h,
-                out: [
-                    layout.row_of_mut(x, j),
-                    layout.row_of_mut(y, j),
-                    layout.row_of_mut(z, j),
-                ],
+                out: [layout.row_of_mut(x, j), layout.row_of_mut(y, j), layout.row_of_mut(z, j)],
                 pressure: layout.row_of_mut(p, j),
                 streamed: if self.non_temporal { n } else { 0 },
                 partial: &mut partial,
@@ -271,10 +250,8 @@ impl<R: Real> CorrectRow<'_, R> {
         // The ghosts are filled from the ends of a row, which therefore stay in the cache.
         let streamed = inside_row(i, V::WIDTH, self.streamed);
         for axis in 0..3 {
-            let (dt_per_h, inverse) = (
-                V::constant(self.dt_per_h[axis]),
-                V::constant(self.inverse[axis]),
-            );
+            let (dt_per_h, inverse) =
+                (V::constant(self.dt_per_h[axis]), V::constant(self.inverse[axis]));
             let q = here(self.q[axis]) - dt_per_h * (f - lower[axis]);
             let next = above[axis] - dt_per_h * (upper[axis] - f);
             let to = window_mut::<V>(self.out[axis], i);

@@ -113,8 +113,7 @@ impl<R: Real> Flow<R> {
     pub fn make_solenoidal(&mut self) -> FlowMeasures {
         self.predicted.copy_from(&self.velocity);
         self.boundaries.set_normal(&mut self.predicted);
-        self.boundaries
-            .convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, 0.0);
+        self.boundaries.convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, 0.0);
         let pressure = self.pressure.to_vec();
         let measures = self.project(1.0);
         self.pressure.copy_from_slice(&pressure);
@@ -126,20 +125,13 @@ impl<R: Real> Flow<R> {
     pub fn predict(&mut self, dt: f64) {
         let ratio = self.previous_step.map_or(0.0, |previous| dt / previous);
         let (now, before) = (dt * (1.0 + 0.5 * ratio), -dt * 0.5 * ratio);
-        let weights = Weights {
-            now,
-            before,
-            dt_per_h: self.mesh.spacing.to_array().map(|h| dt / h),
-        };
+        let weights =
+            Weights { now, before, dt_per_h: self.mesh.spacing.to_array().map(|h| dt / h) };
         let (layout, periodic) = (self.mesh.layout(), self.boundaries.periodic());
         let (velocity, pressure, boundaries) = (&self.velocity, &self.pressure, &self.boundaries);
         let (coefficients, non_temporal) = (&self.coefficients, self.non_temporal);
         let FaceVector { x, y, z } = &mut self.tendency;
-        let FaceVector {
-            x: px,
-            y: py,
-            z: pz,
-        } = &mut self.predicted;
+        let FaceVector { x: px, y: py, z: pz } = &mut self.predicted;
         for_planes_of(
             layout,
             [&mut *x, y, z, px, py, pz],
@@ -165,15 +157,11 @@ impl<R: Real> Flow<R> {
             let plane = layout.plane();
             pz[face * plane..(face + 1) * plane].fill(R::of(value));
         }
-        let sum = self
-            .partial
-            .iter()
-            .fold(DVec3::ZERO, |sum, plane| sum + plane.tendency);
+        let sum = self.partial.iter().fold(DVec3::ZERO, |sum, plane| sum + plane.tendency);
         let [_, _, _, x, y, z] = self.tendency_sums;
         self.tendency_sums = [x, y, z, sum.x, sum.y, sum.z];
         self.impulse = now * sum + before * DVec3::new(x, y, z);
-        self.boundaries
-            .convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, dt);
+        self.boundaries.convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, dt);
         self.previous_step = Some(dt);
         self.weight = now;
     }
@@ -188,51 +176,42 @@ impl<R: Real> Flow<R> {
         let (predicted, boundaries) = (&self.predicted, &self.boundaries);
         let non_temporal = self.non_temporal;
         let divergence = |k: usize, out: &mut Plane<R>| {
-            dispatch(Divergence {
-                layout,
-                periodic,
-                predicted,
-                k,
-                inverse,
-                dt,
-                out,
-            });
+            dispatch(Divergence { layout, periodic, predicted, k, inverse, dt, out });
         };
         let FaceVector { x, y, z } = &mut self.velocity;
         let fields = [&mut **x, &mut **y, &mut **z, &mut *self.pressure];
         let partial = &mut self.partial;
-        self.poisson
-            .solve(divergence, fields, partial, |k, solution, range| {
-                let ([x, y, z, p], measures) = range.plane(k);
-                dispatch(Correct {
-                    layout,
-                    predicted,
-                    solution,
-                    periodic,
-                    k,
-                    inverse,
-                    dt_per_h: inverse.map(|inverse| dt * inverse),
-                    non_temporal,
-                    velocity: [&mut *x, &mut *y, &mut *z],
-                    pressure: &mut *p,
-                    measures,
-                });
-                // The upper boundary faces keep the predicted velocity.
-                if !periodic[0] {
-                    for j in 1..=ny {
-                        let at = j * row + nx + 1;
-                        x[at] = predicted.x[k * plane + at];
-                    }
-                }
-                if !periodic[1] {
-                    let upper = (ny + 1) * row..(ny + 2) * row;
-                    y[upper.clone()].copy_from_slice(&predicted.y[k * plane..][upper]);
-                }
-                for (component, q) in [x, y, z].into_iter().enumerate() {
-                    boundaries.fill_ghosts_of_plane(layout, component, q);
-                }
-                boundaries.fill_pressure_of_plane(layout, p);
+        self.poisson.solve(divergence, fields, partial, |k, solution, range| {
+            let ([x, y, z, p], measures) = range.plane(k);
+            dispatch(Correct {
+                layout,
+                predicted,
+                solution,
+                periodic,
+                k,
+                inverse,
+                dt_per_h: inverse.map(|inverse| dt * inverse),
+                non_temporal,
+                velocity: [&mut *x, &mut *y, &mut *z],
+                pressure: &mut *p,
+                measures,
             });
+            // The upper boundary faces keep the predicted velocity.
+            if !periodic[0] {
+                for j in 1..=ny {
+                    let at = j * row + nx + 1;
+                    x[at] = predicted.x[k * plane + at];
+                }
+            }
+            if !periodic[1] {
+                let upper = (ny + 1) * row..(ny + 2) * row;
+                y[upper.clone()].copy_from_slice(&predicted.y[k * plane..][upper]);
+            }
+            for (component, q) in [x, y, z].into_iter().enumerate() {
+                boundaries.fill_ghosts_of_plane(layout, component, q);
+            }
+            boundaries.fill_pressure_of_plane(layout, p);
+        });
         if !periodic[2] {
             let upper = (nz + 1) * plane..;
             z[upper.clone()].copy_from_slice(&predicted.z[upper]);
@@ -303,15 +282,8 @@ impl<R: Real> Flow<R> {
     pub fn state_mut(&mut self, last_step: f64) -> ([&mut [R]; 7], &mut [f64]) {
         self.previous_step = (last_step > 0.0).then_some(last_step);
         let (u, h) = (&mut self.velocity, &mut self.tendency);
-        let fields = [
-            &mut *u.x,
-            &mut u.y,
-            &mut u.z,
-            &mut h.x,
-            &mut h.y,
-            &mut h.z,
-            &mut self.pressure,
-        ];
+        let fields =
+            [&mut *u.x, &mut u.y, &mut u.z, &mut h.x, &mut h.y, &mut h.z, &mut self.pressure];
         (fields, &mut self.tendency_sums)
     }
 

@@ -129,11 +129,7 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
                     layout.row_of_mut(pz, j),
                 ],
                 sums: &mut sums,
-                prescribed: [
-                    false,
-                    !self.periodic[1] && j == 1,
-                    !self.periodic[2] && k == 1,
-                ],
+                prescribed: [false, !self.periodic[1] && j == 1, !self.periodic[2] && k == 1],
                 streamed: if self.non_temporal { n } else { 0 },
             };
             along_row::<V>(n, &mut work);
@@ -151,11 +147,7 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
 /// Planes k - 1, k, k + 1 of a field.
 #[inline(always)]
 fn planes<R>(layout: Layout, field: &[R], k: usize) -> [&[R]; 3] {
-    [
-        layout.plane_of(field, k - 1),
-        layout.plane_of(field, k),
-        layout.plane_of(field, k + 1),
-    ]
+    [layout.plane_of(field, k - 1), layout.plane_of(field, k), layout.plane_of(field, k + 1)]
 }
 
 /// Rows j - 1, j, j + 1 of the planes k - 1, k, k + 1, all of one length, so that one bounds check
@@ -173,11 +165,7 @@ fn rows<'a, R>(layout: Layout, [below, here, above]: [&'a [R]; 3], j: usize) -> 
 
 #[inline(always)]
 fn rows_of_plane<R>(layout: Layout, plane: &[R], j: usize) -> [&[R]; 3] {
-    [
-        layout.row_of(plane, j - 1),
-        layout.row_of(plane, j),
-        layout.row_of(plane, j + 1),
-    ]
+    [layout.row_of(plane, j - 1), layout.row_of(plane, j), layout.row_of(plane, j + 1)]
 }
 
 /// One row of the prediction.
@@ -240,10 +228,7 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
         let [[_, pb, _], [pm, p, _], _] = self.p;
         let pc = here(p);
         let lower = [left(p), here(pm), here(pb)];
-        let (now, before) = (
-            V::constant(self.weights.now),
-            V::constant(self.weights.before),
-        );
+        let (now, before) = (V::constant(self.weights.now), V::constant(self.weights.before));
         // Boundary conditions read the ends of a row, which therefore stay in the cache.
         let streamed = inside_row(i, V::WIDTH, self.streamed);
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {

@@ -90,9 +90,7 @@ impl Layout {
         values: &'a [T],
     ) -> impl ExactSizeIterator<Item = &'a [T]> + use<'a, T> {
         let entries = self.cells[0] + 2;
-        values
-            .chunks_exact(self.row())
-            .map(move |row| &row[..entries])
+        values.chunks_exact(self.row()).map(move |row| &row[..entries])
     }
     /// Mutable rows of a field, ghosts included, padding excluded.
     pub fn rows_mut<'a, T>(
@@ -100,9 +98,7 @@ impl Layout {
         values: &'a mut [T],
     ) -> impl ExactSizeIterator<Item = &'a mut [T]> + use<'a, T> {
         let entries = self.cells[0] + 2;
-        values
-            .chunks_exact_mut(self.row())
-            .map(move |row| &mut row[..entries])
+        values.chunks_exact_mut(self.row()).map(move |row| &mut row[..entries])
     }
     /// Position of (i, j, k) in memory.
     #[inline]
@@ -185,11 +181,7 @@ impl<L: Location, R: Real> Field<L, R> {
     /// Field of zeros on the cells of `slab`.
     pub fn zeros(slab: &Slab) -> Self {
         let layout = slab.layout();
-        Field {
-            layout,
-            values: Aligned::with_head(1, layout.len()),
-            location: PhantomData,
-        }
+        Field { layout, values: Aligned::with_head(1, layout.len()), location: PhantomData }
     }
     /// Layout in memory.
     #[inline]
@@ -239,8 +231,7 @@ impl<L: Location, R: Real> Field<L, R> {
     /// Copies the layer `from` of an axis onto the layer `to`.
     #[cfg(test)]
     pub fn copy_layer(&mut self, axis: usize, from: usize, to: usize) {
-        self.layout
-            .map_layer(&mut self.values, axis, from, to, |value| value);
+        self.layout.map_layer(&mut self.values, axis, from, to, |value| value);
     }
 }
 
@@ -249,11 +240,7 @@ impl<L, R: Real> Clone for Field<L, R> {
     fn clone(&self) -> Self {
         let mut values = Aligned::with_head(1, self.values.len());
         values.copy_from_slice(&self.values);
-        Field {
-            layout: self.layout,
-            values,
-            location: PhantomData,
-        }
+        Field { layout: self.layout, values, location: PhantomData }
     }
 }
 
@@ -285,17 +272,12 @@ pub struct FaceVector<R = f64> {
 impl<R: Real> FaceVector<R> {
     /// Vector field of zeros on the cells of `slab`.
     pub fn zeros(slab: &Slab) -> Self {
-        FaceVector {
-            x: Field::zeros(slab),
-            y: Field::zeros(slab),
-            z: Field::zeros(slab),
-        }
+        FaceVector { x: Field::zeros(slab), y: Field::zeros(slab), z: Field::zeros(slab) }
     }
     /// Copies all values of `other`, ghosts included.
     pub fn copy_from(&mut self, other: &FaceVector<R>) {
         for axis in 0..3 {
-            self.component_mut(axis)
-                .copy_from_slice(other.component(axis));
+            self.component_mut(axis).copy_from_slice(other.component(axis));
         }
     }
     /// Sets every value to one vector.
@@ -337,11 +319,7 @@ impl<R: Real> FaceVector<R> {
 #[cfg(test)]
 impl<R: Real> Clone for FaceVector<R> {
     fn clone(&self) -> Self {
-        FaceVector {
-            x: self.x.clone(),
-            y: self.y.clone(),
-            z: self.z.clone(),
-        }
+        FaceVector { x: self.x.clone(), y: self.y.clone(), z: self.z.clone() }
     }
 }
 
@@ -352,11 +330,7 @@ mod tests {
 
     #[test]
     fn rows_start_on_cache_lines_and_have_their_entries() {
-        let mesh = Mesh {
-            cells: [5, 3, 2],
-            spacing: DVec3::ONE,
-            origin: DVec3::ZERO,
-        };
+        let mesh = Mesh { cells: [5, 3, 2], spacing: DVec3::ONE, origin: DVec3::ZERO };
         let layout = mesh.layout();
         let mut field = Field::<Centre>::zeros(&mesh.whole());
         for (n, row) in layout.rows_mut(&mut field).enumerate() {

@@ -48,9 +48,7 @@ pub fn for_slabs<const N: usize, R: Send>(
             tasks.push((component, start, parts));
         }
     }
-    tasks
-        .into_par_iter()
-        .for_each(|(component, start, parts)| f(component, start, parts));
+    tasks.into_par_iter().for_each(|(component, start, parts)| f(component, start, parts));
 }
 
 /// Consecutive planes of several fields that one thread holds during [`for_plane_ranges`].
@@ -112,16 +110,13 @@ pub fn for_chunks<R: Send, S: Send>(
 ) {
     let slots = scratch.len();
     let chunks = Pieces::new(values, chunk);
-    scratch
-        .par_iter_mut()
-        .enumerate()
-        .for_each(|(slot, scratch)| {
-            let chunks = &chunks;
-            for k in chunks.count * slot / slots..chunks.count * (slot + 1) / slots {
-                // SAFETY: every k belongs to one slot.
-                f(k, unsafe { chunks.get(k) }, scratch);
-            }
-        });
+    scratch.par_iter_mut().enumerate().for_each(|(slot, scratch)| {
+        let chunks = &chunks;
+        for k in chunks.count * slot / slots..chunks.count * (slot + 1) / slots {
+            // SAFETY: every k belongs to one slot.
+            f(k, unsafe { chunks.get(k) }, scratch);
+        }
+    });
 }
 
 /// Neighbouring columns through all planes that one thread holds during [`for_columns`].
@@ -165,25 +160,22 @@ pub fn for_columns<R: Send, S: Send>(
     );
     let (slots, blocks, planes) = (scratch.len(), len.div_ceil(width), values.len() / stride);
     let whole = Pieces::new(values, stride);
-    scratch
-        .par_iter_mut()
-        .enumerate()
-        .for_each(|(slot, scratch)| {
-            let whole = &whole;
-            for block in blocks * slot / slots..blocks * (slot + 1) / slots {
-                let at = block * width;
-                let mut columns = Columns {
-                    // SAFETY: `at < len <= stride <= values.len()`, so the block starts inside the
-                    // first plane. Every block belongs to one slot.
-                    start: unsafe { whole.start.add(at) },
-                    stride,
-                    planes,
-                    width: width.min(len - at),
-                    borrow: PhantomData,
-                };
-                f(at, &mut columns, scratch);
-            }
-        });
+    scratch.par_iter_mut().enumerate().for_each(|(slot, scratch)| {
+        let whole = &whole;
+        for block in blocks * slot / slots..blocks * (slot + 1) / slots {
+            let at = block * width;
+            let mut columns = Columns {
+                // SAFETY: `at < len <= stride <= values.len()`, so the block starts inside the
+                // first plane. Every block belongs to one slot.
+                start: unsafe { whole.start.add(at) },
+                stride,
+                planes,
+                width: width.min(len - at),
+                borrow: PhantomData,
+            };
+            f(at, &mut columns, scratch);
+        }
+    });
 }
 
 /// A slice cut into equal pieces, each of which one thread may hold.
@@ -202,12 +194,7 @@ unsafe impl<T: Send> Sync for Pieces<'_, T> {}
 
 impl<'a, T> Pieces<'a, T> {
     fn new(values: &'a mut [T], size: usize) -> Pieces<'a, T> {
-        Pieces {
-            start: values.as_mut_ptr(),
-            size,
-            count: values.len() / size,
-            slice: PhantomData,
-        }
+        Pieces { start: values.as_mut_ptr(), size, count: values.len() / size, slice: PhantomData }
     }
     /// Returns piece `k`.
     ///

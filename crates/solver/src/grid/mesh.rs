@@ -32,11 +32,7 @@ pub struct Mesh {
 impl Mesh {
     /// Mesh of cubic cells of edge `spacing` [m] with its lower corner at the origin.
     pub fn cubic(cells: [usize; 3], spacing: f64) -> Mesh {
-        Mesh {
-            cells,
-            spacing: DVec3::splat(spacing),
-            origin: DVec3::ZERO,
-        }
+        Mesh { cells, spacing: DVec3::splat(spacing), origin: DVec3::ZERO }
     }
     /// Number of cells.
     pub fn cell_count(&self) -> usize {
@@ -48,12 +44,7 @@ impl Mesh {
     }
     /// Edge lengths of the box [m].
     pub fn extent(&self) -> DVec3 {
-        self.spacing
-            * DVec3::new(
-                self.cells[0] as f64,
-                self.cells[1] as f64,
-                self.cells[2] as f64,
-            )
+        self.spacing * DVec3::new(self.cells[0] as f64, self.cells[1] as f64, self.cells[2] as f64)
     }
     /// Axes that are not flat: more than one cell.
     pub fn resolved_axes(&self) -> impl Iterator<Item = usize> + Clone + use<> {
@@ -75,11 +66,7 @@ impl Mesh {
     /// Slab of `planes` planes of cells above the first `below` planes of the box.
     pub fn slab(&self, below: usize, planes: usize) -> Slab {
         assert!(planes > 0 && below + planes <= self.cells[2]);
-        Slab {
-            mesh: *self,
-            below,
-            planes,
-        }
+        Slab { mesh: *self, below, planes }
     }
     /// Memory layout of the fields of the whole box.
     pub(crate) fn layout(&self) -> Layout {
@@ -124,9 +111,7 @@ impl Slab {
     /// Memory layout of the fields of the slab.
     pub(crate) fn layout(&self) -> Layout {
         let [nx, ny, _] = self.mesh.cells;
-        Layout {
-            cells: [nx, ny, self.planes],
-        }
+        Layout { cells: [nx, ny, self.planes] }
     }
     /// Index in the box of a cell of the slab.
     pub fn global(&self, LocalCell([i, j, k]): LocalCell) -> GlobalCell {
@@ -170,10 +155,8 @@ mod tests {
         assert_eq!(slab.local(GlobalCell([1, 1, 4])), None);
         assert_eq!(slab.local(GlobalCell([1, 1, 11])), None);
         let value = |x: DVec3| x.x + 3.0 * x.y + 7.0 * x.z;
-        let (mut part, mut all) = (
-            Field::<FaceZ>::zeros(&slab),
-            Field::<FaceZ, f64>::zeros(&mesh.whole()),
-        );
+        let (mut part, mut all) =
+            (Field::<FaceZ>::zeros(&slab), Field::<FaceZ, f64>::zeros(&mesh.whole()));
         part.fill_with(&slab, value);
         all.fill_with(&mesh.whole(), value);
         let (part, all) = (part.view(&slab), all.view(&mesh.whole()));

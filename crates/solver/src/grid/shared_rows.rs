@@ -34,10 +34,7 @@ impl<'a, R> SharedRows<'a, R> {
     /// # Safety
     /// While both exist, no entry of a mutable row of one is in a row of the other.
     pub unsafe fn alias(&self) -> SharedRows<'a, R> {
-        SharedRows {
-            range: self.range.clone(),
-            ..*self
-        }
+        SharedRows { range: self.range.clone(), ..*self }
     }
 
     /// Positions of the entries in the memory of the field.
@@ -63,10 +60,7 @@ impl<'a, R> SharedRows<'a, R> {
     #[inline(always)]
     fn find(&self, at: usize, count: usize) -> *mut R {
         let Range { start, end } = self.range;
-        assert!(
-            start <= at && at <= end && count <= end - at,
-            "a row lies within its entries"
-        );
+        assert!(start <= at && at <= end && count <= end - at, "a row lies within its entries");
         // SAFETY: the position lies in the slice or at its end.
         unsafe { self.first.add(at - start) }
     }
@@ -99,10 +93,7 @@ mod tests {
         let shared = SharedRows::new(10, &mut field[10..30]);
         for (at, count) in [(9, 1), (29, 2), (31, 0), (12, usize::MAX), (usize::MAX, 2)] {
             let row = || shared.row(at, count).len();
-            assert!(
-                std::panic::catch_unwind(std::panic::AssertUnwindSafe(row)).is_err(),
-                "{at}"
-            );
+            assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(row)).is_err(), "{at}");
         }
     }
 }

@@ -70,10 +70,7 @@ impl<'a, R: Copy> FieldView<'a, R> {
     /// Row of entries along x at plane `k` and line `j`. Panics outside the shape.
     pub fn row(&self, k: usize, j: usize) -> &'a [R] {
         let [nz, ny, nx] = self.shape;
-        assert!(
-            k < nz && j < ny,
-            "row [{k}, {j}] of a view of {nz} x {ny} rows"
-        );
+        assert!(k < nz && j < ny, "row [{k}, {j}] of a view of {nz} x {ny} rows");
         let [z, y, _] = self.strides();
         &self.values[k * z + j * y..][..nx]
     }
@@ -106,14 +103,8 @@ mod tests {
         let view = field.view(&slab);
         assert_eq!(view.shape(), [3, 3, 5]);
         assert_eq!(view.normal(), Some(Axis::Z));
-        assert_eq!(
-            view.origin(),
-            slab.position(FaceZ::OFFSET, LocalCell([1; 3]))
-        );
-        assert_eq!(
-            (view.get([0; 3]), view.spacing()),
-            (view.values()[0], mesh.spacing)
-        );
+        assert_eq!(view.origin(), slab.position(FaceZ::OFFSET, LocalCell([1; 3])));
+        assert_eq!((view.get([0; 3]), view.spacing()), (view.values()[0], mesh.spacing));
         let mut rows = 0;
         for (n, row) in view.rows().enumerate() {
             for (i, value) in row.iter().enumerate() {

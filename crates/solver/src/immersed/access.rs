@@ -53,13 +53,8 @@ impl AccessLog {
         faces: impl Iterator<Item = Range<usize>>,
     ) {
         if cfg!(debug_assertions) {
-            let entries = faces.map(|Range { start, end }| Entry {
-                component,
-                start,
-                end,
-                grain,
-                access,
-            });
+            let entries =
+                faces.map(|Range { start, end }| Entry { component, start, end, grain, access });
             self.0.lock().expect("no thread panicked").extend(entries);
         }
     }
@@ -108,13 +103,8 @@ mod tests {
 
     #[test]
     fn faces_read_by_several_grains_are_accepted() {
-        log(&[
-            (0, 10..20, Write),
-            (0, 12..18, Write),
-            (1, 20..30, Read),
-            (2, 25..40, Read),
-        ])
-        .assert_no_conflict();
+        log(&[(0, 10..20, Write), (0, 12..18, Write), (1, 20..30, Read), (2, 25..40, Read)])
+            .assert_no_conflict();
     }
 
     #[test]

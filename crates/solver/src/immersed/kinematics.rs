@@ -20,10 +20,7 @@ pub struct RigidVelocity {
 impl RigidVelocity {
     /// Present velocities of a grain.
     pub fn of(grain: &Grain) -> RigidVelocity {
-        RigidVelocity {
-            linear: grain.velocity,
-            angular: grain.angular_velocity,
-        }
+        RigidVelocity { linear: grain.velocity, angular: grain.angular_velocity }
     }
     /// Velocity V + Omega x r [m/s] at the vector `lever_arm` r [m] from the centroid.
     #[inline(always)]
@@ -37,30 +34,21 @@ impl RigidVelocity {
     }
     /// Inverse of [`Self::to_vector`].
     pub fn from_vector(x: &Vector6) -> RigidVelocity {
-        RigidVelocity {
-            linear: DVec3::from_slice(&x[..3]),
-            angular: DVec3::from_slice(&x[3..]),
-        }
+        RigidVelocity { linear: DVec3::from_slice(&x[..3]), angular: DVec3::from_slice(&x[3..]) }
     }
 }
 
 impl Sub for RigidVelocity {
     type Output = RigidVelocity;
     fn sub(self, other: RigidVelocity) -> RigidVelocity {
-        RigidVelocity {
-            linear: self.linear - other.linear,
-            angular: self.angular - other.angular,
-        }
+        RigidVelocity { linear: self.linear - other.linear, angular: self.angular - other.angular }
     }
 }
 
 impl Div<f64> for RigidVelocity {
     type Output = RigidVelocity;
     fn div(self, dt: f64) -> RigidVelocity {
-        RigidVelocity {
-            linear: self.linear / dt,
-            angular: self.angular / dt,
-        }
+        RigidVelocity { linear: self.linear / dt, angular: self.angular / dt }
     }
 }
 
@@ -77,10 +65,7 @@ pub struct GrainKinematics {
 impl GrainKinematics {
     /// Present kinematics of a grain.
     pub fn of(grain: &Grain) -> GrainKinematics {
-        GrainKinematics {
-            position: grain.pose.position,
-            velocity: RigidVelocity::of(grain),
-        }
+        GrainKinematics { position: grain.pose.position, velocity: RigidVelocity::of(grain) }
     }
     /// Velocity [m/s] of the grain's material point at `x` [m].
     pub fn velocity_at(&self, x: DVec3) -> DVec3 {

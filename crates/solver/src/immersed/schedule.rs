@@ -123,12 +123,7 @@ impl<R: Real> ImmersedGrains<R> {
         // The margin covers the rounding of distances, which are in single precision.
         let margin = 0.01 * reach;
         self.locator.find_neighbours(grains, |index| {
-            margin
-                + if stayed(index) {
-                    displacement(index)
-                } else {
-                    0.0
-                }
+            margin + if stayed(index) { displacement(index) } else { 0.0 }
         });
         let locator = &self.locator;
         updates.clear();
@@ -154,14 +149,7 @@ impl<R: Real> ImmersedGrains<R> {
         each.for_each(|(index, (grain, _))| {
             let (kinematics, scratch) = (&input.kinematics[index], &mut *scratch.borrow());
             let (body, correction) = (&grain.body, &mut grain.correction);
-            find_correction(
-                eps,
-                &known,
-                kinematics,
-                body,
-                &mut scratch.advection,
-                correction,
-            );
+            find_correction(eps, &known, kinematics, body, &mut scratch.advection, correction);
         });
         let (layout, grains) = (flow.mesh().layout(), &self.grains);
         flow.for_predictions(|component, mut prediction| {
@@ -180,12 +168,11 @@ impl<R: Real> ImmersedGrains<R> {
         let RigidStep { dt, .. } = step;
         let density = self.fluid_density;
         let each = (updates.par_iter_mut().zip(&mut *step.grains)).zip(step.loads);
-        each.enumerate()
-            .for_each(|(index, ((update, grain), load))| {
-                let (previous, contact) = (&step.previous[index], step.contact[index]);
-                update.set_velocities(grain, previous, contact, dt);
-                *load = (update.system).hydrodynamic_load(grain, previous, density, dt);
-            });
+        each.enumerate().for_each(|(index, ((update, grain), load))| {
+            let (previous, contact) = (&step.previous[index], step.contact[index]);
+            update.set_velocities(grain, previous, contact, dt);
+            *load = (update.system).hydrodynamic_load(grain, previous, density, dt);
+        });
         // A contact load found in the repeated sub-steps changes the velocity of an isolated grain
         // after its rigidity was imposed: its faces are listed again and take the difference.
         let params = self.forcing_params(dt);

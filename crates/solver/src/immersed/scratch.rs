@@ -11,10 +11,7 @@ impl<T: Default> ScratchPool<T> {
     /// Borrows an idle buffer, or a new one if there is none.
     pub fn borrow(&self) -> Scratch<'_, T> {
         let buffer = self.0.lock().expect("no thread panicked").pop();
-        Scratch {
-            pool: self,
-            buffer: buffer.unwrap_or_default(),
-        }
+        Scratch { pool: self, buffer: buffer.unwrap_or_default() }
     }
 }
 

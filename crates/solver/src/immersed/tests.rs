@@ -27,11 +27,7 @@ fn grains() -> [Grain; 2] {
 /// Predicted velocity and motion of the grains after a step with the contact loads `first`, then
 /// `resolved`; and which grains were isolated.
 fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<f64>, Vec<bool>) {
-    let mesh = Mesh {
-        cells: [48, 32, 32],
-        spacing: DVec3::splat(0.125),
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells: [48, 32, 32], spacing: DVec3::splat(0.125), origin: DVec3::ZERO };
     let params = FluidParams {
         density: 1.0,
         kinematic_viscosity: 0.01,
@@ -45,19 +41,15 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
     let mut grains = grains();
     let mut immersed = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &grains);
     immersed.initialise(&mut flow, &grains);
-    let previous = grains.each_ref().map(|grain| PreviousStep {
-        velocity: RigidVelocity::of(grain),
-        ..Default::default()
-    });
+    let previous = grains
+        .each_ref()
+        .map(|grain| PreviousStep { velocity: RigidVelocity::of(grain), ..Default::default() });
     let kinematics = grains.each_ref().map(GrainKinematics::of);
     flow.predict(DT);
     for grain in &mut grains {
         grain.pose.position += DT * grain.velocity;
     }
-    let applied = [Load {
-        force: DVec3::new(0.0, 0.0, -0.4),
-        torque: DVec3::ZERO,
-    }; 2];
+    let applied = [Load { force: DVec3::new(0.0, 0.0, -0.4), torque: DVec3::ZERO }; 2];
     let input = StepInput {
         grains: &grains,
         kinematics: &kinematics,
@@ -82,22 +74,14 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
         all.extend(flow.predicted.component(axis).iter().map(|u| u.wide()));
     }
     for (grain, load) in grains.iter().zip(&loads) {
-        let vectors = [
-            grain.velocity,
-            grain.angular_velocity,
-            load.force,
-            load.torque,
-        ];
+        let vectors = [grain.velocity, grain.angular_velocity, load.force, load.torque];
         all.extend(vectors.iter().flat_map(|v| v.to_array()));
     }
     (all, isolated)
 }
 
 fn impact() -> Load {
-    Load {
-        force: DVec3::new(0.2, -0.1, 0.3),
-        torque: DVec3::new(0.02, 0.01, -0.03),
-    }
+    Load { force: DVec3::new(0.2, -0.1, 0.3), torque: DVec3::new(0.02, 0.01, -0.03) }
 }
 
 #[test]
@@ -138,11 +122,7 @@ fn an_isolated_grain_that_contact_reaches_after_all_is_completed() {
 
 #[test]
 fn padding_of_rows_affects_no_link() {
-    let mesh = Mesh {
-        cells: [24; 3],
-        spacing: DVec3::splat(0.25),
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells: [24; 3], spacing: DVec3::splat(0.25), origin: DVec3::ZERO };
     let params = FluidParams {
         density: 1.0,
         kinematic_viscosity: 0.01,

@@ -73,10 +73,7 @@ impl GrainUpdate {
         grain.velocity = velocity.linear;
         grain.angular_velocity = velocity.angular;
         self.pending = match self.imposed {
-            None => Some(PendingRigidity {
-                velocity,
-                change: velocity - previous.velocity,
-            }),
+            None => Some(PendingRigidity { velocity, change: velocity - previous.velocity }),
             Some(imposed) => touched.then_some(PendingRigidity {
                 velocity: velocity - imposed,
                 change: velocity - imposed,
@@ -144,12 +141,7 @@ impl<R: Real> CouplingStep<'_, R> {
         predictions: &mut [Prediction<R>; 3],
         scratch: &mut ThreadScratch<R>,
     ) {
-        let ThreadScratch {
-            advection,
-            locate,
-            correction,
-            forced,
-        } = scratch;
+        let ThreadScratch { advection, locate, correction, forced } = scratch;
         let body = &mut grain.body;
         if self.corrects_advection {
             let (kinematics, eps) = (&self.input.kinematics[index], self.locator.eps());

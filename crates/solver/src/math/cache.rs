@@ -21,9 +21,7 @@ pub fn last_cache() -> usize {
 
 /// Parses a size such as `32768K` [bytes].
 fn bytes(text: &str) -> Option<usize> {
-    let unit = text
-        .find(|c: char| !c.is_ascii_digit())
-        .unwrap_or(text.len());
+    let unit = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
     let shift = match &text[unit..] {
         "" => 0,
         "K" => 10,
@@ -40,10 +38,7 @@ mod tests {
     #[test]
     fn sizes_have_units() {
         let sizes = ["512", "48K", "32M", "3T", "K", ""].map(bytes);
-        assert_eq!(
-            sizes,
-            [Some(512), Some(48 << 10), Some(32 << 20), None, None, None]
-        );
+        assert_eq!(sizes, [Some(512), Some(48 << 10), Some(32 << 20), None, None, None]);
         assert!(last_cache() >= 32 << 10);
     }
 }

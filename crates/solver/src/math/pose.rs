@@ -42,10 +42,7 @@ impl Load {
 impl std::ops::Add for Load {
     type Output = Load;
     fn add(self, other: Load) -> Load {
-        Load {
-            force: self.force + other.force,
-            torque: self.torque + other.torque,
-        }
+        Load { force: self.force + other.force, torque: self.torque + other.torque }
     }
 }
 impl std::ops::AddAssign for Load {
@@ -56,9 +53,6 @@ impl std::ops::AddAssign for Load {
 impl std::ops::Mul<f64> for Load {
     type Output = Load;
     fn mul(self, factor: f64) -> Load {
-        Load {
-            force: self.force * factor,
-            torque: self.torque * factor,
-        }
+        Load { force: self.force * factor, torque: self.torque * factor }
     }
 }

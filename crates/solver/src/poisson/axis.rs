@@ -40,11 +40,7 @@ impl<R: Real> AxisTransform<R> {
         };
         let turn = |k: usize| {
             let angle = PI * k as f64 / (2 * n) as f64;
-            if neumann {
-                [angle.cos(), angle.sin()]
-            } else {
-                [1.0, 0.0]
-            }
+            if neumann { [angle.cos(), angle.sin()] } else { [1.0, 0.0] }
         };
         let eigenvalue = |k: usize| {
             let angle = match ends {

@@ -37,10 +37,8 @@ impl Butterfly<3> for Three {
     fn apply<V: Vector>([a, b, c]: [Complex<V>; 3]) -> [Complex<V>; 3] {
         const SIN: f64 = 0.866_025_403_784_438_6;
         let sum = b + c;
-        let [y, z] = rotated_butterfly(
-            a - sum.scale(V::Number::of(0.5)),
-            (b - c).scale(V::Number::of(SIN)),
-        );
+        let [y, z] =
+            rotated_butterfly(a - sum.scale(V::Number::of(0.5)), (b - c).scale(V::Number::of(SIN)));
         [a + sum, y, z]
     }
 }
@@ -75,16 +73,10 @@ impl Butterfly<5> for Five {
 impl Butterfly<7> for Seven {
     #[inline(always)]
     fn apply<V: Vector>([a, b, c, d, e, f, g]: [Complex<V>; 7]) -> [Complex<V>; 7] {
-        const COS: [f64; 3] = [
-            0.623_489_801_858_733_6,
-            -0.222_520_933_956_314_34,
-            -0.900_968_867_902_419_1,
-        ];
-        const SIN: [f64; 3] = [
-            0.781_831_482_468_029_8,
-            0.974_927_912_181_823_6,
-            0.433_883_739_117_558_1,
-        ];
+        const COS: [f64; 3] =
+            [0.623_489_801_858_733_6, -0.222_520_933_956_314_34, -0.900_968_867_902_419_1];
+        const SIN: [f64; 3] =
+            [0.781_831_482_468_029_8, 0.974_927_912_181_823_6, 0.433_883_739_117_558_1];
         let (p, q, r) = (b + g, c + f, d + e);
         let (u, v, w) = (b - g, c - f, d - e);
         let [y1, y6] = rotated_butterfly(
@@ -123,16 +115,8 @@ impl Butterfly<8> for Eight {
         let [t, u, v, w] = Four::apply([b, d, f, h]);
         let half = V::Number::of(FRAC_1_SQRT_2);
         // Times exp(-i pi / 4) and exp(-3 i pi / 4).
-        let u = Complex {
-            re: u.re + u.im,
-            im: u.im - u.re,
-        }
-        .scale(half);
-        let w = Complex {
-            re: w.im - w.re,
-            im: V::constant(0.0) - (w.re + w.im),
-        }
-        .scale(half);
+        let u = Complex { re: u.re + u.im, im: u.im - u.re }.scale(half);
+        let w = Complex { re: w.im - w.re, im: V::constant(0.0) - (w.re + w.im) }.scale(half);
         let [y2, y6] = rotated_butterfly(r, v);
         [p + t, q + u, y2, s + w, p - t, q - u, y6, s - w]
     }

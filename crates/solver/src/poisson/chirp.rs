@@ -107,10 +107,6 @@ impl<R: Real> Fourier<R> {
 /// Smallest length with butterflies alone that holds the convolution.
 fn padded(n: usize) -> usize {
     (2 * n - 1..)
-        .find(|len| {
-            factors(*len)
-                .into_iter()
-                .all(|factor| [2, 3, 4, 5, 8].contains(&factor))
-        })
+        .find(|len| factors(*len).into_iter().all(|factor| [2, 3, 4, 5, 8].contains(&factor)))
         .unwrap_or(2 * n)
 }

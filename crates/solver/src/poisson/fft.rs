@@ -96,9 +96,7 @@ impl<R: Real> Fft<R> {
             stride *= radix;
             pass
         };
-        Fft {
-            passes: factors(n).into_iter().map(pass).collect(),
-        }
+        Fft { passes: factors(n).into_iter().map(pass).collect() }
     }
 
     /// Transforms `a`, using both buffers; returns the one with the result, then the other.
@@ -268,11 +266,7 @@ fn circle<R: Real>(r: usize) -> Vec<[R; 2]> {
     let mut found = Vec::with_capacity(half * half);
     let mut k = 1;
     while k <= half {
-        let together = if k + TOGETHER <= half + 1 {
-            TOGETHER
-        } else {
-            1
-        };
+        let together = if k + TOGETHER <= half + 1 { TOGETHER } else { 1 };
         for t in 1..=half {
             for m in 0..together {
                 let [cos, sin] = root((k + m) * t, r);

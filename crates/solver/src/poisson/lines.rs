@@ -60,10 +60,7 @@ impl Lines {
     #[inline(always)]
     fn entry<V: Vector>(&self, values: &[V::Number], i: usize) -> Complex<V> {
         let both = &values[self.at + i * self.step..][..self.second + V::WIDTH];
-        Complex {
-            re: V::load(both),
-            im: V::load(&both[self.second..]),
-        }
+        Complex { re: V::load(both), im: V::load(&both[self.second..]) }
     }
     /// Mutable entry i of the first lines, and of the second lines.
     #[inline(always)]

@@ -118,9 +118,7 @@ impl<R: Real> Poisson<R> {
             layout,
             modes: Aligned::zeros(layout.stride() * nz),
             eigenvalues,
-            slots: (0..(nz / MIN_PLANES_PER_SLOT).clamp(1, SLOTS))
-                .map(|_| slot())
-                .collect(),
+            slots: (0..(nz / MIN_PLANES_PER_SLOT).clamp(1, SLOTS)).map(|_| slot()).collect(),
             columns: (0..SLOTS.min(blocks))
                 .map(|_| ColumnScratch::new(width, nz, ends[2]))
                 .collect(),
@@ -144,25 +142,11 @@ impl<R: Real> Poisson<R> {
         let start = Instant::now();
         let non_temporal = self.non_temporal;
         let (axes, stride) = ([&self.axes[0], &self.axes[1]], self.layout.stride());
-        for_chunks(
-            &mut self.modes,
-            stride,
-            &mut self.slots,
-            |k, modes, slot| {
-                let Slot {
-                    planes: [plane, ..],
-                    buffers,
-                } = slot;
-                source(k + 1, plane);
-                dispatch(Forward {
-                    axes,
-                    plane,
-                    modes,
-                    buffers,
-                    non_temporal,
-                });
-            },
-        );
+        for_chunks(&mut self.modes, stride, &mut self.slots, |k, modes, slot| {
+            let Slot { planes: [plane, ..], buffers } = slot;
+            source(k + 1, plane);
+            dispatch(Forward { axes, plane, modes, buffers, non_temporal });
+        });
         let forward = Instant::now();
         let (system, eigenvalues) = (self.along_z, &self.eigenvalues);
         let nz = self.mesh.cells[2];
@@ -175,13 +159,7 @@ impl<R: Real> Poisson<R> {
             |at, columns, scratch| {
                 let lambda = &eigenvalues[at..at + columns.width()];
                 let singular = at == 0 && lambda[0] == 0.0;
-                dispatch(Solve {
-                    system,
-                    columns,
-                    lambda,
-                    singular,
-                    scratch,
-                });
+                dispatch(Solve { system, columns, lambda, singular, scratch });
             },
         );
         let columns = Instant::now();
@@ -196,41 +174,35 @@ impl<R: Real> Poisson<R> {
                 buffers,
             });
         };
-        for_plane_ranges(
-            self.mesh.layout(),
-            fields,
-            partial,
-            &mut self.slots,
-            |range, slot| {
-                let Slot { planes, buffers } = slot;
-                // Plane k, wrapped on a periodic axis; none beyond another end.
-                let across = |k: usize| match k {
-                    0 => periodic[2].then_some(nz),
-                    k if k > nz => periodic[2].then_some(1),
-                    k => Some(k),
+        for_plane_ranges(self.mesh.layout(), fields, partial, &mut self.slots, |range, slot| {
+            let Slot { planes, buffers } = slot;
+            // Plane k, wrapped on a periodic axis; none beyond another end.
+            let across = |k: usize| match k {
+                0 => periodic[2].then_some(nz),
+                k if k > nz => periodic[2].then_some(1),
+                k => Some(k),
+            };
+            let start = range.range().start;
+            let [below, here, _] = planes;
+            if let Some(k) = across(start - 1) {
+                invert(k, below, buffers);
+            }
+            invert(start, here, buffers);
+            for k in range.range() {
+                let [below, here, above] = planes;
+                if let Some(k) = across(k + 1) {
+                    invert(k, above, buffers);
+                }
+                let (here, end) = (&*here, |k: usize| across(k).is_none());
+                let solution = Solution {
+                    here,
+                    below: if end(k - 1) { here } else { below },
+                    above: if end(k + 1) { here } else { above },
                 };
-                let start = range.range().start;
-                let [below, here, _] = planes;
-                if let Some(k) = across(start - 1) {
-                    invert(k, below, buffers);
-                }
-                invert(start, here, buffers);
-                for k in range.range() {
-                    let [below, here, above] = planes;
-                    if let Some(k) = across(k + 1) {
-                        invert(k, above, buffers);
-                    }
-                    let (here, end) = (&*here, |k: usize| across(k).is_none());
-                    let solution = Solution {
-                        here,
-                        below: if end(k - 1) { here } else { below },
-                        above: if end(k + 1) { here } else { above },
-                    };
-                    sink(k, solution, range);
-                    planes.rotate_left(1);
-                }
-            },
-        );
+                sink(k, solution, range);
+                planes.rotate_left(1);
+            }
+        });
         self.times.forward += forward - start;
         self.times.columns += columns - forward;
         self.times.inverse += columns.elapsed();

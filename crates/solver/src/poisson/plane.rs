@@ -28,12 +28,7 @@ impl PlaneLayout {
     /// Layout of `nx` x `ny` cells.
     pub fn new<R: Real>(nx: usize, ny: usize) -> PlaneLayout {
         let line = R::LANES;
-        PlaneLayout {
-            nx,
-            ny,
-            line,
-            pitch: line + nx.next_multiple_of(line) + line,
-        }
+        PlaneLayout { nx, ny, line, pitch: line + nx.next_multiple_of(line) + line }
     }
     /// Number of lines along x, padded to a multiple of L.
     fn lines(&self) -> usize {
@@ -81,10 +76,7 @@ pub struct Plane<R> {
 impl<R: Real> Plane<R> {
     /// Plane of zeros.
     pub(super) fn new(layout: PlaneLayout) -> Plane<R> {
-        Plane {
-            layout,
-            values: Aligned::zeros(layout.pitch * (layout.lines() + 2)),
-        }
+        Plane { layout, values: Aligned::zeros(layout.pitch * (layout.lines() + 2)) }
     }
     /// Memory held [bytes].
     pub(super) fn bytes(&self) -> usize {
@@ -110,10 +102,8 @@ impl<R: Real> Plane<R> {
             [row[0], row[nx + 1]] = if periodic_x { [ends[1], ends[0]] } else { ends };
         }
         let [below, above] = if periodic_y { [ny, 1] } else { [1, ny] };
-        self.values
-            .copy_within(below * pitch..(below + 1) * pitch, 0);
-        self.values
-            .copy_within(above * pitch..(above + 1) * pitch, (ny + 1) * pitch);
+        self.values.copy_within(below * pitch..(below + 1) * pitch, 0);
+        self.values.copy_within(above * pitch..(above + 1) * pitch, (ny + 1) * pitch);
     }
     /// Clears the padding lines along y, whose old values would change the rounding of their
     /// partners.
@@ -150,13 +140,7 @@ impl<R: Real> Kernel for Forward<'_, R> {
     type Number = R;
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
-        let Forward {
-            axes: [along_x, along_y],
-            plane,
-            modes,
-            buffers,
-            non_temporal,
-        } = self;
+        let Forward { axes: [along_x, along_y], plane, modes, buffers, non_temporal } = self;
         let layout = plane.layout;
         plane.clear_columns();
         plane.clear_rows();
@@ -165,19 +149,11 @@ impl<R: Real> Kernel for Forward<'_, R> {
             let at = layout.pitch + R::LANES + first;
             if width == 2 * R::LANES {
                 for lane in (0..R::LANES).step_by(V::WIDTH) {
-                    let lines = Lines {
-                        at: at + lane,
-                        step: layout.pitch,
-                        second: R::LANES,
-                    };
+                    let lines = Lines { at: at + lane, step: layout.pitch, second: R::LANES };
                     lines.forward::<V>(along_y, values, buffers);
                 }
             } else {
-                let lines = Lines {
-                    at,
-                    step: layout.pitch,
-                    second: R::LANES / 2,
-                };
+                let lines = Lines { at, step: layout.pitch, second: R::LANES / 2 };
                 lines.forward::<V::Half>(along_y, values, buffers);
             }
         }
@@ -191,11 +167,7 @@ impl<R: Real> Kernel for Forward<'_, R> {
                         pitch: layout.pitch,
                         second: R::LANES,
                     };
-                    let lines = Lines {
-                        at: to + lane,
-                        step: 2 * R::LANES,
-                        second: R::LANES,
-                    };
+                    let lines = Lines { at: to + lane, step: 2 * R::LANES, second: R::LANES };
                     rows.load(&along_x.order, values, buffers.lines::<V>(along_x));
                     let found = buffers.transform::<V>(along_x, false);
                     // A narrower register writes part of a cache line.
@@ -206,16 +178,8 @@ impl<R: Real> Kernel for Forward<'_, R> {
                     }
                 }
             } else {
-                let rows = Rows {
-                    at,
-                    pitch: layout.pitch,
-                    second: R::LANES / 2,
-                };
-                let lines = Lines {
-                    at: to,
-                    step: R::LANES,
-                    second: R::LANES / 2,
-                };
+                let rows = Rows { at, pitch: layout.pitch, second: R::LANES / 2 };
+                let lines = Lines { at: to, step: R::LANES, second: R::LANES / 2 };
                 rows.load(&along_x.order, values, buffers.lines::<V::Half>(along_x));
                 lines.store(buffers.transform::<V::Half>(along_x, false), modes);
             }
@@ -242,13 +206,7 @@ impl<R: Real> Kernel for Inverse<'_, R> {
     type Number = R;
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
-        let Inverse {
-            axes: [along_x, along_y],
-            periodic,
-            plane,
-            modes,
-            buffers,
-        } = self;
+        let Inverse { axes: [along_x, along_y], periodic, plane, modes, buffers } = self;
         let layout = plane.layout;
         let values = &mut plane.values[..];
         for (first, width) in layout.blocks(layout.ny) {
@@ -261,35 +219,15 @@ impl<R: Real> Kernel for Inverse<'_, R> {
                         pitch: layout.pitch,
                         second: R::LANES,
                     };
-                    let lines = Lines {
-                        at: from + lane,
-                        step: 2 * R::LANES,
-                        second: R::LANES,
-                    };
+                    let lines = Lines { at: from + lane, step: 2 * R::LANES, second: R::LANES };
                     lines.load(modes, buffers.lines::<V>(along_x));
-                    rows.store(
-                        &along_x.order,
-                        buffers.transform::<V>(along_x, true),
-                        values,
-                    );
+                    rows.store(&along_x.order, buffers.transform::<V>(along_x, true), values);
                 }
             } else {
-                let rows = Rows {
-                    at,
-                    pitch: layout.pitch,
-                    second: R::LANES / 2,
-                };
-                let lines = Lines {
-                    at: from,
-                    step: R::LANES,
-                    second: R::LANES / 2,
-                };
+                let rows = Rows { at, pitch: layout.pitch, second: R::LANES / 2 };
+                let lines = Lines { at: from, step: R::LANES, second: R::LANES / 2 };
                 lines.load(modes, buffers.lines::<V::Half>(along_x));
-                rows.store(
-                    &along_x.order,
-                    buffers.transform::<V::Half>(along_x, true),
-                    values,
-                );
+                rows.store(&along_x.order, buffers.transform::<V::Half>(along_x, true), values);
             }
         }
         plane.clear_columns();
@@ -298,19 +236,11 @@ impl<R: Real> Kernel for Inverse<'_, R> {
             let at = layout.pitch + R::LANES + first;
             if width == 2 * R::LANES {
                 for lane in (0..R::LANES).step_by(V::WIDTH) {
-                    let lines = Lines {
-                        at: at + lane,
-                        step: layout.pitch,
-                        second: R::LANES,
-                    };
+                    let lines = Lines { at: at + lane, step: layout.pitch, second: R::LANES };
                     lines.inverse::<V>(along_y, values, buffers);
                 }
             } else {
-                let lines = Lines {
-                    at,
-                    step: layout.pitch,
-                    second: R::LANES / 2,
-                };
+                let lines = Lines { at, step: layout.pitch, second: R::LANES / 2 };
                 lines.inverse::<V::Half>(along_y, values, buffers);
             }
         }

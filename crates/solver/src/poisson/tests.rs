@@ -6,19 +6,13 @@ use grainwake_simd::Vector;
 
 /// Small deterministic generator of values in (-1, 1).
 fn noise(state: &mut u64) -> f64 {
-    *state = state
-        .wrapping_mul(6364136223846793005)
-        .wrapping_add(1442695040888963407);
+    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
     (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
 /// Largest residual over the largest right-hand side.
 fn residual(cells: [usize; 3], ends: [Ends; 3]) -> f64 {
-    let mesh = Mesh {
-        cells,
-        spacing: DVec3::new(0.5, 0.7, 0.6),
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells, spacing: DVec3::new(0.5, 0.7, 0.6), origin: DVec3::ZERO };
     let [nx, ny, nz] = cells;
     let mut f = Field::<Centre>::zeros(&mesh.whole());
     let mut state = 7;
@@ -73,16 +67,8 @@ fn residual(cells: [usize; 3], ends: [Ends; 3]) -> f64 {
 #[test]
 fn residual_is_round_off_for_every_pairing_and_awkward_sizes() {
     use Ends::{Neumann as N, Periodic as P};
-    let pairings = [
-        [N, N, N],
-        [P, N, N],
-        [N, P, N],
-        [P, P, N],
-        [N, N, P],
-        [P, N, P],
-        [N, P, P],
-        [P, P, P],
-    ];
+    let pairings =
+        [[N, N, N], [P, N, N], [N, P, N], [P, P, N], [N, N, P], [P, N, P], [N, P, P], [P, P, P]];
     let sizes = [
         [67, 97, 131],
         [67, 31, 12],
@@ -110,19 +96,11 @@ fn residual_is_round_off_for_every_pairing_and_awkward_sizes() {
 /// A smooth right-hand side of zero mean with noise, solved in both precisions: largest difference
 /// over the largest value.
 fn single_against_double(cells: [usize; 3], spacing: DVec3, ends: [Ends; 3]) -> f64 {
-    let mesh = Mesh {
-        cells,
-        spacing,
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells, spacing, origin: DVec3::ZERO };
     let mut state = 7;
     let mut double = Field::<Centre>::zeros(&mesh.whole());
-    double.fill_with(&mesh.whole(), |x| {
-        (std::f64::consts::PI * x.x / mesh.extent().x).cos()
-    });
-    double
-        .iter_mut()
-        .for_each(|value| *value += 0.1 * noise(&mut state));
+    double.fill_with(&mesh.whole(), |x| (std::f64::consts::PI * x.x / mesh.extent().x).cos());
+    double.iter_mut().for_each(|value| *value += 0.1 * noise(&mut state));
     let inside: Vec<usize> = (1..=cells[2])
         .flat_map(|k| (1..=cells[1]).map(move |j| (j, k)))
         .flat_map(|(j, k)| (1..=cells[0]).map(move |i| (i, j, k)))
@@ -178,9 +156,8 @@ fn single_precision_solves_to_its_round_off_in_flat_boxes_too() {
 fn transforms_of_every_length_match_their_definition() {
     use grainwake_simd::{Complex, Scalar};
     for n in (1..=130).chain([143, 251]) {
-        let given: Vec<[f64; 2]> = (0..n)
-            .map(|t| [(1.3 * t as f64).sin(), (0.7 * (t * t) as f64).cos()])
-            .collect();
+        let given: Vec<[f64; 2]> =
+            (0..n).map(|t| [(1.3 * t as f64).sin(), (0.7 * (t * t) as f64).cos()]).collect();
         let plan = chirp::Fourier::new(n);
         let len = plan.buffer_len(n);
         let lanes = |values: &[f64]| {
@@ -212,8 +189,7 @@ fn transforms_of_every_length_match_their_definition() {
 fn bits<R: Real>(mesh: &Mesh, ends: [Ends; 3]) -> Vec<u64> {
     let mut state = 3;
     let mut f = Field::<Centre, R>::zeros(&mesh.whole());
-    f.iter_mut()
-        .for_each(|value| *value = R::of(noise(&mut state)));
+    f.iter_mut().for_each(|value| *value = R::of(noise(&mut state)));
     let mut poisson = Poisson::new(mesh, ends);
     // The second solve meets what the first has left in the buffers.
     let mut g = f.clone();
@@ -226,21 +202,14 @@ fn bits<R: Real>(mesh: &Mesh, ends: [Ends; 3]) -> Vec<u64> {
 #[test]
 fn bits_do_not_depend_on_the_instruction_set() {
     use grainwake_simd::{InstructionSet, limit_instructions};
-    let mesh = Mesh {
-        cells: [37, 39, 18],
-        spacing: DVec3::new(0.5, 0.7, 0.6),
-        origin: DVec3::ZERO,
-    };
+    let mesh =
+        Mesh { cells: [37, 39, 18], spacing: DVec3::new(0.5, 0.7, 0.6), origin: DVec3::ZERO };
     for ends in [[Ends::Neumann; 3], [Ends::Periodic; 3]] {
-        let [eight, four, common] = [
-            InstructionSet::Avx512,
-            InstructionSet::Avx2,
-            InstructionSet::Baseline,
-        ]
-        .map(|level| {
-            limit_instructions(level);
-            [bits::<f64>(&mesh, ends), bits::<f32>(&mesh, ends)]
-        });
+        let [eight, four, common] =
+            [InstructionSet::Avx512, InstructionSet::Avx2, InstructionSet::Baseline].map(|level| {
+                limit_instructions(level);
+                [bits::<f64>(&mesh, ends), bits::<f32>(&mesh, ends)]
+            });
         limit_instructions(InstructionSet::Avx512);
         assert_eq!(eight, four);
         assert_eq!(eight, common);
@@ -249,16 +218,9 @@ fn bits_do_not_depend_on_the_instruction_set() {
 
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
-    let mesh = Mesh {
-        cells: [30, 21, 17],
-        spacing: DVec3::ONE,
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells: [30, 21, 17], spacing: DVec3::ONE, origin: DVec3::ZERO };
     let solve = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let ends = [Ends::Neumann, Ends::Periodic, Ends::Neumann];
         pool.install(|| bits::<f64>(&mesh, ends))
     };

@@ -48,13 +48,7 @@ impl ColumnScratch {
     }
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let Self {
-            values,
-            pivots,
-            corner,
-            carry,
-            mean,
-        } = self;
+        let Self { values, pivots, corner, carry, mean } = self;
         8 * (values.len() + pivots.len() + corner.len() + carry.len() + 2 * mean[0].len())
     }
 }
@@ -72,12 +66,7 @@ impl Tridiagonal {
     /// Systems of `n` cells, `spacing` [m] apart, with the conditions `ends`; `scale` multiplies
     /// the right-hand side (the normalisation of the transforms).
     pub fn new(n: usize, ends: Ends, spacing: f64, scale: f64) -> Tridiagonal {
-        Tridiagonal {
-            n,
-            ends,
-            square: spacing * spacing,
-            scale,
-        }
+        Tridiagonal { n, ends, square: spacing * spacing, scale }
     }
 }
 
@@ -99,13 +88,7 @@ impl<R: Real> Kernel for Solve<'_, '_, R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let Solve {
-            system,
-            columns,
-            lambda,
-            singular,
-            scratch,
-        } = self;
+        let Solve { system, columns, lambda, singular, scratch } = self;
         match system.ends {
             _ if system.n == 1 => system.solve_flat(columns, lambda),
             Ends::Neumann => system.solve_neumann::<V, R>(columns, lambda, singular, scratch),
@@ -134,11 +117,7 @@ fn starts<V: Vector>(width: usize) -> impl Iterator<Item = usize> {
 #[inline(always)]
 fn row_of(values: &mut [f64], k: usize, width: usize) -> (&[f64], &mut [f64]) {
     let (before, rest) = values.split_at_mut(k * width);
-    let before = if k > 0 {
-        &before[(k - 1) * width..][..width]
-    } else {
-        &[]
-    };
+    let before = if k > 0 { &before[(k - 1) * width..][..width] } else { &[] };
     (before, &mut rest[..width])
 }
 
@@ -146,11 +125,7 @@ impl Tridiagonal {
     #[inline(always)]
     fn solve_flat<R: Real>(&self, columns: &mut Columns<R>, lambda: &[f64]) {
         for (value, lambda) in columns.row(0).iter_mut().zip(lambda) {
-            *value = R::of(if *lambda == 0.0 {
-                0.0
-            } else {
-                -self.scale * value.wide() / lambda
-            });
+            *value = R::of(if *lambda == 0.0 { 0.0 } else { -self.scale * value.wide() / lambda });
         }
     }
 
@@ -165,10 +140,7 @@ impl Tridiagonal {
         let (n, width) = (self.n, lambda.len());
         let (one, square) = (V::constant(1.0), V::constant(self.square));
         let factor = V::constant(-self.square * self.scale);
-        let (values, pivots) = (
-            &mut scratch.values[..n * width],
-            &mut scratch.pivots[..n * width],
-        );
+        let (values, pivots) = (&mut scratch.values[..n * width], &mut scratch.pivots[..n * width]);
         for k in 0..n {
             let open =
                 V::constant(2.0 - f64::from(u8::from(k == 0)) - f64::from(u8::from(k + 1 == n)));
@@ -216,17 +188,8 @@ impl Tridiagonal {
     ) {
         let (n, width) = (self.n, lambda.len());
         let (one, two, zero) = (V::constant(1.0), V::constant(2.0), V::constant(0.0));
-        let (square, factor) = (
-            V::constant(self.square),
-            V::constant(-self.square * self.scale),
-        );
-        let ColumnScratch {
-            values,
-            pivots,
-            corner,
-            carry,
-            ..
-        } = scratch;
+        let (square, factor) = (V::constant(self.square), V::constant(-self.square * self.scale));
+        let ColumnScratch { values, pivots, corner, carry, .. } = scratch;
         // A = T + u v^T with u = (g, 0.., -1), v = (1, 0.., -1/g), g = -b.
         for k in 0..n {
             let row = &columns.row(k)[..width];
@@ -244,11 +207,7 @@ impl Tridiagonal {
                     (zero, zero, zero)
                 } else {
                     let at = (k - 1) * width + i;
-                    (
-                        V::load(&pivots[at..]),
-                        V::load(&values[at..]),
-                        V::load(&corner[at..]),
-                    )
+                    (V::load(&pivots[at..]), V::load(&values[at..]), V::load(&corner[at..]))
                 };
                 let pivot = one.div(diagonal - before);
                 let at = k * width + i;

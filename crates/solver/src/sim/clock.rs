@@ -28,14 +28,10 @@ impl Clock {
     /// Clock at t = 0.
     pub fn new(setup: &Setup) -> Clock {
         let mesh = &setup.mesh;
-        let inverse_squares: f64 = mesh
-            .resolved_axes()
-            .map(|axis| mesh.spacing[axis].powi(-2))
-            .sum();
-        let smallest = mesh
-            .resolved_axes()
-            .map(|axis| mesh.spacing[axis])
-            .fold(f64::INFINITY, f64::min);
+        let inverse_squares: f64 =
+            mesh.resolved_axes().map(|axis| mesh.spacing[axis].powi(-2)).sum();
+        let smallest =
+            mesh.resolved_axes().map(|axis| mesh.spacing[axis]).fold(f64::INFINITY, f64::min);
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
         let acceleration = setup
             .grains
@@ -66,17 +62,10 @@ impl Clock {
     pub fn next_step(&self, rate: f64, horizon: f64) -> f64 {
         let (largest, preferred) = match self.rule {
             StepRule::Fixed(step) => (step, step),
-            StepRule::Limits {
-                cfl,
-                viscous,
-                max_step,
-            } => {
+            StepRule::Limits { cfl, viscous, max_step } => {
                 let largest = (cfl / rate).min(viscous / self.viscous_rate).min(max_step);
-                let next = if self.steps == 0 {
-                    self.first_step
-                } else {
-                    MAX_GROWTH * self.last_step
-                };
+                let next =
+                    if self.steps == 0 { self.first_step } else { MAX_GROWTH * self.last_step };
                 (largest, next.min(largest))
             }
         };

@@ -31,15 +31,11 @@ pub struct Diagnostics {
 impl Simulation {
     /// Largest |div u| after the last projection [1/s]; zero without fluid.
     pub fn max_divergence(&self) -> f64 {
-        self.fluid
-            .as_ref()
-            .map_or(0.0, |fluid| fluid.measures().max_divergence)
+        self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures().max_divergence)
     }
     /// CFL number of the last step; zero without fluid.
     pub fn cfl(&self) -> f64 {
-        self.fluid.as_ref().map_or(0.0, |fluid| {
-            fluid.measures().max_rate * self.clock.last_step
-        })
+        self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures().max_rate * self.clock.last_step)
     }
     /// Measures the state at the end of the last step.
     pub fn diagnostics(&self) -> Diagnostics {
@@ -62,11 +58,8 @@ impl Simulation {
             d.momentum += params.density * fluid.measures().momentum;
             let volume = self.setup.mesh.cell_volume() * self.setup.mesh.cell_count() as f64;
             let scale = params.density * volume * d.max_velocity;
-            d.momentum_residual = if scale > 0.0 {
-                self.momentum_residual.length() / scale
-            } else {
-                0.0
-            };
+            d.momentum_residual =
+                if scale > 0.0 { self.momentum_residual.length() / scale } else { 0.0 };
         }
         d
     }

@@ -88,12 +88,7 @@ impl CellField {
         unit: &'static str,
         value: fn(&Simulation, [usize; 3]) -> DVec3,
     ) -> CellField {
-        CellField {
-            name,
-            unit,
-            components: 3,
-            value,
-        }
+        CellField { name, unit, components: 3, value }
     }
 
     const fn scalar(
@@ -101,12 +96,7 @@ impl CellField {
         unit: &'static str,
         value: fn(&Simulation, [usize; 3]) -> DVec3,
     ) -> CellField {
-        CellField {
-            name,
-            unit,
-            components: 1,
-            value,
-        }
+        CellField { name, unit, components: 1, value }
     }
 }
 
@@ -115,9 +105,7 @@ impl CellField {
 pub static CELL_FIELDS: &[CellField] = &[
     CellField::vector("velocity", "m/s", Simulation::velocity_at),
     CellField::vector("vorticity", "1/s", Simulation::vorticity_at),
-    CellField::scalar("pressure", "Pa", |sim, cell| {
-        DVec3::new(sim.pressure_at(cell), 0.0, 0.0)
-    }),
+    CellField::scalar("pressure", "Pa", |sim, cell| DVec3::new(sim.pressure_at(cell), 0.0, 0.0)),
     CellField::scalar("solid_fraction", "1", |sim, cell| {
         DVec3::new(sim.solid_fraction_at(cell), 0.0, 0.0)
     }),

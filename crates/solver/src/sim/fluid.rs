@@ -85,11 +85,7 @@ impl<R: Real> FluidOf<R> {
         let (density, nu) = (params.density, params.kinematic_viscosity);
         let mut grains = ImmersedGrains::new(&flow, setup.scheme, density, nu, &setup.grains);
         let measures = grains.initialise(&mut flow, &setup.grains);
-        FluidOf {
-            flow,
-            grains,
-            measures,
-        }
+        FluidOf { flow, grains, measures }
     }
 }
 
@@ -148,12 +144,7 @@ where
     fn save(&self, out: &mut Encoder) -> io::Result<()> {
         out.u64(R::BYTES as u64)?;
         let m = &self.measures;
-        out.reals(&[
-            m.max_divergence,
-            m.max_rate,
-            m.max_velocity,
-            m.kinetic_energy,
-        ])?;
+        out.reals(&[m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy])?;
         out.vector(m.momentum)?;
         let (fields, sums) = self.flow.state();
         let layout = self.flow.mesh().layout();
@@ -169,12 +160,7 @@ where
     fn restore(&mut self, input: &mut Decoder, last_step: f64) -> io::Result<()> {
         input.expect(R::BYTES, "bytes a number")?;
         let m = &mut self.measures;
-        [
-            m.max_divergence,
-            m.max_rate,
-            m.max_velocity,
-            m.kinetic_energy,
-        ] = input.numbers()?;
+        [m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy] = input.numbers()?;
         m.momentum = input.vector()?;
         let layout = self.flow.mesh().layout();
         let (fields, sums) = self.flow.state_mut(last_step);

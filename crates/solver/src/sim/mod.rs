@@ -98,19 +98,14 @@ impl Simulation {
         (setup.prescription).prescribe_motion(&mut setup.grains, 0.0);
         let enclosure = setup.enclosure();
         let fluid = setup.fluid.map(|params| fluid::start(&setup, &params));
-        let initial = fluid
-            .as_ref()
-            .map_or(PoissonTimes::default(), |fluid| fluid.poisson_times());
+        let initial = fluid.as_ref().map_or(PoissonTimes::default(), |fluid| fluid.poisson_times());
         Ok(Simulation {
             dynamics: ContactDynamics::new(setup.contact, enclosure),
             clock: Clock::new(&setup),
             loads: vec![Load::default(); setup.grains.len()],
             momentum_residual: glam::DVec3::ZERO,
             data: GrainData::new(&setup.grains),
-            times: PassTimes {
-                initial,
-                ..PassTimes::default()
-            },
+            times: PassTimes { initial, ..PassTimes::default() },
             fluid,
             setup,
         })

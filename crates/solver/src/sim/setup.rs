@@ -34,11 +34,7 @@ impl StepRule {
 impl Default for StepRule {
     fn default() -> StepRule {
         let (cfl, viscous) = StepRule::DEFAULT_LIMITS;
-        StepRule::Limits {
-            cfl,
-            viscous,
-            max_step: f64::INFINITY,
-        }
+        StepRule::Limits { cfl, viscous, max_step: f64::INFINITY }
     }
 }
 
@@ -148,10 +144,7 @@ impl Setup {
             lower: self.mesh.origin,
             upper: self.mesh.upper(),
             periodic: self.boundaries.periodic(),
-            solid: self
-                .boundaries
-                .0
-                .map(|sides| sides.map(|boundary| boundary.is_solid())),
+            solid: self.boundaries.0.map(|sides| sides.map(|boundary| boundary.is_solid())),
         }
     }
 

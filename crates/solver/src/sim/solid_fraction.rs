@@ -16,13 +16,9 @@ impl Simulation {
         let mesh = &self.setup.mesh;
         // An axis of one cell is evaluated in its middle plane.
         let counts = [0, 1, 2].map(|axis| if mesh.is_resolved(axis) { SUBCELLS } else { 1 });
-        let edge = DVec3::from_array([0, 1, 2].map(|axis| {
-            if mesh.is_resolved(axis) {
-                mesh.spacing[axis]
-            } else {
-                0.0
-            }
-        }));
+        let edge = DVec3::from_array(
+            [0, 1, 2].map(|axis| if mesh.is_resolved(axis) { mesh.spacing[axis] } else { 0.0 }),
+        );
         let near = match self.grains_near(cell, edge) {
             Near::Inside => return 1.0,
             Near::Cut(near) if near.is_empty() => return 0.0,

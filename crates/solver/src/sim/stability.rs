@@ -54,12 +54,7 @@ pub enum StepError {
 impl StepError {
     /// Returns the message with an advice that names the means of a smaller time step.
     pub fn message(&self, smaller_step: &str) -> String {
-        let StepError::Unstable {
-            time,
-            step,
-            what,
-            remedy,
-        } = self;
+        let StepError::Unstable { time, step, what, remedy } = self;
         let advice = remedy.advice(smaller_step);
         format!("{}; try {advice}", symptom(*time, *step, what))
     }
@@ -76,12 +71,7 @@ impl Simulation {
     /// Checks that the state is finite and the CFL number below its bound.
     pub(super) fn check_stability(&self) -> Result<(), StepError> {
         let unstable = |what: String, remedy: Remedy| {
-            Err(StepError::Unstable {
-                time: self.clock.time,
-                step: self.clock.steps,
-                what,
-                remedy,
-            })
+            Err(StepError::Unstable { time: self.clock.time, step: self.clock.steps, what, remedy })
         };
         for (i, grain) in self.setup.grains.iter().enumerate() {
             let finite = grain.pose.position.is_finite()
@@ -102,10 +92,7 @@ impl Simulation {
             }
             let cfl = self.cfl();
             if cfl > MAX_CFL {
-                return unstable(
-                    format!("the CFL number jumped to {cfl:.1}"),
-                    Remedy::StepOrGrid,
-                );
+                return unstable(format!("the CFL number jumped to {cfl:.1}"), Remedy::StepOrGrid);
             }
         }
         Ok(())

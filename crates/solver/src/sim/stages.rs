@@ -175,9 +175,7 @@ impl<'a> Moved<'a> {
         let Context { solid, flow } = &mut step;
         let dt = solid.dt;
         if flow.scheme == Scheme::Paper {
-            timed(&mut solid.times.project, || {
-                flow.fluid.project_prediction(dt)
-            });
+            timed(&mut solid.times.project, || flow.fluid.project_prediction(dt));
         }
         let input = StepInput {
             grains: solid.grains,
@@ -226,9 +224,7 @@ impl<'a> Resolved<'a> {
             dt: solid.dt,
             loads: solid.loads,
         };
-        timed(&mut solid.times.coupling, || {
-            flow.fluid.impose_rigidity(coupled, rigid)
-        });
+        timed(&mut solid.times.coupling, || flow.fluid.impose_rigidity(coupled, rigid));
         Rigid(step, final_poses)
     }
 }
@@ -240,11 +236,7 @@ impl<'a> Rigid<'a> {
         let Context { solid, flow } = &mut context;
         let momentum_before = flow.fluid.measures().momentum;
         timed(&mut solid.times.project, || flow.fluid.project(solid.dt));
-        Projected {
-            context,
-            final_poses,
-            momentum_before,
-        }
+        Projected { context, final_poses, momentum_before }
     }
 }
 
@@ -268,10 +260,7 @@ impl Projected<'_> {
             // The acceleration of an impact does not continue in the next step; its added mass
             // does.
             (previous.acceleration, previous.pending_added_mass_velocity) = if touched {
-                (
-                    RigidVelocity::default(),
-                    beyond_substeps(grain, &data.ends[i]),
-                )
+                (RigidVelocity::default(), beyond_substeps(grain, &data.ends[i]))
             } else {
                 (change / dt, RigidVelocity::default())
             };

@@ -61,10 +61,7 @@ impl Simulation {
             grain.pose.orientation = input.quaternion()?;
             grain.velocity = input.vector()?;
             grain.angular_velocity = input.vector()?;
-            *load = Load {
-                force: input.vector()?,
-                torque: input.vector()?,
-            };
+            *load = Load { force: input.vector()?, torque: input.vector()? };
             let pending = &mut previous.pending_added_mass_velocity;
             for rates in [&mut previous.acceleration, pending] {
                 rates.linear = input.vector()?;

@@ -23,21 +23,13 @@ fn two_grains(precision: Precision) -> Setup {
     let mut fluid = FluidParams::new(1.0, 0.01);
     fluid.initial_velocity = along(0.2, 0.1, 0.0);
     Setup::new(Mesh::cubic([21, 18, 17], 0.125))
-        .with_boundaries([
-            [Boundary::Periodic; 2],
-            [Boundary::Periodic; 2],
-            [Boundary::WALL; 2],
-        ])
+        .with_boundaries([[Boundary::Periodic; 2], [Boundary::Periodic; 2], [Boundary::WALL; 2]])
         .with_fluid(fluid)
         .with_precision(precision)
         .with_gravity(along(0.0, 0.0, -1.0))
         .with_grains([
             grain(ellipsoid, along(1.3, 1.1, 0.52), along(0.5, 0.2, 0.1)),
-            grain(
-                Shape::sphere(0.4, 600),
-                along(0.1, 0.2, 1.5),
-                along(-0.3, 0.4, 0.2),
-            ),
+            grain(Shape::sphere(0.4, 600), along(0.1, 0.2, 1.5), along(-0.3, 0.4, 0.2)),
         ])
         .with_step(StepRule::Fixed(0.02))
 }
@@ -61,15 +53,11 @@ fn bits_of_coupled_steps_do_not_depend_on_the_instruction_set() {
         all.map(f64::to_bits).collect()
     }
     for precision in [Precision::Double, Precision::Single] {
-        let [widest, middle, common] = [
-            InstructionSet::Avx512,
-            InstructionSet::Avx2,
-            InstructionSet::Baseline,
-        ]
-        .map(|level| {
-            limit_instructions(level);
-            bits(precision)
-        });
+        let [widest, middle, common] =
+            [InstructionSet::Avx512, InstructionSet::Avx2, InstructionSet::Baseline].map(|level| {
+                limit_instructions(level);
+                bits(precision)
+            });
         limit_instructions(InstructionSet::Avx512);
         assert!(widest == middle && widest == common, "{precision}");
     }
@@ -103,23 +91,13 @@ fn views_hold_the_values_of_cells_and_points() {
 
 #[test]
 fn contradictions_in_a_set_up_are_named() {
-    let motion = PrescribedMotion {
-        grain: 2,
-        velocity: None,
-        angular_velocity: None,
-    };
-    let prescription = Prescription {
-        motions: vec![motion],
-        ..Prescription::default()
-    };
+    let motion = PrescribedMotion { grain: 2, velocity: None, angular_velocity: None };
+    let prescription = Prescription { motions: vec![motion], ..Prescription::default() };
     let setup = || two_grains(Precision::Double);
     let bad = [
         (setup().with_prescription(prescription), "grain 2"),
         (setup().with_step(StepRule::Fixed(0.0)), "time step"),
-        (
-            setup().with_fluid(None).with_step(StepRule::default()),
-            "without a fluid",
-        ),
+        (setup().with_fluid(None).with_step(StepRule::default()), "without a fluid"),
         (setup().with_fluid(FluidParams::new(0.0, 1.0)), "density"),
     ];
     for (setup, word) in bad {

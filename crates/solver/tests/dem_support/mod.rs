@@ -49,13 +49,7 @@ pub fn smooth(stiffness: f64) -> ContactParams {
 
 /// Weight of every grain.
 pub fn weights(grains: &[Grain], gravity: DVec3) -> Vec<Load> {
-    grains
-        .iter()
-        .map(|g| Load {
-            force: g.mass() * gravity,
-            torque: DVec3::ZERO,
-        })
-        .collect()
+    grains.iter().map(|g| Load { force: g.mass() * gravity, torque: DVec3::ZERO }).collect()
 }
 
 /// One step under gravity.
@@ -75,10 +69,7 @@ pub struct Random(pub u64);
 
 impl Random {
     pub fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
     pub fn vector(&mut self) -> DVec3 {
@@ -93,14 +84,8 @@ pub fn bits(grains: &[Grain]) -> Vec<u64> {
         .iter()
         .flat_map(|g| {
             let turn = g.pose.orientation.to_array().map(f64::to_bits);
-            let motion = [
-                vector(g.pose.position),
-                vector(g.velocity),
-                vector(g.angular_velocity),
-            ];
-            turn.into_iter()
-                .chain(motion.into_iter().flatten())
-                .collect::<Vec<_>>()
+            let motion = [vector(g.pose.position), vector(g.velocity), vector(g.angular_velocity)];
+            turn.into_iter().chain(motion.into_iter().flatten()).collect::<Vec<_>>()
         })
         .collect()
 }
@@ -113,10 +98,7 @@ pub fn cloud(count: usize, half: f64, radius: f64, speed: f64, seed: u64) -> Vec
     let mut grains: Vec<Grain> = Vec::new();
     while grains.len() < count {
         let position = random.vector() * half;
-        if grains
-            .iter()
-            .all(|g| g.pose.position.distance(position) > 2.0 * radius)
-        {
+        if grains.iter().all(|g| g.pose.position.distance(position) > 2.0 * radius) {
             let grain = Grain::new(shape.clone(), 1000.0 + 500.0 * random.next())
                 .with_position(position)
                 .with_orientation(DQuat::from_scaled_axis(random.vector() * 3.0))

@@ -26,11 +26,7 @@ pub struct Observation {
 impl Observation {
     /// Returns the value for rank tests; censored observations rank last, all equal.
     pub fn rank_value(&self) -> f64 {
-        if self.censored {
-            f64::INFINITY
-        } else {
-            self.value
-        }
+        if self.censored { f64::INFINITY } else { self.value }
     }
 
     /// Returns the levels on all axes but one.
@@ -70,10 +66,7 @@ pub fn observations(
     for record in records.iter().filter(|record| meets(record, when)) {
         if let Some((value, censored)) = observe(record, quantity) {
             let member = (record, value, censored);
-            match models
-                .iter_mut()
-                .find(|members| members[0].0.model == record.model)
-            {
+            match models.iter_mut().find(|members| members[0].0.model == record.model) {
                 Some(members) => members.push(member),
                 None => models.push(vec![member]),
             }
@@ -119,10 +112,7 @@ pub fn matched<'a>(
         let same = |b: &&Observation| on(b, second) && b.other_levels(axis) == a.other_levels(axis);
         Some((a, all.iter().find(same)?))
     };
-    all.iter()
-        .filter(|a| on(a, first))
-        .filter_map(partner)
-        .collect()
+    all.iter().filter(|a| on(a, first)).filter_map(partner).collect()
 }
 
 /// Returns the range of the values over an axis, for every combination of the other axes.
@@ -131,10 +121,7 @@ pub fn matched<'a>(
 pub fn ranges(all: &[Observation], axis: &str) -> Vec<Observation> {
     let mut groups: BTreeMap<BTreeMap<String, String>, Vec<&Observation>> = BTreeMap::new();
     for observation in all.iter().filter(|o| o.levels.contains_key(axis)) {
-        groups
-            .entry(observation.other_levels(axis))
-            .or_default()
-            .push(observation);
+        groups.entry(observation.other_levels(axis)).or_default().push(observation);
     }
     let complete = groups.values().map(Vec::len).max().unwrap_or(0);
     let range = |group: &Vec<&Observation>| {
@@ -147,18 +134,14 @@ pub fn ranges(all: &[Observation], axis: &str) -> Vec<Observation> {
             ..group[0].clone()
         }
     };
-    let whole = groups
-        .values()
-        .filter(|g| g.len() == complete && complete > 1);
+    let whole = groups.values().filter(|g| g.len() == complete && complete > 1);
     whole.map(range).collect()
 }
 
 /// Returns the factor and the rank value of all observations that have the factor, and the number
 /// of censored ones among them.
 pub(super) fn with_factor(all: &[Observation], factor: &str) -> (Vec<f64>, Vec<f64>, usize) {
-    let known = all
-        .iter()
-        .filter_map(|o| Some((o, *o.factors.get(factor)?)));
+    let known = all.iter().filter_map(|o| Some((o, *o.factors.get(factor)?)));
     let known: Vec<(&Observation, f64)> = known.collect();
     let (x, y) = known.iter().map(|(o, f)| (*f, o.rank_value())).unzip();
     (x, y, known.iter().filter(|(o, _)| o.censored).count())

@@ -65,13 +65,7 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
         Ok(t) if r.abs() < 1.0 => 2.0 * t.sf(r.abs() * (freedom / (1.0 - r * r)).sqrt()),
         _ => 0.0,
     };
-    Some(Estimate {
-        n,
-        value: r,
-        low: (z - half_width).tanh(),
-        high: (z + half_width).tanh(),
-        p,
-    })
+    Some(Estimate { n, value: r, low: (z - half_width).tanh(), high: (z + half_width).tanh(), p })
 }
 
 /// Performs Wilcoxon's signed-rank test of paired differences.

@@ -123,11 +123,9 @@ fn test(claim: &Claim, records: &[RunRecord]) -> Finding {
             trend(&all, with, *sign, &format!("range of {name}"))
         }
         Test::Order { axis, more, less } => order(&included(all), axis, [more, less], &name),
-        Test::Equal {
-            axis,
-            values: [a, b],
-            within,
-        } => equal(&included(all), axis, [a, b], *within, &name),
+        Test::Equal { axis, values: [a, b], within } => {
+            equal(&included(all), axis, [a, b], *within, &name)
+        }
         Test::Spread { axis, more, less } => spread(&included(all), axis, [more, less], &name),
         Test::Near { model, within } => {
             let everywhere = observations(records, &claim.quantity, &BTreeMap::new());
@@ -204,9 +202,7 @@ fn equal(all: &[Observation], axis: &str, [a, b]: [&str; 2], within: f64, name: 
         )
     };
     let estimate = signed_rank(&relative);
-    Outcome::new(pairs.len(), censored(&pairs), estimate, says, |e| {
-        inside(e, within)
-    })
+    Outcome::new(pairs.len(), censored(&pairs), estimate, says, |e| inside(e, within))
 }
 
 fn spread(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -> Outcome {
@@ -278,16 +274,11 @@ fn near(
     };
     let censored = others.iter().filter(|o| o.censored).count();
     let estimate = signed_rank(&relative);
-    Outcome::new(others.len(), censored, estimate, says, |e| {
-        inside(e, within)
-    })
+    Outcome::new(others.len(), censored, estimate, says, |e| inside(e, within))
 }
 
 fn censored(pairs: &[(&Observation, &Observation)]) -> usize {
-    pairs
-        .iter()
-        .filter(|(a, b)| a.censored || b.censored)
-        .count()
+    pairs.iter().filter(|(a, b)| a.censored || b.censored).count()
 }
 
 fn probability(e: &Estimate) -> String {

@@ -106,18 +106,12 @@ impl PairMeasures {
         let until = landing.unwrap_or(end);
         let before = |time: &f64| *time <= until;
         let count = |kind: EventKind| {
-            let counted = pair
-                .events
-                .iter()
-                .filter(|e| e.kind == kind && e.time <= until);
+            let counted = pair.events.iter().filter(|e| e.kind == kind && e.time <= until);
             Some(counted.count() as f64)
         };
         let kiss = pair.first(EventKind::Kiss, 0.0).filter(before);
         let after_kiss = |kind: EventKind| pair.first(kind, kiss?).filter(before);
-        let (tumble, pass) = (
-            after_kiss(EventKind::Tumble),
-            after_kiss(EventKind::RoleChange),
-        );
+        let (tumble, pass) = (after_kiss(EventKind::Tumble), after_kiss(EventKind::RoleChange));
         let separation = after_kiss(EventKind::Separation);
         let contact_end = separation.unwrap_or(until);
         let per_second = 1.0 / pair.scales.time();

@@ -119,8 +119,7 @@ impl RunRecord {
 
     /// Returns a measured quantity or a factor by name.
     pub fn get(&self, name: &str) -> Option<f64> {
-        self.measured(name)
-            .or_else(|| self.factors.get(name).copied())
+        self.measured(name).or_else(|| self.factors.get(name).copied())
     }
 
     /// Returns a measured quantity by name.

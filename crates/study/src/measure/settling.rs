@@ -175,9 +175,7 @@ impl GrainSettling {
         let until = landing.unwrap_or(last).min(last);
         let rows = history.time.partition_point(|t| *t <= until).max(1);
         let speeds = history.velocity[..rows].iter().map(|v| -v.dot(up));
-        let peak = speeds
-            .max_by(|a, b| a.abs().total_cmp(&b.abs()))
-            .unwrap_or(0.0);
+        let peak = speeds.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
         let reynolds = |v: f64| Some(v.abs() * diameter / run.facts.viscosity?);
         let window = FinalWindow::find(history, up, rows, diameter, landing.is_some());
         let terminal = window.as_ref().map(|w| w.fallen / (w.to - w.from));
@@ -189,10 +187,7 @@ impl GrainSettling {
         let elapsed = history.time[rows - 1] - history.time[0];
         let drift = |p: &DVec3| (*p - start).reject_from_normalized(up).length();
         let rotation = |q: &DQuat| history.orientation[0].angle_between(*q).to_degrees();
-        let long_axis = surfaces
-            .get(&grain)
-            .and_then(GrainSurface::axes)
-            .map(|axes| axes.long);
+        let long_axis = surfaces.get(&grain).and_then(GrainSurface::axes).map(|axes| axes.long);
         let tilt = |axis: DVec3| {
             let w = window.as_ref()?;
             let inside = (0..rows).filter(|i| (w.from..=w.to).contains(&history.time[*i]));
@@ -254,11 +249,7 @@ impl FinalWindow {
             Some(from + part * (to - from))
         };
         let (from, to) = (time_of(begin)?, time_of(end)?);
-        (to > from).then_some(FinalWindow {
-            from,
-            to,
-            fallen: sign * diameter,
-        })
+        (to > from).then_some(FinalWindow { from, to, fallen: sign * diameter })
     }
 }
 
@@ -285,8 +276,7 @@ mod tests {
         let mut run = RunFolder::default();
         run.facts.gravity = Some(DVec3::new(0.0, 0.0, -10.0));
         run.facts.viscosity = Some(1e-6);
-        run.facts
-            .add_diameters((0..histories.len()).map(|i| (i, 1e-2)));
+        run.facts.add_diameters((0..histories.len()).map(|i| (i, 1e-2)));
         run.grains = histories;
         run
     }
@@ -362,10 +352,6 @@ mod tests {
         let landings: Vec<_> = found.each.iter().map(|g| g.landing_time_s).collect();
         assert_eq!(landings, [Some(0.9), Some(0.7), Some(0.5)]);
         run.grains.pop();
-        assert_eq!(
-            SettlingMeasures::from_run(&run),
-            None,
-            "a pair has measures of its own"
-        );
+        assert_eq!(SettlingMeasures::from_run(&run), None, "a pair has measures of its own");
     }
 }

@@ -66,9 +66,7 @@ pub fn columns(records: &[RunRecord]) -> Vec<&'static str> {
     let pairs = !settling || records.iter().any(|record| record.pair.is_some());
     let of_pairs = PAIR_QUANTITIES.into_iter().filter(|_| pairs);
     let new = |q: &&str| settling && !(pairs && PAIR_QUANTITIES.contains(q));
-    of_pairs
-        .chain(SETTLING_QUANTITIES.into_iter().filter(new))
-        .collect()
+    of_pairs.chain(SETTLING_QUANTITIES.into_iter().filter(new)).collect()
 }
 
 /// Header and one row per grain of the runs that are not pairs, in SI units.
@@ -80,9 +78,7 @@ fn settling_rows(records: &[RunRecord]) -> Vec<Vec<String>> {
         let indices = [record.member, grain.grain].map(|n| n.to_string());
         let names = [record.name.clone(), record.model.clone()];
         let cells = names.into_iter().chain(indices);
-        cells
-            .chain(SETTLING_HEADER[4..].iter().map(value))
-            .collect()
+        cells.chain(SETTLING_HEADER[4..].iter().map(value)).collect()
     };
     for record in records {
         let grains = record.settling.iter().flat_map(|s| &s.each);
@@ -112,10 +108,7 @@ fn rows(records: &[RunRecord]) -> Vec<Vec<String>> {
     let row = |r: &RunRecord| {
         let member = r.member.to_string();
         let mut cells = vec![r.name.clone(), r.model.clone(), member, r.state.to_string()];
-        cells.extend(
-            axes.iter()
-                .map(|a| r.levels.get(*a).cloned().unwrap_or_default()),
-        );
+        cells.extend(axes.iter().map(|a| r.levels.get(*a).cloned().unwrap_or_default()));
         cells.extend(factors.iter().map(|f| number(r.factors.get(*f).copied())));
         cells.extend(quantities.iter().map(|q| number(r.measured(q))));
         cells.push(text(r.diameter_m, |v| format!("{v:e}")));
@@ -129,9 +122,7 @@ fn rows(records: &[RunRecord]) -> Vec<Vec<String>> {
         cells
     };
     let header = header.into_iter().map(str::to_owned).collect();
-    std::iter::once(header)
-        .chain(records.iter().map(row))
-        .collect()
+    std::iter::once(header).chain(records.iter().map(row)).collect()
 }
 
 fn text<T>(value: Option<T>, form: impl Fn(T) -> String) -> String {

@@ -24,9 +24,7 @@ const HEADER: [&str; 16] = [
 fn read_histories(run: &Run, study: &Path) -> Option<Vec<History>> {
     let full = run.folder(study).join("grains.csv");
     let thinned = study.join(HISTORIES).join(format!("{}.csv", run.name));
-    [full, thinned]
-        .iter()
-        .find_map(|file| histories(file, &mut Vec::new()).ok())
+    [full, thinned].iter().find_map(|file| histories(file, &mut Vec::new()).ok())
 }
 
 /// Relative motion of a pair until the first landing, dimensionless.
@@ -52,15 +50,8 @@ impl Trajectory {
         let landing = record.pair.as_ref()?.landing_time;
         let until = landing.map_or(f64::INFINITY, |t| t * unit);
         let height = |h: &History| Some(h.position.first()?.dot(up));
-        let (trailing, leading) = if height(a)? >= height(b)? {
-            (a, b)
-        } else {
-            (b, a)
-        };
-        let rows = trailing
-            .time
-            .partition_point(|t| *t < until)
-            .min(leading.len());
+        let (trailing, leading) = if height(a)? >= height(b)? { (a, b) } else { (b, a) };
+        let rows = trailing.time.partition_point(|t| *t < until).min(leading.len());
         let velocity = |h: &History| {
             let vertical = |v: &DVec3| v.dot(up) * unit / diameter;
             h.velocity[..rows].iter().map(vertical).collect()
@@ -75,11 +66,7 @@ impl Trajectory {
 
     /// Returns the points of a curve of `values` against time.
     pub fn points(&self, values: &[f64]) -> Vec<(f64, f64)> {
-        self.time
-            .iter()
-            .copied()
-            .zip(values.iter().copied())
-            .collect()
+        self.time.iter().copied().zip(values.iter().copied()).collect()
     }
 }
 
@@ -112,9 +99,7 @@ pub fn write_thinned_history(
     let Ok(grains) = histories(&run.folder(study).join("grains.csv"), &mut Vec::new()) else {
         return Ok(false);
     };
-    let interval = record
-        .up_and_time()
-        .map_or(0.0, |(_, unit)| INTERVAL * unit);
+    let interval = record.up_and_time().map_or(0.0, |(_, unit)| INTERVAL * unit);
     let mut out = vec![HEADER.map(str::to_owned).to_vec()];
     let rows = grains.iter().map(History::len).min().unwrap_or(0);
     let mut next = f64::NEG_INFINITY;
@@ -127,9 +112,7 @@ pub fn write_thinned_history(
         for (grain, h) in grains.iter().enumerate() {
             let (x, v, w) = (h.position[i], h.velocity[i], h.angular_velocity[i]);
             let q = h.orientation[i];
-            let values = [
-                x.x, x.y, x.z, v.x, v.y, v.z, q.w, q.x, q.y, q.z, w.x, w.y, w.z,
-            ];
+            let values = [x.x, x.y, x.z, v.x, v.y, v.z, q.w, q.x, q.y, q.z, w.x, w.y, w.z];
             let mut row = vec![cell(time), grain.to_string()];
             row.extend(values.map(cell));
             row.push(h.contacts[i].map_or("NaN".into(), |n| n.to_string()));

@@ -28,9 +28,7 @@ pub(super) const COLUMNS: [(&str, &str); 12] = [
 const STEADY: f64 = 0.02;
 
 fn settling_runs(records: &[RunRecord]) -> Vec<(&RunRecord, &SettlingMeasures)> {
-    let known = records
-        .iter()
-        .filter_map(|r| Some((r, r.settling.as_ref()?)));
+    let known = records.iter().filter_map(|r| Some((r, r.settling.as_ref()?)));
     known.collect()
 }
 
@@ -80,9 +78,7 @@ fn extremes(title: &str, what: &str, unit: &str, runs: &[(&RunRecord, f64)]) -> 
 pub(super) fn summary(content: &Content) -> Markup {
     let all = settling_runs(content.records);
     let sorted = |pick: fn(&SettlingMeasures) -> Option<f64>| {
-        let known = all
-            .iter()
-            .filter_map(|(record, s)| Some((*record, pick(s)?)));
+        let known = all.iter().filter_map(|(record, s)| Some((*record, pick(s)?)));
         let mut values: Vec<(&RunRecord, f64)> = known.collect();
         values.sort_by(|a, b| a.1.total_cmp(&b.1));
         values

@@ -32,12 +32,7 @@ fn cell(text: Option<String>) -> Markup {
 pub(super) fn claims(findings: &[Finding]) -> Markup {
     let row = |f: &Finding| {
         let verdict = html! { span class={ "verdict " (f.verdict) } { (f.verdict) } };
-        vec![
-            html! { (f.part) },
-            html! { (f.claim) },
-            verdict,
-            html! { (f.says) },
-        ]
+        vec![html! { (f.part) }, html! { (f.claim) }, verdict, html! { (f.says) }]
     };
     let columns = ["part", "claim", "verdict", "measured"].map(text_column);
     html! {
@@ -58,12 +53,7 @@ pub(super) fn runs(content: &Content) -> Markup {
     let quantities = pairs.chain(settling::COLUMNS.into_iter().filter(known));
     let (headings, quantities): (Vec<&str>, Vec<&str>) = quantities.unzip();
     let mut columns = vec![name_column("run"), text_column("state")];
-    columns.extend(
-        headings
-            .into_iter()
-            .chain(["wall [min]"])
-            .map(number_column),
-    );
+    columns.extend(headings.into_iter().chain(["wall [min]"]).map(number_column));
     let row = |record: &RunRecord| {
         let quantity = |name: &&str| {
             let value = record.measured(name).map(|v| quantity_value(name, v));
@@ -122,18 +112,9 @@ pub(super) fn provenance(content: &Content) -> Markup {
                 @if let Some(commit) = &plan.commit { ", commit " (commit) }
             },
         ),
-        (
-            "time steps, all runs",
-            html! { (sum(|r| r.steps.map(|n| n as f64))) },
-        ),
-        (
-            "wall-clock time, all runs",
-            html! { (format!("{:.2} h", sum(|r| r.wall_s) / 3600.0)) },
-        ),
-        (
-            "largest |div u|, all runs",
-            html! { (format!("{divergence:.1e} 1/s")) },
-        ),
+        ("time steps, all runs", html! { (sum(|r| r.steps.map(|n| n as f64))) }),
+        ("wall-clock time, all runs", html! { (format!("{:.2} h", sum(|r| r.wall_s) / 3600.0)) }),
+        ("largest |div u|, all runs", html! { (format!("{divergence:.1e} 1/s")) }),
     ];
     html! {
         (properties(&rows.map(|(name, value)| (html! { (name) }, value))))

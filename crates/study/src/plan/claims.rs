@@ -228,8 +228,7 @@ impl NameCheck<'_> {
         let hint = did_you_mean(name, known.iter().copied());
         let problem = Problem::new(format!("there is no {kind} \"{name}\""))
             .help(format!("{hint}known names: {}", known.join(", ")));
-        self.problems
-            .push(self.source.locate(problem, span, "here"));
+        self.problems.push(self.source.locate(problem, span, "here"));
         false
     }
 
@@ -255,12 +254,7 @@ impl NameCheck<'_> {
 
     fn factor(&mut self, name: &str, span: Span) {
         let own = self.models.iter().flat_map(|m| m.factors.keys());
-        self.require(
-            "factor",
-            name,
-            own.map(String::as_str).chain(SHAPE_FACTORS),
-            span,
-        );
+        self.require("factor", name, own.map(String::as_str).chain(SHAPE_FACTORS), span);
     }
 
     fn model(&mut self, name: &str, span: Span) {
@@ -294,10 +288,7 @@ impl NameCheck<'_> {
     }
 
     fn figures(&mut self, figures: &FigureRequest, span: Span) {
-        for axis in [&figures.grains, &figures.orientations]
-            .into_iter()
-            .flatten()
-        {
+        for axis in [&figures.grains, &figures.orientations].into_iter().flatten() {
             self.axis(axis, span);
         }
         for factor in [&figures.rows, &figures.columns].into_iter().flatten() {
@@ -307,10 +298,9 @@ impl NameCheck<'_> {
         for model in models.chain(&figures.stories) {
             self.model(model, span);
         }
-        for (axis, level) in [
-            (&figures.grains, &figures.oriented),
-            (&figures.orientations, &figures.compare),
-        ] {
+        for (axis, level) in
+            [(&figures.grains, &figures.oriented), (&figures.orientations, &figures.compare)]
+        {
             if let Some(axis) = axis {
                 self.levels(axis, level, span);
             }
@@ -326,11 +316,7 @@ impl Analysis {
     pub fn parse(name: &str, text: &str, models: &[Model]) -> Result<Analysis, Vec<Problem>> {
         let (source, raw): (Source, RawAnalysis) =
             Source::parse(name, text, &[]).map_err(|p| vec![refer_to_study_keys(p)])?;
-        let mut check = NameCheck {
-            source: &source,
-            models,
-            problems: Vec::new(),
-        };
+        let mut check = NameCheck { source: &source, models, problems: Vec::new() };
         for claim in &raw.claim {
             check.quantity(&claim.quantity, claim.quantity.span.as_ref());
             check.test(&claim.test);
@@ -340,18 +326,13 @@ impl Analysis {
         }
         if let Some(Located { value, span }) = &raw.correlations {
             let span = span.as_ref();
-            value
-                .quantities
-                .iter()
-                .for_each(|q| check.quantity(q, span));
+            value.quantities.iter().for_each(|q| check.quantity(q, span));
             value.factors.iter().for_each(|f| check.factor(f, span));
             check.axis(&value.by, span);
         }
         if let Some(Located { value, span }) = &raw.resolution {
             let quantities = &value.unconverged;
-            quantities
-                .iter()
-                .for_each(|q| check.quantity(q, span.as_ref()));
+            quantities.iter().for_each(|q| check.quantity(q, span.as_ref()));
         }
         if let Some(figures) = &raw.figures {
             check.figures(&figures.value, figures.span.as_ref());
@@ -365,11 +346,7 @@ impl Analysis {
             quantity: raw.quantity.value,
             test: raw.test.value,
             observed: raw.observed,
-            when: raw
-                .when
-                .into_iter()
-                .map(|(name, c)| (name, c.value))
-                .collect(),
+            when: raw.when.into_iter().map(|(name, c)| (name, c.value)).collect(),
         };
         Ok(Analysis {
             claims: raw.claim.into_iter().map(claim).collect(),

@@ -52,10 +52,7 @@ pub(crate) fn expand(
     raw: &RawStudy,
     folder: &Path,
 ) -> Result<Vec<Model>, Vec<Problem>> {
-    let mut problems = Problems {
-        source,
-        found: Vec::new(),
-    };
+    let mut problems = Problems { source, found: Vec::new() };
     let base = problems.case_file(folder, raw.base.as_ref());
     let common = settings(&raw.set);
     let mut models = Vec::new();
@@ -95,11 +92,7 @@ pub(crate) fn expand(
         }
     }
     problems.check_unique(raw, &models);
-    if problems.found.is_empty() {
-        Ok(models)
-    } else {
-        Err(problems.found)
-    }
+    if problems.found.is_empty() { Ok(models) } else { Err(problems.found) }
 }
 
 /// Problems of a study file, collected while it is expanded.
@@ -181,9 +174,7 @@ impl Problems<'_> {
             return;
         };
         let values = raw.axis.iter().flat_map(|a| &a.values.value);
-        let names = values
-            .map(|v| &v.name)
-            .chain(raw.model.iter().map(|m| &m.name));
+        let names = values.map(|v| &v.name).chain(raw.model.iter().map(|m| &m.name));
         let part_of = |name: &&Located<String>| {
             model.name == name.value || model.name.split('-').any(|part| part == name.value)
         };
@@ -201,18 +192,9 @@ impl Problems<'_> {
 fn settings(set: &RawSet) -> Vec<Setting> {
     let mut found = Vec::new();
     for (key, value) in set {
-        flatten(
-            key.clone(),
-            &value.value,
-            !key.contains('.'),
-            &mut |key, text| {
-                found.push(Setting {
-                    key,
-                    value: text,
-                    span: value.span.clone(),
-                });
-            },
-        );
+        flatten(key.clone(), &value.value, !key.contains('.'), &mut |key, text| {
+            found.push(Setting { key, value: text, span: value.span.clone() });
+        });
     }
     found
 }
@@ -239,16 +221,10 @@ fn inline(value: &Value) -> String {
             let entry = |(key, value): (&String, &Value)| {
                 format!("{} = {}", Value::String(key.clone()), inline(value))
             };
-            format!(
-                "{{ {} }}",
-                table.iter().map(entry).collect::<Vec<_>>().join(", ")
-            )
+            format!("{{ {} }}", table.iter().map(entry).collect::<Vec<_>>().join(", "))
         }
         Value::Array(items) => {
-            format!(
-                "[{}]",
-                items.iter().map(inline).collect::<Vec<_>>().join(", ")
-            )
+            format!("[{}]", items.iter().map(inline).collect::<Vec<_>>().join(", "))
         }
         Value::String(text) if text.contains(['\n', '\'']) => {
             let escaped = text.replace('\\', "\\\\").replace('"', "\\\"");
@@ -279,9 +255,7 @@ fn cross(model: &Model, axis: &RawAxis) -> Vec<Model> {
             }));
         }
         model.settings.extend(settings(&value.set));
-        model
-            .levels
-            .insert(axis.name.value.clone(), value.name.value.clone());
+        model.levels.insert(axis.name.value.clone(), value.name.value.clone());
         model.factors.extend(value.factors.clone());
         model
     };

@@ -134,9 +134,7 @@ fn read_ensemble(
     if !(1..=1000).contains(&raw.members.value) {
         let problem = Problem::new("an ensemble has 1 to 1000 members")
             .help("members includes the run without offset");
-        return Err(source
-            .locate(problem, raw.members.span.as_ref(), "here")
-            .into());
+        return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
     }
     Ok(Ensemble {
         members: raw.members.value,

@@ -107,20 +107,12 @@ impl Plan {
     /// # Errors
     /// [`StudyError::Occupied`] if the folder holds another study or other files.
     pub fn check_folder(&self, folder: &Path) -> Result<(), StudyError> {
-        let occupied = |what: String| {
-            Err(StudyError::Occupied {
-                folder: folder.into(),
-                what,
-            })
-        };
+        let occupied = |what: String| Err(StudyError::Occupied { folder: folder.into(), what });
         if Plan::exists_in(folder) {
             let other = Plan::read(folder)?;
             if other.title != self.title && other.study.file_name() != self.study.file_name() {
                 let study = other.study.display();
-                return occupied(format!(
-                    "holds another study, \"{}\" of {study}",
-                    other.title
-                ));
+                return occupied(format!("holds another study, \"{}\" of {study}", other.title));
             }
             return Ok(());
         }
@@ -138,10 +130,8 @@ impl Plan {
     pub fn read(folder: &Path) -> Result<Plan, StudyError> {
         let file = folder.join(MANIFEST);
         let text = std::fs::read_to_string(&file).at("read", &file)?;
-        serde_json::from_str(&text).map_err(|error| StudyError::Damaged {
-            file,
-            what: error.to_string(),
-        })
+        serde_json::from_str(&text)
+            .map_err(|error| StudyError::Damaged { file, what: error.to_string() })
     }
 
     /// Writes the plan into a study folder.

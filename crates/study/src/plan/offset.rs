@@ -34,9 +34,7 @@ pub(crate) fn offset_override(
     let vertical = if gravity.max_element() == 0.0 {
         2
     } else {
-        (0..3)
-            .max_by(|i, j| gravity[*i].total_cmp(&gravity[*j]))
-            .unwrap_or(2)
+        (0..3).max_by(|i, j| gravity[*i].total_cmp(&gravity[*j])).unwrap_or(2)
     };
     let horizontal: Vec<usize> = (0..3).filter(|axis| *axis != vertical).collect();
     let (radius, angle) = uniform_on_disc(ensemble.seed, &model.name, member);
@@ -48,10 +46,7 @@ pub(crate) fn offset_override(
         .filter(|axis| *axis != vertical || !has_gap_above(model, set, index))
         .map(|axis| format!("{:e}", position[axis]))
         .collect();
-    Ok(format!(
-        "grain.{index}.position=[{}]",
-        coordinates.join(", ")
-    ))
+    Ok(format!("grain.{index}.position=[{}]", coordinates.join(", ")))
 }
 
 /// Draws polar coordinates uniformly from the unit disc; equal arguments give equal results.

@@ -21,10 +21,8 @@ impl Plan {
     /// [`StudyError::Invalid`] with the problems of the first invalid model, located in the study
     /// file where it sets the key.
     pub fn resolve(study: &Study, sets: &[String]) -> Result<Plan, StudyError> {
-        let resolved: Vec<Result<Vec<Run>, StudyError>> = (0..study.models.len())
-            .into_par_iter()
-            .map(|i| runs_of(study, i, sets))
-            .collect();
+        let resolved: Vec<Result<Vec<Run>, StudyError>> =
+            (0..study.models.len()).into_par_iter().map(|i| runs_of(study, i, sets)).collect();
         let mut runs = Vec::new();
         for found in resolved {
             runs.extend(found?);
@@ -52,16 +50,11 @@ fn runs_of(study: &Study, index: usize, sets: &[String]) -> Result<Vec<Run>, Stu
     };
     let case = load(&set)?;
     let mut runs = vec![run(model, 0, set.clone(), &case)];
-    let ensemble = study
-        .ensemble
-        .as_ref()
-        .filter(|e| e.models.contains(&index));
+    let ensemble = study.ensemble.as_ref().filter(|e| e.models.contains(&index));
     if let Some(ensemble) = ensemble {
         for member in 1..ensemble.members {
             let mut set = set.clone();
-            set.push(offset_override(
-                study, model, ensemble, member, &case, &set,
-            )?);
+            set.push(offset_override(study, model, ensemble, member, &case, &set)?);
             let case = load(&set)?;
             runs.push(run(model, member, set, &case));
         }
@@ -79,12 +72,7 @@ fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
         hash.update(part);
         hash.update([0]);
     }
-    let id = hash
-        .finalize()
-        .iter()
-        .take(6)
-        .map(|b| format!("{b:02x}"))
-        .collect();
+    let id = hash.finalize().iter().take(6).map(|b| format!("{b:02x}")).collect();
     Run {
         name: match member {
             0 => model.name.clone(),

@@ -46,10 +46,7 @@ impl Selection {
                 _ => Err(wrong("a share consists of two whole numbers".into())),
             };
         }
-        let names = text
-            .split(',')
-            .map(str::trim)
-            .filter(|part| !part.is_empty());
+        let names = text.split(',').map(str::trim).filter(|part| !part.is_empty());
         match names.map(glob::Pattern::new).collect::<Result<Vec<_>, _>>() {
             Ok(patterns) if patterns.is_empty() => Err(wrong("no name is given".into())),
             Ok(patterns) => Ok(Selection::Patterns(patterns)),

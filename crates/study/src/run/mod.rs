@@ -81,11 +81,7 @@ pub fn execute(
     observer: &dyn StudyObserver,
 ) -> Result<Vec<(usize, Outcome)>, StudyError> {
     let jobs = options.jobs.clamp(1, chosen.len().max(1));
-    let pool = || {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(options.threads)
-            .build()
-    };
+    let pool = || rayon::ThreadPoolBuilder::new().num_threads(options.threads).build();
     let pools: Vec<rayon::ThreadPool> = (0..jobs)
         .map(|_| pool())
         .collect::<Result<_, _>>()
@@ -96,13 +92,7 @@ pub fn execute(
     let disk_full = AtomicBool::new(false);
     let work = |pool: &rayon::ThreadPool| {
         while let Some(index) = queue.lock().ok().and_then(|mut queue| queue.pop_front()) {
-            let job = Job {
-                run: &runs[index],
-                index,
-                study,
-                options,
-                observer,
-            };
+            let job = Job { run: &runs[index], index, study, options, observer };
             let outcome = if observer.interrupted() || disk_full.load(Ordering::Relaxed) {
                 Outcome::Interrupted
             } else {
@@ -220,11 +210,7 @@ impl Job<'_> {
         let folder = self.study.join("locks");
         let path = folder.join(format!("{}.lock", self.run.name));
         let taken = std::fs::create_dir_all(&folder).and_then(|()| lock::acquire(&path));
-        taken.map_err(|source| RunError::Io {
-            action: "lock",
-            path,
-            source,
-        })
+        taken.map_err(|source| RunError::Io { action: "lock", path, source })
     }
 
     /// Removes the checkpoints of a finished run, its largest files, unless they are to be kept.

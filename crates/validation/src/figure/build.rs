@@ -36,12 +36,7 @@ pub fn build(
     folder: &Path,
     constants: &BTreeMap<String, f64>,
 ) -> Result<Vec<FigureSpec>, Problem> {
-    let context = Context {
-        source,
-        runs,
-        folder,
-        constants,
-    };
+    let context = Context { source, runs, folder, constants };
     let mut out: Vec<FigureSpec> = Vec::new();
     for figure in raw {
         let name = &figure.name;
@@ -73,20 +68,13 @@ impl Context<'_> {
 
     fn figure(&self, raw: RawFigure) -> Result<FigureSpec, Problem> {
         let curves = raw.reference.len() + raw.history.len() + raw.results.len();
-        let sources = raw
-            .reference
-            .iter()
-            .filter_map(|r| r.source.clone())
-            .collect();
+        let sources = raw.reference.iter().filter_map(|r| r.source.clone()).collect();
         let content = match (raw.field, raw.x, raw.y) {
             (Some(field), None, None) if curves == 0 && !raw.picture.is_empty() => {
                 for picture in &raw.picture {
                     self.check_picture(picture)?;
                 }
-                Content::Pictures {
-                    style: field,
-                    pictures: raw.picture,
-                }
+                Content::Pictures { style: field, pictures: raw.picture }
             }
             (None, Some(across), Some(up)) if curves > 0 && raw.picture.is_empty() => {
                 self.check_axis(&across)?;
@@ -208,11 +196,7 @@ impl Context<'_> {
             let help = "give one number for each run, or an expression of their constants";
             return Err(self.at(&raw.x, message, help, "as many as `runs`"));
         }
-        let points = raw
-            .runs
-            .iter()
-            .enumerate()
-            .map(|(i, name)| self.point(raw, i, name));
+        let points = raw.runs.iter().enumerate().map(|(i, name)| self.point(raw, i, name));
         Ok(Data::Results {
             points: points.collect::<Result<_, _>>()?,
             error: raw.error.value,
@@ -231,10 +215,7 @@ impl Context<'_> {
         let wanted = |check: &&Check| check.quantity == raw.quantity.value;
         let check = run.checks.iter().find(wanted).ok_or_else(|| {
             let known: Vec<&str> = run.checks.iter().map(|c| c.quantity.as_str()).collect();
-            let message = format!(
-                "run \"{}\" measures no \"{}\"",
-                run.name, raw.quantity.value
-            );
+            let message = format!("run \"{}\" measures no \"{}\"", run.name, raw.quantity.value);
             let help = format!("it measures: {}", known.join(", "));
             self.at(&raw.quantity, message, help, "not measured")
         })?;
@@ -244,12 +225,7 @@ impl Context<'_> {
                 expression::constant(text, &run.constants).map_err(|what| {
                     let names: Vec<&str> = run.constants.keys().map(String::as_str).collect();
                     let help = format!("constants of this run: {}", names.join(", "));
-                    self.at(
-                        &raw.x,
-                        format!("run \"{}\": {what}", run.name),
-                        help,
-                        "here",
-                    )
+                    self.at(&raw.x, format!("run \"{}\": {what}", run.name), help, "here")
                 })?
             }
         };
@@ -259,19 +235,12 @@ impl Context<'_> {
         });
         if raw.error.value && reference.is_none_or(|r| r == 0.0) {
             let quantity = &check.quantity;
-            let message = format!(
-                "\"{quantity}\" of run \"{}\" has no nonzero reference",
-                run.name
-            );
+            let message =
+                format!("\"{quantity}\" of run \"{}\" has no nonzero reference", run.name);
             let help = "a relative error needs `reference = ...`, other than 0, in this series";
             return Err(self.at(&raw.error, message, help, "relative error"));
         }
-        Ok(ResultPoint {
-            run: run.name.clone(),
-            x,
-            check: check.clone(),
-            reference,
-        })
+        Ok(ResultPoint { run: run.name.clone(), x, check: check.clone(), reference })
     }
 
     fn check_picture(&self, picture: &SliceSpec) -> Result<(), Problem> {

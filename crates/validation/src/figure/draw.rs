@@ -107,10 +107,7 @@ impl FigureSpec {
                 }
             }
         };
-        DrawnFigure {
-            drawing,
-            notes: notes(omissions),
-        }
+        DrawnFigure { drawing, notes: notes(omissions) }
     }
 
     /// Returns the caption and the sources of the reference data, in label markup.
@@ -169,12 +166,7 @@ impl SeriesSpec {
             points: Vec::new(),
         };
         match &self.data {
-            Data::Reference {
-                file,
-                x,
-                y,
-                constants,
-            } => {
+            Data::Reference { file, x, y, constants } => {
                 let columns = Columns::read_reference(file)?;
                 let x = expression::evaluate(x, &columns, constants)?;
                 let y = expression::evaluate(y, &columns, constants)?;
@@ -182,12 +174,7 @@ impl SeriesSpec {
                 shown.sign = self.line.is_none().then_some(self.sign);
                 shown.fill = Fill::Hollow;
             }
-            Data::History {
-                run,
-                sampling,
-                constants,
-                derivative,
-            } => {
+            Data::History { run, sampling, constants, derivative } => {
                 let (x, mut y) = sampling.samples(&finished(runs, run)?, constants)?;
                 if *derivative {
                     y = signal::derivative(&x, &y)
@@ -196,11 +183,7 @@ impl SeriesSpec {
                 shown.points = x.into_iter().zip(y).collect();
                 shown.sign = None;
             }
-            Data::Results {
-                points,
-                error,
-                slope,
-            } => {
+            Data::Results { points, error, slope } => {
                 for point in points {
                     match point.value(runs, &saved, *error) {
                         Ok(y) => shown.points.push((point.x, y)),
@@ -287,11 +270,7 @@ mod tests {
         let error = |n: f64| 0.3 / (n * n);
         let points = [(8.0, 0.5), (16.0, error(16.0)), (24.0, error(24.0))];
         assert!((observed_order(&points, -2.0).unwrap() - 2.0).abs() < 1e-12);
-        let by_h = [
-            (1.0 / 24.0, error(24.0)),
-            (1.0 / 16.0, error(16.0)),
-            (0.125, 0.5),
-        ];
+        let by_h = [(1.0 / 24.0, error(24.0)), (1.0 / 16.0, error(16.0)), (0.125, 0.5)];
         assert!((observed_order(&by_h, 2.0).unwrap() - 2.0).abs() < 1e-12);
         let growing = [(8.0, 0.1), (16.0, 0.2)];
         assert!((observed_order(&growing, -2.0).unwrap() + 1.0).abs() < 1e-12);

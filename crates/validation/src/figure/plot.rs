@@ -62,25 +62,14 @@ pub fn draw(across: &AxisSpec, up: &AxisSpec, sets: &[DataSet]) -> Drawing {
         all.filter(|(x, y)| valid(across, *x) && valid(up, *y))
     };
     let across = axis(across, points().map(|p| p.0), 6);
-    let inside = |x: f64| {
-        across
-            .fraction(x)
-            .is_some_and(|p| (-1e-9..=1.0 + 1e-9).contains(&p))
-    };
+    let inside = |x: f64| across.fraction(x).is_some_and(|p| (-1e-9..=1.0 + 1e-9).contains(&p));
     let up = axis(up, points().filter(|p| inside(p.0)).map(|p| p.1), 5);
 
     let legend = Legend::new(sets.iter().filter_map(DataSet::entry), COLUMN - LEFT);
     let top = 6.0 + legend.height();
     let mut drawing = Drawing::new(COLUMN, top + HEIGHT + 26.0);
     legend.draw(&mut drawing, (LEFT, 7.0));
-    let frame = Frame {
-        x: LEFT,
-        y: top,
-        width: COLUMN - LEFT - RIGHT,
-        height: HEIGHT,
-        across,
-        up,
-    };
+    let frame = Frame { x: LEFT, y: top, width: COLUMN - LEFT - RIGHT, height: HEIGHT, across, up };
     frame.grid(&mut drawing);
     for (i, one) in sets.iter().enumerate() {
         if one.line.is_some() {
@@ -128,13 +117,8 @@ mod tests {
 
     #[test]
     fn a_data_set_outside_a_logarithmic_axis_is_left_out() {
-        let plan = AxisSpec {
-            label: "x".into(),
-            scale: Scale::Log,
-            from: None,
-            to: None,
-            ticks: None,
-        };
+        let plan =
+            AxisSpec { label: "x".into(), scale: Scale::Log, from: None, to: None, ticks: None };
         let shown = |label: &str, points: &[(f64, f64)]| DataSet {
             label: label.into(),
             colour: INK,
@@ -144,26 +128,13 @@ mod tests {
             points: points.to_vec(),
         };
         let sets = [
-            shown(
-                "good",
-                &[
-                    (1.0, 1.0),
-                    (10.0, 2.0),
-                    (20.0, f64::NAN),
-                    (30.0, 3.0),
-                    (40.0, 2.0),
-                ],
-            ),
+            shown("good", &[(1.0, 1.0), (10.0, 2.0), (20.0, f64::NAN), (30.0, 3.0), (40.0, 2.0)]),
             shown("none", &[(-1.0, 0.0), (0.0, -1.0)]),
         ];
         let svg = draw(&plan, &plan, &sets).to_svg("f", "t", "d");
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
         let curves = svg.matches("stroke-width=\"1.2\"").count();
-        assert_eq!(
-            curves,
-            2 + 2,
-            "two samples in the legend, and a curve in two parts"
-        );
+        assert_eq!(curves, 2 + 2, "two samples in the legend, and a curve in two parts");
         assert!(svg.contains(">good<") && svg.contains(">none<"));
     }
 }

@@ -25,15 +25,8 @@ pub struct FigureSpec {
 
 #[derive(Clone, Debug)]
 pub enum Content {
-    Plot {
-        across: AxisSpec,
-        up: AxisSpec,
-        series: Vec<SeriesSpec>,
-    },
-    Pictures {
-        style: Style,
-        pictures: Vec<SliceSpec>,
-    },
+    Plot { across: AxisSpec, up: AxisSpec, series: Vec<SeriesSpec> },
+    Pictures { style: Style, pictures: Vec<SliceSpec> },
 }
 
 /// Data set and its style.
@@ -51,12 +44,7 @@ pub struct SeriesSpec {
 #[derive(Clone, Debug)]
 pub enum Data {
     /// Columns of a file.
-    Reference {
-        file: PathBuf,
-        x: String,
-        y: String,
-        constants: BTreeMap<String, f64>,
-    },
+    Reference { file: PathBuf, x: String, y: String, constants: BTreeMap<String, f64> },
     /// Table of a run.
     History {
         run: String,

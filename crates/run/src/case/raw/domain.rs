@@ -73,10 +73,7 @@ pub struct AxisFaces {
 
 impl AxisFaces {
     fn both(face: Face) -> AxisFaces {
-        AxisFaces {
-            lower: face.into(),
-            upper: face.into(),
-        }
+        AxisFaces { lower: face.into(), upper: face.into() }
     }
 }
 

@@ -58,10 +58,7 @@ impl Notation for Component {
         Ok(Component(number.to_string()))
     }
     fn scalar_schemas(_: &mut SchemaGenerator) -> Vec<Schema> {
-        vec![
-            json_schema!({ "type": "string" }),
-            json_schema!({ "type": "number" }),
-        ]
+        vec![json_schema!({ "type": "string" }), json_schema!({ "type": "number" })]
     }
 }
 notations!(Component);
@@ -79,11 +76,7 @@ impl<V: Variables> FormulaTable<V> {
     /// Parses the three components.
     fn parse(self) -> Result<Formula, String> {
         let found = self.formula.len();
-        let text: Vec<String> = self
-            .formula
-            .into_iter()
-            .map(|component| component.0)
-            .collect();
+        let text: Vec<String> = self.formula.into_iter().map(|component| component.0).collect();
         let text: [String; 3] = (text.try_into())
             .map_err(|_| format!("found {found} formulas; expected three, for x, y and z"))?;
         Formula::parse(text.clone(), V::NAMES).map_err(|message| reworded(&text, message))
@@ -115,9 +108,8 @@ impl<V: Variables> JsonSchema for FormulaTable<V> {
 fn reworded(text: &[String; 3], message: String) -> String {
     for (name, component) in ["x", "y", "z"].iter().zip(text) {
         let start = format!("the {name} component \"{component}\": ");
-        let Some((said, accepted)) = message
-            .strip_prefix(&start)
-            .and_then(|rest| rest.split_once("; a formula may use "))
+        let Some((said, accepted)) =
+            message.strip_prefix(&start).and_then(|rest| rest.split_once("; a formula may use "))
         else {
             continue;
         };

@@ -108,14 +108,8 @@ impl Notation for RawMotion {
         })
     }
     fn from_table(table: MotionTable) -> Result<Self, String> {
-        let MotionTable {
-            velocity,
-            angular_velocity,
-        } = table;
-        Ok(RawMotion {
-            velocity,
-            angular_velocity,
-        })
+        let MotionTable { velocity, angular_velocity } = table;
+        Ok(RawMotion { velocity, angular_velocity })
     }
     fn scalar_schemas(generator: &mut SchemaGenerator) -> Vec<Schema> {
         MotionLaw::<Velocity>::scalar_schemas(generator)

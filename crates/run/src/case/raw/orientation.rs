@@ -22,8 +22,7 @@ impl Notation for Direction {
         };
         let axis = ["x", "y", "z"].iter().position(|name| *name == letter);
         let refused = || format!("unknown direction \"{word}\"; expected {}", Self::EXPECTED);
-        axis.map(|axis| Direction(DVec3::AXES[axis] * sign))
-            .ok_or_else(refused)
+        axis.map(|axis| Direction(DVec3::AXES[axis] * sign)).ok_or_else(refused)
     }
     fn from_list(list: [f64; 3]) -> Result<Self, String> {
         DVec3::from_array(list)
@@ -123,11 +122,7 @@ impl Notation for Orientation {
             return Err("a quaternion cannot be zero".into());
         }
         // A quaternion that is already of unit length keeps its bits.
-        Ok(Orientation::Quaternion(if (norm - 1.0).abs() < 1e-14 {
-            q
-        } else {
-            q.normalize()
-        }))
+        Ok(Orientation::Quaternion(if (norm - 1.0).abs() < 1e-14 { q } else { q.normalize() }))
     }
     fn from_table(table: OrientationTable) -> Result<Self, String> {
         let axes = [table.long_axis, table.middle_axis, table.short_axis].map(|d| d.map(|d| d.0));
@@ -136,10 +131,10 @@ impl Notation for Orientation {
                 Ok(Orientation::Quaternion(Turn { axis, angle }.quaternion()))
             }
             (None, None, 1 | 2) => Ok(Orientation::Axes(axes)),
-            (None, None, 3) => Err(
-                "give at most two of long_axis, middle_axis and short_axis: they fix the third"
-                    .into(),
-            ),
+            (None, None, 3) => {
+                Err("give at most two of long_axis, middle_axis and short_axis: they fix the third"
+                    .into())
+            }
             _ => Err(format!("expected {}", Self::EXPECTED)),
         }
     }
@@ -151,11 +146,8 @@ impl Serialize for Orientation {
             Orientation::Quaternion(q) => [q.w, q.x, q.y, q.z].serialize(serializer),
             Orientation::Axes(axes) => {
                 let names = ["long_axis", "middle_axis", "short_axis"].iter();
-                serializer.collect_map(
-                    names
-                        .zip(axes)
-                        .filter_map(|(name, axis)| Some((name, (*axis)?))),
-                )
+                serializer
+                    .collect_map(names.zip(axes).filter_map(|(name, axis)| Some((name, (*axis)?))))
             }
         }
     }

@@ -60,10 +60,7 @@ impl Notation for RawStop {
     type List = Unsupported;
     type Table = StopTable;
     fn from_word(word: &str) -> Result<Self, String> {
-        Ok(RawStop {
-            when: variant(word)?,
-            hold: Located::default(),
-        })
+        Ok(RawStop { when: variant(word)?, hold: Located::default() })
     }
     fn from_table(StopTable { when, hold }: StopTable) -> Result<Self, String> {
         Ok(RawStop { when, hold })
@@ -153,10 +150,6 @@ impl From<&crate::Plane> for RawPlane {
             crate::PlanePosition::At(at) => (Some(Quantity::new(at).into()), None),
             crate::PlanePosition::Grain(grain) => (None, Some(grain.into())),
         };
-        RawPlane {
-            normal: AXES[plane.axis].to_string().into(),
-            at,
-            grain,
-        }
+        RawPlane { normal: AXES[plane.axis].to_string().into(), at, grain }
     }
 }

@@ -33,10 +33,7 @@ fn a_mistyped_key_is_located_and_corrected() {
 fn a_wrong_unit_is_located() {
     let p = problem(&CASE.replace("1 mPa s", "1 mm"), &[]);
     assert_eq!(p.place(), Some(("case.toml", 3, 13)));
-    assert!(
-        p.message.contains("is a length") && p.message.contains("1 mPa s"),
-        "{p}"
-    );
+    assert!(p.message.contains("is a length") && p.message.contains("1 mPa s"), "{p}");
     let p = problem(&CASE.replace("diameter = 0.1", "diameter = \"1 s\""), &[]);
     assert_eq!(p.key.as_deref(), Some("grain.0.shape.diameter"));
 }
@@ -64,23 +61,13 @@ fn a_wrong_override_is_located_on_its_own_line() {
     let p = problem(CASE, &["time.end=2 mm"]);
     assert_eq!(p.place().unwrap().0, "--set");
     assert!(problem(CASE, &["nonsense"]).message.contains("no `=`"));
-    assert!(
-        problem(CASE, &["grain.3.density=1"])
-            .message
-            .contains("no number 3")
-    );
+    assert!(problem(CASE, &["grain.3.density=1"]).message.contains("no number 3"));
 }
 
 #[test]
 fn what_an_override_changed_is_shown_instead_of_the_file() {
-    let text = CASE.replace(
-        "end = 1",
-        "end = 1\nstop = { when = \"rest\", hold = \"1 s\" }",
-    );
-    let set = [
-        "time.stop.hold=-1".to_string(),
-        "grain.0.shape.diameter=2".into(),
-    ];
+    let text = CASE.replace("end = 1", "end = 1\nstop = { when = \"rest\", hold = \"1 s\" }");
+    let set = ["time.stop.hold=-1".to_string(), "grain.0.shape.diameter=2".into()];
     let (source, case): (_, RawCase) = Source::parse("case.toml", &text, &set).unwrap();
     let stop = case.time.stop.unwrap();
     let p = source.locate(Problem::new("wrong"), stop.span.as_ref(), "here");
@@ -96,10 +83,7 @@ fn what_an_override_changed_is_shown_instead_of_the_file() {
 
 #[test]
 fn bare_numbers_are_known() {
-    let set = [
-        "time.end=2 s".to_string(),
-        "grain.0.shape.diameter=2".into(),
-    ];
+    let set = ["time.end=2 s".to_string(), "grain.0.shape.diameter=2".into()];
     let (source, _): (_, RawCase) = Source::parse("case.toml", CASE, &set).unwrap();
     assert!(source.is_bare("grain.0.density") && source.is_bare("grain.0.shape"));
     assert!(source.is_bare("domain.size.1") && !source.is_bare("domain.size.3"));
@@ -110,10 +94,7 @@ fn bare_numbers_are_known() {
 fn a_missing_table_is_named() {
     let p = problem(&CASE.replace("[time]\nend = 1\n", ""), &[]);
     assert_eq!(p.message, "the table [time] is missing in case.toml");
-    assert!(
-        p.help.as_ref().unwrap().contains("add [time] with end ="),
-        "{p:?}"
-    );
+    assert!(p.help.as_ref().unwrap().contains("add [time] with end ="), "{p:?}");
     assert_eq!((p.key.as_deref(), p.place()), (Some("time"), None));
     // What is missing in a table is told of that table.
     let two = format!("{CASE}\n[[grain]]\nshape = {{ kind = \"sphere\", diameter = 0.1 }}\n");
@@ -125,27 +106,15 @@ fn a_missing_table_is_named() {
 #[test]
 fn kinds_of_values_have_plain_names() {
     for (set, words) in [
-        (
-            "run.threads=-1",
-            "found -1, expected a whole number, zero or more",
-        ),
-        (
-            "run.threads=1.5",
-            "found 1.5, expected a whole number, zero or more",
-        ),
+        ("run.threads=-1", "found -1, expected a whole number, zero or more"),
+        ("run.threads=1.5", "found 1.5, expected a whole number, zero or more"),
         ("fluid=3", "found 3, expected a table of keys and values"),
         ("packing=3", "found 3, expected a list"),
         ("title=3", "found 3, expected text in quotes"),
         ("output.at_events=3", "found 3, expected true or false"),
         ("grain.0.file=true", "found true, expected text in quotes"),
-        (
-            "grain.0.orientation=[1, 2, \"a\", 3]",
-            "the text \"a\", expected a number",
-        ),
-        (
-            "domain.cells=[5, 5]",
-            "found 2 values, expected a list of 3 values",
-        ),
+        ("grain.0.orientation=[1, 2, \"a\", 3]", "the text \"a\", expected a number"),
+        ("domain.cells=[5, 5]", "found 2 values, expected a list of 3 values"),
         ("fluid.advection=3", "expected text in quotes"),
     ] {
         let p = problem(CASE, &[set]);

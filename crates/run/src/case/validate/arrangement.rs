@@ -110,11 +110,7 @@ fn check_faces(
         }
         let face = [enclosure.lower, enclosure.upper][o.side][o.axis];
         let (by, axis, side) = (millimetres(o.by), AXES[o.axis], SIDES[o.side]);
-        let what = if o.centroid {
-            "lies outside the box"
-        } else {
-            "crosses a face of the box"
-        };
+        let what = if o.centroid { "lies outside the box" } else { "crosses a face of the box" };
         let message = format!(
             "grain {} {what}: it reaches {by} beyond the {side} {axis} face (at {})",
             o.grain,
@@ -156,8 +152,7 @@ fn too_large(grain: &Grain, enclosure: &Enclosure) -> Option<(usize, f64)> {
         (axis, upper - lower)
     };
     let axes = (0..3).filter(|axis| !enclosure.is_periodic(*axis));
-    axes.map(extent)
-        .find(|(axis, extent)| *extent > enclosure.size()[*axis])
+    axes.map(extent).find(|(axis, extent)| *extent > enclosure.size()[*axis])
 }
 
 fn report_too_large(
@@ -169,11 +164,8 @@ fn report_too_large(
     extent: f64,
 ) {
     let available = enclosure.size()[axis];
-    let unit = if extent > FAR * available && check.is_bare(check.key(size)) {
-        FORGOTTEN
-    } else {
-        ""
-    };
+    let unit =
+        if extent > FAR * available && check.is_bare(check.key(size)) { FORGOTTEN } else { "" };
     let message = format!(
         "grain {index} is larger than the box: {} along {}, the box has {}",
         length(extent),
@@ -227,16 +219,9 @@ fn overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap> {
                 continue;
             };
             let partner = Partner::Grain(j);
-            match found
-                .iter_mut()
-                .find(|o| o.grain == i && o.partner == partner)
-            {
+            match found.iter_mut().find(|o| o.grain == i && o.partner == partner) {
                 Some(overlap) => overlap.depth = overlap.depth.max(depth),
-                None => found.push(Overlap {
-                    grain: i,
-                    partner,
-                    depth,
-                }),
+                None => found.push(Overlap { grain: i, partner, depth }),
             }
         }
     }
@@ -256,9 +241,7 @@ fn nested(a: &Grain, b: &Grain, enclosure: &Enclosure) -> Option<f64> {
     }
     let axes = DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
     let move_along = |way: DVec3| extent(a, way) + extent(b, -way) - line.dot(way);
-    axes.chain(line.try_normalize())
-        .map(move_along)
-        .reduce(f64::min)
+    axes.chain(line.try_normalize()).map(move_along).reduce(f64::min)
 }
 
 /// Returns the extent of the grain from its centre in a direction [m].
@@ -272,9 +255,5 @@ fn extent(grain: &Grain, direction: DVec3) -> f64 {
 
 /// Formats a length [m] in millimetres if it is below one metre.
 fn millimetres(x: f64) -> String {
-    if x.abs() < 1.0 {
-        format!("{:.4} mm", 1e3 * x)
-    } else {
-        length(x)
-    }
+    if x.abs() < 1.0 { format!("{:.4} mm", 1e3 * x) } else { length(x) }
 }

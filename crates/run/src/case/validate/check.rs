@@ -27,8 +27,7 @@ impl<'a> Checker<'a> {
 
     /// Reports a problem of `key`, which is not written in the file.
     pub fn fail_key(&mut self, key: &str, message: impl Into<String>, help: impl Into<String>) {
-        self.problems
-            .push(Problem::new(message).key(key).help(help));
+        self.problems.push(Problem::new(message).key(key).help(help));
     }
 
     /// Returns the dotted key of the value at `span`; empty for a default.

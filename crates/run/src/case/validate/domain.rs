@@ -45,11 +45,7 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
             if let Some(size) = size.as_ref().filter(|size| differs(size.si)) {
                 let (size, extent) = (vector(size.si, "m"), vector(extent, "m"));
                 let message = format!("size {size} is not cells times cell_size, {extent}");
-                check.fail(
-                    &cells.span,
-                    message,
-                    "give two of size, cells and cell_size",
-                );
+                check.fail(&cells.span, message, "give two of size, cells and cell_size");
                 return None;
             }
             (cells.value, cell.0)
@@ -73,11 +69,7 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
         return None;
     }
     let origin = raw.origin.si;
-    let mesh = Mesh {
-        cells,
-        spacing,
-        origin,
-    };
+    let mesh = Mesh { cells, spacing, origin };
     raw.size = Some(Triple::new(mesh.extent()).into());
     raw.cells = Some(cells.into());
     raw.cell_size = Some(CellSize(spacing).into());

@@ -37,8 +37,7 @@ impl Collector<'_, '_> {
         if !raw.is_empty() && measure.of_pair() && self.grains != 2 {
             let grains = self.grains;
             let message = format!("this is a result of a pair, but there are {grains} grains");
-            self.check
-                .fail_key(&key, message, "leave it out, or use two grains");
+            self.check.fail_key(&key, message, "leave it out, or use two grains");
         }
         for item in &raw.0 {
             match bounds(item, self.grains) {
@@ -83,13 +82,7 @@ fn bounds<K: Kind>(
             return Err((&tolerance.span, message, help));
         }
     }
-    let RawExpected {
-        value,
-        tolerance,
-        at_least,
-        at_most,
-        ..
-    } = &item.value;
+    let RawExpected { value, tolerance, at_least, at_most, .. } = &item.value;
     if let (Some(low), Some(high)) = (at_least, at_most)
         && low.si > high.si
     {

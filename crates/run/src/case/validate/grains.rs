@@ -14,7 +14,7 @@ use crate::case::quantity::{Density, Kind, Quantity, Triple};
 use crate::case::raw::{MotionLaw, Orientation, Position, RawGrain, Turns};
 use crate::case::settling::LIGHTEST_FREE;
 use crate::case::shapes::{DEFAULT_NODES, Library};
-use grainwake_solver::dem::{MotionConstraint, Grain};
+use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::sim::PrescribedMotion;
 
 /// Vertical axis, and the sign of the upward direction along it.
@@ -125,11 +125,7 @@ impl<'a> Grains<'a> {
             let (span, message, alternative) = match &raw.position {
                 Some(position) => match position.0[..] {
                     [x, y, z] => return Some(DVec3::new(x, y, z)),
-                    _ => (
-                        &position.span,
-                        "two components, but nothing says the height",
-                        "give",
-                    ),
+                    _ => (&position.span, "two components, but nothing says the height", "give"),
                 },
                 None => (&raw.span, "the grain has no position", "add position ="),
             };
@@ -181,11 +177,7 @@ impl<'a> Grains<'a> {
             };
             (motion.velocity.is_some() || motion.angular_velocity.is_some()).then_some(motion)
         };
-        self.resolved
-            .iter()
-            .enumerate()
-            .filter_map(motion)
-            .collect()
+        self.resolved.iter().enumerate().filter_map(motion).collect()
     }
 }
 
@@ -238,10 +230,7 @@ pub(super) fn shape(
             shape
         }
         (None, Some(shape)) => {
-            let nodes = raw
-                .nodes
-                .as_ref()
-                .map_or(DEFAULT_NODES, |nodes| nodes.value);
+            let nodes = raw.nodes.as_ref().map_or(DEFAULT_NODES, |nodes| nodes.value);
             resolved.nodes = Some(nodes.into());
             let refused = |error: (String, String)| {
                 let nodes = raw.nodes.as_ref().filter(|_| error.0.starts_with("nodes"));
@@ -250,11 +239,7 @@ pub(super) fn shape(
             library.closed_form(shape, nodes).map_err(refused).ok()?
         }
         (Some(_), Some(shape)) => {
-            check.fail(
-                &shape.span,
-                "both file and shape are given",
-                "keep one of them",
-            );
+            check.fail(&shape.span, "both file and shape are given", "keep one of them");
             return None;
         }
         (None, None) => {

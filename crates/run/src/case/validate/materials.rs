@@ -36,10 +36,8 @@ pub(super) fn materials(
             let help = format!("add {name} = {example} to [contact] or to the grain");
             check.fail(&contact.law.span, message, help);
         }
-        let restitution = restitution(
-            check,
-            raw.restitution.as_ref().unwrap_or(&contact.restitution),
-        );
+        let restitution =
+            restitution(check, raw.restitution.as_ref().unwrap_or(&contact.restitution));
         let material = material(check, modulus, ratio, restitution);
         if check.problems.len() > before {
             // A wrong default of [contact] would be reported once for each grain.
@@ -102,16 +100,9 @@ fn refuse_unused(check: &mut Checker, contact: &RawContact, raw: &[Located<RawGr
             ];
             let of_grain = |grain: &Located<RawGrain>| {
                 let (ratio, restitution) = (&grain.poisson_ratio, &grain.restitution);
-                [
-                    modulus(&grain.youngs_modulus),
-                    number(ratio),
-                    number(restitution),
-                ]
+                [modulus(&grain.youngs_modulus), number(ratio), number(restitution)]
             };
-            of_contact
-                .into_iter()
-                .chain(raw.iter().flat_map(of_grain))
-                .collect()
+            of_contact.into_iter().chain(raw.iter().flat_map(of_grain)).collect()
         }
     };
     for span in unused.into_iter().flatten() {

@@ -94,13 +94,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
         return None;
     }
     let motions = grains.prescribed_motions();
-    let Grains {
-        library,
-        vertical,
-        built,
-        resolved,
-        placements,
-    } = grains;
+    let Grains { library, vertical, built, resolved, placements } = grains;
     let mut grains = built.into_iter().collect::<Option<Vec<Grain>>>()?;
     prescription.motions = motions;
     prescription.prescribe_motion(&mut grains, 0.0);
@@ -113,15 +107,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     let material = materials::materials(check, &raw.contact, &resolved, &mut grains);
     let contact = if dry || fluid.is_some() {
         let raw = &mut raw.contact;
-        physics::contact(
-            check,
-            raw,
-            &grains,
-            material,
-            fluid.as_ref(),
-            gravity,
-            &mesh,
-        )
+        physics::contact(check, raw, &grains, material, fluid.as_ref(), gravity, &mesh)
     } else {
         None
     };
@@ -141,19 +127,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     let plan = plan?;
     raw.grain = resolved;
     raw.packing = Vec::new();
-    raw.output.planes = Some(
-        plan.planes
-            .iter()
-            .map(|p| RawPlane::from(p).into())
-            .collect(),
-    );
+    raw.output.planes = Some(plan.planes.iter().map(|p| RawPlane::from(p).into()).collect());
     raw.run.threads = threads.into();
-    Some(Validated {
-        setup,
-        plan,
-        threads,
-        expect,
-        shapes: library.into_files(),
-        resolved: raw,
-    })
+    Some(Validated { setup, plan, threads, expect, shapes: library.into_files(), resolved: raw })
 }

@@ -31,11 +31,7 @@ pub(super) fn packing(
     }
     if count > MOST_GRAINS {
         let message = format!("{count} grains are too many");
-        check.fail(
-            &raw.count.span,
-            message,
-            format!("at most {MOST_GRAINS} grains"),
-        );
+        check.fail(&raw.count.span, message, format!("at most {MOST_GRAINS} grains"));
         return None;
     }
     let density = check.positive(&raw.density, "the density of a grain");
@@ -47,31 +43,20 @@ pub(super) fn packing(
     let mut random = Random::seed_from_u64(raw.seed);
     let (mut packed, radii) = members(check, grains, raw, &mut random)?;
 
-    let (lower, upper) = (raw.region.as_ref()).map_or((enclosure.lower, enclosure.upper), |r| {
-        (r.lower.si, r.upper.si)
-    });
+    let (lower, upper) = (raw.region.as_ref())
+        .map_or((enclosure.lower, enclosure.upper), |r| (r.lower.si, r.upper.si));
     let region_span = raw.region.as_ref().map_or(&raw.span, |region| &region.span);
     if (lower.cmplt(enclosure.lower) | upper.cmpgt(enclosure.upper) | upper.cmple(lower)).any() {
         let (from, to) = (vector(enclosure.lower, "m"), vector(enclosure.upper, "m"));
         let message = "the region is empty or reaches out of the box";
-        check.fail(
-            region_span,
-            message,
-            format!("the box goes from {from} to {to}"),
-        );
+        check.fail(region_span, message, format!("the box goes from {from} to {to}"));
         return None;
     }
     let sphere = |centre, radius| Sphere { centre, radius };
     let taken: Vec<Sphere> = (grains.built.iter().flatten())
         .map(|grain| sphere(grain.pose.position, grain.shape.bounding_radius()))
         .collect();
-    let region = Region {
-        lower,
-        upper,
-        clearance,
-        enclosure,
-        taken: &taken,
-    };
+    let region = Region { lower, upper, clearance, enclosure, taken: &taken };
     let vertical = (grains.vertical.axis, grains.vertical.sign);
     let centres = match raw.arrangement {
         Arrangement::Lattice => region.lattice(&radii, jitter, vertical, &mut random),
@@ -79,20 +64,14 @@ pub(super) fn packing(
     };
     let refused = |capacity| {
         let by_count = check.is_overridden(&raw.count.span);
-        let span = if by_count {
-            &raw.count.span
-        } else {
-            region_span
-        };
+        let span = if by_count { &raw.count.span } else { region_span };
         let message = format!("only {capacity} of {count} grains find a place without touching");
         let help = "take fewer or smaller grains, a larger region, or less clearance; a lattice holds more than random places";
         check.fail(span, message, help);
     };
     let centres = centres.map_err(refused).ok()?;
     let pairs = centres.iter().zip(&radii);
-    let spheres: Vec<Sphere> = pairs
-        .map(|(centre, radius)| sphere(*centre, *radius))
-        .collect();
+    let spheres: Vec<Sphere> = pairs.map(|(centre, radius)| sphere(*centre, *radius)).collect();
     if !region.clear(&spheres) {
         let message = "the packing runs into grains that already stand there";
         let help = "choose a region that is free, or arrangement = \"random\"";
@@ -137,11 +116,7 @@ fn members(
             grain.nodes = raw.nodes.clone();
         }
         if let Some((from, to, span)) = diameters {
-            let d = if to > from {
-                from + (to - from) * random.random::<f64>()
-            } else {
-                from
-            };
+            let d = if to > from { from + (to - from) * random.random::<f64>() } else { from };
             grain.equivalent_diameter = Some(Located::at(Quantity::new(d), span.clone()));
         }
         if raw.orientation == PackingOrientation::Random {

@@ -33,10 +33,9 @@ pub(super) fn fluid(
 ) -> Option<FluidParams> {
     let density = check.positive(&raw.density, "the density of the fluid");
     let kinematic_viscosity = match (&raw.viscosity, &raw.kinematic_viscosity) {
-        (Some(mu), None) => check
-            .positive(mu, "the viscosity")
-            .zip(density)
-            .map(|(mu, rho)| mu / rho),
+        (Some(mu), None) => {
+            check.positive(mu, "the viscosity").zip(density).map(|(mu, rho)| mu / rho)
+        }
         (None, Some(nu)) => check.positive(nu, "the viscosity"),
         (Some(mu), Some(_)) => {
             let message = "both viscosity and kinematic_viscosity are given";
@@ -76,17 +75,9 @@ pub(super) fn formulas(check: &mut Checker, raw: &RawFluid, given: &Prescription
     };
     let speed = given.initial_speed(mesh);
     let everywhere = "everywhere in the box";
-    refuse(
-        speed.is_some_and(f64::is_nan),
-        &raw.initial_velocity.span,
-        everywhere,
-    );
+    refuse(speed.is_some_and(f64::is_nan), &raw.initial_velocity.span, everywhere);
     let acceleration = given.body_acceleration(0.0);
-    refuse(
-        acceleration.is_some_and(DVec3::is_nan),
-        &raw.body_acceleration.span,
-        "at t = 0",
-    );
+    refuse(acceleration.is_some_and(DVec3::is_nan), &raw.body_acceleration.span, "at t = 0");
 }
 
 /// Returns the contact parameters. A stiffness that is not given follows from the largest overlap.
@@ -185,9 +176,5 @@ fn stiffness_for(
         ContactParams::stiffness_for_overlap(grain.mass(), speed, overlap).max(weight / overlap)
     };
     let stiffness = grains.iter().map(needed).fold(0.0, f64::max);
-    if stiffness > 0.0 {
-        stiffness
-    } else {
-        ContactParams::default().normal_stiffness
-    }
+    if stiffness > 0.0 { stiffness } else { ContactParams::default().normal_stiffness }
 }

@@ -7,7 +7,7 @@ use crate::case::quantity::{Quantity, Time};
 use crate::case::raw::{RawOutput, RawPlane, RawRun, RawStop, RawTime};
 use crate::case::settling::{default_max_step, settled_time_step};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
-use grainwake_solver::dem::{MotionConstraint, Grain};
+use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{Setup, StepRule};
@@ -52,11 +52,7 @@ pub(super) fn step(
     let longest = || default_max_step(mesh.spacing, grains, gravity, dry, end);
     let max_step = (raw.max_step).get_or_insert_with(|| Quantity::new(longest()).into());
     let max_step = check.positive(max_step, "the longest step");
-    Some(StepRule::Limits {
-        cfl: cfl?,
-        viscous: viscous?,
-        max_step: max_step?,
-    })
+    Some(StepRule::Limits { cfl: cfl?, viscous: viscous?, max_step: max_step? })
 }
 
 /// Returns the run plan and writes the intervals that are not given.
@@ -88,11 +84,7 @@ pub(super) fn plan(
     };
     let settled = settled_time_step(setup);
     let by_limits = matches!(setup.step, StepRule::Limits { .. }) && !dry;
-    let smallest_step = if by_limits {
-        SMALLEST_STEP * settled
-    } else {
-        0.0
-    };
+    let smallest_step = if by_limits { SMALLEST_STEP * settled } else { 0.0 };
     // Default outputs do not shorten the steps.
     let step = settled.min(end);
     let coarse = (end / 40.0).max(step);
@@ -102,14 +94,11 @@ pub(super) fn plan(
     let surfaces = interval(&mut raw.surfaces, surfaces);
     let fields = check_interval(&raw.fields);
     let checkpoint_interval = check.not_negative(&raw.checkpoint_interval);
-    let stop = time
-        .stop
-        .as_ref()
-        .map(|stop| stop_rule(check, stop, grains));
+    let stop = time.stop.as_ref().map(|stop| stop_rule(check, stop, grains));
     let planes = match &raw.planes {
-        Some(planes) => (planes.iter())
-            .filter_map(|raw| plane(check, raw, grains.len(), &setup.mesh))
-            .collect(),
+        Some(planes) => {
+            (planes.iter()).filter_map(|raw| plane(check, raw, grains.len(), &setup.mesh)).collect()
+        }
         None => default_planes(grains.len(), &setup.mesh, vertical),
     };
     if check.problems.len() > before {
@@ -143,10 +132,7 @@ fn stop_rule(check: &mut Checker, raw: &Located<RawStop>, grains: &[Grain]) -> S
         let message = "no grain moves freely, so this never happens";
         check.fail(&raw.span, message, "leave out `stop`");
     }
-    Stop {
-        when: raw.when,
-        hold: raw.hold.si,
-    }
+    Stop { when: raw.when, hold: raw.hold.si }
 }
 
 /// Returns a plane through each of one or two grains, else one through the middle of the box.

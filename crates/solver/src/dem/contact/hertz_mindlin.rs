@@ -99,10 +99,7 @@ mod tests {
             deepest = deepest.max(overlap);
         }
         assert!((time / expected - 1.0).abs() < 1e-4, "{time} {expected}");
-        assert!(
-            (deepest / largest - 1.0).abs() < 1e-4,
-            "{deepest} {largest}"
-        );
+        assert!((deepest / largest - 1.0).abs() < 1e-4, "{deepest} {largest}");
         // Half way into the contact the speed is lower, but the expected duration is unchanged.
         let half: f64 = 0.5 * largest;
         let energy: f64 = 0.5 * 9.0 / pair.inverse_mass;

@@ -9,11 +9,7 @@ use crate::math::Load;
 
 /// Gap below which the lubrication force acts [m]; zero if it is switched off.
 pub(super) fn range(params: &ContactParams) -> f64 {
-    if params.lubrication_viscosity > 0.0 {
-        params.lubrication_gap.max(0.0)
-    } else {
-        0.0
-    }
+    if params.lubrication_viscosity > 0.0 { params.lubrication_gap.max(0.0) } else { 0.0 }
 }
 
 /// Leading-order squeeze-film force between the equal-volume spheres,
@@ -45,14 +41,8 @@ pub(super) fn lubrication(
     let force = -resistance * approach * closest.normal;
     PairLoads {
         overlap: -closest.gap,
-        on_grain: Load {
-            force,
-            torque: closest.lever_arm.cross(force),
-        },
-        on_partner: Load {
-            force: -force,
-            torque: -lever_arm_b.cross(force),
-        },
+        on_grain: Load { force, torque: closest.lever_arm.cross(force) },
+        on_partner: Load { force: -force, torque: -lever_arm_b.cross(force) },
         lever_arm: closest.lever_arm,
         normal: closest.normal,
         elastic_energy: 0.0,

@@ -67,10 +67,7 @@ pub(in crate::dem) struct ContactModel {
 impl ContactModel {
     /// Model with these parameters.
     pub fn new(params: ContactParams) -> ContactModel {
-        ContactModel {
-            params,
-            law: SelectedLaw::new(&params),
-        }
+        ContactModel { params, law: SelectedLaw::new(&params) }
     }
 
     /// Largest gap at which a pair interacts [m].
@@ -168,21 +165,12 @@ impl ContactModel {
                     displacement,
                 });
             }
-            loads.on_grain += Load {
-                force,
-                torque: point.lever_arm.cross(force),
-            };
-            loads.on_partner += Load {
-                force: -force,
-                torque: -(point.lever_arm + pair.branch).cross(force),
-            };
+            loads.on_grain += Load { force, torque: point.lever_arm.cross(force) };
+            loads.on_partner +=
+                Load { force: -force, torque: -(point.lever_arm + pair.branch).cross(force) };
         }
         std::mem::swap(&mut record.history, &mut record.next_history);
-        record.mean_history = TangentialHistory {
-            id: 0,
-            normal,
-            displacement: mean_displacement,
-        };
+        record.mean_history = TangentialHistory { id: 0, normal, displacement: mean_displacement };
         record.loads = loads;
     }
 }
@@ -193,11 +181,7 @@ impl ContactModel {
 /// the part of the sub-step in contact counts.
 fn begin_or_continue(record: &mut ContactRecord, mean: &PatchMean, step: f64) -> f64 {
     let begins = !record.in_contact && mean.approach * step > mean.overlap;
-    let time_in_contact = if begins {
-        mean.overlap / mean.approach
-    } else {
-        step
-    };
+    let time_in_contact = if begins { mean.overlap / mean.approach } else { step };
     record.dashpot_fraction = match (begins, step > 0.0 && record.in_contact) {
         (true, _) => 0.5 + time_in_contact / step,
         (false, true) => 1.0,
@@ -213,9 +197,5 @@ fn begin_or_continue(record: &mut ContactRecord, mean: &PatchMean, step: f64) ->
 /// The force stays as it is when the stiffness grows (loading), and shrinks with the stiffness when
 /// it falls (unloading); otherwise a closed cycle could create energy.
 fn history_scale(before: f64, now: f64) -> f64 {
-    if now > before && before > 0.0 {
-        before / now
-    } else {
-        1.0
-    }
+    if now > before && before > 0.0 { before / now } else { 1.0 }
 }

@@ -17,11 +17,8 @@ pub(in crate::dem) struct TangentialHistory {
 }
 
 impl TangentialHistory {
-    const NONE: TangentialHistory = TangentialHistory {
-        id: 0,
-        normal: DVec3::ZERO,
-        displacement: DVec3::ZERO,
-    };
+    const NONE: TangentialHistory =
+        TangentialHistory { id: 0, normal: DVec3::ZERO, displacement: DVec3::ZERO };
 }
 
 /// Overlap and loads of a pair.
@@ -145,11 +142,7 @@ mod tests {
     use crate::dem::search::Partner;
 
     fn key((grain, partner): (u32, usize)) -> PairKey {
-        PairKey {
-            grain,
-            partner: Partner::Grain(partner),
-            image: IVec3::ZERO,
-        }
+        PairKey { grain, partner: Partner::Grain(partner), image: IVec3::ZERO }
     }
 
     #[test]

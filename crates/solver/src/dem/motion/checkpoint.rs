@@ -38,10 +38,7 @@ fn decode_partner(input: &mut Decoder, grains: usize) -> io::Result<Partner> {
     }
     let wall = code ^ WALL;
     if wall < 6 {
-        return Ok(Partner::Wall {
-            axis: (wall >> 1) as u8,
-            side: (wall & 1) as u8,
-        });
+        return Ok(Partner::Wall { axis: (wall >> 1) as u8, side: (wall & 1) as u8 });
     }
     Err(damaged("a pair names no grain and no wall"))
 }
@@ -49,11 +46,7 @@ fn decode_partner(input: &mut Decoder, grains: usize) -> io::Result<Partner> {
 /// Decodes the index of one of `grains`.
 fn decode_grain(input: &mut Decoder, grains: usize) -> io::Result<usize> {
     let index = input.u64()?;
-    if index < grains as u64 {
-        Ok(index as usize)
-    } else {
-        Err(damaged("a pair names no grain"))
-    }
+    if index < grains as u64 { Ok(index as usize) } else { Err(damaged("a pair names no grain")) }
 }
 
 impl ContactDynamics {
@@ -92,9 +85,7 @@ impl ContactDynamics {
         let mut signature = [0; SIGNATURE.len()];
         reader.read_exact(&mut signature)?;
         if signature != SIGNATURE {
-            return Err(damaged(
-                "its first bytes are not those of a contact history",
-            ));
+            return Err(damaged("its first bytes are not those of a contact history"));
         }
         let mut input = Decoder::new(reader);
         let version = input.u8()?;
@@ -116,10 +107,7 @@ impl ContactDynamics {
                 grain: decode_grain(input, grains)?,
                 partner: decode_partner(input, grains)?,
                 overlap: input.f64()?,
-                load: Load {
-                    force: input.vector()?,
-                    torque: input.vector()?,
-                },
+                load: Load { force: input.vector()?, torque: input.vector()? },
                 point: input.vector()?,
                 normal: input.vector()?,
             })
@@ -156,11 +144,7 @@ fn decode_record(input: &mut Decoder, grains: usize, version: u8) -> io::Result<
     for axis in 0..3 {
         image[axis] = i32::try_from(input.u64()? as i64).map_err(|_| damaged("image of a pair"))?;
     }
-    let mut record = ContactRecord::new(PairKey {
-        grain,
-        partner,
-        image,
-    });
+    let mut record = ContactRecord::new(PairKey { grain, partner, image });
     record.in_contact = true;
     record.mean_history.normal = input.vector()?;
     record.mean_history.displacement = input.vector()?;

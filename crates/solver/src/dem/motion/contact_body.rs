@@ -132,19 +132,14 @@ impl ContactBody {
         self.displacement =
             step * (half_step.velocity.length() + radius * half_step.angular_velocity.length());
         if step > 0.0 {
-            self.mid_step = PointMotion {
-                linear: half_step.velocity,
-                angular: half_step.angular_velocity,
-            };
+            self.mid_step =
+                PointMotion { linear: half_step.velocity, angular: half_step.angular_velocity };
             self.end_of_step = PointMotion {
                 linear: half_step.predicted_velocity,
                 angular: half_step.predicted_angular_velocity,
             };
         } else {
-            self.mid_step = PointMotion {
-                linear: grain.velocity,
-                angular: grain.angular_velocity,
-            };
+            self.mid_step = PointMotion { linear: grain.velocity, angular: grain.angular_velocity };
             self.end_of_step = self.mid_step;
         }
     }
@@ -159,12 +154,7 @@ impl ContactBody {
     }
 
     fn posed_shape(&self, position: DVec3) -> PosedShape<'_> {
-        PosedShape {
-            shape: &self.shape,
-            tree: &self.tree,
-            rotation: self.rotation,
-            position,
-        }
+        PosedShape { shape: &self.shape, tree: &self.tree, rotation: self.rotation, position }
     }
 }
 

@@ -62,9 +62,7 @@ impl ContactDynamics {
     }
     /// Energy of the contact springs at the end of the last step [J].
     pub fn elastic_energy(&self) -> f64 {
-        (self.records.iter())
-            .map(|record| record.loads.elastic_energy)
-            .sum()
+        (self.records.iter()).map(|record| record.loads.elastic_energy).sum()
     }
 
     /// Advances poses and velocities by `dt` [s] in sub-steps under constant `loads` (space frame,
@@ -135,8 +133,7 @@ impl ContactDynamics {
     /// Records the positions and the contacts at the end of a step.
     pub(super) fn end_step(&mut self, grains: &[Grain]) {
         self.last_positions.clear();
-        self.last_positions
-            .extend(grains.iter().map(|grain| grain.pose.position));
+        self.last_positions.extend(grains.iter().map(|grain| grain.pose.position));
         self.contacts.clear();
         for record in self.records.iter().filter(|r| r.in_contact_during_step) {
             let grain = record.key.grain as usize;

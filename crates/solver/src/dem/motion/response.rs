@@ -20,11 +20,7 @@ impl GrainResponse {
     /// Response from the velocities at the start, the loads without contact [N] and [N m], and the
     /// columns of the inverse 6 x 6 mass.
     pub fn new(start: [DVec3; 2], load: Vector6, inverse: Matrix6) -> GrainResponse {
-        let mut response = GrainResponse {
-            start,
-            free: Default::default(),
-            inverse,
-        };
+        let mut response = GrainResponse { start, free: Default::default(), inverse };
         response.free = response.acceleration(&Load {
             force: DVec3::from_slice(&load[..3]),
             torque: DVec3::from_slice(&load[3..]),

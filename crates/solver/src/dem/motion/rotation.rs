@@ -62,11 +62,8 @@ pub fn half_step_implicit(
         last = change;
     }
     guess = omega;
-    let ratio = DVec3::new(
-        inertia.y - inertia.z,
-        inertia.z - inertia.x,
-        inertia.x - inertia.y,
-    ) / inertia;
+    let ratio =
+        DVec3::new(inertia.y - inertia.z, inertia.z - inertia.x, inertia.x - inertia.y) / inertia;
     for _ in 0..NEWTON {
         let residual =
             guess - omega - half_step * angular_acceleration(inertia, guess, torque, damping);
@@ -160,10 +157,7 @@ mod tests {
             let omega = DVec3::new(0.9, -2.0, 1.4);
             let w = half_step_implicit(inertia, omega, torque, 0.3, half_step);
             let residual = w - omega - half_step * angular_acceleration(inertia, w, torque, 0.3);
-            assert!(
-                residual.length() < 1e-13 * omega.length(),
-                "{half_step}: {residual}"
-            );
+            assert!(residual.length() < 1e-13 * omega.length(), "{half_step}: {residual}");
         }
     }
 

@@ -18,10 +18,7 @@ pub struct RigidState {
 impl RigidState {
     /// Present state of a grain.
     pub fn of(grain: &Grain) -> RigidState {
-        RigidState {
-            pose: grain.pose,
-            velocities: [grain.velocity, grain.angular_velocity],
-        }
+        RigidState { pose: grain.pose, velocities: [grain.velocity, grain.angular_velocity] }
     }
 
     /// Gives a grain this state.

@@ -62,11 +62,7 @@ impl CellGrid {
             let dims = count.to_array().map(|c| c.min(1e9) as usize + 1);
             if dims.iter().map(|&d| d as f64).product::<f64>() <= 8.0 * centres.len() as f64 + 64.0
             {
-                return CellGrid {
-                    lower,
-                    inverse_size: 1.0 / size,
-                    dims,
-                };
+                return CellGrid { lower, inverse_size: 1.0 / size, dims };
             }
             size *= 1.5;
         }
@@ -164,10 +160,7 @@ impl BroadPhase {
                 let down = ((inside[axis] - (enclosure.lower[axis] - reach)) / l).floor();
                 let up = ((enclosure.upper[axis] + reach - inside[axis]) / l).floor();
                 let limit = f64::from(MAX_PERIODS);
-                (
-                    -(down.clamp(0.0, limit) as i32),
-                    up.clamp(0.0, limit) as i32,
-                )
+                (-(down.clamp(0.0, limit) as i32), up.clamp(0.0, limit) as i32)
             });
             for k in range[2].0..=range[2].1 {
                 for j in range[1].0..=range[1].1 {
@@ -218,9 +211,7 @@ mod tests {
     fn scatter(count: usize, seed: u64) -> Vec<BoundingSphere> {
         let mut state = seed;
         let mut next = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         (0..count)
@@ -241,11 +232,7 @@ mod tests {
                     let apart = a.centre - b.centre - image.as_dvec3() * enclosure.size();
                     let listed = i < j || image.to_array() > [0, 0, 0];
                     if periodic && listed && apart.length() <= a.radius + b.radius {
-                        pairs.push(PairKey {
-                            grain: i as u32,
-                            partner: Partner::Grain(j),
-                            image,
-                        });
+                        pairs.push(PairKey { grain: i as u32, partner: Partner::Grain(j), image });
                     }
                 }
             }
@@ -285,11 +272,6 @@ mod tests {
         spheres[3].centre.x = f64::NAN;
         let mut broad = BroadPhase::default();
         broad.search(&spheres, &enclosure);
-        assert!(
-            broad
-                .pairs
-                .iter()
-                .all(|p| p.grain != 3 && p.partner != Partner::Grain(3))
-        );
+        assert!(broad.pairs.iter().all(|p| p.grain != 3 && p.partner != Partner::Grain(3)));
     }
 }

@@ -21,11 +21,7 @@ impl SurfacePoint {
     pub fn at(partner: &PartnerField, position: DVec3) -> Option<SurfacePoint> {
         let (distance, gradient) = partner.distance_and_gradient(position);
         let normal = gradient.try_normalize()?;
-        Some(SurfacePoint {
-            position,
-            distance,
-            normal,
-        })
+        Some(SurfacePoint { position, distance, normal })
     }
 }
 
@@ -93,19 +89,12 @@ pub(super) fn minimise_distance(
         let next_direction = descent_direction(&next);
         let displacement = next.position - point.position;
         let curvature = displacement.dot(direction - next_direction);
-        length = if curvature > 0.0 {
-            displacement.length_squared() / curvature
-        } else {
-            2.0 * step
-        };
+        length =
+            if curvature > 0.0 { displacement.length_squared() / curvature } else { 2.0 * step };
         point = next;
         direction = next_direction;
     }
-    if rejected {
-        compass_search(surface, partner, point, stride)
-    } else {
-        point
-    }
+    if rejected { compass_search(surface, partner, point, stride) } else { point }
 }
 
 /// Compass search from `point`: six points around it in the tangent plane, at a radius that is
@@ -152,19 +141,12 @@ mod tests {
     fn the_deepest_point_of_a_sphere_in_a_wall_and_in_a_sphere() {
         let sphere = Shape::sphere(2.0, 100);
         let direction = DVec3::new(0.3, -0.5, 1.0).normalize();
-        let limits = DescentLimits {
-            stride: 0.5,
-            tolerance: 1e-9,
-            iterations: 12,
-        };
+        let limits = DescentLimits { stride: 0.5, tolerance: 1e-9, iterations: 12 };
         let deepest = |field: &PartnerField, start: DVec3| {
             let start = SurfacePoint::at(field, start).unwrap();
             minimise_distance(&sphere, field, start, limits)
         };
-        let wall = PartnerField::HalfSpace {
-            normal: DVec3::Z,
-            offset: 1.99,
-        };
+        let wall = PartnerField::HalfSpace { normal: DVec3::Z, offset: 1.99 };
         let point = deepest(&wall, 2.0 * DVec3::new(0.5, -0.5, -0.8).normalize());
         assert!((point.distance + 0.01).abs() < 1e-12, "{}", point.distance);
         let other = Shape::sphere(1.0, 100);

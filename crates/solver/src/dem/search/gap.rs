@@ -52,11 +52,8 @@ fn closest_point(owner: &Grain, field: &PartnerField) -> Option<SurfacePoint> {
     }
     let radius = owner.shape.bounding_radius();
     let start = SurfacePoint::at(field, best?.1)?;
-    let limits = DescentLimits {
-        stride: radius,
-        tolerance: TOLERANCE * radius,
-        iterations: ITERATIONS,
-    };
+    let limits =
+        DescentLimits { stride: radius, tolerance: TOLERANCE * radius, iterations: ITERATIONS };
     Some(minimise_distance(&owner.shape, field, start, limits))
 }
 
@@ -86,11 +83,7 @@ fn gap_of_images(
     let radii = a.shape.bounding_radius() + b.shape.bounding_radius();
     // Images beyond the nearest one matter for grains as large as the box.
     let most = [0, 1, 2].map(|axis| {
-        if period[axis] > 0.0 {
-            (radii / period[axis]).ceil().min(4.0) as i32 + 1
-        } else {
-            0
-        }
+        if period[axis] > 0.0 { (radii / period[axis]).ceil().min(4.0) as i32 + 1 } else { 0 }
     });
     let mut images: Vec<(f64, DVec3)> = Vec::new();
     for k in -most[2]..=most[2] {
@@ -110,9 +103,7 @@ fn gap_of_images(
         if bound >= best {
             break;
         }
-        best = best
-            .min(one_way_gap(a, b, branch))
-            .min(one_way_gap(b, a, -branch));
+        best = best.min(one_way_gap(a, b, branch)).min(one_way_gap(b, a, -branch));
     }
     best
 }
@@ -129,18 +120,13 @@ pub fn surface_gap(a: &Grain, b: &Grain, enclosure: &Enclosure) -> f64 {
 fn wall_face_gap(grain: &Grain, face: &WallFace) -> f64 {
     let to_body = grain.pose.orientation.conjugate();
     let offset = face.distance(grain.pose.position);
-    let field = PartnerField::HalfSpace {
-        normal: to_body * face.inward,
-        offset,
-    };
+    let field = PartnerField::HalfSpace { normal: to_body * face.inward, offset };
     closest_point(grain, &field).map_or(f64::INFINITY, |point| point.distance)
 }
 
 /// Gap between the grain's surface and the nearest wall [m] (negative: overlap), and that wall.
 pub fn wall_gap(grain: &Grain, enclosure: &Enclosure) -> Option<(f64, Partner)> {
-    let gaps = enclosure
-        .faces()
-        .map(|face| (wall_face_gap(grain, &face), Partner::from(&face)));
+    let gaps = enclosure.faces().map(|face| (wall_face_gap(grain, &face), Partner::from(&face)));
     gaps.min_by(|x, y| x.0.total_cmp(&y.0))
 }
 
@@ -152,11 +138,7 @@ pub fn initial_overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap>
             let skip = (i == j).then_some(IVec3::ZERO);
             let gap = gap_of_images(a, b, enclosure, skip, 0.0);
             if gap < 0.0 {
-                found.push(Overlap {
-                    grain: i,
-                    partner: Partner::Grain(j),
-                    depth: -gap,
-                });
+                found.push(Overlap { grain: i, partner: Partner::Grain(j), depth: -gap });
             }
         }
         for face in enclosure.faces() {
@@ -165,11 +147,7 @@ pub fn initial_overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap>
             }
             let gap = wall_face_gap(a, &face);
             if gap < 0.0 {
-                found.push(Overlap {
-                    grain: i,
-                    partner: Partner::from(&face),
-                    depth: -gap,
-                });
+                found.push(Overlap { grain: i, partner: Partner::from(&face), depth: -gap });
             }
         }
     }

@@ -71,10 +71,7 @@ impl NearestNode {
     fn update(&mut self, distance: f64, index: u32) {
         let tied = distance == self.distance && self.index.is_some_and(|known| index < known);
         if distance < self.distance || tied {
-            *self = NearestNode {
-                distance,
-                index: Some(index),
-            };
+            *self = NearestNode { distance, index: Some(index) };
         }
     }
 }
@@ -102,10 +99,7 @@ pub(super) fn scan_surface(
         .filter(|_| nearest.distance < range)
         .and_then(|index| SurfacePoint::at(partner, tree.nodes[index as usize].position));
     let Some(start) = start else {
-        return SurfaceScan {
-            separation,
-            closest: None,
-        };
+        return SurfaceScan { separation, closest: None };
     };
     let limits = DescentLimits {
         stride: tree.spacing,
@@ -123,10 +117,7 @@ pub(super) fn scan_surface(
             point: closest,
         });
     }
-    SurfaceScan {
-        separation,
-        closest: (closest.distance < reach).then_some(closest),
-    }
+    SurfaceScan { separation, closest: (closest.distance < reach).then_some(closest) }
 }
 
 /// Collects the penetrating nodes and returns the nearest node within `range` [m].
@@ -137,10 +128,7 @@ fn scan_nodes(
     seed: Option<u32>,
     found: &mut Vec<PenetratingPoint>,
 ) -> NearestNode {
-    let mut nearest = NearestNode {
-        distance: range,
-        index: None,
-    };
+    let mut nearest = NearestNode { distance: range, index: None };
     if let Some((index, node)) = seed.and_then(|n| Some((n, tree.nodes.get(n as usize)?))) {
         nearest.update(partner.distance(node.position), index);
     }
@@ -162,11 +150,7 @@ fn scan_nodes(
                 if distance < 0.0
                     && let Some(point) = SurfacePoint::at(partner, node.position)
                 {
-                    found.push(PenetratingPoint {
-                        id: 2 * index,
-                        area: node.area,
-                        point,
-                    });
+                    found.push(PenetratingPoint { id: 2 * index, area: node.area, point });
                 }
             }
         }
@@ -204,11 +188,7 @@ fn add_mirror_points(
         // Half the area at equal depth, none at zero depth: the split is continuous.
         let share = 0.5 * (mirror.distance / node.point.distance).min(1.0);
         found[index].area = (1.0 - share) * node.area;
-        found.push(PenetratingPoint {
-            id: node.id + 1,
-            area: share * node.area,
-            point: mirror,
-        });
+        found.push(PenetratingPoint { id: node.id + 1, area: share * node.area, point: mirror });
     }
     found.sort_unstable_by_key(|point| point.id);
 }

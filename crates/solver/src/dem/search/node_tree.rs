@@ -44,11 +44,7 @@ impl NodeTree {
         let nodes = shape.nodes().to_vec();
         let area: f64 = nodes.iter().map(|n| n.area).sum();
         let spacing = (area / nodes.len().max(1) as f64).sqrt();
-        let mut tree = NodeTree {
-            nodes,
-            clusters: Vec::new(),
-            spacing,
-        };
+        let mut tree = NodeTree { nodes, clusters: Vec::new(), spacing };
         if !tree.nodes.is_empty() {
             tree.split(0, tree.nodes.len());
         }
@@ -62,10 +58,7 @@ impl NodeTree {
             (lower.min(n.position), upper.max(n.position))
         });
         let centre = 0.5 * (lower + upper);
-        let radius = nodes
-            .iter()
-            .map(|n| n.position.distance(centre))
-            .fold(0.0, f64::max);
+        let radius = nodes.iter().map(|n| n.position.distance(centre)).fold(0.0, f64::max);
         let index = self.clusters.len();
         self.clusters.push(NodeCluster {
             centre,
@@ -75,13 +68,8 @@ impl NodeTree {
         });
         if to - from > LEAF {
             let extent = upper - lower;
-            let axis = (0..3).fold(0, |best, axis| {
-                if extent[axis] > extent[best] {
-                    axis
-                } else {
-                    best
-                }
-            });
+            let axis =
+                (0..3).fold(0, |best, axis| if extent[axis] > extent[best] { axis } else { best });
             nodes.sort_by(|a, b| a.position[axis].total_cmp(&b.position[axis]));
             let middle = from + (to - from) / 2;
             self.split(from, middle);

@@ -20,10 +20,7 @@ pub enum Partner {
 
 impl From<&WallFace> for Partner {
     fn from(face: &WallFace) -> Partner {
-        Partner::Wall {
-            axis: face.axis as u8,
-            side: face.side as u8,
-        }
+        Partner::Wall { axis: face.axis as u8, side: face.side as u8 }
     }
 }
 
@@ -41,11 +38,7 @@ pub(crate) struct PairKey {
 impl PairKey {
     /// Pair of a grain with a wall.
     pub(super) fn wall(grain: u32, face: &WallFace) -> PairKey {
-        PairKey {
-            grain,
-            partner: face.into(),
-            image: IVec3::ZERO,
-        }
+        PairKey { grain, partner: face.into(), image: IVec3::ZERO }
     }
 
     fn rank(&self) -> (u32, Partner, [i32; 3]) {
@@ -70,11 +63,7 @@ mod tests {
 
     #[test]
     fn walls_come_after_grains() {
-        let key = |grain: u32, partner| PairKey {
-            grain,
-            partner,
-            image: IVec3::ZERO,
-        };
+        let key = |grain: u32, partner| PairKey { grain, partner, image: IVec3::ZERO };
         let wall = key(0, Partner::Wall { axis: 0, side: 0 });
         assert!(key(0, Partner::Grain(999)) < wall && wall < key(1, Partner::Grain(0)));
     }

@@ -37,22 +37,12 @@ impl<'a> PartnerField<'a> {
             Field::Sampled(field) => (field.lower(), field.upper()),
             _ => (shape.lower(), shape.upper()),
         };
-        PartnerField::Shape {
-            shape,
-            rotation,
-            translation,
-            exact,
-        }
+        PartnerField::Shape { shape, rotation, translation, exact }
     }
     /// Signed distance [m] and its gradient at `x`.
     pub fn distance_and_gradient(&self, x: DVec3) -> (f64, DVec3) {
         match self {
-            PartnerField::Shape {
-                shape,
-                rotation,
-                translation,
-                ..
-            } => {
+            PartnerField::Shape { shape, rotation, translation, .. } => {
                 let (distance, gradient) =
                     shape.distance_and_gradient(*rotation * x + *translation);
                 (distance, rotation.transpose() * gradient)
@@ -63,12 +53,7 @@ impl<'a> PartnerField<'a> {
     /// Signed distance [m] at `x`, or `None` if a bound shows that it exceeds `reach` [m].
     pub fn distance_within(&self, x: DVec3, reach: f64) -> Option<f64> {
         match self {
-            PartnerField::Shape {
-                shape,
-                rotation,
-                translation,
-                ..
-            } => {
+            PartnerField::Shape { shape, rotation, translation, .. } => {
                 let y = *rotation * x + *translation;
                 let outside = (shape.lower() - y).max(y - shape.upper()).max(DVec3::ZERO);
                 (outside.length_squared() <= reach * reach).then(|| shape.distance(y))
@@ -79,24 +64,16 @@ impl<'a> PartnerField<'a> {
     /// Signed distance [m] at `x`.
     pub fn distance(&self, x: DVec3) -> f64 {
         match self {
-            PartnerField::Shape {
-                shape,
-                rotation,
-                translation,
-                ..
-            } => shape.distance(*rotation * x + *translation),
+            PartnerField::Shape { shape, rotation, translation, .. } => {
+                shape.distance(*rotation * x + *translation)
+            }
             PartnerField::HalfSpace { normal, offset } => normal.dot(x) + offset,
         }
     }
     /// Whether a bound shows that every point of the sphere is farther away than `reach` [m].
     pub fn is_beyond(&self, centre: DVec3, radius: f64, reach: f64) -> bool {
         match self {
-            PartnerField::Shape {
-                shape,
-                rotation,
-                translation,
-                exact,
-            } => {
+            PartnerField::Shape { shape, rotation, translation, exact } => {
                 let y = *rotation * centre + *translation;
                 let far = radius + reach;
                 if y.length_squared() > (shape.bounding_radius() + far).powi(2) {

@@ -34,11 +34,7 @@ pub(in crate::dem) struct ClosestPoint {
 
 impl ClosestPoint {
     fn new(point: &SurfacePoint, (lever_arm, normal): (DVec3, DVec3)) -> ClosestPoint {
-        ClosestPoint {
-            gap: point.distance,
-            lever_arm,
-            normal,
-        }
+        ClosestPoint { gap: point.distance, lever_arm, normal }
     }
 
     fn nearer(a: Option<ClosestPoint>, b: Option<ClosestPoint>) -> Option<ClosestPoint> {
@@ -119,18 +115,11 @@ impl ContactPatch {
         if self.separation > 0.0 {
             return None;
         }
-        let wall = PartnerField::HalfSpace {
-            normal: a.rotation.transpose() * inward,
-            offset,
-        };
+        let wall = PartnerField::HalfSpace { normal: a.rotation.transpose() * inward, offset };
         let scan = scan_surface(a, &wall, reach, &mut self.seeds[0], &mut self.found);
         let to_space = |p: &SurfacePoint| (a.rotation * p.position, -inward);
         self.append_points(0, to_space);
-        self.separation = if self.points.is_empty() {
-            scan.separation - reach
-        } else {
-            0.0
-        };
+        self.separation = if self.points.is_empty() { scan.separation - reach } else { 0.0 };
         scan.closest.map(|p| ClosestPoint::new(&p, to_space(&p)))
     }
 

@@ -37,9 +37,7 @@ pub enum Boundary {
 
 impl Boundary {
     /// A no-slip wall at rest.
-    pub const WALL: Boundary = Boundary::Wall {
-        velocity: DVec3::ZERO,
-    };
+    pub const WALL: Boundary = Boundary::Wall { velocity: DVec3::ZERO };
 
     /// Whether grains collide with this face.
     pub fn is_solid(&self) -> bool {
@@ -67,13 +65,10 @@ impl Boundaries {
     /// that velocity [m/s].
     pub fn prescribed_faces(&self, axis: usize, n: usize) -> impl Iterator<Item = (usize, f64)> {
         let sides = self.0[axis];
-        [1, n + 1]
-            .into_iter()
-            .zip(sides)
-            .filter_map(move |(face, boundary)| match boundary {
-                Boundary::Periodic | Boundary::Outflow => None,
-                Boundary::Wall { .. } | Boundary::Slip | Boundary::FreeSurface => Some((face, 0.0)),
-                Boundary::Inflow { velocity } => Some((face, velocity[axis])),
-            })
+        [1, n + 1].into_iter().zip(sides).filter_map(move |(face, boundary)| match boundary {
+            Boundary::Periodic | Boundary::Outflow => None,
+            Boundary::Wall { .. } | Boundary::Slip | Boundary::FreeSurface => Some((face, 0.0)),
+            Boundary::Inflow { velocity } => Some((face, velocity[axis])),
+        })
     }
 }

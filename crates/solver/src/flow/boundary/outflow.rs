@@ -17,12 +17,7 @@ impl Boundaries {
         next: &mut FaceVector<R>,
         dt: f64,
     ) {
-        if !self
-            .0
-            .iter()
-            .flatten()
-            .any(|side| *side == Boundary::Outflow)
-        {
+        if !self.0.iter().flatten().any(|side| *side == Boundary::Outflow) {
             return;
         }
         let (mut net, mut open) = (0.0, 0.0);

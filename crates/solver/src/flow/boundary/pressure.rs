@@ -47,11 +47,8 @@ impl Boundaries {
 
     fn fill_pressure_ends<R: Real>(&self, values: &mut [R], layer: usize, axis: usize, n: usize) {
         for (ghost, inner) in [(0, 1), (n + 1, n)] {
-            let rule = if self.is_periodic(axis) {
-                GhostRule::Periodic
-            } else {
-                GhostRule::ZeroGradient
-            };
+            let rule =
+                if self.is_periodic(axis) { GhostRule::Periodic } else { GhostRule::ZeroGradient };
             fill_ghost_layer(values, layer, rule, ghost, inner, n);
         }
     }

@@ -25,8 +25,7 @@ impl Boundaries {
     pub(crate) fn set_normal_of_plane<R: Real>(&self, layout: Layout, [x, y]: [&mut [R]; 2]) {
         let row = layout.row();
         for (face, value) in self.prescribed_faces(0, layout.cells[0]) {
-            x.chunks_exact_mut(row)
-                .for_each(|row| row[face] = R::of(value));
+            x.chunks_exact_mut(row).for_each(|row| row[face] = R::of(value));
         }
         for (face, value) in self.prescribed_faces(1, layout.cells[1]) {
             y[face * row..(face + 1) * row].fill(R::of(value));
@@ -48,9 +47,9 @@ impl Boundaries {
                 GhostRule::Periodic => plane.chunks_exact_mut(row).for_each(|row| {
                     (row[0], row[nx + 1]) = (row[nx], row[1]);
                 }),
-                GhostRule::ZeroGradient => plane
-                    .chunks_exact_mut(row)
-                    .for_each(|row| row[ghost] = row[inner]),
+                GhostRule::ZeroGradient => {
+                    plane.chunks_exact_mut(row).for_each(|row| row[ghost] = row[inner])
+                }
                 GhostRule::Wall(wall) => {
                     let next = second(inner, nx);
                     plane
@@ -61,14 +60,7 @@ impl Boundaries {
         }
         for side in 0..2 {
             let (ghost, inner) = if side == 0 { (0, 1) } else { (ny + 1, ny) };
-            fill_ghost_layer(
-                plane,
-                row,
-                self.ghost_rule(1, side, component),
-                ghost,
-                inner,
-                ny,
-            );
+            fill_ghost_layer(plane, row, self.ghost_rule(1, side, component), ghost, inner, ny);
         }
     }
 

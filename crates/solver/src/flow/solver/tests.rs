@@ -19,9 +19,7 @@ fn params(nu: f64) -> FluidParams {
 }
 
 fn noise(state: &mut u64) -> f64 {
-    *state = state
-        .wrapping_mul(6364136223846793005)
-        .wrapping_add(1442695040888963407);
+    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
     (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
@@ -30,10 +28,7 @@ fn random_flow(mesh: &Mesh, boundaries: Boundaries, nu: f64) -> Flow {
     let mut flow = Flow::<f64>::new(mesh, boundaries, &params(nu));
     let mut state = 11;
     for axis in 0..3 {
-        flow.velocity
-            .component_mut(axis)
-            .iter_mut()
-            .for_each(|value| *value = noise(&mut state));
+        flow.velocity.component_mut(axis).iter_mut().for_each(|value| *value = noise(&mut state));
     }
     flow.make_solenoidal();
     flow
@@ -52,18 +47,10 @@ fn tendencies(flow: &mut Flow) -> FaceVector {
 
 #[test]
 fn divergence_is_minus_the_transposed_gradient() {
-    let mesh = Mesh {
-        cells: [7, 6, 5],
-        spacing: DVec3::new(0.3, 0.4, 0.5),
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells: [7, 6, 5], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
     let flow = random_flow(
         &mesh,
-        Boundaries([
-            [Boundary::Periodic; 2],
-            [Boundary::WALL; 2],
-            [Boundary::WALL; 2],
-        ]),
+        Boundaries([[Boundary::Periodic; 2], [Boundary::WALL; 2], [Boundary::WALL; 2]]),
         0.0,
     );
     let mut state = 5;
@@ -72,9 +59,7 @@ fn divergence_is_minus_the_transposed_gradient() {
     flow.boundaries.fill_pressure(&mut p);
     let mut u = flow.velocity.clone();
     for axis in 0..3 {
-        u.component_mut(axis)
-            .iter_mut()
-            .for_each(|value| *value = noise(&mut state));
+        u.component_mut(axis).iter_mut().for_each(|value| *value = noise(&mut state));
     }
     flow.boundaries.set_normal(&mut u);
     let h = mesh.spacing;
@@ -90,20 +75,14 @@ fn divergence_is_minus_the_transposed_gradient() {
             + u.y.at(i, j, k) * (c - p.at(i, j - 1, k)) / h.y
             + u.z.at(i, j, k) * (c - p.at(i, j, k - 1)) / h.z;
     }
-    assert!(
-        (left - right).abs() <= 1e-14 * size,
-        "p.Du = {left:e}, -Gp.u = {right:e}"
-    );
+    assert!((left - right).abs() <= 1e-14 * size, "p.Du = {left:e}, -Gp.u = {right:e}");
 }
 
 #[test]
 fn projection_leaves_round_off_divergence() {
     for boundaries in [PERIODIC, Boundaries([[Boundary::WALL; 2]; 3])] {
-        let mesh = Mesh {
-            cells: [19, 14, 11],
-            spacing: DVec3::new(0.3, 0.4, 0.5),
-            origin: DVec3::ZERO,
-        };
+        let mesh =
+            Mesh { cells: [19, 14, 11], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
         let mut flow = random_flow(&mesh, boundaries, 0.01);
         for _ in 0..5 {
             flow.predict(0.01);
@@ -119,21 +98,14 @@ fn projection_leaves_round_off_divergence() {
                         .abs()
                 })
                 .fold(0.0, f64::max);
-            assert!(
-                worst <= 1e-10 * m.max_rate,
-                "measured apart from the sweep: {worst:e}"
-            );
+            assert!(worst <= 1e-10 * m.max_rate, "measured apart from the sweep: {worst:e}");
         }
     }
 }
 
 #[test]
 fn advection_conserves_momentum_and_kinetic_energy() {
-    let mesh = Mesh {
-        cells: [9, 8, 7],
-        spacing: DVec3::new(0.3, 0.4, 0.5),
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells: [9, 8, 7], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
     let mut flow = random_flow(&mesh, PERIODIC, 0.0);
     let h = tendencies(&mut flow);
     for axis in 0..3 {
@@ -143,10 +115,7 @@ fn advection_conserves_momentum_and_kinetic_energy() {
             momentum += value;
             size += value.abs();
         }
-        assert!(
-            momentum.abs() <= 1e-13 * size,
-            "momentum {axis}: {momentum:e} of {size:e}"
-        );
+        assert!(momentum.abs() <= 1e-13 * size, "momentum {axis}: {momentum:e} of {size:e}");
     }
     let (mut power, mut size) = (0.0, 0.0);
     for [i, j, k] in interior(&mesh) {
@@ -157,10 +126,7 @@ fn advection_conserves_momentum_and_kinetic_energy() {
             size += p.abs();
         }
     }
-    assert!(
-        power.abs() <= 1e-13 * size,
-        "energy rate {power:e} of {size:e}"
-    );
+    assert!(power.abs() <= 1e-13 * size, "energy rate {power:e} of {size:e}");
 }
 
 /// Decaying Taylor-Green vortex in the plane of two axes; returns the largest velocity error.
@@ -168,11 +134,7 @@ fn taylor_green(n: usize, dt: f64, steps: usize, nu: f64, plane: [usize; 2]) -> 
     let mut cells = [1; 3];
     cells[plane[0]] = n;
     cells[plane[1]] = n;
-    let mesh = Mesh {
-        cells,
-        spacing: DVec3::splat(2.0 * PI / n as f64),
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells, spacing: DVec3::splat(2.0 * PI / n as f64), origin: DVec3::ZERO };
     let mut flow = Flow::<f64>::new(&mesh, PERIODIC, &params(nu));
     let exact = |axis: usize, x: DVec3, t: f64| {
         let (a, b) = (x[plane[0]], x[plane[1]]);
@@ -185,15 +147,9 @@ fn taylor_green(n: usize, dt: f64, steps: usize, nu: f64, plane: [usize; 2]) -> 
             0.0
         }
     };
-    flow.velocity
-        .x
-        .fill_with(&mesh.whole(), |x| exact(0, x, 0.0));
-    flow.velocity
-        .y
-        .fill_with(&mesh.whole(), |x| exact(1, x, 0.0));
-    flow.velocity
-        .z
-        .fill_with(&mesh.whole(), |x| exact(2, x, 0.0));
+    flow.velocity.x.fill_with(&mesh.whole(), |x| exact(0, x, 0.0));
+    flow.velocity.y.fill_with(&mesh.whole(), |x| exact(1, x, 0.0));
+    flow.velocity.z.fill_with(&mesh.whole(), |x| exact(2, x, 0.0));
     flow.boundaries.fill_ghosts(&mut flow.velocity);
     for _ in 0..steps {
         flow.predict(dt);
@@ -203,10 +159,8 @@ fn taylor_green(n: usize, dt: f64, steps: usize, nu: f64, plane: [usize; 2]) -> 
     let mut worst: f64 = 0.0;
     for [i, j, k] in interior(&mesh) {
         for axis in 0..3 {
-            let x = mesh.position(
-                crate::grid::FACE_OFFSET[axis],
-                crate::grid::GlobalCell([i, j, k]),
-            );
+            let x =
+                mesh.position(crate::grid::FACE_OFFSET[axis], crate::grid::GlobalCell([i, j, k]));
             let u = flow.velocity.component(axis)[mesh.layout().index(i, j, k)];
             worst = worst.max((u - exact(axis, x, t)).abs());
         }
@@ -220,10 +174,7 @@ fn taylor_green_is_second_order_in_space() {
         let coarse = taylor_green(16, 2e-3, 250, 0.1, plane);
         let fine = taylor_green(32, 2e-3, 250, 0.1, plane);
         let order = (coarse / fine).log2();
-        assert!(
-            (order - 2.0).abs() <= 0.1,
-            "{plane:?}: errors {coarse:e} {fine:e}, order {order}"
-        );
+        assert!((order - 2.0).abs() <= 0.1, "{plane:?}: errors {coarse:e} {fine:e}, order {order}");
     }
 }
 
@@ -239,12 +190,10 @@ fn taylor_green_is_second_order_in_time() {
         };
         let mut flow = Flow::<f64>::new(&mesh, PERIODIC, &params(0.05));
         // Two superposed vortices interact, so that advection is not a gradient.
-        flow.velocity.x.fill_with(&mesh.whole(), |x| {
-            x.x.sin() * x.z.cos() + 0.5 * (2.0 * x.z).sin()
-        });
         flow.velocity
-            .z
-            .fill_with(&mesh.whole(), |x| -x.x.cos() * x.z.sin());
+            .x
+            .fill_with(&mesh.whole(), |x| x.x.sin() * x.z.cos() + 0.5 * (2.0 * x.z).sin());
+        flow.velocity.z.fill_with(&mesh.whole(), |x| -x.x.cos() * x.z.sin());
         flow.make_solenoidal();
         for _ in 0..steps {
             flow.predict(1.0 / steps as f64);
@@ -252,39 +201,22 @@ fn taylor_green_is_second_order_in_time() {
         }
         flow.velocity.x.to_vec()
     };
-    let apart = |a: &[f64], b: &[f64]| {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| (a - b).powi(2))
-            .sum::<f64>()
-            .sqrt()
-    };
+    let apart =
+        |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
     let [one, two, four] = [40, 80, 160].map(field);
     let order = (apart(&one, &two) / apart(&two, &four)).log2();
-    assert!(
-        (1.9..=2.2).contains(&order),
-        "observed order in time {order}"
-    );
+    assert!((1.9..=2.2).contains(&order), "observed order in time {order}");
 }
 
 /// Arnold-Beltrami-Childress flow, an exact decaying solution in three dimensions.
 fn beltrami(n: usize) -> f64 {
     let nu = 0.1;
-    let mesh = Mesh {
-        cells: [n; 3],
-        spacing: DVec3::splat(2.0 * PI / n as f64),
-        origin: DVec3::ZERO,
-    };
+    let mesh =
+        Mesh { cells: [n; 3], spacing: DVec3::splat(2.0 * PI / n as f64), origin: DVec3::ZERO };
     let mut flow = Flow::<f64>::new(&mesh, PERIODIC, &params(nu));
-    flow.velocity
-        .x
-        .fill_with(&mesh.whole(), |x| x.z.sin() + 0.7 * x.y.cos());
-    flow.velocity
-        .y
-        .fill_with(&mesh.whole(), |x| 0.8 * x.x.sin() + x.z.cos());
-    flow.velocity
-        .z
-        .fill_with(&mesh.whole(), |x| 0.7 * x.y.sin() + 0.8 * x.x.cos());
+    flow.velocity.x.fill_with(&mesh.whole(), |x| x.z.sin() + 0.7 * x.y.cos());
+    flow.velocity.y.fill_with(&mesh.whole(), |x| 0.8 * x.x.sin() + x.z.cos());
+    flow.velocity.z.fill_with(&mesh.whole(), |x| 0.7 * x.y.sin() + 0.8 * x.x.cos());
     flow.boundaries.fill_ghosts(&mut flow.velocity);
     let (dt, steps) = (4e-3, 100);
     for _ in 0..steps {
@@ -294,10 +226,7 @@ fn beltrami(n: usize) -> f64 {
     let decay = (-nu * dt * steps as f64).exp();
     interior(&mesh)
         .map(|[i, j, k]| {
-            let x = mesh.position(
-                crate::grid::FACE_OFFSET[0],
-                crate::grid::GlobalCell([i, j, k]),
-            );
+            let x = mesh.position(crate::grid::FACE_OFFSET[0], crate::grid::GlobalCell([i, j, k]));
             (flow.velocity.x.at(i, j, k) - decay * (x.z.sin() + 0.7 * x.y.cos())).abs()
         })
         .fold(0.0, f64::max)
@@ -307,10 +236,7 @@ fn beltrami(n: usize) -> f64 {
 fn beltrami_flow_is_second_order_in_space() {
     let (coarse, fine) = (beltrami(12), beltrami(24));
     let order = (coarse / fine).log2();
-    assert!(
-        (order - 2.0).abs() <= 0.1,
-        "errors {coarse:e} {fine:e}, order {order}"
-    );
+    assert!((order - 2.0).abs() <= 0.1, "errors {coarse:e} {fine:e}, order {order}");
 }
 
 /// Steady Couette-Poiseuille flow between a wall at rest and a moving lid, across `axis`.
@@ -326,11 +252,7 @@ fn channel(n: usize, axis: usize) -> f64 {
     let mut boundaries = PERIODIC;
     boundaries.0[axis] = [Boundary::WALL, Boundary::Wall { velocity }];
     let h = 1.0 / n as f64;
-    let mesh = Mesh {
-        cells,
-        spacing: DVec3::splat(h),
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells, spacing: DVec3::splat(h), origin: DVec3::ZERO };
     let mut flow = Flow::<f64>::new(&mesh, boundaries, &p);
     let dt = 0.2 * h * h;
     for _ in 0..(2.0 / dt) as usize {
@@ -364,11 +286,7 @@ fn decaying_shear(n: usize, axis: usize) -> f64 {
     let mut cells = [1; 3];
     cells[axis] = n;
     let h = 1.0 / n as f64;
-    let mesh = Mesh {
-        cells,
-        spacing: DVec3::splat(h),
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells, spacing: DVec3::splat(h), origin: DVec3::ZERO };
     let mut boundaries = PERIODIC;
     boundaries.0[axis] = [Boundary::WALL; 2];
     let mut flow = Flow::<f64>::new(&mesh, boundaries, &params(1.0));
@@ -407,11 +325,7 @@ fn shear_between_walls_is_second_order() {
 
 #[test]
 fn outflow_keeps_the_mass_of_the_box() {
-    let mesh = Mesh {
-        cells: [20, 8, 8],
-        spacing: DVec3::splat(0.1),
-        origin: DVec3::ZERO,
-    };
+    let mesh = Mesh { cells: [20, 8, 8], spacing: DVec3::splat(0.1), origin: DVec3::ZERO };
     let velocity = DVec3::X;
     let boundaries = Boundaries([
         [Boundary::Inflow { velocity }, Boundary::Outflow],
@@ -441,11 +355,8 @@ fn outflow_keeps_the_mass_of_the_box() {
 fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
     use grainwake_simd::{InstructionSet, limit_instructions};
     fn bits<R: Real>(boundaries: Boundaries, non_temporal: bool) -> Vec<u64> {
-        let mesh = Mesh {
-            cells: [29, 11, 9],
-            spacing: DVec3::new(0.3, 0.4, 0.5),
-            origin: DVec3::ZERO,
-        };
+        let mesh =
+            Mesh { cells: [29, 11, 9], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
         let mut flow = Flow::<R>::new(&mesh, boundaries, &params(0.01));
         (flow.non_temporal, flow.poisson.non_temporal) = (non_temporal, non_temporal);
         flow.start_from(|axis, x| (x + DVec3::new(0.1, 0.2, 0.3)).to_array()[axis].sin());
@@ -453,11 +364,7 @@ fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
         for _ in 0..3 {
             flow.predict(0.05);
             let measures = flow.project(0.05);
-            kept.extend([
-                measures.max_divergence,
-                measures.max_rate,
-                measures.kinetic_energy,
-            ]);
+            kept.extend([measures.max_divergence, measures.max_rate, measures.kinetic_energy]);
             kept.extend(measures.momentum.to_array());
         }
         let (fields, sums) = flow.state();
@@ -467,11 +374,7 @@ fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
     }
     let walls = Boundaries([[Boundary::WALL; 2]; 3]);
     for boundaries in [PERIODIC, walls] {
-        let levels = [
-            InstructionSet::Avx512,
-            InstructionSet::Avx2,
-            InstructionSet::Baseline,
-        ];
+        let levels = [InstructionSet::Avx512, InstructionSet::Avx2, InstructionSet::Baseline];
         let [widest, middle, common] = levels.map(|level| {
             limit_instructions(level);
             let [near, past] = [false, true]
@@ -488,18 +391,11 @@ fn bits_of_a_step_depend_neither_on_the_instruction_set_nor_on_the_caches() {
 fn single_precision_follows_a_driven_flow() {
     // A channel that speeds up from rest: what a step adds is small against the speed.
     fn speed<R: Real>() -> f64 {
-        let mesh = Mesh {
-            cells: [4, 16, 4],
-            spacing: DVec3::splat(1.0 / 16.0),
-            origin: DVec3::ZERO,
-        };
+        let mesh =
+            Mesh { cells: [4, 16, 4], spacing: DVec3::splat(1.0 / 16.0), origin: DVec3::ZERO };
         let mut driven = params(0.1);
         driven.body_acceleration = DVec3::X;
-        let sides = [
-            [Boundary::Periodic; 2],
-            [Boundary::WALL; 2],
-            [Boundary::Periodic; 2],
-        ];
+        let sides = [[Boundary::Periodic; 2], [Boundary::WALL; 2], [Boundary::Periodic; 2]];
         let mut flow = Flow::<R>::new(&mesh, Boundaries(sides), &driven);
         for _ in 0..4000 {
             flow.predict(1e-3);

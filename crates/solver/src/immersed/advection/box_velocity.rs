@@ -55,7 +55,6 @@ impl<'a, R: Real> BoxVelocity<'a, R> {
     #[inline(always)]
     pub fn row(&self, [j, k]: [i32; 2]) -> usize {
         let [_, line, plane] = self.strides;
-        self.origin
-            .wrapping_add(j as usize * line + k as usize * plane)
+        self.origin.wrapping_add(j as usize * line + k as usize * plane)
     }
 }

@@ -82,8 +82,7 @@ impl<R: Real> Kernel for AddCorrection<'_, '_, R> {
         let part = self.prediction.range().clone();
         for row in self.rows.iter().filter(|row| part.contains(&row.at)) {
             let correction = &self.correction[row.first..];
-            self.prediction
-                .add_tendency::<V>(row.at, row.count, correction);
+            self.prediction.add_tendency::<V>(row.at, row.count, correction);
         }
     }
 }
@@ -102,15 +101,7 @@ impl<R: Real> Kernel for FindCorrection<'_, R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let FindCorrection {
-            eps,
-            mesh,
-            kinematics,
-            body,
-            velocity,
-            planes,
-            correction,
-        } = self;
+        let FindCorrection { eps, mesh, kinematics, body, velocity, planes, correction } = self;
         for (component, correction) in correction.iter_mut().enumerate() {
             correction.resize(body.distance[component].len(), 0.0);
             ComponentLinks::new(eps, mesh, kinematics, body, &velocity, component)

@@ -120,14 +120,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
     ) {
         planes.reset(self.body);
         let compute_weights = |k, planes: &mut LinkPlanes| {
-            compute_link_weights(
-                &self.unknowns,
-                self.body,
-                self.component,
-                self.eps,
-                k,
-                planes,
-            );
+            compute_link_weights(&self.unknowns, self.body, self.component, self.eps, k, planes);
         };
         compute_weights(-1, planes);
         for k in 0..self.body.size.z {
@@ -160,24 +153,12 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         for n in 0..8 {
             rigid[n] = rigid_0[n] + y * by_y[n] + z * by_z[n];
         }
-        let LinkPlanes {
-            row_length,
-            weight,
-            flux_y,
-            flux_z,
-            ..
-        } = planes;
+        let LinkPlanes { row_length, weight, flux_y, flux_z, .. } = planes;
         let row_length = *row_length;
         let [wx, wy, wz] = weight;
-        let (wx, wy, wz) = (
-            &wx[first..][..row_length],
-            &wy[first..][..row_length],
-            &wz[first..][..row_length],
-        );
-        let (fy, fz) = (
-            &mut flux_y[..row_length],
-            &mut flux_z[first..][..row_length],
-        );
+        let (wx, wy, wz) =
+            (&wx[first..][..row_length], &wy[first..][..row_length], &wz[first..][..row_length]);
+        let (fy, fz) = (&mut flux_y[..row_length], &mut flux_z[first..][..row_length]);
         let zero = V::constant(0.0);
         let (mut n, mut last_flux, mut index) = (0, zero, V::ramp());
         while n + V::WIDTH <= row_length {
@@ -223,11 +204,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         } else {
             (0.0, 0.0, &axis.two_faces)
         };
-        SixthOrderLinks {
-            start,
-            end,
-            advected,
-        }
+        SixthOrderLinks { start, end, advected }
     }
 
     /// Correction of the flux through links along an axis, over h [m/s^2]; zero where `weight` is

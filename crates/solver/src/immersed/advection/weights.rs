@@ -38,10 +38,7 @@ impl LinkPlanes {
         for list in self.distance.iter_mut().chain(&mut self.weight) {
             list.make_room(count + MAX_LANES);
         }
-        for (list, count) in [
-            (&mut self.flux_y, self.row_length),
-            (&mut self.flux_z, count),
-        ] {
+        for (list, count) in [(&mut self.flux_y, self.row_length), (&mut self.flux_z, count)] {
             list.make_room(count);
             list[..count].fill(0.0);
         }
@@ -76,11 +73,7 @@ pub fn listed_faces(
     if start >= end || j < y.start || j >= y.end || k < z.start || k >= z.end {
         return None;
     }
-    Some(ListedFaces {
-        start: start as usize,
-        end: end as usize,
-        first: span.entry(start),
-    })
+    Some(ListedFaces { start: start as usize, end: end as usize, first: span.entry(start) })
 }
 
 /// Computes the weights of the links whose lower faces are in plane `k`. Must be called for the
@@ -94,14 +87,7 @@ pub fn compute_link_weights(
     k: i32,
     planes: &mut LinkPlanes,
 ) {
-    dispatch(ComputeLinkWeights {
-        unknowns,
-        body,
-        component,
-        eps,
-        k,
-        planes,
-    });
+    dispatch(ComputeLinkWeights { unknowns, body, component, eps, k, planes });
 }
 
 struct ComputeLinkWeights<'a> {
@@ -157,12 +143,7 @@ impl ComputeLinkWeights<'_> {
     /// Computes the weights of the links of this plane.
     #[inline(always)]
     fn compute_weights<V: Vector<Number = f32>>(&mut self) {
-        let LinkPlanes {
-            row_length,
-            distance,
-            weight,
-            ..
-        } = &mut *self.planes;
+        let LinkPlanes { row_length, distance, weight, .. } = &mut *self.planes;
         let [this, next] = [self.k, self.k + 1].map(|k| (k % 2) as usize);
         let (this, above) = (&distance[this][..], &distance[next][..]);
         let [x, y, z] = weight;

@@ -25,11 +25,7 @@ pub struct FaceForcing {
 impl FaceForcing {
     /// Weight of one grain's rigid velocity on a face with the total forcing `all`.
     pub fn weight(self, all: FaceForcing) -> f64 {
-        if self.strength.is_finite() {
-            self.strength / (1.0 + all.strength)
-        } else {
-            1.0
-        }
+        if self.strength.is_finite() { self.strength / (1.0 + all.strength) } else { 1.0 }
     }
 }
 
@@ -77,16 +73,8 @@ impl ForcingParams {
     pub fn of(&self, d: f64, normal: DVec3) -> FaceForcing {
         match self.scheme {
             Scheme::Aperture => {
-                let mut forcing = FaceForcing {
-                    strength: 0.0,
-                    closed_fraction: 0.0,
-                };
-                dispatch(OneFace {
-                    params: self,
-                    d,
-                    normal,
-                    forcing: &mut forcing,
-                });
+                let mut forcing = FaceForcing { strength: 0.0, closed_fraction: 0.0 };
+                dispatch(OneFace { params: self, d, normal, forcing: &mut forcing });
                 forcing
             }
             Scheme::Paper => self.blend(d, normal),
@@ -110,10 +98,7 @@ impl ForcingParams {
     fn blend(&self, d: f64, normal: DVec3) -> FaceForcing {
         let width = normal.abs().dot(self.spacing);
         let solid_fraction = (0.5 - d / width).clamp(0.0, 1.0);
-        FaceForcing {
-            strength: solid_fraction / (1.0 - solid_fraction),
-            closed_fraction: 0.0,
-        }
+        FaceForcing { strength: solid_fraction / (1.0 - solid_fraction), closed_fraction: 0.0 }
     }
 }
 
@@ -132,9 +117,7 @@ impl Kernel for OneFace<'_> {
         let normal = self.normal.to_array().map(Scalar);
         let ([strength, depth], closed_fraction) =
             self.params.aperture_forcing(Scalar(self.d), normal);
-        *self.forcing = FaceForcing {
-            strength: strength.0 / depth.0,
-            closed_fraction: closed_fraction.0,
-        };
+        *self.forcing =
+            FaceForcing { strength: strength.0 / depth.0, closed_fraction: closed_fraction.0 };
     }
 }

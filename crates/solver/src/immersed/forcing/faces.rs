@@ -36,11 +36,7 @@ impl ForcedFaces {
         self.weight.resize(padded, 0.0);
         self.closed_fraction.resize(padded, 0.0);
         match params.scheme {
-            Scheme::Aperture => dispatch(ComputeFaceWeights {
-                params,
-                band,
-                forced: self,
-            }),
+            Scheme::Aperture => dispatch(ComputeFaceWeights { params, band, forced: self }),
             Scheme::Paper => {
                 for entry in 0..count {
                     let (d, normal) = band.face(entry);
@@ -56,8 +52,7 @@ impl ForcedFaces {
         }
         self.total_closed_fraction.clear();
         if !band.shared.is_empty() {
-            self.total_closed_fraction
-                .extend_from_slice(&self.closed_fraction);
+            self.total_closed_fraction.extend_from_slice(&self.closed_fraction);
             self.share_faces(params, band, neighbours, shapes);
         }
     }
@@ -104,11 +99,7 @@ impl ForcedFaces {
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let lists = [
-            &self.weight,
-            &self.closed_fraction,
-            &self.total_closed_fraction,
-        ];
+        let lists = [&self.weight, &self.closed_fraction, &self.total_closed_fraction];
         let runs: usize = self.runs.iter().map(Vec::capacity).sum();
         let values: usize = lists.iter().map(|list| list.capacity()).sum();
         size_of::<FaceRun>() * runs
@@ -128,14 +119,8 @@ impl Kernel for ComputeFaceWeights<'_> {
     type Number = f32;
     #[inline(always)]
     fn run<V: Vector<Number = f32>>(self) {
-        let BandFaces {
-            distance, normal, ..
-        } = self.band;
-        let ForcedFaces {
-            weight,
-            closed_fraction,
-            ..
-        } = self.forced;
+        let BandFaces { distance, normal, .. } = self.band;
+        let ForcedFaces { weight, closed_fraction, .. } = self.forced;
         let one = V::constant(1.0);
         let inside = V::constant(-self.params.eps);
         for at in (0..weight.len()).step_by(V::WIDTH) {
@@ -145,9 +130,7 @@ impl Kernel for ComputeFaceWeights<'_> {
             let s = strength.div(depth + strength);
             // Faces deep inside take the rigid velocity.
             inside.select_below(d, s, one).store(&mut weight[at..]);
-            inside
-                .select_below(d, c, one)
-                .store(&mut closed_fraction[at..]);
+            inside.select_below(d, c, one).store(&mut closed_fraction[at..]);
         }
     }
 }

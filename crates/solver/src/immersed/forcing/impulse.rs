@@ -48,14 +48,7 @@ pub fn sum_impulse<R: Real>(
     dt: f64,
 ) -> Impulse {
     let mut sums = [Moments::default(); 3];
-    dispatch(SumImpulse {
-        known,
-        predictions,
-        forced,
-        old,
-        dt,
-        sums: &mut sums,
-    });
+    dispatch(SumImpulse { known, predictions, forced, old, dt, sums: &mut sums });
     let w = fluid_density * known.mesh.cell_volume();
     let mut impulse = Impulse::default();
     for (axis, sum) in sums.iter().enumerate() {
@@ -93,10 +86,7 @@ impl Moments {
         constant: V,
         derivative: V,
     ) {
-        let (l, m) = (
-            lever_arm[(axis + 2) % 3],
-            V::constant(0.0) - lever_arm[(axis + 1) % 3],
-        );
+        let (l, m) = (lever_arm[(axis + 2) % 3], V::constant(0.0) - lever_arm[(axis + 1) % 3]);
         let [by_l, by_m] = [derivative * l, derivative * m];
         let constants = [constant, constant * l, constant * m];
         let derivatives = [derivative, by_l, by_m, by_l * l, by_l * m, by_m * m];
@@ -129,11 +119,8 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
         let spacing = mesh.spacing;
         let [x, y, z] = mesh.layout().strides().map(|stride| stride as isize);
         let stencil = Stencil::new([0, x, -x, y, -y, z, -z]);
-        let (weights, closed_fraction, total_closed_fraction) = (
-            &forced.weight,
-            &forced.closed_fraction,
-            forced.total_closed_fraction(),
-        );
+        let (weights, closed_fraction, total_closed_fraction) =
+            (&forced.weight, &forced.closed_fraction, forced.total_closed_fraction());
         for (axis, runs) in forced.runs.iter().enumerate() {
             let half_cell = 0.5 * spacing[axis] * DVec3::AXES[axis];
             let above = self.old.angular.cross(half_cell);

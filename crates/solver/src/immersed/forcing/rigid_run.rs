@@ -26,10 +26,7 @@ impl RigidRun {
     /// Velocity along a parallel line, on which the velocity differs by `offset` [m/s].
     #[inline(always)]
     pub fn shifted(self, offset: DVec3) -> RigidRun {
-        RigidRun {
-            first: self.first + offset,
-            ..self
-        }
+        RigidRun { first: self.first + offset, ..self }
     }
     /// Component `axis` of the velocity at the faces `index` of the run [m/s].
     #[inline(always)]

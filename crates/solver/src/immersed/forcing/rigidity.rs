@@ -25,14 +25,7 @@ pub fn impose_rigidity<R: Real>(
     change: RigidVelocity,
     prediction: &mut Prediction<R>,
 ) {
-    dispatch(ImposeRigidity {
-        axis,
-        spacing,
-        forced,
-        velocity,
-        change,
-        prediction,
-    });
+    dispatch(ImposeRigidity { axis, spacing, forced, velocity, change, prediction });
 }
 
 struct ImposeRigidity<'a, 'b, R> {

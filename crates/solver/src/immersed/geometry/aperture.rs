@@ -142,10 +142,7 @@ mod tests {
         for n in -1000..=1000 {
             let s = f64::from(n) / 1000.0;
             assert!((sine(Scalar(s)).0 - (PI * s).sin()).abs() < 1e-14, "{s}");
-            assert!(
-                (cosine(Scalar(s)).0 - (0.5 * PI * s).cos()).abs() < 1e-14,
-                "{s}"
-            );
+            assert!((cosine(Scalar(s)).0 - (0.5 * PI * s).cos()).abs() < 1e-14, "{s}");
         }
         for s in [-1.0, 1.0] {
             assert_eq!((sine(Scalar(s)).0, cosine(Scalar(s)).0), (0.0, 0.0));
@@ -159,10 +156,7 @@ mod tests {
             let wide = f64::from(s);
             let error = |found: f32, exact: f64| (f64::from(found) - exact).abs();
             assert!(error(sine(Scalar(s)).0, (PI * wide).sin()) < 2.5e-7, "{s}");
-            assert!(
-                error(cosine(Scalar(s)).0, (0.5 * PI * wide).cos()) < 2e-7,
-                "{s}"
-            );
+            assert!(error(cosine(Scalar(s)).0, (0.5 * PI * wide).cos()) < 2e-7, "{s}");
             for eps in [1.0, 0.7] {
                 let exact = reference::inverse_aperture_excess(wide, eps);
                 assert!(

@@ -110,11 +110,7 @@ impl FillLists<'_> {
             let row = h * DVec3::new(0.0, f64::from(j), f64::from(k));
             let lever_arm = corner - self.grain.pose.position + row;
             let Range { start, end } = indices_in_sphere(lever_arm, h.x, radius, self.body.size.x);
-            let span = RowSpan {
-                start,
-                end,
-                first: count,
-            };
+            let span = RowSpan { start, end, first: count };
             let first = (to_body * lever_arm).as_vec3();
             for i in (start..end).step_by(V::WIDTH) {
                 let index = V::constant(f64::from(i)) + V::ramp();
@@ -182,11 +178,7 @@ impl FillLists<'_> {
         for part in &*parts {
             let range = part.range.clone();
             let first = span.entry(range.start);
-            self.body.rows[component].push(FaceRow {
-                at: part.at,
-                first,
-                count: range.len(),
-            });
+            self.body.rows[component].push(FaceRow { at: part.at, first, count: range.len() });
             let forced = range.start.max(in_band.start)..range.end.min(in_band.end);
             let first_forced = self.band.count();
             if !forced.is_empty() {
@@ -212,13 +204,7 @@ impl FillLists<'_> {
                     start,
                     step,
                 };
-                row.assign(
-                    range,
-                    forced,
-                    &mut distances[first..],
-                    first_forced,
-                    self.band,
-                );
+                row.assign(range, forced, &mut distances[first..], first_forced, self.band);
             }
         }
     }

@@ -56,11 +56,8 @@ impl UnknownFaces {
                 offsets.extend(padded.clone().map(offset));
             }
             let offset = |i: i32| {
-                let i = if self.periodic[axis] {
-                    (i - 1).rem_euclid(n) + 1
-                } else {
-                    i.clamp(0, n + 1)
-                };
+                let i =
+                    if self.periodic[axis] { (i - 1).rem_euclid(n) + 1 } else { i.clamp(0, n + 1) };
                 i as usize * stride
             };
             map.offsets[axis].clear();
@@ -146,9 +143,8 @@ impl IndexMap {
         let offsets = self.unknown_offsets[2].iter();
         let offsets = offsets.flat_map(|table| &table[PAD as usize..table.len() - PAD as usize]);
         let offsets = offsets.copied().filter(|offset| *offset != NONE);
-        let (first, last) = offsets.fold((usize::MAX, 0), |(first, last), offset| {
-            (first.min(offset), last.max(offset))
-        });
+        let (first, last) = offsets
+            .fold((usize::MAX, 0), |(first, last), offset| (first.min(offset), last.max(offset)));
         first..last + 1
     }
 
@@ -171,9 +167,7 @@ impl IndexMap {
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
         let tables = self.unknown_offsets.iter().flatten().chain(&self.offsets);
-        tables
-            .map(|table| size_of::<usize>() * table.capacity())
-            .sum()
+        tables.map(|table| size_of::<usize>() * table.capacity()).sum()
     }
 }
 
@@ -208,10 +202,7 @@ mod tests {
         assert_eq!(at(3, 0, 5), Some(6 + 60 + 80));
         assert_eq!(at(3, -3, 5), Some(3 + 60 + 80));
         assert_eq!(map.unknown_range(1, 0), -3..8);
-        assert_eq!(
-            [map.unknown_range(1, 1), map.unknown_range(0, 1)],
-            [1..6, 0..6]
-        );
+        assert_eq!([map.unknown_range(1, 1), map.unknown_range(0, 1)], [1..6, 0..6]);
         // A field whose values are its memory positions; ghost cells beyond the wall included.
         let field: Vec<f64> = (0..240).map(f64::from).collect();
         let mut copy = Vec::new();

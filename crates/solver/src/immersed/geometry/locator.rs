@@ -73,13 +73,7 @@ impl Locator {
     /// Finds the neighbours of all grains, before [`Locator::locate`]. `displacement(i)` [m] leads
     /// from the last pose of grain i, whose faces count as well; 0 if they do not.
     pub fn find_neighbours(&mut self, grains: &[Grain], displacement: impl Fn(usize) -> f64) {
-        self.neighbours.update(
-            &self.mesh,
-            &self.unknown_faces,
-            self.reach,
-            grains,
-            displacement,
-        );
+        self.neighbours.update(&self.mesh, &self.unknown_faces, self.reach, grains, displacement);
     }
 
     /// Neighbours of grain `index`.
@@ -136,8 +130,7 @@ impl Locator {
             body.lowest[axis] = from + 1;
             body.size[axis] = to + 2 - body.lowest[axis];
         }
-        self.unknown_faces
-            .map(body.lowest, body.size, &mut body.index_map);
+        self.unknown_faces.map(body.lowest, body.size, &mut body.index_map);
         body.planes = body.index_map.plane_range();
     }
 }

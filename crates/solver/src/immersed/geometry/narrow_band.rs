@@ -43,13 +43,9 @@ impl NarrowBandShapes {
         let mut known: HashMap<*const Shape, NarrowBandShape> = HashMap::new();
         let sampled = |grain: &Grain| {
             let shape = known.entry(Arc::as_ptr(&grain.shape));
-            shape
-                .or_insert_with(|| NarrowBandShape::new(&grain.shape, eps, reach))
-                .clone()
+            shape.or_insert_with(|| NarrowBandShape::new(&grain.shape, eps, reach)).clone()
         };
-        NarrowBandShapes {
-            shapes: grains.iter().map(sampled).collect(),
-        }
+        NarrowBandShapes { shapes: grains.iter().map(sampled).collect() }
     }
 
     /// Shape of grain `index`.
@@ -59,10 +55,7 @@ impl NarrowBandShapes {
 
     /// Memory held in addition to the shapes [bytes].
     pub fn bytes(&self) -> usize {
-        let samples = self
-            .shapes
-            .iter()
-            .filter_map(|shape| shape.samples.as_ref());
+        let samples = self.shapes.iter().filter_map(|shape| shape.samples.as_ref());
         let mut samples: Vec<_> = samples.collect();
         samples.sort_by_key(|samples| Arc::as_ptr(samples));
         samples.dedup_by_key(|samples| Arc::as_ptr(samples));
@@ -89,10 +82,7 @@ impl NarrowBandShape {
             }
             _ => None,
         };
-        NarrowBandShape {
-            shape: shape.clone(),
-            samples,
-        }
+        NarrowBandShape { shape: shape.clone(), samples }
     }
 
     /// Signed distance [m] and its gradient at `x`, both in the frame of the grain. The distance
@@ -141,9 +131,7 @@ impl NarrowBandShape {
     #[cold]
     fn lane_by_lane<V: Vector<Number = f32>>(&self, x: [V; 3]) -> (V, [V; 3]) {
         let mut points = [[0.0; MAX_LANES]; 3];
-        x.iter()
-            .zip(&mut points)
-            .for_each(|(x, lanes)| x.store(lanes));
+        x.iter().zip(&mut points).for_each(|(x, lanes)| x.store(lanes));
         let mut distances = [0.0; MAX_LANES];
         for n in 0..V::WIDTH {
             let x = DVec3::from_array(points.map(|lanes| f64::from(lanes[n])));
@@ -220,10 +208,7 @@ mod tests {
                 }
             }
             let mean_error = errors.iter().sum::<f64>() / errors.len() as f64;
-            println!(
-                "{eps}: mean {mean_error}, beyond {beyond}, near {}",
-                errors.len()
-            );
+            println!("{eps}: mean {mean_error}, beyond {beyond}, near {}", errors.len());
             assert!(mean_error.abs() <= mean, "{mean_error} at {eps}");
             assert!(errors.len() > 200, "{}", errors.len());
         }

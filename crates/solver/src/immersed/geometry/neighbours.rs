@@ -96,17 +96,15 @@ impl NeighbourSearch {
         let enclosure = Enclosure {
             lower: mesh.origin,
             upper: mesh.upper(),
-            periodic: [0, 1, 2].map(|axis| unknown_faces.is_periodic(axis) && mesh.is_resolved(axis)),
+            periodic: [0, 1, 2]
+                .map(|axis| unknown_faces.is_periodic(axis) && mesh.is_resolved(axis)),
             solid: [[false; 2]; 3],
         };
         self.spheres.clear();
-        let spheres = grains
-            .iter()
-            .enumerate()
-            .map(|(index, grain)| BoundingSphere {
-                centre: grain.pose.position,
-                radius: grain.shape.bounding_radius() + reach + displacement(index),
-            });
+        let spheres = grains.iter().enumerate().map(|(index, grain)| BoundingSphere {
+            centre: grain.pose.position,
+            radius: grain.shape.bounding_radius() + reach + displacement(index),
+        });
         self.spheres.extend(spheres);
         self.search.search(&self.spheres, &enclosure);
         self.pairs.clear();
@@ -117,11 +115,7 @@ impl NeighbourSearch {
             let (grain, [x, y, z]) = (pair.grain as usize, pair.image.to_array());
             for (grain, other, sign) in [(grain, other, 1), (other, grain, -1)] {
                 let image = [z, y, x].map(|periods| sign * periods);
-                self.pairs.push(NeighbourPair {
-                    grain,
-                    other,
-                    image,
-                });
+                self.pairs.push(NeighbourPair { grain, other, image });
             }
         }
         self.pairs.sort_unstable();
@@ -133,12 +127,7 @@ impl NeighbourSearch {
         self.neighbours.clear();
         self.first.clear();
         let size = |index: usize| grains[index].shape.bounding_radius() + reach;
-        for &NeighbourPair {
-            grain: index,
-            other,
-            image: [z, y, x],
-        } in &self.pairs
-        {
+        for &NeighbourPair { grain: index, other, image: [z, y, x] } in &self.pairs {
             let entry = self.neighbours.len();
             self.first.resize(self.first.len().max(index + 1), entry);
             let tie = TIE * (size(index) + size(other));
@@ -196,14 +185,9 @@ mod tests {
         assert_eq!(found(&search, 0), [(-along_x, tie)]);
         assert_eq!(found(&search, 1), []);
         assert_eq!(found(&search, 2), [(along_x, -tie)]);
-        assert_eq!(
-            [0, 1, 2].map(|index| search.of(index).is_empty()),
-            [false, true, false]
-        );
+        assert_eq!([0, 1, 2].map(|index| search.of(index).is_empty()), [false, true, false]);
         // The second is 3.4 from the third, both with a reach of 1.1, and moved by 1.25.
-        search.update(&mesh, &unknown_faces, 0.6, &grains, |index| {
-            [0.0, 1.25, 0.0][index]
-        });
+        search.update(&mesh, &unknown_faces, 0.6, &grains, |index| [0.0, 1.25, 0.0][index]);
         assert!(!search.of(1).is_empty());
         let others = found(&search, 1).into_iter();
         let others = others.filter(|(shift, _)| *shift == DVec3::ZERO);
@@ -214,12 +198,7 @@ mod tests {
         let tie = 4.2 * TIE;
         let along_y = DVec3::new(0.0, 4.0, 0.0);
         let along_z = DVec3::new(0.0, 0.0, 4.0);
-        let images = [
-            (-along_z, tie),
-            (-along_y, tie),
-            (along_y, -tie),
-            (along_z, -tie),
-        ];
+        let images = [(-along_z, tie), (-along_y, tie), (along_y, -tie), (along_z, -tie)];
         assert_eq!(found(&search, 0), images);
     }
 }

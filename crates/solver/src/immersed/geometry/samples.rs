@@ -90,10 +90,7 @@ impl<'a, V: Vector> SampleGrid<'a, V> {
             self.slope * (high - low),
         ];
         let distance = self.quantum * (low + fz * (high - low));
-        (
-            zero.select_below(off_grid, V::constant(INFINITE_DISTANCE), distance),
-            gradient,
-        )
+        (zero.select_below(off_grid, V::constant(INFINITE_DISTANCE), distance), gradient)
     }
 }
 

@@ -46,11 +46,7 @@ impl Reference {
         if d <= -self.eps || d >= 2.0 * self.eps {
             return None;
         }
-        Some(if d < self.eps {
-            inverse_aperture_excess(d, self.eps)
-        } else {
-            0.0
-        })
+        Some(if d < self.eps { inverse_aperture_excess(d, self.eps) } else { 0.0 })
     }
 
     /// Correction of the flux through the link along `axis` from the face `lower` to the next, over

@@ -40,10 +40,7 @@ impl Reference {
         let second =
             |a: usize| (m(d + h[a] * n[a]) + m(d - h[a] * n[a]) - 2.0 * m(d)) / h[a].powi(2);
         let drag = (0..3).map(second).sum::<f64>().max(0.0) / m(d);
-        [
-            self.kinematic_viscosity * self.dt * drag,
-            1.0 - aperture(d, eps),
-        ]
+        [self.kinematic_viscosity * self.dt * drag, 1.0 - aperture(d, eps)]
     }
 
     /// Weights of grain `index` on a face at `x`: s = drag / (1 + drag of all grains).
@@ -69,18 +66,10 @@ impl Reference {
         }
         let [drag, closed_fraction] = forcing;
         if d <= -eps && self.scheme == Scheme::Aperture {
-            return Weights {
-                weight: 1.0,
-                closed_fraction: 1.0,
-                total_closed_fraction: 1.0,
-            };
+            return Weights { weight: 1.0, closed_fraction: 1.0, total_closed_fraction: 1.0 };
         }
         Weights {
-            weight: if drag.is_finite() {
-                drag / (1.0 + all_drag)
-            } else {
-                1.0
-            },
+            weight: if drag.is_finite() { drag / (1.0 + all_drag) } else { 1.0 },
             closed_fraction: closed_fraction / total_closed_fraction.max(1.0),
             total_closed_fraction: total_closed_fraction.min(1.0),
         }
@@ -98,18 +87,11 @@ impl Reference {
         face: IVec3,
     ) -> f64 {
         let (h, e) = (self.mesh.spacing, IVec3::AXES[component]);
-        let dt = if self.scheme == Scheme::Aperture {
-            self.dt
-        } else {
-            0.0
-        };
+        let dt = if self.scheme == Scheme::Aperture { self.dt } else { 0.0 };
         let x = self.position(component, face);
         let lever_arm = self.nearest_image(index, x).lever_arm;
-        let Weights {
-            weight: s,
-            closed_fraction: c,
-            total_closed_fraction: all,
-        } = self.weights(index, x);
+        let Weights { weight: s, closed_fraction: c, total_closed_fraction: all } =
+            self.weights(index, x);
         // p~ = p - dt U_old . grad p, at half a spacing above and below the face.
         let moved = |cell: IVec3, lever_arm: DVec3| {
             let (at, velocity) = (self.at(cell), old.at(lever_arm));
@@ -124,11 +106,8 @@ impl Reference {
         let rise = moved(face, lever_arm + half) - moved(face - e, lever_arm - half);
         let removed = dt / h[component] * rise - dt * known.body_acceleration[component];
         let rest_gain = c * removed - s * (predicted + all * removed);
-        let change = if dt > 0.0 {
-            (1.0 - s) * c * (new - old).at(lever_arm)[component]
-        } else {
-            0.0
-        };
+        let change =
+            if dt > 0.0 { (1.0 - s) * c * (new - old).at(lever_arm)[component] } else { 0.0 };
         rest_gain + s * new.at(lever_arm)[component] + change
     }
 

@@ -51,9 +51,6 @@ impl Reference {
         let d = |index| self.nearest_image(index, x).distance;
         let distance = d(index);
         let others = (0..self.grains.len()).filter(|other| *other != index);
-        others
-            .map(d)
-            .all(|other| distance < other)
-            .then_some(distance)
+        others.map(d).all(|other| distance < other).then_some(distance)
     }
 }

@@ -51,9 +51,8 @@ impl Case {
         boundaries.0[1] = [Boundary::Periodic; 2];
         let mut flow = Flow::new(&mesh, boundaries, &params);
         flow.start_from(|axis, x| (1.5 * x).to_array()[(axis + 1) % 3].sin());
-        flow.pressure.fill_with(&mesh.whole(), |x| {
-            (2.0 * x.x).sin() * (1.5 * x.y).cos() + 0.4 * x.z * x.z
-        });
+        flow.pressure
+            .fill_with(&mesh.whole(), |x| (2.0 * x.x).sin() * (1.5 * x.y).cos() + 0.4 * x.z * x.z);
         flow.predict(DT);
         let sphere = Arc::new(Shape::sphere(0.5, 100));
         let options = ShapeOptions::default();
@@ -98,12 +97,7 @@ impl Case {
             kinematic_viscosity: NU,
             dt: DT,
         };
-        Case {
-            flow,
-            reference,
-            locator,
-            located,
-        }
+        Case { flow, reference, locator, located }
     }
 
     /// Velocities of a grain before and after the step.
@@ -151,10 +145,7 @@ impl Case {
 }
 
 fn assert_close(found: f64, expected: f64, tolerance: f64, quantity: &str) {
-    assert!(
-        (found - expected).abs() <= tolerance,
-        "{quantity}: {found} instead of {expected}"
-    );
+    assert!((found - expected).abs() <= tolerance, "{quantity}: {found} instead of {expected}");
 }
 
 #[test]
@@ -276,14 +267,7 @@ fn the_advection_correction_matches_the_reference() {
         let (known, _) = case.flow.prediction();
         let (mut scratch, mut correction) = Default::default();
         let body = &case.located[index].0;
-        find_correction(
-            eps,
-            &known,
-            &kinematics,
-            body,
-            &mut scratch,
-            &mut correction,
-        );
+        find_correction(eps, &known, &kinematics, body, &mut scratch, &mut correction);
         for (component, correction) in correction.iter().enumerate() {
             let found = case.by_row(index, component, correction, 0.0);
             let (known, _) = case.flow.prediction();
@@ -380,10 +364,7 @@ fn new_velocities_satisfy_the_equations_of_motion() {
             let found = system.hydrodynamic_load(&grain, &previous, DENSITY, DT);
             let expected = reference.hydrodynamic_load(index, &previous, new, load);
             assert!((found.force - expected.force).length() < 1e-9, "{found:?}");
-            assert!(
-                (found.torque - expected.torque).length() < 1e-9,
-                "{found:?}"
-            );
+            assert!((found.torque - expected.torque).length() < 1e-9, "{found:?}");
         }
     }
 }

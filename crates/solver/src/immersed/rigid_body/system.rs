@@ -36,10 +36,7 @@ impl RigidBodySystem {
     ) -> RigidBodySystem {
         let ratio = 1.0 - fluid_density / grain.density;
         let (mass, inertia) = (grain.mass() * ratio, grain.inertia() * ratio);
-        let RigidVelocity {
-            linear: v,
-            angular: omega,
-        } = previous.velocity;
+        let RigidVelocity { linear: v, angular: omega } = previous.velocity;
         let gyroscopic = omega.cross(inertia * omega);
         let momentum = mass * v + dt * applied.force;
         let angular_momentum = inertia * omega + dt * (applied.torque - gyroscopic);
@@ -61,12 +58,7 @@ impl RigidBodySystem {
         if grain.rotation != MotionConstraint::Free {
             prescribe(&mut a, &mut b, 3, grain.angular_velocity);
         }
-        RigidBodySystem {
-            matrix: a,
-            right: b,
-            virtual_mass,
-            impulse,
-        }
+        RigidBodySystem { matrix: a, right: b, virtual_mass, impulse }
     }
 
     /// New velocities under the mean `contact` load over `dt` [s].

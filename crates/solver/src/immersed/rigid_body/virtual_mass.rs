@@ -33,19 +33,11 @@ impl VirtualMass {
         let ratio = grain.density / fluid_density;
         let part = ((1.0 - ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0) / ratio;
         let free = |constraint: MotionConstraint| {
-            if constraint == MotionConstraint::Free {
-                part
-            } else {
-                0.0
-            }
+            if constraint == MotionConstraint::Free { part } else { 0.0 }
         };
         let mass = grain.mass() * free(grain.translation);
         let inertia = grain.inertia() * free(grain.rotation);
-        let PreviousStep {
-            velocity,
-            acceleration,
-            ..
-        } = previous;
+        let PreviousStep { velocity, acceleration, .. } = previous;
         VirtualMass {
             mass,
             inertia,

@@ -88,17 +88,11 @@ impl EventParams {
         fluid_density: f64,
         period: [Option<f64>; 3],
     ) -> EventParams {
-        let mut free = grains
-            .iter()
-            .filter(|grain| grain.translation == MotionConstraint::Free)
-            .peekable();
+        let mut free =
+            grains.iter().filter(|grain| grain.translation == MotionConstraint::Free).peekable();
         let rise = free.peek().is_some() && free.all(|grain| grain.density < fluid_density);
         let down = gravity.try_normalize().unwrap_or(DVec3::NEG_Z);
-        let down = if rise && gravity != DVec3::ZERO {
-            -down
-        } else {
-            down
-        };
+        let down = if rise && gravity != DVec3::ZERO { -down } else { down };
         let magnitude = down.abs();
         let axis = if magnitude.z >= magnitude.x && magnitude.z >= magnitude.y {
             2
@@ -107,10 +101,7 @@ impl EventParams {
         } else {
             0
         };
-        let d = grains
-            .iter()
-            .map(|g| g.shape.equivalent_diameter())
-            .sum::<f64>()
+        let d = grains.iter().map(|g| g.shape.equivalent_diameter()).sum::<f64>()
             / grains.len().max(1) as f64;
         let g = gravity.length();
         EventParams {

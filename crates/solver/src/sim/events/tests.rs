@@ -28,11 +28,7 @@ fn follow(path: &[(f64, f64, f64)]) -> Tracker {
     let params = EventParams::for_grains(&start, DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
     let mut tracker = Tracker::new(params, &start, Some(gap(path[0].1, path[0].2)));
     for &(t, x, z) in path {
-        let contacts = if gap(x, z) <= 0.0 {
-            vec![touch(0, Partner::Grain(1))]
-        } else {
-            vec![]
-        };
+        let contacts = if gap(x, z) <= 0.0 { vec![touch(0, Partner::Grain(1))] } else { vec![] };
         tracker.update(t, &grains(x, z), &contacts, Some(gap(x, z)));
     }
     tracker
@@ -40,25 +36,17 @@ fn follow(path: &[(f64, f64, f64)]) -> Tracker {
 
 /// Trailer comes down on the leader, rolls over it, and leads.
 fn dkt() -> Vec<(f64, f64, f64)> {
-    let mut path: Vec<(f64, f64, f64)> = (0..=10)
-        .map(|i| (0.1 * f64::from(i), 0.0, 2.0 - 0.1 * f64::from(i)))
-        .collect();
+    let mut path: Vec<(f64, f64, f64)> =
+        (0..=10).map(|i| (0.1 * f64::from(i), 0.0, 2.0 - 0.1 * f64::from(i))).collect();
     path.extend((1..=24).map(|i| {
         let angle = f64::from(i) * 5f64.to_radians();
-        (
-            1.0 + 0.1 * f64::from(i),
-            0.9999 * angle.sin(),
-            0.9999 * angle.cos(),
-        )
+        (1.0 + 0.1 * f64::from(i), 0.9999 * angle.sin(), 0.9999 * angle.cos())
     }));
     let (t, x, z) = path[path.len() - 1];
-    path.extend((1..=30).map(|i| {
-        (
-            t + 0.1 * f64::from(i),
-            x + 0.02 * f64::from(i),
-            z - 0.02 * f64::from(i),
-        )
-    }));
+    path.extend(
+        (1..=30)
+            .map(|i| (t + 0.1 * f64::from(i), x + 0.02 * f64::from(i), z - 0.02 * f64::from(i))),
+    );
     path
 }
 
@@ -68,12 +56,7 @@ fn phases_of_a_pair_come_in_order() {
     let kinds: Vec<EventKind> = tracker.events().iter().map(|e| e.kind).collect();
     assert_eq!(
         kinds,
-        [
-            EventKind::Kiss,
-            EventKind::Tumble,
-            EventKind::RoleChange,
-            EventKind::Separation
-        ]
+        [EventKind::Kiss, EventKind::Tumble, EventKind::RoleChange, EventKind::Separation]
     );
     assert_eq!(tracker.phase(), Some(Phase::Separated));
     assert!((tracker.kiss_time().unwrap() - 1.0).abs() < 1e-12);
@@ -89,10 +72,7 @@ fn a_grain_that_lands_beside_one_on_the_floor_does_not_change_roles() {
     let grains = |z: f64| [grain(0.0, 0.0), grain(3.0, z)];
     let params = EventParams::for_grains(&grains(1.0), DVec3::new(0.0, 0.0, -1.0), 0.0, [None; 3]);
     let (axis, side) = params.floor;
-    for (contacts, changes) in [
-        (vec![touch(0, Partner::Wall { axis, side })], 0),
-        (vec![], 1),
-    ] {
+    for (contacts, changes) in [(vec![touch(0, Partner::Wall { axis, side })], 0), (vec![], 1)] {
         let mut tracker = Tracker::new(params, &grains(1.0), Some(2.0));
         for (t, z) in [(1.0, 0.5), (2.0, -0.5), (3.0, -0.5)] {
             tracker.update(t, &grains(z), &contacts, Some(2.0));
@@ -113,31 +93,17 @@ fn a_bounce_is_not_a_separation() {
     ];
     let tracker = follow(&path);
     assert_eq!(tracker.events().len(), 1);
-    assert_eq!(
-        (tracker.phase(), tracker.separation_time()),
-        (Some(Phase::Kissing), None)
-    );
+    assert_eq!((tracker.phase(), tracker.separation_time()), (Some(Phase::Kissing), None));
 }
 
 #[test]
 fn a_second_kiss_withdraws_the_separation() {
-    let path = [
-        (0.0, 0.0, 1.5),
-        (1.0, 0.0, 0.999),
-        (2.0, 0.0, 1.2),
-        (4.0, 0.0, 1.3),
-        (5.0, 0.0, 0.999),
-    ];
+    let path =
+        [(0.0, 0.0, 1.5), (1.0, 0.0, 0.999), (2.0, 0.0, 1.2), (4.0, 0.0, 1.3), (5.0, 0.0, 0.999)];
     let tracker = follow(&path);
     let kinds: Vec<EventKind> = tracker.events().iter().map(|e| e.kind).collect();
-    assert_eq!(
-        kinds,
-        [EventKind::Kiss, EventKind::Separation, EventKind::Kiss]
-    );
-    assert_eq!(
-        (tracker.separation_time(), tracker.kiss_time()),
-        (None, Some(1.0))
-    );
+    assert_eq!(kinds, [EventKind::Kiss, EventKind::Separation, EventKind::Kiss]);
+    assert_eq!((tracker.separation_time(), tracker.kiss_time()), (None, Some(1.0)));
 }
 
 #[test]
@@ -151,10 +117,7 @@ fn level_grains_do_not_chatter() {
     ];
     let tracker = follow(&path);
     assert_eq!(tracker.role_changes(), 1);
-    assert_eq!(
-        (tracker.events()[0].time, tracker.events()[0].confirmed),
-        (3.0, 4.0)
-    );
+    assert_eq!((tracker.events()[0].time, tracker.events()[0].confirmed), (3.0, 4.0));
 }
 
 #[test]
@@ -167,10 +130,7 @@ fn landing_and_rest_need_all_free_grains() {
     let events = tracker.update(
         1.0,
         &grains,
-        &[
-            touch(0, floor),
-            touch(1, Partner::Wall { axis: 0, side: 1 }),
-        ],
+        &[touch(0, floor), touch(1, Partner::Wall { axis: 0, side: 1 })],
         None,
     );
     assert_eq!(
@@ -180,12 +140,7 @@ fn landing_and_rest_need_all_free_grains() {
     assert_eq!(tracker.holds_since(StopWhen::Landing, &grains), None);
     assert_eq!(tracker.holds_since(StopWhen::Rest, &grains), Some(1.0));
     grains[0].velocity.z = -0.1;
-    assert_eq!(
-        tracker
-            .update(2.0, &grains, &[touch(0, floor), touch(1, floor)], None)
-            .len(),
-        1
-    );
+    assert_eq!(tracker.update(2.0, &grains, &[touch(0, floor), touch(1, floor)], None).len(), 1);
     assert_eq!(tracker.holds_since(StopWhen::Landing, &grains), Some(2.0));
     assert_eq!(tracker.holds_since(StopWhen::Rest, &grains), None);
     assert_eq!(tracker.peak_settling_speeds()[0], 0.1);
@@ -194,12 +149,8 @@ fn landing_and_rest_need_all_free_grains() {
 #[test]
 fn the_nearest_image_counts() {
     let grains = [grain(0.1, 0.0), grain(9.9, 1.2)];
-    let params = EventParams::for_grains(
-        &grains,
-        DVec3::new(0.0, 0.0, -1.0),
-        0.0,
-        [Some(10.0), None, None],
-    );
+    let params =
+        EventParams::for_grains(&grains, DVec3::new(0.0, 0.0, -1.0), 0.0, [Some(10.0), None, None]);
     let line = params.line_of_centres(&grains[0], &grains[1]);
     assert!((line - DVec3::new(-0.2, 0.0, 1.2)).length() < 1e-12);
 }
@@ -215,11 +166,7 @@ fn a_restored_tracker_goes_on_with_the_same_bits() {
     tracker.restore(serde_json::from_str(&text).unwrap());
     for &(t, x, z) in &path[20..] {
         let gap = x.hypot(z) - 1.0;
-        let contacts = if gap <= 0.0 {
-            vec![touch(0, Partner::Grain(1))]
-        } else {
-            vec![]
-        };
+        let contacts = if gap <= 0.0 { vec![touch(0, Partner::Grain(1))] } else { vec![] };
         tracker.update(t, &[grain(0.0, 0.0), grain(x, z)], &contacts, Some(gap));
     }
     assert_eq!(tracker.state(), whole.state());

@@ -103,11 +103,7 @@ impl Tracker {
                 let spin = g.angular_velocity.length() * g.shape.bounding_radius();
                 supported && g.velocity.length() + spin < self.params.rest_speed
             });
-        self.state.still_since = if still {
-            self.state.still_since.or(Some(time))
-        } else {
-            None
-        };
+        self.state.still_since = if still { self.state.still_since.or(Some(time)) } else { None };
     }
 
     /// Time since which the condition `when` has held [s]; none if it does not hold.
@@ -125,9 +121,9 @@ impl Tracker {
                 free.try_fold(0.0_f64, |last, (landed, _)| landed.map(|t| last.max(t)))
             }
             StopWhen::Rest => self.state.still_since,
-            StopWhen::Separation => (self.phase() == Some(Phase::Separated))
-                .then(|| self.separation_time())
-                .flatten(),
+            StopWhen::Separation => {
+                (self.phase() == Some(Phase::Separated)).then(|| self.separation_time()).flatten()
+            }
         }
     }
 
@@ -167,11 +163,7 @@ impl Tracker {
     }
     /// Number of role changes.
     pub fn role_changes(&self) -> usize {
-        self.state
-            .events
-            .iter()
-            .filter(|e| e.kind == EventKind::RoleChange)
-            .count()
+        self.state.events.iter().filter(|e| e.kind == EventKind::RoleChange).count()
     }
     /// Time of the first contact of each grain with the floor [s].
     pub fn landing_times(&self) -> &[Option<f64>] {
@@ -182,11 +174,7 @@ impl Tracker {
         &self.state.peak_settling_speed
     }
     fn first(&self, kind: EventKind) -> Option<f64> {
-        self.state
-            .events
-            .iter()
-            .find(|e| e.kind == kind)
-            .map(|e| e.time)
+        self.state.events.iter().find(|e| e.kind == kind).map(|e| e.time)
     }
 
     /// State for a checkpoint.

@@ -36,10 +36,7 @@ impl FigureData<'_> {
 
     /// Returns the first run at a level of an axis.
     pub fn run_at(&self, axis: &str, level: &String) -> Option<&Run> {
-        self.plan
-            .runs
-            .iter()
-            .find(|run| run.levels.get(axis) == Some(level))
+        self.plan.runs.iter().find(|run| run.levels.get(axis) == Some(level))
     }
 
     /// Reads the case of a run from its run folder, or else as planned.
@@ -91,11 +88,7 @@ fn symbol(factor: &str) -> String {
 pub fn value_text(value: f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text.contains('.') && text.len() == 3 {
-        format!("{text}0")
-    } else {
-        text.to_owned()
-    }
+    if text.contains('.') && text.len() == 3 { format!("{text}0") } else { text.to_owned() }
 }
 
 /// Label "S = 0.45" of a factor's value.

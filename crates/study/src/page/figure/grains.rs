@@ -34,18 +34,15 @@ pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure> {
     for name in data.levels(axis) {
         let run = data.run_at(axis, &name)?;
         let index = |factor: &str, values: &[f64]| {
-            values
-                .iter()
-                .position(|v| run.factors.get(factor) == Some(v))
+            values.iter().position(|v| run.factors.get(factor) == Some(v))
         };
         let (Some(row), Some(column)) = (index(rows, &down), index(columns, &across)) else {
             continue;
         };
         match first_grain(data, run) {
             Some(grain) => found.push((name, row, column, grain)),
-            None => notes.push(format!(
-                "figure 4 lacks {name}: neither its run nor its case can be read"
-            )),
+            None => notes
+                .push(format!("figure 4 lacks {name}: neither its run nor its case can be read")),
         }
     }
     let radii = found.iter().map(|f| f.3.shape.bounding_radius());
@@ -57,10 +54,7 @@ pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure> {
     let mut drawing = Drawing::new(PAGE, bottom + 22.0);
     // Seen slightly from above and from the side, so that the third dimension shows.
     let rotation = (DQuat::from_rotation_x(-0.45) * DQuat::from_rotation_y(0.35)).conjugate();
-    let view = View {
-        right: rotation * DVec3::X,
-        up: rotation * DVec3::Y,
-    };
+    let view = View { right: rotation * DVec3::X, up: rotation * DVec3::Y };
     for (name, row, column, grain) in &found {
         let (x, y) = (left + cell * *column as f64, top + row_height * *row as f64);
         let height = row_height - 10.0;
@@ -105,16 +99,11 @@ pub fn orientations(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure
         let run = runs
             .find(|r| r.levels.get(grains) == Some(oriented) && r.levels.get(axis) == Some(name));
         let Some(grain) = run.and_then(|run| first_grain(data, run)) else {
-            notes.push(format!(
-                "figure 5 lacks {oriented} in {name}: its case cannot be read"
-            ));
+            notes.push(format!("figure 5 lacks {oriented} in {name}: its case cannot be read"));
             continue;
         };
         let rotation = grain.pose.orientation.conjugate();
-        let view = View {
-            right: rotation * DVec3::X,
-            up: rotation * DVec3::Z,
-        };
+        let view = View { right: rotation * DVec3::X, up: rotation * DVec3::Z };
         let window = 2.3 * grain.shape.bounding_radius();
         let x = cell * n as f64;
         let picture = picture(&grain.shape, view, window, (cell, cell));
@@ -148,10 +137,7 @@ pub(super) fn arrow(drawing: &mut Drawing, from: (f64, f64), to: (f64, f64)) {
     let (dx, dy) = ((to.0 - from.0) / length, (to.1 - from.1) / length);
     let barb = |side: f64| {
         let (along, across) = (4.0, 1.7 * side);
-        (
-            to.0 - along * dx + across * dy,
-            to.1 - along * dy - across * dx,
-        )
+        (to.0 - along * dx + across * dy, to.1 - along * dy - across * dx)
     };
     let head = path_data(&[barb(1.0), to, barb(-1.0)], true);
     drawing.path(&head, &format!("fill=\"{INK}\""));
@@ -188,9 +174,7 @@ fn palette() -> Vec<[u8; 3]> {
     let shade = |s: f64| STONE.map(|c| (s * c).round() as u8);
     let rim = |w: f64| STONE.map(|c| (255.0 * w + (1.0 - w) * RIM * c).round() as u8);
     let shades = (0..224).map(|i| shade(f64::from(i) / 223.0));
-    shades
-        .chain((0..32).map(|i| rim(f64::from(i) / 31.0)))
-        .collect()
+    shades.chain((0..32).map(|i| rim(f64::from(i) / 31.0))).collect()
 }
 
 /// Index of the nearest palette colour, from the portions of stone and page in a pixel.
@@ -216,10 +200,7 @@ mod tests {
         for s in [0.12, 0.5, 0.97] {
             let pixel = STONE.map(|c| (s * c) as u8);
             let got = colours[usize::from(index(pixel))];
-            assert!(
-                got.iter().zip(pixel).all(|(a, b)| a.abs_diff(b) <= 6),
-                "{got:?} {pixel:?}"
-            );
+            assert!(got.iter().zip(pixel).all(|(a, b)| a.abs_diff(b) <= 6), "{got:?} {pixel:?}");
         }
         assert_eq!(colours[usize::from(index([255; 3]))], [255; 3]);
     }

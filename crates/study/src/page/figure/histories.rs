@@ -42,19 +42,14 @@ struct Layout<'a> {
 /// Draws figures 15, 16, 17 and 18.
 pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     let request = &data.plan.analysis.figures;
-    let (Some(rows), Some(columns), Some(axis), Some(level)) = (
-        &request.rows,
-        &request.columns,
-        &request.orientations,
-        &request.compare,
-    ) else {
+    let (Some(rows), Some(columns), Some(axis), Some(level)) =
+        (&request.rows, &request.columns, &request.orientations, &request.compare)
+    else {
         return Vec::new();
     };
     let wanted = |run: &&Run| run.member == 0 && run.levels.get(axis) == Some(level);
     let wanted: Vec<&Run> = data.plan.runs.iter().filter(wanted).collect();
-    let missing = wanted
-        .iter()
-        .filter(|r| !data.trajectories.contains_key(&r.name));
+    let missing = wanted.iter().filter(|r| !data.trajectories.contains_key(&r.name));
     let missing: Vec<&str> = missing.map(|r| r.name.as_str()).collect();
     if !missing.is_empty() {
         let names = missing.join(", ");
@@ -67,43 +62,24 @@ pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
         ("18", Curve::Velocity, columns, rows),
     ];
     let draw = |(number, curve, by, within): (&str, Curve, &String, &String)| {
-        let layout = Layout {
-            number,
-            curve,
-            by,
-            within,
-        };
+        let layout = Layout { number, curve, by, within };
         figure(data, &wanted, &layout, level)
     };
     layouts.into_iter().filter_map(draw).collect()
 }
 
 fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> Option<Figure> {
-    let Layout {
-        number,
-        curve,
-        by,
-        within,
-    } = *layout;
+    let Layout { number, curve, by, within } = *layout;
     let reference = data.plan.analysis.figures.reference.as_ref();
     let reference =
         reference.and_then(|name| Some((name, data.trajectories.get(&data.run(name)?.name)?)));
-    let shown: Vec<(&Run, &Trajectory)> = wanted
-        .iter()
-        .filter_map(|r| Some((*r, data.trajectories.get(&r.name)?)))
-        .collect();
+    let shown: Vec<(&Run, &Trajectory)> =
+        wanted.iter().filter_map(|r| Some((*r, data.trajectories.get(&r.name)?))).collect();
     if shown.is_empty() {
         return None;
     }
-    let all = || {
-        shown
-            .iter()
-            .map(|(_, t)| *t)
-            .chain(reference.map(|(_, t)| t))
-    };
-    let end = all()
-        .filter_map(|t| t.time.last().copied())
-        .fold(0.0, f64::max);
+    let all = || shown.iter().map(|(_, t)| *t).chain(reference.map(|(_, t)| t));
+    let end = all().filter_map(|t| t.time.last().copied()).fold(0.0, f64::max);
     let (label, low, high) = match curve {
         Curve::Gap => {
             let (_, high) = extent(all().flat_map(|t| t.distance.iter().copied()))?;
@@ -149,21 +125,12 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
         if let Some((_, trajectory)) = reference.filter(|_| curve == Curve::Gap) {
             draw(trajectory, INK, "sphere");
         }
-        for (run, trajectory) in shown
-            .iter()
-            .filter(|(r, _)| r.factors.get(by) == Some(value))
-        {
+        for (run, trajectory) in shown.iter().filter(|(r, _)| r.factors.get(by) == Some(value)) {
             let own = run.factors.get(within);
             let n = lines.iter().position(|v| own == Some(v)).unwrap_or(0);
             draw(trajectory, COLOURS[n % 4], &run.name);
         }
-        frame.outline(
-            &mut drawing,
-            Labelled {
-                across: row + 1 == rows,
-                up: column == 0,
-            },
-        );
+        frame.outline(&mut drawing, Labelled { across: row + 1 == rows, up: column == 0 });
     }
     let entry = |name: String, colour: &'static str, dash: Option<&'static str>| Entry {
         name,
@@ -200,11 +167,7 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
     if shown.len() < wanted.len() {
         caption += &format!(" {} of {} runs are finished.", shown.len(), wanted.len());
     }
-    let way = if matches!(number, "15" | "17") {
-        "row"
-    } else {
-        "column"
-    };
+    let way = if matches!(number, "15" | "17") { "row" } else { "column" };
     let name = format!("fig{number}-{file}-by-{way}");
     let title = format!("{quantity} by {by}");
     Some(Figure::new(name, title, caption, drawing).numbered(number))

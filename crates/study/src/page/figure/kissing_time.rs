@@ -38,9 +38,7 @@ fn layout<'a>(data: &'a FigureData, height: f64, top: f64) -> Option<Layout<'a>>
     let grains = data.levels(axis);
     let all = observations(data.records, "kiss_time", &BTreeMap::new());
     let reference = request.reference.as_ref();
-    let found = reference
-        .and_then(|name| all.iter().find(|o| o.model == *name))
-        .cloned();
+    let found = reference.and_then(|name| all.iter().find(|o| o.model == *name)).cloned();
     let (_, high) = extent(all.iter().flat_map(|o| [o.range.0, o.range.1, o.value]))?;
     let count = grains.len() + usize::from(reference.is_some());
     let mut across = Axis::linear("grain", 0.0, count as f64, 4, AxisRange::Tight);
@@ -50,10 +48,7 @@ fn layout<'a>(data: &'a FigureData, height: f64, top: f64) -> Option<Layout<'a>>
     };
     let ticks = grains.iter().map(|grain| number(grain));
     let ticks = ticks.chain(reference.map(|name| text::literal(name)));
-    across.ticks = ticks
-        .enumerate()
-        .map(|(i, label)| (i as f64 + 0.5, label))
-        .collect();
+    across.ticks = ticks.enumerate().map(|(i, label)| (i as f64 + 0.5, label)).collect();
     let mut blocks: Vec<(usize, usize, f64)> = Vec::new();
     for (i, grain) in grains.iter().enumerate() {
         let run = data.run_at(axis, grain)?;
@@ -88,13 +83,10 @@ impl Layout<'_> {
         let f = &self.frame;
         let mut drawing = Drawing::new(PAGE, f.y + f.height + 26.0);
         let blocks = || {
-            self.blocks
-                .iter()
-                .enumerate()
-                .map(|(n, (first, last, value))| {
-                    let (left, right) = (f.px(*first as f64), f.px(*last as f64 + 1.0));
-                    (left, right, format!("fill=\"{}\"", SHADES[n % 2]), *value)
-                })
+            self.blocks.iter().enumerate().map(|(n, (first, last, value))| {
+                let (left, right) = (f.px(*first as f64), f.px(*last as f64 + 1.0));
+                (left, right, format!("fill=\"{}\"", SHADES[n % 2]), *value)
+            })
         };
         for (left, right, shade, _) in blocks() {
             drawing.rectangle(left, f.y, right - left, f.height, &shade);
@@ -128,13 +120,7 @@ impl Layout<'_> {
             let bar = [(x, f.py(o.range.0)), (x, f.py(o.range.1))];
             drawing.line(&bar, colour, 0.9, None);
         }
-        sign.draw(
-            drawing,
-            (x, f.py(o.value)),
-            2.9,
-            colour,
-            Fill::of_bound(o.censored),
-        );
+        sign.draw(drawing, (x, f.py(o.value)), 2.9, colour, Fill::of_bound(o.censored));
     }
 
     fn censored(&self) -> usize {
@@ -148,9 +134,7 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
     let layout = layout(data, 190.0, 20.0)?;
     let mut drawing = layout.drawing(request.rows.as_deref());
     let orientations = request.orientations.as_ref();
-    let levels = orientations
-        .map(|axis| data.levels(axis))
-        .unwrap_or_default();
+    let levels = orientations.map(|axis| data.levels(axis)).unwrap_or_default();
     let entry = |(n, name): (usize, &String)| symbol_entry(name, n, COLOURS[n % 4]);
     let mut entries: Vec<Entry> = levels.iter().enumerate().map(entry).collect();
     let censored = layout.censored();
@@ -169,9 +153,7 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
             continue;
         };
         let level = orientations.and_then(|axis| observation.levels.get(axis));
-        let n = level
-            .and_then(|l| levels.iter().position(|o| o == l))
-            .unwrap_or(0);
+        let n = level.and_then(|l| levels.iter().position(|o| o == l)).unwrap_or(0);
         let shift = match levels.len() {
             0 | 1 => 0.0,
             count => 0.6 * n as f64 / (count - 1) as f64 - 0.3,
@@ -217,10 +199,7 @@ pub fn box_plot(data: &FigureData) -> Option<Figure> {
         format!("fill=\"{BLUE}\" fill-opacity=\"0.35\" stroke=\"{INK}\" stroke-width=\"{HAIR}\"");
     let mut widest: Option<(f64, &String)> = None;
     for (i, grain) in layout.grains.iter().enumerate() {
-        let own = layout
-            .all
-            .iter()
-            .filter(|o| o.levels.get(layout.axis) == Some(grain));
+        let own = layout.all.iter().filter(|o| o.levels.get(layout.axis) == Some(grain));
         let values: Vec<f64> = own.map(|o| o.value).collect();
         if values.is_empty() {
             continue;
@@ -246,13 +225,7 @@ pub fn box_plot(data: &FigureData) -> Option<Figure> {
     }
     if let Some(reference) = &layout.reference {
         let place = (f.px(layout.reference_position()), f.py(reference.value));
-        Marker::Circle.draw(
-            &mut drawing,
-            place,
-            2.9,
-            INK,
-            Fill::of_bound(reference.censored),
-        );
+        Marker::Circle.draw(&mut drawing, place, 2.9, INK, Fill::of_bound(reference.censored));
     }
     f.outline(&mut drawing, Labelled::BOTH);
     let (width, grain) = widest?;

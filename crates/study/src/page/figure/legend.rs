@@ -64,11 +64,7 @@ impl LineStyles {
         };
         match colour {
             Some(colour) => LineStyle::numbered(colour, dash.unwrap_or(0), dash.unwrap_or(colour)),
-            None => LineStyle {
-                colour: INK,
-                dash: None,
-                sign: Marker::Circle,
-            },
+            None => LineStyle { colour: INK, dash: None, sign: Marker::Circle },
         }
     }
 

@@ -38,10 +38,7 @@ pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
 fn renumber(figures: &mut [Figure]) {
     for (i, figure) in figures.iter_mut().enumerate() {
         figure.number = (i + 1).to_string();
-        let numbered = figure
-            .name
-            .strip_prefix("fig")
-            .and_then(|rest| rest.split_once('-'));
+        let numbered = figure.name.strip_prefix("fig").and_then(|rest| rest.split_once('-'));
         let numbered = numbered.filter(|(n, _)| n.starts_with(|c: char| c.is_ascii_digit()));
         let name = numbered.map_or(figure.name.as_str(), |(_, name)| name);
         figure.name = format!("fig{:02}-{name}", i + 1);

@@ -60,9 +60,7 @@ fn curves<'a>(
 ) -> Curves<'a> {
     let runs = data.plan.runs.iter().zip(data.records);
     let finished = runs.filter(|(_, record)| record.finished());
-    finished
-        .filter_map(|(run, record)| Some((run, read(run, record)?)))
-        .collect()
+    finished.filter_map(|(run, record)| Some((run, read(run, record)?))).collect()
 }
 
 fn settling_speeds(data: &FigureData) -> Option<Figure> {
@@ -71,11 +69,7 @@ fn settling_speeds(data: &FigureData) -> Option<Figure> {
         settling_curve(run, record, data.folder)
     });
     let mut settling = data.records.iter().filter_map(|r| r.settling.as_ref());
-    let grains = if settling.all(|s| s.grains == 1) {
-        "grain"
-    } else {
-        "grains (mean)"
-    };
+    let grains = if settling.all(|s| s.grains == 1) { "grain" } else { "grains (mean)" };
     let texts = Texts {
         name: "velocity",
         title: "Settling speed against time",

@@ -78,9 +78,7 @@ fn parameters(data: &FigureData) -> Vec<Parameter> {
         let known = runs.iter().filter_map(|run| {
             let level = run.levels.get(&axis)?;
             let i = levels.iter().position(|l| l == level)?;
-            let at = values
-                .as_ref()
-                .map_or(i as f64 + 0.5, |values: &Vec<f64>| values[i]);
+            let at = values.as_ref().map_or(i as f64 + 0.5, |values: &Vec<f64>| values[i]);
             Some((run.model.clone(), at))
         });
         Parameter {
@@ -109,10 +107,7 @@ fn parameters(data: &FigureData) -> Vec<Parameter> {
     }
     if out.is_empty() {
         let models = unique(runs.iter().map(|run| &run.model));
-        let at = models
-            .iter()
-            .enumerate()
-            .map(|(i, m)| (m.clone(), i as f64 + 0.5));
+        let at = models.iter().enumerate().map(|(i, m)| (m.clone(), i as f64 + 0.5));
         out.push(Parameter {
             name: "model".into(),
             axis: None,
@@ -167,13 +162,7 @@ pub(super) fn against_parameters(
         };
         frame.grid(&mut drawing);
         draw_panel(&mut drawing, &frame, parameter, &all, data, &styles);
-        frame.outline(
-            &mut drawing,
-            Labelled {
-                across: true,
-                up: i % 2 == 0,
-            },
-        );
+        frame.outline(&mut drawing, Labelled { across: true, up: i % 2 == 0 });
     }
     let mut caption = texts.caption.clone();
     let models = data.plan.runs.iter().filter(|r| r.member == 0).count();
@@ -205,10 +194,7 @@ fn draw_panel(
     let mut lines: BTreeMap<BTreeMap<String, String>, Vec<(f64, f64)>> = BTreeMap::new();
     for observation in all {
         if let (Some(axis), Some(point)) = (&parameter.axis, at(observation)) {
-            lines
-                .entry(observation.other_levels(axis))
-                .or_default()
-                .push(point);
+            lines.entry(observation.other_levels(axis)).or_default().push(point);
         }
     }
     for line in lines.values_mut() {
@@ -225,12 +211,6 @@ fn draw_panel(
             let bar = [(x, frame.py(low)), (x, frame.py(high))];
             drawing.line(&bar, style.colour, 0.9, None);
         }
-        style.sign.draw(
-            drawing,
-            (x, y),
-            3.0,
-            style.colour,
-            Fill::of_bound(observation.censored),
-        );
+        style.sign.draw(drawing, (x, y), 3.0, style.colour, Fill::of_bound(observation.censored));
     }
 }

@@ -19,9 +19,7 @@ pub fn figure(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure> {
     let name = data.plan.analysis.figures.setup.as_ref()?;
     let case = data.run(name).and_then(|run| data.case(run));
     if case.is_none() {
-        notes.push(format!(
-            "figure 7 is left out: the case of {name} cannot be read"
-        ));
+        notes.push(format!("figure 7 is left out: the case of {name} cannot be read"));
     }
     draw(name, &case?)
 }
@@ -37,24 +35,13 @@ fn draw(name: &str, case: &Case) -> Option<Figure> {
         false => (second, first),
     };
     let outlines = [trailing, leading].map(outline);
-    let whole = Window {
-        low: (low.x, low.z),
-        high: (high.x, high.z),
-    };
+    let whole = Window { low: (low.x, low.z), high: (high.x, high.z) };
     let scale = (0.40 * COLUMN / whole.width()).min(300.0 / whole.height());
-    let overall = EqualAspectFrame {
-        window: whole,
-        corner: (34.0, TOP),
-        scale,
-    };
+    let overall = EqualAspectFrame { window: whole, corner: (34.0, TOP), scale };
     let pair = pair_window(&outlines);
     let right = overall.corner.0 + overall.width() + 30.0;
     let zoom = ((COLUMN - right - 46.0) / pair.width()).min(overall.height() / pair.height());
-    let detail = EqualAspectFrame {
-        window: pair,
-        corner: (right, TOP),
-        scale: zoom,
-    };
+    let detail = EqualAspectFrame { window: pair, corner: (right, TOP), scale: zoom };
     let frame_style = format!("fill=\"none\" stroke=\"{FAINT}\" stroke-width=\"{HAIR}\"");
     let mut drawing = Drawing::new(COLUMN, TOP + overall.height() + 26.0);
     let (x, y) = overall.at((pair.low.0, pair.high.1));
@@ -85,10 +72,7 @@ fn draw(name: &str, case: &Case) -> Option<Figure> {
     let side = right + width + 4.0;
     let gap = format!("{} mm", value_text(1e3 * (bottom - top)));
     drawing.note((side, centre.1), Anchor::Start, &gap);
-    for (grain, word, colour) in [
-        (trailing, "trailing", BLUE),
-        (leading, "leading", VERMILION),
-    ] {
+    for (grain, word, colour) in [(trailing, "trailing", BLUE), (leading, "leading", VERMILION)] {
         let y = detail.at((0.0, grain.pose.position.z)).1 + 0.36 * SMALL;
         drawing.label((side, y), Anchor::Start, SMALL, colour, word);
     }
@@ -96,10 +80,7 @@ fn draw(name: &str, case: &Case) -> Option<Figure> {
     let arrow_end = |y: f64| (right + 6.0, foot + y);
     arrow(&mut drawing, arrow_end(-12.0), arrow_end(8.0));
     drawing.label((right + 12.0, foot), Anchor::Start, SMALL, INK, "*g*");
-    let size = (high - low)
-        .to_array()
-        .map(|length| value_text(1e3 * length))
-        .join(" × ");
+    let size = (high - low).to_array().map(|length| value_text(1e3 * length)).join(" × ");
     let cells = mesh.cells.map(|n| n.to_string()).join(" × ");
     let caption = format!(
         "The pair {} at the start, seen along y: the whole box of {size} mm ({cells} cells), and \
@@ -121,10 +102,7 @@ fn pair_window(outlines: &[Outline; 2]) -> Window {
     let margin = 0.12 * (z1 - z0);
     let middle = 0.5 * (x0 + x1);
     let half = (0.5 * (x1 - x0) + margin).max(0.30 * (z1 - z0));
-    Window {
-        low: (middle - half, z0 - margin),
-        high: (middle + half, z1 + margin),
-    }
+    Window { low: (middle - half, z0 - margin), high: (middle + half, z1 + margin) }
 }
 
 fn outline(grain: &Grain) -> Outline {

@@ -48,11 +48,7 @@ fn find<'a>(report: &'a RunReport, name: &str) -> Option<&'a Figure> {
 
 /// Sentence of the caption about an unfinished run.
 fn unfinished(report: &RunReport) -> &'static str {
-    if report.run.finished() {
-        ""
-    } else {
-        " The run has not finished."
-    }
+    if report.run.finished() { "" } else { " The run has not finished." }
 }
 
 fn path_and_speed(name: &str, number: usize, report: &RunReport) -> Option<Figure> {

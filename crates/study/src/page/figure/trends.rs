@@ -68,13 +68,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
         let zero = frame.px(0.0);
         let zero = [(zero, frame.y), (zero, frame.y + height)];
         drawing.line(&zero, INK, 0.6, Some("2 2"));
-        frame.outline(
-            &mut drawing,
-            Labelled {
-                across: true,
-                up: false,
-            },
-        );
+        frame.outline(&mut drawing, Labelled { across: true, up: false });
     }
     let entry = |(l, level): (usize, &String)| symbol_entry(level, l, COLOURS[l % 4]);
     let legend = Legend::new(levels.iter().enumerate().map(entry), PAGE - LEFT);
