@@ -185,7 +185,7 @@ fn step<V: Vector, B: Butterfly<R>, const R: usize>(
 
 /// Splits `R` slices of `len` entries off `rest`.
 #[inline(always)]
-fn cut<'a, T, const R: usize>(mut rest: &'a mut [T], len: usize) -> [&'a mut [T]; R] {
+fn cut<T, const R: usize>(mut rest: &mut [T], len: usize) -> [&mut [T]; R] {
     let mut slices = std::array::from_fn(|_| Default::default());
     for slice in &mut slices {
         (*slice, rest) = rest.split_at_mut(len);

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::Simulation;
 use crate::grid::{Axis, FieldView};
+use crate::math::Real;
 
 /// Read-only view of a whole field component in the precision of the run.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +63,7 @@ impl AnyFieldView<'_> {
     }
     /// Value of entry [k, j, i] in double precision. Panics outside the shape.
     pub fn get(&self, entry: [usize; 3]) -> f64 {
-        with_view!(self, view => f64::from(view.get(entry)))
+        with_view!(self, view => Real::wide(view.get(entry)))
     }
 }
 
