@@ -348,7 +348,7 @@ fn modules_form_no_circles() {
         for parent in read.parents() {
             let imports = read.imports(&parent);
             seen += imports.values().map(BTreeSet::len).sum::<usize>();
-            let folder = [&[name.clone()], &parent[..]].concat().join("/");
+            let folder = [std::slice::from_ref(&name), &parent[..]].concat().join("/");
             let is_known = |circle: &Vec<String>| {
                 let mut known = KNOWN_CIRCLES.iter().filter(|known| known.0 == folder);
                 known.any(|known| circle.iter().all(|m| known.1.contains(&m.as_str())))
