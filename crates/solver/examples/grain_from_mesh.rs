@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Octahedron with these semi-axes [m]; faces are counter-clockwise seen from outside.
 fn octahedron([a, b, c]: [f64; 3]) -> TriangleMesh {
     let vertices = [(a, 0.0, 0.0), (0.0, b, 0.0), (0.0, 0.0, c)];
-    let vertices = vertices.map(|v| DVec3::from(v));
+    let vertices = vertices.map(DVec3::from);
     let mut triangles = Vec::new();
     for octant in 0..8u32 {
         // Vertices 0 to 2 lie on the positive half-axes, 3 to 5 on the negative ones.
