@@ -142,6 +142,11 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
+/// Returns the error of a mesh that claims more faces or vertices than the limits allow.
+pub(crate) fn too_many_elements(path: &Path, claimed: &str, limits: &ReadLimits) -> ShapeError {
+    ShapeError::too_large(path, claimed, limits.mesh_elements, "faces or vertices")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,9 +1,6 @@
 //! Signed distance to a closed mesh.
 
 use super::TriangleMesh;
-use super::nearest_cache::About;
-use super::propagate;
-use crate::distance::Distance;
 use crate::error::Result;
 use crate::triangles::{Bvh, Feature, Nearest, Neighbours, nearest_on_triangle};
 use glam::DVec3;
@@ -189,35 +186,10 @@ impl Spokes {
     }
 }
 
-impl Distance for MeshDistance {
-    fn near(&self, x: DVec3, hint: &mut u32) -> f64 {
-        self.signed(x, &self.nearest(x, hint))
-    }
-
-    fn closing_in(&self, _: f64) -> impl FnMut(DVec3) -> (f64, DVec3) {
-        let mut about = About::new(self);
-        move |x| {
-            let nearest = about.nearest(x);
-            let distance = self.signed(x, &nearest);
-            (distance, (x - nearest.point) / distance)
-        }
-    }
-
-    fn on_grid(
-        &self,
-        first: DVec3,
-        spacing: f64,
-        dims: [usize; 3],
-        band: f64,
-        needed: [f64; 2],
-    ) -> Vec<f64> {
-        propagate::on_grid(self, first, spacing, dims, band, needed)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::distance::Distance;
 
     #[test]
     fn distance_to_a_cube_is_exact_everywhere() {

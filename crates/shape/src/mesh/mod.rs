@@ -8,6 +8,7 @@ mod obj;
 mod ply;
 mod propagate;
 mod read;
+mod sampling;
 mod stl;
 mod weld;
 

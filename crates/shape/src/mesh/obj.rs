@@ -2,7 +2,7 @@
 
 use super::TriangleMesh;
 use crate::error::{Result, ShapeError};
-use crate::limits::ReadLimits;
+use crate::limits::{ReadLimits, too_many_elements};
 use glam::DVec3;
 use std::io::Cursor;
 use std::path::Path;
@@ -25,7 +25,7 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
         let faces = model.mesh.indices.chunks_exact(3);
         mesh.triangles.extend(faces.map(|t| [first + t[0], first + t[1], first + t[2]]));
         if mesh.vertices.len().max(mesh.triangles.len()) as u64 > limits.mesh_elements {
-            return Err(super::read::too_many(path, "more faces or vertices", limits));
+            return Err(too_many_elements(path, "more faces or vertices", limits));
         }
     }
     Ok(mesh)

@@ -2,7 +2,7 @@
 
 use super::TriangleMesh;
 use crate::error::{Result, ShapeError};
-use crate::limits::ReadLimits;
+use crate::limits::{ReadLimits, too_many_elements};
 use glam::DVec3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
@@ -79,7 +79,7 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
         }
     }
     if mesh.triangles.len() as u64 > limits.mesh_elements {
-        return Err(super::read::too_many(path, "more faces", limits));
+        return Err(too_many_elements(path, "more faces", limits));
     }
     Ok(mesh)
 }
@@ -122,7 +122,7 @@ fn check_header(path: &Path, header: &Header, size: u64, limits: &ReadLimits) ->
         let count = element.count as u64;
         let claimed = || format!("{count} elements {:?}", element.name);
         if count > limits.mesh_elements {
-            return Err(super::read::too_many(path, &claimed(), limits));
+            return Err(too_many_elements(path, &claimed(), limits));
         }
         if count.saturating_mul(least_bytes(element, header)) > size {
             let claimed = claimed();

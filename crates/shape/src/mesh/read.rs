@@ -34,7 +34,3 @@ pub fn read_mesh(
         Err(error) => Err(error),
     }
 }
-
-pub(super) fn too_many(path: &Path, claimed: &str, limits: &ReadLimits) -> ShapeError {
-    ShapeError::too_large(path, claimed, limits.mesh_elements, "faces or vertices")
-}

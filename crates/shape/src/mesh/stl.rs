@@ -2,7 +2,7 @@
 
 use super::TriangleMesh;
 use crate::error::{Result, ShapeError};
-use crate::limits::ReadLimits;
+use crate::limits::{ReadLimits, too_many_elements};
 use glam::DVec3;
 use std::io::Cursor;
 use std::path::Path;
@@ -38,7 +38,7 @@ pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Resu
     for triangle in triangles {
         let triangle = triangle.map_err(|e| ShapeError::malformed(path, e))?;
         if mesh.triangles.len() as u64 >= limits.mesh_elements {
-            return Err(super::read::too_many(path, "more faces", limits));
+            return Err(too_many_elements(path, "more faces", limits));
         }
         let first = mesh.vertices.len() as u32;
         let corner = |v: stl_io::Vector<f32>| DVec3::from_array(v.0.map(f64::from));

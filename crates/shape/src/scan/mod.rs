@@ -22,6 +22,7 @@ mod header;
 mod npy;
 mod npz;
 mod options;
+mod read;
 mod regions;
 mod runs;
 mod segments;
@@ -35,8 +36,9 @@ mod watershed;
 
 pub use build::{Scan, ScannedGrain, scan_volume, shapes_from_volume};
 pub use options::ScanOptions;
+pub use read::read_volume;
 pub use threshold::Threshold;
-pub use volume::{Volume, Voxels, read_volume};
+pub use volume::{Volume, Voxels};
 
 /// Callback for progress: stage, completed steps, total steps.
 pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) + Sync);

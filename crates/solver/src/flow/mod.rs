@@ -4,6 +4,7 @@
 //! Poisson solve a step.
 
 mod boundary;
+mod measures;
 mod params;
 mod prediction;
 mod project;
@@ -11,6 +12,7 @@ mod solver;
 mod tendency;
 
 pub use boundary::{Boundaries, Boundary};
+pub(crate) use measures::FlowMeasures;
 pub use params::FluidParams;
 pub(crate) use prediction::{OldState, Prediction};
-pub(crate) use solver::{Flow, FlowMeasures};
+pub(crate) use solver::Flow;
