@@ -101,10 +101,7 @@ mod tests {
             start % 4096
         });
         // Tests that run at the same time take offsets too.
-        assert!(
-            offsets.iter().any(|offset| *offset != offsets[0]),
-            "{offsets:?}"
-        );
+        assert!(offsets.iter().any(|offset| *offset != offsets[0]), "{offsets:?}");
         let mut short = Aligned::<f32>::zeros(20);
         short[19] = 1.0;
         short.make_room(20);
