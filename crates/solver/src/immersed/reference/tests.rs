@@ -154,13 +154,13 @@ fn distances_to_faces_match_the_reference() {
     let reference = &case.reference;
     let mut nearer_to_another = 0;
     for (index, (body, _)) in case.located.iter().enumerate() {
-        // Samples of the ellipsoid are interpolated: poorly near its medial axis, far below the
-        // band.
-        let band = 2.0 * case.locator.eps();
+        // The samples of the ellipsoid are interpolated. Below the depth eps, where no weight
+        // depends on the distance, the medial axis is near and interpolation is poor.
+        let eps = case.locator.eps();
         let tolerance_at = |d: f64| match SPHERES.contains(&index) {
             true => 1e-6,
-            false if d > -band => 1e-3,
-            false => 2e-2,
+            false if d > -eps => 1e-3,
+            false => 1e-2,
         };
         let tolerance = tolerance_at(0.0);
         for component in 0..3 {
