@@ -1,7 +1,5 @@
 //! Tiled TIFF and BigTIFF, byte by byte: encoders at hand write neither.
 
-#![allow(dead_code)]
-
 /// Columns, rows and pages; the tiles of 16 x 16 stand out over the right and lower edge.
 pub const SIZE: [usize; 3] = [40, 24, 3];
 const TILE: usize = 16;
