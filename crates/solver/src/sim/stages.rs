@@ -123,19 +123,22 @@ impl<'a> Start<'a> {
 }
 
 impl GrainStep<'_> {
-    /// Moves the grains in contact sub-steps under weight, buoyancy and the hydrodynamic load of
-    /// the last step (Eqs 6 to 36).
-    fn trial_step(&mut self) -> TrialStep {
+    /// Moves the grains by `take_substeps` under weight, buoyancy and the hydrodynamic load of the
+    /// last step (Eqs 6 to 36).
+    fn move_grains<T>(
+        &mut self,
+        take_substeps: impl FnOnce(&mut ContactDynamics, &mut [Grain], &[Load], f64, &mut [Load]) -> T,
+    ) -> T {
         let data = &mut *self.data;
         for (i, driving) in data.driving.iter_mut().enumerate() {
             *driving = data.applied[i] + self.loads[i];
         }
-        let trial = timed(&mut self.times.contact, || {
-            (self.dynamics).trial_step(self.grains, &data.driving, self.dt, &mut data.contact)
+        let taken = timed(&mut self.times.contact, || {
+            take_substeps(self.dynamics, self.grains, &data.driving, self.dt, &mut data.contact)
         });
         let end = self.time + self.dt;
         self.prescription.set_velocities(self.grains, end);
-        trial
+        taken
     }
 }
 
@@ -143,8 +146,7 @@ impl DryStart<'_> {
     /// Moves the grains in contact sub-steps; nothing else happens without fluid.
     pub fn move_grains(self) {
         let DryStart(mut step) = self;
-        let trial = step.trial_step();
-        step.dynamics.accept(trial);
+        step.move_grains(ContactDynamics::advance);
     }
 }
 
@@ -162,7 +164,7 @@ impl<'a> Predicted<'a> {
     /// Moves the grains in contact sub-steps under the hydrodynamic load of the last step.
     pub fn move_grains(self) -> Moved<'a> {
         let Predicted(mut step) = self;
-        let trial = step.solid.trial_step();
+        let trial = step.solid.move_grains(ContactDynamics::trial_step);
         Moved(step, trial)
     }
 }

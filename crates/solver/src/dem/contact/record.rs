@@ -39,7 +39,7 @@ pub(in crate::dem) struct PairLoads {
 }
 
 /// Pair that may touch, with its friction history and buffers, kept between sub-steps.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(in crate::dem) struct ContactRecord {
     /// Identity of the pair.
     pub key: PairKey,
@@ -61,6 +61,29 @@ pub(in crate::dem) struct ContactRecord {
     pub patch: ContactPatch,
     /// Loads of the last evaluation.
     pub loads: PairLoads,
+}
+
+impl Clone for ContactRecord {
+    fn clone(&self) -> ContactRecord {
+        let mut copy = ContactRecord::new(self.key);
+        copy.clone_from(self);
+        copy
+    }
+    /// Copies a record into the buffers of this one: the trial step copies all records in every
+    /// step.
+    fn clone_from(&mut self, source: &ContactRecord) {
+        let ContactRecord { history, next_history, patch, .. } = source;
+        self.history.clone_from(history);
+        self.next_history.clone_from(next_history);
+        self.patch.clone_from(patch);
+        self.key = source.key;
+        self.in_contact = source.in_contact;
+        self.in_contact_during_step = source.in_contact_during_step;
+        self.dashpot_fraction = source.dashpot_fraction;
+        self.tangential_stiffness = source.tangential_stiffness;
+        self.mean_history = source.mean_history;
+        self.loads = source.loads;
+    }
 }
 
 impl ContactRecord {

@@ -26,7 +26,7 @@ impl ContactDynamics {
         dt: f64,
         mean_contact: &mut [Load],
     ) -> TrialStep {
-        // The buffers return with the accepted or resolved step. Copies of records still allocate.
+        // The buffers return with the accepted or resolved step.
         let mut before = std::mem::take(&mut self.state_before);
         before.records.clone_from(&self.records);
         before.last_positions.clone_from(&self.last_positions);

@@ -46,7 +46,7 @@ impl ClosestPoint {
 }
 
 /// Penetrating points of a pair, with the buffers of the narrow phase.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(in crate::dem) struct ContactPatch {
     /// Penetrating points, in ascending identifier.
     pub points: Vec<ContactPoint>,
@@ -55,6 +55,20 @@ pub(in crate::dem) struct ContactPatch {
     /// Nearest node of either grain in the last search.
     seeds: [Option<u32>; 2],
     found: Vec<PenetratingPoint>,
+}
+
+impl Clone for ContactPatch {
+    fn clone(&self) -> ContactPatch {
+        let mut copy = ContactPatch::default();
+        copy.clone_from(self);
+        copy
+    }
+    /// Copies a patch into the buffers of this one.
+    fn clone_from(&mut self, source: &ContactPatch) {
+        self.points.clone_from(&source.points);
+        self.found.clone_from(&source.found);
+        (self.separation, self.seeds) = (source.separation, source.seeds);
+    }
 }
 
 impl ContactPatch {
