@@ -160,11 +160,13 @@ impl ComputeLinkWeights<'_> {
             ];
             for axis in 0..3 {
                 let d = half * (d_0 + d_1[axis]);
-                let excess = inverse_aperture_excess(d, self.eps);
-                let w = d.select_below(band, excess, zero);
-                let w = inside.select_below(d, w, no_link);
-                let w = d.select_below(outside, w, no_link);
-                w.store(&mut weight[axis][entry..]);
+                let mut w = zero;
+                // Most vectors of a box lie beyond the band, where no series is needed.
+                if d.mask_below(band) != 0 {
+                    let excess = inverse_aperture_excess(d, self.eps);
+                    w = inside.select_below(d, d.select_below(band, excess, zero), no_link);
+                }
+                d.select_below(outside, w, no_link).store(&mut weight[axis][entry..]);
             }
         }
     }
