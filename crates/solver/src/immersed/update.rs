@@ -199,8 +199,8 @@ impl<R: Real> CouplingStep<'_, R> {
     ) -> RigidBodySystem {
         let (known, density, dt) = (&self.known, self.fluid_density, self.input.dt);
         let (grain, previous) = (&self.input.grains[index], &self.input.previous[index]);
-        let old = previous.velocity;
-        let impulse = sum_impulse(known, predictions, density, forced, old, dt);
+        let motion = [previous.velocity, previous.acceleration];
+        let impulse = sum_impulse(known, predictions, density, forced, motion, dt);
         let applied = self.input.applied[index];
         RigidBodySystem::new(grain, previous, impulse, density, applied, dt)
     }

@@ -20,10 +20,9 @@ const MAXIMUM_OVERLAP: f64 = 0.01;
 const ROUGHNESS: f64 = 3e-3;
 /// Added mass of a sphere in contact, relative to the displaced fluid.
 ///
-/// Potential flow gives 0.5 far from a wall and 0.803 at it (Hicks 1879); the grid gives 0.75. With
-/// 0.7 an undamped impact conserves the speed
-/// (`docs/decisions/0014-contact-with-the-fluid-response.md`).
-const ADDED_MASS: f64 = 0.7;
+/// Potential flow gives 0.5 far from a wall and 0.803 at it (Hicks 1879). With 0.8 an undamped
+/// impact nearly conserves the speed (`docs/decisions/0018-pressure-weight.md`).
+const ADDED_MASS: f64 = 0.8;
 
 /// Returns the fluid and its formulas; writes the viscosity as a kinematic one.
 pub(super) fn fluid(

@@ -1,13 +1,13 @@
 //! Forcing of a face near a surface: strength of the drag, and fraction closed to the
 //! pressure gradient.
 //!
-//! Legend: d signed distance, eps half-width of the band, A aperture.
+//! Legend: d signed distance, eps half-width of the band, P pressure weight, A aperture.
 
 use std::ops::Add;
 
 use glam::DVec3;
 
-use super::drag::drag;
+use super::drag::{drag, pressure_weight};
 use crate::immersed::geometry::aperture::aperture;
 use crate::immersed::scheme::Scheme;
 use grainwake_simd::{Kernel, Scalar, Vector, dispatch};
@@ -17,9 +17,11 @@ use grainwake_simd::{Kernel, Scalar, Vector, dispatch};
 pub struct FaceForcing {
     /// Drag coefficient times dt; the weight of the rigid velocity is strength / (1 + strength).
     pub strength: f64,
-    /// Fraction of the face closed to the pressure gradient: its solid fraction 1 - A(d), zero in
-    /// the paper's scheme, which blends by the weight.
+    /// Fraction of the face closed to the pressure gradient: one less its pressure weight P; zero
+    /// in the paper's scheme, which blends by the weight.
     pub closed_fraction: f64,
+    /// Solid fraction of the face, 1 - A; zero in the paper's scheme.
+    pub solid_fraction: f64,
 }
 
 impl FaceForcing {
@@ -35,6 +37,7 @@ impl Add for FaceForcing {
         FaceForcing {
             strength: self.strength + other.strength,
             closed_fraction: self.closed_fraction + other.closed_fraction,
+            solid_fraction: self.solid_fraction + other.solid_fraction,
         }
     }
 }
@@ -73,7 +76,8 @@ impl ForcingParams {
     pub fn of(&self, d: f64, normal: DVec3) -> FaceForcing {
         match self.scheme {
             Scheme::Aperture => {
-                let mut forcing = FaceForcing { strength: 0.0, closed_fraction: 0.0 };
+                let mut forcing =
+                    FaceForcing { strength: 0.0, closed_fraction: 0.0, solid_fraction: 0.0 };
                 dispatch(OneFace { params: self, d, normal, forcing: &mut forcing });
                 forcing
             }
@@ -81,16 +85,18 @@ impl ForcingParams {
         }
     }
 
-    /// Strength of the drag as numerator and positive denominator, and closed fraction.
+    /// Strength of the drag as numerator and positive denominator; closed and solid fraction.
     #[inline(always)]
-    pub fn aperture_forcing<V: Vector>(&self, d: V, normal: [V; 3]) -> ([V; 2], V) {
-        let [drag, depth] = drag(d, normal, self.spacing.to_array(), self.eps);
+    pub fn aperture_forcing<V: Vector>(&self, d: V, normal: [V; 3]) -> ([V; 2], [V; 2]) {
+        let (spacing, eps) = (self.spacing.to_array(), self.eps);
+        let [drag, depth] = drag(d, normal, spacing, eps);
+        let open = pressure_weight(d, normal, spacing, eps, [drag, depth]);
         let strength = V::constant(self.diffusion) * drag;
         // Zero outside the band: a concave grain may enclose such faces.
-        let outside = V::constant(2.0 * self.eps);
+        let outside = V::constant(2.0 * eps);
         let strength = d.select_below(outside, strength, V::constant(0.0));
-        let closed_fraction = V::constant(1.0) - aperture(d, self.eps);
-        ([strength, depth], closed_fraction)
+        let one = V::constant(1.0);
+        ([strength, depth], [one - open, one - aperture(d, eps)])
     }
 
     /// Forcing of the paper's scheme: the weight of the rigid velocity is the solid fraction of a
@@ -98,7 +104,11 @@ impl ForcingParams {
     fn blend(&self, d: f64, normal: DVec3) -> FaceForcing {
         let width = normal.abs().dot(self.spacing);
         let solid_fraction = (0.5 - d / width).clamp(0.0, 1.0);
-        FaceForcing { strength: solid_fraction / (1.0 - solid_fraction), closed_fraction: 0.0 }
+        FaceForcing {
+            strength: solid_fraction / (1.0 - solid_fraction),
+            closed_fraction: 0.0,
+            solid_fraction: 0.0,
+        }
     }
 }
 
@@ -115,9 +125,12 @@ impl Kernel for OneFace<'_> {
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
         let normal = self.normal.to_array().map(Scalar);
-        let ([strength, depth], closed_fraction) =
+        let ([strength, depth], [closed_fraction, solid_fraction]) =
             self.params.aperture_forcing(Scalar(self.d), normal);
-        *self.forcing =
-            FaceForcing { strength: strength.0 / depth.0, closed_fraction: closed_fraction.0 };
+        *self.forcing = FaceForcing {
+            strength: strength.0 / depth.0,
+            closed_fraction: closed_fraction.0,
+            solid_fraction: solid_fraction.0,
+        };
     }
 }

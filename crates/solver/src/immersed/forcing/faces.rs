@@ -18,6 +18,8 @@ pub struct ForcedFaces {
     pub closed_fraction: Vec<f32>,
     /// Fraction of a face that all grains together close; empty if the grain shares no face.
     total_closed_fraction: Vec<f32>,
+    /// Solid fraction of a face, with which it takes a change of the rigid velocity, 0 to 1.
+    pub solid_fraction: Vec<f32>,
     /// Velocity that a face gains next to a grain at rest [m/s]; filled by [`super::sum_impulse`].
     pub rest_gain: Vec<f64>,
 }
@@ -35,6 +37,7 @@ impl ForcedFaces {
         let padded = band.pad(params.eps);
         self.weight.resize(padded, 0.0);
         self.closed_fraction.resize(padded, 0.0);
+        self.solid_fraction.resize(padded, 0.0);
         match params.scheme {
             Scheme::Aperture => dispatch(ComputeFaceWeights { params, band, forced: self }),
             Scheme::Paper => {
@@ -43,10 +46,11 @@ impl ForcedFaces {
                     let forcing = params.of(d, normal);
                     self.weight[entry] = forcing.weight(forcing) as f32;
                     self.closed_fraction[entry] = forcing.closed_fraction as f32;
+                    self.solid_fraction[entry] = forcing.solid_fraction as f32;
                 }
             }
         }
-        for list in [&mut self.weight, &mut self.closed_fraction] {
+        for list in [&mut self.weight, &mut self.closed_fraction, &mut self.solid_fraction] {
             list.truncate(count);
             list.resize(count + MAX_LANES, 0.0);
         }
@@ -84,6 +88,8 @@ impl ForcedFaces {
             self.weight[entry] = forcing.weight(all) as f32;
             self.closed_fraction[entry] =
                 (forcing.closed_fraction / all.closed_fraction.max(1.0)) as f32;
+            self.solid_fraction[entry] =
+                (forcing.solid_fraction / all.solid_fraction.max(1.0)) as f32;
             self.total_closed_fraction[entry] = all.closed_fraction.min(1.0) as f32;
         }
     }
@@ -99,7 +105,12 @@ impl ForcedFaces {
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let lists = [&self.weight, &self.closed_fraction, &self.total_closed_fraction];
+        let lists = [
+            &self.weight,
+            &self.closed_fraction,
+            &self.total_closed_fraction,
+            &self.solid_fraction,
+        ];
         let runs: usize = self.runs.iter().map(Vec::capacity).sum();
         let values: usize = lists.iter().map(|list| list.capacity()).sum();
         size_of::<FaceRun>() * runs
@@ -120,17 +131,19 @@ impl Kernel for ComputeFaceWeights<'_> {
     #[inline(always)]
     fn run<V: Vector<Number = f32>>(self) {
         let BandFaces { distance, normal, .. } = self.band;
-        let ForcedFaces { weight, closed_fraction, .. } = self.forced;
+        let ForcedFaces { weight, closed_fraction, solid_fraction, .. } = self.forced;
         let one = V::constant(1.0);
         let inside = V::constant(-self.params.eps);
         for at in (0..weight.len()).step_by(V::WIDTH) {
             let d = V::load(&distance[at..]);
-            let ([strength, depth], c) = self.params.aperture_forcing(d, load_all(normal, at));
+            let ([strength, depth], [c, solid]) =
+                self.params.aperture_forcing(d, load_all(normal, at));
             // strength / (1 + strength) with a single division.
             let s = strength.div(depth + strength);
             // Faces deep inside take the rigid velocity.
             inside.select_below(d, s, one).store(&mut weight[at..]);
             inside.select_below(d, c, one).store(&mut closed_fraction[at..]);
+            solid.store(&mut solid_fraction[at..]);
         }
     }
 }

@@ -6,7 +6,11 @@
 //! - e = dt / h (p~(above) - p~(below)) - dt g, if the step's pressure gradient and body
 //!   acceleration are removed from the face;
 //! - r = c e - s (u* + C e), next to a grain at rest: the drag acts on u* + C e;
-//! - r + s U + f (U - U_old), next to a moving grain, with f = (1 - s) c.
+//! - r + s U + f (U - U_old) + (1 - s) (c - phi) W, next to a moving grain, with f = (1 - s) phi.
+//!
+//! W is the change of U expected from the previous step. The solid part phi of a face follows any
+//! change of U at once. The whole closed part c follows a steady acceleration, as it does a pressure
+//! gradient: viscosity takes a while to bring the outer part along. An impact moves phi only.
 //!
 //! p~ = p - dt U_old . grad p is the pressure of the last step, moved with the grain; without this
 //! shift the drag of a moving grain is of first order in the step
@@ -14,8 +18,8 @@
 //! fluid mass times gain over the faces, J = constant + matrix (V, Omega). The grain loses what the
 //! fluid gains ([`crate::immersed::rigid_body`]). `immersed::reference` has the scalar form.
 //!
-//! Legend: s weight, c closed fraction, C total closed fraction (both zero in the paper's scheme),
-//! f weight of the change of velocity, u* predicted velocity, h spacing along the component, l and
+//! Legend: s weight, c closed fraction, C total closed fraction, phi solid fraction (these three
+//! zero in the paper's scheme), f weight of the change of velocity, u* predicted velocity, h spacing along the component, l and
 //! m lever arms of the face about the two other axes.
 
 use super::faces::ForcedFaces;
@@ -36,19 +40,20 @@ pub struct Impulse {
     pub matrix: Matrix6,
 }
 
-/// Sums the impulse over the faces of `forced` for a grain that had the velocity `old`, and fills
-/// their `rest_gain`. `dt` [s] is the length of the step; 0 leaves out the pressure gradient and
-/// the body acceleration.
+/// Sums the impulse over the faces of `forced` for a grain that had the velocity and acceleration
+/// `old` and `acceleration`, and fills their `rest_gain`. `dt` [s] is the length of the step; 0
+/// leaves out the pressure gradient, the body acceleration and that of the grain.
 pub fn sum_impulse<R: Real>(
     known: &OldState<R>,
     predictions: &[Prediction<R>; 3],
     fluid_density: f64,
     forced: &mut ForcedFaces,
-    old: RigidVelocity,
+    [old, acceleration]: [RigidVelocity; 2],
     dt: f64,
 ) -> Impulse {
     let mut sums = [Moments::default(); 3];
-    dispatch(SumImpulse { known, predictions, forced, old, dt, sums: &mut sums });
+    let sums_of = &mut sums;
+    dispatch(SumImpulse { known, predictions, forced, old, acceleration, dt, sums: sums_of });
     let w = fluid_density * known.mesh.cell_volume();
     let mut impulse = Impulse::default();
     for (axis, sum) in sums.iter().enumerate() {
@@ -104,6 +109,7 @@ struct SumImpulse<'a, R> {
     predictions: &'a [Prediction<'a, R>; 3],
     forced: &'a mut ForcedFaces,
     old: RigidVelocity,
+    acceleration: RigidVelocity,
     dt: f64,
     sums: &'a mut [Moments; 3],
 }
@@ -119,13 +125,13 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
         let spacing = mesh.spacing;
         let [x, y, z] = mesh.layout().strides().map(|stride| stride as isize);
         let stencil = Stencil::new([0, x, -x, y, -y, z, -z]);
-        let (weights, closed_fraction, total_closed_fraction) =
-            (&forced.weight, &forced.closed_fraction, forced.total_closed_fraction());
+        let total_closed_fraction = forced.total_closed_fraction();
         for (axis, runs) in forced.runs.iter().enumerate() {
             let half_cell = 0.5 * spacing[axis] * DVec3::AXES[axis];
             let above = self.old.angular.cross(half_cell);
             for run in runs {
                 let rigid = RigidRun::new(self.old, run.lever_arm, spacing);
+                let acceleration = RigidRun::new(self.acceleration, run.lever_arm, spacing);
                 let faces = RunImpulse {
                     axis,
                     run,
@@ -133,6 +139,8 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
                     pressure: self.known.pressure,
                     stencil,
                     rigid,
+                    acceleration,
+                    dt: self.dt,
                     cells: [above, -above].map(|offset| rigid.shifted(offset)),
                     dt_per_2h: (0.5 * self.dt / spacing).to_array(),
                     dt_per_h: self.dt / spacing[axis],
@@ -141,11 +149,14 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
                 };
                 for n in (0..run.count).step_by(V::WIDTH) {
                     let entry = run.first + n;
-                    let weight = V::load_from(&weights[entry..]);
-                    let closed_fraction = V::load_from(&closed_fraction[entry..]);
-                    let total_closed_fraction = V::load_from(&total_closed_fraction[entry..]);
-                    let sums = &mut self.sums[axis];
-                    let gain = faces.add(n, weight, [closed_fraction, total_closed_fraction], sums);
+                    let weights = [
+                        &forced.weight,
+                        &forced.closed_fraction,
+                        total_closed_fraction,
+                        &forced.solid_fraction,
+                    ];
+                    let weights = weights.map(|list| V::load_from(&list[entry..]));
+                    let gain = faces.add(n, weights, &mut self.sums[axis]);
                     // Entries beyond the run are overwritten by the next run.
                     gain.store(&mut rest_gain[entry..]);
                 }
@@ -167,6 +178,10 @@ struct RunImpulse<'a, R> {
     stencil: Stencil<7>,
     /// U_old at the faces [m/s].
     rigid: RigidRun,
+    /// Acceleration of the grain over the previous step, at the faces [m/s^2].
+    acceleration: RigidRun,
+    /// Length of the step [s].
+    dt: f64,
     /// U_old at the centres of the cells above and below the faces [m/s].
     cells: [RigidRun; 2],
     /// dt / (2 h) along each axis [s/m].
@@ -195,14 +210,13 @@ impl<R: Real> RunImpulse<'_, R> {
         moved
     }
 
-    /// Adds the faces from face `n` of the run on to the sums; returns their gain next to a grain
-    /// at rest [m/s].
+    /// Adds the faces from face `n` of the run on, with the weights s, c, C and phi, to the sums;
+    /// returns their gain for U = U_old = 0 [m/s].
     #[inline(always)]
     fn add<V: Vector<Number = f64>>(
         &self,
         n: usize,
-        weight: V,
-        [closed_fraction, total_closed_fraction]: [V; 2],
+        [weight, closed_fraction, total_closed_fraction, solid_fraction]: [V; 4],
         sums: &mut Moments,
     ) -> V {
         let (zero, index) = (V::constant(0.0), lane_indices::<V>(n));
@@ -211,7 +225,10 @@ impl<R: Real> RunImpulse<'_, R> {
         let e = rise.mul_add(V::constant(self.dt_per_h), V::constant(-self.dt_g));
         let without_drag = total_closed_fraction.mul_add(e, predicted);
         let rest_gain = (zero - weight).mul_add(without_drag, closed_fraction * e);
-        let f = change_weight(weight, closed_fraction);
+        let expected = V::constant(self.dt) * self.acceleration.component(self.axis, index);
+        let rest_gain =
+            change_weight(weight, closed_fraction - solid_fraction).mul_add(expected, rest_gain);
+        let f = change_weight(weight, solid_fraction);
         let constant = rest_gain - f * self.rigid.component(self.axis, index);
         let derivative = weight + f;
         let lever_arm = self.run.lever_arm;

@@ -42,9 +42,9 @@ pub fn lane_indices<V: Vector<Number = f64>>(n: usize) -> V {
     V::constant(n as f64) + V::ramp()
 }
 
-/// Weight f = (1 - s) c of the change U - U_old of the rigid velocity, with the weight s of the
-/// velocity and the closed fraction c.
+/// Weight f = (1 - s) phi of the change U - U_old of the rigid velocity, with the weight s of the
+/// velocity and the solid fraction phi.
 #[inline(always)]
-pub fn change_weight<V: Vector<Number = f64>>(weight: V, closed_fraction: V) -> V {
-    (V::constant(1.0) - weight) * closed_fraction
+pub fn change_weight<V: Vector<Number = f64>>(weight: V, solid_fraction: V) -> V {
+    (V::constant(1.0) - weight) * solid_fraction
 }

@@ -51,11 +51,11 @@ impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
             for n in (0..run.count).step_by(V::WIDTH) {
                 let entry = run.first + n;
                 let weight = V::load_from(&forced.weight[entry..]);
-                let closed_fraction = V::load_from(&forced.closed_fraction[entry..]);
+                let solid_fraction = V::load_from(&forced.solid_fraction[entry..]);
                 let index = lane_indices(n);
                 let gain = V::load(&forced.rest_gain[entry..])
                     + weight * velocity.component(axis, index)
-                    + change_weight(weight, closed_fraction) * change.component(axis, index);
+                    + change_weight(weight, solid_fraction) * change.component(axis, index);
                 gain.add_partial(&mut predicted[n..]);
             }
         }

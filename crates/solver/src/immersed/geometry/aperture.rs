@@ -1,11 +1,13 @@
 //! Aperture (open fraction) of a face or link near a solid surface. The solid fraction is 1 - A.
 //!
 //! A(d) = (1 + s + sin(pi s) / pi) / 2 with s = d / eps limited to [-1, 1]: from 0 inside to 1
-//! outside a band of half-width eps around the surface. The open depth m(d), the integral of A, is
-//! the velocity profile of a linear shear over a plane wall. [`reference`] has the scalar forms.
+//! outside a band of half-width eps around the surface. Velocities near a surface are those of the
+//! fluid averaged over this band: a linear shear over a plane wall becomes the open depth m(d), the
+//! integral of A; a parabola d^2 / 2 becomes M(d), the integral of m. [`reference`] has the scalar
+//! forms.
 //!
 //! Legend: d signed distance (negative inside), eps half-width of the band, A aperture, m open
-//! depth.
+//! depth, M its integral.
 
 use std::f64::consts::PI;
 
@@ -36,8 +38,8 @@ const COSINE: [f64; 7] = [
     6.097403736034505e-09,
 ];
 
-/// Lower limit of the aperture in 1 / A - 1. Without the limit an impulsive start is unstable.
-const MIN_APERTURE: f64 = 0.4;
+/// Value of the limited aperture where A is zero. Without a limit an impulsive start is unstable.
+const LEAST_APERTURE: f64 = 0.2;
 
 /// sin(pi s) for |s| <= 1, within 1e-14 or single-precision rounding.
 #[inline(always)]
@@ -77,11 +79,15 @@ pub fn aperture<V: Vector>(d: V, eps: f64) -> V {
     sine(s).mul_add(V::constant(0.5 / PI), half * (one + s))
 }
 
-/// Inverse-aperture excess 1 / max(A, 0.4) - 1 at distances `d` [m].
+/// Inverse-aperture excess 1 / A' - 1 at distances `d` [m], with the limited aperture
+/// A' = A + 0.2 (1 - A)^2. A limit without a kink keeps the error independent of where the grid
+/// lies.
 #[inline(always)]
 pub fn inverse_aperture_excess<V: Vector>(d: V, eps: f64) -> V {
-    let open = aperture(d, eps).max(V::constant(MIN_APERTURE));
-    (V::constant(1.0) - open).div(open)
+    let open = aperture(d, eps);
+    let closed = V::constant(1.0) - open;
+    let limited = (V::constant(LEAST_APERTURE) * closed).mul_add(closed, open);
+    (V::constant(1.0) - limited).div(limited)
 }
 
 /// Open depth m(d) [m], the integral of the aperture up to `d`: 0 inside, d outside the band.
@@ -95,6 +101,19 @@ pub fn open_depth<V: Vector>(d: V, eps: f64) -> V {
     let inside = (half * (one + s)).mul_add(one + s, inside);
     let beyond = (d - V::constant(eps)).max(zero);
     inside.mul_add(V::constant(0.5 * eps), beyond)
+}
+
+/// Integral M(d) of the open depth up to `d` [m^2], beyond the band d^2 / 2 and a constant.
+#[inline(always)]
+pub fn open_depth_integral<V: Vector>(d: V, eps: f64) -> V {
+    let (zero, half) = (V::constant(0.0), V::constant(0.5));
+    let s = clamped(d, eps);
+    let rise = V::constant(1.0) + s;
+    let linear = sine(s).mul_add(V::constant(1.0 / PI), rise) * V::constant(-1.0 / (PI * PI));
+    let inside = (rise * rise * rise).mul_add(V::constant(1.0 / 6.0), linear).max(zero);
+    let beyond = (d - V::constant(eps)).max(zero);
+    let outside = beyond * half.mul_add(beyond, V::constant(eps));
+    inside.mul_add(V::constant(0.5 * eps * eps), outside)
 }
 
 /// s = d / eps, limited to [-1, 1].
@@ -115,9 +134,10 @@ pub mod reference {
         0.5 * (1.0 + s + (PI * s).sin() / PI)
     }
 
-    /// 1 / max(A, 0.4) - 1.
+    /// 1 / (A + 0.2 (1 - A)^2) - 1.
     pub fn inverse_aperture_excess(d: f64, eps: f64) -> f64 {
-        1.0 / aperture(d, eps).max(0.4) - 1.0
+        let open = aperture(d, eps);
+        1.0 / (open + 0.2 * (1.0 - open).powi(2)) - 1.0
     }
 
     /// m = eps / 2 ((1 + s)^2 / 2 - (1 + cos(pi s)) / pi^2) in the band, m = d beyond it.
@@ -125,6 +145,15 @@ pub mod reference {
         let s = (d / eps).clamp(-1.0, 1.0);
         let band = 0.5 * (1.0 + s).powi(2) - (1.0 + (PI * s).cos()) / (PI * PI);
         0.5 * eps * band + (d - eps).max(0.0)
+    }
+
+    /// M = eps^2 / 2 ((1 + s)^3 / 6 - (1 + s + sin(pi s) / pi) / pi^2) in the band; beyond it M
+    /// continues as eps (d - eps) + (d - eps)^2 / 2.
+    pub fn open_depth_integral(d: f64, eps: f64) -> f64 {
+        let s = (d / eps).clamp(-1.0, 1.0);
+        let linear = (1.0 + s + (PI * s).sin() / PI) / (PI * PI);
+        let beyond = (d - eps).max(0.0);
+        0.5 * eps * eps * ((1.0 + s).powi(3) / 6.0 - linear) + beyond * (eps + 0.5 * beyond)
     }
 }
 
@@ -160,7 +189,7 @@ mod tests {
             for eps in [1.0, 0.7] {
                 let exact = reference::inverse_aperture_excess(wide, eps);
                 assert!(
-                    error(inverse_aperture_excess(Scalar(s), eps).0, exact) < 2e-6,
+                    error(inverse_aperture_excess(Scalar(s), eps).0, exact) < 2e-5,
                     "{s} {eps}"
                 );
             }
@@ -187,14 +216,17 @@ mod tests {
     }
 
     #[test]
-    fn open_depth_is_the_integral_of_the_aperture() {
+    fn open_depth_and_its_integral_are_integrals_of_the_aperture() {
         let (eps, steps) = (0.7, 20_000);
-        let (mut sum, from) = (0.0, -1.2);
+        let (mut depth, mut moment, from) = (0.0, 0.0, -1.2);
         let width = 2.4 / steps as f64;
         for i in 0..steps {
-            sum += aperture(Scalar(from + (i as f64 + 0.5) * width), eps).0 * width;
+            let middle = from + (i as f64 + 0.5) * width;
+            depth += aperture(Scalar(middle), eps).0 * width;
+            moment += open_depth(middle, eps) * width;
             let d = from + (i as f64 + 1.0) * width;
-            assert!((sum - open_depth(d, eps)).abs() < 1e-8, "{d}");
+            assert!((depth - open_depth(d, eps)).abs() < 1e-8, "{d}");
+            assert!((moment - open_depth_integral(Scalar(d), eps).0).abs() < 1e-8, "{d}");
         }
         assert_eq!(open_depth(-eps, eps), 0.0);
         assert_eq!(open_depth(-9.0, eps), 0.0);
@@ -211,6 +243,8 @@ mod tests {
             let [open, depth] = [aperture(Scalar(d), eps).0, open_depth(d, eps)];
             assert!((open - reference::aperture(d, eps)).abs() < 1e-14, "{d}");
             assert!((depth - reference::open_depth(d, eps)).abs() < 1e-14, "{d}");
+            let integral = open_depth_integral(Scalar(d), eps).0;
+            assert!((integral - reference::open_depth_integral(d, eps)).abs() < 1e-14, "{d}");
         }
     }
 }

@@ -20,11 +20,16 @@ pub struct LocateScratch {
     distances: DistanceScratch,
 }
 
+/// Half-width of the band in mean spacings of the grid. With a narrower band the force on a grain
+/// depends on where the grid lies, with a wider one thin boundary layers are smoothed
+/// (`docs/decisions/0018-pressure-weight.md`).
+const BAND_HALF_WIDTH: f64 = 1.25;
+
 /// Geometry of all grains on one grid.
 pub struct Locator {
     mesh: Mesh,
     unknown_faces: UnknownFaces,
-    /// Half-width of the band around the surface, the mean spacing of the grid [m].
+    /// Half-width of the band around the surface [m].
     eps: f64,
     /// Distance from the surface up to which a grain affects faces [m].
     reach: f64,
@@ -37,7 +42,7 @@ impl Locator {
     pub fn new(mesh: &Mesh, boundaries: &Boundaries, grains: &[Grain]) -> Locator {
         let axes = mesh.resolved_axes();
         let spacings: Vec<f64> = axes.map(|axis| mesh.spacing[axis]).collect();
-        let eps = spacings.iter().sum::<f64>() / spacings.len().max(1) as f64;
+        let eps = BAND_HALF_WIDTH * spacings.iter().sum::<f64>() / spacings.len().max(1) as f64;
         // Two band half-widths, and half a link along the axis of the largest spacing.
         let reach = 2.0 * eps + 0.5 * spacings.iter().copied().fold(0.0, f64::max);
         Locator {

@@ -15,11 +15,11 @@ use crate::dem::Grain;
 use grainwake_simd::{MAX_LANES, MAX_SINGLE_INDEX, Vector};
 
 /// Least number of samples per half-width of the band.
-const SAMPLES_PER_BAND: f64 = 4.0;
+const SAMPLES_PER_BAND: f64 = 5.0;
 /// Least number of samples across the thinnest side of a grain.
 const SAMPLES_ACROSS: f64 = 12.0;
 /// Largest number of samples per half-width of the band; the flow does not resolve a thinner grain.
-const MAX_SAMPLES_PER_BAND: f64 = 16.0;
+const MAX_SAMPLES_PER_BAND: f64 = 20.0;
 
 /// Narrow-band shapes of all grains; equal shapes share their samples.
 pub struct NarrowBandShapes {

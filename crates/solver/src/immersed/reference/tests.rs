@@ -23,6 +23,12 @@ const NU: f64 = 0.01;
 const DENSITY: f64 = 1.3;
 /// Grains with a closed-form distance; the third is a sampled ellipsoid.
 const SPHERES: [usize; 2] = [0, 1];
+/// Acceleration of a grain in the step before [m/s^2, rad/s^2].
+const ACCELERATION: RigidVelocity =
+    RigidVelocity { linear: DVec3::new(3.0, -2.0, 1.0), angular: DVec3::new(-1.0, 4.0, 2.0) };
+/// Near the depth eps the closed fraction is a quotient of differences of nearly equal numbers, in
+/// singles in the kernel; the gain of these faces hardly depends on it.
+const CLOSED_TOLERANCE: f64 = 2e-3;
 
 /// Three rotating grains in a smooth predicted flow with pressure and body acceleration. The first
 /// is next to a wall and across a periodic edge, the second half a cell from it, the third
@@ -100,13 +106,13 @@ impl Case {
         Case { flow, reference, locator, located }
     }
 
-    /// Velocities of a grain before and after the step.
-    fn velocities(&self, index: usize) -> [RigidVelocity; 2] {
+    /// Velocity of a grain before the step, its acceleration then, and its velocity after the step.
+    fn motion(&self, index: usize) -> [RigidVelocity; 3] {
         let new = RigidVelocity {
             linear: DVec3::new(0.1, 0.25, -0.3),
             angular: DVec3::new(-0.4, 0.6, 0.1),
         };
-        [RigidVelocity::of(&self.reference.grains[index]), new]
+        [RigidVelocity::of(&self.reference.grains[index]), ACCELERATION, new]
     }
 
     /// Predicted velocity by component.
@@ -155,14 +161,15 @@ fn distances_to_faces_match_the_reference() {
     let mut nearer_to_another = 0;
     for (index, (body, _)) in case.located.iter().enumerate() {
         // The samples of the ellipsoid are interpolated. Below the depth eps, where no weight
-        // depends on the distance, the medial axis is near and interpolation is poor.
+        // depends on the distance, the medial axis is near and interpolation is poor; beyond the
+        // band the samples end.
         let eps = case.locator.eps();
         let tolerance_at = |d: f64| match SPHERES.contains(&index) {
             true => 1e-6,
-            false if d > -eps => 1e-3,
+            false if d > -eps && d < 2.0 * eps => 1e-3,
             false => 1e-2,
         };
-        let tolerance = tolerance_at(0.0);
+        let tolerance = tolerance_at(case.locator.reach());
         for component in 0..3 {
             let distances = &body.distance[component];
             let distances = case.by_row(index, component, distances, f64::INFINITY);
@@ -197,6 +204,7 @@ fn weights_of_forced_faces_match_the_reference() {
                 let runs = runs.map(|run| (run.at, run.first, run.count));
                 let weights = case.by_position(runs.clone(), &forced.weight, 0.0);
                 let closed_fraction = case.by_position(runs.clone(), &forced.closed_fraction, 0.0);
+                let solid_fraction = case.by_position(runs.clone(), &forced.solid_fraction, 0.0);
                 let by_all = case.by_position(runs, forced.total_closed_fraction(), 0.0);
                 for face in reference.faces(component) {
                     let x = reference.position(component, face);
@@ -205,14 +213,16 @@ fn weights_of_forced_faces_match_the_reference() {
                     assert_close(
                         closed_fraction[at],
                         expected.closed_fraction,
-                        2e-5,
+                        CLOSED_TOLERANCE,
                         "closed fraction",
                     );
+                    let found = solid_fraction[at];
+                    assert_close(found, expected.solid_fraction, 2e-5, "solid fraction");
                     if expected.weight > 0.0 {
                         assert_close(
                             by_all[at],
                             expected.total_closed_fraction,
-                            2e-5,
+                            CLOSED_TOLERANCE,
                             "total closed fraction",
                         );
                         forced_faces += 1;
@@ -247,7 +257,7 @@ fn weights_of_links_match_the_reference() {
                         let entry = planes.first_entry(j) + i as usize;
                         let found = f64::from(planes.weight[axis][entry]);
                         let expected = reference.link_weight(index, component, axis, face);
-                        assert_close(found, expected.unwrap_or(-1.0), 1e-5, "weight");
+                        assert_close(found, expected.unwrap_or(-1.0), 5e-5, "weight");
                         links[usize::from(expected.is_some())] += 1;
                     }
                 }
@@ -289,13 +299,15 @@ fn impulse_and_imposed_rigidity_match_the_reference() {
     for scheme in [Scheme::Aperture, Scheme::Paper] {
         let mut case = Case::new(scheme);
         for index in SPHERES {
-            let [old, new] = case.velocities(index);
+            let [old, acceleration, new] = case.motion(index);
             let predicted = case.predicted();
             let u = predicted.each_ref().map(|list| &list[..]);
             let (known, predictions) = case.flow.prediction();
             let forced = &mut case.located[index].1;
-            let impulse = sum_impulse(&known, &predictions, DENSITY, forced, old, DT);
-            let expected = (case.reference).impulse(index, &known, u, [old, new], DENSITY);
+            let before = [old, acceleration];
+            let impulse = sum_impulse(&known, &predictions, DENSITY, forced, before, DT);
+            let motion = [old, acceleration, new];
+            let expected = (case.reference).impulse(index, &known, u, motion, DENSITY);
             let expected = [expected[0].to_array(), expected[1].to_array()].concat();
             for (row, expected) in expected.into_iter().enumerate() {
                 let derivative = impulse.matrix[row].iter().zip(new.to_vector());
@@ -316,7 +328,7 @@ fn impulse_and_imposed_rigidity_match_the_reference() {
                     let (at, x) = (reference.at(face), reference.position(component, face));
                     let u = predicted[component][at];
                     let gain = match reference.weights(index, x).weight > 0.0 {
-                        true => reference.gain(index, &known, u, [old, new], component, face),
+                        true => reference.gain(index, &known, u, motion, component, face),
                         false => 0.0,
                     };
                     assert_close(imposed[component][at] - u, gain, 3e-5, "gain");
@@ -338,10 +350,7 @@ fn new_velocities_satisfy_the_equations_of_motion() {
             let mut grain = case.reference.grains[index].clone();
             let previous = PreviousStep {
                 velocity: RigidVelocity::of(&grain),
-                acceleration: RigidVelocity {
-                    linear: DVec3::new(3.0, -2.0, 1.0),
-                    angular: DVec3::new(-1.0, 4.0, 2.0),
-                },
+                acceleration: ACCELERATION,
                 ..Default::default()
             };
             let [applied, contact] = [1.0, -0.3].map(|factor| Load {
@@ -351,12 +360,13 @@ fn new_velocities_satisfy_the_equations_of_motion() {
             let predicted = case.predicted();
             let u = predicted.each_ref().map(|list| &list[..]);
             let (known, predictions) = case.flow.prediction();
-            let (forced, old) = (&mut case.located[index].1, previous.velocity);
-            let impulse = sum_impulse(&known, &predictions, DENSITY, forced, old, DT);
+            let forced = &mut case.located[index].1;
+            let before = [previous.velocity, previous.acceleration];
+            let impulse = sum_impulse(&known, &predictions, DENSITY, forced, before, DT);
             let system = RigidBodySystem::new(&grain, &previous, impulse, DENSITY, applied, DT);
             let new = system.velocities(&grain, &previous, contact, DT);
             let (reference, load) = (&case.reference, applied + contact);
-            let j = reference.impulse(index, &known, u, [old, new], DENSITY);
+            let j = reference.impulse(index, &known, u, [before[0], before[1], new], DENSITY);
             let residual = reference.momentum_residual(index, &previous, new, j, DENSITY, load);
             assert!(residual[0].length() < 1e-5, "{residual:?}");
             assert!(residual[1].length() < 1e-5, "{residual:?}");
