@@ -22,8 +22,8 @@
 //! 1. `advection/correction.rs` corrects the prediction u* next to the last pose of the grain.
 //! 2. `geometry/locator.rs` lists the faces near the new pose. `distances.rs` evaluates their
 //!    signed distances d, `narrow_band.rs` interpolates d, `lists.rs` defines the lists.
-//! 3. `forcing/faces.rs` computes the weights of the forced faces: the drag, and the weight P of the
-//!    pressure gradient, both of `forcing/drag.rs`.
+//! 3. `forcing/faces.rs` computes the weights of the forced faces: the drag, and the weight P of
+//!    the pressure gradient, both of `forcing/drag.rs`.
 //! 4. `forcing/impulse.rs` sums the impulse J on the fluid as an affine function of the six new
 //!    velocities of the grain. The impulse on the grain is -J.
 //! 5. `rigid_body/system.rs` solves for these velocities, contact load included.

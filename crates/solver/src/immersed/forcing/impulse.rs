@@ -9,8 +9,9 @@
 //! - r + s U + f (U - U_old) + (1 - s) (c - phi) W, next to a moving grain, with f = (1 - s) phi.
 //!
 //! W is the change of U expected from the previous step. The solid part phi of a face follows any
-//! change of U at once. The whole closed part c follows a steady acceleration, as it does a pressure
-//! gradient: viscosity takes a while to bring the outer part along. An impact moves phi only.
+//! change of U at once. The whole closed part c follows a steady acceleration, as it follows a
+//! pressure gradient: viscosity takes a while to bring the outer part along. An impact moves phi
+//! only.
 //!
 //! p~ = p - dt U_old . grad p is the pressure of the last step, moved with the grain; without this
 //! shift the drag of a moving grain is of first order in the step
@@ -19,8 +20,8 @@
 //! fluid gains ([`crate::immersed::rigid_body`]). `immersed::reference` has the scalar form.
 //!
 //! Legend: s weight, c closed fraction, C total closed fraction, phi solid fraction (these three
-//! zero in the paper's scheme), f weight of the change of velocity, u* predicted velocity, h spacing along the component, l and
-//! m lever arms of the face about the two other axes.
+//! zero in the paper's scheme), f weight of the change of velocity, u* predicted velocity, h
+//! spacing along the component, l and m lever arms of the face about the two other axes.
 
 use super::faces::ForcedFaces;
 use super::rigid_run::{RigidRun, change_weight, lane_indices};

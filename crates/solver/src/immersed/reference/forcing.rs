@@ -1,8 +1,9 @@
 //! Weights of forced faces, their gain of velocity, and the impulse on the fluid.
 //!
 //! Legend: d signed distance, n normal, m open depth, M its integral, s weight of the rigid
-//! velocity, c closed fraction, C total closed fraction, phi solid fraction, A aperture, U and U_old new and old rigid velocity, J impulse,
-//! h spacing, nu kinematic viscosity, p pressure, g body acceleration.
+//! velocity, c closed fraction, C total closed fraction, phi solid fraction, A aperture, U and
+//! U_old new and old rigid velocity, J impulse, h spacing, nu kinematic viscosity, p pressure, g
+//! body acceleration.
 
 use glam::{DVec3, IVec3};
 
@@ -26,8 +27,8 @@ pub struct Weights {
 }
 
 impl Reference {
-    /// Drag coefficient times dt, closed and solid fraction, of a face at the distance `d` [m] from a
-    /// surface with the normal `n`.
+    /// Drag coefficient times dt, closed and solid fraction, of a face at the distance `d` [m] from
+    /// a surface with the normal `n`.
     ///
     /// With the discrete Laplacian L of a function of the distance, drag = nu L m / m, and the
     /// closed fraction is 1 - (L M - M L m / m) in the aperture scheme. In the paper's scheme
