@@ -21,7 +21,7 @@ use crate::immersed::geometry::aperture::{open_depth, open_depth_integral};
 #[inline(always)]
 pub fn drag<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
     let depth = open_depth(d, eps);
-    let excess = laplacian(d, n, spacing, depth, |d| open_depth(d, eps));
+    let excess = laplacian::<V, Shear>(d, n, spacing, eps, depth);
     let least = V::constant(1e-12 * eps);
     [excess.max(V::constant(0.0)), depth.max(least)]
 }
@@ -37,7 +37,7 @@ pub fn pressure_weight<V: Vector>(
     [excess, depth]: [V; 2],
 ) -> V {
     let integral = open_depth_integral(d, eps);
-    let driven = laplacian(d, n, spacing, integral, |d| open_depth_integral(d, eps));
+    let driven = laplacian::<V, Parabola>(d, n, spacing, eps, integral);
     // M / m grows from 0.2 to 0.29 times d + eps; the bound holds where rounding is larger than M.
     let bound = V::constant(0.3) * (d + V::constant(eps)).max(V::constant(0.0));
     let mean_depth = integral.div(depth);
@@ -48,15 +48,40 @@ pub fn pressure_weight<V: Vector>(
     d.select_below(outside, weight, V::constant(1.0))
 }
 
-/// Discrete Laplacian of a function `f` of the distance from a plane, with the value `here` at `d`.
+/// Velocity profile over a plane wall. A trait, because a closure would not be inlined in a kernel.
+trait Profile {
+    /// Value at the distances `d` [m].
+    fn at<V: Vector>(d: V, eps: f64) -> V;
+}
+
+/// m(d).
+struct Shear;
+/// M(d).
+struct Parabola;
+
+impl Profile for Shear {
+    #[inline(always)]
+    fn at<V: Vector>(d: V, eps: f64) -> V {
+        open_depth(d, eps)
+    }
+}
+
+impl Profile for Parabola {
+    #[inline(always)]
+    fn at<V: Vector>(d: V, eps: f64) -> V {
+        open_depth_integral(d, eps)
+    }
+}
+
+/// Discrete Laplacian of a profile over a plane, which has the value `here` at `d`.
 #[inline(always)]
-fn laplacian<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], here: V, f: impl Fn(V) -> V) -> V {
+fn laplacian<V: Vector, P: Profile>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64, here: V) -> V {
     let twice = here + here;
     let mut sum = V::constant(0.0);
     for axis in 0..3 {
         let h = spacing[axis];
         let step = V::constant(h) * n[axis];
-        let rise = f(d + step) + f(d - step) - twice;
+        let rise = P::at(d + step, eps) + P::at(d - step, eps) - twice;
         sum = rise.mul_add(V::constant(1.0 / (h * h)), sum);
     }
     sum

@@ -151,12 +151,11 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
                 for n in (0..run.count).step_by(V::WIDTH) {
                     let entry = run.first + n;
                     let weights = [
-                        &forced.weight,
-                        &forced.closed_fraction,
-                        total_closed_fraction,
-                        &forced.solid_fraction,
+                        V::load_from(&forced.weight[entry..]),
+                        V::load_from(&forced.closed_fraction[entry..]),
+                        V::load_from(&total_closed_fraction[entry..]),
+                        V::load_from(&forced.solid_fraction[entry..]),
                     ];
-                    let weights = weights.map(|list| V::load_from(&list[entry..]));
                     let gain = faces.add(n, weights, &mut self.sums[axis]);
                     // Entries beyond the run are overwritten by the next run.
                     gain.store(&mut rest_gain[entry..]);
