@@ -561,8 +561,7 @@ fn force_on_a_carried_sphere_is_quiet() {
 #[test]
 fn drag_hardly_depends_on_the_step_and_little_on_the_frame() {
     // Re 300 on a coarse mesh. The moving sphere has 3.7 % more drag than the held one, and 1.9 %
-    // more than with a quarter of the step. Without moving the pressure along (decision 0011) both
-    // are several times larger.
+    // more than with a quarter of the step (decisions 0011 and 0018).
     let drag = |carried: bool, cfl: f64| {
         let (start, velocity, stream) = match carried {
             true => (1.5, DVec3::X, DVec3::ZERO),
@@ -585,9 +584,9 @@ fn drag_hardly_depends_on_the_step_and_little_on_the_frame() {
     };
     let [held, carried, short_steps] = [drag(false, 0.4), drag(true, 0.4), drag(true, 0.1)];
     let frames = carried / held - 1.0;
-    assert!(frames.abs() < 0.045, "carried {carried}, held {held}");
+    assert!(frames.abs() < 0.04, "carried {carried}, held {held}");
     let steps = carried / short_steps - 1.0;
-    assert!(steps.abs() < 0.025, "{carried}, with a quarter of the step {short_steps}");
+    assert!(steps.abs() < 0.02, "{carried}, with a quarter of the step {short_steps}");
 }
 
 #[test]

@@ -72,17 +72,13 @@ impl Clone for ContactRecord {
     /// Copies a record into the buffers of this one: the trial step copies all records in every
     /// step.
     fn clone_from(&mut self, source: &ContactRecord) {
-        let ContactRecord { history, next_history, patch, .. } = source;
-        self.history.clone_from(history);
-        self.next_history.clone_from(next_history);
-        self.patch.clone_from(patch);
-        self.key = source.key;
-        self.in_contact = source.in_contact;
-        self.in_contact_during_step = source.in_contact_during_step;
-        self.dashpot_fraction = source.dashpot_fraction;
-        self.tangential_stiffness = source.tangential_stiffness;
-        self.mean_history = source.mean_history;
-        self.loads = source.loads;
+        let mut history = std::mem::take(&mut self.history);
+        let mut next_history = std::mem::take(&mut self.next_history);
+        let mut patch = std::mem::take(&mut self.patch);
+        history.clone_from(&source.history);
+        next_history.clone_from(&source.next_history);
+        patch.clone_from(&source.patch);
+        *self = ContactRecord { history, next_history, patch, ..*source };
     }
 }
 

@@ -65,9 +65,11 @@ impl Clone for ContactPatch {
     }
     /// Copies a patch into the buffers of this one.
     fn clone_from(&mut self, source: &ContactPatch) {
-        self.points.clone_from(&source.points);
-        self.found.clone_from(&source.found);
-        (self.separation, self.seeds) = (source.separation, source.seeds);
+        let (mut points, mut found) =
+            (std::mem::take(&mut self.points), std::mem::take(&mut self.found));
+        points.clone_from(&source.points);
+        found.clone_from(&source.found);
+        *self = ContactPatch { points, found, ..*source };
     }
 }
 

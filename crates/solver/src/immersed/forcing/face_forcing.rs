@@ -13,7 +13,7 @@ use crate::immersed::scheme::Scheme;
 use grainwake_simd::{Kernel, Scalar, Vector, dispatch};
 
 /// Forcing of a face by one grain, or by several together.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct FaceForcing {
     /// Drag coefficient times dt; the weight of the rigid velocity is strength / (1 + strength).
     pub strength: f64,
@@ -76,8 +76,7 @@ impl ForcingParams {
     pub fn of(&self, d: f64, normal: DVec3) -> FaceForcing {
         match self.scheme {
             Scheme::Aperture => {
-                let mut forcing =
-                    FaceForcing { strength: 0.0, closed_fraction: 0.0, solid_fraction: 0.0 };
+                let mut forcing = FaceForcing::default();
                 dispatch(OneFace { params: self, d, normal, forcing: &mut forcing });
                 forcing
             }
@@ -104,11 +103,8 @@ impl ForcingParams {
     fn blend(&self, d: f64, normal: DVec3) -> FaceForcing {
         let width = normal.abs().dot(self.spacing);
         let solid_fraction = (0.5 - d / width).clamp(0.0, 1.0);
-        FaceForcing {
-            strength: solid_fraction / (1.0 - solid_fraction),
-            closed_fraction: 0.0,
-            solid_fraction: 0.0,
-        }
+        let strength = solid_fraction / (1.0 - solid_fraction);
+        FaceForcing { strength, ..FaceForcing::default() }
     }
 }
 

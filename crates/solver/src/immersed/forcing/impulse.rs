@@ -53,8 +53,7 @@ pub fn sum_impulse<R: Real>(
     dt: f64,
 ) -> Impulse {
     let mut sums = [Moments::default(); 3];
-    let sums_of = &mut sums;
-    dispatch(SumImpulse { known, predictions, forced, old, acceleration, dt, sums: sums_of });
+    dispatch(SumImpulse { known, predictions, forced, old, acceleration, dt, sums: &mut sums });
     let w = fluid_density * known.mesh.cell_volume();
     let mut impulse = Impulse::default();
     for (axis, sum) in sums.iter().enumerate() {

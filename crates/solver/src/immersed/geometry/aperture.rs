@@ -189,7 +189,7 @@ mod tests {
             for eps in [1.0, 0.7] {
                 let exact = reference::inverse_aperture_excess(wide, eps);
                 assert!(
-                    error(inverse_aperture_excess(Scalar(s), eps).0, exact) < 2e-5,
+                    error(inverse_aperture_excess(Scalar(s), eps).0, exact) < 1e-5,
                     "{s} {eps}"
                 );
             }

@@ -21,7 +21,7 @@ pub struct LocateScratch {
 }
 
 /// Half-width of the band in mean spacings of the grid. With a narrower band the force on a grain
-/// depends on where the grid lies, with a wider one thin boundary layers are smoothed
+/// depends more on where the grid lies; a wider one smooths thin boundary layers
 /// (`docs/decisions/0018-pressure-weight.md`).
 const BAND_HALF_WIDTH: f64 = 1.25;
 

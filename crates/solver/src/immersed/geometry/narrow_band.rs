@@ -169,7 +169,7 @@ mod tests {
     fn sampled_distances_match_the_shape_and_extend_beyond_its_grid() {
         let edges = analytic::rounded_box(0.7, 0.6, 0.5, 0.02, &ShapeOptions::default());
         let edges = Arc::new(edges.unwrap());
-        // The ellipsoid is 17, 8 and 3 flow cells across, the box 10, 5 and 3; its edges are
+        // The ellipsoid is 17, 8 and 3 half-widths across, the box 10, 5 and 3; its edges are
         // rounded by less than two of its own samples. Bounds: largest and mean error near the
         // surface, largest error beyond the grid of the shape.
         for (shape, eps, most, mean, most_beyond) in [
