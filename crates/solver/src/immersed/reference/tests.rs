@@ -27,8 +27,8 @@ const SPHERES: [usize; 2] = [0, 1];
 const ACCELERATION: RigidVelocity =
     RigidVelocity { linear: DVec3::new(3.0, -2.0, 1.0), angular: DVec3::new(-1.0, 4.0, 2.0) };
 
-/// Tolerance of the closed fraction of a face with this solid fraction. In a nearly solid face it is
-/// a quotient of differences of nearly equal numbers, which the kernel has in singles.
+/// Tolerance of the closed fraction of a face with this solid fraction. In a nearly solid face the
+/// closed fraction is a quotient of small differences, which the kernel evaluates in singles.
 fn closed_tolerance(solid_fraction: f64) -> f64 {
     if solid_fraction < 0.95 { 1e-4 } else { 2e-3 }
 }
