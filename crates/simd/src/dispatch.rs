@@ -4,31 +4,9 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 #[cfg(not(target_arch = "x86_64"))]
 use super::plain::Plain;
-use super::sealed::Sealed;
 #[cfg(target_arch = "x86_64")]
 use super::x86::{Avx2F32x8, Avx2F64x4, Avx512F32x16, Avx512F64x8, Sse2F32x8, Sse2F64x4};
-use super::{Real, Vector};
-
-/// Kernels of a number with the vectors of each instruction set.
-///
-/// Only the vector of the baseline has a name outside this crate: safe code cannot execute
-/// instructions that the machine lacks.
-pub trait Registers: Sealed + Sized {
-    /// Vector of [`InstructionSet::Baseline`].
-    type Baseline: Vector<Number = Self>;
-    /// Runs `kernel` with the vectors of [`InstructionSet::Avx2`].
-    ///
-    /// # Safety
-    /// The machine must have AVX2 and FMA.
-    #[cfg(target_arch = "x86_64")]
-    unsafe fn with_avx2<K: Kernel<Number = Self>>(kernel: K);
-    /// Runs `kernel` with the vectors of [`InstructionSet::Avx512`].
-    ///
-    /// # Safety
-    /// The machine must have AVX2, FMA, AVX-512F and AVX-512VL.
-    #[cfg(target_arch = "x86_64")]
-    unsafe fn with_avx512<K: Kernel<Number = Self>>(kernel: K);
-}
+use super::{Kernel, Registers};
 
 #[cfg(target_arch = "x86_64")]
 macro_rules! registers {
@@ -57,14 +35,6 @@ impl Registers for f64 {
 #[cfg(not(target_arch = "x86_64"))]
 impl Registers for f32 {
     type Baseline = Plain<f32, 8>;
-}
-
-/// Computation compiled for every instruction set.
-pub trait Kernel {
-    /// Type of its numbers.
-    type Number: Real;
-    /// Computes with the widest vectors of the instruction set; mark it `inline(always)`.
-    fn run<V: Vector<Number = Self::Number>>(self);
 }
 
 /// Instruction set of the kernels.

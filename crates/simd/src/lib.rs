@@ -14,11 +14,10 @@ mod complex;
 mod dispatch;
 #[cfg(any(test, not(target_arch = "x86_64")))]
 mod plain;
+mod precision;
 mod prefetch;
-mod real;
 mod rows;
 mod scalar;
-mod sealed;
 mod stencil;
 #[cfg(test)]
 mod tests;
@@ -28,13 +27,13 @@ mod x86;
 
 pub use aligned::Aligned;
 pub use complex::{Complex, as_complex, rotated_butterfly};
-pub use dispatch::{InstructionSet, Kernel, Registers, dispatch, instructions, limit_instructions};
+pub use dispatch::{InstructionSet, dispatch, instructions, limit_instructions};
+pub use precision::Precision;
 pub use prefetch::{prefetch, prefetch_ahead};
-pub use real::{Precision, Real};
 pub use rows::{Maximum, Partial, RowWork, along_row, inside_row, window, window_mut};
 pub use scalar::Scalar;
 pub use stencil::Stencil;
-pub use vector::Vector;
+pub use vector::{Kernel, Real, Registers, Vector};
 
 /// Lanes of the widest register.
 pub const MAX_LANES: usize = 16;

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use super::sealed::Sealed;
+use super::vector::Sealed;
 use super::{Real, Vector};
 
 /// Vector of `N` numbers whose registers the compiler chooses.

@@ -1,9 +1,119 @@
-//! The trait of all vectors: arithmetic of `WIDTH` numbers, lane by lane.
+//! Traits of numbers, of their vectors and of kernels. Each of them names the others.
 
-use std::ops::{Add, Mul, Sub};
+use std::fmt::Debug;
+use std::ops::{Add, Div, Mul, Sub};
 
-use super::sealed::Sealed;
-use super::{MAX_LANES, Real};
+use super::MAX_LANES;
+
+/// Prevents implementations of [`Real`] and [`Vector`] in other crates. Unsafe code
+/// relies on two facts: a `Real` is `f32` or `f64`, and a `Vector` is `WIDTH` numbers without
+/// padding.
+pub trait Sealed {}
+
+impl Sealed for f32 {}
+impl Sealed for f64 {}
+
+/// Number of a field, `f64` or `f32`. Sums over the grid and the motion of grains are doubles for
+/// either. Sealed: unsafe code relies on `f64` or `f32`.
+pub trait Real:
+    Sealed
+    + Registers
+    + Copy
+    + Debug
+    + Default
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Send
+    + Sync
+    + 'static
+{
+    /// Size [bytes].
+    const BYTES: usize = size_of::<Self>();
+    /// Numbers in a cache line and in the widest register: 8 or 16.
+    const LANES: usize = 64 / Self::BYTES;
+    /// Number nearest to `value`.
+    fn of(value: f64) -> Self;
+    /// Value in double precision.
+    fn wide(self) -> f64;
+    /// `self * factor + term`, rounded once.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// Reciprocal square root within 0.035: the exponent is halved and negated.
+    fn rsqrt_estimate(self) -> Self;
+    /// Writes the number to the first bytes of `to`, little-endian.
+    fn write_to(self, to: &mut [u8]);
+    /// Reads a number from the first bytes of `from`, little-endian.
+    fn read_from(from: &[u8]) -> Self;
+}
+
+/// Constant of the estimate: 1.5 times the bits of a double near one.
+pub const RSQRT_MAGIC_F64: u64 = 0x5fe6_eb50_c7b5_37a9;
+/// Constant of the estimate: 1.5 times the bits of a single near one.
+pub const RSQRT_MAGIC_F32: u32 = 0x5f37_5a86;
+
+macro_rules! real {
+    ($number:ident, $rsqrt_magic:ident) => {
+        impl Real for $number {
+            #[inline(always)]
+            fn of(value: f64) -> Self {
+                value as $number
+            }
+            #[inline(always)]
+            fn wide(self) -> f64 {
+                self.into()
+            }
+            #[inline(always)]
+            fn mul_add(self, factor: Self, term: Self) -> Self {
+                $number::mul_add(self, factor, term)
+            }
+            #[inline(always)]
+            fn rsqrt_estimate(self) -> Self {
+                $number::from_bits($rsqrt_magic.wrapping_sub(self.to_bits() >> 1))
+            }
+            fn write_to(self, to: &mut [u8]) {
+                to[..Self::BYTES].copy_from_slice(&self.to_le_bytes());
+            }
+            fn read_from(from: &[u8]) -> Self {
+                let mut bytes = [0; Self::BYTES];
+                bytes.copy_from_slice(&from[..Self::BYTES]);
+                $number::from_le_bytes(bytes)
+            }
+        }
+    };
+}
+real!(f64, RSQRT_MAGIC_F64);
+real!(f32, RSQRT_MAGIC_F32);
+
+/// Kernels of a number with the vectors of each instruction set.
+///
+/// Only the vector of the baseline has a name outside this crate: safe code cannot execute
+/// instructions that the machine lacks.
+pub trait Registers: Sealed + Sized {
+    /// Vector of [`crate::InstructionSet::Baseline`].
+    type Baseline: Vector<Number = Self>;
+    /// Runs `kernel` with the vectors of [`crate::InstructionSet::Avx2`].
+    ///
+    /// # Safety
+    /// The machine must have AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    unsafe fn with_avx2<K: Kernel<Number = Self>>(kernel: K);
+    /// Runs `kernel` with the vectors of [`crate::InstructionSet::Avx512`].
+    ///
+    /// # Safety
+    /// The machine must have AVX2, FMA, AVX-512F and AVX-512VL.
+    #[cfg(target_arch = "x86_64")]
+    unsafe fn with_avx512<K: Kernel<Number = Self>>(kernel: K);
+}
+
+/// Computation compiled for every instruction set.
+pub trait Kernel {
+    /// Type of its numbers.
+    type Number: Real;
+    /// Computes with the widest vectors of the instruction set; mark it `inline(always)`.
+    fn run<V: Vector<Number = Self::Number>>(self);
+}
 
 /// A register of `WIDTH` numbers.
 ///

@@ -324,13 +324,6 @@ fn circles(imports: &BTreeMap<String, BTreeSet<String>>) -> BTreeSet<Vec<String>
     imports.keys().map(group).filter(|group| group.len() > 1).collect()
 }
 
-/// Known circles, which remain to be removed: folder and modules. Do not add to this list; a module
-/// or an entry leaves it when its circle is gone.
-const KNOWN_CIRCLES: [(&str, &[&str]); 1] = [
-    // `Real` names its `Registers`, which `dispatch` defines from the vectors.
-    ("simd", &["dispatch", "plain", "real", "vector", "x86"]),
-];
-
 #[test]
 fn modules_form_no_circles() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the folder of crates");
@@ -342,12 +335,7 @@ fn modules_form_no_circles() {
             let imports = read.imports(&parent);
             seen += imports.values().map(BTreeSet::len).sum::<usize>();
             let folder = [std::slice::from_ref(&name), &parent[..]].concat().join("/");
-            let is_known = |circle: &Vec<String>| {
-                let mut known = KNOWN_CIRCLES.iter().filter(|known| known.0 == folder);
-                known.any(|known| circle.iter().all(|m| known.1.contains(&m.as_str())))
-            };
-            let new = circles(&imports).into_iter().filter(|c| !is_known(c));
-            found.extend(new.map(|circle| (folder.clone(), circle)));
+            found.extend(circles(&imports).into_iter().map(|circle| (folder.clone(), circle)));
         }
     }
     assert!(seen > 400, "only {seen} imports found: has the layout changed?");

@@ -4,8 +4,8 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
 
 use super::{Sse2F32x4, same, transpose};
-use crate::real::{RSQRT_MAGIC_F32, RSQRT_MAGIC_F64};
-use crate::sealed::Sealed;
+use crate::vector::Sealed;
+use crate::vector::{RSQRT_MAGIC_F32, RSQRT_MAGIC_F64};
 use crate::{Real, Vector};
 
 vector! {

@@ -5,7 +5,7 @@ use std::ops::{Add, Mul, Sub};
 
 use super::{same, transpose};
 use crate::Vector;
-use crate::sealed::Sealed;
+use crate::vector::Sealed;
 
 vector! {
     /// Four doubles in two registers.

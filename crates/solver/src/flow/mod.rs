@@ -1,18 +1,336 @@
-//! Incompressible Navier-Stokes on the staggered grid (Eqs 1-4), without grains.
+//! Incompressible Navier-Stokes on the staggered grid (Eqs 1-4), without grains: prediction without
+//! the divergence constraint, projection onto it.
 //!
 //! Adams-Bashforth for advection and diffusion, incremental pressure correction, one direct
 //! Poisson solve a step.
+//!
+//! Legend: u velocity, p dynamic pressure over density, f its increment, H tendency.
 
 mod boundary;
-mod measures;
-mod params;
 mod prediction;
 mod project;
-mod solver;
-mod tendency;
+#[cfg(test)]
+mod tests;
 
 pub use boundary::{Boundaries, Boundary};
-pub(crate) use measures::FlowMeasures;
-pub use params::FluidParams;
 pub(crate) use prediction::{OldState, Prediction};
-pub(crate) use solver::Flow;
+pub(crate) use project::FlowMeasures;
+
+use glam::DVec3;
+
+use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, Slab, for_planes_of};
+use crate::math::{Real, last_cache};
+use crate::poisson::{Plane, Poisson, PoissonTimes};
+use grainwake_simd::dispatch;
+use prediction::{Coefficients, PredictPlane, Weights};
+use project::{Correct, Divergence, PlaneMeasures};
+
+/// Properties of the fluid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FluidParams {
+    /// Density [kg/m^3].
+    pub density: f64,
+    /// Kinematic viscosity [m^2/s].
+    pub kinematic_viscosity: f64,
+    /// Uniform acceleration that drives the flow (a mean pressure gradient over density) [m/s^2].
+    pub body_acceleration: DVec3,
+    /// Uniform velocity at the start [m/s].
+    pub initial_velocity: DVec3,
+}
+
+impl FluidParams {
+    /// Fluid at rest of `density` [kg/m^3] and `kinematic_viscosity` [m^2/s].
+    pub fn new(density: f64, kinematic_viscosity: f64) -> FluidParams {
+        FluidParams {
+            density,
+            kinematic_viscosity,
+            body_acceleration: DVec3::ZERO,
+            initial_velocity: DVec3::ZERO,
+        }
+    }
+}
+
+/// State of the fluid.
+pub struct Flow<R = f64> {
+    /// Grid of the box.
+    mesh: Mesh,
+    /// Planes whose fields this flow holds, the whole box.
+    slab: Slab,
+    /// Conditions on the faces of the box.
+    boundaries: Boundaries,
+    /// Constants of the tendency.
+    coefficients: Coefficients,
+    /// Velocity u^n [m/s].
+    pub velocity: FaceVector<R>,
+    /// Predicted velocity u* [m/s].
+    pub predicted: FaceVector<R>,
+    /// Dynamic pressure over density p^n [m^2/s^2].
+    pub pressure: Field<Centre, R>,
+    /// Tendency H of the last prediction [m/s^2].
+    tendency: FaceVector<R>,
+    poisson: Poisson<R>,
+    /// Whether fields are written with non-temporal stores.
+    non_temporal: bool,
+    /// Measures of each plane.
+    partial: Vec<PlaneMeasures>,
+    /// Length of the last step [s]; none before the first.
+    previous_step: Option<f64>,
+    /// Weight of H^n in the last prediction [s].
+    weight: f64,
+    /// Sums of H over the unknown faces: three of the previous step, then three of the last one.
+    tendency_sums: [f64; 6],
+    /// Sum over the unknown faces of the weighted tendencies of the last prediction [m/s].
+    impulse: DVec3,
+    /// Pressure difference between upper and lower end, summed over the lines along each axis.
+    pressure_rise: DVec3,
+}
+
+impl<R: Real> Flow<R> {
+    /// Fluid at the initial velocity, projected onto the divergence-free fields.
+    pub fn new(mesh: &Mesh, boundaries: Boundaries, params: &FluidParams) -> Flow<R> {
+        let slab = mesh.whole();
+        let mut flow = Flow {
+            mesh: *mesh,
+            slab,
+            boundaries,
+            coefficients: Coefficients::new(
+                mesh,
+                params.kinematic_viscosity,
+                params.body_acceleration,
+            ),
+            velocity: FaceVector::zeros(&slab),
+            predicted: FaceVector::zeros(&slab),
+            pressure: Field::zeros(&slab),
+            tendency: FaceVector::zeros(&slab),
+            poisson: Poisson::new(mesh, boundaries.pressure_ends()),
+            non_temporal: false,
+            partial: vec![PlaneMeasures::default(); mesh.cells[2]],
+            previous_step: None,
+            weight: 0.0,
+            tendency_sums: [0.0; 6],
+            impulse: DVec3::ZERO,
+            pressure_rise: DVec3::ZERO,
+        };
+        flow.non_temporal = flow.bytes() > last_cache() / 4 * 3;
+        flow.poisson.non_temporal = flow.non_temporal;
+        flow.velocity.fill(params.initial_velocity);
+        flow.make_solenoidal();
+        flow
+    }
+
+    /// Sets the velocity to `component(axis, position)` [m/s, m] and projects.
+    pub fn start_from(&mut self, component: impl Fn(usize, DVec3) -> f64) {
+        let slab = self.slab;
+        self.velocity.fill_with(&slab, component);
+        self.make_solenoidal();
+    }
+
+    /// Sets the uniform acceleration that drives the flow [m/s^2].
+    pub fn set_body_acceleration(&mut self, acceleration: DVec3) {
+        self.coefficients.acceleration = acceleration;
+    }
+
+    /// Projects the velocity onto the divergence-free fields and keeps the pressure; for initial
+    /// states.
+    pub fn make_solenoidal(&mut self) -> FlowMeasures {
+        self.predicted.copy_from(&self.velocity);
+        self.boundaries.set_normal(&mut self.predicted);
+        self.boundaries.convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, 0.0);
+        let pressure = self.pressure.to_vec();
+        let measures = self.project(1.0);
+        self.pressure.copy_from_slice(&pressure);
+        measures
+    }
+
+    /// Predicts u* = u + dt (3/2 H^n - 1/2 H^{n-1}) - dt grad p^n, with the weights of a variable
+    /// time step; the first step is forward Euler. Boundary faces of u* have the new velocity.
+    pub fn predict(&mut self, dt: f64) {
+        let ratio = self.previous_step.map_or(0.0, |previous| dt / previous);
+        let (now, before) = (dt * (1.0 + 0.5 * ratio), -dt * 0.5 * ratio);
+        let weights =
+            Weights { now, before, dt_per_h: self.mesh.spacing.to_array().map(|h| dt / h) };
+        let (layout, periodic) = (self.mesh.layout(), self.boundaries.periodic());
+        let (velocity, pressure, boundaries) = (&self.velocity, &self.pressure, &self.boundaries);
+        let (coefficients, non_temporal) = (&self.coefficients, self.non_temporal);
+        let FaceVector { x, y, z } = &mut self.tendency;
+        let FaceVector { x: px, y: py, z: pz } = &mut self.predicted;
+        for_planes_of(
+            layout,
+            [&mut *x, y, z, px, py, pz],
+            &mut self.partial,
+            |k, [x, y, z, px, py, pz], partial| {
+                dispatch(PredictPlane {
+                    layout,
+                    coefficients,
+                    weights,
+                    velocity,
+                    pressure,
+                    periodic,
+                    k,
+                    non_temporal,
+                    tendency: [x, y, z],
+                    predicted: [&mut *px, &mut *py, pz],
+                    sum: &mut partial.tendency,
+                });
+                boundaries.set_normal_of_plane(layout, [px, py]);
+            },
+        );
+        for (face, value) in boundaries.prescribed_faces(2, layout.cells[2]) {
+            let plane = layout.plane();
+            pz[face * plane..(face + 1) * plane].fill(R::of(value));
+        }
+        let sum = self.partial.iter().fold(DVec3::ZERO, |sum, plane| sum + plane.tendency);
+        let [_, _, _, x, y, z] = self.tendency_sums;
+        self.tendency_sums = [x, y, z, sum.x, sum.y, sum.z];
+        self.impulse = now * sum + before * DVec3::new(x, y, z);
+        self.boundaries.convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, dt);
+        self.previous_step = Some(dt);
+        self.weight = now;
+    }
+
+    /// Solves lap(f) = div(u*)/dt, sets u = u* - dt grad(f), p += f, and fills the ghosts.
+    pub fn project(&mut self, dt: f64) -> FlowMeasures {
+        let layout = self.mesh.layout();
+        let [row, plane] = [layout.row(), layout.plane()];
+        let [nx, ny, nz] = layout.cells;
+        let inverse = self.mesh.spacing.to_array().map(|h| 1.0 / h);
+        let periodic = self.boundaries.periodic();
+        let (predicted, boundaries) = (&self.predicted, &self.boundaries);
+        let non_temporal = self.non_temporal;
+        let divergence = |k: usize, out: &mut Plane<R>| {
+            dispatch(Divergence { layout, periodic, predicted, k, inverse, dt, out });
+        };
+        let FaceVector { x, y, z } = &mut self.velocity;
+        let fields = [&mut **x, &mut **y, &mut **z, &mut *self.pressure];
+        let partial = &mut self.partial;
+        self.poisson.solve(divergence, fields, partial, |k, solution, range| {
+            let ([x, y, z, p], measures) = range.plane(k);
+            dispatch(Correct {
+                layout,
+                predicted,
+                solution,
+                periodic,
+                k,
+                inverse,
+                dt_per_h: inverse.map(|inverse| dt * inverse),
+                non_temporal,
+                velocity: [&mut *x, &mut *y, &mut *z],
+                pressure: &mut *p,
+                measures,
+            });
+            // The upper boundary faces keep the predicted velocity.
+            if !periodic[0] {
+                for j in 1..=ny {
+                    let at = j * row + nx + 1;
+                    x[at] = predicted.x[k * plane + at];
+                }
+            }
+            if !periodic[1] {
+                let upper = (ny + 1) * row..(ny + 2) * row;
+                y[upper.clone()].copy_from_slice(&predicted.y[k * plane..][upper]);
+            }
+            for (component, q) in [x, y, z].into_iter().enumerate() {
+                boundaries.fill_ghosts_of_plane(layout, component, q);
+            }
+            boundaries.fill_pressure_of_plane(layout, p);
+        });
+        if !periodic[2] {
+            let upper = (nz + 1) * plane..;
+            z[upper.clone()].copy_from_slice(&predicted.z[upper]);
+        }
+        boundaries.fill_pressure_planes(&mut self.pressure);
+        boundaries.fill_ghost_planes(&mut self.velocity);
+        self.total()
+    }
+
+    /// Sums and maxima over all planes, in the order of the planes.
+    fn total(&mut self) -> FlowMeasures {
+        let mut total = FlowMeasures::default();
+        let mut rise = DVec3::ZERO;
+        for plane in &self.partial {
+            let m = &plane.flow;
+            total.max_divergence = total.max_divergence.max(m.max_divergence);
+            total.max_rate = total.max_rate.max(m.max_rate);
+            total.max_velocity = total.max_velocity.max(m.max_velocity);
+            total.kinetic_energy += m.kinetic_energy;
+            total.momentum += m.momentum;
+            rise += DVec3::new(plane.pressure_rise[0], plane.pressure_rise[1], 0.0);
+        }
+        let layout = self.mesh.layout();
+        let (plane, nz) = (layout.plane(), layout.cells[2]);
+        for j in 1..=layout.cells[1] {
+            for at in layout.index(1, j, 0)..=layout.index(layout.cells[0], j, 0) {
+                rise.z += self.pressure[nz * plane + at].wide() - self.pressure[plane + at].wide();
+            }
+        }
+        self.pressure_rise = rise;
+        total.max_velocity = total.max_velocity.sqrt();
+        total.kinetic_energy *= self.mesh.cell_volume();
+        total.momentum *= self.mesh.cell_volume();
+        if total.kinetic_energy.is_nan() {
+            // `max` ignores NaN, a sum does not.
+            total.max_divergence = f64::NAN;
+            total.max_rate = f64::NAN;
+            total.max_velocity = f64::NAN;
+        }
+        total
+    }
+
+    /// Impulse per density [m^4/s] on the fluid from walls, open faces and body force in the step
+    /// just projected.
+    pub fn boundary_impulse(&self, dt: f64) -> DVec3 {
+        let mut sum = self.impulse;
+        for axis in (0..3).filter(|&axis| !self.boundaries.is_periodic(axis)) {
+            // The sum of a gradient over the inner faces is the difference of the outermost cells.
+            sum[axis] -= dt * self.pressure_rise[axis] / self.mesh.spacing[axis];
+        }
+        sum * self.mesh.cell_volume()
+    }
+
+    /// First projection of the paper's scheme: u* becomes the divergence-free flow without grains,
+    /// and p is incremented.
+    pub fn project_prediction(&mut self, dt: f64) {
+        self.project(dt);
+        self.predicted.copy_from(&self.velocity);
+    }
+
+    /// State on which later steps depend: fields, and sums over them.
+    pub fn state(&self) -> ([&[R]; 7], &[f64]) {
+        let (u, h) = (&self.velocity, &self.tendency);
+        let fields = [&*u.x, &u.y, &u.z, &h.x, &h.y, &h.z, &self.pressure];
+        (fields, &self.tendency_sums)
+    }
+    /// Mutable [`Self::state`], to be overwritten by a state whose last step took `last_step` [s].
+    pub fn state_mut(&mut self, last_step: f64) -> ([&mut [R]; 7], &mut [f64]) {
+        self.previous_step = (last_step > 0.0).then_some(last_step);
+        let (u, h) = (&mut self.velocity, &mut self.tendency);
+        let fields =
+            [&mut *u.x, &mut u.y, &mut u.z, &mut h.x, &mut h.y, &mut h.z, &mut self.pressure];
+        (fields, &mut self.tendency_sums)
+    }
+
+    /// View of the velocity component along `axis` on its faces [m/s].
+    pub fn velocity_view(&self, axis: Axis) -> FieldView<'_, R> {
+        self.velocity.view(axis, &self.slab)
+    }
+    /// View of the dynamic pressure over density at the cell centres [m^2/s^2].
+    pub fn pressure_view(&self) -> FieldView<'_, R> {
+        self.pressure.view(&self.slab)
+    }
+    /// Grid of the box.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+    /// Conditions on the faces of the box.
+    pub fn boundaries(&self) -> &Boundaries {
+        &self.boundaries
+    }
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        R::BYTES * 10 * self.mesh.layout().len() + self.poisson.bytes()
+    }
+    /// Time spent in each stage of the Poisson solves, divergence and correction included.
+    pub fn poisson_times(&self) -> PoissonTimes {
+        self.poisson.times()
+    }
+}

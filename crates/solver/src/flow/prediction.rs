@@ -1,13 +1,258 @@
-//! Access of the immersed boundary to the flow between prediction and projection.
+//! Prediction without the divergence constraint: tendency (advection and diffusion of Eq. 1b), one
+//! row at a time, and access of the immersed boundary to the prediction.
+//!
+//! Advection and diffusion are differences of fluxes through the six links to the neighbouring faces
+//! of the same component. The advective flux of a link is the mean of its two ends times the velocity
+//! through the link, which conserves momentum and kinetic energy if the velocity is divergence-free.
+//!
+//! Legend: H tendency; q velocity component, c velocity through a link; u, v, w components along
+//! x, y, z, p pressure. Suffixes: c here, l/r left and right in x, m/p one row down and up in y,
+//! b/t one plane down and up in z; `umr` is u one row down, right.
 
 use std::ops::Range;
 
 use glam::DVec3;
 
 use super::{Boundaries, Flow};
-use crate::grid::{Centre, FaceVector, Field, Mesh, SharedRows, for_slabs};
+use crate::grid::{Centre, FaceVector, Field, Layout, Mesh, SharedRows, for_slabs};
 use crate::math::Real;
-use grainwake_simd::Vector;
+use grainwake_simd::{
+    Kernel, Partial, RowWork, Scalar, Vector, along_row, inside_row, window, window_mut,
+};
+
+/// Constants of the tendency.
+#[derive(Clone, Copy)]
+pub struct Coefficients {
+    /// 1/(4 h) along each axis [1/m]: value and velocity of a link are means of two.
+    quarter_inverse: [f64; 3],
+    /// nu/h^2 along each axis [1/s].
+    nu_inverse_square: [f64; 3],
+    /// Uniform acceleration that drives the flow [m/s^2].
+    pub(super) acceleration: DVec3,
+}
+
+impl Coefficients {
+    /// Constants of a mesh, kinematic viscosity [m^2/s] and body acceleration [m/s^2].
+    pub fn new(mesh: &Mesh, kinematic_viscosity: f64, acceleration: DVec3) -> Coefficients {
+        let h = mesh.spacing.to_array();
+        Coefficients {
+            quarter_inverse: h.map(|h| 0.25 / h),
+            nu_inverse_square: h.map(|h| kinematic_viscosity / (h * h)),
+            acceleration,
+        }
+    }
+
+    /// -div(c q) + nu lap(q) + g of `component` at a face with value `q`, neighbours and link
+    /// velocities (twice the mean) `[axis][minus, plus]`.
+    #[inline(always)]
+    fn at_face<V: Vector>(
+        &self,
+        component: usize,
+        q: V,
+        neighbour: [[V; 2]; 3],
+        link: [[V; 2]; 3],
+    ) -> V {
+        let twice = q + q;
+        let mut sum = V::constant(self.acceleration.to_array()[component]);
+        for axis in 0..3 {
+            let ([qm, qp], [cm, cp]) = (neighbour[axis], link[axis]);
+            let diffusion = V::constant(self.nu_inverse_square[axis]) * (qm + qp - twice);
+            let carried = cp * (q + qp) - cm * (qm + q);
+            sum = sum + (diffusion - V::constant(self.quarter_inverse[axis]) * carried);
+        }
+        sum
+    }
+}
+
+/// Weights of the terms of the prediction.
+#[derive(Clone, Copy)]
+pub struct Weights {
+    /// Weight of the new tendency [s].
+    pub now: f64,
+    /// Weight of the old tendency [s].
+    pub before: f64,
+    /// Weight dt/h of the pressure difference along each axis [s/m].
+    pub dt_per_h: [f64; 3],
+}
+
+/// One plane of the prediction u* = u + now H + before H_old - dt grad p.
+pub struct PredictPlane<'a, R> {
+    /// Layout of all fields.
+    pub layout: Layout,
+    /// Constants of the tendency.
+    pub coefficients: &'a Coefficients,
+    /// Weights of the terms.
+    pub weights: Weights,
+    /// Velocity u^n with ghosts [m/s].
+    pub velocity: &'a FaceVector<R>,
+    /// Pressure over density p^n with ghosts [m^2/s^2].
+    pub pressure: &'a [R],
+    /// Whether each axis is periodic; the boundary faces of the others are no unknowns.
+    pub periodic: [bool; 3],
+    /// Index of the plane.
+    pub k: usize,
+    /// Whether the prediction is written with non-temporal stores.
+    pub non_temporal: bool,
+    /// H_old, overwritten by H.
+    pub tendency: [&'a mut [R]; 3],
+    /// Plane of u* [m/s], overwritten.
+    pub predicted: [&'a mut [R]; 3],
+    /// Sum of H over the unknown faces of the plane [m/s^2], to be set.
+    pub sum: &'a mut DVec3,
+}
+
+impl<R: Real> Kernel for PredictPlane<'_, R> {
+    type Number = R;
+    #[inline(always)]
+    fn run<V: Vector<Number = R>>(self) {
+        let (layout, k, n) = (self.layout, self.k, self.layout.cells[0]);
+        let (coefficients, weights) = (*self.coefficients, self.weights);
+        let u = planes(layout, &self.velocity.x, k);
+        let v = planes(layout, &self.velocity.y, k);
+        let w = planes(layout, &self.velocity.z, k);
+        let p = planes(layout, self.pressure, k);
+        let [tx, ty, tz] = self.tendency.map(|plane| &mut plane[..layout.plane()]);
+        let [px, py, pz] = self.predicted.map(|plane| &mut plane[..layout.plane()]);
+        let mut sums = [Partial::default(); 3];
+        for j in 1..=layout.cells[1] {
+            let mut work = PredictRow {
+                coefficients,
+                weights,
+                u: rows(layout, u, j),
+                v: rows(layout, v, j),
+                w: rows(layout, w, j),
+                p: rows(layout, p, j),
+                tendency: [
+                    layout.row_of_mut(tx, j),
+                    layout.row_of_mut(ty, j),
+                    layout.row_of_mut(tz, j),
+                ],
+                predicted: [
+                    layout.row_of_mut(px, j),
+                    layout.row_of_mut(py, j),
+                    layout.row_of_mut(pz, j),
+                ],
+                sums: &mut sums,
+                prescribed: [false, !self.periodic[1] && j == 1, !self.periodic[2] && k == 1],
+                streamed: if self.non_temporal { n } else { 0 },
+            };
+            along_row::<V>(n, &mut work);
+            if !self.periodic[0] {
+                // The sum contains the lower boundary face, which is no unknown.
+                let prescribed = -work.tendency[0][1].wide();
+                work.sums[0].add(1, Scalar::<R>::constant(prescribed));
+            }
+        }
+        V::fence();
+        *self.sum = DVec3::from_array(sums.map(|sum| sum.sum()));
+    }
+}
+
+/// Planes k - 1, k, k + 1 of a field.
+#[inline(always)]
+fn planes<R>(layout: Layout, field: &[R], k: usize) -> [&[R]; 3] {
+    [layout.plane_of(field, k - 1), layout.plane_of(field, k), layout.plane_of(field, k + 1)]
+}
+
+/// Rows j - 1, j, j + 1 of the planes k - 1, k, k + 1, all of one length, so that one bounds check
+/// serves all of them.
+type Rows<'a, R> = [[&'a [R]; 3]; 3];
+
+#[inline(always)]
+fn rows<'a, R>(layout: Layout, [below, here, above]: [&'a [R]; 3], j: usize) -> Rows<'a, R> {
+    [
+        rows_of_plane(layout, below, j),
+        rows_of_plane(layout, here, j),
+        rows_of_plane(layout, above, j),
+    ]
+}
+
+#[inline(always)]
+fn rows_of_plane<R>(layout: Layout, plane: &[R], j: usize) -> [&[R]; 3] {
+    [layout.row_of(plane, j - 1), layout.row_of(plane, j), layout.row_of(plane, j + 1)]
+}
+
+/// One row of the prediction.
+struct PredictRow<'a, R> {
+    coefficients: Coefficients,
+    weights: Weights,
+    u: Rows<'a, R>,
+    v: Rows<'a, R>,
+    w: Rows<'a, R>,
+    p: Rows<'a, R>,
+    tendency: [&'a mut [R]; 3],
+    predicted: [&'a mut [R]; 3],
+    sums: &'a mut [Partial; 3],
+    /// Components whose faces on the whole row have a prescribed velocity.
+    prescribed: [bool; 3],
+    /// Entries of the row if written with non-temporal stores, else 0.
+    streamed: usize,
+}
+
+impl<R: Real> RowWork for PredictRow<'_, R> {
+    type Number = R;
+    #[inline(always)]
+    fn at<V: Vector<Number = R>>(&mut self, i: usize) {
+        // The vectors that start at entries i - 1, i and i + 1 of a row.
+        let left = |row: &[R]| V::load(window::<V>(row, i));
+        let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
+        let right = |row: &[R]| V::load(&window::<V>(row, i)[2..]);
+        let c = &self.coefficients;
+        let [[_, ub, _], [um, u, up], [_, ut, _]] = self.u;
+        let (ul, uc, ur) = (left(u), here(u), right(u));
+        let (umr, ubr) = (right(um), right(ub));
+        let (um, up, ub, ut) = (here(um), here(up), here(ub), here(ut));
+        let [[_, vb, vpb], [vm, v, vp], [_, vt, _]] = self.v;
+        let (vl, vc, vr) = (left(v), here(v), right(v));
+        let (vpl, vpb) = (left(vp), here(vpb));
+        let (vm, vp, vb, vt) = (here(vm), here(vp), here(vb), here(vt));
+        let [[_, wb, _], [wm, w, wp], [wmt, wt, _]] = self.w;
+        let (wl, wc, wr) = (left(w), here(w), right(w));
+        let (wtl, wmt) = (left(wt), here(wmt));
+        let (wm, wp, wb, wt) = (here(wm), here(wp), here(wb), here(wt));
+
+        let hx = c.at_face(
+            0,
+            uc,
+            [[ul, ur], [um, up], [ub, ut]],
+            [[ul + uc, uc + ur], [vl + vc, vpl + vp], [wl + wc, wtl + wt]],
+        );
+        let hy = c.at_face(
+            1,
+            vc,
+            [[vl, vr], [vm, vp], [vb, vt]],
+            [[um + uc, umr + ur], [vm + vc, vc + vp], [wm + wc, wmt + wt]],
+        );
+        let hz = c.at_face(
+            2,
+            wc,
+            [[wl, wr], [wm, wp], [wb, wt]],
+            [[ub + uc, ubr + ur], [vb + vc, vpb + vp], [wb + wc, wc + wt]],
+        );
+        let [[_, pb, _], [pm, p, _], _] = self.p;
+        let pc = here(p);
+        let lower = [left(p), here(pm), here(pb)];
+        let (now, before) = (V::constant(self.weights.now), V::constant(self.weights.before));
+        // Boundary conditions read the ends of a row, which therefore stay in the cache.
+        let streamed = inside_row(i, V::WIDTH, self.streamed);
+        for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
+            let old = window_mut::<V>(self.tendency[axis], i);
+            let pressure = V::constant(self.weights.dt_per_h[axis]) * (pc - lower[axis]);
+            // Small terms are summed before q is added: fewer of their digits are lost.
+            let gain = now * h + before * V::load(old) - pressure;
+            let to = window_mut::<V>(self.predicted[axis], i);
+            if streamed {
+                (q + gain).store_non_temporal(to);
+            } else {
+                (q + gain).store(to);
+            }
+            h.store(old);
+            if !self.prescribed[axis] {
+                self.sums[axis].add(i, h);
+            }
+        }
+    }
+}
 
 /// State at t^n from which the prediction was computed.
 pub struct OldState<'a, R> {

@@ -2,17 +2,31 @@
 //! velocity and pressure by the increment, with the measures of the flow.
 //!
 //! Legend: u, v, w components along x, y, z; q any of them; f pressure increment over density;
-//! suffixes as in `tendency.rs`: l/r left and right in x, m/p down and up in y, b/t in z.
+//! suffixes as in `prediction.rs`: l/r left and right in x, m/p down and up in y, b/t in z.
 
 use glam::DVec3;
 
-use super::FlowMeasures;
 use crate::grid::{FaceVector, Layout};
 use crate::math::Real;
 use crate::poisson::{Plane, Solution};
 use grainwake_simd::{
     Kernel, Maximum, Partial, RowWork, Scalar, Vector, along_row, inside_row, window, window_mut,
 };
+
+/// Measures of the flow over the whole grid after a projection.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FlowMeasures {
+    /// Largest |div u| [1/s].
+    pub max_divergence: f64,
+    /// Largest sum of |u_a| / h_a of a cell [1/s].
+    pub max_rate: f64,
+    /// Largest speed of a face [m/s].
+    pub max_velocity: f64,
+    /// Kinetic energy of the box per density [m^5/s^2].
+    pub kinetic_energy: f64,
+    /// Momentum of all unknown faces per density [m^4/s].
+    pub momentum: DVec3,
+}
 
 /// Contribution of one plane to the measures of the flow.
 #[derive(Clone, Copy, Debug, Default)]

@@ -6,14 +6,14 @@
 //! line in every other row of singles), so that a vector of neighbours does not straddle two lines.
 //! Cell (i, j, k) of the interior has 1 <= i <= nx and so on. A face field stores the *lower* face
 //! of each cell: face i of `FaceX` lies between cells i-1 and i, so a box with walls has its upper
-//! boundary face at index nx+1.
+//! boundary face at index nx+1. [`FieldView`] shows the values without ghosts to users of the library.
 
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
 use glam::DVec3;
 
-use super::{Axis, FieldView, Layout, LocalCell, Slab};
+use super::{Axis, Layout, LocalCell, Slab};
 use crate::math::{Aligned, Real};
 
 /// Location on the staggered cell.
@@ -211,9 +211,90 @@ impl<R: Real> Clone for FaceVector<R> {
     }
 }
 
+/// All values of one field without ghosts, indexed by [k, j, i] (z, y, x order), counted from 0.
+///
+/// A component on faces has one more entry along its own axis than there are cells: the first and
+/// the last lie on the boundary of the box. On a periodic axis these two are equal.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldView<'a, R> {
+    values: &'a [R],
+    shape: [usize; 3],
+    slab: Slab,
+    normal: Option<Axis>,
+}
+
+impl<'a, R: Copy> FieldView<'a, R> {
+    /// View of the padded `field` on the faces `normal` to an axis, or on the cell centres.
+    pub(crate) fn new(field: &'a [R], slab: &Slab, normal: Option<Axis>) -> FieldView<'a, R> {
+        let layout = slab.layout();
+        assert_eq!(field.len(), layout.len());
+        let mut entries = layout.cells;
+        if let Some(axis) = normal {
+            entries[axis as usize] += 1;
+        }
+        let [nx, ny, nz] = entries;
+        FieldView {
+            values: &field[layout.index(1, 1, 1)..=layout.index(nx, ny, nz)],
+            shape: [nz, ny, nx],
+            slab: *slab,
+            normal,
+        }
+    }
+
+    /// Values in memory: entry [k, j, i] lies at the sum of its indices times the strides.
+    pub fn values(&self) -> &'a [R] {
+        self.values
+    }
+    /// Number of entries along z, y, x.
+    pub fn shape(&self) -> [usize; 3] {
+        self.shape
+    }
+    /// Distance in memory between neighbours along z, y, x [entries]; rows are padded.
+    pub fn strides(&self) -> [usize; 3] {
+        let [x, y, z] = self.slab.layout().strides();
+        [z, y, x]
+    }
+    /// Axis normal to the faces that hold the values; none for values at cell centres.
+    pub fn normal(&self) -> Option<Axis> {
+        self.normal
+    }
+    /// Position of entry [0, 0, 0] [m].
+    pub fn origin(&self) -> DVec3 {
+        self.position([0; 3])
+    }
+    /// Distance between neighbours along x, y, z [m].
+    pub fn spacing(&self) -> DVec3 {
+        self.slab.mesh().spacing
+    }
+    /// Position of entry [k, j, i] [m].
+    pub fn position(&self, [k, j, i]: [usize; 3]) -> DVec3 {
+        let mut offset = [0.5; 3];
+        if let Some(axis) = self.normal {
+            offset[axis as usize] = 0.0;
+        }
+        self.slab.position(offset, LocalCell([i + 1, j + 1, k + 1]))
+    }
+    /// Row of entries along x at plane `k` and line `j`. Panics outside the shape.
+    pub fn row(&self, k: usize, j: usize) -> &'a [R] {
+        let [nz, ny, nx] = self.shape;
+        assert!(k < nz && j < ny, "row [{k}, {j}] of a view of {nz} x {ny} rows");
+        let [z, y, _] = self.strides();
+        &self.values[k * z + j * y..][..nx]
+    }
+    /// All rows in memory order: j fastest, then k.
+    pub fn rows(self) -> impl Iterator<Item = &'a [R]> {
+        let [nz, ny, _] = self.shape;
+        (0..nz).flat_map(move |k| (0..ny).map(move |j| self.row(k, j)))
+    }
+    /// Value of entry [k, j, i]. Panics outside the shape.
+    pub fn get(&self, [k, j, i]: [usize; 3]) -> R {
+        self.row(k, j)[i]
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::Mesh;
+    use super::super::{FaceZ, Field, Location, Mesh};
     use super::*;
 
     #[test]
@@ -230,5 +311,34 @@ mod tests {
         assert_eq!(layout.entries(), 7 * 5 * 4);
         assert_eq!(field.at(6, 2, 1), 7.0);
         assert_eq!(field.at(0, 3, 1), 8.0);
+    }
+
+    #[test]
+    fn a_view_has_the_values_of_its_positions() {
+        let mesh = Mesh {
+            cells: [5, 3, 2],
+            spacing: DVec3::new(0.1, 0.2, 0.3),
+            origin: DVec3::new(-1.0, 2.0, 0.0),
+        };
+        let slab = mesh.whole();
+        let mut field = Field::<FaceZ>::zeros(&slab);
+        field.fill_with(&slab, |x| x.x + 10.0 * x.y + 100.0 * x.z);
+        let view = field.view(&slab);
+        assert_eq!(view.shape(), [3, 3, 5]);
+        assert_eq!(view.normal(), Some(Axis::Z));
+        assert_eq!(view.origin(), slab.position(FaceZ::OFFSET, LocalCell([1; 3])));
+        assert_eq!((view.get([0; 3]), view.spacing()), (view.values()[0], mesh.spacing));
+        let mut rows = 0;
+        for (n, row) in view.rows().enumerate() {
+            for (i, value) in row.iter().enumerate() {
+                let at = [n / 3, n % 3, i];
+                let x = view.position(at);
+                assert_eq!(*value, x.x + 10.0 * x.y + 100.0 * x.z);
+                let place: usize = (0..3).map(|a| at[a] * view.strides()[a]).sum();
+                assert_eq!((view.get(at), view.values()[place]), (*value, *value));
+            }
+            rows += 1;
+        }
+        assert_eq!(rows, 9);
     }
 }

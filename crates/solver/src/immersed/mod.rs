@@ -9,8 +9,8 @@
 //! | layer | task | data it makes |
 //! |---|---|---|
 //! | `geometry` | distances to faces, index lists, neighbours | `LocatedBody`, `BandFaces` |
-//! | `forcing` | weights of faces, impulse, rigid velocity on faces | `ForcedFaces`, `Impulse` |
-//! | `advection` | correction at the links near a grain | `AdvectionCorrection` |
+//! | `forcing`, `rigidity` | weights of faces; impulse, rigid velocity on faces | `ForcedFaces`, `Impulse` |
+//! | `links`, `advection` | correction at the links near a grain | `AdvectionCorrection` |
 //! | `rigid_body` | 6 x 6 equations of motion with the impulse | `RigidBodySystem` |
 //! | `update`, `schedule` | work on one grain; order of the grains | `CoupledGrains` |
 //!
@@ -19,15 +19,15 @@
 //! `ImmersedGrains::couple` and `ImmersedGrains::impose_rigidity` in `schedule.rs` do for each
 //! grain:
 //!
-//! 1. `advection/correction.rs` corrects the prediction u* next to the last pose of the grain.
-//! 2. `geometry/locator.rs` lists the faces near the new pose. `distances.rs` evaluates their
+//! 1. `advection.rs` corrects the prediction u* next to the last pose of the grain.
+//! 2. `geometry/mod.rs` lists the faces near the new pose. `geometry/distances.rs` evaluates their
 //!    signed distances d, `narrow_band.rs` interpolates d, `lists.rs` defines the lists.
-//! 3. `forcing/faces.rs` computes the weights of the forced faces: the drag, and the weight P of
-//!    the pressure gradient, both of `forcing/drag.rs`.
-//! 4. `forcing/impulse.rs` sums the impulse J on the fluid as an affine function of the six new
+//! 3. `forcing.rs` computes the weights of the forced faces: the drag, and the weight P of
+//!    the pressure gradient, both of `geometry/aperture.rs`.
+//! 4. `rigidity.rs` sums the impulse J on the fluid as an affine function of the six new
 //!    velocities of the grain. The impulse on the grain is -J.
-//! 5. `rigid_body/system.rs` solves for these velocities, contact load included.
-//! 6. `forcing/rigidity.rs` imposes the velocities on the forced faces.
+//! 5. `rigid_body.rs` solves for these velocities, contact load included.
+//! 6. `rigidity.rs` imposes the velocities on the forced faces.
 //!
 //! An isolated grain passes from 1 to 6 at once. Grains that touch or are close to others are
 //! processed in passes: 1 for all of them, then 2 to 4, then 5 and 6. If grains touch, the caller
@@ -36,25 +36,155 @@
 //!
 //! Every kernel has a plain scalar form in `reference/`, against which it is tested.
 
-mod access;
 mod advection;
 mod forcing;
 mod geometry;
-mod grains;
-mod initial;
-mod kinematics;
+mod links;
 #[cfg(test)]
 mod reference;
 mod rigid_body;
+mod rigidity;
 mod schedule;
-mod scheme;
-mod scratch;
 #[cfg(test)]
 mod tests;
 mod update;
 
-pub(crate) use grains::ImmersedGrains;
-pub(crate) use kinematics::{GrainKinematics, PreviousStep, RigidVelocity};
+pub(crate) use advection::GrainKinematics;
+pub(crate) use rigid_body::PreviousStep;
 pub(crate) use schedule::{CoupledGrains, RigidStep};
-pub use scheme::Scheme;
 pub(crate) use update::StepInput;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::dem::Grain;
+use crate::flow::{Flow, FlowMeasures};
+use crate::grid::Mesh;
+use crate::math::{Real, RigidVelocity};
+use forcing::{ForcedFaces, ForcingParams};
+use geometry::Locator;
+use rigidity::sum_impulse;
+use update::{
+    AccessLog, GrainUpdate, ImmersedGrain, PendingRigidity, ScratchPool, ThreadScratch,
+    locate_and_compute_weights,
+};
+
+/// Scheme by which the coupling imposes rigidity.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scheme {
+    /// Smoothed ghost-Dirichlet drag with aperture-corrected advection (the default).
+    #[default]
+    Aperture,
+    /// Scheme of the paper: solve without the grain, blend by solid fraction, project again.
+    Paper,
+}
+
+/// The grains of a simulation on the grid of its flow.
+pub struct ImmersedGrains<R> {
+    scheme: Scheme,
+    fluid_density: f64,
+    locator: Locator,
+    grains: Vec<ImmersedGrain>,
+    scratch: ScratchPool<ThreadScratch<R>>,
+    /// Allocation of the updates, kept from one step to the next.
+    updates: Vec<GrainUpdate>,
+    /// Accesses to the prediction in this step.
+    access: AccessLog,
+    mesh: Mesh,
+    kinematic_viscosity: f64,
+}
+
+impl<R: Real> ImmersedGrains<R> {
+    /// Locates `grains` on the grid of `flow`.
+    pub fn new(
+        flow: &Flow<R>,
+        scheme: Scheme,
+        fluid_density: f64,
+        kinematic_viscosity: f64,
+        grains: &[Grain],
+    ) -> ImmersedGrains<R> {
+        let mut immersed = ImmersedGrains {
+            scheme,
+            fluid_density,
+            locator: Locator::new(flow.mesh(), flow.boundaries(), grains),
+            grains: grains.iter().map(|_| ImmersedGrain::default()).collect(),
+            scratch: ScratchPool::default(),
+            updates: Vec::with_capacity(grains.len()),
+            access: AccessLog::default(),
+            mesh: *flow.mesh(),
+            kinematic_viscosity,
+        };
+        immersed.locate(grains);
+        immersed
+    }
+
+    /// Lists the faces near the grains at their present poses.
+    pub fn locate(&mut self, grains: &[Grain]) {
+        self.locate_with_forcing(grains, 1.0);
+        self.release_forcing();
+    }
+
+    /// Lists the faces near the grains and computes the weights of the forced faces for a step of
+    /// `dt` [s].
+    fn locate_with_forcing(&mut self, grains: &[Grain], dt: f64) {
+        self.locator.find_neighbours(grains, |_| 0.0);
+        let params = self.forcing_params(dt);
+        let (locator, scratch) = (&self.locator, &self.scratch);
+        let each = self.grains.par_iter_mut().enumerate();
+        each.for_each(|(index, ImmersedGrain { body, forced, .. })| {
+            let (grain, scratch) = (&grains[index], &mut scratch.borrow().locate);
+            locate_and_compute_weights(locator, &params, index, grain, body, forced, scratch);
+        });
+    }
+
+    /// Releases the lists of forced faces, which isolated grains do not need.
+    fn release_forcing(&mut self) {
+        for grain in &mut self.grains {
+            grain.forced = ForcedFaces::default();
+        }
+    }
+
+    /// Parameters of the forcing in a step of `dt` [s].
+    fn forcing_params(&self, dt: f64) -> ForcingParams {
+        let (eps, spacing) = (self.locator.eps(), self.mesh.spacing);
+        ForcingParams::new(self.scheme, eps, spacing, self.kinematic_viscosity, dt)
+    }
+
+    /// Memory held without the buffers of threads [bytes].
+    pub fn bytes(&self) -> usize {
+        self.grains.iter().map(ImmersedGrain::bytes).sum::<usize>() + self.locator.bytes()
+    }
+}
+
+impl<R: Real> ImmersedGrains<R> {
+    /// Imposes the rigid velocities of the grains on the forced faces and makes the flow
+    /// solenoidal.
+    pub fn initialise(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> FlowMeasures {
+        flow.predicted.copy_from(&flow.velocity);
+        // In the limit of a long step every forced face takes the rigid velocity.
+        self.locate_with_forcing(grains, f64::MAX.sqrt());
+        let (known, predictions) = flow.prediction();
+        let (rest, density) = (RigidVelocity::default(), self.fluid_density);
+        let mut updates = std::mem::take(&mut self.updates);
+        updates.clear();
+        for (immersed, grain) in self.grains.iter_mut().zip(grains) {
+            let forced = &mut immersed.forced;
+            sum_impulse(&known, &predictions, density, forced, [rest; 2], 0.0);
+            let velocity = grain.rigid_velocity();
+            updates.push(GrainUpdate {
+                pending: Some(PendingRigidity {
+                    velocity,
+                    // The change has a weight only if the pressure gradient is removed, in a step.
+                    change: RigidVelocity::default(),
+                }),
+                ..Default::default()
+            });
+        }
+        self.impose_pending(flow, &updates);
+        self.updates = updates;
+        self.release_forcing();
+        flow.velocity.copy_from(&flow.predicted);
+        flow.make_solenoidal()
+    }
+}

@@ -13,16 +13,15 @@
 use rayon::prelude::*;
 
 use super::advection::{add_correction, find_correction};
-use super::forcing::impose_rigidity;
-use super::grains::ImmersedGrains;
-use super::kinematics::PreviousStep;
-use super::scheme::Scheme;
+use super::rigidity::impose_rigidity;
 use super::update::{
     CouplingStep, GrainUpdate, ImmersedGrain, PendingRigidity, StepInput,
     locate_and_compute_weights,
 };
+use super::{ImmersedGrains, Scheme};
 use crate::dem::{Grain, GrainResponse};
 use crate::flow::Flow;
+use crate::immersed::rigid_body::PreviousStep;
 use crate::math::{Load, Real};
 
 /// Grains located and coupled to the prediction: made by [`ImmersedGrains::couple`], consumed by

@@ -43,7 +43,7 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
     immersed.initialise(&mut flow, &grains);
     let previous = grains
         .each_ref()
-        .map(|grain| PreviousStep { velocity: RigidVelocity::of(grain), ..Default::default() });
+        .map(|grain| PreviousStep { velocity: grain.rigid_velocity(), ..Default::default() });
     let kinematics = grains.each_ref().map(GrainKinematics::of);
     flow.predict(DT);
     for grain in &mut grains {

@@ -1,17 +1,18 @@
-//! Eigenmodes of the second difference along one axis.
+//! Eigenmodes of the second difference along one axis, by Fourier transforms of any length.
 //!
 //! Two real lines are transformed as real and imaginary part of one complex line. The
 //! cosine transform (type II and its inverse) uses Makhoul's even-odd reordering (1980), so its
-//! Fourier transform has the length of the line; any length works, primes included.
+//! Fourier transform has the length of the line. A length with a large prime factor is transformed
+//! by a convolution with a chirp (Bluestein): k t = (k^2 + t^2 - (k - t)^2) / 2.
 //!
 //! Legend: z_k spectrum of a pair of lines a + i b; m = n - k the mirror of k.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use super::Ends;
-use super::chirp::Fourier;
-use crate::math::Real;
-use grainwake_simd::{Complex, Kernel, Vector, as_complex};
+use super::fft::{Fft, LARGEST_PRIME, factors, root};
+use crate::math::{Aligned, Real};
+use grainwake_simd::{Complex, Kernel, Vector, as_complex, dispatch};
 
 /// Transforms of one axis and the eigenvalues of minus the second difference.
 pub struct AxisTransform<R> {
@@ -61,11 +62,6 @@ impl<R: Real> AxisTransform<R> {
                 [R::of(1.0); 2]
             },
         }
-    }
-
-    /// Factor by which a forward and an inverse transform multiply.
-    pub fn norm(&self) -> f64 {
-        self.n as f64
     }
 
     /// Length of each of the two buffers.
@@ -127,25 +123,63 @@ fn mirrored<T>(modes: &mut [T]) -> (&mut [T], &mut [T]) {
     (low, &mut high[middle..])
 }
 
+/// Both buffers of the transforms, one set per thread.
+pub struct Buffers<R>(Aligned<R>);
+
+impl<R: Real> Buffers<R> {
+    /// Buffers for the transforms along x and y.
+    pub fn new(axes: [&AxisTransform<R>; 2]) -> Buffers<R> {
+        let longest = axes[0].buffer_len().max(axes[1].buffer_len());
+        Buffers(Aligned::zeros(4 * R::LANES * longest))
+    }
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.0)
+    }
+    /// Input lines of a transform along `axis`.
+    #[inline(always)]
+    pub fn lines<V: Vector<Number = R>>(&mut self, axis: &AxisTransform<R>) -> &mut [Complex<V>] {
+        &mut as_complex::<V>(&mut self.0)[..axis.n]
+    }
+    /// Transforms the input lines and returns the result.
+    #[inline(always)]
+    pub fn transform<V: Vector<Number = R>>(
+        &mut self,
+        axis: &AxisTransform<R>,
+        inverse: bool,
+    ) -> &[Complex<V>] {
+        let len = axis.buffer_len();
+        let buffers = &mut self.0[..4 * V::WIDTH * len];
+        let mut second = false;
+        dispatch(TransformLines {
+            axis,
+            buffers,
+            inverse,
+            half: 2 * V::WIDTH == R::LANES,
+            second: &mut second,
+        });
+        &as_complex::<V>(buffers)[if second { len } else { 0 }..][..axis.n]
+    }
+}
+
 /// Transform of a block of lines. It is a kernel of its own, so that its loops are compiled once
 /// per instruction set and not once per caller.
-pub struct Lines<'a, R> {
-    /// Transforms of the axis of the lines.
-    pub axis: &'a AxisTransform<R>,
+struct TransformLines<'a, R> {
+    axis: &'a AxisTransform<R>,
     /// Both buffers, one after the other; the first holds the lines.
     ///
     /// Forward: entry i at `order[i]` -> modes. Inverse: modes -> entry i at `order[i]`, with real
     /// and imaginary parts exchanged, unnormalised.
-    pub buffers: &'a mut [R],
+    buffers: &'a mut [R],
     /// Whether modes are transformed to entries.
-    pub inverse: bool,
+    inverse: bool,
     /// Whether the block has half the lanes of the widest register.
-    pub half: bool,
+    half: bool,
     /// Set to whether the second buffer holds the result.
-    pub second: &'a mut bool,
+    second: &'a mut bool,
 }
 
-impl<R: Real> Kernel for Lines<'_, R> {
+impl<R: Real> Kernel for TransformLines<'_, R> {
     type Number = R;
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
@@ -157,7 +191,7 @@ impl<R: Real> Kernel for Lines<'_, R> {
     }
 }
 
-impl<R: Real> Lines<'_, R> {
+impl<R: Real> TransformLines<'_, R> {
     #[inline(always)]
     fn transform<V: Vector<Number = R>>(self) {
         let axis = self.axis;
@@ -172,4 +206,110 @@ impl<R: Real> Lines<'_, R> {
         }
         *self.second = first != found.as_ptr();
     }
+}
+
+/// Planned transform of any length.
+pub enum Fourier<R> {
+    /// Transform of a length with small prime factors.
+    Direct(Fft<R>),
+    /// Transform of another length by a padded convolution.
+    Padded(Chirp<R>),
+}
+
+/// Planned convolution.
+pub struct Chirp<R> {
+    fft: Fft<R>,
+    /// exp(-pi i t^2 / n), t < n.
+    chirp: Vec<[R; 2]>,
+    /// Transform of the conjugate chirp over the padded length, over that length.
+    spectrum: Vec<[R; 2]>,
+}
+
+impl<R: Real> Fourier<R> {
+    /// Plans for `n` points.
+    pub fn new(n: usize) -> Fourier<R> {
+        if factors(n).into_iter().all(|factor| factor <= LARGEST_PRIME) {
+            return Fourier::Direct(Fft::new(n));
+        }
+        let padded = padded(n);
+        // t^2 modulo 2n keeps the angle exact for long lines.
+        let chirp: Vec<[f64; 2]> = (0..n).map(|t| root(t * t, 2 * n)).collect();
+        let mut kernel = vec![[0.0; 2]; padded];
+        for (t, [re, im]) in chirp.iter().enumerate() {
+            kernel[t] = [*re, -im];
+            kernel[(padded - t) % padded] = [*re, -im];
+        }
+        let roots: Vec<[f64; 2]> = (0..padded).map(|t| root(t, padded)).collect();
+        let spectrum = (0..padded)
+            .map(|k| {
+                let mut sum = [0.0; 2];
+                for (t, [re, im]) in kernel.iter().enumerate() {
+                    let [c, s] = roots[k * t % padded];
+                    sum[0] += re * c - im * s;
+                    sum[1] += re * s + im * c;
+                }
+                sum.map(|value| R::of(value / padded as f64))
+            })
+            .collect();
+        Fourier::Padded(Chirp {
+            fft: Fft::new(padded),
+            chirp: chirp.into_iter().map(|turn| turn.map(R::of)).collect(),
+            spectrum,
+        })
+    }
+
+    /// Length of each of the two buffers for `n` points.
+    pub fn buffer_len(&self, n: usize) -> usize {
+        match self {
+            Fourier::Direct(_) => n,
+            Fourier::Padded(chirp) => chirp.spectrum.len(),
+        }
+    }
+
+    /// Transforms the first entries of `a`, using both buffers; returns the one with the result,
+    /// then the other.
+    #[inline(always)]
+    pub fn run<'a, V: Vector<Number = R>>(
+        &self,
+        a: &'a mut [Complex<V>],
+        b: &'a mut [Complex<V>],
+    ) -> [&'a mut [Complex<V>]; 2] {
+        let (fft, chirp) = match self {
+            Fourier::Direct(fft) => (fft, None),
+            Fourier::Padded(chirp) => (&chirp.fft, Some(chirp)),
+        };
+        if let Some(Chirp { chirp, .. }) = chirp {
+            for (x, turn) in a.iter_mut().zip(chirp) {
+                *x = x.times(*turn);
+            }
+            a[chirp.len()..].fill(Complex::zero());
+        }
+        let mut buffers = [a, b];
+        for time in 0..1 + usize::from(chirp.is_some()) {
+            let [a, b] = buffers;
+            buffers = fft.run(a, b);
+            // With real and imaginary parts exchanged, a forward transform is an inverse one.
+            match chirp {
+                Some(plan) if time == 0 => {
+                    for (x, turn) in buffers[0].iter_mut().zip(&plan.spectrum) {
+                        *x = x.times(*turn).swap_parts();
+                    }
+                }
+                Some(plan) => {
+                    for (x, turn) in buffers[0].iter_mut().zip(&plan.chirp) {
+                        *x = x.swap_parts().times(*turn);
+                    }
+                }
+                None => {}
+            }
+        }
+        buffers
+    }
+}
+
+/// Smallest length with butterflies alone that holds the convolution.
+fn padded(n: usize) -> usize {
+    (2 * n - 1..)
+        .find(|len| factors(*len).into_iter().all(|factor| [2, 3, 4, 5, 8].contains(&factor)))
+        .unwrap_or(2 * n)
 }

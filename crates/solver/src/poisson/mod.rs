@@ -9,10 +9,7 @@
 //! neighbours while they are in the cache.
 
 mod axis;
-mod butterfly;
-mod chirp;
 mod fft;
-mod lines;
 mod plane;
 mod tridiagonal;
 
@@ -22,9 +19,8 @@ use std::time::{Duration, Instant};
 use crate::grid::{Centre, Field};
 use crate::grid::{Mesh, PlaneRange, for_chunks, for_columns, for_plane_ranges};
 use crate::math::{Aligned, Real};
-use axis::AxisTransform;
+use axis::{AxisTransform, Buffers};
 use grainwake_simd::dispatch;
-use lines::Buffers;
 use plane::{Forward, Inverse, PlaneLayout};
 use tridiagonal::{ColumnScratch, Solve, Tridiagonal, block_width};
 
@@ -95,7 +91,8 @@ impl<R: Real> Poisson<R> {
     pub fn new(mesh: &Mesh, ends: [Ends; 3]) -> Poisson<R> {
         let [nx, ny, nz] = mesh.cells;
         let axes = [0, 1].map(|a| AxisTransform::new(mesh.cells[a], ends[a], mesh.spacing[a]));
-        let scale = 1.0 / (axes[0].norm() * axes[1].norm());
+        // A forward and an inverse transform multiply by the number of cells.
+        let scale = 1.0 / (nx as f64 * ny as f64);
         let layout = PlaneLayout::new::<R>(nx, ny);
         let mut eigenvalues = vec![0.0; layout.modes()];
         // Padding lines of a block hold round-off of their partners; a singular system would turn

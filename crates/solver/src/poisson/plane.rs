@@ -8,10 +8,9 @@
 //!
 //! Legend: L count of numbers in a cache line.
 
-use super::axis::AxisTransform;
-use super::lines::{Buffers, Lines, Rows};
+use super::axis::{AxisTransform, Buffers};
 use crate::math::{Aligned, Real};
-use grainwake_simd::{Kernel, Vector};
+use grainwake_simd::{Complex, Kernel, MAX_LANES, Vector};
 
 /// Memory layout of a plane of cells and of a plane of modes.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +53,19 @@ impl PlaneLayout {
                 }
             }
         }
+    }
+    /// Lines along y in a plane of cells, from line `first` on and `second` lines further.
+    #[inline(always)]
+    fn along_y(&self, first: usize, second: usize) -> Lines {
+        Lines { at: self.pitch + self.line + first, step: self.pitch, second }
+    }
+    /// Rows of a plane of cells, `lane` rows and `lane + second` rows from the start of the block
+    /// of 2 `second` lines that begins with line `first`, and their modes.
+    #[inline(always)]
+    fn along_x(&self, first: usize, lane: usize, second: usize) -> (Rows, Lines) {
+        let at = (first + 1 + lane) * self.pitch + self.line;
+        let modes = Lines { at: first * self.nx + lane, step: 2 * second, second };
+        (Rows { at, pitch: self.pitch, second }, modes)
     }
     /// First line and number of lines, 2 L or L, of each block.
     #[inline(always)]
@@ -146,28 +158,19 @@ impl<R: Real> Kernel for Forward<'_, R> {
         plane.clear_rows();
         let values = &mut plane.values[..];
         for (first, width) in layout.blocks(layout.nx) {
-            let at = layout.pitch + R::LANES + first;
             if width == 2 * R::LANES {
                 for lane in (0..R::LANES).step_by(V::WIDTH) {
-                    let lines = Lines { at: at + lane, step: layout.pitch, second: R::LANES };
+                    let lines = layout.along_y(first + lane, R::LANES);
                     lines.forward::<V>(along_y, values, buffers);
                 }
             } else {
-                let lines = Lines { at, step: layout.pitch, second: R::LANES / 2 };
-                lines.forward::<V::Half>(along_y, values, buffers);
+                layout.along_y(first, R::LANES / 2).forward::<V::Half>(along_y, values, buffers);
             }
         }
         for (first, width) in layout.blocks(layout.ny) {
-            let at = (first + 1) * layout.pitch + R::LANES;
-            let to = first * layout.nx;
             if width == 2 * R::LANES {
                 for lane in (0..R::LANES).step_by(V::WIDTH) {
-                    let rows = Rows {
-                        at: at + lane * layout.pitch,
-                        pitch: layout.pitch,
-                        second: R::LANES,
-                    };
-                    let lines = Lines { at: to + lane, step: 2 * R::LANES, second: R::LANES };
+                    let (rows, lines) = layout.along_x(first, lane, R::LANES);
                     rows.load(&along_x.order, values, buffers.lines::<V>(along_x));
                     let found = buffers.transform::<V>(along_x, false);
                     // A narrower register writes part of a cache line.
@@ -178,8 +181,7 @@ impl<R: Real> Kernel for Forward<'_, R> {
                     }
                 }
             } else {
-                let rows = Rows { at, pitch: layout.pitch, second: R::LANES / 2 };
-                let lines = Lines { at: to, step: R::LANES, second: R::LANES / 2 };
+                let (rows, lines) = layout.along_x(first, 0, R::LANES / 2);
                 rows.load(&along_x.order, values, buffers.lines::<V::Half>(along_x));
                 lines.store(buffers.transform::<V::Half>(along_x, false), modes);
             }
@@ -210,22 +212,14 @@ impl<R: Real> Kernel for Inverse<'_, R> {
         let layout = plane.layout;
         let values = &mut plane.values[..];
         for (first, width) in layout.blocks(layout.ny) {
-            let at = (first + 1) * layout.pitch + R::LANES;
-            let from = first * layout.nx;
             if width == 2 * R::LANES {
                 for lane in (0..R::LANES).step_by(V::WIDTH) {
-                    let rows = Rows {
-                        at: at + lane * layout.pitch,
-                        pitch: layout.pitch,
-                        second: R::LANES,
-                    };
-                    let lines = Lines { at: from + lane, step: 2 * R::LANES, second: R::LANES };
+                    let (rows, lines) = layout.along_x(first, lane, R::LANES);
                     lines.load(modes, buffers.lines::<V>(along_x));
                     rows.store(&along_x.order, buffers.transform::<V>(along_x, true), values);
                 }
             } else {
-                let rows = Rows { at, pitch: layout.pitch, second: R::LANES / 2 };
-                let lines = Lines { at: from, step: R::LANES, second: R::LANES / 2 };
+                let (rows, lines) = layout.along_x(first, 0, R::LANES / 2);
                 lines.load(modes, buffers.lines::<V::Half>(along_x));
                 rows.store(&along_x.order, buffers.transform::<V::Half>(along_x, true), values);
             }
@@ -233,17 +227,171 @@ impl<R: Real> Kernel for Inverse<'_, R> {
         plane.clear_columns();
         let values = &mut plane.values[..];
         for (first, width) in layout.blocks(layout.nx) {
-            let at = layout.pitch + R::LANES + first;
             if width == 2 * R::LANES {
                 for lane in (0..R::LANES).step_by(V::WIDTH) {
-                    let lines = Lines { at: at + lane, step: layout.pitch, second: R::LANES };
+                    let lines = layout.along_y(first + lane, R::LANES);
                     lines.inverse::<V>(along_y, values, buffers);
                 }
             } else {
-                let lines = Lines { at, step: layout.pitch, second: R::LANES / 2 };
-                lines.inverse::<V::Half>(along_y, values, buffers);
+                layout.along_y(first, R::LANES / 2).inverse::<V::Half>(along_y, values, buffers);
             }
         }
         plane.fill_ghosts(periodic);
+    }
+}
+
+/// Pairs of adjacent lines: entry i of the first lines at `at + i step`, of the second lines
+/// `second` further.
+#[derive(Clone, Copy)]
+struct Lines {
+    /// Position of entry 0 of the first lines.
+    at: usize,
+    /// Distance of successive entries of a line.
+    step: usize,
+    /// Distance of the second lines from the first.
+    second: usize,
+}
+
+impl Lines {
+    /// Loads entry i of the lines.
+    #[inline(always)]
+    fn entry<V: Vector>(&self, values: &[V::Number], i: usize) -> Complex<V> {
+        let both = &values[self.at + i * self.step..][..self.second + V::WIDTH];
+        Complex { re: V::load(both), im: V::load(&both[self.second..]) }
+    }
+    /// Mutable entry i of the first lines, and of the second lines.
+    #[inline(always)]
+    fn entry_mut<'a, V: Vector>(
+        &self,
+        values: &'a mut [V::Number],
+        i: usize,
+    ) -> (&'a mut [V::Number], &'a mut [V::Number]) {
+        values[self.at + i * self.step..][..self.second + V::WIDTH].split_at_mut(self.second)
+    }
+    /// Loads all entries of the lines.
+    #[inline(always)]
+    fn load<V: Vector>(&self, values: &[V::Number], a: &mut [Complex<V>]) {
+        for (i, x) in a.iter_mut().enumerate() {
+            *x = self.entry(values, i);
+        }
+    }
+    /// Stores all entries of the lines.
+    #[inline(always)]
+    fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
+        for (i, x) in a.iter().enumerate() {
+            let (first, second) = self.entry_mut::<V>(values, i);
+            x.re.store(first);
+            x.im.store(second);
+        }
+    }
+    /// Stores all entries of the lines with non-temporal stores.
+    #[inline(always)]
+    fn store_non_temporal<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
+        for (i, x) in a.iter().enumerate() {
+            let (first, second) = self.entry_mut::<V>(values, i);
+            x.re.store_non_temporal(first);
+            x.im.store_non_temporal(second);
+        }
+    }
+    /// Replaces the lines by their modes along `axis`.
+    #[inline(always)]
+    fn forward<V: Vector>(
+        &self,
+        axis: &AxisTransform<V::Number>,
+        values: &mut [V::Number],
+        buffers: &mut Buffers<V::Number>,
+    ) {
+        let lines = buffers.lines::<V>(axis);
+        for (i, &to) in axis.order.iter().enumerate() {
+            lines[to] = self.entry(values, i);
+        }
+        self.store(buffers.transform::<V>(axis, false), values);
+    }
+    /// Replaces modes along `axis` by the lines, unnormalised.
+    #[inline(always)]
+    fn inverse<V: Vector>(
+        &self,
+        axis: &AxisTransform<V::Number>,
+        values: &mut [V::Number],
+        buffers: &mut Buffers<V::Number>,
+    ) {
+        self.load(values, buffers.lines::<V>(axis));
+        let lines = buffers.transform::<V>(axis, true);
+        for (i, &from) in axis.order.iter().enumerate() {
+            let (first, second) = self.entry_mut::<V>(values, i);
+            let line = &lines[from];
+            line.im.store(first);
+            line.re.store(second);
+        }
+    }
+}
+
+/// Pairs of rows of a plane: the first rows start at `at`, the second rows `second` rows further.
+#[derive(Clone, Copy)]
+struct Rows {
+    /// Position of entry 0 of the first row.
+    at: usize,
+    /// Distance of successive rows.
+    pitch: usize,
+    /// Number of rows from the first rows to the second rows.
+    second: usize,
+}
+
+impl Rows {
+    /// Loads the rows transposed, entry i at `order[i]`.
+    #[inline(always)]
+    fn load<V: Vector>(&self, order: &[usize], values: &[V::Number], a: &mut [Complex<V>]) {
+        for (group, order) in order.chunks(V::WIDTH).enumerate() {
+            let at = self.at + group * V::WIDTH;
+            let (mut re, mut im) = ([V::constant(0.0); MAX_LANES], [V::constant(0.0); MAX_LANES]);
+            for row in 0..V::WIDTH {
+                re[row] = V::load(&values[at + row * self.pitch..]);
+                im[row] = V::load(&values[at + (row + self.second) * self.pitch..]);
+            }
+            V::transpose(&mut re);
+            V::transpose(&mut im);
+            for ((re, im), &to) in re.into_iter().zip(im).zip(order) {
+                a[to] = Complex { re, im };
+            }
+        }
+    }
+    /// Stores the rows from their transpose, entry i from `order[i]`; real and imaginary parts are
+    /// swapped.
+    #[inline(always)]
+    fn store<V: Vector>(&self, order: &[usize], a: &[Complex<V>], values: &mut [V::Number]) {
+        let groups = order.chunks_exact(V::WIDTH);
+        let rest = groups.remainder();
+        let mut at = self.at;
+        for order in groups {
+            let mut block = [[V::constant(0.0); MAX_LANES]; 2];
+            for n in 0..V::WIDTH {
+                let line = &a[order[n]];
+                (block[0][n], block[1][n]) = (line.im, line.re);
+            }
+            self.store_block(block, at, values);
+            at += V::WIDTH;
+        }
+        if !rest.is_empty() {
+            let mut block = [[V::constant(0.0); MAX_LANES]; 2];
+            for (n, &from) in rest.iter().enumerate() {
+                (block[0][n], block[1][n]) = (a[from].im, a[from].re);
+            }
+            self.store_block(block, at, values);
+        }
+    }
+    /// Transposes two blocks into the entries from `at` on of `V::WIDTH` first and second rows.
+    #[inline(always)]
+    fn store_block<V: Vector>(
+        &self,
+        [mut first, mut second]: [[V; MAX_LANES]; 2],
+        at: usize,
+        values: &mut [V::Number],
+    ) {
+        V::transpose(&mut first);
+        V::transpose(&mut second);
+        for row in 0..V::WIDTH {
+            first[row].store(&mut values[at + row * self.pitch..]);
+            second[row].store(&mut values[at + (row + self.second) * self.pitch..]);
+        }
     }
 }

@@ -158,7 +158,7 @@ fn transforms_of_every_length_match_their_definition() {
     for n in (1..=130).chain([143, 251]) {
         let given: Vec<[f64; 2]> =
             (0..n).map(|t| [(1.3 * t as f64).sin(), (0.7 * (t * t) as f64).cos()]).collect();
-        let plan = chirp::Fourier::new(n);
+        let plan = axis::Fourier::new(n);
         let len = plan.buffer_len(n);
         let lanes = |values: &[f64]| {
             let mut a = vec![Complex::<Scalar<f64>>::zero(); len];

@@ -8,10 +8,8 @@ use super::prescription::Prescription;
 use super::timing::{PassTimes, timed};
 use super::{GrainData, Simulation};
 use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
-use crate::immersed::{
-    CoupledGrains, GrainKinematics, RigidStep, RigidVelocity, Scheme, StepInput,
-};
-use crate::math::Load;
+use crate::immersed::{CoupledGrains, GrainKinematics, RigidStep, Scheme, StepInput};
+use crate::math::{Load, RigidVelocity};
 
 /// Grains of a step, with or without fluid.
 struct GrainStep<'a> {
@@ -98,7 +96,7 @@ impl<'a> Start<'a> {
         let fluid_density = setup.fluid.map_or(0.0, |params| params.density);
         let data = &mut *solid.data;
         for (i, grain) in solid.grains.iter().enumerate() {
-            data.previous[i].velocity = RigidVelocity::of(grain);
+            data.previous[i].velocity = grain.rigid_velocity();
             data.applied[i] = weight_less_buoyancy(grain, setup.gravity, fluid_density);
         }
         // Midpoint rule: the sub-steps take the prescribed velocities at the middle of the step.
@@ -255,7 +253,7 @@ impl Projected<'_> {
                 grain.pose = data.ends[i].pose;
             }
             let previous = &mut data.previous[i];
-            let change = RigidVelocity::of(grain) - previous.velocity;
+            let change = grain.rigid_velocity() - previous.velocity;
             // The fluid lost what it gave the grain, the displaced fluid included.
             residual -= density * grain.shape.volume() * change.linear - dt * load.force;
             let touched = !data.contact[i].is_zero();
@@ -274,7 +272,7 @@ impl Projected<'_> {
 /// Velocities of a grain beyond those at the end of its sub-steps; zero where they are prescribed.
 fn beyond_substeps(grain: &Grain, end: &RigidState) -> RigidVelocity {
     let [linear, angular] = end.velocities;
-    let beyond = RigidVelocity::of(grain) - RigidVelocity { linear, angular };
+    let beyond = grain.rigid_velocity() - RigidVelocity { linear, angular };
     let free = |constraint: MotionConstraint, velocity: DVec3| match constraint {
         MotionConstraint::Free => velocity,
         MotionConstraint::Prescribed(_) => DVec3::ZERO,

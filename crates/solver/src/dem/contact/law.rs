@@ -1,6 +1,93 @@
-//! Interface of the contact force laws: properties of a pair, and coefficients at an overlap.
+//! Contact force laws: parameters, properties of a pair, the interface of the laws, the linear law of
+//! the paper (Eqs 9 and 14) and Hertz-Mindlin.
 
-use crate::dem::material::{Material, damping_ratio};
+use serde::{Deserialize, Serialize};
+
+use crate::dem::grain::{Grain, MIN_RESTITUTION, Material, damping_ratio};
+
+/// Force laws of a contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ContactLawKind {
+    /// Linear spring and dashpot (Eqs 9 and 14), the paper's law.
+    #[default]
+    Linear,
+    /// Hertz normal force and no-slip Mindlin tangential force.
+    HertzMindlin,
+}
+
+/// Contact law (Eqs 9-18) and its options.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactParams {
+    /// Force law. The linear law uses `normal_stiffness`, `tangential_ratio`, `restitution` and
+    /// `tangential_damping`; Hertz-Mindlin uses the materials of grains and walls.
+    pub law: ContactLawKind,
+    /// Normal stiffness k_n [N/m] (Eq. 9).
+    pub normal_stiffness: f64,
+    /// Tangential stiffness over normal stiffness, k_zeta / k_n (Eq. 14).
+    pub tangential_ratio: f64,
+    /// Coulomb friction coefficient between grains (Eq. 15).
+    pub friction: f64,
+    /// Coulomb friction coefficient at walls.
+    pub wall_friction: f64,
+    /// Coefficient of restitution; 1 has no dashpot (the paper's setting). Values below
+    /// `MIN_RESTITUTION` act as that value, at which a contact hardly rebounds.
+    pub restitution: f64,
+    /// Tangential over normal dashpot, for `restitution` < 1.
+    pub tangential_damping: f64,
+    /// Material of the walls.
+    pub wall_material: Material,
+    /// Global damping constant xi [1/s] (Eqs 6, 22, 24).
+    pub global_damping: f64,
+    /// Gap below which the lubrication force acts [m]; zero switches it off (the paper's setting).
+    pub lubrication_gap: f64,
+    /// Dynamic viscosity of the fluid in the lubrication force [Pa s].
+    pub lubrication_viscosity: f64,
+    /// Height of the asperities [m], the smallest thickness of the lubrication film.
+    pub roughness: f64,
+    /// Added mass of a touching grain over its volume [kg/m^3]. A contact shorter than a step also
+    /// accelerates this fluid; without it the fluid takes the momentum afterwards (decision 0009).
+    pub added_density: f64,
+    /// Sub-steps per contact time of the fastest pair.
+    pub substeps_per_contact: f64,
+}
+
+impl Default for ContactParams {
+    fn default() -> Self {
+        ContactParams {
+            law: ContactLawKind::Linear,
+            normal_stiffness: 100.0,
+            tangential_ratio: 2.0 / 7.0,
+            friction: 0.5,
+            wall_friction: 0.5,
+            restitution: 1.0,
+            tangential_damping: 0.5,
+            wall_material: Material::RIGID,
+            global_damping: 0.0,
+            lubrication_gap: 0.0,
+            lubrication_viscosity: 0.0,
+            roughness: 0.0,
+            added_density: 0.0,
+            substeps_per_contact: 25.0,
+        }
+    }
+}
+
+impl ContactParams {
+    /// Restitution below which the dashpot grows no further.
+    pub const MIN_RESTITUTION: f64 = MIN_RESTITUTION;
+
+    /// Damping ratio of the linear law, c / (2 sqrt(k m)), that gives `restitution`.
+    pub fn damping_ratio(&self) -> f64 {
+        damping_ratio(self.restitution)
+    }
+
+    /// Stiffness [N/m] at which two bodies of reduced mass `mass` [kg] that meet at `speed` [m/s]
+    /// overlap by at most `overlap` [m].
+    pub fn stiffness_for_overlap(mass: f64, speed: f64, overlap: f64) -> f64 {
+        mass * (speed / overlap).powi(2)
+    }
+}
 
 /// Elastic constants of one body as contact laws use them.
 #[derive(Clone, Copy, Debug, Default)]
@@ -120,4 +207,235 @@ pub(in crate::dem) trait ContactLaw {
 
     /// Largest overlap [m] of an undamped impact at `speed` [m/s].
     fn impact_overlap(&self, pair: &PairProperties, speed: f64) -> f64;
+}
+
+/// Linear normal and tangential springs, and dashpots that give a constant restitution.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::dem) struct Linear {
+    /// k_n [N/m].
+    normal_stiffness: f64,
+    /// k_zeta [N/m].
+    tangential_stiffness: f64,
+    /// Damping ratio of the restitution.
+    damping_ratio: f64,
+    /// Tangential over normal dashpot.
+    tangential_damping_ratio: f64,
+}
+
+impl Linear {
+    /// Law of these parameters.
+    pub fn new(params: &ContactParams) -> Linear {
+        Linear {
+            normal_stiffness: params.normal_stiffness,
+            tangential_stiffness: params.normal_stiffness * params.tangential_ratio,
+            damping_ratio: damping_ratio(params.restitution),
+            tangential_damping_ratio: params.tangential_damping,
+        }
+    }
+}
+
+impl ContactLaw for Linear {
+    fn coefficients(&self, pair: &PairProperties, overlap: f64) -> ContactCoefficients {
+        let k = self.normal_stiffness;
+        let normal_damping = if pair.inverse_mass > 0.0 {
+            2.0 * self.damping_ratio * (k / pair.inverse_mass).sqrt()
+        } else {
+            0.0
+        };
+        ContactCoefficients {
+            normal_force: k * overlap,
+            normal_energy: 0.5 * k * overlap * overlap,
+            normal_damping,
+            tangential_stiffness: self.tangential_stiffness,
+            tangential_damping_ratio: self.tangential_damping_ratio,
+        }
+    }
+
+    /// Half period of the spring, pi sqrt(m / k_n).
+    fn contact_time(&self, pair: &PairProperties, _speed: f64, _overlap: f64) -> f64 {
+        std::f64::consts::PI * (1.0 / pair.inverse_mass / self.normal_stiffness).sqrt()
+    }
+
+    fn impact_overlap(&self, pair: &PairProperties, speed: f64) -> f64 {
+        speed * (1.0 / pair.inverse_mass / self.normal_stiffness).sqrt()
+    }
+}
+
+/// Duration T of a Hertz impact over pi sqrt(m / S_n), with the stiffness S_n at the largest
+/// overlap (Timoshenko & Goodier 1970, section 142).
+///
+/// ```text
+/// T                = 2.9432 overlap / speed
+/// pi sqrt(m / S_n) = pi sqrt(8/15) overlap / speed
+/// ```
+const HERTZ_DURATION: f64 = 2.943_275 / (std::f64::consts::PI * 0.730_296_743_340_221_5);
+
+/// Hertz-Mindlin law. Moduli, radius and restitution come from the pair.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::dem) struct HertzMindlin;
+
+impl ContactLaw for HertzMindlin {
+    /// Coefficients at the overlap delta, with the tangential stiffness of Mindlin (1949).
+    ///
+    /// ```text
+    /// a   = sqrt(R* delta)                contact radius
+    /// F_n = 4/3 E* a delta                normal force
+    /// S_n = 2 E* a                        normal stiffness dF_n / d delta
+    /// S_t = 8 G* a                        tangential stiffness
+    /// c   = 2 zeta sqrt(5/6) sqrt(S m*)   dashpot, S = S_n or S_t
+    /// ```
+    ///
+    /// The dashpot is Tsuji's (1992). In the variable delta^(5/4) the damped Hertz impact is a
+    /// damped linear oscillator (Antypov & Elliott 2011), with the same end of contact at zero
+    /// force, so the damping ratio of the linear law gives the restitution here as well.
+    fn coefficients(&self, pair: &PairProperties, overlap: f64) -> ContactCoefficients {
+        let contact_radius = (pair.reduced_radius * overlap).sqrt();
+        let normal_force = 4.0 / 3.0 * pair.effective_youngs_modulus * contact_radius * overlap;
+        let normal_stiffness = 2.0 * pair.effective_youngs_modulus * contact_radius;
+        let tangential_stiffness = 8.0 * pair.effective_shear_modulus * contact_radius;
+        let normal_damping = if pair.inverse_mass > 0.0 {
+            2.0 * pair.damping_ratio * (5.0 / 6.0 * normal_stiffness / pair.inverse_mass).sqrt()
+        } else {
+            0.0
+        };
+        ContactCoefficients {
+            normal_force,
+            normal_energy: 0.4 * normal_force * overlap,
+            normal_damping,
+            tangential_stiffness,
+            tangential_damping_ratio: (tangential_stiffness / normal_stiffness).sqrt(),
+        }
+    }
+
+    /// Hertz duration of the impact whose largest overlap stores the kinetic energy and the energy
+    /// of the present overlap. An impact that begins at zero overlap takes
+    ///
+    /// ```text
+    /// 2.87 (m^2 / (R* E*^2 speed))^(1/5)
+    /// ```
+    fn contact_time(&self, pair: &PairProperties, speed: f64, overlap: f64) -> f64 {
+        let largest = (self.impact_overlap(pair, speed).powf(2.5) + overlap.powf(2.5)).powf(0.4);
+        let contact_radius = (pair.reduced_radius * largest).sqrt();
+        let normal_stiffness = 2.0 * pair.effective_youngs_modulus * contact_radius;
+        let half_period =
+            std::f64::consts::PI * (1.0 / (pair.inverse_mass * normal_stiffness)).sqrt();
+        HERTZ_DURATION * half_period
+    }
+
+    fn impact_overlap(&self, pair: &PairProperties, speed: f64) -> f64 {
+        let stiffness = 16.0 / 15.0 * pair.effective_youngs_modulus * pair.reduced_radius.sqrt();
+        (speed * speed / (pair.inverse_mass * stiffness)).powf(0.4)
+    }
+}
+
+/// Law selected by the parameters.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::dem) enum SelectedLaw {
+    /// Linear spring and dashpot.
+    Linear(Linear),
+    /// Hertz-Mindlin.
+    HertzMindlin(HertzMindlin),
+}
+
+impl SelectedLaw {
+    /// Law of these parameters.
+    pub fn new(params: &ContactParams) -> SelectedLaw {
+        match params.law {
+            ContactLawKind::Linear => SelectedLaw::Linear(Linear::new(params)),
+            ContactLawKind::HertzMindlin => SelectedLaw::HertzMindlin(HertzMindlin),
+        }
+    }
+}
+
+macro_rules! delegate {
+    ($law:expr, $method:ident($($argument:expr),*)) => {
+        match $law {
+            SelectedLaw::Linear(law) => law.$method($($argument),*),
+            SelectedLaw::HertzMindlin(law) => law.$method($($argument),*),
+        }
+    };
+}
+
+impl ContactLaw for SelectedLaw {
+    fn coefficients(&self, pair: &PairProperties, overlap: f64) -> ContactCoefficients {
+        delegate!(self, coefficients(pair, overlap))
+    }
+    fn normal_force(&self, at: &ContactCoefficients, damping: f64, approach: f64) -> f64 {
+        delegate!(self, normal_force(at, damping, approach))
+    }
+    fn contact_time(&self, pair: &PairProperties, speed: f64, overlap: f64) -> f64 {
+        delegate!(self, contact_time(pair, speed, overlap))
+    }
+    fn impact_overlap(&self, pair: &PairProperties, speed: f64) -> f64 {
+        delegate!(self, impact_overlap(pair, speed))
+    }
+}
+
+impl ContactParams {
+    /// Duration of an undamped impact at `speed` [m/s] between two grains equal to `grain` [s].
+    pub fn contact_time(&self, grain: &Grain, speed: f64) -> f64 {
+        let body = body_properties(grain);
+        let pair = PairProperties::of_grains(&body, &body);
+        SelectedLaw::new(self).contact_time(&pair, speed, 0.0)
+    }
+
+    /// Largest overlap of an undamped impact of `grain` on a wall at `speed` [m/s], without added
+    /// mass [m].
+    pub fn impact_overlap(&self, grain: &Grain, speed: f64) -> f64 {
+        let wall = ContactMaterial::new(&self.wall_material);
+        let pair = PairProperties::with_wall(&body_properties(grain), &wall);
+        SelectedLaw::new(self).impact_overlap(&pair, speed)
+    }
+}
+
+/// Properties of a grain without added mass.
+fn body_properties(grain: &Grain) -> BodyProperties {
+    BodyProperties {
+        inverse_mass: 1.0 / grain.mass(),
+        radius: 0.5 * grain.shape.equivalent_diameter(),
+        material: ContactMaterial::new(&grain.material),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stiffness_for_overlap_inverts_the_energy_balance() {
+        let k = ContactParams::stiffness_for_overlap(2.0, 3.0, 1e-3);
+        assert!((0.5 * k * 1e-6 - 0.5 * 2.0 * 9.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn contact_time_is_the_duration_of_a_hertz_impact() {
+        let pair = PairProperties {
+            inverse_mass: 40.0,
+            reduced_radius: 0.005,
+            effective_youngs_modulus: 2.5e10,
+            effective_shear_modulus: 8e9,
+            damping_ratio: 0.0,
+            partner_is_wall: false,
+        };
+        let (mut overlap, mut speed, mut time, dt) = (0.0, 3.0, 0.0, 1e-9);
+        let expected = HertzMindlin.contact_time(&pair, speed, 0.0);
+        let largest = HertzMindlin.impact_overlap(&pair, speed);
+        let mut deepest = 0.0f64;
+        while overlap >= 0.0 {
+            let force = HertzMindlin.coefficients(&pair, overlap).normal_force;
+            speed -= dt * force * pair.inverse_mass;
+            overlap += dt * speed;
+            time += dt;
+            deepest = deepest.max(overlap);
+        }
+        assert!((time / expected - 1.0).abs() < 1e-4, "{time} {expected}");
+        assert!((deepest / largest - 1.0).abs() < 1e-4, "{deepest} {largest}");
+        // Half way into the contact the speed is lower, but the expected duration is unchanged.
+        let half: f64 = 0.5 * largest;
+        let energy: f64 = 0.5 * 9.0 / pair.inverse_mass;
+        let stored = HertzMindlin.coefficients(&pair, half).normal_energy;
+        let speed = (2.0 * (energy - stored) * pair.inverse_mass).sqrt();
+        let later = HertzMindlin.contact_time(&pair, speed, half);
+        assert!((later / expected - 1.0).abs() < 1e-9, "{later} {expected}");
+    }
 }

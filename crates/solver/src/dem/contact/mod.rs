@@ -1,31 +1,23 @@
-//! Contact forces (Eqs 9-18): force laws, friction history and lubrication.
+//! Contact forces (Eqs 9-18): contacts and their records, kept between sub-steps. `law.rs` has the
+//! force laws, `model.rs` the loads of a pair.
 //!
-//! A further force law is one file beside `linear.rs` that implements `ContactLaw`, one variant of
-//! [`ContactLawKind`] and of `selected::SelectedLaw`, and its keys in the case file. A cohesive law
+//! A further force law implements `ContactLaw` in `law.rs` or in a file beside it, and needs one
+//! variant of [`ContactLawKind`] and of `SelectedLaw`, and its keys in the case file. A cohesive law
 //! overrides `ContactLaw::normal_force`, which is never negative by default; a force across a gap
-//! belongs beside `lubrication.rs`.
+//! belongs beside the lubrication in `model.rs`.
 
-mod friction;
-mod hertz_mindlin;
-mod kinematics;
 mod law;
-mod linear;
-mod lubrication;
 mod model;
-mod params;
-mod record;
-mod selected;
+
+pub(super) use law::{BodyProperties, ContactMaterial, PairProperties};
+pub use law::{ContactLawKind, ContactParams};
+pub(super) use model::{ContactModel, PairKinematics};
 
 use glam::DVec3;
 
-use super::search::Partner;
+use super::enclosure::{PairKey, Partner};
+use super::search::ContactPatch;
 use crate::math::Load;
-
-pub(super) use kinematics::{PairKinematics, PointMotion};
-pub(super) use law::{BodyProperties, ContactMaterial, PairProperties};
-pub(super) use model::ContactModel;
-pub use params::{ContactLawKind, ContactParams};
-pub(super) use record::{ContactRecord, TangentialHistory, update_records};
 
 /// Contact of a step; `grain` < partner if the partner is a grain, and equal if a grain touches its
 /// own periodic image.
@@ -43,4 +35,181 @@ pub struct Contact {
     pub point: DVec3,
     /// Mean unit normal, out of `grain`.
     pub normal: DVec3,
+}
+
+/// Tangential displacement of a contact point, accumulated since the contact began (Eqs 13-15).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::dem) struct TangentialHistory {
+    /// Identifier of the contact point; ascending within a pair.
+    pub id: u32,
+    /// Normal to which `displacement` is tangential.
+    pub normal: DVec3,
+    /// Displacement of the first grain relative to the partner, limited by Coulomb's bound [m].
+    pub displacement: DVec3,
+}
+
+impl TangentialHistory {
+    const NONE: TangentialHistory =
+        TangentialHistory { id: 0, normal: DVec3::ZERO, displacement: DVec3::ZERO };
+}
+
+/// Overlap and loads of a pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(in crate::dem) struct PairLoads {
+    /// Deepest overlap [m]; zero or negative without contact.
+    pub overlap: f64,
+    /// Load on the first grain.
+    pub on_grain: Load,
+    /// Load on the partner.
+    pub on_partner: Load,
+    /// Lever arm of the mean contact point from the first grain's centroid [m].
+    pub lever_arm: DVec3,
+    /// Mean unit normal out of the first grain.
+    pub normal: DVec3,
+    /// Energy of the springs [J].
+    pub elastic_energy: f64,
+}
+
+/// Pair that may touch, with its friction history and buffers, kept between sub-steps.
+#[derive(Debug)]
+pub(in crate::dem) struct ContactRecord {
+    /// Identity of the pair.
+    pub key: PairKey,
+    /// Whether the pair was in contact at the last evaluation.
+    pub in_contact: bool,
+    /// Whether the pair was in contact at any sub-step of the present step.
+    pub in_contact_during_step: bool,
+    /// Fraction of the dashpot that acts; differs from one just after the contact began.
+    pub dashpot_fraction: f64,
+    /// Tangential stiffness at the last evaluation [N/m]; zero before the first.
+    pub tangential_stiffness: f64,
+    /// Mean displacement of the patch, inherited by new contact points.
+    pub mean_history: TangentialHistory,
+    /// Displacements by contact point.
+    pub history: Vec<TangentialHistory>,
+    /// Displacements under evaluation.
+    pub next_history: Vec<TangentialHistory>,
+    /// Penetrating points of the last search.
+    pub patch: ContactPatch,
+    /// Loads of the last evaluation.
+    pub loads: PairLoads,
+}
+
+impl Clone for ContactRecord {
+    fn clone(&self) -> ContactRecord {
+        let mut copy = ContactRecord::new(self.key);
+        copy.clone_from(self);
+        copy
+    }
+    /// Copies a record into the buffers of this one: the trial step copies all records in every
+    /// step.
+    fn clone_from(&mut self, source: &ContactRecord) {
+        let mut history = std::mem::take(&mut self.history);
+        let mut next_history = std::mem::take(&mut self.next_history);
+        let mut patch = std::mem::take(&mut self.patch);
+        history.clone_from(&source.history);
+        next_history.clone_from(&source.next_history);
+        patch.clone_from(&source.patch);
+        *self = ContactRecord { history, next_history, patch, ..*source };
+    }
+}
+
+impl ContactRecord {
+    /// Record of a pair that has not touched.
+    pub fn new(key: PairKey) -> ContactRecord {
+        ContactRecord {
+            key,
+            in_contact: false,
+            in_contact_during_step: false,
+            dashpot_fraction: 1.0,
+            tangential_stiffness: 0.0,
+            mean_history: TangentialHistory::NONE,
+            history: Vec::new(),
+            next_history: Vec::new(),
+            patch: ContactPatch::default(),
+            loads: PairLoads::default(),
+        }
+    }
+    /// Ends the contact and clears its history; the last contact point and normal are kept.
+    pub fn end_contact(&mut self) {
+        self.in_contact = false;
+        self.dashpot_fraction = 1.0;
+        self.tangential_stiffness = 0.0;
+        self.mean_history = TangentialHistory::NONE;
+        self.history.clear();
+        self.loads = PairLoads {
+            lever_arm: self.loads.lever_arm,
+            normal: self.loads.normal,
+            ..Default::default()
+        };
+    }
+    /// Prepares another step: only quantities of the checkpoint may affect it.
+    pub fn begin_step(&mut self) {
+        self.in_contact_during_step = false;
+        self.patch.reset();
+    }
+    /// Prepares the record for another pair; only the buffers are reused.
+    fn reuse(&mut self, key: PairKey) {
+        self.end_contact();
+        self.begin_step();
+        self.loads = PairLoads::default();
+        self.key = key;
+    }
+}
+
+/// Replaces `records` by one record for each of the ascending `keys`.
+///
+/// Records whose key remains are kept; `spare` takes the others and provides buffers for new ones.
+/// `old` is a buffer.
+pub(in crate::dem) fn update_records(
+    records: &mut Vec<ContactRecord>,
+    old: &mut Vec<ContactRecord>,
+    spare: &mut Vec<ContactRecord>,
+    keys: &[PairKey],
+) {
+    std::mem::swap(records, old);
+    let mut previous = old.drain(..).peekable();
+    for &key in keys {
+        while let Some(gone) = previous.next_if(|record| record.key < key) {
+            spare.push(gone);
+        }
+        let kept = previous.next_if(|record| record.key == key);
+        records.push(kept.unwrap_or_else(|| match spare.pop() {
+            Some(mut record) => {
+                record.reuse(key);
+                record
+            }
+            None => ContactRecord::new(key),
+        }));
+    }
+    spare.extend(previous);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dem::enclosure::Partner;
+    use glam::IVec3;
+
+    fn key((grain, partner): (u32, usize)) -> PairKey {
+        PairKey { grain, partner: Partner::Grain(partner), image: IVec3::ZERO }
+    }
+
+    #[test]
+    fn updating_keeps_the_records_of_pairs_that_remain() {
+        let (mut records, mut old, mut spare) = (Vec::new(), Vec::new(), Vec::new());
+        let mut update = |records: &mut Vec<ContactRecord>, pairs: [(u32, usize); 3]| {
+            update_records(records, &mut old, &mut spare, &pairs.map(key));
+            spare.len()
+        };
+        update(&mut records, [(0, 1), (0, 2), (1, 2)]);
+        records[1].in_contact = true;
+        records[2].in_contact = true;
+        let spare = update(&mut records, [(0, 2), (0, 3), (1, 3)]);
+        let in_contact: Vec<_> = records.iter().map(|r| r.in_contact).collect();
+        assert_eq!(in_contact, [true, false, false]);
+        let keys: Vec<_> = records.iter().map(|r| r.key).collect();
+        assert_eq!(keys, [(0, 2), (0, 3), (1, 3)].map(key));
+        assert_eq!(spare, 0);
+    }
 }

@@ -1,20 +1,17 @@
-//! Loads of a pair from its penetrating points (Eqs 9-18).
+//! Loads of a pair: normal force and friction of its penetrating points (Eqs 9-18), or lubrication
+//! across a gap.
 //!
 //! The force law acts on the deepest overlap of the pair. Its force is distributed over the
 //! penetrating points in proportion to area times overlap, so that the stiffness does not depend on
-//! the number of nodes; a single point receives Eq. 9.
+//! the number of nodes; a single point receives Eq. 9. Friction is an incremental spring with
+//! Coulomb's bound (Eqs 12-15).
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
-use super::friction::{FrictionStep, rotate_tangential};
-use super::kinematics::{PairKinematics, relative_velocity};
-use super::law::{ContactCoefficients, ContactLaw, PairProperties};
-use super::lubrication::{lubrication, range};
-use super::params::ContactParams;
-use super::record::{ContactRecord, PairLoads, TangentialHistory};
-use super::selected::SelectedLaw;
+use super::law::{ContactCoefficients, ContactLaw, ContactParams, PairProperties, SelectedLaw};
+use super::{ContactRecord, PairLoads, TangentialHistory};
 use crate::dem::search::{ClosestPoint, ContactPoint};
-use crate::math::Load;
+use crate::math::{Load, RigidVelocity};
 
 /// Averages over a contact patch, weighted with area times overlap.
 #[derive(Clone, Copy, Debug)]
@@ -198,4 +195,128 @@ fn begin_or_continue(record: &mut ContactRecord, mean: &PatchMean, step: f64) ->
 /// it falls (unloading); otherwise a closed cycle could create energy.
 fn history_scale(before: f64, now: f64) -> f64 {
     if now > before && before > 0.0 { before / now } else { 1.0 }
+}
+
+/// Relative position and velocities of the two bodies of a pair, space frame.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::dem) struct PairKinematics {
+    /// Branch vector from the centroid of the partner (its image) to that of the first grain [m].
+    pub branch: DVec3,
+    /// Velocities in the middle of the sub-step, for the displacement increment (Eqs 12-13).
+    pub mid_step: [RigidVelocity; 2],
+    /// Velocities expected at the end of the sub-step, for the dashpots.
+    pub end_of_step: [RigidVelocity; 2],
+}
+
+/// Velocity of the first body relative to the second at a contact point (Eq. 12) [m/s].
+pub(super) fn relative_velocity(
+    motion: &[RigidVelocity; 2],
+    point: &ContactPoint,
+    branch: DVec3,
+) -> DVec3 {
+    motion[0].at(point.lever_arm) - motion[1].at(point.lever_arm + branch)
+}
+
+/// Quantities of one sub-step that the friction of all points of a patch shares.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FrictionStep {
+    /// Friction coefficient mu.
+    pub coefficient: f64,
+    /// Tangential stiffness k_zeta [N/m].
+    pub stiffness: f64,
+    /// Factor on earlier displacements after a change of the stiffness.
+    pub history_scale: f64,
+    /// Tangential dashpot [N s/m].
+    pub damping: f64,
+    /// Part of the sub-step in contact [s].
+    pub time_in_contact: f64,
+    /// Sub-step [s].
+    pub step: f64,
+}
+
+impl FrictionStep {
+    /// Tangential force [N] on the first grain as if this point carried the whole pair, and the
+    /// tangential displacement [m] (Eqs 13-15).
+    ///
+    /// Coulomb's bound and the stiffness scale alike with the share of the point in the pair, so
+    /// the bound on the displacement does not depend on the share.
+    pub fn tangential_force(
+        &self,
+        point: &ContactPoint,
+        normal_force: f64,
+        history: Option<&TangentialHistory>,
+        pair: &PairKinematics,
+    ) -> (DVec3, DVec3) {
+        let tangential = |v: DVec3| v - v.dot(point.normal) * point.normal;
+        let earlier = history.map_or(DVec3::ZERO, |history| {
+            // The spring turns with the mean spin of the pair about the normal.
+            let spin = pair.mid_step[0].angular + pair.mid_step[1].angular;
+            let twist = 0.5 * self.step * spin.dot(point.normal);
+            let displacement = self.history_scale * history.displacement;
+            DQuat::from_axis_angle(point.normal, twist)
+                * rotate_tangential(displacement, history.normal, point.normal)
+        });
+        // Eq. 13 with the relative velocity of Eq. 12 at the middle of the sub-step.
+        let velocity = relative_velocity(&pair.mid_step, point, pair.branch);
+        let displacement = earlier + self.time_in_contact * tangential(velocity);
+        let sliding = relative_velocity(&pair.end_of_step, point, pair.branch);
+        let viscous = self.damping * tangential(sliding);
+        let force = -(self.stiffness * displacement + viscous);
+        // Coulomb's bound (Eq. 15); an attractive normal force carries no friction.
+        let limit = self.coefficient * normal_force.max(0.0);
+        if force.length_squared() <= limit * limit {
+            return (force, displacement);
+        }
+        let force = force * (limit / force.length());
+        (force, -(force + viscous) / self.stiffness)
+    }
+}
+
+/// Rotates `v` by the smallest rotation from the normal `from` to the normal `to` (R of Eq. 14) and
+/// removes the component along `to`.
+pub(super) fn rotate_tangential(v: DVec3, from: DVec3, to: DVec3) -> DVec3 {
+    let rotated = DQuat::from_rotation_arc(from, to) * v;
+    rotated - rotated.dot(to) * to
+}
+
+/// Gap below which the lubrication force acts [m]; zero if it is switched off.
+pub(super) fn range(params: &ContactParams) -> f64 {
+    if params.lubrication_viscosity > 0.0 { params.lubrication_gap.max(0.0) } else { 0.0 }
+}
+
+/// Leading-order squeeze-film force between the equal-volume spheres,
+/// 6 pi mu R*^2 v_n (1/h - 1/h_0), with h at least the height of the asperities.
+pub(super) fn lubrication(
+    params: &ContactParams,
+    closest: &ClosestPoint,
+    properties: &PairProperties,
+    pair: &PairKinematics,
+    step: f64,
+) -> PairLoads {
+    let range = range(params);
+    if closest.gap >= range {
+        return PairLoads::default();
+    }
+    let strength = 6.0
+        * std::f64::consts::PI
+        * params.lubrication_viscosity
+        * properties.reduced_radius.powi(2);
+    let film = closest.gap.max(params.roughness).min(range);
+    let mut resistance = strength * (1.0 / film - 1.0 / range);
+    // An explicit dashpot must not reverse the approach within a sub-step.
+    if step * properties.inverse_mass > 0.0 {
+        resistance = resistance.min(0.5 / (step * properties.inverse_mass));
+    }
+    let lever_arm_b = closest.lever_arm + pair.branch;
+    let [a, b] = &pair.end_of_step;
+    let approach = (a.at(closest.lever_arm) - b.at(lever_arm_b)).dot(closest.normal);
+    let force = -resistance * approach * closest.normal;
+    PairLoads {
+        overlap: -closest.gap,
+        on_grain: Load { force, torque: closest.lever_arm.cross(force) },
+        on_partner: Load { force: -force, torque: -lever_arm_b.cross(force) },
+        lever_arm: closest.lever_arm,
+        normal: closest.normal,
+        elastic_energy: 0.0,
+    }
 }

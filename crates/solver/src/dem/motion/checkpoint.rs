@@ -9,9 +9,9 @@ use std::io::{self, Read, Write};
 use glam::IVec3;
 use grainwake_formats::codec::{Decoder, Encoder, invalid};
 
-use super::dynamics::ContactDynamics;
+use super::ContactDynamics;
 use crate::dem::contact::{Contact, ContactRecord, TangentialHistory};
-use crate::dem::search::{PairKey, Partner};
+use crate::dem::enclosure::{PairKey, Partner};
 use crate::math::Load;
 
 const SIGNATURE: [u8; 7] = *b"GWDEM\0\0";

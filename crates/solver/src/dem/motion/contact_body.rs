@@ -5,17 +5,14 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 
-use super::integrator::{EffectiveInertia, HalfStepVelocity};
-use super::response::GrainResponse;
+use super::integrator::{EffectiveInertia, GrainResponse, HalfStepVelocity};
 use crate::dem::contact::{
     BodyProperties, ContactMaterial, ContactModel, ContactRecord, PairKinematics, PairProperties,
-    PointMotion,
 };
-use crate::dem::enclosure::Enclosure;
-use crate::dem::grain::Grain;
-use crate::dem::material::Material;
-use crate::dem::search::{NodeTree, PairKey, Partner, PosedShape};
-use crate::math::Load;
+use crate::dem::enclosure::{Enclosure, PairKey, Partner};
+use crate::dem::grain::{Grain, Material};
+use crate::dem::search::{NodeTree, PosedShape};
+use crate::math::{Load, RigidVelocity};
 
 /// Safety factor on the motion that reduces the known separation of a pair.
 const MOTION_MARGIN: f64 = 1.01;
@@ -28,8 +25,8 @@ pub(super) struct ContactBody {
     material: Material,
     contact_material: ContactMaterial,
     rotation: DMat3,
-    mid_step: PointMotion,
-    end_of_step: PointMotion,
+    mid_step: RigidVelocity,
+    end_of_step: RigidVelocity,
     /// Upper bound of the displacement of any surface point since the last evaluation [m].
     displacement: f64,
     /// Velocities in the middle of the sub-step.
@@ -84,8 +81,8 @@ impl ContactBody {
             material: grain.material,
             contact_material: ContactMaterial::new(&grain.material),
             rotation: DMat3::IDENTITY,
-            mid_step: PointMotion::default(),
-            end_of_step: PointMotion::default(),
+            mid_step: RigidVelocity::default(),
+            end_of_step: RigidVelocity::default(),
             displacement: 0.0,
             half_step: HalfStepVelocity::default(),
             contact: Load::default(),
@@ -127,21 +124,11 @@ impl ContactBody {
     pub fn update_kinematics(&mut self, grain: &Grain, step: f64) {
         self.contact = Load::default();
         self.rotation = DMat3::from_quat(grain.pose.orientation);
-        let half_step = &self.half_step;
+        let HalfStepVelocity { middle, end } = self.half_step;
         let radius = grain.shape.bounding_radius();
-        self.displacement =
-            step * (half_step.velocity.length() + radius * half_step.angular_velocity.length());
-        if step > 0.0 {
-            self.mid_step =
-                PointMotion { linear: half_step.velocity, angular: half_step.angular_velocity };
-            self.end_of_step = PointMotion {
-                linear: half_step.predicted_velocity,
-                angular: half_step.predicted_angular_velocity,
-            };
-        } else {
-            self.mid_step = PointMotion { linear: grain.velocity, angular: grain.angular_velocity };
-            self.end_of_step = self.mid_step;
-        }
+        self.displacement = step * (middle.linear.length() + radius * middle.angular.length());
+        [self.mid_step, self.end_of_step] =
+            if step > 0.0 { [middle, end] } else { [grain.rigid_velocity(); 2] };
     }
 
     /// Properties in a pair.
@@ -198,8 +185,8 @@ pub(super) fn evaluate_pair(record: &mut ContactRecord, context: &PairContext) {
     let reach = context.model.range();
     let mut pair = PairKinematics {
         branch: DVec3::ZERO,
-        mid_step: [bodies[i].mid_step, PointMotion::default()],
-        end_of_step: [bodies[i].end_of_step, PointMotion::default()],
+        mid_step: [bodies[i].mid_step, RigidVelocity::default()],
+        end_of_step: [bodies[i].end_of_step, RigidVelocity::default()],
     };
     let closest = match record.key.partner {
         Partner::Grain(j) => {

@@ -2,26 +2,22 @@
 //!
 //! v^(n+1/2) = v^n + dt/2 (F^n/m - xi v^n), x^(n+1) = x^n + dt v^(n+1/2) and
 //! v^(n+1) = (v^(n+1/2) + dt/2 F^(n+1)/m) / (1 + xi dt/2) are Eqs 21-23 split at integer times; the
-//! two half steps in sequence give Eq. 22.
+//! two half steps in sequence give Eq. 22. The mass is that of the grain, or the 6 x 6 mass of grain
+//! and fluid ([`GrainResponse`]).
 
 use glam::DVec3;
 
-use super::response::GrainResponse;
 use super::rotation::{half_step_explicit, half_step_implicit, rotate_by_cayley, rotate_exactly};
 use crate::dem::grain::{Grain, MotionConstraint};
-use crate::math::Load;
+use crate::math::{Load, Matrix6, RigidVelocity, Vector6};
 
-/// Velocities in the middle of a sub-step, space frame.
+/// Velocities in a sub-step, space frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct HalfStepVelocity {
-    /// v^(n+1/2) [m/s].
-    pub velocity: DVec3,
-    /// omega^(n+1/2) [rad/s].
-    pub angular_velocity: DVec3,
-    /// v^(n+1) predicted with the load at n [m/s].
-    pub predicted_velocity: DVec3,
-    /// omega^(n+1) predicted with the load at n [rad/s].
-    pub predicted_angular_velocity: DVec3,
+    /// v^(n+1/2) and omega^(n+1/2).
+    pub middle: RigidVelocity,
+    /// v^(n+1) and omega^(n+1), predicted with the load at n.
+    pub end: RigidVelocity,
 }
 
 /// Inertia against a load.
@@ -42,7 +38,7 @@ pub(super) fn first_half_step(
     step: f64,
 ) -> HalfStepVelocity {
     let half = 0.5 * step;
-    let mut mid = HalfStepVelocity::default();
+    let HalfStepVelocity { mut middle, mut end } = HalfStepVelocity::default();
     match grain.translation {
         MotionConstraint::Free => {
             let acceleration = match inertia {
@@ -50,16 +46,16 @@ pub(super) fn first_half_step(
                 EffectiveInertia::WithFluid(response) => response.acceleration(load)[0],
             };
             let change = half * (acceleration - damping * grain.velocity);
-            mid.velocity = grain.velocity + change;
-            mid.predicted_velocity = mid.velocity + change;
+            middle.linear = grain.velocity + change;
+            end.linear = middle.linear + change;
         }
         MotionConstraint::Prescribed(velocity) => {
             grain.velocity = velocity;
-            mid.velocity = velocity;
-            mid.predicted_velocity = velocity;
+            middle.linear = velocity;
+            end.linear = velocity;
         }
     }
-    grain.pose.position += step * mid.velocity;
+    grain.pose.position += step * middle.linear;
     match grain.rotation {
         MotionConstraint::Free => {
             let to_body = grain.pose.orientation.conjugate();
@@ -75,23 +71,23 @@ pub(super) fn first_half_step(
             };
             grain.pose.orientation = rotate_by_cayley(grain.pose.orientation, omega_mid, step);
             // The rotation axis is omega_mid, so its space components do not change.
-            mid.angular_velocity = grain.pose.orientation * omega_mid;
-            mid.predicted_angular_velocity = 2.0 * mid.angular_velocity - grain.angular_velocity;
+            middle.angular = grain.pose.orientation * omega_mid;
+            end.angular = 2.0 * middle.angular - grain.angular_velocity;
         }
         MotionConstraint::Prescribed(omega) => {
             grain.angular_velocity = omega;
             grain.pose.orientation = rotate_exactly(grain.pose.orientation, omega, step);
-            mid.angular_velocity = omega;
-            mid.predicted_angular_velocity = omega;
+            middle.angular = omega;
+            end.angular = omega;
         }
     }
-    mid
+    HalfStepVelocity { middle, end }
 }
 
 /// Second half step, with the load at n+1: velocities to n+1.
 pub(super) fn second_half_step(
     grain: &mut Grain,
-    mid: &HalfStepVelocity,
+    middle: RigidVelocity,
     load: &Load,
     inertia: EffectiveInertia,
     damping: f64,
@@ -105,7 +101,7 @@ pub(super) fn second_half_step(
             EffectiveInertia::Grain(inverse_mass) => force * inverse_mass,
             EffectiveInertia::WithFluid(response) => response.acceleration(load)[0],
         };
-        grain.velocity = (mid.velocity + half * acceleration) / damping_factor;
+        grain.velocity = (middle.linear + half * acceleration) / damping_factor;
     }
     if grain.rotation == MotionConstraint::Free {
         grain.angular_velocity = match inertia {
@@ -113,7 +109,7 @@ pub(super) fn second_half_step(
                 let to_body = grain.pose.orientation.conjugate();
                 let omega = half_step_implicit(
                     grain.principal_inertia(),
-                    to_body * mid.angular_velocity,
+                    to_body * middle.angular,
                     to_body * torque,
                     damping,
                     half,
@@ -121,8 +117,50 @@ pub(super) fn second_half_step(
                 grain.pose.orientation * omega
             }
             EffectiveInertia::WithFluid(response) => {
-                (mid.angular_velocity + half * response.acceleration(load)[1]) / damping_factor
+                (middle.angular + half * response.acceleration(load)[1]) / damping_factor
             }
         };
+    }
+}
+
+/// Acceleration of a grain in a fluid as an affine function of the contact load, over one step.
+#[derive(Clone, Copy, Debug)]
+pub struct GrainResponse {
+    /// Velocity [m/s] and angular velocity [rad/s] at the start, space frame.
+    pub(super) start: [DVec3; 2],
+    /// Acceleration [m/s^2] and angular acceleration [rad/s^2] without contact, space frame.
+    free: [DVec3; 2],
+    /// Columns of the inverse 6 x 6 mass of grain and entrained fluid: accelerations under a unit
+    /// force along x, y, z and a unit torque about x, y, z.
+    inverse: Matrix6,
+}
+
+impl GrainResponse {
+    /// Response from the velocities at the start, the loads without contact [N] and [N m], and the
+    /// columns of the inverse 6 x 6 mass.
+    pub fn new(start: [DVec3; 2], load: Vector6, inverse: Matrix6) -> GrainResponse {
+        let mut response = GrainResponse { start, free: Default::default(), inverse };
+        response.free = response.acceleration(&Load {
+            force: DVec3::from_slice(&load[..3]),
+            torque: DVec3::from_slice(&load[3..]),
+        });
+        response
+    }
+
+    /// Acceleration [m/s^2] and angular acceleration [rad/s^2] under a contact load.
+    pub(super) fn acceleration(&self, contact: &Load) -> [DVec3; 2] {
+        let mut sum = self.free;
+        let loads = [contact.force, contact.torque];
+        for (n, column) in self.inverse.iter().enumerate() {
+            let load = loads[n / 3][n % 3];
+            sum[0] += load * DVec3::from_slice(&column[..3]);
+            sum[1] += load * DVec3::from_slice(&column[3..]);
+        }
+        sum
+    }
+
+    /// Inverse of the mass against a force, averaged over directions [1/kg].
+    pub(super) fn inverse_mass(&self) -> f64 {
+        (self.inverse[0][0] + self.inverse[1][1] + self.inverse[2][2]) / 3.0
     }
 }

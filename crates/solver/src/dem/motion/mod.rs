@@ -1,17 +1,286 @@
-//! Motion of the grains (Eqs 19-37): contact sub-steps, integrator, rotation and the response of
-//! the fluid to contact.
+//! Motion of the grains (Eqs 19-37): contact dynamics of all grains. A step is taken at once, or as a
+//! trial step that is accepted or repeated with the response of the fluid
+//! (`docs/decisions/0014-contact-with-the-fluid-response.md`).
+//!
+//! `substeps.rs` has the contact sub-steps, `integrator.rs` and `rotation.rs` the motion of one grain.
 
 mod checkpoint;
 mod contact_body;
-mod dynamics;
 mod integrator;
-mod response;
 pub mod rotation;
-mod state_before;
 mod substeps;
-mod trial_step;
 
-pub use dynamics::ContactDynamics;
-pub use response::GrainResponse;
-pub use state_before::RigidState;
-pub use trial_step::TrialStep;
+pub use integrator::GrainResponse;
+
+use glam::{DVec3, IVec3};
+
+use super::contact::{Contact, ContactMaterial, ContactModel, ContactParams, ContactRecord};
+use super::enclosure::{Enclosure, Partner};
+use super::grain::{Grain, MotionConstraint};
+use super::search::{BoundingSphere, BroadPhase};
+use crate::math::{Load, Pose};
+use contact_body::ContactBody;
+
+/// Contact model, contact history and integrator of all grains.
+#[derive(Clone, Debug)]
+pub struct ContactDynamics {
+    model: ContactModel,
+    wall: ContactMaterial,
+    enclosure: Enclosure,
+    contacts: Vec<Contact>,
+    /// Pairs that may touch, in ascending key.
+    records: Vec<ContactRecord>,
+    /// Position of every grain at the end of the last step [m].
+    last_positions: Vec<DVec3>,
+    bodies: Vec<ContactBody>,
+    broad_phase: BroadPhase,
+    spheres: Vec<BoundingSphere>,
+    old_records: Vec<ContactRecord>,
+    spare_records: Vec<ContactRecord>,
+    state_before: StateBefore,
+}
+
+impl ContactDynamics {
+    /// Contact dynamics in `enclosure` of grains that have not touched yet. The grains themselves
+    /// are passed to each step.
+    pub fn new(params: ContactParams, enclosure: Enclosure) -> ContactDynamics {
+        ContactDynamics {
+            model: ContactModel::new(params),
+            wall: ContactMaterial::new(&params.wall_material),
+            enclosure,
+            contacts: Vec::new(),
+            records: Vec::new(),
+            last_positions: Vec::new(),
+            bodies: Vec::new(),
+            broad_phase: BroadPhase::default(),
+            spheres: Vec::new(),
+            old_records: Vec::new(),
+            spare_records: Vec::new(),
+            state_before: StateBefore::default(),
+        }
+    }
+    /// Contacts of the last step, ordered by grain, then partner.
+    pub fn contacts(&self) -> &[Contact] {
+        &self.contacts
+    }
+    /// Contact parameters.
+    pub fn params(&self) -> &ContactParams {
+        &self.model.params
+    }
+    /// Box of the grains.
+    pub fn enclosure(&self) -> &Enclosure {
+        &self.enclosure
+    }
+    /// Energy of the contact springs at the end of the last step [J].
+    pub fn elastic_energy(&self) -> f64 {
+        (self.records.iter()).map(|record| record.loads.elastic_energy).sum()
+    }
+
+    /// Advances poses and velocities by `dt` [s] in sub-steps under constant `loads` (space frame,
+    /// about the centroids) and contact; returns the number of sub-steps.
+    ///
+    /// `mean_contact` receives the contact impulse on each grain divided by `dt`. A missing load
+    /// counts as zero. Positions are not wrapped into the box; a caller may wrap them between
+    /// steps.
+    pub fn advance(
+        &mut self,
+        grains: &mut [Grain],
+        loads: &[Load],
+        dt: f64,
+        mean_contact: &mut [Load],
+    ) -> usize {
+        mean_contact.fill(Load::default());
+        if dt.is_nan() || dt <= 0.0 {
+            return 0;
+        }
+        self.begin_step(grains);
+        self.bodies.iter_mut().for_each(|body| body.response = None);
+        let substeps = self.integrate(grains, loads, dt, mean_contact);
+        self.end_step(grains);
+        substeps
+    }
+
+    /// Applies prescribed velocities, updates the contact bodies, and shifts the images of pairs
+    /// whose grains were wrapped by whole periods since the last step.
+    fn begin_step(&mut self, grains: &mut [Grain]) {
+        for grain in grains.iter_mut() {
+            if let MotionConstraint::Prescribed(velocity) = grain.translation {
+                grain.velocity = velocity;
+            }
+            if let MotionConstraint::Prescribed(omega) = grain.rotation {
+                grain.angular_velocity = omega;
+            }
+        }
+        ContactBody::synchronise(&mut self.bodies, grains);
+        let period = self.enclosure.period();
+        let periods_moved = |i: usize| -> IVec3 {
+            let (Some(last), Some(grain)) = (self.last_positions.get(i), grains.get(i)) else {
+                return IVec3::ZERO;
+            };
+            let displacement = grain.pose.position - *last;
+            IVec3::from_array([0, 1, 2].map(|axis| {
+                if period[axis] > 0.0 {
+                    let periods = (displacement[axis] / period[axis]).round();
+                    periods.clamp(-1e6, 1e6) as i32
+                } else {
+                    0
+                }
+            }))
+        };
+        let mut shifted = false;
+        for record in &mut self.records {
+            record.begin_step();
+            if let Partner::Grain(j) = record.key.partner {
+                let shift = periods_moved(record.key.grain as usize) - periods_moved(j);
+                record.key.image = record.key.image.wrapping_add(shift);
+                shifted |= shift != IVec3::ZERO;
+            }
+        }
+        if shifted {
+            self.records.sort_by_key(|record| record.key);
+        }
+    }
+
+    /// Records the positions and the contacts at the end of a step.
+    fn end_step(&mut self, grains: &[Grain]) {
+        self.last_positions.clear();
+        self.last_positions.extend(grains.iter().map(|grain| grain.pose.position));
+        self.contacts.clear();
+        for record in self.records.iter().filter(|r| r.in_contact_during_step) {
+            let grain = record.key.grain as usize;
+            self.contacts.push(Contact {
+                grain,
+                partner: record.key.partner,
+                overlap: record.loads.overlap.max(0.0),
+                load: record.loads.on_grain,
+                point: grains[grain].pose.position + record.loads.lever_arm,
+                normal: record.loads.normal,
+            });
+        }
+    }
+}
+
+/// Step that [`ContactDynamics::trial_step`] has taken, with the state from before it.
+///
+/// Either [`ContactDynamics::accept`] or [`ContactDynamics::resolve_with_response`] consumes it.
+#[must_use = "accept the step or resolve it with the response of the fluid"]
+#[derive(Debug)]
+pub struct TrialStep {
+    dt: f64,
+    before: StateBefore,
+}
+
+impl ContactDynamics {
+    /// Takes a step as [`ContactDynamics::advance`] does, and keeps the state from before it.
+    pub fn trial_step(
+        &mut self,
+        grains: &mut [Grain],
+        loads: &[Load],
+        dt: f64,
+        mean_contact: &mut [Load],
+    ) -> TrialStep {
+        // The buffers return with the accepted or resolved step.
+        let mut before = std::mem::take(&mut self.state_before);
+        before.records.clone_from(&self.records);
+        before.last_positions.clone_from(&self.last_positions);
+        before.poses.clear();
+        before.poses.extend(grains.iter().map(|grain| grain.pose));
+        self.advance(grains, loads, dt, mean_contact);
+        TrialStep { dt, before }
+    }
+
+    /// Accepts a trial step as it is.
+    pub fn accept(&mut self, trial: TrialStep) {
+        self.state_before = trial.before;
+    }
+
+    /// Repeats a trial step from its start, with the response of the fluid of this step to contact.
+    ///
+    /// The grains keep the state of the trial step; `ends` receives the state after the repetition.
+    /// A grain without contact keeps the pose of the trial step. On entry `mean_contact` holds the
+    /// contact loads of the trial step, on return the loads of the repetition.
+    pub fn resolve_with_response(
+        &mut self,
+        trial: TrialStep,
+        grains: &mut [Grain],
+        responses: &[GrainResponse],
+        mean_contact: &mut [Load],
+        ends: &mut [RigidState],
+    ) {
+        let TrialStep { dt, mut before } = trial;
+        before.trial_ends.clear();
+        let trial_ends = grains.iter().zip(&*mean_contact);
+        (before.trial_ends).extend(trial_ends.map(|(grain, load)| TrialEnd {
+            state: RigidState::of(grain),
+            touched: !load.is_zero(),
+        }));
+        mean_contact.fill(Load::default());
+        self.records.clone_from(&before.records);
+        self.last_positions.clone_from(&before.last_positions);
+        let starts = before.poses.iter().zip(responses);
+        for (grain, (pose, response)) in grains.iter_mut().zip(starts) {
+            let [velocity, angular_velocity] = response.start;
+            (grain.pose, grain.velocity, grain.angular_velocity) =
+                (*pose, velocity, angular_velocity);
+        }
+        self.begin_step(grains);
+        for (body, response) in self.bodies.iter_mut().zip(responses) {
+            body.response = Some(*response);
+        }
+        self.integrate(grains, &[], dt, mean_contact);
+        for (n, grain) in grains.iter_mut().enumerate() {
+            let trial_end = &before.trial_ends[n];
+            if !trial_end.touched && mean_contact[n].is_zero() {
+                grain.pose = trial_end.state.pose;
+            }
+            ends[n] = RigidState::of(grain);
+        }
+        self.end_step(grains);
+        for (grain, trial_end) in grains.iter_mut().zip(&before.trial_ends) {
+            trial_end.state.apply_to(grain);
+        }
+        self.state_before = before;
+    }
+}
+
+/// Pose and velocities of a grain.
+#[derive(Clone, Copy, Debug)]
+pub struct RigidState {
+    /// Position and orientation.
+    pub pose: Pose,
+    /// Velocity [m/s] and angular velocity [rad/s], space frame.
+    pub velocities: [DVec3; 2],
+}
+
+impl RigidState {
+    /// Present state of a grain.
+    pub fn of(grain: &Grain) -> RigidState {
+        RigidState { pose: grain.pose, velocities: [grain.velocity, grain.angular_velocity] }
+    }
+
+    /// Gives a grain this state.
+    pub(super) fn apply_to(&self, grain: &mut Grain) {
+        grain.pose = self.pose;
+        [grain.velocity, grain.angular_velocity] = self.velocities;
+    }
+}
+
+/// Contact history and poses before a trial step.
+///
+/// [`super::ContactDynamics`] keeps the buffers between steps.
+#[derive(Clone, Debug, Default)]
+struct StateBefore {
+    pub records: Vec<ContactRecord>,
+    pub last_positions: Vec<DVec3>,
+    pub poses: Vec<Pose>,
+    /// End of the trial step; filled while the step is resolved with the response of the fluid.
+    pub trial_ends: Vec<TrialEnd>,
+}
+
+/// End of a trial step for one grain.
+#[derive(Clone, Copy, Debug)]
+struct TrialEnd {
+    pub state: RigidState,
+    /// Whether a contact or lubrication load acted on the grain.
+    pub touched: bool,
+}

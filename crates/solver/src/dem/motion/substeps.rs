@@ -2,12 +2,13 @@
 
 use rayon::prelude::*;
 
+use super::ContactDynamics;
 use super::contact_body::{PairContext, evaluate_pair, pair_properties};
-use super::dynamics::ContactDynamics;
 use super::integrator::{first_half_step, second_half_step};
 use crate::dem::contact::{ContactRecord, update_records};
+use crate::dem::enclosure::{PairKey, Partner};
 use crate::dem::grain::{Grain, MotionConstraint};
-use crate::dem::search::{BoundingSphere, PairKey, Partner};
+use crate::dem::search::BoundingSphere;
 use crate::math::Load;
 
 /// Skin of the pair list: displacement that is always allowed before the next search
@@ -75,7 +76,7 @@ impl ContactDynamics {
                 }
                 let load = load_of(i) + body.contact;
                 let inertia = body.inertia();
-                second_half_step(grain, &body.half_step, &load, inertia, damping, step);
+                second_half_step(grain, body.half_step.middle, &load, inertia, damping, step);
             }
         }
         done

@@ -2,10 +2,8 @@
 
 use glam::{DMat3, DVec3, IVec3};
 
-use super::closest_point::{DescentLimits, SurfacePoint, minimise_distance};
-use super::pair::Partner;
-use super::partner_field::PartnerField;
-use crate::dem::enclosure::{Enclosure, WallFace};
+use super::surface::{DescentLimits, PartnerField, SurfacePoint, minimise_distance};
+use crate::dem::enclosure::{Enclosure, Partner, WallFace};
 use crate::dem::grain::Grain;
 
 /// Most steps of the descent to the closest point; smooth surfaces need only a few.

@@ -12,11 +12,8 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3, IVec3};
 
-use super::index_map::RowPart;
-use super::lists::{BandFaces, FaceRow, FaceRun, LocatedBody, RowSpan};
-use super::narrow_band::NarrowBandShapes;
-use super::neighbours::{NeighbourGrain, nearest_distance};
-use super::samples::{load_all, store_all};
+use super::lists::{BandFaces, FaceRow, FaceRun, LocatedBody, RowPart, RowSpan};
+use super::narrow_band::{NarrowBandShapes, NeighbourGrain, load_all, nearest_distance, store_all};
 use crate::dem::Grain;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::Aligned;

@@ -1,20 +1,295 @@
-//! Geometry of grains on the grid. [`Locator`] fills the lists of faces (`lists`) with the
-//! distances of `distances` and `narrow_band`; `neighbours` finds the grains that share faces;
-//! `index_map` converts indices in the box of a grain to positions in memory; `aperture` gives open
-//! and solid fractions.
+//! Geometry of grains on the grid: neighbours that share faces, boxes of cells, distances and lists of
+//! faces.
+//!
+//! [`Locator`] fills the lists (`lists.rs`) with the distances of `distances.rs` and `narrow_band.rs`;
+//! `aperture.rs` gives open and solid fractions and the drag of a face.
 
 pub mod aperture;
 mod distances;
-mod index_map;
 mod lists;
-mod locator;
 mod narrow_band;
-mod neighbours;
-mod samples;
 
-pub use index_map::PAD;
-pub use lists::{BandFaces, FaceRow, FaceRun, LocatedBody};
-pub use locator::{LocateScratch, Locator};
-pub use narrow_band::NarrowBandShapes;
-pub use neighbours::NeighbourGrain;
-pub use samples::load_all;
+pub use lists::{BandFaces, FaceRow, FaceRun, LocatedBody, PAD};
+pub use narrow_band::{NarrowBandShapes, NeighbourGrain, load_all};
+
+use glam::{DMat3, DVec3};
+
+use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};
+use crate::flow::Boundaries;
+use crate::grid::Mesh;
+use distances::{DistanceScratch, FillLists};
+use grainwake_simd::dispatch;
+use lists::UnknownFaces;
+
+/// Buffers of one thread.
+#[derive(Default)]
+pub struct LocateScratch {
+    /// Faces in the forcing band of the grain located last.
+    pub band: BandFaces,
+    distances: DistanceScratch,
+}
+
+/// Half-width of the band in mean spacings of the grid. With a narrower band the force on a grain
+/// depends more on where the grid lies; a wider one smooths thin boundary layers
+/// (`docs/decisions/0018-pressure-weight.md`).
+const BAND_HALF_WIDTH: f64 = 1.25;
+
+/// Geometry of all grains on one grid.
+pub struct Locator {
+    mesh: Mesh,
+    unknown_faces: UnknownFaces,
+    /// Half-width of the band around the surface [m].
+    eps: f64,
+    /// Distance from the surface up to which a grain affects faces [m].
+    reach: f64,
+    shapes: NarrowBandShapes,
+    neighbours: NeighbourSearch,
+}
+
+impl Locator {
+    /// Samples the shapes of `grains` for a grid.
+    pub fn new(mesh: &Mesh, boundaries: &Boundaries, grains: &[Grain]) -> Locator {
+        let axes = mesh.resolved_axes();
+        let spacings: Vec<f64> = axes.map(|axis| mesh.spacing[axis]).collect();
+        let eps = BAND_HALF_WIDTH * spacings.iter().sum::<f64>() / spacings.len().max(1) as f64;
+        // Two band half-widths, and half a link along the axis of the largest spacing.
+        let reach = 2.0 * eps + 0.5 * spacings.iter().copied().fold(0.0, f64::max);
+        Locator {
+            mesh: *mesh,
+            unknown_faces: UnknownFaces::new(mesh, boundaries),
+            eps,
+            reach,
+            shapes: NarrowBandShapes::new(grains, eps, reach),
+            neighbours: NeighbourSearch::default(),
+        }
+    }
+
+    /// Half-width of the band around the surface [m].
+    pub fn eps(&self) -> f64 {
+        self.eps
+    }
+
+    /// Distance from the surface up to which a grain affects faces [m].
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// Narrow-band shapes of the grains.
+    pub fn shapes(&self) -> &NarrowBandShapes {
+        &self.shapes
+    }
+
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        self.shapes.bytes()
+    }
+
+    /// Finds the neighbours of all grains, before [`Locator::locate`]. `displacement(i)` [m] leads
+    /// from the last pose of grain i, whose faces count as well; 0 if they do not.
+    pub fn find_neighbours(&mut self, grains: &[Grain], displacement: impl Fn(usize) -> f64) {
+        self.neighbours.update(&self.mesh, &self.unknown_faces, self.reach, grains, displacement);
+    }
+
+    /// Neighbours of grain `index`.
+    pub fn neighbours(&self, index: usize) -> &[NeighbourGrain] {
+        self.neighbours.of(index)
+    }
+
+    /// Locates grain `index`: lists the faces within reach in `body`, and those in the forcing band
+    /// in `runs`, with their distances and normals in `scratch.band`.
+    pub fn locate(
+        &self,
+        index: usize,
+        grain: &Grain,
+        body: &mut LocatedBody,
+        runs: &mut [Vec<FaceRun>; 3],
+        scratch: &mut LocateScratch,
+    ) {
+        body.position = grain.pose.position;
+        self.set_box(grain, body);
+        dispatch(FillLists {
+            mesh: &self.mesh,
+            eps: self.eps,
+            reach: self.reach,
+            grain,
+            index,
+            shapes: &self.shapes,
+            neighbours: self.neighbours.of(index),
+            body,
+            runs,
+            band: &mut scratch.band,
+            scratch: &mut scratch.distances,
+        });
+    }
+
+    /// Sets the box of cells around a grain.
+    fn set_box(&self, grain: &Grain, body: &mut LocatedBody) {
+        let mesh = &self.mesh;
+        let to_space = DMat3::from_quat(grain.pose.orientation);
+        let (lower, upper) = (grain.shape.lower(), grain.shape.upper());
+        let middle = grain.pose.position + to_space * (0.5 * (lower + upper));
+        let half = 0.5 * (upper - lower);
+        let [x, y, z] = [to_space.x_axis, to_space.y_axis, to_space.z_axis].map(DVec3::abs);
+        let span = x * half.x + y * half.y + z * half.z;
+        for axis in 0..3 {
+            let (h, n) = (mesh.spacing[axis], mesh.cells[axis] as i32);
+            if n == 1 {
+                (body.lowest[axis], body.size[axis]) = (1, 1);
+                continue;
+            }
+            // Limited so that positions do not overflow in an unstable run before it is stopped.
+            let cell = |x: f64| ((x - mesh.origin[axis]) / h).floor().clamp(-1e9, 1e9) as i32;
+            let from = cell(middle[axis] - span[axis] - self.reach);
+            let to = cell(middle[axis] + span[axis] + self.reach);
+            body.lowest[axis] = from + 1;
+            body.size[axis] = to + 2 - body.lowest[axis];
+        }
+        self.unknown_faces.map(body.lowest, body.size, &mut body.index_map);
+        body.planes = body.index_map.plane_range();
+    }
+}
+
+/// Fraction of the size of two grains below which their distances from a face count as equal, since
+/// distances are in single precision. Exactly one of two grains, or of two periodic images, at
+/// equal distance from a face must be the nearest.
+const TIE: f64 = 1e-6;
+
+/// Lists of the neighbours of all grains, found with the broad phase of the contact search.
+#[derive(Default)]
+pub struct NeighbourSearch {
+    search: BroadPhase,
+    spheres: Vec<BoundingSphere>,
+    pairs: Vec<NeighbourPair>,
+    /// Neighbours of grain 0, then of grain 1, ...
+    neighbours: Vec<NeighbourGrain>,
+    /// Entry of the first neighbour of each grain; one entry more at the end.
+    first: Vec<usize>,
+}
+
+/// One direction of a pair, in the order of the lists.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct NeighbourPair {
+    grain: usize,
+    other: usize,
+    /// Periods between the image of the other grain and its own position, along z first.
+    image: [i32; 3],
+}
+
+impl NeighbourSearch {
+    /// Finds the pairs whose spheres overlap. A sphere contains all faces within `reach` [m] of the
+    /// surface of grain i, and `displacement(i)` [m] extends it to the last pose of the grain.
+    pub fn update(
+        &mut self,
+        mesh: &Mesh,
+        unknown_faces: &UnknownFaces,
+        reach: f64,
+        grains: &[Grain],
+        displacement: impl Fn(usize) -> f64,
+    ) {
+        let enclosure = Enclosure {
+            lower: mesh.origin,
+            upper: mesh.upper(),
+            periodic: [0, 1, 2]
+                .map(|axis| unknown_faces.is_periodic(axis) && mesh.is_resolved(axis)),
+            solid: [[false; 2]; 3],
+        };
+        self.spheres.clear();
+        let spheres = grains.iter().enumerate().map(|(index, grain)| BoundingSphere {
+            centre: grain.pose.position,
+            radius: grain.shape.bounding_radius() + reach + displacement(index),
+        });
+        self.spheres.extend(spheres);
+        self.search.search(&self.spheres, &enclosure);
+        self.pairs.clear();
+        for pair in &self.search.pairs {
+            let Partner::Grain(other) = pair.partner else {
+                continue;
+            };
+            let (grain, [x, y, z]) = (pair.grain as usize, pair.image.to_array());
+            for (grain, other, sign) in [(grain, other, 1), (other, grain, -1)] {
+                let image = [z, y, x].map(|periods| sign * periods);
+                self.pairs.push(NeighbourPair { grain, other, image });
+            }
+        }
+        self.pairs.sort_unstable();
+        self.list(mesh, reach, grains);
+    }
+
+    /// Fills the list of neighbours from the sorted pairs.
+    fn list(&mut self, mesh: &Mesh, reach: f64, grains: &[Grain]) {
+        self.neighbours.clear();
+        self.first.clear();
+        let size = |index: usize| grains[index].shape.bounding_radius() + reach;
+        for &NeighbourPair { grain: index, other, image: [z, y, x] } in &self.pairs {
+            let entry = self.neighbours.len();
+            self.first.resize(self.first.len().max(index + 1), entry);
+            let tie = TIE * (size(index) + size(other));
+            self.neighbours.push(NeighbourGrain {
+                grain: other,
+                pose: grains[other].pose,
+                bounding_radius: grains[other].shape.bounding_radius(),
+                shift: DVec3::new(f64::from(x), f64::from(y), f64::from(z)) * mesh.extent(),
+                tie_breaker: match other == index {
+                    true if [x, y, z] > [0; 3] => -tie,
+                    false if other < index => -tie,
+                    _ => tie,
+                },
+            });
+        }
+        self.first.resize(grains.len() + 1, self.neighbours.len());
+    }
+
+    /// Neighbours of grain `index`, sorted by index and image.
+    pub fn of(&self, index: usize) -> &[NeighbourGrain] {
+        &self.neighbours[self.first[index]..self.first[index + 1]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::{Boundaries, Boundary};
+    use grainwake_shape::Shape;
+    use std::sync::Arc;
+
+    #[test]
+    fn neighbours_are_found_across_periodic_edges() {
+        let mesh = Mesh {
+            cells: [32, 16, 16],
+            spacing: DVec3::splat(0.25),
+            origin: DVec3::new(-1.0, 0.0, 0.0),
+        };
+        let boundaries = Boundaries([[Boundary::Periodic; 2]; 3]);
+        let unknown_faces = UnknownFaces::new(&mesh, &boundaries);
+        let shape = Arc::new(Shape::sphere(0.5, 100));
+        // The first and the last are 1.1 apart across x; the second has no neighbours.
+        let at = |x: f64| Grain::new(shape.clone(), 2.0).with_position(DVec3::new(x, 2.0, 2.0));
+        let grains = [at(-0.5), at(3.0), at(6.4)];
+        let mut search = NeighbourSearch::default();
+        let found = |search: &NeighbourSearch, index| -> Vec<(DVec3, f64)> {
+            let neighbours = search.of(index).iter();
+            neighbours.map(|n| (n.shift, n.tie_breaker)).collect()
+        };
+        search.update(&mesh, &unknown_faces, 0.6, &grains, |_| 0.0);
+        let tie = 2.2 * TIE;
+        let along_x = DVec3::new(8.0, 0.0, 0.0);
+        assert_eq!(found(&search, 0), [(-along_x, tie)]);
+        assert_eq!(found(&search, 1), []);
+        assert_eq!(found(&search, 2), [(along_x, -tie)]);
+        assert_eq!([0, 1, 2].map(|index| search.of(index).is_empty()), [false, true, false]);
+        // The second is 3.4 from the third, both with a reach of 1.1, and moved by 1.25.
+        search.update(&mesh, &unknown_faces, 0.6, &grains, |index| [0.0, 1.25, 0.0][index]);
+        assert!(!search.of(1).is_empty());
+        let others = found(&search, 1).into_iter();
+        let others = others.filter(|(shift, _)| *shift == DVec3::ZERO);
+        assert_eq!(others.count(), 1, "the others are its own images");
+        assert_eq!(found(&search, 0), [(-along_x, tie)]);
+        // With a reach of more than half a period a grain neighbours its own images.
+        search.update(&mesh, &unknown_faces, 1.6, &grains[1..2], |_| 0.0);
+        let tie = 4.2 * TIE;
+        let along_y = DVec3::new(0.0, 4.0, 0.0);
+        let along_z = DVec3::new(0.0, 0.0, 4.0);
+        let images = [(-along_z, tie), (-along_y, tie), (along_y, -tie), (along_z, -tie)];
+        assert_eq!(found(&search, 0), images);
+    }
+}

@@ -1,17 +1,18 @@
-//! Signed distance and its gradient in a narrow band around the surface of a grain.
+//! Signed distance and its gradient in a narrow band around the surface of a grain or a neighbour.
 //!
 //! The sampled field of a shape ends closer to the surface than the band of the flow, and is often
 //! finer than the flow resolves. A wider and, where possible, coarser sampled field replaces it,
-//! which fits the cache and is evaluated without searching.
+//! which fits the cache and is interpolated for several points at a time, without searching.
 
 use std::collections::HashMap;
+use std::ops::Deref;
 use std::sync::Arc;
 
 use glam::DVec3;
 use grainwake_shape::{Field, SampledField, Shape};
 
-use super::samples::{INFINITE_DISTANCE, SampleGrid, load_all, store_all};
 use crate::dem::Grain;
+use crate::math::Pose;
 use grainwake_simd::{MAX_LANES, MAX_SINGLE_INDEX, Vector};
 
 /// Least number of samples per half-width of the band.
@@ -152,6 +153,153 @@ fn sphere_distance<V: Vector>(radius: f64, [x, y, z]: [V; 3]) -> (V, [V; 3]) {
     let divisor = length.max(V::constant(1.0 / INFINITE_DISTANCE));
     let normal = [x.div(divisor), y.div(divisor), z.div(divisor)];
     (length - V::constant(radius), normal)
+}
+
+/// A neighbouring grain, or a periodic image of the grain itself.
+#[derive(Clone, Copy, Debug)]
+pub struct NeighbourGrain {
+    /// Index of the neighbour.
+    pub grain: usize,
+    /// Pose of the grain itself, without the shift.
+    pub pose: Pose,
+    /// Radius of the bounding sphere [m].
+    pub bounding_radius: f64,
+    /// Vector from the grain to its image [m].
+    pub shift: DVec3,
+    /// Added to the distance [m], so that both grains of a pair decide a tie alike.
+    pub tie_breaker: f64,
+}
+
+impl NeighbourGrain {
+    /// Signed distance from `x` to the surface of the neighbour [m], and its gradient in the frame
+    /// of the neighbour. A distance above `limit` [m] may be returned as infinity.
+    #[inline(always)]
+    pub fn distance_and_gradient(
+        &self,
+        shapes: &NarrowBandShapes,
+        x: DVec3,
+        limit: f64,
+    ) -> (f64, DVec3) {
+        let x = x - self.shift;
+        let far = self.bounding_radius + limit;
+        if x.distance_squared(self.pose.position) > far * far {
+            return (f64::INFINITY, DVec3::ZERO);
+        }
+        let shape = shapes.of(self.grain);
+        shape.distance_and_gradient(self.pose.to_body(x))
+    }
+}
+
+/// Smallest distance from `x` to a neighbour, tie breaker included [m]; infinite beyond `limit`
+/// [m].
+pub fn nearest_distance(
+    neighbours: &[NeighbourGrain],
+    shapes: &NarrowBandShapes,
+    x: DVec3,
+    limit: f64,
+) -> f64 {
+    let distances = neighbours
+        .iter()
+        .map(|other| other.distance_and_gradient(shapes, x, limit).0 + other.tie_breaker);
+    distances.fold(f64::INFINITY, f64::min)
+}
+
+/// Distance that stands for infinity in single precision [m].
+pub const INFINITE_DISTANCE: f64 = 1e30;
+
+/// Loads a vector from each list. Kernels use no closures on vectors, which would not be inlined.
+#[inline(always)]
+pub fn load_all<V: Vector>([x, y, z]: &[impl Deref<Target = [V::Number]>; 3], at: usize) -> [V; 3] {
+    [V::load(&x[at..]), V::load(&y[at..]), V::load(&z[at..])]
+}
+
+/// Stores a vector in each list.
+#[inline(always)]
+pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [&mut [V::Number]; 3], at: usize) {
+    values[0].store(&mut x[at..]);
+    values[1].store(&mut y[at..]);
+    values[2].store(&mut z[at..]);
+}
+
+/// A sampled distance field with its constants in vector registers.
+pub struct SampleGrid<'a, V> {
+    lower: [V; 3],
+    inverse: V,
+    /// Index of the last sample along each axis.
+    last: [V; 3],
+    /// Samples from one row and one plane to the next.
+    strides: [V; 2],
+    /// Distance per level [m].
+    quantum: V,
+    /// Gradient per level and spacing.
+    slope: V,
+    levels: &'a [f32],
+}
+
+impl<'a, V: Vector> SampleGrid<'a, V> {
+    #[inline(always)]
+    pub fn new(field: &'a SampledField) -> SampleGrid<'a, V> {
+        let (dims, inverse) = (field.dims(), 1.0 / field.spacing());
+        let mut lower = [V::constant(0.0); 3];
+        let mut last = lower;
+        for axis in 0..3 {
+            lower[axis] = V::constant(field.lower()[axis]);
+            last[axis] = V::constant(dims[axis] as f64 - 1.0);
+        }
+        let (row, plane) = (dims[0], dims[0] * dims[1]);
+        SampleGrid {
+            lower,
+            inverse: V::constant(inverse),
+            last,
+            strides: [V::constant(row as f64), V::constant(plane as f64)],
+            quantum: V::constant(field.quantum()),
+            slope: V::constant(field.quantum() * inverse),
+            levels: field.levels(),
+        }
+    }
+
+    /// Interpolates signed distance [m] and gradient at `x`, in the frame of the grain. Off the
+    /// grid the distance is [`INFINITE_DISTANCE`].
+    #[inline(always)]
+    pub fn distance_and_gradient(&self, x: [V; 3]) -> (V, [V; 3]) {
+        let (zero, one) = (V::constant(0.0), V::constant(1.0));
+        let mut cell = [zero; 3];
+        let mut fraction = [zero; 3];
+        let mut off_grid = zero;
+        for axis in 0..3 {
+            let s = (x[axis] - self.lower[axis]) * self.inverse;
+            let nearest = s.max(zero).min(self.last[axis]);
+            off_grid = off_grid + (s - nearest).abs();
+            cell[axis] = nearest.floor().min(self.last[axis] - one);
+            fraction[axis] = nearest - cell[axis];
+        }
+        let [row, plane] = self.strides;
+        let [fx, fy, fz] = fraction;
+        // Value and slope on the four edges along x.
+        let (at, levels) = (cell[0] + row * cell[1] + plane * cell[2], self.levels);
+        let [a, s] = edge(levels, at, fx);
+        let [b, t] = edge(levels, at + row, fx);
+        let [c, u] = edge(levels, at + plane, fx);
+        let [d, v] = edge(levels, at + plane + row, fx);
+        let (low, high) = (a + fy * (b - a), c + fy * (d - c));
+        let (slope_low, slope_high) = (s + fy * (t - s), u + fy * (v - u));
+        let gradient = [
+            self.slope * (slope_low + fz * (slope_high - slope_low)),
+            self.slope * ((b - a) + fz * ((d - c) - (b - a))),
+            self.slope * (high - low),
+        ];
+        let distance = self.quantum * (low + fz * (high - low));
+        (zero.select_below(off_grid, V::constant(INFINITE_DISTANCE), distance), gradient)
+    }
+}
+
+/// Value at the fraction `x` of the edge from sample `at` to the next along x, and their
+/// difference.
+#[inline(always)]
+fn edge<V: Vector>(levels: &[f32], at: V, x: V) -> [V; 2] {
+    let [low, high] = V::gather_pairs(levels, at);
+    let slope = high - low;
+    [low + x * slope, slope]
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@ use glam::IVec3;
 
 use super::Reference;
 use crate::flow::OldState;
+use crate::immersed::advection::GrainKinematics;
 use crate::immersed::geometry::aperture::reference::inverse_aperture_excess;
-use crate::immersed::kinematics::GrainKinematics;
 
 impl Reference {
     /// Correction of the advection of a face [m/s^2] next to grain `index`: flux in through the

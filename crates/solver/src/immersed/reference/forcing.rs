@@ -9,9 +9,9 @@ use glam::{DVec3, IVec3};
 
 use super::Reference;
 use crate::flow::OldState;
+use crate::immersed::Scheme;
 use crate::immersed::geometry::aperture::reference::{aperture, open_depth, open_depth_integral};
-use crate::immersed::kinematics::RigidVelocity;
-use crate::immersed::scheme::Scheme;
+use crate::math::RigidVelocity;
 
 /// Forcing of a face by one grain.
 #[derive(Clone, Copy, Default)]

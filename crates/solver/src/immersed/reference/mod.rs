@@ -14,7 +14,7 @@ mod tests;
 
 use glam::{DVec3, IVec3};
 
-use super::scheme::Scheme;
+use super::Scheme;
 use crate::dem::Grain;
 use crate::flow::Boundaries;
 use crate::grid::{FACE_OFFSET, Mesh};

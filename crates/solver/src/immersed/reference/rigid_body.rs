@@ -7,8 +7,8 @@
 use glam::DVec3;
 
 use super::Reference;
-use crate::immersed::kinematics::{PreviousStep, RigidVelocity};
-use crate::math::Load;
+use crate::immersed::rigid_body::PreviousStep;
+use crate::math::{Load, RigidVelocity};
 
 impl Reference {
     /// Residual of the momentum [N s] and angular momentum [N m s] of grain `index` in a step from

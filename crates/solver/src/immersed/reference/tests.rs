@@ -9,14 +9,15 @@ use super::Reference;
 use crate::dem::Grain;
 use crate::flow::{Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
-use crate::immersed::advection::{LinkPlanes, compute_link_weights, find_correction};
-use crate::immersed::forcing::{ForcedFaces, ForcingParams, impose_rigidity, sum_impulse};
+use crate::immersed::Scheme;
+use crate::immersed::advection::{GrainKinematics, find_correction};
+use crate::immersed::forcing::{ForcedFaces, ForcingParams};
 use crate::immersed::geometry::{LocateScratch, LocatedBody, Locator};
-use crate::immersed::kinematics::{GrainKinematics, PreviousStep, RigidVelocity};
-use crate::immersed::rigid_body::RigidBodySystem;
-use crate::immersed::scheme::Scheme;
+use crate::immersed::links::{LinkPlanes, compute_link_weights};
+use crate::immersed::rigid_body::{PreviousStep, RigidBodySystem};
+use crate::immersed::rigidity::{impose_rigidity, sum_impulse};
 use crate::immersed::update::locate_and_compute_weights;
-use crate::math::Load;
+use crate::math::{Load, RigidVelocity};
 
 const DT: f64 = 0.004;
 const NU: f64 = 0.01;
@@ -115,7 +116,7 @@ impl Case {
             linear: DVec3::new(0.1, 0.25, -0.3),
             angular: DVec3::new(-0.4, 0.6, 0.1),
         };
-        [RigidVelocity::of(&self.reference.grains[index]), ACCELERATION, new]
+        [self.reference.grains[index].rigid_velocity(), ACCELERATION, new]
     }
 
     /// Predicted velocity by component.
@@ -352,7 +353,7 @@ fn new_velocities_satisfy_the_equations_of_motion() {
             case.reference.grains[index].density = density;
             let mut grain = case.reference.grains[index].clone();
             let previous = PreviousStep {
-                velocity: RigidVelocity::of(&grain),
+                velocity: grain.rigid_velocity(),
                 acceleration: ACCELERATION,
                 ..Default::default()
             };

@@ -4,7 +4,6 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::super::Boundary;
 use super::*;
 
 const PERIODIC: Boundaries = Boundaries([[Boundary::Periodic; 2]; 3]);

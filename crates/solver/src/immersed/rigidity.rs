@@ -1,5 +1,5 @@
-//! Impulse that a grain's rigidity takes from the fluid, as an affine function of its new
-//! velocities.
+//! Rigidity of the forced faces (Eqs 4b, 4c), and the impulse that it takes from the fluid (Eq. 5) as
+//! an affine function of the new velocities of the grain.
 //!
 //! In a step of dt, a forced face gains with the rigid velocity U, and U_old before it,
 //!
@@ -17,19 +17,18 @@
 //! shift the drag of a moving grain is of first order in the step
 //! (`docs/decisions/0011-pressure-moves-with-the-grain.md`). The impulse on the fluid is the sum of
 //! fluid mass times gain over the faces, J = constant + matrix (V, Omega). The grain loses what the
-//! fluid gains ([`crate::immersed::rigid_body`]). `immersed::reference` has the scalar form.
+//! fluid gains ([`super::rigid_body`]). `immersed::reference` has the scalar form.
 //!
 //! Legend: s weight, c closed fraction, C total closed fraction, phi solid fraction (these three
 //! zero in the paper's scheme), f weight of the change of velocity, u* predicted velocity, h
 //! spacing along the component, l and m lever arms of the face about the two other axes.
 
-use super::faces::ForcedFaces;
-use super::rigid_run::{RigidRun, change_weight, lane_indices};
-use crate::flow::{OldState, Prediction};
-use crate::immersed::geometry::FaceRun;
-use crate::immersed::kinematics::RigidVelocity;
-use crate::math::{Matrix6, Real, Vector6};
 use glam::DVec3;
+
+use super::forcing::ForcedFaces;
+use super::geometry::FaceRun;
+use crate::flow::{OldState, Prediction};
+use crate::math::{Matrix6, Real, RigidVelocity, Vector6};
 use grainwake_simd::{Kernel, Partial, Stencil, Vector, dispatch};
 
 /// Impulse on the fluid in a step [N s, N m s], affine in the six new velocities of a grain.
@@ -239,4 +238,96 @@ impl<R: Real> RunImpulse<'_, R> {
         sums.add(self.axis, n, lever_arm, constant, derivative);
         rest_gain
     }
+}
+
+/// Adds the gain of the forced faces to component `axis` of a part of the prediction, for a grain
+/// with the new `velocity` that changed by `change` in the step. [`super::sum_impulse`] has filled
+/// the lists of `forced`.
+pub fn impose_rigidity<R: Real>(
+    axis: usize,
+    spacing: DVec3,
+    forced: &ForcedFaces,
+    velocity: RigidVelocity,
+    change: RigidVelocity,
+    prediction: &mut Prediction<R>,
+) {
+    dispatch(ImposeRigidity { axis, spacing, forced, velocity, change, prediction });
+}
+
+struct ImposeRigidity<'a, 'b, R> {
+    axis: usize,
+    spacing: DVec3,
+    forced: &'a ForcedFaces,
+    velocity: RigidVelocity,
+    change: RigidVelocity,
+    prediction: &'a mut Prediction<'b, R>,
+}
+
+impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let (axis, forced) = (self.axis, self.forced);
+        let part = self.prediction.range().clone();
+        let runs = forced.runs[axis].iter();
+        for run in runs.filter(|run| part.contains(&run.at)) {
+            let velocity = RigidRun::new(self.velocity, run.lever_arm, self.spacing);
+            let change = RigidRun::new(self.change, run.lever_arm, self.spacing);
+            let predicted = self.prediction.velocity_mut(run.at, run.count);
+            for n in (0..run.count).step_by(V::WIDTH) {
+                let entry = run.first + n;
+                let weight = V::load_from(&forced.weight[entry..]);
+                let solid_fraction = V::load_from(&forced.solid_fraction[entry..]);
+                let index = lane_indices(n);
+                let gain = V::load(&forced.rest_gain[entry..])
+                    + weight * velocity.component(axis, index)
+                    + change_weight(weight, solid_fraction) * change.component(axis, index);
+                gain.add_partial(&mut predicted[n..]);
+            }
+        }
+    }
+}
+
+/// Rigid velocity V + Omega x r along a run of faces: linear in the index of the face.
+#[derive(Clone, Copy)]
+pub struct RigidRun {
+    /// Velocity at the first face [m/s].
+    first: DVec3,
+    /// Change from a face to the next [m/s].
+    change: DVec3,
+}
+
+impl RigidRun {
+    /// Velocity along the run of faces that begins at `lever_arm` from the centroid [m].
+    #[inline(always)]
+    pub fn new(velocity: RigidVelocity, lever_arm: DVec3, spacing: DVec3) -> RigidRun {
+        RigidRun {
+            first: velocity.at(lever_arm),
+            change: velocity.angular.cross(DVec3::X * spacing.x),
+        }
+    }
+    /// Velocity along a parallel line, on which the velocity differs by `offset` [m/s].
+    #[inline(always)]
+    pub fn shifted(self, offset: DVec3) -> RigidRun {
+        RigidRun { first: self.first + offset, ..self }
+    }
+    /// Component `axis` of the velocity at the faces `index` of the run [m/s].
+    #[inline(always)]
+    pub fn component<V: Vector<Number = f64>>(&self, axis: usize, index: V) -> V {
+        let [first, change] = [self.first, self.change].map(|u| V::constant(u[axis]));
+        index.mul_add(change, first)
+    }
+}
+
+/// Indices of the faces in the lanes of a register that begins at face `n` of a run.
+#[inline(always)]
+pub fn lane_indices<V: Vector<Number = f64>>(n: usize) -> V {
+    V::constant(n as f64) + V::ramp()
+}
+
+/// Weight f = (1 - s) phi of the change U - U_old of the rigid velocity, with the weight s of the
+/// velocity and the solid fraction phi.
+#[inline(always)]
+pub fn change_weight<V: Vector<Number = f64>>(weight: V, solid_fraction: V) -> V {
+    (V::constant(1.0) - weight) * solid_fraction
 }

@@ -4,15 +4,30 @@
 //! stable at any density ratio. The hydrodynamic load is Eq. 5 in the form that also holds for the
 //! torque (Eq. 5b as printed can lose a third of it).
 //!
+//! The fluid around a grain responds by the projection, one step late. A grain lighter than the fluid
+//! and this response amplify each other. A virtual mass, the inertia of the displaced fluid, is
+//! therefore added to both sides of the equations, times the new acceleration on the left and the
+//! previous one on the right (`docs/decisions/0013-light-grains.md`).
+//!
 //! Legend: a and b matrix and right-hand side, x new velocities, J impulse on the fluid.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
-use super::virtual_mass::VirtualMass;
+use super::rigidity::Impulse;
 use crate::dem::{Grain, GrainResponse, MotionConstraint};
-use crate::immersed::forcing::Impulse;
-use crate::immersed::kinematics::{PreviousStep, RigidVelocity};
-use crate::math::{Load, Matrix6, Vector6, solve6};
+use crate::math::{Load, Matrix6, RigidVelocity, Vector6, solve6};
+
+/// State that a grain carries over from the previous step.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PreviousStep {
+    /// Velocities at the start of the step.
+    pub velocity: RigidVelocity,
+    /// Mean acceleration over the previous step [m/s^2, rad/s^2]; zero after contact.
+    pub acceleration: RigidVelocity,
+    /// Part of `velocity` that contact caused in the previous step and that the added mass takes up
+    /// in this step (`docs/decisions/0014-contact-with-the-fluid-response.md`).
+    pub pending_added_mass_velocity: RigidVelocity,
+}
 
 /// Equations a x = b for the new velocities x of one grain.
 #[derive(Clone, Copy, Debug, Default)]
@@ -91,7 +106,7 @@ impl RigidBodySystem {
         fluid_density: f64,
         dt: f64,
     ) -> Load {
-        let new = RigidVelocity::of(grain);
+        let new = grain.rigid_velocity();
         let x = new.to_vector();
         let Impulse { constant, matrix } = &self.impulse;
         let j: Vector6 = std::array::from_fn(|row| {
@@ -164,5 +179,42 @@ fn prescribe(a: &mut Matrix6, b: &mut Vector6, first: usize, velocity: DVec3) {
         a[first + i] = [0.0; 6];
         a[first + i][first + i] = 1.0;
         b[first + i] = velocity[i];
+    }
+}
+
+/// Inertia of the fluid that a light grain accelerates with itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct VirtualMass {
+    /// Virtual mass [kg].
+    pub mass: f64,
+    /// Virtual inertia about the centroid, space frame [kg m^2].
+    pub inertia: DMat3,
+    /// Momentum of the virtual mass after a step with the previous acceleration [kg m/s].
+    pub momentum: DVec3,
+    /// Angular momentum of the virtual inertia after such a step [kg m^2/s].
+    pub angular_momentum: DVec3,
+}
+
+/// Density ratio below which the virtual mass is the displaced mass. Above it the virtual mass
+/// decreases linearly to 0 at a density ratio of 1.
+const FULL_BELOW: f64 = 0.8;
+
+impl VirtualMass {
+    /// Virtual mass of a grain in a step of `dt` [s]; 0 along prescribed degrees of freedom.
+    pub fn new(grain: &Grain, previous: &PreviousStep, fluid_density: f64, dt: f64) -> VirtualMass {
+        let ratio = grain.density / fluid_density;
+        let part = ((1.0 - ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0) / ratio;
+        let free = |constraint: MotionConstraint| {
+            if constraint == MotionConstraint::Free { part } else { 0.0 }
+        };
+        let mass = grain.mass() * free(grain.translation);
+        let inertia = grain.inertia() * free(grain.rotation);
+        let PreviousStep { velocity, acceleration, .. } = previous;
+        VirtualMass {
+            mass,
+            inertia,
+            momentum: mass * (velocity.linear + dt * acceleration.linear),
+            angular_momentum: inertia * (velocity.angular + dt * acceleration.angular),
+        }
     }
 }

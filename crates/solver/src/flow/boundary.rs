@@ -1,0 +1,395 @@
+//! Conditions on the six faces of the box (Eq. 4a).
+//!
+//! Velocity: prescribed normal components, ghost layers, convective outflow. Pressure: periodic, or
+//! zero normal gradient. The normal velocity of every face that is not periodic is known before the
+//! projection: walls and inflows prescribe it, outflows get it by convection. The projection must not
+//! change it, hence the zero normal gradient of the pressure increment, and of the pressure.
+//!
+//! Legend: q normal velocity, n outward direction, C mean outward velocity of the face.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::grid::{Centre, FaceVector, Field, Layout, Mesh};
+use crate::math::Real;
+use crate::poisson::Ends;
+
+/// Condition on one face of the box.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Boundary {
+    /// Periodic with the opposite face, which must be periodic too.
+    Periodic,
+    /// No-slip wall moving in its own plane at `velocity` [m/s] (zero: a wall at rest).
+    Wall {
+        /// Velocity of the wall [m/s]; its normal component must be zero.
+        velocity: DVec3,
+    },
+    /// Frictionless wall.
+    Slip,
+    /// Flat stress-free lid: `Slip` for the flow, no contact for grains.
+    FreeSurface,
+    /// Inflow of prescribed velocity.
+    Inflow {
+        /// Velocity of the entering fluid [m/s].
+        velocity: DVec3,
+    },
+    /// Convective outflow, corrected so that the volume of fluid in the box is conserved.
+    Outflow,
+}
+
+impl Boundary {
+    /// A no-slip wall at rest.
+    pub const WALL: Boundary = Boundary::Wall { velocity: DVec3::ZERO };
+
+    /// Whether grains collide with this face.
+    pub fn is_solid(&self) -> bool {
+        matches!(self, Boundary::Wall { .. } | Boundary::Slip)
+    }
+}
+
+/// Conditions on the six faces: `[axis][0]` lower, `[axis][1]` upper.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Boundaries(pub [[Boundary; 2]; 3]);
+
+impl Boundaries {
+    /// Whether `axis` is periodic.
+    pub fn is_periodic(&self, axis: usize) -> bool {
+        self.0[axis][0] == Boundary::Periodic
+    }
+
+    /// Whether each axis is periodic. On the other axes the normal velocity of the boundary faces
+    /// is known before the projection.
+    pub fn periodic(&self) -> [bool; 3] {
+        [0, 1, 2].map(|axis| self.is_periodic(axis))
+    }
+
+    /// Layers of faces normal to `axis` with `n` cells whose normal velocity is prescribed, and
+    /// that velocity [m/s].
+    pub fn prescribed_faces(&self, axis: usize, n: usize) -> impl Iterator<Item = (usize, f64)> {
+        let sides = self.0[axis];
+        [1, n + 1].into_iter().zip(sides).filter_map(move |(face, boundary)| match boundary {
+            Boundary::Periodic | Boundary::Outflow => None,
+            Boundary::Wall { .. } | Boundary::Slip | Boundary::FreeSurface => Some((face, 0.0)),
+            Boundary::Inflow { velocity } => Some((face, velocity[axis])),
+        })
+    }
+}
+
+impl Boundaries {
+    /// Sets the normal velocity on every face where it is prescribed, and the upper faces of
+    /// periodic axes; outflow faces keep theirs.
+    pub(crate) fn set_normal<R: Real>(&self, velocity: &mut FaceVector<R>) {
+        let layout = velocity.x.layout();
+        for axis in 0..3 {
+            let normal = velocity.component_mut(axis);
+            if self.is_periodic(axis) {
+                layout.wrap(normal, axis);
+            }
+            for (face, value) in self.prescribed_faces(axis, layout.cells[axis]) {
+                layout.map_layer(normal, axis, face, face, |_| R::of(value));
+            }
+        }
+    }
+
+    /// Sets the normal velocity on the prescribed x and y faces of one plane.
+    pub(crate) fn set_normal_of_plane<R: Real>(&self, layout: Layout, [x, y]: [&mut [R]; 2]) {
+        let row = layout.row();
+        for (face, value) in self.prescribed_faces(0, layout.cells[0]) {
+            x.chunks_exact_mut(row).for_each(|row| row[face] = R::of(value));
+        }
+        for (face, value) in self.prescribed_faces(1, layout.cells[1]) {
+            y[face * row..(face + 1) * row].fill(R::of(value));
+        }
+    }
+
+    /// Fills the ghosts along x and y of one plane of a velocity component.
+    pub(crate) fn fill_ghosts_of_plane<R: Real>(
+        &self,
+        layout: Layout,
+        component: usize,
+        plane: &mut [R],
+    ) {
+        let (row, [nx, ny, _]) = (layout.row(), layout.cells);
+        for side in 0..2 {
+            let (ghost, inner) = if side == 0 { (0, 1) } else { (nx + 1, nx) };
+            match self.ghost_rule(0, side, component) {
+                GhostRule::Unused => {}
+                GhostRule::Periodic => plane.chunks_exact_mut(row).for_each(|row| {
+                    (row[0], row[nx + 1]) = (row[nx], row[1]);
+                }),
+                GhostRule::ZeroGradient => {
+                    plane.chunks_exact_mut(row).for_each(|row| row[ghost] = row[inner])
+                }
+                GhostRule::Wall(wall) => {
+                    let next = second(inner, nx);
+                    plane
+                        .chunks_exact_mut(row)
+                        .for_each(|row| row[ghost] = beyond_wall(wall, row[inner], row[next], nx));
+                }
+            }
+        }
+        for side in 0..2 {
+            let (ghost, inner) = if side == 0 { (0, 1) } else { (ny + 1, ny) };
+            fill_ghost_layer(plane, row, self.ghost_rule(1, side, component), ghost, inner, ny);
+        }
+    }
+
+    /// Fills the ghost planes below and above, and the ghosts of the upper boundary faces.
+    pub(crate) fn fill_ghost_planes<R: Real>(&self, velocity: &mut FaceVector<R>) {
+        let layout = velocity.x.layout();
+        let (plane, nz) = (layout.plane(), layout.cells[2]);
+        if !self.is_periodic(2) {
+            self.fill_ghosts_of_plane(layout, 2, &mut velocity.z[(nz + 1) * plane..]);
+        }
+        for component in 0..3 {
+            for side in 0..2 {
+                let (ghost, inner) = if side == 0 { (0, 1) } else { (nz + 1, nz) };
+                let rule = self.ghost_rule(2, side, component);
+                let q = velocity.component_mut(component);
+                fill_ghost_layer(q, plane, rule, ghost, inner, nz);
+            }
+        }
+    }
+
+    /// Rule for the ghosts of a velocity component on one side of the box.
+    fn ghost_rule(&self, axis: usize, side: usize, component: usize) -> GhostRule {
+        match self.0[axis][side] {
+            Boundary::Periodic => GhostRule::Periodic,
+            // The boundary face itself is set; only the lower side has a ghost beyond it, and no
+            // interior face reads that.
+            _ if component == axis && side == 1 => GhostRule::Unused,
+            _ if component == axis => GhostRule::ZeroGradient,
+            Boundary::Wall { velocity } | Boundary::Inflow { velocity } => {
+                GhostRule::Wall(velocity[component])
+            }
+            Boundary::Slip | Boundary::FreeSurface | Boundary::Outflow => GhostRule::ZeroGradient,
+        }
+    }
+}
+
+#[cfg(test)]
+impl Boundaries {
+    /// Fills the ghost layers of a velocity whose interior and boundary faces are set.
+    pub(crate) fn fill_ghosts<R: Real>(&self, velocity: &mut FaceVector<R>) {
+        let layout = velocity.x.layout();
+        for component in 0..3 {
+            let planes = velocity.component_mut(component);
+            for plane in planes.chunks_exact_mut(layout.plane()) {
+                self.fill_ghosts_of_plane(layout, component, plane);
+            }
+        }
+        self.fill_ghost_planes(velocity);
+    }
+}
+
+/// Condition on the pressure at a face of the box; an outflow has a zero normal gradient.
+fn pressure_condition(boundary: &Boundary) -> Ends {
+    match boundary {
+        Boundary::Periodic => Ends::Periodic,
+        Boundary::Wall { .. }
+        | Boundary::Slip
+        | Boundary::FreeSurface
+        | Boundary::Inflow { .. }
+        | Boundary::Outflow => Ends::Neumann,
+    }
+}
+
+impl Boundaries {
+    /// Conditions on the pressure at the ends of each axis.
+    pub(crate) fn pressure_ends(&self) -> [Ends; 3] {
+        [0, 1, 2].map(|axis| pressure_condition(&self.0[axis][0]))
+    }
+
+    /// Fills the ghosts along x and y of one plane of the pressure.
+    pub(crate) fn fill_pressure_of_plane<R: Real>(&self, layout: Layout, plane: &mut [R]) {
+        let (row, [nx, ny, _]) = (layout.row(), layout.cells);
+        let periodic = self.is_periodic(0);
+        for row in plane.chunks_exact_mut(row) {
+            let ends = [row[1], row[nx]];
+            [row[0], row[nx + 1]] = if periodic { [ends[1], ends[0]] } else { ends };
+        }
+        self.fill_pressure_ends(plane, row, 1, ny);
+    }
+
+    /// Fills the ghost planes of the pressure.
+    pub(crate) fn fill_pressure_planes<R: Real>(&self, pressure: &mut Field<Centre, R>) {
+        let layout = pressure.layout();
+        self.fill_pressure_ends(pressure, layout.plane(), 2, layout.cells[2]);
+    }
+
+    fn fill_pressure_ends<R: Real>(&self, values: &mut [R], layer: usize, axis: usize, n: usize) {
+        for (ghost, inner) in [(0, 1), (n + 1, n)] {
+            let rule =
+                if self.is_periodic(axis) { GhostRule::Periodic } else { GhostRule::ZeroGradient };
+            fill_ghost_layer(values, layer, rule, ghost, inner, n);
+        }
+    }
+}
+
+#[cfg(test)]
+impl Boundaries {
+    /// Fills all ghosts of the pressure.
+    pub(crate) fn fill_pressure<R: Real>(&self, pressure: &mut Field<Centre, R>) {
+        let layout = pressure.layout();
+        for plane in pressure.chunks_exact_mut(layout.plane()) {
+            self.fill_pressure_of_plane(layout, plane);
+        }
+        self.fill_pressure_planes(pressure);
+    }
+}
+
+/// Rule by which a ghost layer follows from the interior.
+#[derive(Clone, Copy)]
+pub(super) enum GhostRule {
+    /// No stencil reads the ghost layer.
+    Unused,
+    /// Copy of the outermost layer at the opposite end of the box.
+    Periodic,
+    /// Copy of the adjacent interior layer.
+    ZeroGradient,
+    /// Extrapolation through this velocity at the wall [m/s].
+    Wall(f64),
+}
+
+/// Second interior layer from the end at which `inner` is the first, of layers 1..=n.
+pub(super) fn second(inner: usize, n: usize) -> usize {
+    if inner == 1 { 2.min(n) } else { inner - 1 }
+}
+
+/// Ghost value beyond a wall of velocity `wall` [m/s], on the parabola through the wall and the two
+/// nearest values, which makes the shear at the wall second-order.
+pub(super) fn beyond_wall<R: Real>(wall: f64, near: R, next: R, n: usize) -> R {
+    R::of(if n == 1 {
+        2.0 * wall - near.wide()
+    } else {
+        (8.0 * wall - 6.0 * near.wide() + next.wide()) / 3.0
+    })
+}
+
+/// Fills the layer `ghost` of `layer` entries; `inner` is adjacent, 1..=n are interior.
+pub(super) fn fill_ghost_layer<R: Real>(
+    values: &mut [R],
+    layer: usize,
+    rule: GhostRule,
+    ghost: usize,
+    inner: usize,
+    n: usize,
+) {
+    let from = match rule {
+        GhostRule::Unused => return,
+        GhostRule::Periodic => n + 1 - inner,
+        GhostRule::ZeroGradient => inner,
+        GhostRule::Wall(wall) => {
+            let next = second(inner, n);
+            for i in 0..layer {
+                let [near, next] = [inner, next].map(|from| values[from * layer + i]);
+                values[ghost * layer + i] = beyond_wall(wall, near, next, n);
+            }
+            return;
+        }
+    };
+    values.copy_within(from * layer..(from + 1) * layer, ghost * layer);
+}
+
+impl Boundaries {
+    /// Sets the outflow faces of `next` from `now`, `dt` [s] earlier, by dq/dt + C dq/dn = 0, then
+    /// shifts all of them by one velocity so that inflow equals outflow. The other boundary faces
+    /// of `next` must be set.
+    pub(crate) fn convect_outflow<R: Real>(
+        &self,
+        mesh: &Mesh,
+        now: &FaceVector<R>,
+        next: &mut FaceVector<R>,
+        dt: f64,
+    ) {
+        if !self.0.iter().flatten().any(|side| *side == Boundary::Outflow) {
+            return;
+        }
+        let (mut net, mut open) = (0.0, 0.0);
+        self.for_sides(|axis, side, boundary| {
+            let n = mesh.cells[axis];
+            let (face, inner) = if side == 0 { (1, 2) } else { (n + 1, n) };
+            let outward = if side == 0 { -1.0 } else { 1.0 };
+            let faces = BoundaryFaces::new(mesh, axis, face, inner);
+            if boundary == Boundary::Outflow {
+                let old = now.component(axis);
+                let speed = (outward * faces.sum(old) / faces.count as f64).max(0.0);
+                let courant = (speed * dt / mesh.spacing[axis]).min(1.0);
+                let new = next.component_mut(axis);
+                faces.each(|at, inside| {
+                    let (value, inside) = (old[at].wide(), old[inside].wide());
+                    new[at] = R::of(value - courant * (value - inside));
+                });
+                open += faces.area();
+            }
+            if boundary != Boundary::Periodic {
+                net +=
+                    outward * faces.sum(next.component(axis)) * faces.area() / faces.count as f64;
+            }
+        });
+        if open > 0.0 {
+            let shift = net / open;
+            self.for_sides(|axis, side, boundary| {
+                if boundary == Boundary::Outflow {
+                    let face = if side == 0 { 1 } else { mesh.cells[axis] + 1 };
+                    let outward = if side == 0 { -1.0 } else { 1.0 };
+                    let new = next.component_mut(axis);
+                    BoundaryFaces::new(mesh, axis, face, face)
+                        .each(|at, _| new[at] = R::of(new[at].wide() - outward * shift));
+                }
+            });
+        }
+    }
+
+    fn for_sides(&self, mut f: impl FnMut(usize, usize, Boundary)) {
+        for axis in 0..3 {
+            for side in 0..2 {
+                f(axis, side, self.0[axis][side]);
+            }
+        }
+    }
+}
+
+/// The faces of one side of the box and their inner neighbours in memory.
+struct BoundaryFaces {
+    start: usize,
+    inward: isize,
+    steps: [usize; 2],
+    counts: [usize; 2],
+    count: usize,
+    face_area: f64,
+}
+
+impl BoundaryFaces {
+    fn new(mesh: &Mesh, axis: usize, face: usize, inner: usize) -> BoundaryFaces {
+        let layout = mesh.layout();
+        let mut first = [1; 3];
+        first[axis] = face;
+        let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+        let strides = layout.strides();
+        BoundaryFaces {
+            start: layout.index(first[0], first[1], first[2]),
+            inward: (inner as isize - face as isize) * strides[axis] as isize,
+            steps: [strides[a], strides[b]],
+            counts: [mesh.cells[a], mesh.cells[b]],
+            count: mesh.cells[a] * mesh.cells[b],
+            face_area: mesh.spacing[a] * mesh.spacing[b],
+        }
+    }
+    fn area(&self) -> f64 {
+        self.count as f64 * self.face_area
+    }
+    fn each(&self, mut f: impl FnMut(usize, usize)) {
+        for b in 0..self.counts[1] {
+            for a in 0..self.counts[0] {
+                let at = self.start + a * self.steps[0] + b * self.steps[1];
+                f(at, at.wrapping_add_signed(self.inward));
+            }
+        }
+    }
+    fn sum<R: Real>(&self, values: &[R]) -> f64 {
+        let mut sum = 0.0;
+        self.each(|at, _| sum += values[at].wide());
+        sum
+    }
+}
