@@ -15,7 +15,6 @@ mod dispatch;
 #[cfg(any(test, not(target_arch = "x86_64")))]
 mod plain;
 mod precision;
-mod prefetch;
 mod rows;
 mod scalar;
 mod stencil;
@@ -29,7 +28,6 @@ pub use aligned::Aligned;
 pub use complex::{Complex, as_complex, rotated_butterfly};
 pub use dispatch::{InstructionSet, dispatch, instructions, limit_instructions};
 pub use precision::Precision;
-pub use prefetch::{prefetch, prefetch_ahead};
 pub use rows::{Maximum, Partial, RowWork, along_row, inside_row, window, window_mut};
 pub use scalar::Scalar;
 pub use stencil::Stencil;

@@ -239,13 +239,6 @@ pub trait Vector:
     fn abs(self) -> Self {
         self.max(Self::constant(0.0) - self)
     }
-    /// Whether every lane is zero.
-    #[inline(always)]
-    fn is_zero(self) -> bool {
-        let mut lanes = [Self::Number::default(); MAX_LANES];
-        self.store(&mut lanes);
-        lanes[..Self::WIDTH].iter().all(|lane| lane.wide() == 0.0)
-    }
     /// Lanes shifted up by one; lane 0 is the last lane of `before`.
     #[inline(always)]
     fn shift(self, before: Self) -> Self {

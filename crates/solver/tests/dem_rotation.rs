@@ -2,8 +2,48 @@
 
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 use grainwake_solver::dem::rotation::{
-    Rotor, from_paper_quaternion, rotate_by_cayley, rotate_exactly, to_paper_quaternion,
+    half_step_explicit, half_step_implicit, rotate_by_cayley, rotate_exactly,
 };
+
+/// The paper's (q1, q2, q3, q4) of Eq. 31 for an orientation.
+fn to_paper_quaternion(orientation: DQuat) -> [f64; 4] {
+    [-orientation.y, orientation.x, orientation.z, orientation.w]
+}
+
+/// The orientation for the paper's (q1, q2, q3, q4) of Eq. 31.
+fn from_paper_quaternion(q: [f64; 4]) -> DQuat {
+    DQuat::from_xyzw(q[1], -q[0], q[2], q[3])
+}
+
+/// Rigid body that rotates about its centroid, without grain or contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rotor {
+    /// Principal moments of inertia [kg m^2].
+    inertia: DVec3,
+    /// Orientation, body to space.
+    orientation: DQuat,
+    /// Angular velocity at integer time [rad/s, body frame].
+    omega: DVec3,
+}
+
+impl Rotor {
+    /// One step [s] with the torque [N m, space frame] that `torque` gives for an orientation.
+    fn step(&mut self, step: f64, damping: f64, mut torque: impl FnMut(DQuat) -> DVec3) {
+        let before = self.orientation.conjugate() * torque(self.orientation);
+        let mid = half_step_explicit(self.inertia, self.omega, before, damping, 0.5 * step);
+        self.orientation = rotate_by_cayley(self.orientation, mid, step);
+        let after = self.orientation.conjugate() * torque(self.orientation);
+        self.omega = half_step_implicit(self.inertia, mid, after, damping, 0.5 * step);
+    }
+    /// Kinetic energy [J].
+    fn energy(&self) -> f64 {
+        0.5 * self.omega.dot(self.inertia * self.omega)
+    }
+    /// Angular momentum [kg m^2/s, space frame].
+    fn angular_momentum(&self) -> DVec3 {
+        self.orientation * (self.inertia * self.omega)
+    }
+}
 
 /// Eq. 30 as printed, rows first.
 fn printed_a([q1, q2, q3, q4]: [f64; 4]) -> DMat3 {

@@ -56,14 +56,6 @@ vector! {
         }
     }
     #[inline(always)]
-    fn is_zero(self) -> bool {
-        // SAFETY: see the head of `x86/mod.rs`.
-        unsafe {
-            let zeros = _mm256_cmp_pd::<_CMP_EQ_OQ>(self.0, _mm256_setzero_pd());
-            _mm256_movemask_pd(zeros) == 0xf
-        }
-    }
-    #[inline(always)]
     fn mask_below(self, limit: Self) -> u32 {
         // SAFETY: see the head of `x86/mod.rs`.
         unsafe {
@@ -103,14 +95,6 @@ vector! {
     _mm256_sqrt_ps,
     select256_ps, _mm256_fmadd_ps, _mm256_set1_ps, _mm256_loadu_ps,
     _mm256_storeu_ps, _mm256_stream_ps;
-    #[inline(always)]
-    fn is_zero(self) -> bool {
-        // SAFETY: see the head of `x86/mod.rs`.
-        unsafe {
-            let zeros = _mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, _mm256_setzero_ps());
-            _mm256_movemask_ps(zeros) == 0xff
-        }
-    }
     #[inline(always)]
     fn mask_below(self, limit: Self) -> u32 {
         // SAFETY: see the head of `x86/mod.rs`.

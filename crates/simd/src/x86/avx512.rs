@@ -51,11 +51,6 @@ vector! {
         unsafe { _mm512_mask_storeu_pd(to.as_mut_ptr().wrapping_sub(skip), lanes, self.0) };
     }
     #[inline(always)]
-    fn is_zero(self) -> bool {
-        // SAFETY: see the head of `x86/mod.rs`.
-        unsafe { _mm512_cmp_pd_mask::<_CMP_EQ_OQ>(self.0, _mm512_setzero_pd()) == 0xff }
-    }
-    #[inline(always)]
     fn mask_below(self, limit: Self) -> u32 {
         // SAFETY: see the head of `x86/mod.rs`.
         unsafe { u32::from(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, limit.0)) }
@@ -93,11 +88,6 @@ vector! {
     _mm512_sqrt_ps,
     select512_ps, _mm512_fmadd_ps, _mm512_set1_ps, _mm512_loadu_ps,
     _mm512_storeu_ps, _mm512_stream_ps;
-    #[inline(always)]
-    fn is_zero(self) -> bool {
-        // SAFETY: see the head of `x86/mod.rs`.
-        unsafe { _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(self.0, _mm512_setzero_ps()) == 0xffff }
-    }
     #[inline(always)]
     fn mask_below(self, limit: Self) -> u32 {
         // SAFETY: see the head of `x86/mod.rs`.

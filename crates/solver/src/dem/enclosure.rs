@@ -1,5 +1,5 @@
-//! Box of the grains: its solid faces, its images along periodic axes, and the pairs of a grain with
-//! a grain, an image or a wall.
+//! Box of the grains: its solid faces, its images along periodic axes, and the pairs of a grain
+//! with a grain, an image or a wall.
 
 use glam::{DVec3, IVec3};
 

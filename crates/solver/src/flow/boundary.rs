@@ -2,8 +2,8 @@
 //!
 //! Velocity: prescribed normal components, ghost layers, convective outflow. Pressure: periodic, or
 //! zero normal gradient. The normal velocity of every face that is not periodic is known before the
-//! projection: walls and inflows prescribe it, outflows get it by convection. The projection must not
-//! change it, hence the zero normal gradient of the pressure increment, and of the pressure.
+//! projection: walls and inflows prescribe it, outflows get it by convection. The projection must
+//! not change it, hence the zero normal gradient of the pressure increment, and of the pressure.
 //!
 //! Legend: q normal velocity, n outward direction, C mean outward velocity of the face.
 

@@ -1,9 +1,10 @@
 //! Prediction without the divergence constraint: tendency (advection and diffusion of Eq. 1b), one
 //! row at a time, and access of the immersed boundary to the prediction.
 //!
-//! Advection and diffusion are differences of fluxes through the six links to the neighbouring faces
-//! of the same component. The advective flux of a link is the mean of its two ends times the velocity
-//! through the link, which conserves momentum and kinetic energy if the velocity is divergence-free.
+//! Advection and diffusion are differences of fluxes through the six links to the neighbouring
+//! faces of the same component. The advective flux of a link is the mean of its two ends times the
+//! velocity through the link, which conserves momentum and kinetic energy if the velocity is
+//! divergence-free.
 //!
 //! Legend: H tendency; q velocity component, c velocity through a link; u, v, w components along
 //! x, y, z, p pressure. Suffixes: c here, l/r left and right in x, m/p one row down and up in y,

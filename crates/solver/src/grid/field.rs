@@ -6,7 +6,8 @@
 //! line in every other row of singles), so that a vector of neighbours does not straddle two lines.
 //! Cell (i, j, k) of the interior has 1 <= i <= nx and so on. A face field stores the *lower* face
 //! of each cell: face i of `FaceX` lies between cells i-1 and i, so a box with walls has its upper
-//! boundary face at index nx+1. [`FieldView`] shows the values without ghosts to users of the library.
+//! boundary face at index nx+1. [`FieldView`] shows the values without ghosts to users of the
+//! library.
 
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};

@@ -1,8 +1,8 @@
 //! The uniform staggered (MAC) grid: cells of constant spacing, axis order x, y, z, x fastest.
 //!
 //! Positions depend on the index of a cell in the box ([`GlobalCell`]); fields are indexed by the
-//! cells of their own slab ([`LocalCell`]). `field.rs` has the typed fields, `loops.rs` the loops in a
-//! fixed order.
+//! cells of their own slab ([`LocalCell`]). `field.rs` has the typed fields, `loops.rs` the loops
+//! in a fixed order.
 
 mod field;
 mod loops;
@@ -215,16 +215,6 @@ impl Layout {
         self.map_layer(values, axis, n, 0, |value| value);
         self.map_layer(values, axis, 1, n + 1, |value| value);
     }
-    /// Calls `f` with the memory position of every entry of a layer, ghosts included.
-    pub fn each_of_layer(&self, axis: usize, layer: usize, mut f: impl FnMut(usize)) {
-        let (row, plane) = (self.row(), self.plane());
-        let (outer, middle) = (self.len() / plane, plane / row);
-        match axis {
-            0 => (0..outer * middle).for_each(|line| f(line * row + layer)),
-            1 => (0..outer).for_each(|k| (0..row).for_each(|i| f(k * plane + layer * row + i))),
-            _ => (0..plane).for_each(|at| f(layer * plane + at)),
-        }
-    }
     /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.
     pub fn map_layer<T: Copy>(
         &self,
@@ -234,22 +224,15 @@ impl Layout {
         to: usize,
         f: impl Fn(T) -> T,
     ) {
-        self.map_layers(values, axis, [from; 2], to, |[value, _]| f(value));
-    }
-    /// Sets layer `to` to `f` of two layers `from` of `axis`, ghosts of the other axes included.
-    pub fn map_layers<T: Copy>(
-        &self,
-        values: &mut [T],
-        axis: usize,
-        from: [usize; 2],
-        to: usize,
-        f: impl Fn([T; 2]) -> T,
-    ) {
-        let stride = self.strides()[axis] as isize;
-        let shift = from.map(|layer| (layer as isize - to as isize) * stride);
-        self.each_of_layer(axis, to, |at| {
-            values[at] = f(shift.map(|s| values[at.wrapping_add_signed(s)]));
-        });
+        let [_, row, plane] = self.strides();
+        let shift = (from as isize - to as isize) * self.strides()[axis] as isize;
+        let mut set = |at: usize| values[at] = f(values[at.wrapping_add_signed(shift)]);
+        match axis {
+            0 => (0..self.len() / row).for_each(|line| set(line * row + to)),
+            1 => (0..self.len() / plane)
+                .for_each(|k| (0..row).for_each(|i| set(k * plane + to * row + i))),
+            _ => (0..plane).for_each(|at| set(to * plane + at)),
+        }
     }
 }
 

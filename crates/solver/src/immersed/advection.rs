@@ -1,4 +1,5 @@
-//! Correction of the second-order central advection scheme at the links near a grain, plane by plane.
+//! Correction of the second-order central advection scheme at the links near a grain, plane by
+//! plane.
 //!
 //! A link joins two neighbouring faces of the same component. Two terms correct its flux:
 //!
@@ -16,8 +17,8 @@
 //! c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60 h)
 //! ```
 //!
-//! The second term is left out at the ends of the grid, where fewer than six faces are in line. Both
-//! are fluxes between two faces, so momentum is conserved
+//! The second term is left out at the ends of the grid, where fewer than six faces are in line.
+//! Both are fluxes between two faces, so momentum is conserved
 //! (`docs/decisions/0003-advection-next-to-grains.md`). `links.rs` finds the links,
 //! `immersed::reference` has the scalar form.
 //!

@@ -1,5 +1,5 @@
-//! Links next to a grain: their weights, plane by plane, in single precision like the distances, and
-//! the velocity in the box around the grain.
+//! Links next to a grain: their weights, plane by plane, in single precision like the distances,
+//! and the velocity in the box around the grain.
 //!
 //! The weight of a link is 1 / A - 1 for |d| < eps, 0 for eps <= d < 2 eps, and -1 elsewhere, which
 //! marks links without correction. `immersed::reference` has the scalar form.

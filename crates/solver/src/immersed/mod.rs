@@ -9,7 +9,7 @@
 //! | layer | task | data it makes |
 //! |---|---|---|
 //! | `geometry` | distances to faces, index lists, neighbours | `LocatedBody`, `BandFaces` |
-//! | `forcing`, `rigidity` | weights of faces; impulse, rigid velocity on faces | `ForcedFaces`, `Impulse` |
+//! | `forcing`, `rigidity` | weights of faces; impulse, rigid velocity | `ForcedFaces`, `Impulse` |
 //! | `links`, `advection` | correction at the links near a grain | `AdvectionCorrection` |
 //! | `rigid_body` | 6 x 6 equations of motion with the impulse | `RigidBodySystem` |
 //! | `update`, `schedule` | work on one grain; order of the grains | `CoupledGrains` |

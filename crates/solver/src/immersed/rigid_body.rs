@@ -4,10 +4,10 @@
 //! stable at any density ratio. The hydrodynamic load is Eq. 5 in the form that also holds for the
 //! torque (Eq. 5b as printed can lose a third of it).
 //!
-//! The fluid around a grain responds by the projection, one step late. A grain lighter than the fluid
-//! and this response amplify each other. A virtual mass, the inertia of the displaced fluid, is
-//! therefore added to both sides of the equations, times the new acceleration on the left and the
-//! previous one on the right (`docs/decisions/0013-light-grains.md`).
+//! The fluid around a grain responds by the projection, one step late. A grain lighter than the
+//! fluid and this response amplify each other. A virtual mass, the inertia of the displaced fluid,
+//! is therefore added to both sides of the equations, times the new acceleration on the left and
+//! the previous one on the right (`docs/decisions/0013-light-grains.md`).
 //!
 //! Legend: a and b matrix and right-hand side, x new velocities, J impulse on the fluid.
 

@@ -1,5 +1,5 @@
-//! Rigidity of the forced faces (Eqs 4b, 4c), and the impulse that it takes from the fluid (Eq. 5) as
-//! an affine function of the new velocities of the grain.
+//! Rigidity of the forced faces (Eqs 4b, 4c), and the impulse that it takes from the fluid (Eq. 5)
+//! as an affine function of the new velocities of the grain.
 //!
 //! In a step of dt, a forced face gains with the rigid velocity U, and U_old before it,
 //!

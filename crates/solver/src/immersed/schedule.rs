@@ -13,6 +13,7 @@
 use rayon::prelude::*;
 
 use super::advection::{add_correction, find_correction};
+use super::rigid_body::PreviousStep;
 use super::rigidity::impose_rigidity;
 use super::update::{
     CouplingStep, GrainUpdate, ImmersedGrain, PendingRigidity, StepInput,
@@ -21,7 +22,6 @@ use super::update::{
 use super::{ImmersedGrains, Scheme};
 use crate::dem::{Grain, GrainResponse};
 use crate::flow::Flow;
-use crate::immersed::rigid_body::PreviousStep;
 use crate::math::{Load, Real};
 
 /// Grains located and coupled to the prediction: made by [`ImmersedGrains::couple`], consumed by

@@ -1,18 +1,19 @@
 //! Work on one grain in a step: the whole update of an isolated grain; location and equations of
-//! motion of any other. Buffers of the threads, and in debug builds a log of the faces that they use.
+//! motion of any other. Buffers of the threads, and in debug builds a log of the faces that they
+//! use.
 
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::Mutex;
 
-use super::advection::{AdvectionCorrection, AdvectionScratch, add_correction, find_correction};
+use super::advection::{
+    AdvectionCorrection, AdvectionScratch, GrainKinematics, add_correction, find_correction,
+};
 use super::forcing::{ForcedFaces, ForcingParams};
 use super::geometry::{LocateScratch, LocatedBody, Locator};
-use super::rigid_body::RigidBodySystem;
+use super::rigid_body::{PreviousStep, RigidBodySystem};
 use super::rigidity::{impose_rigidity, sum_impulse};
 use crate::dem::Grain;
 use crate::flow::{OldState, Prediction};
-use crate::immersed::advection::GrainKinematics;
-use crate::immersed::rigid_body::PreviousStep;
 use crate::math::{Load, Real, RigidVelocity};
 
 /// Lists of the faces near one grain, kept from one step to the next.

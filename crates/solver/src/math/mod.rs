@@ -65,7 +65,8 @@ impl std::ops::Mul<f64> for Load {
     }
 }
 
-/// Velocity and angular velocity of a body in the space frame, or a change or rate of change of both.
+/// Velocity and angular velocity of a body in the space frame, or a change or rate of change of
+/// both.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RigidVelocity {
     /// Velocity of the centroid [m/s].

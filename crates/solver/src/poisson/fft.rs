@@ -4,8 +4,8 @@
 //! no bit reversal. Factors 2, 3, 4, 5, 7 and 8 have butterflies of their own, other primes a loop
 //! over pairs of outputs; beyond `LARGEST_PRIME` the length is padded instead (`axis.rs`).
 //!
-//! Outputs of a butterfly come in pairs k, r - k: with e_k the cosine sum over x_t + x_{r-t} and o_k
-//! the sine sum over x_t - x_{r-t} they are e_k - i o_k and e_k + i o_k.
+//! Outputs of a butterfly come in pairs k, r - k: with e_k the cosine sum over x_t + x_{r-t} and
+//! o_k the sine sum over x_t - x_{r-t} they are e_k - i o_k and e_k + i o_k.
 //!
 //! Legend: r radix; blocks number of groups with different twiddle factors; stride product of the
 //! radices of the earlier passes.

@@ -1,5 +1,5 @@
-//! Contact force laws: parameters, properties of a pair, the interface of the laws, the linear law of
-//! the paper (Eqs 9 and 14) and Hertz-Mindlin.
+//! Contact force laws: parameters, properties of a pair, the interface of the laws, the linear law
+//! of the paper (Eqs 9 and 14) and Hertz-Mindlin.
 
 use serde::{Deserialize, Serialize};
 
@@ -345,29 +345,12 @@ impl SelectedLaw {
             ContactLawKind::HertzMindlin => SelectedLaw::HertzMindlin(HertzMindlin),
         }
     }
-}
-
-macro_rules! delegate {
-    ($law:expr, $method:ident($($argument:expr),*)) => {
-        match $law {
-            SelectedLaw::Linear(law) => law.$method($($argument),*),
-            SelectedLaw::HertzMindlin(law) => law.$method($($argument),*),
+    /// The law itself.
+    pub fn get(&self) -> &dyn ContactLaw {
+        match self {
+            SelectedLaw::Linear(law) => law,
+            SelectedLaw::HertzMindlin(law) => law,
         }
-    };
-}
-
-impl ContactLaw for SelectedLaw {
-    fn coefficients(&self, pair: &PairProperties, overlap: f64) -> ContactCoefficients {
-        delegate!(self, coefficients(pair, overlap))
-    }
-    fn normal_force(&self, at: &ContactCoefficients, damping: f64, approach: f64) -> f64 {
-        delegate!(self, normal_force(at, damping, approach))
-    }
-    fn contact_time(&self, pair: &PairProperties, speed: f64, overlap: f64) -> f64 {
-        delegate!(self, contact_time(pair, speed, overlap))
-    }
-    fn impact_overlap(&self, pair: &PairProperties, speed: f64) -> f64 {
-        delegate!(self, impact_overlap(pair, speed))
     }
 }
 
@@ -376,7 +359,7 @@ impl ContactParams {
     pub fn contact_time(&self, grain: &Grain, speed: f64) -> f64 {
         let body = body_properties(grain);
         let pair = PairProperties::of_grains(&body, &body);
-        SelectedLaw::new(self).contact_time(&pair, speed, 0.0)
+        SelectedLaw::new(self).get().contact_time(&pair, speed, 0.0)
     }
 
     /// Largest overlap of an undamped impact of `grain` on a wall at `speed` [m/s], without added
@@ -384,7 +367,7 @@ impl ContactParams {
     pub fn impact_overlap(&self, grain: &Grain, speed: f64) -> f64 {
         let wall = ContactMaterial::new(&self.wall_material);
         let pair = PairProperties::with_wall(&body_properties(grain), &wall);
-        SelectedLaw::new(self).impact_overlap(&pair, speed)
+        SelectedLaw::new(self).get().impact_overlap(&pair, speed)
     }
 }
 

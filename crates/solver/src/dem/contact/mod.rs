@@ -2,9 +2,9 @@
 //! force laws, `model.rs` the loads of a pair.
 //!
 //! A further force law implements `ContactLaw` in `law.rs` or in a file beside it, and needs one
-//! variant of [`ContactLawKind`] and of `SelectedLaw`, and its keys in the case file. A cohesive law
-//! overrides `ContactLaw::normal_force`, which is never negative by default; a force across a gap
-//! belongs beside the lubrication in `model.rs`.
+//! variant of [`ContactLawKind`] and of `SelectedLaw`, and its keys in the case file. A cohesive
+//! law overrides `ContactLaw::normal_force`, which is never negative by default; a force across a
+//! gap belongs beside the lubrication in `model.rs`.
 
 mod law;
 mod model;

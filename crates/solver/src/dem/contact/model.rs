@@ -8,7 +8,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::law::{ContactCoefficients, ContactLaw, ContactParams, PairProperties, SelectedLaw};
+use super::law::{ContactCoefficients, ContactParams, PairProperties, SelectedLaw};
 use super::{ContactRecord, PairLoads, TangentialHistory};
 use crate::dem::search::{ClosestPoint, ContactPoint};
 use crate::math::{Load, RigidVelocity};
@@ -74,7 +74,7 @@ impl ContactModel {
 
     /// Duration of an undamped contact [s] that is closing at `speed` [m/s] at `overlap` [m].
     pub fn contact_time(&self, pair: &PairProperties, speed: f64, overlap: f64) -> f64 {
-        self.law.contact_time(pair, speed, overlap)
+        self.law.get().contact_time(pair, speed, overlap)
     }
 
     /// Evaluates the loads of a pair at the end of a sub-step of `step` [s] into `record.loads` and
@@ -94,7 +94,7 @@ impl ContactModel {
             }
             return;
         };
-        let at = self.law.coefficients(properties, mean.overlap);
+        let at = self.law.get().coefficients(properties, mean.overlap);
         let time_in_contact = begin_or_continue(record, &mean, step);
         let damping = record.dashpot_fraction * at.normal_damping;
         let friction = FrictionStep {
@@ -142,7 +142,7 @@ impl ContactModel {
             // The local closing speed also damps rocking on a flat face.
             let approach =
                 relative_velocity(&pair.end_of_step, point, pair.branch).dot(point.normal);
-            let normal_force = self.law.normal_force(at, damping, approach);
+            let normal_force = self.law.get().normal_force(at, damping, approach);
             let mut force = -(normal_force * share * scale) * point.normal;
             if friction.stiffness > 0.0 && friction.coefficient > 0.0 {
                 while record.history.get(known).is_some_and(|h| h.id < point.id) {

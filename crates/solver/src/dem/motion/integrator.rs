@@ -1,9 +1,9 @@
 //! Leapfrog integration of one grain over a sub-step, in kick-drift-kick form (Eqs 19-36).
 //!
-//! v^(n+1/2) = v^n + dt/2 (F^n/m - xi v^n), x^(n+1) = x^n + dt v^(n+1/2) and
-//! v^(n+1) = (v^(n+1/2) + dt/2 F^(n+1)/m) / (1 + xi dt/2) are Eqs 21-23 split at integer times; the
-//! two half steps in sequence give Eq. 22. The mass is that of the grain, or the 6 x 6 mass of grain
-//! and fluid ([`GrainResponse`]).
+//! v^(n+1/2) = v^n + dt/2 (F^n/m - xi v^n), x^(n+1) = x^n + dt v^(n+1/2) and v^(n+1) = (v^(n+1/2) +
+//! dt/2 F^(n+1)/m) / (1 + xi dt/2) are Eqs 21-23 split at integer times; the two half steps in
+//! sequence give Eq. 22. The mass is that of the grain, or the 6 x 6 mass of grain and fluid
+//! ([`GrainResponse`]).
 
 use glam::DVec3;
 

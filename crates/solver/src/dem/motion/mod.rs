@@ -1,8 +1,9 @@
-//! Motion of the grains (Eqs 19-37): contact dynamics of all grains. A step is taken at once, or as a
-//! trial step that is accepted or repeated with the response of the fluid
+//! Motion of the grains (Eqs 19-37): contact dynamics of all grains. A step is taken at once, or as
+//! a trial step that is accepted or repeated with the response of the fluid
 //! (`docs/decisions/0014-contact-with-the-fluid-response.md`).
 //!
-//! `substeps.rs` has the contact sub-steps, `integrator.rs` and `rotation.rs` the motion of one grain.
+//! `substeps.rs` has the contact sub-steps, `integrator.rs` and `rotation.rs` the motion of one
+//! grain.
 
 mod checkpoint;
 mod contact_body;

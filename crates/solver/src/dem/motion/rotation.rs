@@ -103,47 +103,6 @@ pub fn rotate_exactly(orientation: DQuat, omega_space: DVec3, step: f64) -> DQua
     (DQuat::from_scaled_axis(omega_space * step) * orientation).normalize()
 }
 
-/// The paper's (q1, q2, q3, q4) of Eq. 31 for an orientation.
-pub fn to_paper_quaternion(orientation: DQuat) -> [f64; 4] {
-    [-orientation.y, orientation.x, orientation.z, orientation.w]
-}
-
-/// The orientation for the paper's (q1, q2, q3, q4) of Eq. 31.
-pub fn from_paper_quaternion(q: [f64; 4]) -> DQuat {
-    DQuat::from_xyzw(q[1], -q[0], q[2], q[3])
-}
-
-/// Rigid body that rotates about its centroid, without grain or contact, for tests and
-/// demonstrations.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rotor {
-    /// Principal moments of inertia [kg m^2].
-    pub inertia: DVec3,
-    /// Orientation, body to space.
-    pub orientation: DQuat,
-    /// Angular velocity at integer time [rad/s, body frame].
-    pub omega: DVec3,
-}
-
-impl Rotor {
-    /// One step [s] with the torque [N m, space frame] that `torque` gives for an orientation.
-    pub fn step(&mut self, step: f64, damping: f64, mut torque: impl FnMut(DQuat) -> DVec3) {
-        let before = self.orientation.conjugate() * torque(self.orientation);
-        let mid = half_step_explicit(self.inertia, self.omega, before, damping, 0.5 * step);
-        self.orientation = rotate_by_cayley(self.orientation, mid, step);
-        let after = self.orientation.conjugate() * torque(self.orientation);
-        self.omega = half_step_implicit(self.inertia, mid, after, damping, 0.5 * step);
-    }
-    /// Kinetic energy [J].
-    pub fn energy(&self) -> f64 {
-        0.5 * self.omega.dot(self.inertia * self.omega)
-    }
-    /// Angular momentum [kg m^2/s, space frame].
-    pub fn angular_momentum(&self) -> DVec3 {
-        self.orientation * (self.inertia * self.omega)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,5 +1,5 @@
-//! Narrow phase: contact patch of a pair, from the surface nodes of each grain in the distance field
-//! of its partner and the deepest point of the surface (Eqs 7-8).
+//! Narrow phase: contact patch of a pair, from the surface nodes of each grain in the distance
+//! field of its partner and the deepest point of the surface (Eqs 7-8).
 
 use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;

@@ -1,5 +1,5 @@
-//! Surface of a grain and the distance field of its partner: hierarchy of the surface nodes, field in
-//! the frame of the grain, and the point of the surface with the smallest distance.
+//! Surface of a grain and the distance field of its partner: hierarchy of the surface nodes, field
+//! in the frame of the grain, and the point of the surface with the smallest distance.
 
 use glam::{DMat3, DVec3};
 use grainwake_shape::{Field, Shape, SurfaceNode};

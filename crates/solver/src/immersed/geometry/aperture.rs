@@ -1,13 +1,13 @@
 //! Aperture (open fraction) of a face or link near a solid surface, and the drag on a face.
 //!
 //! A(d) = (1 + s + sin(pi s) / pi) / 2 with s = d / eps limited to [-1, 1]: from 0 inside to 1
-//! outside a band of half-width eps around the surface. The solid fraction is 1 - A. Velocities near
-//! a surface are those of the fluid averaged over this band: a linear shear over a plane wall becomes
-//! the open depth m(d), the integral of A; a parabola d^2 / 2 becomes M(d), the integral of m.
-//! [`reference`] has the scalar forms.
+//! outside a band of half-width eps around the surface. The solid fraction is 1 - A. Velocities
+//! near a surface are those of the fluid averaged over this band: a linear shear over a plane wall
+//! becomes the open depth m(d), the integral of A; a parabola d^2 / 2 becomes M(d), the integral of
+//! m. [`reference`] has the scalar forms.
 //!
-//! The drag is a smoothed ghost-Dirichlet condition; the pressure weight P is the weight with which a
-//! pressure gradient drives the face:
+//! The drag is a smoothed ghost-Dirichlet condition; the pressure weight P is the weight with which
+//! a pressure gradient drives the face:
 //!
 //! drag = L m / m, P = L M - drag M,
 //! with L f = sum_a (f(d + h_a n_a) + f(d - h_a n_a) - 2 f(d)) / h_a^2
@@ -17,8 +17,8 @@
 //! parabola M(d) under a uniform pressure gradient or in an accelerated frame
 //! (`docs/decisions/0018-pressure-weight.md`).
 //!
-//! Legend: d signed distance (negative inside), n unit normal, h spacing, eps half-width of the band,
-//! A aperture, m open depth, M its integral.
+//! Legend: d signed distance (negative inside), n unit normal, h spacing, eps half-width of the
+//! band, A aperture, m open depth, M its integral.
 
 use std::f64::consts::PI;
 

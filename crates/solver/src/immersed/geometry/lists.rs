@@ -1,5 +1,5 @@
-//! Index lists of the faces near a grain: plain data, filled by [`super::Locator`]. Positions in memory
-//! of the cells and faces in the box around a grain, across periodic edges.
+//! Index lists of the faces near a grain: plain data, filled by [`super::Locator`]. Positions in
+//! memory of the cells and faces in the box around a grain, across periodic edges.
 //!
 //! `at` is a position in the memory of a field, `entry` an index into the lists of one grain. Lists
 //! that vector registers read have at least `MAX_LANES` unused entries at the end.

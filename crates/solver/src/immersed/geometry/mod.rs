@@ -1,8 +1,8 @@
-//! Geometry of grains on the grid: neighbours that share faces, boxes of cells, distances and lists of
-//! faces.
+//! Geometry of grains on the grid: neighbours that share faces, boxes of cells, distances and lists
+//! of faces.
 //!
-//! [`Locator`] fills the lists (`lists.rs`) with the distances of `distances.rs` and `narrow_band.rs`;
-//! `aperture.rs` gives open and solid fractions and the drag of a face.
+//! [`Locator`] fills the lists (`lists.rs`) with the distances of `distances.rs` and
+//! `narrow_band.rs`; `aperture.rs` gives open and solid fractions and the drag of a face.
 
 pub mod aperture;
 mod distances;
