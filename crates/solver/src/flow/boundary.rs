@@ -240,7 +240,7 @@ impl Boundaries {
 
 /// Rule by which a ghost layer follows from the interior.
 #[derive(Clone, Copy)]
-pub(super) enum GhostRule {
+enum GhostRule {
     /// No stencil reads the ghost layer.
     Unused,
     /// Copy of the outermost layer at the opposite end of the box.
@@ -252,13 +252,13 @@ pub(super) enum GhostRule {
 }
 
 /// Second interior layer from the end at which `inner` is the first, of layers 1..=n.
-pub(super) fn second(inner: usize, n: usize) -> usize {
+fn second(inner: usize, n: usize) -> usize {
     if inner == 1 { 2.min(n) } else { inner - 1 }
 }
 
 /// Ghost value beyond a wall of velocity `wall` [m/s], on the parabola through the wall and the two
 /// nearest values, which makes the shear at the wall second-order.
-pub(super) fn beyond_wall<R: Real>(wall: f64, near: R, next: R, n: usize) -> R {
+fn beyond_wall<R: Real>(wall: f64, near: R, next: R, n: usize) -> R {
     R::of(if n == 1 {
         2.0 * wall - near.wide()
     } else {
@@ -267,7 +267,7 @@ pub(super) fn beyond_wall<R: Real>(wall: f64, near: R, next: R, n: usize) -> R {
 }
 
 /// Fills the layer `ghost` of `layer` entries; `inner` is adjacent, 1..=n are interior.
-pub(super) fn fill_ghost_layer<R: Real>(
+fn fill_ghost_layer<R: Real>(
     values: &mut [R],
     layer: usize,
     rule: GhostRule,

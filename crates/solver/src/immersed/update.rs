@@ -226,7 +226,8 @@ pub fn locate_and_compute_weights(
     forced.compute_weights(params, &mut scratch.band, neighbours, locator.shapes());
 }
 
-/// Pool of idle buffers. It grows to the largest number of threads that have worked at once.
+/// Pool of idle buffers, kept from one step to the next. It grows to the largest number of threads
+/// that have worked at once.
 #[derive(Default)]
 pub struct ScratchPool<T>(Mutex<Vec<T>>);
 
@@ -270,7 +271,8 @@ pub enum Access {
     Write,
 }
 
-/// Accesses of all grains to the prediction in a step; empty in release builds.
+/// Accesses of all grains to the prediction in a step, to assert that no thread writes a face that
+/// another one uses; empty in release builds.
 #[derive(Default)]
 pub struct AccessLog(Mutex<Vec<Entry>>);
 

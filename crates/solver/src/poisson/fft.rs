@@ -110,12 +110,12 @@ impl<R: Real> Fft<R> {
     ) -> [&'a mut [Complex<V>]; 2] {
         for pass in &self.passes {
             match pass.radix {
-                2 => step::<V, Two, 2>(pass, a, b),
-                3 => step::<V, Three, 3>(pass, a, b),
-                4 => step::<V, Four, 4>(pass, a, b),
-                5 => step::<V, Five, 5>(pass, a, b),
-                7 => step::<V, Seven, 7>(pass, a, b),
-                8 => step::<V, Eight, 8>(pass, a, b),
+                2 => step::<V, 2>(pass, a, b),
+                3 => step::<V, 3>(pass, a, b),
+                4 => step::<V, 4>(pass, a, b),
+                5 => step::<V, 5>(pass, a, b),
+                7 => step::<V, 7>(pass, a, b),
+                8 => step::<V, 8>(pass, a, b),
                 _ => prime_step(pass, a, b),
             }
             std::mem::swap(&mut a, &mut b);
@@ -126,11 +126,13 @@ impl<R: Real> Fft<R> {
 
 /// Pass with a butterfly.
 #[inline(always)]
-fn step<V: Vector, B: Butterfly<R>, const R: usize>(
+fn step<V: Vector, const R: usize>(
     pass: &Pass<V::Number>,
     source: &[Complex<V>],
     target: &mut [Complex<V>],
-) {
+) where
+    Short: Butterfly<R>,
+{
     let (stride, span) = (pass.stride, pass.blocks * pass.stride);
     let mut from: [&[Complex<V>]; R] = [&[]; R];
     for t in 0..R {
@@ -144,7 +146,7 @@ fn step<V: Vector, B: Butterfly<R>, const R: usize>(
             for t in 0..R {
                 x[t] = from[t][q];
             }
-            let y = B::apply(x);
+            let y = Short::apply(x);
             for t in 0..R {
                 to[t][q] = y[t];
             }
@@ -156,7 +158,7 @@ fn step<V: Vector, B: Butterfly<R>, const R: usize>(
             for t in 0..R {
                 x[t] = from[t][p];
             }
-            let y = B::apply(x);
+            let y = Short::apply(x);
             to[0] = y[0];
             for t in 1..R {
                 to[t] = y[t].times(turn[t - 1]);
@@ -175,7 +177,7 @@ fn step<V: Vector, B: Butterfly<R>, const R: usize>(
                 for t in 0..R {
                     x[t] = here[t][q];
                 }
-                let y = B::apply(x);
+                let y = Short::apply(x);
                 to[0][q] = y[0];
                 for t in 1..R {
                     to[t][q] = y[t].times(turn[t - 1]);
@@ -281,32 +283,22 @@ fn circle<R: Real>(r: usize) -> Vec<[R; 2]> {
 }
 
 /// Fourier transform of fixed length `R`.
-pub trait Butterfly<const R: usize> {
+trait Butterfly<const R: usize> {
     /// Returns X_k = sum over t of x_t exp(-2 pi i k t / R).
     fn apply<V: Vector>(x: [Complex<V>; R]) -> [Complex<V>; R];
 }
 
-/// Transform of length two.
-pub struct Two;
-/// Transform of length three.
-pub struct Three;
-/// Transform of length four.
-pub struct Four;
-/// Transform of length five.
-pub struct Five;
-/// Transform of length seven.
-pub struct Seven;
-/// Transform of length eight.
-pub struct Eight;
+/// Transforms of the lengths 2, 3, 4, 5, 7 and 8.
+struct Short;
 
-impl Butterfly<2> for Two {
+impl Butterfly<2> for Short {
     #[inline(always)]
     fn apply<V: Vector>([a, b]: [Complex<V>; 2]) -> [Complex<V>; 2] {
         [a + b, a - b]
     }
 }
 
-impl Butterfly<3> for Three {
+impl Butterfly<3> for Short {
     #[inline(always)]
     fn apply<V: Vector>([a, b, c]: [Complex<V>; 3]) -> [Complex<V>; 3] {
         const SIN: f64 = 0.866_025_403_784_438_6;
@@ -317,7 +309,7 @@ impl Butterfly<3> for Three {
     }
 }
 
-impl Butterfly<4> for Four {
+impl Butterfly<4> for Short {
     #[inline(always)]
     fn apply<V: Vector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
         let (s, t, u) = (a + c, a - c, b + d);
@@ -326,7 +318,7 @@ impl Butterfly<4> for Four {
     }
 }
 
-impl Butterfly<5> for Five {
+impl Butterfly<5> for Short {
     #[inline(always)]
     fn apply<V: Vector>([a, b, c, d, e]: [Complex<V>; 5]) -> [Complex<V>; 5] {
         const COS: [f64; 2] = [0.309_016_994_374_947_45, -0.809_016_994_374_947_5];
@@ -344,7 +336,7 @@ impl Butterfly<5> for Five {
     }
 }
 
-impl Butterfly<7> for Seven {
+impl Butterfly<7> for Short {
     #[inline(always)]
     fn apply<V: Vector>([a, b, c, d, e, f, g]: [Complex<V>; 7]) -> [Complex<V>; 7] {
         const COS: [f64; 3] =
@@ -380,13 +372,13 @@ impl Butterfly<7> for Seven {
     }
 }
 
-impl Butterfly<8> for Eight {
+impl Butterfly<8> for Short {
     #[inline(always)]
     fn apply<V: Vector>([a, b, c, d, e, f, g, h]: [Complex<V>; 8]) -> [Complex<V>; 8] {
         use std::f64::consts::FRAC_1_SQRT_2;
         // Transforms of length four of the even and of the odd inputs.
-        let [p, q, r, s] = Four::apply([a, c, e, g]);
-        let [t, u, v, w] = Four::apply([b, d, f, h]);
+        let [p, q, r, s] = <Short as Butterfly<4>>::apply([a, c, e, g]);
+        let [t, u, v, w] = <Short as Butterfly<4>>::apply([b, d, f, h]);
         let half = V::Number::of(FRAC_1_SQRT_2);
         // Times exp(-i pi / 4) and exp(-3 i pi / 4).
         let u = Complex { re: u.re + u.im, im: u.im - u.re }.scale(half);

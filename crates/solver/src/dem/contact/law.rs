@@ -211,7 +211,7 @@ pub(in crate::dem) trait ContactLaw {
 
 /// Linear normal and tangential springs, and dashpots that give a constant restitution.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::dem) struct Linear {
+pub(super) struct Linear {
     /// k_n [N/m].
     normal_stiffness: f64,
     /// k_zeta [N/m].
@@ -270,9 +270,14 @@ impl ContactLaw for Linear {
 /// ```
 const HERTZ_DURATION: f64 = 2.943_275 / (std::f64::consts::PI * 0.730_296_743_340_221_5);
 
-/// Hertz-Mindlin law. Moduli, radius and restitution come from the pair.
+/// Hertz normal law and no-slip Mindlin tangential law. Moduli, radius and restitution come from
+/// the pair.
+///
+/// The law applies to the equal-volume spheres of the pair: the radius of curvature is the reduced
+/// radius of these spheres, not the local curvature at the contact, which a sampled distance field
+/// does not resolve. It is exact for spheres.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::dem) struct HertzMindlin;
+pub(super) struct HertzMindlin;
 
 impl ContactLaw for HertzMindlin {
     /// Coefficients at the overlap delta, with the tangential stiffness of Mindlin (1949).

@@ -209,17 +209,13 @@ pub(in crate::dem) struct PairKinematics {
 }
 
 /// Velocity of the first body relative to the second at a contact point (Eq. 12) [m/s].
-pub(super) fn relative_velocity(
-    motion: &[RigidVelocity; 2],
-    point: &ContactPoint,
-    branch: DVec3,
-) -> DVec3 {
+fn relative_velocity(motion: &[RigidVelocity; 2], point: &ContactPoint, branch: DVec3) -> DVec3 {
     motion[0].at(point.lever_arm) - motion[1].at(point.lever_arm + branch)
 }
 
 /// Quantities of one sub-step that the friction of all points of a patch shares.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct FrictionStep {
+struct FrictionStep {
     /// Friction coefficient mu.
     pub coefficient: f64,
     /// Tangential stiffness k_zeta [N/m].
@@ -274,19 +270,19 @@ impl FrictionStep {
 
 /// Rotates `v` by the smallest rotation from the normal `from` to the normal `to` (R of Eq. 14) and
 /// removes the component along `to`.
-pub(super) fn rotate_tangential(v: DVec3, from: DVec3, to: DVec3) -> DVec3 {
+fn rotate_tangential(v: DVec3, from: DVec3, to: DVec3) -> DVec3 {
     let rotated = DQuat::from_rotation_arc(from, to) * v;
     rotated - rotated.dot(to) * to
 }
 
 /// Gap below which the lubrication force acts [m]; zero if it is switched off.
-pub(super) fn range(params: &ContactParams) -> f64 {
+fn range(params: &ContactParams) -> f64 {
     if params.lubrication_viscosity > 0.0 { params.lubrication_gap.max(0.0) } else { 0.0 }
 }
 
 /// Leading-order squeeze-film force between the equal-volume spheres,
 /// 6 pi mu R*^2 v_n (1/h - 1/h_0), with h at least the height of the asperities.
-pub(super) fn lubrication(
+fn lubrication(
     params: &ContactParams,
     closest: &ClosestPoint,
     properties: &PairProperties,
