@@ -74,7 +74,7 @@ impl<L: Location, R: Real> Field<L, R> {
     }
     /// Layout in memory.
     #[inline]
-    pub fn layout(&self) -> Layout {
+    pub(crate) fn layout(&self) -> Layout {
         self.layout
     }
     /// Read-only view of all values without ghosts.

@@ -143,7 +143,7 @@ impl Slab {
 
 /// Memory layout shared by all fields of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layout {
+pub(crate) struct Layout {
     /// Interior cells along x, y, z.
     pub cells: [usize; 3],
 }
