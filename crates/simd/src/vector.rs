@@ -1,13 +1,12 @@
-//! Traits of numbers, of their vectors and of kernels. Each of them names the others.
+//! Traits of numbers, of their vectors and of kernels; they refer to each other.
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Sub};
 
 use super::MAX_LANES;
 
-/// Prevents implementations of [`Real`] and [`Vector`] in other crates. Unsafe code
-/// relies on two facts: a `Real` is `f32` or `f64`, and a `Vector` is `WIDTH` numbers without
-/// padding.
+/// Prevents implementations of [`Real`] and [`Vector`] in other crates. Unsafe code relies on two
+/// facts: a `Real` is `f32` or `f64`, and a `Vector` is `WIDTH` numbers without padding.
 pub trait Sealed {}
 
 impl Sealed for f32 {}

@@ -79,8 +79,7 @@ fn a_heap_at_rest_steps_without_allocating() {
         let trial = dynamics.trial_step(&mut grains, &loads, 1e-3, &mut mean);
         dynamics.resolve_with_response(trial, &mut grains, &responses, &mut mean, &mut ends);
         for (grain, end) in grains.iter_mut().zip(&ends) {
-            grain.pose = end.pose;
-            [grain.velocity, grain.angular_velocity] = end.velocities;
+            end.apply_to(grain);
         }
     }
     let count = COUNT.load(Ordering::Relaxed) - before;
@@ -97,6 +96,5 @@ fn response(grain: &Grain, gravity: DVec3) -> GrainResponse {
         row[n] = 1.0 / if n < 3 { mass } else { inertia };
     }
     let [x, y, z] = (mass * gravity).to_array();
-    let start = [grain.velocity, grain.angular_velocity];
-    GrainResponse::new(start, [x, y, z, 0.0, 0.0, 0.0], inverse)
+    GrainResponse::new(grain.rigid_velocity(), [x, y, z, 0.0, 0.0, 0.0], inverse)
 }

@@ -85,8 +85,8 @@ impl Grain {
             (MotionConstraint::Prescribed(DVec3::ZERO), MotionConstraint::Prescribed(DVec3::ZERO));
         self
     }
-    /// Velocity and angular velocity.
-    pub(crate) fn rigid_velocity(&self) -> RigidVelocity {
+    /// Velocity and angular velocity, space frame.
+    pub fn rigid_velocity(&self) -> RigidVelocity {
         RigidVelocity { linear: self.velocity, angular: self.angular_velocity }
     }
     /// Mass [kg].

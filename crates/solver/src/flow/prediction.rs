@@ -88,7 +88,7 @@ pub struct PredictPlane<'a, R> {
     pub velocity: &'a FaceVector<R>,
     /// Pressure over density p^n with ghosts [m^2/s^2].
     pub pressure: &'a [R],
-    /// Whether each axis is periodic; the boundary faces of the others are no unknowns.
+    /// Whether each axis is periodic; boundary faces normal to the others are not unknown.
     pub periodic: [bool; 3],
     /// Index of the plane.
     pub k: usize,

@@ -62,7 +62,7 @@ impl Mesh {
         let mesh = *self;
         (0..3).filter(move |&axis| mesh.is_resolved(axis))
     }
-    /// Whether `axis` is not flat: more than one cell.
+    /// Whether the grid has more than one cell along `axis`.
     pub fn is_resolved(&self, axis: usize) -> bool {
         self.cells[axis] > 1
     }

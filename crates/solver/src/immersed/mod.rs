@@ -22,8 +22,8 @@
 //! 1. `advection.rs` corrects the prediction u* next to the last pose of the grain.
 //! 2. `geometry/mod.rs` lists the faces near the new pose. `geometry/distances.rs` evaluates their
 //!    signed distances d, `narrow_band.rs` interpolates d, `lists.rs` defines the lists.
-//! 3. `forcing.rs` computes the weights of the forced faces: the drag, and the weight P of
-//!    the pressure gradient, both of `geometry/aperture.rs`.
+//! 3. `forcing.rs` computes the weights of the forced faces: the drag, and the weight P of the
+//!    pressure gradient.
 //! 4. `rigidity.rs` sums the impulse J on the fluid as an affine function of the six new
 //!    velocities of the grain. The impulse on the grain is -J.
 //! 5. `rigid_body.rs` solves for these velocities, contact load included.
@@ -155,9 +155,7 @@ impl<R: Real> ImmersedGrains<R> {
     pub fn bytes(&self) -> usize {
         self.grains.iter().map(ImmersedGrain::bytes).sum::<usize>() + self.locator.bytes()
     }
-}
 
-impl<R: Real> ImmersedGrains<R> {
     /// Imposes the rigid velocities of the grains on the forced faces and makes the flow
     /// solenoidal.
     pub fn initialise(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> FlowMeasures {

@@ -4,10 +4,10 @@
 //! stable at any density ratio. The hydrodynamic load is Eq. 5 in the form that also holds for the
 //! torque (Eq. 5b as printed can lose a third of it).
 //!
-//! The fluid around a grain responds by the projection, one step late. A grain lighter than the
-//! fluid and this response amplify each other. A virtual mass, the inertia of the displaced fluid,
-//! is therefore added to both sides of the equations, times the new acceleration on the left and
-//! the previous one on the right (`docs/decisions/0013-light-grains.md`).
+//! The fluid around a grain responds by the projection, one step late. For a grain lighter than the
+//! fluid this delay is unstable. A virtual mass, the inertia of the displaced fluid, is therefore
+//! added to both sides of the equations: it multiplies the new acceleration on the left and the
+//! previous one on the right (`docs/decisions/0013-light-grains.md`).
 //!
 //! Legend: a and b matrix and right-hand side, x new velocities, J impulse on the fluid.
 
@@ -169,7 +169,7 @@ impl RigidBodySystem {
                 drive[3 * n..3 * n + 3].fill(0.0);
             }
         }
-        GrainResponse::new([start.linear, start.angular], drive, columns)
+        GrainResponse::new(start, drive, columns)
     }
 }
 
@@ -184,15 +184,15 @@ fn prescribe(a: &mut Matrix6, b: &mut Vector6, first: usize, velocity: DVec3) {
 
 /// Inertia of the fluid that a light grain accelerates with itself.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct VirtualMass {
+struct VirtualMass {
     /// Virtual mass [kg].
-    pub mass: f64,
+    mass: f64,
     /// Virtual inertia about the centroid, space frame [kg m^2].
-    pub inertia: DMat3,
+    inertia: DMat3,
     /// Momentum of the virtual mass after a step with the previous acceleration [kg m/s].
-    pub momentum: DVec3,
+    momentum: DVec3,
     /// Angular momentum of the virtual inertia after such a step [kg m^2/s].
-    pub angular_momentum: DVec3,
+    angular_momentum: DVec3,
 }
 
 /// Density ratio below which the virtual mass is the displaced mass. Above it the virtual mass
@@ -201,7 +201,7 @@ const FULL_BELOW: f64 = 0.8;
 
 impl VirtualMass {
     /// Virtual mass of a grain in a step of `dt` [s]; 0 along prescribed degrees of freedom.
-    pub fn new(grain: &Grain, previous: &PreviousStep, fluid_density: f64, dt: f64) -> VirtualMass {
+    fn new(grain: &Grain, previous: &PreviousStep, fluid_density: f64, dt: f64) -> VirtualMass {
         let ratio = grain.density / fluid_density;
         let part = ((1.0 - ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0) / ratio;
         let free = |constraint: MotionConstraint| {

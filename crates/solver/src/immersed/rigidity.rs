@@ -241,7 +241,7 @@ impl<R: Real> RunImpulse<'_, R> {
 }
 
 /// Adds the gain of the forced faces to component `axis` of a part of the prediction, for a grain
-/// with the new `velocity` that changed by `change` in the step. [`super::sum_impulse`] has filled
+/// with the new `velocity` that changed by `change` in the step. [`sum_impulse`] has filled
 /// the lists of `forced`.
 pub fn impose_rigidity<R: Real>(
     axis: usize,

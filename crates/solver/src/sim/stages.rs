@@ -271,8 +271,7 @@ impl Projected<'_> {
 
 /// Velocities of a grain beyond those at the end of its sub-steps; zero where they are prescribed.
 fn beyond_substeps(grain: &Grain, end: &RigidState) -> RigidVelocity {
-    let [linear, angular] = end.velocities;
-    let beyond = grain.rigid_velocity() - RigidVelocity { linear, angular };
+    let beyond = grain.rigid_velocity() - end.velocity;
     let free = |constraint: MotionConstraint, velocity: DVec3| match constraint {
         MotionConstraint::Free => velocity,
         MotionConstraint::Prescribed(_) => DVec3::ZERO,

@@ -350,7 +350,7 @@ impl SelectedLaw {
             ContactLawKind::HertzMindlin => SelectedLaw::HertzMindlin(HertzMindlin),
         }
     }
-    /// The law itself.
+    /// Selected law behind the interface of all laws.
     pub fn get(&self) -> &dyn ContactLaw {
         match self {
             SelectedLaw::Linear(law) => law,

@@ -67,9 +67,10 @@ impl ContactModel {
         ContactModel { params, law: SelectedLaw::new(&params) }
     }
 
-    /// Largest gap at which a pair interacts [m].
+    /// Largest gap at which a pair interacts [m], by lubrication; zero without it.
     pub fn range(&self) -> f64 {
-        range(&self.params)
+        let ContactParams { lubrication_viscosity, lubrication_gap, .. } = self.params;
+        if lubrication_viscosity > 0.0 { lubrication_gap.max(0.0) } else { 0.0 }
     }
 
     /// Duration of an undamped contact [s] that is closing at `speed` [m/s] at `overlap` [m].
@@ -90,7 +91,7 @@ impl ContactModel {
         let Some(mean) = PatchMean::of(&record.patch.points, pair) else {
             record.end_contact();
             if let Some(closest) = closest {
-                record.loads = lubrication(&self.params, &closest, properties, pair, step);
+                record.loads = self.lubrication(&closest, properties, pair, step);
             }
             return;
         };
@@ -170,6 +171,43 @@ impl ContactModel {
         record.mean_history = TangentialHistory { id: 0, normal, displacement: mean_displacement };
         record.loads = loads;
     }
+
+    /// Leading-order squeeze-film force between the equal-volume spheres,
+    /// 6 pi mu R*^2 v_n (1/h - 1/h_0), with h at least the height of the asperities.
+    fn lubrication(
+        &self,
+        closest: &ClosestPoint,
+        properties: &PairProperties,
+        pair: &PairKinematics,
+        step: f64,
+    ) -> PairLoads {
+        let (params, range) = (&self.params, self.range());
+        if closest.gap >= range {
+            return PairLoads::default();
+        }
+        let strength = 6.0
+            * std::f64::consts::PI
+            * params.lubrication_viscosity
+            * properties.reduced_radius.powi(2);
+        let film = closest.gap.max(params.roughness).min(range);
+        let mut resistance = strength * (1.0 / film - 1.0 / range);
+        // An explicit dashpot must not reverse the approach within a sub-step.
+        if step * properties.inverse_mass > 0.0 {
+            resistance = resistance.min(0.5 / (step * properties.inverse_mass));
+        }
+        let lever_arm_b = closest.lever_arm + pair.branch;
+        let [a, b] = &pair.end_of_step;
+        let approach = (a.at(closest.lever_arm) - b.at(lever_arm_b)).dot(closest.normal);
+        let force = -resistance * approach * closest.normal;
+        PairLoads {
+            overlap: -closest.gap,
+            on_grain: Load { force, torque: closest.lever_arm.cross(force) },
+            on_partner: Load { force: -force, torque: -lever_arm_b.cross(force) },
+            lever_arm: closest.lever_arm,
+            normal: closest.normal,
+            elastic_energy: 0.0,
+        }
+    }
 }
 
 /// Updates the dashpot fraction and returns the part of the sub-step in contact [s].
@@ -217,17 +255,17 @@ fn relative_velocity(motion: &[RigidVelocity; 2], point: &ContactPoint, branch: 
 #[derive(Clone, Copy, Debug)]
 struct FrictionStep {
     /// Friction coefficient mu.
-    pub coefficient: f64,
+    coefficient: f64,
     /// Tangential stiffness k_zeta [N/m].
-    pub stiffness: f64,
+    stiffness: f64,
     /// Factor on earlier displacements after a change of the stiffness.
-    pub history_scale: f64,
+    history_scale: f64,
     /// Tangential dashpot [N s/m].
-    pub damping: f64,
+    damping: f64,
     /// Part of the sub-step in contact [s].
-    pub time_in_contact: f64,
+    time_in_contact: f64,
     /// Sub-step [s].
-    pub step: f64,
+    step: f64,
 }
 
 impl FrictionStep {
@@ -236,7 +274,7 @@ impl FrictionStep {
     ///
     /// Coulomb's bound and the stiffness scale alike with the share of the point in the pair, so
     /// the bound on the displacement does not depend on the share.
-    pub fn tangential_force(
+    fn tangential_force(
         &self,
         point: &ContactPoint,
         normal_force: f64,
@@ -273,46 +311,4 @@ impl FrictionStep {
 fn rotate_tangential(v: DVec3, from: DVec3, to: DVec3) -> DVec3 {
     let rotated = DQuat::from_rotation_arc(from, to) * v;
     rotated - rotated.dot(to) * to
-}
-
-/// Gap below which the lubrication force acts [m]; zero if it is switched off.
-fn range(params: &ContactParams) -> f64 {
-    if params.lubrication_viscosity > 0.0 { params.lubrication_gap.max(0.0) } else { 0.0 }
-}
-
-/// Leading-order squeeze-film force between the equal-volume spheres,
-/// 6 pi mu R*^2 v_n (1/h - 1/h_0), with h at least the height of the asperities.
-fn lubrication(
-    params: &ContactParams,
-    closest: &ClosestPoint,
-    properties: &PairProperties,
-    pair: &PairKinematics,
-    step: f64,
-) -> PairLoads {
-    let range = range(params);
-    if closest.gap >= range {
-        return PairLoads::default();
-    }
-    let strength = 6.0
-        * std::f64::consts::PI
-        * params.lubrication_viscosity
-        * properties.reduced_radius.powi(2);
-    let film = closest.gap.max(params.roughness).min(range);
-    let mut resistance = strength * (1.0 / film - 1.0 / range);
-    // An explicit dashpot must not reverse the approach within a sub-step.
-    if step * properties.inverse_mass > 0.0 {
-        resistance = resistance.min(0.5 / (step * properties.inverse_mass));
-    }
-    let lever_arm_b = closest.lever_arm + pair.branch;
-    let [a, b] = &pair.end_of_step;
-    let approach = (a.at(closest.lever_arm) - b.at(lever_arm_b)).dot(closest.normal);
-    let force = -resistance * approach * closest.normal;
-    PairLoads {
-        overlap: -closest.gap,
-        on_grain: Load { force, torque: closest.lever_arm.cross(force) },
-        on_partner: Load { force: -force, torque: -lever_arm_b.cross(force) },
-        lever_arm: closest.lever_arm,
-        normal: closest.normal,
-        elastic_energy: 0.0,
-    }
 }

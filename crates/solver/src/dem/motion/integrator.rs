@@ -126,8 +126,8 @@ pub(super) fn second_half_step(
 /// Acceleration of a grain in a fluid as an affine function of the contact load, over one step.
 #[derive(Clone, Copy, Debug)]
 pub struct GrainResponse {
-    /// Velocity [m/s] and angular velocity [rad/s] at the start, space frame.
-    pub(super) start: [DVec3; 2],
+    /// Velocities at the start, space frame.
+    pub(super) start: RigidVelocity,
     /// Acceleration [m/s^2] and angular acceleration [rad/s^2] without contact, space frame.
     free: [DVec3; 2],
     /// Columns of the inverse 6 x 6 mass of grain and entrained fluid: accelerations under a unit
@@ -138,7 +138,7 @@ pub struct GrainResponse {
 impl GrainResponse {
     /// Response from the velocities at the start, the loads without contact [N] and [N m], and the
     /// columns of the inverse 6 x 6 mass.
-    pub fn new(start: [DVec3; 2], load: Vector6, inverse: Matrix6) -> GrainResponse {
+    pub fn new(start: RigidVelocity, load: Vector6, inverse: Matrix6) -> GrainResponse {
         let mut response = GrainResponse { start, free: Default::default(), inverse };
         response.free = response.acceleration(&Load {
             force: DVec3::from_slice(&load[..3]),

@@ -19,7 +19,7 @@ use super::contact::{Contact, ContactMaterial, ContactModel, ContactParams, Cont
 use super::enclosure::{Enclosure, Partner};
 use super::grain::{Grain, MotionConstraint};
 use super::search::{BoundingSphere, BroadPhase};
-use crate::math::{Load, Pose};
+use crate::math::{Load, Pose, RigidVelocity};
 use contact_body::ContactBody;
 
 /// Contact model, contact history and integrator of all grains.
@@ -220,9 +220,7 @@ impl ContactDynamics {
         self.last_positions.clone_from(&before.last_positions);
         let starts = before.poses.iter().zip(responses);
         for (grain, (pose, response)) in grains.iter_mut().zip(starts) {
-            let [velocity, angular_velocity] = response.start;
-            (grain.pose, grain.velocity, grain.angular_velocity) =
-                (*pose, velocity, angular_velocity);
+            RigidState { pose: *pose, velocity: response.start }.apply_to(grain);
         }
         self.begin_step(grains);
         for (body, response) in self.bodies.iter_mut().zip(responses) {
@@ -249,39 +247,40 @@ impl ContactDynamics {
 pub struct RigidState {
     /// Position and orientation.
     pub pose: Pose,
-    /// Velocity [m/s] and angular velocity [rad/s], space frame.
-    pub velocities: [DVec3; 2],
+    /// Velocity and angular velocity, space frame.
+    pub velocity: RigidVelocity,
 }
 
 impl RigidState {
     /// Present state of a grain.
     pub fn of(grain: &Grain) -> RigidState {
-        RigidState { pose: grain.pose, velocities: [grain.velocity, grain.angular_velocity] }
+        RigidState { pose: grain.pose, velocity: grain.rigid_velocity() }
     }
 
     /// Gives a grain this state.
-    pub(super) fn apply_to(&self, grain: &mut Grain) {
+    pub fn apply_to(&self, grain: &mut Grain) {
         grain.pose = self.pose;
-        [grain.velocity, grain.angular_velocity] = self.velocities;
+        grain.velocity = self.velocity.linear;
+        grain.angular_velocity = self.velocity.angular;
     }
 }
 
 /// Contact history and poses before a trial step.
 ///
-/// [`super::ContactDynamics`] keeps the buffers between steps.
+/// [`ContactDynamics`] keeps the buffers between steps.
 #[derive(Clone, Debug, Default)]
 struct StateBefore {
-    pub records: Vec<ContactRecord>,
-    pub last_positions: Vec<DVec3>,
-    pub poses: Vec<Pose>,
+    records: Vec<ContactRecord>,
+    last_positions: Vec<DVec3>,
+    poses: Vec<Pose>,
     /// End of the trial step; filled while the step is resolved with the response of the fluid.
-    pub trial_ends: Vec<TrialEnd>,
+    trial_ends: Vec<TrialEnd>,
 }
 
 /// End of a trial step for one grain.
 #[derive(Clone, Copy, Debug)]
 struct TrialEnd {
-    pub state: RigidState,
+    state: RigidState,
     /// Whether a contact or lubrication load acted on the grain.
-    pub touched: bool,
+    touched: bool,
 }
