@@ -4,7 +4,7 @@
 //! The drag is a smoothed ghost-Dirichlet condition; the pressure weight P is the weight with which
 //! a pressure gradient drives the face:
 //!
-//! drag = L m / m, P = L M - drag M,
+//! drag / nu = D = L m / m, P = L M - D M,
 //! with L f = sum_a (f(d + h_a n_a) + f(d - h_a n_a) - 2 f(d)) / h_a^2
 //!
 //! With this drag and weight two velocity profiles over a plane wall solve the discrete equations
@@ -12,8 +12,11 @@
 //! parabola M(d) under a uniform pressure gradient or in an accelerated frame
 //! (`docs/decisions/0018-pressure-weight.md`).
 //!
-//! Legend: d signed distance, n unit normal, h spacing, eps half-width of the band, P pressure
-//! weight, A aperture, m open depth, M its integral.
+//! The strength of the drag is S = nu dt D, and s = S / (1 + S) is the weight of the rigid
+//! velocity.
+//!
+//! Legend: a axes, nu kinematic viscosity, d signed distance, n unit normal, h spacing, eps
+//! half-width of the band, P pressure weight, A aperture, m open depth, M its integral.
 
 use std::ops::Add;
 
@@ -29,10 +32,10 @@ use grainwake_simd::{Kernel, MAX_LANES, Scalar, Vector, dispatch};
 pub struct FaceForcing {
     /// Drag coefficient times dt; the weight of the rigid velocity is strength / (1 + strength).
     pub strength: f64,
-    /// Fraction of the face closed to the pressure gradient: one less its pressure weight P; zero
-    /// in the paper's scheme, which blends by the weight.
+    /// Fraction of the face closed to the pressure gradient, 1 - P; zero in the paper's scheme,
+    /// which uses the weight alone.
     pub closed_fraction: f64,
-    /// Solid fraction of the face, 1 - A; zero in the paper's scheme.
+    /// Solid fraction of the face, 1 - A; zero in the paper's scheme, which uses the weight alone.
     pub solid_fraction: f64,
 }
 
@@ -103,7 +106,8 @@ impl ForcingParams {
         let [drag, depth] = drag(d, normal, spacing, eps);
         let open = pressure_weight(d, normal, spacing, eps, [drag, depth]);
         let strength = V::constant(self.diffusion) * drag;
-        // Zero outside the band: a concave grain may enclose such faces.
+        // Zero beyond the forcing band, 2 eps from the surface: a run may span such faces between
+        // two parts of a concave grain.
         let outside = V::constant(2.0 * eps);
         let strength = d.select_below(outside, strength, V::constant(0.0));
         let one = V::constant(1.0);
@@ -143,8 +147,8 @@ impl Kernel for OneFace<'_> {
     }
 }
 
-/// Forced faces of one grain. All lists but `runs` have one entry per face, in the order of the
-/// runs, and `MAX_LANES` unused entries at the end.
+/// Forced faces of one grain. All lists but `runs` are empty or have one entry per face, in the
+/// order of the runs, and `MAX_LANES` unused entries at the end.
 #[derive(Clone, Debug, Default)]
 pub struct ForcedFaces {
     /// Positions of the faces, by component.
@@ -257,7 +261,7 @@ impl ForcedFaces {
     }
 }
 
-/// Weights of the faces of a grain without neighbours, aperture scheme.
+/// Weights of the faces as if the grain had no neighbours, aperture scheme.
 struct ComputeFaceWeights<'a> {
     params: &'a ForcingParams,
     band: &'a BandFaces,
@@ -287,33 +291,33 @@ impl Kernel for ComputeFaceWeights<'_> {
 }
 
 /// Drag coefficient over kinematic viscosity [1/m^2] of faces at distances `d` [m] with unit
-/// normals `n`, as numerator and positive denominator; very large where a face is closed.
+/// normals `n`, as numerator L m and positive denominator m; very large where a face is closed.
 #[inline(always)]
 pub fn drag<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
     let depth = open_depth(d, eps);
-    let excess = laplacian::<V, Shear>(d, n, spacing, eps, depth);
+    let numerator = laplacian::<V, Shear>(d, n, spacing, eps, depth);
     let least = V::constant(1e-12 * eps);
-    [excess.max(V::constant(0.0)), depth.max(least)]
+    [numerator.max(V::constant(0.0)), depth.max(least)]
 }
 
 /// Pressure weight P, 0 to 1, of faces at distances `d` [m] with unit normals `n`, which have the
-/// drag `excess` / `depth`.
+/// drag `numerator` / `depth`.
 #[inline(always)]
 pub fn pressure_weight<V: Vector>(
     d: V,
     n: [V; 3],
     spacing: [f64; 3],
     eps: f64,
-    [excess, depth]: [V; 2],
+    [numerator, depth]: [V; 2],
 ) -> V {
     let integral = open_depth_integral(d, eps);
     let driven = laplacian::<V, Parabola>(d, n, spacing, eps, integral);
-    // M / m grows from 0.2 to 0.29 times d + eps; the bound holds where rounding is larger than M.
+    // M / m grows from 0.2 to 0.283 times d + eps; the bound holds where rounding is larger than M.
     let bound = V::constant(0.3) * (d + V::constant(eps)).max(V::constant(0.0));
     let mean_depth = integral.div(depth);
     let outside = V::constant(2.0 * eps);
     let mean_depth = d.select_below(V::constant(eps), mean_depth.min(bound), mean_depth);
-    let weight = driven - excess * mean_depth;
+    let weight = driven - numerator * mean_depth;
     let weight = weight.max(V::constant(0.0)).min(V::constant(1.0));
     d.select_below(outside, weight, V::constant(1.0))
 }

@@ -2,8 +2,8 @@
 //! a trial step that is accepted or repeated with the response of the fluid
 //! (`docs/decisions/0014-contact-with-the-fluid-response.md`).
 //!
-//! `substeps.rs` has the contact sub-steps, `integrator.rs` and `rotation.rs` the motion of one
-//! grain.
+//! `substeps.rs` has the contact sub-steps, `contact_body.rs` the evaluation of one pair,
+//! `integrator.rs` and `rotation.rs` the motion of one grain, `checkpoint.rs` the stored state.
 
 mod checkpoint;
 mod contact_body;
@@ -80,9 +80,10 @@ impl ContactDynamics {
     /// Advances poses and velocities by `dt` [s] in sub-steps under constant `loads` (space frame,
     /// about the centroids) and contact; returns the number of sub-steps.
     ///
-    /// `mean_contact` receives the contact impulse on each grain divided by `dt`. A missing load
-    /// counts as zero. Positions are not wrapped into the box; a caller may wrap them between
-    /// steps.
+    /// `mean_contact` receives the impulse of contact and lubrication on each grain over `dt`, as a
+    /// mean load.
+    /// A missing load counts as zero. Positions are not wrapped into the box; a caller may wrap
+    /// them between steps.
     pub fn advance(
         &mut self,
         grains: &mut [Grain],
@@ -101,8 +102,8 @@ impl ContactDynamics {
         substeps
     }
 
-    /// Applies prescribed velocities, updates the contact bodies, and shifts the images of pairs
-    /// whose grains were wrapped by whole periods since the last step.
+    /// Applies prescribed velocities, updates the contact bodies, and renumbers the periodic image
+    /// of a pair if one of its grains was wrapped into the box since the last step.
     fn begin_step(&mut self, grains: &mut [Grain]) {
         for grain in grains.iter_mut() {
             if let MotionConstraint::Prescribed(velocity) = grain.translation {
@@ -198,7 +199,8 @@ impl ContactDynamics {
     /// Repeats a trial step from its start, with the response of the fluid of this step to contact.
     ///
     /// The grains keep the state of the trial step; `ends` receives the state after the repetition.
-    /// A grain without contact keeps the pose of the trial step. On entry `mean_contact` holds the
+    /// A grain on which no contact or lubrication load acts in either pass keeps the pose of the
+    /// trial step. On entry `mean_contact` holds the
     /// contact loads of the trial step, on return the loads of the repetition.
     pub fn resolve_with_response(
         &mut self,
@@ -226,6 +228,7 @@ impl ContactDynamics {
         for (body, response) in self.bodies.iter_mut().zip(responses) {
             body.response = Some(*response);
         }
+        // The responses contain all other loads.
         self.integrate(grains, &[], dt, mean_contact);
         for (n, grain) in grains.iter_mut().enumerate() {
             let trial_end = &before.trial_ends[n];
@@ -265,9 +268,8 @@ impl RigidState {
     }
 }
 
-/// Contact history and poses before a trial step.
-///
-/// [`ContactDynamics`] keeps the buffers between steps.
+/// Contact history and poses before a trial step, and the states after it. [`ContactDynamics`]
+/// keeps the buffers between steps.
 #[derive(Clone, Debug, Default)]
 struct StateBefore {
     records: Vec<ContactRecord>,

@@ -2,7 +2,7 @@
 //! of faces.
 //!
 //! [`Locator`] fills the lists (`lists.rs`) with the distances of `distances.rs` and
-//! `narrow_band.rs`; `aperture.rs` gives the open and the solid fraction of a face.
+//! `narrow_band.rs`; `aperture.rs` gives the aperture of a face or link.
 
 pub mod aperture;
 mod distances;
