@@ -13,6 +13,7 @@
 //! | `links`, `advection` | correction at the links near a grain | `AdvectionCorrection` |
 //! | `rigid_body` | 6 x 6 equations of motion with the impulse | `RigidBodySystem` |
 //! | `update`, `schedule` | work on one grain; order of the grains | `CoupledGrains` |
+//! | `initial` | flow at t = 0 | |
 //!
 //! # Order in a step
 //!
@@ -39,6 +40,7 @@
 mod advection;
 mod forcing;
 mod geometry;
+mod initial;
 mod links;
 #[cfg(test)]
 mod reference;
@@ -58,15 +60,13 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::dem::Grain;
-use crate::flow::{Flow, FlowMeasures};
+use crate::flow::Flow;
 use crate::grid::Mesh;
-use crate::math::{Real, RigidVelocity};
+use crate::math::Real;
 use forcing::{ForcedFaces, ForcingParams};
 use geometry::Locator;
-use rigidity::sum_impulse;
 use update::{
-    AccessLog, GrainUpdate, ImmersedGrain, PendingRigidity, ScratchPool, ThreadScratch,
-    locate_and_compute_weights,
+    AccessLog, GrainUpdate, ImmersedGrain, ScratchPool, ThreadScratch, locate_and_compute_weights,
 };
 
 /// Scheme by which the coupling imposes rigidity.
@@ -154,35 +154,5 @@ impl<R: Real> ImmersedGrains<R> {
     /// Memory held without the buffers of threads [bytes].
     pub fn bytes(&self) -> usize {
         self.grains.iter().map(ImmersedGrain::bytes).sum::<usize>() + self.locator.bytes()
-    }
-
-    /// Imposes the rigid velocities of the grains on the forced faces and makes the flow
-    /// solenoidal.
-    pub fn initialise(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> FlowMeasures {
-        flow.predicted.copy_from(&flow.velocity);
-        // In the limit of a long step every forced face takes the rigid velocity.
-        self.locate_with_forcing(grains, f64::MAX.sqrt());
-        let (known, predictions) = flow.prediction();
-        let (rest, density) = (RigidVelocity::default(), self.fluid_density);
-        let mut updates = std::mem::take(&mut self.updates);
-        updates.clear();
-        for (immersed, grain) in self.grains.iter_mut().zip(grains) {
-            let forced = &mut immersed.forced;
-            sum_impulse(&known, &predictions, density, forced, [rest; 2], 0.0);
-            let velocity = grain.rigid_velocity();
-            updates.push(GrainUpdate {
-                pending: Some(PendingRigidity {
-                    velocity,
-                    // The change has a weight only if the pressure gradient is removed, in a step.
-                    change: RigidVelocity::default(),
-                }),
-                ..Default::default()
-            });
-        }
-        self.impose_pending(flow, &updates);
-        self.updates = updates;
-        self.release_forcing();
-        flow.velocity.copy_from(&flow.predicted);
-        flow.make_solenoidal()
     }
 }

@@ -107,11 +107,7 @@ impl RigidBodySystem {
         dt: f64,
     ) -> Load {
         let new = grain.rigid_velocity();
-        let x = new.to_vector();
-        let Impulse { constant, matrix } = &self.impulse;
-        let j: Vector6 = std::array::from_fn(|row| {
-            constant[row] + matrix[row].iter().zip(x).map(|(m, x)| m * x).sum::<f64>()
-        });
+        let j = self.impulse.at(new);
         let added = &self.virtual_mass;
         let force = DVec3::from_slice(&j[..3]) + added.mass * new.linear - added.momentum;
         let torque =

@@ -40,6 +40,16 @@ pub struct Impulse {
     pub matrix: Matrix6,
 }
 
+impl Impulse {
+    /// Impulse for a grain with the new `velocity`.
+    pub fn at(&self, velocity: RigidVelocity) -> Vector6 {
+        let x = velocity.to_vector();
+        std::array::from_fn(|row| {
+            self.constant[row] + self.matrix[row].iter().zip(x).map(|(m, x)| m * x).sum::<f64>()
+        })
+    }
+}
+
 /// Sums the impulse over the faces of `forced` for a grain that had the velocity and acceleration
 /// `old` and `acceleration`, and fills their `rest_gain`. `dt` [s] is the length of the step; 0
 /// leaves out the pressure gradient, the body acceleration and that of the grain.

@@ -88,8 +88,9 @@ impl GrainData {
 }
 
 impl Simulation {
-    /// Builds the simulation at t = 0. The fluid inside and next to a grain starts at the velocity
-    /// of the grain.
+    /// Builds the simulation at t = 0. Grains that start with a velocity set the fluid in motion at
+    /// once: it starts with the irrotational flow around them (its added mass), inside a grain with
+    /// the velocity of the grain.
     ///
     /// # Errors
     /// [`SetupError::Inconsistent`] if values of the set-up contradict each other.

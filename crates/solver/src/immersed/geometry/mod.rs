@@ -10,7 +10,7 @@ mod lists;
 mod narrow_band;
 
 pub use lists::{BandFaces, FaceRow, FaceRun, LocatedBody, PAD};
-pub use narrow_band::{NarrowBandShapes, NeighbourGrain, load_all};
+pub use narrow_band::{NarrowBandShapes, NeighbourGrain, load_all, nearest_distance};
 
 use glam::{DMat3, DVec3};
 

@@ -1,0 +1,79 @@
+//! Flow around the grains at t = 0.
+//!
+//! A grain that starts with a velocity differing from the fluid's sets the fluid in motion at once,
+//! as an impulsive start does: the velocity jumps from the given one to the irrotational flow
+//! around the moving grain, before viscosity acts. The fluid outside a sphere then has half the
+//! momentum of the displaced fluid (its added mass).
+//!
+//! The faces inside the grains take the rigid velocity and the projection follows, in turns, until
+//! the faces hardly change. Faces in the band around the surface stay free: forced as well, they
+//! would drag along a layer of fluid.
+
+use super::rigidity::sum_impulse;
+use super::update::{GrainUpdate, PendingRigidity, locate_and_compute_weights};
+use super::{ImmersedGrain, ImmersedGrains};
+use crate::dem::Grain;
+use crate::flow::{Flow, FlowMeasures};
+use crate::math::{Real, RigidVelocity};
+use rayon::prelude::*;
+
+/// Share of the first impulse at which the iteration ends.
+const TOLERANCE: f64 = 1e-3;
+/// Largest number of projections.
+const MAX_PROJECTIONS: usize = 50;
+
+impl<R: Real> ImmersedGrains<R> {
+    /// Sets the flow around the grains in motion, or to rest, as an impulsive start does; returns
+    /// the measures of the flow.
+    pub fn initialise(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> FlowMeasures {
+        self.force_inside(grains);
+        let mut first = None;
+        for _ in 1..MAX_PROJECTIONS {
+            flow.predicted.copy_from(&flow.velocity);
+            let impulse = self.impose_start(flow, grains);
+            flow.velocity.copy_from(&flow.predicted);
+            if impulse <= TOLERANCE * *first.get_or_insert(impulse) {
+                break;
+            }
+            flow.make_solenoidal();
+        }
+        self.release_forcing();
+        flow.make_solenoidal()
+    }
+
+    /// Lists the faces inside the grains as forced faces.
+    fn force_inside(&mut self, grains: &[Grain]) {
+        self.locator.find_neighbours(grains, |_| 0.0);
+        let params = self.forcing_params(1.0);
+        let (locator, scratch) = (&self.locator, &self.scratch);
+        let each = self.grains.par_iter_mut().enumerate();
+        each.for_each(|(index, ImmersedGrain { body, forced, .. })| {
+            let (grain, scratch) = (&grains[index], &mut scratch.borrow().locate);
+            locate_and_compute_weights(locator, &params, index, grain, body, forced, scratch);
+            forced.force_inside(&scratch.band, locator.neighbours(index), locator.shapes());
+        });
+    }
+
+    /// Gives the forced faces of the prediction the velocities of the grains; returns the magnitude
+    /// of the impulse that this takes [N s].
+    fn impose_start(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> f64 {
+        let (known, predictions) = flow.prediction();
+        let rest = RigidVelocity::default();
+        let mut updates = std::mem::take(&mut self.updates);
+        updates.clear();
+        let mut square = 0.0;
+        for (immersed, grain) in self.grains.iter_mut().zip(grains) {
+            let (density, forced) = (self.fluid_density, &mut immersed.forced);
+            let impulse = sum_impulse(&known, &predictions, density, forced, [rest; 2], 0.0);
+            let velocity = grain.rigid_velocity();
+            let [x, y, z, ..] = impulse.at(velocity);
+            square += x * x + y * y + z * z;
+            // The change has a weight only in a step.
+            let pending = Some(PendingRigidity { velocity, change: rest });
+            updates.push(GrainUpdate { pending, ..GrainUpdate::default() });
+        }
+        self.impose_pending(flow, &updates);
+        self.updates = updates;
+        square.sqrt()
+    }
+}
