@@ -26,6 +26,8 @@ pub enum EventKind {
     /// A grain touches the floor for the first time.
     #[serde(alias = "floor")]
     Landing,
+    /// A grain has left the box through an open side.
+    Left,
 }
 
 impl EventKind {
@@ -37,6 +39,7 @@ impl EventKind {
             EventKind::RoleChange => "role-change",
             EventKind::Separation => "separation",
             EventKind::Landing => "landing",
+            EventKind::Left => "left",
         }
     }
     /// Returns the name in figures and pages.

@@ -87,8 +87,8 @@ pub struct GrainSummary {
     pub peak_settling_speed_m_per_s: f64,
     /// First contact with the floor [s].
     pub landing_time_s: Option<f64>,
-    /// Centroid at the end [m].
-    pub position_m: [f64; 3],
+    /// Centroid at the end [m]; none if the grain has left the box.
+    pub position_m: Option<[f64; 3]>,
 }
 
 impl Summary {

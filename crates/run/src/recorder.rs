@@ -257,7 +257,7 @@ impl Recorder {
             density: grain.density,
             peak_settling_speed_m_per_s: tracker.peak_settling_speeds()[i],
             landing_time_s: tracker.landing_times()[i],
-            position_m: grain.pose.position.to_array(),
+            position_m: (!grain.has_left()).then(|| grain.pose.position.to_array()),
         });
         Summary {
             steps: sim.steps(),
@@ -282,7 +282,7 @@ impl Recorder {
 /// Returns the gap between the surfaces of a pair [m].
 fn pair_gap(sim: &Simulation, enclosure: &Enclosure) -> Option<f64> {
     match sim.grains() {
-        [a, b] => Some(surface_gap(a, b, enclosure)),
+        [a, b] if !a.has_left() && !b.has_left() => Some(surface_gap(a, b, enclosure)),
         _ => None,
     }
 }

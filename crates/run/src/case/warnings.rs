@@ -65,11 +65,14 @@ fn open_faces(setup: &Setup) -> Vec<String> {
         let falls = pulls
             .iter()
             .any(|pull| outward * pull[axis] > 0.5 * pull.length() && *pull != DVec3::ZERO);
-        if open && falls {
+        let (side, axis) = (SIDES[side], AXES[axis]);
+        if open && falls && boundary == Boundary::FreeSurface {
             found.push(format!(
-                "grains may leave through the {} face of {}: outside they go on in free fall, feel no fluid and still count in tables and speeds; make it a \"wall\", or end the run before",
-                SIDES[side],
-                AXES[axis]
+                "grains may float in the free surface at the {side} face of {axis}, which stays flat: they have their buoyancy there, but make no waves and feel no splash and no surface tension"
+            ));
+        } else if open && falls {
+            found.push(format!(
+                "grains may leave through the {side} face of {axis}: they are gone from then on, with an event \"left\"; make it a \"wall\" to keep them"
             ));
         }
     }

@@ -52,7 +52,8 @@ impl Surfaces {
     pub fn at(&self, grains: &[Grain], time: f64) -> Surface {
         let mut surface = Surface { time: Some(time), ..Surface::default() };
         let (mut velocity, mut owners) = (Vec::new(), Vec::new());
-        for (index, (grain, body)) in grains.iter().zip(&self.by_grain).enumerate() {
+        let all = grains.iter().zip(&self.by_grain).enumerate();
+        for (index, (grain, body)) in all.filter(|(_, (grain, _))| !grain.has_left()) {
             let first = surface.points.len();
             for point in &body.points {
                 let point = grain.pose.to_space(*point);

@@ -105,7 +105,8 @@ fn grain_rows(sim: &Simulation) -> String {
         }
     }
     let mut text = String::new();
-    for (index, (grain, load)) in sim.grains().iter().zip(sim.loads()).enumerate() {
+    let all = sim.grains().iter().zip(sim.loads()).enumerate();
+    for (index, (grain, load)) in all.filter(|(_, (grain, _))| !grain.has_left()) {
         let row = GrainRow {
             time: sim.time(),
             grain: index,

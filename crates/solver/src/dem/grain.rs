@@ -85,6 +85,15 @@ impl Grain {
             (MotionConstraint::Prescribed(DVec3::ZERO), MotionConstraint::Prescribed(DVec3::ZERO));
         self
     }
+    /// Removes the grain from the box: it is at rest at infinity from now on.
+    pub fn leave(&mut self) {
+        self.pose.position = DVec3::INFINITY;
+        (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
+    }
+    /// Whether the grain has left the box.
+    pub fn has_left(&self) -> bool {
+        self.pose.position == DVec3::INFINITY
+    }
     /// Velocity and angular velocity, space frame.
     pub fn rigid_velocity(&self) -> RigidVelocity {
         RigidVelocity { linear: self.velocity, angular: self.angular_velocity }

@@ -7,12 +7,14 @@
 //! Legend: u velocity, p dynamic pressure over density, f its increment, H tendency.
 
 mod boundary;
+mod open_boundary;
 mod prediction;
 mod project;
 #[cfg(test)]
 mod tests;
 
 pub use boundary::{Boundaries, Boundary};
+pub(crate) use open_boundary::{BoxSide, CoveredFace};
 pub(crate) use prediction::{OldState, Prediction};
 pub(crate) use project::FlowMeasures;
 
@@ -83,6 +85,8 @@ pub struct Flow<R = f64> {
     impulse: DVec3,
     /// Pressure difference between upper and lower end, summed over the lines along each axis.
     pressure_rise: DVec3,
+    /// Outward speed of the fastest grain that crosses each side [m/s].
+    crossing_speeds: [[f64; 2]; 3],
 }
 
 impl<R: Real> Flow<R> {
@@ -110,6 +114,7 @@ impl<R: Real> Flow<R> {
             tendency_sums: [0.0; 6],
             impulse: DVec3::ZERO,
             pressure_rise: DVec3::ZERO,
+            crossing_speeds: [[0.0; 2]; 3],
         };
         flow.non_temporal = flow.bytes() > last_cache() / 4 * 3;
         flow.poisson.non_temporal = flow.non_temporal;
@@ -135,7 +140,7 @@ impl<R: Real> Flow<R> {
     pub fn make_solenoidal(&mut self) -> FlowMeasures {
         self.predicted.copy_from(&self.velocity);
         self.boundaries.set_normal(&mut self.predicted);
-        self.boundaries.convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, 0.0);
+        self.convect_outflow(0.0);
         let pressure = self.pressure.to_vec();
         let measures = self.project(1.0);
         self.pressure.copy_from_slice(&pressure);
@@ -183,7 +188,7 @@ impl<R: Real> Flow<R> {
         let [_, _, _, x, y, z] = self.tendency_sums;
         self.tendency_sums = [x, y, z, sum.x, sum.y, sum.z];
         self.impulse = now * sum + before * DVec3::new(x, y, z);
-        self.boundaries.convect_outflow(&self.mesh, &self.velocity, &mut self.predicted, dt);
+        self.convect_outflow(dt);
         self.previous_step = Some(dt);
         self.weight = now;
     }

@@ -14,6 +14,7 @@
 //! | `rigid_body` | 6 x 6 equations of motion with the impulse | `RigidBodySystem` |
 //! | `update`, `schedule` | work on one grain; order of the grains | `CoupledGrains` |
 //! | `initial` | flow at t = 0 | |
+//! | `emerged`, `open_sides` | grains that leave the box or a free surface | `Crossing` |
 //!
 //! # Order in a step
 //!
@@ -38,10 +39,12 @@
 //! Every kernel has a plain scalar form in `reference/`, against which it is tested.
 
 mod advection;
+mod emerged;
 mod forcing;
 mod geometry;
 mod initial;
 mod links;
+mod open_sides;
 #[cfg(test)]
 mod reference;
 mod rigid_body;
@@ -52,6 +55,7 @@ mod tests;
 mod update;
 
 pub(crate) use advection::GrainKinematics;
+pub(crate) use open_sides::{Crossing, OpenSides};
 pub(crate) use rigid_body::PreviousStep;
 pub(crate) use schedule::{CoupledGrains, RigidStep};
 pub(crate) use update::StepInput;

@@ -13,9 +13,10 @@
 
 use glam::{DMat3, DVec3};
 
+use super::emerged::EmergedPart;
 use super::rigidity::Impulse;
 use crate::dem::{Grain, GrainResponse, MotionConstraint};
-use crate::math::{Load, Matrix6, RigidVelocity, Vector6, solve6};
+use crate::math::{Load, Matrix6, RigidVelocity, Vector6, multiply6, solve6};
 
 /// State that a grain carries over from the previous step.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,17 +37,37 @@ pub struct RigidBodySystem {
     right: Vector6,
     virtual_mass: VirtualMass,
     impulse: Impulse,
+    /// Inertia of fluid that the emerged part of the grain does not displace; zero without one.
+    not_displaced: Matrix6,
+    /// Load of a grain that leaves the box.
+    last_load: Option<Load>,
 }
 
 impl RigidBodySystem {
+    /// Assembles the equations of a grain that leaves the box under the `applied` load and the
+    /// hydrodynamic load of the last step, `last_load`, over `dt` [s], without contact.
+    pub fn departing(
+        grain: &Grain,
+        previous: &PreviousStep,
+        impulse: Impulse,
+        [applied, last_load]: [Load; 2],
+        dt: f64,
+    ) -> RigidBodySystem {
+        let (none, load) = (Impulse::default(), applied + last_load);
+        let system = RigidBodySystem::new(grain, previous, none, 0.0, load, None, dt);
+        RigidBodySystem { impulse, last_load: Some(last_load), ..system }
+    }
+
     /// Assembles the equations under the `applied` load (weight less buoyancy) over `dt` [s],
-    /// without contact.
+    /// without contact. The `impulse` on a grain with an `emerged` part is relative to the pressure
+    /// at the free surface.
     pub fn new(
         grain: &Grain,
         previous: &PreviousStep,
         impulse: Impulse,
         fluid_density: f64,
         applied: Load,
+        emerged: Option<&EmergedPart>,
         dt: f64,
     ) -> RigidBodySystem {
         let ratio = 1.0 - fluid_density / grain.density;
@@ -55,7 +76,7 @@ impl RigidBodySystem {
         let gyroscopic = omega.cross(inertia * omega);
         let momentum = mass * v + dt * applied.force;
         let angular_momentum = inertia * omega + dt * (applied.torque - gyroscopic);
-        let virtual_mass = VirtualMass::new(grain, previous, fluid_density, dt);
+        let virtual_mass = VirtualMass::new(grain, previous, fluid_density, emerged.is_some(), dt);
         let mut a = impulse.matrix;
         let mut b = [0.0; 6];
         for row in 0..3 {
@@ -67,13 +88,31 @@ impl RigidBodySystem {
                 a[3 + row][3 + column] += (inertia + virtual_mass.inertia).col(column)[row];
             }
         }
+        let mut not_displaced = Matrix6::default();
+        if let Some(part) = emerged {
+            not_displaced = part.inertia.map(|row| row.map(|entry| fluid_density * entry));
+            let momentum = multiply6(&not_displaced, &previous.velocity.to_vector());
+            for row in 0..6 {
+                b[row] += momentum[row];
+                for column in 0..6 {
+                    a[row][column] += not_displaced[row][column];
+                }
+            }
+        }
         if grain.translation != MotionConstraint::Free {
             prescribe(&mut a, &mut b, 0, grain.velocity);
         }
         if grain.rotation != MotionConstraint::Free {
             prescribe(&mut a, &mut b, 3, grain.angular_velocity);
         }
-        RigidBodySystem { matrix: a, right: b, virtual_mass, impulse }
+        RigidBodySystem {
+            matrix: a,
+            right: b,
+            virtual_mass,
+            impulse,
+            not_displaced,
+            last_load: None,
+        }
     }
 
     /// New velocities under the mean `contact` load over `dt` [s].
@@ -106,13 +145,18 @@ impl RigidBodySystem {
         fluid_density: f64,
         dt: f64,
     ) -> Load {
+        if let Some(load) = self.last_load {
+            return load;
+        }
         let new = grain.rigid_velocity();
-        let j = self.impulse.at(new);
+        let mut j = self.impulse.at(new);
+        let change = new - previous.velocity;
+        let not_displaced = multiply6(&self.not_displaced, &change.to_vector());
+        j.iter_mut().zip(not_displaced).for_each(|(j, momentum)| *j += momentum);
         let added = &self.virtual_mass;
         let force = DVec3::from_slice(&j[..3]) + added.mass * new.linear - added.momentum;
         let torque =
             DVec3::from_slice(&j[3..]) + added.inertia * new.angular - added.angular_momentum;
-        let change = new - previous.velocity;
         let omega = previous.velocity.angular;
         let displaced = fluid_density / grain.density;
         let fluid_inertia = grain.inertia() * displaced;
@@ -121,6 +165,11 @@ impl RigidBodySystem {
             torque: (fluid_inertia * change.angular - torque) / dt
                 + omega.cross(fluid_inertia * omega),
         }
+    }
+
+    /// Impulse on the fluid [N s] of the grain, which has its new velocities.
+    pub fn fluid_impulse(&self, grain: &Grain) -> DVec3 {
+        DVec3::from_slice(&self.impulse.at(grain.rigid_velocity())[..3])
     }
 
     /// Response of the grain to contact in the sub-steps of this step. Without further contact the
@@ -196,10 +245,18 @@ struct VirtualMass {
 const FULL_BELOW: f64 = 0.8;
 
 impl VirtualMass {
-    /// Virtual mass of a grain in a step of `dt` [s]; 0 along prescribed degrees of freedom.
-    fn new(grain: &Grain, previous: &PreviousStep, fluid_density: f64, dt: f64) -> VirtualMass {
+    /// Virtual mass of a grain in a step of `dt` [s]; 0 along prescribed degrees of freedom. A
+    /// grain in a free surface gets all of it, since its added mass may exceed the displaced mass.
+    fn new(
+        grain: &Grain,
+        previous: &PreviousStep,
+        fluid_density: f64,
+        in_free_surface: bool,
+        dt: f64,
+    ) -> VirtualMass {
         let ratio = grain.density / fluid_density;
-        let part = ((1.0 - ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0) / ratio;
+        let part = ((1.0 - ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0);
+        let part = if in_free_surface { 1.0 } else { part } / ratio;
         let free = |constraint: MotionConstraint| {
             if constraint == MotionConstraint::Free { part } else { 0.0 }
         };

@@ -28,7 +28,7 @@ use glam::DVec3;
 use super::forcing::ForcedFaces;
 use super::geometry::FaceRun;
 use crate::flow::{OldState, Prediction};
-use crate::math::{Matrix6, Real, RigidVelocity, Vector6};
+use crate::math::{Matrix6, Real, RigidVelocity, Vector6, multiply6};
 use grainwake_simd::{Kernel, Partial, Stencil, Vector, dispatch};
 
 /// Impulse on the fluid in a step [N s, N m s], affine in the six new velocities of a grain.
@@ -43,10 +43,8 @@ pub struct Impulse {
 impl Impulse {
     /// Impulse for a grain with the new `velocity`.
     pub fn at(&self, velocity: RigidVelocity) -> Vector6 {
-        let x = velocity.to_vector();
-        std::array::from_fn(|row| {
-            self.constant[row] + self.matrix[row].iter().zip(x).map(|(m, x)| m * x).sum::<f64>()
-        })
+        let linear = multiply6(&self.matrix, &velocity.to_vector());
+        std::array::from_fn(|row| self.constant[row] + linear[row])
     }
 }
 

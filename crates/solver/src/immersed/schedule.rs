@@ -10,6 +10,7 @@
 //!
 //! Both orders give the same bits (`docs/decisions/0016-isolated-grains-in-one-traversal.md`).
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::advection::{add_correction, find_correction};
@@ -67,6 +68,8 @@ pub struct RigidStep<'a> {
     pub dt: f64,
     /// Receives the hydrodynamic loads (Eq. 5).
     pub loads: &'a mut [Load],
+    /// Receives the impulses on the fluid [N s].
+    pub fluid_impulses: &'a mut [DVec3],
 }
 
 impl<R: Real> ImmersedGrains<R> {
@@ -147,6 +150,10 @@ impl<R: Real> ImmersedGrains<R> {
         let each = each.filter(|(_, (_, update))| !update.isolated);
         each.for_each(|(index, (grain, _))| {
             let (kinematics, scratch) = (&input.kinematics[index], &mut *scratch.borrow());
+            if input.grains[index].has_left() {
+                *grain = ImmersedGrain::default();
+                return;
+            }
             let (body, correction) = (&grain.body, &mut grain.correction);
             find_correction(eps, &known, kinematics, body, &mut scratch.advection, correction);
         });
@@ -166,11 +173,13 @@ impl<R: Real> ImmersedGrains<R> {
         let mut updates = coupled.updates;
         let RigidStep { dt, .. } = step;
         let density = self.fluid_density;
-        let each = (updates.par_iter_mut().zip(&mut *step.grains)).zip(step.loads);
-        each.enumerate().for_each(|(index, ((update, grain), load))| {
+        let each = updates.par_iter_mut().zip(&mut *step.grains);
+        let each = each.zip(step.loads).zip(step.fluid_impulses).enumerate();
+        each.for_each(|(index, (((update, grain), load), impulse))| {
             let (previous, contact) = (&step.previous[index], step.contact[index]);
             update.set_velocities(grain, previous, contact, dt);
             *load = (update.system).hydrodynamic_load(grain, previous, density, dt);
+            *impulse = update.system.fluid_impulse(grain);
         });
         // A contact load found in the repeated sub-steps changes the velocity of an isolated grain
         // after its rigidity was imposed: its faces are listed again and take the difference.

@@ -56,6 +56,9 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
         previous: &previous,
         contact: &first,
         applied: &applied,
+        last_loads: &[],
+        crossings: &[],
+        surface_impulses: &[],
         dt: DT,
     };
     let coupled = immersed.couple(&mut flow, input);
@@ -67,6 +70,7 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
         contact: &resolved,
         dt: DT,
         loads: &mut loads,
+        fluid_impulses: &mut [DVec3::ZERO; 2],
     };
     immersed.impose_rigidity(&mut flow, coupled, rigid);
     let mut all: Vec<f64> = Vec::new();
@@ -157,6 +161,9 @@ fn padding_of_rows_affects_no_link() {
                 previous: &[PreviousStep::default(); 2],
                 contact: &[impact(), Load::default()],
                 applied: &[Load::default(); 2],
+                last_loads: &[],
+                crossings: &[],
+                surface_impulses: &[],
                 dt: 0.01,
             },
         );

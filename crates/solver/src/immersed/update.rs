@@ -10,11 +10,12 @@ use super::advection::{
 };
 use super::forcing::{ForcedFaces, ForcingParams};
 use super::geometry::{LocateScratch, LocatedBody, Locator};
+use super::open_sides::Crossing;
 use super::rigid_body::{PreviousStep, RigidBodySystem};
 use super::rigidity::{impose_rigidity, sum_impulse};
 use crate::dem::Grain;
 use crate::flow::{OldState, Prediction};
-use crate::math::{Load, Real, RigidVelocity};
+use crate::math::{Load, Real, RigidVelocity, Vector6};
 
 /// Lists of the faces near one grain, kept from one step to the next.
 #[derive(Default)]
@@ -100,6 +101,12 @@ pub struct StepInput<'a> {
     pub contact: &'a [Load],
     /// Weight less buoyancy.
     pub applied: &'a [Load],
+    /// Hydrodynamic loads of the last step.
+    pub last_loads: &'a [Load],
+    /// Crossings of open sides of the box; empty if it has none.
+    pub crossings: &'a [Crossing],
+    /// Impulses of the pressure at free surfaces, per density; empty without open sides.
+    pub surface_impulses: &'a [Vector6],
     /// Length of the step [s].
     pub dt: f64,
 }
@@ -205,13 +212,27 @@ impl<R: Real> CouplingStep<'_, R> {
         let (known, density, dt) = (&self.known, self.fluid_density, self.input.dt);
         let (grain, previous) = (&self.input.grains[index], &self.input.previous[index]);
         let motion = [previous.velocity, previous.acceleration];
-        let impulse = sum_impulse(known, predictions, density, forced, motion, dt);
+        let mut impulse = sum_impulse(known, predictions, density, forced, motion, dt);
         let applied = self.input.applied[index];
-        RigidBodySystem::new(grain, previous, impulse, density, applied, dt)
+        let emerged = match self.input.crossings.get(index) {
+            Some(Crossing::Departing) => {
+                let last_load = self.input.last_loads[index];
+                let loads = [applied, last_load];
+                return RigidBodySystem::departing(grain, previous, impulse, loads, dt);
+            }
+            Some(Crossing::Emerged(part)) => {
+                let surface = self.input.surface_impulses[index].map(|value| density * value);
+                impulse.constant.iter_mut().zip(surface).for_each(|(sum, value)| *sum += value);
+                Some(part)
+            }
+            _ => None,
+        };
+        RigidBodySystem::new(grain, previous, impulse, density, applied, emerged, dt)
     }
 }
 
-/// Locates a grain and computes the weights of the faces that it forces.
+/// Locates a grain and computes the weights of the faces that it forces; a grain that has left the
+/// box forces none.
 pub fn locate_and_compute_weights(
     locator: &Locator,
     params: &ForcingParams,
@@ -221,6 +242,10 @@ pub fn locate_and_compute_weights(
     forced: &mut ForcedFaces,
     scratch: &mut LocateScratch,
 ) {
+    if grain.has_left() {
+        (*body, *forced) = Default::default();
+        return;
+    }
     locator.locate(index, grain, body, &mut forced.runs, scratch);
     let neighbours = locator.neighbours(index);
     forced.compute_weights(params, &mut scratch.band, neighbours, locator.shapes());

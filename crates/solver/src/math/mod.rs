@@ -81,6 +81,14 @@ impl RigidVelocity {
     pub fn at(self, lever_arm: DVec3) -> DVec3 {
         self.linear + self.angular.cross(lever_arm)
     }
+    /// Pose of a body after it has moved from `pose` at this constant velocity for `dt` [s].
+    pub fn advance(self, pose: Pose, dt: f64) -> Pose {
+        let turn = DQuat::from_scaled_axis(dt * self.angular);
+        Pose {
+            position: pose.position + dt * self.linear,
+            orientation: (turn * pose.orientation).normalize(),
+        }
+    }
     /// Vector (V, Omega) of the six unknowns of the equations of motion.
     pub fn to_vector(self) -> Vector6 {
         let ([a, b, c], [d, e, f]) = (self.linear.to_array(), self.angular.to_array());
@@ -89,6 +97,13 @@ impl RigidVelocity {
     /// Inverse of [`Self::to_vector`].
     pub fn from_vector(x: &Vector6) -> RigidVelocity {
         RigidVelocity { linear: DVec3::from_slice(&x[..3]), angular: DVec3::from_slice(&x[3..]) }
+    }
+}
+
+impl std::ops::Add for RigidVelocity {
+    type Output = RigidVelocity;
+    fn add(self, other: RigidVelocity) -> RigidVelocity {
+        RigidVelocity { linear: self.linear + other.linear, angular: self.angular + other.angular }
     }
 }
 
@@ -110,6 +125,11 @@ impl std::ops::Div<f64> for RigidVelocity {
 pub type Vector6 = [f64; 6];
 /// Row-major 6 x 6 matrix.
 pub type Matrix6 = [[f64; 6]; 6];
+
+/// Product of a matrix and a vector.
+pub fn multiply6(a: &Matrix6, x: &Vector6) -> Vector6 {
+    a.map(|row| row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>())
+}
 
 /// Solves `a x = b` by Gaussian elimination with partial pivoting; `None` if singular.
 pub fn solve6(mut a: Matrix6, mut b: Vector6) -> Option<Vector6> {

@@ -9,7 +9,7 @@ use super::fields::AnyFieldView;
 use super::probe::Probe;
 use super::setup::Setup;
 use crate::dem::Grain;
-use crate::flow::{Flow, FlowMeasures, FluidParams};
+use crate::flow::{CoveredFace, Flow, FlowMeasures, FluidParams};
 use crate::grid::{Axis, FieldView};
 use crate::immersed::{CoupledGrains, ImmersedGrains, RigidStep, StepInput};
 use crate::math::{Precision, Real};
@@ -27,6 +27,12 @@ pub(super) trait Fluid: Send + Sync {
     fn couple(&mut self, input: StepInput) -> CoupledGrains;
     /// Solves for the velocities of the grains and imposes them on the forced faces.
     fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidStep);
+    /// Sets the outward speeds [m/s] of the fastest grains that cross each side.
+    fn set_crossing_speeds(&mut self, speeds: [[f64; 2]; 3]);
+    /// Kinematic pressure [m^2/s^2] below covered faces of one side, relative to the open ones.
+    fn pressure_below(&self, covered: &[CoveredFace]) -> Vec<f64>;
+    /// Gives the boundary faces that grains cover the velocities of these.
+    fn cover_boundary(&mut self, covered: &[CoveredFace]);
     /// Makes the velocity divergence-free.
     fn project(&mut self, dt: f64);
     /// Finds the faces near restored grains.
@@ -107,6 +113,15 @@ where
     }
     fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidStep) {
         self.grains.impose_rigidity(&mut self.flow, coupled, step);
+    }
+    fn set_crossing_speeds(&mut self, speeds: [[f64; 2]; 3]) {
+        self.flow.set_crossing_speeds(speeds);
+    }
+    fn pressure_below(&self, covered: &[CoveredFace]) -> Vec<f64> {
+        self.flow.pressure_below(covered)
+    }
+    fn cover_boundary(&mut self, covered: &[CoveredFace]) {
+        self.flow.cover_boundary(covered);
     }
     fn locate(&mut self, grains: &[Grain]) {
         self.grains.locate(grains);

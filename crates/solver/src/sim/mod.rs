@@ -17,9 +17,11 @@ mod step;
 mod tests;
 mod timing;
 
+use glam::DVec3;
+
 use crate::dem::{Contact, ContactDynamics, Grain, GrainResponse, RigidState};
 use crate::grid::Mesh;
-use crate::immersed::{GrainKinematics, PreviousStep};
+use crate::immersed::{GrainKinematics, OpenSides, PreviousStep};
 use crate::math::{Load, Pose};
 use crate::poisson::PoissonTimes;
 
@@ -46,10 +48,12 @@ pub struct Simulation {
     clock: Clock,
     fluid: Option<Box<dyn Fluid>>,
     dynamics: ContactDynamics,
+    /// Open sides of the box; none if all are walls or periodic.
+    open_sides: Option<OpenSides>,
     /// Mean hydrodynamic load on each grain over the last step.
     loads: Vec<Load>,
     /// Change of momentum in the last step not explained by forces [kg m/s].
-    momentum_residual: glam::DVec3,
+    momentum_residual: DVec3,
     data: GrainData,
     times: PassTimes,
 }
@@ -69,6 +73,8 @@ struct GrainData {
     ends: Vec<RigidState>,
     /// Poses at which the grains were located on the grid.
     located: Vec<Pose>,
+    /// Impulses on the fluid [N s].
+    fluid_impulses: Vec<DVec3>,
 }
 
 impl GrainData {
@@ -83,6 +89,7 @@ impl GrainData {
             responses: Vec::with_capacity(count),
             ends: grains.iter().map(RigidState::of).collect(),
             located: grains.iter().map(|grain| grain.pose).collect(),
+            fluid_impulses: vec![DVec3::ZERO; count],
         }
     }
 }
@@ -102,9 +109,10 @@ impl Simulation {
         let initial = fluid.as_ref().map_or(PoissonTimes::default(), |fluid| fluid.poisson_times());
         Ok(Simulation {
             dynamics: ContactDynamics::new(setup.contact, enclosure),
+            open_sides: OpenSides::new(&setup.mesh, &setup.boundaries, &setup.grains),
             clock: Clock::new(&setup),
             loads: vec![Load::default(); setup.grains.len()],
-            momentum_residual: glam::DVec3::ZERO,
+            momentum_residual: DVec3::ZERO,
             data: GrainData::new(&setup.grains),
             times: PassTimes { initial, ..PassTimes::default() },
             fluid,

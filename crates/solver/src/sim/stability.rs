@@ -74,7 +74,7 @@ impl Simulation {
             Err(StepError::Unstable { time: self.clock.time, step: self.clock.steps, what, remedy })
         };
         for (i, grain) in self.setup.grains.iter().enumerate() {
-            let finite = grain.pose.position.is_finite()
+            let finite = (grain.pose.position.is_finite() || grain.has_left())
                 && grain.velocity.is_finite()
                 && grain.angular_velocity.is_finite()
                 && grain.pose.orientation.is_finite();

@@ -8,7 +8,9 @@ use super::prescription::Prescription;
 use super::timing::{PassTimes, timed};
 use super::{GrainData, Simulation};
 use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
-use crate::immersed::{CoupledGrains, GrainKinematics, RigidStep, Scheme, StepInput};
+use crate::immersed::{
+    CoupledGrains, Crossing, GrainKinematics, OpenSides, PreviousStep, RigidStep, Scheme, StepInput,
+};
 use crate::math::{Load, RigidVelocity};
 
 /// Grains of a step, with or without fluid.
@@ -19,6 +21,7 @@ struct GrainStep<'a> {
     loads: &'a mut [Load],
     data: &'a mut GrainData,
     prescription: &'a Prescription,
+    open_sides: Option<&'a mut OpenSides>,
     times: &'a mut PassTimes,
     /// Time at the start of the step [s].
     time: f64,
@@ -83,21 +86,30 @@ impl<'a> Start<'a> {
     /// motion.
     pub fn new(sim: &'a mut Simulation, dt: f64) -> Start<'a> {
         let (setup, time) = (&mut sim.setup, sim.clock.time);
-        let solid = GrainStep {
+        let mut solid = GrainStep {
             grains: &mut setup.grains,
             dynamics: &mut sim.dynamics,
             loads: &mut sim.loads,
             data: &mut sim.data,
             prescription: &setup.prescription,
+            open_sides: sim.open_sides.as_mut(),
             times: &mut sim.times,
             time,
             dt,
         };
         let fluid_density = setup.fluid.map_or(0.0, |params| params.density);
         let data = &mut *solid.data;
+        if let Some(open_sides) = &mut solid.open_sides {
+            open_sides.update(solid.grains, dt);
+            open_sides.extrapolate_accelerations(&mut data.previous);
+        }
         for (i, grain) in solid.grains.iter().enumerate() {
+            let crossing = solid.open_sides.as_ref().map_or(Crossing::Inside, |o| o.crossings()[i]);
             data.previous[i].velocity = grain.rigid_velocity();
-            data.applied[i] = weight_less_buoyancy(grain, setup.gravity, fluid_density);
+            data.applied[i] = crossing.weight_less_buoyancy(grain, setup.gravity, fluid_density);
+            if let Crossing::Left = crossing {
+                (data.previous[i], solid.loads[i]) = (PreviousStep::default(), Load::default());
+            }
         }
         // Midpoint rule: the sub-steps take the prescribed velocities at the middle of the step.
         (setup.prescription).prescribe_motion(solid.grains, time + 0.5 * dt);
@@ -109,6 +121,9 @@ impl<'a> Start<'a> {
         }
         if let Some(acceleration) = setup.prescription.body_acceleration(time) {
             fluid.set_body_acceleration(acceleration);
+        }
+        if let Some(open_sides) = &solid.open_sides {
+            fluid.set_crossing_speeds(open_sides.speeds(solid.grains));
         }
         let flow = FluidStep {
             fluid,
@@ -177,12 +192,22 @@ impl<'a> Moved<'a> {
         if flow.scheme == Scheme::Paper {
             timed(&mut solid.times.project, || flow.fluid.project_prediction(dt));
         }
+        let (mut crossings, mut surface_impulses) = (&[][..], Vec::new());
+        if let Some(open_sides) = &mut solid.open_sides {
+            open_sides.list_covered_faces(solid.grains);
+            surface_impulses =
+                open_sides.surface_impulses(dt, |faces| flow.fluid.pressure_below(faces));
+            crossings = open_sides.crossings();
+        }
         let input = StepInput {
             grains: solid.grains,
             kinematics: &solid.data.kinematics,
             previous: &solid.data.previous,
             contact: &solid.data.contact,
             applied: &solid.data.applied,
+            last_loads: solid.loads,
+            crossings,
+            surface_impulses: &surface_impulses,
             dt,
         };
         let coupled = timed(&mut solid.times.coupling, || flow.fluid.couple(input));
@@ -223,8 +248,12 @@ impl<'a> Resolved<'a> {
             contact: &solid.data.contact,
             dt: solid.dt,
             loads: solid.loads,
+            fluid_impulses: &mut solid.data.fluid_impulses,
         };
         timed(&mut solid.times.coupling, || flow.fluid.impose_rigidity(coupled, rigid));
+        if let Some(open_sides) = &solid.open_sides {
+            flow.fluid.cover_boundary(&open_sides.covered_faces(solid.grains));
+        }
         Rigid(step, final_poses)
     }
 }
@@ -247,6 +276,7 @@ impl Projected<'_> {
         let (density, dt, data) = (flow.density, solid.dt, solid.data);
         let gain = flow.fluid.measures().momentum - self.momentum_before;
         let mut residual = density * (gain - flow.fluid.boundary_impulse(dt));
+        let crossings = solid.open_sides.as_ref().map_or(&[][..], |o| o.crossings());
         for (i, (grain, load)) in solid.grains.iter_mut().zip(&*solid.loads).enumerate() {
             data.located[i] = grain.pose;
             if let FinalPoses::Resolved = self.final_poses {
@@ -255,7 +285,12 @@ impl Projected<'_> {
             let previous = &mut data.previous[i];
             let change = grain.rigid_velocity() - previous.velocity;
             // The fluid lost what it gave the grain, the displaced fluid included.
-            residual -= density * grain.shape.volume() * change.linear - dt * load.force;
+            residual -= match crossings.get(i) {
+                None | Some(Crossing::Inside) => {
+                    density * grain.shape.volume() * change.linear - dt * load.force
+                }
+                Some(_) => data.fluid_impulses[i],
+            };
             let touched = !data.contact[i].is_zero();
             // The acceleration of an impact does not continue in the next step; its added mass
             // does.
@@ -279,13 +314,5 @@ fn beyond_substeps(grain: &Grain, end: &RigidState) -> RigidVelocity {
     RigidVelocity {
         linear: free(grain.translation, beyond.linear),
         angular: free(grain.rotation, beyond.angular),
-    }
-}
-
-/// Weight of a grain less its buoyancy in a fluid of `fluid_density` [kg/m^3].
-fn weight_less_buoyancy(grain: &Grain, gravity: DVec3, fluid_density: f64) -> Load {
-    Load {
-        force: gravity * (grain.density - fluid_density) * grain.shape.volume(),
-        torque: DVec3::ZERO,
     }
 }

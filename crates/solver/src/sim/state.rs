@@ -2,10 +2,13 @@
 
 use std::io::{self, Read, Write};
 
-use grainwake_formats::codec::{Decoder, Encoder};
+use grainwake_formats::codec::{Decoder, Encoder, invalid};
 
 use super::Simulation;
 use crate::math::Load;
+
+/// Begins the state of grains at open sides of the box.
+const OPEN_SIDES: u64 = u64::from_le_bytes(*b"OPENSIDE");
 
 impl Simulation {
     /// Writes the full state; a simulation restored from it continues with identical bits.
@@ -41,6 +44,13 @@ impl Simulation {
                 out.quaternion(pose.orientation)?;
             }
             fluid.save(&mut out)?;
+        }
+        if let Some(open_sides) = &self.open_sides {
+            out.u64(OPEN_SIDES)?;
+            for acceleration in &open_sides.earlier_accelerations {
+                out.vector(acceleration.linear)?;
+                out.vector(acceleration.angular)?;
+            }
         }
         self.dynamics.save(writer)
     }
@@ -79,6 +89,17 @@ impl Simulation {
             }
             fluid.restore(&mut input, self.clock.last_step)?;
             fluid.locate(&grains);
+        }
+        if let Some(open_sides) = &mut self.open_sides {
+            if input.u64()? != OPEN_SIDES {
+                return Err(invalid(
+                    "it was written by a version without grains that leave the box",
+                ));
+            }
+            for acceleration in &mut open_sides.earlier_accelerations {
+                acceleration.linear = input.vector()?;
+                acceleration.angular = input.vector()?;
+            }
         }
         self.dynamics.restore(reader)
     }

@@ -7,7 +7,10 @@ use crate::case::located::{Located, Span};
 use crate::case::number_format::{AXES, SIDES, length};
 use crate::case::placement::extent_along;
 use crate::case::raw::RawGrain;
-use grainwake_solver::dem::{Enclosure, Grain, Overlap, Partner, initial_overlaps, outside};
+use grainwake_solver::dem::{
+    Enclosure, Grain, Outside, Overlap, Partner, initial_overlaps, outside,
+};
+use grainwake_solver::flow::{Boundaries, Boundary};
 
 /// Coordinates and sizes of more box lengths than this suggest a forgotten unit.
 const FAR: f64 = 10.0;
@@ -79,15 +82,16 @@ impl Placement {
     }
 }
 
-/// Reports grains that leave the box or overlap.
+/// Reports grains that overlap or cross a side of the box other than a free surface.
 pub(super) fn check(
     check: &mut Checker,
     grains: &[Grain],
     placements: &[Placement],
     enclosure: &Enclosure,
+    boundaries: &Boundaries,
 ) {
     if grains.iter().all(|grain| grain.pose.position.is_finite()) {
-        check_faces(check, grains, placements, enclosure);
+        check_faces(check, grains, placements, enclosure, boundaries);
         check_overlaps(check, grains, placements, enclosure);
     }
 }
@@ -97,9 +101,12 @@ fn check_faces(
     grains: &[Grain],
     placements: &[Placement],
     enclosure: &Enclosure,
+    boundaries: &Boundaries,
 ) {
     let mut reported = vec![false; grains.len()];
-    for o in outside(grains, enclosure) {
+    let found = outside(grains, enclosure);
+    let floats = |o: &Outside| boundaries.0[o.axis][o.side] == Boundary::FreeSurface;
+    for o in found.into_iter().filter(|o| !floats(o)) {
         if std::mem::replace(&mut reported[o.grain], true) {
             continue;
         }

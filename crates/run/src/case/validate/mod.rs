@@ -98,7 +98,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     let mut grains = built.into_iter().collect::<Option<Vec<Grain>>>()?;
     prescription.motions = motions;
     prescription.prescribe_motion(&mut grains, 0.0);
-    arrangement::check(check, &grains, &placements, &enclosure);
+    arrangement::check(check, &grains, &placements, &enclosure, &boundaries);
     if dry && grains.is_empty() {
         let message = "there is neither a fluid nor a grain";
         check.fail_key("grain", message, "add [fluid] or [[grain]]");

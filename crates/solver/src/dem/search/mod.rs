@@ -100,9 +100,8 @@ impl BroadPhase {
         let cells = CellGrid::around(&self.centres, 2.0 * largest);
         self.sort_by_cell(&cells);
         for (grain, sphere) in spheres.iter().enumerate() {
-            if let Some(centre) = self.inside[grain] {
-                self.pair_with_neighbours(grain as u32, centre as usize, spheres, &cells);
-            }
+            let Some(centre) = self.inside[grain] else { continue };
+            self.pair_with_neighbours(grain as u32, centre as usize, spheres, &cells);
             for face in enclosure.faces() {
                 if face.distance(sphere.centre) <= sphere.radius {
                     self.pairs.push(PairKey::wall(grain as u32, &face));

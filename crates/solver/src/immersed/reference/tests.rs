@@ -367,7 +367,8 @@ fn new_velocities_satisfy_the_equations_of_motion() {
             let forced = &mut case.located[index].1;
             let before = [previous.velocity, previous.acceleration];
             let impulse = sum_impulse(&known, &predictions, DENSITY, forced, before, DT);
-            let system = RigidBodySystem::new(&grain, &previous, impulse, DENSITY, applied, DT);
+            let system =
+                RigidBodySystem::new(&grain, &previous, impulse, DENSITY, applied, None, DT);
             let new = system.velocities(&grain, &previous, contact, DT);
             let (reference, load) = (&case.reference, applied + contact);
             let j = reference.impulse(index, &known, u, [before[0], before[1], new], DENSITY);

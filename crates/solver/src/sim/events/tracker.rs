@@ -53,6 +53,7 @@ impl Tracker {
         for (peak, grain) in self.state.peak_settling_speed.iter_mut().zip(grains) {
             *peak = peak.max(grain.velocity.dot(self.params.down));
         }
+        self.update_left(time, grains);
         if let ([a, b], Some(gap), Some(pair)) = (grains, gap, &mut self.state.pair) {
             let of_pair = |contact: &Contact| {
                 let pair = (contact.grain, contact.partner);
@@ -70,6 +71,16 @@ impl Tracker {
         self.update_landing(time, contacts);
         self.update_rest(time, grains, contacts);
         self.state.events[first..].to_vec()
+    }
+
+    fn update_left(&mut self, time: f64, grains: &[Grain]) {
+        for (index, _) in grains.iter().enumerate().filter(|(_, grain)| grain.has_left()) {
+            let left = Event::new(EventKind::Left, time, &[index]);
+            let same = |event: &Event| event.kind == left.kind && event.grains == left.grains;
+            if !self.state.events.iter().any(same) {
+                self.state.events.push(left);
+            }
+        }
     }
 
     fn update_landing(&mut self, time: f64, contacts: &[Contact]) {
@@ -98,7 +109,7 @@ impl Tracker {
         let still = grains
             .iter()
             .zip(supported)
-            .filter(|(g, _)| g.translation == MotionConstraint::Free)
+            .filter(|(g, _)| g.translation == MotionConstraint::Free && !g.has_left())
             .all(|(g, supported)| {
                 let spin = g.angular_velocity.length() * g.shape.bounding_radius();
                 supported && g.velocity.length() + spin < self.params.rest_speed
@@ -115,7 +126,7 @@ impl Tracker {
                     .landed
                     .iter()
                     .zip(grains)
-                    .filter(|(_, g)| g.translation == MotionConstraint::Free)
+                    .filter(|(_, g)| g.translation == MotionConstraint::Free && !g.has_left())
                     .peekable();
                 free.peek()?;
                 free.try_fold(0.0_f64, |last, (landed, _)| landed.map(|t| last.max(t)))
@@ -135,9 +146,10 @@ impl Tracker {
     pub fn phase(&self) -> Option<Phase> {
         self.state.pair.as_ref().map(|p| p.phase)
     }
-    /// Gap between the surfaces of a pair after the last step [m].
+    /// Gap between the surfaces of a pair after the last step [m]; none once a grain has left.
     pub fn gap(&self) -> Option<f64> {
-        self.state.pair.as_ref().map(|p| p.gap)
+        let complete = self.first(EventKind::Left).is_none();
+        self.state.pair.as_ref().filter(|_| complete).map(|p| p.gap)
     }
     /// Index of the lower grain of a pair.
     pub fn leader(&self) -> Option<usize> {

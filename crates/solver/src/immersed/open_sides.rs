@@ -1,0 +1,272 @@
+//! Grains at the open sides of the box: outflows and inflows, through which they leave, and free
+//! surfaces, from which they emerge.
+//!
+//! - **Leaving.** Close to an open side the hydrodynamic load is no longer that of an unbounded
+//!   fluid. From [`MARGIN`] cells before the side on, a grain moves under its last load. Once it is
+//!   beyond the side it has left ([`Grain::leave`]).
+//! - **Emerging.** The part beyond a free surface has neither buoyancy nor displaced fluid
+//!   (`emerged.rs`). The pressure that acts on the grain is relative to that at the open surface.
+//!
+//! The boundary faces that a grain covers move with it (`flow/open_boundary.rs`).
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::emerged::{EmergedPart, Subvolumes};
+use super::rigid_body::PreviousStep;
+use crate::dem::Grain;
+use crate::flow::{Boundaries, Boundary, BoxSide, CoveredFace};
+use crate::grid::Mesh;
+use crate::math::{Load, RigidVelocity, Vector6};
+
+/// Cells before an open side from which on a grain moves under its last hydrodynamic load.
+const MARGIN: f64 = 2.0;
+
+/// Location of a grain relative to the open sides.
+#[derive(Clone, Copy, Debug, Default)]
+pub enum Crossing {
+    /// Away from them.
+    #[default]
+    Inside,
+    /// Partly beyond a free surface.
+    Emerged(EmergedPart),
+    /// About to leave: moves under its last hydrodynamic load.
+    Departing,
+    /// Gone.
+    Left,
+}
+
+/// Face that a grain covers.
+#[derive(Clone, Copy)]
+struct GrainFace {
+    grain: usize,
+    /// Vector from the centroid [m].
+    lever_arm: DVec3,
+    face: CoveredFace,
+}
+
+/// Open sides of a box and the grains that cross them.
+pub struct OpenSides {
+    mesh: Mesh,
+    periodic: [bool; 3],
+    sides: Vec<(BoxSide, Boundary)>,
+    /// By grain; empty without a free surface.
+    subvolumes: Vec<Arc<Subvolumes>>,
+    /// By grain.
+    crossings: Vec<Crossing>,
+    /// Accelerations of the grains over the step before the last; part of a checkpoint.
+    pub earlier_accelerations: Vec<RigidVelocity>,
+    faces: Vec<GrainFace>,
+}
+
+impl OpenSides {
+    /// Open sides of a box; none if it has only walls and periodic sides.
+    pub fn new(mesh: &Mesh, boundaries: &Boundaries, grains: &[Grain]) -> Option<OpenSides> {
+        let sides = BoxSide::all().map(|side| (side, side.boundary(boundaries)));
+        let sides: Vec<_> = sides
+            .filter(|(_, boundary)| *boundary != Boundary::Periodic && !boundary.is_solid())
+            .collect();
+        let has_surface = sides.iter().any(|(_, side)| *side == Boundary::FreeSurface);
+        (!sides.is_empty()).then(|| OpenSides {
+            mesh: *mesh,
+            periodic: boundaries.periodic(),
+            sides,
+            subvolumes: if has_surface { Subvolumes::of_all(grains) } else { Vec::new() },
+            crossings: vec![Crossing::Inside; grains.len()],
+            earlier_accelerations: vec![RigidVelocity::default(); grains.len()],
+            faces: Vec::new(),
+        })
+    }
+
+    /// Crossings of the grains.
+    pub fn crossings(&self) -> &[Crossing] {
+        &self.crossings
+    }
+
+    /// Finds the crossings in a step of `dt` [s] that begins at the present poses; grains beyond an
+    /// open side leave.
+    pub fn update(&mut self, grains: &mut [Grain], dt: f64) {
+        for (index, grain) in grains.iter_mut().enumerate() {
+            let crossing = self.crossing(index, grain, dt);
+            if let Crossing::Left = crossing {
+                grain.leave();
+            }
+            self.crossings[index] = crossing;
+        }
+    }
+
+    /// Extrapolates the accelerations of emerged grains, of `previous`, to the step about to be
+    /// taken: a virtual mass that lags behind by one step feeds the heave.
+    pub fn extrapolate_accelerations(&mut self, previous: &mut [PreviousStep]) {
+        let all = previous.iter_mut().zip(&mut self.earlier_accelerations).zip(&self.crossings);
+        for ((previous, earlier), crossing) in all {
+            let last = std::mem::replace(earlier, previous.acceleration);
+            if let Crossing::Emerged(_) = crossing {
+                previous.acceleration = previous.acceleration + (previous.acceleration - last);
+            }
+        }
+    }
+
+    fn crossing(&self, index: usize, grain: &Grain, dt: f64) -> Crossing {
+        if grain.has_left() {
+            return Crossing::Left;
+        }
+        let mut crossing = Crossing::Inside;
+        for &(side, boundary) in &self.sides {
+            let margin = MARGIN * self.mesh.spacing[side.axis];
+            let coordinate = side.coordinate(&self.mesh);
+            let beyond = |x: DVec3| side.outward() * (x[side.axis] - coordinate);
+            if beyond(grain.pose.position) + grain.shape.bounding_radius() < -margin {
+                continue;
+            }
+            let nodes = grain.shape.nodes().iter();
+            let nodes = nodes.map(|node| beyond(grain.pose.to_space(node.position)));
+            let (lowest, highest) = nodes.fold((f64::INFINITY, f64::NEG_INFINITY), |range, x| {
+                (range.0.min(x), range.1.max(x))
+            });
+            if boundary == Boundary::FreeSurface {
+                if highest > 0.0 && !matches!(crossing, Crossing::Departing) {
+                    let direction = (side.axis, side.outward());
+                    let spacing = self.mesh.spacing[side.axis];
+                    let subvolumes = &self.subvolumes[index];
+                    // Buoyancy at the start of the step would feed the heave.
+                    let middle = grain.rigid_velocity().advance(grain.pose, 0.5 * dt);
+                    let part = EmergedPart::new(subvolumes, middle, direction, coordinate, spacing);
+                    crossing = Crossing::Emerged(part);
+                }
+            } else if lowest > 0.0 {
+                return Crossing::Left;
+            } else if highest > -margin {
+                crossing = Crossing::Departing;
+            }
+        }
+        crossing
+    }
+
+    /// Outward speed [m/s] of the fastest grain that crosses each side, by axis and side.
+    pub fn speeds(&self, grains: &[Grain]) -> [[f64; 2]; 3] {
+        let mut speeds = [[0.0; 2]; 3];
+        for (grain, crossing) in grains.iter().zip(&self.crossings) {
+            if !matches!(crossing, Crossing::Left) {
+                for (side, _) in self.near(grain, 4.0 * grain.shape.bounding_radius()) {
+                    let fastest: &mut f64 = &mut speeds[side.axis][side.side];
+                    *fastest = fastest.max(side.outward() * grain.velocity[side.axis]);
+                }
+            }
+        }
+        speeds
+    }
+
+    /// Sides closer than `distance` [m] to the centroid of a grain, or which it has crossed.
+    fn near(&self, grain: &Grain, distance: f64) -> impl Iterator<Item = (BoxSide, Boundary)> {
+        self.sides.iter().copied().filter(move |(side, _)| {
+            let along = grain.pose.position[side.axis] - side.coordinate(&self.mesh);
+            side.outward() * along > -distance
+        })
+    }
+
+    /// Lists the boundary faces that the grains cover at their present poses. The normal velocity at
+    /// an inflow is prescribed, covered or not.
+    pub fn list_covered_faces(&mut self, grains: &[Grain]) {
+        self.faces.clear();
+        for (index, grain) in grains.iter().enumerate() {
+            if matches!(self.crossings[index], Crossing::Inside | Crossing::Left) {
+                continue;
+            }
+            let reach = grain.shape.bounding_radius() + self.mesh.spacing.max_element();
+            let sides: Vec<_> = self.near(grain, reach).collect();
+            for (side, boundary) in sides {
+                if !matches!(boundary, Boundary::Inflow { .. }) {
+                    self.list_faces_of(index, grain, side);
+                }
+            }
+        }
+    }
+
+    fn list_faces_of(&mut self, index: usize, grain: &Grain, side: BoxSide) {
+        let (mesh, centre) = (self.mesh, grain.pose.position);
+        let axes = [(side.axis + 1) % 3, (side.axis + 2) % 3];
+        let [a, b] = axes.map(|axis| {
+            let cell = |x: f64| ((x - mesh.origin[axis]) / mesh.spacing[axis]).floor() as i64;
+            let radius = grain.shape.bounding_radius();
+            cell(centre[axis] - radius)..=cell(centre[axis] + radius)
+        });
+        let width = 0.5 * (mesh.spacing[axes[0]] + mesh.spacing[axes[1]]);
+        // Index of a face inside the box, counted from 1.
+        let inside = |n: i64, axis: usize| {
+            let count = mesh.cells[axis] as i64;
+            let n = if self.periodic[axis] { n.rem_euclid(count) } else { n };
+            (0..count).contains(&n).then_some(n as usize + 1)
+        };
+        for (n, m) in b.flat_map(|m| a.clone().map(move |n| (n, m))) {
+            let (Some(i), Some(j)) = (inside(n, axes[0]), inside(m, axes[1])) else { continue };
+            let mut x = DVec3::ZERO;
+            x[side.axis] = side.coordinate(&mesh);
+            for (axis, n) in axes.into_iter().zip([n, m]) {
+                x[axis] = mesh.origin[axis] + mesh.spacing[axis] * (n as f64 + 0.5);
+            }
+            let distance = grain.shape.distance(grain.pose.to_body(x));
+            let fraction = (0.5 - distance / width).clamp(0.0, 1.0);
+            if fraction > 0.0 {
+                let lever_arm = x - centre;
+                let face = CoveredFace { side, indices: [i, j], fraction, velocity: 0.0 };
+                self.faces.push(GrainFace { grain: index, lever_arm, face });
+            }
+        }
+    }
+
+    /// Covered faces with the velocities of their grains.
+    pub fn covered_faces(&self, grains: &[Grain]) -> Vec<CoveredFace> {
+        let velocity = |face: &GrainFace| {
+            grains[face.grain].rigid_velocity().at(face.lever_arm)[face.face.side.axis]
+        };
+        let each = self.faces.iter();
+        each.map(|face| CoveredFace { velocity: velocity(face), ..face.face }).collect()
+    }
+
+    /// Impulse that the pressure at the free surface takes from the forcing of each emerged grain
+    /// over a step of `dt` [s], per density of the fluid. `pressure_below` returns the kinematic
+    /// pressure below faces of one side, relative to the open surface.
+    pub fn surface_impulses(
+        &self,
+        dt: f64,
+        pressure_below: impl Fn(&[CoveredFace]) -> Vec<f64>,
+    ) -> Vec<Vector6> {
+        let mut impulses = vec![[0.0; 6]; self.crossings.len()];
+        for &(side, boundary) in &self.sides {
+            if boundary != Boundary::FreeSurface {
+                continue;
+            }
+            let of_side = || self.faces.iter().filter(|face| face.face.side == side);
+            let faces: Vec<_> = of_side().map(|face| face.face).collect();
+            let area = self.mesh.cell_volume() / self.mesh.spacing[side.axis];
+            for (face, pressure) in of_side().zip(pressure_below(&faces)) {
+                let magnitude = -dt * area * face.face.fraction * pressure * side.outward();
+                let force = magnitude * DVec3::AXES[side.axis];
+                let torque = face.lever_arm.cross(force);
+                let sum = &mut impulses[face.grain];
+                let all = force.to_array().into_iter().chain(torque.to_array());
+                sum.iter_mut().zip(all).for_each(|(sum, value)| *sum += value);
+            }
+        }
+        impulses
+    }
+}
+
+impl Crossing {
+    /// Weight less buoyancy of a grain in a fluid of `fluid_density` [kg/m^3].
+    pub fn weight_less_buoyancy(&self, grain: &Grain, gravity: DVec3, fluid_density: f64) -> Load {
+        let force = gravity * (grain.density - fluid_density) * grain.shape.volume();
+        let submerged = Load { force, torque: DVec3::ZERO };
+        match self {
+            Crossing::Inside | Crossing::Departing => submerged,
+            Crossing::Left => Load::default(),
+            Crossing::Emerged(part) => {
+                let weight = fluid_density * gravity;
+                let lost = Load { force: part.volume * weight, torque: part.moment.cross(weight) };
+                submerged + lost
+            }
+        }
+    }
+}
