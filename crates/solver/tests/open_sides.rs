@@ -1,0 +1,201 @@
+//! Grains at open sides of the box: they leave through an outflow as if the domain went on, and
+//! float in a free surface as Archimedes found.
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use glam::DVec3;
+use grainwake_shape::{Shape, ShapeOptions, analytic};
+use grainwake_solver::dem::{ContactParams, Grain};
+use grainwake_solver::flow::{Boundary, FluidParams};
+use grainwake_solver::grid::Mesh;
+use grainwake_solver::sim::events::{EventKind, EventParams, StopWhen, Tracker};
+use grainwake_solver::sim::{Setup, Simulation, StepRule};
+
+const WALLS: [Boundary; 2] = [Boundary::WALL; 2];
+const H: f64 = 1.0 / 8.0;
+
+/// Grains in a fluid of density 1 and kinematic viscosity `nu` in a box of `cells`, with gravity 1
+/// along -z and the sides `z` below and above.
+fn setup(cells: [usize; 3], z: [Boundary; 2], nu: f64, grains: Vec<Grain>) -> Setup {
+    Setup::new(Mesh::cubic(cells, H))
+        .with_boundaries([WALLS, WALLS, z])
+        .with_fluid(FluidParams::new(1.0, nu))
+        .with_gravity(DVec3::NEG_Z)
+        .with_grains(grains)
+        .with_contact(ContactParams { normal_stiffness: 50.0, ..ContactParams::default() })
+        .with_step(StepRule::Limits { cfl: 0.3, viscous: 0.2, max_step: 0.1 })
+}
+
+fn grain(shape: Shape, density: f64, position: [f64; 3]) -> Grain {
+    Grain::new(shape, density).with_position(DVec3::from_array(position))
+}
+
+fn sphere(density: f64, position: [f64; 3]) -> Grain {
+    grain(Shape::sphere(0.5, 600), density, position)
+}
+
+fn step(sim: &mut Simulation) {
+    sim.step(f64::INFINITY).expect("a stable step");
+}
+
+/// Sphere of density 2.65 that falls from `above` over the lower side, an outflow; Galileo number
+/// 100.
+fn falling_out(height: usize, above: f64) -> Simulation {
+    let nu = 1.65f64.sqrt() / 100.0;
+    let grain = sphere(2.65, [2.0, 2.02, above]);
+    let sides = [Boundary::Outflow, Boundary::WALL];
+    Simulation::new(setup([32, 32, height], sides, nu, vec![grain])).unwrap()
+}
+
+#[test]
+fn a_grain_leaves_through_an_outflow_as_if_the_domain_went_on() {
+    let (mut short, mut long) = (falling_out(56, 5.5), falling_out(88, 9.5));
+    let mut balance: f64 = 0.0;
+    while short.grains()[0].pose.position.z > 0.0 {
+        step(&mut short);
+        long.advance_to(short.time()).unwrap();
+        balance = balance.max(short.diagnostics().momentum_residual);
+    }
+    let [short_speed, long_speed] = [&short, &long].map(|sim| sim.grains()[0].velocity.z);
+    let difference = short_speed / long_speed - 1.0;
+    assert!(difference.abs() < 0.03, "speed at the plane: {short_speed} and {long_speed}");
+    let sideways = short.grains()[0].velocity.truncate().length() / short_speed.abs();
+    assert!(sideways < 0.01, "{sideways}");
+    // The grain leaves within a few steps after it is beyond the plane, and is gone for good.
+    let params = EventParams::for_grains(short.grains(), DVec3::NEG_Z, 1.0, [None; 3]);
+    let mut tracker = Tracker::new(params, short.grains(), None);
+    for _ in 0..200 {
+        step(&mut short);
+        tracker.update(short.time(), short.grains(), short.contacts(), None);
+        balance = balance.max(short.diagnostics().momentum_residual);
+    }
+    assert!(short.grains()[0].has_left());
+    assert_eq!(tracker.events().len(), 1);
+    assert_eq!(
+        (tracker.events()[0].kind, &tracker.events()[0].grains[..]),
+        (EventKind::Left, &[0][..])
+    );
+    assert!(tracker.holds_since(StopWhen::Landing, short.grains()).is_none());
+    assert_eq!(short.loads()[0], Default::default());
+    assert!(balance < 1e-13, "momentum residual {balance:e}");
+    let after = short.diagnostics();
+    assert!(after.grain_kinetic_energy == 0.0 && after.slip == 0.0, "{after:?}");
+    assert!(after.max_divergence < 1e-10 * after.max_velocity / H, "{after:?}");
+}
+
+#[test]
+fn a_grain_that_leaves_is_restored_with_the_same_bits() {
+    let bits = |sim: &Simulation| {
+        let mut bytes = Vec::new();
+        sim.save(&mut bytes).unwrap();
+        bytes
+    };
+    let mut sim = falling_out(32, 1.2);
+    let mut saved = Vec::new();
+    // States with the grain inside, close to the plane, across it, and gone.
+    for n in 0..160 {
+        if n % 40 == 20 {
+            saved.push((bits(&sim), sim.steps()));
+        }
+        step(&mut sim);
+    }
+    assert!(sim.grains()[0].has_left());
+    let end = bits(&sim);
+    for (state, at) in saved {
+        let mut restored = falling_out(32, 1.2);
+        restored.restore(&mut &state[..]).unwrap();
+        assert_eq!(restored.steps(), at);
+        while restored.steps() < sim.steps() {
+            step(&mut restored);
+        }
+        assert!(bits(&restored) == end, "restored at step {at}");
+    }
+}
+
+#[test]
+fn a_dry_grain_leaves_too_and_its_neighbour_stays() {
+    let case = setup(
+        [32, 32, 32],
+        [Boundary::Outflow, Boundary::WALL],
+        0.1,
+        vec![sphere(2.0, [1.0, 1.0, 1.0]), sphere(2.0, [3.0, 3.0, 3.0]).held()],
+    );
+    let case = case.with_fluid(None).with_step(StepRule::Fixed(0.01));
+    let mut sim = Simulation::new(case).unwrap();
+    sim.advance_to(2.5).unwrap();
+    assert!(sim.grains()[0].has_left() && !sim.grains()[1].has_left());
+}
+
+/// Fraction of the volume of a grain below the height `surface`, by summation over points.
+fn immersed_fraction(grain: &Grain, surface: f64) -> f64 {
+    let n = 80;
+    let (lower, size) = (grain.shape.lower(), grain.shape.upper() - grain.shape.lower());
+    let (mut below, mut all) = (0.0, 0.0);
+    for index in 0..n * n * n {
+        let [i, j, k] =
+            [index % n, index / n % n, index / (n * n)].map(|i| (i as f64 + 0.5) / n as f64);
+        let x = lower + size * DVec3::new(i, j, k);
+        if grain.shape.distance(x) <= 0.0 {
+            all += 1.0;
+            below += f64::from(u8::from(grain.pose.to_space(x).z <= surface));
+        }
+    }
+    below / all
+}
+
+#[test]
+fn grains_float_as_archimedes_found() {
+    let options = ShapeOptions::default();
+    let edge = (PI / 6.0f64).cbrt();
+    let cube = || analytic::rounded_box(edge, edge, edge, 0.05 * edge, &options).unwrap();
+    let rock = || {
+        let file =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/grains/tsquare_rock.grain");
+        Shape::load(&file).unwrap().scaled_to_equivalent_diameter(1.0).unwrap()
+    };
+    let ball = || Shape::sphere(0.5, 600);
+    let surface = 3.0;
+    let float = |name: &str, shape: Shape, ratio: f64| {
+        // Released at half immersion; viscous enough to come to rest soon.
+        let grain = grain(shape, ratio, [2.0, 2.02, surface]);
+        let sides = [Boundary::WALL, Boundary::FreeSurface];
+        let mut sim = Simulation::new(setup([32, 32, 24], sides, 0.05, vec![grain])).unwrap();
+        sim.advance_to(40.0).unwrap();
+        let grain = &sim.grains()[0];
+        let found = immersed_fraction(grain, surface);
+        let speed = grain.velocity.length();
+        assert!(speed < 2e-3, "{name} of {ratio} moves at {speed}");
+        assert!((found / ratio - 1.0).abs() < 0.02, "{name} of {ratio}: {found} immersed");
+    };
+    for ratio in [0.2, 0.5, 0.8, 0.9] {
+        float("sphere", ball(), ratio);
+        float("cube", cube(), ratio);
+        float("rock", rock(), ratio);
+    }
+}
+
+#[test]
+fn a_floating_sphere_heaves_with_the_period_of_potential_flow() {
+    // A half-immersed sphere under a rigid lid has the added mass of zero frequency, 0.831 of the
+    // displaced mass: T = 2 pi sqrt((1 + 0.831) (2/3) a / g).
+    let expected = 2.0 * PI * (1.831 * 2.0 / 3.0 * 0.5f64).sqrt();
+    let surface = 4.0;
+    let grain = sphere(0.5, [3.0, 3.0, surface - 0.1]);
+    let sides = [Boundary::WALL, Boundary::FreeSurface];
+    let mut sim = Simulation::new(setup([48, 48, 32], sides, 1e-4, vec![grain])).unwrap();
+    let (mut turns, mut last, mut extremes) = (Vec::new(), 0.0, Vec::new());
+    while turns.len() < 7 {
+        step(&mut sim);
+        let speed = sim.grains()[0].velocity.z;
+        if last * speed < 0.0 {
+            turns.push(sim.time() - sim.time_step() * speed / (speed - last));
+            extremes.push((sim.grains()[0].pose.position.z - surface).abs());
+        }
+        last = speed;
+    }
+    let period = (turns[6] - turns[0]) / 3.0;
+    assert!((period / expected - 1.0).abs() < 0.05, "period {period}, expected {expected}");
+    let decays = extremes.windows(2).all(|pair| pair[1] < pair[0]);
+    assert!(decays, "a heave gains no energy: {extremes:?}");
+}
