@@ -85,7 +85,7 @@ pub struct Flow<R = f64> {
     impulse: DVec3,
     /// Pressure difference between upper and lower end, summed over the lines along each axis.
     pressure_rise: DVec3,
-    /// Outward speed of the fastest grain that crosses each side [m/s].
+    /// Outward speed of the fastest grain close to each side [m/s].
     crossing_speeds: [[f64; 2]; 3],
 }
 

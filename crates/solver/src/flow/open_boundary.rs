@@ -1,14 +1,14 @@
-//! Normal velocity on open sides of the box: convective outflow, and faces that a grain covers while
-//! it crosses the side.
+//! Normal velocity on open sides of the box: convective outflow, and faces that a grain covers
+//! while it crosses the side.
 //!
-//! An outflow face follows dq/dt + C dq/dn = 0. A face of an outflow or of a free surface covered by
-//! a grain has the velocity of the grain. All faces left open are then shifted by one velocity, so
-//! that inflow equals outflow: those of the outflows, or of the free surfaces if there is no
-//! outflow. A free surface therefore sinks where a grain leaves the fluid and rises where it enters,
-//! but stays at its place.
+//! An outflow face follows dq/dt + C dq/dn = 0. A face of an outflow or of a free surface that a
+//! grain covers has the velocity of the grain. All faces left open are then shifted by one
+//! velocity, so that inflow equals outflow: those of the outflows, or of the free surfaces if there
+//! is no outflow. Fluid thus passes through a free surface in place of a grain that crosses it; the
+//! surface itself stays flat and at its height.
 //!
 //! Legend: q normal velocity, n outward direction, C the mean outward velocity of the side, or that
-//! of the fastest grain which crosses it if larger.
+//! of the fastest grain close to it if larger.
 
 use super::{Boundaries, Boundary, Flow};
 use crate::grid::Mesh;
@@ -61,7 +61,7 @@ pub struct CoveredFace {
 }
 
 impl<R: Real> Flow<R> {
-    /// Sets the outward speed [m/s] of the fastest grain that crosses each side, by axis and side.
+    /// Sets the outward speed [m/s] of the fastest grain close to each side, by axis and side.
     pub fn set_crossing_speeds(&mut self, speeds: [[f64; 2]; 3]) {
         self.crossing_speeds = speeds;
     }
@@ -102,8 +102,8 @@ impl<R: Real> Flow<R> {
         }
     }
 
-    /// Shifts the faces that no grain covers on the outflows, or on the free surfaces if there is no
-    /// outflow, by one velocity, so that inflow equals outflow.
+    /// Shifts the faces that no grain covers by one velocity, so that inflow equals outflow: those
+    /// of the outflows, or of the free surfaces if there is no outflow.
     fn balance_volume(&mut self, covered: &[CoveredFace]) {
         let of = |side: BoxSide| side.boundary(&self.boundaries);
         let has_outflow = BoxSide::all().any(|side| of(side) == Boundary::Outflow);

@@ -86,8 +86,8 @@ pub struct EmergedPart {
 }
 
 impl EmergedPart {
-    /// Part of a grain at `pose` beyond the plane at `coordinate` [m] along `axis`, in the direction
-    /// `outward` (-1 or 1) along the axis; `spacing` [m] is that of the grid along the axis.
+    /// Part of a grain at `pose` beyond the plane at `coordinate` [m] along `axis`, in the
+    /// direction `outward` (-1 or 1); `spacing` [m] is that of the grid along the axis.
     pub fn new(
         subvolumes: &Subvolumes,
         pose: Pose,

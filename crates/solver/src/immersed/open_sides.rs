@@ -23,14 +23,17 @@ use crate::math::{Load, RigidVelocity, Vector6};
 /// Cells before an open side from which on a grain moves under its last hydrodynamic load.
 const MARGIN: f64 = 2.0;
 
+/// Distance from a side up to which a grain is close to it, in bounding radii.
+const CLOSE: f64 = 4.0;
+
 /// Location of a grain relative to the open sides.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub enum Crossing {
     /// Away from them.
     #[default]
     Inside,
     /// Partly beyond a free surface.
-    Emerged(EmergedPart),
+    Emerged(Box<EmergedPart>),
     /// About to leave: moves under its last hydrodynamic load.
     Departing,
     /// Gone.
@@ -133,7 +136,7 @@ impl OpenSides {
                     // Buoyancy at the start of the step would feed the heave.
                     let middle = grain.rigid_velocity().advance(grain.pose, 0.5 * dt);
                     let part = EmergedPart::new(subvolumes, middle, direction, coordinate, spacing);
-                    crossing = Crossing::Emerged(part);
+                    crossing = Crossing::Emerged(Box::new(part));
                 }
             } else if lowest > 0.0 {
                 return Crossing::Left;
@@ -144,12 +147,13 @@ impl OpenSides {
         crossing
     }
 
-    /// Outward speed [m/s] of the fastest grain that crosses each side, by axis and side.
+    /// Outward speed [m/s] of the fastest grain close to each side, by axis and side. The flow
+    /// around the grain moves with it, so that this is the speed of convection at an outflow.
     pub fn speeds(&self, grains: &[Grain]) -> [[f64; 2]; 3] {
         let mut speeds = [[0.0; 2]; 3];
         for (grain, crossing) in grains.iter().zip(&self.crossings) {
             if !matches!(crossing, Crossing::Left) {
-                for (side, _) in self.near(grain, 4.0 * grain.shape.bounding_radius()) {
+                for (side, _) in self.near(grain, CLOSE * grain.shape.bounding_radius()) {
                     let fastest: &mut f64 = &mut speeds[side.axis][side.side];
                     *fastest = fastest.max(side.outward() * grain.velocity[side.axis]);
                 }
@@ -166,8 +170,8 @@ impl OpenSides {
         })
     }
 
-    /// Lists the boundary faces that the grains cover at their present poses. The normal velocity at
-    /// an inflow is prescribed, covered or not.
+    /// Lists the boundary faces that the grains cover at their present poses. The normal velocity
+    /// at an inflow is prescribed, covered or not.
     pub fn list_covered_faces(&mut self, grains: &[Grain]) {
         self.faces.clear();
         for (index, grain) in grains.iter().enumerate() {

@@ -223,7 +223,7 @@ impl<R: Real> CouplingStep<'_, R> {
             Some(Crossing::Emerged(part)) => {
                 let surface = self.input.surface_impulses[index].map(|value| density * value);
                 impulse.constant.iter_mut().zip(surface).for_each(|(sum, value)| *sum += value);
-                Some(part)
+                Some(&**part)
             }
             _ => None,
         };

@@ -27,7 +27,7 @@ pub(super) trait Fluid: Send + Sync {
     fn couple(&mut self, input: StepInput) -> CoupledGrains;
     /// Solves for the velocities of the grains and imposes them on the forced faces.
     fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidStep);
-    /// Sets the outward speeds [m/s] of the fastest grains that cross each side.
+    /// Sets the outward speeds [m/s] of the fastest grains close to each side.
     fn set_crossing_speeds(&mut self, speeds: [[f64; 2]; 3]);
     /// Kinematic pressure [m^2/s^2] below covered faces of one side, relative to the open ones.
     fn pressure_below(&self, covered: &[CoveredFace]) -> Vec<f64>;

@@ -104,7 +104,8 @@ impl<'a> Start<'a> {
             open_sides.extrapolate_accelerations(&mut data.previous);
         }
         for (i, grain) in solid.grains.iter().enumerate() {
-            let crossing = solid.open_sides.as_ref().map_or(Crossing::Inside, |o| o.crossings()[i]);
+            let crossing =
+                solid.open_sides.as_ref().map_or(&Crossing::Inside, |o| &o.crossings()[i]);
             data.previous[i].velocity = grain.rigid_velocity();
             data.applied[i] = crossing.weight_less_buoyancy(grain, setup.gravity, fluid_density);
             if let Crossing::Left = crossing {
