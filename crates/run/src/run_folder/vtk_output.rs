@@ -31,14 +31,16 @@ impl VtkOutput {
         }
     }
 
-    /// Writes one slice for each plane; `tag` ends the file names.
+    /// Writes one slice for each plane; `tag` ends the file names. A plane through a grain that has
+    /// left the box is left out.
     pub fn slices(&self, run: &Path, sim: &Simulation, tag: &str) -> Result<Vec<Entry>, RunError> {
         let mut written = Vec::new();
         let planes = self.planes.iter().filter(|_| self.has_fluid).enumerate();
         for (index, plane) in planes {
             let name = plane.name(index);
+            let Some(layer) = layer(plane, sim) else { continue };
             let (mut first, mut count) = ([0; 3], sim.mesh().cells);
-            (first[plane.axis], count[plane.axis]) = (layer(plane, sim), 1);
+            (first[plane.axis], count[plane.axis]) = (layer, 1);
             let file = format!("slices/{name}_{tag}.vti");
             write_image(&run.join(&file), sim, first, count)?;
             written.push(Entry { time: sim.time(), group: format!("slice {name}"), file });
@@ -69,11 +71,12 @@ impl VtkOutput {
     }
 }
 
-/// Returns the layer of cells that a plane cuts.
-fn layer(plane: &Plane, sim: &Simulation) -> usize {
+/// Returns the layer of cells that a plane cuts; none if it follows a grain that has left the box.
+fn layer(plane: &Plane, sim: &Simulation) -> Option<usize> {
     let (mesh, axis) = (sim.mesh(), plane.axis);
     let position = match plane.position {
         PlanePosition::At(position) => position,
+        PlanePosition::Grain(grain) if sim.grains()[grain].has_left() => return None,
         PlanePosition::Grain(grain) => sim.grains()[grain].pose.position[axis],
     };
     let cells = mesh.cells[axis];
@@ -82,7 +85,7 @@ fn layer(plane: &Plane, sim: &Simulation) -> usize {
         layer = layer.rem_euclid(cells as f64);
     }
     // The conversion saturates: a plane outside the box cuts the nearest layer.
-    (layer.floor() as usize).min(cells - 1)
+    Some((layer.floor() as usize).min(cells - 1))
 }
 
 /// Writes `count` cells along each axis, beginning with cell `first`.
