@@ -409,6 +409,35 @@ fn light_grains_are_warned_of() {
     assert!(!heavy.contains("rise") && !heavy.contains("landing"), "{heavy}");
 }
 
+/// Warnings of a case.
+fn warnings(text: &str) -> String {
+    good(text).estimate(1).warnings.join("\n")
+}
+
+#[test]
+fn eight_cells_are_enough_and_fewer_are_warned_of() {
+    let cells = |size: &str| PAIR.replace("cell_size = \"0.25 mm\"", size);
+    assert!(!warnings(PAIR).contains("cells across"), "{}", warnings(PAIR));
+    // 0.8 mm over 0.1 mm is 7.999999999999999.
+    let tenths = PAIR
+        .replace("[\"25 mm\", \"25 mm\", \"97.5 mm\"]", "[0.025, 0.025, 0.095]")
+        .replace("\"2 mm\"", "\"0.8 mm\"");
+    let tenths = tenths.replace("cell_size = \"0.25 mm\"", "cell_size = \"0.1 mm\"");
+    assert!(!warnings(&tenths).contains("cells across"), "{}", warnings(&tenths));
+    let coarse = warnings(&cells("cell_size = \"0.5 mm\""));
+    assert!(coarse.contains("only 4.0 cells across the smallest grain: below 8"), "{coarse}");
+}
+
+#[test]
+fn boundary_layers_are_warned_of_from_five_percent() {
+    // Settling at Re 194 (4.8 %) and Re 208 (5.2 %), by Schiller and Naumann.
+    let density = |value: &str| PAIR.replace("1500 kg/m3", value).replace("1.5 g/cm3", value);
+    assert!(!warnings(&density("1301 kg/m3")).contains("boundary layer"));
+    let thin = warnings(&density("1341 kg/m3"));
+    assert!(thin.contains("boundary layer is not resolved"), "{thin}");
+    assert!(thin.contains("expect the drag 5 % too low; 11 cells"), "{thin}");
+}
+
 #[test]
 fn ways_out_are_warned_of() {
     let warnings = |from: &str, to: &str| {
