@@ -84,7 +84,7 @@ impl fmt::Display for Remedy {
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
     /// The state is not finite, changes too fast, or grains overlap too far.
-    #[error("{}; try {remedy}", symptom(*time, *step, what))]
+    #[error("{}; try {remedy}", symptom(*time, *step, what, remedy))]
     Unstable {
         /// Time [s].
         time: f64,
@@ -101,12 +101,16 @@ impl StepError {
     /// Returns the message with an advice in the given terms.
     pub fn message(&self, terms: &RemedyTerms) -> String {
         let StepError::Unstable { time, step, what, remedy } = self;
-        format!("{}; try {}", symptom(*time, *step, what), remedy.advice(terms))
+        format!("{}; try {}", symptom(*time, *step, what, remedy), remedy.advice(terms))
     }
 }
 
-fn symptom(time: f64, step: u64, what: &str) -> String {
-    format!("the run failed at t = {time:.6e} s (step {step}): {what}")
+fn symptom(time: f64, step: u64, what: &str, remedy: &Remedy) -> String {
+    let failure = match remedy {
+        Remedy::StifferContact { .. } => "the run was stopped",
+        _ => "the run became unstable",
+    };
+    format!("{failure} at t = {time:.6e} s (step {step}): {what}")
 }
 
 /// CFL number above which a step counts as unstable.

@@ -51,7 +51,7 @@ pub struct ContactParams {
     /// Sub-steps per contact time of the fastest pair.
     pub substeps_per_contact: f64,
     /// Overlap over the smaller equal-volume diameter above which a step of
-    /// [`Simulation`](crate::sim::Simulation) fails; infinity switches the check off.
+    /// [`Simulation`](crate::sim::Simulation) fails; by default infinite, which is no limit.
     pub overlap_limit: f64,
 }
 
@@ -72,7 +72,7 @@ impl Default for ContactParams {
             roughness: 0.0,
             added_density: 0.0,
             substeps_per_contact: 25.0,
-            overlap_limit: 0.1,
+            overlap_limit: f64::INFINITY,
         }
     }
 }
