@@ -207,36 +207,35 @@ fn check_overlaps(
     }
 }
 
-/// Returns the pairs that overlap.
+/// Returns the pairs that overlap by the distance of the contact model.
 ///
 /// If a grain contains the centre of another, the overlap depth of the surface nodes is no measure
 /// of the overlap; [`nested`] replaces it.
 fn overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap> {
     let mut found = initial_overlaps(grains, enclosure);
-    for (i, a) in grains.iter().enumerate() {
-        for (j, b) in grains.iter().enumerate().skip(i + 1) {
-            let Some(depth) = nested(a, b, enclosure) else {
-                continue;
-            };
-            let partner = Partner::Grain(j);
-            match found.iter_mut().find(|o| o.grain == i && o.partner == partner) {
-                Some(overlap) => overlap.depth = overlap.depth.max(depth),
-                None => found.push(Overlap { grain: i, partner, depth }),
-            }
+    for overlap in &mut found {
+        let Partner::Grain(other) = overlap.partner else {
+            continue;
+        };
+        if let Some(depth) = nested(&grains[overlap.grain], &grains[other], enclosure) {
+            overlap.depth = overlap.depth.max(depth);
         }
     }
     found
 }
 
-/// Returns the shortest separating displacement of two grains of which one contains the centre of
-/// the other [m], along the line of centres or an axis. Exact for spheres.
+/// Returns the shortest separating displacement of two overlapping grains of which one contains the
+/// centre of the other [m], along the line of centres or an axis. Exact for spheres. The centre of
+/// a ring or a bowl does not count: it lies outside the solid.
 fn nested(a: &Grain, b: &Grain, enclosure: &Enclosure) -> Option<f64> {
     let line = enclosure.nearest_image(b.pose.position - a.pose.position);
-    let holds = |grain: &Grain, x: DVec3| {
+    let solid_at = |grain: &Grain, x: DVec3| {
         x.length() < grain.shape.bounding_radius()
             && grain.shape.distance(grain.pose.orientation.conjugate() * x) < 0.0
     };
-    if !holds(a, line) && !holds(b, -line) {
+    let holds =
+        |grain: &Grain, x: DVec3, other: &Grain| solid_at(grain, x) && solid_at(other, DVec3::ZERO);
+    if !holds(a, line, b) && !holds(b, -line, a) {
         return None;
     }
     let axes = DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
