@@ -159,6 +159,10 @@ fn linked_rings_hang_in_each_other() {
     check(folder.path(), &format!("{upper}{}", lower(6.0, 9.0)))
         .code(2)
         .stderr(contains("grains 0 and 1 overlap at the start"));
+    // Two equal rings at one place have no distance between their surfaces.
+    check(folder.path(), &format!("{}{}", lower(7.0, 7.0), lower(7.0, 7.0)))
+        .code(2)
+        .stderr(contains("grains 0 and 1 overlap at the start by 0."));
     // Linked, the lower ring cannot fall: its tube rests on that of the upper ring.
     let z = heights(folder.path(), &format!("{upper}{}", lower(9.0, 9.0)));
     assert!(z[1] > 3.0 && z[1] < 8.0, "{z:?}");

@@ -625,6 +625,24 @@ fn packings_become_grains() {
 }
 
 #[test]
+fn lattices_of_one_size_fit_every_box() {
+    let mut refused = Vec::new();
+    for diameter in (7..34).map(|tenths| 0.1 * f64::from(tenths)) {
+        for edge in [10.0, 12.0, 13.7, 20.0] {
+            let text = format!(
+                "[domain]\nsize = [\"{edge} mm\", \"{edge} mm\", \"{edge} mm\"]\n\
+                 [time]\nend = \"1 ms\"\n[[packing]]\ncount = 27\ndensity = 2650\n\
+                 shapes = [{{ kind = \"sphere\", diameter = \"{diameter:.1} mm\" }}]\nnodes = 100\n"
+            );
+            if let Err(error) = parse(&text) {
+                refused.push(format!("{diameter:.1} mm in {edge} mm: {error}"));
+            }
+        }
+    }
+    assert!(refused.is_empty(), "{}", refused.join("\n"));
+}
+
+#[test]
 fn expectations_need_a_meaning() {
     let with = |text: &str| PAIR.replace("[time]", &format!("[expect]\n{text}\n[time]"));
     assert_eq!(good(&with("kiss_time = { value = \"0.2 s\", tolerance = \"5 %\" }\npeak_settling_speed = [{ at_least = 0.1, grain = 0 }, { at_most = 0.2, grain = 1 }]")).expect.len(), 3);
