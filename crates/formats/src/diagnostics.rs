@@ -7,7 +7,7 @@ pub const FILE: &str = "diagnostics.csv";
 /// Header of the table.
 pub const HEADER: &str = "time,step,dt,cfl,max_divergence,max_velocity,slip,\
      fluid_kinetic_energy,grain_kinetic_energy,momentum_x,momentum_y,momentum_z,\
-     momentum_residual,contacts,gap";
+     momentum_residual,contacts,gap,max_overlap,mean_overlap";
 
 /// Row of `diagnostics.csv`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +38,10 @@ pub struct DiagnosticsRow {
     pub contacts: usize,
     /// Gap between the surfaces of a pair [m].
     pub gap: Option<f64>,
+    /// Largest overlap since the last row, over the smaller equal-volume diameter.
+    pub max_overlap: f64,
+    /// Mean overlap of the contacts at this time, over the smaller equal-volume diameter.
+    pub mean_overlap: f64,
 }
 
 impl DiagnosticsRow {
@@ -45,7 +49,7 @@ impl DiagnosticsRow {
     pub fn to_line(&self) -> String {
         let gap = self.gap.map_or(String::new(), |gap| format!("{gap:?}"));
         format!(
-            "{:?},{},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{},{gap}\n",
+            "{:?},{},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{},{gap},{:?},{:?}\n",
             self.time,
             self.step,
             self.dt,
@@ -59,7 +63,9 @@ impl DiagnosticsRow {
             self.momentum.y,
             self.momentum.z,
             self.momentum_residual,
-            self.contacts
+            self.contacts,
+            self.max_overlap,
+            self.mean_overlap
         )
     }
 }
@@ -84,6 +90,8 @@ mod tests {
             momentum_residual: 0.0,
             contacts: 2,
             gap: Some(1.0 / 3.0),
+            max_overlap: 0.02,
+            mean_overlap: 1.0 / 7.0,
         };
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join(FILE);
@@ -92,5 +100,6 @@ mod tests {
         assert_eq!(table.column("momentum_z"), Some(&[3.0][..]));
         assert_eq!(table.column("contacts"), Some(&[2.0][..]));
         assert_eq!(table.column("gap"), Some(&[1.0 / 3.0][..]));
+        assert_eq!(table.column("mean_overlap"), Some(&[1.0 / 7.0][..]));
     }
 }

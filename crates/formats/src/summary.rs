@@ -27,6 +27,12 @@ pub struct Summary {
     pub max_divergence: f64,
     /// Largest CFL number of any step.
     pub max_cfl: f64,
+    /// Largest overlap of any contact, over the smaller equal-volume diameter.
+    #[serde(default)]
+    pub max_overlap: f64,
+    /// Mean overlap over all contacts and steps, over the smaller equal-volume diameter.
+    #[serde(default)]
+    pub mean_overlap: f64,
     /// Reason of the end.
     pub ended_by: EndReason,
     /// Results of a pair.

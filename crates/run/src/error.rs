@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use grainwake_solver::sim::{SetupError, StepError};
+use grainwake_solver::sim::{RemedyTerms, SetupError, StepError};
 
 /// Kind of a failure, from the mildest to the worst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -38,13 +38,13 @@ pub enum RunError {
         /// Process number, if known.
         process: Option<u32>,
     },
-    /// The numerics failed.
-    #[error("{}\nThe last good checkpoint, at t = {time:.6e} s, is kept in {}", source.message(smaller_step), folder.display())]
+    /// The numerics failed, or grains overlap too far.
+    #[error("{}\nThe last good checkpoint, at t = {time:.6e} s, is kept in {}", source.message(terms), folder.display())]
     Unstable {
         /// Symptom.
         source: StepError,
-        /// Key of the case for a smaller time step.
-        smaller_step: &'static str,
+        /// Keys of the case in the advice.
+        terms: RemedyTerms,
         /// Time of the last good checkpoint [s].
         time: f64,
         /// Folder of the checkpoints.

@@ -5,11 +5,12 @@
 //! `docs/reference/run-folder.md` lists the files.
 //!
 //! Layers, downwards: `case` -> `run_loop` -> `recorder` -> `run_folder`, `contact_events` ->
-//! `plan`, `error`.
+//! `overlaps`, `plan`, `error`.
 
 pub mod case;
 mod contact_events;
 mod error;
+mod overlaps;
 mod plan;
 mod recorder;
 mod run_folder;

@@ -12,6 +12,7 @@ use grainwake_solver::sim::{SAME_TIME, Simulation};
 
 use crate::contact_events::{ContactEvents, MAX_GRAINS};
 use crate::error::{Context, RunError};
+use crate::overlaps::Overlaps;
 use crate::plan::RunPlan;
 use crate::run_folder::checkpoint::{self, Record};
 use crate::run_folder::{Tables, VtkOutput};
@@ -49,6 +50,7 @@ pub(crate) struct Recorder {
     vtk_files: Vec<Entry>,
     max_divergence: f64,
     max_cfl: f64,
+    overlaps: Overlaps,
     last_row: Option<f64>,
 }
 
@@ -83,6 +85,7 @@ impl Recorder {
             vtk_files: Vec::new(),
             max_divergence: sim.max_divergence(),
             max_cfl: 0.0,
+            overlaps: Overlaps::default(),
             last_row: None,
         }
     }
@@ -115,6 +118,7 @@ impl Recorder {
         recorder.vtk_files = record.vtk_files;
         recorder.max_divergence = record.max_divergence;
         recorder.max_cfl = record.max_cfl;
+        recorder.overlaps = record.overlaps;
         recorder.last_row = record.last_row;
         recorder.write_collection()?;
         Ok(recorder)
@@ -142,6 +146,7 @@ impl Recorder {
     pub fn after_step(&mut self, sim: &Simulation) -> Result<Vec<Event>, RunError> {
         self.max_divergence = self.max_divergence.max(sim.max_divergence());
         self.max_cfl = self.max_cfl.max(sim.cfl());
+        self.overlaps.add(sim);
         let gap = pair_gap(sim, &self.enclosure);
         let before = self.tracker.events().len();
         let mut events = self.tracker.update(sim.time(), sim.grains(), sim.contacts(), gap);
@@ -183,8 +188,7 @@ impl Recorder {
             let tag = format!("{:06}", self.next[index]);
             match series {
                 Series::Tables => {
-                    self.tables.append_rows(sim, self.tracker.gap())?;
-                    self.last_row = Some(time);
+                    self.append_rows(sim)?;
                 }
                 Series::Slices => files.extend(self.vtk.slices(&self.run, sim, &tag)?),
                 Series::Fields => files.extend(self.vtk.fields(&self.run, sim, &tag)?),
@@ -193,6 +197,13 @@ impl Recorder {
             self.next[index] += 1;
         }
         if files.is_empty() { Ok(()) } else { self.add(files) }
+    }
+
+    fn append_rows(&mut self, sim: &Simulation) -> Result<(), RunError> {
+        self.tables.append_rows(sim, self.tracker.gap(), &self.overlaps)?;
+        self.overlaps.largest_since_row = 0.0;
+        self.last_row = Some(sim.time());
+        Ok(())
     }
 
     fn add(&mut self, files: impl IntoIterator<Item = Entry>) -> Result<(), RunError> {
@@ -208,8 +219,7 @@ impl Recorder {
     /// Writes the outputs of the last state, unless they have been written.
     pub fn finish(&mut self, sim: &Simulation) -> Result<(), RunError> {
         if self.last_row != Some(sim.time()) {
-            self.tables.append_rows(sim, self.tracker.gap())?;
-            self.last_row = Some(sim.time());
+            self.append_rows(sim)?;
             let slices = self.vtk.slices(&self.run, sim, "end")?;
             let grains = self.vtk.grains(&self.run, sim, "end")?;
             self.add(slices.into_iter().chain(grains))?;
@@ -228,6 +238,7 @@ impl Recorder {
             vtk_files: self.vtk_files.clone(),
             max_divergence: self.max_divergence,
             max_cfl: self.max_cfl,
+            overlaps: self.overlaps,
             last_row: self.last_row,
             tracker: self.tracker.state().clone(),
             contact_events: self.contact_events.clone(),
@@ -266,6 +277,8 @@ impl Recorder {
             events: self.events(),
             max_divergence: self.max_divergence,
             max_cfl: self.max_cfl,
+            max_overlap: self.overlaps.largest,
+            mean_overlap: self.overlaps.mean(),
             ended_by,
             pair: tracker.phase().map(|phase| PairSummary {
                 kiss_time_s: tracker.kiss_time(),

@@ -8,7 +8,9 @@ use grainwake_formats::atomic_file::write_atomically;
 use grainwake_formats::events::Event;
 use grainwake_formats::summary::{self, EndReason, Summary};
 use grainwake_solver::sim::events::{Phase, StopWhen};
-use grainwake_solver::sim::{Remedy, SAME_TIME, Setup, Simulation, StepError, StepRule};
+use grainwake_solver::sim::{
+    Remedy, RemedyTerms, SAME_TIME, Setup, Simulation, StepError, StepRule,
+};
 
 use crate::error::{Context, RunError};
 use crate::plan::RunPlan;
@@ -282,19 +284,23 @@ impl Running {
         Ok(Ending::Finished(summary))
     }
 
-    /// Returns the advice of a smaller time step with the key of the case.
-    fn smaller_step(&self) -> &'static str {
-        match self.sim.setup().step {
-            StepRule::Fixed(_) => "a smaller [time] step",
-            StepRule::Limits { .. } => "a smaller [time] cfl",
+    /// Returns the terms of a remedy as keys of the case.
+    fn terms(&self) -> RemedyTerms {
+        RemedyTerms {
+            smaller_step: match self.sim.setup().step {
+                StepRule::Fixed(_) => "a smaller [time] step",
+                StepRule::Limits { .. } => "a smaller [time] cfl",
+            },
+            stiffness: "a [contact] stiffness",
+            youngs_modulus: "a youngs_modulus",
         }
     }
 
     /// Writes `failure.json`; the last valid checkpoint is kept.
     fn failed(&mut self, source: StepError, time: f64) -> RunError {
         let StepError::Unstable { time: at, step, what, remedy } = &source;
-        let smaller_step = self.smaller_step();
-        let remedy = remedy.advice(smaller_step);
+        let terms = self.terms();
+        let remedy = remedy.advice(&terms);
         let failure = serde_json::json!({
             "time": at, "step": step, "what": what, "remedy": remedy, "checkpoint_time": time
         });
@@ -304,7 +310,7 @@ impl Running {
         match kept {
             Ok(()) => RunError::Unstable {
                 source,
-                smaller_step,
+                terms,
                 time,
                 folder: self.out.join(checkpoint::FOLDER),
             },

@@ -409,6 +409,35 @@ fn light_grains_are_warned_of() {
     assert!(!heavy.contains("rise") && !heavy.contains("landing"), "{heavy}");
 }
 
+/// Warnings of a case.
+fn warnings(text: &str) -> String {
+    good(text).estimate(1).warnings.join("\n")
+}
+
+#[test]
+fn eight_cells_are_enough_and_fewer_are_warned_of() {
+    let cells = |size: &str| PAIR.replace("cell_size = \"0.25 mm\"", size);
+    assert!(!warnings(PAIR).contains("cells across"), "{}", warnings(PAIR));
+    // 0.8 mm over 0.1 mm is 7.999999999999999.
+    let tenths = PAIR
+        .replace("[\"25 mm\", \"25 mm\", \"97.5 mm\"]", "[0.025, 0.025, 0.095]")
+        .replace("\"2 mm\"", "\"0.8 mm\"");
+    let tenths = tenths.replace("cell_size = \"0.25 mm\"", "cell_size = \"0.1 mm\"");
+    assert!(!warnings(&tenths).contains("cells across"), "{}", warnings(&tenths));
+    let coarse = warnings(&cells("cell_size = \"0.5 mm\""));
+    assert!(coarse.contains("only 4.0 cells across the smallest grain: below 8"), "{coarse}");
+}
+
+#[test]
+fn boundary_layers_are_warned_of_from_five_percent() {
+    // Settling at Re 194 (4.8 %) and Re 208 (5.2 %), by Schiller and Naumann.
+    let density = |value: &str| PAIR.replace("1500 kg/m3", value).replace("1.5 g/cm3", value);
+    assert!(!warnings(&density("1301 kg/m3")).contains("boundary layer"));
+    let thin = warnings(&density("1341 kg/m3"));
+    assert!(thin.contains("boundary layer is not resolved"), "{thin}");
+    assert!(thin.contains("expect the drag 5 % too low; 11 cells"), "{thin}");
+}
+
 #[test]
 fn ways_out_are_warned_of() {
     let warnings = |from: &str, to: &str| {
@@ -593,6 +622,24 @@ fn packings_become_grains() {
     assert_eq!(crowded.len(), 1, "{crowded:?}");
     let random = good(&text.replace("seed = 3", "seed = 3\narrangement = \"random\""));
     assert_eq!(random.setup.grains.len(), 60);
+}
+
+#[test]
+fn lattices_of_one_size_fit_every_box() {
+    let mut refused = Vec::new();
+    for diameter in (7..34).map(|tenths| 0.1 * f64::from(tenths)) {
+        for edge in [10.0, 12.0, 13.7, 20.0] {
+            let text = format!(
+                "[domain]\nsize = [\"{edge} mm\", \"{edge} mm\", \"{edge} mm\"]\n\
+                 [time]\nend = \"1 ms\"\n[[packing]]\ncount = 27\ndensity = 2650\n\
+                 shapes = [{{ kind = \"sphere\", diameter = \"{diameter:.1} mm\" }}]\nnodes = 100\n"
+            );
+            if let Err(error) = parse(&text) {
+                refused.push(format!("{diameter:.1} mm in {edge} mm: {error}"));
+            }
+        }
+    }
+    assert!(refused.is_empty(), "{}", refused.join("\n"));
 }
 
 #[test]

@@ -48,7 +48,7 @@ title = "small and dry"
 [domain]
 size = ["10 mm", "10 mm", "30 mm"]
 [contact]
-stiffness = 200
+stiffness = 1500
 restitution = 0.8
 [time]
 end = "120 ms"

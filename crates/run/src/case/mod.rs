@@ -69,7 +69,7 @@ pub struct Case {
     /// Grain files of the case.
     pub shapes: Vec<ShapeFile>,
     /// Hash of everything that decides the results up to a given time: threads, `[expect]`, the
-    /// title, the end and the checkpoint intervals do not.
+    /// title, the end, `contact.overlap_limit` and the checkpoint intervals do not.
     pub digest: String,
 }
 
@@ -149,6 +149,8 @@ fn digest(resolved: &RawCase, shapes: &[ShapeFile]) -> Result<String, CaseError>
     // The precision decides the results; the number of threads does not.
     core.run.threads = RawRun::default().threads;
     core.expect = RawExpect::default();
+    // The limit ends a run and changes no result before.
+    core.contact.overlap_limit = None;
     core.time.end = Default::default();
     core.time.stop = None;
     core.output.checkpoint_interval = Default::default();

@@ -23,6 +23,9 @@ fn point(random: &mut Random) -> DVec3 {
     DVec3::from_array(random.random())
 }
 
+/// Relative depth below which an overlap is a rounding error.
+pub(super) const ROUNDING: f64 = 1e-9;
+
 /// Bounding sphere of a grain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sphere {
@@ -56,7 +59,8 @@ impl Region<'_> {
                     arm[axis] -= period * (arm[axis] / period).round();
                 }
             }
-            arm.length() >= sphere.radius + other.radius + self.clearance
+            // Neighbours on a full lattice touch, up to rounding.
+            arm.length() >= (sphere.radius + other.radius + self.clearance) * (1.0 - ROUNDING)
         })
     }
 

@@ -20,6 +20,7 @@ use grainwake_solver::sim::events::TrackerState;
 use super::tables::Lengths;
 use crate::contact_events::ContactEvents;
 use crate::error::{Context, RunError};
+use crate::overlaps::Overlaps;
 
 const SIGNATURE: &[u8; 8] = b"GWCKPT\r\n";
 const VERSION: u32 = 4;
@@ -48,6 +49,9 @@ pub struct Record {
     pub max_divergence: f64,
     /// Largest CFL number so far.
     pub max_cfl: f64,
+    /// Overlaps so far.
+    #[serde(default)]
+    pub overlaps: Overlaps,
     /// Time of the last row of the tables [s].
     pub last_row: Option<f64>,
     /// State of the event tracker.

@@ -2,7 +2,7 @@
 //! back to the checkpoint when a run is resumed.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, Seek, SeekFrom, Write};
+use std::io::{self, BufRead, BufReader, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use grainwake_formats::diagnostics::{self, DiagnosticsRow};
@@ -13,6 +13,7 @@ use grainwake_solver::sim::Simulation;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Context, RunError};
+use crate::overlaps::Overlaps;
 
 /// The growing files of a run.
 pub const FILES: [&str; 3] = [grains::FILE, diagnostics::FILE, events::FILE];
@@ -24,6 +25,8 @@ pub struct Lengths([u64; 3]);
 /// The three growing files, open for appending.
 pub struct Tables {
     files: [(PathBuf, File); 3],
+    /// Columns of `diagnostics.csv`; a run of an earlier program has fewer.
+    diagnostics_columns: usize,
     lengths: Lengths,
 }
 
@@ -37,6 +40,7 @@ impl Tables {
         };
         let mut tables = Tables {
             files: [open(FILES[0])?, open(FILES[1])?, open(FILES[2])?],
+            diagnostics_columns: columns(diagnostics::HEADER),
             lengths: Lengths::default(),
         };
         tables.append(0, &format!("{}\n", grains::HEADER))?;
@@ -60,7 +64,11 @@ impl Tables {
             file.seek(SeekFrom::End(0)).context("continue", &path)?;
             Ok((path, file))
         };
-        Ok(Tables { files: [open(0)?, open(1)?, open(2)?], lengths })
+        let files = [open(0)?, open(1)?, open(2)?];
+        let path = &files[1].0;
+        let header = BufReader::new(File::open(path).context("read", path)?).lines().next();
+        let header = header.transpose().context("read", path)?.unwrap_or_default();
+        Ok(Tables { files, diagnostics_columns: columns(&header), lengths })
     }
 
     fn append(&mut self, index: usize, text: &str) -> Result<(), RunError> {
@@ -71,10 +79,17 @@ impl Tables {
     }
 
     /// Appends a row for each grain and one of diagnostics.
-    pub fn append_rows(&mut self, sim: &Simulation, gap: Option<f64>) -> Result<(), RunError> {
-        let (grains, diagnostics) = (grain_rows(sim), diagnostics_row(sim, gap));
+    pub fn append_rows(
+        &mut self,
+        sim: &Simulation,
+        gap: Option<f64>,
+        overlaps: &Overlaps,
+    ) -> Result<(), RunError> {
+        let (grains, diagnostics) = (grain_rows(sim), diagnostics_row(sim, gap, overlaps));
         self.append(0, &grains)?;
-        self.append(1, &diagnostics.to_line())
+        let line = diagnostics.to_line();
+        let known = line.trim_end().split(',').take(self.diagnostics_columns);
+        self.append(1, &format!("{}\n", known.collect::<Vec<_>>().join(",")))
     }
 
     /// Appends events to the log.
@@ -94,6 +109,11 @@ impl Tables {
         }
         Ok(self.lengths)
     }
+}
+
+/// Returns the number of columns of a table with this header.
+fn columns(header: &str) -> usize {
+    header.split(',').count()
 }
 
 fn grain_rows(sim: &Simulation) -> String {
@@ -123,7 +143,7 @@ fn grain_rows(sim: &Simulation) -> String {
     text
 }
 
-fn diagnostics_row(sim: &Simulation, gap: Option<f64>) -> DiagnosticsRow {
+fn diagnostics_row(sim: &Simulation, gap: Option<f64>, overlaps: &Overlaps) -> DiagnosticsRow {
     let measured = sim.diagnostics();
     DiagnosticsRow {
         time: sim.time(),
@@ -139,5 +159,35 @@ fn diagnostics_row(sim: &Simulation, gap: Option<f64>) -> DiagnosticsRow {
         momentum_residual: measured.momentum_residual,
         contacts: sim.contacts().len(),
         gap,
+        max_overlap: overlaps.largest_since_row,
+        mean_overlap: overlaps.mean_now,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use grainwake_solver::grid::Mesh;
+    use grainwake_solver::sim::{Setup, StepRule};
+
+    use super::*;
+
+    #[test]
+    fn a_run_of_an_earlier_program_keeps_its_columns() {
+        let folder = tempfile::tempdir().unwrap();
+        let old = "time,step,dt,cfl,max_divergence,max_velocity,slip,fluid_kinetic_energy,\
+                   grain_kinetic_energy,momentum_x,momentum_y,momentum_z,momentum_residual,\
+                   contacts,gap\n";
+        let texts = [format!("{}\n", grains::HEADER), old.to_owned(), String::new()];
+        for (name, text) in FILES.iter().zip(&texts) {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        let lengths = Lengths([0, 1, 2].map(|index: usize| texts[index].len() as u64));
+        let setup = Setup::new(Mesh::cubic([1; 3], 1.0));
+        let sim = Simulation::new(setup.with_step(StepRule::Fixed(1.0))).unwrap();
+        let mut tables = Tables::reopen(folder.path(), lengths).unwrap();
+        tables.append_rows(&sim, None, &Overlaps::default()).unwrap();
+        let text = std::fs::read_to_string(folder.path().join(diagnostics::FILE)).unwrap();
+        let counts: Vec<usize> = text.lines().map(columns).collect();
+        assert_eq!(counts, [15, 15]);
     }
 }

@@ -20,6 +20,8 @@ mod search;
 pub use contact::{Contact, ContactLawKind, ContactParams};
 pub use enclosure::{Enclosure, Partner};
 pub use grain::{Grain, Material, MotionConstraint};
-pub use motion::{ContactDynamics, GrainResponse, RigidState, TrialStep, rotation};
+pub use motion::{
+    ContactDynamics, GrainResponse, RelativeOverlap, RigidState, TrialStep, rotation,
+};
 pub(crate) use search::{BoundingSphere, BroadPhase};
 pub use search::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};

@@ -19,7 +19,7 @@ mod timing;
 
 use glam::DVec3;
 
-use crate::dem::{Contact, ContactDynamics, Grain, GrainResponse, RigidState};
+use crate::dem::{Contact, ContactDynamics, Grain, GrainResponse, RelativeOverlap, RigidState};
 use crate::grid::Mesh;
 use crate::immersed::{GrainKinematics, OpenSides, PreviousStep};
 use crate::math::{Load, Pose};
@@ -33,7 +33,7 @@ pub use diagnostics::Diagnostics;
 pub use fields::{AnyFieldView, CELL_FIELDS, CellField};
 pub use prescription::{PrescribedMotion, Prescription};
 pub use setup::{Setup, SetupError, StepRule};
-pub use stability::{Remedy, StepError};
+pub use stability::{Remedy, RemedyTerms, StepError};
 pub use step::SAME_TIME;
 
 /// Simulation of grains in a fluid, or of grains alone.
@@ -151,6 +151,10 @@ impl Simulation {
     /// Pairs that touched during the last step.
     pub fn contacts(&self) -> &[Contact] {
         self.dynamics.contacts()
+    }
+    /// Largest overlap at any sub-step of the last step; `None` without contact.
+    pub fn largest_overlap(&self) -> Option<RelativeOverlap> {
+        self.dynamics.largest_overlap()
     }
     /// Memory held by fields, solver and grains on the grid [bytes].
     pub fn bytes(&self) -> usize {

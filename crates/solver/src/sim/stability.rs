@@ -1,11 +1,15 @@
-//! Detection of unstable runs.
+//! Detection of failed runs: states that are not finite, unstable flow, contacts that are too soft.
 
 use std::fmt;
 
 use super::Simulation;
+use crate::dem::{ContactLawKind, MotionConstraint, Partner, RelativeOverlap};
 
-/// Remedy of an unstable run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Overlap for which a stiffness is suggested [smaller equal-volume diameters].
+const SUGGESTED_OVERLAP: f64 = 0.01;
+
+/// Remedy of a failed run.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Remedy {
     /// A smaller time step or a softer contact.
     StepOrContact,
@@ -13,16 +17,58 @@ pub enum Remedy {
     StepOrGrid,
     /// A finer grid or a smaller time step; the last slices may show the cause.
     GridOrStepOrSlices,
+    /// A stiffer contact, at which the overlap would be 1 % of the smaller diameter.
+    StifferContact {
+        /// Force law.
+        law: ContactLawKind,
+        /// Suggested over present stiffness, or Young's modulus.
+        factor: f64,
+        /// Suggested stiffness [N/m] or Young's modulus [Pa].
+        value: f64,
+    },
+}
+
+/// Names of the means of a remedy, as the user of a program knows them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RemedyTerms {
+    /// "a smaller time step".
+    pub smaller_step: &'static str,
+    /// "a normal stiffness".
+    pub stiffness: &'static str,
+    /// "a Young's modulus".
+    pub youngs_modulus: &'static str,
+}
+
+impl Default for RemedyTerms {
+    fn default() -> RemedyTerms {
+        RemedyTerms {
+            smaller_step: "a smaller time step",
+            stiffness: "a normal stiffness",
+            youngs_modulus: "a Young's modulus",
+        }
+    }
 }
 
 impl Remedy {
-    /// Returns the advice; `smaller_step` names the means of a smaller time step.
-    pub fn advice(self, smaller_step: &str) -> String {
+    /// Returns the advice in the given terms.
+    pub fn advice(self, terms: &RemedyTerms) -> String {
+        let smaller_step = terms.smaller_step;
         match self {
             Remedy::StepOrContact => format!("{smaller_step} or a softer contact"),
             Remedy::StepOrGrid => format!("{smaller_step} or a finer grid"),
             Remedy::GridOrStepOrSlices => {
                 format!("a finer grid, {smaller_step}, or a look at the last slices")
+            }
+            Remedy::StifferContact { law, factor, value } => {
+                let (term, unit) = match law {
+                    ContactLawKind::Linear => (terms.stiffness, "N/m"),
+                    ContactLawKind::HertzMindlin => (terms.youngs_modulus, "Pa"),
+                };
+                format!(
+                    "{term} of {value:.2e} {unit}, {factor:.0} times the present one, for an \
+                     overlap of {:.0} %",
+                    100.0 * SUGGESTED_OVERLAP
+                )
             }
         }
     }
@@ -30,15 +76,15 @@ impl Remedy {
 
 impl fmt::Display for Remedy {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(&self.advice("a smaller time step"))
+        f.write_str(&self.advice(&RemedyTerms::default()))
     }
 }
 
 /// Failure of a step.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
-    /// The state is not finite or changes too fast.
-    #[error("{}; try {remedy}", symptom(*time, *step, what))]
+    /// The state is not finite, changes too fast, or grains overlap too far.
+    #[error("{}; try {remedy}", symptom(*time, *step, what, remedy))]
     Unstable {
         /// Time [s].
         time: f64,
@@ -52,23 +98,27 @@ pub enum StepError {
 }
 
 impl StepError {
-    /// Returns the message with an advice that names the means of a smaller time step.
-    pub fn message(&self, smaller_step: &str) -> String {
+    /// Returns the message with an advice in the given terms.
+    pub fn message(&self, terms: &RemedyTerms) -> String {
         let StepError::Unstable { time, step, what, remedy } = self;
-        let advice = remedy.advice(smaller_step);
-        format!("{}; try {advice}", symptom(*time, *step, what))
+        format!("{}; try {}", symptom(*time, *step, what, remedy), remedy.advice(terms))
     }
 }
 
-fn symptom(time: f64, step: u64, what: &str) -> String {
-    format!("the run became unstable at t = {time:.6e} s (step {step}): {what}")
+fn symptom(time: f64, step: u64, what: &str, remedy: &Remedy) -> String {
+    let failure = match remedy {
+        Remedy::StifferContact { .. } => "the run was stopped",
+        _ => "the run became unstable",
+    };
+    format!("{failure} at t = {time:.6e} s (step {step}): {what}")
 }
 
 /// CFL number above which a step counts as unstable.
 const MAX_CFL: f64 = 10.0;
 
 impl Simulation {
-    /// Checks that the state is finite and the CFL number below its bound.
+    /// Checks that the state is finite, the overlaps within their limit and the CFL number below
+    /// its bound.
     pub(super) fn check_stability(&self) -> Result<(), StepError> {
         let unstable = |what: String, remedy: Remedy| {
             Err(StepError::Unstable { time: self.clock.time, step: self.clock.steps, what, remedy })
@@ -85,6 +135,9 @@ impl Simulation {
                 );
             }
         }
+        if let Some((what, remedy)) = self.excessive_overlap() {
+            return unstable(what, remedy);
+        }
         if let Some(fluid) = &self.fluid {
             let measures = fluid.measures();
             if !(measures.kinetic_energy.is_finite() && measures.max_divergence.is_finite()) {
@@ -96,5 +149,46 @@ impl Simulation {
             }
         }
         Ok(())
+    }
+
+    /// Describes an overlap beyond the limit, with its remedy. No contact resists a given motion,
+    /// so a pair without a free grain does not count.
+    fn excessive_overlap(&self) -> Option<(String, Remedy)> {
+        let (params, grains) = (&self.setup.contact, &self.setup.grains);
+        let overlap = self.largest_overlap().filter(|it| it.relative > params.overlap_limit)?;
+        let RelativeOverlap { grain, partner, depth, relative } = overlap;
+        let free = |index: usize| grains[index].translation == MotionConstraint::Free;
+        let other = match partner {
+            Partner::Grain(other) => Some(other),
+            Partner::Wall { .. } => None,
+        };
+        if !free(grain) && !other.is_some_and(free) {
+            return None;
+        }
+        let with = match partner {
+            Partner::Grain(other) => format!("grain {other}"),
+            Partner::Wall { axis, side } => {
+                let (side, axis) =
+                    (["lower", "upper"][side as usize], ["x", "y", "z"][axis as usize]);
+                format!("the {side} {axis} wall")
+            }
+        };
+        let what = format!(
+            "grain {grain} overlaps {with} by {:.4} mm, {:.1} % of the equivalent diameter; the \
+             limit is {:.0} %",
+            1e3 * depth,
+            100.0 * relative,
+            100.0 * params.overlap_limit
+        );
+        let partner = other.map(|other| &grains[other]);
+        let velocity = grains[grain].velocity - partner.map_or(glam::DVec3::ZERO, |p| p.velocity);
+        let wanted = SUGGESTED_OVERLAP * depth / relative;
+        let factor = params.stiffening(&grains[grain], partner, velocity.length(), depth, wanted);
+        let value = factor
+            * match params.law {
+                ContactLawKind::Linear => params.normal_stiffness,
+                ContactLawKind::HertzMindlin => grains[grain].material.youngs_modulus,
+            };
+        Some((what, Remedy::StifferContact { law: params.law, factor, value }))
     }
 }

@@ -112,6 +112,10 @@ pub struct RawContact {
     pub roughness: Option<Located<Quantity<Length>>>,
     /// Sub-steps per contact time.
     pub substeps_per_contact: Located<Quantity<Number>>,
+    /// Overlap over the smaller equal-volume diameter at which the run stops; 0.1, or twice
+    /// `maximum_overlap` if that is larger.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub overlap_limit: Option<Located<Quantity<Number>>>,
 }
 
 fn is_linear(law: &Located<ContactLawKind>) -> bool {
@@ -142,6 +146,7 @@ impl Default for RawContact {
             lubrication_gap: Quantity::new(params.lubrication_gap).into(),
             roughness: None,
             substeps_per_contact: Quantity::new(params.substeps_per_contact).into(),
+            overlap_limit: None,
         }
     }
 }

@@ -5,6 +5,7 @@ use glam::{DQuat, DVec3};
 use super::check::Checker;
 use crate::case::located::{Located, Span};
 use crate::case::number_format::{AXES, SIDES, length};
+use crate::case::packing::ROUNDING;
 use crate::case::placement::extent_along;
 use crate::case::raw::RawGrain;
 use grainwake_solver::dem::{
@@ -104,9 +105,9 @@ fn check_faces(
     boundaries: &Boundaries,
 ) {
     let mut reported = vec![false; grains.len()];
-    let found = outside(grains, enclosure);
+    let rounding = |o: &Outside| o.by <= ROUNDING * grains[o.grain].shape.bounding_radius();
     let floats = |o: &Outside| boundaries.0[o.axis][o.side] == Boundary::FreeSurface;
-    for o in found.into_iter().filter(|o| !floats(o)) {
+    for o in outside(grains, enclosure).into_iter().filter(|o| !rounding(o) && !floats(o)) {
         if std::mem::replace(&mut reported[o.grain], true) {
             continue;
         }
@@ -214,15 +215,18 @@ fn check_overlaps(
     }
 }
 
-/// Returns the pairs that overlap.
+/// Returns the pairs that overlap, by the distance of the contact model. Depths within rounding do
+/// not count.
 ///
-/// If a grain contains the centre of another, the overlap depth of the surface nodes is no measure
-/// of the overlap; [`nested`] replaces it.
+/// The distance of the surfaces is no measure of the overlap if a grain contains the centre of
+/// another, and vanishes for two equal grains at one place; [`nested`] replaces it.
 fn overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap> {
     let mut found = initial_overlaps(grains, enclosure);
+    found.retain(|o| o.depth > ROUNDING * grains[o.grain].shape.bounding_radius());
+    let solid: Vec<DVec3> = grains.iter().map(solid_point).collect();
     for (i, a) in grains.iter().enumerate() {
         for (j, b) in grains.iter().enumerate().skip(i + 1) {
-            let Some(depth) = nested(a, b, enclosure) else {
+            let Some(depth) = nested([a, b], [solid[i], solid[j]], enclosure) else {
                 continue;
             };
             let partner = Partner::Grain(j);
@@ -235,16 +239,37 @@ fn overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap> {
     found
 }
 
-/// Returns the shortest separating displacement of two grains of which one contains the centre of
-/// the other [m], along the line of centres or an axis. Exact for spheres.
-fn nested(a: &Grain, b: &Grain, enclosure: &Enclosure) -> Option<f64> {
-    let line = enclosure.nearest_image(b.pose.position - a.pose.position);
-    let holds = |grain: &Grain, x: DVec3| {
-        x.length() < grain.shape.bounding_radius()
-            && grain.shape.distance(grain.pose.orientation.conjugate() * x) < 0.0
+/// Returns a point inside the solid, relative to the centroid, space frame [m]: the centroid, or
+/// for rings and bowls a point below a surface node.
+fn solid_point(grain: &Grain) -> DVec3 {
+    let shape = &grain.shape;
+    let below = |depth: f64| {
+        let node = shape.nodes().first()?.position;
+        let (_, outward) = shape.distance_and_gradient(node);
+        Some(node - depth * outward.normalize_or_zero())
     };
-    if !holds(a, line) && !holds(b, -line) {
-        return None;
+    let depths = (1..8).map(|halving| 0.5 * shape.equivalent_diameter() / f64::from(1 << halving));
+    let candidates = std::iter::once(DVec3::ZERO).chain(depths.filter_map(below));
+    let inside = candidates.into_iter().find(|x| shape.distance(*x) < 0.0);
+    grain.pose.orientation * inside.unwrap_or(DVec3::ZERO)
+}
+
+/// Returns the depth of two grains of which one contains a solid point of the other [m]. If the
+/// points are the centres, it is the shortest separating displacement along the line of centres or
+/// an axis, exact for spheres.
+fn nested(grains: [&Grain; 2], solid: [DVec3; 2], enclosure: &Enclosure) -> Option<f64> {
+    let [a, b] = grains;
+    let line = enclosure.nearest_image(b.pose.position - a.pose.position);
+    let depth_at = |grain: &Grain, x: DVec3| {
+        let inside = x.length() < grain.shape.bounding_radius();
+        let depth = -grain.shape.distance(grain.pose.orientation.conjugate() * x);
+        Some(depth).filter(|depth| inside && *depth > 0.0)
+    };
+    let in_a = depth_at(a, line + solid[1]).zip(depth_at(b, solid[1]));
+    let in_b = depth_at(b, solid[0] - line).zip(depth_at(a, solid[0]));
+    let (first, second) = in_a.or(in_b)?;
+    if solid != [DVec3::ZERO; 2] {
+        return Some(first.min(second));
     }
     let axes = DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
     let move_along = |way: DVec3| extent(a, way) + extent(b, -way) - line.dot(way);

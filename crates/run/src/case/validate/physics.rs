@@ -16,6 +16,8 @@ use grainwake_solver::sim::Prescription;
 
 /// Default of the largest overlap at impact [diameters].
 const MAXIMUM_OVERLAP: f64 = 0.01;
+/// Default of the overlap at which a run stops [diameters].
+const OVERLAP_LIMIT: f64 = 0.1;
 /// Default of the roughness, relative to the smallest equal-volume radius.
 const ROUGHNESS: f64 = 3e-3;
 /// Added mass of a sphere in contact, relative to the displaced fluid.
@@ -107,6 +109,11 @@ pub(super) fn contact(
         None => Some(ROUGHNESS * 0.5 * smallest_diameter(grains)),
     };
     let substeps = check.within(&raw.substeps_per_contact, 5.0, 1e6);
+    let overlap_limit = match (&raw.overlap_limit, &raw.maximum_overlap) {
+        (Some(limit), _) => check.within(limit, 1e-3, 0.5),
+        (None, Some(overlap)) => Some(OVERLAP_LIMIT.max(2.0 * overlap.si)),
+        (None, None) => Some(OVERLAP_LIMIT),
+    };
     if let Some(gap) = lubrication_gap.filter(|gap| *gap > 0.0 && fluid.is_none()) {
         let message = format!("a lubrication gap of {} needs a fluid", length(gap));
         let help = "add [fluid] or set lubrication_gap = 0";
@@ -143,8 +150,10 @@ pub(super) fn contact(
         roughness: roughness?,
         added_density: fluid.map_or(0.0, |f| ADDED_MASS * f.density),
         substeps_per_contact: substeps?,
+        overlap_limit: overlap_limit?,
     };
     raw.maximum_overlap = None;
+    raw.overlap_limit = Some(Quantity::new(params.overlap_limit).into());
     if params.lubrication_gap > 0.0 {
         raw.roughness = Some(Quantity::new(params.roughness).into());
     }

@@ -50,6 +50,9 @@ pub struct ContactParams {
     pub added_density: f64,
     /// Sub-steps per contact time of the fastest pair.
     pub substeps_per_contact: f64,
+    /// Overlap over the smaller equal-volume diameter above which a step of
+    /// [`Simulation`](crate::sim::Simulation) fails; by default infinite, which is no limit.
+    pub overlap_limit: f64,
 }
 
 impl Default for ContactParams {
@@ -69,6 +72,7 @@ impl Default for ContactParams {
             roughness: 0.0,
             added_density: 0.0,
             substeps_per_contact: 25.0,
+            overlap_limit: f64::INFINITY,
         }
     }
 }
@@ -362,7 +366,7 @@ impl SelectedLaw {
 impl ContactParams {
     /// Duration of an undamped impact at `speed` [m/s] between two grains equal to `grain` [s].
     pub fn contact_time(&self, grain: &Grain, speed: f64) -> f64 {
-        let body = body_properties(grain);
+        let body = BodyProperties::of(grain);
         let pair = PairProperties::of_grains(&body, &body);
         SelectedLaw::new(self).get().contact_time(&pair, speed, 0.0)
     }
@@ -371,17 +375,19 @@ impl ContactParams {
     /// mass [m].
     pub fn impact_overlap(&self, grain: &Grain, speed: f64) -> f64 {
         let wall = ContactMaterial::new(&self.wall_material);
-        let pair = PairProperties::with_wall(&body_properties(grain), &wall);
+        let pair = PairProperties::with_wall(&BodyProperties::of(grain), &wall);
         SelectedLaw::new(self).get().impact_overlap(&pair, speed)
     }
 }
 
-/// Properties of a grain without added mass.
-fn body_properties(grain: &Grain) -> BodyProperties {
-    BodyProperties {
-        inverse_mass: 1.0 / grain.mass(),
-        radius: 0.5 * grain.shape.equivalent_diameter(),
-        material: ContactMaterial::new(&grain.material),
+impl BodyProperties {
+    /// Properties of a grain without added mass, as if it moved freely.
+    pub fn of(grain: &Grain) -> BodyProperties {
+        BodyProperties {
+            inverse_mass: 1.0 / grain.mass(),
+            radius: 0.5 * grain.shape.equivalent_diameter(),
+            material: ContactMaterial::new(&grain.material),
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 //! Contact forces (Eqs 9-18): contacts and their records, kept between sub-steps. `law.rs` has the
-//! force laws, `model.rs` the loads of a pair.
+//! force laws, `model.rs` the loads of a pair, `stiffening.rs` the stiffness that an impact needs.
 //!
 //! A further force law implements `ContactLaw` in `law.rs` or in a file beside it, and needs one
 //! variant of [`ContactLawKind`] and of `SelectedLaw`, and its keys in the case file. A cohesive
@@ -8,6 +8,7 @@
 
 mod law;
 mod model;
+mod stiffening;
 
 pub(super) use law::{BodyProperties, ContactMaterial, PairProperties};
 pub use law::{ContactLawKind, ContactParams};
@@ -79,6 +80,8 @@ pub(in crate::dem) struct ContactRecord {
     pub in_contact: bool,
     /// Whether the pair was in contact at any sub-step of the present step.
     pub in_contact_during_step: bool,
+    /// Deepest overlap at any sub-step of the present step [m]; zero without contact.
+    pub deepest_overlap: f64,
     /// Fraction of the dashpot that acts; differs from one just after the contact began.
     pub dashpot_fraction: f64,
     /// Tangential stiffness at the last evaluation [N/m]; zero before the first.
@@ -121,6 +124,7 @@ impl ContactRecord {
             key,
             in_contact: false,
             in_contact_during_step: false,
+            deepest_overlap: 0.0,
             dashpot_fraction: 1.0,
             tangential_stiffness: 0.0,
             mean_history: TangentialHistory::NONE,
@@ -146,6 +150,7 @@ impl ContactRecord {
     /// Prepares another step: only quantities of the checkpoint may affect it.
     pub fn begin_step(&mut self) {
         self.in_contact_during_step = false;
+        self.deepest_overlap = 0.0;
         self.patch.reset();
     }
     /// Prepares the record for another pair; only the buffers are reused.

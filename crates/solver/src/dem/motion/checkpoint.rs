@@ -112,6 +112,7 @@ impl ContactDynamics {
                 normal: input.vector()?,
             })
         })?;
+        self.largest_overlap = None;
         (self.last_positions, self.records, self.contacts) = (last_positions, records, contacts);
         Ok(())
     }

@@ -29,6 +29,8 @@ pub struct ContactDynamics {
     wall: ContactMaterial,
     enclosure: Enclosure,
     contacts: Vec<Contact>,
+    /// Deepest overlap of the last step relative to the smaller equal-volume diameter.
+    largest_overlap: Option<RelativeOverlap>,
     /// Pairs that may touch, in ascending key.
     records: Vec<ContactRecord>,
     /// Position of every grain at the end of the last step [m].
@@ -50,6 +52,7 @@ impl ContactDynamics {
             wall: ContactMaterial::new(&params.wall_material),
             enclosure,
             contacts: Vec::new(),
+            largest_overlap: None,
             records: Vec::new(),
             last_positions: Vec::new(),
             bodies: Vec::new(),
@@ -63,6 +66,11 @@ impl ContactDynamics {
     /// Contacts of the last step, ordered by grain, then partner.
     pub fn contacts(&self) -> &[Contact] {
         &self.contacts
+    }
+    /// Largest overlap at any sub-step of the last step, relative to the smaller equal-volume
+    /// diameter of the pair. `None` without contact, and after [`ContactDynamics::restore`].
+    pub fn largest_overlap(&self) -> Option<RelativeOverlap> {
+        self.largest_overlap
     }
     /// Contact parameters.
     pub fn params(&self) -> &ContactParams {
@@ -148,8 +156,14 @@ impl ContactDynamics {
         self.last_positions.clear();
         self.last_positions.extend(grains.iter().map(|grain| grain.pose.position));
         self.contacts.clear();
+        self.largest_overlap = None;
         for record in self.records.iter().filter(|r| r.in_contact_during_step) {
             let grain = record.key.grain as usize;
+            let overlap =
+                RelativeOverlap::of(grains, grain, record.key.partner, record.deepest_overlap);
+            if self.largest_overlap.is_none_or(|known| overlap.relative > known.relative) {
+                self.largest_overlap = Some(overlap);
+            }
             self.contacts.push(Contact {
                 grain,
                 partner: record.key.partner,
@@ -159,6 +173,31 @@ impl ContactDynamics {
                 normal: record.loads.normal,
             });
         }
+    }
+}
+
+/// Overlap of a pair, also relative to the smaller equal-volume diameter of its grains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelativeOverlap {
+    /// First grain.
+    pub grain: usize,
+    /// Second body.
+    pub partner: Partner,
+    /// Depth of the overlap [m].
+    pub depth: f64,
+    /// Depth over the smaller equal-volume diameter.
+    pub relative: f64,
+}
+
+impl RelativeOverlap {
+    /// Relates the overlap `depth` [m] of a pair to the diameters of its grains.
+    pub fn of(grains: &[Grain], grain: usize, partner: Partner, depth: f64) -> RelativeOverlap {
+        let diameter = |index: usize| grains[index].shape.equivalent_diameter();
+        let smaller = match partner {
+            Partner::Grain(other) => diameter(grain).min(diameter(other)),
+            Partner::Wall { .. } => diameter(grain),
+        };
+        RelativeOverlap { grain, partner, depth, relative: depth / smaller }
     }
 }
 

@@ -196,6 +196,7 @@ impl ContactDynamics {
         let evaluate = |record: &mut ContactRecord| {
             evaluate_pair(record, &context);
             record.in_contact_during_step |= record.loads.overlap > 0.0;
+            record.deepest_overlap = record.deepest_overlap.max(record.loads.overlap);
         };
         // Each pair writes its own record and the records are summed in order, so the bits do not
         // depend on the number of threads.

@@ -1,20 +1,20 @@
 //! Warnings about settings that impair the results of a run.
 
+mod contact;
+mod resolution;
+
 use glam::DVec3;
 
-use super::estimate::Estimate;
-use super::expect::{Expectation, Measure};
-use super::number_format::{AXES, SIDES, quantity};
-use super::settling::{is_free, terminal_speed, time_step};
+use crate::case::estimate::Estimate;
+use crate::case::expect::{Expectation, Measure};
+use crate::case::number_format::{AXES, SIDES, quantity};
+use crate::case::settling::{is_free, time_step};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
-use grainwake_solver::dem::{ContactLawKind, Grain, MotionConstraint, outside};
+use grainwake_solver::dem::{MotionConstraint, outside};
 use grainwake_solver::flow::Boundary;
-use grainwake_solver::math::Precision;
 use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{Setup, StepRule};
 
-/// Steps over which single-precision rounding errors of one sign add up to 0.3 %.
-const MOST_SINGLE_STEPS: u64 = 50_000;
 /// Number of steps that suggests a wrong unit.
 const ABSURD_STEPS: u64 = 100_000_000;
 /// Settling Reynolds number below which a grain hardly moves, which suggests a wrong unit.
@@ -28,7 +28,8 @@ pub(super) fn warnings(
     e: &Estimate,
 ) -> Vec<String> {
     let mut found = wrong_units(setup, e);
-    found.extend(resolution_and_cost(setup, e));
+    found.extend(resolution::resolution_and_cost(setup, e));
+    found.extend(contact::deep_impacts(setup));
     found.extend(light_grains(setup, plan.stop.as_ref()));
     found.extend(ignored_in_dry_runs(setup, plan, expect));
     found.extend(open_faces(setup));
@@ -227,86 +228,6 @@ fn ignored_in_dry_runs(setup: &Setup, plan: &RunPlan, expect: &[Expectation]) ->
     })
 }
 
-/// Coarse grids, blockage, and costs.
-fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
-    let mut found = Vec::new();
-    if let Some(n) = e.cells_per_diameter.filter(|n| *n < 8.0) {
-        found.push(format!("only {n:.1} cells across the smallest grain: below 8 forces are rough; make cell_size smaller"));
-    }
-    if let (Some(n), Some(re)) = (e.cells_per_diameter, e.reynolds) {
-        let error = 0.02 * re / (n * n);
-        if error > 0.1 {
-            found.push(format!(
-                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells); expect forces off by 10 % or more",
-                n / re.sqrt()
-            ));
-        }
-    }
-    if let Some(blockage) = e.blockage.filter(|b| *b > 0.05) {
-        let closed =
-            (0..3).any(|axis| !setup.boundaries.is_periodic(axis) && setup.gravity[axis] == 0.0);
-        let what =
-            if closed { "the walls slow the grains" } else { "the grain feels its own images" };
-        found.push(format!("a grain blocks {:.0} % of the cross-section: {what}; widen the box for an unbounded fluid", 100.0 * blockage));
-    }
-    // Contact dominates the cost of a dry run, so that its sub-steps are no reason for a warning.
-    let wet = setup.fluid.is_some();
-    // The transform is a small part of the cost of a small grid.
-    let large = wet && setup.mesh.cell_count() > 1_000_000;
-    for (axis, &n) in setup.mesh.cells.iter().enumerate() {
-        if large && largest_prime(n) > LARGEST_CHEAP_PRIME {
-            let fast = |n: &usize| largest_prime(*n) <= 5;
-            let below = (1..n).rev().find(fast).unwrap_or(1);
-            let above = (n..).find(fast).unwrap_or(n);
-            found.push(format!(
-                "{n} cells along {} have a large prime factor, {}: a step takes half as long again; {below} or {above} cells are fast",
-                AXES[axis],
-                largest_prime(n)
-            ));
-        }
-    }
-    if setup.precision == Precision::Single && e.steps > MOST_SINGLE_STEPS {
-        found.push(format!(
-            "single precision loses what a step adds beyond its seventh digit: over {} steps speeds may drift by {:.1} %; \"f64\" does not",
-            e.steps,
-            100.0 * f64::from(f32::EPSILON) / 2.0 * e.steps as f64
-        ));
-    }
-    if let Some(substeps) = e.contact_substeps.filter(|n| wet && *n > 200.0) {
-        let remedy = match setup.contact.law {
-            ContactLawKind::Linear => "a lower [contact] stiffness or a larger maximum_overlap",
-            ContactLawKind::HertzMindlin => "a lower youngs_modulus",
-        };
-        found.push(format!("contacts need {substeps:.0} sub-steps a step: {remedy} is cheaper"));
-    }
-    if let Some(overlap) = expected_overlap(setup).filter(|overlap| *overlap > 0.05) {
-        let remedy = match setup.contact.law {
-            ContactLawKind::Linear => "[contact] stiffness",
-            ContactLawKind::HertzMindlin => "youngs_modulus",
-        };
-        found.push(format!(
-            "a grain at its settling speed would overlap by {:.0} % of its diameter at impact: raise {remedy}",
-            100.0 * overlap
-        ));
-    }
-    if let StepRule::Fixed(step) = setup.step {
-        let limits = setup.clone().with_step(StepRule::Limits {
-            cfl: 0.6,
-            viscous: 0.216,
-            max_step: f64::INFINITY,
-        });
-        let most = time_step(&limits, e.settling_speed_m_per_s.unwrap_or(0.0));
-        if step > most {
-            found.push(format!(
-                "the fixed step of {} is above the stability limit of about {}",
-                quantity(step, "s"),
-                quantity(most, "s")
-            ));
-        }
-    }
-    found
-}
-
 /// Free grains that rise.
 fn light_grains(setup: &Setup, stop: Option<&Stop>) -> Vec<String> {
     let Some(fluid) = &setup.fluid else {
@@ -333,41 +254,4 @@ fn light_grains(setup: &Setup, stop: Option<&Stop>) -> Vec<String> {
         );
     }
     found
-}
-
-/// Largest prime factor of a number of cells for which the Fourier transform is fast.
-const LARGEST_CHEAP_PRIME: usize = 13;
-
-/// Returns the largest prime factor of `n`; 1 for 1.
-fn largest_prime(mut n: usize) -> usize {
-    let (mut largest, mut factor) = (1, 2);
-    while factor * factor <= n {
-        while n.is_multiple_of(factor) {
-            (largest, n) = (factor, n / factor);
-        }
-        factor += 1;
-    }
-    largest.max(n)
-}
-
-/// Returns the largest overlap of an impact at the settling speed, relative to the diameter.
-fn expected_overlap(setup: &Setup) -> Option<f64> {
-    let fluid = setup.fluid.as_ref()?;
-    let g = setup.gravity.length();
-    let of = |grain: &Grain| {
-        let speed = terminal_speed(grain, fluid, g).max(grain.velocity.length());
-        setup.contact.impact_overlap(grain, speed) / grain.shape.equivalent_diameter()
-    };
-    setup.grains.iter().map(of).reduce(f64::max)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn prime_factors_are_found() {
-        let found = [1, 2, 97, 100, 131, 390, 2 * 53].map(largest_prime);
-        assert_eq!(found, [1, 2, 97, 5, 131, 13, 53]);
-    }
 }

@@ -1,0 +1,50 @@
+//! Warnings about contact.
+
+use crate::case::settling::{impact_speed, is_free, terminal_speed};
+use grainwake_solver::dem::{ContactLawKind, Grain};
+use grainwake_solver::sim::Setup;
+
+/// Overlap at impact that is a reason for a warning [diameters].
+const WARNED_OVERLAP: f64 = 0.05;
+
+/// Impacts with a large overlap: at the settling speed, in a dry run after a fall through the box.
+pub(super) fn deep_impacts(setup: &Setup) -> Option<String> {
+    let g = setup.gravity.length();
+    let relative_overlap = |grain: &Grain| {
+        let speed = match &setup.fluid {
+            Some(fluid) => terminal_speed(grain, fluid, g).max(grain.velocity.length()),
+            None => impact_speed(grain, None, setup.gravity, &setup.mesh),
+        };
+        setup.contact.impact_overlap(grain, speed) / grain.shape.equivalent_diameter()
+    };
+    let free = setup.grains.iter().filter(|grain| is_free(grain));
+    let of_free = free.map(|grain| (relative_overlap(grain), grain));
+    let (overlap, grain) = of_free.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    if overlap.is_nan() || overlap <= WARNED_OVERLAP {
+        return None;
+    }
+    let diameter = grain.shape.equivalent_diameter();
+    let wanted = 0.01 * diameter;
+    let factor = setup.contact.stiffening(grain, None, 0.0, overlap * diameter, wanted);
+    let remedy = match setup.contact.law {
+        ContactLawKind::Linear => {
+            format!("[contact] stiffness to {:.1e} N/m", factor * setup.contact.normal_stiffness)
+        }
+        ContactLawKind::HertzMindlin => {
+            format!("youngs_modulus to {:.1e} Pa", factor * grain.material.youngs_modulus)
+        }
+    };
+    let speed = match setup.fluid {
+        Some(_) => "at its settling speed",
+        None => "that falls through the box",
+    };
+    let limit = setup.contact.overlap_limit;
+    let stops = match overlap > limit {
+        true => format!(" (the run stops at {:.0} %)", 100.0 * limit),
+        false => String::new(),
+    };
+    Some(format!(
+        "a grain {speed} would overlap by {:.0} % of its diameter at impact{stops}: raise {remedy} for 1 %",
+        100.0 * overlap
+    ))
+}

@@ -1,0 +1,118 @@
+//! Warnings about resolution and cost.
+
+use crate::case::estimate::Estimate;
+use crate::case::number_format::{AXES, quantity};
+use crate::case::settling::time_step;
+use grainwake_solver::dem::ContactLawKind;
+use grainwake_solver::math::Precision;
+use grainwake_solver::sim::{Setup, StepRule};
+
+/// Cells per diameter below which forces are rough.
+const COARSE: f64 = 8.0;
+/// Relative error of the drag times n^2 / Re, n cells per diameter: the smallest factor that bounds
+/// the errors at 8 cells in `docs/accuracy.md` (5.9 % at Re 300, 8.7 % at Re 350).
+const DRAG_ERROR: f64 = 0.016;
+/// Estimated error of the drag from which the resolution is a reason for a warning.
+const LARGEST_DRAG_ERROR: f64 = 0.05;
+/// Steps over which single-precision rounding errors of one sign add up to 0.3 %.
+const MOST_SINGLE_STEPS: u64 = 50_000;
+
+/// Coarse grids, blockage, and costs.
+pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
+    let mut found = Vec::new();
+    // The number counts as printed: a measured diameter of 7.98 cells is no reason for a warning.
+    let printed = |n: f64| (10.0 * n).round() / 10.0;
+    if let Some(n) = e.cells_per_diameter.map(printed).filter(|n| *n < COARSE) {
+        found.push(format!("only {n:.1} cells across the smallest grain: below 8 forces are rough; make cell_size smaller"));
+    }
+    if let (Some(n), Some(re)) = (e.cells_per_diameter, e.reynolds) {
+        let error = DRAG_ERROR * re / (n * n);
+        if error > LARGEST_DRAG_ERROR {
+            found.push(format!(
+                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells): expect the drag {:.0} % too low; {:.0} cells reduce the error to 3 %",
+                n / re.sqrt(),
+                100.0 * error,
+                (DRAG_ERROR * re / 0.03).sqrt().ceil()
+            ));
+        }
+    }
+    if let Some(blockage) = e.blockage.filter(|b| *b > 0.05) {
+        let closed =
+            (0..3).any(|axis| !setup.boundaries.is_periodic(axis) && setup.gravity[axis] == 0.0);
+        let what =
+            if closed { "the walls slow the grains" } else { "the grain feels its own images" };
+        found.push(format!("a grain blocks {:.0} % of the cross-section: {what}; widen the box for an unbounded fluid", 100.0 * blockage));
+    }
+    // Contact dominates the cost of a dry run, so that its sub-steps are no reason for a warning.
+    let wet = setup.fluid.is_some();
+    // The transform is a small part of the cost of a small grid.
+    let large = wet && setup.mesh.cell_count() > 1_000_000;
+    for (axis, &n) in setup.mesh.cells.iter().enumerate() {
+        if large && largest_prime(n) > LARGEST_CHEAP_PRIME {
+            let fast = |n: &usize| largest_prime(*n) <= 5;
+            let below = (1..n).rev().find(fast).unwrap_or(1);
+            let above = (n..).find(fast).unwrap_or(n);
+            found.push(format!(
+                "{n} cells along {} have a large prime factor, {}: a step takes half as long again; {below} or {above} cells are fast",
+                AXES[axis],
+                largest_prime(n)
+            ));
+        }
+    }
+    if setup.precision == Precision::Single && e.steps > MOST_SINGLE_STEPS {
+        found.push(format!(
+            "single precision loses what a step adds beyond its seventh digit: over {} steps speeds may drift by {:.1} %; \"f64\" does not",
+            e.steps,
+            100.0 * f64::from(f32::EPSILON) / 2.0 * e.steps as f64
+        ));
+    }
+    if let Some(substeps) = e.contact_substeps.filter(|n| wet && *n > 200.0) {
+        let remedy = match setup.contact.law {
+            ContactLawKind::Linear => "a lower [contact] stiffness or a larger maximum_overlap",
+            ContactLawKind::HertzMindlin => "a lower youngs_modulus",
+        };
+        found.push(format!("contacts need {substeps:.0} sub-steps a step: {remedy} is cheaper"));
+    }
+    if let StepRule::Fixed(step) = setup.step {
+        let limits = setup.clone().with_step(StepRule::Limits {
+            cfl: 0.6,
+            viscous: 0.216,
+            max_step: f64::INFINITY,
+        });
+        let most = time_step(&limits, e.settling_speed_m_per_s.unwrap_or(0.0));
+        if step > most {
+            found.push(format!(
+                "the fixed step of {} is above the stability limit of about {}",
+                quantity(step, "s"),
+                quantity(most, "s")
+            ));
+        }
+    }
+    found
+}
+
+/// Largest prime factor of a number of cells for which the Fourier transform is fast.
+const LARGEST_CHEAP_PRIME: usize = 13;
+
+/// Returns the largest prime factor of `n`; 1 for 1.
+fn largest_prime(mut n: usize) -> usize {
+    let (mut largest, mut factor) = (1, 2);
+    while factor * factor <= n {
+        while n.is_multiple_of(factor) {
+            (largest, n) = (factor, n / factor);
+        }
+        factor += 1;
+    }
+    largest.max(n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prime_factors_are_found() {
+        let found = [1, 2, 97, 100, 131, 390, 2 * 53].map(largest_prime);
+        assert_eq!(found, [1, 2, 97, 5, 131, 13, 53]);
+    }
+}
