@@ -12,6 +12,17 @@ export function el(name, properties = {}, ...children) {
   return node;
 }
 
+/** Creates an icon of 20 x 20 units from the data of a path. */
+export function icon(path) {
+  const space = "http://www.w3.org/2000/svg";
+  const node = document.createElementNS(space, "svg");
+  const line = document.createElementNS(space, "path");
+  node.setAttribute("viewBox", "0 0 20 20");
+  line.setAttribute("d", path);
+  node.append(line);
+  return node;
+}
+
 /** Sizes a canvas to its element; returns its 2-D context in CSS pixels. */
 export function context2d(canvas) {
   const ratio = Math.min(3, window.devicePixelRatio || 1);

@@ -73,7 +73,7 @@ export class FlatScreen {
     for (let grain = 0; place && grain < run.count; grain++) {
       if (!run.position(grain, place, at)) continue;
       const [px, py] = this.project(at, i);
-      if (Math.hypot(px - x, py - y) < run.grains[grain].scale * this.zoom) return { run: run.number, grain };
+      if (Math.hypot(px - x, py - y) < run.grains[grain].scale * this.zoom) return { run: run.index, grain };
     }
     return null;
   }

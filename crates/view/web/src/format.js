@@ -15,6 +15,25 @@ export function short(value, digits = 3) {
 
 const superscript = (n) => String(n).replace(/[-\d]/g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]));
 
+/** Next number of two significant digits. */
+export function roundUp(value) {
+  if (!(value > 0)) return 0;
+  const power = 10 ** (Math.floor(Math.log10(value)) - 1);
+  return Number((Math.ceil(value / power - 1e-6) * power).toPrecision(6));
+}
+
+/** Rounded number without zeros at its end. */
+export function plain(value) {
+  return short(value).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
+}
+
+/** Power of ten in which an axis up to `size` is labelled, and its name. */
+export function axisFactor(size) {
+  if (!(size > 0) || (size >= 1e-2 && size < 1e4)) return [1, ""];
+  const exponent = Math.floor(Math.log10(size));
+  return [10 ** exponent, ` × 10${superscript(-exponent)}`];
+}
+
 /** Unit of length for a size [m], and metres in it. */
 export function lengthUnit(size) {
   if (size < 2e-3) return ["µm", 1e-6];
@@ -23,7 +42,7 @@ export function lengthUnit(size) {
 
 /** Time with the decimals that a duration needs. */
 export function seconds(time, duration) {
-  const decimals = Math.max(2, Math.min(7, 4 - Math.floor(Math.log10(duration || 1))));
+  const decimals = Math.max(2, Math.min(7, 3 - Math.floor(Math.log10(duration || 1))));
   return time.toFixed(Math.min(decimals, 5));
 }
 

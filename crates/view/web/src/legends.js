@@ -1,7 +1,7 @@
 // Colour bars, time and labels; drawn on a 2-D canvas over the scene and into exported pictures.
 
 import { GRAIN_MAP, theme } from "./colours.js";
-import { lengthUnit, seconds, short } from "./format.js";
+import { lengthUnit, plain, seconds } from "./format.js";
 
 /** Quantities by which grains are coloured. */
 export const GRAIN_QUANTITIES = {
@@ -30,7 +30,7 @@ function bar(context, x, y, width, map, low, high, title) {
   const marks = low < 0 ? [low, 0, high] : [low, 0.5 * (low + high), high];
   marks.forEach((value, i) => {
     context.textAlign = ["left", "center", "right"][i];
-    context.fillText(short(value), x + (i * width) / 2, y + height + 13);
+    context.fillText(plain(value), x + (i * width) / 2, y + height + 13);
   });
 }
 

@@ -2,7 +2,7 @@
 
 import { Recorder, savePicture } from "./capture.js";
 import { Colours } from "./colours.js";
-import { context2d, el } from "./dom.js";
+import { context2d, el, icon } from "./dom.js";
 import { FlatScreen } from "./flat.js";
 import { helpOverlay, listenToKeys } from "./keys.js";
 import { drawLegends } from "./legends.js";
@@ -47,8 +47,8 @@ class Page {
     const tools = el("div", { class: "tools" },
       tool("PNG", "Save a picture (I)", () => this.picture()),
       tool("WebM", "Record a video (W)", () => this.video()),
-      tool("⟲", "Camera to its first place (R)", () => this.screen.home()),
-      tool("⛶", "Full screen (X)", () => this.fullScreen()),
+      tool(icon("M4 10a6 6 0 1 0 2-4.5M6 2v4h4"), "Camera to its first place (R)", () => this.screen.home()),
+      tool(icon("M3 7V3h4M13 3h4v4M17 13v4h-4M7 17H3v-4"), "Full screen (X)", () => this.fullScreen()),
       tool("?", "Help (?)", () => store.set({ help: !store.state.help })));
     const header = el("header", {}, this.title, this.badge, this.chips, tools);
     this.canvas = el("canvas", { class: "scene", tabindex: 0, role: "img", "aria-label": "Grains in their box" });

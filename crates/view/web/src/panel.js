@@ -95,7 +95,7 @@ export class Panel {
   /** Numbers of the picked grain. */
   showPicked() {
     const { picked, time } = this.store.state;
-    const run = picked && this.runs.find((r) => r.number === picked.run);
+    const run = picked && this.runs.find((r) => r.index === picked.run);
     this.picked.hidden = !run;
     if (!run) return;
     const place = run.locate(Math.min(time, run.last));

@@ -2,11 +2,11 @@
 
 import { theme } from "./colours.js";
 import { context2d, el } from "./dom.js";
-import { lengthUnit, short, ticks } from "./format.js";
+import { axisFactor, lengthUnit, ticks } from "./format.js";
 
 /** Largest number of grains with a curve each; further ones are summed up by their range. */
 const EACH = 6;
-const MARGIN = { left: 46, right: 10, top: 20, bottom: 20 };
+const MARGIN = { left: 40, right: 10, top: 20, bottom: 20 };
 
 /** Curves of a run: title and lists of times, values and colours. */
 export function curves(run, colours) {
@@ -105,6 +105,7 @@ export class Plot {
     const y = (v) => height - MARGIN.bottom - ((v - low) / (high - low)) * (height - MARGIN.top - MARGIN.bottom);
     context.font = "10.5px system-ui, sans-serif";
     context.lineWidth = 1;
+    const [factor, name] = axisFactor(Math.max(Math.abs(low), Math.abs(high)));
     for (const v of ticks(low, high, 3)) {
       context.strokeStyle = theme("--grid");
       context.beginPath();
@@ -113,7 +114,7 @@ export class Plot {
       context.stroke();
       context.fillStyle = theme("--faint");
       context.textAlign = "right";
-      context.fillText(short(v), MARGIN.left - 6, y(v) + 3.5);
+      context.fillText(Number((v / factor).toPrecision(6)).toString().replace("-", "−"), MARGIN.left - 6, y(v) + 3.5);
     }
     context.textAlign = "center";
     for (const t of ticks(start, end, 4)) {
@@ -145,7 +146,7 @@ export class Plot {
     context.fillStyle = theme("--ink");
     context.textAlign = "left";
     context.font = "500 12px system-ui, sans-serif";
-    context.fillText(plot.title, 8, 12);
+    context.fillText(plot.title + name, 8, 12);
     const now = Math.min(state.time, run.last);
     context.strokeStyle = theme("--cursor");
     context.lineWidth = 1.5;

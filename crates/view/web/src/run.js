@@ -1,5 +1,6 @@
 // One run: poses at any time, values of grains, curves and slices.
 
+import { roundUp } from "./format.js";
 import { unpack } from "./packed.js";
 
 const FIELDS = {
@@ -16,7 +17,7 @@ export const QUANTITIES = Object.keys(FIELDS);
 export class Run {
   constructor(number, document, redraw) {
     Object.assign(this, document);
-    this.number = number;
+    this.index = number;
     this.redraw = redraw;
     this.rows = this.poses ? this.poses.time.length : 0;
     this.count = this.poses ? this.poses.grains : 0;
@@ -151,7 +152,7 @@ export class Run {
         if (value > 0) values.push(value);
       }
       values.sort((a, b) => a - b);
-      this.scales.set(name, values[Math.floor(0.995 * (values.length - 1))] ?? 0);
+      this.scales.set(name, roundUp(values[Math.floor(0.995 * (values.length - 1))] ?? 0));
     }
     return this.scales.get(name);
   }
@@ -217,7 +218,7 @@ export class Run {
       const first = sorted.findIndex((v) => v >= 0.02 * largest);
       high = sorted[Math.floor(first + 0.98 * (sorted.length - 1 - first))] ?? 0;
     }
-    high = high > 0 ? high : 1;
+    high = high > 0 ? roundUp(high) : 1;
     this.scales.set(key, { label, unit, signed, low: signed ? -high : 0, high });
   }
 

@@ -136,7 +136,7 @@ export class Screen {
     ray.setFromCamera(point, this.camera);
     this.stages[i].scene.updateMatrixWorld();
     const grain = this.stages[i].grains?.pick(ray) ?? null;
-    return grain === null ? null : { run: this.stages[i].run.number, grain };
+    return grain === null ? null : { run: this.stages[i].run.index, grain };
   }
 
   /** Point of the canvas [CSS px] at a position in metres of the i-th run shown. */

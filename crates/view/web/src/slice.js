@@ -5,6 +5,8 @@ import * as THREE from "three";
 const PLANE_AXES = [[1, 2], [0, 2], [0, 1]];
 /** Arrows along the shorter edge of a slice. */
 const ARROWS = 11;
+/** Up to this number of grains the slice is drawn behind all of them. */
+const BACKDROP = 12;
 
 const vertexShader = `
   varying vec2 place;
@@ -59,7 +61,10 @@ export class Slice {
     });
     this.plane = new THREE.Mesh(this.geometry(series.frames[0]), material);
     this.plane.frustumCulled = false;
-    const ink = new THREE.MeshBasicMaterial({ side: THREE.DoubleSide, transparent: true, opacity: 0.8 });
+    // Few grains are never hidden by the slice; many would hide it, if they lay behind.
+    material.depthWrite = run.count > BACKDROP;
+    this.plane.renderOrder = -1;
+    const ink = new THREE.MeshBasicMaterial({ side: THREE.DoubleSide, transparent: true, opacity: 0.8, depthWrite: false });
     this.arrows = new THREE.InstancedMesh(arrowShape(), ink, 4000);
     this.arrows.frustumCulled = false;
     this.group = new THREE.Group();

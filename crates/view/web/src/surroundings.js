@@ -26,6 +26,7 @@ export class Box {
     const lines = new LineSegmentsGeometry().setPositions(edges);
     this.edges = new LineSegments2(lines, new LineMaterial({ linewidth: 1.3, transparent: true }));
     this.floor = this.grid(run);
+    this.floor.renderOrder = -2;
     this.group = new THREE.Group();
     this.group.add(this.floor, this.edges);
   }
