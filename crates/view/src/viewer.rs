@@ -102,7 +102,8 @@ fn revision(source: &Source) -> String {
     format!("{:016x}", hasher.finish())
 }
 
-/// Serialises a document. Non-finite numbers become null; all keys are text, so that it cannot fail.
+/// Serialises a document; numbers that are not finite become null. All keys are text, so that the
+/// serialisation cannot fail.
 fn json(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value)
         .unwrap_or_else(|error| format!("{{\"error\":{:?}}}", error.to_string()))

@@ -31,7 +31,12 @@ const DARK = {
   magnitude: map((s) => fromOklch(0.235 + 0.66 * s, 0.03 + 0.13 * Math.sin(Math.PI * s ** 0.8), 268 - 178 * s)),
   signed: map((s) => {
     const size = Math.abs(2 * s - 1);
-    return fromOklch(0.235 + 0.53 * size, 0.15 * size ** 0.8, s < 0.5 ? 250 : 38);
+    // Zero has the colour of the page: a trace of blue fades into the hue of the end.
+    const [hue, rest] = [((s < 0.5 ? 250 : 38) * Math.PI) / 180, 0.022 * (1 - size) ** 2];
+    const chroma = 0.15 * size ** 0.9;
+    const a = chroma * Math.cos(hue) + rest * Math.cos(4.6);
+    const b = chroma * Math.sin(hue) + rest * Math.sin(4.6);
+    return fromOklch(0.225 + 0.53 * size, Math.hypot(a, b), (Math.atan2(b, a) * 180) / Math.PI);
   }),
 };
 
@@ -43,6 +48,7 @@ export class Colours {
     this.grains = index.colours;
     this.light = { magnitude: fromTriples(index.magnitude), signed: fromTriples(index.signed) };
     this.query = matchMedia("(prefers-color-scheme: dark)");
+    this.query.addEventListener("change", () => known.clear());
   }
 
   get dark() {
@@ -64,8 +70,13 @@ export class Colours {
     });
   }
 
+  /** Colour of the path and the curves of a grain: lighter on a dark page. */
+  line(index) {
+    return this.grain(index).map((v) => (this.dark ? v + 0.22 * (1 - v) : v));
+  }
+
   css(index) {
-    return `rgb(${this.grain(index).map((v) => Math.round(255 * v)).join(" ")})`;
+    return `rgb(${this.line(index).map((v) => Math.round(255 * v)).join(" ")})`;
   }
 }
 
@@ -75,6 +86,12 @@ export function onMap(bytes, s) {
   return [bytes[i] / 255, bytes[i + 1] / 255, bytes[i + 2] / 255];
 }
 
-/** Value of a CSS variable of the page. */
-export const theme = (name) =>
-  getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const known = new Map();
+
+/** Value of a CSS variable of the page; remembered until the theme changes. */
+export function theme(name) {
+  if (!known.has(name)) {
+    known.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  }
+  return known.get(name);
+}

@@ -1,6 +1,6 @@
 // Side view on a 2-D canvas, for browsers without WebGL 2.
 
-import { theme } from "./colours.js";
+import { GRAIN_MAP, onMap, theme } from "./colours.js";
 import { context2d } from "./dom.js";
 
 /** Has the methods of `Screen` that the page uses. */
@@ -53,15 +53,35 @@ export class FlatScreen {
       if (!run.rows) return;
       const place = run.locate(Math.min(state.time, run.last));
       const at = [0, 0, 0];
+      if (state.paths && run.count <= 60) this.drawPaths(context, run, i, colours);
       for (let grain = 0; grain < run.count; grain++) {
         if (!run.position(grain, place, at)) continue;
         const [x, y] = this.project(at, i);
-        context.fillStyle = colours.css(grain);
+        context.fillStyle = this.colour(run, grain, place, state, colours);
         context.beginPath();
         context.arc(x, y, Math.max(1.5, run.grains[grain].scale * this.zoom), 0, 2 * Math.PI);
         context.fill();
       }
     });
+  }
+
+  colour(run, grain, place, state, colours) {
+    if (state.colour === "grain") return colours.css(grain);
+    const value = run.number(state.colour, grain, place) / (run.grainScale(state.colour) || 1);
+    return `rgb(${onMap(GRAIN_MAP, value || 0).map((v) => Math.round(255 * v)).join(" ")})`;
+  }
+
+  drawPaths(context, run, i, colours) {
+    const at = [0, 0, 0];
+    const step = Math.max(1, Math.ceil(run.rows / 400));
+    for (let grain = 0; grain < run.count; grain++) {
+      context.strokeStyle = colours.css(grain);
+      context.beginPath();
+      for (let row = 0; row < run.rows; row += step) {
+        if (run.position(grain, { row, part: 0 }, at)) context.lineTo(...this.project(at, i));
+      }
+      context.stroke();
+    }
   }
 
   pick(x, y) {

@@ -1,11 +1,18 @@
 // Grains of one run: one instanced mesh per shape.
 
 import * as THREE from "three";
+import { mergeVertices } from "three/addons/utils/BufferGeometryUtils.js";
 import { GRAIN_MAP, onMap } from "./colours.js";
+
+/** From this number of grains on, meshes and lighting are simpler. */
+const MANY = 300;
 
 function geometry(mesh, count) {
   if (mesh.kind === "sphere") {
-    return new THREE.IcosahedronGeometry(1, count > 300 ? 3 : count > 30 ? 5 : 12);
+    const sphere = new THREE.IcosahedronGeometry(1, count > MANY ? 3 : count > 30 ? 5 : 12);
+    sphere.deleteAttribute("uv");
+    // Shared vertices are computed once instead of once for each of six triangles.
+    return mergeVertices(sphere);
   }
   const shape = new THREE.BufferGeometry();
   shape.setAttribute("position", new THREE.BufferAttribute(mesh.points, 3));
@@ -21,7 +28,9 @@ export class Grains {
     const members = run.meshes.map(() => []);
     run.grains.forEach((grain, i) => i < run.count && members[grain.mesh]?.push(i));
     this.parts = run.meshes.map((mesh, m) => {
-      const material = new THREE.MeshStandardMaterial({ roughness: 0.62, metalness: 0 });
+      const material = run.count > MANY
+        ? new THREE.MeshLambertMaterial()
+        : new THREE.MeshStandardMaterial({ roughness: 0.62, metalness: 0 });
       const shape = geometry(mesh, members[m].length);
       const part = new THREE.InstancedMesh(shape, material, members[m].length);
       part.frustumCulled = false;
@@ -33,7 +42,7 @@ export class Grains {
   }
 
   /** Moves and colours the grains. */
-  update(place, state, colours) {
+  update(place, state, colours, high) {
     const { run, scratch } = this;
     const matrix = new THREE.Matrix4();
     const position = new THREE.Vector3();
@@ -49,7 +58,7 @@ export class Grains {
         scale.setScalar(known ? run.grains[grain].scale : 0);
         if (!known) position.set(0, 0, 0);
         part.setMatrixAt(i, matrix.compose(position, turn, scale));
-        colour.setRGB(...this.colour(grain, place, state, colours), THREE.SRGBColorSpace);
+        colour.setRGB(...this.colour(grain, place, state, colours, high), THREE.SRGBColorSpace);
         part.setColorAt(i, colour);
       });
       part.instanceMatrix.needsUpdate = true;
@@ -58,10 +67,9 @@ export class Grains {
     }
   }
 
-  colour(grain, place, state, colours) {
+  colour(grain, place, state, colours, high) {
     if (state.colour === "grain") return colours.grain(grain);
     const value = this.run.number(state.colour, grain, place);
-    const high = this.run.grainScale(state.colour);
     if (value === null || !Number.isFinite(value)) return [0.6, 0.6, 0.6];
     return onMap(GRAIN_MAP, high > 0 ? value / high : 0);
   }

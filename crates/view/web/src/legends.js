@@ -56,7 +56,7 @@ export function drawLegends(context, width, height, { state, colours, screen, ru
     const lines = runs.length > 1 ? [run.name, `box ${size} ${unit}`] : [`box ${size} ${unit}`];
     lines.forEach((line, n) => context.fillText(line, left + 18, 52 + 17 * n));
     let y = height - 34;
-    const { map, scale, time } = sliceBar(run, screen?.stages[i], colours);
+    const { map, scale, time } = sliceBar(run, screen.stages[i], colours);
     if (scale) {
       const component = scale.label.startsWith("vorticity") ? ["x", "y", "z"][run.slices[Math.min(state.plane, run.slices.length - 1)].axis] : "";
       const sub = component ? `${scale.label}_${component}` : scale.label;
@@ -64,14 +64,14 @@ export function drawLegends(context, width, height, { state, colours, screen, ru
       y -= 52;
     }
     const { label, unit: of } = GRAIN_QUANTITIES[state.colour];
-    if (of && run.rows) bar(context, left + 18, y, barWidth, GRAIN_MAP, 0, run.grainScale(state.colour) || 1, `${label} [${of}]`);
+    if (of && run.rows) bar(context, left + 18, y, barWidth, GRAIN_MAP, 0, screen.colourScales?.grain || run.grainScale(state.colour) || 1, `${label} [${of}]`);
     if (i > 0) {
       context.fillStyle = theme("--line");
       context.fillRect(left, 0, 1, height);
     }
     context.restore();
   });
-  if (screen && state.box) axisNames(context, runs, screen);
+  if (state.box && !screen.flat) axisNames(context, runs, screen);
 }
 
 function sliceBar(run, stage, colours) {

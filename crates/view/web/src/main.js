@@ -32,7 +32,7 @@ class Page {
       this.redraw();
     });
     this.colours.query.addEventListener("change", () => {
-      for (const run of this.runs) this.panel.showCurves(this.runs[0]);
+      if (this.runs.length) this.panel.showCurves(this.runs[0]);
       this.redraw();
     });
     addEventListener("resize", this.redraw);
@@ -53,7 +53,7 @@ class Page {
     const header = el("header", {}, this.title, this.badge, this.chips, tools);
     this.canvas = el("canvas", { class: "scene", tabindex: 0, role: "img", "aria-label": "Grains in their box" });
     this.legends = el("canvas", { class: "legends", "aria-hidden": "true" });
-    this.message = el("div", { class: "message", role: "status", hidden: true });
+    this.message = el("div", { class: "message", role: "status", title: "Click to close", hidden: true, onclick: () => this.say("") });
     this.view = el("main", { class: "view" }, this.canvas, this.legends, this.message);
     this.timeline = new Timeline(store, () => this.extent());
     this.panel = new Panel(store, this.colours);
@@ -124,7 +124,7 @@ class Page {
     this.badge.textContent = goesOn ? "following" : STATES[state];
     this.badge.className = `badge ${goesOn ? "live" : state}`;
     this.timeline.show(runs);
-    this.panel.show(runs);
+    this.panel.show(runs, this.screen.flat);
     this.store.set({ time, plane: Math.min(this.store.state.plane, Math.max(0, runs[0].slices.length - 1)) });
     this.showChips();
     this.redraw();
@@ -224,10 +224,14 @@ class Page {
     this.pending ||= requestAnimationFrame((now) => {
       this.pending = 0;
       if (this.store.state.playing) {
-        if (this.before) this.timeline.advance(Math.min(0.25, (now - this.before) / 1000));
+        if (this.before) {
+          this.timeline.advance(Math.min(0.25, (now - this.before) / 1000));
+          this.adapt(now - this.before);
+        }
         this.before = now;
       } else {
         this.before = 0;
+        this.adapt(0);
       }
       this.draw();
       if (this.recorder) {
@@ -236,6 +240,13 @@ class Page {
       }
       if (this.store.state.playing) this.redraw();
     });
+  }
+
+  /** Lowers the resolution while frames take long [ms]; at rest it is full again. */
+  adapt(interval) {
+    this.slow = interval > 45 && !this.recorder ? (this.slow ?? 0) + 1 : 0;
+    if (!interval || this.recorder) this.screen.quality = 1;
+    else if (this.slow >= 4) [this.screen.quality, this.slow] = [Math.max(0.5, this.screen.quality - 0.25), 0];
   }
 
   draw() {

@@ -36,24 +36,25 @@ export class Panel {
   }
 
   /** Shows controls, curves and notes of the runs. */
-  show(runs) {
+  show(runs, flat) {
     this.runs = runs;
     const [run] = runs;
     const grains = Object.entries(GRAIN_QUANTITIES).filter(([name]) => name === "grain" || name === "speed" || runs.some((r) => r.poses?.[name]));
+    const slices = !flat && run.slices.length > 0;
     const planes = run.slices.map((series, i) => [i, series.name]);
     const follow = [[null, "no grain"], ...run.grains.slice(0, Math.min(200, run.count)).map((_, i) => [i, `grain ${i}`])];
     const rows = [
-      run.rows && this.select("colour", "Grains by", grains.map(([name, { label }]) => [name, label])),
-      run.slices.length && this.select("quantity", "Slice of", QUANTITIES.map((name) => [name, NAMES[name]])),
-      planes.length > 1 && this.select("plane", "Plane", planes),
-      run.rows && this.select("follow", "Follow", follow),
+      run.rows > 0 && this.select("colour", "Grains by", grains.map(([name, { label }]) => [name, label])),
+      slices && this.select("quantity", "Slice of", QUANTITIES.map((name) => [name, NAMES[name]])),
+      slices && planes.length > 1 && this.select("plane", "Plane", planes),
+      !flat && run.rows > 0 && this.select("follow", "Follow", follow),
     ];
     this.controls.replaceChildren(
       el("div", { class: "selects" }, ...rows.filter(Boolean)),
       el("div", { class: "toggles" }, ...[
-        run.slices.length && this.toggle("slice", "Slice", "S"),
-        run.slices.length && this.toggle("arrows", "Arrows", "V"),
-        run.rows && this.toggle("paths", "Paths", "P"),
+        slices && this.toggle("slice", "Slice", "S"),
+        slices && this.toggle("arrows", "Arrows", "V"),
+        run.rows > 0 && this.toggle("paths", "Paths", "P"),
         this.toggle("box", "Box", "B"),
       ].filter(Boolean)),
     );

@@ -11,6 +11,8 @@ export class Screen {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.canvas = canvas;
     this.stages = [];
+    /** Part of the full resolution; lower while a slow machine plays. */
+    this.quality = 1;
     this.camera = new THREE.PerspectiveCamera(30, 1, 0.005, 50);
     this.changed = changed;
     canvas.addEventListener("webglcontextrestored", changed);
@@ -25,7 +27,8 @@ export class Screen {
       return known ?? new Stage(run, unit);
     });
     for (const stage of before) if (!this.stages.includes(stage)) stage.dispose();
-    if (!this.controls) this.home();
+    const same = before.length === runs.length && before[0].unit === unit;
+    if (!this.controls || !same) this.home();
   }
 
   /** Places the camera so that every box fits its part of the canvas. */
@@ -62,7 +65,9 @@ export class Screen {
           ...run.box.size.map((s, axis) => ((((n >> axis) & 1) - 0.5) * s) / unit),
         );
         const need = Math.max(Math.abs(corner.dot(y)) / tangent, Math.abs(corner.dot(x)) / (tangent * (width / height)));
-        distance = Math.max(distance, 1.09 * need + corner.dot(direction));
+        // Legends take a larger part of a small canvas.
+        const margin = height < 600 ? 1.2 : 1.09;
+        distance = Math.max(distance, margin * need + corner.dot(direction));
       }
     }
     return distance;
@@ -95,12 +100,22 @@ export class Screen {
     this.controls.update();
   }
 
+  /** Ranges of the colours that cover all runs; no range of the slices until all are known. */
+  scales(state) {
+    const grain = Math.max(...this.stages.map(({ run }) => (run.rows && state.colour !== "grain" ? run.grainScale(state.colour) : 0)));
+    const shown = this.stages.filter((stage) => stage.series(state));
+    const fields = shown.map((stage) => stage.run.fieldScale(stage.series(state), state.quantity));
+    if (!fields.length || fields.includes(null)) return { grain, field: null };
+    const high = Math.max(...fields.map((scale) => scale.high));
+    return { grain, field: { ...fields[0], low: fields[0].signed ? -high : 0, high } };
+  }
+
   /** Draws all runs. */
   draw(state, colours) {
     const { renderer, camera, canvas } = this;
     const { clientWidth: width, clientHeight: height } = canvas;
     if (!width || !height || !this.stages.length) return;
-    const ratio = Math.min(2, window.devicePixelRatio || 1);
+    const ratio = this.quality * Math.min(2, window.devicePixelRatio || 1);
     const size = renderer.getSize(new THREE.Vector2());
     if (size.x !== width || size.y !== height || renderer.getPixelRatio() !== ratio) {
       renderer.setPixelRatio(ratio);
@@ -113,8 +128,9 @@ export class Screen {
     camera.aspect = part / height;
     camera.updateProjectionMatrix();
     camera.updateMatrixWorld();
+    this.colourScales = this.scales(state);
     this.stages.forEach((stage, i) => {
-      stage.update(state, colours);
+      stage.update(state, colours, this.colourScales);
       stage.turnLight(camera);
       renderer.setViewport(i * part, 0, part, height);
       renderer.setScissor(i * part, 0, part, height);

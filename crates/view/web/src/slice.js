@@ -18,12 +18,15 @@ const vertexShader = `
 const fragmentShader = `
   uniform sampler2D codes, solid, map;
   uniform vec2 range, scale;
+  uniform vec3 grey;
   varying vec2 place;
   void main() {
-    if (texture2D(solid, place).r > 0.5) discard;
     float value = mix(range.x, range.y, texture2D(codes, place).r);
     float s = clamp((value - scale.x) / (scale.y - scale.x), 0.0, 1.0);
-    gl_FragColor = vec4(texture2D(map, vec2((s * 255.0 + 0.5) / 256.0, 0.5)).rgb, 1.0);
+    vec3 fluid = texture2D(map, vec2((s * 255.0 + 0.5) / 256.0, 0.5)).rgb;
+    // Grains at the time of the slice are grey, as in the figures of the report.
+    float part = smoothstep(0.35, 0.65, texture2D(solid, place).r);
+    gl_FragColor = vec4(mix(fluid, grey, part), 1.0);
   }`;
 
 function texture(width, height, format = THREE.RedFormat) {
@@ -54,6 +57,7 @@ export class Slice {
       map: { value: texture(256, 1, THREE.RGBAFormat) },
       range: { value: new THREE.Vector2() },
       scale: { value: new THREE.Vector2(0, 1) },
+      grey: { value: new THREE.Vector3() },
     };
     const material = new THREE.ShaderMaterial({
       uniforms, vertexShader, fragmentShader,
@@ -89,17 +93,16 @@ export class Slice {
   }
 
   /** Shows a quantity at a time; returns the scale and the time of the frame, or null. */
-  update(time, state, colours) {
+  update(time, state, colours, scale) {
     const { run, series, plane } = this;
     const frame = run.frame(series, time);
-    const scale = run.fieldScale(series, state.quantity);
     const codes = run.frameCodes(frame);
     this.group.visible = Boolean(scale && codes);
     if (!this.group.visible) return null;
     const { uniforms } = plane.material;
     const count = frame.cells[0] * frame.cells[1];
     const field = series.fields.indexOf(state.quantity);
-    const shown = `${series.frames.indexOf(frame)} ${field} ${colours.dark}`;
+    const shown = [series.frames.indexOf(frame), field, colours.dark, scale.high].join(" ");
     if (shown !== this.shown) {
       this.shown = shown;
       uniforms.codes.value.image.data = codes.subarray(field * count, (field + 1) * count);
@@ -108,6 +111,7 @@ export class Slice {
       for (const name of ["codes", "solid", "map"]) uniforms[name].value.needsUpdate = true;
       uniforms.range.value.fromArray(frame.ranges[field]);
       uniforms.scale.value.set(scale.low, scale.high);
+      uniforms.grey.value.setScalar(colours.dark ? 0.3 : 0.85);
       const corner = [...frame.corner];
       this.group.position.fromArray(corner);
       this.placeArrows(frame, codes);

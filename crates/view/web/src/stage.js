@@ -33,24 +33,29 @@ export class Stage {
     this.scene.add(this.lamp, this.lamp.target);
   }
 
-  /** Brings everything to a time; returns the scale of the slice, or null. */
-  update(state, colours) {
+  /** Slices along the chosen plane; the last ones if there are fewer planes. */
+  series(state) {
+    const { slices } = this.run;
+    return state.slice ? slices[Math.min(state.plane, slices.length - 1)] : undefined;
+  }
+
+  /** Brings everything to a time; `scales` are the ranges of the colours, common to all runs. */
+  update(state, colours, scales) {
     const { run } = this;
     const time = Math.min(state.time, run.last);
     const place = run.rows ? run.locate(time) : { row: 0, part: 0 };
-    this.grains?.update(place, state, colours);
+    this.grains?.update(place, state, colours, scales.grain);
     this.paths.update(place, state, colours);
     this.box.update(state);
     for (const slice of this.slices.values()) slice.group.visible = false;
     this.shownSlice = null;
-    const series = run.slices[Math.min(state.plane, run.slices.length - 1)];
-    if (!state.slice || !series) return null;
+    const series = this.series(state);
+    if (!series) return;
     if (!this.slices.has(series)) {
       this.slices.set(series, new Slice(run, series));
       this.world.add(this.slices.get(series).group);
     }
-    this.shownSlice = this.slices.get(series).update(time, state, colours);
-    return this.shownSlice;
+    this.shownSlice = this.slices.get(series).update(time, state, colours, scales.field);
   }
 
   /** Lights from behind the viewer's left shoulder. */
