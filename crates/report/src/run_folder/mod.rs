@@ -304,6 +304,20 @@ mod tests {
     }
 
     #[test]
+    fn a_damaged_run_is_read_up_to_the_damage_if_asked() {
+        let folder = crate::testing::folder();
+        std::fs::write(folder.join("summary.json"), "{").unwrap();
+        std::fs::write(folder.join("diagnostics.csv"), "time,gap\n0,1\n1,x\n2,3\n").unwrap();
+        assert!(RunFolder::open(&folder).is_err());
+        let run = RunFolder::open_with(&folder, Damage::Truncate).unwrap();
+        assert_eq!(run.diagnostics.unwrap().column("time"), Some(&[0.0][..]));
+        assert!(run.summary.is_none());
+        assert!(run.notes.iter().any(|n| n.contains("diagnostics.csv, line 3")), "{:?}", run.notes);
+        assert!(run.notes.iter().any(|n| n.contains("summary.json, line 1")), "{:?}", run.notes);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
     fn a_folder_without_a_run_is_refused() {
         let folder = crate::testing::folder();
         let error = RunFolder::open(&folder).unwrap_err();

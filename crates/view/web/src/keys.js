@@ -63,7 +63,7 @@ export function listenToKeys(store, actions) {
       i: actions.picture,
       w: actions.video,
       "?": () => store.set({ help: !state.help }),
-      Escape: () => store.set({ help: false, picked: null }),
+      Escape: () => store.set({ help: false, table: false, picked: null }),
     };
     QUANTITIES.forEach((quantity, i) => (known[i + 1] = () => store.set({ quantity, slice: true })));
     if (!known[key]) return;

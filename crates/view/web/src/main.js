@@ -117,7 +117,7 @@ class Page {
     const [start, end] = this.extent();
     const goesOn = this.index.live && runs.some((run) => run.state === "unfinished");
     const time = wasAtEnd && goesOn ? end : Math.min(end, Math.max(start, this.store.state.time));
-    this.title.textContent = runs.length > 1 ? "Comparison" : runs[0].title ?? runs[0].name;
+    this.title.textContent = runs.length > 1 ? "Comparison" : (!this.index.study && runs[0].title) || runs[0].name;
     document.title = `${this.title.textContent} – Grainwake`;
     const states = new Set(runs.map((run) => run.state));
     const state = ["failed", "unfinished", "finished"].find((s) => states.has(s));

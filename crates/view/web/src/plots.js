@@ -118,7 +118,8 @@ export class Plot {
     }
     context.textAlign = "center";
     for (const t of ticks(start, end, 4)) {
-      context.fillText(String(t).replace("-", "−"), x(t), height - 6);
+      context.textAlign = x(t) > width - 18 ? "right" : "center";
+      context.fillText(String(t).replace("-", "−"), context.textAlign === "right" ? width - 2 : x(t), height - 6);
     }
     context.setLineDash([2, 3]);
     context.strokeStyle = theme("--faint");

@@ -4,11 +4,13 @@ import { el } from "./dom.js";
 
 /** Overlay with the table; a click on a row opens its run, a box adds it beside the others. */
 export function studyOverlay(study, store) {
-  const head = ["", "run", "state", ...study.columns];
+  // Columns without any value are left out, as those of pairs in a study of single grains.
+  const columns = study.columns.map((_, i) => i).filter((i) => study.rows.some((row) => row.values[i]));
+  const head = ["", "run", "state", ...columns.map((i) => study.columns[i])];
   let sorted = null;
   let down = false;
   const body = el("tbody");
-  const value = (row, i) => (i === 1 ? row.name : i === 2 ? row.state : row.values[i - 3] ?? "");
+  const value = (row, i) => (i === 1 ? row.name : i === 2 ? row.state : row.values[columns[i - 3]] ?? "");
   const fill = () => {
     const rows = [...study.rows];
     if (sorted !== null) {
@@ -29,7 +31,8 @@ export function studyOverlay(study, store) {
       toggleRun(store, row.run);
       fill();
     } });
-    const cells = row.values.map((text) => el("td", { class: Number.isFinite(Number(text)) ? "number" : null }, text));
+    const values = columns.map((i) => row.values[i] ?? "");
+    const cells = values.map((text) => el("td", { class: Number.isFinite(Number(text)) ? "number" : null }, text));
     return el("tr", { class: open ? (shown ? "open shown" : "open") : null, onclick: () => open && store.set({ shown: [row.run], picked: null, follow: null, table: false }) },
       el("td", {}, box || ""), el("th", {}, row.name), el("td", {}, row.state), ...cells);
   };
@@ -45,10 +48,12 @@ export function studyOverlay(study, store) {
     el("p", { class: "faint" }, "Click a run to see it; tick up to four runs to see them beside each other."),
     el("div", { class: "scroll" }, el("table", { class: "study" }, el("thead", {}, el("tr", {}, ...heads)), body)));
   const overlay = el("div", { class: "overlay", hidden: true, onclick: close }, card);
-  store.listen((state) => {
+  const update = (state) => {
     if (state.table && overlay.hidden) fill();
     overlay.hidden = !state.table;
-  });
+  };
+  store.listen(update);
+  update(store.state);
   return overlay;
 }
 

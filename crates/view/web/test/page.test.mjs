@@ -5,7 +5,7 @@ import { appendFileSync, cpSync, readFileSync, rmSync, statSync } from "node:fs"
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { after, before, test } from "node:test";
-import { RUN, SCREENSHOTS, browser, folder, manySpheres, open, save, serve, settled } from "./support.mjs";
+import { RUN, SCREENSHOTS, browser, folder, manySpheres, open, save, serve, settled, study } from "./support.mjs";
 
 let chrome;
 let saved;
@@ -240,6 +240,23 @@ test("several runs stand beside each other", async () => {
   await page.waitForFunction(() => window.grainwake.screen.stages.length === 2);
   await settled(page);
   if (SCREENSHOTS) await page.screenshot({ path: join(SCREENSHOTS, "two-runs.png") });
+  assert.deepEqual(problems, []);
+  await context.close();
+});
+
+test("a study opens with the table of its runs", async () => {
+  const { page, context, problems } = await open(chrome, url(save("study.html", study())));
+  const rows = page.locator(".study tbody tr");
+  assert.equal(await rows.count(), 3);
+  if (SCREENSHOTS) await page.screenshot({ path: join(SCREENSHOTS, "study.png") });
+  await page.locator(".study thead th", { hasText: "weight" }).click({ clickCount: 2, delay: 20 });
+  assert.match(await rows.first().innerText(), /d3000/, "sorted downwards");
+  await rows.filter({ hasText: "d2500" }).locator("th").click();
+  await page.waitForFunction(() => window.grainwake.runs[0].name.includes("d2500"));
+  assert.ok(await page.locator(".overlay .study").isHidden());
+  await page.locator(".chips .run").click();
+  await rows.filter({ hasText: "d3000" }).locator("input").click();
+  await page.waitForFunction(() => window.grainwake.screen.stages.length === 2);
   assert.deepEqual(problems, []);
   await context.close();
 });

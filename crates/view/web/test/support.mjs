@@ -62,6 +62,26 @@ export async function settled(page) {
   });
 }
 
+const CASE = `title = "small"
+[fluid]\ndensity = 1000\nviscosity = "5 mPa s"
+[domain]\nsize = ["4 mm", "4 mm", "12 mm"]\ncell_size = "0.5 mm"
+[time]\nend = "20 ms"
+[output]\ntables = "2 ms"\nslices = "10 ms"
+[[grain]]\nshape = { kind = "sphere", diameter = "2 mm" }\nnodes = 200\ndensity = 2500
+position = ["2 mm", "2 mm", "6 mm"]\n`;
+
+/** Runs a study of three small runs; returns its folder. */
+export function study() {
+  const [place, out] = [join(folder, "plan"), join(folder, "study")];
+  mkdirSync(place);
+  writeFileSync(join(place, "case.toml"), CASE);
+  const values = [2000, 2500, 3000].map((d) => `{ name = "d${d}", value = ${d} }`).join(", ");
+  writeFileSync(join(place, "study.toml"), `title = "three weights"\nbase = "case.toml"
+[[axis]]\nname = "weight"\nkey = "grain.0.density"\nvalues = [${values}]\n`);
+  execFileSync(GRAINWAKE, ["study", join(place, "study.toml"), "-o", out, "--quiet"], { stdio: "ignore" });
+  return out;
+}
+
 /** Writes the folder of a run of many equal spheres that fall, for the measurement of speed. */
 export function manySpheres(count, times) {
   const path = join(folder, `spheres-${count}`);
