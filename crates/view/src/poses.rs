@@ -39,8 +39,19 @@ pub fn poses(run: &RunFolder, diameters: &[Option<f64>], limit: usize) -> Option
     let last = longest.len().checked_sub(1)?;
     let rows = (0..=last).filter(|row| row % stride == 0 || *row == last);
     let times: Vec<f64> = rows.map(|row| longest.time[row]).collect();
+    // A grain that has left the box has no rows any more.
+    let present = |history: &&History, time: f64| {
+        history
+            .time
+            .first()
+            .zip(history.time.last())
+            .is_some_and(|(a, b)| (*a..=*b).contains(&time))
+    };
+    let row = |history: &History, time: f64| {
+        Some(history).filter(|history| present(history, time))?.nearest(time)
+    };
     let at: Vec<Vec<Option<usize>>> = (times.iter())
-        .map(|time| run.grains.iter().map(|history| history.nearest(*time)).collect())
+        .map(|time| run.grains.iter().map(|history| row(history, *time)).collect())
         .collect();
     let all = |value: &dyn Fn(usize, &History, usize) -> Vec<f64>, empty: &[f64]| -> Vec<f64> {
         let of = |(grain, row): (usize, &Option<usize>)| match row {
@@ -112,4 +123,47 @@ fn contact_force(
     let weight = (density - displaced) * volume * run.facts.gravity?;
     let force = history.force[row].filter(|f| f.is_finite()).unwrap_or(DVec3::ZERO);
     Some((density * volume * acceleration - weight - force).length())
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+    use crate::packed::tests::inflated;
+
+    fn history(times: &[f64]) -> History {
+        History {
+            time: times.to_vec(),
+            position: times.iter().map(|t| DVec3::splat(*t)).collect(),
+            velocity: vec![DVec3::ONE; times.len()],
+            orientation: vec![DQuat::IDENTITY; times.len()],
+            angular_velocity: vec![DVec3::ZERO; times.len()],
+            force: vec![None; times.len()],
+            contacts: vec![None; times.len()],
+        }
+    }
+
+    fn positions(limit: usize) -> (Vec<f32>, usize) {
+        let grains = vec![history(&[0.0, 1.0, 2.0, 3.0]), history(&[0.0, 1.0])];
+        let run = RunFolder { grains, ..RunFolder::default() };
+        let poses = poses(&run, &[None, None], limit).unwrap();
+        let bytes = inflated(&poses.position);
+        let x = bytes.chunks_exact(12).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        (x.collect(), poses.stride)
+    }
+
+    #[test]
+    fn a_grain_that_has_left_has_no_position() {
+        let (x, _) = positions(100);
+        assert_eq!(x[..5], [0.0, 0.0, 1.0, 1.0, 2.0]);
+        assert!(x[5].is_nan() && x[7].is_nan(), "{x:?}");
+    }
+
+    #[test]
+    fn thinned_poses_keep_the_first_and_the_last_time() {
+        let (x, stride) = positions(3);
+        assert_eq!(stride, 3);
+        assert_eq!((x[0], x[2], x.len()), (0.0, 3.0, 4));
+    }
 }

@@ -112,7 +112,7 @@ export class Panel {
       ["angular velocity [rad/s]", list("spin")],
       ["hydrodynamic force [N]", list("force")],
       ["contact force [N]", run.poses.contact_force && short(run.number("contact_force", grain, place))],
-      ["contacts", run.poses.contacts && String(run.number("contacts", grain, place))],
+      ["contacts", run.poses.contacts && String(run.number("contacts", grain, place) ?? "–")],
       ["diameter [m]", facts.diameter && short(facts.diameter, 4)],
       ["density [kg/m³]", facts.density && short(facts.density, 4)],
       ["shape", facts.shape],

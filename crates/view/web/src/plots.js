@@ -39,7 +39,10 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 function ofGrains(run, colours, title, value) {
   const { time } = run.poses;
   const at = (grain) =>
-    Array.from(time, (_, row) => value(run.vector("velocity", grain, { row, part: 0 })));
+    Array.from(time, (_, row) => {
+      const velocity = run.vector("velocity", grain, { row, part: 0 });
+      return velocity ? value(velocity) : NaN;
+    });
   if (run.count <= EACH) {
     const lines = Array.from({ length: run.count }, (_, grain) => ({
       time, values: at(grain), colour: colours.css(grain), grain,
@@ -47,16 +50,19 @@ function ofGrains(run, colours, title, value) {
     return { title, lines, zero: true };
   }
   const mean = new Float64Array(run.rows);
+  const counts = new Float64Array(run.rows);
   const high = new Float64Array(run.rows).fill(-Infinity);
   const low = new Float64Array(run.rows).fill(Infinity);
   for (let grain = 0; grain < run.count; grain++) {
     at(grain).forEach((v, row) => {
       if (!Number.isFinite(v)) return;
-      mean[row] += v / run.count;
+      mean[row] += v;
+      counts[row] += 1;
       high[row] = Math.max(high[row], v);
       low[row] = Math.min(low[row], v);
     });
   }
+  for (let row = 0; row < run.rows; row++) mean[row] /= counts[row];
   const line = (values, colour) => ({ time, values, colour });
   const lines = [line(low, "--faint"), line(high, "--faint"), line(mean, "--accent")];
   return { title: `${title}: least, mean, largest`, lines, zero: true };

@@ -126,6 +126,8 @@ export class Run {
     if (!array) return null;
     const nearest = Math.min(this.rows - 1, row + (part > 0.5 ? 1 : 0));
     const first = 3 * (nearest * this.count + grain);
+    // A grain that has left the box has no position.
+    if (!Number.isFinite(this.poses.position[first])) return null;
     return Array.from(array.subarray(first, first + 3));
   }
 
@@ -138,7 +140,8 @@ export class Run {
     const array = this.poses?.[name];
     if (!array) return null;
     const nearest = Math.min(this.rows - 1, place.row + (place.part > 0.5 ? 1 : 0));
-    return array[nearest * this.count + grain];
+    const at = nearest * this.count + grain;
+    return Number.isFinite(this.poses.position[3 * at]) ? array[at] : null;
   }
 
   /** Upper end of the colours of a grain quantity: the 99.5th percentile over the run. */

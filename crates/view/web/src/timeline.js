@@ -61,7 +61,8 @@ export class Timeline {
     const several = runs.length > 1;
     for (const run of runs) {
       for (const event of run.events) {
-        const name = `${event.label}${event.grains.length === 1 ? ` of grain ${event.grains[0]}` : ""}`;
+        const [grain] = event.grains;
+        const name = event.event === "left" ? `grain ${grain} left` : event.grains.length === 1 ? `${event.label} of grain ${grain}` : event.label;
         const time = `${seconds(event.time, end - start)} s`;
         const jump = () => this.store.set({ time: event.time, playing: false });
         const details = [name, time, several ? run.name : null, Number.isFinite(event.gap) ? `gap ${short(event.gap)} m` : null];
