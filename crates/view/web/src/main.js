@@ -245,8 +245,9 @@ class Page {
   /** Lowers the resolution while frames take long [ms]; at rest it is full again. */
   adapt(interval) {
     this.slow = interval > 45 && !this.recorder ? (this.slow ?? 0) + 1 : 0;
-    if (!interval || this.recorder) this.screen.quality = 1;
-    else if (this.slow >= 4) [this.screen.quality, this.slow] = [Math.max(0.5, this.screen.quality - 0.25), 0];
+    if (!interval || this.recorder) this.screen.quality = this.recorder ? 1 : this.screen.full;
+    else if (this.screen.quality > 1) this.screen.quality = 1;
+    else if (this.slow >= 2) [this.screen.quality, this.slow] = [Math.max(0.5, this.screen.quality - 0.25), 0];
   }
 
   draw() {

@@ -5,14 +5,27 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { theme } from "./colours.js";
 import { Stage } from "./stage.js";
 
+/** Whether the processor draws: the browser found no graphics card. */
+function drawsInSoftware() {
+  const probe = document.createElement("canvas").getContext("webgl2");
+  if (!probe) return false;
+  const names = probe.getExtension("WEBGL_debug_renderer_info");
+  const name = names ? probe.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
+  probe.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|basic render/i.test(name);
+}
+
 export class Screen {
   /** Throws if the browser has no WebGL 2. */
   constructor(canvas, changed) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    // Multisampling is slow in software: there, pictures at rest have more pixels instead.
+    const software = drawsInSoftware();
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, alpha: true });
+    this.full = software ? 1.5 : 1;
     this.canvas = canvas;
     this.stages = [];
     /** Part of the full resolution; lower while a slow machine plays. */
-    this.quality = 1;
+    this.quality = this.full;
     this.camera = new THREE.PerspectiveCamera(30, 1, 0.005, 50);
     this.changed = changed;
     canvas.addEventListener("webglcontextrestored", changed);
