@@ -18,6 +18,7 @@ mod study;
 mod study_board;
 mod threads;
 mod validate;
+mod view;
 
 use clap::{CommandFactory, Parser};
 
@@ -33,6 +34,7 @@ fn main() -> std::process::ExitCode {
         Command::Validate(args) => validate::validate(args),
         Command::Study(args) => study::study(args),
         Command::Report(args) => report::report(args),
+        Command::View(args) => view::view(args),
         Command::Bench(args) => bench::bench(args),
         Command::Schema => print(&format!("{:#}", grainwake_run::case::schema())),
         Command::Completions { shell } => {

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DQuat, DVec3};
 
 use crate::error::FormatError;
-use crate::table::Table;
+use crate::table::{Damage, Table};
 
 /// Name of the file in a run folder.
 pub const FILE: &str = "grains.csv";
@@ -67,7 +67,20 @@ impl GrainRow {
 /// # Errors
 /// [`FormatError`] with the first damaged line.
 pub fn read(file: &Path, notes: &mut Vec<String>) -> Result<Vec<GrainRow>, FormatError> {
-    let table = Table::read(file, notes)?;
+    read_with(file, notes, Damage::Refuse)
+}
+
+/// Reads the rows with the given treatment of a damaged line.
+///
+/// # Errors
+/// [`FormatError`] if the file or its header is unreadable, or with the first damaged line if
+/// damage is refused.
+pub fn read_with(
+    file: &Path,
+    notes: &mut Vec<String>,
+    damage: Damage,
+) -> Result<Vec<GrainRow>, FormatError> {
+    let table = Table::read_with(file, notes, damage)?;
     let column = |name: &str| {
         let names = || table.names().join(", ");
         let missing = || format!("the column '{name}' is missing; found: {}", names());
@@ -86,36 +99,46 @@ pub fn read(file: &Path, notes: &mut Vec<String>) -> Result<Vec<GrainRow>, Forma
     let torque = vector(["tx", "ty", "tz"]).ok();
     let contacts = table.column("contacts");
     let at = |columns: [&[f64]; 3], row: usize| DVec3::from_array(columns.map(|c| c[row]));
-    (0..table.rows())
-        .map(|row| {
-            let damaged = |what: String| FormatError::line(file, row + 2, what);
-            let index = grain[row];
-            if !(index >= 0.0 && index.fract() == 0.0 && index < LARGEST_INDEX) {
-                return Err(damaged(format!("{index} is not the index of a grain")));
-            }
-            if index >= table.rows() as f64 {
-                let rows = table.rows();
-                return Err(damaged(format!("grain {index} in a table of {rows} rows")));
-            }
-            let position = at(position, row);
-            if !time[row].is_finite() || !position.is_finite() {
-                return Err(damaged("time or position is not finite".to_owned()));
-            }
-            let orientation = DQuat::from_xyzw(qx[row], qy[row], qz[row], qw[row]);
-            let valid = orientation.is_finite() && orientation.length() > 1e-6;
-            Ok(GrainRow {
-                time: time[row],
-                grain: index as usize,
-                position,
-                velocity: at(velocity, row),
-                orientation: if valid { orientation.normalize() } else { DQuat::IDENTITY },
-                angular_velocity: at(angular_velocity, row),
-                force: force.map(|columns| at(columns, row)),
-                torque: torque.map(|columns| at(columns, row)),
-                contacts: contacts.and_then(|column| count(column[row])),
-            })
+    let rows = (0..table.rows()).map(|row| {
+        let damaged = |what: String| FormatError::line(file, row + 2, what);
+        let index = grain[row];
+        if !(index >= 0.0 && index.fract() == 0.0 && index < LARGEST_INDEX) {
+            return Err(damaged(format!("{index} is not the index of a grain")));
+        }
+        if index >= table.rows() as f64 {
+            let rows = table.rows();
+            return Err(damaged(format!("grain {index} in a table of {rows} rows")));
+        }
+        let position = at(position, row);
+        if !time[row].is_finite() || !position.is_finite() {
+            return Err(damaged("time or position is not finite".to_owned()));
+        }
+        let orientation = DQuat::from_xyzw(qx[row], qy[row], qz[row], qw[row]);
+        let valid = orientation.is_finite() && orientation.length() > 1e-6;
+        Ok(GrainRow {
+            time: time[row],
+            grain: index as usize,
+            position,
+            velocity: at(velocity, row),
+            orientation: if valid { orientation.normalize() } else { DQuat::IDENTITY },
+            angular_velocity: at(angular_velocity, row),
+            force: force.map(|columns| at(columns, row)),
+            torque: torque.map(|columns| at(columns, row)),
+            contacts: contacts.and_then(|column| count(column[row])),
         })
-        .collect()
+    });
+    let mut read = Vec::with_capacity(table.rows());
+    for row in rows {
+        match row {
+            Ok(row) => read.push(row),
+            Err(error) if damage == Damage::Truncate => {
+                notes.push(format!("{error}; this line and all after it were left out"));
+                break;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(read)
 }
 
 /// Returns a number of the table as a count; none for NaN, fractions and negative numbers.

@@ -4,6 +4,15 @@ use std::path::Path;
 
 use crate::error::{FormatError, read_text, unfinished_line};
 
+/// Treatment of a damaged line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Damage {
+    /// The table is refused.
+    Refuse,
+    /// The lines before the damage are kept, and a note says so.
+    Truncate,
+}
+
 /// Table of numbers; an empty cell is NaN.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
@@ -17,6 +26,19 @@ impl Table {
     /// # Errors
     /// [`FormatError`] with the first damaged line.
     pub fn read(file: &Path, notes: &mut Vec<String>) -> Result<Table, FormatError> {
+        Table::read_with(file, notes, Damage::Refuse)
+    }
+
+    /// Reads a table with the given treatment of a damaged line.
+    ///
+    /// # Errors
+    /// [`FormatError`] if the file or its header is unreadable, or with the first damaged line if
+    /// damage is refused.
+    pub fn read_with(
+        file: &Path,
+        notes: &mut Vec<String>,
+        damage: Damage,
+    ) -> Result<Table, FormatError> {
         let mut text = read_text(file)?;
         let complete = text.rfind('\n').map_or(0, |end| end + 1);
         let unfinished = !text[complete..].trim().is_empty() && complete > 0;
@@ -48,18 +70,26 @@ impl Table {
         }
         let mut columns = vec![Vec::new(); names.len()];
         for record in records {
-            let record = record.map_err(broken)?;
-            if record.len() != names.len() {
-                let what = format!("{} values under {} columns", record.len(), names.len());
-                return Err(damaged(&record, what));
-            }
-            for ((cell, column), name) in record.iter().zip(&mut columns).zip(&names) {
-                column.push(match cell {
-                    "" => f64::NAN,
+            let row = record.map_err(broken).and_then(|record| {
+                if record.len() != names.len() {
+                    let what = format!("{} values under {} columns", record.len(), names.len());
+                    return Err(damaged(&record, what));
+                }
+                let number = |(cell, name): (&str, &String)| match cell {
+                    "" => Ok(f64::NAN),
                     number => number.parse().map_err(|_| {
                         damaged(&record, format!("'{cell}' under '{name}' is not a number"))
-                    })?,
-                });
+                    }),
+                };
+                record.iter().zip(&names).map(number).collect::<Result<Vec<f64>, _>>()
+            });
+            match row {
+                Ok(row) => columns.iter_mut().zip(row).for_each(|(column, v)| column.push(v)),
+                Err(error) if damage == Damage::Truncate => {
+                    notes.push(format!("{error}; this line and all after it were left out"));
+                    break;
+                }
+                Err(error) => return Err(error),
             }
         }
         Ok(Table { names, columns })

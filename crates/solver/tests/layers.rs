@@ -17,7 +17,7 @@ const ALLOWED: [(&str, &[&str]); 7] = [
 ];
 
 /// Crates of the workspace that each crate may depend on.
-const CRATES: [(&str, &[&str]); 10] = [
+const CRATES: [(&str, &[&str]); 11] = [
     ("simd", &[]),
     ("formats", &["simd"]),
     ("shape", &["formats"]),
@@ -25,9 +25,13 @@ const CRATES: [(&str, &[&str]); 10] = [
     ("run", &["formats", "shape", "solver"]),
     ("plot", &[]),
     ("report", &["formats", "plot"]),
+    ("view", &["formats", "plot", "report", "shape"]),
     ("study", &["formats", "plot", "report", "run", "shape", "solver"]),
     ("validation", &["formats", "plot", "report", "run", "shape", "solver"]),
-    ("cli", &["formats", "plot", "report", "run", "shape", "solver", "study", "validation"]),
+    (
+        "cli",
+        &["formats", "plot", "report", "run", "shape", "solver", "study", "validation", "view"],
+    ),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

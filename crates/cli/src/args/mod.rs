@@ -6,6 +6,7 @@ mod report;
 mod run;
 mod study;
 mod validate;
+mod view;
 
 use clap::{Parser, Subcommand};
 
@@ -18,6 +19,7 @@ pub use report::ReportArgs;
 pub use run::{CheckArgs, RunArgs};
 pub use study::StudyArgs;
 pub use validate::ValidateArgs;
+pub use view::ViewArgs;
 
 /// Resolved simulation of grains in fluid: from images or meshes to figures.
 #[derive(Debug, Parser)]
@@ -43,6 +45,8 @@ pub enum Command {
     Study(StudyArgs),
     /// Draw the figures and the page of a run folder or a study folder
     Report(ReportArgs),
+    /// Show runs as an interactive 3-D page, served on this machine or saved as one file
+    View(ViewArgs),
     /// Measure the speed and memory of the solver on this machine
     Bench(BenchArgs),
     /// Print the JSON schema of the case file

@@ -39,6 +39,16 @@ impl GrainSurface {
         GrainSurface { points, triangles }
     }
 
+    /// Returns the points, in the body frame [m].
+    pub fn points(&self) -> &[DVec3] {
+        &self.points
+    }
+
+    /// Returns the triangles as indices of points.
+    pub fn triangles(&self) -> &[[usize; 3]] {
+        &self.triangles
+    }
+
     /// Returns the outline of the body at a pose, projected to the axes `across` and `up`.
     pub fn outline(&self, position: DVec3, rotation: DQuat, across: usize, up: usize) -> Outline {
         let project = |p: &DVec3| {

@@ -12,6 +12,9 @@ use crate::html::{self, label, name_column, notice, number_column, section};
 use crate::phases::{Phase, PhaseKind};
 use crate::run_folder::RunFolder;
 
+/// Saved 3-D page in a run folder, to which the report links.
+const VIEW: &str = "view.html";
+
 /// Returns the page.
 pub fn page(
     run: &RunFolder,
@@ -30,7 +33,9 @@ pub fn page(
     };
     let footer = html! {
         "Produced by Grainwake from the tables of this run folder. Figures as PNG and SVG: "
-        code { "figures/" } "."
+        code { "figures/" } ". Interactive 3-D page: "
+        @if run.path.join(VIEW).is_file() { a href=(VIEW) { (VIEW) } } @else { code { "grainwake view" } }
+        "."
     };
     html::page(title(run, features), &lead(run, features), &content, &footer)
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::{DQuat, DVec3};
 use grainwake_formats::grains;
+use grainwake_formats::table::Damage;
 
 use crate::error::ReportError;
 
@@ -83,9 +84,21 @@ impl History {
 /// # Errors
 /// [`ReportError`] with the first damaged line.
 pub fn histories(file: &Path, notes: &mut Vec<String>) -> Result<Vec<History>, ReportError> {
+    histories_with(file, notes, Damage::Refuse)
+}
+
+/// Reads the motion of all grains with the given treatment of a damaged line.
+///
+/// # Errors
+/// [`ReportError`] if the file is unreadable, or with the first damaged line if damage is refused.
+pub fn histories_with(
+    file: &Path,
+    notes: &mut Vec<String>,
+    damage: Damage,
+) -> Result<Vec<History>, ReportError> {
     let mut out: Vec<History> = Vec::new();
     let mut went_back = false;
-    for row in grains::read(file, notes)? {
+    for row in grains::read_with(file, notes, damage)? {
         if row.grain >= out.len() {
             out.resize_with(row.grain + 1, History::default);
         }

@@ -10,7 +10,7 @@ use glam::DVec3;
 use serde_json::Value;
 
 use grainwake_formats::events::Event;
-use grainwake_formats::table::Table;
+use grainwake_formats::table::{Damage, Table};
 use grainwake_formats::vti::{self, Image};
 use grainwake_formats::vtp::{self, Surface};
 use grainwake_formats::{events, pvd};
@@ -18,7 +18,7 @@ use grainwake_formats::{events, pvd};
 use crate::error::ReportError;
 
 pub use facts::Facts;
-pub use history::{History, histories};
+pub use history::{History, histories, histories_with};
 
 /// VTK file of a run: a slice of the fields, or surfaces of grains.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +52,8 @@ pub struct RunFolder {
     pub provenance: Option<Value>,
     /// Slices, in order of time.
     pub slices: Vec<FrameFile>,
+    /// Full fields, in order of time.
+    pub fields: Vec<FrameFile>,
     /// Surfaces, in order of time.
     pub surfaces: Vec<FrameFile>,
     /// Missing or omitted parts.
@@ -64,45 +66,68 @@ impl RunFolder {
     /// # Errors
     /// If the folder holds no run, or a table or log is damaged.
     pub fn open(path: &Path) -> Result<RunFolder, ReportError> {
+        RunFolder::open_with(path, Damage::Refuse)
+    }
+
+    /// Returns whether a folder holds a file of a run.
+    pub fn exists_in(path: &Path) -> bool {
+        let known = ["case.resolved.toml", "grains.csv", "diagnostics.csv", "summary.json"];
+        known.iter().any(|name| path.join(name).is_file())
+    }
+
+    /// Reads a run folder; missing files are noted, damaged ones treated as given. A damaged table
+    /// is kept up to the damage, any other damaged file is left out.
+    ///
+    /// # Errors
+    /// If the folder holds no run, or a file is damaged and damage is refused.
+    pub fn open_with(path: &Path, damage: Damage) -> Result<RunFolder, ReportError> {
         let mut run = RunFolder { path: path.to_owned(), ..RunFolder::default() };
         let present = |name: &str| Some(path.join(name)).filter(|file| file.is_file());
-        let known = ["case.resolved.toml", "grains.csv", "diagnostics.csv", "summary.json"];
-        if !known.iter().any(|name| present(name).is_some()) {
+        if !RunFolder::exists_in(path) {
             return Err(ReportError::NotARun(path.to_owned()));
         }
+        let mut notes = Vec::new();
         match present("case.resolved.toml") {
-            Some(file) => run.facts = facts::read_case(&file)?,
-            None => {
-                run.notes.push("case.resolved.toml is missing: the set-up is not known".to_owned())
+            Some(file) => {
+                let facts = usable(facts::read_case(&file), damage, &mut notes)?;
+                run.facts = facts.unwrap_or_default();
             }
+            None => notes.push("case.resolved.toml is missing: the set-up is not known".to_owned()),
         }
-        if let Some(file) = present("summary.json") {
-            let summary = facts::read_json(&file)?;
-            facts::add_summary(&mut run.facts, &summary);
-            run.summary = Some(summary);
-        }
-        if let Some(file) = present("failure.json") {
-            run.failure = Some(facts::read_json(&file)?);
-        }
-        if let Some(file) = present("provenance.json") {
-            run.provenance = Some(facts::read_json(&file)?);
+        let mut json = |name: &str| match present(name) {
+            Some(file) => usable(facts::read_json(&file), damage, &mut notes),
+            None => Ok(None),
+        };
+        run.summary = json("summary.json")?;
+        run.failure = json("failure.json")?;
+        run.provenance = json("provenance.json")?;
+        if let Some(summary) = &run.summary {
+            facts::add_summary(&mut run.facts, summary);
         }
         match present("grains.csv") {
-            Some(file) => run.grains = histories(&file, &mut run.notes)?,
+            Some(file) => {
+                let read = histories_with(&file, &mut notes, damage);
+                run.grains = usable(read, damage, &mut notes)?.unwrap_or_default();
+            }
             None if run.facts.grains.is_empty() => {}
-            None => run
-                .notes
+            None => notes
                 .push("grains.csv is missing: the motion of the grains is not known".to_owned()),
         }
         match present("diagnostics.csv") {
-            Some(file) => run.diagnostics = Some(Table::read(&file, &mut run.notes)?),
-            None => run.notes.push("diagnostics.csv is missing".to_owned()),
+            Some(file) => {
+                let read = Table::read_with(&file, &mut notes, damage);
+                run.diagnostics = usable(read.map_err(ReportError::from), damage, &mut notes)?;
+            }
+            None => notes.push("diagnostics.csv is missing".to_owned()),
         }
         if let Some(file) = present("events.jsonl") {
-            run.events = events::read(&file, &mut run.notes)?;
+            let read = events::read(&file, &mut notes).map_err(ReportError::from);
+            run.events = usable(read, damage, &mut notes)?.unwrap_or_default();
         }
+        run.notes = notes;
         let times = run.collection();
         run.slices = run.frames("slices", "vti", &times);
+        run.fields = run.frames("fields", "vti", &times);
         run.surfaces = run.frames("grains", "vtp", &times);
         Ok(run)
     }
@@ -219,6 +244,22 @@ impl RunFolder {
     }
 }
 
+/// Returns the contents of a file, or a note instead of its damage unless damage is refused.
+fn usable<T>(
+    read: Result<T, ReportError>,
+    damage: Damage,
+    notes: &mut Vec<String>,
+) -> Result<Option<T>, ReportError> {
+    match read {
+        Ok(contents) => Ok(Some(contents)),
+        Err(error) if damage == Damage::Truncate => {
+            notes.push(format!("{error}; the file was left out"));
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}
+
 fn time_inside(file: &Path, extension: &str) -> Result<f64, String> {
     let time = match extension {
         "vti" => Some(read_image(file)?.frame.time),
@@ -260,6 +301,20 @@ mod tests {
         assert_eq!(run.wrapped(DVec3::new(1.5, 3.5, -0.5)), DVec3::new(-0.5, 3.5, 3.5));
         assert_eq!(run.nearest(DVec3::new(1.5, 3.5, -0.5)), DVec3::new(-0.5, 3.5, -0.5));
         assert_eq!((run.period(0), run.period(1)), (Some(2.0), None));
+    }
+
+    #[test]
+    fn a_damaged_run_is_read_up_to_the_damage_if_asked() {
+        let folder = crate::testing::folder();
+        std::fs::write(folder.join("summary.json"), "{").unwrap();
+        std::fs::write(folder.join("diagnostics.csv"), "time,gap\n0,1\n1,x\n2,3\n").unwrap();
+        assert!(RunFolder::open(&folder).is_err());
+        let run = RunFolder::open_with(&folder, Damage::Truncate).unwrap();
+        assert_eq!(run.diagnostics.unwrap().column("time"), Some(&[0.0][..]));
+        assert!(run.summary.is_none());
+        assert!(run.notes.iter().any(|n| n.contains("diagnostics.csv, line 3")), "{:?}", run.notes);
+        assert!(run.notes.iter().any(|n| n.contains("summary.json, line 1")), "{:?}", run.notes);
+        std::fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]

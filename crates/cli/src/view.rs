@@ -1,0 +1,127 @@
+//! `grainwake view`.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use grainwake_report::run_folder::RunFolder;
+use grainwake_study::format::rounded;
+use grainwake_study::{Plan, columns, records};
+use grainwake_view::server::Server;
+use grainwake_view::{Source, StudyRow, StudyTable, ViewError, Viewer, save};
+
+use crate::args::ViewArgs;
+use crate::exit::{BAD_INPUT, Exit, IO};
+use crate::{print, tell};
+
+impl From<ViewError> for Exit {
+    fn from(error: ViewError) -> Exit {
+        let code = if error.is_input_output() { IO } else { BAD_INPUT };
+        let help = match &error {
+            ViewError::Run(_) => {
+                "give folders that `grainwake run` or `grainwake study` has written"
+            }
+            ViewError::Listen { .. } => "choose another port with --port N; 0 takes any free port",
+            ViewError::Write { .. } => "check the folder and its permissions",
+        };
+        Exit::with_help(code, error.to_string(), help)
+    }
+}
+
+/// Serves or saves the page of run folders or of a study folder.
+pub fn view(args: &ViewArgs) -> Result<(), Exit> {
+    let mut viewer = viewer(&args.folders)?;
+    if let Some(file) = &args.save {
+        if file.is_dir() {
+            let message = format!("{} is a folder", file.display());
+            return Err(Exit::with_help(BAD_INPUT, message, "name a file, such as page.html"));
+        }
+        let notes = save(&mut viewer, file)?;
+        for note in &notes {
+            tell!("note: {note}");
+        }
+        let bytes = std::fs::metadata(file)?.len();
+        return print(&format!("{} ({:.1} MB)", file.display(), bytes as f64 / 1e6));
+    }
+    let server = Server::bind(viewer, args.port)?;
+    let address = format!("http://{}/", server.address());
+    print(&address)?;
+    tell!("served on this machine only; Ctrl-C ends it");
+    if args.open && !open(&address) {
+        tell!("note: no browser could be started; open {address} yourself");
+    }
+    server.run();
+    Ok(())
+}
+
+/// Creates the viewer of run folders, or of the runs of one study folder.
+fn viewer(folders: &[PathBuf]) -> Result<Viewer, Exit> {
+    match folders {
+        [study] if Plan::exists_in(study) => of_study(study),
+        _ => {
+            if let Some(study) = folders.iter().find(|folder| Plan::exists_in(folder)) {
+                let message = format!("{} is a study among several folders", study.display());
+                return Err(Exit::with_help(BAD_INPUT, message, "view one study at a time"));
+            }
+            let source = |folder: &PathBuf| Source { name: name(folder), folder: folder.clone() };
+            let mut sources: Vec<Source> = folders.iter().map(source).collect();
+            // Folders of equal names are told apart by their paths.
+            for i in 0..sources.len() {
+                if folders.iter().filter(|folder| name(folder) == name(&folders[i])).count() > 1 {
+                    sources[i].name = folders[i].display().to_string();
+                }
+            }
+            Ok(Viewer::new(sources, None)?)
+        }
+    }
+}
+
+/// Returns the last part of the path of a folder.
+fn name(folder: &Path) -> String {
+    let full = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    full.file_name()
+        .map_or_else(|| full.display().to_string(), |n| n.to_string_lossy().into_owned())
+}
+
+fn of_study(folder: &Path) -> Result<Viewer, Exit> {
+    let plan = Plan::read(folder)?;
+    let records = records(&plan, folder);
+    let axes: BTreeSet<&String> = records.iter().flat_map(|record| record.levels.keys()).collect();
+    let quantities = columns(&records);
+    let mut table = StudyTable { title: plan.title.clone(), ..StudyTable::default() };
+    table.columns = axes.iter().map(|axis| (*axis).clone()).collect();
+    table.columns.push("kiss_time_s".to_owned());
+    table.columns.extend(quantities.iter().map(|name| (*name).to_owned()));
+    let mut sources = Vec::new();
+    for (run, record) in plan.runs.iter().zip(&records) {
+        let source = Source { name: run.name.clone(), folder: run.folder(folder) };
+        let index = RunFolder::exists_in(&source.folder).then_some(sources.len());
+        sources.extend(index.map(|_| source));
+        let number = |value: Option<f64>| value.map_or(String::new(), |v| rounded(v).to_string());
+        let levels = axes.iter().map(|axis| record.levels.get(*axis).cloned().unwrap_or_default());
+        let measured = quantities.iter().map(|name| number(record.measured(name)));
+        let values = levels.chain([number(record.kiss_time_s)]).chain(measured).collect();
+        let (name, state) = (record.name.clone(), record.state.to_string());
+        table.rows.push(StudyRow { name, state, run: index, values });
+    }
+    if sources.is_empty() {
+        let message = format!("{}: no run of the study has been started", folder.display());
+        return Err(Exit::with_help(BAD_INPUT, message, "run `grainwake study` first"));
+    }
+    Ok(Viewer::new(sources, Some(table))?)
+}
+
+/// Starts the default browser; returns whether that was possible.
+fn open(address: &str) -> bool {
+    let mut command = if cfg!(target_os = "macos") {
+        Command::new("open")
+    } else if cfg!(windows) {
+        let mut command = Command::new("rundll32");
+        command.arg("url.dll,FileProtocolHandler");
+        command
+    } else {
+        Command::new("xdg-open")
+    };
+    command.arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.spawn().is_ok()
+}

@@ -1,0 +1,68 @@
+// Table of the runs of a study.
+
+import { el } from "./dom.js";
+
+/** Overlay with the table; a click on a row opens its run, a box adds it beside the others. */
+export function studyOverlay(study, store) {
+  // Columns without any value are left out, as those of pairs in a study of single grains.
+  const columns = study.columns.map((_, i) => i).filter((i) => study.rows.some((row) => row.values[i]));
+  const head = ["", "run", "state", ...columns.map((i) => study.columns[i])];
+  let sorted = null;
+  let down = false;
+  const body = el("tbody");
+  const value = (row, i) => (i === 1 ? row.name : i === 2 ? row.state : row.values[columns[i - 3]] ?? "");
+  const fill = () => {
+    const rows = [...study.rows];
+    if (sorted !== null) {
+      rows.sort((a, b) => {
+        const [x, y] = [value(a, sorted), value(b, sorted)];
+        const numbers = [Number(x), Number(y)];
+        const order = x !== "" && y !== "" && numbers.every(Number.isFinite) ? numbers[0] - numbers[1] : x.localeCompare(y);
+        return down ? -order : order;
+      });
+    }
+    body.replaceChildren(...rows.map(line));
+  };
+  const line = (row) => {
+    const open = row.run !== null;
+    const shown = open && store.state.shown.includes(row.run);
+    const box = open && el("input", { type: "checkbox", checked: shown, "aria-label": `Show ${row.name}`, onclick: (event) => {
+      event.stopPropagation();
+      toggleRun(store, row.run);
+      fill();
+    } });
+    const values = columns.map((i) => row.values[i] ?? "");
+    const cells = values.map((text) => el("td", { class: Number.isFinite(Number(text)) ? "number" : null }, text));
+    return el("tr", { class: open ? (shown ? "open shown" : "open") : null, onclick: () => open && store.set({ shown: [row.run], picked: null, follow: null, table: false }) },
+      el("td", {}, box || ""), el("th", {}, row.name), el("td", {}, row.state), ...cells);
+  };
+  const heads = head.map((name, i) => el("th", { onclick: () => {
+    if (!i) return;
+    down = sorted === i && !down;
+    sorted = i;
+    fill();
+  } }, name.replaceAll("_", " ")));
+  const close = () => store.set({ table: false });
+  const card = el("div", { class: "card wide", role: "dialog", "aria-label": "Runs of the study", onclick: (event) => event.stopPropagation() },
+    el("h2", {}, study.title, el("button", { "aria-label": "Close", onclick: close }, "×")),
+    el("p", { class: "faint" }, "Click a run to see it; tick up to four runs to see them beside each other."),
+    el("div", { class: "scroll" }, el("table", { class: "study" }, el("thead", {}, el("tr", {}, ...heads)), body)));
+  const overlay = el("div", { class: "overlay", hidden: true, onclick: close }, card);
+  const update = (state) => {
+    if (state.table && overlay.hidden) fill();
+    overlay.hidden = !state.table;
+  };
+  store.listen(update);
+  update(store.state);
+  return overlay;
+}
+
+/** Adds a run to those shown, or removes it; at least one and at most four are shown. */
+export function toggleRun(store, number) {
+  const { shown } = store.state;
+  if (shown.includes(number)) {
+    if (shown.length > 1) store.set({ shown: shown.filter((n) => n !== number) });
+  } else {
+    store.set({ shown: [...shown, number].slice(-4) });
+  }
+}
