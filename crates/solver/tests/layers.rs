@@ -17,7 +17,7 @@ const ALLOWED: [(&str, &[&str]); 7] = [
 ];
 
 /// Crates of the workspace that each crate may depend on.
-const CRATES: [(&str, &[&str]); 10] = [
+const CRATES: [(&str, &[&str]); 11] = [
     ("simd", &[]),
     ("formats", &["simd"]),
     ("shape", &["formats"]),
@@ -28,6 +28,7 @@ const CRATES: [(&str, &[&str]); 10] = [
     ("study", &["formats", "plot", "report", "run", "shape", "solver"]),
     ("validation", &["formats", "plot", "report", "run", "shape", "solver"]),
     ("cli", &["formats", "plot", "report", "run", "shape", "solver", "study", "validation"]),
+    ("python", &["formats", "report", "run", "shape", "solver", "study", "validation"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

@@ -1,0 +1,59 @@
+//! `validate`: suites of cases with references and bounds.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use grainwake_run::case::Case;
+use grainwake_run::Existing;
+use grainwake_validation::{Level, Suite};
+use pyo3::prelude::*;
+
+use crate::arrays::json;
+use crate::error::{Raise, SolverError, input};
+use crate::{running, threads};
+
+/// Results of validations as dicts; called by ``grainwake.validate``.
+#[pyfunction]
+pub fn _validate<'py>(
+    py: Python<'py>,
+    names: Vec<String>,
+    suites: PathBuf,
+    output: PathBuf,
+    level: &str,
+    threads: usize,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let level = match level {
+        "ci" => Level::Ci,
+        "full" => Level::Full,
+        other => {
+            let message = format!("level: found \"{other}\"; expected \"ci\" or \"full\"");
+            return Err(input(message));
+        }
+    };
+    let all = Suite::read_all(&suites).raise()?;
+    let known: Vec<String> = all.iter().map(|suite| suite.name.clone()).collect();
+    if let Some(name) = names.iter().find(|name| !known.contains(name)) {
+        let known = known.join(", ");
+        return Err(input(format!("there is no validation \"{name}\"; there are: {known}")));
+    }
+    let threads = threads::resolve(threads);
+    let mut results = Vec::new();
+    for suite in all.iter().filter(|suite| names.is_empty() || names.contains(&suite.name)) {
+        let mut values = BTreeMap::new();
+        for run in suite.runs.iter().filter(|run| run.level <= level) {
+            let folder = output.join(&suite.name).join(&run.name);
+            let case = py.detach(|| Case::load(&run.case, &run.set)).raise()?;
+            let existing = Existing::Replace;
+            let found = match running::run(py, &case, &folder, existing, threads, progress) {
+                Ok(_) => py.detach(|| suite.evaluate(run, &folder, &mut values)),
+                Err(error) if error.is_instance_of::<SolverError>(py) => {
+                    suite.results_of_failed_run(run, &error.value(py).to_string())
+                }
+                Err(error) => return Err(error),
+            };
+            results.extend(found);
+        }
+    }
+    json(py, &results)
+}
