@@ -26,7 +26,8 @@ pub fn quantity<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> 
 
 /// Returns a vector in SI units: three quantities.
 pub fn vector<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<DVec3> {
-    let refused = |found: &str| input(format!("{name}: found {found}; expected {}", K::EXPECTED_VECTOR));
+    let refused =
+        |found: &str| input(format!("{name}: found {found}; expected {}", K::EXPECTED_VECTOR));
     if value.is_instance_of::<PyString>() {
         return Err(refused("a string"));
     }
@@ -37,7 +38,8 @@ pub fn vector<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<DVec3> 
     let [x, y, z] = &items[..] else {
         return Err(refused(&format!("{} components", items.len())));
     };
-    let part = |axis: &str, item: &Bound<'_, PyAny>| quantity::<K>(&format!("{name}, {axis}"), item);
+    let part =
+        |axis: &str, item: &Bound<'_, PyAny>| quantity::<K>(&format!("{name}, {axis}"), item);
     Ok(DVec3::new(part("x", x)?, part("y", y)?, part("z", z)?))
 }
 
@@ -75,5 +77,8 @@ pub fn points(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<DVec3>> {
 pub fn wrong_shape(name: &str, found: &[usize], wanted: &str) -> PyErr {
     let shape: Vec<String> = found.iter().map(usize::to_string).collect();
     let tail = if found.len() == 1 { "," } else { "" };
-    input(format!("{name}: found an array of shape ({}{tail}); expected {wanted}", shape.join(", ")))
+    input(format!(
+        "{name}: found an array of shape ({}{tail}); expected {wanted}",
+        shape.join(", ")
+    ))
 }

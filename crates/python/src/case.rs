@@ -261,7 +261,8 @@ impl PyCase {
         let existing = running::existing(resume, force);
         running::run(py, &self.case, &folder, existing, threads, progress)?;
         if report {
-            py.detach(|| grainwake_report::render(&folder)).map_err(IntoException::into_exception)?;
+            py.detach(|| grainwake_report::render(&folder))
+                .map_err(IntoException::into_exception)?;
         }
         py.import("grainwake._results")?.call_method1("open", (folder,))
     }

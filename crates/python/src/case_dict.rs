@@ -54,11 +54,7 @@ fn table(path: &str, mapping: &Bound<'_, PyMapping>, store: Option<&Path>) -> Py
 }
 
 /// Returns a value; `None` for Python's None.
-fn value(
-    path: &str,
-    given: &Bound<'_, PyAny>,
-    store: Option<&Path>,
-) -> PyResult<Option<Value>> {
+fn value(path: &str, given: &Bound<'_, PyAny>, store: Option<&Path>) -> PyResult<Option<Value>> {
     if given.is_none() {
         return Ok(None);
     }

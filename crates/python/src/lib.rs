@@ -33,7 +33,7 @@ mod _grainwake {
     #[pymodule_export]
     use super::results::{
         _read_collection, _read_events, _read_grains, _read_image, _read_surface, _read_table,
-        _render,
+        _render, _run_notes, _seconds,
     };
     #[pymodule_export]
     use super::simulation::PySimulation;

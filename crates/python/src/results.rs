@@ -2,14 +2,18 @@
 
 use std::path::PathBuf;
 
-use grainwake_formats::{events, grains, pvd, table::Table, vti, vtp};
+use grainwake_formats::{events, grains, pvd, summary, table::Table, vti, vtp};
 use grainwake_report::ReportError;
+use grainwake_report::run_folder::RunFolder;
+use grainwake_run::case::quantity::Time;
+use grainwake_run::provenance::Provenance;
 use grainwake_study::Plan;
 use numpy::IntoPyArray;
 use numpy::ndarray::{Array, IxDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::arguments::quantity;
 use crate::arrays::{json, numbers, rows, vectors};
 use crate::error::{IntoException, Raise, input, system};
 
@@ -39,10 +43,7 @@ pub fn _read_grains(py: Python<'_>, path: PathBuf) -> PyResult<Content<'_>> {
 
 /// Events in order of time as dicts.
 #[pyfunction]
-pub fn _read_events(
-    py: Python<'_>,
-    path: PathBuf,
-) -> PyResult<(Bound<'_, PyAny>, Vec<String>)> {
+pub fn _read_events(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyAny>, Vec<String>)> {
     let mut notes = Vec::new();
     let events = events::read(&path, &mut notes).raise()?;
     Ok((json(py, &events)?, notes))
@@ -112,4 +113,40 @@ pub fn _render(py: Python<'_>, folder: PathBuf) -> PyResult<(PathBuf, Vec<String
             .map_err(|error: ReportError| error.into_exception())?;
         Ok((done.page, done.notes))
     })
+}
+
+/// Missing, unfinished or damaged parts of a run folder.
+#[pyfunction]
+pub fn _run_notes(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<String>> {
+    let opened = py.detach(|| RunFolder::open(&folder));
+    let mut notes = match opened {
+        Ok(run) => run.notes,
+        Err(error @ ReportError::NotARun(_)) => return Err(error.into_exception()),
+        // The other parts can still be read.
+        Err(error) => vec![error.to_string()],
+    };
+    if !folder.join(summary::FILE).is_file() {
+        notes.push("summary.json is missing: the run has not finished".to_owned());
+    }
+    if let Some(provenance) = Provenance::read(&folder) {
+        let own = env!("CARGO_PKG_VERSION");
+        if version(&provenance.version) > version(own) {
+            notes.push(format!(
+                "the run was made by version {}, this is version {own}: update the package",
+                provenance.version
+            ));
+        }
+    }
+    Ok(notes)
+}
+
+/// Returns the numbers of a version, "0.1.0" -> [0, 1, 0].
+fn version(text: &str) -> Vec<u64> {
+    text.split('.').map(|part| part.parse().unwrap_or(0)).collect()
+}
+
+/// Time in seconds of a number or a string with a unit.
+#[pyfunction]
+pub fn _seconds(time: &Bound<'_, PyAny>) -> PyResult<f64> {
+    quantity::<Time>("time", time)
 }

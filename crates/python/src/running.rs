@@ -93,12 +93,8 @@ impl Observer for Relay<'_> {
     }
     fn event(&mut self, event: &Event) {
         let grains: Vec<String> = event.grains.iter().map(usize::to_string).collect();
-        let text = format!(
-            "t {:.4} s  {} (grain {})",
-            event.time,
-            event.kind.name(),
-            grains.join(", ")
-        );
+        let text =
+            format!("t {:.4} s  {} (grain {})", event.time, event.kind.name(), grains.join(", "));
         self.update(|shared| shared.messages.push(text));
     }
     fn note(&mut self, text: &str) {

@@ -142,9 +142,8 @@ impl PyStudy {
             command: running::command(py)?,
         };
         let (messages, stop) = (Mutex::new(Vec::new()), AtomicBool::new(false));
-        let display = py
-            .import("grainwake._progress")?
-            .call_method1("of_study", (progress, chosen.len()))?;
+        let display =
+            py.import("grainwake._progress")?.call_method1("of_study", (progress, chosen.len()))?;
         let work = || {
             let relay = Relay { plan, messages: &messages, stop: &stop };
             execute(&plan.runs, &chosen, &folder, &options, &relay)

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use grainwake_run::case::Case;
 use grainwake_run::Existing;
+use grainwake_run::case::Case;
 use grainwake_validation::{Level, Suite};
 use pyo3::prelude::*;
 

@@ -259,7 +259,9 @@ impl PyGrain {
         let unit = unit.map(unit_length).transpose()?;
         let built = if let Ok(path) = mesh.extract::<PathBuf>() {
             let unit = unit.ok_or_else(|| {
-                input("unit: it is missing; give the length of one unit of the file, such as \"mm\"")
+                input(
+                    "unit: it is missing; give the length of one unit of the file, such as \"mm\"",
+                )
             })?;
             py.detach(|| {
                 let (mesh, source) = read_mesh(&path, unit, &ReadLimits::default())?;

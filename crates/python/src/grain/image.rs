@@ -331,15 +331,16 @@ fn read(
     } else {
         let volume = volume(image)?;
         py.detach(|| {
-            let source = grainwake_shape::SourceFile { name: "array".into(), sha256: hash(&volume) };
+            let source =
+                grainwake_shape::SourceFile { name: "array".into(), sha256: hash(&volume) };
             scan_volume(&volume, &source, &how, &quiet)
         })
     };
     scanned.map_err(|error| match error {
         // The message of the library names an option of the command line.
-        ShapeError::Unsupported { .. } if how.threshold.is_none() => input(format!(
-            "{error}; in Python: threshold=\"otsu\", \"otsu3\" or a grey value"
-        )),
+        ShapeError::Unsupported { .. } if how.threshold.is_none() => {
+            input(format!("{error}; in Python: threshold=\"otsu\", \"otsu3\" or a grey value"))
+        }
         error => error.into_exception(),
     })
 }
@@ -354,9 +355,10 @@ fn segmentation(value: &Bound<'_, PyAny>) -> PyResult<Threshold> {
             ))),
         };
     }
-    value.extract().map(Threshold::Value).map_err(|_| {
-        input("threshold: expected a grey value, \"otsu\" or \"otsu3\"")
-    })
+    value
+        .extract()
+        .map(Threshold::Value)
+        .map_err(|_| input("threshold: expected a grey value, \"otsu\" or \"otsu3\""))
 }
 
 /// Returns an array of the shape (z, y, x) as a volume: integers and booleans are labels, floating

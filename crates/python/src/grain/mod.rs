@@ -217,7 +217,8 @@ impl PyGrain {
             return Err(input(format!("pixels: found {pixels}; expected 16 to 4096")));
         }
         let mut bytes = Vec::new();
-        let drawn = py.detach(|| Picture::three_sides(&self.shape, pixels, false).encode(&mut bytes));
+        let drawn =
+            py.detach(|| Picture::three_sides(&self.shape, pixels, false).encode(&mut bytes));
         drawn.map_err(|error| crate::error::system(error.kind(), error.to_string()))?;
         Ok(PyBytes::new(py, &bytes))
     }

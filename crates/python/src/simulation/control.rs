@@ -100,10 +100,8 @@ impl PySimulation {
     ///     Motions to release.
     #[pyo3(signature = (grain, *, translation = true, rotation = true))]
     fn release(&mut self, grain: usize, translation: bool, rotation: bool) -> PyResult<()> {
-        let chosen = [
-            (MotionComponent::Translation, translation),
-            (MotionComponent::Rotation, rotation),
-        ];
+        let chosen =
+            [(MotionComponent::Translation, translation), (MotionComponent::Rotation, rotation)];
         for (component, _) in chosen.into_iter().filter(|(_, chosen)| *chosen) {
             self.sim.release(grain, component).raise()?;
         }

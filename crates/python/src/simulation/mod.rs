@@ -157,7 +157,8 @@ impl PySimulation {
     ///     An array shows the fields of the present step.
     #[pyo3(signature = (horizon = None))]
     fn step(&mut self, py: Python<'_>, horizon: Option<&Bound<'_, PyAny>>) -> PyResult<f64> {
-        let horizon = horizon.map_or(Ok(f64::INFINITY), |given| quantity::<Time>("horizon", given))?;
+        let horizon =
+            horizon.map_or(Ok(f64::INFINITY), |given| quantity::<Time>("horizon", given))?;
         if horizon <= 0.0 {
             return Err(input(format!("horizon: found {horizon} s; expected a positive time")));
         }

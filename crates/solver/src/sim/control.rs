@@ -29,7 +29,9 @@ pub enum ControlError {
         quantity: &'static str,
     },
     /// The velocity is prescribed, so that a present velocity would have no effect.
-    #[error("the {quantity} of grain {grain} is prescribed; release the grain first, or prescribe another one")]
+    #[error(
+        "the {quantity} of grain {grain} is prescribed; release the grain first, or prescribe another one"
+    )]
     Prescribed {
         /// Index of the grain.
         grain: usize,
