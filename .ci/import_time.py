@@ -11,7 +11,7 @@ bound = float(sys.argv[1])
 
 def measure(code):
     started = time.perf_counter()
-    subprocess.run([sys.executable, "-c", code], check=True)
+    subprocess.run([sys.executable, "-I", "-c", code], check=True)
     return time.perf_counter() - started
 
 

@@ -44,8 +44,8 @@ impl PyCase {
     /// path : path-like
     ///     Case file in TOML.
     /// overrides : dict or sequence of str, optional
-    ///     Values that replace those of the file: ``{"time.end": "0.5 s", "grain.0.density": 2600}``
-    ///     or the strings of ``--set``.
+    ///     Values that replace those of the file, such as ``{"time.end": "0.5 s"}`` or
+    ///     ``{"grain.0.density": 2600}``, or the strings of ``--set``.
     ///
     /// Returns
     /// -------

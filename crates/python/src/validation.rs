@@ -31,15 +31,10 @@ pub fn _validate<'py>(
             return Err(input(message));
         }
     };
-    let all = Suite::read_all(&suites).raise()?;
-    let known: Vec<String> = all.iter().map(|suite| suite.name.clone()).collect();
-    if let Some(name) = names.iter().find(|name| !known.contains(name)) {
-        let known = known.join(", ");
-        return Err(input(format!("there is no validation \"{name}\"; there are: {known}")));
-    }
+    let suites = chosen(Suite::read_all(&suites).raise()?, &names)?;
     let threads = threads::resolve(threads);
     let mut results = Vec::new();
-    for suite in all.iter().filter(|suite| names.is_empty() || names.contains(&suite.name)) {
+    for suite in &suites {
         let mut values = BTreeMap::new();
         for run in suite.runs.iter().filter(|run| run.level <= level) {
             let folder = output.join(&suite.name).join(&run.name);
@@ -56,4 +51,30 @@ pub fn _validate<'py>(
         }
     }
     json(py, &results)
+}
+
+/// Returns the suites and runs with the given names, NAME or NAME/RUN; all without names.
+fn chosen(all: Vec<Suite>, names: &[String]) -> PyResult<Vec<Suite>> {
+    let absent = |what: String, known: Vec<&str>| {
+        Err(input(format!("{what}; there are: {}", known.join(", "))))
+    };
+    for name in names {
+        let (suite_name, run) = name.split_once('/').unwrap_or((name, ""));
+        let Some(suite) = all.iter().find(|suite| suite.name == suite_name) else {
+            let known = all.iter().map(|suite| suite.name.as_str()).collect();
+            return absent(format!("there is no validation \"{suite_name}\""), known);
+        };
+        if !run.is_empty() && suite.runs.iter().all(|known| known.name != run) {
+            let known = suite.runs.iter().map(|run| run.name.as_str()).collect();
+            return absent(format!("the validation \"{suite_name}\" has no run \"{run}\""), known);
+        }
+    }
+    let wanted = |suite: Suite| {
+        if names.is_empty() || names.contains(&suite.name) {
+            return suite;
+        }
+        let name = suite.name.clone();
+        suite.restricted_to(|run| names.contains(&format!("{name}/{run}")))
+    };
+    Ok(all.into_iter().map(wanted).collect())
 }

@@ -38,7 +38,7 @@ def test_units_are_numbers_in_si_or_strings():
 @pytest.mark.parametrize("value, words", [
     ("2 kg", ["diameter", "is a mass", "expected a length"]),
     ("2 mmm", ["unknown unit `mmm`", "did you mean `mm`?"]),
-    (float("nan"), ["found nan"]),
+    (float("nan"), ["found NaN"]),
     ([1], ["found a value of type list"]),
     (-1.0, ["must be finite and positive"]),
 ])

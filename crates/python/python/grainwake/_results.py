@@ -395,7 +395,7 @@ def validate(
     Parameters
     ----------
     names : str or sequence of str, optional
-        Names of the validations; all by default.
+        Names of validations, or of single runs as "NAME/RUN"; all by default.
     suites : path-like, default "validation"
         Folder of the validations in the source tree.
     output : path-like, default "runs/validation"

@@ -85,7 +85,7 @@ impl PySimulation {
     /// -------
     /// ndarray, read-only
     ///     Velocity [m/s], shape (z, y, x) with one more entry along `axis` than there are cells;
-    ///     float64, or float32 for a case of single precision. Inside grains it is their velocity.
+    ///     float64, or float32 for a case of single precision. Values inside grains have no meaning.
     ///
     /// Notes
     /// -----

@@ -53,7 +53,7 @@ const INTERVAL: Duration = Duration::from_millis(50);
 /// >>> for state in sim.run(every="5 ms", progress=False):
 /// ...     print(f"{state.time:.3f} s  {state.velocities[0, 2]:.4f} m/s")
 /// 0.000 s  0.0000 m/s
-/// 0.005 s  -0.0491 m/s
+/// 0.005 s  -0.0490 m/s
 /// 0.010 s  -0.0981 m/s
 #[pyclass(module = "grainwake", name = "Simulation", weakref)]
 pub struct PySimulation {
@@ -329,7 +329,8 @@ impl PySimulation {
     fn forces<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         vectors(py, self.sim.loads().iter().map(|load| load.force))
     }
-    /// Mean hydrodynamic torques about the centroids over the last step [N m], shape (n, 3); a copy.
+    /// Mean hydrodynamic torques about the centroids over the last step [N m], shape (n, 3); a
+    /// copy.
     #[getter]
     fn torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         vectors(py, self.sim.loads().iter().map(|load| load.torque))
