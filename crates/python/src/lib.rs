@@ -1,8 +1,8 @@
 //! Python package of Grainwake. The classes and functions here convert arguments, call the
 //! libraries and convert results; `python/grainwake` adds pandas, xarray and PyVista.
 //!
-//! Layers, downwards: `study`, `validation`, `case` -> `running` -> `simulation` -> `grain`,
-//! `results` -> `case_dict`, `arguments`, `arrays`, `threads` -> `error`.
+//! Layers, downwards: `simulation`, `study`, `validation` -> `case` -> `running`, `case_dict` ->
+//! `grain`, `results` -> `arguments`, `arrays`, `threads` -> `error`.
 
 // PyO3 takes the doc comments as docstrings in the NumPy style.
 #![allow(rustdoc::all, clippy::doc_markdown)]

@@ -85,7 +85,8 @@ impl PySimulation {
     /// -------
     /// ndarray, read-only
     ///     Velocity [m/s], shape (z, y, x) with one more entry along `axis` than there are cells;
-    ///     float64, or float32 for a case of single precision. Values inside grains have no meaning.
+    ///     float64, or float32 for a case of single precision. Values inside grains are without
+    ///     meaning.
     ///
     /// Notes
     /// -----
