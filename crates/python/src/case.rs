@@ -264,7 +264,7 @@ impl PyCase {
             py.detach(|| grainwake_report::render(&folder))
                 .map_err(IntoException::into_exception)?;
         }
-        py.import("grainwake._results")?.call_method1("open", (folder,))
+        py.import("grainwake._studies")?.call_method1("open", (folder,))
     }
 
     /// Expected size, cost and warnings, with the names of ``grainwake check --json``.

@@ -164,7 +164,7 @@ impl PyStudy {
             Some(error) => Err(error),
             None => failures(plan, &outcomes),
         }?;
-        py.import("grainwake._results")?.call_method1("open", (folder,))
+        py.import("grainwake._studies")?.call_method1("open", (folder,))
     }
 
     /// Title of the study, one line.

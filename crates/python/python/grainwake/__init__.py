@@ -6,8 +6,9 @@ and `Simulation` steps a case in memory. Numbers are SI; strings carry their uni
 
 from ._errors import CaseError, CaseWarning, Problem, SolverError
 from ._grainwake import Case, Grain, Scan, Simulation, Study, __version__, commit, scan
-from ._results import RunFolder, StudyFolder, open, validate
+from ._results import RunFolder
 from ._simulation import State, frame
+from ._studies import StudyFolder, open, validate
 
 __all__ = [
     "Case",

@@ -9,8 +9,9 @@ import pyvista
 import trimesh
 import xarray
 
-from ._results import RunFolder, StudyFolder
+from ._results import RunFolder
 from ._simulation import State
+from ._studies import StudyFolder
 
 _Path = str | os.PathLike[str]
 _Quantity = float | str

@@ -4,19 +4,17 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use grainwake_run::case::quantity::Length;
-use grainwake_shape::scan::{
-    Scan, ScanOptions, Threshold, Volume, Voxels, read_volume, scan_volume,
-};
+use grainwake_shape::scan::{Scan, ScanOptions, Threshold, Voxels, read_volume, scan_volume};
 use grainwake_shape::{ReadLimits, ShapeError};
 use numpy::ndarray::Array3;
-use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
-use sha2::{Digest, Sha256};
 
 use super::PyGrain;
 use super::build::{options, sized};
-use crate::arguments::{array, quantity, wrong_shape};
+use super::volume;
+use crate::arguments::quantity;
 use crate::error::{IntoException, Raise, input};
 
 /// Grains of a 3-D image, by label.
@@ -329,10 +327,9 @@ fn read(
             scan_volume(&volume, &source, &how, &quiet)
         })
     } else {
-        let volume = volume(image)?;
+        let volume = volume::volume(image)?;
         py.detach(|| {
-            let source =
-                grainwake_shape::SourceFile { name: "array".into(), sha256: hash(&volume) };
+            let source = volume::source(&volume);
             scan_volume(&volume, &source, &how, &quiet)
         })
     };
@@ -359,44 +356,4 @@ fn segmentation(value: &Bound<'_, PyAny>) -> PyResult<Threshold> {
         .extract()
         .map(Threshold::Value)
         .map_err(|_| input("threshold: expected a grey value, \"otsu\" or \"otsu3\""))
-}
-
-/// Returns an array of the shape (z, y, x) as a volume: integers and booleans are labels, floating
-/// numbers grey values.
-fn volume(image: &Bound<'_, PyAny>) -> PyResult<Volume> {
-    let plain = image.py().import("numpy")?.call_method1("asarray", (image,))?;
-    let kind: String = plain.getattr("dtype")?.getattr("kind")?.extract()?;
-    let is_label = matches!(kind.as_str(), "b" | "u" | "i") && fits_labels(&plain)?;
-    let (shape, voxels) = if is_label {
-        let values = array::<u32>("image", &plain)?;
-        (values.shape().to_vec(), Voxels::Labels(values.readonly().as_slice()?.to_vec()))
-    } else {
-        let values = array::<f32>("image", &plain)?;
-        (values.shape().to_vec(), Voxels::Grey(values.readonly().as_slice()?.to_vec()))
-    };
-    let [nz, ny, nx] = shape[..] else {
-        return Err(wrong_shape("image", &shape, "three axes (z, y, x)"));
-    };
-    if nx * ny * nz == 0 {
-        return Err(wrong_shape("image", &shape, "at least one voxel along each axis"));
-    }
-    Ok(Volume { dims: [nx, ny, nz], voxels })
-}
-
-/// Returns whether integers can be labels; others are grey values, as in files.
-fn fits_labels(values: &Bound<'_, PyAny>) -> PyResult<bool> {
-    if values.getattr("size")?.extract::<usize>()? == 0 {
-        return Ok(true);
-    }
-    let bound = |name: &str| values.call_method0(name)?.call_method0("__int__")?.extract::<i128>();
-    Ok(bound("min")? >= 0 && bound("max")? <= i128::from(u32::MAX))
-}
-
-fn hash(volume: &Volume) -> String {
-    let mut hash = Sha256::new();
-    match &volume.voxels {
-        Voxels::Labels(values) => values.iter().for_each(|v| hash.update(v.to_le_bytes())),
-        Voxels::Grey(values) => values.iter().for_each(|v| hash.update(v.to_le_bytes())),
-    }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }

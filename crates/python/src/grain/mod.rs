@@ -2,6 +2,7 @@
 
 mod build;
 pub mod image;
+mod volume;
 
 use std::path::PathBuf;
 use std::sync::Arc;
