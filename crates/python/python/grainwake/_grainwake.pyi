@@ -1,7 +1,7 @@
 """Types of the extension module."""
 
 import os
-from typing import Any, Callable, Iterator, Literal, Mapping, Sequence, TypedDict, overload
+from typing import Any, Callable, Iterator, Literal, Mapping, Sequence, TypedDict, final, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -18,17 +18,17 @@ _Quantity = float | str
 _Vector = Sequence[float | str] | npt.NDArray[np.float64]
 _Overrides = Mapping[str, Any] | Sequence[str] | None
 _Progress = bool | Callable[[dict[str, Any]], object] | None
-_Mesh = (
-    _Path | tuple[npt.ArrayLike, npt.ArrayLike] | pyvista.PolyData | trimesh.Trimesh
-)
+_Mesh = _Path | tuple[npt.ArrayLike, npt.ArrayLike] | pyvista.PolyData | trimesh.Trimesh
 _Threshold = float | Literal["otsu", "otsu3"] | None
 _Floats = npt.NDArray[np.float64]
 _Integers = npt.NDArray[np.int64]
+_Field = npt.NDArray[np.float64] | npt.NDArray[np.float32]
 _Axis = Literal["x", "y", "z"]
 
 __version__: str
 commit: str | None
 
+@final
 class Grain:
     @staticmethod
     def sphere(diameter: _Quantity, *, nodes: int | None = None) -> Grain: ...
@@ -123,9 +123,7 @@ class Grain:
     @staticmethod
     def _from_bytes(bytes: bytes) -> Grain: ...
     def scaled(self, equivalent_diameter: _Quantity) -> Grain: ...
-    def at(
-        self, position: _Vector, *, density: _Quantity, **keys: Any
-    ) -> dict[str, Any]: ...
+    def at(self, position: _Vector, *, density: _Quantity, **keys: Any) -> dict[str, Any]: ...
     def distance(self, points: npt.ArrayLike) -> _Floats: ...
     def surface(self) -> tuple[_Floats, _Integers]: ...
     @overload
@@ -178,6 +176,7 @@ class Grain:
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
+@final
 class Scan:
     @property
     def grains(self) -> dict[int, Grain]: ...
@@ -211,6 +210,7 @@ def scan(
     nodes: int | None = None,
 ) -> Scan: ...
 
+@final
 class Case:
     @staticmethod
     def load(path: _Path, overrides: _Overrides = None) -> Case: ...
@@ -276,6 +276,7 @@ class _Contacts(TypedDict):
     point: _Floats
     normal: _Floats
 
+@final
 class Simulation:
     def __new__(cls, case: Case, *, threads: int | None = None) -> Simulation: ...
     def step(self, horizon: _Quantity | None = None) -> float: ...
@@ -302,20 +303,14 @@ class Simulation:
         velocity: _Vector | None = None,
         angular_velocity: _Vector | None = None,
     ) -> None: ...
-    def release(
-        self, grain: int, *, translation: bool = True, rotation: bool = True
-    ) -> None: ...
+    def release(self, grain: int, *, translation: bool = True, rotation: bool = True) -> None: ...
     def set_load(
         self, grain: int, force: _Vector | None = None, torque: _Vector | None = None
     ) -> None: ...
     def save_checkpoint(self, path: _Path) -> None: ...
     def restore_checkpoint(self, path: _Path) -> None: ...
-    def fluid_velocity(
-        self, axis: _Axis
-    ) -> npt.NDArray[np.float64] | npt.NDArray[np.float32]: ...
-    def kinematic_pressure(
-        self,
-    ) -> npt.NDArray[np.float64] | npt.NDArray[np.float32]: ...
+    def fluid_velocity(self, axis: _Axis) -> _Field: ...
+    def kinematic_pressure(self) -> _Field: ...
     def cell_field(
         self, name: Literal["velocity", "vorticity", "pressure", "solid_fraction"]
     ) -> _Floats: ...
@@ -347,6 +342,7 @@ class Simulation:
     @property
     def threads(self) -> int: ...
 
+@final
 class Study:
     @staticmethod
     def load(path: _Path, overrides: _Overrides = None) -> Study: ...
