@@ -338,6 +338,26 @@ def test_progress_goes_to_a_callable(sim, capfd):
     assert "100 %" in capfd.readouterr().err
 
 
+def test_a_grain_that_has_left_is_at_infinity_and_out_of_the_table():
+    pytest.importorskip("pandas")
+    case = gw.Case.new(
+        size=["3 mm", "3 mm", "4 mm"],
+        cell_size="0.25 mm",
+        fluid={"density": 1000, "viscosity": "1 mPa s"},
+        grains=[gw.Grain.sphere("1 mm").at(["1.5 mm", "1.5 mm", "1 mm"], density=2500,
+                                           velocity=[0, 0, -0.2])],
+        boundaries={"z": ["outflow", "wall"]},
+        end="0.1 s",
+    )
+    sim = gw.Simulation(case)
+    states = list(sim.run(every="1 ms", progress=False))
+    assert np.isinf(states[-1].positions).all()
+    table = gw.frame(states)
+    assert 0 < len(table) < len(states) and np.isfinite(table["z"]).all()
+    with pytest.raises(gw.CaseError, match="grain 0 has left the box"):
+        sim.set_load(0, force=[0, 0, 1e-6])
+
+
 def test_states_become_a_table(sim):
     pandas = pytest.importorskip("pandas")
     table = gw.frame(sim.run(until="4 ms", every="2 ms", progress=False))

@@ -108,4 +108,8 @@ fn unknown_grains_and_infinite_values_are_refused() {
     assert!(matches!(sim.set_velocity(0, ROTATION, nan), Err(ControlError::NotFinite { .. })));
     let load = Load { force: nan, torque: DVec3::ZERO };
     assert!(matches!(sim.set_external_load(0, load), Err(ControlError::NotFinite { .. })));
+    let mut gone = setup();
+    gone.grains[0].leave();
+    let mut sim = Simulation::new(gone).unwrap();
+    assert_eq!(sim.release(0, TRANSLATION), Err(ControlError::HasLeft { grain: 0 }));
 }

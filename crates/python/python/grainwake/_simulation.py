@@ -111,10 +111,12 @@ def frame(states: Iterable[State]) -> pandas.DataFrame:
     rows = []
     for each in states:
         count = len(each.positions)
-        rows.append(np.column_stack([
+        all_grains = np.column_stack([
             np.full(count, each.time), np.arange(count), each.positions, each.velocities,
             each.orientations, each.angular_velocities, each.forces, each.torques,
-        ]))
+        ])
+        # A grain that has left the box is at infinity; tables of runs leave it out as well.
+        rows.append(all_grains[np.isfinite(each.positions).all(axis=1)])
     values = np.concatenate(rows) if rows else np.empty((0, len(_COLUMNS)))
     table = pandas.DataFrame(values, columns=list(_COLUMNS))
     table["grain"] = table["grain"].astype("int64")

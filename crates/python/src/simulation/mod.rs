@@ -300,7 +300,7 @@ impl PySimulation {
     fn time_step(&self) -> f64 {
         self.sim.time_step()
     }
-    /// Centroids [m], shape (n, 3); a copy.
+    /// Centroids [m], shape (n, 3); a copy. A grain that has left the box is at infinity.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         self.grain_vectors(py, |grain| grain.pose.position)

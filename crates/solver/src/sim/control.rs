@@ -20,6 +20,12 @@ pub enum ControlError {
         /// Number of grains.
         count: usize,
     },
+    /// The grain has left the box.
+    #[error("grain {grain} has left the box")]
+    HasLeft {
+        /// Index of the grain.
+        grain: usize,
+    },
     /// A component is not a finite number.
     #[error("the {quantity} of grain {grain} is not finite")]
     NotFinite {
@@ -75,7 +81,8 @@ impl Simulation {
     /// the change as an impulse in the next step.
     ///
     /// # Errors
-    /// [`ControlError`] for an unknown grain, a velocity that is not finite, or a prescribed one.
+    /// [`ControlError`] for a grain that is unknown or has left, a velocity that is not finite, or a
+    /// prescribed one.
     pub fn set_velocity(
         &mut self,
         grain: usize,
@@ -96,7 +103,7 @@ impl Simulation {
     /// for this motion is removed.
     ///
     /// # Errors
-    /// [`ControlError`] for an unknown grain or a velocity that is not finite.
+    /// [`ControlError`] for a grain that is unknown or has left, or a velocity that is not finite.
     pub fn prescribe_velocity(
         &mut self,
         grain: usize,
@@ -115,7 +122,7 @@ impl Simulation {
     /// velocity. A formula of the set-up for this motion is removed.
     ///
     /// # Errors
-    /// [`ControlError::NoGrain`].
+    /// [`ControlError`] for a grain that is unknown or has left.
     pub fn release(
         &mut self,
         grain: usize,
@@ -132,7 +139,7 @@ impl Simulation {
     /// besides.
     ///
     /// # Errors
-    /// [`ControlError`] for an unknown grain or a load that is not finite.
+    /// [`ControlError`] for a grain that is unknown or has left, or a load that is not finite.
     pub fn set_external_load(&mut self, grain: usize, load: Load) -> Result<(), ControlError> {
         let finite = load.force.is_finite() && load.torque.is_finite();
         self.check_control(grain, finite, "external load")?;
@@ -154,6 +161,9 @@ impl Simulation {
         let count = self.setup.grains.len();
         if grain >= count {
             return Err(ControlError::NoGrain { grain, count });
+        }
+        if self.setup.grains[grain].has_left() {
+            return Err(ControlError::HasLeft { grain });
         }
         if finite { Ok(()) } else { Err(ControlError::NotFinite { grain, quantity }) }
     }
