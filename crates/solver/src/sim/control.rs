@@ -81,8 +81,8 @@ impl Simulation {
     /// the change as an impulse in the next step.
     ///
     /// # Errors
-    /// [`ControlError`] for a grain that is unknown or has left, or a velocity that is not finite or
-    /// prescribed.
+    /// [`ControlError`] for a grain that is unknown or has left, or a velocity that is not finite
+    /// or prescribed.
     pub fn set_velocity(
         &mut self,
         grain: usize,
