@@ -4,6 +4,7 @@ use crate::Shape;
 use crate::error::{Result, ShapeError};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use std::io::Write;
 use std::path::Path;
 
 /// An RGB image, rows from the top.
@@ -81,12 +82,20 @@ impl Picture {
     pub fn save(&self, path: &Path) -> Result<()> {
         let io = |e| ShapeError::io(path, e);
         let file = std::io::BufWriter::new(std::fs::File::create(path).map_err(io)?);
-        let mut encoder = png::Encoder::new(file, self.width as u32, self.height as u32);
+        self.encode(file).map_err(io)
+    }
+
+    /// Writes the image as PNG.
+    ///
+    /// # Errors
+    /// Errors of the writer.
+    pub fn encode(&self, out: impl Write) -> std::io::Result<()> {
+        let mut encoder = png::Encoder::new(out, self.width as u32, self.height as u32);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         let bytes: Vec<u8> = self.pixels.iter().flatten().copied().collect();
         let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&bytes));
-        written.map_err(|e| io(std::io::Error::other(e)))
+        written.map_err(std::io::Error::other)
     }
 
     /// Renders a grain in orthographic projection, lit from the upper left. The image is `pixels`

@@ -4,7 +4,9 @@ mod common;
 
 use common::{close, shared};
 use glam::DVec3;
-use grainwake_shape::mesh::{MeshOptions, TriangleMesh, read_mesh, shape_from_mesh};
+use grainwake_shape::mesh::{
+    MeshOptions, TriangleMesh, mesh_from_memory, read_mesh, shape_from_mesh,
+};
 use grainwake_shape::{ReadLimits, Shape, ShapeError, ShapeOptions, SourceFile, analytic};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::SplitMix64;
@@ -477,4 +479,30 @@ fn harmonic_coefficients_give_the_grain_of_their_mesh() {
         let size = (b.1 - b.0).length();
         assert!(a.0.distance(b.0) < 0.01 * size && a.1.distance(b.1) < 0.01 * size);
     }
+}
+
+#[test]
+fn a_mesh_in_memory_is_merged_and_checked_as_a_file_is() {
+    let whole = ball(12, DVec3::ZERO);
+    // Triangles without shared vertices, as in an STL file.
+    let soup = TriangleMesh {
+        vertices: whole.triangles.iter().flatten().map(|v| whole.vertices[*v as usize]).collect(),
+        triangles: (0..whole.triangles.len() as u32)
+            .map(|t| [0, 1, 2].map(|v| 3 * t + v))
+            .collect(),
+    };
+    let (merged, source) = mesh_from_memory(&soup, 1e-3).unwrap();
+    assert_eq!(merged.vertices.len(), whole.vertices.len());
+    close(merged.signed_volume(), 1e-9 * whole.signed_volume(), 1e-10);
+    assert_eq!((source.name.as_str(), source.sha256.len()), ("", 64));
+    let (_, other) = mesh_from_memory(&whole, 1e-3).unwrap();
+    assert_ne!(source, other);
+    let mut open = whole.clone();
+    open.triangles.pop();
+    let message = mesh_from_memory(&open, 1.0).unwrap_err().to_string();
+    assert!(message.contains("edge"), "{message}");
+    open.triangles[0][1] = 10_000;
+    let message = mesh_from_memory(&open, 1.0).unwrap_err().to_string();
+    assert!(message.contains("has vertex 10000"), "{message}");
+    assert!(mesh_from_memory(&whole, 0.0).is_err());
 }

@@ -17,7 +17,7 @@ const ALLOWED: [(&str, &[&str]); 7] = [
 ];
 
 /// Crates of the workspace that each crate may depend on.
-const CRATES: [(&str, &[&str]); 11] = [
+const CRATES: [(&str, &[&str]); 12] = [
     ("simd", &[]),
     ("formats", &["simd"]),
     ("shape", &["formats"]),
@@ -32,6 +32,7 @@ const CRATES: [(&str, &[&str]); 11] = [
         "cli",
         &["formats", "plot", "report", "run", "shape", "solver", "study", "validation", "view"],
     ),
+    ("python", &["formats", "report", "run", "shape", "solver", "study", "validation"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

@@ -21,7 +21,7 @@ pub mod number_format;
 mod overrides;
 mod packing;
 mod placement;
-mod quantity;
+pub mod quantity;
 mod raw;
 mod schema;
 mod settling;

@@ -87,6 +87,10 @@ kinds! {
     Stiffness(1, 0, -2, 0) "a stiffness", "N/m", "100 N/m";
     /// Elastic modulus [Pa].
     ElasticModulus(1, -1, -2, 0) "an elastic modulus", "Pa", "70 GPa";
+    /// Force [N].
+    Force(1, 1, -2, 0) "a force", "N", "2 uN";
+    /// Torque [N m].
+    Torque(1, 2, -2, 0) "a torque", "N m", "2 nN m";
     /// Rate [1/s].
     Rate(0, 0, -1, 0) "a rate", "1/s", "2 1/s";
     /// Plain number.
@@ -254,7 +258,7 @@ fn describe(dimension: Dimension) -> String {
         (Dimension::new(1, 0, 0, 0), "a mass"),
         (Dimension::new(0, 2, 0, 0), "an area"),
         (Dimension::new(0, 3, 0, 0), "a volume"),
-        (Dimension::new(1, 1, -2, 0), "a force"),
+        (Dimension::new(1, 2, -2, 0), "an energy or a torque"),
         (Dimension::new(1, -1, -2, 0), "a pressure"),
     ];
     let mut known = others.iter().chain(NAMES);

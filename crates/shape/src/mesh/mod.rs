@@ -16,4 +16,4 @@ pub use crate::triangles::TriangleMesh;
 pub(crate) use build::from_closed;
 pub use build::{MeshOptions, shape_from_mesh};
 pub(crate) use distance::MeshDistance;
-pub use read::read_mesh;
+pub use read::{mesh_from_memory, read_mesh};

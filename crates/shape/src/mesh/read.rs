@@ -3,6 +3,7 @@
 use super::{TriangleMesh, harmonics, obj, ply, stl, weld};
 use crate::error::{Result, ShapeError, positive};
 use crate::limits::{ReadLimits, SourceFile, extension, read_bytes};
+use sha2::{Digest, Sha256};
 use std::path::Path;
 
 /// Reads STL, OBJ, PLY or spherical-harmonic coefficients (.anm), merges coincident vertices and
@@ -25,12 +26,29 @@ pub fn read_mesh(
         }
     };
     let (bytes, source) = read_bytes(path, limits)?;
-    let raw = reader(path, bytes, limits)?;
+    Ok((closed(&reader(path, bytes, limits)?, unit)?, source))
+}
+
+/// Merges coincident vertices of a mesh in memory and checks it as [`read_mesh`] does. `unit` is
+/// the length [m] of its unit. The source has no name, and the hash of the coordinates and faces.
+pub fn mesh_from_memory(mesh: &TriangleMesh, unit: f64) -> Result<(TriangleMesh, SourceFile)> {
+    positive("unit", unit)?;
+    let mut hash = Sha256::new();
+    for x in mesh.vertices.iter().flat_map(|v| v.to_array()) {
+        hash.update(x.to_le_bytes());
+    }
+    for vertex in mesh.triangles.iter().flatten() {
+        hash.update(vertex.to_le_bytes());
+    }
+    Ok((closed(mesh, unit)?, SourceFile::new(Path::new(""), hash)))
+}
+
+fn closed(raw: &TriangleMesh, unit: f64) -> Result<TriangleMesh> {
     raw.check_faces()?;
-    let (mesh, _) = weld::weld(&raw);
+    let (mesh, _) = weld::weld(raw);
     // An inverted mesh is left to the builder, which can flip it on request.
     match mesh.check_closed() {
-        Err(ShapeError::InsideOut { .. }) | Ok(()) => Ok((mesh.scaled(unit), source)),
+        Err(ShapeError::InsideOut { .. }) | Ok(()) => Ok(mesh.scaled(unit)),
         Err(error) => Err(error),
     }
 }

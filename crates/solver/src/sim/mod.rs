@@ -1,6 +1,7 @@
 //! The coupled simulation: set-up, clock, time step, events, diagnostics and state.
 
 mod clock;
+mod control;
 mod diagnostics;
 pub mod events;
 mod fields;
@@ -29,6 +30,7 @@ use clock::Clock;
 use fluid::Fluid;
 use timing::PassTimes;
 
+pub use control::{ControlError, MotionComponent};
 pub use diagnostics::Diagnostics;
 pub use fields::{AnyFieldView, CELL_FIELDS, CellField};
 pub use prescription::{PrescribedMotion, Prescription};
@@ -62,7 +64,9 @@ pub struct Simulation {
 struct GrainData {
     previous: Vec<PreviousStep>,
     kinematics: Vec<GrainKinematics>,
-    /// Weight less buoyancy.
+    /// Loads set between steps.
+    external: Vec<Load>,
+    /// Weight less buoyancy, and external load.
     applied: Vec<Load>,
     /// Load during the sub-steps: applied load and hydrodynamic load of the last step.
     driving: Vec<Load>,
@@ -83,6 +87,7 @@ impl GrainData {
         GrainData {
             previous: vec![PreviousStep::default(); count],
             kinematics: vec![GrainKinematics::default(); count],
+            external: vec![Load::default(); count],
             applied: vec![Load::default(); count],
             driving: vec![Load::default(); count],
             contact: vec![Load::default(); count],

@@ -82,8 +82,8 @@ enum FinalPoses {
 }
 
 impl<'a> Start<'a> {
-    /// Records the state before the step of `dt` [s] and sets weight, buoyancy and prescribed
-    /// motion.
+    /// Records the state before the step of `dt` [s] and sets weight, buoyancy, external
+    /// loads and prescribed motion.
     pub fn new(sim: &'a mut Simulation, dt: f64) -> Start<'a> {
         let (setup, time) = (&mut sim.setup, sim.clock.time);
         let mut solid = GrainStep {
@@ -110,6 +110,9 @@ impl<'a> Start<'a> {
             data.applied[i] = crossing.weight_less_buoyancy(grain, setup.gravity, fluid_density);
             if let Crossing::Left = crossing {
                 (data.previous[i], solid.loads[i]) = (PreviousStep::default(), Load::default());
+            } else if !data.external[i].is_zero() {
+                // A zero load is not added: it would turn -0.0 into 0.0.
+                data.applied[i] += data.external[i];
             }
         }
         // Midpoint rule: the sub-steps take the prescribed velocities at the middle of the step.

@@ -1,0 +1,24 @@
+#!/usr/bin/env python3
+"""Executes notebooks and discards their output; fails on an error, on committed output, and if a
+notebook takes longer than the bound [s]."""
+
+import pathlib
+import sys
+import time
+
+import nbformat
+from nbclient import NotebookClient
+
+bound = float(sys.argv[1])
+for name in sys.argv[2:]:
+    path = pathlib.Path(name)
+    book = nbformat.read(path, as_version=4)
+    if any(cell.get("outputs") for cell in book.cells):
+        sys.exit(f"{path.name}: clear the output of all cells before the commit")
+    started = time.perf_counter()
+    NotebookClient(book, timeout=600, kernel_name="python3",
+                   resources={"metadata": {"path": str(path.parent)}}).execute()
+    wall = time.perf_counter() - started
+    print(f"python: {path.name} in {wall:.0f} s")
+    if wall > bound:
+        sys.exit(f"{path.name} takes longer than {bound:.0f} s")

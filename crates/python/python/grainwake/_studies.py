@@ -1,0 +1,162 @@
+"""Results of studies, opening of folders, and validations."""
+
+from __future__ import annotations
+
+import pathlib
+import warnings
+from typing import TYPE_CHECKING, Any, Sequence
+
+from . import _grainwake
+from ._errors import CaseWarning
+from ._optional import need
+from ._progress import Choice
+from ._results import Path, RunFolder
+
+if TYPE_CHECKING:
+    import pandas
+
+
+def open(path: Path) -> RunFolder | StudyFolder:
+    """Open a run folder or a study folder.
+
+    Parameters
+    ----------
+    path : path-like
+        Folder written by `Case.run`, `Study.run` or the command line.
+
+    Returns
+    -------
+    RunFolder or StudyFolder
+
+    Raises
+    ------
+    CaseError
+        The folder holds neither a run nor a study.
+    FileNotFoundError
+        There is no such folder.
+
+    Warns
+    -----
+    CaseWarning
+        Parts of the folder are missing or damaged; `RunFolder.notes` lists them.
+    """
+    folder = pathlib.Path(path)
+    if not folder.is_dir():
+        raise FileNotFoundError(f"there is no folder {folder}")
+    if (folder / "study.json").is_file():
+        return StudyFolder(folder)
+    return RunFolder(folder)
+
+
+class StudyFolder:
+    """Results of a study.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+        The folder.
+    """
+
+    path: pathlib.Path
+
+    def __init__(self, path: Path) -> None:
+        self.path = pathlib.Path(path)
+        self._plan = _grainwake._read_plan(self.path)
+
+    def __repr__(self) -> str:
+        return f"StudyFolder({str(self.path)!r}, {len(self)} runs)"
+
+    def __len__(self) -> int:
+        return len(self._plan["runs"])
+
+    @property
+    def title(self) -> str:
+        """Title of the study, one line."""
+        return str(self._plan["title"])
+
+    @property
+    def runs(self) -> list[str]:
+        """Names of the runs."""
+        return [run["name"] for run in self._plan["runs"]]
+
+    def run(self, name: str) -> RunFolder:
+        """Results of one run.
+
+        Parameters
+        ----------
+        name : str
+            One of `runs`.
+        """
+        if name not in self.runs:
+            raise KeyError(f"there is no run {name!r}; there are: {', '.join(self.runs)}")
+        folder = self.path / "runs" / name
+        if not folder.is_dir():
+            raise FileNotFoundError(f"the run {name!r} has not started: {folder} is missing")
+        return RunFolder(folder)
+
+    @property
+    def table(self) -> pandas.DataFrame:
+        """Measured values of all runs (``table.csv``)."""
+        return self._csv("table.csv")
+
+    @property
+    def settling(self) -> pandas.DataFrame:
+        """Results of single grains (``settling.csv``)."""
+        return self._csv("settling.csv")
+
+    def _csv(self, name: str) -> pandas.DataFrame:
+        pandas = need("pandas")
+        file = self.path / name
+        if not file.is_file():
+            raise FileNotFoundError(f"{file} is missing")
+        return pandas.read_csv(file)
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """Measured values of all runs as dicts, also of a study that is still going."""
+        return _grainwake._read_records(self.path)
+
+    def report(self) -> pathlib.Path:
+        """Draw the figures and ``report.html``, and return the path of the page."""
+        page, notes = _grainwake._render(self.path)
+        for note in notes:
+            warnings.warn(note, CaseWarning, stacklevel=2)
+        return pathlib.Path(page)
+
+
+def validate(
+    names: str | Sequence[str] = (),
+    *,
+    suites: Path = "validation",
+    output: Path = "runs/validation",
+    level: str = "ci",
+    threads: int = 0,
+    progress: Choice = None,
+) -> pandas.DataFrame:
+    """Run validations and compare the results with their references.
+
+    Parameters
+    ----------
+    names : str or sequence of str, optional
+        Names of validations, or of single runs as "NAME/RUN"; all by default.
+    suites : path-like, default "validation"
+        Folder of the validations in the source tree.
+    output : path-like, default "runs/validation"
+        Folder of the runs; existing runs are replaced.
+    level : {"ci", "full"}, default "ci"
+        Small runs only, or all.
+    threads : int, default 0
+        Threads; 0 for all cores.
+    progress : bool or callable, optional
+        As in `Case.run`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each check: name, run, quantity, value, reference, error, bound, pass, problem.
+    """
+    wanted = [names] if isinstance(names, str) else [*names]
+    rows = _grainwake._validate(
+        wanted, pathlib.Path(suites), pathlib.Path(output), level, threads, progress
+    )
+    return need("pandas").DataFrame(rows)

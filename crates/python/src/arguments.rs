@@ -1,0 +1,84 @@
+//! Arguments from Python: numbers with units, vectors and arrays.
+
+use glam::DVec3;
+use grainwake_run::case::quantity::{Kind, parse_quantity};
+use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+
+use crate::error::input;
+
+/// Returns a quantity in SI units: a number is SI, a string carries its unit ("2 mm").
+pub fn quantity<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    if let Ok(text) = value.cast::<PyString>() {
+        let text = text.to_cow()?;
+        return parse_quantity::<K>(&text).map_err(|message| input(format!("{name}: {message}")));
+    }
+    match value.extract::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        Ok(number) => Err(input(format!("{name}: found {number}; expected {}", K::EXPECTED))),
+        Err(_) => {
+            let found = value.get_type().name()?;
+            Err(input(format!("{name}: found a value of type {found}; expected {}", K::EXPECTED)))
+        }
+    }
+}
+
+/// Returns a vector in SI units: three quantities.
+pub fn vector<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<DVec3> {
+    let refused =
+        |found: &str| input(format!("{name}: found {found}; expected {}", K::EXPECTED_VECTOR));
+    if value.is_instance_of::<PyString>() {
+        return Err(refused("a string"));
+    }
+    let items: Vec<Bound<'_, PyAny>> = match value.try_iter() {
+        Ok(items) => items.collect::<PyResult<_>>()?,
+        Err(_) => return Err(refused("one value")),
+    };
+    let [x, y, z] = &items[..] else {
+        return Err(refused(&format!("{} components", items.len())));
+    };
+    let part =
+        |axis: &str, item: &Bound<'_, PyAny>| quantity::<K>(&format!("{name}, {axis}"), item);
+    Ok(DVec3::new(part("x", x)?, part("y", y)?, part("z", z)?))
+}
+
+/// Returns a value as an array of this type, contiguous with the last axis fastest; it is converted
+/// if necessary.
+pub fn array<'py, T: numpy::Element>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
+    let py = value.py();
+    let numpy = py.import("numpy")?;
+    let plain = numpy.call_method1("asarray", (value,))?;
+    let dtype = numpy::dtype::<T>(py);
+    let from = plain.getattr("dtype")?;
+    let kind: String = from.getattr("kind")?.extract()?;
+    if !matches!(kind.as_str(), "b" | "i" | "u" | "f") {
+        return Err(input(format!("{name}: an array of {from} holds no real numbers")));
+    }
+    let converted = numpy.call_method1("ascontiguousarray", (plain, dtype))?;
+    Ok(converted.cast_into::<PyArrayDyn<T>>()?)
+}
+
+/// Returns an array of points, of the shape (n, 3) or (3,).
+pub fn points(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<DVec3>> {
+    let array = array::<f64>(name, value)?;
+    if !matches!(array.shape(), [3] | [_, 3]) {
+        return Err(wrong_shape(name, array.shape(), "(n, 3)"));
+    }
+    let readonly = array.readonly();
+    let values = readonly.as_slice()?;
+    Ok(values.chunks_exact(3).map(DVec3::from_slice).collect())
+}
+
+/// Returns the exception of an array of a wrong shape.
+pub fn wrong_shape(name: &str, found: &[usize], wanted: &str) -> PyErr {
+    let shape: Vec<String> = found.iter().map(usize::to_string).collect();
+    let tail = if found.len() == 1 { "," } else { "" };
+    input(format!(
+        "{name}: found an array of shape ({}{tail}); expected {wanted}",
+        shape.join(", ")
+    ))
+}

@@ -1,0 +1,359 @@
+//! Grains of a 3-D image.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use grainwake_run::case::quantity::Length;
+use grainwake_shape::scan::{Scan, ScanOptions, Threshold, Voxels, read_volume, scan_volume};
+use grainwake_shape::{ReadLimits, ShapeError};
+use numpy::ndarray::Array3;
+use numpy::{IntoPyArray, PyArray3};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+
+use super::PyGrain;
+use super::build::{options, sized};
+use super::volume;
+use crate::arguments::quantity;
+use crate::error::{IntoException, Raise, input};
+
+/// Grains of a 3-D image, by label.
+#[pyclass(module = "grainwake", name = "Scan", frozen)]
+pub struct PyScan {
+    grains: BTreeMap<u32, Py<PyGrain>>,
+    rejected: BTreeMap<u32, String>,
+    voxels: BTreeMap<u32, u64>,
+    labels: Py<PyArray3<u32>>,
+    threshold: Option<f64>,
+}
+
+#[pymethods]
+impl PyScan {
+    /// Grains by label, in the order of the labels.
+    #[getter]
+    fn grains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let grains = PyDict::new(py);
+        self.grains.iter().try_for_each(|(label, grain)| grains.set_item(label, grain))?;
+        Ok(grains)
+    }
+    /// Reason of each rejected label.
+    #[getter]
+    fn rejected(&self) -> BTreeMap<u32, String> {
+        self.rejected.clone()
+    }
+    /// Number of voxels of each label.
+    #[getter]
+    fn voxels(&self) -> BTreeMap<u32, u64> {
+        self.voxels.clone()
+    }
+    /// Labels of the voxels, 0 for background, shape (z, y, x).
+    #[getter]
+    fn labels(&self, py: Python<'_>) -> Py<PyArray3<u32>> {
+        self.labels.clone_ref(py)
+    }
+    /// Grey value of the threshold; None if none was applied.
+    #[getter]
+    fn threshold(&self) -> Option<f64> {
+        self.threshold
+    }
+    fn __len__(&self) -> usize {
+        self.grains.len()
+    }
+    fn __getitem__(&self, py: Python<'_>, label: u32) -> PyResult<Py<PyGrain>> {
+        if let Some(grain) = self.grains.get(&label) {
+            return Ok(grain.clone_ref(py));
+        }
+        let why = self.rejected.get(&label).map_or("no voxel has it", String::as_str);
+        Err(pyo3::exceptions::PyKeyError::new_err(format!("label {label}: {why}")))
+    }
+    fn __repr__(&self) -> String {
+        format!("Scan({} grains, {} labels rejected)", self.grains.len(), self.rejected.len())
+    }
+}
+
+/// Options of a scan as Python gives them.
+struct Given {
+    label: Option<u32>,
+    median: bool,
+    split: bool,
+    separate: Option<f64>,
+    from_mask: bool,
+    pad: bool,
+    largest_piece: bool,
+    smoothing: Option<f64>,
+    roundness: bool,
+    cells: Option<usize>,
+    nodes: Option<usize>,
+}
+
+impl Given {
+    fn options(self, voxel: f64, threshold: Option<Threshold>) -> ScanOptions {
+        let mut how = ScanOptions::new(voxel);
+        how.label = self.label;
+        how.threshold = threshold;
+        how.median = self.median;
+        how.split = self.split;
+        how.separate = self.separate;
+        how.sub_voxel = !self.from_mask;
+        how.pad = self.pad;
+        how.largest_piece = self.largest_piece;
+        how.smoothing = self.smoothing;
+        how.shape = options(self.cells, self.nodes);
+        how.shape.roundness = self.roundness;
+        how
+    }
+}
+
+#[pymethods]
+impl PyGrain {
+    /// Grain of a 3-D image that holds one grain, or the grain of one label.
+    ///
+    /// Parameters
+    /// ----------
+    /// image : path-like or array_like, shape (z, y, x)
+    ///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif slices, or volume. Integers and
+    ///     booleans are labels with 0 for background, floating numbers are grey values.
+    /// voxel : float or str
+    ///     Edge length of a voxel [m].
+    /// label : int, optional
+    ///     Label of a single grain.
+    /// threshold : float or {"otsu", "otsu3"}, optional
+    ///     Grey value between void and solid; required for grey images.
+    /// median : bool, default False
+    ///     Apply a median of 27 voxels before the threshold.
+    /// split : bool, default False
+    ///     Treat each connected piece of solid as a grain.
+    /// separate : float, optional
+    ///     Separate touching grains where the neck is narrower than this fraction of the smaller
+    ///     grain; 0.87 did best on rendered packings.
+    /// from_mask : bool, default False
+    ///     Locate surfaces by the mask even if there are grey values.
+    /// pad : bool, default False
+    ///     Include grains at the image border, truncated there.
+    /// largest_piece : bool, default False
+    ///     Keep the largest piece of a label with several pieces.
+    /// smoothing : float, optional
+    ///     Standard deviation of the smoothing [voxels]; 1.1 with grey values, 1.5 with a mask.
+    /// roundness : bool, default True
+    ///     Measure the roundness, which takes long.
+    /// equivalent_diameter : float or str, optional
+    ///     Rescale to this diameter of the sphere of equal volume [m].
+    /// cells, nodes : int, optional
+    ///     Cells of the distance field across the longest extent, and number of surface nodes.
+    ///
+    /// Returns
+    /// -------
+    /// Grain
+    ///
+    /// Raises
+    /// ------
+    /// CaseError
+    ///     The image holds several grains, or the grain is cut by the border.
+    ///
+    /// See Also
+    /// --------
+    /// scan : all grains of an image.
+    #[staticmethod]
+    #[pyo3(signature = (image, *, voxel, label = None, threshold = None, median = false, split = false, separate = None, from_mask = false, pad = false, largest_piece = false, smoothing = None, roundness = true, equivalent_diameter = None, cells = None, nodes = None))]
+    fn from_scan(
+        py: Python<'_>,
+        image: &Bound<'_, PyAny>,
+        voxel: &Bound<'_, PyAny>,
+        label: Option<u32>,
+        threshold: Option<&Bound<'_, PyAny>>,
+        median: bool,
+        split: bool,
+        separate: Option<f64>,
+        from_mask: bool,
+        pad: bool,
+        largest_piece: bool,
+        smoothing: Option<f64>,
+        roundness: bool,
+        equivalent_diameter: Option<&Bound<'_, PyAny>>,
+        cells: Option<usize>,
+        nodes: Option<usize>,
+    ) -> PyResult<PyGrain> {
+        let given = Given {
+            label,
+            median,
+            split,
+            separate,
+            from_mask,
+            pad,
+            largest_piece,
+            smoothing,
+            roundness,
+            cells,
+            nodes,
+        };
+        let scan = read(py, image, voxel, threshold, given)?;
+        let labels: Vec<String> = scan.grains.iter().map(|g| g.label.to_string()).collect();
+        let mut grains = scan.grains.into_iter();
+        let (Some(grain), None) = (grains.next(), grains.next()) else {
+            return Err(input(format!(
+                "the image holds {} grains, but one is wanted; the labels are {}{}; select one with \
+                 label=N, or take all with grainwake.scan; if the values are grey values instead of \
+                 labels, add threshold=\"otsu\"",
+                labels.len(),
+                labels[..labels.len().min(10)].join(", "),
+                if labels.len() > 10 { ", ..." } else { "" }
+            )));
+        };
+        sized(grain.shape.raise()?, equivalent_diameter, "voxel").map(PyGrain::new)
+    }
+}
+
+/// All grains of a 3-D image.
+///
+/// Parameters
+/// ----------
+/// image : path-like or array_like, shape (z, y, x)
+///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif slices, or volume. Integers and
+///     booleans are labels with 0 for background, floating numbers are grey values.
+/// voxel : float or str
+///     Edge length of a voxel [m].
+/// label : int, optional
+///     Label of a single grain.
+/// threshold : float or {"otsu", "otsu3"}, optional
+///     Grey value between void and solid; required for grey images.
+/// median : bool, default False
+///     Apply a median of 27 voxels before the threshold.
+/// split : bool, default False
+///     Treat each connected piece of solid as a grain.
+/// separate : float, optional
+///     Separate touching grains where the neck is narrower than this fraction of the smaller
+///     grain; 0.87 did best on rendered packings.
+/// from_mask : bool, default False
+///     Locate surfaces by the mask even if there are grey values.
+/// pad : bool, default False
+///     Include grains at the image border, truncated there.
+/// largest_piece : bool, default False
+///     Keep the largest piece of a label with several pieces.
+/// smoothing : float, optional
+///     Standard deviation of the smoothing [voxels]; 1.1 with grey values, 1.5 with a mask.
+/// roundness : bool, default True
+///     Measure the roundness, which takes long.
+/// equivalent_diameter : float or str, optional
+///     Rescale to this diameter of the sphere of equal volume [m].
+/// cells, nodes : int, optional
+///     Cells of the distance field across the longest extent, and number of surface nodes.
+///
+/// Returns
+/// -------
+/// Scan
+///     Grains by label, and the reason of each rejected label.
+#[pyfunction]
+#[pyo3(signature = (image, *, voxel, label = None, threshold = None, median = false, split = false, separate = None, from_mask = false, pad = false, largest_piece = false, smoothing = None, roundness = true, equivalent_diameter = None, cells = None, nodes = None))]
+pub fn scan(
+    py: Python<'_>,
+    image: &Bound<'_, PyAny>,
+    voxel: &Bound<'_, PyAny>,
+    label: Option<u32>,
+    threshold: Option<&Bound<'_, PyAny>>,
+    median: bool,
+    split: bool,
+    separate: Option<f64>,
+    from_mask: bool,
+    pad: bool,
+    largest_piece: bool,
+    smoothing: Option<f64>,
+    roundness: bool,
+    equivalent_diameter: Option<&Bound<'_, PyAny>>,
+    cells: Option<usize>,
+    nodes: Option<usize>,
+) -> PyResult<PyScan> {
+    let given = Given {
+        label,
+        median,
+        split,
+        separate,
+        from_mask,
+        pad,
+        largest_piece,
+        smoothing,
+        roundness,
+        cells,
+        nodes,
+    };
+    let Scan { grains, labels, threshold } = read(py, image, voxel, threshold, given)?;
+    let (mut accepted, mut rejected, mut voxels) =
+        (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+    for grain in grains {
+        voxels.insert(grain.label, grain.voxels);
+        match grain.shape {
+            Ok(shape) => {
+                let shape = match equivalent_diameter {
+                    Some(_) => sized(shape, equivalent_diameter, "voxel")?,
+                    None => shape,
+                };
+                accepted.insert(grain.label, Py::new(py, PyGrain::new(shape))?);
+            }
+            Err(why) => {
+                rejected.insert(grain.label, why.to_string());
+            }
+        }
+    }
+    // Only the largest grain is checked, because fragments may be small.
+    let largest = accepted.values().map(|grain| &grain.get().shape);
+    let size = |shape: &&std::sync::Arc<grainwake_shape::Shape>| shape.equivalent_diameter();
+    if let Some(shape) = largest.max_by(|a, b| size(a).total_cmp(&size(b))) {
+        sized(shape.as_ref().clone(), None, "voxel")?;
+    }
+    let [nx, ny, nz] = labels.dims;
+    let Voxels::Labels(values) = labels.voxels else {
+        return Err(input("the image has no labels"));
+    };
+    let labels = Array3::from_shape_vec((nz, ny, nx), values)
+        .map_err(|error| input(error.to_string()))?
+        .into_pyarray(py)
+        .unbind();
+    Ok(PyScan { grains: accepted, rejected, voxels, labels, threshold })
+}
+
+fn read(
+    py: Python<'_>,
+    image: &Bound<'_, PyAny>,
+    voxel: &Bound<'_, PyAny>,
+    threshold: Option<&Bound<'_, PyAny>>,
+    given: Given,
+) -> PyResult<Scan> {
+    let voxel = quantity::<Length>("voxel", voxel)?;
+    let how = given.options(voxel, threshold.map(segmentation).transpose()?);
+    let quiet = |_: &str, _: u64, _: u64| {};
+    let scanned = if let Ok(path) = image.extract::<PathBuf>() {
+        py.detach(|| {
+            let limits = ReadLimits::of_this_machine(how.bytes_per_voxel());
+            let (volume, source) = read_volume(&path, &limits)?;
+            scan_volume(&volume, &source, &how, &quiet)
+        })
+    } else {
+        let volume = volume::volume(image)?;
+        py.detach(|| {
+            let source = volume::source(&volume);
+            scan_volume(&volume, &source, &how, &quiet)
+        })
+    };
+    scanned.map_err(|error| match error {
+        // The message of the library names an option of the command line.
+        ShapeError::Unsupported { .. } if how.threshold.is_none() => {
+            input(format!("{error}; in Python: threshold=\"otsu\", \"otsu3\" or a grey value"))
+        }
+        error => error.into_exception(),
+    })
+}
+
+fn segmentation(value: &Bound<'_, PyAny>) -> PyResult<Threshold> {
+    if let Ok(word) = value.cast::<PyString>() {
+        return match &*word.to_cow()? {
+            "otsu" => Ok(Threshold::Otsu),
+            "otsu3" => Ok(Threshold::Otsu3),
+            other => Err(input(format!(
+                "threshold: found \"{other}\"; expected a grey value, \"otsu\" or \"otsu3\""
+            ))),
+        };
+    }
+    value
+        .extract()
+        .map(Threshold::Value)
+        .map_err(|_| input("threshold: expected a grey value, \"otsu\" or \"otsu3\""))
+}

@@ -1,0 +1,164 @@
+//! Runs and studies on threads of their own, while the thread of Python handles signals and shows
+//! the progress.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use grainwake_formats::events::Event;
+use grainwake_formats::summary::Summary;
+use grainwake_run::case::Case;
+use grainwake_run::{Ending, Existing, Observer, Options, Progress};
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::error::{Raise, numerics};
+use crate::threads;
+
+/// Interval at which signals are handled and the progress is shown.
+const INTERVAL: Duration = Duration::from_millis(50);
+
+/// Returns the treatment of a run in the folder.
+pub fn existing(resume: bool, force: bool) -> Existing {
+    match (resume, force) {
+        (true, _) => Existing::Resume,
+        (_, true) => Existing::Replace,
+        _ => Existing::Refuse,
+    }
+}
+
+/// Runs `work` on another thread and calls `show` at intervals; the first exception of `show` or of
+/// a signal handler sets `stop` and is returned after the end of `work`.
+pub fn attended<T: Send>(
+    py: Python<'_>,
+    stop: &AtomicBool,
+    work: impl FnOnce() -> T + Send,
+    mut show: impl FnMut(Python<'_>) -> PyResult<()>,
+) -> PyResult<(T, Option<PyErr>)> {
+    std::thread::scope(|scope| {
+        let (sender, receiver) = mpsc::channel();
+        let worker = scope.spawn(move || {
+            let result = work();
+            // The receiver is gone only if the thread of Python has panicked.
+            let _ = sender.send(());
+            result
+        });
+        let receiver = Mutex::new(receiver);
+        let mut raised = None;
+        let wait = || {
+            let receiver = receiver.lock().unwrap_or_else(PoisonError::into_inner);
+            receiver.recv_timeout(INTERVAL)
+        };
+        while py.detach(wait) == Err(RecvTimeoutError::Timeout) {
+            let attended = py.check_signals().and_then(|()| show(py));
+            if let (Err(error), None) = (attended, &raised) {
+                stop.store(true, Ordering::Relaxed);
+                raised = Some(error);
+            }
+        }
+        let failed = |_| numerics("internal error of the program: please report it with the case");
+        let result = worker.join().map_err(failed)?;
+        if raised.is_none() {
+            show(py)?;
+        }
+        Ok((result, raised))
+    })
+}
+
+/// State of a run that its thread shares with that of Python.
+#[derive(Default)]
+struct Shared {
+    progress: Option<Progress>,
+    messages: Vec<String>,
+}
+
+/// Observer on the thread of the run.
+struct Relay<'a> {
+    shared: &'a Mutex<Shared>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Relay<'_> {
+    fn update(&self, change: impl FnOnce(&mut Shared)) {
+        change(&mut self.shared.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+}
+
+impl Observer for Relay<'_> {
+    fn progress(&mut self, progress: &Progress) {
+        self.update(|shared| shared.progress = Some(*progress));
+    }
+    fn event(&mut self, event: &Event) {
+        let grains: Vec<String> = event.grains.iter().map(usize::to_string).collect();
+        let text =
+            format!("t {:.4} s  {} (grain {})", event.time, event.kind.name(), grains.join(", "));
+        self.update(|shared| shared.messages.push(text));
+    }
+    fn note(&mut self, text: &str) {
+        self.update(|shared| shared.messages.push(text.to_owned()));
+    }
+    fn interrupted(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+fn as_dict<'py>(py: Python<'py>, p: &Progress) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("time", p.time)?;
+    dict.set_item("end", p.end)?;
+    dict.set_item("start", p.from)?;
+    dict.set_item("steps", p.steps)?;
+    dict.set_item("wall_s", p.wall_s)?;
+    dict.set_item("dt", p.dt)?;
+    dict.set_item("gap", p.gap)?;
+    dict.set_item("phase", p.phase.map(|phase| phase.name()))?;
+    dict.set_item("contacts", p.contacts)?;
+    Ok(dict)
+}
+
+/// Runs a case in a folder.
+pub fn run(
+    py: Python<'_>,
+    case: &Case,
+    folder: &Path,
+    existing: Existing,
+    threads: usize,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Summary> {
+    let pool = threads::pool(threads)?;
+    let (shared, stop) = (Mutex::new(Shared::default()), Arc::new(AtomicBool::new(false)));
+    let options = Options { existing, command: command(py)?, threads };
+    let display = py.import("grainwake._progress")?.call_method1("of_run", (progress,))?;
+    let warnings = case.estimate(threads).warnings;
+    display.call_method1("warn", (warnings,))?;
+    let work = || {
+        let mut relay = Relay { shared: &shared, stop: stop.clone() };
+        pool.install(|| grainwake_run::run(case.job(), folder, &options, &mut relay))
+    };
+    let show = |py: Python<'_>| -> PyResult<()> {
+        let (progress, messages) = {
+            let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+            (shared.progress, std::mem::take(&mut shared.messages))
+        };
+        let progress = progress.map(|p| as_dict(py, &p)).transpose()?;
+        display.call_method1("update", (progress, messages)).map(drop)
+    };
+    let ended = attended(py, &stop, work, show);
+    display.call_method0("close")?;
+    let (ending, raised) = ended?;
+    match (ending.raise()?, raised) {
+        (_, Some(error)) => Err(error),
+        (Ending::Finished(summary) | Ending::AlreadyFinished(summary), None) => Ok(summary),
+        (Ending::Interrupted(time), None) => {
+            Err(PyKeyboardInterrupt::new_err(format!("interrupted at t = {time:.6e} s")))
+        }
+    }
+}
+
+/// Returns the command line of Python, for the provenance.
+pub fn command(py: Python<'_>) -> PyResult<Vec<String>> {
+    py.import("sys")?.getattr("orig_argv")?.extract()
+}

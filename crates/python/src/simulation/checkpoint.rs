@@ -1,0 +1,102 @@
+//! Checkpoints of a simulation in memory.
+//!
+//! Layout, little-endian: 8 bytes signature, u32 version, digest of the case, state of the
+//! simulation, SHA-256 of all preceding bytes.
+
+use std::io::{self, Cursor, Write};
+use std::path::PathBuf;
+
+use grainwake_formats::atomic_file::write_atomically;
+use grainwake_formats::codec::{Decoder, Encoder};
+use pyo3::prelude::*;
+use sha2::{Digest, Sha256};
+
+use super::PySimulation;
+use crate::error::{input, system};
+
+const SIGNATURE: &[u8; 8] = b"GWSTATE\n";
+const VERSION: u32 = 1;
+const CHECKSUM: usize = 32;
+
+impl PySimulation {
+    fn encode(&self) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let mut encoder = Encoder::new(&mut bytes);
+        encoder.raw(SIGNATURE)?;
+        encoder.u32(VERSION)?;
+        encoder.bytes(self.case.get().case.digest.as_bytes())?;
+        self.sim.save(&mut bytes)?;
+        let checksum = Sha256::digest(&bytes);
+        bytes.write_all(&checksum)?;
+        Ok(bytes)
+    }
+
+    fn decode(&mut self, bytes: &[u8]) -> Result<(), String> {
+        let text = |error: io::Error| error.to_string();
+        let Some(body) = bytes.len().checked_sub(CHECKSUM).and_then(|end| bytes.get(..end)) else {
+            return Err("it is cut off".into());
+        };
+        if !body.starts_with(SIGNATURE) {
+            return Err("it is not a checkpoint of a simulation".into());
+        }
+        if Sha256::digest(body).as_slice() != &bytes[body.len()..] {
+            return Err("its checksum does not match: it is damaged or cut off".into());
+        }
+        let mut rest = Cursor::new(&body[SIGNATURE.len()..]);
+        let mut decoder = Decoder::new(&mut rest);
+        let version = decoder.u32().map_err(text)?;
+        if version != VERSION {
+            return Err(format!("its version is {version}, this program reads version {VERSION}"));
+        }
+        if decoder.bytes().map_err(text)? != self.case.get().case.digest.as_bytes() {
+            return Err("it belongs to another case".into());
+        }
+        let restored = self.pool.install(|| self.sim.restore(&mut rest));
+        restored.map_err(|error| {
+            self.failed = Some("the state could not be restored".into());
+            text(error)
+        })
+    }
+}
+
+#[pymethods]
+impl PySimulation {
+    /// Write the state to a file, exact to the bit.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///     File; an existing one is replaced.
+    ///
+    /// Notes
+    /// -----
+    /// Prescribed motions and external loads are not part of the state: set them again after
+    /// `restore_checkpoint`.
+    fn save_checkpoint(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let written = py.detach(|| {
+            let bytes = self.encode()?;
+            write_atomically(&path, true, |out| out.write_all(&bytes))
+        });
+        written.map_err(|e| system(e.kind(), format!("cannot write {}: {e}", path.display())))
+    }
+
+    /// Restore a state written by `save_checkpoint` of a simulation of the same case. The
+    /// simulation then continues with the same bits.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///     File.
+    ///
+    /// Raises
+    /// ------
+    /// CaseError
+    ///     The file is damaged or belongs to another case.
+    fn restore_checkpoint(&mut self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        self.may_change()?;
+        let bytes = std::fs::read(&path)
+            .map_err(|e| system(e.kind(), format!("cannot read {}: {e}", path.display())))?;
+        py.detach(|| self.decode(&bytes))
+            .map_err(|why| input(format!("{} cannot be restored: {why}", path.display())))
+    }
+}

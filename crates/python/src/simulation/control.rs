@@ -1,0 +1,135 @@
+//! Control of the grains from Python.
+
+use glam::DVec3;
+use grainwake_run::case::quantity::{AngularVelocity, Force, Kind, Torque, Velocity};
+use grainwake_solver::math::Load;
+use grainwake_solver::sim::MotionComponent;
+use pyo3::prelude::*;
+
+use super::PySimulation;
+use crate::arguments::vector;
+use crate::error::{Raise, input};
+
+fn optional<K: Kind>(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<DVec3>> {
+    value.map(|value| vector::<K>(name, value)).transpose()
+}
+
+/// Velocities of the motion, each with its component; at least one is required.
+fn motions(
+    velocity: Option<&Bound<'_, PyAny>>,
+    angular_velocity: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<(MotionComponent, DVec3)>> {
+    let linear = optional::<Velocity>("velocity", velocity)?;
+    let angular = optional::<AngularVelocity>("angular_velocity", angular_velocity)?;
+    let linear = linear.map(|v| (MotionComponent::Translation, v));
+    let both: Vec<_> =
+        linear.into_iter().chain(angular.map(|w| (MotionComponent::Rotation, w))).collect();
+    if both.is_empty() {
+        return Err(input("give velocity, angular_velocity or both"));
+    }
+    Ok(both)
+}
+
+#[pymethods]
+impl PySimulation {
+    /// Set the present velocity of a free grain. The fluid receives the change as an impulse in the
+    /// next step.
+    ///
+    /// Parameters
+    /// ----------
+    /// grain : int
+    ///     Index of the grain.
+    /// velocity : sequence of float or str, optional
+    ///     Velocity of the centroid [m/s].
+    /// angular_velocity : sequence of float or str, optional
+    ///     Angular velocity in the space frame [rad/s].
+    ///
+    /// Raises
+    /// ------
+    /// IndexError
+    ///     There is no such grain.
+    /// CaseError
+    ///     The motion is prescribed, or a component is not finite.
+    #[pyo3(signature = (grain, velocity = None, angular_velocity = None))]
+    fn set_velocity(
+        &mut self,
+        grain: usize,
+        velocity: Option<&Bound<'_, PyAny>>,
+        angular_velocity: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        for (component, value) in motions(velocity, angular_velocity)? {
+            self.sim.set_velocity(grain, component, value).raise()?;
+        }
+        Ok(())
+    }
+
+    /// Prescribe the motion of a grain from now on; zero holds it.
+    ///
+    /// Parameters
+    /// ----------
+    /// grain : int
+    ///     Index of the grain.
+    /// velocity : sequence of float or str, optional
+    ///     Velocity of the centroid [m/s]; left as it is if not given.
+    /// angular_velocity : sequence of float or str, optional
+    ///     Angular velocity in the space frame [rad/s]; left as it is if not given.
+    ///
+    /// See Also
+    /// --------
+    /// release : let the grain move freely again.
+    #[pyo3(signature = (grain, velocity = None, angular_velocity = None))]
+    fn prescribe_motion(
+        &mut self,
+        grain: usize,
+        velocity: Option<&Bound<'_, PyAny>>,
+        angular_velocity: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        for (component, value) in motions(velocity, angular_velocity)? {
+            self.sim.prescribe_velocity(grain, component, value).raise()?;
+        }
+        Ok(())
+    }
+
+    /// Let a grain move freely from now on, starting from its present velocity.
+    ///
+    /// Parameters
+    /// ----------
+    /// grain : int
+    ///     Index of the grain.
+    /// translation, rotation : bool, default True
+    ///     Motions to release.
+    #[pyo3(signature = (grain, *, translation = true, rotation = true))]
+    fn release(&mut self, grain: usize, translation: bool, rotation: bool) -> PyResult<()> {
+        let chosen =
+            [(MotionComponent::Translation, translation), (MotionComponent::Rotation, rotation)];
+        for (component, _) in chosen.into_iter().filter(|(_, chosen)| *chosen) {
+            self.sim.release(grain, component).raise()?;
+        }
+        Ok(())
+    }
+
+    /// Set the external load on a grain, which acts in every step until it is replaced. Weight,
+    /// buoyancy, contact and fluid act besides.
+    ///
+    /// Parameters
+    /// ----------
+    /// grain : int
+    ///     Index of the grain.
+    /// force : sequence of float or str, optional
+    ///     Force [N] in the space frame; zero if not given.
+    /// torque : sequence of float or str, optional
+    ///     Torque about the centroid [N m] in the space frame; zero if not given.
+    #[pyo3(signature = (grain, force = None, torque = None))]
+    fn set_load(
+        &mut self,
+        grain: usize,
+        force: Option<&Bound<'_, PyAny>>,
+        torque: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let load = Load {
+            force: optional::<Force>("force", force)?.unwrap_or(DVec3::ZERO),
+            torque: optional::<Torque>("torque", torque)?.unwrap_or(DVec3::ZERO),
+        };
+        self.sim.set_external_load(grain, load).raise()
+    }
+}

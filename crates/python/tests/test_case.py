@@ -1,0 +1,128 @@
+"""Cases: construction, and the words of the command line for refused input."""
+
+import numpy as np
+import pytest
+
+import grainwake as gw
+
+BAD = {
+    "a wrong unit": ("[fluid]\ndensity = 1000\nviscosity = \"1 mm\"\n", None),
+    "an unknown key": ("[fluid]\ndensty = 1000\n", None),
+    "an unknown table": ("[flud]\ndensity = 1000\n", None),
+    "no TOML": ("[fluid\n", None),
+    "a missing table": ("title = \"nothing\"\n", None),
+    "a missing file": ("[domain]\nsize = [1, 1, 1]\ncell_size = 0.1\n[time]\nend = 1\n"
+                       "[[grain]]\nfile = \"none.grain\"\ndensity = 2000\n"
+                       "position = [0.5, 0.5, 0.5]\n", None),
+    "a wrong override": ("[domain]\nsize = [1, 1, 1]\ncell_size = 0.1\n[time]\nend = 1\n",
+                         "time.end=2 kg"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_refused_cases_have_the_words_of_the_command_line(name, tmp_path, cli, monkeypatch):
+    text, override = BAD[name]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.toml").write_text(text)
+    settings = ["--set", override] if override else []
+    told = cli("check", "bad.toml", *settings, code=2, cwd=tmp_path).stderr
+    with pytest.raises(gw.CaseError) as refused:
+        gw.Case.load("bad.toml", [override] if override else None)
+    assert str(refused.value).strip() == told.strip()
+    assert refused.value.problems and refused.value.problems[0].message in told.replace("\n", " ")
+
+
+def test_a_problem_has_its_place(tmp_path):
+    file = tmp_path / "bad.toml"
+    file.write_text("[fluid]\ndensity = 1000\nviscosity = \"1 mm\"\n"
+                    "[domain]\nsize = [1, 1, 1]\ncell_size = 0.1\n[time]\nend = 1\n")
+    with pytest.raises(gw.CaseError) as refused:
+        gw.Case.load(file)
+    problem = refused.value.problems[0]
+    assert (problem.key, problem.line, problem.column) == ("fluid.viscosity", 3, 13)
+    assert problem.file == str(file)
+    assert isinstance(refused.value, ValueError)
+
+
+def test_a_missing_case_file_is_an_os_error(tmp_path):
+    with pytest.raises(FileNotFoundError, match="cannot read the case file"):
+        gw.Case.load(tmp_path / "none.toml")
+
+
+def test_overrides_are_a_dict_or_strings(case_file):
+    by_dict = gw.Case.load(case_file, {"time.end": "5 ms", "grain.0.density": 2500})
+    by_list = gw.Case.load(case_file, ["time.end=5 ms", "grain.0.density=2500"])
+    assert by_dict.resolved == by_list.resolved
+    assert by_dict.end == 0.005
+    position = gw.Case.load(case_file, {"grain.0.position": np.array([2e-3, 2e-3, 5e-3])})
+    assert "0.005" in position.resolved
+    with pytest.raises(gw.CaseError, match="found a string"):
+        gw.Case.load(case_file, "time.end=1")
+
+
+def test_a_dict_gives_the_case_of_its_file(case_file):
+    from_file = gw.Case.load(case_file)
+    from_dict = gw.Case.from_dict({
+        "title": "Small sphere",
+        "fluid": {"density": np.float64(1000), "viscosity": "1 mPa s"},
+        "domain": {"size": ("4 mm", "4 mm", "8 mm"), "cell_size": "0.25 mm", "cells": None},
+        "grain": [{
+            "shape": {"kind": "sphere", "diameter": "1.5 mm"},
+            "density": "2000 kg/m3",
+            "position": ["2 mm", "2 mm", "6 mm"],
+        }],
+        "time": {"end": "20 ms"},
+        "output": {"tables": "2 ms", "slices": "10 ms", "fields": "10 ms", "surfaces": "10 ms"},
+    })
+    assert from_dict.digest == from_file.digest
+    assert from_dict.resolved == from_file.resolved
+    assert gw.Case.from_toml(from_file.resolved).digest == from_file.digest
+
+
+def test_a_problem_of_a_dict_quotes_its_toml():
+    tables = {"domain": {"size": [1, 1, 1], "cell_size": "0.1 kg"}, "time": {"end": 1}}
+    with pytest.raises(gw.CaseError) as refused:
+        gw.Case.from_dict(tables)
+    assert refused.value.problems[0].key == "domain.cell_size"
+    assert 'cell_size = "0.1 kg"' in str(refused.value)
+
+
+@pytest.mark.parametrize("tables, words", [
+    ({"time": {"end": object()}}, "time.end: found a value of type object"),
+    ({"time": {"end": [1, None]}}, "time.end.1: found None"),
+    ({"time": {1: 2}}, "time: the key 1 is not a string"),
+    ({"time": {"end": 2**70}}, "is too large"),
+    ({"grain": [{"shape": gw.Grain.sphere("1 mm")}]}, "stands for the key `file`"),
+])
+def test_a_value_without_toml_is_refused(tables, words):
+    with pytest.raises(gw.CaseError, match=words):
+        gw.Case.from_dict(tables)
+
+
+def test_a_case_of_keywords():
+    pebble = gw.Grain.ellipsoid("2 mm", "1.6 mm", "1.2 mm", cells=32)
+    case = gw.Case.new(
+        size=["8 mm", "8 mm", "12 mm"],
+        cell_size="0.5 mm",
+        fluid={"density": 1000, "viscosity": "1 mPa s"},
+        grains=[
+            pebble.at(["4 mm", "4 mm", "8 mm"], density="1500 kg/m3"),
+            pebble.at(["4 mm", "4 mm", "4 mm"], density=2000, velocity=[0, 0, "1 mm/s"]),
+        ],
+        boundaries={"x": "periodic", "y": "periodic"},
+        end="50 ms",
+        time={"stop": "landing"},
+        contact={"restitution": 0.2},
+        title="Two pebbles",
+    )
+    assert case.cells == (16, 16, 24)
+    assert case.grains == [pebble, pebble]
+    assert case.title == "Two pebbles" and case.end == 0.05
+    assert "restitution = 0.2" in case.resolved
+    estimate = case.estimate(1)
+    assert estimate["cells"] == 16 * 16 * 24
+    assert isinstance(case.warnings, list)
+
+
+def test_the_schema_lists_the_tables():
+    assert {"fluid", "domain", "grain"} <= set(gw.Case.schema()["properties"])

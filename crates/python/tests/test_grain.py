@@ -1,0 +1,211 @@
+"""Grains: constructors, measures, files and refused input."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import grainwake as gw
+
+CUBE_VERTICES = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
+CUBE_FACES = np.array([
+    [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5], [0, 1, 5], [0, 5, 4],
+    [2, 6, 7], [2, 7, 3], [0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6],
+])
+
+
+def ball(diameter=20, size=28):
+    """Binary image of a sphere with the axes (z, y, x)."""
+    at = np.arange(size) - (size - 1) / 2 + 0.13
+    z, y, x = np.meshgrid(at, at, at, indexing="ij")
+    return x**2 + y**2 + z**2 < (diameter / 2) ** 2
+
+
+def test_a_sphere_has_its_closed_form():
+    sphere = gw.Grain.sphere("2 mm")
+    assert sphere.volume == pytest.approx(np.pi / 6 * 8e-9)
+    assert sphere.krumbein_sphericity == pytest.approx(1)
+    assert sphere.distance([[0, 0, 0], [0.002, 0, 0]]) == pytest.approx([-1e-3, 1e-3])
+    assert sphere.nodes.shape == (len(sphere.node_areas), 3)
+    assert sphere.node_areas.sum() == pytest.approx(np.pi * 4e-6)
+
+
+def test_units_are_numbers_in_si_or_strings():
+    assert gw.Grain.sphere(0.002) == gw.Grain.sphere("2 mm") == gw.Grain.sphere("0.2 cm")
+    assert gw.Grain.sphere(np.float32(0.5)).equivalent_diameter == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("value, words", [
+    ("2 kg", ["diameter", "is a mass", "expected a length"]),
+    ("2 mmm", ["unknown unit `mmm`", "did you mean `mm`?"]),
+    (float("nan"), ["found NaN"]),
+    ([1], ["found a value of type list"]),
+    (-1.0, ["must be finite and positive"]),
+])
+def test_a_wrong_length_is_refused(value, words):
+    with pytest.raises(gw.CaseError) as refused:
+        gw.Grain.sphere(value)
+    assert all(word in str(refused.value) for word in words), str(refused.value)
+
+
+def test_closed_forms_have_their_extents():
+    ellipsoid = gw.Grain.ellipsoid("3 mm", "2 mm", "1 mm", cells=40)
+    assert (ellipsoid.a, ellipsoid.b, ellipsoid.c) == pytest.approx((3e-3, 2e-3, 1e-3), rel=0.01)
+    box = gw.Grain.rounded_box("2 mm", "2 mm", "1 mm", radius="0.2 mm", cells=40)
+    assert box.roundness == pytest.approx(0.4, abs=0.1)
+    assert gw.Grain.cylinder("1 mm", "2 mm", cells=32).a == pytest.approx(2e-3, rel=0.02)
+    assert gw.Grain.capsule("1 mm", "1 mm", cells=32).a == pytest.approx(2e-3, rel=0.02)
+    quadric = gw.Grain.superquadric("2 mm", "2 mm", "2 mm", exponents=(1, 1), cells=32)
+    assert quadric.wadell_sphericity == pytest.approx(1, abs=0.01)
+
+
+def test_a_family_grain_has_its_targets():
+    stone = gw.Grain.family(0.7, 0.4, "3 mm", seed=3)
+    assert stone.equivalent_diameter == pytest.approx(3e-3)
+    assert stone.krumbein_sphericity == pytest.approx(0.7, abs=0.02)
+    assert stone.roundness == pytest.approx(0.4, abs=0.05)
+    with pytest.raises(gw.CaseError, match="must lie between 0.3 and 0.97"):
+        gw.Grain.family(1.2, 0.4)
+
+
+def test_a_grain_survives_files_and_pickling(tmp_path, cli):
+    grain = gw.Grain.ellipsoid("3 mm", "2 mm", "1 mm", cells=24)
+    file = tmp_path / "pebble.grain"
+    grain.save(file)
+    assert gw.Grain.load(file) == grain == pickle.loads(pickle.dumps(grain))
+    assert hash(gw.Grain.load(file)) == hash(grain)
+    with pytest.raises(gw.CaseError, match="exists already"):
+        grain.save(file)
+    grain.save(file, force=True)
+    with pytest.raises(gw.CaseError, match="does not end in .grain"):
+        grain.save(tmp_path / "pebble.stl")
+    with pytest.raises(FileNotFoundError):
+        gw.Grain.load(tmp_path / "none.grain")
+    file.write_bytes(file.read_bytes()[:-40])
+    with pytest.raises(gw.CaseError, match="pebble.grain"):
+        gw.Grain.load(file)
+
+
+def test_python_and_the_command_line_make_the_same_grain(tmp_path, cli):
+    file = tmp_path / "e.grain"
+    cli("grain", "make", "ellipsoid", "3 mm", "2 mm", "1 mm", "-o", file)
+    assert gw.Grain.load(file).digest == gw.Grain.ellipsoid("3 mm", "2 mm", "1 mm").digest
+
+
+def test_a_mesh_of_arrays_becomes_a_grain():
+    cube = gw.Grain.from_mesh((CUBE_VERTICES, CUBE_FACES), unit="mm", cells=32)
+    assert cube.volume == pytest.approx(1e-9, rel=0.01)
+    # Other orders and types of arrays are converted.
+    other = gw.Grain.from_mesh(
+        (np.asfortranarray(CUBE_VERTICES.astype(np.float32)), CUBE_FACES.astype(np.uint16)),
+        unit="1 mm", cells=32,
+    )
+    assert other.digest == cube.digest
+    # Triangles without shared vertices are merged.
+    soup = CUBE_VERTICES[CUBE_FACES].reshape(-1, 3), np.arange(36).reshape(12, 3)
+    assert gw.Grain.from_mesh(soup, unit="mm", cells=32).volume == pytest.approx(cube.volume)
+
+
+@pytest.mark.parametrize("mesh, words", [
+    ((CUBE_VERTICES[:, :2], CUBE_FACES), ["vertices", "(8, 2)", "(n, 3)"]),
+    ((CUBE_VERTICES, CUBE_FACES[:, :2]), ["faces", "(12, 2)", "(m, 3)"]),
+    ((CUBE_VERTICES, CUBE_FACES[1:]), ["edge"]),
+    ((CUBE_VERTICES, CUBE_FACES + 1), ["has vertex 8"]),
+    ((CUBE_VERTICES, CUBE_FACES - 1), ["-1 is not the index"]),
+    ((CUBE_VERTICES * np.nan, CUBE_FACES), ["not a finite number"]),
+    ((CUBE_VERTICES * 1j, CUBE_FACES), ["holds no real numbers"]),
+    ((CUBE_VERTICES, CUBE_FACES[:, ::-1]), ["inside out", "flip=True"]),
+    (42, ["expected a path, a pair (vertices, faces)"]),
+])
+def test_a_bad_mesh_is_refused(mesh, words):
+    with pytest.raises(gw.CaseError) as refused:
+        gw.Grain.from_mesh(mesh, unit="mm")
+    assert all(word in str(refused.value) for word in words), str(refused.value)
+
+
+def test_a_wrong_unit_is_noticed():
+    with pytest.raises(gw.CaseError, match="accepted are 1 um to 1 m; check unit"):
+        gw.Grain.from_mesh((CUBE_VERTICES, CUBE_FACES), unit="km", cells=16)
+    with pytest.raises(gw.CaseError, match="unit: it is missing"):
+        gw.Grain.from_mesh("cube.stl")
+
+
+def test_meshes_go_to_pyvista_and_back():
+    pyvista = pytest.importorskip("pyvista")
+    grain = gw.Grain.ellipsoid("3 mm", "2 mm", "1 mm", cells=32)
+    mesh = grain.mesh()
+    assert isinstance(mesh, pyvista.PolyData)
+    assert mesh.is_manifold
+    assert mesh.volume == pytest.approx(grain.volume, rel=0.02)
+    again = gw.Grain.from_mesh(mesh, cells=32)
+    assert again.a == pytest.approx(grain.a, rel=0.02)
+    with pytest.raises(gw.CaseError, match='expected "pyvista" or "trimesh"'):
+        grain.mesh("blender")
+
+
+def test_a_scan_of_an_array_becomes_a_grain():
+    image = ball()
+    exact = image.sum() * (50e-6) ** 3
+    grain = gw.Grain.from_scan(image, voxel="50 um", roundness=False)
+    assert grain.volume == pytest.approx(exact, rel=0.01)
+    # Labels of other types and orders give the same grain.
+    other = gw.Grain.from_scan(
+        np.asfortranarray(image.astype(np.int16)), voxel=50e-6, roundness=False
+    )
+    assert other.digest == grain.digest
+
+
+def test_the_axes_of_an_image_are_z_y_x():
+    # A block that is long along z: the last axis of the array is x.
+    image = np.zeros((40, 20, 24), dtype=np.uint8)
+    image[6:34, 6:14, 7:17] = 1
+    scan = gw.scan(image, voxel="0.1 mm", roundness=False)
+    assert scan.labels.shape == image.shape
+    assert (scan.labels == image).all()
+    grain = scan[1]
+    assert (grain.a, grain.b, grain.c) == pytest.approx((2.8e-3, 1.0e-3, 0.8e-3), rel=0.06)
+
+
+def test_a_scan_of_several_grains():
+    image = np.zeros((28, 28, 60), dtype=np.int32)
+    image[:, :, :28][ball()] = 4
+    image[:, :, 32:][ball(16)] = 7
+    image[0, 0, 0] = 9
+    scan = gw.scan(image, voxel="0.1 mm", roundness=False)
+    assert list(scan.grains) == [4, 7] and len(scan) == 2
+    assert list(scan.rejected) == [9]
+    assert scan.voxels[4] == (image == 4).sum()
+    assert scan[4].volume > scan[7].volume
+    with pytest.raises(KeyError, match="label 9"):
+        scan[9]
+    with pytest.raises(gw.CaseError, match="holds 3 grains"):
+        gw.Grain.from_scan(image, voxel="0.1 mm", roundness=False)
+    one = gw.Grain.from_scan(image, voxel="0.1 mm", label=7, roundness=False)
+    assert one.digest == scan[7].digest
+
+
+def test_grey_images_need_a_threshold():
+    image = 1.0 + 2.0 * ball().astype(np.float64)
+    with pytest.raises(gw.CaseError, match='threshold="otsu"'):
+        gw.scan(image, voxel="50 um")
+    scan = gw.scan(image, voxel="50 um", threshold="otsu", roundness=False)
+    assert 1 < scan.threshold < 3 and len(scan) == 1
+    with pytest.raises(gw.CaseError, match='found "mean"'):
+        gw.scan(image, voxel="50 um", threshold="mean")
+
+
+@pytest.mark.parametrize("image, words", [
+    (np.zeros((4, 4), dtype=int), ["(4, 4)", "(z, y, x)"]),
+    (np.zeros((4, 4, 0), dtype=int), ["at least one voxel"]),
+    (np.zeros((4, 4, 4), dtype=int), ["no solid voxel"]),
+    (np.array([["a"]]), ["no real numbers"]),
+])
+def test_a_bad_image_is_refused(image, words):
+    with pytest.raises(gw.CaseError) as refused:
+        gw.scan(image, voxel="50 um")
+    assert all(word in str(refused.value) for word in words), str(refused.value)
+
+
+def test_a_picture_is_a_png():
+    picture = gw.Grain.sphere("2 mm").picture(64)
+    assert picture.startswith(b"\x89PNG")

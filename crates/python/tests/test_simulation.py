@@ -1,0 +1,369 @@
+"""Simulations in memory: steps, arrays, control, interruption, checkpoints."""
+
+import gc
+import signal
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import grainwake as gw
+
+
+def dry(**keys):
+    return gw.Case.new(
+        size=["4 mm", "4 mm", "8 mm"],
+        cell_size="0.25 mm",
+        grains=[gw.Grain.sphere("1 mm").at(["2 mm", "2 mm", "6 mm"], density=2500, **keys)],
+        end="10 ms",
+    )
+
+
+def test_a_run_yields_states_at_its_times(sim):
+    states = list(sim.run(until="10 ms", every="2 ms", progress=False))
+    assert [state.time for state in states] == pytest.approx([0, 2e-3, 4e-3, 6e-3, 8e-3, 10e-3])
+    assert states[-1].velocities[0, 2] < -0.02
+    assert states[-1].positions.shape == (1, 3) and states[-1].orientations.shape == (1, 4)
+    # States are copies.
+    assert states[0].velocities[0, 2] == 0
+    assert sim.time == pytest.approx(0.01) and sim.steps == states[-1].steps
+
+
+def test_states_continue_after_a_break(sim):
+    for state in sim.run(every="2 ms", progress=False):
+        if state.time > 3e-3:
+            break
+    later = [state.time for state in sim.run(until="8 ms", every="2 ms", progress=False)]
+    assert later == pytest.approx([4e-3, 6e-3, 8e-3])
+
+
+def test_steps_and_times_are_checked(sim):
+    step = sim.step()
+    assert step == sim.time_step == sim.time
+    assert sim.step(horizon="1 ms") <= 1e-3
+    for call, words in [
+        (lambda: sim.step(horizon=0), "expected a positive time"),
+        (lambda: sim.advance_to("2 mm"), "is a length"),
+        (lambda: sim.run(every=-1), "expected a positive time"),
+    ]:
+        with pytest.raises(gw.CaseError, match=words):
+            call()
+
+
+def test_the_bits_do_not_depend_on_threads_and_on_python(case):
+    one, two = gw.Simulation(case, threads=1), gw.Simulation(case, threads=2)
+    assert (one.threads, two.threads) == (1, 2)
+    one.advance_to("4 ms")
+    while two.time < 4e-3 * (1 - 1e-9):
+        two.step(horizon=4e-3 - two.time)
+    assert one.time == two.time
+    assert (one.velocities == two.velocities).all()
+    assert (one.fluid_velocity("z") == two.fluid_velocity("z")).all()
+
+
+def test_fields_are_shown_without_a_copy(sim, case):
+    nx, ny, nz = case.cells
+    sim.advance_to("2 ms")
+    w = sim.fluid_velocity("z")
+    assert w.shape == (nz + 1, ny, nx) and w.dtype == np.float64
+    assert not w.flags.writeable and not w.flags.owndata
+    assert sim.fluid_velocity("x").shape == (nz, ny, nx + 1)
+    assert sim.kinematic_pressure().shape == (nz, ny, nx)
+    # Two arrays show the same memory.
+    assert np.shares_memory(w, sim.fluid_velocity("z"))
+    with pytest.raises(ValueError):
+        w[0, 0, 0] = 1
+    with pytest.raises(ValueError):
+        w.flags.writeable = True
+    z, y, x = sim.coordinates("z")
+    assert (len(z), len(y), len(x)) == w.shape
+    assert z[0] == 0 and z[-1] == pytest.approx(8e-3) and x[0] == pytest.approx(0.125e-3)
+    # The walls are at rest, and the fluid is fastest next to the grain.
+    assert (w[0] == 0).all()
+    at = np.unravel_index(np.argmin(w), w.shape)
+    assert np.linalg.norm([z[at[0]] - 6e-3, y[at[1]] - 2e-3, x[at[2]] - 2e-3]) < 1e-3
+
+
+def test_a_step_is_refused_while_an_array_shows_the_fields(sim):
+    sim.step()
+    w = sim.fluid_velocity("z")
+    before, part = w.copy(), w[2:4, ::2]
+    for change in (sim.step, lambda: sim.advance_to("5 ms"),
+                   lambda: list(sim.run(progress=False))):
+        with pytest.raises(BufferError, match="copy what is needed"):
+            change()
+    assert (w == before).all()
+    # A part of the array keeps the memory as well.
+    del w
+    with pytest.raises(BufferError, match="1 array still shows"):
+        sim.step()
+    view = memoryview(part)
+    del part
+    with pytest.raises(BufferError):
+        sim.step()
+    view.release()
+    del view
+    sim.step()
+    assert (sim.fluid_velocity("z") != before).any()
+
+
+def test_an_array_outlives_its_simulation(case):
+    sim = gw.Simulation(case)
+    sim.step()
+    pressure = sim.kinematic_pressure()
+    copy = pressure.copy()
+    del sim
+    gc.collect()
+    others = [gw.Simulation(case) for _ in range(3)]
+    assert (pressure == copy).all()
+    del others
+
+
+def test_single_precision_shows_its_type(case_file):
+    sim = gw.Simulation(gw.Case.load(case_file, {"run.precision": "f32"}))
+    sim.step()
+    assert sim.fluid_velocity("y").dtype == np.float32
+
+
+def test_fields_at_cells(sim):
+    pytest.importorskip("xarray")
+    sim.advance_to("2 ms")
+    velocity = sim.cell_field("velocity")
+    w = sim.fluid_velocity("z")
+    assert velocity[..., 2] == pytest.approx(0.5 * (w[1:] + w[:-1]))
+    pressure = sim.cell_field("pressure")
+    assert pressure == pytest.approx(1000 * sim.kinematic_pressure())
+    fraction = sim.cell_field("solid_fraction")
+    volume = fraction.sum() * (0.25e-3) ** 3
+    assert volume == pytest.approx(np.pi / 6 * 1.5e-3**3, rel=0.02)
+    with pytest.raises(gw.CaseError, match="expected one of velocity"):
+        sim.cell_field("density")
+    data = sim.to_xarray()
+    assert data["velocity"].dims == ("z", "y", "x", "component")
+    assert data["pressure"].attrs["units"] == "Pa" and data.attrs["time"] == sim.time
+    at = dict(x=2e-3, y=2e-3, z=5.1e-3, method="nearest")
+    below = data["velocity"].sel(component="z").sel(**at)
+    assert float(below) == velocity[20, 8, 8, 2] < -1e-3
+
+
+def test_velocity_at_points(sim):
+    sim.advance_to("2 ms")
+    w, (z, y, x) = sim.fluid_velocity("z"), sim.coordinates("z")
+    found = sim.interpolate_velocity([[x[8], y[7], z[20]], [1, 1, 1]])
+    assert found[0, 2] == pytest.approx(w[20, 7, 8]) and w[20, 7, 8] < -1e-3
+    assert np.isnan(found[1]).all()
+    with pytest.raises(gw.CaseError, match=r"\(2, 2\); expected \(n, 3\)"):
+        sim.interpolate_velocity(np.zeros((2, 2)))
+
+
+def test_a_dry_case_has_no_fields():
+    sim = gw.Simulation(dry())
+    sim.advance_to("5 ms")
+    assert sim.velocities[0, 2] == pytest.approx(-9.81 * 5e-3, rel=1e-6)
+    for ask in (lambda: sim.fluid_velocity("z"), sim.kinematic_pressure,
+                lambda: sim.cell_field("pressure"), lambda: sim.interpolate_velocity([0, 0, 0])):
+        with pytest.raises(gw.CaseError, match="has no fluid"):
+            ask()
+
+
+def test_a_controller_holds_a_grain_at_its_height(case):
+    """A proportional and integral controller in Python against weight and drag."""
+    sim = gw.Simulation(case)
+    mass, target, integral = sim.masses[0], sim.positions[0, 2], 0.0
+    for _ in range(60):
+        error = target - sim.positions[0, 2]
+        integral += error * sim.time_step
+        lift = 2e3 * mass * (error + 30 * integral) - 100 * mass * sim.velocities[0, 2]
+        sim.set_load(0, force=[0, 0, lift + 0.5 * mass * 9.81])
+        sim.step()
+    assert abs(sim.positions[0, 2] - target) < 2e-5
+    free = gw.Simulation(case)
+    free.advance_to(sim.time)
+    assert target - free.positions[0, 2] > 2e-4
+
+
+def test_a_prescribed_motion_is_followed_and_released(sim):
+    start = sim.positions[0]
+    sim.prescribe_motion(0, velocity=["10 mm/s", 0, 0], angular_velocity=[0, 0, "90 deg/s"])
+    sim.advance_to("2 ms")
+    assert sim.positions[0] == pytest.approx(start + [2e-5, 0, 0])
+    assert sim.angular_velocities[0] == pytest.approx([0, 0, np.pi / 2])
+    assert sim.forces[0, 0] < 0
+    with pytest.raises(gw.CaseError, match="is prescribed; release the grain first"):
+        sim.set_velocity(0, [0, 0, 0])
+    sim.release(0)
+    sim.advance_to("6 ms")
+    assert sim.velocities[0, 2] < -0.01 and 0 < sim.velocities[0, 0] < 0.01
+
+
+def test_a_set_velocity_acts_in_the_next_step():
+    sim = gw.Simulation(dry())
+    sim.set_velocity(0, velocity=(0.1, 0, 0), angular_velocity=(0, 0, 3))
+    sim.advance_to("5 ms")
+    assert sim.velocities[0, 0] == pytest.approx(0.1)
+    assert sim.positions[0, 0] == pytest.approx(2e-3 + 0.1 * 5e-3)
+    assert sim.angular_velocities[0, 2] == pytest.approx(3)
+
+
+def test_wrong_control_is_refused(sim):
+    with pytest.raises(IndexError, match="there is no grain 3"):
+        sim.set_load(3, force=[0, 0, 0])
+    with pytest.raises(gw.CaseError, match="force, z.*is a length"):
+        sim.set_load(0, force=[0, 0, "2 mm"])
+    with pytest.raises(gw.CaseError, match="found 2 components"):
+        sim.set_velocity(0, velocity=[0, 0])
+    with pytest.raises(gw.CaseError, match="give velocity, angular_velocity or both"):
+        sim.prescribe_motion(0)
+    sim.set_load(0, force=[0, 0, "2 uN"], torque=["1 nN m", 0, 0])
+
+
+def test_contacts_are_listed():
+    case = gw.Case.new(
+        size=["4 mm", "4 mm", "4 mm"],
+        cell_size="0.25 mm",
+        grains=[gw.Grain.sphere("1 mm").at(["2 mm", "2 mm", "0.501 mm"], density=2500,
+                                           velocity=[0, 0, -0.1])],
+        end="10 ms",
+        time={"step": "1 us"},
+    )
+    sim = gw.Simulation(case)
+    contacts = sim.contacts()
+    assert len(contacts["grain"]) == 0 and contacts["force"].shape == (0, 3)
+    while not (contacts["overlap"] > 0).any():
+        assert sim.steps < 200
+        sim.step()
+        contacts = sim.contacts()
+    assert contacts["grain"].tolist() == [0] and contacts["partner"].tolist() == [-1]
+    assert contacts["overlap"][0] > 0 and contacts["force"][0, 2] > 0
+    assert contacts["point"][0] == pytest.approx([2e-3, 2e-3, 0], abs=2e-5)
+
+
+def test_diagnostics_are_small(sim):
+    sim.advance_to("4 ms")
+    found = sim.diagnostics()
+    assert found["max_divergence"] < 1e-9 and abs(found["momentum_residual"]) < 1e-9
+    assert found["grain_kinetic_energy"] > 0
+
+
+def test_a_checkpoint_restores_the_bits(case, tmp_path):
+    file = tmp_path / "state.ckpt"
+    sim = gw.Simulation(case)
+    sim.advance_to("2 ms")
+    sim.save_checkpoint(file)
+    sim.advance_to("4 ms")
+    other = gw.Simulation(case)
+    other.restore_checkpoint(file)
+    assert other.time == pytest.approx(2e-3)
+    other.advance_to("4 ms")
+    assert (other.velocities == sim.velocities).all() and other.steps == sim.steps
+    damaged = tmp_path / "damaged.ckpt"
+    content = file.read_bytes()
+    damaged.write_bytes(content[:100] + b"x" + content[101:])
+    with pytest.raises(gw.CaseError, match="checksum does not match"):
+        other.restore_checkpoint(damaged)
+    damaged.write_bytes(b"short")
+    with pytest.raises(gw.CaseError, match="cut off"):
+        other.restore_checkpoint(damaged)
+    with pytest.raises(gw.CaseError, match="belongs to another case"):
+        gw.Simulation(dry()).restore_checkpoint(file)
+    with pytest.raises(FileNotFoundError):
+        other.restore_checkpoint(tmp_path / "none")
+
+
+def test_failed_numerics_raise_solver_error(case_file):
+    unstable = gw.Case.load(case_file, {"time.step": "20 ms", "time.end": "1 s"})
+    sim = gw.Simulation(unstable)
+    with pytest.raises(gw.SolverError, match="became unstable.*try"):
+        sim.advance_to("1 s")
+    with pytest.raises(gw.SolverError, match="cannot be continued"):
+        sim.step()
+
+
+def test_the_lock_of_the_interpreter_is_released(case_file):
+    sim = gw.Simulation(gw.Case.load(case_file, {"time.step": "20 us"}), threads=1)
+    counted, done = [0], threading.Event()
+
+    def count():
+        while not done.is_set():
+            counted[0] += 1
+            time.sleep(0.001)
+
+    counter = threading.Thread(target=count)
+    counter.start()
+    started = time.monotonic()
+    sim.advance_to("20 ms")
+    wall = time.monotonic() - started
+    done.set()
+    counter.join()
+    # With the lock held, the thread would count a few times only.
+    assert counted[0] > 100 * wall
+
+
+def test_another_thread_cannot_step_at_the_same_time(case_file):
+    sim = gw.Simulation(gw.Case.load(case_file, {"time.step": "20 us"}))
+    running = threading.Thread(target=lambda: sim.advance_to("20 ms"))
+    running.start()
+    refused = 0
+    while running.is_alive():
+        try:
+            sim.step()
+        except RuntimeError as error:
+            refused += "borrowed" in str(error)
+        time.sleep(0.01)
+    running.join()
+    assert refused > 0
+    assert sim.time >= 0.02 * (1 - 1e-9)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals of this kind")
+def test_an_interrupt_stops_at_a_step(case_file):
+    sim = gw.Simulation(gw.Case.load(case_file, {"time.end": "1000 s"}))
+    threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT)).start()
+    started = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        sim.advance_to("1000 s")
+    assert time.monotonic() - started < 5
+    at = sim.time
+    assert 0 < at < 1000
+    sim.step()
+    assert sim.time > at
+
+
+def test_progress_goes_to_a_callable(sim, capfd):
+    seen = []
+    list(sim.run(until="6 ms", every="2 ms", progress=seen.append))
+    assert [each["time"] for each in seen] == pytest.approx([2e-3, 4e-3, 6e-3])
+    assert seen[-1]["end"] == pytest.approx(6e-3)
+    assert capfd.readouterr().err == ""
+    list(sim.run(until="8 ms", every="2 ms", progress=True))
+    assert "100 %" in capfd.readouterr().err
+
+
+def test_a_grain_that_has_left_is_at_infinity_and_out_of_the_table():
+    pytest.importorskip("pandas")
+    case = gw.Case.new(
+        size=["3 mm", "3 mm", "4 mm"],
+        cell_size="0.25 mm",
+        fluid={"density": 1000, "viscosity": "1 mPa s"},
+        grains=[gw.Grain.sphere("1 mm").at(["1.5 mm", "1.5 mm", "1 mm"], density=2500,
+                                           velocity=[0, 0, -0.2])],
+        boundaries={"z": ["outflow", "wall"]},
+        end="0.1 s",
+    )
+    sim = gw.Simulation(case)
+    states = list(sim.run(every="1 ms", progress=False))
+    assert np.isinf(states[-1].positions).all()
+    table = gw.frame(states)
+    assert 0 < len(table) < len(states) and np.isfinite(table["z"]).all()
+    with pytest.raises(gw.CaseError, match="grain 0 has left the box"):
+        sim.set_load(0, force=[0, 0, 1e-6])
+
+
+def test_states_become_a_table(sim):
+    pandas = pytest.importorskip("pandas")
+    table = gw.frame(sim.run(until="4 ms", every="2 ms", progress=False))
+    assert isinstance(table, pandas.DataFrame)
+    assert list(table["grain"]) == [0, 0, 0]
+    assert table["vz"].is_monotonic_decreasing

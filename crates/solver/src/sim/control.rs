@@ -1,0 +1,179 @@
+//! Control of grains between steps: velocities, prescribed motion and external loads.
+//!
+//! Control is not part of the saved state: after [`Simulation::restore`] prescribed motions and
+//! external loads have to be set again.
+
+use glam::DVec3;
+
+use super::Simulation;
+use crate::dem::{Grain, MotionConstraint};
+use crate::math::Load;
+
+/// Reason why a grain cannot be controlled.
+#[derive(Debug, PartialEq, thiserror::Error)]
+pub enum ControlError {
+    /// There is no grain with this index.
+    #[error("there is no grain {grain}: the simulation has {count} grains, counted from 0")]
+    NoGrain {
+        /// Index.
+        grain: usize,
+        /// Number of grains.
+        count: usize,
+    },
+    /// The grain has left the box.
+    #[error("grain {grain} has left the box")]
+    HasLeft {
+        /// Index of the grain.
+        grain: usize,
+    },
+    /// A component is not a finite number.
+    #[error("the {quantity} of grain {grain} is not finite")]
+    NotFinite {
+        /// Index of the grain.
+        grain: usize,
+        /// "velocity", "angular velocity", "external load".
+        quantity: &'static str,
+    },
+    /// The velocity is prescribed, so that a present velocity would have no effect.
+    #[error(
+        "the {quantity} of grain {grain} is prescribed; release the grain first, or prescribe another one"
+    )]
+    Prescribed {
+        /// Index of the grain.
+        grain: usize,
+        /// "velocity", "angular velocity".
+        quantity: &'static str,
+    },
+}
+
+/// Component of the motion of a grain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotionComponent {
+    /// Velocity of the centroid [m/s].
+    Translation,
+    /// Angular velocity, space frame [rad/s].
+    Rotation,
+}
+
+impl MotionComponent {
+    fn quantity(self) -> &'static str {
+        match self {
+            MotionComponent::Translation => "velocity",
+            MotionComponent::Rotation => "angular velocity",
+        }
+    }
+    fn constraint(self, grain: &mut Grain) -> &mut MotionConstraint {
+        match self {
+            MotionComponent::Translation => &mut grain.translation,
+            MotionComponent::Rotation => &mut grain.rotation,
+        }
+    }
+    fn velocity(self, grain: &mut Grain) -> &mut DVec3 {
+        match self {
+            MotionComponent::Translation => &mut grain.velocity,
+            MotionComponent::Rotation => &mut grain.angular_velocity,
+        }
+    }
+}
+
+impl Simulation {
+    /// Sets the present velocity of a free grain: [m/s] or [rad/s], space frame. The fluid receives
+    /// the change as an impulse in the next step.
+    ///
+    /// # Errors
+    /// [`ControlError`] for a grain that is unknown or has left, or a velocity that is not finite
+    /// or prescribed.
+    pub fn set_velocity(
+        &mut self,
+        grain: usize,
+        component: MotionComponent,
+        velocity: DVec3,
+    ) -> Result<(), ControlError> {
+        self.check_control(grain, velocity.is_finite(), component.quantity())?;
+        let quantity = component.quantity();
+        let body = &mut self.setup.grains[grain];
+        if *component.constraint(body) != MotionConstraint::Free {
+            return Err(ControlError::Prescribed { grain, quantity });
+        }
+        *component.velocity(body) = velocity;
+        Ok(())
+    }
+
+    /// Prescribes a velocity from now on: [m/s] or [rad/s], space frame. A formula of the set-up
+    /// for this motion is removed.
+    ///
+    /// # Errors
+    /// [`ControlError`] for a grain that is unknown or has left, or a velocity that is not finite.
+    pub fn prescribe_velocity(
+        &mut self,
+        grain: usize,
+        component: MotionComponent,
+        velocity: DVec3,
+    ) -> Result<(), ControlError> {
+        self.check_control(grain, velocity.is_finite(), component.quantity())?;
+        self.remove_formula(grain, component);
+        let body = &mut self.setup.grains[grain];
+        *component.constraint(body) = MotionConstraint::Prescribed(velocity);
+        *component.velocity(body) = velocity;
+        Ok(())
+    }
+
+    /// Lets a motion follow Newton's or Euler's equation from now on, starting from the present
+    /// velocity. A formula of the set-up for this motion is removed.
+    ///
+    /// # Errors
+    /// [`ControlError`] for a grain that is unknown or has left.
+    pub fn release(
+        &mut self,
+        grain: usize,
+        component: MotionComponent,
+    ) -> Result<(), ControlError> {
+        self.check_control(grain, true, component.quantity())?;
+        self.remove_formula(grain, component);
+        *component.constraint(&mut self.setup.grains[grain]) = MotionConstraint::Free;
+        Ok(())
+    }
+
+    /// Sets the external load on a grain, which acts in every step until it is replaced: force [N]
+    /// and torque about the centroid [N m], space frame. Weight, buoyancy, contact and fluid act
+    /// besides.
+    ///
+    /// # Errors
+    /// [`ControlError`] for a grain that is unknown or has left, or a load that is not finite.
+    pub fn set_external_load(&mut self, grain: usize, load: Load) -> Result<(), ControlError> {
+        let finite = load.force.is_finite() && load.torque.is_finite();
+        self.check_control(grain, finite, "external load")?;
+        self.data.external[grain] = load;
+        Ok(())
+    }
+
+    /// External loads, one per grain: force [N] and torque about the centroid [N m], space frame.
+    pub fn external_loads(&self) -> &[Load] {
+        &self.data.external
+    }
+
+    fn check_control(
+        &self,
+        grain: usize,
+        finite: bool,
+        quantity: &'static str,
+    ) -> Result<(), ControlError> {
+        let count = self.setup.grains.len();
+        if grain >= count {
+            return Err(ControlError::NoGrain { grain, count });
+        }
+        if self.setup.grains[grain].has_left() {
+            return Err(ControlError::HasLeft { grain });
+        }
+        if finite { Ok(()) } else { Err(ControlError::NotFinite { grain, quantity }) }
+    }
+
+    fn remove_formula(&mut self, grain: usize, component: MotionComponent) {
+        for motion in self.setup.prescription.motions.iter_mut().filter(|m| m.grain == grain) {
+            match component {
+                MotionComponent::Translation => motion.velocity = None,
+                MotionComponent::Rotation => motion.angular_velocity = None,
+            }
+        }
+    }
+}

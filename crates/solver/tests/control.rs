@@ -1,0 +1,115 @@
+//! Control of grains between steps.
+
+use grainwake_solver::dem::Grain;
+use grainwake_solver::flow::FluidParams;
+use grainwake_solver::glam::DVec3;
+use grainwake_solver::grid::Mesh;
+use grainwake_solver::math::Load;
+use grainwake_solver::shape::Shape;
+use grainwake_solver::sim::{ControlError, MotionComponent, Setup, Simulation, StepRule};
+
+const TRANSLATION: MotionComponent = MotionComponent::Translation;
+const ROTATION: MotionComponent = MotionComponent::Rotation;
+const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
+
+fn setup() -> Setup {
+    let sphere = Grain::new(Shape::sphere(0.5e-3, 300), 2500.0);
+    Setup::new(Mesh::cubic([16, 16, 24], 0.125e-3))
+        .with_fluid(FluidParams::new(1000.0, 1e-6))
+        .with_gravity(GRAVITY)
+        .with_step(StepRule::Fixed(1e-4))
+        .with_grains([sphere.with_position(DVec3::new(1e-3, 1e-3, 2e-3))])
+}
+
+fn state(sim: &Simulation) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    sim.save(&mut bytes).unwrap();
+    bytes
+}
+
+fn advance(sim: &mut Simulation, steps: usize) {
+    for _ in 0..steps {
+        sim.step(f64::INFINITY).unwrap();
+    }
+}
+
+#[test]
+fn a_zero_load_changes_no_bit() {
+    let (mut plain, mut loaded) =
+        (Simulation::new(setup()).unwrap(), Simulation::new(setup()).unwrap());
+    loaded.set_external_load(0, Load::default()).unwrap();
+    advance(&mut plain, 5);
+    advance(&mut loaded, 5);
+    assert_eq!(state(&plain), state(&loaded));
+}
+
+#[test]
+fn a_load_that_carries_the_weight_keeps_the_grain_at_rest() {
+    let mut sim = Simulation::new(setup()).unwrap();
+    let grain = &sim.grains()[0];
+    let weight = (grain.density - 1000.0) * grain.shape.volume() * GRAVITY;
+    sim.set_external_load(0, Load { force: -weight, torque: DVec3::ZERO }).unwrap();
+    advance(&mut sim, 20);
+    assert!(sim.grains()[0].velocity.length() < 1e-12, "{}", sim.grains()[0].velocity);
+    sim.set_external_load(0, Load::default()).unwrap();
+    advance(&mut sim, 20);
+    assert!(sim.grains()[0].velocity.z < -5e-3, "{}", sim.grains()[0].velocity);
+    assert!(sim.diagnostics().momentum_residual < 1e-10);
+}
+
+#[test]
+fn a_torque_turns_the_grain_and_leaves_the_momentum_balanced() {
+    let mut sim = Simulation::new(setup()).unwrap();
+    let torque = DVec3::new(0.0, 1e-9, 0.0);
+    sim.set_external_load(0, Load { force: DVec3::ZERO, torque }).unwrap();
+    advance(&mut sim, 10);
+    assert!(sim.grains()[0].angular_velocity.y > 0.0);
+    assert!(sim.diagnostics().momentum_residual < 1e-10);
+}
+
+#[test]
+fn a_prescribed_grain_moves_as_told_and_falls_after_its_release() {
+    let mut sim = Simulation::new(setup()).unwrap();
+    let (start, velocity) = (sim.grains()[0].pose.position, DVec3::new(2e-3, 0.0, 0.0));
+    sim.prescribe_velocity(0, TRANSLATION, velocity).unwrap();
+    sim.prescribe_velocity(0, ROTATION, DVec3::Z).unwrap();
+    advance(&mut sim, 10);
+    let grain = &sim.grains()[0];
+    assert!((grain.pose.position - start - velocity * sim.time()).length() < 1e-15);
+    assert_eq!((grain.velocity, grain.angular_velocity), (velocity, DVec3::Z));
+    let refused = sim.set_velocity(0, TRANSLATION, DVec3::ZERO).unwrap_err();
+    assert_eq!(refused, ControlError::Prescribed { grain: 0, quantity: "velocity" });
+    sim.release(0, TRANSLATION).unwrap();
+    advance(&mut sim, 10);
+    let grain = &sim.grains()[0];
+    assert!(grain.velocity.z < -1e-3, "{}", grain.velocity);
+    assert_eq!(grain.angular_velocity, DVec3::Z);
+}
+
+#[test]
+fn a_set_velocity_is_slowed_by_the_fluid() {
+    let mut sim = Simulation::new(setup().with_gravity(DVec3::ZERO)).unwrap();
+    let velocity = DVec3::new(5e-3, 0.0, 0.0);
+    sim.set_velocity(0, TRANSLATION, velocity).unwrap();
+    assert_eq!(sim.grains()[0].velocity, velocity);
+    advance(&mut sim, 1);
+    let first = sim.grains()[0].velocity.x;
+    advance(&mut sim, 20);
+    let later = sim.grains()[0].velocity.x;
+    assert!(0.0 < later && later < first && first < velocity.x, "{first} {later}");
+}
+
+#[test]
+fn unknown_grains_and_infinite_values_are_refused() {
+    let mut sim = Simulation::new(setup()).unwrap();
+    let no_grain = ControlError::NoGrain { grain: 1, count: 1 };
+    assert_eq!(sim.set_velocity(1, TRANSLATION, DVec3::ZERO), Err(no_grain));
+    let nan = DVec3::new(0.0, f64::NAN, 0.0);
+    assert!(matches!(sim.set_velocity(0, ROTATION, nan), Err(ControlError::NotFinite { .. })));
+    let load = Load { force: nan, torque: DVec3::ZERO };
+    assert!(matches!(sim.set_external_load(0, load), Err(ControlError::NotFinite { .. })));
+    let mut gone = setup();
+    gone.grains[0].leave();
+    let mut sim = Simulation::new(gone).unwrap();
+    assert_eq!(sim.release(0, TRANSLATION), Err(ControlError::HasLeft { grain: 0 }));
+}
