@@ -11,7 +11,7 @@ pub struct RunArgs {
     /// Run folder [default: runs/NAME; for a case.resolved.toml its own folder]
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// Number of threads, 0 for all cores [default: value of the case]
+    /// Number of threads, 0 for all cores, at most 4 per core [default: value of the case]
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
     /// Continue from the last checkpoint

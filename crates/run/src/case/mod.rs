@@ -37,7 +37,7 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use crate::{Job, RunPlan};
+use crate::{Job, RunError, RunPlan, memory};
 use grainwake_solver::sim::Setup;
 
 pub use error::{CaseError, Problem};
@@ -121,6 +121,14 @@ impl Case {
             digest: self.digest.clone(),
             files: (files.map(|file| (file.name.clone(), file.bytes.clone()))).collect(),
         }
+    }
+
+    /// Compares the memory of the run with the memory that is free.
+    ///
+    /// # Errors
+    /// [`RunError::Memory`] with both figures.
+    pub fn admit_memory(&self) -> Result<(), RunError> {
+        memory::admit(&self.setup)
     }
 
     /// Estimates a run on `threads` threads, with warnings.
