@@ -13,7 +13,7 @@ use crate::{kind, print, threads};
 
 /// Checks a case and prints its derived numbers, cost and warnings.
 pub fn check(args: &CheckArgs) -> Result<(), Exit> {
-    let case = kind::case(&args.case, &args.set)?;
+    let case = kind::case(&args.case, &kind::overrides(&args.unset, &args.set))?;
     let threads = threads::resolve(args.threads.unwrap_or(case.threads));
     let estimate = case.estimate(threads);
     if args.json {

@@ -74,7 +74,8 @@ pub struct Case {
 }
 
 impl Case {
-    /// Reads a case file and applies overrides such as "time.end=0.5".
+    /// Reads a case file and applies overrides: "time.end=0.5" sets a key, "-time.step" removes
+    /// one.
     ///
     /// # Errors
     /// [`CaseError`] with every problem found and its place.
