@@ -44,7 +44,7 @@ pub enum RunError {
         /// Symptom.
         source: StepError,
         /// Keys of the case in the advice.
-        terms: RemedyTerms,
+        terms: Box<RemedyTerms>,
         /// Time of the last good checkpoint [s].
         time: f64,
         /// Folder of the checkpoints.

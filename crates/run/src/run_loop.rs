@@ -310,7 +310,7 @@ impl Running {
         match kept {
             Ok(()) => RunError::Unstable {
                 source,
-                terms,
+                terms: Box::new(terms),
                 time,
                 folder: self.out.join(checkpoint::FOLDER),
             },
