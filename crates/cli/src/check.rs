@@ -13,13 +13,15 @@ use crate::{kind, print, threads};
 
 /// Checks a case and prints its derived numbers, cost and warnings.
 pub fn check(args: &CheckArgs) -> Result<(), Exit> {
-    let case = kind::case(&args.case, &args.set)?;
+    let case = kind::case(&args.case, &kind::overrides(&args.unset, &args.set))?;
     let threads = threads::resolve(args.threads.unwrap_or(case.threads));
     let estimate = case.estimate(threads);
     if args.json {
-        return print(&serde_json::to_string(&estimate)?);
+        print(&serde_json::to_string(&estimate)?)?;
+    } else {
+        print(&table(&case, &estimate, threads))?;
     }
-    print(&table(&case, &estimate, threads))
+    case.admit_memory().map_err(Exit::from)
 }
 
 /// Returns one line per warning.
@@ -45,6 +47,9 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
         value.map(|v| (name, format!("{} {unit}", short(v)).trim_end().to_string()))
     };
     rows.extend(with_unit("cells per diameter", e.cells_per_diameter, ""));
+    let thin = |(n, thin): &(f64, f64)| *thin < 0.95 * n;
+    let shortest = e.cells_per_diameter.zip(e.cells_across_shortest_axis).filter(thin);
+    rows.extend(with_unit("cells across shortest axis", shortest.map(|(_, thin)| thin), ""));
     // For unequal grains the number refers to one of them.
     let which = e.galileo_grain.filter(|_| differ(case));
     let which = which.map_or(String::new(), |i| format!("(grain {i}, the largest)"));
@@ -66,7 +71,10 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     }
     rows.push(("time step", quantity(e.time_step_s, "s")));
     rows.push(("steps", format!("{} to t = {} s", e.steps, case.plan.end)));
-    rows.push(("memory", format!("{:.0} MB", e.memory_bytes as f64 / 1e6)));
+    let free = e
+        .memory_free_bytes
+        .map_or(String::new(), |free| format!(" ({:.0} MB are free)", free as f64 / 1e6));
+    rows.push(("memory", format!("{:.0} MB{free}", e.memory_bytes as f64 / 1e6)));
     let (wall, threads) = (clock(e.wall_s), count(threads, "thread"));
     rows.push(("wall time", format!("about {wall} on {threads}")));
     let mut lines = vec![columns(&rows)];

@@ -39,6 +39,11 @@ fn kind(path: &Path) -> Option<Kind> {
     }
 }
 
+/// Returns the overrides of `--unset` and `--set`, in this order.
+pub fn overrides(unset: &[String], set: &[String]) -> Vec<String> {
+    unset.iter().map(|key| format!("-{key}")).chain(set.iter().cloned()).collect()
+}
+
 /// Reads a case file and applies overrides.
 pub fn case(path: &Path, set: &[String]) -> Result<Case, Exit> {
     Case::load(path, set).map_err(|error| {

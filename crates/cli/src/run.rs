@@ -15,12 +15,13 @@ use crate::{check, expect, kind, print, tell, threads};
 
 /// Runs a case.
 pub fn run(args: &RunArgs) -> Result<(), Exit> {
-    let case = kind::case(&args.case, &args.set)?;
+    let case = kind::case(&args.case, &kind::overrides(&args.unset, &args.set))?;
     let out = args.output.clone().unwrap_or_else(|| default_folder(&args.case));
     let threads = threads::resolve(args.threads.unwrap_or(case.threads));
-    let existing = match (args.resume, args.force) {
-        (true, _) => Existing::Resume,
-        (_, true) => Existing::Replace,
+    let existing = match (args.resume, args.resume_or_start, args.force) {
+        (true, ..) => Existing::Resume,
+        (_, true, _) => Existing::ResumeOrStart,
+        (.., true) => Existing::Replace,
         _ => Existing::Refuse,
     };
     let options = Options { existing, command: std::env::args().collect(), threads };

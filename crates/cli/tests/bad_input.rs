@@ -3,6 +3,8 @@
 mod common;
 
 use common::{WET, folder_with, grainwake};
+use predicates::prelude::*;
+use predicates::str::contains;
 
 /// Runs a modified case and asserts that standard error contains these words.
 fn refused(from: &str, to: &str, words: &[&str]) {
@@ -143,4 +145,29 @@ fn a_damaged_grain_file_is_told_of_with_its_place() {
     let done = grainwake().arg("check").arg(&case).assert().code(2);
     let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
     assert!(message.contains("case.toml:18:8") && message.contains("checksum"), "{message}");
+}
+
+#[test]
+fn a_box_beyond_the_memory_is_refused_with_both_figures() {
+    let (folder, case) = folder_with(WET);
+    let size = ["--set", "domain.cells=[4000, 4000, 4000]", "--set", "domain.size=[1, 1, 1]"];
+    let small = ["--set", "domain.cell_size=0.25 mm"];
+    for command in ["check", "run"] {
+        let mut program = grainwake();
+        program.arg(command).arg(&case).args(size).args(small).current_dir(folder.path());
+        let refused = program.assert().code(2);
+        refused
+            .stderr(contains("the run needs 7040 GB of memory and").and(contains("GB are free")));
+    }
+    assert!(!folder.path().join("runs").exists());
+}
+
+#[test]
+fn thousands_of_threads_are_reduced_with_a_warning() {
+    let (folder, case) = folder_with(WET);
+    let out = folder.path().join("run");
+    let mut program = grainwake();
+    program.arg("run").arg(&case).args(["--threads", "5000", "--set", "time.end=2 ms", "-o"]);
+    let done = program.arg(&out).arg("--no-report").assert().success();
+    done.stderr(contains("warning: 5000 threads are too many for"));
 }

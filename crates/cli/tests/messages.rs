@@ -123,3 +123,19 @@ fn an_analysis_without_a_key_points_to_its_own_page() {
         .stderr(contains("a.toml:1:").and(contains("`by` is missing")))
         .stderr(contains("docs/reference/study-file.md").and(contains("grainwake schema").not()));
 }
+
+#[test]
+fn unset_removes_a_key_so_that_its_default_applies() {
+    let (_folder, case) = folder_with(DRY);
+    let check = |more: &[&str]| grainwake().arg("check").arg(&case).args(more).assert();
+    check(&["--set", "time.max_step=1 ms"]).code(2).stderr(contains("a fixed step has no limits"));
+    check(&["--unset", "time.step", "--set", "time.max_step=1 ms"])
+        .success()
+        .stdout(contains("time step").and(contains("1 ms")));
+    check(&["--unset", "grain.1.angular_velocity"]).success();
+    check(&["--unset", "time.speed"])
+        .code(2)
+        .stderr(contains("--unset time.speed: the case has no such key"))
+        .stderr(contains("present are end, step"));
+    check(&["--unset", "grain.7.density"]).code(2).stderr(contains("grain.0, grain.1, grain.2"));
+}

@@ -305,3 +305,18 @@ fn outputs_that_nearly_coincide_do_not_end_a_run() {
     let more: Vec<&str> = more.iter().flat_map(|set| ["--set", set]).collect();
     run(&case, &out, &more).success();
 }
+
+#[test]
+fn resume_or_start_serves_the_first_and_every_later_job() {
+    let (folder, case) = folder_with(DRY);
+    let out = folder.path().join("run");
+    let run = |more: &[&str]| {
+        let mut command = grainwake();
+        command.arg("run").arg(&case).arg("-o").arg(&out).args(["--no-report"]).args(more).assert()
+    };
+    run(&["--resume"]).code(2).stderr(predicates::str::contains("--resume-or-start"));
+    run(&["--resume-or-start", "--set", "time.end=20 ms"]).success();
+    let resumed = run(&["--resume-or-start", "--set", "time.end=20 ms"]).success();
+    resumed.stderr(predicates::str::contains("already finished"));
+    run(&["--resume-or-start", "--force"]).code(2);
+}

@@ -44,11 +44,19 @@ pub enum RunError {
         /// Symptom.
         source: StepError,
         /// Keys of the case in the advice.
-        terms: RemedyTerms,
+        terms: Box<RemedyTerms>,
         /// Time of the last good checkpoint [s].
         time: f64,
         /// Folder of the checkpoints.
         folder: PathBuf,
+    },
+    /// The run needs more memory than is free.
+    #[error("the run needs {} of memory and {} are free; take larger cells, a smaller box, fewer surface nodes or [run] precision = \"f32\"", gigabytes(*needed), gigabytes(*free))]
+    Memory {
+        /// Memory of the run [bytes].
+        needed: u64,
+        /// Free memory [bytes].
+        free: u64,
     },
     /// Reading or writing failed.
     #[error("cannot {action} {}: {source}", path.display())]
@@ -85,11 +93,19 @@ impl RunError {
             RunError::Setup(_)
             | RunError::Occupied { .. }
             | RunError::InUse { .. }
+            | RunError::Memory { .. }
             | RunError::OtherCase { .. } => FailureKind::Input,
             RunError::Unstable { .. } => FailureKind::Computation,
             RunError::Io { .. } | RunError::NoCheckpoint { .. } => FailureKind::InputOutput,
         }
     }
+}
+
+/// Formats bytes as gigabytes with three digits.
+fn gigabytes(bytes: u64) -> String {
+    let value = bytes as f64 / 1e9;
+    let digits = (2.0 - value.max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
+    format!("{value:.digits$} GB")
 }
 
 /// Conversion of input/output errors, with the file and the action.

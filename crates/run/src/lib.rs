@@ -5,11 +5,12 @@
 //! `docs/reference/run-folder.md` lists the files.
 //!
 //! Layers, downwards: `case` -> `run_loop` -> `recorder` -> `run_folder`, `contact_events` ->
-//! `overlaps`, `plan`, `error`.
+//! `overlaps`, `memory`, `plan`, `error`.
 
 pub mod case;
 mod contact_events;
 mod error;
+mod memory;
 mod overlaps;
 mod plan;
 mod recorder;

@@ -13,6 +13,7 @@ use grainwake_solver::sim::{
 };
 
 use crate::error::{Context, RunError};
+use crate::memory;
 use crate::plan::RunPlan;
 use crate::recorder::Recorder;
 use crate::run_folder::provenance::{Provenance, Session};
@@ -111,6 +112,7 @@ pub fn run(
     options: &Options,
     observer: &mut dyn Observer,
 ) -> Result<Ending, RunError> {
+    memory::admit(&job.setup)?;
     // The folder is checked before the lock file is created in it, and again under the lock.
     run_folder::admit(out, options.existing.resolve(out, &job.digest))?;
     let _lock = run_folder::lock_folder(out)?;
@@ -236,15 +238,13 @@ impl Running {
         if dt >= self.plan.smallest_step || 2.0 * dt > limit {
             return Ok(());
         }
-        Err(StepError::Unstable {
-            time: self.sim.time(),
-            step: self.sim.steps(),
-            what: format!(
-                "the time step has collapsed to {dt:.1e} s: somewhere the fluid is far faster than \
-                 any grain should settle"
-            ),
-            remedy: Remedy::GridOrStepOrSlices,
-        })
+        let symptom = format!(
+            "the time step has collapsed to {dt:.1e} s: somewhere the fluid is far faster than any \
+             grain should settle"
+        );
+        let (what, remedy) = self.sim.with_cause(symptom, Remedy::GridOrStepOrSlices);
+        let (time, step) = (self.sim.time(), self.sim.steps());
+        Err(StepError::Unstable { time, step, what, remedy })
     }
 
     /// Returns the reason of the end, if the run is at its end.
@@ -310,7 +310,7 @@ impl Running {
         match kept {
             Ok(()) => RunError::Unstable {
                 source,
-                terms,
+                terms: Box::new(terms),
                 time,
                 folder: self.out.join(checkpoint::FOLDER),
             },

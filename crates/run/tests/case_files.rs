@@ -643,6 +643,52 @@ fn lattices_of_one_size_fit_every_box() {
 }
 
 #[test]
+fn thin_grains_are_warned_of_by_their_shortest_axis() {
+    let plate = |thickness: &str| {
+        let shape = format!("kind = \"ellipsoid\", size = [\"4 mm\", \"4 mm\", \"{thickness}\"]");
+        PAIR.replace("kind = \"sphere\", diameter = \"2 mm\"", &shape)
+    };
+    let thin = warnings(&plate("0.5 mm"));
+    assert!(thin.contains("only 2.0 cells across the shortest axis"), "{thin}");
+    assert!(!thin.contains("across the smallest grain"), "{thin}");
+    assert!(!warnings(&plate("1 mm")).contains("shortest axis"));
+}
+
+#[test]
+fn a_fixed_step_is_compared_with_the_velocities_at_the_start() {
+    let start = |speed: &str, time: &str| {
+        warnings(
+            &PAIR
+                .replacen("[[grain]]", &format!("[[grain]]\nvelocity = [\"{speed}\", 0, 0]"), 1)
+                .replace("end = \"1 s\"", &format!("end = \"1 s\"\n{time}")),
+        )
+    };
+    let fast = start("1 m/s", "step = \"0.5 ms\"");
+    assert!(
+        fast.contains("grain 0 at the start gives the first step a CFL number of 2.0"),
+        "{fast}"
+    );
+    assert!(fast.contains("fixed step of 0.25 ms or less"), "{fast}");
+    assert!(!start("0.1 m/s", "step = \"0.5 ms\"").contains("CFL number"));
+    assert!(!start("1 m/s", "").contains("CFL number"));
+}
+
+#[test]
+fn contact_that_dominates_names_its_levers() {
+    let heap = "[domain]\nsize = [\"50 mm\", \"50 mm\", \"200 mm\"]\n[contact]\nstiffness = \"1 MN/m\"\n\
+                [time]\nend = \"2 s\"\n[[packing]]\ncount = 500\ndensity = 2650\nnodes = 1000\n\
+                shapes = [{ kind = \"sphere\", diameter = \"2 mm\" }]\n";
+    let dear = warnings(heap);
+    for lever in
+        ["contact takes 100 % of the wall time", "stiffness", "nodes", "substeps_per_contact"]
+    {
+        assert!(dear.contains(lever), "{dear}");
+    }
+    let cheap = warnings(&heap.replace("count = 500", "count = 3").replace("1 MN/m", "1000 N/m"));
+    assert!(!cheap.contains("of the wall time"), "{cheap}");
+}
+
+#[test]
 fn expectations_need_a_meaning() {
     let with = |text: &str| PAIR.replace("[time]", &format!("[expect]\n{text}\n[time]"));
     assert_eq!(good(&with("kiss_time = { value = \"0.2 s\", tolerance = \"5 %\" }\npeak_settling_speed = [{ at_least = 0.1, grain = 0 }, { at_most = 0.2, grain = 1 }]")).expect.len(), 3);

@@ -73,7 +73,7 @@ pub use assemble::ShapeOptions;
 pub use compare::Comparison;
 pub use error::{Result, ShapeError};
 pub use field::SampledField;
-pub use limits::{Memory, ReadLimits, SourceFile};
+pub use limits::{Memory, ReadLimits, SourceFile, available_memory};
 pub use morphology::Morphology;
 pub use nodes::SurfaceNode;
 pub use provenance::Provenance;

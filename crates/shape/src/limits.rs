@@ -45,9 +45,7 @@ impl ReadLimits {
     /// Returns limits for volumes that fit in the available memory at `per_voxel` [bytes]; the
     /// default if the available memory is unknown.
     pub fn of_this_machine(per_voxel: u64) -> ReadLimits {
-        // Only Linux reports the memory available without swapping.
-        let meminfo = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-        ReadLimits::default().within(mem_available(&meminfo), per_voxel)
+        ReadLimits::default().within(available_memory(), per_voxel)
     }
 
     fn within(self, available: Option<u64>, per_voxel: u64) -> ReadLimits {
@@ -84,6 +82,12 @@ impl ReadLimits {
         }
         Ok(voxels)
     }
+}
+
+/// Returns the memory available without swapping [bytes], if the operating system reports it
+/// (Linux).
+pub fn available_memory() -> Option<u64> {
+    mem_available(&std::fs::read_to_string("/proc/meminfo").unwrap_or_default())
 }
 
 /// Parses the available memory [bytes] from the text of /proc/meminfo.

@@ -89,6 +89,14 @@ impl Shape {
     pub fn field(&self) -> &Field {
         &self.field
     }
+    /// Memory of distances and nodes [bytes].
+    pub fn bytes(&self) -> usize {
+        let field = match &self.field {
+            Field::Sphere(_) => 0,
+            Field::Sampled(field) => size_of_val(field.levels()),
+        };
+        field + size_of_val(self.nodes.as_slice())
+    }
     /// Surface nodes, evenly spread.
     pub fn nodes(&self) -> &[SurfaceNode] {
         &self.nodes

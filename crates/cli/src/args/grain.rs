@@ -26,6 +26,8 @@ pub enum GrainCommand {
     Info(InfoArgs),
     /// Compare two grains by their morphology and the distance of their surfaces
     Compare(CompareArgs),
+    /// Write the surface of a grain as a mesh for other programs
+    Export(ExportArgs),
 }
 
 /// Output and resolution of new grains.
@@ -232,6 +234,22 @@ pub struct InfoArgs {
     /// Render three sides of each grain with its surface nodes into this PNG, one row per grain
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
+}
+
+/// Arguments of `grain export`.
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// Grain file
+    pub grain: PathBuf,
+    /// Mesh; the ending gives the format: .stl, .ply, .obj or .vtp
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Length of one unit of the mesh, for example "1 mm"
+    #[arg(long, value_name = "LENGTH", default_value = "1 m")]
+    pub unit: String,
+    /// Replace an existing file
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Arguments of `grain compare`.

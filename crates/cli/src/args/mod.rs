@@ -12,8 +12,8 @@ use clap::{Parser, Subcommand};
 
 pub use bench::BenchArgs;
 pub use grain::{
-    Body, CompareArgs, FamilyArgs, FromMeshArgs, FromScanArgs, GrainArgs, GrainCommand, InfoArgs,
-    NewGrain,
+    Body, CompareArgs, ExportArgs, FamilyArgs, FromMeshArgs, FromScanArgs, GrainArgs, GrainCommand,
+    InfoArgs, NewGrain,
 };
 pub use report::ReportArgs;
 pub use run::{CheckArgs, RunArgs};

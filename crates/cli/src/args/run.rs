@@ -11,18 +11,24 @@ pub struct RunArgs {
     /// Run folder [default: runs/NAME; for a case.resolved.toml its own folder]
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// Number of threads, 0 for all cores [default: value of the case]
+    /// Number of threads, 0 for all cores, at most 4 per core [default: value of the case]
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
     /// Continue from the last checkpoint
     #[arg(long, conflicts_with = "force")]
     pub resume: bool,
+    /// Continue from the last checkpoint, or start if the folder holds no run (for job scripts)
+    #[arg(long, conflicts_with_all = ["force", "resume"])]
+    pub resume_or_start: bool,
     /// Replace an existing run
     #[arg(long)]
     pub force: bool,
     /// Override a value of the case, for example time.end=0.5 or grain.0.density=2600
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+    /// Remove a key of the case, so that its default applies, for example time.step; before --set
+    #[arg(long = "unset", value_name = "KEY")]
+    pub unset: Vec<String>,
     /// Do not draw the figures and the page at the end of the run
     #[arg(long)]
     pub no_report: bool,
@@ -45,6 +51,9 @@ pub struct CheckArgs {
     /// Override a value of the case, for example time.end=0.5
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+    /// Remove a key of the case, so that its default applies; before --set
+    #[arg(long = "unset", value_name = "KEY")]
+    pub unset: Vec<String>,
     /// Print a JSON object
     #[arg(long)]
     pub json: bool,

@@ -1,6 +1,7 @@
 //! `grainwake grain`: creates, inspects and compares `.grain` files.
 
 mod compare;
+mod export;
 mod family;
 mod make;
 mod mesh;
@@ -28,7 +29,15 @@ pub fn grain(args: &GrainArgs) -> Result<(), Exit> {
         GrainCommand::Family(args) => family::family(args),
         GrainCommand::Info(args) => info(args),
         GrainCommand::Compare(args) => compare::compare(args),
+        GrainCommand::Export(args) => export::export(args),
     }
+}
+
+/// Parses the length of one unit of a mesh [m]. A bare unit such as "mm" means "1 mm" here; in
+/// other options it is an error.
+fn mesh_unit(text: &str) -> Result<f64, Exit> {
+    let bare = text.chars().all(char::is_alphabetic);
+    length("--unit", &if bare { format!("1 {text}") } else { text.to_owned() })
 }
 
 /// Parses a length of the command line [m].

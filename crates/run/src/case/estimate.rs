@@ -2,12 +2,11 @@
 
 use super::settling::{galileo, settling_reynolds, smallest_diameter, terminal_speed, time_step};
 use super::settling::{impact_speed, is_free};
-use crate::RunPlan;
+use crate::{RunPlan, memory};
+use grainwake_shape::available_memory;
 use grainwake_solver::dem::Grain;
 use grainwake_solver::sim::Setup;
 
-/// Numbers of the fields and of the Poisson solver per cell. `grainwake bench` measures the bytes.
-const NUMBERS_PER_CELL: f64 = 13.75;
 /// Time of a step on one thread [ns per cell and byte of a number], from `grainwake bench`.
 const NS_PER_CELL_BYTE: f64 = 3.0;
 /// Time of a contact sub-step on one thread [ns per surface node], measured with heaps. Grains
@@ -25,6 +24,8 @@ pub struct Estimate {
     pub time_step_s: f64,
     /// Memory expected [bytes].
     pub memory_bytes: u64,
+    /// Free memory of this machine, if known [bytes].
+    pub memory_free_bytes: Option<u64>,
     /// Largest Galileo number of the grains.
     pub galileo: Option<f64>,
     /// Index of the free grain with that Galileo number.
@@ -35,12 +36,16 @@ pub struct Estimate {
     pub settling_speed_m_per_s: Option<f64>,
     /// Cells across the smallest equal-volume diameter.
     pub cells_per_diameter: Option<f64>,
+    /// Cells across the shortest axis of the thinnest grain.
+    pub cells_across_shortest_axis: Option<f64>,
     /// Blocked part of the cross-section normal to gravity, largest grain.
     pub blockage: Option<f64>,
     /// Duration of a contact of two equal grains, shortest [s].
     pub contact_time_s: Option<f64>,
     /// Sub-steps of the contact in one step.
     pub contact_substeps: Option<f64>,
+    /// Part of the wall-clock time that contact takes.
+    pub contact_share: f64,
     /// Wall-clock time expected [s], for the given threads.
     pub wall_s: f64,
     /// Warnings about settings that impair the results.
@@ -75,26 +80,37 @@ impl Estimate {
         let field_bytes = fluid.map_or(0.0, |_| cells as f64 * setup.precision.bytes() as f64);
         let nodes: usize = setup.grains.iter().map(|g| g.shape.nodes().len()).sum();
         let substep_s = seconds(nodes as f64 * NS_PER_NODE);
+        let contact_s = substep_s * contact_substeps.unwrap_or(1.0);
         let step_s = seconds(field_bytes * NS_PER_CELL_BYTE);
         let smallest = smallest_diameter(&setup.grains);
         Estimate {
             cells,
             steps: steps as u64,
             time_step_s,
-            memory_bytes: (field_bytes * NUMBERS_PER_CELL) as u64,
+            memory_bytes: memory::needed(setup),
+            memory_free_bytes: available_memory(),
             galileo,
             galileo_grain: largest.map(|(index, ..)| index),
             reynolds: galileo.map(settling_reynolds),
             settling_speed_m_per_s: speed,
             cells_per_diameter: (fluid.is_some() && smallest.is_finite())
                 .then(|| smallest / setup.mesh.spacing.max_element()),
+            cells_across_shortest_axis: (fluid.is_some() && smallest.is_finite())
+                .then(|| shortest_axis(setup) / setup.mesh.spacing.max_element()),
             blockage: blockage(setup),
             contact_time_s,
             contact_substeps,
-            wall_s: steps * (step_s + substep_s * contact_substeps.unwrap_or(1.0)),
+            contact_share: contact_s / (step_s + contact_s).max(f64::MIN_POSITIVE),
+            wall_s: steps * (step_s + contact_s),
             warnings: Vec::new(),
         }
     }
+}
+
+/// Returns the shortest principal extent of a grain [m].
+fn shortest_axis(setup: &Setup) -> f64 {
+    let extents = setup.grains.iter().map(|grain| grain.shape.morphology().c);
+    extents.fold(f64::INFINITY, f64::min)
 }
 
 /// Returns the shortest contact time of two equal grains [s].

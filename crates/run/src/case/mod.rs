@@ -37,7 +37,7 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use crate::{Job, RunPlan};
+use crate::{Job, RunError, RunPlan, memory};
 use grainwake_solver::sim::Setup;
 
 pub use error::{CaseError, Problem};
@@ -74,7 +74,8 @@ pub struct Case {
 }
 
 impl Case {
-    /// Reads a case file and applies overrides such as "time.end=0.5".
+    /// Reads a case file and applies overrides: "time.end=0.5" sets a key, "-time.step" removes
+    /// one.
     ///
     /// # Errors
     /// [`CaseError`] with every problem found and its place.
@@ -121,6 +122,14 @@ impl Case {
             digest: self.digest.clone(),
             files: (files.map(|file| (file.name.clone(), file.bytes.clone()))).collect(),
         }
+    }
+
+    /// Compares the memory of the run with the memory that is free.
+    ///
+    /// # Errors
+    /// [`RunError::Memory`] with both figures.
+    pub fn admit_memory(&self) -> Result<(), RunError> {
+        memory::admit(&self.setup)
     }
 
     /// Estimates a run on `threads` threads, with warnings.

@@ -62,6 +62,45 @@ pub(super) fn override_table<'i>(
     Ok(())
 }
 
+/// Removes a key such as "time.step" or "grain.0.velocity" from a table.
+pub(super) fn remove_key(table: &mut DeTable, key: &str) -> Result<(), Problem> {
+    let absent = |known: Vec<String>| {
+        let help = match known.is_empty() {
+            true => "there are no keys at this place".to_owned(),
+            false => format!("present are {}", known.join(", ")),
+        };
+        Problem::new(format!("--unset {key}: the case has no such key")).help(help)
+    };
+    let names = |table: &DeTable| table.keys().map(|key| key.get_ref().to_string()).collect();
+    let (parents, last) = key.rsplit_once('.').map_or((None, key), |(p, l)| (Some(p), l));
+    let mut table = table;
+    let mut parts = parents.into_iter().flat_map(|parents| parents.split('.'));
+    while let Some(part) = parts.next() {
+        if !table.contains_key(part) {
+            return Err(absent(names(table)));
+        }
+        let value = match table.get_mut(part).map(Spanned::get_mut) {
+            Some(DeValue::Array(items)) => {
+                let count = items.len();
+                let index = parts.next().and_then(|part| part.parse::<usize>().ok());
+                let item = index.and_then(|index| items.get_mut(index));
+                let item =
+                    item.ok_or_else(|| absent((0..count).map(|n| format!("{part}.{n}")).collect()));
+                Some(item?.get_mut())
+            }
+            value => value,
+        };
+        table = match value {
+            Some(DeValue::Table(inner)) => inner,
+            _ => return Err(absent(Vec::new())),
+        };
+    }
+    match table.remove(last) {
+        Some(_) => Ok(()),
+        None => Err(absent(names(table))),
+    }
+}
+
 fn is_of_tables(items: &DeArray) -> bool {
     items.iter().any(|item| item.get_ref().is_table())
 }

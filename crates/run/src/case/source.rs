@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
 use super::error::Problem;
-use super::overrides::{override_line, override_table};
+use super::overrides::{override_line, override_table, remove_key};
 use super::suggest::nearest;
 use super::toml_messages::{plainly, wrong_kind};
 
@@ -52,7 +52,8 @@ const NEEDED: [(&str, &str); 2] = [
 ];
 
 impl Source {
-    /// Reads the text of a file called `name` and applies overrides such as `time.end=0.5`.
+    /// Reads the text of a file called `name` and applies overrides: `-time.step` removes a key,
+    /// `time.end=0.5` sets one. Keys are removed first.
     ///
     /// # Errors
     /// The first problem, with its position.
@@ -68,18 +69,23 @@ impl Source {
             entries: Vec::new(),
         };
         let mut start = text.len() + 1;
-        for item in overrides {
+        let (removed, overrides): (Vec<&String>, Vec<&String>) =
+            overrides.iter().partition(|item| item.starts_with('-'));
+        for item in &overrides {
             let line = override_line(item)?;
             let length = line.len() + 1;
             source.overrides.push(Override { start, line });
             start += length;
         }
         let mut table = DeTable::parse(text).map_err(|e| source.located(&e))?;
+        for key in removed {
+            remove_key(table.get_mut(), &key[1..])?;
+        }
         // Each override is parsed after as many blanks as there is text before it, which makes its
         // spans count from the start of the file.
         let padded: Vec<String> =
             source.overrides.iter().map(|o| format!("{}{}", " ".repeat(o.start), o.line)).collect();
-        for (item, line) in padded.iter().zip(overrides) {
+        for (item, line) in padded.iter().zip(&overrides) {
             let extra = DeTable::parse(item).map_err(|e| source.located(&e))?;
             let parts = line.split('=').next().map_or(1, |key| key.split('.').count());
             override_table(table.get_mut(), extra.into_inner(), parts)

@@ -24,15 +24,23 @@ pub enum Existing {
     Replace,
     /// Continue from the last checkpoint.
     Resume,
+    /// Continue from the last checkpoint; start in a folder without a run.
+    ResumeOrStart,
     /// Keep or continue a run of the same case and program; otherwise start over.
     Reuse,
 }
 
 impl Existing {
-    /// Resolves [`Existing::Reuse`] for this folder; other values are returned unchanged.
+    /// Resolves [`Existing::Reuse`] and [`Existing::ResumeOrStart`] for this folder; other values
+    /// are returned unchanged.
     pub(crate) fn resolve(self, folder: &Path, digest: &str) -> Existing {
-        if self != Existing::Reuse {
-            return self;
+        match self {
+            Existing::Reuse => {}
+            Existing::ResumeOrStart if Provenance::read(folder).is_some() => {
+                return Existing::Resume;
+            }
+            Existing::ResumeOrStart => return Existing::Refuse,
+            _ => return self,
         }
         let own = Provenance::new(digest);
         let same = |there: &Provenance| {
@@ -108,9 +116,10 @@ pub(crate) fn admit(folder: &Path, existing: Existing) -> Result<Content, RunErr
             "holds a run that has not finished",
             "continue it with --resume, give another folder with -o, or --force to start over",
         ),
-        (Content::Empty, Existing::Resume) => {
-            occupied("holds no run to resume", "leave out --resume, or give the run folder with -o")
-        }
+        (Content::Empty, Existing::Resume) => occupied(
+            "holds no run to resume",
+            "leave out --resume, write --resume-or-start, or give the run folder with -o",
+        ),
         _ => Ok(present),
     }
 }

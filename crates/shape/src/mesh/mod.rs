@@ -1,4 +1,4 @@
-//! Closed surface meshes: readers, exact distances, and shapes built from them.
+//! Closed surface meshes: readers, writers, exact distances, and shapes built from them.
 
 mod build;
 mod distance;
@@ -11,9 +11,11 @@ mod read;
 mod sampling;
 mod stl;
 mod weld;
+mod write;
 
 pub use crate::triangles::TriangleMesh;
 pub(crate) use build::from_closed;
 pub use build::{MeshOptions, shape_from_mesh};
 pub(crate) use distance::MeshDistance;
 pub use read::{mesh_from_memory, read_mesh};
+pub use write::{MeshFormat, write_mesh};

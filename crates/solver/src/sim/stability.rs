@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::Simulation;
-use crate::dem::{ContactLawKind, MotionConstraint, Partner, RelativeOverlap};
+use crate::dem::{ContactLawKind, MotionConstraint, Outside, Partner, RelativeOverlap, outside};
 
 /// Overlap for which a stiffness is suggested [smaller equal-volume diameters].
 const SUGGESTED_OVERLAP: f64 = 0.01;
@@ -17,6 +17,8 @@ pub enum Remedy {
     StepOrGrid,
     /// A finer grid or a smaller time step; the last slices may show the cause.
     GridOrStepOrSlices,
+    /// An open face farther away, or an end of the run before a grain reaches it.
+    FartherFace,
     /// A stiffer contact, at which the overlap would be 1 % of the smaller diameter.
     StifferContact {
         /// Force law.
@@ -58,6 +60,12 @@ impl Remedy {
             Remedy::StepOrGrid => format!("{smaller_step} or a finer grid"),
             Remedy::GridOrStepOrSlices => {
                 format!("a finer grid, {smaller_step}, or a look at the last slices")
+            }
+            Remedy::FartherFace => {
+                format!(
+                    "a box in which the grain stays inside, an end before it reaches the face, or \
+                     {smaller_step}"
+                )
             }
             Remedy::StifferContact { law, factor, value } => {
                 let (term, unit) = match law {
@@ -140,15 +148,35 @@ impl Simulation {
         }
         if let Some(fluid) = &self.fluid {
             let measures = fluid.measures();
-            if !(measures.kinetic_energy.is_finite() && measures.max_divergence.is_finite()) {
-                return unstable("the velocity is not finite".into(), Remedy::StepOrGrid);
-            }
             let cfl = self.cfl();
-            if cfl > MAX_CFL {
-                return unstable(format!("the CFL number jumped to {cfl:.1}"), Remedy::StepOrGrid);
-            }
+            let what =
+                if !(measures.kinetic_energy.is_finite() && measures.max_divergence.is_finite()) {
+                    "the velocity is not finite".to_owned()
+                } else if cfl > MAX_CFL {
+                    format!("the CFL number jumped to {cfl:.1}")
+                } else {
+                    return Ok(());
+                };
+            let (what, remedy) = self.with_cause(what, Remedy::StepOrGrid);
+            return unstable(what, remedy);
         }
         Ok(())
+    }
+
+    /// Adds the likely cause to a symptom of the flow: a grain in an open face of the box. The
+    /// remedy is `otherwise` without such a grain.
+    pub fn with_cause(&self, symptom: String, otherwise: Remedy) -> (String, Remedy) {
+        let enclosure = self.setup.enclosure();
+        let open = |o: &Outside| !enclosure.solid[o.axis][o.side];
+        match outside(&self.setup.grains, &enclosure).into_iter().find(open) {
+            Some(Outside { grain, axis, side, .. }) => {
+                let (side, axis) = (["lower", "upper"][side], ["x", "y", "z"][axis]);
+                let what =
+                    format!("{symptom} while grain {grain} crosses the open {side} {axis} face");
+                (what, Remedy::FartherFace)
+            }
+            None => (symptom, otherwise),
+        }
     }
 
     /// Describes an overlap beyond the limit, with its remedy. No contact resists a given motion,

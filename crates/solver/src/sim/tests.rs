@@ -1,7 +1,7 @@
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
-use super::{CELL_FIELDS, PrescribedMotion, Prescription, Setup, Simulation, StepRule};
+use super::{CELL_FIELDS, PrescribedMotion, Prescription, Remedy, Setup, Simulation, StepRule};
 use crate::dem::Grain;
 use crate::flow::{Boundary, FluidParams};
 use crate::grid::{Axis, Mesh};
@@ -104,4 +104,23 @@ fn contradictions_in_a_set_up_are_named() {
         let message = Simulation::new(setup).err().expect(word).to_string();
         assert!(message.contains(word), "{message}");
     }
+}
+
+#[test]
+fn an_instability_beside_an_open_face_names_the_grain_in_it() {
+    let with_floor = |floor: Boundary, height: f64| {
+        let walls = [Boundary::WALL; 2];
+        let grain = Grain::new(Shape::sphere(0.4, 200), 2.0);
+        let setup = Setup::new(Mesh::cubic([16, 16, 16], 0.25))
+            .with_boundaries([walls, walls, [floor, Boundary::WALL]])
+            .with_grains([grain.with_position(DVec3::new(2.0, 2.0, height))])
+            .with_step(StepRule::Fixed(0.01));
+        let sim = Simulation::new(setup).unwrap();
+        sim.with_cause("the velocity is not finite".into(), Remedy::StepOrGrid)
+    };
+    let (what, remedy) = with_floor(Boundary::Outflow, 0.3);
+    assert!(what.ends_with("while grain 0 crosses the open lower z face"), "{what}");
+    assert_eq!(remedy, Remedy::FartherFace);
+    assert_eq!(with_floor(Boundary::WALL, 0.3).1, Remedy::StepOrGrid);
+    assert_eq!(with_floor(Boundary::Outflow, 2.0).1, Remedy::StepOrGrid);
 }

@@ -3,10 +3,19 @@
 use crate::case::estimate::Estimate;
 use crate::case::number_format::{AXES, quantity};
 use crate::case::settling::time_step;
-use grainwake_solver::dem::ContactLawKind;
+use grainwake_solver::dem::{ContactLawKind, Grain};
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::{Setup, StepRule};
 
+/// Cells across the shortest axis of a grain below which forces are rough. Oblate spheroids of
+/// 3 : 1 at 8 cells per diameter have 3.8 (`docs/accuracy.md`).
+const THIN: f64 = 3.0;
+/// Wall-clock time from which the cost of contact is a reason for a warning [s].
+const LONG_RUN: f64 = 600.0;
+/// Part of the cost of contact from which it dominates.
+const CONTACT_DOMINATES: f64 = 0.5;
+/// CFL number of the first step from which it is unstable.
+const UNSTABLE_CFL: f64 = 1.0;
 /// Cells per diameter below which forces are rough.
 const COARSE: f64 = 8.0;
 /// Relative error of the drag times n^2 / Re, n cells per diameter: the smallest factor that bounds
@@ -24,6 +33,9 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     let printed = |n: f64| (10.0 * n).round() / 10.0;
     if let Some(n) = e.cells_per_diameter.map(printed).filter(|n| *n < COARSE) {
         found.push(format!("only {n:.1} cells across the smallest grain: below 8 forces are rough; make cell_size smaller"));
+    }
+    if let Some(n) = e.cells_across_shortest_axis.map(printed).filter(|n| *n < THIN) {
+        found.push(format!("only {n:.1} cells across the shortest axis of the thinnest grain: below {THIN:.0} forces are rough; make cell_size smaller"));
     }
     if let (Some(n), Some(re)) = (e.cells_per_diameter, e.reynolds) {
         let error = DRAG_ERROR * re / (n * n);
@@ -43,7 +55,6 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
             if closed { "the walls slow the grains" } else { "the grain feels its own images" };
         found.push(format!("a grain blocks {:.0} % of the cross-section: {what}; widen the box for an unbounded fluid", 100.0 * blockage));
     }
-    // Contact dominates the cost of a dry run, so that its sub-steps are no reason for a warning.
     let wet = setup.fluid.is_some();
     // The transform is a small part of the cost of a small grid.
     let large = wet && setup.mesh.cell_count() > 1_000_000;
@@ -66,13 +77,8 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
             100.0 * f64::from(f32::EPSILON) / 2.0 * e.steps as f64
         ));
     }
-    if let Some(substeps) = e.contact_substeps.filter(|n| wet && *n > 200.0) {
-        let remedy = match setup.contact.law {
-            ContactLawKind::Linear => "a lower [contact] stiffness or a larger maximum_overlap",
-            ContactLawKind::HertzMindlin => "a lower youngs_modulus",
-        };
-        found.push(format!("contacts need {substeps:.0} sub-steps a step: {remedy} is cheaper"));
-    }
+    found.extend(contact_cost(setup, e));
+    found.extend(first_step(setup));
     if let StepRule::Fixed(step) = setup.step {
         let limits = setup.clone().with_step(StepRule::Limits {
             cfl: 0.6,
@@ -89,6 +95,49 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
         }
     }
     found
+}
+
+/// Contact that dominates the cost of a long run, or needs many sub-steps in a fluid.
+fn contact_cost(setup: &Setup, e: &Estimate) -> Option<String> {
+    let substeps = e.contact_substeps?;
+    let dominates = e.contact_share > CONTACT_DOMINATES && e.wall_s > LONG_RUN;
+    let many = setup.fluid.is_some() && substeps > 200.0;
+    let stiffness = match setup.contact.law {
+        ContactLawKind::Linear => "a lower [contact] stiffness or a larger maximum_overlap",
+        ContactLawKind::HertzMindlin => "a lower youngs_modulus",
+    };
+    (dominates || many).then(|| {
+        format!(
+            "contact takes {:.0} % of the wall time ({substeps:.0} sub-steps a step): {stiffness}, fewer nodes per grain or fewer substeps_per_contact are cheaper",
+            100.0 * e.contact_share
+        )
+    })
+}
+
+/// Initial velocities for which the first fixed step is too long.
+fn first_step(setup: &Setup) -> Option<String> {
+    let StepRule::Fixed(step) = setup.step else {
+        return None;
+    };
+    setup.fluid.as_ref()?;
+    let inverse_spacing = |axis: usize| {
+        if setup.mesh.is_resolved(axis) { 1.0 / setup.mesh.spacing[axis] } else { 0.0 }
+    };
+    let cfl = |grain: &Grain| {
+        let turning = grain.angular_velocity.length() * grain.shape.bounding_radius();
+        (0..3)
+            .map(|axis| (grain.velocity[axis].abs() + turning) * inverse_spacing(axis))
+            .sum::<f64>()
+            * step
+    };
+    let grains = setup.grains.iter().map(cfl).enumerate();
+    let (index, cfl) = grains.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (cfl > UNSTABLE_CFL).then(|| {
+        format!(
+            "the velocity of grain {index} at the start gives the first step a CFL number of {cfl:.1}: a fixed step of {} or less is stable, and [time] cfl adapts it",
+            quantity(step * UNSTABLE_CFL / cfl, "s")
+        )
+    })
 }
 
 /// Largest prime factor of a number of cells for which the Fourier transform is fast.

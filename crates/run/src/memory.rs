@@ -1,0 +1,51 @@
+//! Memory that a run needs, compared with the memory that is free.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use grainwake_shape::available_memory;
+use grainwake_solver::sim::Setup;
+
+use crate::error::RunError;
+
+/// Numbers of the fields and of the Poisson solver per cell. `grainwake bench` measures the bytes.
+const NUMBERS_PER_CELL: f64 = 13.75;
+/// Bytes of the forced faces of a grain over the square of its diameter in cells, from
+/// `grainwake bench --grains 300`.
+const BYTES_PER_SURFACE_CELL: f64 = 1200.0;
+/// Bytes of a surface node with its place in the contact search.
+const BYTES_PER_NODE: f64 = 100.0;
+
+/// Returns the memory of a run: fields, forced faces of the grains, and shapes [bytes].
+pub(crate) fn needed(setup: &Setup) -> u64 {
+    let mesh = &setup.mesh;
+    // The number of cells of an absurd box exceeds any integer.
+    let cells: f64 = mesh.cells.iter().map(|n| *n as f64).product();
+    let mut bytes = 0.0;
+    if setup.fluid.is_some() {
+        bytes += cells * setup.precision.bytes() as f64 * NUMBERS_PER_CELL;
+        let across = |diameter: f64| diameter / mesh.spacing.min_element();
+        bytes += (setup.grains.iter())
+            .map(|grain| across(grain.shape.equivalent_diameter()).powi(2) * BYTES_PER_SURFACE_CELL)
+            .sum::<f64>();
+    }
+    // Grains of equal shape share it.
+    let mut seen = BTreeSet::new();
+    for grain in &setup.grains {
+        let shape = &grain.shape;
+        bytes += shape.nodes().len() as f64 * BYTES_PER_NODE;
+        if seen.insert(Arc::as_ptr(shape).addr()) {
+            bytes += shape.bytes() as f64;
+        }
+    }
+    bytes as u64
+}
+
+/// Refuses a run that needs more memory than is free.
+pub(crate) fn admit(setup: &Setup) -> Result<(), RunError> {
+    let needed = needed(setup);
+    match available_memory() {
+        Some(free) if needed > free => Err(RunError::Memory { needed, free }),
+        _ => Ok(()),
+    }
+}
