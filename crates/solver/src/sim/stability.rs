@@ -167,7 +167,8 @@ impl Simulation {
     /// remedy is `otherwise` without such a grain.
     pub fn with_cause(&self, symptom: String, otherwise: Remedy) -> (String, Remedy) {
         let enclosure = self.setup.enclosure();
-        let open = |o: &Outside| !enclosure.solid[o.axis][o.side];
+        let present = |o: &Outside| !self.setup.grains[o.grain].has_left();
+        let open = |o: &Outside| present(o) && !enclosure.solid[o.axis][o.side];
         match outside(&self.setup.grains, &enclosure).into_iter().find(open) {
             Some(Outside { grain, axis, side, .. }) => {
                 let (side, axis) = (["lower", "upper"][side], ["x", "y", "z"][axis]);
