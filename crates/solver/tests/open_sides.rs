@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 use grainwake_solver::dem::{ContactParams, Grain};
 use grainwake_solver::flow::{Boundary, FluidParams};
@@ -59,7 +59,7 @@ fn a_grain_leaves_through_an_outflow_as_if_the_domain_went_on() {
     }
     let [short_speed, long_speed] = [&short, &long].map(|sim| sim.grains()[0].velocity.z);
     let difference = short_speed / long_speed - 1.0;
-    assert!(difference.abs() < 0.03, "speed at the plane: {short_speed} and {long_speed}");
+    assert!(difference.abs() < 0.015, "speed at the plane: {short_speed} and {long_speed}");
     let sideways = short.grains()[0].velocity.truncate().length() / short_speed.abs();
     assert!(sideways < 0.01, "{sideways}");
     // The grain leaves within a few steps after it is beyond the plane, and is gone for good.
@@ -157,16 +157,17 @@ fn grains_float_as_archimedes_found() {
     let ball = || Shape::sphere(0.5, 600);
     let surface = 3.0;
     let float = |name: &str, shape: Shape, ratio: f64| {
-        // Released at half immersion; viscous enough to come to rest soon.
-        let grain = grain(shape, ratio, [2.0, 2.02, surface]);
+        // Released tilted and out of equilibrium; viscous enough to come to rest soon.
+        let tilt = DQuat::from_scaled_axis(DVec3::new(0.5, 0.3, 0.1));
+        let grain = grain(shape, ratio, [2.0, 2.02, surface - 0.15]).with_orientation(tilt);
         let sides = [Boundary::WALL, Boundary::FreeSurface];
         let mut sim = Simulation::new(setup([32, 32, 24], sides, 0.05, vec![grain])).unwrap();
-        sim.advance_to(40.0).unwrap();
+        sim.advance_to(60.0).unwrap();
         let grain = &sim.grains()[0];
         let found = immersed_fraction(grain, surface);
         let speed = grain.velocity.length();
         assert!(speed < 2e-3, "{name} of {ratio} moves at {speed}");
-        assert!((found / ratio - 1.0).abs() < 0.02, "{name} of {ratio}: {found} immersed");
+        assert!((found / ratio - 1.0).abs() < 0.005, "{name} of {ratio}: {found} immersed");
     };
     for ratio in [0.2, 0.5, 0.8, 0.9] {
         float("sphere", ball(), ratio);
@@ -185,8 +186,10 @@ fn a_floating_sphere_heaves_with_the_period_of_potential_flow() {
     let sides = [Boundary::WALL, Boundary::FreeSurface];
     let mut sim = Simulation::new(setup([48, 48, 32], sides, 1e-4, vec![grain])).unwrap();
     let (mut turns, mut last, mut extremes) = (Vec::new(), 0.0, Vec::new());
+    let mut balance: f64 = 0.0;
     while turns.len() < 7 {
         step(&mut sim);
+        balance = balance.max(sim.diagnostics().momentum_residual);
         let speed = sim.grains()[0].velocity.z;
         if last * speed < 0.0 {
             turns.push(sim.time() - sim.time_step() * speed / (speed - last));
@@ -195,7 +198,8 @@ fn a_floating_sphere_heaves_with_the_period_of_potential_flow() {
         last = speed;
     }
     let period = (turns[6] - turns[0]) / 3.0;
-    assert!((period / expected - 1.0).abs() < 0.05, "period {period}, expected {expected}");
+    assert!(balance < 1e-13, "momentum residual {balance:e}");
+    assert!((period / expected - 1.0).abs() < 0.04, "period {period}, expected {expected}");
     let decays = extremes.windows(2).all(|pair| pair[1] < pair[0]);
     assert!(decays, "a heave gains no energy: {extremes:?}");
 }

@@ -17,7 +17,7 @@ use crate::slices::{FrameCache, Series, SliceLimits, series};
 pub struct Index {
     /// Program and version.
     pub program: String,
-    /// Whether a server answers for later states of the runs.
+    /// True if a server sends later states of the runs, false in a saved page.
     pub live: bool,
     /// Names of the runs.
     pub runs: Vec<String>,

@@ -90,7 +90,7 @@ impl Grain {
         self.pose.position = DVec3::INFINITY;
         (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
     }
-    /// Whether the grain has left the box.
+    /// Returns whether the grain has left the box.
     pub fn has_left(&self) -> bool {
         self.pose.position == DVec3::INFINITY
     }

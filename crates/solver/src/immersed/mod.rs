@@ -11,10 +11,11 @@
 //! | `geometry` | distances to faces, index lists, neighbours | `LocatedBody`, `BandFaces` |
 //! | `forcing`, `rigidity` | weights of faces; impulse, rigid velocity | `ForcedFaces`, `Impulse` |
 //! | `links`, `advection` | correction at the links near a grain | `AdvectionCorrection` |
+//! | `emerged` | part of a grain beyond a free surface | `EmergedPart` |
 //! | `rigid_body` | 6 x 6 equations of motion with the impulse | `RigidBodySystem` |
+//! | `open_sides` | grains that leave the box or float | `Crossing` |
 //! | `update`, `schedule` | work on one grain; order of the grains | `CoupledGrains` |
 //! | `initial` | flow at t = 0 | |
-//! | `emerged`, `open_sides` | grains that leave the box or a free surface | `Crossing` |
 //!
 //! # Order in a step
 //!

@@ -4,7 +4,7 @@
 //! - **Leaving.** Close to an open side the hydrodynamic load is no longer that of an unbounded
 //!   fluid. From [`MARGIN`] cells before the side on, a grain moves under its last load. Once it is
 //!   beyond the side it has left ([`Grain::leave`]).
-//! - **Emerging.** The part beyond a free surface has neither buoyancy nor displaced fluid
+//! - **Emerging.** The part beyond a free surface has no buoyancy and displaces no fluid
 //!   (`emerged.rs`). The pressure that acts on the grain is relative to that at the open surface.
 //!
 //! The boundary faces that a grain covers move with it (`flow/open_boundary.rs`).
@@ -18,7 +18,7 @@ use super::rigid_body::PreviousStep;
 use crate::dem::Grain;
 use crate::flow::{Boundaries, Boundary, BoxSide, CoveredFace};
 use crate::grid::Mesh;
-use crate::math::{Load, RigidVelocity, Vector6};
+use crate::math::{Load, RigidVelocity};
 
 /// Cells before an open side from which on a grain moves under its last hydrodynamic load.
 const MARGIN: f64 = 2.0;
@@ -29,14 +29,14 @@ const CLOSE: f64 = 4.0;
 /// Location of a grain relative to the open sides.
 #[derive(Clone, Debug, Default)]
 pub enum Crossing {
-    /// Away from them.
+    /// The grain crosses no open side and is not about to.
     #[default]
     Inside,
-    /// Partly beyond a free surface.
+    /// A part of the grain is beyond a free surface.
     Emerged(Box<EmergedPart>),
-    /// About to leave: moves under its last hydrodynamic load.
+    /// The grain is about to leave and moves under its last hydrodynamic load.
     Departing,
-    /// Gone.
+    /// The grain has left the box.
     Left,
 }
 
@@ -58,6 +58,8 @@ pub struct OpenSides {
     subvolumes: Vec<Arc<Subvolumes>>,
     /// By grain.
     crossings: Vec<Crossing>,
+    /// Impulses of the grains on the fluid in the last step [N s].
+    pub fluid_impulses: Vec<DVec3>,
     /// Accelerations of the grains over the step before the last; part of a checkpoint.
     pub earlier_accelerations: Vec<RigidVelocity>,
     faces: Vec<GrainFace>,
@@ -77,6 +79,7 @@ impl OpenSides {
             sides,
             subvolumes: if has_surface { Subvolumes::of_all(grains) } else { Vec::new() },
             crossings: vec![Crossing::Inside; grains.len()],
+            fluid_impulses: vec![DVec3::ZERO; grains.len()],
             earlier_accelerations: vec![RigidVelocity::default(); grains.len()],
             faces: Vec::new(),
         })
@@ -85,6 +88,12 @@ impl OpenSides {
     /// Crossings of the grains.
     pub fn crossings(&self) -> &[Crossing] {
         &self.crossings
+    }
+
+    /// Impulse on the fluid in the last step [N s] of a grain that crosses a side; none of another.
+    pub fn impulse_across(&self, grain: usize) -> Option<DVec3> {
+        let crosses = !matches!(self.crossings[grain], Crossing::Inside);
+        crosses.then(|| self.fluid_impulses[grain])
     }
 
     /// Finds the crossings in a step of `dt` [s] that begins at the present poses; grains beyond an
@@ -99,8 +108,8 @@ impl OpenSides {
         }
     }
 
-    /// Extrapolates the accelerations of emerged grains, of `previous`, to the step about to be
-    /// taken: a virtual mass that lags behind by one step feeds the heave.
+    /// Extrapolates the accelerations in `previous` of emerged grains to the step about to be
+    /// taken. With the last acceleration the virtual mass would add energy to the heave.
     pub fn extrapolate_accelerations(&mut self, previous: &mut [PreviousStep]) {
         let all = previous.iter_mut().zip(&mut self.earlier_accelerations).zip(&self.crossings);
         for ((previous, earlier), crossing) in all {
@@ -133,7 +142,7 @@ impl OpenSides {
                     let direction = (side.axis, side.outward());
                     let spacing = self.mesh.spacing[side.axis];
                     let subvolumes = &self.subvolumes[index];
-                    // Buoyancy at the start of the step would feed the heave.
+                    // Buoyancy at the start of the step would add energy to the heave.
                     let middle = grain.rigid_velocity().advance(grain.pose, 0.5 * dt);
                     let part = EmergedPart::new(subvolumes, middle, direction, coordinate, spacing);
                     crossing = Crossing::Emerged(Box::new(part));
@@ -229,15 +238,12 @@ impl OpenSides {
         each.map(|face| CoveredFace { velocity: velocity(face), ..face.face }).collect()
     }
 
-    /// Impulse that the pressure at the free surface takes from the forcing of each emerged grain
-    /// over a step of `dt` [s], per density of the fluid. `pressure_below` returns the kinematic
-    /// pressure below faces of one side, relative to the open surface.
-    pub fn surface_impulses(
-        &self,
-        dt: f64,
-        pressure_below: impl Fn(&[CoveredFace]) -> Vec<f64>,
-    ) -> Vec<Vector6> {
-        let mut impulses = vec![[0.0; 6]; self.crossings.len()];
+    /// Load of the pressure at the free surface on each grain, per density of the fluid: the
+    /// impulse on the fluid is relative to the pressure under the covered faces, but the pressure
+    /// at the surface vanishes. `pressure_below` returns the kinematic pressure below faces of one
+    /// side, relative to the open surface.
+    pub fn surface_loads(&self, pressure_below: impl Fn(&[CoveredFace]) -> Vec<f64>) -> Vec<Load> {
+        let mut loads = vec![Load::default(); self.crossings.len()];
         for &(side, boundary) in &self.sides {
             if boundary != Boundary::FreeSurface {
                 continue;
@@ -245,16 +251,13 @@ impl OpenSides {
             let of_side = || self.faces.iter().filter(|face| face.face.side == side);
             let faces: Vec<_> = of_side().map(|face| face.face).collect();
             let area = self.mesh.cell_volume() / self.mesh.spacing[side.axis];
+            let outward = side.outward() * DVec3::AXES[side.axis];
             for (face, pressure) in of_side().zip(pressure_below(&faces)) {
-                let magnitude = -dt * area * face.face.fraction * pressure * side.outward();
-                let force = magnitude * DVec3::AXES[side.axis];
-                let torque = face.lever_arm.cross(force);
-                let sum = &mut impulses[face.grain];
-                let all = force.to_array().into_iter().chain(torque.to_array());
-                sum.iter_mut().zip(all).for_each(|(sum, value)| *sum += value);
+                let force = area * face.face.fraction * pressure * outward;
+                loads[face.grain] += Load { force, torque: face.lever_arm.cross(force) };
             }
         }
-        impulses
+        loads
     }
 }
 

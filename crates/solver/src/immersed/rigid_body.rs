@@ -37,10 +37,19 @@ pub struct RigidBodySystem {
     right: Vector6,
     virtual_mass: VirtualMass,
     impulse: Impulse,
-    /// Inertia of fluid that the emerged part of the grain does not displace; zero without one.
-    not_displaced: Matrix6,
+    /// Terms of a part of the grain beyond a free surface.
+    surface: Option<SurfaceTerms>,
     /// Load of a grain that leaves the box.
     last_load: Option<Load>,
+}
+
+/// Terms of a part of a grain beyond a free surface.
+#[derive(Clone, Copy, Debug)]
+struct SurfaceTerms {
+    /// Inertia of fluid that the part does not displace.
+    not_displaced: Matrix6,
+    /// Load of the pressure at the surface.
+    load: Load,
 }
 
 impl RigidBodySystem {
@@ -58,16 +67,45 @@ impl RigidBodySystem {
         RigidBodySystem { impulse, last_load: Some(last_load), ..system }
     }
 
+    /// Assembles the equations of a grain with an emerged `part` under the `applied` load and that
+    /// of the pressure at the free surface, `surface_load`, over `dt` [s], without contact.
+    pub fn emerged(
+        grain: &Grain,
+        previous: &PreviousStep,
+        impulse: Impulse,
+        fluid_density: f64,
+        [applied, surface_load]: [Load; 2],
+        part: &EmergedPart,
+        dt: f64,
+    ) -> RigidBodySystem {
+        let terms = SurfaceTerms {
+            not_displaced: part.inertia.map(|row| row.map(|entry| fluid_density * entry)),
+            load: surface_load,
+        };
+        let load = applied + surface_load;
+        RigidBodySystem::new(grain, previous, impulse, fluid_density, load, Some(terms), dt)
+    }
+
     /// Assembles the equations under the `applied` load (weight less buoyancy) over `dt` [s],
-    /// without contact. The `impulse` on a grain with an `emerged` part is relative to the pressure
-    /// at the free surface.
-    pub fn new(
+    /// without contact.
+    pub fn submerged(
         grain: &Grain,
         previous: &PreviousStep,
         impulse: Impulse,
         fluid_density: f64,
         applied: Load,
-        emerged: Option<&EmergedPart>,
+        dt: f64,
+    ) -> RigidBodySystem {
+        RigidBodySystem::new(grain, previous, impulse, fluid_density, applied, None, dt)
+    }
+
+    fn new(
+        grain: &Grain,
+        previous: &PreviousStep,
+        impulse: Impulse,
+        fluid_density: f64,
+        applied: Load,
+        surface: Option<SurfaceTerms>,
         dt: f64,
     ) -> RigidBodySystem {
         let ratio = 1.0 - fluid_density / grain.density;
@@ -76,7 +114,7 @@ impl RigidBodySystem {
         let gyroscopic = omega.cross(inertia * omega);
         let momentum = mass * v + dt * applied.force;
         let angular_momentum = inertia * omega + dt * (applied.torque - gyroscopic);
-        let virtual_mass = VirtualMass::new(grain, previous, fluid_density, emerged.is_some(), dt);
+        let virtual_mass = VirtualMass::new(grain, previous, fluid_density, surface.is_some(), dt);
         let mut a = impulse.matrix;
         let mut b = [0.0; 6];
         for row in 0..3 {
@@ -88,9 +126,7 @@ impl RigidBodySystem {
                 a[3 + row][3 + column] += (inertia + virtual_mass.inertia).col(column)[row];
             }
         }
-        let mut not_displaced = Matrix6::default();
-        if let Some(part) = emerged {
-            not_displaced = part.inertia.map(|row| row.map(|entry| fluid_density * entry));
+        if let Some(SurfaceTerms { not_displaced, .. }) = surface {
             let momentum = multiply6(&not_displaced, &previous.velocity.to_vector());
             for row in 0..6 {
                 b[row] += momentum[row];
@@ -105,14 +141,7 @@ impl RigidBodySystem {
         if grain.rotation != MotionConstraint::Free {
             prescribe(&mut a, &mut b, 3, grain.angular_velocity);
         }
-        RigidBodySystem {
-            matrix: a,
-            right: b,
-            virtual_mass,
-            impulse,
-            not_displaced,
-            last_load: None,
-        }
+        RigidBodySystem { matrix: a, right: b, virtual_mass, impulse, surface, last_load: None }
     }
 
     /// New velocities under the mean `contact` load over `dt` [s].
@@ -151,8 +180,10 @@ impl RigidBodySystem {
         let new = grain.rigid_velocity();
         let mut j = self.impulse.at(new);
         let change = new - previous.velocity;
-        let not_displaced = multiply6(&self.not_displaced, &change.to_vector());
-        j.iter_mut().zip(not_displaced).for_each(|(j, momentum)| *j += momentum);
+        if let Some(SurfaceTerms { not_displaced, .. }) = &self.surface {
+            let momentum = multiply6(not_displaced, &change.to_vector());
+            j.iter_mut().zip(momentum).for_each(|(j, momentum)| *j += momentum);
+        }
         let added = &self.virtual_mass;
         let force = DVec3::from_slice(&j[..3]) + added.mass * new.linear - added.momentum;
         let torque =
@@ -160,11 +191,12 @@ impl RigidBodySystem {
         let omega = previous.velocity.angular;
         let displaced = fluid_density / grain.density;
         let fluid_inertia = grain.inertia() * displaced;
-        Load {
+        let load = Load {
             force: (displaced * grain.mass() * change.linear - force) / dt,
             torque: (fluid_inertia * change.angular - torque) / dt
                 + omega.cross(fluid_inertia * omega),
-        }
+        };
+        self.surface.map_or(load, |terms| load + terms.load)
     }
 
     /// Impulse on the fluid [N s] of the grain, which has its new velocities.

@@ -68,7 +68,7 @@ pub struct RigidStep<'a> {
     pub dt: f64,
     /// Receives the hydrodynamic loads (Eq. 5).
     pub loads: &'a mut [Load],
-    /// Receives the impulses on the fluid [N s].
+    /// Receives the impulses on the fluid [N s]; empty if they are not needed.
     pub fluid_impulses: &'a mut [DVec3],
 }
 
@@ -173,14 +173,14 @@ impl<R: Real> ImmersedGrains<R> {
         let mut updates = coupled.updates;
         let RigidStep { dt, .. } = step;
         let density = self.fluid_density;
-        let each = updates.par_iter_mut().zip(&mut *step.grains);
-        let each = each.zip(step.loads).zip(step.fluid_impulses).enumerate();
-        each.for_each(|(index, (((update, grain), load), impulse))| {
+        let each = (updates.par_iter_mut().zip(&mut *step.grains)).zip(step.loads);
+        each.enumerate().for_each(|(index, ((update, grain), load))| {
             let (previous, contact) = (&step.previous[index], step.contact[index]);
             update.set_velocities(grain, previous, contact, dt);
             *load = (update.system).hydrodynamic_load(grain, previous, density, dt);
-            *impulse = update.system.fluid_impulse(grain);
         });
+        let each = step.fluid_impulses.iter_mut().zip(&updates).zip(&*step.grains);
+        each.for_each(|((impulse, update), grain)| *impulse = update.system.fluid_impulse(grain));
         // A contact load found in the repeated sub-steps changes the velocity of an isolated grain
         // after its rigidity was imposed: its faces are listed again and take the difference.
         let params = self.forcing_params(dt);

@@ -58,7 +58,7 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
         applied: &applied,
         last_loads: &[],
         crossings: &[],
-        surface_impulses: &[],
+        surface_loads: &[],
         dt: DT,
     };
     let coupled = immersed.couple(&mut flow, input);
@@ -70,7 +70,7 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
         contact: &resolved,
         dt: DT,
         loads: &mut loads,
-        fluid_impulses: &mut [DVec3::ZERO; 2],
+        fluid_impulses: &mut [],
     };
     immersed.impose_rigidity(&mut flow, coupled, rigid);
     let mut all: Vec<f64> = Vec::new();
@@ -163,7 +163,7 @@ fn padding_of_rows_affects_no_link() {
                 applied: &[Load::default(); 2],
                 last_loads: &[],
                 crossings: &[],
-                surface_impulses: &[],
+                surface_loads: &[],
                 dt: 0.01,
             },
         );

@@ -15,7 +15,7 @@ use super::rigid_body::{PreviousStep, RigidBodySystem};
 use super::rigidity::{impose_rigidity, sum_impulse};
 use crate::dem::Grain;
 use crate::flow::{OldState, Prediction};
-use crate::math::{Load, Real, RigidVelocity, Vector6};
+use crate::math::{Load, Real, RigidVelocity};
 
 /// Lists of the faces near one grain, kept from one step to the next.
 #[derive(Default)]
@@ -105,8 +105,8 @@ pub struct StepInput<'a> {
     pub last_loads: &'a [Load],
     /// Crossings of open sides of the box; empty if it has none.
     pub crossings: &'a [Crossing],
-    /// Impulses of the pressure at free surfaces, per density; empty without open sides.
-    pub surface_impulses: &'a [Vector6],
+    /// Loads of the pressure at free surfaces, per density; empty without open sides.
+    pub surface_loads: &'a [Load],
     /// Length of the step [s].
     pub dt: f64,
 }
@@ -212,22 +212,19 @@ impl<R: Real> CouplingStep<'_, R> {
         let (known, density, dt) = (&self.known, self.fluid_density, self.input.dt);
         let (grain, previous) = (&self.input.grains[index], &self.input.previous[index]);
         let motion = [previous.velocity, previous.acceleration];
-        let mut impulse = sum_impulse(known, predictions, density, forced, motion, dt);
+        let impulse = sum_impulse(known, predictions, density, forced, motion, dt);
         let applied = self.input.applied[index];
-        let emerged = match self.input.crossings.get(index) {
+        match self.input.crossings.get(index) {
             Some(Crossing::Departing) => {
-                let last_load = self.input.last_loads[index];
-                let loads = [applied, last_load];
-                return RigidBodySystem::departing(grain, previous, impulse, loads, dt);
+                let loads = [applied, self.input.last_loads[index]];
+                RigidBodySystem::departing(grain, previous, impulse, loads, dt)
             }
             Some(Crossing::Emerged(part)) => {
-                let surface = self.input.surface_impulses[index].map(|value| density * value);
-                impulse.constant.iter_mut().zip(surface).for_each(|(sum, value)| *sum += value);
-                Some(&**part)
+                let loads = [applied, self.input.surface_loads[index] * density];
+                RigidBodySystem::emerged(grain, previous, impulse, density, loads, part, dt)
             }
-            _ => None,
-        };
-        RigidBodySystem::new(grain, previous, impulse, density, applied, emerged, dt)
+            _ => RigidBodySystem::submerged(grain, previous, impulse, density, applied, dt),
+        }
     }
 }
 

@@ -77,8 +77,6 @@ struct GrainData {
     ends: Vec<RigidState>,
     /// Poses at which the grains were located on the grid.
     located: Vec<Pose>,
-    /// Impulses on the fluid [N s].
-    fluid_impulses: Vec<DVec3>,
 }
 
 impl GrainData {
@@ -94,7 +92,6 @@ impl GrainData {
             responses: Vec::with_capacity(count),
             ends: grains.iter().map(RigidState::of).collect(),
             located: grains.iter().map(|grain| grain.pose).collect(),
-            fluid_impulses: vec![DVec3::ZERO; count],
         }
     }
 }

@@ -196,11 +196,10 @@ impl<'a> Moved<'a> {
         if flow.scheme == Scheme::Paper {
             timed(&mut solid.times.project, || flow.fluid.project_prediction(dt));
         }
-        let (mut crossings, mut surface_impulses) = (&[][..], Vec::new());
+        let (mut crossings, mut surface_loads) = (&[][..], Vec::new());
         if let Some(open_sides) = &mut solid.open_sides {
             open_sides.list_covered_faces(solid.grains);
-            surface_impulses =
-                open_sides.surface_impulses(dt, |faces| flow.fluid.pressure_below(faces));
+            surface_loads = open_sides.surface_loads(|faces| flow.fluid.pressure_below(faces));
             crossings = open_sides.crossings();
         }
         let input = StepInput {
@@ -211,7 +210,7 @@ impl<'a> Moved<'a> {
             applied: &solid.data.applied,
             last_loads: solid.loads,
             crossings,
-            surface_impulses: &surface_impulses,
+            surface_loads: &surface_loads,
             dt,
         };
         let coupled = timed(&mut solid.times.coupling, || flow.fluid.couple(input));
@@ -246,16 +245,17 @@ impl<'a> Resolved<'a> {
     pub fn impose_rigidity(self) -> Rigid<'a> {
         let Resolved(mut step, coupled, final_poses) = self;
         let Context { solid, flow } = &mut step;
+        let open_sides = &mut solid.open_sides;
         let rigid = RigidStep {
             grains: solid.grains,
             previous: &solid.data.previous,
             contact: &solid.data.contact,
             dt: solid.dt,
             loads: solid.loads,
-            fluid_impulses: &mut solid.data.fluid_impulses,
+            fluid_impulses: open_sides.as_mut().map_or(&mut [][..], |o| &mut o.fluid_impulses),
         };
         timed(&mut solid.times.coupling, || flow.fluid.impose_rigidity(coupled, rigid));
-        if let Some(open_sides) = &solid.open_sides {
+        if let Some(open_sides) = open_sides {
             flow.fluid.cover_boundary(&open_sides.covered_faces(solid.grains));
         }
         Rigid(step, final_poses)
@@ -280,7 +280,6 @@ impl Projected<'_> {
         let (density, dt, data) = (flow.density, solid.dt, solid.data);
         let gain = flow.fluid.measures().momentum - self.momentum_before;
         let mut residual = density * (gain - flow.fluid.boundary_impulse(dt));
-        let crossings = solid.open_sides.as_ref().map_or(&[][..], |o| o.crossings());
         for (i, (grain, load)) in solid.grains.iter_mut().zip(&*solid.loads).enumerate() {
             data.located[i] = grain.pose;
             if let FinalPoses::Resolved = self.final_poses {
@@ -289,11 +288,9 @@ impl Projected<'_> {
             let previous = &mut data.previous[i];
             let change = grain.rigid_velocity() - previous.velocity;
             // The fluid lost what it gave the grain, the displaced fluid included.
-            residual -= match crossings.get(i) {
-                None | Some(Crossing::Inside) => {
-                    density * grain.shape.volume() * change.linear - dt * load.force
-                }
-                Some(_) => data.fluid_impulses[i],
+            residual -= match solid.open_sides.as_deref().and_then(|o| o.impulse_across(i)) {
+                None => density * grain.shape.volume() * change.linear - dt * load.force,
+                Some(impulse) => impulse,
             };
             let touched = !data.contact[i].is_zero();
             // The acceleration of an impact does not continue in the next step; its added mass

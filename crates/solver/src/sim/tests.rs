@@ -5,6 +5,7 @@ use super::{CELL_FIELDS, PrescribedMotion, Prescription, Remedy, Setup, Simulati
 use crate::dem::Grain;
 use crate::flow::{Boundary, FluidParams};
 use crate::grid::{Axis, Mesh};
+use crate::immersed::Scheme;
 use crate::math::Precision;
 use grainwake_simd::{InstructionSet, limit_instructions};
 
@@ -36,8 +37,8 @@ fn two_grains(precision: Precision) -> Setup {
 
 #[test]
 fn bits_of_coupled_steps_do_not_depend_on_the_instruction_set() {
-    fn bits(precision: Precision) -> Vec<u64> {
-        let mut sim = Simulation::new(two_grains(precision)).unwrap();
+    fn bits(precision: Precision, scheme: Scheme) -> Vec<u64> {
+        let mut sim = Simulation::new(two_grains(precision).with_scheme(scheme)).unwrap();
         for _ in 0..4 {
             sim.step(f64::INFINITY).unwrap();
         }
@@ -52,14 +53,18 @@ fn bits_of_coupled_steps_do_not_depend_on_the_instruction_set() {
         let all = velocity.chain(grains.flat_map(|v| v.to_array()));
         all.map(f64::to_bits).collect()
     }
-    for precision in [Precision::Double, Precision::Single] {
+    for (precision, scheme) in [
+        (Precision::Double, Scheme::Aperture),
+        (Precision::Single, Scheme::Aperture),
+        (Precision::Double, Scheme::Paper),
+    ] {
         let [widest, middle, common] =
             [InstructionSet::Avx512, InstructionSet::Avx2, InstructionSet::Baseline].map(|level| {
                 limit_instructions(level);
-                bits(precision)
+                bits(precision, scheme)
             });
         limit_instructions(InstructionSet::Avx512);
-        assert!(widest == middle && widest == common, "{precision}");
+        assert!(widest == middle && widest == common, "{precision}, {scheme:?}");
     }
 }
 

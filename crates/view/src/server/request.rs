@@ -27,7 +27,7 @@ pub enum Refusal {
 pub struct Request {
     /// Path, without query.
     pub path: String,
-    /// Whether the body of the answer is left out.
+    /// True for HEAD: the answer has no body.
     pub head_only: bool,
     method: String,
     hosts: Vec<String>,

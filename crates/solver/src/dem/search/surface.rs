@@ -146,7 +146,8 @@ impl<'a> PartnerField<'a> {
             PartnerField::HalfSpace { normal, offset } => normal.dot(x) + offset,
         }
     }
-    /// Whether the whole sphere is certainly farther away than `reach` [m]; false if it may not be.
+    /// Returns true if the whole sphere is farther away than `reach` [m], false if that is
+    /// uncertain.
     pub fn is_beyond(&self, centre: DVec3, radius: f64, reach: f64) -> bool {
         match self {
             PartnerField::Shape { shape, rotation, translation, exact } => {
