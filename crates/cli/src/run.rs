@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use grainwake_formats::summary::Summary;
-use grainwake_run::case::{Case, Problem, Verdict};
+use grainwake_run::case::{Case, Problem, Verdict, find_parent};
 use grainwake_run::{Ending, Existing, Options, RESOLVED};
 
 use crate::args::RunArgs;
@@ -24,7 +24,13 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         (.., true) => Existing::Replace,
         _ => Existing::Refuse,
     };
-    let options = Options { existing, command: std::env::args().collect(), threads };
+    let mut parent = None;
+    if let Some(text) = &args.from {
+        let found = find_parent(text, &mut |note| tell!("{note}"))?;
+        case.check_parent(&found)?;
+        parent = Some(found);
+    }
+    let options = Options { existing, command: std::env::args().collect(), threads, parent };
     let stop = Arc::new(AtomicBool::new(false));
     watch_for_interrupt(stop.clone());
     if !args.quiet {

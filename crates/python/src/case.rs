@@ -223,6 +223,9 @@ impl PyCase {
     ///     Continue from the last checkpoint in the folder.
     /// force : bool, default False
     ///     Replace a run in the folder.
+    /// start_from : str, optional
+    ///     Start from a checkpoint of another run, "DIR" or "DIR@TIME": the newest one, or the
+    ///     newest at or before the time.
     /// threads : int, optional
     ///     Threads; those of the case by default, 0 for all cores. They do not affect the results.
     /// report : bool, default True
@@ -246,20 +249,22 @@ impl PyCase {
     ///     Reading or writing failed.
     /// KeyboardInterrupt
     ///     The run was interrupted; a checkpoint was written, and ``resume=True`` continues.
-    #[pyo3(signature = (folder, *, resume = false, force = false, threads = None, report = true, progress = None))]
+    #[pyo3(signature = (folder, *, resume = false, force = false, start_from = None, threads = None, report = true, progress = None))]
     fn run<'py>(
         &self,
         py: Python<'py>,
         folder: PathBuf,
         resume: bool,
         force: bool,
+        start_from: Option<String>,
         threads: Option<usize>,
         report: bool,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let threads = threads::resolve(threads.unwrap_or(self.case.threads));
         let existing = running::existing(resume, force);
-        running::run(py, &self.case, &folder, existing, threads, progress)?;
+        let parent = start_from.map(|text| running::parent(py, &self.case, &text)).transpose()?;
+        running::run(py, &self.case, &folder, existing, parent, threads, progress)?;
         if report {
             py.detach(|| grainwake_report::render(&folder))
                 .map_err(IntoException::into_exception)?;

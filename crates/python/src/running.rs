@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use grainwake_formats::events::Event;
 use grainwake_formats::summary::Summary;
-use grainwake_run::case::Case;
-use grainwake_run::{Ending, Existing, Observer, Options, Progress};
+use grainwake_run::case::{Case, find_parent};
+use grainwake_run::{Ending, Existing, Observer, Options, Parent, Progress};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -119,18 +119,32 @@ fn as_dict<'py>(py: Python<'py>, p: &Progress) -> PyResult<Bound<'py, PyDict>> {
     Ok(dict)
 }
 
-/// Runs a case in a folder.
+/// Finds the checkpoint that `text`, "DIR" or "DIR@TIME", names, and checks that the case can start
+/// from it.
+pub fn parent(py: Python<'_>, case: &Case, text: &str) -> PyResult<Parent> {
+    let mut notes = Vec::new();
+    let found = find_parent(text, &mut |note| notes.push(note.to_owned())).raise()?;
+    case.check_parent(&found).raise()?;
+    let warnings = py.import("warnings")?;
+    for note in notes {
+        warnings.call_method1("warn", (note,))?;
+    }
+    Ok(found)
+}
+
+/// Runs a case in a folder, from a checkpoint of the parent if there is one.
 pub fn run(
     py: Python<'_>,
     case: &Case,
     folder: &Path,
     existing: Existing,
+    parent: Option<Parent>,
     threads: usize,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Summary> {
     let pool = threads::pool(threads)?;
     let (shared, stop) = (Mutex::new(Shared::default()), Arc::new(AtomicBool::new(false)));
-    let options = Options { existing, command: command(py)?, threads };
+    let options = Options { existing, command: command(py)?, threads, parent };
     let display = py.import("grainwake._progress")?.call_method1("of_run", (progress,))?;
     let warnings = case.estimate(threads).warnings;
     display.call_method1("warn", (warnings,))?;

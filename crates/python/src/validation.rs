@@ -40,7 +40,7 @@ pub fn _validate<'py>(
             let folder = output.join(&suite.name).join(&run.name);
             let case = py.detach(|| Case::load(&run.case, &run.set)).raise()?;
             let existing = Existing::Replace;
-            let found = match running::run(py, &case, &folder, existing, threads, progress) {
+            let found = match running::run(py, &case, &folder, existing, None, threads, progress) {
                 Ok(_) => py.detach(|| suite.evaluate(run, &folder, &mut values)),
                 Err(error) if error.is_instance_of::<SolverError>(py) => {
                     suite.results_of_failed_run(run, &error.value(py).to_string())

@@ -69,12 +69,22 @@ pub enum RunError {
         source: io::Error,
     },
     /// No checkpoint is valid.
-    #[error("no checkpoint in {} can be used:\n{}\nRun again without --resume (and with --force) to start over", folder.display(), reasons.join("\n"))]
+    #[error("no checkpoint in {} can be used:\n{}\n{remedy}", folder.display(), reasons.join("\n"))]
     NoCheckpoint {
         /// Folder of the checkpoints.
         folder: PathBuf,
         /// Fault of each checkpoint.
         reasons: Vec<String>,
+        /// Advice.
+        remedy: &'static str,
+    },
+    /// There is no checkpoint to start a new run from.
+    #[error("{what}; {remedy}")]
+    NoParent {
+        /// Description of the run.
+        what: String,
+        /// Advice.
+        remedy: String,
     },
     /// The folder belongs to another case.
     #[error("the run folder {} was made from another case ({what}); give another folder with -o, or start over with --force", folder.display())]
@@ -94,6 +104,7 @@ impl RunError {
             | RunError::Occupied { .. }
             | RunError::InUse { .. }
             | RunError::Memory { .. }
+            | RunError::NoParent { .. }
             | RunError::OtherCase { .. } => FailureKind::Input,
             RunError::Unstable { .. } => FailureKind::Computation,
             RunError::Io { .. } | RunError::NoCheckpoint { .. } => FailureKind::InputOutput,

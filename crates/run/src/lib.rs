@@ -19,5 +19,5 @@ mod run_loop;
 
 pub use error::{FailureKind, RunError};
 pub use plan::{Plane, PlanePosition, RunPlan, Stop};
-pub use run_folder::{Existing, RESOLVED, checkpoint, lock, provenance};
+pub use run_folder::{Existing, Parent, RESOLVED, checkpoint, lock, provenance};
 pub use run_loop::{Ending, Job, Observer, Options, Progress, Silent, run};

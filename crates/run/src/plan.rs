@@ -28,6 +28,21 @@ pub struct RunPlan {
     pub checkpoint_interval: f64,
     /// Steps between checkpoints.
     pub checkpoint_steps: u64,
+    /// Number of checkpoints to keep, if given.
+    pub checkpoint_keep: Option<usize>,
+}
+
+impl RunPlan {
+    /// Returns the number of checkpoints kept during the run: at least two, in case the newest one
+    /// is damaged.
+    pub(crate) fn kept_during_run(&self) -> usize {
+        self.checkpoint_keep.map_or(2, |kept| kept.max(2))
+    }
+    /// Returns the number of checkpoints kept after the end: by default one, which suffices to
+    /// continue to a later end.
+    pub(crate) fn kept_after_end(&self) -> usize {
+        self.checkpoint_keep.unwrap_or(1)
+    }
 }
 
 /// Stop condition: the run ends `hold` seconds after the condition became true for good.

@@ -52,6 +52,7 @@ pub(crate) struct Recorder {
     max_cfl: f64,
     overlaps: Overlaps,
     last_row: Option<f64>,
+    kept_checkpoints: usize,
 }
 
 impl Recorder {
@@ -87,6 +88,7 @@ impl Recorder {
             max_cfl: 0.0,
             overlaps: Overlaps::default(),
             last_row: None,
+            kept_checkpoints: plan.kept_during_run(),
         }
     }
 
@@ -101,6 +103,46 @@ impl Recorder {
         recorder.write_due(sim)?;
         recorder.checkpoint(sim)?;
         Ok(recorder)
+    }
+
+    /// Starts the record of a run from a checkpoint of its parent and writes the first outputs.
+    ///
+    /// The events of the parent are kept, because the phase of a pair follows from them. Largest
+    /// divergence, CFL number and overlap are those of the new run.
+    pub fn branch(
+        run: &Path,
+        digest: &str,
+        record: Record,
+        plan: &RunPlan,
+        sim: &Simulation,
+    ) -> Result<Recorder, RunError> {
+        let mut recorder = Recorder::build(run, digest, plan, sim, Tables::create(run)?);
+        recorder.tracker.restore(record.tracker);
+        recorder.contact_events = record.contact_events;
+        recorder.overlaps.mean_now = record.overlaps.mean_now;
+        recorder.next = recorder.intervals.map(|interval| first_after(sim.time(), interval));
+        let events = recorder.events();
+        recorder.tables.append_events(&events)?;
+        recorder.write_start(sim)?;
+        recorder.checkpoint(sim)?;
+        Ok(recorder)
+    }
+
+    /// Writes the state that a run starts from, in every series.
+    fn write_start(&mut self, sim: &Simulation) -> Result<(), RunError> {
+        let mut files = Vec::new();
+        for (series, interval) in SERIES.into_iter().zip(self.intervals) {
+            if interval == 0.0 {
+                continue;
+            }
+            match series {
+                Series::Tables => self.append_rows(sim)?,
+                Series::Slices => files.extend(self.vtk.slices(&self.run, sim, "start")?),
+                Series::Fields => files.extend(self.vtk.fields(&self.run, sim, "start")?),
+                Series::Surfaces => files.extend(self.vtk.grains(&self.run, sim, "start")?),
+            }
+        }
+        if files.is_empty() { Ok(()) } else { self.add(files) }
     }
 
     /// Continues the record of a run from a checkpoint.
@@ -243,7 +285,7 @@ impl Recorder {
             tracker: self.tracker.state().clone(),
             contact_events: self.contact_events.clone(),
         };
-        checkpoint::write(&self.run, &record, sim)
+        checkpoint::write(&self.run, &record, sim, self.kept_checkpoints)
     }
 
     /// Returns the event tracker.
@@ -290,6 +332,11 @@ impl Recorder {
             grains: grains.collect(),
         }
     }
+}
+
+/// Returns the index of the first output after `time` [s]; zero for an output that is off.
+fn first_after(time: f64, interval: f64) -> u64 {
+    if interval > 0.0 { (time / interval + SAME_TIME).floor() as u64 + 1 } else { 0 }
 }
 
 /// Returns the gap between the surfaces of a pair [m].

@@ -16,8 +16,9 @@ use crate::error::{Context, RunError};
 use crate::memory;
 use crate::plan::RunPlan;
 use crate::recorder::Recorder;
-use crate::run_folder::provenance::{Provenance, Session};
-use crate::run_folder::{self, Content, Existing, RESOLVED, checkpoint, differing};
+use crate::run_folder::checkpoint::Record;
+use crate::run_folder::provenance::{ParentRun, Provenance, Session};
+use crate::run_folder::{self, Content, Existing, Parent, RESOLVED, checkpoint, differing};
 
 /// Simulation to run, with its outputs.
 #[derive(Clone, Debug)]
@@ -43,6 +44,9 @@ pub struct Options {
     pub command: Vec<String>,
     /// Number of threads, for the provenance; the caller configures the thread pool.
     pub threads: usize,
+    /// Checkpoint that a new run starts from; none for a start at t = 0. The case is valid for it
+    /// ([`Case::check_parent`](crate::case::Case::check_parent)).
+    pub parent: Option<Parent>,
 }
 
 /// Progress of a run.
@@ -113,12 +117,15 @@ pub fn run(
     observer: &mut dyn Observer,
 ) -> Result<Ending, RunError> {
     memory::admit(&job.setup)?;
+    let parent = options.parent.as_ref();
+    run_folder::admit_parent(out, parent)?;
     // The folder is checked before the lock file is created in it, and again under the lock.
     run_folder::admit(out, options.existing.resolve(out, &job.digest))?;
     let _lock = run_folder::lock_folder(out)?;
     let existing = options.existing.resolve(out, &job.digest);
     let content = run_folder::admit(out, existing)?;
     let mut provenance = Provenance::new(&job.digest);
+    provenance.parent = parent.map(Parent::described);
     let resuming = existing == Existing::Resume;
     if resuming {
         provenance = Provenance::read(out).unwrap_or(provenance);
@@ -126,6 +133,7 @@ pub fn run(
             let what = differing(out, &job.resolved);
             return Err(RunError::OtherCase { folder: out.into(), what });
         }
+        run_folder::same_parent(out, &provenance, parent)?;
     }
     if content == Content::Finished && resuming {
         let summary = Summary::read(out).context("read", &out.join(summary::FILE))?;
@@ -140,25 +148,20 @@ pub fn run(
         ));
     }
     let mut sim = Simulation::new(job.setup)?;
-    let record = if resuming {
-        checkpoint::restore(out, &job.digest, &mut sim, &mut |text| observer.note(text))?
-    } else {
-        None
-    };
-    match &record {
-        Some(record) => {
-            observer.note(&format!("resuming at t = {:.6e} s, step {}", record.time, record.steps))
-        }
-        None if resuming => observer.note("there is no checkpoint: starting from the beginning"),
-        None => {}
+    let begin = begin(&job.digest, out, resuming, parent, &mut sim, observer)?;
+    if let (None, Some(lost)) = (parent, &provenance.parent)
+        && matches!(begin, Begin::Fresh)
+    {
+        return Err(run_folder::start_lost(out, lost));
     }
-    if record.is_none() && content != Content::Empty {
+    if !matches!(begin, Begin::Resumed(_)) && content != Content::Empty {
         run_folder::clear(out)?;
     }
     run_folder::create(out)?;
     provenance.sessions.push(Session::now(&options.command, options.threads, sim.steps()));
     provenance.write(out)?;
-    write(&out.join(RESOLVED), job.resolved.as_bytes())?;
+    let started_from = provenance.parent.as_ref().map_or(String::new(), ParentRun::comment);
+    write(&out.join(RESOLVED), (started_from + &job.resolved).as_bytes())?;
     for (name, bytes) in &job.files {
         write(&out.join(name), bytes)?;
     }
@@ -166,12 +169,54 @@ pub fn run(
     if summary_path.exists() {
         std::fs::remove_file(&summary_path).context("remove", &summary_path)?;
     }
-    let recorder = match record {
-        Some(record) => Recorder::resume(out, record, &job.plan, &sim)?,
-        None => Recorder::start(out, &job.digest, &job.plan, &sim)?,
+    let recorder = match begin {
+        Begin::Fresh => Recorder::start(out, &job.digest, &job.plan, &sim)?,
+        Begin::Resumed(record) => Recorder::resume(out, *record, &job.plan, &sim)?,
+        Begin::Branched(record) => {
+            Recorder::branch(out, &job.digest, *record, &job.plan, &sim)?
+        }
     };
     Running { out: out.into(), plan: job.plan, sim, recorder, provenance, started: Instant::now() }
         .advance(observer)
+}
+
+/// State that a run begins with.
+enum Begin {
+    /// State at t = 0.
+    Fresh,
+    /// Checkpoint of the same run.
+    Resumed(Box<Record>),
+    /// Checkpoint of the parent run.
+    Branched(Box<Record>),
+}
+
+/// Restores the checkpoint that the run begins with, if there is one.
+fn begin(
+    digest: &str,
+    out: &Path,
+    resuming: bool,
+    parent: Option<&Parent>,
+    sim: &mut Simulation,
+    observer: &mut dyn Observer,
+) -> Result<Begin, RunError> {
+    if resuming {
+        let own = checkpoint::restore(out, digest, sim, &mut |text| observer.note(text))?;
+        if let Some(record) = own {
+            let (time, steps) = (record.time, record.steps);
+            observer.note(&format!("resuming at t = {time:.6e} s, step {steps}"));
+            return Ok(Begin::Resumed(Box::new(record)));
+        }
+    }
+    let Some(parent) = parent else {
+        if resuming {
+            observer.note("there is no checkpoint: starting from the beginning");
+        }
+        return Ok(Begin::Fresh);
+    };
+    let record = parent.restore(sim)?;
+    let (folder, time, steps) = (parent.folder().display(), record.time, record.steps);
+    observer.note(&format!("starting from {folder} at t = {time:.6e} s, step {steps}"));
+    Ok(Begin::Branched(Box::new(record)))
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
@@ -279,8 +324,7 @@ impl Running {
         self.checkpoint()?;
         let summary = self.recorder.summary(&self.sim, self.provenance.wall_s(), why);
         (summary.write(&self.out)).context("write", &self.out.join(summary::FILE))?;
-        // One checkpoint suffices to continue to a later end.
-        checkpoint::keep(&self.out, 1)?;
+        checkpoint::keep(&self.out, self.plan.kept_after_end())?;
         Ok(Ending::Finished(summary))
     }
 

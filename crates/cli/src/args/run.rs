@@ -23,6 +23,10 @@ pub struct RunArgs {
     /// Replace an existing run
     #[arg(long)]
     pub force: bool,
+    /// Start from a checkpoint of another run: the newest, or the newest at or before TIME, for
+    /// example runs/heap@0.5
+    #[arg(long, value_name = "DIR[@TIME]", conflicts_with = "resume")]
+    pub from: Option<String>,
     /// Override a value of the case, for example time.end=0.5 or grain.0.density=2600
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,

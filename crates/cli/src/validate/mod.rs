@@ -191,6 +191,7 @@ fn execute(
         existing: if args.resume { Existing::Reuse } else { Existing::Replace },
         command: std::env::args().collect(),
         threads,
+        parent: None,
     };
     let diameter = case.setup.grains.first().map(|g| g.shape.equivalent_diameter());
     let mut shown = ProgressDisplay::new(args.quiet, stop.clone(), diameter);

@@ -244,6 +244,7 @@ class Case:
         *,
         resume: bool = False,
         force: bool = False,
+        start_from: str | None = None,
         threads: int | None = None,
         report: bool = True,
         progress: _Progress = None,

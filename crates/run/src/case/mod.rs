@@ -8,10 +8,11 @@
 //!
 //! A problem is reported with file, line, key and remedy; then nothing is written.
 //!
-//! Layers, downwards: `validate` -> `warnings` -> `estimate`, `packing`, `placement`, `shapes` ->
-//! `settling`, `expect` -> `raw` -> `source` -> `quantity` -> `notation`, `units`, `located`,
-//! `error`, `number_format`, `suggest`.
+//! Layers, downwards: `branch`, `validate` -> `warnings` -> `estimate`, `packing`, `placement`,
+//! `shapes` -> `settling`, `expect` -> `raw` -> `source` -> `quantity` -> `notation`, `units`,
+//! `located`, `error`, `number_format`, `suggest`.
 
+mod branch;
 mod error;
 mod estimate;
 mod expect;
@@ -40,6 +41,7 @@ use sha2::{Digest, Sha256};
 use crate::{Job, RunError, RunPlan, memory};
 use grainwake_solver::sim::Setup;
 
+pub use branch::find_parent;
 pub use error::{CaseError, Problem};
 pub use estimate::Estimate;
 pub use expect::{Expectation, Verdict};
@@ -71,6 +73,8 @@ pub struct Case {
     /// Hash of everything that decides the results up to a given time: threads, `[expect]`, the
     /// title, the end, `contact.overlap_limit` and the checkpoint intervals do not.
     pub digest: String,
+    /// Text of the case, for the positions of later problems.
+    source: Source,
 }
 
 impl Case {
@@ -109,6 +113,7 @@ impl Case {
             resolved,
             shapes: validated.shapes,
             digest,
+            source,
         })
     }
 
@@ -164,6 +169,7 @@ fn digest(resolved: &RawCase, shapes: &[ShapeFile]) -> Result<String, CaseError>
     core.time.stop = None;
     core.output.checkpoint_interval = Default::default();
     core.output.checkpoint_steps = Default::default();
+    core.output.checkpoint_keep = None;
     let mut hash = Sha256::new();
     hash.update(write(&core)?);
     for shape in shapes {

@@ -13,6 +13,7 @@ use super::toml_messages::{plainly, wrong_kind};
 
 /// TOML file with its `key=value` overrides. Spans count as if the overrides followed the file, so
 /// that one range identifies the origin of a value.
+#[derive(Debug)]
 pub struct Source {
     name: String,
     text: String,
@@ -20,12 +21,14 @@ pub struct Source {
     entries: Vec<Entry>,
 }
 
+#[derive(Debug)]
 struct Override {
     start: usize,
     line: String,
 }
 
 /// Key or value with its position.
+#[derive(Debug)]
 struct Entry {
     span: Range<usize>,
     path: String,
@@ -33,7 +36,7 @@ struct Entry {
 }
 
 /// Kind of an entry.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum EntryKind {
     /// A key.
     Key,
@@ -105,6 +108,12 @@ impl Source {
             .filter(|e| e.span.start <= span.start && span.end <= e.span.end.max(e.span.start + 1))
             .min_by_key(|e| (e.span.len(), !is_element(&e.path)))
             .map(|e| e.path.as_str())
+    }
+
+    /// Returns the position of the value of `key`; none if the file does not give it.
+    pub(super) fn value_of(&self, key: &str) -> Option<&Range<usize>> {
+        let values = self.entries.iter().filter(|entry| entry.kind != EntryKind::Key);
+        values.filter(|entry| entry.path == key).map(|entry| &entry.span).next()
     }
 
     /// Returns whether a value at `key` or below it is a number without a unit.

@@ -1,5 +1,5 @@
-//! Checkpoints: the whole state in one file, checksummed, synced, renamed. Two are kept during a
-//! run, and the last one after its end.
+//! Checkpoints: the whole state in one file, checksummed, synced, renamed. Unless the case keeps
+//! more, two are kept during a run, and the last one after its end.
 //!
 //! Layout, little-endian: 8 bytes signature, u32 version, u64 length of the record, the record
 //! (JSON), the state of the simulation (`Simulation::save`), SHA-256 of all preceding bytes.
@@ -91,8 +91,13 @@ pub fn list(run: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// Writes a checkpoint and removes all but the one before it.
-pub(crate) fn write(run: &Path, record: &Record, sim: &Simulation) -> Result<(), RunError> {
+/// Writes a checkpoint and removes all but the newest `kept`.
+pub(crate) fn write(
+    run: &Path,
+    record: &Record,
+    sim: &Simulation,
+    kept: usize,
+) -> Result<(), RunError> {
     let folder = run.join(FOLDER);
     let path = folder.join(name(record.steps));
     let json = serde_json::to_vec(record).map_err(io::Error::from).context("write", &path)?;
@@ -108,7 +113,7 @@ pub(crate) fn write(run: &Path, record: &Record, sim: &Simulation) -> Result<(),
     })
     .and_then(|()| sync_folder(&folder))
     .context("write", &path)?;
-    keep(run, 2)
+    keep(run, kept)
 }
 
 /// Removes all checkpoints but the newest `count`.
@@ -119,47 +124,57 @@ pub(crate) fn keep(run: &Path, count: usize) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Verifies the checksum of a checkpoint, then reads it into `sim`.
-fn read(path: &Path, digest: &str, sim: &mut Simulation) -> Result<Record, String> {
-    let text = |e: io::Error| match e.kind() {
-        io::ErrorKind::UnexpectedEof => "it is cut off".to_owned(),
-        _ => e.to_string(),
-    };
-    let mut file = File::open(path).map_err(text)?;
-    let length = file.metadata().map_err(text)?.len();
+/// Verifies the checksum of a checkpoint and reads its record; the reader is at the state.
+pub(super) fn open(path: &Path) -> Result<(Record, BufReader<File>), String> {
+    let mut file = File::open(path).map_err(in_words)?;
+    let length = file.metadata().map_err(in_words)?.len();
     let body = length.checked_sub(CHECKSUM).ok_or("it is cut off")?;
     let mut hash = Sha256::new();
     let mut buffer = vec![0; 1 << 18];
     let mut left = body;
     while left > 0 {
         let part = buffer.len().min(usize::try_from(left).unwrap_or(usize::MAX));
-        file.read_exact(&mut buffer[..part]).map_err(text)?;
+        file.read_exact(&mut buffer[..part]).map_err(in_words)?;
         hash.update(&buffer[..part]);
         left -= part as u64;
     }
     let mut checksum = [0; CHECKSUM as usize];
-    file.read_exact(&mut checksum).map_err(text)?;
+    file.read_exact(&mut checksum).map_err(in_words)?;
     if hash.finalize().as_slice() != checksum {
         return Err("its checksum does not match: it is damaged or cut off".into());
     }
-    file.seek(SeekFrom::Start(0)).map_err(text)?;
+    file.seek(SeekFrom::Start(0)).map_err(in_words)?;
     let mut input = BufReader::with_capacity(1 << 18, file);
     let mut signature = [0; 8];
-    input.read_exact(&mut signature).map_err(text)?;
+    input.read_exact(&mut signature).map_err(in_words)?;
     let mut decoder = Decoder::new(&mut input);
-    if &signature != SIGNATURE || decoder.u32().map_err(text)? != VERSION {
+    if &signature != SIGNATURE || decoder.u32().map_err(in_words)? != VERSION {
         return Err(format!("it is not a checkpoint of version {VERSION}"));
     }
-    let json = decoder.bytes().map_err(text)?;
-    let record: Record = serde_json::from_slice(&json).map_err(|e| e.to_string())?;
+    let json = decoder.bytes().map_err(in_words)?;
+    let record = serde_json::from_slice(&json).map_err(|e| e.to_string())?;
+    Ok((record, input))
+}
+
+/// Reads a checkpoint of the case with this hash into `sim`.
+pub(super) fn read(path: &Path, digest: &str, sim: &mut Simulation) -> Result<Record, String> {
+    let (record, mut input) = open(path)?;
     if record.digest != digest {
         return Err("it belongs to another case".into());
     }
-    sim.restore(&mut input).map_err(text)?;
+    sim.restore(&mut input).map_err(in_words)?;
     if sim.time().to_bits() != record.time.to_bits() || sim.steps() != record.steps {
         return Err("its record and its state differ".into());
     }
     Ok(record)
+}
+
+/// Describes an error while reading a checkpoint.
+fn in_words(error: io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => "it is cut off".to_owned(),
+        _ => error.to_string(),
+    }
 }
 
 /// Restores the newest valid checkpoint; `note` receives the faults of newer ones. None if the run
@@ -191,6 +206,10 @@ pub(crate) fn restore(
     if reasons.is_empty() {
         Ok(None)
     } else {
-        Err(RunError::NoCheckpoint { folder: run.join(FOLDER), reasons })
+        Err(RunError::NoCheckpoint {
+            folder: run.join(FOLDER),
+            reasons,
+            remedy: "Run again without --resume (and with --force) to start over",
+        })
     }
 }

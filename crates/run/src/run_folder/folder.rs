@@ -6,7 +6,8 @@ use grainwake_formats::summary;
 
 use super::checkpoint;
 use super::lock::{self, Attempt, Lock};
-use super::provenance::{self, Provenance};
+use super::parent::Parent;
+use super::provenance::{self, ParentRun, Provenance};
 use super::tables;
 use super::vtk_output;
 use crate::error::{Context, RunError};
@@ -121,6 +122,49 @@ pub(crate) fn admit(folder: &Path, existing: Existing) -> Result<Content, RunErr
             "leave out --resume, write --resume-or-start, or give the run folder with -o",
         ),
         _ => Ok(present),
+    }
+}
+
+/// Refuses a run in the folder of its own parent.
+pub(crate) fn admit_parent(folder: &Path, parent: Option<&Parent>) -> Result<(), RunError> {
+    let Some(parent) = parent else { return Ok(()) };
+    let absolute = |path: &Path| std::fs::canonicalize(path).ok();
+    match absolute(folder) {
+        path @ Some(_) if absolute(parent.folder()) == path => Err(RunError::Occupied {
+            what: format!("{} is the run to start from", folder.display()),
+            remedy: "give another folder with -o, or continue the run itself with --resume".into(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses to resume a run as the continuation of another parent; without a parent it resumes.
+pub(crate) fn same_parent(
+    folder: &Path,
+    own: &Provenance,
+    parent: Option<&Parent>,
+) -> Result<(), RunError> {
+    let recorded = own.parent.as_ref();
+    match parent {
+        Some(parent) if recorded.is_none_or(|own| own.case_sha256 != parent.digest()) => {
+            let there = recorded.map_or("at t = 0".into(), |own| format!("from {}", own.folder));
+            let here = parent.folder().display();
+            let what = format!("it started {there}, and --from names {here}");
+            Err(RunError::OtherCase { folder: folder.into(), what })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Error of a run that was interrupted before it had saved the state it started from.
+pub(crate) fn start_lost(folder: &Path, parent: &ParentRun) -> RunError {
+    let (time, from) = (parent.checkpoint_time, &parent.folder);
+    RunError::Occupied {
+        what: format!(
+            "{} holds a run that started from {from} at t = {time:.6e} s and has no checkpoint yet",
+            folder.display()
+        ),
+        remedy: format!("start it again with --from \"{from}@{time:e}\" --force"),
     }
 }
 

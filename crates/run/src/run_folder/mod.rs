@@ -4,14 +4,18 @@ pub mod checkpoint;
 mod compare;
 mod folder;
 pub mod lock;
+mod parent;
 pub mod provenance;
 mod surfaces;
 mod tables;
 mod vtk_output;
 
 pub use folder::{Existing, RESOLVED};
+pub use parent::Parent;
 
 pub(crate) use compare::differing;
-pub(crate) use folder::{Content, admit, clear, create, lock_folder};
+pub(crate) use folder::{
+    Content, admit, admit_parent, clear, create, lock_folder, same_parent, start_lost,
+};
 pub(crate) use tables::Tables;
 pub(crate) use vtk_output::VtkOutput;

@@ -19,8 +19,31 @@ pub struct Provenance {
     pub commit: Option<String>,
     /// SHA-256 of everything that affects the results.
     pub case_sha256: String,
+    /// Run and checkpoint that the run started from; none if it started at t = 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parent: Option<ParentRun>,
     /// Sessions: the first start and each resumption.
     pub sessions: Vec<Session>,
+}
+
+/// Run from whose checkpoint another run started.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ParentRun {
+    /// Absolute path of its folder at the start.
+    pub folder: String,
+    /// Version of the program that began it.
+    pub version: String,
+    /// Commit of that program, if known.
+    pub commit: Option<String>,
+    /// SHA-256 of everything that affects its results.
+    pub case_sha256: String,
+    /// Simulated time of the checkpoint [s].
+    pub checkpoint_time: f64,
+    /// Steps taken up to the checkpoint.
+    pub checkpoint_step: u64,
+    /// Run that the parent itself started from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parent: Option<Box<ParentRun>>,
 }
 
 /// Session of a run.
@@ -52,6 +75,15 @@ pub fn commit() -> Option<&'static str> {
     option_env!("GRAINWAKE_COMMIT").filter(|c| !c.is_empty())
 }
 
+impl ParentRun {
+    /// Returns a comment for `case.resolved.toml`, which alone describes a start at t = 0.
+    pub(crate) fn comment(&self) -> String {
+        let ParentRun { folder, checkpoint_time: time, checkpoint_step: step, .. } = self;
+        let folder = folder.escape_debug();
+        format!("# Started from step {step} of another run: --from \"{folder}@{time:e}\"\n")
+    }
+}
+
 impl Provenance {
     /// Returns the provenance of a new run.
     pub fn new(digest: &str) -> Provenance {
@@ -60,6 +92,7 @@ impl Provenance {
             version: env!("CARGO_PKG_VERSION").into(),
             commit: commit().map(str::to_owned),
             case_sha256: digest.into(),
+            parent: None,
             sessions: Vec::new(),
         }
     }

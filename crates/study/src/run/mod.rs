@@ -181,6 +181,7 @@ impl Job<'_> {
                 existing,
                 command: self.options.command.clone(),
                 threads: self.options.threads,
+                parent: None,
             };
             grainwake_run::run(case.job(), &folder, &options, &mut Forward(self))
         };

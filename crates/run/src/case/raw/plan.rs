@@ -98,6 +98,10 @@ pub struct RawOutput {
     pub checkpoint_interval: Located<Quantity<Time>>,
     /// Steps between checkpoints; 0 writes none by steps.
     pub checkpoint_steps: Located<u64>,
+    /// Checkpoints to keep, at least 1; 2 during the run and 1 after its end if not given. Another
+    /// run can start from each of them (`run --from`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub checkpoint_keep: Option<Located<usize>>,
 }
 
 impl Default for RawOutput {
@@ -111,6 +115,7 @@ impl Default for RawOutput {
             planes: None,
             checkpoint_interval: Quantity::new(300.0).into(),
             checkpoint_steps: 0.into(),
+            checkpoint_keep: None,
         }
     }
 }

@@ -94,6 +94,12 @@ pub(super) fn plan(
     let surfaces = interval(&mut raw.surfaces, surfaces);
     let fields = check_interval(&raw.fields);
     let checkpoint_interval = check.not_negative(&raw.checkpoint_interval);
+    let keep = raw.checkpoint_keep.as_ref();
+    if let Some(keep) = keep.filter(|keep| keep.value == 0) {
+        let help = "a run keeps at least 1 checkpoint; `rm -r DIR/checkpoint` removes it";
+        check.fail(&keep.span, "found 0 checkpoints", help);
+    }
+    let checkpoint_keep = keep.map(|keep| keep.value);
     let stop = time.stop.as_ref().map(|stop| stop_rule(check, stop, grains));
     let planes = match &raw.planes {
         Some(planes) => {
@@ -116,6 +122,7 @@ pub(super) fn plan(
         planes,
         checkpoint_interval: checkpoint_interval?,
         checkpoint_steps: raw.checkpoint_steps.value,
+        checkpoint_keep,
     })
 }
 
