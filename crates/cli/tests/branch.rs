@@ -56,7 +56,8 @@ fn assert_continues(text: &str, time: &str) {
     let of_parent = contents(&parent);
     let mut compared = 0;
     for (name, bytes) in contents(&child) {
-        let series = ["slices/", "fields/", "grains/"].iter().any(|folder| name.starts_with(folder));
+        let series =
+            ["slices/", "fields/", "grains/"].iter().any(|folder| name.starts_with(folder));
         if series && !name.contains("_start.") || name == "events.jsonl" {
             let same = of_parent.iter().find(|(other, _)| *other == name);
             assert!(same.is_some_and(|(_, other)| *other == bytes), "{name} differs");

@@ -263,3 +263,13 @@ def test_a_validation_has_the_columns_of_the_command_line(root, tmp_path):
         gw.validate("x", suites=root / "validation", output=tmp_path)
     with pytest.raises(gw.CaseError, match='"rotation" has no run "x"'):
         gw.validate("rotation/x", suites=root / "validation", output=tmp_path)
+
+
+def test_a_run_starts_from_a_checkpoint_of_another_run(case_file, run, tmp_path):
+    longer = gw.Case.load(case_file, {"time.end": "0.2 s"})
+    branch = longer.run(tmp_path / "branch", start_from=str(run.path), progress=False, report=False)
+    parent = branch.provenance["parent"]
+    assert parent["case_sha256"] == run.provenance["case_sha256"]
+    assert branch.grains["time"].iloc[0] == parent["checkpoint_time"] == run.grains["time"].iloc[-1]
+    with pytest.raises(gw.CaseError, match="later end"):
+        gw.Case.load(case_file).run(tmp_path / "same", start_from=str(run.path), progress=False)

@@ -172,9 +172,7 @@ pub fn run(
     let recorder = match begin {
         Begin::Fresh => Recorder::start(out, &job.digest, &job.plan, &sim)?,
         Begin::Resumed(record) => Recorder::resume(out, *record, &job.plan, &sim)?,
-        Begin::Branched(record) => {
-            Recorder::branch(out, &job.digest, *record, &job.plan, &sim)?
-        }
+        Begin::Branched(record) => Recorder::branch(out, &job.digest, *record, &job.plan, &sim)?,
     };
     Running { out: out.into(), plan: job.plan, sim, recorder, provenance, started: Instant::now() }
         .advance(observer)

@@ -106,15 +106,17 @@ impl Differences<'_> {
         }
         if mesh.origin != old.origin {
             let (here, there) = (vector(mesh.origin, "m"), vector(old.origin, "m"));
-            let message = format!("the box begins at {here}, and that of the parent run at {there}");
+            let message =
+                format!("the box begins at {here}, and that of the parent run at {there}");
             self.report(&["domain.origin", "domain"], message, AS_BEFORE);
         }
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             let sides = [now, before].map(|setup| setup.boundaries.0[axis]);
             let [here, there] = sides.map(|sides| sides.map(|side| std::mem::discriminant(&side)));
             if here != there {
-                let message =
-                    format!("the sides normal to {name} are of another kind than in the parent run");
+                let message = format!(
+                    "the sides normal to {name} are of another kind than in the parent run"
+                );
                 let key = format!("domain.boundaries.{name}");
                 self.report(&[&key, "domain.boundaries", "domain"], message, AS_BEFORE);
             }
@@ -210,9 +212,7 @@ const ASPECTS: [Aspect; 6] = [
         name: "angular velocity at the start",
         keys: &["angular_velocity"],
         of_shape: false,
-        same: |a, b| {
-            !both_free(a.rotation, b.rotation) || a.angular_velocity == b.angular_velocity
-        },
+        same: |a, b| !both_free(a.rotation, b.rotation) || a.angular_velocity == b.angular_velocity,
     },
 ];
 
