@@ -103,6 +103,36 @@ fn an_ensemble_offsets_all_but_the_first_member() {
 }
 
 #[test]
+fn an_ensemble_turns_a_grain_and_pairs_the_members_of_all_models() {
+    let ensemble = "[ensemble]\nmembers = 3\noffset = \"0.05 mm\"\n";
+    let (_folder, path) = folder(&format!("{STUDY}\n{ensemble}turn = \"2 deg\"\n"));
+    let runs = plan(&path).unwrap().runs;
+    let pose = |name: &str| {
+        let run = runs.iter().find(|run| run.name == name).unwrap();
+        run.case().unwrap().setup.grains[1].pose
+    };
+    let largest = 3.0_f64.sqrt() * 2.0_f64.to_radians();
+    for member in ["m1", "m2"] {
+        let [light, heavy] = ["light", "heavy"].map(|weight| {
+            let (start, moved) =
+                (pose(&format!("{weight}-rough")), pose(&format!("{weight}-rough-{member}")));
+            let turn = moved.orientation * start.orientation.inverse();
+            (moved.position - start.position, turn)
+        });
+        let angle = light.1.to_axis_angle().1;
+        assert!(angle > 1e-3 && angle <= largest * (1.0 + 1e-9), "{angle}");
+        assert!(light.0.distance(heavy.0) < 1e-12 && light.1.angle_between(heavy.1) < 1e-6);
+    }
+    let turn = |a: &str, b: &str| pose(a).orientation.angle_between(pose(b).orientation);
+    assert!(turn("light-rough-m1", "light-rough-m2") > 1e-3);
+    let (message, help) = {
+        let found = problems(&format!("{STUDY}\n{ensemble}turn = \"2 mm\"\n"));
+        (found[0].to_string(), found[0].help.clone().unwrap_or_default())
+    };
+    assert!(message.contains("angle") && help.contains("2 deg"), "{message} {help}");
+}
+
+#[test]
 fn problems_are_located() {
     let one = |study: &str| {
         let found = problems(study);

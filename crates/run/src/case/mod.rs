@@ -157,6 +157,14 @@ pub fn parse_length(text: &str) -> Result<f64, String> {
     quantity::parse_quantity::<quantity::Length>(text)
 }
 
+/// Reads an angle such as "2 deg" or "0.03" [rad]; the error says what is accepted.
+///
+/// # Errors
+/// A message for the user.
+pub fn parse_angle(text: &str) -> Result<f64, String> {
+    quantity::parse_quantity::<quantity::Angle>(text)
+}
+
 fn digest(resolved: &RawCase, shapes: &[ShapeFile]) -> Result<String, CaseError> {
     let mut core = resolved.clone();
     core.title = String::new();

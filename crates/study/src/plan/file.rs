@@ -3,11 +3,11 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use grainwake_run::case::{Located, Problem, Source, parse_length};
+use grainwake_run::case::{Located, Problem, Source, parse_angle, parse_length};
 
 use super::claims::Analysis;
 use super::expand::{self, Model};
-use super::raw::{Length, RawEnsemble, RawStudy};
+use super::raw::{RawEnsemble, RawStudy, Size};
 use crate::error::{At, StudyError, refer_to_study_keys};
 
 /// A study: its models, repetitions and requested analysis.
@@ -18,23 +18,25 @@ pub struct Study {
     pub title: String,
     /// Models in the order of the file.
     pub models: Vec<Model>,
-    /// Repetitions with random offsets of the initial position.
+    /// Repetitions with small changes of the start.
     pub ensemble: Option<Ensemble>,
     /// Requested analysis.
     pub analysis: Analysis,
     source: Source,
 }
 
-/// Repetitions of models with random offsets of the initial position of one grain.
+/// Repetitions of models with small changes of the initial position and orientation of one grain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ensemble {
     /// Runs of each model; the first one has no offset.
     pub members: usize,
     /// Radius of the disc normal to gravity from which offsets are drawn uniformly [m].
     pub offset: f64,
-    /// Grain that is offset; the last one by default.
+    /// Largest rotation about each axis of the space frame, drawn uniformly up to it [rad].
+    pub turn: f64,
+    /// Grain that is moved; the last one by default.
     pub grain: Option<usize>,
-    /// Seed of the random numbers.
+    /// Seed of the Sobol sequence.
     pub seed: u64,
     /// Indices of the repeated models.
     pub models: Vec<usize>,
@@ -118,19 +120,12 @@ fn read_ensemble(
     raw: &RawEnsemble,
     models: &[Model],
 ) -> Result<Ensemble, StudyError> {
-    let offset = match &raw.offset.value {
-        Length::Metres(metres) => Ok(*metres),
-        Length::Text(text) => parse_length(text),
-    };
-    let offset = offset.and_then(|metres| match metres.is_finite() && metres > 0.0 {
-        true => Ok(metres),
-        false => Err("an offset must be a positive length".into()),
+    let offset = positive(source, &raw.offset, parse_length, "an offset must be a positive length")
+        .map_err(|problem| problem.help("for example offset = \"0.02 mm\""))?;
+    let turn = raw.turn.as_ref().map(|turn| {
+        positive(source, turn, parse_angle, "a turn must be a positive angle")
+            .map_err(|problem| problem.help("for example turn = \"2 deg\""))
     });
-    let offset = offset.map_err(|message| {
-        let problem = Problem::new(message)
-            .help("for example offset = \"0.02 mm\", a hundredth of a diameter");
-        source.locate(problem, raw.offset.span.as_ref(), "here")
-    })?;
     if !(1..=1000).contains(&raw.members.value) {
         let problem = Problem::new("an ensemble has 1 to 1000 members")
             .help("members includes the run without offset");
@@ -139,6 +134,7 @@ fn read_ensemble(
     Ok(Ensemble {
         members: raw.members.value,
         offset,
+        turn: turn.transpose()?.unwrap_or(0.0),
         grain: raw.grain,
         seed: raw.seed,
         models: match &raw.models {
@@ -146,4 +142,23 @@ fn read_ensemble(
             Some(patterns) => expand::matching(source, patterns, models)?,
         },
     })
+}
+
+/// Reads a positive number or text with a unit.
+fn positive(
+    source: &Source,
+    given: &Located<Size>,
+    parse: fn(&str) -> Result<f64, String>,
+    expected: &str,
+) -> Result<f64, Problem> {
+    let value = match &given.value {
+        Size::Number(value) => Ok(*value),
+        Size::Text(text) => parse(text),
+    };
+    value
+        .and_then(|value| match value.is_finite() && value > 0.0 {
+            true => Ok(value),
+            false => Err(expected.into()),
+        })
+        .map_err(|message| source.locate(Problem::new(message), given.span.as_ref(), "here"))
 }

@@ -76,7 +76,8 @@ pub(crate) struct RawAdjust {
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawEnsemble {
     pub members: Located<usize>,
-    pub offset: Located<Length>,
+    pub offset: Located<Size>,
+    pub turn: Option<Located<Size>>,
     #[serde(default)]
     pub grain: Option<usize>,
     #[serde(default)]
@@ -84,10 +85,10 @@ pub(crate) struct RawEnsemble {
     pub models: Option<Located<Vec<String>>>,
 }
 
-/// Length in metres, or as text with a unit.
+/// Length in metres or angle in radians, or text with a unit.
 #[derive(Clone, Deserialize)]
 #[serde(untagged)]
-pub(crate) enum Length {
-    Metres(f64),
+pub(crate) enum Size {
+    Number(f64),
     Text(String),
 }

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::expand::Model;
 use super::file::Study;
-use super::offset::offset_override;
+use super::offset::member_overrides;
 use super::quantities::SHAPE_FACTORS;
 use super::{Plan, Run};
 use crate::error::StudyError;
@@ -54,7 +54,8 @@ fn runs_of(study: &Study, index: usize, sets: &[String]) -> Result<Vec<Run>, Stu
     if let Some(ensemble) = ensemble {
         for member in 1..ensemble.members {
             let mut set = set.clone();
-            set.push(offset_override(study, model, ensemble, member, &case, &set)?);
+            let overrides = member_overrides(study, model, ensemble, member, &case, &set)?;
+            set.extend(overrides);
             let case = load(&set)?;
             runs.push(run(model, member, set, &case));
         }
