@@ -10,6 +10,7 @@ mod exit;
 mod expect;
 mod grain;
 mod kind;
+mod man;
 mod out;
 mod progress;
 mod report;
@@ -42,6 +43,7 @@ fn main() -> std::process::ExitCode {
             clap_complete::generate(*shell, &mut Cli::command(), "grainwake", &mut script);
             out::write(&script)
         }
+        Command::Man(args) => man::man(args),
     };
     match done {
         Ok(()) => std::process::ExitCode::SUCCESS,

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use base64::Engine;
 use resvg::{tiny_skia, usvg};
 
+use crate::font;
 use crate::raster::{Raster, encode_png};
 use crate::style;
 use crate::text;
@@ -271,8 +272,8 @@ fn options() -> usvg::Options<'static> {
     static FONTS: OnceLock<Arc<usvg::fontdb::Database>> = OnceLock::new();
     let fonts = FONTS.get_or_init(|| {
         let mut fonts = usvg::fontdb::Database::new();
-        fonts.load_font_data(dejavu::sans::regular().to_vec());
-        fonts.load_font_data(dejavu::sans::oblique().to_vec());
+        fonts.load_font_data(font::REGULAR.clone());
+        fonts.load_font_data(font::OBLIQUE.clone());
         Arc::new(fonts)
     });
     let font_family = "DejaVu Sans".to_owned();

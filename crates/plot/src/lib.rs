@@ -13,6 +13,7 @@ mod curve;
 pub mod drawing;
 pub mod equal_aspect;
 mod figure;
+mod font;
 pub mod frame;
 pub mod legend;
 pub mod raster;

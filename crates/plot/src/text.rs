@@ -6,6 +6,8 @@ use skrifa::instance::{LocationRef, Size};
 use skrifa::metrics::GlyphMetrics;
 use skrifa::{FontRef, MetadataProvider};
 
+use crate::font;
+
 /// Size of a sub- or superscript relative to the text.
 const SMALL: f64 = 0.72;
 
@@ -122,7 +124,7 @@ pub fn spans(label: &str, size: f64) -> String {
 /// Returns the width of a label at font size `size` [pt].
 pub fn width(label: &str, size: f64) -> f64 {
     static FONT: OnceLock<Option<FontRef<'static>>> = OnceLock::new();
-    let font = FONT.get_or_init(|| FontRef::new(dejavu::sans::regular()).ok());
+    let font = FONT.get_or_init(|| FontRef::new(&font::REGULAR).ok());
     let Some(font) = font else {
         let count = |piece: &Piece| piece.text.chars().count() as f64;
         return 0.6 * size * pieces(label).iter().map(count).sum::<f64>();

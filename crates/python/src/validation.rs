@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use grainwake_run::Existing;
 use grainwake_run::case::Case;
-use grainwake_validation::{Level, Suite};
+use grainwake_validation::{Level, Library, Suite};
 use pyo3::prelude::*;
 
 use crate::arrays::json;
@@ -17,7 +17,7 @@ use crate::{running, threads};
 pub fn _validate<'py>(
     py: Python<'py>,
     names: Vec<String>,
-    suites: PathBuf,
+    suites: Option<PathBuf>,
     output: PathBuf,
     level: &str,
     threads: usize,
@@ -31,7 +31,8 @@ pub fn _validate<'py>(
             return Err(input(message));
         }
     };
-    let suites = chosen(Suite::read_all(&suites).raise()?, &names)?;
+    let library = Library::open(suites.as_deref()).raise()?;
+    let suites = chosen(library.suites.clone(), &names)?;
     let threads = threads::resolve(threads);
     let mut results = Vec::new();
     for suite in &suites {

@@ -265,6 +265,13 @@ def test_a_validation_has_the_columns_of_the_command_line(root, tmp_path):
         gw.validate("rotation/x", suites=root / "validation", output=tmp_path)
 
 
+def test_the_validations_in_the_package_need_no_source_tree(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    table = gw.validate("contact/bounce", progress=False)
+    assert table["pass"].all() and len(table) > 0
+    assert {path.name for path in tmp_path.iterdir()} == {"runs"}
+
+
 def test_a_run_starts_from_a_checkpoint_of_another_run(case_file, run, tmp_path):
     longer = gw.Case.load(case_file, {"time.end": "0.2 s"})
     branch = longer.run(tmp_path / "branch", start_from=str(run.path), progress=False, report=False)

@@ -3,13 +3,15 @@
 //! A [`Suite`] is a folder with `validation.toml`: runs of case files, and for each run checks of
 //! values measured in its tables ([`Measure`]) against references and bounds. [`Suite::evaluate`]
 //! measures a run folder and returns [`CheckResult`]s; each [`FigureSpec`] shows results beside the
-//! reference data. `validation/README.md` describes the keys of the file.
+//! reference data. [`Library`] opens all suites: those of a folder, or those in the program.
+//! `validation/README.md` describes the keys of the file.
 
 mod check;
 mod check_result;
 mod columns;
 mod expression;
 mod figure;
+mod library;
 mod measurement;
 mod problem;
 mod signal;
@@ -19,5 +21,6 @@ pub use check::{Bounds, Check, Level, Reference, SuiteRun};
 pub use check_result::CheckResult;
 pub use columns::TableSource;
 pub use figure::{DrawnFigure, FigureSpec};
+pub use library::Library;
 pub use measurement::{Measure, Sampling};
 pub use suite::{Suite, SuiteError};

@@ -1,11 +1,20 @@
 //! HTML page with its content security policy.
 
+use std::io::Read as _;
+use std::sync::LazyLock;
+
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use flate2::read::DeflateDecoder;
 use sha2::{Digest as _, Sha256};
 
-/// Bundle of the page's scripts, made by `web/build.mjs`.
-const SCRIPT: &str = include_str!("../web/dist/view.js");
+/// Bundle of the page's scripts, made by `web/build.mjs`. The program holds it compressed.
+static SCRIPT: LazyLock<String> = LazyLock::new(|| {
+    let packed: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/view.js.deflate"));
+    let mut text = String::new();
+    DeflateDecoder::new(packed).read_to_string(&mut text).expect("the bundle of the build");
+    text
+});
 /// Style sheet of the page, made by `web/build.mjs`.
 const STYLE: &str = include_str!("../web/dist/view.css");
 
@@ -16,7 +25,7 @@ pub fn policy(connect: &str) -> String {
     format!(
         "default-src 'none'; script-src 'sha256-{}'; style-src 'sha256-{}'; img-src data: blob:; \
          media-src blob:; connect-src {connect}; base-uri 'none'; form-action 'none'",
-        hash(SCRIPT),
+        hash(&SCRIPT),
         hash(STYLE)
     )
 }
@@ -50,7 +59,8 @@ fn document(policy: &str, data: &str) -> String {
          <link rel=\"icon\" href=\"data:,\">\n\
          <title>Grainwake</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <noscript>This page needs JavaScript. The figures are in report.html.</noscript>\n\
-         {data}<script>{SCRIPT}</script>\n</body>\n</html>\n"
+         {data}<script>{}</script>\n</body>\n</html>\n",
+        *SCRIPT
     )
 }
 

@@ -2,28 +2,40 @@
 
 mod bench;
 mod grain;
+mod man;
 mod report;
 mod run;
 mod study;
 mod validate;
 mod view;
 
+use std::sync::LazyLock;
+
 use clap::{Parser, Subcommand};
+use grainwake_run::provenance;
 
 pub use bench::BenchArgs;
 pub use grain::{
     Body, CompareArgs, ExportArgs, FamilyArgs, FromMeshArgs, FromScanArgs, GrainArgs, GrainCommand,
     InfoArgs, NewGrain,
 };
+pub use man::ManArgs;
 pub use report::ReportArgs;
 pub use run::{CheckArgs, RunArgs};
 pub use study::StudyArgs;
 pub use validate::ValidateArgs;
 pub use view::ViewArgs;
 
+/// Version and commit, as in `provenance.json`.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let commit = provenance::commit().unwrap_or("unknown");
+    format!("{} (commit {commit})", env!("CARGO_PKG_VERSION"))
+});
+
 /// Resolved simulation of grains in fluid: from images or meshes to figures.
 #[derive(Debug, Parser)]
-#[command(name = "grainwake", version, about, propagate_version = true)]
+#[command(name = "grainwake", version, long_version = VERSION.as_str(), about)]
+#[command(propagate_version = true)]
 pub struct Cli {
     /// Command.
     #[command(subcommand)]
@@ -56,4 +68,6 @@ pub enum Command {
         /// Shell
         shell: clap_complete::Shell,
     },
+    /// Print the manual page (roff)
+    Man(ManArgs),
 }

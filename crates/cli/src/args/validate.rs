@@ -11,9 +11,10 @@ pub struct ValidateArgs {
     /// Extent: ci for small runs, full for the published resolutions
     #[arg(long, default_value = "ci", value_parser = ["ci", "full"])]
     pub level: String,
-    /// Folder of the validations
-    #[arg(long, value_name = "DIR", default_value = "validation")]
-    pub suites: PathBuf,
+    /// Folder of the validations [default: `validation` if it holds any, otherwise those in the
+    /// program]
+    #[arg(long, value_name = "DIR")]
+    pub suites: Option<PathBuf>,
     /// Folder of the runs
     #[arg(short, long, value_name = "DIR", default_value = "runs/validation")]
     pub output: PathBuf,

@@ -13,7 +13,7 @@ use grainwake_formats::summary::Summary;
 use grainwake_run::case::{Case, nearest};
 use grainwake_run::provenance::Provenance;
 use grainwake_run::{Ending, Existing, Options, RunError};
-use grainwake_validation::{Level, Suite, SuiteError, SuiteRun};
+use grainwake_validation::{Level, Library, Suite, SuiteError, SuiteRun};
 use table::{line, table};
 
 use crate::args::ValidateArgs;
@@ -30,8 +30,8 @@ impl From<SuiteError> for Exit {
                 Exit::with_help(
                     if missing { BAD_INPUT } else { IO },
                     error.to_string(),
-                    "the validations are in the folder `validation` of the source tree: run from \
-                     its top folder, or give the folder with --suites",
+                    "give the folder of the validations with --suites, or omit --suites for those \
+                     in the program",
                 )
             }
         }
@@ -40,7 +40,8 @@ impl From<SuiteError> for Exit {
 
 /// Runs validations and prints the deviation of each value from its reference.
 pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
-    let mut suites = chosen(Suite::read_all(&args.suites)?, &args.names)?;
+    let library = Library::open(args.suites.as_deref())?;
+    let mut suites = chosen(library.suites.clone(), &args.names)?;
     for run in suites.iter_mut().flat_map(|suite| &mut suite.runs) {
         run.set.extend(args.set.iter().cloned());
     }
@@ -87,10 +88,10 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         print(&table(&results).to_string())?;
     }
     if let Some(folder) = &args.save {
-        let all = Suite::read_all(&args.suites)?;
-        let saved = saved::add(folder, &args.level, &results, &args.output, &all)?;
+        let all = &library.suites;
+        let saved = saved::add(folder, &args.level, &results, &args.output, all)?;
         let drawn = pictures::add(folder, &suites, &args.output, &saved)?;
-        pictures::list(folder, &all)?;
+        pictures::list(folder, all)?;
         if !args.quiet {
             tell!("{drawn} figures in {}", folder.join("figures").display());
         }

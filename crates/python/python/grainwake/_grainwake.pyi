@@ -392,7 +392,7 @@ def _run_notes(folder: _Path) -> list[str]: ...
 def _seconds(time: _Quantity) -> float: ...
 def _validate(
     names: list[str],
-    suites: _Path,
+    suites: _Path | None,
     output: _Path,
     level: str,
     threads: int,

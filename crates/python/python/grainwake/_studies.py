@@ -127,7 +127,7 @@ class StudyFolder:
 def validate(
     names: str | Sequence[str] = (),
     *,
-    suites: Path = "validation",
+    suites: Path | None = None,
     output: Path = "runs/validation",
     level: str = "ci",
     threads: int = 0,
@@ -139,8 +139,9 @@ def validate(
     ----------
     names : str or sequence of str, optional
         Names of validations, or of single runs as "NAME/RUN"; all by default.
-    suites : path-like, default "validation"
-        Folder of the validations in the source tree.
+    suites : path-like, optional
+        Folder of the validations; by default the folder "validation" if it holds any, otherwise
+        those in the package.
     output : path-like, default "runs/validation"
         Folder of the runs; existing runs are replaced.
     level : {"ci", "full"}, default "ci"
@@ -156,7 +157,8 @@ def validate(
         One row for each check: name, run, quantity, value, reference, error, bound, pass, problem.
     """
     wanted = [names] if isinstance(names, str) else [*names]
+    folder = None if suites is None else pathlib.Path(suites)
     rows = _grainwake._validate(
-        wanted, pathlib.Path(suites), pathlib.Path(output), level, threads, progress
+        wanted, folder, pathlib.Path(output), level, threads, progress
     )
     return need("pandas").DataFrame(rows)

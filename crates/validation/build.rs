@@ -1,0 +1,39 @@
+//! Puts the suites of the source tree, small text files, into the program. A copy of the crate
+//! without the tree has none.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Files of a suite: its cases and reference data.
+const KINDS: [&str; 2] = ["toml", "csv"];
+
+fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a readable folder").flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            files(&path, found);
+        } else if KINDS.iter().any(|kind| path.extension().is_some_and(|end| end == *kind)) {
+            found.push(path);
+        }
+    }
+}
+
+fn main() {
+    let root = Path::new(&std::env::var("CARGO_MANIFEST_DIR").unwrap()).join("../../validation");
+    println!("cargo:rerun-if-changed=build.rs");
+    let mut found = Vec::new();
+    if root.is_dir() {
+        println!("cargo:rerun-if-changed={}", root.display());
+        files(&root, &mut found);
+    }
+    found.sort();
+    let mut text = String::from("[\n");
+    for path in found {
+        let name = path.strip_prefix(&root).unwrap().components();
+        let name: Vec<_> = name.map(|part| part.as_os_str().to_str().expect("UTF-8")).collect();
+        writeln!(text, "    ({:?}, include_str!({path:?})),", name.join("/")).unwrap();
+    }
+    text += "]\n";
+    let output = Path::new(&std::env::var("OUT_DIR").unwrap()).join("suites.rs");
+    std::fs::write(output, text).expect("a writable output folder");
+}
