@@ -22,7 +22,7 @@ pub mod page;
 pub mod plan;
 pub mod run;
 
-pub use analysis::{correlation, observation, statistics, verdict};
+pub use analysis::{correlation, kissing, observation, statistics, survival, verdict};
 pub use error::StudyError;
 pub use measure::pair::{PairHistory, PairMeasures};
 pub use measure::record::{RunRecord, records};
@@ -30,7 +30,9 @@ pub use measure::settling::{GrainSettling, SettlingMeasures};
 pub use measure::table::{columns, to_csv, write_tables};
 pub use measure::trajectory::Trajectory;
 pub use page::{StudyReportFiles, render};
-pub use plan::claims::{Analysis, Claim, Condition, Correlations, FigureRequest, Sign, Test};
+pub use plan::claims::{
+    Analysis, Claim, Condition, Correlations, FigureRequest, Kissing, Sign, Test,
+};
 pub use plan::expand::{Model, Setting};
 pub use plan::file::{Ensemble, Study};
 pub use plan::selection::Selection;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use grainwake_study::{Plan, RUNS, Run, Study, StudyReportFiles, render};
+use grainwake_study::{Kissing, Plan, RUNS, Run, Study, StudyReportFiles, render};
 
 /// Plan of the 65 models of the repository, with the hashes of the synthetic run folders.
 fn synthetic_plan() -> Plan {
@@ -271,4 +271,40 @@ fn an_empty_study_has_a_page_and_a_damaged_one_is_an_error() {
     assert!(std::fs::read_to_string(&rendered.page).unwrap().contains("0 of 65 runs are finished"));
     std::fs::write(folder.join("study.json"), "{").unwrap();
     assert!(render(&folder).unwrap_err().to_string().contains("study.json is damaged"));
+}
+
+#[test]
+fn the_page_tells_who_kisses_and_does_not_name_every_missing_run() {
+    let root = tempfile::tempdir().unwrap();
+    let orientation = |run: &Run| run.levels.get("orientation").cloned().unwrap_or_default();
+    let folder = study(root.path(), |run| ["o1", "o3"].contains(&&*orientation(run)));
+    let path = folder.join("study.json");
+    let mut plan: Plan = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    // Another title keeps the analysis of the plan.
+    plan.title = "Who kisses".into();
+    plan.analysis.kissing = Some(Kissing { by: "orientation".into(), grid: None });
+    std::fs::write(&path, serde_json::to_string(&plan).unwrap()).unwrap();
+    let rendered = render(&folder).unwrap();
+    assert!(names(&rendered).contains(&"kissing-share".to_owned()));
+    let svg = std::fs::read_to_string(folder.join("figures/kissing-share.svg")).unwrap();
+    assert!(svg.contains("share that has kissed") && !svg.contains("NaN"));
+    let page = std::fs::read_to_string(&rendered.page).unwrap();
+    assert!(page.contains("<h2>Who kisses</h2>"), "no section");
+    assert!(page.contains("missing: 33 runs, the first are g01-o2, g01-o4, "));
+    assert!(!page.contains("g15-o2"), "a missing run has no row");
+    let analysis = std::fs::read_to_string(folder.join("analysis.json")).unwrap();
+    let analysis: serde_json::Value = serde_json::from_str(&analysis).unwrap();
+    let levels = analysis["kissing"]["levels"].as_array().unwrap();
+    let of = |level: &serde_json::Value| {
+        (
+            level["level"].as_str().unwrap().to_owned(),
+            level["runs"].as_u64(),
+            level["share"].as_f64(),
+        )
+    };
+    let expected = |name: &str| (name.to_owned(), Some(16), Some(1.0));
+    assert_eq!(levels.iter().map(of).collect::<Vec<_>>(), [expected("o1"), expected("o3")]);
+    let difference = &analysis["kissing"]["differences"][0];
+    assert!(difference["time_shift"].as_f64().unwrap() > 0.0, "orientation 1 is later");
+    assert!(difference["log_rank_p"].as_f64().unwrap() < 1e-3);
 }

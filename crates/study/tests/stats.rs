@@ -3,6 +3,7 @@
 use grainwake_study::statistics::{
     coefficient_of_variation, median, quantile, ranks, relative_spread_test, signed_rank, spearman,
 };
+use grainwake_study::survival::{Duration, kaplan_meier, log_rank, median_time};
 
 #[test]
 fn ties_share_their_mean_rank() {
@@ -99,4 +100,53 @@ fn quartiles_and_spreads() {
     let wide: Vec<f64> = (0..12).map(|i| 10.0 + f64::from(i * 7 % 12)).collect();
     assert!(relative_spread_test(&wide, &narrow).unwrap().low > 0.0);
     assert!(relative_spread_test(&narrow, &wide).unwrap().high < 0.0);
+}
+
+/// Times to relapse in weeks of Freireich et al. (1963): treated patients and those with a placebo.
+fn relapses() -> [Vec<Duration>; 2] {
+    let duration = |time: i32| Duration { time: f64::from(time.abs()), censored: time < 0 };
+    let treated =
+        [6, 6, 6, -6, 7, -9, 10, -10, -11, 13, 16, -17, -19, -20, 22, 23, -25, -32, -32, -34, -35];
+    let placebo = [1, 1, 2, 2, 3, 4, 4, 5, 5, 8, 8, 8, 8, 11, 11, 12, 12, 15, 17, 22, 23];
+    [treated.map(duration).to_vec(), placebo.map(duration).to_vec()]
+}
+
+#[test]
+fn kaplan_and_meier_of_a_known_sample() {
+    let [treated, placebo] = relapses();
+    let expected = [
+        (6.0, 0.8571),
+        (7.0, 0.8067),
+        (10.0, 0.7529),
+        (13.0, 0.6902),
+        (16.0, 0.6275),
+        (22.0, 0.5378),
+        (23.0, 0.4482),
+    ];
+    let found = kaplan_meier(&treated);
+    assert_eq!(found.len(), expected.len());
+    for ((time, share), (at, survival)) in found.into_iter().zip(expected) {
+        assert!(time == at && (1.0 - share - survival).abs() < 1e-4, "{time}: {share}");
+    }
+    assert_eq!(median_time(&treated), Some(23.0));
+    assert_eq!(median_time(&placebo), Some(8.0));
+    assert_eq!(median_time(&treated[..4]), Some(6.0));
+    assert_eq!(median_time(&treated[15..]), None, "one event of six");
+    assert_eq!(median_time(&[]), None);
+}
+
+#[test]
+fn log_rank_of_a_known_sample() {
+    // Chi-squared 16.79 with one degree of freedom.
+    let p = log_rank(&[relapses()]).unwrap();
+    assert!((p - 4.17e-5).abs() < 0.02e-5, "{p}");
+    let [treated, placebo] = relapses();
+    let reversed = log_rank(&[[placebo.clone(), treated.clone()]]).unwrap();
+    assert!((reversed / p - 1.0).abs() < 1e-9);
+    // A stratum without a second sample adds nothing.
+    let strata = [relapses(), [treated.clone(), Vec::new()]];
+    assert!((log_rank(&strata).unwrap() / p - 1.0).abs() < 1e-9);
+    assert!(log_rank(&[[treated, Vec::new()]]).is_none());
+    // Equal samples do not differ.
+    assert!((log_rank(&[[placebo.clone(), placebo]]).unwrap() - 1.0).abs() < 1e-9);
 }

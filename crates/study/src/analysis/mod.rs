@@ -1,6 +1,8 @@
 //! Statistics over runs: right-censored observations, rank tests and verdicts on claims.
 
 pub mod correlation;
+pub mod kissing;
 pub mod observation;
 pub mod statistics;
+pub mod survival;
 pub mod verdict;

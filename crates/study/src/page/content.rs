@@ -3,6 +3,7 @@
 use grainwake_report::WrittenFigure;
 
 use crate::analysis::correlation::Correlation;
+use crate::analysis::kissing::KissingResults;
 use crate::analysis::verdict::Finding;
 use crate::measure::record::RunRecord;
 use crate::plan::Plan;
@@ -13,6 +14,7 @@ pub(crate) struct Content<'a> {
     pub records: &'a [RunRecord],
     pub findings: &'a [Finding],
     pub correlations: &'a [Correlation],
+    pub kissing: Option<&'a KissingResults>,
     pub figures: &'a [WrittenFigure],
     pub notes: &'a [String],
 }

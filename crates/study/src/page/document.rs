@@ -4,10 +4,13 @@ use grainwake_report::html::{self, section};
 use maud::{Markup, html};
 
 use super::content::Content;
-use super::{pairs, settling, tables};
+use super::{kissing, pairs, settling, tables};
 use crate::analysis::verdict::Verdict;
 use crate::measure::record::RunRecord;
 use crate::run::state::StateKind;
+
+/// Number of runs that are named where very many are in the same state.
+const LISTED: usize = 10;
 
 impl Content<'_> {
     /// Returns the page.
@@ -21,6 +24,9 @@ impl Content<'_> {
             @if self.has_pairs() {
                 @let title = "Contact and separation times and their uncertainty";
                 (section(title, &pairs::summary(self)))
+            }
+            @if let Some(results) = self.kissing {
+                (section("Who kisses", &kissing::tables(results)))
             }
             @if !self.findings.is_empty() {
                 (section("Claims and verdicts", &tables::claims(self.findings)))
@@ -75,7 +81,10 @@ impl Content<'_> {
         for state in [Missing, Unfinished, Failed, Stale] {
             let runs = self.records.iter().filter(|r| r.state == state);
             let names: Vec<&str> = runs.map(|r| r.name.as_str()).collect();
-            if !names.is_empty() {
+            if let Some(first) = names.get(..LISTED).filter(|_| names.len() > 2 * LISTED) {
+                let all = names.len();
+                out.push(format!("{state}: {all} runs, the first are {}", first.join(", ")));
+            } else if !names.is_empty() {
                 out.push(format!("{state}: {}", names.join(", ")));
             }
         }

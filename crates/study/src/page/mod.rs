@@ -3,6 +3,7 @@
 mod content;
 mod document;
 pub mod figure;
+mod kissing;
 mod pairs;
 mod settling;
 mod tables;
@@ -16,6 +17,7 @@ use rayon::prelude::*;
 use self::content::Content;
 use self::figure::FigureData;
 use crate::analysis::correlation::correlations;
+use crate::analysis::kissing::kissing;
 use crate::analysis::verdict::evaluate;
 use crate::error::{At, StudyError, write_file, write_json};
 use crate::measure::record::{RunRecord, records};
@@ -67,13 +69,19 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     let trajectories = shown.filter_map(trajectory).collect();
     let findings = evaluate(&plan.analysis, &records);
     let correlations = correlations(&plan.analysis, &records);
-    let analysis = serde_json::json!({ "claims": findings, "correlations": correlations });
+    let kissing = kissing(&plan.analysis, &records);
+    let analysis = serde_json::json!({
+        "claims": findings,
+        "correlations": correlations,
+        "kissing": kissing,
+    });
     write_json(&folder.join("analysis.json"), &analysis)?;
     let data = FigureData {
         plan: &plan,
         records: &records,
         folder,
         correlations: &correlations,
+        kissing: kissing.as_ref(),
         trajectories,
     };
     let figures = figure::all(&data, &mut notes);
@@ -88,6 +96,7 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
         records: &records,
         findings: &findings,
         correlations: &correlations,
+        kissing: kissing.as_ref(),
         figures: &figures,
         notes: &notes,
     };

@@ -9,6 +9,7 @@ use crate::analysis::correlation::Correlation;
 use crate::analysis::verdict::Finding;
 use crate::format::{p_value, quantity_value, significant, title};
 use crate::measure::record::RunRecord;
+use crate::run::state::StateKind;
 
 /// Columns of the table of pairs: heading and quantity.
 const PAIR_COLUMNS: [(&str, &str); 9] = [
@@ -64,6 +65,9 @@ pub(super) fn runs(content: &Content) -> Markup {
         row.push(cell(record.wall_s.map(|s| format!("{:.1}", s / 60.0))));
         row
     };
+    // The page names missing runs at its head.
+    let shown = content.records.iter().filter(|record| record.state != StateKind::Missing);
+    let shown: Vec<&RunRecord> = shown.collect();
     html! {
         @if content.has_pairs() {
             p {
@@ -72,7 +76,7 @@ pub(super) fn runs(content: &Content) -> Markup {
             }
         }
         @if content.has_settling() { (settling::table_note()) }
-        (table(&columns, content.records.iter().map(row)))
+        (table(&columns, shown.into_iter().map(row)))
     }
 }
 

@@ -19,6 +19,9 @@ pub struct Analysis {
     /// Rank correlations to be computed.
     #[serde(default)]
     pub correlations: Option<Correlations>,
+    /// Requested results on the first contact of pairs.
+    #[serde(default)]
+    pub kissing: Option<Kissing>,
     /// Contents of the figures.
     #[serde(default)]
     pub figures: FigureRequest,
@@ -153,6 +156,17 @@ pub struct Correlations {
     pub by: String,
 }
 
+/// Requested results on the first contact of pairs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Kissing {
+    /// Axis whose levels are compared.
+    pub by: String,
+    /// Axis of the grids, from coarse to fine.
+    #[serde(default)]
+    pub grid: Option<String>,
+}
+
 /// Requested figures; a figure whose keys are missing is not drawn.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -183,6 +197,7 @@ struct RawAnalysis {
     #[serde(default)]
     claim: Vec<RawClaim>,
     correlations: Option<Located<Correlations>>,
+    kissing: Option<Located<Kissing>>,
     figures: Option<Located<FigureRequest>>,
     resolution: Option<Located<Resolution>>,
 }
@@ -330,6 +345,11 @@ impl Analysis {
             value.factors.iter().for_each(|f| check.factor(f, span));
             check.axis(&value.by, span);
         }
+        if let Some(Located { value, span }) = &raw.kissing {
+            for axis in [&value.by].into_iter().chain(&value.grid) {
+                check.axis(axis, span.as_ref());
+            }
+        }
         if let Some(Located { value, span }) = &raw.resolution {
             let quantities = &value.unconverged;
             quantities.iter().for_each(|q| check.quantity(q, span.as_ref()));
@@ -351,6 +371,7 @@ impl Analysis {
         Ok(Analysis {
             claims: raw.claim.into_iter().map(claim).collect(),
             correlations: raw.correlations.map(|c| c.value),
+            kissing: raw.kissing.map(|k| k.value),
             figures: raw.figures.map(|f| f.value).unwrap_or_default(),
             resolution: raw.resolution.map(|r| r.value),
         })

@@ -10,6 +10,7 @@ use grainwake_run::RESOLVED;
 use grainwake_run::case::Case;
 
 use crate::analysis::correlation::Correlation;
+use crate::analysis::kissing::KissingResults;
 use crate::measure::record::RunRecord;
 use crate::measure::trajectory::Trajectory;
 use crate::plan::{Plan, Run};
@@ -24,6 +25,8 @@ pub struct FigureData<'a> {
     pub folder: &'a Path,
     /// Correlations.
     pub correlations: &'a [Correlation],
+    /// Results on the first contact.
+    pub kissing: Option<&'a KissingResults>,
     /// Trajectories of the finished runs that are compared, by name of the run.
     pub trajectories: BTreeMap<String, Trajectory>,
 }

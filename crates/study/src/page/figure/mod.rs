@@ -3,6 +3,7 @@
 mod data;
 mod grains;
 mod histories;
+mod kissing_share;
 mod kissing_time;
 mod legend;
 mod overview;
@@ -25,6 +26,7 @@ pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     out.extend(snapshots::figures(data, notes));
     out.extend(kissing_time::by_model(data));
     out.extend(kissing_time::box_plot(data));
+    out.extend(kissing_share::figure(data));
     out.extend(histories::figures(data, notes));
     out.extend(overview::figures(data));
     out.extend(trends::figure(data));

@@ -1,0 +1,90 @@
+//! Share of the pairs that have kissed, against time: Kaplan and Meier's curves.
+
+use grainwake_plot::axis::{Axis, AxisRange};
+use grainwake_plot::drawing::{Anchor, Drawing};
+use grainwake_plot::frame::{Frame, Labelled};
+use grainwake_plot::legend::{Entry, Legend};
+use grainwake_plot::style::{PAGE, series_colour};
+use grainwake_plot::{Figure, letter, text};
+
+use super::data::{FigureData, unique};
+use crate::analysis::kissing::Level;
+use crate::analysis::survival::kaplan_meier;
+
+const LEFT: f64 = 42.0;
+const GAP: f64 = 20.0;
+const HEIGHT: f64 = 140.0;
+/// Height of the title above a panel [pt].
+const TITLE: f64 = 20.0;
+/// Largest number of panels in a row.
+const ACROSS: usize = 2;
+
+/// Draws one panel per grid, with one curve per level.
+pub fn figure(data: &FigureData) -> Option<Figure> {
+    let levels = &data.kissing?.levels;
+    let shown: Vec<&Level> = levels.iter().filter(|l| !l.durations.is_empty()).collect();
+    let times = shown.iter().flat_map(|l| &l.durations).map(|d| d.time);
+    let end = times.fold(0.0, f64::max);
+    if end == 0.0 {
+        return None;
+    }
+    let names: Vec<String> = unique(shown.iter().map(|l| &l.level));
+    let grids: Vec<String> = unique(shown.iter().filter_map(|l| l.grid.as_ref()));
+    let panels = grids.len().max(1);
+    let across = panels.min(ACROSS);
+    let width = (PAGE - LEFT - 8.0 - GAP * (across as f64 - 1.0)) / across as f64;
+    let entry = |(i, name): (usize, &String)| Entry {
+        name: text::literal(name),
+        colour: series_colour(i),
+        line: Some(""),
+        symbol: None,
+    };
+    let legend = Legend::new(names.iter().enumerate().map(entry), PAGE - LEFT);
+    let top = legend.height() + 8.0;
+    let rows = panels.div_ceil(across) as f64;
+    let mut drawing = Drawing::new(PAGE, top + rows * (HEIGHT + TITLE) + 26.0);
+    legend.draw(&mut drawing, (LEFT, 5.0));
+    for panel in 0..panels {
+        let (column, row) = (panel % across, panel / across);
+        let frame = Frame {
+            x: LEFT + column as f64 * (width + GAP),
+            y: top + TITLE + row as f64 * (HEIGHT + TITLE),
+            width,
+            height: HEIGHT,
+            across: Axis::linear("*t* √(*g*/*d*)  [–]", 0.0, end, 6, AxisRange::Tight),
+            up: Axis::linear("share that has kissed  [–]", 0.0, 1.0, 5, AxisRange::Tight),
+        };
+        frame.grid(&mut drawing);
+        if let Some(grid) = grids.get(panel) {
+            let title = format!("{}  {}", letter(panel), text::literal(grid));
+            drawing.text((frame.x, frame.y - 4.0), Anchor::Start, &title);
+        }
+        for level in shown.iter().filter(|l| l.grid.as_ref() == grids.get(panel)) {
+            let colour = names.iter().position(|name| *name == level.level).unwrap_or(0);
+            let clip = format!("clip-share-{panel}-{}", level.level);
+            frame.curve(&mut drawing, &steps(level, end), series_colour(colour), None, &clip);
+        }
+        let last_row = panel + across >= panels;
+        frame.outline(&mut drawing, Labelled { across: last_row, up: column == 0 });
+    }
+    let runs: usize = shown.iter().map(|l| l.runs).sum();
+    let caption = format!(
+        "Probability that a pair has come into contact by time *t*, by Kaplan and Meier's \
+         estimate from {runs} runs; pairs that land first are right-censored. A curve ends at the \
+         last landing."
+    );
+    Some(Figure::new("kissing-share", "Share of the pairs that have kissed", caption, drawing))
+}
+
+/// Points of the step curve of a level, to its last observation.
+fn steps(level: &Level, end: f64) -> Vec<(f64, f64)> {
+    let last = level.durations.iter().map(|d| d.time).fold(0.0, f64::max).min(end);
+    let mut points = vec![(0.0, 0.0)];
+    let mut share = 0.0;
+    for (time, next) in kaplan_meier(&level.durations) {
+        points.extend([(time, share), (time, next)]);
+        share = next;
+    }
+    points.push((last, share));
+    points
+}
