@@ -132,6 +132,11 @@ impl Problems<'_> {
             let help = "give each axis a unique name";
             self.add(message, help, axis.name.span.as_ref(), "this one");
         }
+        if all.iter().flat_map(|a| &a.values.value).any(|v| v.factors.contains_key(name)) {
+            let message = format!("the axis \"{name}\" has the name of a factor");
+            let help = "both are columns of the table: give the factor another name";
+            self.add(message, help, axis.name.span.as_ref(), "this axis");
+        }
         if axis.values.value.is_empty() {
             let message = format!("the axis \"{name}\" has no values");
             let help = "values = [{ name = \"a\", value = ... }, ...]";

@@ -1,0 +1,132 @@
+"""Checks the table `kissing` of a study's analysis.json by a second route.
+
+Recomputes it from table.csv with pandas, lifelines and statsmodels: shares, their bootstrap
+intervals, medians of Kaplan and Meier, stratified log-rank tests, Hodges-Lehmann shifts, and the
+differences between grids.
+
+    pip install lifelines statsmodels
+    python studies/second_route.py results/dkt-morphology-ensemble orientation cells
+"""
+
+import json
+import sys
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from lifelines import KaplanMeierFitter
+from statsmodels.duration.survfunc import survdiff
+
+SAMPLES = 4000
+INTERVAL_TOLERANCE = 0.02
+
+
+def read(folder, by):
+    table = pd.read_csv(folder / "table.csv")
+    table = table[(table.state == "finished") & table[by].notna()].copy()
+    table["kissed"] = table.kiss_time.notna()
+    table["time"] = table.kiss_time.fillna(table.landing_time)
+    return table
+
+
+def interval(groups, seed=1):
+    """95 % interval of the mean over models of the mean over members, both drawn anew."""
+    random = np.random.default_rng(seed)
+    samples = np.empty(SAMPLES)
+    for i in range(SAMPLES):
+        models = random.integers(len(groups), size=len(groups))
+        samples[i] = np.mean([np.mean(random.choice(groups[m], len(groups[m]))) for m in models])
+    return np.quantile(samples, [0.025, 0.975])
+
+
+def median_time(table):
+    found = KaplanMeierFitter().fit(table.time, table.kissed).median_survival_time_
+    return found if np.isfinite(found) else None
+
+
+def pairs(first, second, other):
+    """Models of two tables that are equal on the axes `other`."""
+    left = {key: group for key, group in first.groupby(other)}
+    right = {key: group for key, group in second.groupby(other)}
+    return [(left[key], right[key]) for key in left if key in right]
+
+
+def common_differences(two):
+    out = []
+    for a, b in two:
+        both = a.set_index("member").kissed.astype(float) - b.set_index("member").kissed.astype(
+            float
+        )
+        both = both.dropna().to_numpy()
+        if len(both):
+            out.append(both)
+    return out
+
+
+def close(what, found, expected, tolerance=1e-9):
+    missing = (found is None) != (expected is None)
+    if missing or found is not None and abs(found - expected) > tolerance:
+        sys.exit(f"{what}: {expected} in analysis.json, {found} by the second route")
+
+
+def main(folder, by, grid):
+    folder = Path(folder)
+    table = read(folder, by)
+    analysis = json.loads((folder / "analysis.json").read_text())["kissing"]
+    axes = [name for name in ("grain", "orientation", "cells") if name in table.columns]
+    on = lambda level, cells: table[
+        (table[by] == level) & ((table[grid] == cells) if cells is not None else True)
+    ]
+    checks = 0
+    for entry in analysis["levels"]:
+        here = on(entry["level"], entry["grid"])
+        what = f"{entry['level']} {entry['grid']}"
+        groups = [g.kissed.to_numpy(float) for _, g in here.groupby("model")]
+        close(f"{what}: runs", float(len(here)), entry["runs"])
+        close(f"{what}: share", float(np.mean([g.mean() for g in groups])), entry["share"])
+        close(f"{what}: median time", median_time(here), entry["median_time"])
+        for end, expected in zip(interval(groups), entry["interval"]):
+            close(f"{what}: interval", end, expected, INTERVAL_TOLERANCE)
+        checks += 5
+    for entry in analysis["differences"]:
+        what = f"{entry['first']} - {entry['second']} {entry['grid']}"
+        other = [axis for axis in axes if axis != by]
+        two = pairs(on(entry["first"], entry["grid"]), on(entry["second"], entry["grid"]), other)
+        groups = common_differences(two)
+        close(f"{what}: share", float(np.mean([g.mean() for g in groups])), entry["share"])
+        for end, expected in zip(interval(groups), entry["interval"]):
+            close(f"{what}: interval", end, expected, INTERVAL_TOLERANCE)
+        strata = pd.concat([g.assign(stratum=i) for i, ab in enumerate(two) for g in ab])
+        if strata.kissed.any():
+            _, p = survdiff(
+                strata.time, strata.kissed, strata[by], strata=strata.stratum.to_numpy()
+            )
+            close(f"{what}: log-rank", p, entry["log_rank_p"], 1e-6)
+        medians = [(median_time(a), median_time(b)) for a, b in two]
+        shifts = np.array([a - b for a, b in medians if a is not None and b is not None])
+        if len(shifts) >= 6:
+            walsh = [shifts] + [(shifts[i] + shifts[j]) / 2 for i, j in combinations(range(len(shifts)), 2)]
+            close(f"{what}: shift", float(np.median(np.hstack(walsh))), entry["time_shift"], 1e-6)
+        checks += 5
+    for entry in analysis["grids"]:
+        what = f"{entry['coarse']} - {entry['fine']} {entry['level']}"
+        here = table if entry["level"] is None else table[table[by] == entry["level"]]
+        other = [axis for axis in axes if axis != grid]
+        two = pairs(
+            here[here[grid] == entry["coarse"]], here[here[grid] == entry["fine"]], other
+        )
+        groups = common_differences(two)
+        close(f"{what}: share", float(np.mean([g.mean() for g in groups])), entry["share"])
+        same = [(a.kissed.mean() >= 0.5) == (b.kissed.mean() >= 0.5) for a, b in two]
+        close(f"{what}: agreement", float(np.mean(same)), entry["agreement"])
+        checks += 2
+    if not checks:
+        sys.exit("analysis.json has no table `kissing`")
+    print(f"{folder}: {checks} values agree by the second route")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 4:
+        sys.exit(__doc__)
+    main(*sys.argv[1:])
