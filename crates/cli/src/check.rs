@@ -1,8 +1,8 @@
 //! `grainwake check`.
 
 use grainwake_run::case::Case;
-use grainwake_run::case::Estimate;
 use grainwake_run::case::number_format::{number, quantity};
+use grainwake_run::case::{Estimate, cells_for_drag_error};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 
 use crate::args::CheckArgs;
@@ -50,6 +50,12 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     let thin = |(n, thin): &(f64, f64)| *thin < 0.95 * n;
     let shortest = e.cells_per_diameter.zip(e.cells_across_shortest_axis).filter(thin);
     rows.extend(with_unit("cells across shortest axis", shortest.map(|(_, thin)| thin), ""));
+    if let Some((error, reynolds)) = e.drag_error.zip(e.reynolds) {
+        let [five, two] = [0.05, 0.02].map(|error| cells_for_drag_error(error, reynolds));
+        let error = 100.0 * error;
+        let text = format!("{error:.1} % expected; at most 5 % from {five} cells, 2 % from {two}");
+        rows.push(("error of the drag", text));
+    }
     // For unequal grains the number refers to one of them.
     let which = e.galileo_grain.filter(|_| differ(case));
     let which = which.map_or(String::new(), |i| format!("(grain {i}, the largest)"));

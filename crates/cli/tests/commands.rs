@@ -117,6 +117,7 @@ fn check_gives_the_derived_numbers() {
         "memory_bytes",
         "galileo",
         "cells_per_diameter",
+        "drag_error",
         "warnings",
     ] {
         assert!(numbers.get(key).is_some(), "{key}");
@@ -127,7 +128,9 @@ fn check_gives_the_derived_numbers() {
     );
     assert!(numbers["warnings"].to_string().contains("cells across"));
     let text = grainwake().arg("check").arg(&case).assert().success();
-    assert!(String::from_utf8_lossy(&text.get_output().stdout).contains("Galileo number"));
+    let text = String::from_utf8_lossy(&text.get_output().stdout).into_owned();
+    assert!(text.contains("Galileo number"), "{text}");
+    assert!(text.contains("error of the drag") && text.contains("2 % from"), "{text}");
 }
 
 #[test]

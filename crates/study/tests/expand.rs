@@ -158,8 +158,7 @@ fn problems_are_located() {
     assert!(message.contains("cannot be a name"), "{message}");
     let (message, ..) = one(&STUDY.replace("name = \"grip\"", "name = \"weight\""));
     assert!(message.contains("two axes"), "{message}");
-    let (message, help, place) =
-        one(&STUDY.replace("factors = { density", "factors = { weight"));
+    let (message, help, place) = one(&STUDY.replace("factors = { density", "factors = { weight"));
     assert!(message.contains("name of a factor") && help.contains("another name"), "{message}");
     assert_eq!(place, Some((true, 5)));
     let (message, ..) = one(&format!("{STUDY}[ensemble]\nmembers = 0\noffset = 1\n"));

@@ -38,6 +38,8 @@ pub struct Estimate {
     pub cells_per_diameter: Option<f64>,
     /// Cells across the shortest axis of the thinnest grain.
     pub cells_across_shortest_axis: Option<f64>,
+    /// Relative error of the drag expected on this grid, see [`drag_error`].
+    pub drag_error: Option<f64>,
     /// Blocked part of the cross-section normal to gravity, largest grain.
     pub blockage: Option<f64>,
     /// Duration of a contact of two equal grains, shortest [s].
@@ -83,6 +85,9 @@ impl Estimate {
         let contact_s = substep_s * contact_substeps.unwrap_or(1.0);
         let step_s = seconds(field_bytes * NS_PER_CELL_BYTE);
         let smallest = smallest_diameter(&setup.grains);
+        let cells_per_diameter = (fluid.is_some() && smallest.is_finite())
+            .then(|| smallest / setup.mesh.spacing.max_element());
+        let reynolds = galileo.map(settling_reynolds);
         Estimate {
             cells,
             steps: steps as u64,
@@ -91,12 +96,12 @@ impl Estimate {
             memory_free_bytes: available_memory(),
             galileo,
             galileo_grain: largest.map(|(index, ..)| index),
-            reynolds: galileo.map(settling_reynolds),
+            reynolds,
             settling_speed_m_per_s: speed,
-            cells_per_diameter: (fluid.is_some() && smallest.is_finite())
-                .then(|| smallest / setup.mesh.spacing.max_element()),
+            cells_per_diameter,
             cells_across_shortest_axis: (fluid.is_some() && smallest.is_finite())
                 .then(|| shortest_axis(setup) / setup.mesh.spacing.max_element()),
+            drag_error: cells_per_diameter.zip(reynolds).map(|(n, re)| drag_error(n, re)),
             blockage: blockage(setup),
             contact_time_s,
             contact_substeps,
@@ -105,6 +110,27 @@ impl Estimate {
             warnings: Vec::new(),
         }
     }
+}
+
+/// Error of the drag where the boundary layer is resolved, at 8 cells per diameter. It falls slowly
+/// with the number of cells (`docs/accuracy.md`: 2.3 % at 8 and 1.6 % at 16 cells, Re 100).
+const RESOLVED_DRAG_ERROR: f64 = 0.023;
+/// Error of the drag times n^2 / Re where the boundary layer is not resolved, n cells per diameter:
+/// the smallest factor that bounds the errors at 8 cells in `docs/accuracy.md` (5.9 % at Re 300,
+/// 8.7 % at Re 350).
+pub(super) const THIN_LAYER_DRAG_ERROR: f64 = 0.016;
+
+/// Relative error of the drag expected with `n` cells per diameter at a Reynolds number: a bound of
+/// the errors measured in `docs/accuracy.md`, Re 20 to 350, from 8 cells on.
+fn drag_error(n: f64, reynolds: f64) -> f64 {
+    let resolved = RESOLVED_DRAG_ERROR * (8.0 / n).sqrt();
+    resolved.max(THIN_LAYER_DRAG_ERROR * reynolds / (n * n))
+}
+
+/// Smallest number of cells per diameter, 8 or more, with which the expected error of the drag is
+/// at most `error`.
+pub fn cells_for_drag_error(error: f64, reynolds: f64) -> u32 {
+    (8..1000).find(|n| drag_error(f64::from(*n), reynolds) <= error).unwrap_or(1000)
 }
 
 /// Returns the shortest principal extent of a grain [m].
@@ -132,4 +158,31 @@ fn blockage(setup: &Setup) -> Option<f64> {
     let extent = setup.mesh.extent();
     let along = (extent * down.abs()).element_sum();
     Some(std::f64::consts::FRAC_PI_4 * largest * largest * along / extent.element_product())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn expected_errors_bound_the_measured_ones() {
+        // Reynolds number, cells per diameter, measured error of the drag (docs/accuracy.md).
+        let measured = [
+            (20.0, 8.0, 0.007),
+            (50.0, 8.0, 0.016),
+            (100.0, 8.0, 0.023),
+            (100.0, 16.0, 0.016),
+            (150.0, 8.0, 0.002),
+            (300.0, 8.0, 0.059),
+            (350.0, 8.0, 0.087),
+        ];
+        for (reynolds, n, error) in measured {
+            let expected = drag_error(n, reynolds);
+            assert!(expected >= error && expected < 0.09, "Re {reynolds}, {n} cells: {expected}");
+        }
+        assert_eq!(cells_for_drag_error(0.05, 100.0), 8);
+        assert_eq!(cells_for_drag_error(0.02, 100.0), 11);
+        assert_eq!(cells_for_drag_error(0.05, 300.0), 10);
+        assert_eq!(cells_for_drag_error(0.02, 300.0), 16);
+    }
 }

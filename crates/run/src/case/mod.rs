@@ -43,7 +43,7 @@ use grainwake_solver::sim::Setup;
 
 pub use branch::find_parent;
 pub use error::{CaseError, Problem};
-pub use estimate::Estimate;
+pub use estimate::{Estimate, cells_for_drag_error};
 pub use expect::{Expectation, Verdict};
 pub use located::Located;
 pub use schema::schema;

@@ -1,6 +1,6 @@
 //! Warnings about resolution and cost.
 
-use crate::case::estimate::Estimate;
+use crate::case::estimate::{Estimate, THIN_LAYER_DRAG_ERROR};
 use crate::case::number_format::{AXES, quantity};
 use crate::case::settling::time_step;
 use grainwake_solver::dem::{ContactLawKind, Grain};
@@ -18,9 +18,6 @@ const CONTACT_DOMINATES: f64 = 0.5;
 const UNSTABLE_CFL: f64 = 1.0;
 /// Cells per diameter below which forces are rough.
 const COARSE: f64 = 8.0;
-/// Relative error of the drag times n^2 / Re, n cells per diameter: the smallest factor that bounds
-/// the errors at 8 cells in `docs/accuracy.md` (5.9 % at Re 300, 8.7 % at Re 350).
-const DRAG_ERROR: f64 = 0.016;
 /// Estimated error of the drag from which the resolution is a reason for a warning.
 const LARGEST_DRAG_ERROR: f64 = 0.05;
 /// Steps over which single-precision rounding errors of one sign add up to 0.3 %.
@@ -38,13 +35,13 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
         found.push(format!("only {n:.1} cells across the shortest axis of the thinnest grain: below {THIN:.0} forces are rough; make cell_size smaller"));
     }
     if let (Some(n), Some(re)) = (e.cells_per_diameter, e.reynolds) {
-        let error = DRAG_ERROR * re / (n * n);
+        let error = THIN_LAYER_DRAG_ERROR * re / (n * n);
         if error > LARGEST_DRAG_ERROR {
             found.push(format!(
                 "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells): expect the drag {:.0} % too low; {:.0} cells reduce the error to 3 %",
                 n / re.sqrt(),
                 100.0 * error,
-                (DRAG_ERROR * re / 0.03).sqrt().ceil()
+                (THIN_LAYER_DRAG_ERROR * re / 0.03).sqrt().ceil()
             ));
         }
     }
