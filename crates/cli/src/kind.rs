@@ -15,6 +15,7 @@ struct Marks {
     domain: Option<IgnoredAny>,
     grain: Option<IgnoredAny>,
     packing: Option<IgnoredAny>,
+    poses: Option<IgnoredAny>,
     base: Option<IgnoredAny>,
     axis: Option<IgnoredAny>,
     model: Option<IgnoredAny>,
@@ -30,7 +31,7 @@ enum Kind {
 fn kind(path: &Path) -> Option<Kind> {
     let text = std::fs::read_to_string(path).ok()?;
     let (_, marks): (Source, Marks) = Source::parse("", &text, &[]).ok()?;
-    let case = marks.domain.or(marks.grain).or(marks.packing).is_some();
+    let case = marks.domain.or(marks.grain).or(marks.packing).or(marks.poses).is_some();
     let study = marks.base.or(marks.axis).or(marks.model).is_some();
     match (case, study) {
         (true, false) => Some(Kind::Case),

@@ -6,6 +6,7 @@
 //! | `grains/*.vtp` (VTK polygonal data) | [`vtp`] |
 //! | `run.pvd` (ParaView collection) | [`pvd`] |
 //! | `grains.csv`, `diagnostics.csv` | [`grains`], [`diagnostics`], [`table`] |
+//! | tables of poses | [`poses`] |
 //! | `events.jsonl` | [`events`] |
 //! | `summary.json` | [`summary`] |
 //! | `.grain` files and checkpoints (binary encoding) | [`codec`] |
@@ -18,6 +19,7 @@ pub mod diagnostics;
 mod error;
 pub mod events;
 pub mod grains;
+pub mod poses;
 pub mod pvd;
 pub mod summary;
 pub mod table;

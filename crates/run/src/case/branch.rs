@@ -16,7 +16,7 @@ const LISTED: usize = 3;
 /// Advice for a difference in what a checkpoint fixes.
 const AS_BEFORE: &str = "the checkpoint fixes the grid, the sides of the box, the precision, and \
     number, shape and nodes of the grains; leave these as they are in the parent's \
-    case.resolved.toml";
+    case.resolved.toml, or place the grains of the parent in a new run with [[poses]]";
 /// Advice for another state at the start.
 const FROM_CHECKPOINT: &str = "the state at the start comes from the checkpoint, so this would have \
     no effect; leave it as it is in the parent's case.resolved.toml";

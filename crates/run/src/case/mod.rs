@@ -171,8 +171,9 @@ fn digest(resolved: &RawCase, shapes: &[ShapeFile]) -> Result<String, CaseError>
     // The precision decides the results; the number of threads does not.
     core.run.threads = RawRun::default().threads;
     core.expect = RawExpect::default();
-    // The limit ends a run and changes no result before.
+    // One limit ends a run, the other admits it; no result depends on them.
     core.contact.overlap_limit = None;
+    core.contact.accept_overlap = None;
     core.time.end = Default::default();
     core.time.stop = None;
     core.output.checkpoint_interval = Default::default();

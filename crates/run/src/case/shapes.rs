@@ -40,6 +40,11 @@ impl<'a> Library<'a> {
         Library { folder, files: BTreeMap::new(), built: BTreeMap::new() }
     }
 
+    /// Returns the path of a file that the case names.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
     /// Returns the files that were read, by name.
     pub fn into_files(self) -> Vec<ShapeFile> {
         self.files.into_values().map(|(file, _)| file).collect()
@@ -79,7 +84,10 @@ impl<'a> Library<'a> {
 
     /// Returns a closed form with this number of surface nodes.
     pub fn closed_form(&mut self, raw: &RawShape, nodes: usize) -> Result<Arc<Shape>, Refusal> {
-        let key = format!("{raw:?} {nodes}");
+        // Positions in the case file are no part of the shape.
+        let text = toml::to_string(raw);
+        let text = text.map_err(|error| (error.to_string(), "change the shape".to_owned()))?;
+        let key = format!("{text} {nodes}");
         if let Some(shape) = self.built.get(&key) {
             return Ok(shape.clone());
         }

@@ -8,8 +8,16 @@ use toml::Value;
 use super::RESOLVED;
 
 /// Keys that do not affect the results up to a given time.
-const IGNORED: [&str; 6] =
-    ["title", "expect", "run.threads", "time.end", "time.stop", "output.checkpoint"];
+const IGNORED: [&str; 8] = [
+    "title",
+    "expect",
+    "run.threads",
+    "time.end",
+    "time.stop",
+    "output.checkpoint",
+    "contact.overlap_limit",
+    "contact.accept_overlap",
+];
 /// Largest number of differences that are named.
 const MAX_NAMED: usize = 4;
 /// Longest value that is quoted [characters].

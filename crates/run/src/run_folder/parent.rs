@@ -76,7 +76,8 @@ impl Parent {
                 none(what, remedy)
             }
             _ => {
-                let remedy = "a run starts from a checkpoint; run it again to write one";
+                let remedy =
+                    "run it again to write one, or place its grains in a new run with [[poses]]";
                 none("has no checkpoint".into(), remedy)
             }
         }

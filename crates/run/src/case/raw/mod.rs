@@ -10,6 +10,7 @@ mod orientation;
 mod packing;
 mod physics;
 mod plan;
+mod poses;
 
 pub use domain::{AxisFaces, CellSize, Face, FaceKind, RawBoundaries, RawDomain};
 pub use expect::{OneOrMany, RawExpect, RawExpected, Tolerance};
@@ -19,6 +20,7 @@ pub use orientation::{Orientation, Turns};
 pub use packing::{Arrangement, Bounds, PackingOrientation, RawPacking};
 pub use physics::{RawContact, RawCoupling, RawFluid};
 pub use plan::{RawOutput, RawPlane, RawRun, RawStop, RawTime};
+pub use poses::RawPoses;
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -63,6 +65,9 @@ pub struct RawCase {
     /// The grains.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub grain: Vec<Located<RawGrain>>,
+    /// Groups of grains placed by a table; written out as `[[grain]]` in the resolved case.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub poses: Vec<Located<RawPoses>>,
     /// Groups of grains placed by a rule; written out as `[[grain]]` in the resolved case.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub packing: Vec<Located<RawPacking>>,

@@ -116,6 +116,10 @@ pub struct RawContact {
     /// `maximum_overlap` if that is larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub overlap_limit: Option<Located<Quantity<Number>>>,
+    /// Overlap over the smaller equal-volume diameter up to which grains may overlap at the start:
+    /// they begin in contact, with compressed springs. Without it they may not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accept_overlap: Option<Located<Quantity<Number>>>,
 }
 
 fn is_linear(law: &Located<ContactLawKind>) -> bool {
@@ -147,6 +151,7 @@ impl Default for RawContact {
             roughness: None,
             substeps_per_contact: Quantity::new(params.substeps_per_contact).into(),
             overlap_limit: None,
+            accept_overlap: None,
         }
     }
 }

@@ -1,27 +1,27 @@
 //! Check that grains lie in the box and do not overlap.
 
-use glam::{DQuat, DVec3};
-
 use super::check::Checker;
+use super::overlaps::check_overlaps;
 use crate::case::located::{Located, Span};
 use crate::case::number_format::{AXES, SIDES, length};
 use crate::case::packing::ROUNDING;
 use crate::case::placement::extent_along;
 use crate::case::raw::RawGrain;
-use grainwake_solver::dem::{
-    Enclosure, Grain, Outside, Overlap, Partner, initial_overlaps, outside,
-};
+use grainwake_solver::dem::{Enclosure, Grain, Outside, outside};
 use grainwake_solver::flow::{Boundaries, Boundary};
 
 /// Coordinates and sizes of more box lengths than this suggest a forgotten unit.
 const FAR: f64 = 10.0;
 const FORGOTTEN: &str = "; was a unit forgotten? bare numbers are metres";
 
+/// Number of problems of one kind that are listed.
+pub(super) const LISTED: usize = 10;
+
 /// Positions in the source that place a grain and set its size.
 pub(super) struct Placement {
-    span: Span,
+    pub span: Span,
     /// Whether an override has set the placement.
-    overridden: bool,
+    pub overridden: bool,
     /// Keys of the three coordinates.
     coordinates: [String; 3],
     size: Span,
@@ -83,17 +83,19 @@ impl Placement {
     }
 }
 
-/// Reports grains that overlap or cross a side of the box other than a free surface.
+/// Reports grains that overlap or cross a side of the box other than a free surface. Overlaps up to
+/// `accepted` diameters are contacts.
 pub(super) fn check(
     check: &mut Checker,
     grains: &[Grain],
     placements: &[Placement],
     enclosure: &Enclosure,
     boundaries: &Boundaries,
+    accepted: f64,
 ) {
     if grains.iter().all(|grain| grain.pose.position.is_finite()) {
-        check_faces(check, grains, placements, enclosure, boundaries);
-        check_overlaps(check, grains, placements, enclosure);
+        check_faces(check, grains, placements, enclosure, boundaries, accepted);
+        check_overlaps(check, grains, placements, enclosure, accepted);
     }
 }
 
@@ -103,21 +105,26 @@ fn check_faces(
     placements: &[Placement],
     enclosure: &Enclosure,
     boundaries: &Boundaries,
+    accepted: f64,
 ) {
-    let mut reported = vec![false; grains.len()];
     let rounding = |o: &Outside| o.by <= ROUNDING * grains[o.grain].shape.bounding_radius();
     let floats = |o: &Outside| boundaries.0[o.axis][o.side] == Boundary::FreeSurface;
-    for o in outside(grains, enclosure).into_iter().filter(|o| !rounding(o) && !floats(o)) {
-        if std::mem::replace(&mut reported[o.grain], true) {
-            continue;
-        }
+    let touches = |o: &Outside| {
+        let diameter = grains[o.grain].shape.equivalent_diameter();
+        boundaries.0[o.axis][o.side].is_solid() && o.by <= accepted * diameter
+    };
+    let mut found = outside(grains, enclosure);
+    found.retain(|o| !rounding(o) && !floats(o) && !touches(o));
+    // The first face of a grain is reported.
+    found.dedup_by_key(|o| o.grain);
+    for o in found.iter().take(LISTED) {
         let (grain, placement) = (&grains[o.grain], &placements[o.grain]);
         if let Some((axis, extent)) = too_large(grain, enclosure) {
             report_too_large(check, o.grain, &placement.size, enclosure, axis, extent);
             continue;
         }
         let face = [enclosure.lower, enclosure.upper][o.side][o.axis];
-        let (by, axis, side) = (millimetres(o.by), AXES[o.axis], SIDES[o.side]);
+        let (by, axis, side) = (distance(o.by), AXES[o.axis], SIDES[o.side]);
         let what = if o.centroid { "lies outside the box" } else { "crosses a face of the box" };
         let message = format!(
             "grain {} {what}: it reaches {by} beyond the {side} {axis} face (at {})",
@@ -131,6 +138,21 @@ fn check_faces(
         );
         check.fail(&placement.span, message, help);
     }
+    if found.len() > LISTED {
+        let message = format!("{} more grains cross a face of the box", found.len() - LISTED);
+        let help = "move the grains, or make the box larger";
+        check.fail(&placements[found[LISTED].grain].span, message, help);
+    }
+    check_periodic(check, grains, placements, enclosure);
+}
+
+/// Reports grains outside the box along a periodic axis.
+fn check_periodic(
+    check: &mut Checker,
+    grains: &[Grain],
+    placements: &[Placement],
+    enclosure: &Enclosure,
+) {
     for (i, (grain, placement)) in grains.iter().zip(placements).enumerate() {
         for axis in (0..3).filter(|axis| enclosure.periodic[*axis]) {
             let x = grain.pose.position[axis];
@@ -184,108 +206,14 @@ fn report_too_large(
     check.fail(size, message, help);
 }
 
-fn check_overlaps(
-    check: &mut Checker,
-    grains: &[Grain],
-    placements: &[Placement],
-    enclosure: &Enclosure,
-) {
-    for overlap in overlaps(grains, enclosure) {
-        let i = overlap.grain;
-        let Partner::Grain(j) = overlap.partner else {
-            continue;
-        };
-        let depth = millimetres(overlap.depth);
-        if i == j {
-            let message =
-                format!("grain {i} touches its own image across the periodic box (by {depth})");
-            let help = "make the box larger or the grain smaller";
-            check.fail(&placements[i].span, message, help);
-            continue;
+/// Formats a length [m] with four digits or more.
+pub(super) fn distance(x: f64) -> String {
+    match x.abs() {
+        x if x >= 1.0 => length(x),
+        x if x >= 1e-6 => {
+            let decimals = (3.0 - (1e3 * x).log10().floor()).clamp(4.0, 6.0);
+            format!("{:.*} mm", decimals as usize, 1e3 * x)
         }
-        let (first, second) = (i.min(j), i.max(j));
-        let message = format!("grains {first} and {second} overlap at the start by {depth}");
-        let help = "move them apart; contact begins with grains that do not touch";
-        let moved = if placements[first].overridden && !placements[second].overridden {
-            first
-        } else {
-            second
-        };
-        check.fail(&placements[moved].span, message, help);
+        x => format!("{:.4} nm", 1e9 * x),
     }
-}
-
-/// Returns the pairs that overlap, by the distance of the contact model. Depths within rounding do
-/// not count.
-///
-/// The distance of the surfaces is no measure of the overlap if a grain contains the centre of
-/// another, and vanishes for two equal grains at one place; [`nested`] replaces it.
-fn overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap> {
-    let mut found = initial_overlaps(grains, enclosure);
-    found.retain(|o| o.depth > ROUNDING * grains[o.grain].shape.bounding_radius());
-    let solid: Vec<DVec3> = grains.iter().map(solid_point).collect();
-    for (i, a) in grains.iter().enumerate() {
-        for (j, b) in grains.iter().enumerate().skip(i + 1) {
-            let Some(depth) = nested([a, b], [solid[i], solid[j]], enclosure) else {
-                continue;
-            };
-            let partner = Partner::Grain(j);
-            match found.iter_mut().find(|o| o.grain == i && o.partner == partner) {
-                Some(overlap) => overlap.depth = overlap.depth.max(depth),
-                None => found.push(Overlap { grain: i, partner, depth }),
-            }
-        }
-    }
-    found
-}
-
-/// Returns a point inside the solid, relative to the centroid, space frame [m]: the centroid, or
-/// for rings and bowls a point below a surface node.
-fn solid_point(grain: &Grain) -> DVec3 {
-    let shape = &grain.shape;
-    let below = |depth: f64| {
-        let node = shape.nodes().first()?.position;
-        let (_, outward) = shape.distance_and_gradient(node);
-        Some(node - depth * outward.normalize_or_zero())
-    };
-    let depths = (1..8).map(|halving| 0.5 * shape.equivalent_diameter() / f64::from(1 << halving));
-    let candidates = std::iter::once(DVec3::ZERO).chain(depths.filter_map(below));
-    let inside = candidates.into_iter().find(|x| shape.distance(*x) < 0.0);
-    grain.pose.orientation * inside.unwrap_or(DVec3::ZERO)
-}
-
-/// Returns the depth of two grains of which one contains a solid point of the other [m]. If the
-/// points are the centres, it is the shortest separating displacement along the line of centres or
-/// an axis, exact for spheres.
-fn nested(grains: [&Grain; 2], solid: [DVec3; 2], enclosure: &Enclosure) -> Option<f64> {
-    let [a, b] = grains;
-    let line = enclosure.nearest_image(b.pose.position - a.pose.position);
-    let depth_at = |grain: &Grain, x: DVec3| {
-        let inside = x.length() < grain.shape.bounding_radius();
-        let depth = -grain.shape.distance(grain.pose.orientation.conjugate() * x);
-        Some(depth).filter(|depth| inside && *depth > 0.0)
-    };
-    let in_a = depth_at(a, line + solid[1]).zip(depth_at(b, solid[1]));
-    let in_b = depth_at(b, solid[0] - line).zip(depth_at(a, solid[0]));
-    let (first, second) = in_a.or(in_b)?;
-    if solid != [DVec3::ZERO; 2] {
-        return Some(first.min(second));
-    }
-    let axes = DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
-    let move_along = |way: DVec3| extent(a, way) + extent(b, -way) - line.dot(way);
-    axes.chain(line.try_normalize()).map(move_along).reduce(f64::min)
-}
-
-/// Returns the extent of the grain from its centre in a direction [m].
-fn extent(grain: &Grain, direction: DVec3) -> f64 {
-    let mut turned = grain.clone();
-    turned.pose.position = DVec3::ZERO;
-    turned.pose.orientation =
-        DQuat::from_rotation_arc(direction, DVec3::Z) * grain.pose.orientation;
-    extent_along(&turned, 2).1
-}
-
-/// Formats a length [m] in millimetres if it is below one metre.
-fn millimetres(x: f64) -> String {
-    if x.abs() < 1.0 { format!("{:.4} mm", 1e3 * x) } else { length(x) }
 }

@@ -6,9 +6,11 @@ mod domain;
 mod expect;
 mod grains;
 mod materials;
+mod overlaps;
 mod packings;
 mod physics;
 mod plan;
+mod poses;
 
 use std::path::Path;
 
@@ -81,6 +83,15 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
         solid: boundaries.0.map(|sides| sides.map(|b| b.is_solid())),
     };
     let before_packings = check.problems.len();
+    for raw_poses in &raw.poses {
+        let law = raw.contact.law.value;
+        let placed = poses::poses(check, &mut grains, raw_poses, &enclosure, law, fluid_density);
+        for grain in placed.into_iter().flatten() {
+            let placement = Placement::packed(check, &grain.span);
+            // The densities of a table are checked once for all its grains.
+            grains.add(check, &grain, placement, None);
+        }
+    }
     for raw in &raw.packing {
         let packed = packings::packing(check, &mut grains, raw, &enclosure, fluid_density);
         for grain in packed.into_iter().flatten() {
@@ -98,7 +109,8 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     let mut grains = built.into_iter().collect::<Option<Vec<Grain>>>()?;
     prescription.motions = motions;
     prescription.prescribe_motion(&mut grains, 0.0);
-    arrangement::check(check, &grains, &placements, &enclosure, &boundaries);
+    let accepted = physics::accepted_overlap(check, &raw.contact);
+    arrangement::check(check, &grains, &placements, &enclosure, &boundaries, accepted);
     if dry && grains.is_empty() {
         let message = "there is neither a fluid nor a grain";
         check.fail_key("grain", message, "add [fluid] or [[grain]]");
@@ -127,6 +139,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     let plan = plan?;
     raw.grain = resolved;
     raw.packing = Vec::new();
+    raw.poses = Vec::new();
     raw.output.planes = Some(plan.planes.iter().map(|p| RawPlane::from(p).into()).collect());
     raw.run.threads = threads.into();
     Some(Validated { setup, plan, threads, expect, shapes: library.into_files(), resolved: raw })

@@ -13,7 +13,7 @@ use grainwake_solver::dem::Enclosure;
 use rand::{RngExt, SeedableRng};
 
 /// Largest number of grains of a packing.
-const MOST_GRAINS: usize = 1_000_000;
+pub(super) const MOST_GRAINS: usize = 1_000_000;
 
 /// Returns the grains of a packing as raw grains; `None` after a problem.
 pub(super) fn packing(

@@ -26,6 +26,22 @@ const ROUGHNESS: f64 = 3e-3;
 /// impact nearly conserves the speed (`docs/decisions/0018-pressure-weight.md`).
 const ADDED_MASS: f64 = 0.8;
 
+/// Returns the overlap at which the run stops [diameters].
+fn overlap_limit(raw: &RawContact) -> f64 {
+    match (&raw.overlap_limit, &raw.maximum_overlap) {
+        (Some(limit), _) => limit.si,
+        (None, Some(overlap)) => OVERLAP_LIMIT.max(2.0 * overlap.si),
+        (None, None) => OVERLAP_LIMIT,
+    }
+}
+
+/// Returns the overlap up to which grains may overlap at the start [diameters].
+pub(super) fn accepted_overlap(check: &mut Checker, raw: &RawContact) -> f64 {
+    let limit = overlap_limit(raw);
+    let accepted = raw.accept_overlap.as_ref();
+    accepted.and_then(|accepted| check.within(accepted, 0.0, limit)).unwrap_or(0.0)
+}
+
 /// Returns the fluid and its formulas; writes the viscosity as a kinematic one.
 pub(super) fn fluid(
     check: &mut Checker,
@@ -109,11 +125,10 @@ pub(super) fn contact(
         None => Some(ROUGHNESS * 0.5 * smallest_diameter(grains)),
     };
     let substeps = check.within(&raw.substeps_per_contact, 5.0, 1e6);
-    let overlap_limit = match (&raw.overlap_limit, &raw.maximum_overlap) {
-        (Some(limit), _) => check.within(limit, 1e-3, 0.5),
-        (None, Some(overlap)) => Some(OVERLAP_LIMIT.max(2.0 * overlap.si)),
-        (None, None) => Some(OVERLAP_LIMIT),
-    };
+    if let Some(limit) = &raw.overlap_limit {
+        check.within(limit, 1e-3, 0.5)?;
+    }
+    let overlap_limit = overlap_limit(raw);
     if let Some(gap) = lubrication_gap.filter(|gap| *gap > 0.0 && fluid.is_none()) {
         let message = format!("a lubrication gap of {} needs a fluid", length(gap));
         let help = "add [fluid] or set lubrication_gap = 0";
@@ -150,7 +165,7 @@ pub(super) fn contact(
         roughness: roughness?,
         added_density: fluid.map_or(0.0, |f| ADDED_MASS * f.density),
         substeps_per_contact: substeps?,
-        overlap_limit: overlap_limit?,
+        overlap_limit,
     };
     raw.maximum_overlap = None;
     raw.overlap_limit = Some(Quantity::new(params.overlap_limit).into());

@@ -1,11 +1,46 @@
 //! Warnings about contact.
 
+use crate::case::number_format::number;
 use crate::case::settling::{impact_speed, is_free, terminal_speed};
-use grainwake_solver::dem::{ContactLawKind, Grain};
+use grainwake_solver::dem::{ContactDynamics, ContactLawKind, Grain};
+use grainwake_solver::math::Load;
 use grainwake_solver::sim::Setup;
 
 /// Overlap at impact that is a reason for a warning [diameters].
 const WARNED_OVERLAP: f64 = 0.05;
+
+/// Ratio of contact forces and weight at the start from which contact is out of balance.
+const UNBALANCED: f64 = 3.0;
+/// Time over which the contact forces at the start act [s]; the grains hardly move.
+const MOMENT: f64 = 1e-12;
+
+/// Contacts at the start that do not carry the weight: the stiffness is not that of the run in
+/// which the grains settled.
+pub(super) fn start_out_of_balance(setup: &Setup) -> Option<String> {
+    let up = -setup.gravity.try_normalize()?;
+    let mut grains = setup.grains.clone();
+    let mut contact = vec![Load::default(); grains.len()];
+    let mut dynamics = ContactDynamics::new(setup.contact, setup.enclosure());
+    dynamics.advance(&mut grains, &[], MOMENT, &mut contact);
+    let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
+    let (mut carried, mut weight) = (0.0, 0.0);
+    for (grain, load) in setup.grains.iter().zip(&contact).filter(|(grain, _)| is_free(grain)) {
+        carried += load.force.dot(up);
+        weight += (grain.density - fluid_density) * grain.shape.volume() * setup.gravity.length();
+    }
+    let ratio = (carried / weight).abs();
+    let touching = dynamics.contacts().iter().any(|contact| contact.overlap > 0.0);
+    (touching && ratio > UNBALANCED).then(|| {
+        let name = match setup.contact.law {
+            ContactLawKind::Linear => "[contact] stiffness",
+            ContactLawKind::HertzMindlin => "youngs_modulus",
+        };
+        format!(
+            "the contacts at the start push the grains up with {} times their weight and throw them apart: take {name} of the run in which they settled",
+            number((10.0 * ratio).round() / 10.0)
+        )
+    })
+}
 
 /// Impacts with a large overlap: at the settling speed, in a dry run after a fall through the box.
 pub(super) fn deep_impacts(setup: &Setup) -> Option<String> {
