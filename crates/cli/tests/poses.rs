@@ -58,7 +58,7 @@ fn heap() -> &'static Path {
     &HEAP.1
 }
 
-/// A folder with the case `next.toml`: the box and `more`, in which HEAP stands for the settled run.
+/// A folder with the case `next.toml`: the box and `more`, where HEAP is the settled run.
 fn next(more: &str) -> (tempfile::TempDir, PathBuf) {
     next_of(NEXT, more)
 }
