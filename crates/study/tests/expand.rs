@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{STUDY, folder, plan, problems};
+use common::{DRY, STUDY, folder, plan, problems};
 use grainwake_study::{Selection, Study};
 
 fn names(study: &str) -> Vec<String> {
@@ -130,6 +130,46 @@ fn an_ensemble_turns_a_grain_and_pairs_the_members_of_all_models() {
         (found[0].to_string(), found[0].help.clone().unwrap_or_default())
     };
     assert!(message.contains("angle") && help.contains("2 deg"), "{message} {help}");
+}
+
+#[test]
+fn an_ensemble_shifts_all_grains_by_a_part_of_a_cell() {
+    let wet = DRY.replace(
+        "[contact]",
+        "cell_size = \"0.5 mm\"\n[fluid]\ndensity = 1000\n\
+        viscosity = \"1 mPa s\"\n[contact]",
+    );
+    let wet = wet.replace("step = \"0.1 ms\"\n", "");
+    let ensemble = "[ensemble]\nmembers = 6\noffset = \"0.05 mm\"\ncell_shift = true\n";
+    let root = tempfile::tempdir().unwrap();
+    let path = root.path().join("study.toml");
+    std::fs::write(root.path().join("case.toml"), wet).unwrap();
+    std::fs::write(
+        &path,
+        format!(
+            "title = \"shift\"\nbase = \"case.toml\"\n\
+        [[axis]]\nname = \"weight\"\nkey = \"grain.0.density\"\n\
+        values = [{{ name = \"a\", value = 2500 }}]\n{ensemble}"
+        ),
+    )
+    .unwrap();
+    let runs = plan(&path).unwrap().runs;
+    let positions = |i: usize| {
+        let grains = runs[i].case().unwrap().setup.grains;
+        [grains[0].pose.position, grains[1].pose.position]
+    };
+    let start = positions(0);
+    let mut largest: f64 = 0.0;
+    for member in 1..6 {
+        let [first, second] = positions(member);
+        let shift = first - start[0];
+        assert!(shift.min_element() >= 0.0 && shift.max_element() <= 0.5e-3, "{shift}");
+        largest = largest.max(shift.max_element());
+        // The second grain has an offset of its own; the gap stays.
+        let own = second - start[1] - shift;
+        assert!(own.length() <= 0.05e-3 * (1.0 + 1e-6) && own.z.abs() < 1e-5, "{own}");
+    }
+    assert!(largest > 0.3e-3, "{largest}");
 }
 
 #[test]

@@ -4,8 +4,12 @@ use std::io::{self, Read, Write};
 
 use grainwake_formats::codec::{Decoder, Encoder, invalid};
 
+use glam::DVec3;
+
 use super::Simulation;
-use crate::math::Load;
+
+use crate::grid::Mesh;
+use crate::math::{Load, Pose};
 
 /// Begins the state of grains at open sides of the box.
 const OPEN_SIDES: u64 = u64::from_le_bytes(*b"OPENSIDE");
@@ -69,6 +73,7 @@ impl Simulation {
         for ((grain, load), previous) in grains.zip(&mut self.loads).zip(&mut self.data.previous) {
             grain.pose.position = input.vector()?;
             grain.pose.orientation = input.quaternion()?;
+            check_pose(&grain.pose, &self.setup.mesh)?;
             grain.velocity = input.vector()?;
             grain.angular_velocity = input.vector()?;
             *load = Load { force: input.vector()?, torque: input.vector()? };
@@ -85,6 +90,7 @@ impl Simulation {
             for (grain, pose) in grains.iter_mut().zip(&mut self.data.located) {
                 pose.position = input.vector()?;
                 pose.orientation = input.quaternion()?;
+                check_pose(pose, &self.setup.mesh)?;
                 grain.pose = *pose;
             }
             fluid.restore(&mut input, self.clock.last_step)?;
@@ -103,4 +109,21 @@ impl Simulation {
         }
         self.dynamics.restore(reader)
     }
+}
+
+/// Largest distance of a grain from the box, in diagonals of the box. Positions of grains in
+/// periodic boxes are not wrapped.
+const FAR: f64 = 1e6;
+
+/// Refuses a pose that no simulation reaches. Locating it would take any amount of memory.
+fn check_pose(pose: &Pose, mesh: &Mesh) -> io::Result<()> {
+    let distance = (pose.position - mesh.origin).length();
+    let left = pose.position.cmpeq(DVec3::INFINITY).all();
+    if !left && !(distance < FAR * mesh.extent().length()) {
+        return Err(invalid(format!("a grain is at {} m", pose.position)));
+    }
+    if !pose.orientation.is_normalized() {
+        return Err(invalid(format!("the quaternion {} has no unit length", pose.orientation)));
+    }
+    Ok(())
 }

@@ -34,6 +34,8 @@ pub struct Ensemble {
     pub offset: f64,
     /// Largest rotation about each axis of the space frame, drawn uniformly up to it [rad].
     pub turn: f64,
+    /// Whether all grains are moved together by a part of a cell along every axis.
+    pub cell_shift: bool,
     /// Grain that is moved; the last one by default.
     pub grain: Option<usize>,
     /// Seed of the Sobol sequence.
@@ -135,6 +137,7 @@ fn read_ensemble(
         members: raw.members.value,
         offset,
         turn: turn.transpose()?.unwrap_or(0.0),
+        cell_shift: raw.cell_shift,
         grain: raw.grain,
         seed: raw.seed,
         models: match &raw.models {

@@ -9,11 +9,11 @@ use super::expand::Model;
 use super::file::{Ensemble, Study};
 use crate::error::StudyError;
 
-/// Returns the overrides that move and turn a grain of an ensemble member: an offset in the plane
-/// normal to gravity, and rotations about the three axes of the space frame.
+/// Returns the overrides of an ensemble member: one grain is moved normal to gravity and turned
+/// about the three axes of the space frame; if asked for, all grains are moved by a part of a cell.
 ///
 /// # Errors
-/// If the case has no grain of that index.
+/// If the case has no grain of that index, or grains that have no position in the case file.
 pub(crate) fn member_overrides(
     study: &Study,
     model: &Model,
@@ -41,15 +41,39 @@ pub(crate) fn member_overrides(
     };
     let horizontal: Vec<usize> = (0..3).filter(|axis| *axis != vertical).collect();
     let draw = Draw::of(ensemble.seed, member);
-    let mut position = grain.pose.position;
-    position[horizontal[0]] += ensemble.offset * draw.offset[0];
-    position[horizontal[1]] += ensemble.offset * draw.offset[1];
-    // A grain placed with `gap_above` has two coordinates; its height follows from the gap.
-    let coordinates: Vec<String> = (0..3)
-        .filter(|axis| *axis != vertical || !has_gap_above(model, set, index))
-        .map(|axis| format!("{:e}", position[axis]))
-        .collect();
-    let mut overrides = vec![format!("grain.{index}.position=[{}]", coordinates.join(", "))];
+    let mut offset = DVec3::ZERO;
+    offset[horizontal[0]] = ensemble.offset * draw.offset[0];
+    offset[horizontal[1]] = ensemble.offset * draw.offset[1];
+    let mut shift = DVec3::ZERO;
+    if ensemble.cell_shift {
+        let given = tables_of_grains(case);
+        if given != grains.len() {
+            let problem = Problem::new(format!(
+                "cell_shift moves grains with a position of their own, but \"{}\" has {given} of \
+                 {} grains",
+                model.name,
+                grains.len()
+            ));
+            let problem = problem.help("list the grains as [[grain]], or leave out cell_shift");
+            return Err(study.locate(problem, None, "").into());
+        }
+        shift = case.setup.mesh.spacing * draw.shift;
+    }
+    let moved: Vec<usize> = match ensemble.cell_shift {
+        true => (0..grains.len()).collect(),
+        false => vec![index],
+    };
+    let place = |moved: usize| {
+        let own = if moved == index { offset } else { DVec3::ZERO };
+        let position = grains[moved].pose.position + shift + own;
+        // A grain placed with `gap_above` has two coordinates; its height follows from the gap.
+        let coordinates: Vec<String> = (0..3)
+            .filter(|axis| *axis != vertical || !has_gap_above(model, set, moved))
+            .map(|axis| format!("{:e}", position[axis]))
+            .collect();
+        format!("grain.{moved}.position=[{}]", coordinates.join(", "))
+    };
+    let mut overrides: Vec<String> = moved.into_iter().map(place).collect();
     if ensemble.turn > 0.0 {
         let turned = DQuat::from_scaled_axis(ensemble.turn * draw.turn) * grain.pose.orientation;
         let DQuat { x, y, z, w } = turned;
@@ -65,6 +89,8 @@ struct Draw {
     offset: [f64; 2],
     /// Rotation vector, each component uniform in [-1, 1].
     turn: DVec3,
+    /// Shift in cells, each component uniform in [0, 1].
+    shift: DVec3,
 }
 
 impl Draw {
@@ -77,8 +103,15 @@ impl Draw {
         Draw {
             offset: [radius * angle.cos(), radius * angle.sin()],
             turn: DVec3::from_array([2, 3, 4].map(|dimension| 2.0 * unit(dimension) - 1.0)),
+            shift: DVec3::from_array([5, 6, 7].map(unit)),
         }
     }
+}
+
+/// Returns the number of tables `[[grain]]` of a case.
+fn tables_of_grains(case: &Case) -> usize {
+    let table: toml::Table = case.resolved.parse().unwrap_or_default();
+    table.get("grain").and_then(toml::Value::as_array).map_or(0, Vec::len)
 }
 
 /// Returns whether the height of a grain follows from `gap_above`.

@@ -79,6 +79,8 @@ pub(crate) struct RawEnsemble {
     pub offset: Located<Size>,
     pub turn: Option<Located<Size>>,
     #[serde(default)]
+    pub cell_shift: bool,
+    #[serde(default)]
     pub grain: Option<usize>,
     #[serde(default)]
     pub seed: u64,
