@@ -119,7 +119,8 @@ const FAR: f64 = 1e6;
 fn check_pose(pose: &Pose, mesh: &Mesh) -> io::Result<()> {
     let distance = (pose.position - mesh.origin).length();
     let left = pose.position.cmpeq(DVec3::INFINITY).all();
-    if !left && !(distance < FAR * mesh.extent().length()) {
+    let near = distance < FAR * mesh.extent().length();
+    if !left && !near {
         return Err(invalid(format!("a grain is at {} m", pose.position)));
     }
     if !pose.orientation.is_normalized() {
