@@ -1,8 +1,9 @@
 //! `grainwake check`.
 
 use grainwake_run::case::Case;
-use grainwake_run::case::number_format::{number, quantity};
+use grainwake_run::case::number_format::{number, quantity, vector};
 use grainwake_run::case::{Estimate, cells_for_drag_error};
+use grainwake_run::{Probe, ProbePlace};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 
 use crate::args::CheckArgs;
@@ -77,6 +78,7 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     }
     rows.push(("time step", quantity(e.time_step_s, "s")));
     rows.push(("steps", format!("{} to t = {} s", e.steps, case.plan.end)));
+    rows.extend(case.plan.probes.iter().map(|p| ("probe", probe(p))));
     let free = e
         .memory_free_bytes
         .map_or(String::new(), |free| format!(" ({:.0} MB are free)", free as f64 / 1e6));
@@ -89,6 +91,24 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
         lines.push("no warnings".into());
     }
     lines.join("\n")
+}
+
+/// Describes a probe: place, interval and file.
+fn probe(probe: &Probe) -> String {
+    let place = match &probe.place {
+        ProbePlace::Points(points) => match points[..] {
+            [p] => format!("point {}", vector(p, "m")),
+            _ => format!("{} points", points.len()),
+        },
+        ProbePlace::Plane { axis, at } => {
+            format!("plane {} = {}", ["x", "y", "z"][*axis], quantity(*at, "m"))
+        }
+    };
+    let every = match probe.every {
+        0.0 => "turned off".into(),
+        every => format!("every {}", quantity(every, "s")),
+    };
+    format!("{place}, {every} ({})", probe.file())
 }
 
 /// Formats a number with four significant digits.

@@ -7,6 +7,7 @@
 //! | `run.pvd` (ParaView collection) | [`pvd`] |
 //! | `grains.csv`, `diagnostics.csv` | [`grains`], [`diagnostics`], [`table`] |
 //! | tables of poses | [`poses`] |
+//! | `probes/*.csv` | [`probes`] |
 //! | `events.jsonl` | [`events`] |
 //! | `summary.json` | [`summary`] |
 //! | `.grain` files and checkpoints (binary encoding) | [`codec`] |
@@ -20,6 +21,7 @@ mod error;
 pub mod events;
 pub mod grains;
 pub mod poses;
+pub mod probes;
 pub mod pvd;
 pub mod summary;
 pub mod table;

@@ -50,6 +50,30 @@ def test_tables_are_frames(run):
         run.grain(1)
 
 
+def test_probes_are_frames(case_file, tmp_path):
+    import pandas
+
+    text = case_file.read_text() + """
+[[probe]]
+name = "middle"
+every = "10 ms"
+plane = { normal = "z", at = "4 mm" }
+[[probe]]
+line = { from = ["2 mm", "2 mm", 0], to = ["2 mm", "2 mm", "8 mm"], points = 3 }
+"""
+    (tmp_path / "case.toml").write_text(text)
+    case = gw.Case.load(tmp_path / "case.toml")
+    run = case.run(tmp_path / "run", progress=False, report=False)
+    assert sorted(run.probes) == ["middle", "probe1"]
+    middle, line = run.probes["middle"], run.probes["probe1"]
+    assert middle["time"].tolist() == [0, 0.01, 0.02]
+    assert abs(middle["volume_flux"]).max() < 1e-18
+    assert line["point"].dtype == "int64" and len(line) == 11 * 3
+    assert line["z"].tolist()[:3] == [0, 0.004, 0.008]
+    for name, table in run.probes.items():
+        pandas.testing.assert_frame_equal(table, pandas.read_csv(run.path / f"probes/{name}.csv"))
+
+
 def test_the_summary_of_a_finished_run(run):
     assert run.finished and run.notes == [] and run.failure is None
     assert run.summary["ended_by"] == "end"

@@ -4,8 +4,8 @@
 //! simulation and fills a folder with tables, VTK files, checkpoints and a summary.
 //! `docs/reference/run-folder.md` lists the files.
 //!
-//! Layers, downwards: `case` -> `run_loop` -> `recorder` -> `run_folder`, `contact_events` ->
-//! `overlaps`, `memory`, `plan`, `error`.
+//! Layers, downwards: `case` -> `run_loop` -> `recorder` -> `run_folder`, `contact_events`,
+//! `series` -> `overlaps`, `memory`, `plan`, `error`.
 
 pub mod case;
 mod contact_events;
@@ -16,8 +16,9 @@ mod plan;
 mod recorder;
 mod run_folder;
 mod run_loop;
+mod series;
 
 pub use error::{FailureKind, RunError};
-pub use plan::{Plane, PlanePosition, RunPlan, Stop};
+pub use plan::{Plane, PlanePosition, Probe, ProbePlace, RunPlan, Stop};
 pub use run_folder::{Existing, Parent, RESOLVED, checkpoint, lock, provenance};
 pub use run_loop::{Ending, Job, Observer, Options, Progress, Silent, run};

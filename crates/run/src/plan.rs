@@ -1,5 +1,7 @@
 //! Outputs and end of a run. Times are simulated times unless stated otherwise.
 
+use glam::DVec3;
+
 use grainwake_solver::sim::events::StopWhen;
 
 /// Validated plan of a run. An interval of zero turns an output off.
@@ -24,6 +26,8 @@ pub struct RunPlan {
     pub at_events: bool,
     /// Slice planes.
     pub planes: Vec<Plane>,
+    /// Points, lines and planes sampled over time.
+    pub probes: Vec<Probe>,
     /// Wall-clock time between checkpoints [s].
     pub checkpoint_interval: f64,
     /// Steps between checkpoints.
@@ -43,6 +47,40 @@ impl RunPlan {
     pub(crate) fn kept_after_end(&self) -> usize {
         self.checkpoint_keep.unwrap_or(1)
     }
+}
+
+impl RunPlan {
+    /// Returns the intervals of all outputs that are turned on [s].
+    pub fn intervals(&self) -> impl Iterator<Item = f64> {
+        let series = [self.tables, self.slices, self.fields, self.surfaces];
+        let probes = self.probes.iter().map(|probe| probe.every);
+        series.into_iter().chain(probes).filter(|interval| *interval > 0.0)
+    }
+}
+
+/// Points or a plane whose state is written to a table of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Probe {
+    /// Name of the table.
+    pub name: String,
+    /// Interval of its rows [s].
+    pub every: f64,
+    /// Points or plane.
+    pub place: ProbePlace,
+}
+
+/// Place of a probe.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ProbePlace {
+    /// Points [m].
+    Points(Vec<DVec3>),
+    /// Plane across the box.
+    Plane {
+        /// Axis of its normal.
+        axis: usize,
+        /// Coordinate along that axis [m].
+        at: f64,
+    },
 }
 
 /// Stop condition: the run ends `hold` seconds after the condition became true for good.

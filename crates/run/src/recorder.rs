@@ -1,5 +1,4 @@
-//! Outputs after each step. Output times are multiples of their intervals, so that they do not
-//! depend on where a run was interrupted.
+//! Outputs after each step.
 
 use std::path::{Path, PathBuf};
 
@@ -7,36 +6,21 @@ use grainwake_formats::events::{Event, EventKind};
 use grainwake_formats::pvd::{self, Entry};
 use grainwake_formats::summary::{EndReason, GrainSummary, PairSummary, Summary};
 use grainwake_solver::dem::{Enclosure, surface_gap};
+use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::{EventParams, Tracker};
-use grainwake_solver::sim::{SAME_TIME, Simulation};
 
 use crate::contact_events::{ContactEvents, MAX_GRAINS};
 use crate::error::{Context, RunError};
 use crate::overlaps::Overlaps;
-use crate::plan::RunPlan;
+use crate::plan::{Probe, RunPlan};
 use crate::run_folder::checkpoint::{self, Record};
-use crate::run_folder::{Tables, VtkOutput};
-
-/// Outputs closer than this fraction of a time step are written together.
-const SHORTEST_STEP: f64 = 0.1;
-
-/// Series of outputs.
-#[derive(Clone, Copy, PartialEq)]
-enum Series {
-    Tables,
-    Slices,
-    Fields,
-    Surfaces,
-}
-
-/// All series, in the order of their indices.
-const SERIES: [Series; 4] = [Series::Tables, Series::Slices, Series::Fields, Series::Surfaces];
+use crate::run_folder::{ExtraTable, Tables, VtkOutput};
+use crate::series::{self, Content, Series};
 
 /// Recorder of a run: tables, VTK files, events, checkpoints.
 pub(crate) struct Recorder {
     run: PathBuf,
     digest: String,
-    intervals: [f64; 4],
     end: f64,
     at_events: bool,
     enclosure: Enclosure,
@@ -46,7 +30,10 @@ pub(crate) struct Recorder {
     contact_events: ContactEvents,
     /// Time without contact after which grains are separated [s].
     separation_hold: f64,
-    next: [u64; 4],
+    series: Vec<Series>,
+    probes: Vec<Probe>,
+    /// Times of the last rows of the extra tables [s].
+    last_extra_rows: Vec<Option<f64>>,
     vtk_files: Vec<Entry>,
     max_divergence: f64,
     max_cfl: f64,
@@ -73,7 +60,6 @@ impl Recorder {
         Recorder {
             run: run.into(),
             digest: digest.into(),
-            intervals: [plan.tables, plan.slices, plan.fields, plan.surfaces],
             end: plan.end,
             at_events: plan.at_events && sim.grains().len() <= 2,
             enclosure,
@@ -82,7 +68,9 @@ impl Recorder {
             tracker: Tracker::new(params, sim.grains(), gap),
             contact_events: ContactEvents::default(),
             separation_hold: params.separation_hold,
-            next: [0; 4],
+            series: Series::of(plan),
+            probes: plan.probes.clone(),
+            last_extra_rows: vec![None; plan.probes.len()],
             vtk_files: Vec::new(),
             max_divergence: sim.max_divergence(),
             max_cfl: 0.0,
@@ -99,7 +87,8 @@ impl Recorder {
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let mut recorder = Recorder::build(run, digest, plan, sim, Tables::create(run)?);
+        let tables = Tables::create(run, &extra_tables(plan))?;
+        let mut recorder = Recorder::build(run, digest, plan, sim, tables);
         recorder.write_due(sim)?;
         recorder.checkpoint(sim)?;
         Ok(recorder)
@@ -116,11 +105,12 @@ impl Recorder {
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let mut recorder = Recorder::build(run, digest, plan, sim, Tables::create(run)?);
+        let tables = Tables::create(run, &extra_tables(plan))?;
+        let mut recorder = Recorder::build(run, digest, plan, sim, tables);
         recorder.tracker.restore(record.tracker);
         recorder.contact_events = record.contact_events;
         recorder.overlaps.mean_now = record.overlaps.mean_now;
-        recorder.next = recorder.intervals.map(|interval| first_after(sim.time(), interval));
+        recorder.series.iter_mut().for_each(|series| series.start_after(sim.time()));
         let events = recorder.events();
         recorder.tables.append_events(&events)?;
         recorder.write_start(sim)?;
@@ -131,15 +121,10 @@ impl Recorder {
     /// Writes the state that a run starts from, in every series.
     fn write_start(&mut self, sim: &Simulation) -> Result<(), RunError> {
         let mut files = Vec::new();
-        for (series, interval) in SERIES.into_iter().zip(self.intervals) {
-            if interval == 0.0 {
-                continue;
-            }
-            match series {
-                Series::Tables => self.append_rows(sim)?,
-                Series::Slices => files.extend(self.vtk.slices(&self.run, sim, "start")?),
-                Series::Fields => files.extend(self.vtk.fields(&self.run, sim, "start")?),
-                Series::Surfaces => files.extend(self.vtk.grains(&self.run, sim, "start")?),
+        for index in 0..self.series.len() {
+            let Series { content, .. } = self.series[index];
+            if self.series[index].is_on() {
+                files.extend(self.write(content, sim, "start")?);
             }
         }
         if files.is_empty() { Ok(()) } else { self.add(files) }
@@ -152,11 +137,16 @@ impl Recorder {
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let mut recorder =
-            Recorder::build(run, &record.digest, plan, sim, Tables::reopen(run, record.lengths)?);
+        let tables = Tables::reopen(run, &record.lengths, &extra_tables(plan))?;
+        let mut recorder = Recorder::build(run, &record.digest, plan, sim, tables);
         recorder.tracker.restore(record.tracker);
         recorder.contact_events = record.contact_events;
-        recorder.next = record.next;
+        for (series, next) in recorder.series.iter_mut().zip(record.next) {
+            series.next = next;
+        }
+        for (last, row) in recorder.last_extra_rows.iter_mut().zip(record.last_extra_rows) {
+            *last = row;
+        }
         recorder.vtk_files = record.vtk_files;
         recorder.max_divergence = record.max_divergence;
         recorder.max_cfl = record.max_cfl;
@@ -166,21 +156,9 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// Returns the time from `now` to the next output or the end [s].
-    ///
-    /// Outputs that are nearly due at the same time are written together at the last of them: a
-    /// time step much shorter than the usual `step` [s] disturbs the pressure.
+    /// Returns the time from `now` to the next output or the end [s]; `step` [s] is the usual step.
     pub fn until_next(&self, now: f64, step: f64) -> f64 {
-        let times = || {
-            let due = self.intervals.iter().zip(&self.next);
-            due.filter(|(interval, _)| **interval > 0.0)
-                .map(|(interval, k)| *k as f64 * interval)
-                .filter(|time| *time < self.end)
-                .chain([self.end])
-        };
-        let first = times().fold(f64::INFINITY, f64::min);
-        let together = first + SHORTEST_STEP * step;
-        times().filter(|time| *time <= together).fold(first, f64::max) - now
+        series::until_next(&self.series, self.end, now, step)
     }
 
     /// Updates the record with the state after a step, writes the outputs that are due, and returns
@@ -220,31 +198,47 @@ impl Recorder {
     }
 
     fn write_due(&mut self, sim: &Simulation) -> Result<(), RunError> {
-        let time = sim.time();
         let mut files = Vec::new();
-        for (index, series) in SERIES.into_iter().enumerate() {
-            let interval = self.intervals[index];
-            if interval == 0.0 || time < self.next[index] as f64 * interval - SAME_TIME * interval {
+        for index in 0..self.series.len() {
+            let series = &mut self.series[index];
+            if !series.is_due(sim.time()) {
                 continue;
             }
-            let tag = format!("{:06}", self.next[index]);
-            match series {
-                Series::Tables => {
-                    self.append_rows(sim)?;
-                }
-                Series::Slices => files.extend(self.vtk.slices(&self.run, sim, &tag)?),
-                Series::Fields => files.extend(self.vtk.fields(&self.run, sim, &tag)?),
-                Series::Surfaces => files.extend(self.vtk.grains(&self.run, sim, &tag)?),
-            }
-            self.next[index] += 1;
+            let (content, tag) = (series.content, format!("{:06}", series.next));
+            series.next += 1;
+            files.extend(self.write(content, sim, &tag)?);
         }
         if files.is_empty() { Ok(()) } else { self.add(files) }
+    }
+
+    /// Writes one output and returns its VTK files; `tag` ends their names.
+    fn write(
+        &mut self,
+        content: Content,
+        sim: &Simulation,
+        tag: &str,
+    ) -> Result<Vec<Entry>, RunError> {
+        match content {
+            Content::Tables => self.append_rows(sim)?,
+            Content::Slices => return self.vtk.slices(&self.run, sim, tag),
+            Content::Fields => return self.vtk.fields(&self.run, sim, tag),
+            Content::Surfaces => return self.vtk.grains(&self.run, sim, tag),
+            Content::Extra(table) => self.append_extra(table, sim)?,
+        }
+        Ok(Vec::new())
     }
 
     fn append_rows(&mut self, sim: &Simulation) -> Result<(), RunError> {
         self.tables.append_rows(sim, self.tracker.gap(), &self.overlaps)?;
         self.overlaps.largest_since_row = 0.0;
         self.last_row = Some(sim.time());
+        Ok(())
+    }
+
+    /// Appends rows of the present state to an extra table.
+    fn append_extra(&mut self, table: usize, sim: &Simulation) -> Result<(), RunError> {
+        self.tables.append_extra(table, &self.probes[table].rows(sim))?;
+        self.last_extra_rows[table] = Some(sim.time());
         Ok(())
     }
 
@@ -266,6 +260,15 @@ impl Recorder {
             let grains = self.vtk.grains(&self.run, sim, "end")?;
             self.add(slices.into_iter().chain(grains))?;
         }
+        for index in 0..self.series.len() {
+            let series = &self.series[index];
+            if let Content::Extra(table) = series.content
+                && series.is_on()
+                && self.last_extra_rows[table] != Some(sim.time())
+            {
+                self.append_extra(table, sim)?;
+            }
+        }
         Ok(())
     }
 
@@ -276,7 +279,8 @@ impl Recorder {
             time: sim.time(),
             steps: sim.steps(),
             lengths: self.tables.sync()?,
-            next: self.next,
+            next: self.series.iter().map(|series| series.next).collect(),
+            last_extra_rows: self.last_extra_rows.clone(),
             vtk_files: self.vtk_files.clone(),
             max_divergence: self.max_divergence,
             max_cfl: self.max_cfl,
@@ -334,9 +338,9 @@ impl Recorder {
     }
 }
 
-/// Returns the index of the first output after `time` [s]; zero for an output that is off.
-fn first_after(time: f64, interval: f64) -> u64 {
-    if interval > 0.0 { (time / interval + SAME_TIME).floor() as u64 + 1 } else { 0 }
+/// Returns the tables that a plan asks for besides those of every run.
+fn extra_tables(plan: &RunPlan) -> Vec<ExtraTable> {
+    plan.probes.iter().map(Probe::table).collect()
 }
 
 /// Returns the gap between the surfaces of a pair [m].

@@ -148,6 +148,23 @@ class RunFolder:
         return table
 
     @property
+    def probes(self) -> dict[str, pandas.DataFrame]:
+        """Table of each probe of the case, by name; SI units.
+
+        Points and lines have the columns time, point, x, y, z, vx, vy, vz, pressure and
+        solid_fraction; planes have time, volume_flux, grain_flux, solid_fraction and pressure.
+        """
+        pandas = need("pandas")
+        tables = {}
+        for file in sorted((self.path / "probes").glob("*.csv")):
+            columns, _ = _grainwake._read_table(file)
+            table = pandas.DataFrame(columns)
+            if "point" in table:
+                table["point"] = table["point"].astype("int64")
+            tables[file.stem] = table
+        return tables
+
+    @property
     def files(self) -> pandas.DataFrame:
         """VTK files of ``run.pvd``: time, group, file."""
         return need("pandas").DataFrame(self._entries(), columns=["time", "group", "file"])

@@ -68,10 +68,8 @@ impl Estimate {
         let galileo = largest.map(|(_, _, galileo)| galileo);
         let speed =
             (largest.zip(fluid)).map(|((_, grain, _), fluid)| terminal_speed(grain, fluid, g));
-        let outputs = [plan.tables, plan.slices, plan.fields, plan.surfaces];
         let allowed = time_step(setup, speed.unwrap_or(0.0));
-        let intervals = outputs.into_iter().filter(|interval| *interval > 0.0);
-        let time_step_s = intervals.fold(allowed, f64::min);
+        let time_step_s = plan.intervals().fold(allowed, f64::min);
         let steps = (plan.end / time_step_s).ceil();
 
         let cells = setup.mesh.cell_count();

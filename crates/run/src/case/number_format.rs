@@ -44,7 +44,7 @@ pub fn length(value: f64) -> String {
 }
 
 /// Formats a vector [SI] with its unit: "[25 mm, 25 mm, 0 m]".
-pub(super) fn vector(value: DVec3, unit: &str) -> String {
+pub fn vector(value: DVec3, unit: &str) -> String {
     let parts = value.to_array().map(|x| quantity(x, unit));
     format!("[{}]", parts.join(", "))
 }

@@ -40,8 +40,8 @@ pub struct Record {
     pub steps: u64,
     /// Lengths of the tables.
     pub lengths: Lengths,
-    /// Index of the next output of each series.
-    pub next: [u64; 4],
+    /// Index of the next output of each series: tables, slices, fields, surfaces, then the probes.
+    pub next: Vec<u64>,
     /// VTK files written.
     #[serde(rename = "pictures")]
     pub vtk_files: Vec<Entry>,
@@ -54,6 +54,9 @@ pub struct Record {
     pub overlaps: Overlaps,
     /// Time of the last row of the tables [s].
     pub last_row: Option<f64>,
+    /// Times of the last rows of the extra tables [s].
+    #[serde(default)]
+    pub last_extra_rows: Vec<Option<f64>>,
     /// State of the event tracker.
     pub tracker: TrackerState,
     /// Contacts between three and more grains.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_formats::summary;
+use grainwake_formats::{probes, summary};
 
 use super::checkpoint;
 use super::lock::{self, Attempt, Lock};
@@ -184,7 +184,8 @@ pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
     // repeated.
     let files =
         [summary::FILE, "failure.json", "run.pvd", "report.html", RESOLVED, provenance::FILE];
-    for name in vtk_output::FOLDERS.iter().chain(&[checkpoint::FOLDER, "shapes", "figures"]) {
+    let folders = [checkpoint::FOLDER, probes::FOLDER, "shapes", "figures"];
+    for name in vtk_output::FOLDERS.iter().chain(&folders) {
         remove(&folder.join(name), |p| std::fs::remove_dir_all(p))?;
     }
     for name in tables::FILES.into_iter().chain(files) {

@@ -5,6 +5,7 @@ mod compare;
 mod folder;
 pub mod lock;
 mod parent;
+mod probes;
 pub mod provenance;
 mod surfaces;
 mod tables;
@@ -17,5 +18,5 @@ pub(crate) use compare::differing;
 pub(crate) use folder::{
     Content, admit, admit_parent, clear, create, lock_folder, same_parent, start_lost,
 };
-pub(crate) use tables::Tables;
+pub(crate) use tables::{ExtraTable, Tables};
 pub(crate) use vtk_output::VtkOutput;

@@ -1,5 +1,5 @@
-//! The growing files `grains.csv`, `diagnostics.csv` and `events.jsonl`: rows are appended, and cut
-//! back to the checkpoint when a run is resumed.
+//! The growing files: `grains.csv`, `diagnostics.csv`, `events.jsonl`, and the tables that a case
+//! asks for. Rows are appended, and cut back to the checkpoint when a run is resumed.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Seek, SeekFrom, Write};
@@ -15,67 +15,101 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Context, RunError};
 use crate::overlaps::Overlaps;
 
-/// The growing files of a run.
+/// The growing files of every run.
 pub const FILES: [&str; 3] = [grains::FILE, diagnostics::FILE, events::FILE];
 
-/// Lengths of the three files [bytes].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Lengths([u64; 3]);
+/// Table that a case asks for besides [`FILES`].
+#[derive(Clone, Debug)]
+pub struct ExtraTable {
+    /// Path in the run folder.
+    pub file: String,
+    /// First line, without its line break.
+    pub header: &'static str,
+}
 
-/// The three growing files, open for appending.
+/// Lengths of the growing files [bytes], the extra tables last.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Lengths(Vec<u64>);
+
+/// Growing file, open for appending.
+struct GrowingFile {
+    path: PathBuf,
+    file: File,
+    /// Bytes written.
+    length: u64,
+}
+
+impl GrowingFile {
+    fn create(path: PathBuf) -> Result<GrowingFile, RunError> {
+        let file = File::create(&path).context("create", &path)?;
+        Ok(GrowingFile { path, file, length: 0 })
+    }
+
+    /// Opens the file and cuts it back to `length` bytes.
+    fn reopen(path: PathBuf, length: u64) -> Result<GrowingFile, RunError> {
+        let mut file = OpenOptions::new().write(true).open(&path).context("open", &path)?;
+        let found = file.metadata().context("read", &path)?.len();
+        if found < length {
+            let message = format!("it has {found} bytes; at the checkpoint it had {length}");
+            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, message))
+                .context("continue", &path);
+        }
+        file.set_len(length).context("cut back", &path)?;
+        file.seek(SeekFrom::End(0)).context("continue", &path)?;
+        Ok(GrowingFile { path, file, length })
+    }
+
+    fn append(&mut self, text: &str) -> Result<(), RunError> {
+        self.file.write_all(text.as_bytes()).context("write", &self.path)?;
+        self.length += text.len() as u64;
+        Ok(())
+    }
+}
+
+/// The growing files of a run.
 pub struct Tables {
-    files: [(PathBuf, File); 3],
+    /// The files of every run, then the extra tables.
+    files: Vec<GrowingFile>,
     /// Columns of `diagnostics.csv`; a run of an earlier program has fewer.
     diagnostics_columns: usize,
-    lengths: Lengths,
 }
 
 impl Tables {
     /// Creates the tables with their headers.
-    pub fn create(folder: &Path) -> Result<Tables, RunError> {
-        let open = |name: &str| {
-            let path = folder.join(name);
-            let file = File::create(&path).context("create", &path)?;
-            Ok::<_, RunError>((path, file))
-        };
-        let mut tables = Tables {
-            files: [open(FILES[0])?, open(FILES[1])?, open(FILES[2])?],
-            diagnostics_columns: columns(diagnostics::HEADER),
-            lengths: Lengths::default(),
-        };
-        tables.append(0, &format!("{}\n", grains::HEADER))?;
-        tables.append(1, &format!("{}\n", diagnostics::HEADER))?;
-        Ok(tables)
+    pub fn create(folder: &Path, extra: &[ExtraTable]) -> Result<Tables, RunError> {
+        let mut files = Vec::new();
+        for name in FILES {
+            files.push(GrowingFile::create(folder.join(name))?);
+        }
+        files[0].append(&format!("{}\n", grains::HEADER))?;
+        files[1].append(&format!("{}\n", diagnostics::HEADER))?;
+        for table in extra {
+            let path = folder.join(&table.file);
+            if let Some(parent) = path.parent() {
+                std::fs::create_dir_all(parent).context("create", parent)?;
+            }
+            let mut file = GrowingFile::create(path)?;
+            file.append(&format!("{}\n", table.header))?;
+            files.push(file);
+        }
+        Ok(Tables { files, diagnostics_columns: columns(diagnostics::HEADER) })
     }
 
     /// Opens the tables of a run and cuts them back to these lengths.
-    pub fn reopen(folder: &Path, lengths: Lengths) -> Result<Tables, RunError> {
-        let open = |index: usize| {
-            let path = folder.join(FILES[index]);
-            let mut file = OpenOptions::new().write(true).open(&path).context("open", &path)?;
-            let found = file.metadata().context("read", &path)?.len();
-            if found < lengths.0[index] {
-                let message =
-                    format!("it has {found} bytes; at the checkpoint it had {}", lengths.0[index]);
-                return Err(io::Error::new(io::ErrorKind::UnexpectedEof, message))
-                    .context("continue", &path);
-            }
-            file.set_len(lengths.0[index]).context("cut back", &path)?;
-            file.seek(SeekFrom::End(0)).context("continue", &path)?;
-            Ok((path, file))
-        };
-        let files = [open(0)?, open(1)?, open(2)?];
-        let path = &files[1].0;
+    pub fn reopen(
+        folder: &Path,
+        lengths: &Lengths,
+        extra: &[ExtraTable],
+    ) -> Result<Tables, RunError> {
+        let names = FILES.into_iter().chain(extra.iter().map(|table| table.file.as_str()));
+        let files = names.zip(&lengths.0);
+        let files = files
+            .map(|(name, length)| GrowingFile::reopen(folder.join(name), *length))
+            .collect::<Result<Vec<_>, _>>()?;
+        let path = &files[1].path;
         let header = BufReader::new(File::open(path).context("read", path)?).lines().next();
         let header = header.transpose().context("read", path)?.unwrap_or_default();
-        Ok(Tables { files, diagnostics_columns: columns(&header), lengths })
-    }
-
-    fn append(&mut self, index: usize, text: &str) -> Result<(), RunError> {
-        let (path, file) = &mut self.files[index];
-        file.write_all(text.as_bytes()).context("write", path)?;
-        self.lengths.0[index] += text.len() as u64;
-        Ok(())
+        Ok(Tables { files, diagnostics_columns: columns(&header) })
     }
 
     /// Appends a row for each grain and one of diagnostics.
@@ -86,28 +120,33 @@ impl Tables {
         overlaps: &Overlaps,
     ) -> Result<(), RunError> {
         let (grains, diagnostics) = (grain_rows(sim), diagnostics_row(sim, gap, overlaps));
-        self.append(0, &grains)?;
+        self.files[0].append(&grains)?;
         let line = diagnostics.to_line();
         let known = line.trim_end().split(',').take(self.diagnostics_columns);
-        self.append(1, &format!("{}\n", known.collect::<Vec<_>>().join(",")))
+        self.files[1].append(&format!("{}\n", known.collect::<Vec<_>>().join(",")))
     }
 
     /// Appends events to the log.
     pub fn append_events(&mut self, events: &[Event]) -> Result<(), RunError> {
         for event in events {
             let line =
-                (event.to_line().map_err(io::Error::from)).context("write", &self.files[2].0)?;
-            self.append(2, &line)?;
+                (event.to_line().map_err(io::Error::from)).context("write", &self.files[2].path)?;
+            self.files[2].append(&line)?;
         }
         Ok(())
     }
 
+    /// Appends rows to an extra table.
+    pub fn append_extra(&mut self, index: usize, rows: &str) -> Result<(), RunError> {
+        self.files[FILES.len() + index].append(rows)
+    }
+
     /// Makes the tables durable and returns their lengths.
     pub fn sync(&mut self) -> Result<Lengths, RunError> {
-        for (path, file) in &self.files {
-            file.sync_data().context("write", path)?;
+        for file in &self.files {
+            file.file.sync_data().context("write", &file.path)?;
         }
-        Ok(self.lengths)
+        Ok(Lengths(self.files.iter().map(|file| file.length).collect()))
     }
 }
 
@@ -181,10 +220,10 @@ mod tests {
         for (name, text) in FILES.iter().zip(&texts) {
             std::fs::write(folder.path().join(name), text).unwrap();
         }
-        let lengths = Lengths([0, 1, 2].map(|index: usize| texts[index].len() as u64));
+        let lengths = Lengths(texts.iter().map(|text| text.len() as u64).collect());
         let setup = Setup::new(Mesh::cubic([1; 3], 1.0));
         let sim = Simulation::new(setup.with_step(StepRule::Fixed(1.0))).unwrap();
-        let mut tables = Tables::reopen(folder.path(), lengths).unwrap();
+        let mut tables = Tables::reopen(folder.path(), &lengths, &[]).unwrap();
         tables.append_rows(&sim, None, &Overlaps::default()).unwrap();
         let text = std::fs::read_to_string(folder.path().join(diagnostics::FILE)).unwrap();
         let counts: Vec<usize> = text.lines().map(columns).collect();

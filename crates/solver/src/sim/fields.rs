@@ -135,8 +135,12 @@ impl Simulation {
         let density = self.setup.fluid.map_or(0.0, |fluid| fluid.density);
         (self.kinematic_pressure()).map_or(0.0, |pressure| density * pressure.get([k, j, i]))
     }
-    /// Velocity [m/s] at a point by trilinear interpolation of each component; `None` outside the
-    /// box or without fluid.
+    /// Velocity [m/s] at a point by trilinear interpolation of each component between its own
+    /// faces; `None` outside the box or without fluid.
+    ///
+    /// In the half cell next to a side, the second value is the velocity that the side prescribes.
+    /// Where it prescribes none, the value is extrapolated from the two nearest ones. Linear
+    /// velocities are exact.
     pub fn interpolate_velocity(&self, x: DVec3) -> Option<DVec3> {
         self.fluid.as_ref()?.interpolate_velocity(x)
     }

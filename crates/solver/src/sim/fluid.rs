@@ -6,7 +6,7 @@ use glam::DVec3;
 use grainwake_formats::codec::{Decoder, Encoder};
 
 use super::fields::AnyFieldView;
-use super::probe::Probe;
+use super::probe::{Probe, SampledGrid};
 use super::setup::Setup;
 use crate::dem::Grain;
 use crate::flow::{CoveredFace, Flow, FlowMeasures, FluidParams};
@@ -77,11 +77,8 @@ struct FluidOf<R> {
 
 impl<R: Real> FluidOf<R> {
     fn probe(&self) -> Probe<'_, R> {
-        Probe {
-            velocity: &self.flow.velocity,
-            mesh: self.flow.mesh(),
-            boundaries: self.flow.boundaries(),
-        }
+        let grid = SampledGrid { mesh: self.flow.mesh(), boundaries: self.flow.boundaries() };
+        Probe { velocity: &self.flow.velocity, grid }
     }
     fn start(setup: &Setup, params: &FluidParams) -> FluidOf<R> {
         let mut flow = Flow::new(&setup.mesh, setup.boundaries, params);

@@ -11,6 +11,7 @@ mod packing;
 mod physics;
 mod plan;
 mod poses;
+mod probe;
 
 pub use domain::{AxisFaces, CellSize, Face, FaceKind, RawBoundaries, RawDomain};
 pub use expect::{OneOrMany, RawExpect, RawExpected, Tolerance};
@@ -21,6 +22,7 @@ pub use packing::{Arrangement, Bounds, PackingOrientation, RawPacking};
 pub use physics::{RawContact, RawCoupling, RawFluid};
 pub use plan::{RawOutput, RawPlane, RawRun, RawStop, RawTime};
 pub use poses::RawPoses;
+pub use probe::{RawLine, RawProbe, RawProbePlane};
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -62,6 +64,9 @@ pub struct RawCase {
     /// Expected results, which make the case a test.
     #[serde(default, skip_serializing_if = "RawExpect::is_empty")]
     pub expect: RawExpect,
+    /// Points, lines and planes sampled over time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub probe: Vec<Located<RawProbe>>,
     /// The grains.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub grain: Vec<Located<RawGrain>>,

@@ -11,6 +11,7 @@ mod packings;
 mod physics;
 mod plan;
 mod poses;
+mod probes;
 
 use std::path::Path;
 
@@ -134,7 +135,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
         .with_contact(contact?)
         .with_step(step?)
         .with_prescription(prescription);
-    let plan = plan::plan(check, &raw.time, &mut raw.output, &setup, vertical.axis);
+    let plan = plan::plan(check, &raw.time, &mut raw.output, &mut raw.probe, &setup, vertical.axis);
     let expect = expect::expectations(check, &raw.expect, setup.grains.len());
     let plan = plan?;
     raw.grain = resolved;

@@ -1,10 +1,11 @@
 //! `[time]`, `[output]` and `[run]` -> step rule and run plan.
 
 use super::check::Checker;
+use super::probes::probes;
 use crate::case::located::Located;
 use crate::case::number_format::{AXES, length, quantity};
 use crate::case::quantity::{Quantity, Time};
-use crate::case::raw::{RawOutput, RawPlane, RawRun, RawStop, RawTime};
+use crate::case::raw::{RawOutput, RawPlane, RawProbe, RawRun, RawStop, RawTime};
 use crate::case::settling::{default_max_step, settled_time_step};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{Grain, MotionConstraint};
@@ -60,6 +61,7 @@ pub(super) fn plan(
     check: &mut Checker,
     time: &RawTime,
     raw: &mut RawOutput,
+    raw_probes: &mut [Located<RawProbe>],
     setup: &Setup,
     vertical: usize,
 ) -> Option<RunPlan> {
@@ -93,6 +95,13 @@ pub(super) fn plan(
     let surfaces = if slices > 0.0 { slices } else { coarse };
     let surfaces = interval(&mut raw.surfaces, surfaces);
     let fields = check_interval(&raw.fields);
+    let every: Vec<f64> = (raw_probes.iter_mut())
+        .map(|probe| {
+            let every = (probe.value.every).get_or_insert_with(|| Quantity::new(tables).into());
+            check_interval(every)
+        })
+        .collect();
+    let probes = probes(check, raw_probes, &every, &setup.mesh, dry);
     let checkpoint_interval = check.not_negative(&raw.checkpoint_interval);
     let keep = raw.checkpoint_keep.as_ref();
     if let Some(keep) = keep.filter(|keep| keep.value == 0) {
@@ -120,6 +129,7 @@ pub(super) fn plan(
         surfaces,
         at_events: raw.at_events,
         planes,
+        probes,
         checkpoint_interval: checkpoint_interval?,
         checkpoint_steps: raw.checkpoint_steps.value,
         checkpoint_keep,

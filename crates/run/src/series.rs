@@ -1,0 +1,82 @@
+//! Series of outputs. Output times are multiples of their intervals, so that they do not depend on
+//! where a run was interrupted.
+
+use grainwake_solver::sim::SAME_TIME;
+
+use crate::plan::RunPlan;
+
+/// Outputs closer than this fraction of a time step are written together.
+const SHORTEST_STEP: f64 = 0.1;
+
+/// Content of a series of outputs.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Content {
+    Tables,
+    Slices,
+    Fields,
+    Surfaces,
+    /// Rows of the extra table with this index.
+    Extra(usize),
+}
+
+/// Outputs at the multiples of an interval.
+pub(crate) struct Series {
+    /// Content of each output.
+    pub content: Content,
+    /// Interval [s]; zero turns the series off.
+    pub interval: f64,
+    /// Index of the next output.
+    pub next: u64,
+}
+
+impl Series {
+    /// Returns all series of a plan, in the order of the checkpoint.
+    pub fn of(plan: &RunPlan) -> Vec<Series> {
+        let fixed = [
+            (Content::Tables, plan.tables),
+            (Content::Slices, plan.slices),
+            (Content::Fields, plan.fields),
+            (Content::Surfaces, plan.surfaces),
+        ];
+        let probes = plan.probes.iter().enumerate();
+        let probes = probes.map(|(index, probe)| (Content::Extra(index), probe.every));
+        let all = fixed.into_iter().chain(probes);
+        all.map(|(content, interval)| Series { content, interval, next: 0 }).collect()
+    }
+
+    /// Returns whether the series is turned on.
+    pub fn is_on(&self) -> bool {
+        self.interval > 0.0
+    }
+
+    /// Returns the time of the next output [s].
+    fn next_time(&self) -> Option<f64> {
+        self.is_on().then_some(self.next as f64 * self.interval)
+    }
+
+    /// Returns whether the next output is due at `time` [s].
+    pub fn is_due(&self, time: f64) -> bool {
+        self.next_time().is_some_and(|next| time >= next - SAME_TIME * self.interval)
+    }
+
+    /// Moves on to the first output after `time` [s].
+    pub fn start_after(&mut self, time: f64) {
+        if self.is_on() {
+            self.next = (time / self.interval + SAME_TIME).floor() as u64 + 1;
+        }
+    }
+}
+
+/// Returns the time from `now` to the next output of any series or to `end` [s].
+///
+/// Outputs that are nearly due at the same time are written together at the last of them: a time
+/// step much shorter than the usual `step` [s] disturbs the pressure.
+pub(crate) fn until_next(series: &[Series], end: f64, now: f64, step: f64) -> f64 {
+    let times = || {
+        let next = series.iter().filter_map(Series::next_time);
+        next.filter(|time| *time < end).chain([end])
+    };
+    let first = times().fold(f64::INFINITY, f64::min);
+    let together = first + SHORTEST_STEP * step;
+    times().filter(|time| *time <= together).fold(first, f64::max) - now
+}

@@ -1,0 +1,217 @@
+//! Samples of the flow at points and on planes of the grid.
+
+use glam::DVec3;
+
+use super::Simulation;
+use super::probe::SampledGrid;
+use crate::dem::Grain;
+use crate::grid::{Axis, GlobalCell};
+
+/// Sub-cells along each edge of a cell face, for the grains on a plane.
+const SUBCELLS: usize = 4;
+/// Distance of a plane from a layer of faces below which it counts as that layer [cells].
+const ON_FACES: f64 = 1e-9;
+
+/// State of the flow at a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointSample {
+    /// Velocity [m/s]; inside a grain that of the field which the solver keeps there.
+    pub velocity: DVec3,
+    /// Dynamic pressure [Pa].
+    pub pressure: f64,
+    /// Solid fraction of the cells around the point.
+    pub solid_fraction: f64,
+}
+
+/// State of the flow on a plane across the box.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlaneSample {
+    /// Volume of fluid and grains that crosses the plane [m^3/s], positive along the normal.
+    pub volume_flux: f64,
+    /// Volume of grains in `volume_flux` [m^3/s].
+    pub grain_flux: f64,
+    /// Part of the plane that lies inside grains.
+    pub solid_fraction: f64,
+    /// Mean dynamic pressure over the part outside grains [Pa]; NaN if there is none.
+    pub pressure: f64,
+}
+
+impl Simulation {
+    /// Samples the flow at a point: velocity and pressure as [`Simulation::interpolate_velocity`]
+    /// does, exact for linear fields. `None` outside the box or without fluid.
+    pub fn sample_point(&self, x: DVec3) -> Option<PointSample> {
+        let grid = self.sampled_grid();
+        let solid_fraction = grid.interpolate_cells(x, |cell| self.solid_fraction_at(cell))?;
+        Some(PointSample {
+            velocity: self.interpolate_velocity(x)?,
+            pressure: grid.interpolate_cells(x, |cell| self.pressure_at(cell))?,
+            solid_fraction: solid_fraction.clamp(0.0, 1.0),
+        })
+    }
+
+    /// Samples the flow on the plane normal to `axis` at the coordinate `at` [m]. `None` outside
+    /// the box or without fluid.
+    ///
+    /// The volume flux is the sum over the faces in the plane, which the projection conserves from
+    /// plane to plane to round-off; between two layers of faces it is interpolated linearly.
+    pub fn sample_plane(&self, axis: Axis, at: f64) -> Option<PlaneSample> {
+        let normal = axis as usize;
+        let mesh = &self.setup.mesh;
+        let [a, b] = [(normal + 1) % 3, (normal + 2) % 3];
+        let volume_flux = mesh.spacing[a] * mesh.spacing[b] * self.face_sum(axis, at)?;
+        let solid = self.solid_faces(normal, at);
+        let count = (mesh.cells[a] * mesh.cells[b]) as f64;
+        let grid = self.sampled_grid();
+        let (mut solid_sum, mut pressure_sum) = (0.0, 0.0);
+        let mut x = mesh.position([0.5; 3], GlobalCell([1; 3]));
+        x[normal] = at;
+        for (n, fraction) in solid.fraction.iter().enumerate() {
+            solid_sum += fraction;
+            x[a] = mesh.origin[a] + ((n % mesh.cells[a]) as f64 + 0.5) * mesh.spacing[a];
+            x[b] = mesh.origin[b] + ((n / mesh.cells[a]) as f64 + 0.5) * mesh.spacing[b];
+            if *fraction < 1.0 {
+                let pressure = grid.interpolate_cells(x, |cell| self.pressure_at(cell))?;
+                pressure_sum += (1.0 - fraction) * pressure;
+            }
+        }
+        Some(PlaneSample {
+            volume_flux,
+            grain_flux: solid.flux,
+            solid_fraction: solid_sum / count,
+            pressure: pressure_sum / (count - solid_sum),
+        })
+    }
+
+    fn sampled_grid(&self) -> SampledGrid<'_> {
+        SampledGrid { mesh: &self.setup.mesh, boundaries: &self.setup.boundaries }
+    }
+
+    /// Sum of the normal velocity over the faces of a plane [m/s], in the order of memory.
+    fn face_sum(&self, axis: Axis, at: f64) -> Option<f64> {
+        let (mesh, normal) = (&self.setup.mesh, axis as usize);
+        let n = mesh.cells[normal];
+        let s = (at - mesh.origin[normal]) / mesh.spacing[normal];
+        if !(-ON_FACES..=n as f64 + ON_FACES).contains(&s) {
+            return None;
+        }
+        let view = self.velocity(axis)?;
+        let layer = |index: usize| {
+            let mut shape = view.shape();
+            // Entries are in the order z, y, x.
+            let along = 2 - normal;
+            shape[along] = 1;
+            let mut sum = 0.0;
+            for k in 0..shape[0] {
+                for j in 0..shape[1] {
+                    for i in 0..shape[2] {
+                        let mut entry = [k, j, i];
+                        entry[along] = index;
+                        sum += view.get(entry);
+                    }
+                }
+            }
+            sum
+        };
+        let nearest = s.round();
+        if (s - nearest).abs() <= ON_FACES {
+            return Some(layer(nearest as usize));
+        }
+        let below = s.floor();
+        Some(
+            layer(below as usize)
+                + (s - below) * (layer(below as usize + 1) - layer(below as usize)),
+        )
+    }
+
+    /// Solid fraction of each face cell of a plane, and the volume of grains that crosses it.
+    fn solid_faces(&self, normal: usize, at: f64) -> SolidFaces {
+        let mesh = &self.setup.mesh;
+        let [a, b] = [(normal + 1) % 3, (normal + 2) % 3];
+        let cells = [mesh.cells[a], mesh.cells[b]];
+        let mut faces = SolidFaces { fraction: vec![0.0; cells[0] * cells[1]], flux: 0.0 };
+        for grain in self.setup.grains.iter().filter(|grain| !grain.has_left()) {
+            self.add_cross_section(&mut faces, grain, normal, at);
+        }
+        faces
+    }
+
+    /// Adds the cross-section of a grain and of its periodic images with a plane.
+    fn add_cross_section(&self, faces: &mut SolidFaces, grain: &Grain, normal: usize, at: f64) {
+        let (mesh, enclosure) = (&self.setup.mesh, self.setup.enclosure());
+        let [a, b] = [(normal + 1) % 3, (normal + 2) % 3];
+        let mut to_plane = DVec3::ZERO;
+        to_plane[normal] = at - grain.pose.position[normal];
+        let height = enclosure.nearest_image(to_plane)[normal];
+        let radius = grain.shape.bounding_radius();
+        if height.abs() > radius {
+            return;
+        }
+        let reach = (radius * radius - height * height).sqrt();
+        // An axis of one cell is evaluated in its middle plane.
+        let resolved = [a, b].map(|axis| mesh.is_resolved(axis));
+        let parts = resolved.map(|resolved| if resolved { SUBCELLS } else { 1 });
+        let edges = [a, b].map(|axis| mesh.spacing[axis]);
+        let area = edges[0] * edges[1] / (parts[0] * parts[1]) as f64;
+        let mut width = DVec3::ZERO;
+        for (n, axis) in [a, b].into_iter().enumerate().filter(|(n, _)| resolved[*n]) {
+            width[axis] = edges[n] / parts[n] as f64;
+        }
+        let columns = [a, b].map(|axis| self.cells_near(axis, grain.pose.position[axis], reach));
+        for (cell_b, centre_b) in &columns[1] {
+            for (cell_a, centre_a) in &columns[0] {
+                let cell = cell_a + mesh.cells[a] * cell_b;
+                for part in 0..parts[0] * parts[1] {
+                    let offset =
+                        |n: usize, i: usize| ((i as f64 + 0.5) / parts[n] as f64 - 0.5) * edges[n];
+                    let mut lever_arm = DVec3::ZERO;
+                    lever_arm[normal] = height;
+                    lever_arm[a] = centre_a + offset(0, part % parts[0]);
+                    lever_arm[b] = centre_b + offset(1, part / parts[0]);
+                    let orientation = grain.pose.orientation;
+                    let (distance, gradient) =
+                        (grain.shape).distance_and_gradient(orientation.conjugate() * lever_arm);
+                    let outward = orientation * gradient.normalize_or_zero();
+                    // Each sub-cell is cut by the line in which the nearest surface meets it.
+                    let across = outward.abs().dot(width).max(f64::MIN_POSITIVE);
+                    let fraction = (0.5 - distance / across).clamp(0.0, 1.0);
+                    if fraction > 0.0 {
+                        let share = fraction / (parts[0] * parts[1]) as f64;
+                        faces.fraction[cell] = (faces.fraction[cell] + share).min(1.0);
+                        let velocity = grain.velocity + grain.angular_velocity.cross(lever_arm);
+                        faces.flux += fraction * area * velocity[normal];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Cells along `axis` within `reach` [m] of a coordinate, each with the distance of its centre
+    /// from it [m]; across periodic sides too.
+    fn cells_near(&self, axis: usize, centre: f64, reach: f64) -> Vec<(usize, f64)> {
+        let mesh = &self.setup.mesh;
+        let n = mesh.cells[axis] as i64;
+        if n == 1 {
+            return vec![(0, 0.0)];
+        }
+        let (h, periodic) = (mesh.spacing[axis], self.setup.boundaries.is_periodic(axis));
+        let index = |x: f64| ((x - mesh.origin[axis]) / h).floor() as i64;
+        let (mut from, mut to) = (index(centre - reach), index(centre + reach));
+        if !periodic {
+            (from, to) = (from.max(0), to.min(n - 1));
+        }
+        (from..=to)
+            .map(|i| {
+                let at = mesh.origin[axis] + (i as f64 + 0.5) * h;
+                (i.rem_euclid(n) as usize, at - centre)
+            })
+            .collect()
+    }
+}
+
+/// Cross-sections of the grains with a plane.
+struct SolidFaces {
+    /// Solid fraction of each face cell, the first axis after the normal fastest.
+    fraction: Vec<f64>,
+    /// Volume of grains that crosses the plane [m^3/s].
+    flux: f64,
+}
