@@ -42,4 +42,8 @@ cargo build --release --quiet
 (cd "$work" && "$work/full/bin/python" -m mypy.stubtest grainwake._grainwake \
   --mypy-config-file "$root/crates/python/pyproject.toml" --allowlist "$root/.ci/stubtest.txt")
 (cd "$work" && "$work/full/bin/python" "$root/.ci/notebooks.py" 60 "$root"/docs/notebooks/*.ipynb)
+
+# 4. Statistics of the study by a second route.
+"$work/full/bin/pip" install -q lifelines statsmodels
+"$work/full/bin/python" studies/second_route.py results/dkt-morphology-ensemble orientation cells
 echo "python: all checks passed in $((SECONDS - started)) s"
