@@ -28,7 +28,7 @@ impl From<StudyError> for Exit {
             StudyError::Damaged { .. } => Exit::with_help(
                 BAD_INPUT,
                 error.to_string(),
-                "start the study again: it rewrites the file and keeps finished runs",
+                "start the study with `grainwake study`: it writes the file again",
             ),
             StudyError::Io { action, ref source, .. } => {
                 use std::io::ErrorKind::{InvalidData, NotFound};
@@ -67,6 +67,9 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
             return print(&list(runs, &states));
         }
         return print(&dry_run(args, runs, &states, jobs, each));
+    }
+    if let Some(note) = plan.damage_in(&folder) {
+        tell!("note: {note}");
     }
     plan.create_folder(&folder)?;
     let stop = Arc::new(AtomicBool::new(false));

@@ -133,6 +133,17 @@ fn read_ensemble(
             .help("members includes the run without offset");
         return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
     }
+    let models = match &raw.models {
+        None => (0..models.len()).collect(),
+        Some(patterns) => expand::matching(source, patterns, models)?,
+    };
+    let runs = models.len().saturating_mul(raw.members.value);
+    if runs > expand::MOST_RUNS {
+        let most = expand::MOST_RUNS;
+        let problem = Problem::new(format!("the ensemble has {runs} runs"))
+            .help(format!("a study has at most {most} runs: take fewer members or models"));
+        return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
+    }
     Ok(Ensemble {
         members: raw.members.value,
         offset,
@@ -140,10 +151,7 @@ fn read_ensemble(
         cell_shift: raw.cell_shift,
         grain: raw.grain,
         seed: raw.seed,
-        models: match &raw.models {
-            None => (0..models.len()).collect(),
-            Some(patterns) => expand::matching(source, patterns, models)?,
-        },
+        models,
     })
 }
 
