@@ -108,6 +108,14 @@ impl From<RunError> for Exit {
             RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => {
                 Some("the disk is full: free some space, then continue with --resume")
             }
+            RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::FileTooLarge => {
+                Some(
+                    "the file exceeds the limit of this shell (ulimit -f) or of the file system: raise it, then continue with --resume",
+                )
+            }
+            RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::QuotaExceeded => {
+                Some("your disk quota is used up: free some space, then continue with --resume")
+            }
             RunError::Io { .. } => {
                 Some("check the folder and its permissions; continue a started run with --resume")
             }

@@ -14,7 +14,7 @@ use crate::args::StudyArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, exit_code};
 use crate::progress::{clock, count, first_line};
 use crate::study_board::Board;
-use crate::{kind, print, run, tell, threads};
+use crate::{kind, print, signals, tell, threads};
 
 impl From<StudyError> for Exit {
     fn from(error: StudyError) -> Exit {
@@ -73,7 +73,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     }
     plan.create_folder(&folder)?;
     let stop = Arc::new(AtomicBool::new(false));
-    run::watch_for_interrupt(stop.clone());
+    signals::watch_for_interrupt(stop.clone());
     if !args.quiet {
         tell!(
             "{}: {} of {}, {jobs} at once with {} each -> {}",
