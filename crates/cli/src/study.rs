@@ -31,8 +31,9 @@ impl From<StudyError> for Exit {
                 "start the study with `grainwake study`: it writes the file again",
             ),
             StudyError::Io { action, ref source, .. } => {
-                use std::io::ErrorKind::{InvalidData, NotFound};
-                let bad = action == "read" && matches!(source.kind(), NotFound | InvalidData);
+                use std::io::ErrorKind::{FileTooLarge, InvalidData, InvalidInput, NotFound};
+                let kinds = [NotFound, InvalidData, InvalidInput, FileTooLarge];
+                let bad = action == "read" && kinds.contains(&source.kind());
                 let help = if bad {
                     "give the path of a study file, for example studies/dkt-morphology/study.toml"
                 } else {
