@@ -12,7 +12,7 @@ pub const DATA: u64 = 16 << 30;
 /// Reads a whole file of at most `limit` bytes.
 ///
 /// # Errors
-/// `InvalidInput` for a device, `FileTooLarge` beyond the limit, and errors of the operating system.
+/// `InvalidInput` for a device, `FileTooLarge` beyond the limit, errors of the operating system.
 pub fn read_bytes(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let too_large = |bytes: u64| {
