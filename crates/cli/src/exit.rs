@@ -90,7 +90,9 @@ impl From<CaseError> for Exit {
                         BAD_INPUT,
                         "give the path of a case file, for example cases/dkt-pair/quick.toml",
                     ),
-                    std::io::ErrorKind::InvalidData => {
+                    std::io::ErrorKind::InvalidData
+                    | std::io::ErrorKind::InvalidInput
+                    | std::io::ErrorKind::FileTooLarge => {
                         (BAD_INPUT, "a case file is a TOML text in UTF-8")
                     }
                     _ => (IO, "check the file and its permissions"),
@@ -108,6 +110,14 @@ impl From<RunError> for Exit {
             RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => {
                 Some("the disk is full: free some space, then continue with --resume")
             }
+            RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::FileTooLarge => {
+                Some(
+                    "the file exceeds the limit of this shell (ulimit -f) or of the file system: raise it, then continue with --resume",
+                )
+            }
+            RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::QuotaExceeded => {
+                Some("your disk quota is used up: free some space, then continue with --resume")
+            }
             RunError::Io { .. } => {
                 Some("check the folder and its permissions; continue a started run with --resume")
             }
@@ -120,7 +130,10 @@ impl From<RunError> for Exit {
 impl From<ShapeError> for Exit {
     fn from(error: ShapeError) -> Exit {
         let code = match &error {
-            ShapeError::Io { source, .. } if source.kind() != std::io::ErrorKind::NotFound => IO,
+            ShapeError::Io { source, .. } => match source.kind() {
+                std::io::ErrorKind::NotFound | std::io::ErrorKind::InvalidInput => BAD_INPUT,
+                _ => IO,
+            },
             _ => BAD_INPUT,
         };
         Exit::with_hint(code, &error, shape_help(&error))

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use grainwake_formats::bounded_file::{SETTINGS, read_text};
 use grainwake_run::case::{Case, CaseError, Source};
 use grainwake_study::{Study, StudyError};
 use serde::Deserialize;
@@ -29,7 +30,7 @@ enum Kind {
 
 /// Returns the kind of a file by its keys; `None` if they are ambiguous.
 fn kind(path: &Path) -> Option<Kind> {
-    let text = std::fs::read_to_string(path).ok()?;
+    let text = read_text(path, SETTINGS).ok()?;
     let (_, marks): (Source, Marks) = Source::parse("", &text, &[]).ok()?;
     let case = marks.domain.or(marks.grain).or(marks.packing).or(marks.poses).is_some();
     let study = marks.base.or(marks.axis).or(marks.model).is_some();

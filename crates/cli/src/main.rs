@@ -15,6 +15,7 @@ mod out;
 mod progress;
 mod report;
 mod run;
+mod signals;
 mod study;
 mod study_board;
 mod threads;
@@ -28,6 +29,7 @@ use out::{print, tell};
 
 fn main() -> std::process::ExitCode {
     let cli = Cli::parse();
+    signals::survive_file_size_limit();
     let done = match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Check(args) => check::check(args),

@@ -21,7 +21,8 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
         for note in &done.notes {
             tell!("note: {note}");
         }
-        if done.png.is_empty() && Plan::read(&args.run)?.analysis == Analysis::default() {
+        let (plan, _) = Plan::read_or_rebuild(&args.run)?;
+        if done.png.is_empty() && plan.analysis == Analysis::default() {
             tell!("note: no figures: no run has results to draw");
         }
         let (finished, all) = done.runs;

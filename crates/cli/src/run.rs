@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use grainwake_formats::summary::Summary;
 use grainwake_run::case::{Case, Problem, Verdict, find_parent};
@@ -11,7 +11,7 @@ use grainwake_run::{Ending, Existing, Options, RESOLVED};
 use crate::args::RunArgs;
 use crate::exit::{Exit, INTERRUPTED, MISSED};
 use crate::progress::{ProgressDisplay, count};
-use crate::{check, expect, kind, print, tell, threads};
+use crate::{check, expect, kind, print, signals, tell, threads};
 
 /// Runs a case.
 pub fn run(args: &RunArgs) -> Result<(), Exit> {
@@ -32,7 +32,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
     }
     let options = Options { existing, command: std::env::args().collect(), threads, parent };
     let stop = Arc::new(AtomicBool::new(false));
-    watch_for_interrupt(stop.clone());
+    signals::watch_for_interrupt(stop.clone());
     if !args.quiet {
         let cells = case.setup.mesh.cells;
         let what = if case.setup.fluid.is_some() {
@@ -164,19 +164,6 @@ fn default_folder(case: &Path) -> PathBuf {
         None => stem,
     };
     Path::new("runs").join(name)
-}
-
-/// Requests a checkpoint on the first interrupt and ends the program on the second.
-pub(crate) fn watch_for_interrupt(stop: Arc<AtomicBool>) {
-    // Without a handler an interrupt ends the program, and the last checkpoint remains.
-    let _ = ctrlc::set_handler(move || {
-        if stop.swap(true, Ordering::Relaxed) {
-            std::process::exit(i32::from(INTERRUPTED));
-        }
-        tell!(
-            "interrupted: writing a checkpoint after this step (interrupt again to stop immediately)"
-        );
-    });
 }
 
 #[cfg(test)]

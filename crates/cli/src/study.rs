@@ -14,7 +14,7 @@ use crate::args::StudyArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, exit_code};
 use crate::progress::{clock, count, first_line};
 use crate::study_board::Board;
-use crate::{kind, print, run, tell, threads};
+use crate::{kind, print, signals, tell, threads};
 
 impl From<StudyError> for Exit {
     fn from(error: StudyError) -> Exit {
@@ -28,11 +28,12 @@ impl From<StudyError> for Exit {
             StudyError::Damaged { .. } => Exit::with_help(
                 BAD_INPUT,
                 error.to_string(),
-                "start the study again: it rewrites the file and keeps finished runs",
+                "start the study with `grainwake study`: it writes the file again",
             ),
             StudyError::Io { action, ref source, .. } => {
-                use std::io::ErrorKind::{InvalidData, NotFound};
-                let bad = action == "read" && matches!(source.kind(), NotFound | InvalidData);
+                use std::io::ErrorKind::{FileTooLarge, InvalidData, InvalidInput, NotFound};
+                let kinds = [NotFound, InvalidData, InvalidInput, FileTooLarge];
+                let bad = action == "read" && kinds.contains(&source.kind());
                 let help = if bad {
                     "give the path of a study file, for example studies/dkt-morphology/study.toml"
                 } else {
@@ -68,9 +69,12 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         }
         return print(&dry_run(args, runs, &states, jobs, each));
     }
+    if let Some(note) = plan.damage_in(&folder) {
+        tell!("note: {note}");
+    }
     plan.create_folder(&folder)?;
     let stop = Arc::new(AtomicBool::new(false));
-    run::watch_for_interrupt(stop.clone());
+    signals::watch_for_interrupt(stop.clone());
     if !args.quiet {
         tell!(
             "{}: {} of {}, {jobs} at once with {} each -> {}",

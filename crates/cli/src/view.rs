@@ -84,7 +84,10 @@ fn name(folder: &Path) -> String {
 }
 
 fn of_study(folder: &Path) -> Result<Viewer, Exit> {
-    let plan = Plan::read(folder)?;
+    let (plan, damage) = Plan::read_or_rebuild(folder)?;
+    if let Some(note) = damage {
+        tell!("note: {note}");
+    }
     let records = records(&plan, folder);
     let axes: BTreeSet<&String> = records.iter().flat_map(|record| record.levels.keys()).collect();
     let quantities = columns(&records);

@@ -525,3 +525,25 @@ fn an_absurd_image_header() {
     refused_image("absurd.tif", &bytes, &["absurd.tif", "1000000"]);
     assert!(start.elapsed().as_secs() < 20);
 }
+
+#[test]
+fn lengths_that_no_grain_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("x.grain");
+    let bodies: [&[&str]; 5] = [
+        &["sphere", "1e300"],
+        &["sphere", "1e-300"],
+        &["sphere", "1e7 m"],
+        &["ellipsoid", "1e100", "1e100", "1e100"],
+        &["cylinder", "1e200", "1"],
+    ];
+    for body in bodies {
+        let mut command = grainwake();
+        let done = command.args(["grain", "make"]).args(body).arg("-o").arg(&out).assert().code(2);
+        let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        assert!(message.contains("between 1e-9 m and 1e6 m"), "{body:?}: {message}");
+        assert!(!out.exists());
+    }
+    let mut command = grainwake();
+    command.args(["grain", "make", "sphere", "2 mm"]).arg("-o").arg(&out).assert().success();
+}

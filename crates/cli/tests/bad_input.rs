@@ -171,3 +171,31 @@ fn thousands_of_threads_are_reduced_with_a_warning() {
     let done = program.arg(&out).arg("--no-report").assert().success();
     done.stderr(contains("warning: 5000 threads are too many for"));
 }
+
+#[cfg(unix)]
+#[test]
+fn devices_are_no_files() {
+    refused(
+        "shape = { kind = \"sphere\", diameter = \"2 mm\" }\nnodes = 200",
+        "file = \"/dev/zero\"",
+        &["case.toml:18:8", "grain.0.file", "/dev/zero: it is a device, not a file"],
+    );
+    let start = std::time::Instant::now();
+    let commands: [&[&str]; 6] = [
+        &["run", "/dev/zero"],
+        &["check", "/dev/zero"],
+        &["study", "/dev/zero"],
+        &["grain", "info", "/dev/zero"],
+        &["grain", "from-mesh", "/dev/zero", "--unit", "mm", "-o", "x.grain"],
+        &["grain", "compare", "/dev/zero", "/dev/zero"],
+    ];
+    for command in commands {
+        let done = grainwake().args(command).assert().code(2);
+        let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        assert!(
+            message.contains("/dev/zero: it is a device, not a file"),
+            "{command:?}: {message}"
+        );
+    }
+    assert!(start.elapsed().as_secs() < 30, "nothing is read");
+}

@@ -151,6 +151,73 @@ fn a_damaged_checkpoint_gives_way_to_the_one_before() {
 }
 
 #[test]
+fn a_checkpoint_ahead_of_the_tables_gives_way_to_the_one_before() {
+    let (folder, case) = folder_with(WET);
+    let whole = folder.path().join("whole");
+    run(&case, &whole, &["--set", "time.end=30 ms"]).success();
+    for table in ["grains.csv", "diagnostics.csv"] {
+        let out = unfinished(folder.path(), &case);
+        // The rows since the older checkpoint, at 20 ms, are lost.
+        let text = std::fs::read_to_string(out.join(table)).unwrap();
+        let early = |line: &&str| {
+            let time = line.split(',').next().unwrap().parse::<f64>();
+            time.is_ok_and(|time| time < 0.0201) || line.starts_with("time")
+        };
+        let kept: Vec<&str> = text.lines().filter(early).collect();
+        std::fs::write(out.join(table), kept.join("\n") + "\n").unwrap();
+        let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).success();
+        let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        assert!(
+            message.contains(&format!("it is ahead of the tables: {table} has"))
+                && message.contains("checkpoint before it"),
+            "{message}"
+        );
+        assert_same_run(&whole, &out);
+        std::fs::remove_dir_all(out).unwrap();
+    }
+    // Without any rows there is nothing to continue.
+    let out = unfinished(folder.path(), &case);
+    std::fs::remove_file(out.join("grains.csv")).unwrap();
+    let before = common::contents(&out);
+    let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).code(4);
+    let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    assert!(
+        message.contains("grains.csv is missing")
+            && message.contains("--force")
+            && !message.contains("continue a started run with --resume"),
+        "{message}"
+    );
+    assert_eq!(before, common::contents(&out), "nothing may change");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_limit_of_the_file_size_is_an_error_and_the_run_resumes() {
+    let (folder, case) = folder_with(WET);
+    let (out, whole) = (folder.path().join("run"), folder.path().join("whole"));
+    let sets = ["--set", "output.fields=0", "--set", "output.tables=0.2 ms", "--no-report"];
+    run(&case, &whole, &sets).success();
+    let largest = |file: &str| std::fs::metadata(whole.join(file)).unwrap().len();
+    assert!(largest("grains.csv") > 180_000);
+    // The first checkpoint exceeds the first limit; in the middle of the run a table exceeds the
+    // second one.
+    for (kilobytes, file) in [(50, "checkpoint"), (140, "grains.csv")] {
+        let command = format!("ulimit -c 0; ulimit -f {kilobytes}; exec \"$@\"");
+        let mut shell = Command::new("bash");
+        shell.args(["-c", &command, "bash"]).arg(assert_cmd::cargo::cargo_bin("grainwake"));
+        shell.arg("run").arg(&case).arg("-o").arg(&out).arg("--quiet").args(sets);
+        let output = shell.output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(4), "{message}");
+        assert!(message.contains("cannot write") && message.contains("ulimit -f"), "{message}");
+        assert!(message.contains(file) && !out.join("summary.json").exists(), "{message}");
+        run(&case, &out, &[&sets[..], &["--resume"]].concat()).success();
+        assert_same_run(&whole, &out);
+        std::fs::remove_dir_all(&out).unwrap();
+    }
+}
+
+#[test]
 fn two_damaged_checkpoints_end_with_exit_code_4() {
     let (folder, case) = folder_with(WET);
     let out = unfinished(folder.path(), &case);
@@ -215,7 +282,14 @@ fn a_folder_of_something_else_is_never_touched() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupt_writes_a_checkpoint_and_exits_with_130() {
+fn an_interrupt_and_sigterm_write_a_checkpoint_and_exit_with_130() {
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        interrupted_by(signal);
+    }
+}
+
+#[cfg(unix)]
+fn interrupted_by(signal: &str) {
     let (folder, case) = folder_with(WET);
     let (out, whole) = (folder.path().join("run"), folder.path().join("whole"));
     let long = ["--set", "output.checkpoint_steps=0"];
@@ -226,7 +300,7 @@ fn an_interrupt_writes_a_checkpoint_and_exits_with_130() {
     while !out.join("slices/y-grain0_000000.vti").is_file() {
         std::thread::sleep(Duration::from_millis(1));
     }
-    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
     let output = child.wait_with_output().unwrap();
     let message = String::from_utf8_lossy(&output.stderr);
     if output.status.success() {

@@ -188,3 +188,25 @@ fn wrong_studies_end_with_2_and_a_place() {
     std::fs::write(out.join("thesis.tex"), "").unwrap();
     run(STUDY, &[]).stderr(contains("holds no study"));
 }
+
+#[test]
+fn a_damaged_plan_is_no_dead_end() {
+    let (folder, path) = study();
+    let out = folder.path().join("out");
+    let run = || {
+        let mut command = grainwake();
+        command.arg("study").arg(&path).arg("-o").arg(&out).args(["--set", "time.end=10 ms"]);
+        command.assert().success()
+    };
+    run();
+    std::fs::write(out.join("study.json"), "{ \"grainwake_study\": 1, \"runs\": [").unwrap();
+    let report = grainwake().arg("report").arg(&out).assert().success();
+    report
+        .stderr(contains("study.json is damaged").and(contains("`grainwake study ")))
+        .stdout(contains("2 of 2 runs finished"));
+    run().stderr(contains("study.json is damaged").and(contains("finished runs are kept")));
+    let provenance = std::fs::read_to_string(out.join("runs/light/provenance.json")).unwrap();
+    assert_eq!(provenance.matches("\"started\"").count(), 1, "the run was not repeated");
+    let report = grainwake().arg("report").arg(&out).assert().success();
+    report.stderr(contains("damaged").not());
+}

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::bounded_file;
+
 /// Reason why a file of text cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum FormatError {
@@ -37,7 +39,7 @@ impl FormatError {
 /// # Errors
 /// [`FormatError::Line`] with the first line that is not UTF-8, or [`FormatError::Read`].
 pub fn read_text(file: &Path) -> Result<String, FormatError> {
-    let bytes = std::fs::read(file)
+    let bytes = bounded_file::read_bytes(file, bounded_file::DATA)
         .map_err(|source| FormatError::Read { file: file.to_owned(), source })?;
     String::from_utf8(bytes).map_err(|error| {
         let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];

@@ -15,6 +15,7 @@
 //! The crate knows no shape, no solver and no case file.
 
 pub mod atomic_file;
+pub mod bounded_file;
 pub mod codec;
 pub mod diagnostics;
 mod error;

@@ -7,6 +7,7 @@ use roxmltree::Document;
 use serde::{Deserialize, Serialize};
 
 use crate::atomic_file::write_atomically;
+use crate::bounded_file::{SETTINGS, read_text};
 
 /// Entry of a collection: one VTK file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,7 +56,7 @@ pub fn write(path: &Path, entries: &[Entry]) -> io::Result<()> {
 /// # Errors
 /// A description of the damage, or the error of the operating system.
 pub fn read(path: &Path) -> Result<Vec<Entry>, String> {
-    let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
+    let text = read_text(path, SETTINGS).map_err(|error| error.to_string())?;
     let document = Document::parse(&text).map_err(|error| format!("not XML: {error}"))?;
     let elements = document.descendants().filter(|node| node.has_tag_name("DataSet"));
     Ok(elements

@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::atomic_file::write_atomically;
+use crate::bounded_file::{SETTINGS, read_text};
 use crate::events::Event;
 
 /// Name of the file in a run folder; it is written last.
@@ -103,7 +104,7 @@ impl Summary {
     /// # Errors
     /// `InvalidData` for a damaged file, or errors of the operating system.
     pub fn read(run: &Path) -> io::Result<Summary> {
-        let text = std::fs::read_to_string(run.join(FILE))?;
+        let text = read_text(&run.join(FILE), SETTINGS)?;
         serde_json::from_str(&text).map_err(io::Error::from)
     }
 

@@ -8,6 +8,7 @@ use glam::DVec3;
 use roxmltree::{Document, Node};
 
 use crate::atomic_file::write_atomically;
+use crate::bounded_file::{DATA, read_bytes};
 use crate::vtk_xml::{
     ArrayElements, ArrayReader, child, close_appended, damaged, open_appended, split, write_head,
     write_length,
@@ -134,7 +135,7 @@ pub fn write_from(path: &Path, frame: &Frame, sources: &[Source]) -> io::Result<
 /// # Errors
 /// `InvalidData` with the damage, or errors of the operating system.
 pub fn read(path: &Path) -> io::Result<Image> {
-    parse(&std::fs::read(path)?).map_err(|what| damaged(path, what))
+    parse(&read_bytes(path, DATA)?).map_err(|what| damaged(path, what))
 }
 
 fn parse(bytes: &[u8]) -> Result<Image, String> {

@@ -9,6 +9,7 @@ use glam::DVec3;
 use roxmltree::Document;
 
 use crate::atomic_file::write_atomically;
+use crate::bounded_file::{DATA, read_bytes};
 use crate::vtk_xml::{
     ArrayElements, ArrayReader, child, close_appended, open_appended, split, write_head,
     write_length,
@@ -89,7 +90,7 @@ fn write_indices(out: &mut dyn Write, mut list: impl Iterator<Item = usize>) -> 
 /// # Errors
 /// A description of the damage, or the error of the operating system.
 pub fn read(file: &Path) -> Result<Surface, String> {
-    let bytes = std::fs::read(file).map_err(|error| error.to_string())?;
+    let bytes = read_bytes(file, DATA).map_err(|error| error.to_string())?;
     let (xml, data) = split(&bytes)?;
     let document = Document::parse(&xml).map_err(|error| format!("not XML: {error}"))?;
     let reader = ArrayReader::new(&document, "PolyData", data)?;

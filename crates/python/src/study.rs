@@ -219,12 +219,18 @@ fn failures(plan: &Plan, ended: &[(usize, Outcome)]) -> PyResult<()> {
 /// Runs of a study folder as written in its plan, as dicts.
 #[pyfunction]
 pub fn _read_plan(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyAny>> {
-    json(py, &Plan::read(&folder).raise()?)
+    let (plan, damage) = Plan::read_or_rebuild(&folder).raise()?;
+    if let Some(note) = damage {
+        py.import("warnings")?.call_method1("warn", (note,))?;
+    }
+    json(py, &plan)
 }
 
 /// Measured values of all runs of a study folder, as dicts.
 #[pyfunction]
 pub fn _read_records(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyAny>> {
-    let rows = py.detach(|| Plan::read(&folder).map(|plan| records(&plan, &folder))).raise()?;
+    let rows = py
+        .detach(|| Plan::read_or_rebuild(&folder).map(|(plan, _)| records(&plan, &folder)))
+        .raise()?;
     json(py, &rows)
 }

@@ -339,7 +339,7 @@ impl Recorder {
 }
 
 /// Returns the tables that a plan asks for besides those of every run.
-fn extra_tables(plan: &RunPlan) -> Vec<ExtraTable> {
+pub(crate) fn extra_tables(plan: &RunPlan) -> Vec<ExtraTable> {
     plan.probes.iter().map(Probe::table).collect()
 }
 

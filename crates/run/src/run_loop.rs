@@ -15,7 +15,7 @@ use grainwake_solver::sim::{
 use crate::error::{Context, RunError};
 use crate::memory;
 use crate::plan::RunPlan;
-use crate::recorder::Recorder;
+use crate::recorder::{Recorder, extra_tables};
 use crate::run_folder::checkpoint::Record;
 use crate::run_folder::provenance::{ParentRun, Provenance, Session};
 use crate::run_folder::{self, Content, Existing, Parent, RESOLVED, checkpoint, differing};
@@ -148,7 +148,13 @@ pub fn run(
         ));
     }
     let mut sim = Simulation::new(job.setup)?;
-    let begin = begin(&job.digest, out, resuming, parent, &mut sim, observer)?;
+    let own = if resuming {
+        let tables = extra_tables(&job.plan);
+        checkpoint::restore(out, &job.digest, &tables, &mut sim, &mut |text| observer.note(text))?
+    } else {
+        None
+    };
+    let begin = begin(own, resuming, parent, &mut sim, observer)?;
     if let (None, Some(lost)) = (parent, &provenance.parent)
         && matches!(begin, Begin::Fresh)
     {
@@ -188,22 +194,19 @@ enum Begin {
     Branched(Box<Record>),
 }
 
-/// Restores the checkpoint that the run begins with, if there is one.
+/// Returns the state that the run begins with: its own restored checkpoint, or that of the parent,
+/// which is restored here.
 fn begin(
-    digest: &str,
-    out: &Path,
+    own: Option<Record>,
     resuming: bool,
     parent: Option<&Parent>,
     sim: &mut Simulation,
     observer: &mut dyn Observer,
 ) -> Result<Begin, RunError> {
-    if resuming {
-        let own = checkpoint::restore(out, digest, sim, &mut |text| observer.note(text))?;
-        if let Some(record) = own {
-            let (time, steps) = (record.time, record.steps);
-            observer.note(&format!("resuming at t = {time:.6e} s, step {steps}"));
-            return Ok(Begin::Resumed(Box::new(record)));
-        }
+    if let Some(record) = own {
+        let (time, steps) = (record.time, record.steps);
+        observer.note(&format!("resuming at t = {time:.6e} s, step {steps}"));
+        return Ok(Begin::Resumed(Box::new(record)));
     }
     let Some(parent) = parent else {
         if resuming {

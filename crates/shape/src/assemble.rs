@@ -1,7 +1,7 @@
 //! Assembly of a shape from a distance function in the principal frame.
 
 use crate::distance::Distance;
-use crate::error::{Result, ShapeError, positive, within};
+use crate::error::{Result, ShapeError, positive, size, within};
 use crate::field::SampledField;
 use crate::morphology::Morphology;
 use crate::nodes::SurfaceNode;
@@ -70,6 +70,7 @@ impl ShapeOptions {
             within("nodes", nodes as f64, 16.0..=1e6, "must be 16 to 1000000")?;
         }
         positive("shortest extent of the body", extent.min_element())?;
+        size("longest extent of the body", extent.max_element())?;
         Ok((extent.max_element() / self.cells as f64)
             .min(extent.min_element() / self.least_cells as f64))
     }

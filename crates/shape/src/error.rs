@@ -165,6 +165,16 @@ pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64> {
     Err(ShapeError::parameter(name, value, reason))
 }
 
+/// Lengths of grains that are accepted [m]. Beyond them moments of inertia, which scale with the
+/// fifth power, lose their digits.
+const SIZES: RangeInclusive<f64> = 1e-9..=1e6;
+
+/// Refuses a length that no grain has [m].
+pub(crate) fn size(name: &'static str, value: f64) -> Result<()> {
+    positive(name, value)?;
+    within(name, value, SIZES, "a length must lie between 1e-9 m and 1e6 m; was a unit forgotten?")
+}
+
 /// Refuses a value outside `range`.
 pub(crate) fn within(
     name: &'static str,

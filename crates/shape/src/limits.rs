@@ -115,7 +115,7 @@ impl SourceFile {
 
 /// Reads a whole file within the size limit; returns content and identity.
 pub(crate) fn read_bytes(path: &Path, limits: &ReadLimits) -> Result<(Vec<u8>, SourceFile)> {
-    let file = std::fs::File::open(path).map_err(|e| ShapeError::io(path, e))?;
+    let file = grainwake_formats::bounded_file::open(path).map_err(|e| ShapeError::io(path, e))?;
     let claimed = file.metadata().map_err(|e| ShapeError::io(path, e))?.len();
     let too_large = |bytes: u64| {
         let claimed = format!("at least {bytes} bytes");

@@ -242,3 +242,35 @@ fn selection_accepts_patterns_and_shares() {
         assert!(Selection::parse(bad).is_err(), "{bad}");
     }
 }
+
+#[test]
+fn factors_that_are_no_numbers_are_refused_where_they_stand() {
+    for bad in ["nan", "inf", "-inf"] {
+        let found = problems(&STUDY.replace("density = 2000 }", &format!("density = {bad} }}")));
+        let place = found[0].place().map(|(_, line, _)| line);
+        assert!(found[0].message.starts_with("the factor \"density\" is"), "{}", found[0]);
+        assert_eq!((found.len(), place), (1, Some(8)));
+        let model = "name = \"alone\"\nfactors = { size = nan }";
+        let found = problems(&STUDY.replace("name = \"alone\"", model));
+        assert_eq!(found[0].place().map(|(_, line, _)| line), Some(20), "{}", found[0]);
+    }
+}
+
+#[test]
+fn a_billion_models_are_refused_at_once() {
+    let values: Vec<String> = (0..1000).map(|n| format!("{{ name = \"v{n}\" }}")).collect();
+    let axis =
+        |name: &str| format!("[[axis]]\nname = \"{name}\"\nvalues = [{}]\n", values.join(", "));
+    let text =
+        format!("title = \"large\"\nbase = \"case.toml\"\n{}{}{}", axis("a"), axis("b"), axis("c"));
+    let start = std::time::Instant::now();
+    let found = problems(&text);
+    assert!(start.elapsed().as_secs() < 10);
+    assert_eq!(found.len(), 1);
+    assert!(found[0].message.contains("the axes up to \"b\" give 1000000 models"), "{}", found[0]);
+    assert_eq!(found[0].place().map(|(_, line, _)| line), Some(8));
+    let ensemble = "[ensemble]\nmembers = 1000\noffset = \"0.01 mm\"\n";
+    let text = format!("title = \"large\"\nbase = \"case.toml\"\n{}{ensemble}", axis("a"));
+    let found = problems(&text);
+    assert!(found[0].message.contains("1000000 runs"), "{}", found[0]);
+}

@@ -263,13 +263,18 @@ fn an_incomplete_study_is_drawn_and_missing_runs_are_listed() {
 }
 
 #[test]
-fn an_empty_study_has_a_page_and_a_damaged_one_is_an_error() {
+fn an_empty_study_has_a_page_and_one_without_plan_and_runs_is_an_error() {
     let root = tempfile::tempdir().unwrap();
     let folder = study(root.path(), |_| false);
     let rendered = render(&folder).unwrap();
     assert_eq!(rendered.runs, (0, 65));
     assert!(std::fs::read_to_string(&rendered.page).unwrap().contains("0 of 65 runs are finished"));
+    // The table still lists the runs.
     std::fs::write(folder.join("study.json"), "{").unwrap();
+    let rebuilt = render(&folder).unwrap();
+    assert_eq!(rebuilt.runs, (0, 65));
+    assert!(rebuilt.notes[0].contains("study.json is damaged"), "{:?}", rebuilt.notes);
+    std::fs::remove_file(folder.join("table.json")).unwrap();
     assert!(render(&folder).unwrap_err().to_string().contains("study.json is damaged"));
 }
 

@@ -232,3 +232,48 @@ fn the_table_has_every_run_and_survives_removal_of_the_run_folders() {
     std::fs::remove_dir_all(study.join("runs")).unwrap();
     assert_eq!(records(&plan, &study), rows, "the table is kept");
 }
+
+#[test]
+fn a_damaged_plan_is_rebuilt_from_the_runs() {
+    let (folder, path) = folder(STUDY);
+    let study = folder.path().join("out");
+    let first = plan(&path).unwrap();
+    run(&first, &study, &Quiet, &options(2));
+    let before = records(&first, &study);
+    write_tables(&before, &study).unwrap();
+    let manifest = study.join("study.json");
+    let whole = std::fs::read(&manifest).unwrap();
+    let damages: [&[u8]; 4] = [b"{", b"", b"\xff\xfe", &whole[..whole.len() / 2]];
+    for damage in damages {
+        std::fs::write(&manifest, damage).unwrap();
+        assert!(Plan::read(&study).unwrap_err().to_string().contains("study.json is damaged"));
+        let (rebuilt, note) = Plan::read_or_rebuild(&study).unwrap();
+        assert!(note.unwrap().contains("writes the file again"));
+        let mut found = records(&rebuilt, &study);
+        found.sort_by_key(|record| before.iter().position(|old| old.name == record.name));
+        assert_eq!(found, before, "with levels, factors and results");
+    }
+    // Without the table, runs and results are found, but no levels.
+    std::fs::remove_file(study.join("table.json")).unwrap();
+    let (rebuilt, _) = Plan::read_or_rebuild(&study).unwrap();
+    assert_eq!(rebuilt.runs.len(), 5);
+    let found = records(&rebuilt, &study);
+    assert!(found.iter().all(|record| record.finished() && record.pair.is_some()));
+    // The study goes on as if nothing had happened, also without the file.
+    for damage in [true, false] {
+        if damage {
+            std::fs::write(&manifest, "{").unwrap();
+        } else {
+            std::fs::remove_file(&manifest).unwrap();
+        }
+        assert_eq!(first.damage_in(&study).is_some(), damage);
+        let ended = run(&first, &study, &Quiet, &options(2));
+        assert!(ended.iter().all(|outcome| *outcome == Outcome::AlreadyFinished), "{ended:?}");
+        assert_eq!(std::fs::read(&manifest).unwrap(), whole);
+    }
+    // A folder of something else is left alone.
+    let other = folder.path().join("other");
+    std::fs::create_dir_all(&other).unwrap();
+    std::fs::write(other.join("study.json"), "{").unwrap();
+    assert!(first.create_folder(&other).is_err());
+}

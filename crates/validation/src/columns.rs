@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use glam::DVec3;
+use grainwake_formats::bounded_file::{DATA, read_text};
 use grainwake_formats::table::Table;
 use grainwake_formats::vti::{self, Image};
 use serde::Deserialize;
@@ -95,7 +96,7 @@ impl Columns {
     /// Reads reference data: comma-separated, names in the first line, comments after `#`.
     pub fn read_reference(file: &Path) -> Result<Columns, String> {
         let problem = |what: String| format!("{}: {what}", file.display());
-        let text = std::fs::read_to_string(file).map_err(|e| problem(e.to_string()))?;
+        let text = read_text(file, DATA).map_err(|e| problem(e.to_string()))?;
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)

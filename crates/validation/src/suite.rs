@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::bounded_file::{SETTINGS, read_text};
 use grainwake_run::case::{Located, Problem, Source};
 use serde::Deserialize;
 
@@ -132,7 +133,7 @@ impl Suite {
     /// [`SuiteError`] with file, line, key and remedy.
     pub fn read(folder: &Path) -> Result<Suite, SuiteError> {
         let path = folder.join(FILE);
-        let text = std::fs::read_to_string(&path)
+        let text = read_text(&path, SETTINGS)
             .map_err(|source| SuiteError::Unreadable { path: path.clone(), source })?;
         let (source, raw) = Source::parse(&path.display().to_string(), &text, &[])?;
         let builder = Builder { source: &source, folder };

@@ -19,7 +19,7 @@ use table::{line, table};
 use crate::args::ValidateArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, MISSED};
 use crate::progress::{ProgressDisplay, clock};
-use crate::{print, run, tell, threads};
+use crate::{print, signals, tell, threads};
 
 impl From<SuiteError> for Exit {
     fn from(error: SuiteError) -> Exit {
@@ -53,7 +53,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         return print(&listing(&suites));
     }
     let stop = Arc::new(AtomicBool::new(false));
-    run::watch_for_interrupt(stop.clone());
+    signals::watch_for_interrupt(stop.clone());
     let started = std::time::Instant::now();
     let mut results = Vec::new();
     for suite in &suites {

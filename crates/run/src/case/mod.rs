@@ -39,6 +39,7 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 
 use crate::{Job, RunError, RunPlan, memory};
+use grainwake_formats::bounded_file::{SETTINGS, read_text};
 use grainwake_solver::sim::Setup;
 
 pub use branch::find_parent;
@@ -84,7 +85,7 @@ impl Case {
     /// # Errors
     /// [`CaseError`] with every problem found and its place.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Case, CaseError> {
-        let text = std::fs::read_to_string(path)
+        let text = read_text(path, SETTINGS)
             .map_err(|source| CaseError::Unreadable { path: path.into(), source })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Case::parse(&text, &path.display().to_string(), folder, overrides)

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use grainwake_shape::{Shape, ShapeError, ShapeOptions, analytic};
+use grainwake_formats::bounded_file::read_bytes;
+use grainwake_shape::{ReadLimits, Shape, ShapeError, ShapeOptions, analytic};
 
 use super::located::Located;
 use super::quantity::{Length, Quantity};
@@ -56,7 +57,8 @@ impl<'a> Library<'a> {
         if let Some((file, shape)) = self.files.get(&path) {
             return Ok((shape.clone(), file.name.clone()));
         }
-        let bytes = std::fs::read(&path).map_err(|error| match error.kind() {
+        let limit = ReadLimits::default().file_bytes;
+        let bytes = read_bytes(&path, limit).map_err(|error| match error.kind() {
             std::io::ErrorKind::NotFound => (
                 format!("there is no grain file {}", path.display()),
                 "paths are relative to the case file; make a grain file with `grainwake grain from-scan`, `from-mesh` or `make`".to_string(),

@@ -17,7 +17,7 @@ use grainwake_formats::pvd::Entry;
 use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::TrackerState;
 
-use super::tables::Lengths;
+use super::tables::{ExtraTable, Lengths};
 use crate::contact_events::ContactEvents;
 use crate::error::{Context, RunError};
 use crate::overlaps::Overlaps;
@@ -180,20 +180,36 @@ fn in_words(error: io::Error) -> String {
     }
 }
 
-/// Restores the newest valid checkpoint; `note` receives the faults of newer ones. None if the run
-/// has no checkpoint.
+/// Reads a checkpoint of the run in the folder `run`, with these extra tables, into `sim`.
+fn read_own(
+    path: &Path,
+    run: &Path,
+    digest: &str,
+    extra: &[ExtraTable],
+    sim: &mut Simulation,
+) -> Result<Record, String> {
+    let (record, _) = open(path)?;
+    if let Some(lacking) = record.lengths.lacking(run, extra) {
+        return Err(format!("it is ahead of the tables: {lacking}"));
+    }
+    read(path, digest, sim)
+}
+
+/// Restores the newest valid checkpoint that the tables reach; `note` receives the faults of newer
+/// ones. None if the run has no checkpoint.
 ///
 /// # Errors
 /// [`RunError::NoCheckpoint`] if there are checkpoints and none is valid.
 pub(crate) fn restore(
     run: &Path,
     digest: &str,
+    extra: &[ExtraTable],
     sim: &mut Simulation,
     note: &mut dyn FnMut(&str),
 ) -> Result<Option<Record>, RunError> {
     let mut reasons = Vec::new();
     for path in list(run) {
-        match read(&path, digest, sim) {
+        match read_own(&path, run, digest, extra, sim) {
             Ok(record) => {
                 for reason in &reasons {
                     note(&format!(

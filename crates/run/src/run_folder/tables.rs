@@ -31,6 +31,28 @@ pub struct ExtraTable {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lengths(Vec<u64>);
 
+impl Lengths {
+    /// Returns what the growing files in a run folder lack to be at least this long; none if they
+    /// are.
+    pub(super) fn lacking(&self, run: &Path, extra: &[ExtraTable]) -> Option<String> {
+        names(extra).zip(&self.0).find_map(|(name, length)| {
+            match std::fs::metadata(run.join(name)).map(|data| data.len()) {
+                Ok(found) if found >= *length => None,
+                Ok(found) => Some(format!("{name} has {found} bytes, and then it had {length}")),
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                    Some(format!("{name} is missing"))
+                }
+                Err(error) => Some(format!("{name} cannot be read: {error}")),
+            }
+        })
+    }
+}
+
+/// Returns the names of the growing files, the extra tables last.
+fn names(extra: &[ExtraTable]) -> impl Iterator<Item = &str> {
+    FILES.into_iter().chain(extra.iter().map(|table| table.file.as_str()))
+}
+
 /// Growing file, open for appending.
 struct GrowingFile {
     path: PathBuf,
@@ -101,8 +123,7 @@ impl Tables {
         lengths: &Lengths,
         extra: &[ExtraTable],
     ) -> Result<Tables, RunError> {
-        let names = FILES.into_iter().chain(extra.iter().map(|table| table.file.as_str()));
-        let files = names.zip(&lengths.0);
+        let files = names(extra).zip(&lengths.0);
         let files = files
             .map(|(name, length)| GrowingFile::reopen(folder.join(name), *length))
             .collect::<Result<Vec<_>, _>>()?;

@@ -2,7 +2,7 @@
 
 use super::Threshold;
 use crate::assemble::ShapeOptions;
-use crate::error::{Result, positive, within};
+use crate::error::{Result, size, within};
 
 /// Options for converting a volume to shapes.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,7 +72,7 @@ impl ScanOptions {
 
     /// Checks the numeric options.
     pub(super) fn check(&self) -> Result<()> {
-        positive("voxel size", self.voxel)?;
+        size("voxel size", self.voxel)?;
         if let Some(smoothing) = self.smoothing {
             let reason = "must lie between 0.5 and 5 voxels";
             within("smoothing", smoothing, 0.5..=5.0, reason)?;

@@ -46,8 +46,9 @@ pub struct StudyReportFiles {
 /// # Errors
 /// If the folder holds no study, the analysis file is wrong, or a file cannot be written.
 pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
-    let mut plan = Plan::read(folder)?;
-    let mut notes: Vec<String> = refresh_analysis(&mut plan, folder)?.into_iter().collect();
+    let (mut plan, damage) = Plan::read_or_rebuild(folder)?;
+    let mut notes: Vec<String> = damage.into_iter().collect();
+    notes.extend(refresh_analysis(&mut plan, folder)?);
     let plan = plan;
     let records = records(&plan, folder);
     write_tables(&records, folder)?;

@@ -7,8 +7,11 @@ use std::path::{Path, PathBuf};
 use grainwake_run::case::{Located, Problem, Source};
 use toml::Value;
 
-use super::raw::{Keys, RawAxis, RawModel, RawSet, RawStudy, RawValue};
+use super::raw::{Keys, RawAxis, RawFactors, RawModel, RawSet, RawStudy, RawValue};
 use crate::error::did_you_mean;
+
+/// Largest number of runs of a study.
+pub(crate) const MOST_RUNS: usize = 100_000;
 
 /// Override of one case key.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,6 +69,9 @@ pub(crate) fn expand(
         });
         for axis in &raw.axis {
             problems.check_axis(axis, &raw.axis);
+            if !problems.check_count(axis, models.len()) {
+                return Err(problems.found);
+            }
             models = models.iter().flat_map(|model| cross(model, axis)).collect();
         }
         if base.is_none() && problems.found.is_empty() {
@@ -144,6 +150,7 @@ impl Problems<'_> {
         }
         for value in &axis.values.value {
             self.check_name(&value.name);
+            self.check_factors(&value.factors);
             match (&value.value, &axis.key) {
                 (Some(given), None) => {
                     let message = format!("the axis \"{name}\" has no key to set this value to");
@@ -158,6 +165,28 @@ impl Problems<'_> {
                 }
                 _ => {}
             }
+        }
+    }
+
+    /// Checks the number of models that the axes up to this one give.
+    fn check_count(&mut self, axis: &RawAxis, before: usize) -> bool {
+        let count = before.saturating_mul(axis.values.value.len());
+        if count > MOST_RUNS {
+            let message = format!("the axes up to \"{}\" give {count} models", axis.name.value);
+            let help = format!(
+                "a study has at most {MOST_RUNS} runs: take fewer values, or several studies"
+            );
+            self.add(message, &help, axis.values.span.as_ref(), "these values");
+        }
+        count <= MOST_RUNS
+    }
+
+    /// Checks factors, which are numbers of the analysis.
+    fn check_factors(&mut self, factors: &RawFactors) {
+        for (name, factor) in factors.iter().filter(|(_, factor)| !factor.value.is_finite()) {
+            let message = format!("the factor \"{name}\" is {}", factor.value);
+            let help = "a factor is a finite number; leave it out where there is none";
+            self.add(message, help, factor.span.as_ref(), "not finite");
         }
     }
 
@@ -261,10 +290,15 @@ fn cross(model: &Model, axis: &RawAxis) -> Vec<Model> {
         }
         model.settings.extend(settings(&value.set));
         model.levels.insert(axis.name.value.clone(), value.name.value.clone());
-        model.factors.extend(value.factors.clone());
+        model.factors.extend(numbers(&value.factors));
         model
     };
     axis.values.value.iter().map(at).collect()
+}
+
+/// Returns factors without their positions.
+fn numbers(factors: &RawFactors) -> impl Iterator<Item = (String, f64)> + '_ {
+    factors.iter().map(|(name, factor)| (name.clone(), factor.value))
 }
 
 /// Builds a model outside the axes.
@@ -276,6 +310,7 @@ fn single(
     problems: &mut Problems,
 ) -> Option<Model> {
     problems.check_name(&own.name);
+    problems.check_factors(&own.factors);
     let path = problems.case_file(folder, own.base.as_ref());
     let Some(path) = path.or_else(|| base.map(Path::to_owned)) else {
         let message = format!("the model \"{}\" has no base case", own.name.value);
@@ -288,7 +323,7 @@ fn single(
         base: path,
         settings: common.iter().cloned().chain(settings(&own.set)).collect(),
         levels: BTreeMap::new(),
-        factors: own.factors.clone(),
+        factors: numbers(&own.factors).collect(),
     })
 }
 

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::bounded_file::{SETTINGS, read_text};
 use grainwake_run::case::{Located, Problem, Source, parse_angle, parse_length};
 
 use super::claims::Analysis;
@@ -50,7 +51,7 @@ impl Study {
     /// # Errors
     /// [`StudyError`] with all problems found and their location.
     pub fn read(path: &Path) -> Result<Study, StudyError> {
-        let text = std::fs::read_to_string(path).at("read", path)?;
+        let text = read_text(path, SETTINGS).at("read", path)?;
         Study::parse(&text, path)
     }
 
@@ -109,7 +110,7 @@ fn read_analysis(
     models: &[Model],
 ) -> Result<Analysis, StudyError> {
     let path = folder.join(&given.value);
-    let text = std::fs::read_to_string(&path).map_err(|error| {
+    let text = read_text(&path, SETTINGS).map_err(|error| {
         let problem = Problem::new(format!("cannot read {}: {error}", path.display()))
             .help("paths are relative to the study file");
         source.locate(problem, given.span.as_ref(), "this file")
@@ -133,6 +134,17 @@ fn read_ensemble(
             .help("members includes the run without offset");
         return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
     }
+    let models = match &raw.models {
+        None => (0..models.len()).collect(),
+        Some(patterns) => expand::matching(source, patterns, models)?,
+    };
+    let runs = models.len().saturating_mul(raw.members.value);
+    if runs > expand::MOST_RUNS {
+        let most = expand::MOST_RUNS;
+        let problem = Problem::new(format!("the ensemble has {runs} runs"))
+            .help(format!("a study has at most {most} runs: take fewer members or models"));
+        return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
+    }
     Ok(Ensemble {
         members: raw.members.value,
         offset,
@@ -140,10 +152,7 @@ fn read_ensemble(
         cell_shift: raw.cell_shift,
         grain: raw.grain,
         seed: raw.seed,
-        models: match &raw.models {
-            None => (0..models.len()).collect(),
-            Some(patterns) => expand::matching(source, patterns, models)?,
-        },
+        models,
     })
 }
 

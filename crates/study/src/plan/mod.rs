@@ -6,6 +6,7 @@ pub mod file;
 mod offset;
 pub mod quantities;
 mod raw;
+mod rebuild;
 mod resolve;
 pub mod selection;
 
@@ -24,6 +25,18 @@ pub(crate) use resolve::end_condition;
 pub const RUNS: &str = "runs";
 /// File of a study folder that holds its plan.
 pub const MANIFEST: &str = "study.json";
+
+/// Other files and folders of a study folder.
+const WRITTEN: [&str; 8] = [
+    "locks",
+    "table.csv",
+    "table.json",
+    "settling.csv",
+    "histories",
+    "figures",
+    "analysis.json",
+    "report.html",
+];
 
 /// One run of a study. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -108,16 +121,24 @@ impl Plan {
     /// [`StudyError::Occupied`] if the folder holds another study or other files.
     pub fn check_folder(&self, folder: &Path) -> Result<(), StudyError> {
         let occupied = |what: String| Err(StudyError::Occupied { folder: folder.into(), what });
+        let has_runs = folder.join(RUNS).is_dir();
         if Plan::exists_in(folder) {
-            let other = Plan::read(folder)?;
+            let other = match Plan::read(folder) {
+                Ok(other) => other,
+                // The plan is written again, and finished runs are kept.
+                Err(StudyError::Damaged { .. }) if has_runs => return Ok(()),
+                Err(error) => return Err(error),
+            };
             if other.title != self.title && other.study.file_name() != self.study.file_name() {
                 let study = other.study.display();
                 return occupied(format!("holds another study, \"{}\" of {study}", other.title));
             }
             return Ok(());
         }
+        // A study that has lost its plan is recognised by its runs.
+        let own = |name: &str| name == RUNS || has_runs && WRITTEN.contains(&name);
         let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-        match entries.find(|e| e.file_name() != RUNS) {
+        match entries.find(|entry| !entry.file_name().to_str().is_some_and(own)) {
             Some(_) => occupied("is not empty and holds no study".into()),
             None => Ok(()),
         }
@@ -129,8 +150,8 @@ impl Plan {
     /// If the file is missing or damaged.
     pub fn read(folder: &Path) -> Result<Plan, StudyError> {
         let file = folder.join(MANIFEST);
-        let text = std::fs::read_to_string(&file).at("read", &file)?;
-        serde_json::from_str(&text)
+        let text = std::fs::read(&file).at("read", &file)?;
+        serde_json::from_slice(&text)
             .map_err(|error| StudyError::Damaged { file, what: error.to_string() })
     }
 

@@ -10,6 +10,9 @@ use toml::Value;
 /// Case keys and their values, in order of the keys.
 pub(crate) type RawSet = BTreeMap<String, Located<Value>>;
 
+/// Numerical factors for the analysis, in order of their names.
+pub(crate) type RawFactors = BTreeMap<String, Located<f64>>;
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawStudy {
@@ -50,7 +53,7 @@ pub(crate) struct RawValue {
     #[serde(default)]
     pub set: RawSet,
     #[serde(default)]
-    pub factors: BTreeMap<String, f64>,
+    pub factors: RawFactors,
 }
 
 #[derive(Deserialize)]
@@ -61,7 +64,7 @@ pub(crate) struct RawModel {
     #[serde(default)]
     pub set: RawSet,
     #[serde(default)]
-    pub factors: BTreeMap<String, f64>,
+    pub factors: RawFactors,
 }
 
 #[derive(Deserialize)]

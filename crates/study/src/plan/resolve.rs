@@ -1,6 +1,7 @@
 //! Resolution of models into runs: cases with all overrides, ensemble members and hashes.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use grainwake_run::case::{Case, CaseError, Problem};
 use grainwake_run::provenance::Provenance;
@@ -64,6 +65,19 @@ fn runs_of(study: &Study, index: usize, sets: &[String]) -> Result<Vec<Run>, Stu
 }
 
 fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
+    let base = std::path::absolute(&model.base).unwrap_or_else(|_| model.base.clone());
+    let mut run = run_of_case(&model.name, &base, set, case);
+    if member > 0 {
+        run.name = format!("{}-m{member}", model.name);
+    }
+    run.member = member;
+    run.levels = model.levels.clone();
+    run.factors.extend(model.factors.clone());
+    run
+}
+
+/// Returns the run of a case, outside all axes.
+pub(super) fn run_of_case(name: &str, base: &Path, set: Vec<String>, case: &Case) -> Run {
     let estimate = case.estimate(1);
     let ending = end_condition(&case.resolved);
     let program = Provenance::new(&case.digest);
@@ -75,35 +89,34 @@ fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
     }
     let id = hash.finalize().iter().take(6).map(|b| format!("{b:02x}")).collect();
     Run {
-        name: match member {
-            0 => model.name.clone(),
-            _ => format!("{}-m{member}", model.name),
-        },
-        model: model.name.clone(),
-        member,
-        levels: model.levels.clone(),
-        factors: factors(model, case),
-        base: std::path::absolute(&model.base).unwrap_or_else(|_| model.base.clone()),
+        name: name.into(),
+        model: name.into(),
+        member: 0,
+        levels: BTreeMap::new(),
+        factors: shape_factors(case),
+        base: base.into(),
         set,
         id,
         case_sha256: case.digest.clone(),
         ending,
         end_s: case.plan.end,
         memory_bytes: estimate.memory_bytes,
-        wall_s: estimate.wall_s,
+        // JSON has no infinity.
+        wall_s: estimate.wall_s.min(f64::MAX),
     }
 }
 
-/// Returns the shape factors of the first grain and the factors of the model, which override them.
-fn factors(model: &Model, case: &Case) -> BTreeMap<String, f64> {
+/// Returns the shape factors of the first grain.
+fn shape_factors(case: &Case) -> BTreeMap<String, f64> {
     let mut factors = BTreeMap::new();
     if let Some(grain) = case.setup.grains.first() {
         let shape = grain.shape.morphology();
         let values = [Some(shape.krumbein_sphericity), shape.wadell_roundness];
         let known = SHAPE_FACTORS.into_iter().zip(values);
-        factors.extend(known.filter_map(|(name, value)| Some((name.to_owned(), value?))));
+        let finite =
+            known.filter_map(|(name, value)| Some((name, value.filter(|v| v.is_finite())?)));
+        factors.extend(finite.map(|(name, value)| (name.to_owned(), value)));
     }
-    factors.extend(model.factors.clone());
     factors
 }
 

@@ -14,6 +14,7 @@ use crate::case::number_format::quantity;
 use crate::case::quantity::{Quantity, Triple};
 use crate::case::raw::{MotionLaw, Orientation, Position, RawCase, RawGrain, RawPoses, Turns};
 use crate::case::source::Source;
+use grainwake_formats::bounded_file::{SETTINGS, read_text};
 use grainwake_formats::poses::{Pose, Poses, read};
 use grainwake_formats::{grains as grains_table, summary};
 use grainwake_solver::dem::{ContactLawKind, Enclosure};
@@ -104,7 +105,7 @@ fn of_run<'a>(
     let folder = grains.library.path(&run.value);
     let path = folder.join(RESOLVED);
     let help = "give the folder of a run, relative to the case file";
-    let text = match std::fs::read_to_string(&path) {
+    let text = match read_text(&path, SETTINGS) {
         Ok(text) => text,
         Err(error) => {
             let message = match error.kind() {

@@ -1,0 +1,133 @@
+//! The plan of a study whose `study.json` is damaged, from its run folders and its table.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use grainwake_run::RESOLVED;
+use grainwake_run::case::Case;
+use grainwake_run::provenance::Provenance;
+
+use super::claims::Analysis;
+use super::resolve::run_of_case;
+use super::{Plan, RUNS, Run};
+use crate::error::StudyError;
+
+/// Entry of `table.json`, as far as a plan needs it.
+#[derive(serde::Deserialize)]
+struct Entry {
+    name: String,
+    model: String,
+    member: usize,
+    #[serde(default)]
+    levels: BTreeMap<String, String>,
+    #[serde(default)]
+    factors: BTreeMap<String, f64>,
+    #[serde(default)]
+    id: String,
+}
+
+impl Plan {
+    /// Reads the plan of a study folder. If `study.json` is damaged, the plan is put together from
+    /// the run folders and `table.json`, and a note says what is missing from it.
+    ///
+    /// # Errors
+    /// Those of [`Plan::read`]; a damaged file only if there is no run either.
+    pub fn read_or_rebuild(folder: &Path) -> Result<(Plan, Option<String>), StudyError> {
+        let damage = match Plan::read(folder) {
+            Ok(plan) => return Ok((plan, None)),
+            Err(error @ StudyError::Damaged { .. }) => error,
+            Err(error) => return Err(error),
+        };
+        let runs = runs_in(folder);
+        if runs.is_empty() {
+            return Err(damage);
+        }
+        let program = Provenance::new("");
+        let name = folder.file_name().unwrap_or_default().to_string_lossy();
+        let plan = Plan {
+            grainwake_study: 1,
+            study: PathBuf::new(),
+            title: format!("Study {name}"),
+            version: program.version,
+            commit: program.commit,
+            analysis: Analysis::default(),
+            runs,
+        };
+        let again = match command_of(&plan, folder) {
+            Some(command) => format!("`{command}`"),
+            None => "`grainwake study`".to_owned(),
+        };
+        let note = format!(
+            "{damage}; its runs were found in the folder, without title, claims and runs that have not begun: {again} writes the file again and keeps finished runs"
+        );
+        Ok((plan, Some(note)))
+    }
+}
+
+impl Plan {
+    /// Returns a note if the folder has a damaged plan, which this plan replaces.
+    pub fn damage_in(&self, folder: &Path) -> Option<String> {
+        match Plan::read(folder) {
+            Err(error @ StudyError::Damaged { .. }) => {
+                Some(format!("{error}; it is written again, and finished runs are kept"))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Returns the runs with a folder or an entry in the table, by name.
+fn runs_in(folder: &Path) -> Vec<Run> {
+    let text = std::fs::read_to_string(folder.join("table.json")).unwrap_or_default();
+    let table: Vec<Entry> = serde_json::from_str(&text).unwrap_or_default();
+    let mut runs: BTreeMap<String, Run> = BTreeMap::new();
+    let folders = std::fs::read_dir(folder.join(RUNS)).into_iter().flatten().flatten();
+    for path in folders.map(|entry| entry.path()) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let resolved = path.join(RESOLVED);
+        let Some((provenance, case)) = Provenance::read(&path).zip(Case::load(&resolved, &[]).ok())
+        else {
+            continue;
+        };
+        let base = std::path::absolute(&resolved).unwrap_or(resolved);
+        let mut run = run_of_case(&name, &base, Vec::new(), &case);
+        // The hash of an earlier program may differ for the same case.
+        run.case_sha256 = provenance.case_sha256;
+        let member = name.rsplit_once("-m").and_then(|(model, n)| Some((model, n.parse().ok()?)));
+        if let Some((model, member)) = member {
+            (run.model, run.member) = (model.to_owned(), member);
+        }
+        runs.insert(name, run);
+    }
+    for entry in table {
+        let Entry { name, model, member, levels, factors, id } = entry;
+        let run = runs.entry(name.clone()).or_insert_with(|| Run {
+            name,
+            model: String::new(),
+            member: 0,
+            levels: BTreeMap::new(),
+            factors: BTreeMap::new(),
+            base: PathBuf::new(),
+            set: Vec::new(),
+            id,
+            case_sha256: String::new(),
+            ending: String::new(),
+            end_s: 0.0,
+            memory_bytes: 0,
+            wall_s: 0.0,
+        });
+        (run.model, run.member, run.levels) = (model, member, levels);
+        run.factors.extend(factors);
+    }
+    runs.into_values().collect()
+}
+
+/// Returns the command that started the runs, if their provenance names a study.
+fn command_of(plan: &Plan, folder: &Path) -> Option<String> {
+    let sessions = plan.runs.iter().filter_map(|run| Provenance::read(&run.folder(folder)));
+    let commands =
+        sessions.filter_map(|provenance| Some(provenance.sessions.last()?.command.clone()));
+    let mut of_study = commands.filter(|words| words.get(1).is_some_and(|word| word == "study"));
+    let words = of_study.next()?;
+    Some(format!("grainwake {}", words[1..].join(" ")))
+}
