@@ -18,6 +18,7 @@ end = "60 ms"
 step = "0.1 ms"
 [output]
 tables = "10 ms"
+surfaces = "20 ms"
 contacts = "10 ms"
 contact_network = "30 ms"
 wall_events = true

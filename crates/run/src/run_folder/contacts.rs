@@ -4,10 +4,12 @@ use grainwake_formats::contacts::{ContactRow, wall_code};
 use grainwake_solver::dem::Partner;
 use grainwake_solver::sim::Simulation;
 
-/// Returns the contacts at the end of the last step, ordered by grain, then partner.
+/// Returns the contacts at the end of the last step, ordered by grain, then partner. Contacts that
+/// have ended within the step are left out.
 pub(super) fn contacts(sim: &Simulation) -> Vec<ContactRow> {
     let enclosure = sim.setup().enclosure();
-    let rows = sim.contacts().iter().map(|contact| {
+    let acting = sim.contacts().iter().filter(|contact| contact.overlap > 0.0);
+    let rows = acting.map(|contact| {
         let centre = sim.grains()[contact.grain].pose.position;
         let (partner, partner_centre) = match contact.partner {
             Partner::Grain(other) => {
