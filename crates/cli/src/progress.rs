@@ -129,8 +129,9 @@ impl Observer for ProgressDisplay {
     fn event(&mut self, event: &Event) {
         if !self.quiet {
             let grains: Vec<String> = event.grains.iter().map(usize::to_string).collect();
+            let wall = event.wall.as_ref().map_or(String::new(), |wall| format!(", {wall} wall"));
             self.line(&format!(
-                "t {:.4} s  {} (grain {})",
+                "t {:.4} s  {} (grain {}{wall})",
                 event.time,
                 event.kind.name(),
                 grains.join(", ")

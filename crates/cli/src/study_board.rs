@@ -196,7 +196,8 @@ impl StudyObserver for Board<'_> {
     }
 
     fn event(&self, run: usize, event: &Event) {
-        if !self.quiet && event.kind != EventKind::Landing {
+        let shown = event.kind != EventKind::Landing && event.wall.is_none();
+        if !self.quiet && shown {
             self.line(&format!(
                 "{}: t {:.4} s  {}",
                 self.runs[run].name,

@@ -26,6 +26,10 @@ pub enum EventKind {
     /// A grain touches the floor for the first time.
     #[serde(alias = "floor")]
     Landing,
+    /// A grain comes into contact with a wall.
+    WallContact,
+    /// A grain that was in contact with a wall has parted from it.
+    WallSeparation,
     /// A grain has left the box through an open side.
     Left,
 }
@@ -39,6 +43,8 @@ impl EventKind {
             EventKind::RoleChange => "role-change",
             EventKind::Separation => "separation",
             EventKind::Landing => "landing",
+            EventKind::WallContact => "wall-contact",
+            EventKind::WallSeparation => "wall-separation",
             EventKind::Left => "left",
         }
     }
@@ -47,6 +53,8 @@ impl EventKind {
         match self {
             EventKind::Tumble => "tumbling",
             EventKind::RoleChange => "role change",
+            EventKind::WallContact => "wall contact",
+            EventKind::WallSeparation => "wall separation",
             other => other.name(),
         }
     }
@@ -64,6 +72,9 @@ pub struct Event {
     /// Indices of the grains.
     #[serde(default)]
     pub grains: Vec<usize>,
+    /// Wall of a contact with a wall: "lower z".
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub wall: Option<String>,
     /// Time at which the event was certain [s]: a separation and a role change need some distance.
     pub confirmed: f64,
     /// Gap between the surfaces of the pair when confirmed [m].
@@ -77,7 +88,15 @@ pub struct Event {
 impl Event {
     /// Returns an event that was certain at once.
     pub fn new(kind: EventKind, time: f64, grains: &[usize]) -> Event {
-        Event { time, kind, grains: grains.to_vec(), confirmed: time, gap: None, tilt: None }
+        Event {
+            time,
+            kind,
+            grains: grains.to_vec(),
+            wall: None,
+            confirmed: time,
+            gap: None,
+            tilt: None,
+        }
     }
 
     /// Returns the line of the log, with its line break.

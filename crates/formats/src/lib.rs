@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `slices/*.vti`, `fields/*.vti` (VTK image data) | [`vti`] |
 //! | `grains/*.vtp` (VTK polygonal data) | [`vtp`] |
+//! | `contacts.csv`, `contacts/*.vtp` (VTK polygonal data) | [`contacts`] |
 //! | `run.pvd` (ParaView collection) | [`pvd`] |
 //! | `grains.csv`, `diagnostics.csv` | [`grains`], [`diagnostics`], [`table`] |
 //! | tables of poses | [`poses`] |
@@ -17,6 +18,7 @@
 pub mod atomic_file;
 pub mod bounded_file;
 pub mod codec;
+pub mod contacts;
 pub mod diagnostics;
 mod error;
 pub mod events;

@@ -45,7 +45,7 @@ def test_tables_are_frames(run):
     assert one.index.name == "time" and one["vz"].iloc[-1] < -0.02
     assert run.by_grain()["z", 0].iloc[0] == pytest.approx(6e-3)
     assert run.diagnostics["step"].dtype == "int64"
-    assert list(run.events.columns) == ["time", "event", "grains", "confirmed", "gap", "tilt"]
+    assert list(run.events.columns) == ["time", "event", "grains", "confirmed", "gap", "tilt", "wall"]
     with pytest.raises(IndexError, match="there is no grain 1"):
         run.grain(1)
 
@@ -72,6 +72,24 @@ line = { from = ["2 mm", "2 mm", 0], to = ["2 mm", "2 mm", "8 mm"], points = 3 }
     assert line["z"].tolist()[:3] == [0, 0.004, 0.008]
     for name, table in run.probes.items():
         pandas.testing.assert_frame_equal(table, pandas.read_csv(run.path / f"probes/{name}.csv"))
+
+
+def test_contacts_are_a_frame(case_file, tmp_path):
+    case = gw.Case.load(
+        case_file,
+        {
+            "grain.0.position": [2e-3, 2e-3, 0.76e-3],
+            "output.contacts": 2e-3,
+            "output.wall_events": True,
+        },
+    )
+    run = case.run(tmp_path / "run", progress=False, report=False)
+    contacts = run.contacts
+    assert list(contacts.columns[:4]) == ["time", "grain", "partner", "x"]
+    assert contacts["partner"].dtype == "int64" and set(contacts["partner"]) == {-5}
+    assert (contacts["fz"] >= 0).all() and contacts["fz"].max() > 0
+    events = run.events
+    assert "lower z" in events.loc[events["event"] == "wall-contact", "wall"].tolist()
 
 
 def test_the_summary_of_a_finished_run(run):

@@ -1,28 +1,67 @@
-//! Kiss and separation events between three to twelve grains. A pair has its own event tracker, and
-//! a heap has too many contacts to list.
+//! Events of contacts: kiss and separation between three to twelve grains, and contacts with walls.
+//! A pair has its own event tracker, and a heap has too many contacts to list.
 
 use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
+use grainwake_formats::contacts::wall_name;
 use grainwake_formats::events::{Event, EventKind};
 use grainwake_solver::dem::{Contact, Partner};
 
 /// Largest number of grains whose contacts are events.
 pub(crate) const MAX_GRAINS: usize = 12;
 
-/// Pair of grains that has been in contact.
+/// Two bodies that have been in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct ContactPair {
-    grains: [usize; 2],
+struct OpenContact<K> {
+    /// The bodies.
+    #[serde(rename = "grains")]
+    bodies: K,
     /// Start of the present gap [s]; none during contact.
     apart_since: Option<f64>,
+}
+
+/// Beginning or end of a contact.
+struct Change<K> {
+    bodies: K,
+    begins: bool,
+    /// Time of the change [s].
+    time: f64,
+}
+
+/// Updates the contacts with the bodies that touch after a step, and returns the changes. Bodies
+/// are separated after `hold` [s] without contact.
+fn changes<K: Copy + Ord>(
+    open: &mut Vec<OpenContact<K>>,
+    mut touching: BTreeSet<K>,
+    time: f64,
+    hold: f64,
+) -> Vec<Change<K>> {
+    let mut changes = Vec::new();
+    open.retain_mut(|contact| {
+        if touching.remove(&contact.bodies) {
+            contact.apart_since = None;
+            return true;
+        }
+        let since = *contact.apart_since.get_or_insert(time);
+        let parted = time - since >= hold;
+        if parted {
+            changes.push(Change { bodies: contact.bodies, begins: false, time: since });
+        }
+        !parted
+    });
+    for bodies in touching {
+        changes.push(Change { bodies, begins: true, time });
+        open.push(OpenContact { bodies, apart_since: None });
+    }
+    changes
 }
 
 /// Contacts between grains and their events; part of a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ContactEvents {
-    open: Vec<ContactPair>,
+    open: Vec<OpenContact<[usize; 2]>>,
     /// All events.
     pub(crate) events: Vec<Event>,
 }
@@ -31,34 +70,47 @@ impl ContactEvents {
     /// Updates the pairs with the contacts after a step and returns the new events. Grains are
     /// separated after `hold` [s] without contact.
     pub(crate) fn update(&mut self, time: f64, contacts: &[Contact], hold: f64) -> Vec<Event> {
-        let mut touching: BTreeSet<[usize; 2]> = BTreeSet::new();
-        for contact in contacts {
-            if let Partner::Grain(other) = contact.partner
-                && other != contact.grain
-            {
-                touching.insert([contact.grain.min(other), contact.grain.max(other)]);
+        let pairs = contacts.iter().filter_map(|contact| match contact.partner {
+            Partner::Grain(other) if other != contact.grain => {
+                Some([contact.grain.min(other), contact.grain.max(other)])
             }
-        }
-        let first = self.events.len();
-        let mut record = |kind, start, grains: [usize; 2]| {
-            let event = Event::new(kind, start, &grains);
-            self.events.push(Event { confirmed: time, ..event });
-        };
-        self.open.retain_mut(|pair| {
-            if touching.remove(&pair.grains) {
-                pair.apart_since = None;
-                return true;
-            }
-            let since = *pair.apart_since.get_or_insert(time);
-            let parted = time - since >= hold;
-            if parted {
-                record(EventKind::Separation, since, pair.grains);
-            }
-            !parted
+            _ => None,
         });
-        for grains in touching {
-            record(EventKind::Kiss, time, grains);
-            self.open.push(ContactPair { grains, apart_since: None });
+        let first = self.events.len();
+        for change in changes(&mut self.open, pairs.collect(), time, hold) {
+            let kind = if change.begins { EventKind::Kiss } else { EventKind::Separation };
+            let event = Event::new(kind, change.time, &change.bodies);
+            self.events.push(Event { confirmed: time, ..event });
+        }
+        self.events[first..].to_vec()
+    }
+}
+
+/// Contacts of grains with walls and their events; part of a checkpoint.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WallEvents {
+    /// Grain, axis and side of each contact.
+    open: Vec<OpenContact<(usize, u8, u8)>>,
+    /// All events.
+    pub(crate) events: Vec<Event>,
+}
+
+impl WallEvents {
+    /// Updates the contacts with walls after a step and returns the new events. A grain is
+    /// separated from a wall after `hold` [s] without contact.
+    pub(crate) fn update(&mut self, time: f64, contacts: &[Contact], hold: f64) -> Vec<Event> {
+        let touching = contacts.iter().filter_map(|contact| match contact.partner {
+            Partner::Wall { axis, side } => Some((contact.grain, axis, side)),
+            Partner::Grain(_) => None,
+        });
+        let first = self.events.len();
+        for change in changes(&mut self.open, touching.collect(), time, hold) {
+            let kind =
+                if change.begins { EventKind::WallContact } else { EventKind::WallSeparation };
+            let (grain, axis, side) = change.bodies;
+            let event = Event::new(kind, change.time, &[grain]);
+            let wall = Some(wall_name(axis, side).to_owned());
+            self.events.push(Event { wall, confirmed: time, ..event });
         }
         self.events[first..].to_vec()
     }
@@ -114,5 +166,31 @@ mod tests {
             ]
         );
         assert_eq!(contacts_of_grains.events.len(), 4);
+    }
+
+    #[test]
+    fn a_bounce_off_a_wall_is_one_contact_and_two_walls_are_two() {
+        let wall = |grain, axis, side| Contact {
+            partner: Partner::Wall { axis, side },
+            ..touch(grain, 0)
+        };
+        let (floor, lid) = (wall(1, 2, 0), wall(1, 2, 1));
+        let mut walls = WallEvents::default();
+        let steps = [vec![touch(0, 1), floor], vec![], vec![floor], vec![], vec![], vec![lid]];
+        let mut events = Vec::new();
+        for (step, contacts) in steps.iter().enumerate() {
+            events.extend(walls.update(step as f64, contacts, 1.5));
+        }
+        let found: Vec<_> =
+            events.iter().map(|e| (e.kind, e.time, e.confirmed, e.wall.as_deref())).collect();
+        assert_eq!(
+            found,
+            [
+                (EventKind::WallContact, 0.0, 0.0, Some("lower z")),
+                (EventKind::WallSeparation, 3.0, 5.0, Some("lower z")),
+                (EventKind::WallContact, 5.0, 5.0, Some("upper z")),
+            ]
+        );
+        assert!(events.iter().all(|event| event.grains == [1]));
     }
 }

@@ -26,6 +26,12 @@ pub struct RunPlan {
     pub at_events: bool,
     /// Slice planes.
     pub planes: Vec<Plane>,
+    /// Interval of the rows of `contacts.csv` [s].
+    pub contacts: f64,
+    /// Interval of the VTK files of the contacts [s].
+    pub contact_network: f64,
+    /// Whether contacts with walls are events.
+    pub wall_events: bool,
     /// Points, lines and planes sampled over time.
     pub probes: Vec<Probe>,
     /// Wall-clock time between checkpoints [s].
@@ -52,9 +58,10 @@ impl RunPlan {
 impl RunPlan {
     /// Returns the intervals of all outputs that are turned on [s].
     pub fn intervals(&self) -> impl Iterator<Item = f64> {
-        let series = [self.tables, self.slices, self.fields, self.surfaces];
+        let tables = [self.tables, self.contacts];
+        let files = [self.slices, self.fields, self.surfaces, self.contact_network];
         let probes = self.probes.iter().map(|probe| probe.every);
-        series.into_iter().chain(probes).filter(|interval| *interval > 0.0)
+        tables.into_iter().chain(files).chain(probes).filter(|interval| *interval > 0.0)
     }
 }
 

@@ -9,12 +9,12 @@ use grainwake_solver::dem::{Enclosure, surface_gap};
 use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::{EventParams, Tracker};
 
-use crate::contact_events::{ContactEvents, MAX_GRAINS};
+use crate::contact_events::{ContactEvents, MAX_GRAINS, WallEvents};
 use crate::error::{Context, RunError};
 use crate::overlaps::Overlaps;
-use crate::plan::{Probe, RunPlan};
+use crate::plan::RunPlan;
 use crate::run_folder::checkpoint::{self, Record};
-use crate::run_folder::{ExtraTable, Tables, VtkOutput};
+use crate::run_folder::{ExtraTable, Tables, VtkOutput, contact_files};
 use crate::series::{self, Content, Series};
 
 /// Recorder of a run: tables, VTK files, events, checkpoints.
@@ -28,10 +28,12 @@ pub(crate) struct Recorder {
     vtk: VtkOutput,
     tracker: Tracker,
     contact_events: ContactEvents,
+    /// Contacts with walls, if they are events.
+    wall_events: Option<WallEvents>,
     /// Time without contact after which grains are separated [s].
     separation_hold: f64,
     series: Vec<Series>,
-    probes: Vec<Probe>,
+    extra: Vec<ExtraTable>,
     /// Times of the last rows of the extra tables [s].
     last_extra_rows: Vec<Option<f64>>,
     vtk_files: Vec<Entry>,
@@ -57,6 +59,8 @@ impl Recorder {
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
         let params = EventParams::for_grains(sim.grains(), setup.gravity, fluid_density, period);
         let gap = pair_gap(sim, &enclosure);
+        let extra = ExtraTable::all(plan);
+        let intervals: Vec<f64> = extra.iter().map(ExtraTable::interval).collect();
         Recorder {
             run: run.into(),
             digest: digest.into(),
@@ -67,10 +71,11 @@ impl Recorder {
             vtk: VtkOutput::new(&plan.planes, sim),
             tracker: Tracker::new(params, sim.grains(), gap),
             contact_events: ContactEvents::default(),
+            wall_events: plan.wall_events.then(WallEvents::default),
             separation_hold: params.separation_hold,
-            series: Series::of(plan),
-            probes: plan.probes.clone(),
-            last_extra_rows: vec![None; plan.probes.len()],
+            series: Series::of(plan, &intervals),
+            last_extra_rows: vec![None; extra.len()],
+            extra,
             vtk_files: Vec::new(),
             max_divergence: sim.max_divergence(),
             max_cfl: 0.0,
@@ -87,7 +92,7 @@ impl Recorder {
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let tables = Tables::create(run, &extra_tables(plan))?;
+        let tables = Tables::create(run, &ExtraTable::all(plan))?;
         let mut recorder = Recorder::build(run, digest, plan, sim, tables);
         recorder.write_due(sim)?;
         recorder.checkpoint(sim)?;
@@ -105,10 +110,11 @@ impl Recorder {
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let tables = Tables::create(run, &extra_tables(plan))?;
+        let tables = Tables::create(run, &ExtraTable::all(plan))?;
         let mut recorder = Recorder::build(run, digest, plan, sim, tables);
         recorder.tracker.restore(record.tracker);
         recorder.contact_events = record.contact_events;
+        recorder.restore_wall_events(record.wall_events);
         recorder.overlaps.mean_now = record.overlaps.mean_now;
         recorder.series.iter_mut().for_each(|series| series.start_after(sim.time()));
         let events = recorder.events();
@@ -137,10 +143,11 @@ impl Recorder {
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let tables = Tables::reopen(run, &record.lengths, &extra_tables(plan))?;
+        let tables = Tables::reopen(run, &record.lengths, &ExtraTable::all(plan))?;
         let mut recorder = Recorder::build(run, &record.digest, plan, sim, tables);
         recorder.tracker.restore(record.tracker);
         recorder.contact_events = record.contact_events;
+        recorder.restore_wall_events(record.wall_events);
         for (series, next) in recorder.series.iter_mut().zip(record.next) {
             series.next = next;
         }
@@ -154,6 +161,12 @@ impl Recorder {
         recorder.last_row = record.last_row;
         recorder.write_collection()?;
         Ok(recorder)
+    }
+
+    fn restore_wall_events(&mut self, recorded: WallEvents) {
+        if let Some(events) = &mut self.wall_events {
+            *events = recorded;
+        }
     }
 
     /// Returns the time from `now` to the next output or the end [s]; `step` [s] is the usual step.
@@ -174,10 +187,14 @@ impl Recorder {
             let hold = self.separation_hold;
             events.extend((self.contact_events).update(sim.time(), sim.contacts(), hold));
         }
+        let of_grains = events.len();
+        if let Some(walls) = &mut self.wall_events {
+            events.extend(walls.update(sim.time(), sim.contacts(), self.separation_hold));
+        }
         self.tables.append_events(&events)?;
         self.write_due(sim)?;
         if self.at_events {
-            for (index, event) in events.iter().enumerate() {
+            for (index, event) in events[..of_grains].iter().enumerate() {
                 self.write_event(sim, event.kind, before + index)?;
             }
         }
@@ -223,6 +240,7 @@ impl Recorder {
             Content::Slices => return self.vtk.slices(&self.run, sim, tag),
             Content::Fields => return self.vtk.fields(&self.run, sim, tag),
             Content::Surfaces => return self.vtk.grains(&self.run, sim, tag),
+            Content::Contacts => return contact_files(&self.run, sim, tag),
             Content::Extra(table) => self.append_extra(table, sim)?,
         }
         Ok(Vec::new())
@@ -237,7 +255,7 @@ impl Recorder {
 
     /// Appends rows of the present state to an extra table.
     fn append_extra(&mut self, table: usize, sim: &Simulation) -> Result<(), RunError> {
-        self.tables.append_extra(table, &self.probes[table].rows(sim))?;
+        self.tables.append_extra(table, &self.extra[table].rows(sim))?;
         self.last_extra_rows[table] = Some(sim.time());
         Ok(())
     }
@@ -258,7 +276,11 @@ impl Recorder {
             self.append_rows(sim)?;
             let slices = self.vtk.slices(&self.run, sim, "end")?;
             let grains = self.vtk.grains(&self.run, sim, "end")?;
-            self.add(slices.into_iter().chain(grains))?;
+            let mut files: Vec<Entry> = slices.into_iter().chain(grains).collect();
+            if self.series.iter().any(|s| s.content == Content::Contacts && s.is_on()) {
+                files.extend(contact_files(&self.run, sim, "end")?);
+            }
+            self.add(files)?;
         }
         for index in 0..self.series.len() {
             let series = &self.series[index];
@@ -288,6 +310,7 @@ impl Recorder {
             last_row: self.last_row,
             tracker: self.tracker.state().clone(),
             contact_events: self.contact_events.clone(),
+            wall_events: self.wall_events.clone().unwrap_or_default(),
         };
         checkpoint::write(&self.run, &record, sim, self.kept_checkpoints)
     }
@@ -301,6 +324,7 @@ impl Recorder {
     fn events(&self) -> Vec<Event> {
         let mut events = self.tracker.events().to_vec();
         events.extend_from_slice(&self.contact_events.events);
+        events.extend(self.wall_events.iter().flat_map(|walls| walls.events.iter().cloned()));
         // The sort is stable: events of one step keep the order of the log.
         events.sort_by(|a, b| a.confirmed.total_cmp(&b.confirmed));
         events
@@ -336,11 +360,6 @@ impl Recorder {
             grains: grains.collect(),
         }
     }
-}
-
-/// Returns the tables that a plan asks for besides those of every run.
-pub(crate) fn extra_tables(plan: &RunPlan) -> Vec<ExtraTable> {
-    plan.probes.iter().map(Probe::table).collect()
 }
 
 /// Returns the gap between the surfaces of a pair [m].

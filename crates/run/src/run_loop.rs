@@ -15,7 +15,8 @@ use grainwake_solver::sim::{
 use crate::error::{Context, RunError};
 use crate::memory;
 use crate::plan::RunPlan;
-use crate::recorder::{Recorder, extra_tables};
+use crate::recorder::Recorder;
+use crate::run_folder::ExtraTable;
 use crate::run_folder::checkpoint::Record;
 use crate::run_folder::provenance::{ParentRun, Provenance, Session};
 use crate::run_folder::{self, Content, Existing, Parent, RESOLVED, checkpoint, differing};
@@ -149,7 +150,7 @@ pub fn run(
     }
     let mut sim = Simulation::new(job.setup)?;
     let own = if resuming {
-        let tables = extra_tables(&job.plan);
+        let tables = ExtraTable::all(&job.plan);
         checkpoint::restore(out, &job.digest, &tables, &mut sim, &mut |text| observer.note(text))?
     } else {
         None

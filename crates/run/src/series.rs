@@ -15,6 +15,8 @@ pub(crate) enum Content {
     Slices,
     Fields,
     Surfaces,
+    /// VTK files of the contacts.
+    Contacts,
     /// Rows of the extra table with this index.
     Extra(usize),
 }
@@ -30,17 +32,19 @@ pub(crate) struct Series {
 }
 
 impl Series {
-    /// Returns all series of a plan, in the order of the checkpoint.
-    pub fn of(plan: &RunPlan) -> Vec<Series> {
+    /// Returns all series of a plan, in the order of the checkpoint; `extra` are the intervals of
+    /// the extra tables [s].
+    pub fn of(plan: &RunPlan, extra: &[f64]) -> Vec<Series> {
         let fixed = [
             (Content::Tables, plan.tables),
             (Content::Slices, plan.slices),
             (Content::Fields, plan.fields),
             (Content::Surfaces, plan.surfaces),
+            (Content::Contacts, plan.contact_network),
         ];
-        let probes = plan.probes.iter().enumerate();
-        let probes = probes.map(|(index, probe)| (Content::Extra(index), probe.every));
-        let all = fixed.into_iter().chain(probes);
+        let extra = extra.iter().enumerate();
+        let extra = extra.map(|(index, interval)| (Content::Extra(index), *interval));
+        let all = fixed.into_iter().chain(extra);
         all.map(|(content, interval)| Series { content, interval, next: 0 }).collect()
     }
 

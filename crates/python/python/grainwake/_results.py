@@ -139,13 +139,24 @@ class RunFolder:
 
     @property
     def events(self) -> pandas.DataFrame:
-        """Events in order of time: time, event, grains, confirmed, gap, tilt."""
+        """Events in order of time: time, event, grains, confirmed, gap, tilt, wall."""
         pandas = need("pandas")
-        columns = ["time", "event", "grains", "confirmed", "gap", "tilt"]
+        columns = ["time", "event", "grains", "confirmed", "gap", "tilt", "wall"]
         rows, _ = _grainwake._read_events(self._need("events.jsonl"))
         table = pandas.DataFrame(rows, columns=columns)
         table["grains"] = table["grains"].map(tuple)
         return table
+
+    @property
+    def contacts(self) -> pandas.DataFrame:
+        """Contacts, one row for each time and contact, if the case writes them; SI units.
+
+        Columns: time, grain, partner, x, y, z, nx, ny, nz, overlap, fx, fy, fz. A negative partner
+        is a wall: -1 lower x, -2 upper x, -3 lower y, -4 upper y, -5 lower z, -6 upper z. The force
+        acts on ``grain``.
+        """
+        columns, _ = _grainwake._read_table(self._need("contacts.csv"))
+        return need("pandas").DataFrame(columns).astype({"grain": "int64", "partner": "int64"})
 
     @property
     def probes(self) -> dict[str, pandas.DataFrame]:

@@ -42,7 +42,9 @@ impl Scene<'_> {
     /// Returns the events as marks on the time axis.
     fn marks(&self) -> Vec<VerticalMark> {
         let (_, factor) = self.features.time_axis();
-        let mark = self.run.events.iter().map(|event| VerticalMark {
+        // Contacts with walls are too many to mark.
+        let marked = self.run.events.iter().filter(|event| event.wall.is_none());
+        let mark = marked.map(|event| VerticalMark {
             at: event.time * factor,
             name: event.kind.label().to_owned(),
         });

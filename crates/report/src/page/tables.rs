@@ -183,7 +183,8 @@ fn details(event: &Event) -> Vec<String> {
     let gap = event.gap.map(|gap| format!("gap {} mm", short(1e3 * gap)));
     let tilt = event.tilt.map(|tilt| short(tilt.to_degrees()));
     let tilt = tilt.map(|degrees| format!("pair {degrees}° from the vertical"));
-    [Some(confirmed), gap, tilt].into_iter().flatten().collect()
+    let wall = event.wall.as_ref().map(|wall| format!("{wall} wall"));
+    [wall, Some(confirmed), gap, tilt].into_iter().flatten().collect()
 }
 
 /// Returns the provenance of the run and the files for further use.

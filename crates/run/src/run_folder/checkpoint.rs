@@ -17,8 +17,9 @@ use grainwake_formats::pvd::Entry;
 use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::TrackerState;
 
-use super::tables::{ExtraTable, Lengths};
-use crate::contact_events::ContactEvents;
+use super::ExtraTable;
+use super::tables::Lengths;
+use crate::contact_events::{ContactEvents, WallEvents};
 use crate::error::{Context, RunError};
 use crate::overlaps::Overlaps;
 
@@ -40,7 +41,8 @@ pub struct Record {
     pub steps: u64,
     /// Lengths of the tables.
     pub lengths: Lengths,
-    /// Index of the next output of each series: tables, slices, fields, surfaces, then the probes.
+    /// Index of the next output of each series: tables, slices, fields, surfaces, contacts, then
+    /// the extra tables.
     pub next: Vec<u64>,
     /// VTK files written.
     #[serde(rename = "pictures")]
@@ -59,6 +61,9 @@ pub struct Record {
     pub last_extra_rows: Vec<Option<f64>>,
     /// State of the event tracker.
     pub tracker: TrackerState,
+    /// Contacts of grains with walls.
+    #[serde(default)]
+    pub wall_events: WallEvents,
     /// Contacts between three and more grains.
     #[serde(default, rename = "meetings")]
     pub contact_events: ContactEvents,

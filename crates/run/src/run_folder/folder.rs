@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_formats::{probes, summary};
+use grainwake_formats::{contacts, probes, summary};
 
 use super::checkpoint;
 use super::lock::{self, Attempt, Lock};
@@ -182,9 +182,16 @@ pub(crate) fn lock_folder(folder: &Path) -> Result<Lock, RunError> {
 pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
     // The provenance marks a run folder. It is removed last, so that an interrupted removal can be
     // repeated.
-    let files =
-        [summary::FILE, "failure.json", "run.pvd", "report.html", RESOLVED, provenance::FILE];
-    let folders = [checkpoint::FOLDER, probes::FOLDER, "shapes", "figures"];
+    let files = [
+        contacts::FILE,
+        summary::FILE,
+        "failure.json",
+        "run.pvd",
+        "report.html",
+        RESOLVED,
+        provenance::FILE,
+    ];
+    let folders = [checkpoint::FOLDER, probes::FOLDER, contacts::FOLDER, "shapes", "figures"];
     for name in vtk_output::FOLDERS.iter().chain(&folders) {
         remove(&folder.join(name), |p| std::fs::remove_dir_all(p))?;
     }
@@ -209,12 +216,16 @@ fn is_temporary(path: &Path) -> bool {
 
 /// Creates the folder and its subfolders, and removes temporary files of a killed run.
 pub(crate) fn create(folder: &Path) -> Result<(), RunError> {
-    let inner = vtk_output::FOLDERS
-        .iter()
-        .chain(&[checkpoint::FOLDER, "shapes"])
-        .map(|name| folder.join(name));
-    for path in std::iter::once(PathBuf::from(folder)).chain(inner) {
+    let inner = || {
+        let names = vtk_output::FOLDERS.iter().chain(&[checkpoint::FOLDER, "shapes"]);
+        names.map(|name| folder.join(name))
+    };
+    for path in std::iter::once(PathBuf::from(folder)).chain(inner()) {
         std::fs::create_dir_all(&path).context("create", &path)?;
+    }
+    let optional = [probes::FOLDER, contacts::FOLDER].map(|name| folder.join(name));
+    let optional = optional.into_iter().filter(|path| path.is_dir());
+    for path in std::iter::once(PathBuf::from(folder)).chain(inner()).chain(optional) {
         let entries = std::fs::read_dir(&path).context("read", &path)?;
         for file in entries.flatten().map(|e| e.path()).filter(|p| is_temporary(p)) {
             std::fs::remove_file(&file).context("remove", &file)?;

@@ -2,6 +2,8 @@
 
 pub mod checkpoint;
 mod compare;
+mod contacts;
+mod extra;
 mod folder;
 pub mod lock;
 mod parent;
@@ -15,8 +17,9 @@ pub use folder::{Existing, RESOLVED};
 pub use parent::Parent;
 
 pub(crate) use compare::differing;
+pub(crate) use extra::ExtraTable;
 pub(crate) use folder::{
     Content, admit, admit_parent, clear, create, lock_folder, same_parent, start_lost,
 };
-pub(crate) use tables::{ExtraTable, Tables};
-pub(crate) use vtk_output::VtkOutput;
+pub(crate) use tables::Tables;
+pub(crate) use vtk_output::{VtkOutput, contact_files};

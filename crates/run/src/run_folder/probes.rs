@@ -4,7 +4,6 @@ use grainwake_formats::probes::{FOLDER, PLANE_HEADER, POINTS_HEADER, PlaneRow, P
 use grainwake_solver::grid::Axis;
 use grainwake_solver::sim::Simulation;
 
-use super::tables::ExtraTable;
 use crate::plan::{Probe, ProbePlace};
 
 impl Probe {
@@ -13,17 +12,16 @@ impl Probe {
         format!("{FOLDER}/{}.csv", self.name)
     }
 
-    /// Returns the table to create for the probe.
-    pub(crate) fn table(&self) -> ExtraTable {
-        let header = match self.place {
+    /// Returns the first line of the table, without its line break.
+    pub(super) fn header(&self) -> &'static str {
+        match self.place {
             ProbePlace::Points(_) => POINTS_HEADER,
             ProbePlace::Plane { .. } => PLANE_HEADER,
-        };
-        ExtraTable { file: self.file(), header }
+        }
     }
 
     /// Returns the rows of the table for the present state; none for what the box does not hold.
-    pub(crate) fn rows(&self, sim: &Simulation) -> String {
+    pub(super) fn rows(&self, sim: &Simulation) -> String {
         let (time, mut text) = (sim.time(), String::new());
         match &self.place {
             ProbePlace::Points(points) => {

@@ -12,20 +12,12 @@ use grainwake_solver::dem::Partner;
 use grainwake_solver::sim::Simulation;
 use serde::{Deserialize, Serialize};
 
+use super::extra::ExtraTable;
 use crate::error::{Context, RunError};
 use crate::overlaps::Overlaps;
 
 /// The growing files of every run.
 pub const FILES: [&str; 3] = [grains::FILE, diagnostics::FILE, events::FILE];
-
-/// Table that a case asks for besides [`FILES`].
-#[derive(Clone, Debug)]
-pub struct ExtraTable {
-    /// Path in the run folder.
-    pub file: String,
-    /// First line, without its line break.
-    pub header: &'static str,
-}
 
 /// Lengths of the growing files [bytes], the extra tables last.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,7 +28,7 @@ impl Lengths {
     /// are.
     pub(super) fn lacking(&self, run: &Path, extra: &[ExtraTable]) -> Option<String> {
         names(extra).zip(&self.0).find_map(|(name, length)| {
-            match std::fs::metadata(run.join(name)).map(|data| data.len()) {
+            match std::fs::metadata(run.join(&name)).map(|data| data.len()) {
                 Ok(found) if found >= *length => None,
                 Ok(found) => Some(format!("{name} has {found} bytes, and then it had {length}")),
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {
@@ -49,8 +41,8 @@ impl Lengths {
 }
 
 /// Returns the names of the growing files, the extra tables last.
-fn names(extra: &[ExtraTable]) -> impl Iterator<Item = &str> {
-    FILES.into_iter().chain(extra.iter().map(|table| table.file.as_str()))
+fn names(extra: &[ExtraTable]) -> impl Iterator<Item = String> {
+    FILES.map(str::to_owned).into_iter().chain(extra.iter().map(ExtraTable::file))
 }
 
 /// Growing file, open for appending.
@@ -106,12 +98,12 @@ impl Tables {
         files[0].append(&format!("{}\n", grains::HEADER))?;
         files[1].append(&format!("{}\n", diagnostics::HEADER))?;
         for table in extra {
-            let path = folder.join(&table.file);
+            let path = folder.join(table.file());
             if let Some(parent) = path.parent() {
                 std::fs::create_dir_all(parent).context("create", parent)?;
             }
             let mut file = GrowingFile::create(path)?;
-            file.append(&format!("{}\n", table.header))?;
+            file.append(&format!("{}\n", table.header()))?;
             files.push(file);
         }
         Ok(Tables { files, diagnostics_columns: columns(diagnostics::HEADER) })

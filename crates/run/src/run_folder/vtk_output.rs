@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use grainwake_formats::contacts::{self, ContactRow};
 use grainwake_formats::pvd::Entry;
 use grainwake_formats::vti::{self, Frame, Source};
 use grainwake_formats::vtp;
 use grainwake_solver::sim::{CELL_FIELDS, Simulation};
 
+use super::contacts::contacts as contacts_of;
 use super::surfaces::Surfaces;
 use crate::error::{Context, RunError};
 use crate::plan::{Plane, PlanePosition};
@@ -69,6 +71,28 @@ impl VtkOutput {
         vtp::write(&path, &surface).context("write", &path)?;
         Ok(vec![Entry { time: sim.time(), group: "grains".into(), file }])
     }
+}
+
+/// Writes contact points and contact network.
+pub(crate) fn contact_files(
+    run: &Path,
+    sim: &Simulation,
+    tag: &str,
+) -> Result<Vec<Entry>, RunError> {
+    type Write = fn(&Path, f64, &[ContactRow]) -> std::io::Result<()>;
+    let folder = run.join(contacts::FOLDER);
+    std::fs::create_dir_all(&folder).context("create", &folder)?;
+    let rows = contacts_of(sim);
+    let files: [(&str, Write); 2] =
+        [("points", contacts::write_points), ("network", contacts::write_network)];
+    let mut written = Vec::new();
+    for (name, write) in files {
+        let file = format!("{}/{name}_{tag}.vtp", contacts::FOLDER);
+        let path = run.join(&file);
+        write(&path, sim.time(), &rows).context("write", &path)?;
+        written.push(Entry { time: sim.time(), group: format!("contact {name}"), file });
+    }
+    Ok(written)
 }
 
 /// Returns the layer of cells that a plane cuts; none if it follows a grain that has left the box.

@@ -88,6 +88,16 @@ pub struct RawOutput {
     /// Interval of the posed grain surfaces [s]; that of the slices if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surfaces: Option<Located<Quantity<Time>>>,
+    /// Interval of the rows of `contacts.csv` [s]: force, overlap and point of every contact; none
+    /// if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contacts: Option<Located<Quantity<Time>>>,
+    /// Interval of the VTK files of contact points and contact network [s]; none if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact_network: Option<Located<Quantity<Time>>>,
+    /// Whether the beginning and the end of contacts with walls are events.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub wall_events: bool,
     /// Slices and surfaces also at a kiss, role change, separation or landing.
     pub at_events: bool,
     /// Slice planes. If not given: normal to y (normal to x if gravity acts along y) through the
@@ -111,6 +121,9 @@ impl Default for RawOutput {
             slices: None,
             fields: Located::default(),
             surfaces: None,
+            contacts: None,
+            contact_network: None,
+            wall_events: false,
             at_events: true,
             planes: None,
             checkpoint_interval: Quantity::new(300.0).into(),

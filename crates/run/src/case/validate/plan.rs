@@ -95,6 +95,8 @@ pub(super) fn plan(
     let surfaces = if slices > 0.0 { slices } else { coarse };
     let surfaces = interval(&mut raw.surfaces, surfaces);
     let fields = check_interval(&raw.fields);
+    let [contacts, contact_network] = [&raw.contacts, &raw.contact_network]
+        .map(|interval| interval.as_ref().map_or(0.0, &mut check_interval));
     let every: Vec<f64> = (raw_probes.iter_mut())
         .map(|probe| {
             let every = (probe.value.every).get_or_insert_with(|| Quantity::new(tables).into());
@@ -129,6 +131,9 @@ pub(super) fn plan(
         surfaces,
         at_events: raw.at_events,
         planes,
+        contacts,
+        contact_network,
+        wall_events: raw.wall_events,
         probes,
         checkpoint_interval: checkpoint_interval?,
         checkpoint_steps: raw.checkpoint_steps.value,

@@ -62,6 +62,7 @@ impl Pair {
             time: at,
             kind,
             grains: vec![0, 1],
+            wall: None,
             confirmed: time,
             gap: Some(self.gap),
             tilt: Some(self.tilt),
