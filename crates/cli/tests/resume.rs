@@ -195,7 +195,9 @@ fn a_checkpoint_ahead_of_the_tables_gives_way_to_the_one_before() {
 fn a_limit_of_the_file_size_is_an_error_and_the_run_resumes() {
     let (folder, case) = folder_with(WET);
     let (out, whole) = (folder.path().join("run"), folder.path().join("whole"));
-    let sets = ["--set", "output.fields=0", "--set", "output.tables=0.2 ms", "--no-report"];
+    let sets = ["fields=0", "slices=0", "surfaces=0", "at_events=false", "tables=0.2 ms"];
+    let sets = sets.map(|set| format!("output.{set}"));
+    let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
     run(&case, &whole, &sets).success();
     let largest = |file: &str| std::fs::metadata(whole.join(file)).unwrap().len();
     assert!(largest("grains.csv") > 180_000);
@@ -205,7 +207,7 @@ fn a_limit_of_the_file_size_is_an_error_and_the_run_resumes() {
         let command = format!("ulimit -c 0; ulimit -f {kilobytes}; exec \"$@\"");
         let mut shell = Command::new("bash");
         shell.args(["-c", &command, "bash"]).arg(assert_cmd::cargo::cargo_bin("grainwake"));
-        shell.arg("run").arg(&case).arg("-o").arg(&out).arg("--quiet").args(sets);
+        shell.arg("run").arg(&case).arg("-o").arg(&out).arg("--quiet").args(&sets);
         let output = shell.output().unwrap();
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(4), "{message}");

@@ -15,14 +15,16 @@ pub enum ReportError {
     #[error(transparent)]
     Format(#[from] FormatError),
     /// A film would have too few pictures.
-    #[error("no film of {}: it would have {found} pictures, and at least {} are needed; run the \
+    #[error("no film of {}: it would have {found} pictures, and at least {least} are needed; run the \
              case with a shorter interval, for example --set output.{output}=END/100 with the end \
-             of the run in place of END", .folder.display(), crate::film::MIN_FRAMES)]
+             of the run in place of END", .folder.display())]
     TooFewFrames {
         /// Run folder.
         folder: PathBuf,
         /// Number of moments that can be shown.
         found: usize,
+        /// Least number of moments.
+        least: usize,
         /// Key of `[output]` that gives more.
         output: &'static str,
     },

@@ -252,7 +252,7 @@ fn factors_that_are_no_numbers_are_refused_where_they_stand() {
         assert_eq!((found.len(), place), (1, Some(8)));
         let model = "name = \"alone\"\nfactors = { size = nan }";
         let found = problems(&STUDY.replace("name = \"alone\"", model));
-        assert_eq!(found[0].place().map(|(_, line, _)| line), Some(20), "{}", found[0]);
+        assert_eq!(found[0].place().map(|(_, line, _)| line), Some(19), "{}", found[0]);
     }
 }
 

@@ -90,7 +90,7 @@ pub fn write_film(run_dir: &Path) -> Result<Film, ReportError> {
     if found < MIN_FRAMES {
         let folder = run_dir.to_owned();
         let output = if wet || run.facts.fluid_density.is_some() { "slices" } else { "tables" };
-        return Err(ReportError::TooFewFrames { folder, found, output });
+        return Err(ReportError::TooFewFrames { folder, found, least: MIN_FRAMES, output });
     }
     let folder = run_dir.join(FOLDER);
     let mut film = write_frames(&*view, folder)?;

@@ -1,7 +1,6 @@
 //! Check that grains lie in the box and do not overlap.
 
 use super::check::Checker;
-use super::overlaps::check_overlaps;
 use crate::case::located::{Located, Span};
 use crate::case::number_format::{AXES, SIDES, length};
 use crate::case::packing::ROUNDING;
@@ -83,23 +82,9 @@ impl Placement {
     }
 }
 
-/// Reports grains that overlap or cross a side of the box other than a free surface. Overlaps up to
+/// Reports grains that cross a side of the box other than a free surface; overlaps with a wall up to
 /// `accepted` diameters are contacts.
-pub(super) fn check(
-    check: &mut Checker,
-    grains: &[Grain],
-    placements: &[Placement],
-    enclosure: &Enclosure,
-    boundaries: &Boundaries,
-    accepted: f64,
-) {
-    if grains.iter().all(|grain| grain.pose.position.is_finite()) {
-        check_faces(check, grains, placements, enclosure, boundaries, accepted);
-        check_overlaps(check, grains, placements, enclosure, accepted);
-    }
-}
-
-fn check_faces(
+pub(super) fn check_faces(
     check: &mut Checker,
     grains: &[Grain],
     placements: &[Placement],

@@ -111,7 +111,10 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     prescription.motions = motions;
     prescription.prescribe_motion(&mut grains, 0.0);
     let accepted = physics::accepted_overlap(check, &raw.contact);
-    arrangement::check(check, &grains, &placements, &enclosure, &boundaries, accepted);
+    if grains.iter().all(|grain| grain.pose.position.is_finite()) {
+        arrangement::check_faces(check, &grains, &placements, &enclosure, &boundaries, accepted);
+        overlaps::check_overlaps(check, &grains, &placements, &enclosure, accepted);
+    }
     if dry && grains.is_empty() {
         let message = "there is neither a fluid nor a grain";
         check.fail_key("grain", message, "add [fluid] or [[grain]]");
