@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds the wheel of the Python package, tests it in clean environments, checks its types and runs
-# the notebooks. Bounds: wheel at most 15 MB, import below 0.3 s, each notebook below 60 s.
+# the notebooks. Wheel and executed notebooks are kept for .ci/site.sh. Bounds: wheel at most 15 MB, import below 0.3 s, each notebook below 60 s.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root="$PWD"
@@ -22,6 +22,10 @@ PATH="$work/build/bin:$PATH" maturin build --release --quiet \
 wheel="$(ls "$work"/wheels/grainwake-*.whl)"
 size="$(stat -c %s "$wheel")"
 echo "python: wheel of $((size / 1000)) kB after $((SECONDS - started)) s"
+input="${CARGO_TARGET_DIR:-$root/target}/site-input"
+rm -rf "$input"
+mkdir -p "$input"
+cp "$wheel" "$input/"
 test "$size" -le 15000000 || { echo "the wheel is larger than 15 MB" >&2; exit 1; }
 
 # 2. An environment without optional packages: the example of the manual.
@@ -41,7 +45,8 @@ cargo build --release --quiet
   -p grainwake)
 (cd "$work" && "$work/full/bin/python" -m mypy.stubtest grainwake._grainwake \
   --mypy-config-file "$root/crates/python/pyproject.toml" --allowlist "$root/.ci/stubtest.txt")
-(cd "$work" && "$work/full/bin/python" "$root/.ci/notebooks.py" 60 "$root"/docs/notebooks/*.ipynb)
+(cd "$work" && "$work/full/bin/python" "$root/.ci/notebooks.py" 60 "$input/notebooks" \
+  "$root"/docs/notebooks/*.ipynb)
 
 # 4. Statistics of the study by a second route.
 "$work/full/bin/pip" install -q lifelines statsmodels
