@@ -1,6 +1,6 @@
 //! `grainwake report`.
 
-use grainwake_report::{ReportError, render};
+use grainwake_report::{ReportError, render, write_film};
 use grainwake_study::{Analysis, Plan};
 
 use crate::args::ReportArgs;
@@ -14,9 +14,20 @@ impl From<ReportError> for Exit {
     }
 }
 
-/// Writes the figures and the page of a run folder or a study folder.
+/// Writes the figures and the page of a run folder or a study folder, or the film of a run folder.
 pub fn report(args: &ReportArgs) -> Result<(), Exit> {
-    if Plan::exists_in(&args.run) {
+    let study = Plan::exists_in(&args.run);
+    if args.film && study {
+        return Err(Exit::with_help(
+            BAD_INPUT,
+            format!("{} is a study folder; a film shows one run", args.run.display()),
+            format!("give a run folder, for example {}", args.run.join("runs/NAME").display()),
+        ));
+    }
+    if args.film {
+        return film(args);
+    }
+    if study {
         let done = grainwake_study::render(&args.run)?;
         for note in &done.notes {
             tell!("note: {note}");
@@ -36,4 +47,30 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
         tell!("note: {note}");
     }
     print(&format!("{} ({} figures)", done.page.display(), done.png.len()))
+}
+
+/// Writes the film of a run folder.
+fn film(args: &ReportArgs) -> Result<(), Exit> {
+    let film = write_film(&args.run)?;
+    for note in &film.notes {
+        tell!("note: {note}");
+    }
+    let [width, height] = film.size;
+    let slower = film.delay / film.interval;
+    tell!(
+        "{} pictures, {} s each, {:.3} s of the run apart ({slower:.3} times slower than the run)",
+        film.frames,
+        film.delay,
+        film.interval
+    );
+    tell!(
+        "video: ffmpeg -framerate {:.4} -i {} -pix_fmt yuv420p film.mp4",
+        1.0 / film.delay,
+        film.folder.join("frame-%04d.png").display()
+    );
+    print(&format!(
+        "{} ({width} x {height} pixels, {:.1} MB)",
+        film.file.display(),
+        film.bytes as f64 / 1e6
+    ))
 }

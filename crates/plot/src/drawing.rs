@@ -6,7 +6,7 @@ use base64::Engine;
 use resvg::{tiny_skia, usvg};
 
 use crate::font;
-use crate::raster::{Raster, encode_png};
+use crate::raster::{Picture, Raster, encode_png};
 use crate::style;
 use crate::text;
 
@@ -222,10 +222,23 @@ impl Drawing {
     /// The reason, if the drawing has no pixels or cannot be rendered.
     pub fn to_png(&self) -> Result<Vec<u8>, String> {
         let scale = style::PIXELS_PER_POINT;
-        let (width, height) =
-            ((self.width * scale).round() as u32, (self.height * scale).round() as u32);
+        let size = [self.width, self.height].map(|length| (length * scale).round() as u32);
+        encode_png(size[0], size[1], &self.render(size, scale)?)
+    }
+
+    /// Renders a picture of `size` pixels at `scale` pixels per point, white beyond the drawing.
+    ///
+    /// # Errors
+    /// The reason, if there are no pixels or the drawing cannot be rendered.
+    pub fn to_picture(&self, size: [u32; 2], scale: f64) -> Result<Picture, String> {
+        let pixmap = self.render(size, scale)?;
+        let pixels = pixmap.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+        Ok(Picture { width: size[0] as usize, height: size[1] as usize, pixels })
+    }
+
+    fn render(&self, size: [u32; 2], scale: f64) -> Result<tiny_skia::Pixmap, String> {
         let mut pixmap =
-            tiny_skia::Pixmap::new(width, height).ok_or("the drawing has no pixels")?;
+            tiny_skia::Pixmap::new(size[0], size[1]).ok_or("the drawing has no pixels")?;
         pixmap.fill(tiny_skia::Color::WHITE);
         for (x, y, width, height, raster) in &self.rasters {
             let picture = raster.to_pixmap().ok_or("a raster has no pixels")?;
@@ -257,7 +270,7 @@ impl Drawing {
             tiny_skia::Transform::from_scale(scale as f32, scale as f32),
             &mut pixmap.as_mut(),
         );
-        encode_png(width, height, &pixmap)
+        Ok(pixmap)
     }
 }
 

@@ -6,6 +6,7 @@
 //! Lengths on paper are in points [pt], with y downwards. Labels use a small markup for italics and
 //! scripts, see [`text`].
 
+pub mod animation;
 pub mod axis;
 pub mod colormap;
 pub mod contour;
@@ -16,6 +17,7 @@ mod figure;
 mod font;
 pub mod frame;
 pub mod legend;
+mod palette;
 pub mod raster;
 pub mod stacked;
 pub mod style;

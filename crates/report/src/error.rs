@@ -14,6 +14,18 @@ pub enum ReportError {
     /// A file of the run is unreadable or damaged.
     #[error(transparent)]
     Format(#[from] FormatError),
+    /// A film would have too few pictures.
+    #[error("no film of {}: it would have {found} pictures, and at least {} are needed; run the \
+             case with a shorter interval, for example --set output.{output}=END/100 with the end \
+             of the run in place of END", .folder.display(), crate::film::MIN_FRAMES)]
+    TooFewFrames {
+        /// Run folder.
+        folder: PathBuf,
+        /// Number of moments that can be shown.
+        found: usize,
+        /// Key of `[output]` that gives more.
+        output: &'static str,
+    },
     /// A file could not be written, or a figure could not be drawn.
     #[error("cannot write {}: {source}", .file.display())]
     Write {

@@ -12,6 +12,7 @@ mod error;
 pub mod features;
 pub mod figure;
 mod files;
+mod film;
 pub mod html;
 mod page;
 pub mod phases;
@@ -23,6 +24,7 @@ use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
 pub use files::{WrittenFigure, write_figure, write_file};
+pub use film::{Film, write_film};
 use grainwake_plot::Figure;
 
 use features::RunFeatures;

@@ -14,6 +14,9 @@ use crate::run_folder::{History, RunFolder};
 /// Closed polygon in two of the three coordinates [m].
 pub type Outline = Vec<(f64, f64)>;
 
+/// Edge of a surface: two points, the lower index first.
+type Edge = (usize, usize);
+
 /// Resolution of the mask from which an outline is traced.
 const SAMPLES: usize = 72;
 
@@ -76,8 +79,9 @@ impl GrainSurface {
             let (from, to) = (p[view.normal], q[view.normal]);
             view.seen(p.lerp(q, (place - from) / (to - from)))
         };
-        // An intersected triangle connects two edges, which its neighbours share.
-        let mut next: BTreeMap<(usize, usize), (usize, usize)> = BTreeMap::new();
+        // An intersected triangle connects two edges, which its neighbours share. Where a coarsened
+        // surface touches itself, several pairs of triangles share an edge.
+        let mut next: BTreeMap<Edge, Vec<Edge>> = BTreeMap::new();
         for triangle in &self.triangles {
             let [a, b, c] = *triangle;
             let edges = [(a, b), (b, c), (c, a)];
@@ -85,16 +89,19 @@ impl GrainSurface {
             let out = edges.iter().find(|(i, j)| above(*i) && !above(*j));
             if let (Some(into), Some(out)) = (into, out) {
                 let name = |edge: &(usize, usize)| (edge.0.min(edge.1), edge.0.max(edge.1));
-                next.insert(name(into), name(out));
+                next.entry(name(into)).or_default().push(name(out));
             }
         }
         let mut loops = Vec::new();
         while let Some((&start, _)) = next.first_key_value() {
             let mut ring = Outline::new();
             let mut edge = start;
-            while let Some(following) = next.remove(&edge) {
+            while let Some(following) = take(&mut next, edge) {
                 ring.push(cross(edge.0, edge.1));
                 edge = following;
+                if edge == start {
+                    break;
+                }
             }
             if ring.len() > 2 {
                 loops.push(ring);
@@ -128,6 +135,16 @@ impl GrainSurface {
         let clear = moments[long] > 1.04 * moments[short];
         clear.then_some(PrincipalAxes { long: DVec3::AXES[long], short: DVec3::AXES[short] })
     }
+}
+
+/// Removes and returns an edge that follows `edge`.
+fn take(next: &mut BTreeMap<Edge, Vec<Edge>>, edge: Edge) -> Option<Edge> {
+    let following = next.get_mut(&edge)?;
+    let taken = following.pop();
+    if following.is_empty() {
+        next.remove(&edge);
+    }
+    taken
 }
 
 /// Reads the surface of each grain from its first surface file; unusable files are added to
@@ -300,6 +317,27 @@ mod tests {
         assert_eq!(cut.len(), 1);
         assert!((area(&cut[0]) - 4e-6).abs() < 1e-12, "{}", area(&cut[0]));
         assert!(body.section(at, DQuat::IDENTITY, view, 0.2011).is_empty());
+    }
+
+    /// Coarsening may merge points of two parts of a surface, which then share an edge.
+    #[test]
+    fn sections_of_a_surface_that_touches_itself_are_whole() {
+        let (first, second) = (block(1.0, 1.0, 1.0), block(1.0, 1.0, 1.0));
+        // The blocks share the edge from (1, 1, -1) to (1, 1, 1): points 3 and 7 of the first.
+        let shared = |i: usize| match i {
+            0 => 3,
+            4 => 7,
+            _ => 8 + i,
+        };
+        let mut body = first.clone();
+        body.points.extend(second.points.iter().map(|p| *p + DVec3::new(2.0, 2.0, 0.0)));
+        body.triangles.extend(second.triangles.iter().map(|t| t.map(shared)));
+        for place in [-0.7, 0.3] {
+            let view = SliceView::along(2, 2);
+            let cut = body.section(DVec3::ZERO, DQuat::IDENTITY, view, place);
+            let whole: f64 = cut.iter().map(|ring| area(ring)).sum();
+            assert!((whole - 8.0).abs() < 1e-12, "{place}: {whole} in {} rings", cut.len());
+        }
     }
 
     #[test]

@@ -6,11 +6,11 @@ pub mod grain_surface;
 mod history;
 mod orientation;
 mod positions;
-mod scene;
+pub(crate) mod scene;
 pub mod section;
-mod slice_grid;
-mod slice_outlines;
-mod slices;
+pub(crate) mod slice_grid;
+pub(crate) mod slice_outlines;
+pub(crate) mod slices;
 mod trajectory;
 
 use std::collections::BTreeMap;
@@ -22,7 +22,7 @@ use crate::phases;
 use crate::run_folder::RunFolder;
 
 pub use grain_surface::{GrainSurface, surfaces};
-use scene::Scene;
+pub(crate) use scene::Scene;
 
 /// Draws all figures that the run has data for; omissions are added to `notes`.
 pub fn all(

@@ -147,6 +147,12 @@ impl ColourScale {
         }
     }
 
+    /// Sets the largest magnitude, by which the arrows are scaled [m/s].
+    pub fn set_largest(&mut self, largest: f64) {
+        self.largest = largest;
+        self.arrows |= self.quantity == Quantity::Speed && largest > 0.0;
+    }
+
     /// Returns whether values lie below and above the scale.
     fn beyond(&self) -> (bool, bool) {
         let above = self.largest > self.axis.high() && self.quantity != Quantity::SolidFraction;

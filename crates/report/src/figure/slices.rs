@@ -90,7 +90,7 @@ fn row_names(scene: &Scene, columns: &[Column]) -> Vec<(String, &'static str)> {
 
 /// Crops all windows to one size around settling grains: at least eight diameters wide, with the
 /// wake above the grains.
-fn crop(scene: &Scene, columns: &mut [Column]) {
+pub fn crop(scene: &Scene, columns: &mut [Column]) {
     let settling = matches!(scene.features.kind, RunKind::Pair | RunKind::Single);
     let diameter = scene.run.facts.diameter();
     let Some(diameter) = diameter.filter(|_| settling && scene.features.travels) else {
