@@ -5,7 +5,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 started=$SECONDS
 target="${CARGO_TARGET_DIR:-$PWD/target}"
-export SITE_INPUT="$target/site-input" PIP_DISABLE_PIP_VERSION_CHECK=1 NO_MKDOCS_2_WARNING=true
+export SITE_INPUT="$target/site-input" SITE_API="$target/site-input/api"
+export PIP_DISABLE_PIP_VERSION_CHECK=1 NO_MKDOCS_2_WARNING=true
 
 wheel="$(ls "$SITE_INPUT"/grainwake-*.whl 2>/dev/null | head -1 || true)"
 [ -n "$wheel" ] || { echo "no wheel in $SITE_INPUT: run .ci/python.sh first" >&2; exit 1; }
@@ -25,10 +26,9 @@ fi
 # 2. Generated pages.
 cargo build --release --quiet -p grainwake
 "$env/bin/python" .ci/site/commands.py "$target/release/grainwake" > "$SITE_INPUT/commands.md"
+"$env/bin/python" .ci/site/api.py "$SITE_INPUT/api"
 "$env/bin/python" .ci/site/gallery.py --check
-if [ ! -f "$target/doc/grainwake_solver/index.html" ]; then
-  cargo doc --release --workspace --no-deps --quiet
-fi
+RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet
 
 # 3. The site. The page 404.html has absolute links and serves no site below a host's root.
 site="$target/site"

@@ -10,7 +10,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TARGET = ROOT / "docs/assets/gallery"
-WIDTH = 900
+SIZE = 900
 LIMIT = 120_000
 PICTURES = {
     "pair-speed": "results/dkt-pair/figures/speed.png",
@@ -58,9 +58,7 @@ def main():
             continue
         with Image.open(ROOT / source) as picture:
             picture = picture.convert("RGB")
-            if picture.width > WIDTH:
-                height = round(picture.height * WIDTH / picture.width)
-                picture = picture.resize((WIDTH, height), Image.Resampling.LANCZOS)
+            picture.thumbnail((SIZE, SIZE), Image.Resampling.LANCZOS)
             picture.save(TARGET / f"{name}.jpg", quality=82, optimize=True, progressive=True)
 
 

@@ -45,14 +45,17 @@ fn a_film_of_slices_shows_fluid_and_grains() {
     let frames = frames(&run);
     assert_eq!(frames.len(), 31, "one per slice, none of an older film");
     let size = (frames[0].width, frames[0].height);
-    assert!(size.0 % 2 == 0 && size.1 % 2 == 0 && size.0 <= 1280 && size.1 <= 960, "{size:?}");
+    assert!(
+        size.0.is_multiple_of(2) && size.1.is_multiple_of(2) && size.0 <= 1280 && size.1 <= 960,
+        "{size:?}"
+    );
     for pair in frames.windows(2) {
         assert!((pair[1].width, pair[1].height) == size && pair[0] != pair[1]);
     }
     let grain = |p: &[u8]| p == [0xd9; 3];
     let (_, area) = mean_row(&frames[15], grain);
     assert!(area > size.0 * size.1 / 200, "{area} of {size:?} pixels are grains");
-    let coloured = |p: &[u8]| p[0] + 8 < p[1];
+    let coloured = |p: &[u8]| i16::from(p[0]) + 8 < i16::from(p[1]);
     // At the start only the colour bar has colours.
     let (still, moving) = (mean_row(&frames[0], coloured).1, mean_row(&frames[15], coloured).1);
     assert!(still > 0 && moving > 2 * still, "{still} {moving}: the fluid starts to move");

@@ -3,7 +3,7 @@
 use crate::raster::Picture;
 
 /// Bits per component of a cell of the histogram.
-const BITS: u32 = 6;
+const BITS: u32 = 7;
 const CELLS: usize = 1 << (3 * BITS);
 
 /// Histogram of the colours of pictures.
@@ -30,12 +30,12 @@ fn cell(rgb: &[u8]) -> usize {
     rgb.iter().fold(0, |cell, value| cell << BITS | usize::from(*value >> (8 - BITS)))
 }
 
-/// Component `axis` of the colour of a cell, 0 to 63.
+/// Component `axis` of the colour of a cell, 0 to 127.
 fn component(cell: usize, axis: usize) -> usize {
     cell >> (BITS as usize * (2 - axis)) & ((1 << BITS) - 1)
 }
 
-/// Colour in the middle of a cell; the first and the last value are kept, so that white stays white.
+/// Colour of a cell. The first and the last value are kept, so that white stays white.
 fn colour(cell: usize) -> [f64; 3] {
     [0, 1, 2].map(|axis| component(cell, axis) as f64 * 255.0 / ((1 << BITS) - 1) as f64)
 }

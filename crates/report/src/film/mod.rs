@@ -30,9 +30,9 @@ const MAX_SIZE: [f64; 2] = [1280.0, 960.0];
 /// Sharpest pictures [pixels/pt].
 const MAX_SCALE: f64 = 4.0;
 /// Intended duration of a film [s].
-const DURATION: f64 = 8.0;
+const DURATION: f64 = 6.0;
 /// Shortest and longest time that a picture is shown [s].
-const DELAYS: (f64, f64) = (0.04, 0.2);
+const DELAYS: (f64, f64) = (0.04, 0.12);
 /// Folder of the pictures in the run folder.
 const FOLDER: &str = "film";
 /// Film in the run folder.
@@ -147,7 +147,9 @@ fn write_frames(view: &dyn View, folder: PathBuf) -> Result<Film, ReportError> {
         size: size.map(|length| length as usize),
         folder,
         frames: count,
-        delay: (DURATION / count as f64).clamp(DELAYS.0, DELAYS.1),
+        // A GIF counts hundredths of a second.
+        delay: (100.0 * DURATION / count as f64).round().clamp(100.0 * DELAYS.0, 100.0 * DELAYS.1)
+            / 100.0,
         interval: span / (count - 1) as f64,
         notes: Vec::new(),
     })

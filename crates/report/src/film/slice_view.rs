@@ -23,8 +23,8 @@ pub struct SliceFilm<'a> {
     /// Displayed ranges of each picture.
     windows: Vec<Vec<grainwake_plot::equal_aspect::Window>>,
     style: Style,
+    /// Largest speed in any slice [m/s].
     largest: f64,
-    moving_window: bool,
 }
 
 impl<'a> SliceFilm<'a> {
@@ -42,7 +42,6 @@ impl<'a> SliceFilm<'a> {
             windows: Vec::new(),
             style: Style::new(Quantity::Speed),
             largest: 0.0,
-            moving_window: false,
         };
         let mut columns = Vec::new();
         let mut apart = false;
@@ -76,10 +75,7 @@ impl<'a> SliceFilm<'a> {
             film.times.push(time);
             film.files.push(files);
         }
-        let whole: Vec<_> = columns.iter().map(|column| column.window).collect();
         slices::crop(scene, &mut columns);
-        film.moving_window =
-            columns.iter().zip(&whole).any(|(column, whole)| column.window != *whole);
         let mut windows = columns.into_iter().map(|column| column.window);
         film.windows =
             film.files.iter().map(|files| windows.by_ref().take(files.len()).collect()).collect();
