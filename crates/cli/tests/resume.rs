@@ -197,7 +197,9 @@ fn a_limit_of_the_file_size_is_an_error_and_the_run_resumes() {
     let (out, whole) = (folder.path().join("run"), folder.path().join("whole"));
     let sets = ["fields=0", "slices=0", "surfaces=0", "at_events=false", "tables=0.2 ms"];
     let sets = sets.map(|set| format!("output.{set}"));
-    let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+    let mut sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+    // A checkpoint smaller than the table at its end.
+    sets.extend(["--set", "run.precision=f32"]);
     run(&case, &whole, &sets).success();
     let largest = |file: &str| std::fs::metadata(whole.join(file)).unwrap().len();
     assert!(largest("grains.csv") > 180_000);
@@ -214,7 +216,10 @@ fn a_limit_of_the_file_size_is_an_error_and_the_run_resumes() {
         assert!(message.contains("cannot write") && message.contains("ulimit -f"), "{message}");
         assert!(message.contains(file) && !out.join("summary.json").exists(), "{message}");
         run(&case, &out, &[&sets[..], &["--resume"]].concat()).success();
-        assert_same_run(&whole, &out);
+        for file in ["grains.csv", "diagnostics.csv", "events.jsonl"] {
+            let read = |run: &Path| std::fs::read(run.join(file)).unwrap();
+            assert!(read(&whole) == read(&out), "{file}");
+        }
         std::fs::remove_dir_all(&out).unwrap();
     }
 }

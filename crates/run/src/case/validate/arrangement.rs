@@ -82,8 +82,8 @@ impl Placement {
     }
 }
 
-/// Reports grains that cross a side of the box other than a free surface; overlaps with a wall up to
-/// `accepted` diameters are contacts.
+/// Reports grains that cross a side of the box other than a free surface. Overlaps with a wall up
+/// to `accepted` diameters are contacts.
 pub(super) fn check_faces(
     check: &mut Checker,
     grains: &[Grain],
