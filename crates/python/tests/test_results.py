@@ -79,7 +79,7 @@ def test_contacts_are_a_frame(case_file, tmp_path):
         case_file,
         {
             "grain.0.position": [2e-3, 2e-3, 0.76e-3],
-            "output.contacts": 2e-3,
+            "output.contacts": 1e-4,
             "output.wall_events": True,
         },
     )
