@@ -10,7 +10,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use crate::atomic_file::write_atomically;
+use crate::disk::write_atomically;
 use crate::vtk_xml::{ArrayElements, close_appended, open_appended, write_head, write_length};
 
 /// Name of the table in a run folder.

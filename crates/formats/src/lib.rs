@@ -13,13 +13,13 @@
 //! | `summary.json` | [`summary`] |
 //! | `.grain` files and checkpoints (binary encoding) | [`codec`] |
 //!
-//! The crate knows no shape, no solver and no case file.
+//! [`disk`] makes every change on the disk. The crate knows no shape, no solver and no case file.
 
-pub mod atomic_file;
 pub mod bounded_file;
 pub mod codec;
 pub mod contacts;
 pub mod diagnostics;
+pub mod disk;
 mod error;
 pub mod events;
 pub mod grains;

@@ -6,8 +6,8 @@ use std::path::Path;
 use roxmltree::Document;
 use serde::{Deserialize, Serialize};
 
-use crate::atomic_file::write_atomically;
 use crate::bounded_file::{SETTINGS, read_text};
+use crate::disk::write_atomically;
 
 /// Entry of a collection: one VTK file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

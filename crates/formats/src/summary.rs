@@ -6,8 +6,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::atomic_file::write_atomically;
 use crate::bounded_file::{SETTINGS, read_text};
+use crate::disk::write_atomically;
 use crate::events::Event;
 
 /// Name of the file in a run folder; it is written last.

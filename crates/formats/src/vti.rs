@@ -7,8 +7,8 @@ use std::path::Path;
 use glam::DVec3;
 use roxmltree::{Document, Node};
 
-use crate::atomic_file::write_atomically;
 use crate::bounded_file::{DATA, read_bytes};
+use crate::disk::write_atomically;
 use crate::vtk_xml::{
     ArrayElements, ArrayReader, child, close_appended, damaged, open_appended, split, write_head,
     write_length,

@@ -8,8 +8,8 @@ use std::path::Path;
 use glam::DVec3;
 use roxmltree::Document;
 
-use crate::atomic_file::write_atomically;
 use crate::bounded_file::{DATA, read_bytes};
+use crate::disk::write_atomically;
 use crate::vtk_xml::{
     ArrayElements, ArrayReader, child, close_appended, open_appended, split, write_head,
     write_length,

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::disk::write_atomically;
 use grainwake_plot::Figure;
 
 use crate::error::ReportError;
@@ -21,15 +22,10 @@ pub struct WrittenFigure {
 
 /// Writes a file through a temporary name, so that readers never see a part of it.
 ///
-/// The temporary name holds the process id: several programs may share the folder.
-///
 /// # Errors
 /// Error of the operating system.
 pub fn write_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".{}.tmp", std::process::id()));
-    let temporary = path.with_file_name(name);
-    std::fs::write(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, path))
+    write_atomically(path, false, |out| out.write_all(bytes))
 }
 
 /// Writes a figure as `NAME.png` and `NAME.svg` into an existing folder.

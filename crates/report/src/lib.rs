@@ -25,6 +25,7 @@ use std::path::{Path, PathBuf};
 pub use error::ReportError;
 pub use files::{WrittenFigure, write_figure, write_file};
 pub use film::{Film, write_film};
+use grainwake_formats::disk;
 use grainwake_plot::Figure;
 
 use features::RunFeatures;
@@ -84,7 +85,7 @@ pub fn render(run_dir: &Path) -> Result<ReportFiles, ReportError> {
         let file = file.to_owned();
         move |source| ReportError::Write { file, source }
     };
-    std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
+    disk::create_folder(&folder).map_err(failed(&folder))?;
     let figures = figures.into_iter().zip(1..);
     let figures: Vec<WrittenFigure> = figures
         .map(|(figure, number)| write_figure(&folder, figure.numbered(number)))

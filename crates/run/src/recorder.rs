@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::disk;
 use grainwake_formats::events::{Event, EventKind};
 use grainwake_formats::pvd::{self, Entry};
 use grainwake_formats::summary::{EndReason, GrainSummary, PairSummary, Summary};
@@ -16,6 +17,9 @@ use crate::plan::RunPlan;
 use crate::run_folder::checkpoint::{self, Record};
 use crate::run_folder::{ExtraTable, Tables, VtkOutput, contact_files};
 use crate::series::{self, Content, Series};
+
+/// Index of the VTK files.
+const INDEX: &str = "run.pvd";
 
 /// Recorder of a run: tables, VTK files, events, checkpoints.
 pub(crate) struct Recorder {
@@ -37,6 +41,8 @@ pub(crate) struct Recorder {
     /// Times of the last rows of the extra tables [s].
     last_extra_rows: Vec<Option<f64>>,
     vtk_files: Vec<Entry>,
+    /// Number of VTK files whose content is on the disk.
+    synced_vtk_files: usize,
     max_divergence: f64,
     max_cfl: f64,
     overlaps: Overlaps,
@@ -77,6 +83,7 @@ impl Recorder {
             last_extra_rows: vec![None; extra.len()],
             extra,
             vtk_files: Vec::new(),
+            synced_vtk_files: 0,
             max_divergence: sim.max_divergence(),
             max_cfl: 0.0,
             overlaps: Overlaps::default(),
@@ -155,6 +162,7 @@ impl Recorder {
             *last = row;
         }
         recorder.vtk_files = record.vtk_files;
+        recorder.synced_vtk_files = recorder.vtk_files.len();
         recorder.max_divergence = record.max_divergence;
         recorder.max_cfl = record.max_cfl;
         recorder.overlaps = record.overlaps;
@@ -265,8 +273,12 @@ impl Recorder {
         self.write_collection()
     }
 
+    /// Writes the index of the VTK files, unless there are none.
     fn write_collection(&self) -> Result<(), RunError> {
-        let path = self.run.join("run.pvd");
+        if self.vtk_files.is_empty() {
+            return Ok(());
+        }
+        let path = self.run.join(INDEX);
         pvd::write(&path, &self.vtk_files).context("write", &path)
     }
 
@@ -294,8 +306,20 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes a checkpoint.
+    /// Makes the VTK files and their index durable.
+    fn sync_vtk_files(&mut self) -> Result<(), RunError> {
+        let new = self.vtk_files[self.synced_vtk_files..].iter().map(|entry| entry.file.as_str());
+        let index = (!self.vtk_files.is_empty()).then_some(INDEX);
+        for path in new.chain(index).map(|file| self.run.join(file)) {
+            disk::sync_file(&path).context("write", &path)?;
+        }
+        self.synced_vtk_files = self.vtk_files.len();
+        Ok(())
+    }
+
+    /// Writes a checkpoint. All files that it refers to are durable before it is.
     pub fn checkpoint(&mut self, sim: &Simulation) -> Result<(), RunError> {
+        self.sync_vtk_files()?;
         let record = Record {
             digest: self.digest.clone(),
             time: sim.time(),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use grainwake_formats::atomic_file::write_atomically;
+use grainwake_formats::disk::{self, write_atomically};
 use grainwake_formats::events::Event;
 use grainwake_formats::summary::{self, EndReason, Summary};
 use grainwake_solver::sim::events::{Phase, StopWhen};
@@ -174,7 +174,7 @@ pub fn run(
     }
     let summary_path = out.join(summary::FILE);
     if summary_path.exists() {
-        std::fs::remove_file(&summary_path).context("remove", &summary_path)?;
+        disk::remove_file(&summary_path).context("remove", &summary_path)?;
     }
     let recorder = match begin {
         Begin::Fresh => Recorder::start(out, &job.digest, &job.plan, &sim)?,
@@ -222,7 +222,7 @@ fn begin(
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
-    write_atomically(path, false, |out| out.write_all(bytes)).context("write", path)
+    write_atomically(path, true, |out| out.write_all(bytes)).context("write", path)
 }
 
 /// Run in progress.
@@ -324,9 +324,10 @@ impl Running {
     fn finish(mut self, why: EndReason) -> Result<Ending, RunError> {
         self.recorder.finish(&self.sim)?;
         self.checkpoint()?;
+        checkpoint::keep(&self.out, self.plan.kept_after_end())?;
+        // The summary is written last: it marks a finished run.
         let summary = self.recorder.summary(&self.sim, self.provenance.wall_s(), why);
         (summary.write(&self.out)).context("write", &self.out.join(summary::FILE))?;
-        checkpoint::keep(&self.out, self.plan.kept_after_end())?;
         Ok(Ending::Finished(summary))
     }
 

@@ -347,6 +347,42 @@ fn modules_form_no_circles() {
     assert!(found.is_empty(), "modules import each other: {found:#?}");
 }
 
+/// Crates whose files are written through `formats::disk` only.
+const WRITERS: [&str; 4] = ["formats", "run", "report", "study"];
+
+/// Functions that change the disk; `.open(` is the method of `OpenOptions`.
+const CHANGES: [&str; 10] = [
+    " File::create",
+    "(File::create",
+    ".open(",
+    ".sync_all(",
+    ".sync_data(",
+    "fs::write(",
+    "fs::rename(",
+    "fs::remove_",
+    "fs::create_dir",
+    "fs::copy(",
+];
+
+#[test]
+fn every_change_on_the_disk_can_be_made_to_fail() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the folder of crates");
+    let mut seen = 0;
+    for name in WRITERS {
+        for (module, code) in Crate::read(&crates.join(name).join("src")).code {
+            let found: Vec<&str> =
+                CHANGES.into_iter().filter(|change| code.contains(change)).collect();
+            if name == "formats" && module.first().is_some_and(|first| first == "disk") {
+                seen += found.len();
+                continue;
+            }
+            let place = module.join("/");
+            assert!(found.is_empty(), "crates/{name}, {place}: {found:?} instead of `disk`");
+        }
+    }
+    assert!(seen >= 6, "`formats::disk` makes only {seen} kinds of changes: has it moved?");
+}
+
 #[test]
 fn use_trees_are_read_whole() {
     let module = ["m", "n"].map(str::to_owned);

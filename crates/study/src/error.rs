@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::disk::write_atomically;
 use grainwake_report::ReportError;
 use grainwake_run::case::{CaseError, Problem, nearest};
 
@@ -69,7 +70,7 @@ impl<T> At<T> for std::io::Result<T> {
 
 /// Writes a file in one piece.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
-    grainwake_report::write_file(path, bytes).at("write", path)
+    write_atomically(path, true, |out| out.write_all(bytes)).at("write", path)
 }
 
 /// Writes a value as indented JSON.

@@ -6,8 +6,8 @@
 use std::io::{self, Cursor, Write};
 use std::path::PathBuf;
 
-use grainwake_formats::atomic_file::write_atomically;
 use grainwake_formats::codec::{Decoder, Encoder};
+use grainwake_formats::disk::write_atomically;
 use pyo3::prelude::*;
 use sha2::{Digest, Sha256};
 

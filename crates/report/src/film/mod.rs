@@ -9,6 +9,7 @@ mod slice_view;
 
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::disk;
 use grainwake_plot::Drawing;
 use grainwake_plot::animation::encode_gif;
 use grainwake_plot::raster::Picture;
@@ -119,7 +120,7 @@ fn frame_file(folder: &Path, index: usize) -> PathBuf {
 
 /// Draws all pictures into `folder`, in place of those of an earlier film.
 fn write_frames(view: &dyn View, folder: PathBuf) -> Result<Film, ReportError> {
-    std::fs::create_dir_all(&folder).map_err(failed_write(&folder))?;
+    disk::create_folder(&folder).map_err(failed_write(&folder))?;
     let times = view.times();
     let mut size = [0, 0];
     let mut scale = 1.0;
@@ -137,7 +138,7 @@ fn write_frames(view: &dyn View, folder: PathBuf) -> Result<Film, ReportError> {
         write_file(&file, &png).map_err(failed_write(&file))?;
     }
     for old in (times.len()..).map(|index| frame_file(&folder, index)).take_while(|f| f.is_file()) {
-        std::fs::remove_file(&old).map_err(failed_write(&old))?;
+        disk::remove_file(&old).map_err(failed_write(&old))?;
     }
     let count = times.len();
     let span = times[count - 1] - times[0];

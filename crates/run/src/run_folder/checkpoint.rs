@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use grainwake_formats::atomic_file::{sync_folder, write_atomically};
 use grainwake_formats::codec::{Decoder, Encoder};
+use grainwake_formats::disk::{self, sync_folder, write_atomically};
 use grainwake_formats::pvd::Entry;
 use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::TrackerState;
@@ -127,7 +127,7 @@ pub(crate) fn write(
 /// Removes all checkpoints but the newest `count`.
 pub(crate) fn keep(run: &Path, count: usize) -> Result<(), RunError> {
     for old in list(run).into_iter().skip(count) {
-        std::fs::remove_file(&old).context("remove", &old)?;
+        disk::remove_file(&old).context("remove", &old)?;
     }
     Ok(())
 }

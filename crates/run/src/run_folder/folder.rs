@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::disk::{self, is_temporary};
 use grainwake_formats::{contacts, probes, summary};
 
 use super::checkpoint;
@@ -170,7 +171,7 @@ pub(crate) fn start_lost(folder: &Path, parent: &ParentRun) -> RunError {
 
 /// Creates the folder if absent, and locks it for this program.
 pub(crate) fn lock_folder(folder: &Path) -> Result<Lock, RunError> {
-    std::fs::create_dir_all(folder).context("create", folder)?;
+    disk::create_folder(folder).context("create", folder)?;
     let path = folder.join(lock::FILE);
     match lock::acquire(&path).context("lock", &path)? {
         Attempt::Acquired(lock) => Ok(lock),
@@ -180,23 +181,19 @@ pub(crate) fn lock_folder(folder: &Path) -> Result<Lock, RunError> {
 
 /// Removes the files of a run and nothing else; the lock is kept.
 pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
-    // The provenance marks a run folder. It is removed last, so that an interrupted removal can be
-    // repeated.
-    let files = [
-        contacts::FILE,
-        summary::FILE,
-        "failure.json",
-        "run.pvd",
-        "report.html",
-        RESOLVED,
-        provenance::FILE,
-    ];
-    let folders = [checkpoint::FOLDER, probes::FOLDER, contacts::FOLDER, "shapes", "figures"];
+    // An interrupted removal can be repeated: the summary, which marks a finished run, goes first,
+    // then the checkpoints, which refer to the other files. The provenance marks a run folder and
+    // goes last.
+    remove(&folder.join(summary::FILE), disk::remove_file)?;
+    remove(&folder.join(checkpoint::FOLDER), disk::remove_folder)?;
+    let files =
+        [contacts::FILE, "failure.json", "run.pvd", "report.html", RESOLVED, provenance::FILE];
+    let folders = [probes::FOLDER, contacts::FOLDER, "shapes", "figures"];
     for name in vtk_output::FOLDERS.iter().chain(&folders) {
-        remove(&folder.join(name), |p| std::fs::remove_dir_all(p))?;
+        remove(&folder.join(name), disk::remove_folder)?;
     }
     for name in tables::FILES.into_iter().chain(files) {
-        remove(&folder.join(name), |p| std::fs::remove_file(p))?;
+        remove(&folder.join(name), disk::remove_file)?;
     }
     Ok(())
 }
@@ -210,10 +207,6 @@ fn remove(path: &Path, how: impl Fn(&Path) -> std::io::Result<()>) -> Result<(),
     }
 }
 
-fn is_temporary(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "tmp")
-}
-
 /// Creates the folder and its subfolders, and removes temporary files of a killed run.
 pub(crate) fn create(folder: &Path) -> Result<(), RunError> {
     let inner = || {
@@ -221,14 +214,14 @@ pub(crate) fn create(folder: &Path) -> Result<(), RunError> {
         names.map(|name| folder.join(name))
     };
     for path in std::iter::once(PathBuf::from(folder)).chain(inner()) {
-        std::fs::create_dir_all(&path).context("create", &path)?;
+        disk::create_folder(&path).context("create", &path)?;
     }
-    let optional = [probes::FOLDER, contacts::FOLDER].map(|name| folder.join(name));
+    let optional = [probes::FOLDER, contacts::FOLDER, "figures"].map(|name| folder.join(name));
     let optional = optional.into_iter().filter(|path| path.is_dir());
     for path in std::iter::once(PathBuf::from(folder)).chain(inner()).chain(optional) {
         let entries = std::fs::read_dir(&path).context("read", &path)?;
         for file in entries.flatten().map(|e| e.path()).filter(|p| is_temporary(p)) {
-            std::fs::remove_file(&file).context("remove", &file)?;
+            disk::remove_file(&file).context("remove", &file)?;
         }
     }
     Ok(())

@@ -1,9 +1,11 @@
 //! Locks: one program at a time writes into a folder. The operating system releases a lock when its
 //! program ends, also after a crash.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::Path;
+
+use grainwake_formats::disk::Output;
 
 /// Name of the lock in a run folder.
 pub const FILE: &str = "run.lock";
@@ -11,7 +13,7 @@ pub const FILE: &str = "run.lock";
 /// File that is locked during the life of this value.
 #[derive(Debug)]
 pub struct Lock {
-    file: File,
+    file: Output,
 }
 
 impl Drop for Lock {
@@ -37,13 +39,14 @@ pub enum Attempt {
 /// # Errors
 /// If the file cannot be created.
 pub fn acquire(path: &Path) -> io::Result<Attempt> {
-    let mut open = OpenOptions::new();
-    let mut file = open.read(true).write(true).create(true).truncate(false).open(path)?;
-    match file.try_lock() {
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create(true).truncate(false);
+    let mut file = Output::open(path, &options)?;
+    match file.file().try_lock() {
         Err(TryLockError::WouldBlock) => {
             let mut text = String::new();
             // Some systems forbid reading a locked file.
-            let _ = file.read_to_string(&mut text);
+            let _ = file.file().read_to_string(&mut text);
             Ok(Attempt::HeldByOther(text.trim().parse().ok()))
         }
         Ok(()) | Err(TryLockError::Error(_)) => {

@@ -104,7 +104,7 @@ impl Provenance {
     /// Writes the provenance into the folder of a run.
     pub(crate) fn write(&self, run: &Path) -> Result<(), RunError> {
         let path = run.join(FILE);
-        write_json(&path, false, self).context("write", &path)
+        write_json(&path, true, self).context("write", &path)
     }
     /// Returns the wall-clock time of all sessions [s].
     pub fn wall_s(&self) -> f64 {

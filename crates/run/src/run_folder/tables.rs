@@ -6,6 +6,7 @@ use std::io::{self, BufRead, BufReader, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use grainwake_formats::diagnostics::{self, DiagnosticsRow};
+use grainwake_formats::disk::{self, Output};
 use grainwake_formats::events::{self, Event};
 use grainwake_formats::grains::{self, GrainRow};
 use grainwake_solver::dem::Partner;
@@ -48,28 +49,28 @@ fn names(extra: &[ExtraTable]) -> impl Iterator<Item = String> {
 /// Growing file, open for appending.
 struct GrowingFile {
     path: PathBuf,
-    file: File,
+    file: Output,
     /// Bytes written.
     length: u64,
 }
 
 impl GrowingFile {
     fn create(path: PathBuf) -> Result<GrowingFile, RunError> {
-        let file = File::create(&path).context("create", &path)?;
+        let file = Output::create(&path).context("create", &path)?;
         Ok(GrowingFile { path, file, length: 0 })
     }
 
     /// Opens the file and cuts it back to `length` bytes.
     fn reopen(path: PathBuf, length: u64) -> Result<GrowingFile, RunError> {
-        let mut file = OpenOptions::new().write(true).open(&path).context("open", &path)?;
-        let found = file.metadata().context("read", &path)?.len();
+        let file = Output::open(&path, OpenOptions::new().write(true)).context("open", &path)?;
+        let found = file.file().metadata().context("read", &path)?.len();
         if found < length {
             let message = format!("it has {found} bytes; at the checkpoint it had {length}");
             return Err(io::Error::new(io::ErrorKind::UnexpectedEof, message))
                 .context("continue", &path);
         }
         file.set_len(length).context("cut back", &path)?;
-        file.seek(SeekFrom::End(0)).context("continue", &path)?;
+        file.file().seek(SeekFrom::End(0)).context("continue", &path)?;
         Ok(GrowingFile { path, file, length })
     }
 
@@ -100,7 +101,7 @@ impl Tables {
         for table in extra {
             let path = folder.join(table.file());
             if let Some(parent) = path.parent() {
-                std::fs::create_dir_all(parent).context("create", parent)?;
+                disk::create_folder(parent).context("create", parent)?;
             }
             let mut file = GrowingFile::create(path)?;
             file.append(&format!("{}\n", table.header()))?;
@@ -157,7 +158,7 @@ impl Tables {
     /// Makes the tables durable and returns their lengths.
     pub fn sync(&mut self) -> Result<Lengths, RunError> {
         for file in &self.files {
-            file.file.sync_data().context("write", &file.path)?;
+            file.file.sync().context("write", &file.path)?;
         }
         Ok(Lengths(self.files.iter().map(|file| file.length).collect()))
     }

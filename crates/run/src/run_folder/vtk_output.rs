@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use grainwake_formats::contacts::{self, ContactRow};
+use grainwake_formats::disk;
 use grainwake_formats::pvd::Entry;
 use grainwake_formats::vti::{self, Frame, Source};
 use grainwake_formats::vtp;
@@ -81,7 +82,7 @@ pub(crate) fn contact_files(
 ) -> Result<Vec<Entry>, RunError> {
     type Write = fn(&Path, f64, &[ContactRow]) -> std::io::Result<()>;
     let folder = run.join(contacts::FOLDER);
-    std::fs::create_dir_all(&folder).context("create", &folder)?;
+    disk::create_folder(&folder).context("create", &folder)?;
     let rows = contacts_of(sim);
     let files: [(&str, Write); 2] =
         [("points", contacts::write_points), ("network", contacts::write_network)];

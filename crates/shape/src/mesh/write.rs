@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use glam::DVec3;
-use grainwake_formats::atomic_file::write_atomically;
+use grainwake_formats::disk::write_atomically;
 use grainwake_formats::vtp::{self, Surface};
 
 use crate::error::{Result, ShapeError};

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use glam::DVec3;
+use grainwake_formats::disk;
 use grainwake_report::run_folder::{History, histories};
 
 use super::record::RunRecord;
@@ -120,7 +121,7 @@ pub fn write_thinned_history(
         }
     }
     let folder = study.join(HISTORIES);
-    std::fs::create_dir_all(&folder).at("create", &folder)?;
+    disk::create_folder(&folder).at("create", &folder)?;
     write_csv(&folder.join(format!("{}.csv", run.name)), out)?;
     Ok(true)
 }

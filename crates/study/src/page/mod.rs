@@ -10,6 +10,7 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::disk;
 use grainwake_report::{WrittenFigure, write_figure};
 use grainwake_run::case::Problem;
 use rayon::prelude::*;
@@ -87,7 +88,7 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     };
     let figures = figure::all(&data, &mut notes);
     let figure_folder = folder.join("figures");
-    std::fs::create_dir_all(&figure_folder).at("create", &figure_folder)?;
+    disk::create_folder(&figure_folder).at("create", &figure_folder)?;
     let figures: Vec<WrittenFigure> = figures
         .into_par_iter()
         .map(|figure| write_figure(&figure_folder, figure))

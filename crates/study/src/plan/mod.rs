@@ -13,6 +13,7 @@ pub mod selection;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::disk::{self, is_temporary};
 use grainwake_run::case::{Case, CaseError};
 use serde::{Deserialize, Serialize};
 
@@ -111,7 +112,7 @@ impl Plan {
     /// [`StudyError::Occupied`] if the folder holds another study or other files.
     pub fn create_folder(&self, folder: &Path) -> Result<(), StudyError> {
         self.check_folder(folder)?;
-        std::fs::create_dir_all(folder.join(RUNS)).at("create", folder)?;
+        disk::create_folder(&folder.join(RUNS)).at("create", folder)?;
         self.write(folder)
     }
 
@@ -136,7 +137,8 @@ impl Plan {
             return Ok(());
         }
         // A study that has lost its plan is recognised by its runs.
-        let own = |name: &str| name == RUNS || has_runs && WRITTEN.contains(&name);
+        let of_study = |name: &str| WRITTEN.contains(&name) || is_temporary(Path::new(name));
+        let own = |name: &str| name == RUNS || has_runs && of_study(name);
         let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
         match entries.find(|entry| !entry.file_name().to_str().is_some_and(own)) {
             Some(_) => occupied("is not empty and holds no study".into()),

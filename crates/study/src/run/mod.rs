@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use grainwake_formats::disk;
 use grainwake_formats::events::Event;
 use grainwake_formats::summary::Summary;
 use grainwake_run::checkpoint;
@@ -210,7 +211,7 @@ impl Job<'_> {
     fn lock(&self) -> Result<Attempt, RunError> {
         let folder = self.study.join("locks");
         let path = folder.join(format!("{}.lock", self.run.name));
-        let taken = std::fs::create_dir_all(&folder).and_then(|()| lock::acquire(&path));
+        let taken = disk::create_folder(&folder).and_then(|()| lock::acquire(&path));
         taken.map_err(|source| RunError::Io { action: "lock", path, source })
     }
 
@@ -218,7 +219,7 @@ impl Job<'_> {
     fn remove_checkpoints(&self, folder: &Path) {
         if !self.options.keep_checkpoints {
             // A failure costs disk space only.
-            let _ = std::fs::remove_dir_all(folder.join(checkpoint::FOLDER));
+            let _ = disk::remove_folder(&folder.join(checkpoint::FOLDER));
         }
     }
 }
