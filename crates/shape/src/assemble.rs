@@ -1,7 +1,7 @@
 //! Assembly of a shape from a distance function in the principal frame.
 
 use crate::distance::Distance;
-use crate::error::{Result, ShapeError, positive, size, within};
+use crate::error::{Defect, Result, ShapeError, positive, size, within};
 use crate::field::SampledField;
 use crate::morphology::Morphology;
 use crate::nodes::SurfaceNode;
@@ -9,7 +9,7 @@ use crate::provenance::Provenance;
 use crate::quality::{self, Quality, QualityBounds};
 use crate::shape::{Field, Shape};
 use crate::triangles::TriangleMesh;
-use crate::{inscribed, mass, nodes, roundness, surface};
+use crate::{inscribed, mass, nodes, roundness, specks, surface};
 use glam::DVec3;
 
 /// Resolution, surface nodes and bounds of a sampled shape.
@@ -86,10 +86,17 @@ pub(crate) fn assemble<D: Distance>(
     let extent = body.upper - body.lower;
     let spacing = options.spacing(extent)?;
     let margin = (MARGIN * extent.max_element()).max(MARGIN_CELLS * spacing);
-    let field = SampledField::sample(&body.distance, body.lower, body.upper, spacing, margin)?;
+    let mut field = SampledField::sample(&body.distance, body.lower, body.upper, spacing, margin)?;
+    if let roundness::Surface::Scanned { .. } = body.surface {
+        // Noise in an image leaves specks; in a mesh or a closed form they are details.
+        let removed = specks::remove(&mut field);
+        if removed > 0.0 {
+            provenance = provenance.with(specks::REMOVED, removed);
+        }
+    }
     let off = mass::of_field(&field).centroid;
     if !off.is_finite() {
-        return Err(ShapeError::quality("the sampled body is empty"));
+        return Err(ShapeError::quality(Defect::Empty, "the sampled body is empty"));
     }
     provenance.centroid += provenance.rotation * off;
     let field = field.shifted(-off);
@@ -98,10 +105,11 @@ pub(crate) fn assemble<D: Distance>(
 
     let mesh = surface::of_field(&field);
     mesh.check_closed().map_err(|e| {
-        ShapeError::quality(format!(
+        let reason = format!(
             "the surface of the sampled body is not one closed surface ({e}); ask for more cells \
              across the grain"
-        ))
+        );
+        ShapeError::quality(Defect::Surface, reason)
     })?;
     let diameter = (6.0 * mass.volume / std::f64::consts::PI).cbrt();
     let count = options.nodes.unwrap_or_else(|| {

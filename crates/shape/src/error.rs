@@ -108,6 +108,8 @@ pub enum ShapeError {
     /// The finished shape failed the quality check.
     #[error("the shape fails the quality check: {reason}")]
     Quality {
+        /// Kind of the defect.
+        defect: Defect,
         /// The bound, and the value that exceeds it.
         reason: String,
     },
@@ -139,10 +141,30 @@ impl ShapeError {
         let defect = defect.into();
         ShapeError::BadMesh { defect }
     }
-    pub(crate) fn quality(reason: impl Into<String>) -> ShapeError {
+    pub(crate) fn quality(defect: Defect, reason: impl Into<String>) -> ShapeError {
         let reason = reason.into();
-        ShapeError::Quality { reason }
+        ShapeError::Quality { defect, reason }
     }
+}
+
+/// Defect of a shape that failed the quality check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Defect {
+    /// The gradient of the distance field deviates from 1 at the surface.
+    Gradient,
+    /// The volume of the distance field deviates from that of the source.
+    Volume,
+    /// The distance field is not in its principal frame.
+    Axes,
+    /// The smoothed surface of a scan falls into pieces.
+    Broken,
+    /// The surface of the distance field is not one closed surface.
+    Surface,
+    /// The generator of grains missed its target.
+    Target,
+    /// The distance field has no inside, or values that are not finite.
+    Empty,
 }
 
 /// Lists at most `count` items for messages, with dots if there are more.

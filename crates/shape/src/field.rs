@@ -1,7 +1,7 @@
 //! A signed distance sampled on a regular grid.
 
 use crate::distance::{Distance, EVERYWHERE};
-use crate::error::{Result, ShapeError, within};
+use crate::error::{Defect, Result, ShapeError, within};
 use crate::grid::{self, coordinates, place};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -110,7 +110,7 @@ impl SampledField {
         let largest =
             values.iter().fold(0.0f64, |m, v| if v.is_nan() { *v } else { m.max(v.abs()) });
         if !(largest.is_finite() && largest > 0.0) {
-            return Err(ShapeError::quality("a sampled distance is not a finite number"));
+            return Err(ShapeError::quality(Defect::Empty, "a sampled distance is not finite"));
         }
         let quantum = (largest / LEVELS).log2().ceil().exp2();
         let levels = values.iter().map(|v| (v / quantum).round() as f32).collect();
@@ -158,6 +158,10 @@ impl SampledField {
     /// Stored integer levels, x fastest; the distance is `quantum` times the level.
     pub fn levels(&self) -> &[f32] {
         &self.levels
+    }
+    /// Mutable view of the levels.
+    pub(crate) fn levels_mut(&mut self) -> &mut [f32] {
+        &mut self.levels
     }
     /// Index of sample (i, j, k) in [`levels`](Self::levels).
     pub(crate) fn index(&self, i: usize, j: usize, k: usize) -> usize {

@@ -63,15 +63,17 @@ mod random;
 mod record;
 pub mod render;
 mod roundness;
+mod runs;
 pub mod scan;
 mod shape;
+mod specks;
 mod surface;
 mod table;
 mod triangles;
 
 pub use assemble::ShapeOptions;
 pub use compare::Comparison;
-pub use error::{Result, ShapeError};
+pub use error::{Defect, Result, ShapeError};
 pub use field::SampledField;
 pub use limits::{Memory, ReadLimits, SourceFile, available_memory};
 pub use morphology::Morphology;

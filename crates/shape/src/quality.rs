@@ -1,6 +1,6 @@
 //! Quality check of sampled shapes.
 
-use crate::error::{Result, ShapeError};
+use crate::error::{Defect, Result, ShapeError};
 use crate::field::SampledField;
 use crate::nodes::SurfaceNode;
 use glam::{DMat3, DVec3};
@@ -35,15 +35,16 @@ impl QualityBounds {
         let gradient = "the 0.9 quantile of | |grad phi| - 1 | at the surface";
         let volume = "the relative difference of volume from the source";
         let measured = [
-            (gradient, Some(quality.gradient_error), self.gradient_error),
-            (volume, quality.volume_error, self.volume_error),
+            (Defect::Gradient, gradient, Some(quality.gradient_error), self.gradient_error),
+            (Defect::Volume, volume, quality.volume_error, self.volume_error),
         ];
-        for (what, value, bound) in measured {
+        for (defect, what, value, bound) in measured {
             if let Some(value) = value.filter(|v| v.is_nan() || v.abs() > bound) {
-                return Err(ShapeError::quality(format!(
+                let reason = format!(
                     "{what} is {value:.4}, the bound is {bound}; ask for more cells across the \
                      grain, or smooth the source"
-                )));
+                );
+                return Err(ShapeError::quality(defect, reason));
             }
         }
         Ok(())
@@ -73,8 +74,9 @@ pub(crate) fn check_axes(second: &DMat3) -> Result<()> {
     if share < 5e-3 {
         return Ok(());
     }
-    Err(ShapeError::quality(format!(
+    let reason = format!(
         "the products of inertia of the sampled body are {share:.4} of its largest moment; ask for \
          more cells across the grain"
-    )))
+    );
+    Err(ShapeError::quality(Defect::Axes, reason))
 }

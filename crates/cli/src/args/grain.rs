@@ -88,6 +88,9 @@ pub struct FromScanArgs {
     /// Label of a single grain [default: all]
     #[arg(long, value_name = "N")]
     pub label: Option<u32>,
+    /// Read integers as labels even if the image looks grey
+    #[arg(long, conflicts_with = "threshold")]
+    pub labels: bool,
     /// Threshold between void and solid in a grey image: a grey value, "otsu", or "otsu3" (the
     /// upper of two thresholds)
     #[arg(long, value_name = "VALUE|otsu|otsu3", allow_negative_numbers = true)]
@@ -117,6 +120,9 @@ pub struct FromScanArgs {
     /// mask]
     #[arg(long, value_name = "VOXELS")]
     pub smoothing: Option<f64>,
+    /// Try rejected labels again with more smoothing or a median, each with the gentlest that works
+    #[arg(long)]
+    pub rescue: bool,
     /// Output and resolution.
     #[command(flatten)]
     pub new: NewGrain,

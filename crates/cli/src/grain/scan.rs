@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::refused::{Refused, advice, lines};
+use super::refused::{advice, lines, named};
 use super::{finish, folder, length, may_write, not_input, options, plausible, save};
 use crate::args::FromScanArgs;
 use crate::exit::{BAD_INPUT, Exit, IO};
@@ -47,6 +47,13 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     if let Some(threshold) = scan.threshold {
         tell!("threshold {threshold}");
     }
+    if let Some(masked) = scan.masked {
+        tell!(
+            "note: {:.0} % of the image lie outside the field of view or mask and have the value {}; the threshold ignores them, and grains at their edge count as cut",
+            100.0 * masked.share,
+            masked.value
+        );
+    }
     if !one_file {
         return all(args, scan);
     }
@@ -77,6 +84,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
 fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
     let mut how = ScanOptions::new(length("--voxel", &args.voxel)?);
     how.label = args.label;
+    how.labels = args.labels;
     how.threshold = match args.threshold.as_deref() {
         None => None,
         Some("otsu") => Some(Threshold::Otsu),
@@ -96,6 +104,8 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
     how.pad = args.pad;
     how.largest_piece = args.largest_piece;
     how.smoothing = args.smoothing;
+    how.rescue = args.rescue;
+    how.advise = true;
     how.shape = options(&args.new);
     how.shape.roundness = !args.no_roundness;
     Ok(how)
@@ -103,6 +113,33 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
 
 /// Fraction of the surface cut from neighbours above which the roundness is doubtful.
 const MUCH_SHARED: f64 = 0.01;
+
+/// Describes what was changed on grains: specks removed, and labels rescued, by cure.
+fn treated(grains: &[ScannedGrain]) -> Vec<String> {
+    let mut lines = Vec::new();
+    let cleaned: Vec<&ScannedGrain> = grains.iter().filter(|g| g.specks_removed() > 0.0).collect();
+    let most = cleaned.iter().map(|g| g.specks_removed()).fold(0.0, f64::max);
+    let labels: Vec<u32> = cleaned.iter().map(|g| g.label).collect();
+    if !labels.is_empty() {
+        lines.push(format!(
+            "specks removed from {}, at most {:.2} % of the volume: {}",
+            count(labels.len(), "grain"),
+            100.0 * most.max(5e-5),
+            named(&labels)
+        ));
+    }
+    let mut cures: Vec<(String, Vec<u32>)> = Vec::new();
+    for (cure, label) in grains.iter().filter_map(|g| Some((g.rescued?.to_string(), g.label))) {
+        match cures.iter_mut().find(|(other, _)| *other == cure) {
+            Some((_, labels)) => labels.push(label),
+            None => cures.push((cure, vec![label])),
+        }
+    }
+    lines.extend(cures.iter().map(|(cure, labels)| {
+        format!("{} rescued with {cure}: {}", count(labels.len(), "grain"), named(labels))
+    }));
+    lines
+}
 
 /// Returns the grain files of an earlier command in a folder.
 fn earlier(folder: &Path) -> Vec<PathBuf> {
@@ -120,7 +157,7 @@ fn earlier(folder: &Path) -> Vec<PathBuf> {
 /// Writes every grain into a folder, with table, contact sheet and label image, and lists rejected
 /// labels with the reason.
 fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
-    let Scan { grains, labels, .. } = scan;
+    let Scan { grains, labels, refusals, .. } = scan;
     let place = &args.new.output;
     let path = |label: u32| -> PathBuf { place.join(format!("label-{label:05}.grain")) };
     let (table, sheet, image) =
@@ -145,49 +182,51 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
         let failed = |e| Exit::new(IO, format!("cannot remove {}: {e}", file.display()));
         std::fs::remove_file(file).map_err(failed)?;
     }
+    let advice = advice(&grains);
+    let treated = treated(&grains);
+    let rejected = grains.iter().filter(|g| g.shape.is_err()).count();
     let drawn: Vec<u32> = usable().take(SHEET.2).map(|(label, _)| label).collect();
     let outcomes: Vec<_> = grains
         .into_par_iter()
-        .map(|grain| {
-            let shape = grain.shape.map(|shape| {
-                let file = path(grain.label);
+        .filter_map(|grain| {
+            let specks = grain.specks_removed();
+            let ScannedGrain { label, voxels, shared_surface, shape, rescued } = grain;
+            let written = shape.ok().map(|shape| {
+                let file = path(label);
                 let shape = finish(shape, &file, &args.new)?;
-                let picture = drawn.binary_search(&grain.label).is_ok().then(|| {
+                let picture = drawn.binary_search(&label).is_ok().then(|| {
                     let width = 2.1 * shape.bounding_radius();
                     Picture::of(&shape, View::BROAD, SHEET.0, width, false)
                 });
                 Ok::<_, Exit>((file, shape.record(), picture))
-            });
-            ((grain.label, grain.voxels, grain.shared_surface), shape)
+            })?;
+            Some((label, voxels, shared_surface, specks, rescued, written))
         })
         .collect();
-    let (mut rows, mut pictures, mut refused) = (Vec::new(), Vec::new(), Vec::new());
-    let mut shared = Vec::new();
-    for ((label, voxels, shared_surface), outcome) in outcomes {
-        match outcome {
-            Ok(written) => {
-                let (file, record, picture) = written?;
-                pictures.extend(picture.map(|picture| picture.numbered(label)));
-                if args.new.common.json {
-                    print(&json!({ "label": label, "voxels": voxels, "shared_surface": shared_surface, "file": file, "record": record }).to_string())?;
-                } else {
-                    print(&format!(
-                        "{}  {} voxels, equivalent diameter {:.4} mm, Krumbein sphericity {:.3}",
-                        file.display(),
-                        voxels,
-                        1e3 * record.equivalent_diameter_m,
-                        record.krumbein_sphericity
-                    ))?;
-                }
-                rows.push((format!("label-{label:05}"), record));
-                shared.push(shared_surface);
-            }
-            Err(why) => refused.push(Refused { label, voxels, why }),
+    let (mut rows, mut pictures) = (Vec::new(), Vec::new());
+    let (mut shared, mut removed) = (Vec::new(), Vec::new());
+    for (label, voxels, shared_surface, specks, rescued, written) in outcomes {
+        let (file, record, picture) = written?;
+        pictures.extend(picture.map(|picture| picture.numbered(label)));
+        if args.new.common.json {
+            let rescued = rescued.map(|cure| cure.to_string());
+            print(&json!({ "label": label, "voxels": voxels, "shared_surface": shared_surface, "specks_removed": specks, "rescued": rescued, "file": file, "record": record }).to_string())?;
+        } else {
+            print(&format!(
+                "{}  {} voxels, equivalent diameter {:.4} mm, Krumbein sphericity {:.3}",
+                file.display(),
+                voxels,
+                1e3 * record.equivalent_diameter_m,
+                record.krumbein_sphericity
+            ))?;
         }
+        rows.push((format!("label-{label:05}"), record));
+        shared.push(shared_surface);
+        removed.push(specks);
     }
-    lines(&refused).iter().for_each(|line| tell!("{line}"));
-    tell!("{} written, {} rejected", count(rows.len(), "grain"), refused.len());
-    let advice = advice(&refused, rows.len(), &labels, args);
+    treated.iter().for_each(|line| tell!("{line}"));
+    lines(&refusals, args.rescue).iter().for_each(|line| tell!("{line}"));
+    tell!("{} written, {rejected} rejected", count(rows.len(), "grain"));
     if rows.is_empty() {
         let message = "no label of the image gives a valid grain";
         return Err(Exit::with_hint(BAD_INPUT, message, advice));
@@ -204,7 +243,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
             table.display()
         );
     }
-    write_table(&table, &rows, &[("shared_surface", shared)])?;
+    write_table(&table, &rows, &[("shared_surface", shared), ("specks_removed", removed)])?;
     Picture::sheet(&pictures, SHEET.1).save(&sheet)?;
     labels.save_labels(&image)?;
     Ok(())

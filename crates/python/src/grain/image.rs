@@ -81,6 +81,8 @@ struct Given {
     pad: bool,
     largest_piece: bool,
     smoothing: Option<f64>,
+    rescue: bool,
+    labels: bool,
     roundness: bool,
     cells: Option<usize>,
     nodes: Option<usize>,
@@ -98,6 +100,8 @@ impl Given {
         how.pad = self.pad;
         how.largest_piece = self.largest_piece;
         how.smoothing = self.smoothing;
+        how.rescue = self.rescue;
+        how.labels = self.labels;
         how.shape = options(self.cells, self.nodes);
         how.shape.roundness = self.roundness;
         how
@@ -134,6 +138,10 @@ impl PyGrain {
     ///     Keep the largest piece of a label with several pieces.
     /// smoothing : float, optional
     ///     Standard deviation of the smoothing [voxels]; 1.1 with grey values, 1.5 with a mask.
+    /// rescue : bool, default False
+    ///     Try rejected labels again with more smoothing or a median, the gentlest that works.
+    /// labels : bool, default False
+    ///     Read integers as labels even if the image looks grey.
     /// roundness : bool, default True
     ///     Measure the roundness, which takes long.
     /// equivalent_diameter : float or str, optional
@@ -154,7 +162,7 @@ impl PyGrain {
     /// --------
     /// scan : all grains of an image.
     #[staticmethod]
-    #[pyo3(signature = (image, *, voxel, label = None, threshold = None, median = false, split = false, separate = None, from_mask = false, pad = false, largest_piece = false, smoothing = None, roundness = true, equivalent_diameter = None, cells = None, nodes = None))]
+    #[pyo3(signature = (image, *, voxel, label = None, threshold = None, median = false, split = false, separate = None, from_mask = false, pad = false, largest_piece = false, smoothing = None, rescue = false, labels = false, roundness = true, equivalent_diameter = None, cells = None, nodes = None))]
     fn from_scan(
         py: Python<'_>,
         image: &Bound<'_, PyAny>,
@@ -168,6 +176,8 @@ impl PyGrain {
         pad: bool,
         largest_piece: bool,
         smoothing: Option<f64>,
+        rescue: bool,
+        labels: bool,
         roundness: bool,
         equivalent_diameter: Option<&Bound<'_, PyAny>>,
         cells: Option<usize>,
@@ -182,6 +192,8 @@ impl PyGrain {
             pad,
             largest_piece,
             smoothing,
+            rescue,
+            labels,
             roundness,
             cells,
             nodes,
@@ -231,6 +243,10 @@ impl PyGrain {
 ///     Keep the largest piece of a label with several pieces.
 /// smoothing : float, optional
 ///     Standard deviation of the smoothing [voxels]; 1.1 with grey values, 1.5 with a mask.
+/// rescue : bool, default False
+///     Try rejected labels again with more smoothing or a median, the gentlest that works.
+/// labels : bool, default False
+///     Read integers as labels even if the image looks grey.
 /// roundness : bool, default True
 ///     Measure the roundness, which takes long.
 /// equivalent_diameter : float or str, optional
@@ -243,7 +259,7 @@ impl PyGrain {
 /// Scan
 ///     Grains by label, and the reason of each rejected label.
 #[pyfunction]
-#[pyo3(signature = (image, *, voxel, label = None, threshold = None, median = false, split = false, separate = None, from_mask = false, pad = false, largest_piece = false, smoothing = None, roundness = true, equivalent_diameter = None, cells = None, nodes = None))]
+#[pyo3(signature = (image, *, voxel, label = None, threshold = None, median = false, split = false, separate = None, from_mask = false, pad = false, largest_piece = false, smoothing = None, rescue = false, labels = false, roundness = true, equivalent_diameter = None, cells = None, nodes = None))]
 pub fn scan(
     py: Python<'_>,
     image: &Bound<'_, PyAny>,
@@ -257,6 +273,8 @@ pub fn scan(
     pad: bool,
     largest_piece: bool,
     smoothing: Option<f64>,
+    rescue: bool,
+    labels: bool,
     roundness: bool,
     equivalent_diameter: Option<&Bound<'_, PyAny>>,
     cells: Option<usize>,
@@ -271,11 +289,13 @@ pub fn scan(
         pad,
         largest_piece,
         smoothing,
+        rescue,
+        labels,
         roundness,
         cells,
         nodes,
     };
-    let Scan { grains, labels, threshold } = read(py, image, voxel, threshold, given)?;
+    let Scan { grains, labels, threshold, .. } = read(py, image, voxel, threshold, given)?;
     let (mut accepted, mut rejected, mut voxels) =
         (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
     for grain in grains {
@@ -335,9 +355,9 @@ fn read(
     };
     scanned.map_err(|error| match error {
         // The message of the library names an option of the command line.
-        ShapeError::Unsupported { .. } if how.threshold.is_none() => {
-            input(format!("{error}; in Python: threshold=\"otsu\", \"otsu3\" or a grey value"))
-        }
+        ShapeError::Unsupported { .. } if how.threshold.is_none() => input(format!(
+            "{error}; in Python: threshold=\"otsu\", \"otsu3\" or a grey value, or labels=True"
+        )),
         error => error.into_exception(),
     })
 }

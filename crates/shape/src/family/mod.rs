@@ -11,7 +11,7 @@ mod ball_intersection;
 mod stone;
 
 use crate::assemble::{Body, assemble};
-use crate::error::{Result, ShapeError, size, within};
+use crate::error::{Defect, Result, ShapeError, size, within};
 use crate::provenance::Provenance;
 use crate::random::Random;
 use crate::roundness::Surface;
@@ -108,9 +108,10 @@ pub fn family_grain(target: &FamilyTarget, seed: u64, options: &ShapeOptions) ->
         let shape = assemble(&body, provenance, options)?;
         return shape.scaled_to_equivalent_diameter(target.equivalent_diameter);
     }
-    Err(ShapeError::quality(format!(
+    let reason = format!(
         "no stone of sphericity {} and roundness {} in {ATTEMPTS} attempts; try another seed or \
          flatness",
         target.sphericity, target.roundness
-    )))
+    );
+    Err(ShapeError::quality(Defect::Target, reason))
 }

@@ -1,13 +1,15 @@
 //! Construction of shapes from a volume.
 
+use super::cure::{Cure, cures};
 use super::grain::{self, Context};
-use super::regions::{regions, shared_surfaces};
-use super::segments::segment;
+use super::refusals::{Refusal, Refused, refusals};
+use super::regions::{Region, regions, shared_surfaces};
+use super::segments::{Masked, segment};
 use super::volume::{Volume, Voxels};
 use super::{Progress, ScanOptions};
-use crate::Shape;
 use crate::error::{Result, ShapeError, first_few, within};
 use crate::limits::SourceFile;
+use crate::{Shape, specks};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -22,6 +24,17 @@ pub struct ScannedGrain {
     pub shared_surface: f64,
     /// The shape, or the reason why there is none.
     pub shape: Result<Shape>,
+    /// Other options that the shape needed, if labels are rescued.
+    pub rescued: Option<Cure>,
+}
+
+impl ScannedGrain {
+    /// Returns the fraction of the volume that was removed as specks.
+    pub fn specks_removed(&self) -> f64 {
+        let parameters = self.shape.iter().flat_map(|shape| &shape.provenance().parameters);
+        let removed = parameters.filter(|(name, _)| name.ends_with(specks::REMOVED));
+        removed.filter_map(|(_, value)| value.parse::<f64>().ok()).fold(0.0, |sum, part| sum + part)
+    }
 }
 
 /// Result for a volume.
@@ -33,6 +46,10 @@ pub struct Scan {
     pub labels: Volume,
     /// Grey value of the threshold, if one was applied.
     pub threshold: Option<f64>,
+    /// Exterior of the field of view, if the image does not fill it.
+    pub masked: Option<Masked>,
+    /// The refused labels, grouped by reason.
+    pub refusals: Vec<Refusal>,
 }
 
 /// Builds the shapes of the grains in a volume, ordered by label. Errors of the whole volume are
@@ -84,22 +101,49 @@ pub fn scan_volume(
     let done = AtomicU64::new(0);
     let total = selected.len() as u64;
     progress("shapes", 0, total);
-    let grains = selected
+    let grains: Vec<ScannedGrain> = selected
         .par_iter()
         .map(|(label, region)| {
-            let shape = grain::shape(&context, **label, region);
+            let (shape, rescued) = attempt(&context, **label, region);
             progress("shapes", done.fetch_add(1, Ordering::Relaxed) + 1, total);
             ScannedGrain {
                 label: **label,
                 voxels: region.voxels,
                 shared_surface: shared.get(label).copied().unwrap_or(0.0),
                 shape,
+                rescued,
             }
         })
         .collect();
+    let refused: Vec<Refused> = grains
+        .iter()
+        .filter_map(|grain| {
+            let why = grain.shape.as_ref().err()?;
+            Some(Refused { label: grain.label, voxels: grain.voxels, why })
+        })
+        .collect();
+    let refusals = refusals(&context, &regions, &refused, progress);
     Ok(Scan {
         grains,
         labels: Volume { dims, voxels: Voxels::Labels(segments.labels) },
         threshold: segments.threshold,
+        masked: segments.masked,
+        refusals,
     })
+}
+
+/// Builds the shape of a label. If it is refused and labels are to be rescued, tries the cures, the
+/// gentlest first. Which of several pieces is the grain remains a question for the user.
+fn attempt(context: &Context, label: u32, region: &Region) -> (Result<Shape>, Option<Cure>) {
+    let shape = grain::shape(context, label, region, Cure::default());
+    let Some(why) = shape.as_ref().err().filter(|_| context.options.rescue) else {
+        return (shape, None);
+    };
+    let cures = cures(why, context.options, context.smoothing());
+    for cure in cures.into_iter().filter(|cure| !cure.largest_piece) {
+        if let Ok(rescued) = grain::shape(context, label, region, cure) {
+            return (Ok(rescued), Some(cure));
+        }
+    }
+    (shape, None)
 }

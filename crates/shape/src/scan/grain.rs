@@ -1,18 +1,20 @@
 //! The shape of one grain of a volume.
 
+use super::cure::Cure;
 use super::regions::{Region, crop, cuts};
-use super::runs::{fill_cavities, pieces};
 use super::segments::Segments;
+use super::threshold::median;
 use super::{Mask, ScanOptions, smooth, transform};
-use crate::Shape;
-use crate::error::{Result, ShapeError, first_few};
+use crate::error::{Defect, Result, ShapeError, first_few};
 use crate::filter::refine;
 use crate::grid::{coordinates, index, place};
 use crate::limits::SourceFile;
 use crate::mesh::{TriangleMesh, from_closed};
 use crate::provenance::Provenance;
 use crate::roundness::Surface;
+use crate::runs::{fill_cavities, pieces};
 use crate::surface::{Samples, extract};
+use crate::{Shape, specks};
 use glam::DVec3;
 
 /// Minimum number of voxels of a grain: a ball of diameter 5 voxels.
@@ -20,8 +22,6 @@ const FEWEST: u64 = 64;
 /// Number of cells across a grain below which the smoothed field is refined before surface
 /// extraction, for grey values and for a mask.
 const FINE: [usize; 2] = [40, 64];
-/// Maximum surface fraction of pieces detached by smoothing.
-const CRUMBS: f64 = 0.02;
 /// Cells of the final field per voxel across a grain, and the minimum number of cells.
 const CELLS: (f64, usize) = (1.25, 24);
 /// Smoothing for grey values and for a mask [voxels].
@@ -35,8 +35,17 @@ pub(super) struct Context<'a> {
     pub options: &'a ScanOptions,
 }
 
-/// Builds the shape of the grain `label`, which lies in `region`.
-pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Shape> {
+impl Context<'_> {
+    /// Returns the smoothing of the image [voxels].
+    pub fn smoothing(&self) -> f64 {
+        let default = SMOOTHING[usize::from(self.segments.grey.is_none())];
+        self.options.smoothing.unwrap_or(default)
+    }
+}
+
+/// Builds the shape of the grain `label`, which lies in `region`, with the options of the image as
+/// changed by `cure`.
+pub(super) fn shape(context: &Context, label: u32, region: &Region, cure: Cure) -> Result<Shape> {
     let Context { dims, segments, source, options } = *context;
     let labels = &segments.labels;
     let faces = region.faces(dims);
@@ -46,16 +55,19 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
     if segments.cut_by_view.contains(&label) && !options.pad {
         return Err(ShapeError::CutByView { label });
     }
-    let smoothing = SMOOTHING[usize::from(segments.grey.is_none())];
-    let smoothing = options.smoothing.unwrap_or(smoothing);
+    let smoothing = cure.smoothing.unwrap_or_else(|| context.smoothing());
     let margin = (4.0 * smoothing).ceil() as usize + 4;
     let mut mask = crop(dims, labels, label, region, margin);
-    let largest = options.largest_piece || options.separate.is_some();
-    let voxels = one_piece(&mut mask, label, largest)?;
+    let low = region.lower.map(|n| n as isize - margin as isize);
+    if cure.median {
+        filter(&mut mask, context, low, label);
+    }
+    let largest = options.largest_piece || options.separate.is_some() || cure.largest_piece;
+    let (voxels, dropped) = one_piece(&mut mask, label, largest)?;
     if voxels < FEWEST {
         return Err(ShapeError::TooFewVoxels { label, voxels, needed: FEWEST });
     }
-    let filled = fill_cavities(&mut mask);
+    let filled = fill_cavities(mask.dims, &mut mask.solid);
     let longest = (0..3).map(|a| region.upper[a] - region.lower[a] + 1).max().unwrap_or(1);
     let factor = FINE[usize::from(segments.grey.is_none())].div_ceil(longest).clamp(1, 4);
     let mut provenance = Provenance::new("scan")
@@ -66,6 +78,13 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
         .with("smoothing_voxels", smoothing)
         .with("split", options.split)
         .with("pad", options.pad);
+    if cure != Cure::default() {
+        provenance = provenance.with("rescued", cure);
+    }
+    if dropped > 0 {
+        let share = dropped as f64 / voxels as f64;
+        provenance = provenance.with(&format!("mask_{}", specks::REMOVED), share);
+    }
     if let Some(threshold) = segments.threshold {
         provenance = provenance.with("threshold", threshold);
     }
@@ -74,7 +93,6 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
     }
     let (field, volume, image) = match &segments.grey {
         Some(grey) => {
-            let low = region.lower.map(|n| n as isize - margin as isize);
             let cut = grey.cut(&mask, low, label, smoothing);
             provenance =
                 provenance.with("surface", "grey").with("blur_voxels", format!("{:.3}", cut.blur));
@@ -87,7 +105,10 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
             (field, (voxels + filled) as f64, kernel)
         }
     };
-    let mut mesh = surface(&field, mask.dims, volume, factor)?;
+    let (mut mesh, crumbs) = surface(&field, mask.dims, volume, factor)?;
+    if crumbs > 0.0 {
+        provenance = provenance.with(&format!("surface_{}", specks::REMOVED), crumbs);
+    }
     // Voxel i extends from i to i + 1 edge lengths from the image corner; its centre is at i + 1/2.
     let shift = DVec3::from_array(region.lower.map(|low| low as f64 - margin as f64 + 0.5));
     for v in &mut mesh.vertices {
@@ -106,41 +127,67 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region) -> Result<Sh
     from_closed(&mesh, surface, provenance, &finish)
 }
 
-/// Refuses, or on request drops, all but the largest piece; returns the number of voxels kept.
-fn one_piece(mask: &mut Mask, label: u32, largest: bool) -> Result<u64> {
+/// Applies a median of 27 voxels to the mask of a label, which gains no voxel of another label.
+fn filter(mask: &mut Mask, context: &Context, low: [isize; 3], label: u32) {
+    let values: Vec<f32> = mask.solid.iter().map(|s| f32::from(u8::from(*s))).collect();
+    let filtered = median(&values, mask.dims);
+    for (n, (solid, value)) in mask.solid.iter_mut().zip(filtered).enumerate() {
+        let at = place(mask.dims, n);
+        let at: [usize; 3] =
+            std::array::from_fn(|a| low[a].saturating_add_unsigned(at[a]) as usize);
+        let free = || {
+            let inside = (0..3).all(|a| at[a] < context.dims[a]);
+            let own = |other: u32| other == 0 || other == label;
+            inside && own(context.segments.labels[index(context.dims, at)])
+        };
+        *solid = value > 0.5 && free();
+    }
+}
+
+/// Drops specks, on request all pieces but the largest, and refuses larger pieces; returns the
+/// numbers of voxels kept and dropped.
+fn one_piece(mask: &mut Mask, label: u32, largest: bool) -> Result<(u64, u64)> {
     let (number, sizes) = pieces(mask.dims, |n| mask.solid[n]);
     let mut order: Vec<usize> = (0..sizes.len()).collect();
     order.sort_by_key(|n| std::cmp::Reverse(sizes[*n]));
-    if sizes.len() > 1 && !largest {
+    let Some(&kept) = order.first() else {
+        return Err(ShapeError::TooFewVoxels { label, voxels: 0, needed: FEWEST });
+    };
+    let dropped = sizes.iter().sum::<u64>() - sizes[kept];
+    if dropped as f64 > specks::LIMIT * sizes[kept] as f64 && !largest {
         return Err(ShapeError::SeveralPieces {
             label,
             count: order.len(),
             sizes: first_few(order.iter().map(|n| sizes[*n]), 5),
         });
     }
-    let kept = order[0];
     for (solid, number) in mask.solid.iter_mut().zip(number) {
         *solid = number == kept as u32 + 1;
     }
-    Ok(sizes[kept])
+    Ok((sizes[kept], dropped))
 }
 
 /// Extracts a closed smooth surface in voxel units (voxel centres at integers) that encloses
 /// `volume` voxels. The field approximates the signed distance; its level is set to give that
-/// volume, on a grid refined by `factor`.
-fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Result<TriangleMesh> {
+/// volume, on a grid refined by `factor`. Also returns the relative volume of dropped pieces.
+fn surface(
+    field: &[f32],
+    dims: [usize; 3],
+    volume: f64,
+    factor: usize,
+) -> Result<(TriangleMesh, f64)> {
     let (field, dims, lower) = near_surface(field, dims);
     let (mut fine, dims) = refine(&field, dims, factor);
     let spacing = 1.0 / factor as f64;
-    let mut mesh = TriangleMesh::default();
+    let (mut mesh, mut crumbs) = (TriangleMesh::default(), 0.0);
     // Newton's method: the derivative of the volume with respect to the level is the area.
     for _ in 0..5 {
         let samples = Samples { dims, lower, spacing, values: &fine };
-        mesh = extract(&samples).largest_piece(CRUMBS).ok_or_else(|| {
-            ShapeError::quality(
-                "smoothing leaves no single surface (a neck of a voxel or two breaks); reduce \
-                     the smoothing",
-            )
+        let largest = extract(&samples).largest_piece();
+        (mesh, crumbs) = largest.filter(|(_, rest)| *rest <= specks::LIMIT).ok_or_else(|| {
+            let reason = "the smoothed surface falls into pieces; smooth more if noise causes \
+                          them, and less if a neck of a voxel or two breaks";
+            ShapeError::quality(Defect::Broken, reason)
         })?;
         let missing = (volume - mesh.signed_volume()) / mesh.area();
         if missing.abs() < 1e-4 {
@@ -150,7 +197,7 @@ fn surface(field: &[f32], dims: [usize; 3], volume: f64, factor: usize) -> Resul
             *value -= missing as f32;
         }
     }
-    Ok(mesh)
+    Ok((mesh, crumbs))
 }
 
 /// Margin [samples] of the extraction box around the interior of the field; exceeds the range of

@@ -58,14 +58,20 @@ pub(crate) struct Cut {
 
 impl Grey {
     /// Computes the mean grey values of the phases from voxels without the other phase within
-    /// `reach` along the axes, or from the deepest voxels if there are hardly any.
-    pub(crate) fn new(dims: [usize; 3], values: Vec<f32>, owner: Vec<u32>) -> Grey {
+    /// `reach` along the axes, or from the deepest voxels if there are hardly any. Voxels with the
+    /// value `outside` lie outside the field of view.
+    pub(crate) fn new(
+        dims: [usize; 3],
+        values: Vec<f32>,
+        owner: Vec<u32>,
+        outside: Option<f32>,
+    ) -> Grey {
         let is_solid = |n: usize| owner[n] != 0 && owner[n] & HALO == 0;
         // For large images a fraction of the rows suffices, unless few voxels are deep.
         let share = (values.len() / ENOUGH).max(1);
-        let mut grey = mean_grey(dims, &values, is_solid, share);
+        let mut grey = mean_grey(dims, &values, outside, is_solid, share);
         if share > 1 && grey.iter().any(|(_, deep)| *deep < FEW_DEEP) {
-            grey = mean_grey(dims, &values, is_solid, 1);
+            grey = mean_grey(dims, &values, outside, is_solid, 1);
         }
         let [(void, _), (solid, _)] = grey;
         Grey { dims, values, owner, void, solid }
@@ -157,6 +163,7 @@ fn clear(dims: [usize; 3], n: usize, other: impl Fn(usize) -> bool) -> usize {
 fn mean_grey(
     dims: [usize; 3],
     values: &[f32],
+    outside: Option<f32>,
     is_solid: impl Fn(usize) -> bool + Sync,
     share: usize,
 ) -> [(f64, u64); 2] {
@@ -170,7 +177,7 @@ fn mean_grey(
         .map(|k| {
             let mut sums = [[(0.0, 0); CLEAR + 1]; 2];
             let rows = (0..dims[1]).filter(|j| (j + k) % share == 0);
-            for n in rows.flat_map(|j| row(j, k)) {
+            for n in rows.flat_map(|j| row(j, k)).filter(|n| Some(values[*n]) != outside) {
                 let phase = is_solid(n);
                 let sum = &mut sums[usize::from(phase)][clear(dims, n, |m| is_solid(m) != phase)];
                 *sum = (sum.0 + f64::from(values[n]), sum.1 + 1);
@@ -265,7 +272,7 @@ mod tests {
         };
         let values: Vec<f32> = (0..64_000).map(value).collect();
         for share in [1, 4] {
-            let [void, solid] = mean_grey(dims, &values, inside, share);
+            let [void, solid] = mean_grey(dims, &values, None, inside, share);
             assert!((void.0 - 1.0).abs() < 0.01, "{}", void.0);
             assert!((solid.0 - 3.0).abs() < 0.01, "deep voxels alone: {}", solid.0);
             // 16^3 voxels are deep.

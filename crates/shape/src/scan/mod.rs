@@ -15,16 +15,18 @@
 //! differ from the sphere by 3 % of volume, which cannot be recovered from the mask.
 
 mod build;
+mod cure;
 mod field_of_view;
 mod grain;
 mod grey;
 mod header;
+mod looks_grey;
 mod npy;
 mod npz;
 mod options;
 mod read;
+mod refusals;
 mod regions;
-mod runs;
 mod segments;
 mod slices;
 mod smooth;
@@ -35,8 +37,11 @@ mod volume;
 mod watershed;
 
 pub use build::{Scan, ScannedGrain, scan_volume, shapes_from_volume};
+pub use cure::Cure;
 pub use options::ScanOptions;
 pub use read::read_volume;
+pub use refusals::{Advice, Refusal};
+pub use segments::Masked;
 pub use threshold::Threshold;
 pub use volume::{Volume, Voxels};
 

@@ -12,6 +12,8 @@ pub struct ScanOptions {
     /// Label of a single grain; `None` for all labels. If a labelled image is to be split or
     /// separated, the label of the solid phase, and all grains are built.
     pub label: Option<u32>,
+    /// Whether integers are labels even if the image looks grey.
+    pub labels: bool,
     /// Segmentation of solid and void; required for grey images, `None` for labels.
     pub threshold: Option<Threshold>,
     /// Whether to apply a median of 27 voxels before the threshold. Surfaces are located in the
@@ -32,6 +34,10 @@ pub struct ScanOptions {
     /// Standard deviation of the smoothing [voxels]; `None` for 1.1 with grey values and 1.5 with a
     /// mask.
     pub smoothing: Option<f64>,
+    /// Whether to try refused labels again with other options for each, see [`Cure`](super::Cure).
+    pub rescue: bool,
+    /// Whether to try on the refused labels which options would accept them.
+    pub advise: bool,
     /// Resolution, nodes and bounds. Small grains get fewer cells: 1.25 times the number of voxels
     /// across them, but at least 24.
     pub shape: ShapeOptions,
@@ -43,6 +49,7 @@ impl ScanOptions {
         ScanOptions {
             voxel,
             label: None,
+            labels: false,
             threshold: None,
             median: false,
             split: false,
@@ -51,6 +58,8 @@ impl ScanOptions {
             pad: false,
             largest_piece: false,
             smoothing: None,
+            rescue: false,
+            advise: false,
             shape: ShapeOptions::default(),
         }
     }

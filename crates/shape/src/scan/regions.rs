@@ -129,8 +129,8 @@ pub(crate) fn shared_surfaces(dims: [usize; 3], labels: &[u32]) -> HashMap<u32, 
 
 #[cfg(test)]
 mod tests {
-    use super::super::runs::{fill_cavities, pieces};
     use super::*;
+    use crate::runs::{fill_cavities, pieces};
 
     #[test]
     fn regions_pieces_and_cavities() {
@@ -153,7 +153,7 @@ mod tests {
         assert_eq!(found[&9].faces(dims), "high x, low y, high z");
         let mut mask = crop(dims, &labels, 7, &found[&7], 2);
         assert_eq!(mask.dims, [7, 7, 7]);
-        assert_eq!(fill_cavities(&mut mask), 1);
+        assert_eq!(fill_cavities(mask.dims, &mut mask.solid), 1);
         assert_eq!(mask.solid.iter().filter(|s| **s).count(), 27);
         let (number, sizes) = pieces(dims, |n| labels[n] != 0);
         assert_eq!(sizes, [26, 1]);

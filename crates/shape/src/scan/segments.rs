@@ -2,13 +2,13 @@
 
 use super::field_of_view::FieldOfView;
 use super::grey::{Grey, LAYERS};
-use super::runs::{fill_cavities, pieces};
 use super::threshold::median;
 use super::volume::{Volume, Voxels};
 use super::watershed::{HALO, add_halo, separate};
-use super::{Mask, Progress, ScanOptions, transform};
+use super::{Mask, Progress, ScanOptions, looks_grey, transform};
 use crate::error::{Result, ShapeError};
 use crate::limits::SourceFile;
+use crate::runs::{fill_cavities, pieces};
 use std::collections::BTreeSet;
 
 /// Result of the segmentation.
@@ -19,6 +19,16 @@ pub(super) struct Segments {
     pub threshold: Option<f64>,
     /// Labels at the edge of the field of view.
     pub cut_by_view: BTreeSet<u32>,
+    pub masked: Option<Masked>,
+}
+
+/// Exterior of the field of view of an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Masked {
+    /// Grey value of the exterior.
+    pub value: f32,
+    /// Fraction of the image outside the field of view.
+    pub share: f64,
 }
 
 /// Determines the grain of each voxel.
@@ -31,6 +41,15 @@ pub(super) fn segment(
     let dims = volume.dims;
     let values = match (&volume.voxels, options.threshold) {
         (Voxels::Labels(labels), None) => {
+            let grey = looks_grey::values_if_grey(labels, dims).filter(|_| !options.labels);
+            if let Some(values) = grey {
+                let reason = format!(
+                    "the image looks grey: it has {values} values whose voxels are scattered, \
+                     unlike the labels of grains; give a threshold (--threshold otsu, otsu3, or a \
+                     grey value), or state with --labels that the values are labels"
+                );
+                return Err(ShapeError::unsupported(source.name.as_ref(), reason));
+            }
             let divided = match options.label.filter(|_| options.divides()) {
                 None => divide(labels, dims, options, progress)?,
                 Some(phase) => {
@@ -43,6 +62,7 @@ pub(super) fn segment(
                 grey: None,
                 threshold: None,
                 cut_by_view: BTreeSet::new(),
+                masked: None,
             });
         }
         (Voxels::Grey(_), None) => {
@@ -56,27 +76,31 @@ pub(super) fn segment(
     progress("threshold", 0, 1);
     let clean = options.median.then(|| median(&values, dims));
     let filtered = clean.as_ref().unwrap_or(&values);
-    let cut = options.threshold.and_then(|t| t.of(filtered));
-    let Some(cut) = cut else {
+    let view = options.threshold.and_then(|t| FieldOfView::of(&values, dims, t));
+    let outside = view.as_ref().map(|view| view.outside);
+    let Some(cut) = options.threshold.and_then(|t| t.of(filtered, outside)) else {
         // All values are equal: black counts as empty.
         return Err(ShapeError::EmptyVolume);
     };
-    let binary: Vec<u32> = filtered.iter().map(|v| u32::from(f64::from(*v) >= cut)).collect();
+    let mut binary: Vec<u32> = filtered.iter().map(|v| u32::from(f64::from(*v) >= cut)).collect();
     drop(clean);
+    if let Some(view) = &view {
+        view.clear_outside(&mut binary);
+    }
     let labels = divide(&binary, dims, options, progress)?;
-    let view = FieldOfView::of(&values, dims, cut);
     let mut segments = Segments {
-        cut_by_view: view.map_or_else(BTreeSet::new, |view| view.cuts(&labels)),
+        cut_by_view: view.as_ref().map_or_else(BTreeSet::new, |view| view.cuts(&labels)),
         labels,
         grey: None,
         threshold: Some(cut),
+        masked: view.map(|view| Masked { value: view.outside, share: view.share }),
     };
     // A binary image has no intermediate grey values.
     let two = values.iter().all(|v| *v == values[0] || *v == 0.0 || *v == 1.0 || *v == 255.0);
     if options.sub_voxel && !two && segments.labels.iter().all(|l| *l < HALO) {
         let mut owner = segments.labels.clone();
         add_halo(&mut owner, dims, LAYERS);
-        segments.grey = Some(Grey::new(dims, values, owner));
+        segments.grey = Some(Grey::new(dims, values, owner, outside));
     }
     Ok(segments)
 }
@@ -100,6 +124,6 @@ fn divide(
     if mask.solid.iter().all(|s| *s) {
         return Err(ShapeError::SolidVolume);
     }
-    fill_cavities(&mut mask);
+    fill_cavities(dims, &mut mask.solid);
     Ok(separate(&transform::to_void(&mask), dims, neck))
 }

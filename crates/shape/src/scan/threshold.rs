@@ -18,31 +18,33 @@ const BINS: usize = 1024;
 const BINS3: usize = 256;
 
 impl Threshold {
-    /// Returns the grey value of the threshold, or `None` if all values are equal.
-    pub(crate) fn of(self, values: &[f32]) -> Option<f64> {
+    /// Returns the grey value of the threshold, or `None` if all values are equal. The value
+    /// `except` is ignored.
+    pub(crate) fn of(self, values: &[f32], except: Option<f32>) -> Option<f64> {
         match self {
             Threshold::Value(v) => Some(v),
-            Threshold::Otsu => otsu(values),
-            Threshold::Otsu3 => otsu3(values),
+            Threshold::Otsu => otsu(values, except),
+            Threshold::Otsu3 => otsu3(values, except),
         }
     }
 }
 
-/// Returns counts by bin, the lowest value and the bin width.
-fn histogram(values: &[f32], bins: usize) -> Option<(Vec<f64>, f64, f64)> {
+/// Returns counts by bin, the lowest value and the bin width, without the value `except`.
+fn histogram(values: &[f32], except: Option<f32>, bins: usize) -> Option<(Vec<f64>, f64, f64)> {
     let start = || (f32::INFINITY, f32::NEG_INFINITY);
-    let (low, high) =
-        values.par_iter().map(|v| (*v, *v)).reduce(start, |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let counts = |v: &f32| Some(*v) != except;
+    let used = values.par_iter().filter(|v| counts(v));
+    let (low, high) = used.map(|v| (*v, *v)).reduce(start, |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let (low, high) = (f64::from(low), f64::from(high));
     let width = (high - low) / bins as f64;
     if width.is_nan() || width <= 0.0 {
         return None;
     }
-    let mut counts = vec![0.0; bins];
-    for v in values {
-        counts[(((f64::from(*v) - low) / width) as usize).min(bins - 1)] += 1.0;
+    let mut bars = vec![0.0; bins];
+    for v in values.iter().filter(|v| counts(v)) {
+        bars[(((f64::from(*v) - low) / width) as usize).min(bins - 1)] += 1.0;
     }
-    Some((counts, low, width))
+    Some((bars, low, width))
 }
 
 /// Returns cumulative sums of counts and of counts times bin index.
@@ -62,8 +64,8 @@ fn share(sums: &[(f64, f64)], a: usize, b: usize) -> f64 {
     if count > 0.0 { moment * moment / count } else { 0.0 }
 }
 
-fn otsu(values: &[f32]) -> Option<f64> {
-    let (counts, low, width) = histogram(values, BINS)?;
+fn otsu(values: &[f32], except: Option<f32>) -> Option<f64> {
+    let (counts, low, width) = histogram(values, except, BINS)?;
     let sums = sums(&counts);
     let score = |b: usize| share(&sums, 0, b) + share(&sums, b, BINS);
     // All thresholds in an empty interval between the classes are equivalent; its middle is
@@ -74,8 +76,8 @@ fn otsu(values: &[f32]) -> Option<f64> {
     Some(low + width * middle)
 }
 
-fn otsu3(values: &[f32]) -> Option<f64> {
-    let (counts, low, width) = histogram(values, BINS3)?;
+fn otsu3(values: &[f32], except: Option<f32>) -> Option<f64> {
+    let (counts, low, width) = histogram(values, except, BINS3)?;
     let sums = sums(&counts);
     let mut best = (0.0, 1);
     for a in 1..BINS3 {
@@ -137,15 +139,16 @@ mod tests {
     #[test]
     fn thresholds_fall_between_the_classes() {
         let two = classes(&[(10.0, 6000), (60.0, 3000)], 5.0);
-        let found = Threshold::Otsu.of(&two).unwrap();
+        let found = Threshold::Otsu.of(&two, None).unwrap();
         assert!((25.0..45.0).contains(&found), "{found}");
         let three = classes(&[(10.0, 6000), (35.0, 3000), (80.0, 3000)], 4.0);
-        let found = Threshold::Otsu3.of(&three).unwrap();
+        let found = Threshold::Otsu3.of(&three, None).unwrap();
         assert!((47.0..68.0).contains(&found), "{found}");
         // A binary image: midway.
-        let binary = Threshold::Otsu.of(&[0.0, 0.0, 200.0, 200.0, 0.0]).unwrap();
+        let binary = Threshold::Otsu.of(&[0.0, 0.0, 200.0, 200.0, 0.0], None).unwrap();
         assert!((binary - 100.0).abs() < 1.0, "{binary}");
-        assert_eq!(Threshold::Otsu.of(&[7.0; 50]), None);
+        assert_eq!(Threshold::Otsu.of(&[7.0; 50], None), None);
+        assert_eq!(Threshold::Otsu.of(&[0.0, 0.0, 7.0, 7.0], Some(0.0)), None);
     }
 
     #[test]

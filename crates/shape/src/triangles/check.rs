@@ -127,19 +127,23 @@ impl TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// Returns the piece with the most faces, or `None` if the others together exceed the fraction
-    /// `crumbs` of all faces, or if the edges do not match.
-    pub(crate) fn largest_piece(self, crumbs: f64) -> Option<TriangleMesh> {
+    /// Returns the piece with the most faces and the volume of the others relative to it, the
+    /// volumes of bubbles counted as positive; `None` if the edges do not match.
+    pub(crate) fn largest_piece(self) -> Option<(TriangleMesh, f64)> {
         let neighbours = self.check_edges().ok()?;
         let (number, sizes) = pieces(&neighbours);
         let largest = (0..sizes.len()).max_by_key(|n| (sizes[*n], std::cmp::Reverse(*n)))?;
         if sizes.len() == 1 {
-            return Some(self);
+            return Some((self, 0.0));
         }
-        let others = self.triangles.len() - sizes[largest];
-        if others as f64 > crumbs * self.triangles.len() as f64 {
-            return None;
+        let mut volumes = vec![0.0; sizes.len()];
+        let origin = self.vertices[0];
+        for (face, n) in number.iter().enumerate() {
+            let [a, b, c] = self.corners(face).map(|x| x - origin);
+            volumes[*n] += a.dot(b.cross(c));
         }
+        let all: f64 = volumes.iter().map(|v| v.abs()).sum();
+        let rest = all / volumes[largest].abs() - 1.0;
         let mut renamed = vec![None; self.vertices.len()];
         let mut mesh = TriangleMesh::default();
         for (triangle, _) in self.triangles.iter().zip(number).filter(|(_, n)| *n == largest) {
@@ -150,7 +154,7 @@ impl TriangleMesh {
                 })
             }));
         }
-        Some(mesh)
+        Some((mesh, rest))
     }
 }
 

@@ -1,6 +1,5 @@
 //! Connected components of a volume, computed from runs: sequences of equal voxels along x.
 
-use super::Mask;
 use crate::grid::root;
 use rayon::prelude::*;
 
@@ -98,7 +97,7 @@ impl Runs {
 
 /// Labels the connected components (through voxel faces) of the voxels selected by `solid`, from 1
 /// in the order of their first voxels, and 0 elsewhere. Also returns their sizes.
-pub(super) fn pieces(
+pub(crate) fn pieces(
     dims: [usize; 3],
     solid: impl Fn(usize) -> bool + Sync,
 ) -> (Vec<u32>, Vec<u64>) {
@@ -119,11 +118,11 @@ pub(super) fn pieces(
     (number, sizes)
 }
 
-/// Fills cavities (background without connection to the border of the mask, even through voxel
+/// Fills cavities (background without connection to the border of the volume, even through voxel
 /// edges and corners); returns the number of filled voxels.
-pub(super) fn fill_cavities(mask: &mut Mask) -> u64 {
-    let [nx, ny, nz] = mask.dims;
-    let runs = Runs::new(mask.dims, true, |n| !mask.solid[n]);
+pub(crate) fn fill_cavities(dims: [usize; 3], solid: &mut [bool]) -> u64 {
+    let [nx, ny, nz] = dims;
+    let runs = Runs::new(dims, true, |n| !solid[n]);
     let mut open = vec![false; runs.runs.len()];
     for (n, [begin, end], first) in runs.each() {
         let (j, k) = (first / nx % ny, first / nx / ny);
@@ -136,7 +135,7 @@ pub(super) fn fill_cavities(mask: &mut Mask) -> u64 {
     for (n, [begin, end], first) in runs.each() {
         if !open[runs.parent[n] as usize] {
             let length = (end - begin) as usize;
-            mask.solid[first..first + length].fill(true);
+            solid[first..first + length].fill(true);
             filled += length as u64;
         }
     }
@@ -206,11 +205,11 @@ mod tests {
             };
             let expected: Vec<bool> =
                 (0..504).map(|n| solid[n] || !reaches_border(regions[n])).collect();
-            let mut mask = Mask { dims, solid };
-            let before = mask.solid.iter().filter(|s| **s).count() as u64;
-            let filled = fill_cavities(&mut mask);
-            assert_eq!(mask.solid, expected);
-            let after = mask.solid.iter().filter(|s| **s).count() as u64;
+            let mut filled_up = solid.clone();
+            let before = solid.iter().filter(|s| **s).count() as u64;
+            let filled = fill_cavities(dims, &mut filled_up);
+            assert_eq!(filled_up, expected);
+            let after = filled_up.iter().filter(|s| **s).count() as u64;
             assert_eq!(filled, after - before);
         }
     }
