@@ -125,7 +125,7 @@ fn describe(s: &Summary, wet: bool, out: &Path) -> String {
         s.end_time_s,
         s.ended_by,
         count(s.steps as usize, "step"),
-        crate::progress::clock(s.wall_s)
+        crate::progress::clock(s.cost.wall_s)
     )];
     if wet {
         lines[0] += &format!("; largest |div u| {:.1e} 1/s", s.max_divergence);

@@ -243,7 +243,7 @@ impl StudyObserver for Board<'_> {
                 "finished at t = {:.4} s ({}) in {}",
                 s.end_time_s,
                 s.ended_by,
-                clock(s.wall_s)
+                clock(s.cost.wall_s)
             ),
             Outcome::AlreadyFinished => "had finished before".into(),
             Outcome::Failed(why, _) => format!("FAILED: {}", first_line(why)),

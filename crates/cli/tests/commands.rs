@@ -43,7 +43,69 @@ fn run_prints_one_json_object() {
     assert_eq!(file, summary);
     let provenance = json(&std::fs::read(out.join("provenance.json")).unwrap());
     assert_eq!(provenance["sessions"][0]["from_step"], 0);
+    assert_eq!(provenance["sessions"][0]["passes"], summary["passes"]);
 }
+
+#[test]
+fn the_summary_has_sub_steps_pairs_and_times_of_the_passes() {
+    let (folder, case) = folder_with(HEAP);
+    let out = folder.path().join("run");
+    let run = |more: &[&str]| {
+        let done = grainwake().arg("run").arg(&case).arg("-o").arg(&out).args(more).output();
+        json(&done.unwrap().stdout)
+    };
+    let stopped = run(&["--no-report", "--json"]);
+    let number = |value: &serde_json::Value| value.as_f64().unwrap_or_else(|| panic!("{value}"));
+    let (steps, total) = (number(&stopped["steps"]), number(&stopped["substeps"]["total"]));
+    let largest = number(&stopped["substeps"]["largest_per_step"]);
+    assert!(total > steps && largest * steps >= total, "{stopped}");
+    // Both grains rest on the floor and on each other: three pairs.
+    assert_eq!(stopped["contact_pairs"]["largest"], 3);
+    let mean = number(&stopped["contact_pairs"]["mean"]);
+    assert!(mean > 0.5 && mean < 3.0, "{mean}");
+    let passes = stopped["passes"].as_array().unwrap();
+    let names: Vec<&str> = passes.iter().map(|pass| pass["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["contact", "output", "other"]);
+    let sum: f64 = passes.iter().map(|pass| number(&pass["wall_s"])).sum();
+    let wall = number(&stopped["wall_s"]);
+    assert!((sum / wall - 1.0).abs() < 0.02, "{sum} of {wall}");
+    if cfg!(target_os = "linux") {
+        let cpu = number(&stopped["cpu_s"]);
+        assert!(cpu > 0.0 && cpu < 2.5 * wall, "{cpu} of {wall}");
+    }
+    // A later end goes on with the counts and adds the time of the second session.
+    let extended = run(&["--resume", "--no-report", "--json", "--set", "time.end=60 ms"]);
+    assert!(number(&extended["substeps"]["total"]) > total);
+    assert!(number(&extended["wall_s"]) > wall);
+    let wall_of =
+        |summary: &serde_json::Value, pass: usize| number(&summary["passes"][pass]["wall_s"]);
+    assert!(wall_of(&extended, 0) > wall_of(&stopped, 0));
+}
+
+/// Two spheres on a floor between walls that keep them together.
+const HEAP: &str = r#"
+[domain]
+size = ["3.9 mm", "2.2 mm", "8 mm"]
+cell_size = "0.1 mm"
+boundaries = { x = "wall", y = "wall", z = "wall" }
+
+[[grain]]
+shape = { kind = "sphere", diameter = "2 mm" }
+density = 2500
+position = ["1.0 mm", "1.1 mm", "1.2 mm"]
+
+[[grain]]
+shape = { kind = "sphere", diameter = "2 mm" }
+density = 2500
+position = ["2.95 mm", "1.1 mm", "1.5 mm"]
+
+[time]
+end = "40 ms"
+
+[output]
+tables = "1 ms"
+surfaces = 0
+"#;
 
 #[test]
 fn a_run_folder_holds_what_the_reference_says() {
@@ -248,6 +310,35 @@ fn schema_and_completions_are_printed() {
 }
 
 #[test]
+fn bench_measures_a_dry_case() {
+    let (_folder, case) = folder_with(HEAP);
+    let done = grainwake()
+        .arg("bench")
+        .arg(&case)
+        .args(["--steps", "5", "--warm-up", "400", "--json"])
+        .assert()
+        .success();
+    let measured = json(&done.get_output().stdout);
+    let step = &measured["seconds_per_step"];
+    let number = |key: &str| step[key].as_f64().unwrap_or_else(|| panic!("{measured}"));
+    assert!(number("minimum") > 0.0 && number("minimum") <= number("median"), "{measured}");
+    if cfg!(target_os = "linux") {
+        assert!(number("cpu") > 0.0, "{measured}");
+    }
+    assert!(measured["contact_pairs"]["largest"].as_u64() >= Some(2), "{measured}");
+    assert!(measured["substeps_per_step"]["mean"].as_f64() > Some(1.0), "{measured}");
+    assert!(measured.get("cells").is_none() && measured["grains"] == 2);
+    let table = grainwake().arg("bench").arg(&case).args(["--steps", "2"]).assert().success();
+    let table = String::from_utf8_lossy(&table.get_output().stdout).into_owned();
+    assert!(table.starts_with("dry, 2 grains"), "{table}");
+    assert!(table.contains("minimum") && table.contains("CPU"), "{table}");
+    let both = grainwake().arg("bench").arg(&case).args(["--grains", "3"]).assert().code(2);
+    assert!(String::from_utf8_lossy(&both.get_output().stderr).contains("--grains"));
+    let missing = grainwake().args(["bench", "no.toml"]).assert().code(2);
+    assert!(String::from_utf8_lossy(&missing.get_output().stderr).contains("no.toml"));
+}
+
+#[test]
 fn bench_measures_time_memory_and_the_limit() {
     let done = grainwake()
         .args(["bench", "--size", "24", "24", "48", "--grains", "7", "--steps", "2", "--json"])
@@ -258,6 +349,10 @@ fn bench_measures_time_memory_and_the_limit() {
         assert!(measured[key].as_f64().is_some_and(|v| v > 0.0), "{key} in {measured}");
     }
     assert!(measured["passes"].as_array().is_some_and(|p| p.len() >= 7));
+    let step = &measured["seconds_per_step"];
+    assert!(
+        step["minimum"].as_f64() > Some(0.0) && step["minimum"].as_f64() <= step["median"].as_f64()
+    );
     assert_eq!(measured["grains"], 7);
     let single = grainwake()
         .args(["bench", "--size", "24", "24", "48", "--grains", "7"])

@@ -20,8 +20,9 @@ pub struct Summary {
     pub steps: u64,
     /// Simulated time at the end [s].
     pub end_time_s: f64,
-    /// Wall-clock time of all sessions [s].
-    pub wall_s: f64,
+    /// Computing time of all sessions.
+    #[serde(flatten)]
+    pub cost: Cost,
     /// Events in the order of their confirmation.
     pub events: Vec<Event>,
     /// Largest |div u| after any step [1/s].
@@ -34,6 +35,12 @@ pub struct Summary {
     /// Mean overlap over all contacts and steps, over the smaller equal-volume diameter.
     #[serde(default)]
     pub mean_overlap: f64,
+    /// Contact sub-steps.
+    #[serde(default)]
+    pub substeps: SubstepCounts,
+    /// Touching pairs, walls included.
+    #[serde(default)]
+    pub contact_pairs: PairCounts,
     /// Reason of the end.
     pub ended_by: EndReason,
     /// Results of a pair.
@@ -41,6 +48,66 @@ pub struct Summary {
     pub pair: Option<PairSummary>,
     /// Each grain.
     pub grains: Vec<GrainSummary>,
+}
+
+/// Computing time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Wall-clock time [s].
+    pub wall_s: f64,
+    /// CPU time of all threads [s]; none if it is unknown.
+    #[serde(default)]
+    pub cpu_s: Option<f64>,
+    /// Times of the passes of a step, of the outputs and of the rest.
+    #[serde(default)]
+    pub passes: Vec<PassTime>,
+}
+
+/// Computing time of one pass.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PassTime {
+    /// Name: "predict", "contact", "output" and so on.
+    pub name: String,
+    /// Wall-clock time [s].
+    pub wall_s: f64,
+    /// CPU time of all threads [s]; none if it is unknown.
+    pub cpu_s: Option<f64>,
+}
+
+impl std::ops::AddAssign<&Cost> for Cost {
+    /// Adds the time of another session; the CPU time is unknown if it is unknown for one of them.
+    fn add_assign(&mut self, other: &Cost) {
+        let sum = |a: Option<f64>, b: Option<f64>| Some(a? + b?);
+        self.cpu_s = sum(self.cpu_s, other.cpu_s);
+        self.wall_s += other.wall_s;
+        for pass in &other.passes {
+            match self.passes.iter_mut().find(|known| known.name == pass.name) {
+                Some(known) => {
+                    known.wall_s += pass.wall_s;
+                    known.cpu_s = sum(known.cpu_s, pass.cpu_s);
+                }
+                None => self.passes.push(pass.clone()),
+            }
+        }
+    }
+}
+
+/// Number of contact sub-steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SubstepCounts {
+    /// Sub-steps in all steps.
+    pub total: u64,
+    /// Most sub-steps in a step.
+    pub largest_per_step: u64,
+}
+
+/// Number of touching pairs, walls included.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PairCounts {
+    /// Mean over the steps.
+    pub mean: f64,
+    /// Most pairs in a step.
+    pub largest: u64,
 }
 
 /// Reason of the end of a run.

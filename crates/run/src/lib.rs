@@ -5,12 +5,14 @@
 //! `docs/reference/run-folder.md` lists the files.
 //!
 //! Layers, downwards: `case` -> `run_loop` -> `recorder` -> `run_folder`, `contact_events`,
-//! `series` -> `overlaps`, `memory`, `plan`, `error`.
+//! `series` -> `overlaps`, `contact_work`, `memory`, `meter`, `plan`, `error`.
 
 pub mod case;
 mod contact_events;
+mod contact_work;
 mod error;
 mod memory;
+mod meter;
 mod overlaps;
 mod plan;
 mod recorder;

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use grainwake_formats::disk;
 use grainwake_formats::events::{Event, EventKind};
 use grainwake_formats::pvd::{self, Entry};
-use grainwake_formats::summary::{EndReason, GrainSummary, PairSummary, Summary};
+use grainwake_formats::summary::{Cost, EndReason, GrainSummary, PairSummary, Summary};
 use grainwake_solver::dem::{Enclosure, surface_gap};
 use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::{EventParams, Tracker};
 
 use crate::contact_events::{ContactEvents, MAX_GRAINS, WallEvents};
+use crate::contact_work::ContactWork;
 use crate::error::{Context, RunError};
 use crate::overlaps::Overlaps;
 use crate::plan::RunPlan;
@@ -46,6 +47,7 @@ pub(crate) struct Recorder {
     max_divergence: f64,
     max_cfl: f64,
     overlaps: Overlaps,
+    contact_work: ContactWork,
     last_row: Option<f64>,
     kept_checkpoints: usize,
 }
@@ -87,6 +89,7 @@ impl Recorder {
             max_divergence: sim.max_divergence(),
             max_cfl: 0.0,
             overlaps: Overlaps::default(),
+            contact_work: ContactWork::default(),
             last_row: None,
             kept_checkpoints: plan.kept_during_run(),
         }
@@ -166,6 +169,7 @@ impl Recorder {
         recorder.max_divergence = record.max_divergence;
         recorder.max_cfl = record.max_cfl;
         recorder.overlaps = record.overlaps;
+        recorder.contact_work = record.contact_work;
         recorder.last_row = record.last_row;
         recorder.write_collection()?;
         Ok(recorder)
@@ -188,6 +192,7 @@ impl Recorder {
         self.max_divergence = self.max_divergence.max(sim.max_divergence());
         self.max_cfl = self.max_cfl.max(sim.cfl());
         self.overlaps.add(sim);
+        self.contact_work.add(sim);
         let gap = pair_gap(sim, &self.enclosure);
         let before = self.tracker.events().len();
         let mut events = self.tracker.update(sim.time(), sim.grains(), sim.contacts(), gap);
@@ -331,6 +336,7 @@ impl Recorder {
             max_divergence: self.max_divergence,
             max_cfl: self.max_cfl,
             overlaps: self.overlaps,
+            contact_work: self.contact_work,
             last_row: self.last_row,
             tracker: self.tracker.state().clone(),
             contact_events: self.contact_events.clone(),
@@ -354,8 +360,8 @@ impl Recorder {
         events
     }
 
-    /// Returns the results so far.
-    pub fn summary(&self, sim: &Simulation, wall_s: f64, ended_by: EndReason) -> Summary {
+    /// Returns the results so far, of a run that has taken this time.
+    pub fn summary(&self, sim: &Simulation, cost: Cost, ended_by: EndReason) -> Summary {
         let tracker = &self.tracker;
         let grains = sim.grains().iter().enumerate().map(|(i, grain)| GrainSummary {
             equivalent_diameter_m: grain.shape.equivalent_diameter(),
@@ -367,12 +373,14 @@ impl Recorder {
         Summary {
             steps: sim.steps(),
             end_time_s: sim.time(),
-            wall_s,
+            cost,
             events: self.events(),
             max_divergence: self.max_divergence,
             max_cfl: self.max_cfl,
             max_overlap: self.overlaps.largest,
             mean_overlap: self.overlaps.mean(),
+            substeps: self.contact_work.substeps(),
+            contact_pairs: self.contact_work.pairs(),
             ended_by,
             pair: tracker.phase().map(|phase| PairSummary {
                 kiss_time_s: tracker.kiss_time(),

@@ -14,6 +14,7 @@ use grainwake_solver::sim::{
 
 use crate::error::{Context, RunError};
 use crate::memory;
+use crate::meter::Meter;
 use crate::plan::RunPlan;
 use crate::recorder::Recorder;
 use crate::run_folder::ExtraTable;
@@ -181,7 +182,7 @@ pub fn run(
         Begin::Resumed(record) => Recorder::resume(out, *record, &job.plan, &sim)?,
         Begin::Branched(record) => Recorder::branch(out, &job.digest, *record, &job.plan, &sim)?,
     };
-    Running { out: out.into(), plan: job.plan, sim, recorder, provenance, started: Instant::now() }
+    Running { out: out.into(), plan: job.plan, sim, recorder, provenance, meter: Meter::start() }
         .advance(observer)
 }
 
@@ -232,7 +233,7 @@ struct Running {
     sim: Simulation,
     recorder: Recorder,
     provenance: Provenance,
-    started: Instant,
+    meter: Meter,
 }
 
 impl Running {
@@ -249,7 +250,7 @@ impl Running {
             if let Err(source) = stepped {
                 return Err(self.failed(source, saved_time));
             }
-            for event in self.recorder.after_step(&self.sim)? {
+            for event in self.meter.output(|| self.recorder.after_step(&self.sim))? {
                 observer.event(&event);
             }
             let tracker = self.recorder.tracker();
@@ -258,7 +259,7 @@ impl Running {
                 end: self.plan.end,
                 steps: self.sim.steps(),
                 session_steps: self.sim.steps() - first_step,
-                wall_s: self.started.elapsed().as_secs_f64(),
+                wall_s: self.meter.wall_s(),
                 from,
                 dt: self.sim.time_step(),
                 gap: tracker.gap(),
@@ -309,24 +310,24 @@ impl Running {
         })
     }
 
-    fn write_wall_time(&mut self) -> Result<(), RunError> {
+    fn write_cost(&mut self) -> Result<(), RunError> {
         if let Some(session) = self.provenance.sessions.last_mut() {
-            session.wall_s = self.started.elapsed().as_secs_f64();
+            session.cost = self.meter.cost(&self.sim);
         }
         self.provenance.write(&self.out)
     }
 
     fn checkpoint(&mut self) -> Result<(), RunError> {
-        self.recorder.checkpoint(&self.sim)?;
-        self.write_wall_time()
+        self.meter.output(|| self.recorder.checkpoint(&self.sim))?;
+        self.write_cost()
     }
 
     fn finish(mut self, why: EndReason) -> Result<Ending, RunError> {
-        self.recorder.finish(&self.sim)?;
+        self.meter.output(|| self.recorder.finish(&self.sim))?;
         self.checkpoint()?;
         checkpoint::keep(&self.out, self.plan.kept_after_end())?;
         // The summary is written last: it marks a finished run.
-        let summary = self.recorder.summary(&self.sim, self.provenance.wall_s(), why);
+        let summary = self.recorder.summary(&self.sim, self.provenance.cost(), why);
         (summary.write(&self.out)).context("write", &self.out.join(summary::FILE))?;
         Ok(Ending::Finished(summary))
     }
@@ -353,7 +354,7 @@ impl Running {
         });
         let path = self.out.join("failure.json");
         let kept =
-            write(&path, format!("{failure:#}\n").as_bytes()).and_then(|()| self.write_wall_time());
+            write(&path, format!("{failure:#}\n").as_bytes()).and_then(|()| self.write_cost());
         match kept {
             Ok(()) => RunError::Unstable {
                 source,

@@ -1,6 +1,7 @@
 //! Case files: what is read, what is refused, and where the message points.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DVec3;
 use grainwake_run::case::{Case, CaseError, Problem};
@@ -622,6 +623,41 @@ fn packings_become_grains() {
     assert_eq!(crowded.len(), 1, "{crowded:?}");
     let random = good(&text.replace("seed = 3", "seed = 3\narrangement = \"random\""));
     assert_eq!(random.setup.grains.len(), 60);
+}
+
+#[test]
+fn copies_of_a_shape_are_prepared_once() {
+    let head = "[domain]\nsize = [0.05, 0.05, 0.2]\n[time]\nend = 0.1\n";
+    let packed = "[[packing]]\ncount = 100\ndensity = 2650\nseed = 3\n";
+    let file = "../../cases/grains/tsquare_rock.grain";
+    let folder = tempfile::tempdir().unwrap();
+    let copy = folder.path().join("copy.grain");
+    std::fs::copy(file, &copy).unwrap();
+    let mut entries = String::new();
+    for n in 0..100 {
+        // The same file under other names, and the same length in other units.
+        let copy = copy.display().to_string();
+        let name = [file, "../run/../../cases/grains/tsquare_rock.grain", &copy][n % 3];
+        let diameter = ["\"2 mm\"", "0.002", "\"0.2 cm\""][n / 3 % 3];
+        let (x, z) = (4e-3 * (n % 10 + 1) as f64, 4e-3 * (n / 10 + 1) as f64);
+        entries += &format!(
+            "[[grain]]\nfile = \"{name}\"\nequivalent_diameter = {diameter}\ndensity = 2650\n\
+             position = [{x}, 0.02, {z}]\n"
+        );
+    }
+    let shape = "shapes = [{ kind = \"rounded-box\", size = [2e-3, 2e-3, 2e-3], radius = 3e-4 }]\n";
+    for text in [
+        format!("{head}{packed}files = [\"{file}\"]\nequivalent_diameter = 2e-3\n"),
+        format!("{head}{packed}files = [\"{file}\"]\narrangement = \"random\"\n"),
+        format!("{head}{packed}{shape}arrangement = \"lattice\"\n"),
+        format!("{head}{entries}"),
+    ] {
+        let case = good(&text);
+        let first = &case.setup.grains[0].shape;
+        assert_eq!(case.setup.grains.len(), 100);
+        let shared = case.setup.grains.iter().filter(|grain| Arc::ptr_eq(&grain.shape, first));
+        assert_eq!(shared.count(), 100, "{text}");
+    }
 }
 
 #[test]

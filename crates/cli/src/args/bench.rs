@@ -1,20 +1,32 @@
 //! Arguments of `bench`.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use grainwake_solver::math::{InstructionSet, Precision};
 
 /// Arguments of `bench`.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
+    /// Case file to measure, dry or with fluid, instead of grains in a box of water
+    #[arg(value_name = "CASE.toml", conflicts_with_all = ["size", "grains", "scheme", "precision",
+        "scaling"])]
+    pub case: Option<PathBuf>,
+    /// Override a key of the case, as in `run`
+    #[arg(long, value_name = "KEY=VALUE", requires = "case")]
+    pub set: Vec<String>,
     /// Number of cells along x, y and z
     #[arg(long, num_args = 3, value_names = ["NX", "NY", "NZ"], default_values_t = [100, 100, 390])]
     pub size: Vec<usize>,
     /// Number of grains, 8 cells across, evenly distributed
     #[arg(long, value_name = "N", default_value_t = 2)]
     pub grains: usize,
-    /// Number of timed steps, after two untimed ones
-    #[arg(long, default_value_t = 10)]
+    /// Number of timed steps
+    #[arg(long, value_name = "N", default_value_t = 10)]
     pub steps: u64,
+    /// Number of untimed steps before
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub warm_up: u64,
     /// Number of threads, 0 for all cores
     #[arg(long, value_name = "N", default_value_t = 2)]
     pub threads: usize,

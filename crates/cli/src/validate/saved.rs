@@ -92,7 +92,7 @@ pub fn add(
             threads: session.map_or(0, |s| s.threads),
             cells: None,
             steps: summary.steps,
-            wall_s: summary.wall_s,
+            wall_s: summary.cost.wall_s,
             name,
             run,
         });

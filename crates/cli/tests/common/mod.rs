@@ -114,7 +114,9 @@ pub fn assert_same_run(a: &Path, b: &Path) {
                     return (name, bytes);
                 }
                 let mut summary: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
-                summary["wall_s"] = 0.into();
+                for key in ["wall_s", "cpu_s", "passes"] {
+                    summary[key] = 0.into();
+                }
                 (name, summary.to_string().into_bytes())
             })
             .collect()

@@ -65,10 +65,15 @@ impl<'a> Library<'a> {
             ),
             _ => (format!("cannot read {}: {error}", path.display()), "check the file and its permissions".to_string()),
         })?;
-        let shape = Shape::from_bytes(&bytes, &path).map_err(|error| {
-            let help = "a case takes .grain files; make one with `grainwake grain from-scan`, `from-mesh` or `make`";
-            (error.to_string(), help.to_string())
-        })?;
+        // A copy of a file under another name has the same shape.
+        let copy = self.files.values().find(|(known, _)| *known.bytes == bytes);
+        let shape = match copy {
+            Some((_, shape)) => shape.clone(),
+            None => Arc::new(Shape::from_bytes(&bytes, &path).map_err(|error| {
+                let help = "a case takes .grain files; make one with `grainwake grain from-scan`, `from-mesh` or `make`";
+                (error.to_string(), help.to_string())
+            })?),
+        };
         let stem =
             path.file_stem().map_or_else(|| "grain".into(), |s| s.to_string_lossy().into_owned());
         let taken = |candidate: &str| self.files.values().any(|(f, _)| f.name == candidate);
@@ -78,7 +83,6 @@ impl<'a> Library<'a> {
             count += 1;
             name = format!("shapes/{stem}-{count}.grain");
         }
-        let shape = Arc::new(shape);
         let file = ShapeFile { name: name.clone(), source: path.clone(), bytes: Arc::new(bytes) };
         self.files.insert(path, (file, shape.clone()));
         Ok((shape, name))

@@ -20,6 +20,7 @@ use grainwake_solver::sim::events::TrackerState;
 use super::ExtraTable;
 use super::tables::Lengths;
 use crate::contact_events::{ContactEvents, WallEvents};
+use crate::contact_work::ContactWork;
 use crate::error::{Context, RunError};
 use crate::overlaps::Overlaps;
 
@@ -54,6 +55,9 @@ pub struct Record {
     /// Overlaps so far.
     #[serde(default)]
     pub overlaps: Overlaps,
+    /// Contact sub-steps and pairs so far.
+    #[serde(default)]
+    pub contact_work: ContactWork,
     /// Time of the last row of the tables [s].
     pub last_row: Option<f64>,
     /// Times of the last rows of the extra tables [s].

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use grainwake_formats::summary::write_json;
+use grainwake_formats::summary::{Cost, write_json};
 
 use crate::error::{Context, RunError};
 
@@ -61,8 +61,9 @@ pub struct Session {
     pub threads: usize,
     /// First time step.
     pub from_step: u64,
-    /// Wall-clock time up to the last checkpoint or the end [s].
-    pub wall_s: f64,
+    /// Computing time up to the last checkpoint or the end.
+    #[serde(flatten)]
+    pub cost: Cost,
 }
 
 /// Name of the file in a run folder.
@@ -106,9 +107,12 @@ impl Provenance {
         let path = run.join(FILE);
         write_json(&path, true, self).context("write", &path)
     }
-    /// Returns the wall-clock time of all sessions [s].
-    pub fn wall_s(&self) -> f64 {
-        self.sessions.iter().map(|s| s.wall_s).sum()
+    /// Returns the computing time of all sessions.
+    pub fn cost(&self) -> Cost {
+        let mut sessions = self.sessions.iter().map(|session| &session.cost);
+        let mut total = sessions.next().cloned().unwrap_or_default();
+        sessions.for_each(|cost| total += cost);
+        total
     }
 }
 
@@ -122,7 +126,7 @@ impl Session {
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             threads,
             from_step,
-            wall_s: 0.0,
+            cost: Cost::default(),
         }
     }
 }

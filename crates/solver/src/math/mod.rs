@@ -2,11 +2,14 @@
 
 mod cache;
 mod formula;
+mod time_spent;
 
 pub(crate) use cache::last_cache;
 pub use formula::Formula;
 pub(crate) use grainwake_simd::{Aligned, Real};
 pub use grainwake_simd::{InstructionSet, Precision, instructions, limit_instructions};
+pub(crate) use time_spent::timed;
+pub use time_spent::{Stopwatch, TimeSpent};
 
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};

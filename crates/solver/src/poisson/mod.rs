@@ -13,12 +13,10 @@ mod fft;
 mod plane;
 mod tridiagonal;
 
-use std::time::{Duration, Instant};
-
 #[cfg(test)]
 use crate::grid::{Centre, Field};
 use crate::grid::{Mesh, PlaneRange, for_chunks, for_columns, for_plane_ranges};
-use crate::math::{Aligned, Real};
+use crate::math::{Aligned, Real, Stopwatch, TimeSpent};
 use axis::{AxisTransform, Buffers};
 use grainwake_simd::dispatch;
 use plane::{Forward, Inverse, PlaneLayout};
@@ -39,11 +37,11 @@ pub enum Ends {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PoissonTimes {
     /// Right-hand side and its transforms.
-    pub forward: Duration,
+    pub forward: TimeSpent,
     /// Tridiagonal systems.
-    pub columns: Duration,
+    pub columns: TimeSpent,
     /// Inverse transforms and the caller's use of the solution.
-    pub inverse: Duration,
+    pub inverse: TimeSpent,
 }
 
 /// One plane of the solution and its neighbours, ghosts included. Beyond an end of the box the
@@ -136,7 +134,7 @@ impl<R: Real> Poisson<R> {
         partial: &mut [T],
         sink: impl Fn(usize, Solution<R>, &mut PlaneRange<N, R, T>) + Sync,
     ) {
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let non_temporal = self.non_temporal;
         let (axes, stride) = ([&self.axes[0], &self.axes[1]], self.layout.stride());
         for_chunks(&mut self.modes, stride, &mut self.slots, |k, modes, slot| {
@@ -144,7 +142,7 @@ impl<R: Real> Poisson<R> {
             source(k + 1, plane);
             dispatch(Forward { axes, plane, modes, buffers, non_temporal });
         });
-        let forward = Instant::now();
+        let forward = Stopwatch::start();
         let (system, eigenvalues) = (self.along_z, &self.eigenvalues);
         let nz = self.mesh.cells[2];
         for_columns(
@@ -159,7 +157,7 @@ impl<R: Real> Poisson<R> {
                 dispatch(Solve { system, columns, lambda, singular, scratch });
             },
         );
-        let columns = Instant::now();
+        let columns = Stopwatch::start();
         let periodic = self.ends.map(|ends| ends == Ends::Periodic);
         let modes = &self.modes;
         let invert = |k: usize, plane: &mut Plane<R>, buffers: &mut Buffers<R>| {
@@ -200,8 +198,8 @@ impl<R: Real> Poisson<R> {
                 planes.rotate_left(1);
             }
         });
-        self.times.forward += forward - start;
-        self.times.columns += columns - forward;
+        self.times.forward += start.until(&forward);
+        self.times.columns += forward.until(&columns);
         self.times.inverse += columns.elapsed();
     }
 

@@ -160,6 +160,11 @@ impl Simulation {
     pub fn largest_overlap(&self) -> Option<RelativeOverlap> {
         self.dynamics.largest_overlap()
     }
+    /// Contact sub-steps of the last step; of a step repeated with the response of the fluid, those
+    /// of the repetition.
+    pub fn substeps(&self) -> usize {
+        self.dynamics.substeps()
+    }
     /// Memory held by fields, solver and grains on the grid [bytes].
     pub fn bytes(&self) -> usize {
         self.fluid.as_ref().map_or(0, |fluid| fluid.bytes())

@@ -5,13 +5,13 @@ use glam::DVec3;
 
 use super::fluid::Fluid;
 use super::prescription::Prescription;
-use super::timing::{PassTimes, timed};
+use super::timing::PassTimes;
 use super::{GrainData, Simulation};
 use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
 use crate::immersed::{
     CoupledGrains, Crossing, GrainKinematics, OpenSides, PreviousStep, RigidStep, Scheme, StepInput,
 };
-use crate::math::{Load, RigidVelocity};
+use crate::math::{Load, RigidVelocity, timed};
 
 /// Grains of a step, with or without fluid.
 struct GrainStep<'a> {

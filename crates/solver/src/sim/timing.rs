@@ -1,56 +1,48 @@
-//! Wall time of the passes of a step.
+//! Time of the passes of a step.
 
-use std::time::{Duration, Instant};
-
+use crate::math::TimeSpent;
 use crate::poisson::PoissonTimes;
 
 use super::Simulation;
 
-/// Wall time spent in each pass since the start.
+/// Time spent in each pass since the start.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PassTimes {
     /// Prediction of the flow without the grains.
-    pub predict: Duration,
+    pub predict: TimeSpent,
     /// Contact sub-steps.
-    pub contact: Duration,
+    pub contact: TimeSpent,
     /// Location of the grains, impulse and rigidity.
-    pub coupling: Duration,
+    pub coupling: TimeSpent,
     /// Projection, with the Poisson solver.
-    pub project: Duration,
-    /// Wall time of the Poisson solver before the first step.
+    pub project: TimeSpent,
+    /// Time of the Poisson solver before the first step.
     pub initial: PoissonTimes,
 }
 
-/// Runs `work` and adds its wall time to `total`.
-pub(super) fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {
-    let start = Instant::now();
-    let result = work();
-    *total += start.elapsed();
-    result
-}
-
 impl Simulation {
-    /// Wall time spent in each pass of the step since the start [s]. The projection has four
+    /// Time spent in each pass of the step since the start, by name. The projection has four
     /// passes: right-hand side and forward transforms, tridiagonal columns, inverse transforms and
-    /// correction, ghost cells and sums.
-    pub fn pass_times(&self) -> [(&'static str, f64); 7] {
+    /// correction, ghost cells and sums. Without fluid, contact is the only pass.
+    pub fn pass_times(&self) -> Vec<(&'static str, TimeSpent)> {
         let times = &self.times;
-        let poisson = (self.fluid.as_ref()).map_or(times.initial, |fluid| fluid.poisson_times());
+        let Some(fluid) = &self.fluid else {
+            return vec![("contact", times.contact)];
+        };
+        let (now, before) = (fluid.poisson_times(), times.initial);
         let [forward, columns, inverse] = [
-            poisson.forward - times.initial.forward,
-            poisson.columns - times.initial.columns,
-            poisson.inverse - times.initial.inverse,
+            now.forward - before.forward,
+            now.columns - before.columns,
+            now.inverse - before.inverse,
         ];
-        let solve = forward + columns + inverse;
-        [
+        vec![
             ("predict", times.predict),
             ("contact", times.contact),
             ("coupling", times.coupling),
             ("divergence", forward),
             ("columns", columns),
             ("correct", inverse),
-            ("ghosts", times.project.saturating_sub(solve)),
+            ("ghosts", times.project - (forward + columns + inverse)),
         ]
-        .map(|(name, time)| (name, time.as_secs_f64()))
     }
 }

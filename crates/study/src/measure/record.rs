@@ -90,7 +90,7 @@ impl RunRecord {
             self.kiss_time_s = summary.pair.as_ref().and_then(|p| p.kiss_time_s);
             self.steps = Some(summary.steps);
             self.end_time_s = Some(summary.end_time_s);
-            self.wall_s = Some(summary.wall_s);
+            self.wall_s = Some(summary.cost.wall_s);
             self.max_divergence = Some(summary.max_divergence);
         }
         self.threads = Provenance::read(folder).and_then(|p| Some(p.sessions.last()?.threads));

@@ -31,6 +31,8 @@ pub struct ContactDynamics {
     contacts: Vec<Contact>,
     /// Deepest overlap of the last step relative to the smaller equal-volume diameter.
     largest_overlap: Option<RelativeOverlap>,
+    /// Sub-steps of the last step.
+    substeps: usize,
     /// Pairs that may touch, in ascending key.
     records: Vec<ContactRecord>,
     /// Position of every grain at the end of the last step [m].
@@ -53,6 +55,7 @@ impl ContactDynamics {
             enclosure,
             contacts: Vec::new(),
             largest_overlap: None,
+            substeps: 0,
             records: Vec::new(),
             last_positions: Vec::new(),
             bodies: Vec::new(),
@@ -71,6 +74,11 @@ impl ContactDynamics {
     /// diameter of the pair. `None` without contact, and after [`ContactDynamics::restore`].
     pub fn largest_overlap(&self) -> Option<RelativeOverlap> {
         self.largest_overlap
+    }
+    /// Number of sub-steps of the last step; of a step repeated with the response of the fluid,
+    /// those of the repetition.
+    pub fn substeps(&self) -> usize {
+        self.substeps
     }
     /// Contact parameters.
     pub fn params(&self) -> &ContactParams {
@@ -100,14 +108,15 @@ impl ContactDynamics {
         mean_contact: &mut [Load],
     ) -> usize {
         mean_contact.fill(Load::default());
+        self.substeps = 0;
         if dt.is_nan() || dt <= 0.0 {
             return 0;
         }
         self.begin_step(grains);
         self.bodies.iter_mut().for_each(|body| body.response = None);
-        let substeps = self.integrate(grains, loads, dt, mean_contact);
+        self.substeps = self.integrate(grains, loads, dt, mean_contact);
         self.end_step(grains);
-        substeps
+        self.substeps
     }
 
     /// Applies prescribed velocities, updates the contact bodies, and renumbers the periodic image
@@ -268,7 +277,7 @@ impl ContactDynamics {
             body.response = Some(*response);
         }
         // The responses contain all other loads.
-        self.integrate(grains, &[], dt, mean_contact);
+        self.substeps = self.integrate(grains, &[], dt, mean_contact);
         for (n, grain) in grains.iter_mut().enumerate() {
             let trial_end = &before.trial_ends[n];
             if !trial_end.touched && mean_contact[n].is_zero() {

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use grainwake_shape::{Field, SampledField, Shape};
+use rayon::prelude::*;
 
 use crate::dem::Grain;
 use crate::math::Pose;
@@ -41,12 +42,19 @@ impl NarrowBandShapes {
     /// Samples the distances up to `reach` [m] from the surfaces; `eps` [m] is the half-width of
     /// the band.
     pub fn new(grains: &[Grain], eps: f64, reach: f64) -> NarrowBandShapes {
-        let mut known: HashMap<*const Shape, NarrowBandShape> = HashMap::new();
-        let sampled = |grain: &Grain| {
-            let shape = known.entry(Arc::as_ptr(&grain.shape));
-            shape.or_insert_with(|| NarrowBandShape::new(&grain.shape, eps, reach)).clone()
-        };
-        NarrowBandShapes { shapes: grains.iter().map(sampled).collect() }
+        let mut indices: HashMap<*const Shape, usize> = HashMap::new();
+        let mut distinct = Vec::new();
+        for grain in grains {
+            indices.entry(Arc::as_ptr(&grain.shape)).or_insert_with(|| {
+                distinct.push(&grain.shape);
+                distinct.len() - 1
+            });
+        }
+        let sampled: Vec<NarrowBandShape> = (distinct.into_par_iter())
+            .map(|shape| NarrowBandShape::new(shape, eps, reach))
+            .collect();
+        let of = |grain: &Grain| sampled[indices[&Arc::as_ptr(&grain.shape)]].clone();
+        NarrowBandShapes { shapes: grains.iter().map(of).collect() }
     }
 
     /// Shape of grain `index`.
