@@ -336,6 +336,18 @@ fn few_grains_are_shown_one_by_one() {
     assert!(svg(&rendered, "grains").contains("stroke-dasharray"));
     let said = page(&rendered);
     assert!(said.contains("true outlines") && !said.contains("left the box"));
+    assert!(!said.contains("indices of their grains"), "there are no events");
+    // Events name their grains.
+    let events = "{\"time\":0.1,\"event\":\"kiss\",\"grains\":[0,2],\"confirmed\":0.1}\n\
+                  {\"time\":0.3,\"event\":\"landing\",\"grains\":[3],\"confirmed\":0.3}\n\
+                  {\"time\":0.45,\"event\":\"landing\",\"grains\":[11],\"confirmed\":0.45}\n";
+    std::fs::write(folder.join("events.jsonl"), events).unwrap();
+    let rendered = render(&folder).unwrap();
+    let seen = text_of(&svg(&rendered, "grains"));
+    for name in ["kiss 0, 2", "landing 3", "landing 11"] {
+        assert!(seen.contains(name), "{name} in {seen}");
+    }
+    assert!(page(&rendered).contains("Events are named with the indices of their grains"));
     // A grain that falls out of the box is not claimed to be drawn.
     let file = folder.join("grains.csv");
     let table = std::fs::read_to_string(&file).unwrap();

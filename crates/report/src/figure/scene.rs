@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
+use grainwake_formats::events::Event;
 use grainwake_plot::Figure;
 use grainwake_plot::axis::{Axis, AxisRange};
 use grainwake_plot::stacked::{Panel, Series, VerticalMark, stacked_panels};
@@ -44,11 +45,20 @@ impl Scene<'_> {
         let (_, factor) = self.features.time_axis();
         // Contacts with walls are too many to mark.
         let marked = self.run.events.iter().filter(|event| event.wall.is_none());
-        let mark = marked.map(|event| VerticalMark {
-            at: event.time * factor,
-            name: event.kind.label().to_owned(),
-        });
+        let mark = marked
+            .map(|event| VerticalMark { at: event.time * factor, name: self.event_name(event) });
         mark.collect()
+    }
+
+    /// Returns the name of an event with the indices of its grains, "landing 3" or "kiss 0, 2"; an
+    /// event of all grains of the run is named without them.
+    pub fn event_name(&self, event: &Event) -> String {
+        let label = event.kind.label();
+        if event.grains.len() == self.run.grains.len() {
+            return label.to_owned();
+        }
+        let grains: Vec<String> = event.grains.iter().map(usize::to_string).collect();
+        format!("{label} {}", grains.join(", "))
     }
 
     /// Draws panels against time with the events marked.
@@ -59,8 +69,12 @@ impl Scene<'_> {
         caption: String,
         panels: &[Panel],
     ) -> Figure {
+        let some = |event: &Event| event.grains.len() < self.run.grains.len();
+        let named = self.run.events.iter().any(|event| event.wall.is_none() && some(event));
+        let of_grains =
+            if named { " Events are named with the indices of their grains." } else { "" };
         let drawing = stacked_panels(&self.time(), panels, &self.marks());
-        Figure::new(name, title, caption, drawing)
+        Figure::new(name, title, caption + of_grains, drawing)
     }
 
     /// Draws panels against time.

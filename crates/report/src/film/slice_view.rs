@@ -95,7 +95,8 @@ impl<'a> SliceFilm<'a> {
         let events = self.scene.run.events.iter().rev();
         let mut past = events.filter(|event| event.time <= time + 1e-12);
         let recent = past.find(|event| time - event.time < interval);
-        let name = recent.map_or(String::new(), |event| format!(", {}", event.kind.label()));
+        let name =
+            recent.map_or(String::new(), |event| format!(", {}", self.scene.event_name(event)));
         format!("*t* = {} s{name}", short(time))
     }
 }
