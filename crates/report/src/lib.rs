@@ -19,6 +19,7 @@ pub mod phases;
 pub mod run_folder;
 #[cfg(test)]
 mod testing;
+pub mod thumbnail;
 
 use std::path::{Path, PathBuf};
 

@@ -12,7 +12,7 @@
 //! | `document` | JSON of a run and of the list of runs |
 //! | `viewer` | run folders and their current state |
 //! | `page` | HTML page with its content security policy |
-//! | [`server`] | HTTP on 127.0.0.1 with four routes |
+//! | [`server`] | HTTP on 127.0.0.1 with fixed routes |
 
 mod document;
 mod error;
@@ -38,7 +38,7 @@ pub use viewer::{Source, Viewer};
 pub fn save(viewer: &mut Viewer, file: &Path) -> Result<Vec<String>, ViewError> {
     let index = viewer.index(false);
     let (runs, notes) = viewer.all_runs()?;
-    let text = page::saved(&index, &runs);
+    let text = page::saved(&index, &runs, &viewer.all_pictures()?);
     grainwake_report::write_file(file, text.as_bytes())
         .map_err(|source| ViewError::Write { file: file.to_owned(), source })?;
     Ok(notes)

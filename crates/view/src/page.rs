@@ -35,11 +35,13 @@ pub fn served() -> String {
     document(&policy("'self'"), "")
 }
 
-/// Returns a page that contains the list of runs and all runs, given as JSON.
-pub fn saved(index: &str, runs: &[String]) -> String {
+/// Returns a page that contains the list of runs, all runs and their small pictures, given as JSON.
+pub fn saved(index: &str, runs: &[String], pictures: &[String]) -> String {
     let mut data = data_block("index", index);
-    for (i, run) in runs.iter().enumerate() {
-        data += &data_block(&format!("run-{i}"), run);
+    for (kind, documents) in [("run", runs), ("picture", pictures)] {
+        for (i, document) in documents.iter().enumerate() {
+            data += &data_block(&format!("{kind}-{i}"), document);
+        }
     }
     document(&policy("'none'"), &data)
 }
@@ -70,7 +72,7 @@ mod tests {
 
     #[test]
     fn data_cannot_end_its_block() {
-        let page = saved(r#"{"title":"</script><script>alert(1)</script>"}"#, &["{}".to_owned()]);
+        let page = saved(r#"{"title":"</script><script>alert(1)</script>"}"#, &["{}".to_owned()], &[]);
         assert!(!page.contains("alert(1)</script>"));
         assert!(page.contains(r"\u003c/script>\u003cscript>alert(1)"));
     }

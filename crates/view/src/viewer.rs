@@ -8,6 +8,7 @@ use grainwake_formats::table::Damage;
 use grainwake_formats::{diagnostics, events, grains, summary};
 use grainwake_report::ReportError;
 use grainwake_report::run_folder::RunFolder;
+use grainwake_report::thumbnail::thumbnail;
 
 use crate::document::{Index, Limits, RunDocument, StudyTable};
 use crate::error::ViewError;
@@ -64,6 +65,19 @@ impl Viewer {
         let document =
             run.map(|run| RunDocument::of(&source.name, &run, Limits::SERVED, &mut self.frames));
         Some(document.map(|document| json(&document)).map_err(ViewError::from))
+    }
+
+    /// Returns the small picture of a run as JSON, `null` if it has none; `None` for an unknown
+    /// index.
+    pub(crate) fn picture(&self, index: usize) -> Option<Result<String, ViewError>> {
+        let run = open(self.sources.get(index)?);
+        Some(run.map(|run| json(&thumbnail(&run))).map_err(ViewError::from))
+    }
+
+    /// Returns the small pictures of the runs of a study; none of other runs, which have no table.
+    pub(crate) fn all_pictures(&self) -> Result<Vec<String>, ViewError> {
+        let count = if self.study.is_some() { self.sources.len() } else { 0 };
+        (0..count).filter_map(|index| self.picture(index)).collect()
     }
 
     /// Returns the documents of all runs, within the limits of a saved page, and their notes.

@@ -59,6 +59,9 @@ fn the_routes_answer() {
     assert_eq!(status(&run), 200);
     assert!(run.contains(r#""label":"kiss""#) && run.contains(r#""name":"y-grain0""#), "{run}");
     assert_eq!(status(&ask(address, "GET /runs/1.json", "")), 404);
+    let picture = ask(address, "GET /pictures/0.json", "");
+    assert!(status(&picture) == 200 && picture.contains("\"frames\":[{\"name\":"), "{picture}");
+    assert_eq!(status(&ask(address, "GET /pictures/1.json", "")), 404);
     assert_eq!(status(&ask(address, "GET /runs/99999999999999999999999.json", "")), 404);
     let head = ask(address, "HEAD /", "");
     assert_eq!(status(&head), 200);
@@ -82,6 +85,8 @@ fn no_path_names_a_file() {
         "/runs/..%2f0.json",
         "/runs/-0.json",
         "/runs/.json",
+        "/pictures/.json",
+        "/pictures/../runs/0.json",
         "//etc/passwd",
         "/index.json/../grains.csv",
     ] {

@@ -6,6 +6,7 @@
 //! | `/index.json` | list of runs |
 //! | `/revisions.json` | one text per run that changes when the run goes on |
 //! | `/runs/N.json` | contents of run N |
+//! | `/pictures/N.json` | small picture of run N |
 
 mod request;
 mod response;
@@ -99,17 +100,23 @@ fn refused(refusal: &Refusal) -> Response {
 fn route(path: &str, viewer: &Mutex<Viewer>) -> Response {
     // A panic in another connection leaves the cache of frames complete.
     let lock = || viewer.lock().unwrap_or_else(PoisonError::into_inner);
-    let run = path.strip_prefix("/runs/").and_then(|rest| rest.strip_suffix(".json"));
-    let number = run.filter(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
-    match (path, number) {
-        ("/", _) => Response::html(page::served(), &page::policy("'self'")),
-        ("/index.json", _) => Response::json(lock().index(true)),
-        ("/revisions.json", _) => Response::json(lock().revisions()),
-        (_, Some(number)) => match number.parse().ok().and_then(|n| lock().run(n)) {
-            Some(Ok(document)) => Response::json(document),
-            Some(Err(error)) => Response::text(500, &error.to_string()),
-            None => Response::text(404, "no such run"),
+    let number = |folder: &str| -> Option<usize> {
+        let number = path.strip_prefix(folder)?.strip_suffix(".json")?;
+        number.bytes().all(|b| b.is_ascii_digit()).then(|| number.parse().ok())?
+    };
+    let document = match path {
+        "/" => return Response::html(page::served(), &page::policy("'self'")),
+        "/index.json" => return Response::json(lock().index(true)),
+        "/revisions.json" => return Response::json(lock().revisions()),
+        _ => match (number("/runs/"), number("/pictures/")) {
+            (Some(run), _) => lock().run(run),
+            (_, Some(run)) => lock().picture(run),
+            _ => return Response::text(404, "no such page"),
         },
-        _ => Response::text(404, "no such page"),
+    };
+    match document {
+        Some(Ok(document)) => Response::json(document),
+        Some(Err(error)) => Response::text(500, &error.to_string()),
+        None => Response::text(404, "no such run"),
     }
 }

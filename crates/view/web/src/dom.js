@@ -12,16 +12,16 @@ export function el(name, properties = {}, ...children) {
   return node;
 }
 
-/** Creates an icon of 20 x 20 units from the data of a path. */
-export function icon(path) {
-  const space = "http://www.w3.org/2000/svg";
-  const node = document.createElementNS(space, "svg");
-  const line = document.createElementNS(space, "path");
-  node.setAttribute("viewBox", "0 0 20 20");
-  line.setAttribute("d", path);
-  node.append(line);
+/** Creates an element of a drawing. */
+export function svg(name, attributes = {}, ...children) {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  node.append(...children);
   return node;
 }
+
+/** Creates an icon of 20 x 20 units from the data of a path. */
+export const icon = (path) => svg("svg", { viewBox: "0 0 20 20" }, svg("path", { d: path }));
 
 /** Sizes a canvas to its element; returns its 2-D context in CSS pixels. */
 export function context2d(canvas) {

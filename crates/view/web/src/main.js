@@ -7,6 +7,7 @@ import { FlatScreen } from "./flat.js";
 import { helpOverlay, listenToKeys } from "./keys.js";
 import { drawLegends } from "./legends.js";
 import { Panel } from "./panel.js";
+import { Pictures } from "./pictures.js";
 import { Run } from "./run.js";
 import { Screen } from "./screen.js";
 import { follow, readIndex, readRun } from "./source.js";
@@ -58,7 +59,8 @@ class Page {
     this.timeline = new Timeline(store, () => this.extent());
     this.panel = new Panel(store, this.colours);
     this.app = el("div", { class: "app" }, header, this.view, this.timeline.element, this.panel.element, helpOverlay(store, this.index.program));
-    if (this.index.study) this.app.append(studyOverlay(this.index.study, store));
+    this.pictures = new Pictures(this.colours);
+    if (this.index.study) this.app.append(studyOverlay(this.index.study, store, this.pictures));
     document.body.append(this.app);
     try {
       this.screen = new Screen(this.canvas, this.redraw);
@@ -149,6 +151,7 @@ class Page {
   /** Reads runs again that have gone on. */
   async refresh(numbers) {
     for (const number of numbers) this.known.delete(number);
+    this.pictures.forget(numbers);
     if (numbers.some((number) => this.store.state.shown.includes(number))) await this.load();
   }
 

@@ -21,6 +21,9 @@ export async function readRun(number) {
   return unpackAll(await read(`run-${number}`, `/runs/${number}.json`), ["codes"]);
 }
 
+/** Reads the small picture of a run; null if it has none. */
+export const readPicture = (number) => read(`picture-${number}`, `/pictures/${number}.json`);
+
 /** Calls `changed` with the numbers of runs that have gone on, every two seconds. */
 export function follow(changed, lost) {
   let known = null;

@@ -2,15 +2,16 @@
 
 import { el } from "./dom.js";
 
-/** Overlay with the table; a click on a row opens its run, a box adds it beside the others. */
-export function studyOverlay(study, store) {
+/** Overlay with the table and small pictures of the runs; a click on a row opens its run, a box adds it beside the others. */
+export function studyOverlay(study, store, pictures) {
   // Columns without any value are left out, as those of pairs in a study of single grains.
   const columns = study.columns.map((_, i) => i).filter((i) => study.rows.some((row) => row.values[i]));
-  const head = ["", "run", "state", ...columns.map((i) => study.columns[i])];
+  const head = ["", "", "run", "state", ...columns.map((i) => study.columns[i])];
   let sorted = null;
   let down = false;
   const body = el("tbody");
-  const value = (row, i) => (i === 1 ? row.name : i === 2 ? row.state : row.values[columns[i - 3]] ?? "");
+  const unfilled = [];
+  const value = (row, i) => (i === 2 ? row.name : i === 3 ? row.state : row.values[columns[i - 4]] ?? "");
   const fill = () => {
     const rows = [...study.rows];
     if (sorted !== null) {
@@ -21,7 +22,9 @@ export function studyOverlay(study, store) {
         return down ? -order : order;
       });
     }
+    unfilled.length = 0;
     body.replaceChildren(...rows.map(line));
+    unfilled.forEach(([run, cell]) => pictures.show(run, cell));
   };
   const line = (row) => {
     const open = row.run !== null;
@@ -31,13 +34,15 @@ export function studyOverlay(study, store) {
       toggleRun(store, row.run);
       fill();
     } });
+    const picture = el("td", { class: "pictures" });
+    if (open) unfilled.push([row.run, picture]);
     const values = columns.map((i) => row.values[i] ?? "");
     const cells = values.map((text) => el("td", { class: Number.isFinite(Number(text)) ? "number" : null }, text));
     return el("tr", { class: open ? (shown ? "open shown" : "open") : null, onclick: () => open && store.set({ shown: [row.run], picked: null, follow: null, table: false }) },
-      el("td", {}, box || ""), el("th", {}, row.name), el("td", {}, row.state), ...cells);
+      el("td", {}, box || ""), picture, el("th", {}, row.name), el("td", {}, row.state), ...cells);
   };
   const heads = head.map((name, i) => el("th", { onclick: () => {
-    if (!i) return;
+    if (i < 2) return;
     down = sorted === i && !down;
     sorted = i;
     fill();
@@ -45,7 +50,7 @@ export function studyOverlay(study, store) {
   const close = () => store.set({ table: false });
   const card = el("div", { class: "card wide", role: "dialog", "aria-label": "Runs of the study", onclick: (event) => event.stopPropagation() },
     el("h2", {}, study.title, el("button", { "aria-label": "Close", onclick: close }, "×")),
-    el("p", { class: "faint" }, "Click a run to see it; tick up to four runs to see them beside each other."),
+    el("p", { class: "faint" }, "Click a run to see it; tick up to four runs to see them beside each other. The pictures show the grains from the side at key instants."),
     el("div", { class: "scroll" }, el("table", { class: "study" }, el("thead", {}, el("tr", {}, ...heads)), body)));
   const overlay = el("div", { class: "overlay", hidden: true, onclick: close }, card);
   const update = (state) => {

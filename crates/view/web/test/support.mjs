@@ -71,8 +71,8 @@ const CASE = `title = "small"
 position = ["2 mm", "2 mm", "6 mm"]\n`;
 
 /** Runs a study of three small runs; returns its folder. */
-export function study() {
-  const [place, out] = [join(folder, "plan"), join(folder, "study")];
+export function study(name = "study") {
+  const [place, out] = [join(folder, `${name}-plan`), join(folder, name)];
   mkdirSync(place);
   writeFileSync(join(place, "case.toml"), CASE);
   const values = [2000, 2500, 3000].map((d) => `{ name = "d${d}", value = ${d} }`).join(", ");
