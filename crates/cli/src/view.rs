@@ -100,7 +100,7 @@ fn of_study(folder: &Path) -> Result<Viewer, Exit> {
         let source = Source { name: run.name.clone(), folder: run.folder(folder) };
         let index = RunFolder::exists_in(&source.folder).then_some(sources.len());
         sources.extend(index.map(|_| source));
-        let number = |value: Option<f64>| value.map_or(String::new(), |v| rounded(v).to_string());
+        let number = |value: Option<f64>| value.map_or(String::new(), |v| text(rounded(v)));
         let levels = axes.iter().map(|axis| record.levels.get(*axis).cloned().unwrap_or_default());
         let measured = quantities.iter().map(|name| number(record.measured(name)));
         let values = levels.chain([number(record.kiss_time_s)]).chain(measured).collect();
@@ -112,6 +112,12 @@ fn of_study(folder: &Path) -> Result<Viewer, Exit> {
         return Err(Exit::with_help(BAD_INPUT, message, "run `grainwake study` first"));
     }
     Ok(Viewer::new(sources, Some(table))?)
+}
+
+/// Returns a number as text; tiny ones with an exponent.
+fn text(number: f64) -> String {
+    let tiny = number != 0.0 && number.abs() < 1e-4;
+    if tiny { format!("{number:e}") } else { number.to_string() }
 }
 
 /// Starts the default browser; returns whether that was possible.

@@ -125,8 +125,12 @@ pub fn thumbnail(run: &RunFolder) -> Option<Thumbnail> {
                 let far = (*p - centre).abs();
                 far[across].max(far[up]) < 1.5 * widest
             };
-            let points: Vec<DVec3> =
-                history.position[..=row].iter().map(|p| *p + offset).rev().take_while(near).collect();
+            let points: Vec<DVec3> = history.position[..=row]
+                .iter()
+                .map(|p| *p + offset)
+                .rev()
+                .take_while(near)
+                .collect();
             let stride = points.len().div_ceil(TRAIL).max(1);
             let thinned = points.iter().step_by(stride).map(|p| (p[across], p[up]));
             Drawn { colour: colour(grain), path: square.path(thinned, "") }
@@ -180,8 +184,7 @@ impl Moment {
 fn across(scene: &Scene, moving: &[usize]) -> usize {
     let [first, second] = scene.horizontal();
     let apart = |axis: usize| {
-        let moments =
-            scene.instants.iter().filter_map(|i| Moment::of(scene, moving, i.time));
+        let moments = scene.instants.iter().filter_map(|i| Moment::of(scene, moving, i.time));
         let far = moments.flat_map(|m| {
             let centre = m.centre;
             m.grains.into_iter().map(move |(_, _, p)| (p - centre)[axis].abs())

@@ -72,7 +72,8 @@ mod tests {
 
     #[test]
     fn data_cannot_end_its_block() {
-        let page = saved(r#"{"title":"</script><script>alert(1)</script>"}"#, &["{}".to_owned()], &[]);
+        let page =
+            saved(r#"{"title":"</script><script>alert(1)</script>"}"#, &["{}".to_owned()], &[]);
         assert!(!page.contains("alert(1)</script>"));
         assert!(page.contains(r"\u003c/script>\u003cscript>alert(1)"));
     }

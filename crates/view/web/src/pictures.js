@@ -29,6 +29,8 @@ export class Pictures {
   async read() {
     if (this.reading) return;
     this.reading = true;
+    // The table is not yet in the page when its first rows are made.
+    await null;
     while (this.waiting.length) {
       const [number, cell] = this.waiting.shift();
       // A table that was sorted again has new cells.

@@ -261,23 +261,34 @@ test("a study opens with the table of its runs", async () => {
   await context.close();
 });
 
-test("the table of a study shows a picture of each run, from disk and from the server", async () => {
+test("the table of a study shows a picture of each run, from disk and from the server", async (context) => {
   const place = study("pictures");
   const server = await serve(place);
+  context.after(() => server.stop());
   for (const [where, address] of [["disk", url(save("pictures.html", place))], ["server", server.address]]) {
     for (const width of [1600, 400]) {
       const { page, context, problems } = await open(chrome, address, { viewport: { width, height: 700 } });
       await page.waitForFunction(() => document.querySelectorAll(".study .pictures svg").length === 12);
-      const pictures = await page.locator(".study tbody tr").evaluateAll((rows) => rows.map((row) => [...row.querySelectorAll(".pictures svg")].map((svg) => {
-        const [trail, grain] = [...svg.querySelectorAll("path")].map((path) => path.getBBox());
-        return { name: svg.textContent, wide: svg.getBoundingClientRect().width, trail: trail.height, grain: [grain.x + grain.width / 2, grain.y + grain.height / 2, grain.width] };
-      })));
+      const pictures = await page.locator(".study tbody tr").evaluateAll((rows) => rows.map((row) => [...row.querySelectorAll(".pictures svg")].map((svg) => ({
+        name: svg.textContent,
+        wide: svg.getBoundingClientRect().width,
+        // Points of the trail and of the outline of the grain.
+        lines: [...svg.querySelectorAll("path")].map((path) => path.getAttribute("d").match(/[\d.-]+ [\d.-]+/g).map((point) => point.split(" ").map(Number))),
+      }))));
+      const extent = (points, axis) => [Math.min, Math.max].map((of) => of(...points.map((point) => point[axis])));
       for (const frames of pictures) {
-        // Four times; the grain stays in the middle, and the path behind it grows.
         assert.match(frames[3].name, /t = 0\.02/, where);
-        frames.forEach(({ grain: [x, y] }) => assert.ok(Math.abs(x - 50) < 2 && Math.abs(y - 50) < 2, `${x} ${y}`));
-        assert.ok(frames[0].grain[2] > 30 && frames[0].trail < frames[1].trail && frames[2].trail < frames[3].trail, JSON.stringify(frames));
-        // A narrow page shows every second one.
+        const trails = frames.map(({ lines: [trail, grain] }) => {
+          // The grain stays in the middle and is round.
+          const [[left, right], [top, bottom]] = [extent(grain, 0), extent(grain, 1)];
+          assert.ok(Math.abs(left + right - 100) < 3 && Math.abs(top + bottom - 100) < 3, JSON.stringify(frames));
+          assert.ok(right - left > 40 && Math.abs(right - left - (bottom - top)) < 3, JSON.stringify(frames));
+          const [high, low] = extent(trail, 1);
+          return low - high;
+        });
+        // The path behind it grows.
+        assert.ok(trails.every((length, n) => n === 0 || length > trails[n - 1]), `${trails}`);
+        // A narrow page shows every second picture.
         assert.equal(frames.filter((frame) => frame.wide > 40).length, width < 600 ? 2 : 4);
       }
       if (SCREENSHOTS) await page.screenshot({ path: join(SCREENSHOTS, `study-${where}-${width}.png`) });
@@ -285,7 +296,6 @@ test("the table of a study shows a picture of each run, from disk and from the s
       await context.close();
     }
   }
-  server.stop();
 });
 
 test("without WebGL 2 a flat view and the curves remain", async () => {
