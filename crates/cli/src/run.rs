@@ -30,7 +30,13 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         case.check_parent(&found)?;
         parent = Some(found);
     }
-    let options = Options { existing, command: std::env::args().collect(), threads, parent };
+    let options = Options {
+        existing,
+        command: std::env::args().collect(),
+        threads,
+        parent,
+        controlled_from: None,
+    };
     let stop = Arc::new(AtomicBool::new(false));
     signals::watch_for_interrupt(stop.clone());
     if !args.quiet {

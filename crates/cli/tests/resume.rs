@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use grainwake_formats::table::Table;
+
 use common::{DRY, WET, assert_same_run, folder_with, grainwake};
 
 fn run(case: &Path, out: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
@@ -19,6 +21,74 @@ fn checkpoints(run: &Path) -> Vec<PathBuf> {
         std::fs::read_dir(run.join("checkpoint")).unwrap().map(|e| e.unwrap().path()).collect();
     found.sort();
     found
+}
+
+#[test]
+fn dimensionless_columns_are_added_and_survive_kills() {
+    let scales = "[output]\nscales = { length = \"2 mm\", time = \"10 ms\", density = 500 }\n";
+    let probe = "[[probe]]\nname = \"middle\"\npoints = [[2e-3, 2e-3, 6e-3]]\n";
+    let text = WET.replace("[output]\n", scales) + probe;
+    survives_kills(&text, 5);
+    let (folder, case) = folder_with(&text);
+    let (plain, scaled) = (folder.path().join("plain"), folder.path().join("scaled"));
+    run(&case, &scaled, &[]).success();
+    run(&case, &plain, &["--unset", "output.scales"]).success();
+    // The force scale is 500 * 0.2^2 * 0.002^2 = 8e-5 N, that of pressure 20 Pa.
+    let expected: [(&str, &[(&str, f64)]); 3] = [
+        (
+            "grains.csv",
+            &[
+                ("time", 0.01),
+                ("z", 2e-3),
+                ("vz", 0.2),
+                ("wx", 100.0),
+                ("fz", 8e-5),
+                ("tx", 1.6e-7),
+            ],
+        ),
+        (
+            "diagnostics.csv",
+            &[
+                ("time", 0.01),
+                ("gap", 2e-3),
+                ("max_velocity", 0.2),
+                ("grain_kinetic_energy", 1.6e-7),
+                ("momentum_z", 8e-7),
+            ],
+        ),
+        ("probes/middle.csv", &[("x", 2e-3), ("vz", 0.2), ("pressure", 20.0)]),
+    ];
+    let mut notes = Vec::new();
+    for (file, columns) in expected {
+        let read = |run: &Path| std::fs::read_to_string(run.join(file)).unwrap();
+        let table = Table::read(&scaled.join(file), &mut notes).unwrap();
+        for (name, unit) in columns {
+            let column =
+                |name: &str| table.column(name).unwrap_or_else(|| panic!("{name}")).to_vec();
+            let (values, without) = (column(name), column(&format!("{name}_scaled")));
+            assert!(values.iter().zip(&without).all(|(v, s)| {
+                v.is_nan() && s.is_nan() || (v / unit - s).abs() <= 1e-12 * s.abs()
+            }));
+            assert!(values.iter().any(|value| *value != 0.0), "{name}");
+        }
+        // The columns in SI units have the same bits as without scales.
+        let (all, si) = (read(&scaled), read(&plain));
+        assert_eq!(all.lines().count(), si.lines().count());
+        for (all, si) in all.lines().zip(si.lines()) {
+            assert!(all.starts_with(&format!("{si},")), "{all}\n{si}");
+        }
+        assert!(
+            !si.contains("_scaled") && !all.contains("grain_scaled") && !all.contains("qw_scaled")
+        );
+    }
+    let summary = std::fs::read_to_string(scaled.join("summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!(summary["scales"]["velocity_m_per_s"], 0.2);
+    // Other scales are another case.
+    let other = ["--resume", "--set", "output.scales=\"gravity\"", "--set", "time.end=1"];
+    let message = run(&case, &scaled, &other).code(2);
+    let message = String::from_utf8_lossy(&message.get_output().stderr).into_owned();
+    assert!(message.contains("output.scales"), "{message}");
 }
 
 /// Kills the run at random moments until it comes through, and compares with an unharmed one.

@@ -41,6 +41,9 @@ pub struct Summary {
     /// Touching pairs, walls included.
     #[serde(default)]
     pub contact_pairs: PairCounts,
+    /// Scales of the dimensionless columns of the tables, if they have them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scales: Option<Scales>,
     /// Reason of the end.
     pub ended_by: EndReason,
     /// Results of a pair.
@@ -90,6 +93,19 @@ impl std::ops::AddAssign<&Cost> for Cost {
             }
         }
     }
+}
+
+/// Scales of dimensionless columns.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scales {
+    /// Length [m].
+    pub length_m: f64,
+    /// Time [s].
+    pub time_s: f64,
+    /// Velocity [m/s].
+    pub velocity_m_per_s: f64,
+    /// Density [kg/m3].
+    pub density_kg_per_m3: f64,
 }
 
 /// Number of contact sub-steps.

@@ -144,7 +144,8 @@ pub fn run(
 ) -> PyResult<Summary> {
     let pool = threads::pool(threads)?;
     let (shared, stop) = (Mutex::new(Shared::default()), Arc::new(AtomicBool::new(false)));
-    let options = Options { existing, command: command(py)?, threads, parent };
+    let options =
+        Options { existing, command: command(py)?, threads, parent, controlled_from: None };
     let display = py.import("grainwake._progress")?.call_method1("of_run", (progress,))?;
     let warnings = case.estimate(threads).warnings;
     display.call_method1("warn", (warnings,))?;

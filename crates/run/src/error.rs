@@ -86,6 +86,14 @@ pub enum RunError {
         /// Advice.
         remedy: String,
     },
+    /// The run was controlled by another program, which alone can go on with it.
+    #[error("the run in {} was controlled from {program}: continue it there, with output and resume=True, or give another folder with -o", folder.display())]
+    Controlled {
+        /// The run folder.
+        folder: PathBuf,
+        /// Program.
+        program: String,
+    },
     /// The folder belongs to another case.
     #[error("the run folder {} was made from another case ({what}); give another folder with -o, or start over with --force", folder.display())]
     OtherCase {
@@ -105,6 +113,7 @@ impl RunError {
             | RunError::InUse { .. }
             | RunError::Memory { .. }
             | RunError::NoParent { .. }
+            | RunError::Controlled { .. }
             | RunError::OtherCase { .. } => FailureKind::Input,
             RunError::Unstable { .. } => FailureKind::Computation,
             RunError::Io { .. } | RunError::NoCheckpoint { .. } => FailureKind::InputOutput,

@@ -4,23 +4,27 @@
 //! simulation and fills a folder with tables, VTK files, checkpoints and a summary.
 //! `docs/reference/run-folder.md` lists the files.
 //!
-//! Layers, downwards: `case` -> `run_loop` -> `recorder` -> `run_folder`, `contact_events`,
+//! Layers, downwards: `case` -> `run_loop` -> `recording` -> `recorder` -> `run_folder`, `contact_events`,
 //! `series` -> `overlaps`, `contact_work`, `memory`, `meter`, `plan`, `error`.
 
 pub mod case;
 mod contact_events;
 mod contact_work;
 mod error;
+mod job;
 mod memory;
 mod meter;
 mod overlaps;
 mod plan;
 mod recorder;
+mod recording;
 mod run_folder;
 mod run_loop;
 mod series;
 
 pub use error::{FailureKind, RunError};
+pub use job::{Job, Options};
 pub use plan::{Plane, PlanePosition, Probe, ProbePlace, RunPlan, Stop};
+pub use recording::Recording;
 pub use run_folder::{Existing, Parent, RESOLVED, checkpoint, lock, provenance};
-pub use run_loop::{Ending, Job, Observer, Options, Progress, Silent, run};
+pub use run_loop::{Ending, Observer, Progress, Silent, run};

@@ -1,6 +1,7 @@
 //! Outputs and end of a run. Times are simulated times unless stated otherwise.
 
 use glam::DVec3;
+use grainwake_formats::summary::Scales;
 
 use grainwake_solver::sim::events::StopWhen;
 
@@ -34,6 +35,8 @@ pub struct RunPlan {
     pub wall_events: bool,
     /// Points, lines and planes sampled over time.
     pub probes: Vec<Probe>,
+    /// Scales of the dimensionless columns, if the tables have them.
+    pub scales: Option<Scales>,
     /// Wall-clock time between checkpoints [s].
     pub checkpoint_interval: f64,
     /// Steps between checkpoints.

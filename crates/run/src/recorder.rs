@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use grainwake_formats::disk;
 use grainwake_formats::events::{Event, EventKind};
 use grainwake_formats::pvd::{self, Entry};
-use grainwake_formats::summary::{Cost, EndReason, GrainSummary, PairSummary, Summary};
+use grainwake_formats::summary::{Cost, EndReason, GrainSummary, PairSummary, Scales, Summary};
 use grainwake_solver::dem::{Enclosure, surface_gap};
 use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::{EventParams, Tracker};
@@ -48,6 +48,7 @@ pub(crate) struct Recorder {
     max_cfl: f64,
     overlaps: Overlaps,
     contact_work: ContactWork,
+    scales: Option<Scales>,
     last_row: Option<f64>,
     kept_checkpoints: usize,
 }
@@ -90,6 +91,7 @@ impl Recorder {
             max_cfl: 0.0,
             overlaps: Overlaps::default(),
             contact_work: ContactWork::default(),
+            scales: plan.scales,
             last_row: None,
             kept_checkpoints: plan.kept_during_run(),
         }
@@ -102,7 +104,7 @@ impl Recorder {
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let tables = Tables::create(run, &ExtraTable::all(plan))?;
+        let tables = Tables::create(run, &ExtraTable::all(plan), plan.scales.as_ref())?;
         let mut recorder = Recorder::build(run, digest, plan, sim, tables);
         recorder.write_due(sim)?;
         recorder.checkpoint(sim)?;
@@ -120,7 +122,7 @@ impl Recorder {
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let tables = Tables::create(run, &ExtraTable::all(plan))?;
+        let tables = Tables::create(run, &ExtraTable::all(plan), plan.scales.as_ref())?;
         let mut recorder = Recorder::build(run, digest, plan, sim, tables);
         recorder.tracker.restore(record.tracker);
         recorder.contact_events = record.contact_events;
@@ -153,7 +155,10 @@ impl Recorder {
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let tables = Tables::reopen(run, &record.lengths, &ExtraTable::all(plan))?;
+        let tables = {
+            let extra = ExtraTable::all(plan);
+            Tables::reopen(run, &record.lengths, &extra, plan.scales.as_ref())?
+        };
         let mut recorder = Recorder::build(run, &record.digest, plan, sim, tables);
         recorder.tracker.restore(record.tracker);
         recorder.contact_events = record.contact_events;
@@ -381,6 +386,7 @@ impl Recorder {
             mean_overlap: self.overlaps.mean(),
             substeps: self.contact_work.substeps(),
             contact_pairs: self.contact_work.pairs(),
+            scales: self.scales,
             ended_by,
             pair: tracker.phase().map(|phase| PairSummary {
                 kiss_time_s: tracker.kiss_time(),

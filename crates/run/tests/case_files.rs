@@ -494,6 +494,58 @@ fn shapes_must_be_whole() {
 }
 
 #[test]
+fn scales_follow_from_the_case_or_are_given() {
+    let with = |scales: &str| format!("{PAIR}\n[output]\nscales = {scales}\n");
+    let scales = |text: &str| good(text).plan.scales.expect("scales");
+    let near = |value: f64, expected: f64| {
+        assert!((value / expected - 1.0).abs() < 1e-3, "{value} instead of {expected}");
+    };
+    let velocities = [
+        ("\"gravity\"", (9.80665f64 * 2e-3).sqrt()),
+        ("\"buoyancy\"", (0.5f64 * 9.80665 * 2e-3).sqrt()),
+        ("\"viscous\"", 1e-6 / 2e-3),
+    ];
+    for (preset, velocity) in velocities {
+        let found = scales(&with(preset));
+        near(found.length_m, 2e-3);
+        near(found.velocity_m_per_s, velocity);
+        near(found.time_s, 2e-3 / velocity);
+        assert_eq!(found.density_kg_per_m3, 1000.0);
+        // The resolved case has the numbers.
+        let case = good(&with(preset));
+        let resolved = good(&case.resolved);
+        assert_eq!((resolved.plan.scales, resolved.digest), (case.plan.scales, case.digest));
+    }
+    let given = scales(&with("{ length = \"1 mm\", time = \"0.5 s\", density = 2500 }"));
+    assert_eq!((given.velocity_m_per_s, given.density_kg_per_m3), (2e-3, 2500.0));
+    assert_eq!(scales(&with("{ length = 1e-3, velocity = 2e-3 }")).time_s, 0.5);
+    assert_ne!(good(&with("\"gravity\"")).digest, good(PAIR).digest);
+    let dry = |text: &str| {
+        let (fluid, domain) = (text.find("[fluid]").unwrap(), text.find("[domain]").unwrap());
+        text[..fluid].to_owned() + &text[domain..]
+    };
+    let floating = PAIR.replace("\"1500 kg/m3\"", "1000").replace("\"1.5 g/cm3\"", "1000");
+    let weightless = with("\"gravity\"").replace("title = \"pair\"", "gravity = [0, 0, 0]");
+    for (text, words) in [
+        (with("\"graviti\""), "gravity"),
+        (with("{ length = \"2 mm\" }"), "add `time` or `velocity`"),
+        (with("{ length = \"2 s\", time = 1 }"), "is a time"),
+        (with("{ length = 0, time = 1 }"), "length scale"),
+        (with("{ length = 1, time = 1, mass = 1 }"), "mass"),
+        (dry(&with("\"buoyancy\"")), "use scales = \"gravity\""),
+        (dry(&with("\"viscous\"")), "there is no fluid"),
+        (weightless, "there is no gravity"),
+        (floating + "[output]\nscales = \"buoyancy\"\n", "is that of the fluid"),
+    ] {
+        let found = problems(&text);
+        let all = |p: &Problem| format!("{p} {}", p.help.clone().unwrap_or_default());
+        let told = found.iter().find(|problem| all(problem).contains(words));
+        let told = told.unwrap_or_else(|| panic!("{words} is not in {found:?}"));
+        assert!(told.to_string().contains("output.scales"), "{told}");
+    }
+}
+
+#[test]
 fn several_problems_are_told_at_once() {
     let text = PAIR
         .replace("density = 1000", "density = -1")

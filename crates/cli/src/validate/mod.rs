@@ -193,6 +193,7 @@ fn execute(
         command: std::env::args().collect(),
         threads,
         parent: None,
+        controlled_from: None,
     };
     let diameter = case.setup.grains.first().map(|g| g.shape.equivalent_diameter());
     let mut shown = ProgressDisplay::new(args.quiet, stop.clone(), diameter);

@@ -102,10 +102,25 @@ fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
     rows.add("simulated time *t* √(*g*/*d*)", scaled);
     rows.add("steps", run.summary_number("steps").map(|steps| steps.to_string()));
     rows.add("wall time", run.summary_number("wall_s").map(duration));
+    rows.add("CPU time of all threads", run.summary_number("cpu_s").map(duration));
+    rows.add("scales of the columns ending in _scaled", table_scales(run));
     let divergence = run.summary_number("max_divergence");
     let divergence = divergence.map(|d| format!("{} 1/s", short(d)));
     rows.add("largest divergence after projection", divergence);
     rows
+}
+
+/// Returns the scales of the dimensionless columns of the tables, if they have them.
+fn table_scales(run: &RunFolder) -> Option<String> {
+    let scales = run.summary.as_ref()?.get("scales")?;
+    let number = |name: &str| scales.get(name)?.as_f64().map(short);
+    Some(format!(
+        "{} m, {} s, {} m/s, {} kg/m^{{3}}",
+        number("length_m")?,
+        number("time_s")?,
+        number("velocity_m_per_s")?,
+        number("density_kg_per_m3")?
+    ))
 }
 
 /// Adds one row per kind of grain, with the number of the grain or the count of equal grains.

@@ -9,6 +9,7 @@ pub mod lock;
 mod parent;
 mod probes;
 pub mod provenance;
+mod scaled;
 mod surfaces;
 mod tables;
 mod vtk_output;

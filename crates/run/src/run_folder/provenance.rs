@@ -22,6 +22,10 @@ pub struct Provenance {
     /// Run and checkpoint that the run started from; none if it started at t = 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<ParentRun>,
+    /// Program that stepped the run and may have controlled its grains: "Python"; none for a run of
+    /// the case alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub controlled_from: Option<String>,
     /// Sessions: the first start and each resumption.
     pub sessions: Vec<Session>,
 }
@@ -94,6 +98,7 @@ impl Provenance {
             commit: commit().map(str::to_owned),
             case_sha256: digest.into(),
             parent: None,
+            controlled_from: None,
             sessions: Vec::new(),
         }
     }

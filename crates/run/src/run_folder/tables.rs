@@ -9,11 +9,13 @@ use grainwake_formats::diagnostics::{self, DiagnosticsRow};
 use grainwake_formats::disk::{self, Output};
 use grainwake_formats::events::{self, Event};
 use grainwake_formats::grains::{self, GrainRow};
+use grainwake_formats::summary::Scales;
 use grainwake_solver::dem::Partner;
 use grainwake_solver::sim::Simulation;
 use serde::{Deserialize, Serialize};
 
 use super::extra::ExtraTable;
+use super::scaled::{ScaledColumns, plain_columns};
 use crate::error::{Context, RunError};
 use crate::overlaps::Overlaps;
 
@@ -52,12 +54,22 @@ struct GrowingFile {
     file: Output,
     /// Bytes written.
     length: u64,
+    /// Columns that are repeated without dimension.
+    scaled: ScaledColumns,
 }
 
 impl GrowingFile {
     fn create(path: PathBuf) -> Result<GrowingFile, RunError> {
         let file = Output::create(&path).context("create", &path)?;
-        Ok(GrowingFile { path, file, length: 0 })
+        Ok(GrowingFile { path, file, length: 0, scaled: ScaledColumns::default() })
+    }
+
+    /// Creates a table with this header and dimensionless columns.
+    fn table(path: PathBuf, header: &str, scales: Option<&Scales>) -> Result<Self, RunError> {
+        let mut file = GrowingFile::create(path)?;
+        let scaled = ScaledColumns::of(header, scales);
+        file.append(&format!("{}\n", scaled.header(header)))?;
+        Ok(GrowingFile { scaled, ..file })
     }
 
     /// Opens the file and cuts it back to `length` bytes.
@@ -71,7 +83,13 @@ impl GrowingFile {
         }
         file.set_len(length).context("cut back", &path)?;
         file.file().seek(SeekFrom::End(0)).context("continue", &path)?;
-        Ok(GrowingFile { path, file, length })
+        Ok(GrowingFile { path, file, length, scaled: ScaledColumns::default() })
+    }
+
+    /// Appends rows of a table.
+    fn append_rows(&mut self, rows: &str) -> Result<(), RunError> {
+        let rows = self.scaled.extend(rows);
+        self.append(&rows)
     }
 
     fn append(&mut self, text: &str) -> Result<(), RunError> {
@@ -91,23 +109,24 @@ pub struct Tables {
 
 impl Tables {
     /// Creates the tables with their headers.
-    pub fn create(folder: &Path, extra: &[ExtraTable]) -> Result<Tables, RunError> {
+    pub fn create(
+        folder: &Path,
+        extra: &[ExtraTable],
+        scales: Option<&Scales>,
+    ) -> Result<Tables, RunError> {
         let mut files = Vec::new();
-        for name in FILES {
-            files.push(GrowingFile::create(folder.join(name))?);
+        for (name, header) in [(FILES[0], grains::HEADER), (FILES[1], diagnostics::HEADER)] {
+            files.push(GrowingFile::table(folder.join(name), header, scales)?);
         }
-        files[0].append(&format!("{}\n", grains::HEADER))?;
-        files[1].append(&format!("{}\n", diagnostics::HEADER))?;
+        files.push(GrowingFile::create(folder.join(FILES[2]))?);
         for table in extra {
             let path = folder.join(table.file());
             if let Some(parent) = path.parent() {
                 disk::create_folder(parent).context("create", parent)?;
             }
-            let mut file = GrowingFile::create(path)?;
-            file.append(&format!("{}\n", table.header()))?;
-            files.push(file);
+            files.push(GrowingFile::table(path, table.header(), scales)?);
         }
-        Ok(Tables { files, diagnostics_columns: columns(diagnostics::HEADER) })
+        Ok(Tables { files, diagnostics_columns: plain_columns(diagnostics::HEADER) })
     }
 
     /// Opens the tables of a run and cuts them back to these lengths.
@@ -115,15 +134,21 @@ impl Tables {
         folder: &Path,
         lengths: &Lengths,
         extra: &[ExtraTable],
+        scales: Option<&Scales>,
     ) -> Result<Tables, RunError> {
         let files = names(extra).zip(&lengths.0);
-        let files = files
+        let mut files = files
             .map(|(name, length)| GrowingFile::reopen(folder.join(name), *length))
             .collect::<Result<Vec<_>, _>>()?;
         let path = &files[1].path;
         let header = BufReader::new(File::open(path).context("read", path)?).lines().next();
         let header = header.transpose().context("read", path)?.unwrap_or_default();
-        Ok(Tables { files, diagnostics_columns: columns(&header) })
+        let headers = [grains::HEADER, diagnostics::HEADER].into_iter().map(Some).chain([None]);
+        let headers = headers.chain(extra.iter().map(|table| Some(table.header())));
+        for (file, header) in files.iter_mut().zip(headers) {
+            file.scaled = header.map_or_else(Default::default, |h| ScaledColumns::of(h, scales));
+        }
+        Ok(Tables { files, diagnostics_columns: plain_columns(&header) })
     }
 
     /// Appends a row for each grain and one of diagnostics.
@@ -134,10 +159,10 @@ impl Tables {
         overlaps: &Overlaps,
     ) -> Result<(), RunError> {
         let (grains, diagnostics) = (grain_rows(sim), diagnostics_row(sim, gap, overlaps));
-        self.files[0].append(&grains)?;
+        self.files[0].append_rows(&grains)?;
         let line = diagnostics.to_line();
         let known = line.trim_end().split(',').take(self.diagnostics_columns);
-        self.files[1].append(&format!("{}\n", known.collect::<Vec<_>>().join(",")))
+        self.files[1].append_rows(&format!("{}\n", known.collect::<Vec<_>>().join(",")))
     }
 
     /// Appends events to the log.
@@ -152,7 +177,7 @@ impl Tables {
 
     /// Appends rows to an extra table.
     pub fn append_extra(&mut self, index: usize, rows: &str) -> Result<(), RunError> {
-        self.files[FILES.len() + index].append(rows)
+        self.files[FILES.len() + index].append_rows(rows)
     }
 
     /// Makes the tables durable and returns their lengths.
@@ -162,11 +187,6 @@ impl Tables {
         }
         Ok(Lengths(self.files.iter().map(|file| file.length).collect()))
     }
-}
-
-/// Returns the number of columns of a table with this header.
-fn columns(header: &str) -> usize {
-    header.split(',').count()
 }
 
 fn grain_rows(sim: &Simulation) -> String {
@@ -237,10 +257,10 @@ mod tests {
         let lengths = Lengths(texts.iter().map(|text| text.len() as u64).collect());
         let setup = Setup::new(Mesh::cubic([1; 3], 1.0));
         let sim = Simulation::new(setup.with_step(StepRule::Fixed(1.0))).unwrap();
-        let mut tables = Tables::reopen(folder.path(), &lengths, &[]).unwrap();
+        let mut tables = Tables::reopen(folder.path(), &lengths, &[], None).unwrap();
         tables.append_rows(&sim, None, &Overlaps::default()).unwrap();
         let text = std::fs::read_to_string(folder.path().join(diagnostics::FILE)).unwrap();
-        let counts: Vec<usize> = text.lines().map(columns).collect();
+        let counts: Vec<usize> = text.lines().map(plain_columns).collect();
         assert_eq!(counts, [15, 15]);
     }
 }

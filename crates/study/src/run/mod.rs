@@ -183,6 +183,7 @@ impl Job<'_> {
                 command: self.options.command.clone(),
                 threads: self.options.threads,
                 parent: None,
+                controlled_from: None,
             };
             grainwake_run::run(case.job(), &folder, &options, &mut Forward(self))
         };

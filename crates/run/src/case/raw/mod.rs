@@ -12,6 +12,7 @@ mod physics;
 mod plan;
 mod poses;
 mod probe;
+mod scales;
 
 pub use domain::{AxisFaces, CellSize, Face, FaceKind, RawBoundaries, RawDomain};
 pub use expect::{OneOrMany, RawExpect, RawExpected, Tolerance};
@@ -23,6 +24,7 @@ pub use physics::{RawContact, RawCoupling, RawFluid};
 pub use plan::{RawOutput, RawPlane, RawRun, RawStop, RawTime};
 pub use poses::RawPoses;
 pub use probe::{RawLine, RawProbe, RawProbePlane};
+pub use scales::{RawScales, ScalePreset, ScaleTable};
 
 use glam::DVec3;
 use schemars::JsonSchema;

@@ -3,6 +3,7 @@
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
+use super::scales::RawScales;
 use crate::case::located::Located;
 use crate::case::notation::{Notation, Unsupported, notations, variant};
 use crate::case::number_format::AXES;
@@ -104,6 +105,10 @@ pub struct RawOutput {
     /// centre of each of at most two grains, else through the middle of the box.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub planes: Option<Vec<Located<RawPlane>>>,
+    /// Scales of dimensionless columns in the tables: "gravity", "buoyancy", "viscous", or numbers;
+    /// no such columns if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scales: Option<Located<RawScales>>,
     /// Wall-clock time between checkpoints [s]; 0 writes none by the clock.
     pub checkpoint_interval: Located<Quantity<Time>>,
     /// Steps between checkpoints; 0 writes none by steps.
@@ -126,6 +131,7 @@ impl Default for RawOutput {
             wall_events: false,
             at_events: true,
             planes: None,
+            scales: None,
             checkpoint_interval: Quantity::new(300.0).into(),
             checkpoint_steps: 0.into(),
             checkpoint_keep: None,

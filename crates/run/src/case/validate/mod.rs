@@ -12,6 +12,7 @@ mod physics;
 mod plan;
 mod poses;
 mod probes;
+mod scales;
 
 use std::path::Path;
 

@@ -2,6 +2,7 @@
 
 use super::check::Checker;
 use super::probes::probes;
+use super::scales::scales;
 use crate::case::located::Located;
 use crate::case::number_format::{AXES, length, quantity};
 use crate::case::quantity::{Quantity, Time};
@@ -118,6 +119,7 @@ pub(super) fn plan(
         }
         None => default_planes(grains.len(), &setup.mesh, vertical),
     };
+    let scales = scales(check, &mut raw.scales, setup);
     if check.problems.len() > before {
         return None;
     }
@@ -135,6 +137,7 @@ pub(super) fn plan(
         contact_network,
         wall_events: raw.wall_events,
         probes,
+        scales,
         checkpoint_interval: checkpoint_interval?,
         checkpoint_steps: raw.checkpoint_steps.value,
         checkpoint_keep,
