@@ -26,7 +26,8 @@ pub struct Thumbnail {
     pub frames: Vec<Frame>,
 }
 
-/// Picture of one instant. Paths are in the notation of SVG, in a square of edge 100; y points down.
+/// Picture of one instant. Paths are in the notation of SVG, in a square of edge 100 whose y axis
+/// points down.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Frame {
     /// Name and time of the instant.

@@ -4,8 +4,8 @@
 //! simulation and fills a folder with tables, VTK files, checkpoints and a summary.
 //! `docs/reference/run-folder.md` lists the files.
 //!
-//! Layers, downwards: `case` -> `run_loop` -> `recording` -> `recorder` -> `run_folder`, `contact_events`,
-//! `series` -> `overlaps`, `contact_work`, `memory`, `meter`, `plan`, `error`.
+//! Layers, downwards: `case` -> `run_loop` -> `recording` -> `recorder` -> `run_folder`,
+//! `contact_events`, `series` -> `overlaps`, `contact_work`, `memory`, `meter`, `plan`, `error`.
 
 pub mod case;
 mod contact_events;
