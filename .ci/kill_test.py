@@ -117,7 +117,7 @@ def settled(name, data):
     if base in ("provenance.json", "run.lock", "report.html") or base.endswith(".lock"):
         return None
     if base == "summary.json":
-        return {**json.loads(data), "wall_s": 0}
+        return {**json.loads(data), "wall_s": 0, "cpu_s": 0, "passes": []}
     if base == "table.json":
         return [{**row, "wall_s": 0, "threads": 0} for row in json.loads(data)]
     if base == "table.csv":

@@ -131,7 +131,8 @@ impl Session {
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             threads,
             from_step,
-            cost: Cost::default(),
+            // A session that ends early counts with no time.
+            cost: Cost { cpu_s: Some(0.0), ..Cost::default() },
         }
     }
 }

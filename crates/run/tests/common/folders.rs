@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Files below a folder with their contents, without the wall time, the provenance and the lock.
+/// Files below a folder with their contents, without times, the provenance and the lock.
 pub fn contents(run: &Path) -> BTreeMap<String, Vec<u8>> {
     fn collect(folder: &Path, run: &Path, found: &mut BTreeMap<String, Vec<u8>>) {
         for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
@@ -21,7 +21,8 @@ pub fn contents(run: &Path) -> BTreeMap<String, Vec<u8>> {
     found.remove("provenance.json").expect("a provenance");
     let summary = found.get_mut("summary.json").expect("a summary");
     let text = String::from_utf8(summary.clone()).unwrap();
-    let lines = text.lines().filter(|line| !line.contains("\"wall_s\""));
+    let times = ["\"wall_s\"", "\"cpu_s\""];
+    let lines = text.lines().filter(|line| !times.iter().any(|name| line.contains(name)));
     *summary = lines.collect::<Vec<_>>().join("\n").into_bytes();
     found
 }
