@@ -10,7 +10,9 @@ use crate::{print, tell};
 impl From<ReportError> for Exit {
     fn from(error: ReportError) -> Exit {
         let code = if error.is_input_output() { IO } else { BAD_INPUT };
-        Exit::new(code, error.to_string())
+        let remedy = "give a folder that `grainwake run` or `grainwake study` has written";
+        let help = matches!(error, ReportError::NotARun(_)).then_some(remedy);
+        Exit::with_hint(code, error, help)
     }
 }
 

@@ -139,3 +139,30 @@ fn unset_removes_a_key_so_that_its_default_applies() {
         .stderr(contains("present are end, step"));
     check(&["--unset", "grain.7.density"]).code(2).stderr(contains("grain.0, grain.1, grain.2"));
 }
+
+#[test]
+fn a_length_without_a_unit_is_in_metres() {
+    let wrong = WET.replacen("cell_size = \"0.5 mm\"", "cell_size = 0.5", 1);
+    assert_ne!(wrong, WET);
+    check(&wrong)
+        .code(2)
+        .stderr(contains("domain.cell_size").and(contains("a cell of 500 mm is larger than")))
+        .stderr(contains("without a unit is in metres").and(contains("\"0.5 mm\"")));
+}
+
+#[test]
+fn a_report_of_no_run_says_what_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("notes.txt");
+    std::fs::write(&file, "no run").unwrap();
+    for (path, why) in [
+        (folder.path().join("nowhere"), "there is no folder"),
+        (file, "is a file, not a run folder"),
+        (folder.path().to_owned(), "holds no run"),
+    ] {
+        for more in [&[][..], &["--film"]] {
+            let done = grainwake().arg("report").arg(&path).args(more).assert().code(2);
+            done.stderr(contains(why).and(contains("`grainwake study` has written")));
+        }
+    }
+}

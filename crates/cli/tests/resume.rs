@@ -238,7 +238,7 @@ fn a_checkpoint_ahead_of_the_tables_gives_way_to_the_one_before() {
         let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).success();
         let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
         assert!(
-            message.contains(&format!("it is ahead of the tables: {table} has"))
+            message.contains(&format!("the tables end before it: {table} has"))
                 && message.contains("checkpoint before it"),
             "{message}"
         );

@@ -136,9 +136,9 @@ fn bad_input_is_refused_with_the_remedy() {
         grainwake().arg("view").args(folders).args(more).assert()
     };
     let missing = folder.path().join("nowhere");
-    let remedy = || contains("holds no run").and(contains("`grainwake run`"));
-    view(&[&missing], &[]).code(2).stderr(remedy());
-    view(&[folder.path()], &[]).code(2).stderr(remedy());
+    let remedy = |why| contains(why).and(contains("`grainwake run`"));
+    view(&[&missing], &[]).code(2).stderr(remedy("there is no folder"));
+    view(&[folder.path()], &[]).code(2).stderr(remedy("holds no run"));
     let here = folder.path().display().to_string();
     view(&[&out], &["--save", &here]).code(2).stderr(contains("is a folder"));
     let deep = folder.path().join("no/such/page.html").display().to_string();

@@ -1,15 +1,14 @@
 //! Errors of a report.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use grainwake_formats::FormatError;
 
 /// Reason why a report could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// The folder holds no file of a run.
-    #[error("{} holds no run: none of case.resolved.toml, grains.csv, diagnostics.csv and \
-             summary.json is there", .0.display())]
+    /// The folder does not exist, or holds no file of a run.
+    #[error("{}", no_run(.0))]
     NotARun(PathBuf),
     /// A file of the run is unreadable or damaged.
     #[error(transparent)]
@@ -36,6 +35,21 @@ pub enum ReportError {
         /// Error of the operating system, or reason why the figure could not be drawn.
         source: std::io::Error,
     },
+}
+
+/// Describes why a path is no run folder.
+fn no_run(path: &Path) -> String {
+    let shown = path.display();
+    if !path.exists() {
+        return format!("there is no folder {shown}");
+    }
+    if !path.is_dir() {
+        return format!("{shown} is a file, not a run folder");
+    }
+    format!(
+        "{shown} holds no run: none of case.resolved.toml, grains.csv, diagnostics.csv and \
+         summary.json is there"
+    )
 }
 
 impl ReportError {

@@ -123,6 +123,9 @@ pub struct FromScanArgs {
     /// Try rejected labels again with more smoothing or a median, each with the gentlest that works
     #[arg(long)]
     pub rescue: bool,
+    /// Draw slices with the labels that would be kept and rejected into this PNG; write no grain
+    #[arg(long, value_name = "FILE.png")]
+    pub preview: Option<PathBuf>,
     /// Output and resolution.
     #[command(flatten)]
     pub new: NewGrain,

@@ -5,6 +5,7 @@ mod export;
 mod family;
 mod make;
 mod mesh;
+mod preview;
 mod refused;
 mod scan;
 mod table;

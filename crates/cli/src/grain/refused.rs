@@ -14,6 +14,7 @@ pub fn named(labels: &[u32]) -> String {
 }
 
 /// Returns one line per reason, followed by the result of the trials if there were any.
+/// Returns the reason with the labels and their sizes.
 pub fn lines(refusals: &[Refusal], rescue: bool) -> Vec<String> {
     refusals
         .iter()
@@ -22,7 +23,8 @@ pub fn lines(refusals: &[Refusal], rescue: bool) -> Vec<String> {
         .collect()
 }
 
-fn line(refusal: &Refusal) -> String {
+/// Returns the reason with the labels and their sizes.
+pub fn line(refusal: &Refusal) -> String {
     let [fewest, most] = refusal.voxels;
     let sizes = if fewest == most { most.to_string() } else { format!("{fewest} to {most}") };
     let count = refusal.labels.len();
@@ -35,7 +37,7 @@ fn line(refusal: &Refusal) -> String {
 }
 
 /// Describes which options would accept how many labels of a group.
-fn trial(refusal: &Refusal, rescue: bool) -> Option<String> {
+pub fn trial(refusal: &Refusal, rescue: bool) -> Option<String> {
     let advice = refusal.advice?;
     let (count, tried) = (refusal.labels.len(), advice.tried);
     let of = match (tried < count, count) {

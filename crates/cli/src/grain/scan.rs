@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde_json::json;
 
+use super::preview;
 use super::refused::{advice, lines, named};
 use super::{finish, folder, length, may_write, not_input, options, plausible, save};
 use crate::args::FromScanArgs;
@@ -29,7 +30,12 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     } else {
         folder(output)?;
     }
-    let how = how(args)?;
+    let mut how = how(args)?;
+    if let Some(picture) = &args.preview {
+        preview::may_draw(picture, args)?;
+        // Acceptance does not depend on it.
+        how.shape.roundness = false;
+    }
     let limits = ReadLimits::of_this_machine(how.bytes_per_voxel());
     let (volume, source) = read_volume(&args.image, &limits)?;
     let bar = ProgressBar::new(0);
@@ -43,7 +49,6 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     });
     bar.finish_and_clear();
     let scan = scan?;
-    drop(volume);
     if let Some(threshold) = scan.threshold {
         tell!("threshold {threshold}");
     }
@@ -54,6 +59,16 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
             masked.value
         );
     }
+    if let Some(picture) = &args.preview {
+        preview::draw(picture, args, &volume, &scan)?;
+        let lines = treated(&scan.grains).into_iter().chain(lines(&scan.refusals, args.rescue));
+        lines.for_each(|line| tell!("{line}"));
+        let kept = scan.grains.iter().filter(|g| g.shape.is_ok()).count();
+        let rejected = scan.grains.len() - kept;
+        tell!("{} kept, {rejected} rejected; none written", count(kept, "grain"));
+        return print(&picture.display().to_string());
+    }
+    drop(volume);
     if !one_file {
         return all(args, scan);
     }

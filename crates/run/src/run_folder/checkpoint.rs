@@ -199,7 +199,7 @@ fn read_own(
 ) -> Result<Record, String> {
     let (record, _) = open(path)?;
     if let Some(lacking) = record.lengths.lacking(run, extra) {
-        return Err(format!("it is ahead of the tables: {lacking}"));
+        return Err(format!("the tables end before it: {lacking}"));
     }
     read(path, digest, sim)
 }

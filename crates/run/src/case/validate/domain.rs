@@ -15,6 +15,10 @@ const MOST_CELLS: usize = 1 << 20;
 /// Largest number of cells in all; more suggest a forgotten unit.
 const MOST_CELLS_IN_ALL: usize = 1 << 36;
 
+/// Remedy for too many cells.
+const COARSER: &str =
+    "make the cells larger; was a unit forgotten? A number without a unit is in metres";
+
 /// Returns the grid and writes size, cells and cell size. The cells of a dry run may be left out.
 pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Option<Mesh> {
     let positive = |v: DVec3| v.min_element() > 0.0;
@@ -64,8 +68,7 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
         let cell_size = raw.cell_size.as_ref().map(|cell| &cell.span);
         let span = cell_size.or(raw.cells.as_ref().map(|cells| &cells.span));
         let message = format!("{cells:?} cells are more than any machine holds");
-        let help = "make the cells larger; was a unit forgotten?";
-        check.fail(span.unwrap_or(&None), message, help);
+        check.fail(span.unwrap_or(&None), message, COARSER);
         return None;
     }
     let origin = raw.origin.si;
@@ -88,7 +91,19 @@ fn divide(
         let ratio = edge / h;
         if ratio > MOST_CELLS as f64 {
             let message = format!("{:.1} million cells along {name}", 1e-6 * ratio);
-            let help = "make the cells larger; was a unit forgotten?";
+            check.fail(&cell.span, message, COARSER);
+            return None;
+        }
+        if ratio < 1.0 - 1e-6 {
+            let message = format!(
+                "a cell of {} is larger than the box, {} along {name}",
+                length(h),
+                length(edge)
+            );
+            let help = format!(
+                "a number without a unit is in metres; write a string with a unit, for example \"{}\"",
+                length(1e-3 * h)
+            );
             check.fail(&cell.span, message, help);
             return None;
         }
@@ -102,8 +117,9 @@ fn divide(
                 number(ratio)
             );
             let help = format!(
-                "take {name} = {} ({below} cells) or {} ({above} cells), or keep the size with a cell of {}",
+                "take {name} = {} ({}) or {} ({above} cells), or keep the size with a cell of {}",
                 length(below * h),
+                if below == 1.0 { "1 cell".into() } else { format!("{below} cells") },
                 length(above * h),
                 length(edge / whole)
             );
