@@ -5,10 +5,12 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use grainwake_run::Parent;
 use grainwake_run::case::Case;
 use grainwake_solver::sim::Simulation;
 use proptest::prelude::*;
 use proptest::sample::Index;
+use sha2::{Digest, Sha256};
 
 /// Most memory that a case of these tests may take [bytes]. Grids are allocated later, by the run.
 const MOST_MEMORY: usize = 512 << 20;
@@ -283,6 +285,51 @@ proptest! {
             // A state that is accepted can be advanced or fails with an error.
             drop(simulation.step(f64::INFINITY));
         }
+        let peak = PEAK.load(Ordering::Relaxed);
+        prop_assert!(peak < MOST_MEMORY, "{} MB", peak >> 20);
+    }
+}
+
+/// Finds the checkpoint with this body, and a sound checksum, in a run folder.
+fn found(folder: &Path, body: &[u8]) -> bool {
+    let mut file = body.to_vec();
+    file.extend(Sha256::digest(body));
+    std::fs::create_dir_all(folder.join("checkpoint")).unwrap();
+    std::fs::write(folder.join("checkpoint/step-0000000001.ckpt"), file).unwrap();
+    let provenance = include_bytes!("../../../fuzz/seeds/provenance.json");
+    std::fs::write(folder.join("provenance.json"), provenance).unwrap();
+    Parent::find(folder, None, &mut |_| {}).is_ok()
+}
+
+/// Checkpoint up to its state.
+fn record() -> Vec<u8> {
+    include_bytes!("../../../fuzz/seeds/checkpoint/record")[1..].to_vec()
+}
+
+#[test]
+fn a_sound_record_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(found(folder.path(), &record()));
+}
+
+proptest! {
+    #![proptest_config(config(200))]
+
+    #[test]
+    fn damaged_records_are_refused_or_read(
+        changes in prop::collection::vec((any::<Index>(), any::<u8>()), 1..6),
+        cut in prop::option::weighted(0.2, any::<Index>()),
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let mut body = record();
+        for (at, value) in changes {
+            let at = at.index(body.len());
+            body[at] = value;
+        }
+        if let Some(cut) = cut {
+            body.truncate(cut.index(body.len()));
+        }
+        found(folder.path(), &body);
         let peak = PEAK.load(Ordering::Relaxed);
         prop_assert!(peak < MOST_MEMORY, "{} MB", peak >> 20);
     }
