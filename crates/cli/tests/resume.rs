@@ -8,7 +8,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use grainwake_formats::summary::EndReason;
 use grainwake_formats::table::Table;
+use grainwake_run::case::Case;
+use grainwake_run::provenance::Provenance;
+use grainwake_run::{Existing, Options, Recording};
 
 use common::{DRY, WET, assert_same_run, folder_with, grainwake};
 
@@ -342,6 +346,50 @@ fn a_finished_run_can_be_continued_to_a_later_end() {
     run(&case, &out, &["--set", "time.end=40 ms", "--resume"]).success();
     run(&case, &whole, &["--set", "time.end=40 ms"]).success();
     assert_same_run(&whole, &out);
+}
+
+/// Runs the case up to `until` [s] in steps that the test takes, as a program that controls grains.
+fn controlled(case: &Path, out: &Path, existing: Existing, until: f64) {
+    let job = Case::load(case, &[]).unwrap().job();
+    let options =
+        Options { existing, controlled_from: Some("Python".into()), ..Options::default() };
+    let (mut sim, mut recording) = Recording::start(&job, out, &options, &mut |_| {}).unwrap();
+    while sim.time() < until {
+        recording.step(&mut sim, f64::INFINITY).unwrap();
+    }
+    recording.checkpoint(&sim).unwrap();
+    if recording.at_end(&sim) {
+        recording.finish(&sim, EndReason::End).unwrap();
+    }
+}
+
+#[test]
+fn only_the_program_that_controls_a_run_resumes_it() {
+    let (folder, case) = folder_with(WET);
+    let (out, whole) = (folder.path().join("run"), folder.path().join("whole"));
+    run(&case, &whole, &[]).success();
+    controlled(&case, &out, Existing::Refuse, 0.02);
+    let before = common::contents(&out);
+    let refused = run(&case, &out, &["--resume"]).code(2);
+    let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    let words = message.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        words.contains("was controlled from Python: continue it there") && words.contains("-o"),
+        "{message}"
+    );
+    assert_eq!(before, common::contents(&out), "nothing may change");
+    // The program goes on. It has controlled nothing, so that the bits are those of the case.
+    controlled(&case, &out, Existing::Resume, 0.0599);
+    assert_same_run(&whole, &out);
+    let by = |run: &Path| Provenance::read(run).unwrap().controlled_from;
+    assert_eq!((by(&out).as_deref(), by(&whole)), (Some("Python"), None));
+    // Its checkpoint is a start for a run of the case alone.
+    let branch = folder.path().join("branch");
+    let from = out.to_string_lossy().into_owned();
+    run(&case, &branch, &["--from", &from, "--set", "time.end=70 ms"]).success();
+    assert_eq!(by(&branch), None);
+    run(&case, &out, &["--force"]).success();
+    assert_eq!(by(&out), None);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 """Types of the extension module."""
 
 import os
+import pathlib
 from typing import Any, Callable, Iterator, Literal, Mapping, Sequence, TypedDict, final, overload
 
 import numpy as np
@@ -283,7 +284,21 @@ class _Contacts(TypedDict):
 
 @final
 class Simulation:
-    def __new__(cls, case: Case, *, threads: int | None = None) -> Simulation: ...
+    def __new__(
+        cls,
+        case: Case,
+        *,
+        threads: int | None = None,
+        output: _Path | None = None,
+        resume: bool = False,
+        force: bool = False,
+    ) -> Simulation: ...
+    def __enter__(self) -> Simulation: ...
+    def __exit__(self, kind: Any, value: Any, traceback: Any, /) -> Literal[False]: ...
+    @property
+    def output(self) -> pathlib.Path | None: ...
+    def checkpoint(self) -> None: ...
+    def finish(self, *, report: bool = True) -> RunFolder: ...
     def step(self, horizon: _Quantity | None = None) -> float: ...
     def advance_to(self, time: _Quantity) -> None: ...
     def run(

@@ -94,6 +94,11 @@ impl PySimulation {
     ///     The file is damaged or belongs to another case.
     fn restore_checkpoint(&mut self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         self.may_change()?;
+        if self.recording.is_some() {
+            return Err(input(
+                "a simulation with a run folder continues with Simulation(case, output=..., resume=True)",
+            ));
+        }
         let bytes = std::fs::read(&path)
             .map_err(|e| system(e.kind(), format!("cannot read {}: {e}", path.display())))?;
         py.detach(|| self.decode(&bytes))

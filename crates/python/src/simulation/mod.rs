@@ -1,44 +1,70 @@
-//! `Simulation`: steps a case in memory.
+//! `Simulation`: steps a case in memory, or into a run folder.
 
 mod checkpoint;
 mod control;
 mod fields;
+mod recording;
+mod state;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
+use grainwake_run::Recording;
 use grainwake_run::case::quantity::Time;
-use grainwake_solver::dem::{Contact, Partner};
-use grainwake_solver::sim::{SAME_TIME, Simulation, StepError};
-use numpy::{PyArray1, PyArray2};
+use grainwake_solver::sim::{SAME_TIME, Simulation};
 use pyo3::exceptions::PyBufferError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use rayon::ThreadPool;
 
 use crate::arguments::quantity;
-use crate::arrays::{numbers, rows, vectors};
 use crate::case::PyCase;
 use crate::error::{Raise, input, numerics};
 use crate::threads;
+use recording::Failure;
 
 /// Wall time after which signals are handled.
 const INTERVAL: Duration = Duration::from_millis(50);
 
-/// Simulation of a case in memory, step by step.
+/// Message of a simulation whose run folder is closed.
+const CLOSED: &str = "the run folder is closed: continue it with Simulation(case, output=..., \
+                      resume=True), and a later end if the case had ended";
+
+/// Simulation of a case, step by step, with grains that can be controlled between the steps.
 ///
 /// Parameters
 /// ----------
 /// case : Case
-///     The case; its outputs are not written.
+///     The case.
 /// threads : int, optional
 ///     Threads; those of the case by default, 0 for all cores. They do not affect the results.
+/// output : path-like, optional
+///     Run folder for the outputs of the case: tables, VTK files, events, checkpoints. Nothing is
+///     written by default.
+/// resume : bool, default False
+///     Continue from the last checkpoint in the folder. Loads and prescribed motions are not part
+///     of it: set them again.
+/// force : bool, default False
+///     Replace the run in the folder.
+///
+/// Raises
+/// ------
+/// CaseError
+///     The folder holds another run, a finished one, or the run of another case.
+/// OSError
+///     Reading or writing failed.
 ///
 /// Notes
 /// -----
 /// The global interpreter lock is released during steps. Ctrl-C raises ``KeyboardInterrupt`` after
-/// a step, and the simulation can be continued. `Case.run` fills a run folder instead.
+/// a step, and the simulation can be continued.
+///
+/// With `output`, steps end at the output times of the case as well. If nothing is controlled and
+/// no other times are asked for, the folder has the bits of `Case.run`. The program decides when
+/// to stop: a stop condition of the case (``time.stop``) has no effect, and steps beyond its end
+/// are refused. Call `finish` at the end, or use a ``with`` block: it calls `finish`, or after an
+/// exception `checkpoint`. The folder is locked until then.
 ///
 /// Examples
 /// --------
@@ -58,6 +84,10 @@ const INTERVAL: Duration = Duration::from_millis(50);
 #[pyclass(module = "grainwake", name = "Simulation", weakref)]
 pub struct PySimulation {
     sim: Simulation,
+    /// Open run folder.
+    recording: Option<Recording>,
+    /// Path of the run folder, open or closed.
+    output: Option<PathBuf>,
     case: Py<PyCase>,
     pool: Arc<ThreadPool>,
     /// Number of arrays that show the fields.
@@ -69,9 +99,7 @@ pub struct PySimulation {
 impl PySimulation {
     /// Refuses a change of the fields that arrays show, or after a failed step.
     fn may_change(&self) -> PyResult<()> {
-        if let Some(message) = &self.failed {
-            return Err(numerics(format!("{message}\nThe simulation cannot be continued.")));
-        }
+        self.may_continue()?;
         match self.views.load(Ordering::Acquire) {
             0 => Ok(()),
             count => {
@@ -84,19 +112,32 @@ impl PySimulation {
         }
     }
 
-    /// Takes steps until `step` returns that it has finished, and handles signals between them.
+    /// Refuses to use a simulation that has failed or whose run folder is closed.
+    fn may_continue(&self) -> PyResult<()> {
+        if let Some(message) = &self.failed {
+            return Err(numerics(format!("{message}\nThe simulation cannot be continued.")));
+        }
+        if self.output.is_some() && self.recording.is_none() {
+            return Err(input(CLOSED));
+        }
+        Ok(())
+    }
+
+    /// Takes steps until `horizon` returns no time for another one [s], and handles signals between
+    /// them.
     fn advance(
         &mut self,
         py: Python<'_>,
-        step: impl Fn(&mut Simulation) -> Result<bool, StepError> + Sync,
+        mut horizon: impl FnMut(&Simulation) -> Option<f64> + Send,
     ) -> PyResult<()> {
         self.may_change()?;
         loop {
-            let (pool, sim) = (self.pool.clone(), &mut self.sim);
+            let (pool, sim, recording) = (self.pool.clone(), &mut self.sim, &mut self.recording);
             let taken = py.detach(|| {
                 let started = Instant::now();
                 pool.install(|| {
-                    while !step(sim)? {
+                    while let Some(horizon) = horizon(sim) {
+                        recording::step(sim, recording.as_mut(), horizon)?;
                         if started.elapsed() > INTERVAL {
                             return Ok(false);
                         }
@@ -107,34 +148,50 @@ impl PySimulation {
             match taken {
                 Ok(true) => return py.check_signals(),
                 Ok(false) => py.check_signals()?,
+                Err(error @ Failure::End(_)) => return Err(error).raise(),
                 Err(error) => {
-                    let error: StepError = error;
-                    self.failed = Some(error.to_string());
-                    return Err(error).raise();
+                    let message = error.to_string();
+                    let raised = Err(error).raise();
+                    self.failed = Some(message);
+                    self.recording = None;
+                    return raised;
                 }
             }
         }
-    }
-
-    fn grain_vectors<'py>(
-        &self,
-        py: Python<'py>,
-        pick: fn(&grainwake_solver::dem::Grain) -> glam::DVec3,
-    ) -> Bound<'py, PyArray2<f64>> {
-        vectors(py, self.sim.grains().iter().map(pick))
     }
 }
 
 #[pymethods]
 impl PySimulation {
     #[new]
-    #[pyo3(signature = (case, *, threads = None))]
-    fn new(py: Python<'_>, case: Py<PyCase>, threads: Option<usize>) -> PyResult<PySimulation> {
+    #[pyo3(signature = (case, *, threads = None, output = None, resume = false, force = false))]
+    fn new(
+        py: Python<'_>,
+        case: Py<PyCase>,
+        threads: Option<usize>,
+        output: Option<PathBuf>,
+        resume: bool,
+        force: bool,
+    ) -> PyResult<PySimulation> {
         let given = &case.get().case;
         let threads = threads::resolve(threads.unwrap_or(given.threads));
-        let (pool, setup) = (threads::pool(threads)?, given.setup.clone());
-        let sim = py.detach(|| pool.install(|| Simulation::new(setup))).raise()?;
-        Ok(PySimulation { sim, case, pool, views: Arc::default(), failed: None })
+        let pool = threads::pool(threads)?;
+        let (sim, recording) = match &output {
+            Some(folder) => {
+                let (sim, recording) =
+                    recording::start(py, given, folder, (resume, force), threads, &pool)?;
+                (sim, Some(recording))
+            }
+            None if resume || force => {
+                return Err(input("resume and force need a run folder: give output=..."));
+            }
+            None => {
+                let setup = given.setup.clone();
+                (py.detach(|| pool.install(|| Simulation::new(setup))).raise()?, None)
+            }
+        };
+        let views = Arc::default();
+        Ok(PySimulation { sim, recording, output, case, pool, views, failed: None })
     }
 
     /// Take one time step.
@@ -162,7 +219,8 @@ impl PySimulation {
         if horizon <= 0.0 {
             return Err(input(format!("horizon: found {horizon} s; expected a positive time")));
         }
-        self.advance(py, |sim| sim.step(horizon).map(|()| true))?;
+        let mut steps = std::iter::once(horizon);
+        self.advance(py, |_| steps.next())?;
         Ok(self.sim.time_step())
     }
 
@@ -179,12 +237,7 @@ impl PySimulation {
     ///     As in `step`.
     fn advance_to(&mut self, py: Python<'_>, time: &Bound<'_, PyAny>) -> PyResult<()> {
         let until = quantity::<Time>("time", time)?;
-        self.advance(py, |sim| {
-            if sim.time() < until * (1.0 - SAME_TIME) {
-                sim.step(until - sim.time())?;
-            }
-            Ok(sim.time() >= until * (1.0 - SAME_TIME))
-        })
+        self.advance(py, |sim| (sim.time() < until * (1.0 - SAME_TIME)).then(|| until - sim.time()))
     }
 
     /// Iterate over states at regular times.
@@ -236,50 +289,6 @@ impl PySimulation {
         slf.py().import("grainwake._simulation")?.call_method1("state", (slf,))
     }
 
-    /// Conservation checks and other measures of the state.
-    ///
-    /// Returns
-    /// -------
-    /// dict
-    ///     max_divergence [1/s], max_velocity [m/s], cfl, slip [m/s], fluid_kinetic_energy [J],
-    ///     grain_kinetic_energy [J], momentum [kg m/s], momentum_residual (relative).
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let d = py.detach(|| self.pool.install(|| self.sim.diagnostics()));
-        let dict = PyDict::new(py);
-        dict.set_item("max_divergence", d.max_divergence)?;
-        dict.set_item("max_velocity", d.max_velocity)?;
-        dict.set_item("cfl", d.cfl)?;
-        dict.set_item("slip", d.slip)?;
-        dict.set_item("fluid_kinetic_energy", d.fluid_kinetic_energy)?;
-        dict.set_item("grain_kinetic_energy", d.grain_kinetic_energy)?;
-        dict.set_item("momentum", <(f64, f64, f64)>::from(d.momentum))?;
-        dict.set_item("momentum_residual", d.momentum_residual)?;
-        Ok(dict)
-    }
-
-    /// Pairs that touched during the last step.
-    ///
-    /// Returns
-    /// -------
-    /// dict of ndarray
-    ///     grain (n,), partner (n,) with -1 for a wall, overlap (n,) [m], force (n, 3) [N] on
-    ///     `grain`, point (n, 3) [m] and normal (n, 3).
-    fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let all = self.sim.contacts();
-        let partner = |contact: &Contact| match contact.partner {
-            Partner::Grain(index) => index as i64,
-            Partner::Wall { .. } => -1,
-        };
-        let dict = PyDict::new(py);
-        dict.set_item("grain", numbers(py, all.iter().map(|c| c.grain as i64).collect()))?;
-        dict.set_item("partner", numbers(py, all.iter().map(partner).collect()))?;
-        dict.set_item("overlap", numbers(py, all.iter().map(|c| c.overlap).collect()))?;
-        dict.set_item("force", vectors(py, all.iter().map(|c| c.load.force)))?;
-        dict.set_item("point", vectors(py, all.iter().map(|c| c.point)))?;
-        dict.set_item("normal", vectors(py, all.iter().map(|c| c.normal)))?;
-        Ok(dict)
-    }
-
     /// The case.
     #[getter]
     fn case(&self, py: Python<'_>) -> Py<PyCase> {
@@ -299,46 +308,6 @@ impl PySimulation {
     #[getter]
     fn time_step(&self) -> f64 {
         self.sim.time_step()
-    }
-    /// Centroids [m], shape (n, 3); a copy. A grain that has left the box is at infinity.
-    #[getter]
-    fn positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.grain_vectors(py, |grain| grain.pose.position)
-    }
-    /// Quaternions (w, x, y, z) from the body frame to the space frame, shape (n, 4); a copy.
-    #[getter]
-    fn orientations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let turns = self.sim.grains().iter().map(|grain| {
-            let q = grain.pose.orientation;
-            [q.w, q.x, q.y, q.z]
-        });
-        rows(py, turns)
-    }
-    /// Velocities of the centroids [m/s], shape (n, 3); a copy.
-    #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.grain_vectors(py, |grain| grain.velocity)
-    }
-    /// Angular velocities in the space frame [rad/s], shape (n, 3); a copy.
-    #[getter]
-    fn angular_velocities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.grain_vectors(py, |grain| grain.angular_velocity)
-    }
-    /// Mean hydrodynamic forces over the last step [N], without buoyancy, shape (n, 3); a copy.
-    #[getter]
-    fn forces<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        vectors(py, self.sim.loads().iter().map(|load| load.force))
-    }
-    /// Mean hydrodynamic torques about the centroids over the last step [N m], shape (n, 3); a
-    /// copy.
-    #[getter]
-    fn torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        vectors(py, self.sim.loads().iter().map(|load| load.torque))
-    }
-    /// Masses of the grains [kg], shape (n,).
-    #[getter]
-    fn masses<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        numbers(py, self.sim.grains().iter().map(|grain| grain.mass()).collect())
     }
     /// Threads of the simulation.
     #[getter]

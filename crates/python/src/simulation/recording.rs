@@ -1,0 +1,184 @@
+//! Run folder of a simulation that Python steps.
+
+use std::path::{Path, PathBuf};
+
+use grainwake_formats::summary::EndReason;
+use grainwake_run::case::Case;
+use grainwake_run::{Options, Recording, RunError};
+use grainwake_solver::sim::{Simulation, StepError};
+use pyo3::prelude::*;
+use rayon::ThreadPool;
+
+use super::PySimulation;
+use crate::error::{IntoException, Raise, input};
+use crate::running::{command, existing};
+
+/// Name of this program in the provenance.
+const PROGRAM: &str = "Python";
+
+/// Failure of a step.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Failure {
+    /// Step in memory.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// Step into a run folder.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The case ends at this time [s].
+    #[error(
+        "the case ends at t = {0:.6e} s, and its run folder records nothing later: give it a later end"
+    )]
+    End(f64),
+}
+
+impl IntoException for Failure {
+    fn into_exception(self) -> PyErr {
+        match self {
+            Failure::Step(error) => error.into_exception(),
+            Failure::Run(error) => error.into_exception(),
+            Failure::End(_) => input(self.to_string()),
+        }
+    }
+}
+
+/// Takes one time step, and writes what is due.
+pub(super) fn step(
+    sim: &mut Simulation,
+    recording: Option<&mut Recording>,
+    horizon: f64,
+) -> Result<(), Failure> {
+    let Some(recording) = recording else {
+        return Ok(sim.step(horizon)?);
+    };
+    if recording.at_end(sim) {
+        return Err(Failure::End(sim.time()));
+    }
+    recording.step(sim, horizon)?;
+    Ok(())
+}
+
+/// Opens a run folder and builds its simulation; `(resume, force)` treat an existing run.
+pub(super) fn start(
+    py: Python<'_>,
+    case: &Case,
+    folder: &Path,
+    (resume, force): (bool, bool),
+    threads: usize,
+    pool: &ThreadPool,
+) -> PyResult<(Simulation, Recording)> {
+    let options = Options {
+        existing: existing(resume, force),
+        command: command(py)?,
+        threads,
+        controlled_from: Some(PROGRAM.into()),
+        ..Options::default()
+    };
+    let mut notes: Vec<String> = Vec::new();
+    let started = py.detach(|| {
+        let mut note = |text: &str| notes.push(text.to_owned());
+        pool.install(|| Recording::start(&case.job(), folder, &options, &mut note))
+    });
+    let warnings = py.import("warnings")?;
+    let kind = py.import("grainwake")?.getattr("CaseWarning")?;
+    for note in notes.into_iter().filter(|note| !note.starts_with("resuming")) {
+        warnings.call_method1("warn", (note, &kind))?;
+    }
+    started.raise()
+}
+
+impl PySimulation {
+    /// Refuses to write into a run folder that is closed or was not given.
+    fn may_write(&self) -> PyResult<()> {
+        if self.output.is_none() {
+            return Err(input("there is no run folder: give Simulation(case, output=\"runs/x\")"));
+        }
+        self.may_continue()
+    }
+}
+
+#[pymethods]
+impl PySimulation {
+    /// Run folder; None without one.
+    #[getter]
+    fn output(&self) -> Option<PathBuf> {
+        self.output.clone()
+    }
+
+    /// Write a checkpoint into the run folder, from which ``resume=True`` continues.
+    ///
+    /// Raises
+    /// ------
+    /// CaseError
+    ///     The simulation has no run folder, or the folder is closed.
+    /// OSError
+    ///     Writing failed.
+    fn checkpoint(&mut self, py: Python<'_>) -> PyResult<()> {
+        self.may_write()?;
+        let (pool, sim) = (self.pool.clone(), &self.sim);
+        let Some(recording) = &mut self.recording else { return Ok(()) };
+        py.detach(|| pool.install(|| recording.checkpoint(sim))).raise()
+    }
+
+    /// Write the last outputs and the summary, close the run folder, and draw the report.
+    ///
+    /// Parameters
+    /// ----------
+    /// report : bool, default True
+    ///     Whether to draw the report.
+    ///
+    /// Returns
+    /// -------
+    /// RunFolder
+    ///     The run folder.
+    ///
+    /// Raises
+    /// ------
+    /// CaseError
+    ///     The simulation has no run folder, or the folder is closed.
+    /// SolverError
+    ///     A step has failed.
+    /// OSError
+    ///     Writing failed; ``resume=True`` continues from the last checkpoint.
+    ///
+    /// Notes
+    /// -----
+    /// The simulation can still be read, but not stepped. A run that is finished before the end of
+    /// the case is continued by ``resume=True``.
+    #[pyo3(signature = (*, report = true))]
+    fn finish<'py>(&mut self, py: Python<'py>, report: bool) -> PyResult<Bound<'py, PyAny>> {
+        self.may_write()?;
+        let (pool, sim, folder) = (self.pool.clone(), &self.sim, self.output.clone());
+        if let Some(recording) = self.recording.take() {
+            py.detach(|| pool.install(|| recording.finish(sim, EndReason::End))).raise()?;
+        }
+        if let (true, Some(folder)) = (report, &folder) {
+            py.detach(|| grainwake_report::render(folder)).raise()?;
+        }
+        py.import("grainwake._studies")?.call_method1("open", (folder,))
+    }
+
+    fn __enter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    /// Finishes the run folder; after an exception, writes a checkpoint and closes it.
+    fn __exit__(
+        &mut self,
+        py: Python<'_>,
+        kind: &Bound<'_, PyAny>,
+        _value: &Bound<'_, PyAny>,
+        _traceback: &Bound<'_, PyAny>,
+    ) -> PyResult<bool> {
+        if self.recording.is_none() {
+            return Ok(false);
+        }
+        if kind.is_none() {
+            self.finish(py, true)?;
+            return Ok(false);
+        }
+        let written = self.checkpoint(py);
+        self.recording = None;
+        written.map(|()| false)
+    }
+}
