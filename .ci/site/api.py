@@ -3,6 +3,7 @@
 of the extension module with its docstrings. Usage: api.py FOLDER"""
 
 import ast
+import copy
 import pathlib
 import shutil
 import sys
@@ -33,17 +34,36 @@ def described(nodes, owner):
     return count
 
 
+def readable(text):
+    """Names a type of the docstrings that would be read as a difference."""
+    return text.replace(" : path-like", " : str or os.PathLike")
+
+
+class Aliases(ast.NodeTransformer):
+    """Replaces the private names of types, such as _Path, by what they stand for."""
+
+    def __init__(self, tree):
+        pairs = [(node.targets[0], node.value) for node in tree.body if isinstance(node, ast.Assign)]
+        self.meaning = {name.id: value for name, value in pairs if name.id.startswith("_")}
+
+    def visit_Name(self, node):
+        if isinstance(node.ctx, ast.Load) and node.id in self.meaning:
+            return self.visit(copy.deepcopy(self.meaning[node.id]))
+        return node
+
+
 def main():
     target = pathlib.Path(sys.argv[1]) / "grainwake"
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir(parents=True)
     for path in SOURCE.glob("*.py"):
-        shutil.copy(path, target)
+        (target / path.name).write_text(readable(path.read_text(encoding="utf-8")))
     tree = ast.parse((SOURCE / "_grainwake.pyi").read_text(encoding="utf-8"))
     count = described(tree.body, _grainwake)
     if count < 100:
         sys.exit(f"only {count} docstrings in {grainwake.__file__}")
-    (target / "_grainwake.py").write_text(ast.unparse(ast.fix_missing_locations(tree)))
+    tree = ast.fix_missing_locations(Aliases(tree).visit(tree))
+    (target / "_grainwake.py").write_text(readable(ast.unparse(tree)))
     print(f"site: {count} docstrings of the extension module")
 
 

@@ -1,4 +1,4 @@
-// Renders the equations of a page.
+// Renders the equations of a page, and keeps options such as --no-roundness on one line.
 document.addEventListener("DOMContentLoaded", () => {
   renderMathInElement(document.body, {
     delimiters: [
@@ -7,4 +7,7 @@ document.addEventListener("DOMContentLoaded", () => {
     ],
     throwOnError: true,
   });
+  for (const code of document.querySelectorAll(".md-typeset :not(pre) > code")) {
+    code.classList.toggle("option", /^--?[\w-]+$/.test(code.textContent));
+  }
 });
