@@ -9,8 +9,8 @@ use grainwake_plot::raster::Picture;
 
 const N: usize = 64;
 
-/// An 8-bit image: 0 outside a cylinder, void 60, three balls of 160 with blurred surfaces. The ball
-/// with the largest y reaches the edge of the cylinder.
+/// An 8-bit image: 0 outside a cylinder, void 60, three balls of 160 with blurred surfaces. The
+/// ball with the largest y reaches the edge of the cylinder.
 fn masked() -> Vec<u8> {
     let balls = [[22.3, 30.2, 20.4, 8.0], [40.1, 33.4, 40.2, 10.0], [32.2, 53.1, 30.7, 8.0]];
     let value = |n: usize| {
