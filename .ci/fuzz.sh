@@ -5,7 +5,8 @@
 #   .ci/fuzz.sh SECONDS [TARGET ...]      without targets, all of fuzz/targets
 #
 # Seeds lie in fuzz/seeds, found inputs in target/fuzz-corpus, crashes in target/fuzz-artifacts.
-# A crash ends the script: `cargo +nightly fuzz run --target-dir target/fuzz TARGET FILE` repeats it.
+# A crash ends the script. It is repeated by
+# `cargo +nightly fuzz run --target-dir target/fuzz TARGET FILE`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 seconds="${1:?usage: .ci/fuzz.sh SECONDS [TARGET ...]}"
