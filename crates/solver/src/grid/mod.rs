@@ -12,8 +12,8 @@ pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field};
 #[cfg(test)]
 pub(crate) use field::{FaceZ, Location};
 pub(crate) use loops::{
-    Columns, PlaneRange, SharedRows, for_chunks, for_columns, for_plane_ranges, for_planes_of,
-    for_slabs,
+    BorrowedRow, Columns, PlaneRange, SharedRows, borrowed_rows, for_chunks, for_columns,
+    for_plane_ranges, for_planes_of, for_slabs,
 };
 
 use glam::DVec3;

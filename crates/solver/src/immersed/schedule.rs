@@ -23,6 +23,7 @@ use super::update::{
 use super::{ImmersedGrains, Scheme};
 use crate::dem::{Grain, GrainResponse};
 use crate::flow::Flow;
+use crate::grid::borrowed_rows;
 use crate::math::{Load, Real};
 
 /// Grains located and coupled to the prediction: made by [`ImmersedGrains::couple`], consumed by
@@ -90,21 +91,24 @@ impl<R: Real> ImmersedGrains<R> {
             known,
             corrects_advection,
             fluid_density: self.fluid_density,
-            access: &self.access,
         };
-        let scratch = &self.scratch;
+        let (scratch, access) = (&self.scratch, &self.access);
         let each = self.grains.par_iter_mut().zip(&mut updates).enumerate();
         each.for_each(|(index, (grain, update))| {
             let scratch = &mut *scratch.borrow();
-            if update.isolated {
-                // SAFETY: `find_isolated` found no other grain that uses the faces which this grain
-                // reads or writes. The access log asserts it below in debug builds. `SharedRows`
-                // checks the bounds of every row.
-                let mut aliases = predictions.each_ref().map(|one| unsafe { one.alias() });
-                step.update_isolated(index, grain, update, &mut aliases, scratch);
-            } else {
-                step.locate_and_assemble(index, grain, update, &predictions, &mut scratch.locate);
-            }
+            let rows = borrowed_rows(|| {
+                if update.isolated {
+                    // SAFETY: `find_isolated` found no other grain that uses the faces which this
+                    // grain reads or writes. The access log asserts it below in debug builds.
+                    // `SharedRows` checks the bounds of every row.
+                    let mut aliases = predictions.each_ref().map(|one| unsafe { one.alias() });
+                    step.update_isolated(index, grain, update, &mut aliases, scratch);
+                } else {
+                    let locate = &mut scratch.locate;
+                    step.locate_and_assemble(index, grain, update, &predictions, locate);
+                }
+            });
+            access.record(index, rows);
         });
         if cfg!(debug_assertions) {
             self.access.assert_no_conflict();

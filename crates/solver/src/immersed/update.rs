@@ -2,7 +2,7 @@
 //! motion of any other. Buffers of the threads, and in debug builds a log of the faces that they
 //! use.
 
-use std::ops::{Deref, DerefMut, Range};
+use std::ops::{Deref, DerefMut};
 use std::sync::Mutex;
 
 use super::advection::{
@@ -15,6 +15,7 @@ use super::rigid_body::{PreviousStep, RigidBodySystem};
 use super::rigidity::{impose_rigidity, sum_impulse};
 use crate::dem::Grain;
 use crate::flow::{OldState, Prediction};
+use crate::grid::BorrowedRow;
 use crate::math::{Load, Real, RigidVelocity};
 
 /// Lists of the faces near one grain, kept from one step to the next.
@@ -138,8 +139,6 @@ pub struct CouplingStep<'a, R> {
     pub corrects_advection: bool,
     /// Density of the fluid [kg/m^3].
     pub fluid_density: f64,
-    /// Log of the faces that the grains read and write.
-    pub access: &'a AccessLog,
 }
 
 impl<R: Real> CouplingStep<'_, R> {
@@ -158,13 +157,11 @@ impl<R: Real> CouplingStep<'_, R> {
         if self.corrects_advection {
             let (kinematics, eps) = (&self.input.kinematics[index], self.locator.eps());
             find_correction(eps, &self.known, kinematics, body, advection, correction);
-            self.access.record_rows(index, body);
             for (component, prediction) in predictions.iter_mut().enumerate() {
                 add_correction(body, correction, component, prediction);
             }
         }
         self.locate(index, body, forced, locate);
-        self.access.record_forced(index, Access::Write, forced);
         update.system = self.assemble(index, predictions, forced);
         let (grain, previous) = (&self.input.grains[index], &self.input.previous[index]);
         let no_contact = Load::default();
@@ -187,7 +184,6 @@ impl<R: Real> CouplingStep<'_, R> {
         scratch: &mut LocateScratch,
     ) {
         self.locate(index, &mut grain.body, &mut grain.forced, scratch);
-        (self.access).record_forced(index, Access::Read, &grain.forced);
         update.system = self.assemble(index, predictions, &mut grain.forced);
     }
 
@@ -286,55 +282,54 @@ impl<T: Default> Drop for Scratch<'_, T> {
     }
 }
 
-/// Kind of an access to faces.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Access {
-    Read,
-    Write,
-}
-
-/// Accesses of all grains to the prediction in a step, to assert that no thread writes a face that
-/// another one uses; empty in release builds.
+/// Faces of the prediction that the grains have borrowed in a step, to assert that no thread writes
+/// a face that another one uses; empty in release builds.
 #[derive(Default)]
 pub struct AccessLog(Mutex<Vec<Entry>>);
 
-/// Access of one grain to adjacent faces.
+/// Adjacent faces that one grain has borrowed.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 struct Entry {
-    component: usize,
     start: usize,
     end: usize,
     grain: usize,
-    access: Access,
+    writes: bool,
+}
+
+/// Ends of the entries so far, the furthest of all and the furthest of another grain.
+#[derive(Clone, Copy, Default)]
+struct Furthest([(usize, usize); 2]);
+
+impl Furthest {
+    /// Adds an entry of a grain.
+    fn add(&mut self, grain: usize, end: usize) {
+        let [first, second] = &mut self.0;
+        if first.0 == grain {
+            first.1 = first.1.max(end);
+        } else if first.1 < end {
+            (*second, *first) = (*first, (grain, end));
+        } else if second.1 < end {
+            *second = (grain, end);
+        }
+    }
+
+    /// Returns the grain other than `grain` whose entries end last, if they end behind `start`.
+    fn beyond(&self, grain: usize, start: usize) -> Option<usize> {
+        let other = self.0.iter().find(|one| one.0 != grain && one.1 > start);
+        other.map(|one| one.0)
+    }
 }
 
 impl AccessLog {
-    /// Records that a grain corrects the advection of its faces.
-    pub fn record_rows(&self, grain: usize, body: &LocatedBody) {
-        for (component, rows) in body.rows.iter().enumerate() {
-            let rows = rows.iter().map(|row| row.at..row.at + row.count);
-            self.record(grain, Access::Write, component, rows);
-        }
-    }
-
-    /// Records that a grain reads or writes the faces that it forces.
-    pub fn record_forced(&self, grain: usize, access: Access, forced: &ForcedFaces) {
-        for (component, runs) in forced.runs.iter().enumerate() {
-            let runs = runs.iter().map(|run| run.at..run.at + run.count);
-            self.record(grain, access, component, runs);
-        }
-    }
-
-    fn record(
-        &self,
-        grain: usize,
-        access: Access,
-        component: usize,
-        faces: impl Iterator<Item = Range<usize>>,
-    ) {
-        if cfg!(debug_assertions) {
-            let entries =
-                faces.map(|Range { start, end }| Entry { component, start, end, grain, access });
+    /// Records the faces that a grain has borrowed.
+    pub fn record(&self, grain: usize, rows: Vec<BorrowedRow>) {
+        if !rows.is_empty() {
+            let entries = rows.into_iter().map(|BorrowedRow { addresses, mutable }| Entry {
+                start: addresses.start,
+                end: addresses.end,
+                grain,
+                writes: mutable,
+            });
             self.0.lock().expect("no thread panicked").extend(entries);
         }
     }
@@ -343,53 +338,52 @@ impl AccessLog {
     pub fn assert_no_conflict(&mut self) {
         let entries = self.0.get_mut().expect("no thread panicked");
         entries.sort_unstable();
-        // Compares each entry with the preceding one that ends last, of all entries and of writes.
-        for writes_only in [false, true] {
-            let mut last: Option<&Entry> = None;
-            for entry in entries.iter() {
-                let same_component = last.filter(|last| last.component == entry.component);
-                if let Some(last) = same_component {
-                    assert!(
-                        last.end <= entry.start
-                            || last.grain == entry.grain
-                            || last.access == Access::Read && entry.access == Access::Read,
-                        "grains {} and {} use the same faces at once",
-                        last.grain,
-                        entry.grain
-                    );
-                }
-                let extends = same_component.is_none_or(|last| last.end < entry.end);
-                if extends && (entry.access == Access::Write || !writes_only) {
-                    last = Some(entry);
-                }
+        let (mut all, mut written) = (Furthest::default(), Furthest::default());
+        for Entry { start, end, grain, writes } in entries.drain(..) {
+            let before = if writes { &all } else { &written };
+            if let Some(other) = before.beyond(grain, start) {
+                panic!("grains {other} and {grain} use the same faces at once");
+            }
+            all.add(grain, end);
+            if writes {
+                written.add(grain, end);
             }
         }
-        entries.clear();
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Access::{Read, Write};
+    use std::ops::Range;
+
     use super::*;
 
-    fn log(entries: &[(usize, Range<usize>, Access)]) -> AccessLog {
+    /// Log of entries: grain, faces, whether they are written.
+    fn log(entries: &[(usize, Range<usize>, bool)]) -> AccessLog {
         let log = AccessLog::default();
-        for (grain, faces, access) in entries {
-            log.record(*grain, *access, 0, [faces.clone()].into_iter());
+        for (grain, addresses, mutable) in entries {
+            let row = BorrowedRow { addresses: addresses.clone(), mutable: *mutable };
+            log.record(*grain, vec![row]);
         }
         log
     }
 
     #[test]
     fn faces_read_by_several_grains_are_accepted() {
-        log(&[(0, 10..20, Write), (0, 12..18, Write), (1, 20..30, Read), (2, 25..40, Read)])
+        let (write, read) = (true, false);
+        log(&[(0, 10..20, write), (0, 12..18, write), (1, 20..30, read), (2, 25..40, read)])
             .assert_no_conflict();
     }
 
     #[test]
-    #[cfg_attr(debug_assertions, should_panic(expected = "use the same faces"))]
+    #[should_panic(expected = "use the same faces")]
     fn a_face_written_by_one_grain_and_read_by_another_is_refused() {
-        log(&[(0, 10..20, Write), (1, 0..50, Read), (2, 48..60, Read)]).assert_no_conflict();
+        log(&[(0, 10..20, true), (1, 0..50, false), (2, 48..60, false)]).assert_no_conflict();
+    }
+
+    #[test]
+    #[should_panic(expected = "grains 2 and 1 use the same faces")]
+    fn a_reader_is_found_behind_a_longer_row_of_the_writer() {
+        log(&[(2, 1..10, false), (1, 2..20, false), (1, 5..6, true)]).assert_no_conflict();
     }
 }

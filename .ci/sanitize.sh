@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# Checks the unsafe code. Each check is run alone by its name; without names all of them are.
+#
+#   .ci/sanitize.sh [memcheck] [address] [miri]
+#
+# memcheck  valgrind on the release program with two small cases in both precisions, 2 threads
+# address   address sanitizer on the tests of crates/simd, with all instruction sets of the machine
+# miri      tests of crates/simd with the instructions of every machine
+#
+# A check whose tool is missing is skipped with a note. The last two need a nightly toolchain.
+# The fuzz target `checkpoint` steps whole simulations under the address sanitizer.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+[ $# -gt 0 ] || set -- memcheck address miri
+host="$(rustc -vV | sed -n 's/^host: //p')"
+export CARGO_INCREMENTAL=0
+
+missing() { echo "$1: skipped, $2"; }
+
+memcheck() {
+  command -v valgrind >/dev/null || { missing memcheck "valgrind is not installed"; return; }
+  cargo build --release --quiet -p grainwake
+  local out case precision
+  out="$(mktemp -d)"
+  for case in fuzz/seeds/case/wet.toml fuzz/seeds/case/pair.toml; do
+    for precision in f64 f32; do
+      valgrind --quiet --error-exitcode=99 --leak-check=no target/release/grainwake run "$case" \
+        -o "$out/run" --force --quiet --no-report --threads 2 \
+        --set "run.precision=\"$precision\"" --set 'time.end="3 ms"'
+    done
+  done
+  rm -r "$out"
+  echo "memcheck: no error"
+}
+
+address() {
+  cargo +nightly --version >/dev/null 2>&1 || { missing address "no nightly"; return; }
+  RUSTFLAGS="-Zsanitizer=address -Cunsafe-allow-abi-mismatch=sanitizer -Cdebug-assertions=on" \
+    cargo +nightly test --release --target "$host" --target-dir target/address \
+    -p grainwake-simd --lib
+}
+
+miri() {
+  cargo +nightly miri --version >/dev/null 2>&1 || { missing miri "Miri is not installed"; return; }
+  cargo +nightly miri test --target-dir target/miri -p grainwake-simd --lib
+}
+
+for check in "$@"; do
+  case "$check" in
+    memcheck) memcheck ;;
+    address) address ;;
+    miri) miri ;;
+    *) echo "unknown check: $check" >&2; exit 2 ;;
+  esac
+done
