@@ -89,24 +89,28 @@ impl ForcingParams {
         }
     }
 
-    /// Forcing of a face at the distance `d` [m] from a surface with the unit `normal`.
-    pub fn of(&self, d: f64, normal: DVec3) -> FaceForcing {
+    /// Forcing of a face at a distance and mean distance [m] from a surface with the unit `normal`.
+    pub fn of(&self, distances: [f64; 2], normal: DVec3) -> FaceForcing {
         match self.scheme {
             Scheme::Aperture => {
                 let mut forcing = FaceForcing::default();
-                dispatch(OneFace { params: self, d, normal, forcing: &mut forcing });
+                dispatch(OneFace { params: self, distances, normal, forcing: &mut forcing });
                 forcing
             }
-            Scheme::Paper => self.blend(d, normal),
+            Scheme::Paper => self.blend(distances[0], normal),
         }
     }
 
     /// Strength of the drag as numerator and positive denominator; closed and solid fraction.
     #[inline(always)]
-    pub fn aperture_forcing<V: Vector>(&self, d: V, normal: [V; 3]) -> ([V; 2], [V; 2]) {
+    pub fn aperture_forcing<V: Vector>(
+        &self,
+        [d, mean]: [V; 2],
+        normal: [V; 3],
+    ) -> ([V; 2], [V; 2]) {
         let (spacing, eps) = (self.spacing.to_array(), self.eps);
         let [drag, depth] = drag(d, normal, spacing, eps);
-        let open = pressure_weight(d, normal, spacing, eps, [drag, depth]);
+        let open = pressure_weight(mean, normal, spacing, eps);
         let strength = V::constant(self.diffusion) * drag;
         // Zero beyond the forcing band, 2 eps from the surface: a run may span such faces between
         // two parts of a concave grain.
@@ -129,7 +133,7 @@ impl ForcingParams {
 /// Evaluates one face with the instruction set in use, in which fused products are instructions.
 struct OneFace<'a> {
     params: &'a ForcingParams,
-    d: f64,
+    distances: [f64; 2],
     normal: DVec3,
     forcing: &'a mut FaceForcing,
 }
@@ -140,7 +144,7 @@ impl Kernel for OneFace<'_> {
     fn run<V: Vector<Number = f64>>(self) {
         let normal = self.normal.to_array().map(Scalar);
         let ([strength, depth], [closed_fraction, solid_fraction]) =
-            self.params.aperture_forcing(Scalar(self.d), normal);
+            self.params.aperture_forcing(self.distances.map(Scalar), normal);
         *self.forcing = FaceForcing {
             strength: strength.0 / depth.0,
             closed_fraction: closed_fraction.0,
@@ -186,8 +190,8 @@ impl ForcedFaces {
             Scheme::Aperture => dispatch(ComputeFaceWeights { params, band, forced: self }),
             Scheme::Paper => {
                 for entry in 0..count {
-                    let (d, normal) = band.face(entry);
-                    let forcing = params.of(d, normal);
+                    let (distances, normal) = band.face(entry);
+                    let forcing = params.of(distances, normal);
                     self.weight[entry] = forcing.weight(forcing) as f32;
                     self.closed_fraction[entry] = forcing.closed_fraction as f32;
                     self.solid_fraction[entry] = forcing.solid_fraction as f32;
@@ -215,18 +219,19 @@ impl ForcedFaces {
     ) {
         let limit = 2.0 * params.eps;
         for &(entry, x) in &band.shared {
-            let (d, normal) = band.face(entry);
-            if params.scheme == Scheme::Aperture && d <= -params.eps {
+            let (distances, normal) = band.face(entry);
+            if params.scheme == Scheme::Aperture && distances[0] <= -params.eps {
                 // A face deep inside a grain takes the velocity of this grain alone.
                 continue;
             }
-            let forcing = params.of(d, normal);
+            let forcing = params.of(distances, normal);
             let mut all = forcing;
             for other in neighbours {
                 let (d, gradient) = other.distance_and_gradient(shapes, x, limit);
                 if d < limit {
                     let normal = other.pose.orientation * gradient.normalize_or_zero();
-                    all = all + params.of(d, normal);
+                    let mean = other.mean_distance(shapes, x, d);
+                    all = all + params.of([d, mean], normal);
                 }
             }
             self.weight[entry] = forcing.weight(all) as f32;
@@ -297,14 +302,15 @@ impl Kernel for ComputeFaceWeights<'_> {
     type Number = f32;
     #[inline(always)]
     fn run<V: Vector<Number = f32>>(self) {
-        let BandFaces { distance, normal, .. } = self.band;
+        let BandFaces { distance, mean_distance, normal, .. } = self.band;
         let ForcedFaces { weight, closed_fraction, solid_fraction, .. } = self.forced;
         let one = V::constant(1.0);
         let inside = V::constant(-self.params.eps);
         for at in (0..weight.len()).step_by(V::WIDTH) {
             let d = V::load(&distance[at..]);
+            let distances = [d, V::load(&mean_distance[at..])];
             let ([strength, depth], [c, solid]) =
-                self.params.aperture_forcing(d, load_all(normal, at));
+                self.params.aperture_forcing(distances, load_all(normal, at));
             // strength / (1 + strength) with a single division.
             let s = strength.div(depth + strength);
             // Faces deep inside take the rigid velocity.
@@ -325,16 +331,10 @@ pub fn drag<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
     [numerator.max(V::constant(0.0)), depth.max(least)]
 }
 
-/// Pressure weight P, 0 to 1, of faces at distances `d` [m] with unit normals `n`, which have the
-/// drag `numerator` / `depth`.
+/// Pressure weight P, 0 to 1, of faces at distances `d` [m] with unit normals `n`.
 #[inline(always)]
-pub fn pressure_weight<V: Vector>(
-    d: V,
-    n: [V; 3],
-    spacing: [f64; 3],
-    eps: f64,
-    [numerator, depth]: [V; 2],
-) -> V {
+pub fn pressure_weight<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> V {
+    let [numerator, depth] = drag(d, n, spacing, eps);
     let integral = open_depth_integral(d, eps);
     let driven = laplacian::<V, Parabola>(d, n, spacing, eps, integral);
     // M / m grows from 0.2 to 0.283 times d + eps; the bound holds where rounding is larger than M.
@@ -408,7 +408,7 @@ mod tests {
                 for d in [-0.3, -0.05, 0.0, 0.2, 0.45, 0.7, 2.0] {
                     let normal = n.to_array().map(Scalar);
                     let drag = drag(Scalar(d), normal, [h; 3], eps);
-                    let weight = pressure_weight(Scalar(d), normal, [h; 3], eps, drag).0;
+                    let weight = pressure_weight(Scalar(d), normal, [h; 3], eps).0;
                     let drag = drag[0].0 / drag[1].0;
                     let residual = laplacian(shear, d, n, h) - drag * shear(d);
                     assert!(residual.abs() < 1e-12, "shear at {d}: {residual:e}");
@@ -425,11 +425,11 @@ mod tests {
         let normal = (DVec3::new(1.0, 2.0, -2.0) / 3.0).to_array();
         let weight = |d: f64| {
             let normal = normal.map(Scalar);
-            pressure_weight(Scalar(d), normal, [h; 3], eps, drag(Scalar(d), normal, [h; 3], eps)).0
+            pressure_weight(Scalar(d), normal, [h; 3], eps).0
         };
         let single = |d: f64| {
             let (normal, d) = (normal.map(|n| Scalar(n as f32)), Scalar(d as f32));
-            pressure_weight(d, normal, [h; 3], eps, drag(d, normal, [h; 3], eps)).0
+            pressure_weight(d, normal, [h; 3], eps).0
         };
         let mut last = 0.0;
         for n in -240..=500 {

@@ -116,6 +116,11 @@ pub fn open_depth_integral<V: Vector>(d: V, eps: f64) -> V {
     inside.mul_add(V::constant(0.5 * eps * eps), outside)
 }
 
+/// Variance [m^2] of the distance under the derivative of the aperture, the kernel of the band.
+pub fn band_variance(eps: f64) -> f64 {
+    (1.0 / 3.0 - 2.0 / (PI * PI)) * eps * eps
+}
+
 /// s = d / eps, limited to [-1, 1].
 #[inline(always)]
 fn clamped<V: Vector>(d: V, eps: f64) -> V {
@@ -233,6 +238,18 @@ mod tests {
         for (d, open) in [(-eps, 0.0), (eps, 1.0), (-9.0, 0.0), (f64::INFINITY, 1.0)] {
             assert_eq!(aperture(Scalar(d), eps).0, open);
         }
+    }
+
+    #[test]
+    fn the_variance_is_that_of_the_derivative_of_the_aperture() {
+        let (eps, steps) = (0.7, 20_000);
+        let width = 2.0 * eps / f64::from(steps);
+        let aperture = |d| aperture(Scalar(d), eps).0;
+        let moments = (0..steps).map(|i| {
+            let low = -eps + f64::from(i) * width;
+            (low + 0.5 * width).powi(2) * (aperture(low + width) - aperture(low))
+        });
+        assert!((moments.sum::<f64>() - band_variance(eps)).abs() < 1e-8);
     }
 
     #[test]

@@ -26,6 +26,8 @@ pub struct DistanceScratch {
     /// the grain [m], then their unit normals in the space frame. `MAX_LANES` unused entries
     /// follow the last.
     points: [Aligned<f32>; 3],
+    /// Mean distances of the candidates [m].
+    mean_distances: Aligned<f32>,
     parts: Vec<RowPart>,
 }
 
@@ -64,6 +66,7 @@ impl Kernel for FillLists<'_> {
         for list in &mut self.scratch.points {
             list.make_room((size.x * size.y) as usize + MAX_LANES);
         }
+        self.scratch.mean_distances.make_room((size.x * size.y) as usize + MAX_LANES);
         for component in 0..3 {
             self.body.spans[component].clear();
             self.body.rows[component].clear();
@@ -136,7 +139,8 @@ impl FillLists<'_> {
         let mut points = [&mut x[..], &mut y[..], &mut z[..]];
         let distances = &mut self.body.distance[component][plane_entry..];
         let shape = self.shapes.of(self.index);
-        shape.fill_distances::<V>(&mut points, distances, count);
+        let mean_distances = &mut self.scratch.mean_distances[..];
+        shape.fill_distances::<V>(&mut points, [distances, mean_distances], count);
         let [a, b, c] = DMat3::from_quat(self.grain.pose.orientation).to_cols_array_2d();
         for at in (0..count).step_by(V::WIDTH) {
             let [x, y, z] = load_all::<V>(&points, at);
@@ -169,7 +173,7 @@ impl FillLists<'_> {
         let h = self.mesh.spacing;
         let start = corner + h * DVec3::new(0.0, f64::from(j), f64::from(k));
         let step = h.x * DVec3::X;
-        let DistanceScratch { points, parts, .. } = &mut *self.scratch;
+        let DistanceScratch { points, mean_distances, parts } = &mut *self.scratch;
         parts.clear();
         (self.body.index_map).contiguous_parts(component, [j, k], span.start..span.end, parts);
         for part in &*parts {
@@ -189,8 +193,8 @@ impl FillLists<'_> {
                 });
                 let entry = candidates.entry(forced.start);
                 let normal = points.each_ref().map(|list| &list[entry - plane_entry..]);
-                let distance = &distances[entry..];
-                self.band.extend::<V>(forced.len(), distance, normal);
+                let distances = [&distances[entry..], &mean_distances[entry - plane_entry..]];
+                self.band.extend::<V>(forced.len(), distances, normal);
             }
             if !self.neighbours.is_empty() {
                 let row = SharedRow {

@@ -105,6 +105,8 @@ pub struct BandFaces {
     count: usize,
     /// Signed distances [m].
     pub distance: Vec<f32>,
+    /// Distances averaged over the kernel of the band [m].
+    pub mean_distance: Vec<f32>,
     /// Unit normals out of the grain, space frame, by axis.
     pub normal: [Vec<f32>; 3],
     /// Faces in the bands of other grains as well: entry and position [m].
@@ -124,7 +126,7 @@ impl BandFaces {
     /// Makes room for `count` more faces.
     pub(super) fn reserve(&mut self, count: usize) {
         let needed = self.count + count + MAX_LANES;
-        for list in [&mut self.distance].into_iter().chain(&mut self.normal) {
+        for list in self.lists() {
             list.resize(list.len().max(needed), 0.0);
         }
     }
@@ -133,7 +135,7 @@ impl BandFaces {
     pub(super) fn extend<V: Vector<Number = f32>>(
         &mut self,
         count: usize,
-        distance: &[f32],
+        [distance, mean_distance]: [&[f32]; 2],
         normal: [&[f32]; 3],
     ) {
         let first = self.count;
@@ -141,15 +143,17 @@ impl BandFaces {
         let [x, y, z] = &mut self.normal;
         for n in (0..count).step_by(V::WIDTH) {
             V::load(&distance[n..]).store(&mut self.distance[first + n..]);
+            V::load(&mean_distance[n..]).store(&mut self.mean_distance[first + n..]);
             V::load(&normal[0][n..]).store(&mut x[first + n..]);
             V::load(&normal[1][n..]).store(&mut y[first + n..]);
             V::load(&normal[2][n..]).store(&mut z[first + n..]);
         }
     }
-    /// Signed distance [m] and unit normal of a face.
-    pub fn face(&self, entry: usize) -> (f64, DVec3) {
+    /// Signed distance and mean distance [m], and unit normal of a face.
+    pub fn face(&self, entry: usize) -> ([f64; 2], DVec3) {
         let normal = self.normal.each_ref().map(|list| f64::from(list[entry]));
-        (f64::from(self.distance[entry]), DVec3::from_array(normal))
+        let distances = [&self.distance, &self.mean_distance].map(|list| f64::from(list[entry]));
+        (distances, DVec3::from_array(normal))
     }
     /// Distance outside the forcing band [m].
     pub(super) fn outside(eps: f64) -> f64 {
@@ -159,11 +163,17 @@ impl BandFaces {
     /// `eps` [m]; returns that length.
     pub fn pad(&mut self, eps: f64) -> usize {
         let padded = self.count.next_multiple_of(MAX_LANES);
-        for list in [&mut self.distance].into_iter().chain(&mut self.normal) {
+        for list in self.lists() {
             list.resize(padded.max(list.len()), 0.0);
         }
-        self.distance[self.count..padded].fill(Self::outside(eps) as f32);
+        for list in [&mut self.distance, &mut self.mean_distance] {
+            list[self.count..padded].fill(Self::outside(eps) as f32);
+        }
         padded
+    }
+    /// All lists with one entry per face.
+    fn lists(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
+        [&mut self.distance, &mut self.mean_distance].into_iter().chain(&mut self.normal)
     }
 }
 

@@ -8,6 +8,7 @@ pub mod aperture;
 mod distances;
 mod lists;
 mod narrow_band;
+mod samples;
 
 pub use lists::{BandFaces, FaceRow, FaceRun, LocatedBody, PAD};
 pub use narrow_band::{NarrowBandShapes, NeighbourGrain, load_all, nearest_distance};
@@ -59,7 +60,7 @@ impl Locator {
             unknown_faces: UnknownFaces::new(mesh, boundaries),
             eps,
             reach,
-            shapes: NarrowBandShapes::new(grains, eps, reach),
+            shapes: NarrowBandShapes::new(grains, [eps, reach], spacings.len()),
             neighbours: NeighbourSearch::default(),
         }
     }

@@ -1,5 +1,10 @@
 //! Signed distance and its gradient in a narrow band around the surface of a grain or a neighbour.
 //!
+//! The mean distance is the distance averaged over the kernel of the band, which has the variance
+//! sigma^2 along each axis: d + sigma^2 / 2 times the Laplacian of d. Next to a plane it is d, next
+//! to a convex surface it is larger. With it the volume closed by the band is that of the grain
+//! (`docs/decisions/0021-curved-surfaces.md`).
+//!
 //! The sampled field of a shape ends closer to the surface than the band of the flow, and is often
 //! finer than the flow resolves. A wider and, where possible, coarser sampled field replaces it,
 //! which fits the cache and is interpolated for several points at a time, without searching.
@@ -9,12 +14,14 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 use glam::DVec3;
-use grainwake_shape::{Field, SampledField, Shape};
+use grainwake_shape::{Field, Shape};
 use rayon::prelude::*;
 
+use super::aperture::band_variance;
+use super::samples::{BandSamples, INFINITE_DISTANCE, SampleGrid, SurfaceDistance};
 use crate::dem::Grain;
 use crate::math::Pose;
-use grainwake_simd::{MAX_LANES, MAX_SINGLE_INDEX, Vector};
+use grainwake_simd::{MAX_LANES, MAX_SINGLE_INDEX, Scalar, Vector};
 
 /// Least number of samples per half-width of the band.
 const SAMPLES_PER_BAND: f64 = 5.0;
@@ -35,13 +42,17 @@ pub struct NarrowBandShape {
     shape: Arc<Shape>,
     /// `None` if the shape itself is evaluated: a closed form, or a shape that needs too many
     /// samples.
-    samples: Option<Arc<SampledField>>,
+    samples: Option<Arc<BandSamples>>,
+    /// Variance sigma^2 of the kernel of the band along an axis [m^2], half of it in two dimensions.
+    variance: f64,
 }
 
 impl NarrowBandShapes {
     /// Samples the distances up to `reach` [m] from the surfaces; `eps` [m] is the half-width of
-    /// the band.
-    pub fn new(grains: &[Grain], eps: f64, reach: f64) -> NarrowBandShapes {
+    /// the band, `dimensions` those of the flow.
+    pub fn new(grains: &[Grain], [eps, reach]: [f64; 2], dimensions: usize) -> NarrowBandShapes {
+        // A sphere in two dimensions is a disc, which has half the curvature.
+        let variance = band_variance(eps) * 0.5 * (dimensions as f64 - 1.0).max(0.0);
         let mut indices: HashMap<*const Shape, usize> = HashMap::new();
         let mut distinct = Vec::new();
         for grain in grains {
@@ -51,7 +62,7 @@ impl NarrowBandShapes {
             });
         }
         let sampled: Vec<NarrowBandShape> = (distinct.into_par_iter())
-            .map(|shape| NarrowBandShape::new(shape, eps, reach))
+            .map(|shape| NarrowBandShape::new(shape, eps, reach, variance))
             .collect();
         let of = |grain: &Grain| sampled[indices[&Arc::as_ptr(&grain.shape)]].clone();
         NarrowBandShapes { shapes: grains.iter().map(of).collect() }
@@ -68,13 +79,13 @@ impl NarrowBandShapes {
         let mut samples: Vec<_> = samples.collect();
         samples.sort_by_key(|samples| Arc::as_ptr(samples));
         samples.dedup_by_key(|samples| Arc::as_ptr(samples));
-        let levels = samples.iter().map(|samples| samples.levels().len());
+        let levels = samples.iter().map(|samples| 2 * samples.mean_excess.len());
         size_of::<f32>() * levels.sum::<usize>()
     }
 }
 
 impl NarrowBandShape {
-    fn new(shape: &Arc<Shape>, eps: f64, reach: f64) -> NarrowBandShape {
+    fn new(shape: &Arc<Shape>, eps: f64, reach: f64, variance: f64) -> NarrowBandShape {
         let samples = match shape.field() {
             Field::Sampled(_) => {
                 let thickness = (shape.upper() - shape.lower()).min_element();
@@ -87,11 +98,11 @@ impl NarrowBandShape {
                     let field = shape.distances(spacing, reach + spacing).ok()?;
                     (field.levels().len() <= MAX_SINGLE_INDEX).then_some(field)
                 });
-                field.map(Arc::new)
+                field.map(|field| Arc::new(BandSamples::new(field, variance)))
             }
             _ => None,
         };
-        NarrowBandShape { shape: shape.clone(), samples }
+        NarrowBandShape { shape: shape.clone(), samples, variance }
     }
 
     /// Signed distance [m] and its gradient at `x`, both in the frame of the grain. The distance
@@ -101,66 +112,102 @@ impl NarrowBandShape {
         let Some(samples) = &self.samples else {
             return self.shape.distance_and_gradient(x);
         };
-        let on_grid = samples.distance_and_gradient_on_grid(x);
+        let on_grid = samples.distances.distance_and_gradient_on_grid(x);
         on_grid.unwrap_or((f64::INFINITY, DVec3::ZERO))
     }
 
-    /// Fills the distances [m] at the first `count` of `points` [m], in single precision, and
-    /// replaces the points by the gradients; both in the frame of the grain. Infinite distances are
-    /// at least [`INFINITE_DISTANCE`] here. The lists must be `MAX_LANES` entries longer than
-    /// `count`; these are overwritten.
+    /// Mean distance [m] at `x`, in the frame of the grain, where the distance is `d` [m].
+    #[inline(always)]
+    pub fn mean_distance(&self, x: DVec3, d: f64) -> f64 {
+        if let Field::Sphere(_) = self.shape.field() {
+            return d + self.variance / x.length().max(self.variance.sqrt());
+        }
+        match &self.samples {
+            Some(samples) => {
+                let x = x.to_array().map(|x| Scalar(x as f32));
+                let at = SampleGrid::new(samples).surface_distance(x);
+                d + f64::from(at.mean_distance.0 - at.distance.0)
+            }
+            None => {
+                let step = (3.0 * self.variance).sqrt();
+                let around = DVec3::AXES.map(|axis| {
+                    self.shape.distance(x + step * axis) + self.shape.distance(x - step * axis)
+                });
+                around.iter().sum::<f64>() / 6.0
+            }
+        }
+    }
+
+    /// Fills the distances and mean distances [m] at the first `count` of `points` [m], in single
+    /// precision, and replaces the points by the gradients; all in the frame of the grain. Infinite
+    /// distances are at least [`INFINITE_DISTANCE`] here. The lists must be `MAX_LANES` entries
+    /// longer than `count`; these are overwritten.
     #[inline(always)]
     pub fn fill_distances<V: Vector<Number = f32>>(
         &self,
         points: &mut [&mut [f32]; 3],
-        distances: &mut [f32],
+        [distances, mean_distances]: [&mut [f32]; 2],
         count: usize,
     ) {
         if let Some(samples) = &self.samples {
             let grid = SampleGrid::<V>::new(samples);
             for at in (0..count).step_by(V::WIDTH) {
-                let (distance, gradient) = grid.distance_and_gradient(load_all(points, at));
-                distance.store(&mut distances[at..]);
-                store_all(gradient, points, at);
+                let surface = grid.surface_distance(load_all(points, at));
+                surface.distance.store(&mut distances[at..]);
+                surface.mean_distance.store(&mut mean_distances[at..]);
+                store_all(surface.gradient, points, at);
             }
             return;
         }
         for at in (0..count).step_by(V::WIDTH) {
             let x: [V; 3] = load_all(points, at);
-            let (distance, gradient) = match self.shape.field() {
-                Field::Sphere(radius) => sphere_distance(*radius, x),
+            let surface = match self.shape.field() {
+                Field::Sphere(radius) => sphere_distance(*radius, self.variance, x),
                 _ => self.lane_by_lane(x),
             };
-            distance.store(&mut distances[at..]);
-            store_all(gradient, points, at);
+            surface.distance.store(&mut distances[at..]);
+            surface.mean_distance.store(&mut mean_distances[at..]);
+            store_all(surface.gradient, points, at);
         }
     }
 
     /// Evaluates the shape at the points `x`, lane by lane.
     #[cold]
-    fn lane_by_lane<V: Vector<Number = f32>>(&self, x: [V; 3]) -> (V, [V; 3]) {
+    fn lane_by_lane<V: Vector<Number = f32>>(&self, x: [V; 3]) -> SurfaceDistance<V> {
         let mut points = [[0.0; MAX_LANES]; 3];
         x.iter().zip(&mut points).for_each(|(x, lanes)| x.store(lanes));
-        let mut distances = [0.0; MAX_LANES];
+        let [mut distances, mut mean_distances] = [[0.0; MAX_LANES]; 2];
         for n in 0..V::WIDTH {
             let x = DVec3::from_array(points.map(|lanes| f64::from(lanes[n])));
             let (d, gradient) = self.distance_and_gradient(x);
             distances[n] = d.min(INFINITE_DISTANCE) as f32;
+            mean_distances[n] = self.mean_distance(x, d).min(INFINITE_DISTANCE) as f32;
             for axis in 0..3 {
                 points[axis][n] = gradient[axis] as f32;
             }
         }
-        (V::load(&distances), points.map(|lanes| V::load(&lanes)))
+        SurfaceDistance {
+            distance: V::load(&distances),
+            mean_distance: V::load(&mean_distances),
+            gradient: points.map(|lanes| V::load(&lanes)),
+        }
     }
 }
 
-/// Distance from a sphere around the origin, and its gradient.
+/// Distance from a sphere around the origin, mean distance and gradient; `variance` [m^2] is that
+/// of the kernel.
 #[inline(always)]
-fn sphere_distance<V: Vector>(radius: f64, [x, y, z]: [V; 3]) -> (V, [V; 3]) {
+fn sphere_distance<V: Vector>(radius: f64, variance: f64, [x, y, z]: [V; 3]) -> SurfaceDistance<V> {
     let length = (x * x + y * y + z * z).sqrt();
     let divisor = length.max(V::constant(1.0 / INFINITE_DISTANCE));
-    let normal = [x.div(divisor), y.div(divisor), z.div(divisor)];
-    (length - V::constant(radius), normal)
+    let distance = length - V::constant(radius);
+    // The Laplacian of the distance is 2 / r; near the centre the kernel spans the sphere.
+    let excess = V::constant(variance).div(length.max(V::constant(variance.sqrt())));
+    SurfaceDistance {
+        distance,
+        mean_distance: distance + excess,
+        gradient: [x.div(divisor), y.div(divisor), z.div(divisor)],
+    }
 }
 
 /// A neighbouring grain, or a periodic image of the grain itself.
@@ -196,6 +243,11 @@ impl NeighbourGrain {
         let shape = shapes.of(self.grain);
         shape.distance_and_gradient(self.pose.to_body(x))
     }
+
+    /// Mean distance [m] from `x` to the surface of the neighbour, where the distance is `d` [m].
+    pub fn mean_distance(&self, shapes: &NarrowBandShapes, x: DVec3, d: f64) -> f64 {
+        shapes.of(self.grain).mean_distance(self.pose.to_body(x - self.shift), d)
+    }
 }
 
 /// Smallest distance from `x` to a neighbour, tie breaker included [m]; infinite beyond `limit`
@@ -212,9 +264,6 @@ pub fn nearest_distance(
     distances.fold(f64::INFINITY, f64::min)
 }
 
-/// Distance that stands for infinity in single precision [m].
-pub const INFINITE_DISTANCE: f64 = 1e30;
-
 /// Loads a vector from each list. Kernels use no closures on vectors, which would not be inlined.
 #[inline(always)]
 pub fn load_all<V: Vector>([x, y, z]: &[impl Deref<Target = [V::Number]>; 3], at: usize) -> [V; 3] {
@@ -229,92 +278,12 @@ pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [&mut [V::Number]; 3
     values[2].store(&mut z[at..]);
 }
 
-/// A sampled distance field with its constants in vector registers.
-pub struct SampleGrid<'a, V> {
-    lower: [V; 3],
-    inverse: V,
-    /// Index of the last sample along each axis.
-    last: [V; 3],
-    /// Samples from one row and one plane to the next.
-    strides: [V; 2],
-    /// Distance per level [m].
-    quantum: V,
-    /// Gradient per level and spacing.
-    slope: V,
-    levels: &'a [f32],
-}
-
-impl<'a, V: Vector> SampleGrid<'a, V> {
-    #[inline(always)]
-    pub fn new(field: &'a SampledField) -> SampleGrid<'a, V> {
-        let (dims, inverse) = (field.dims(), 1.0 / field.spacing());
-        let mut lower = [V::constant(0.0); 3];
-        let mut last = lower;
-        for axis in 0..3 {
-            lower[axis] = V::constant(field.lower()[axis]);
-            last[axis] = V::constant(dims[axis] as f64 - 1.0);
-        }
-        let (row, plane) = (dims[0], dims[0] * dims[1]);
-        SampleGrid {
-            lower,
-            inverse: V::constant(inverse),
-            last,
-            strides: [V::constant(row as f64), V::constant(plane as f64)],
-            quantum: V::constant(field.quantum()),
-            slope: V::constant(field.quantum() * inverse),
-            levels: field.levels(),
-        }
-    }
-
-    /// Interpolates signed distance [m] and gradient at `x`, in the frame of the grain. Off the
-    /// grid the distance is [`INFINITE_DISTANCE`].
-    #[inline(always)]
-    pub fn distance_and_gradient(&self, x: [V; 3]) -> (V, [V; 3]) {
-        let (zero, one) = (V::constant(0.0), V::constant(1.0));
-        let mut cell = [zero; 3];
-        let mut fraction = [zero; 3];
-        let mut off_grid = zero;
-        for axis in 0..3 {
-            let s = (x[axis] - self.lower[axis]) * self.inverse;
-            let nearest = s.max(zero).min(self.last[axis]);
-            off_grid = off_grid + (s - nearest).abs();
-            cell[axis] = nearest.floor().min(self.last[axis] - one);
-            fraction[axis] = nearest - cell[axis];
-        }
-        let [row, plane] = self.strides;
-        let [fx, fy, fz] = fraction;
-        // Value and slope on the four edges along x.
-        let (at, levels) = (cell[0] + row * cell[1] + plane * cell[2], self.levels);
-        let [a, s] = edge(levels, at, fx);
-        let [b, t] = edge(levels, at + row, fx);
-        let [c, u] = edge(levels, at + plane, fx);
-        let [d, v] = edge(levels, at + plane + row, fx);
-        let (low, high) = (a + fy * (b - a), c + fy * (d - c));
-        let (slope_low, slope_high) = (s + fy * (t - s), u + fy * (v - u));
-        let gradient = [
-            self.slope * (slope_low + fz * (slope_high - slope_low)),
-            self.slope * ((b - a) + fz * ((d - c) - (b - a))),
-            self.slope * (high - low),
-        ];
-        let distance = self.quantum * (low + fz * (high - low));
-        (zero.select_below(off_grid, V::constant(INFINITE_DISTANCE), distance), gradient)
-    }
-}
-
-/// Value at the fraction `x` of the edge from sample `at` to the next along x, and their
-/// difference.
-#[inline(always)]
-fn edge<V: Vector>(levels: &[f32], at: V, x: V) -> [V; 2] {
-    let [low, high] = V::gather_pairs(levels, at);
-    let slope = high - low;
-    [low + x * slope, slope]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::immersed::geometry::aperture::reference;
     use grainwake_shape::{ShapeOptions, analytic};
-    use grainwake_simd::{Kernel, Registers, Scalar, dispatch};
+    use grainwake_simd::{Kernel, Registers, dispatch};
 
     /// Ellipsoid with the half-axes 1, 0.8 and 0.7.
     fn ellipsoid() -> Arc<Shape> {
@@ -340,7 +309,7 @@ mod tests {
                 unreachable!("the shapes are sampled")
             };
             let reach = 2.5 * eps;
-            let band = NarrowBandShape::new(&shape, eps, reach);
+            let band = NarrowBandShape::new(&shape, eps, reach, band_variance(eps));
             let (mut beyond, mut errors) = (0, Vec::new());
             for i in 0..20_000 {
                 let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(i);
@@ -385,9 +354,11 @@ mod tests {
                     let x = 2.0 * (2.0 * u.fract() - DVec3::ONE);
                     (0..3).for_each(|axis| points[axis][n] = x[axis] as f32);
                 }
-                let (mut slopes, mut distance) = (points.clone(), [0.0_f32; 2 * MAX_LANES]);
+                let mut slopes = points.clone();
+                let [mut distance, mut mean] = [[0.0_f32; 2 * MAX_LANES]; 2];
                 let mut lists = slopes.each_mut().map(|list| &mut list[..]);
-                (self.0).fill_distances::<V>(&mut lists, &mut distance, MAX_LANES);
+                let distances: [&mut [f32]; 2] = [&mut distance, &mut mean];
+                (self.0).fill_distances::<V>(&mut lists, distances, MAX_LANES);
                 for n in 0..MAX_LANES {
                     let of = |lists: &[Vec<f32>; 3]| {
                         DVec3::from_array(lists.each_ref().map(|list| f64::from(list[n])))
@@ -400,6 +371,8 @@ mod tests {
                         continue;
                     }
                     assert!((found - d).abs() < 1e-6, "{found} for {d} at {x}");
+                    let (found, exact) = (f64::from(mean[n]), self.0.mean_distance(x, d));
+                    assert!((found - exact).abs() < 1e-6, "mean {found} for {exact} at {x}");
                     // Gradients jump from one cell of the samples to the next.
                     let step = DVec3::splat(1e-6);
                     let sides = [x - step, x + step].map(|x| self.0.distance_and_gradient(x).1);
@@ -417,10 +390,42 @@ mod tests {
     fn lanes_match_scalar_evaluation() {
         let sphere = Arc::new(Shape::sphere(0.8, 100));
         for (shape, eps) in [(ellipsoid(), 0.25), (ellipsoid(), 0.05), (sphere, 0.25)] {
-            let band = NarrowBandShape::new(&shape, eps, 2.5 * eps);
+            let band = NarrowBandShape::new(&shape, eps, 2.5 * eps, band_variance(eps));
             dispatch(CompareLanes(&band));
             CompareLanes(&band).run::<<f32 as Registers>::Baseline>();
             CompareLanes(&band).run::<Scalar<f32>>();
+        }
+    }
+
+    #[test]
+    fn the_mean_distance_closes_the_volume_of_the_grain() {
+        let sphere = Arc::new(Shape::sphere(0.8, 100));
+        let edges = analytic::rounded_box(0.7, 0.6, 0.5, 0.02, &ShapeOptions::default());
+        // Excess of the volume with the mean distance and, at least, with the distance itself.
+        for (shape, most, without) in [
+            (sphere, 0.003, 0.03),
+            (ellipsoid(), 0.003, 0.03),
+            (Arc::new(edges.unwrap()), 0.01, 0.03),
+        ] {
+            let eps = 0.25;
+            let band = NarrowBandShape::new(&shape, eps, 2.5 * eps, band_variance(eps));
+            let (step, count) = (0.031, 90);
+            let [mut with_mean, mut with_distance] = [0.0; 2];
+            for n in 0..count * count * count {
+                let index = [n % count, n / count % count, n / (count * count)];
+                let x = step * DVec3::from_array(index.map(|i| i as f64 - 44.3));
+                let d = band.distance_and_gradient(x).0;
+                if d < 2.0 * eps {
+                    let mean = band.mean_distance(x, d);
+                    with_mean += step.powi(3) * (1.0 - reference::aperture(mean, eps));
+                    with_distance += step.powi(3) * (1.0 - reference::aperture(d, eps));
+                }
+            }
+            let excess = |volume: f64| volume / shape.volume() - 1.0;
+            let [found, plain] = [with_mean, with_distance].map(excess);
+            println!("mean distance {found:.5}, distance {plain:.5}");
+            assert!(found.abs() < most, "{found}");
+            assert!(plain > without, "{plain}");
         }
     }
 }

@@ -27,27 +27,29 @@ pub struct Weights {
 }
 
 impl Reference {
-    /// Drag coefficient times dt, closed and solid fraction, of a face at the distance `d` [m] from
-    /// a surface with the normal `n`.
+    /// Drag coefficient times dt, closed and solid fraction, of a face at the distance `d` and the
+    /// mean distance `mean` [m] from a surface with the normal `n`.
     ///
     /// With the discrete Laplacian L of a function of the distance, drag = nu L m / m, and the
-    /// closed fraction is 1 - (L M - M L m / m) in the aperture scheme. In the paper's scheme
-    /// drag / (1 + drag) is the solid fraction of a cell cut by a plane.
-    fn drag(&self, d: f64, n: DVec3) -> [f64; 3] {
+    /// closed fraction is 1 - (L M - M L m / m) at the mean distance in the aperture scheme. In the
+    /// paper's scheme drag / (1 + drag) is the solid fraction of a cell cut by a plane.
+    fn drag(&self, d: f64, mean: f64, n: DVec3) -> [f64; 3] {
         let (eps, h) = (self.eps, self.mesh.spacing);
         if self.scheme == Scheme::Paper {
             let solid_fraction = (0.5 - d / n.abs().dot(h)).clamp(0.0, 1.0);
             return [solid_fraction / (1.0 - solid_fraction), 0.0, 0.0];
         }
-        let laplacian = |f: fn(f64, f64) -> f64| -> f64 {
+        let laplacian = |f: fn(f64, f64) -> f64, d: f64| -> f64 {
             let second = |a: usize| {
                 let step = h[a] * n[a];
                 (f(d + step, eps) + f(d - step, eps) - 2.0 * f(d, eps)) / h[a].powi(2)
             };
             (0..3).map(second).sum()
         };
-        let drag = laplacian(open_depth).max(0.0) / open_depth(d, eps);
-        let open = laplacian(open_depth_integral) - drag * open_depth_integral(d, eps);
+        let drag = |d| laplacian(open_depth, d).max(0.0) / open_depth(d, eps);
+        let open =
+            laplacian(open_depth_integral, mean) - drag(mean) * open_depth_integral(mean, eps);
+        let drag = drag(d);
         let closed_fraction = 1.0 - open.clamp(0.0, 1.0);
         [self.kinematic_viscosity * self.dt * drag, closed_fraction, 1.0 - aperture(d, eps)]
     }
@@ -66,7 +68,7 @@ impl Reference {
             }
             if image.distance < 2.0 * eps {
                 let [drag, closed_fraction, solid_fraction] =
-                    self.drag(image.distance, image.normal);
+                    self.drag(image.distance, image.mean_distance, image.normal);
                 all_drag += drag;
                 total_closed_fraction += closed_fraction;
                 total_solid_fraction += solid_fraction;

@@ -3,11 +3,14 @@
 use glam::{DVec3, IVec3};
 
 use super::Reference;
+use crate::immersed::geometry::aperture::band_variance;
 
 /// Nearest periodic image of a grain, seen from a point.
 pub struct NearestImage {
     /// Signed distance d to the surface [m].
     pub distance: f64,
+    /// Distance averaged over the kernel of the band [m]: d + sigma^2 / 2 times the Laplacian of d.
+    pub mean_distance: f64,
     /// Unit normal n out of the grain, space frame.
     pub normal: DVec3,
     /// Vector from the centroid of the image to the point [m].
@@ -24,8 +27,17 @@ impl Reference {
             let in_body = grain.pose.orientation.inverse() * lever_arm;
             let (distance, gradient) = grain.shape.distance_and_gradient(in_body);
             if nearest.as_ref().is_none_or(|n| distance < n.distance) {
+                let variance = band_variance(self.eps);
+                let step = 1e-3 * self.eps;
+                let second = |e: DVec3| {
+                    let sides = [in_body + step * e, in_body - step * e];
+                    let sides = sides.map(|x| grain.shape.distance(x) - distance);
+                    (sides[0] + sides[1]) / (step * step)
+                };
+                let laplacian: f64 = DVec3::AXES.map(second).iter().sum();
                 nearest = Some(NearestImage {
                     distance,
+                    mean_distance: distance + 0.5 * variance * laplacian,
                     normal: grain.pose.orientation * gradient.normalize(),
                     lever_arm,
                 });
