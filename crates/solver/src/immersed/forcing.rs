@@ -10,7 +10,8 @@
 //! With this drag and weight two velocity profiles over a plane wall solve the discrete equations
 //! exactly, so that the wall acts at d = 0 wherever the grid lies: the linear shear m(d), and the
 //! parabola M(d) under a uniform pressure gradient or in an accelerated frame
-//! (`docs/decisions/0018-pressure-weight.md`).
+//! (`docs/decisions/0018-pressure-weight.md`). Next to a curved surface P is taken at the mean
+//! distance, which closes the volume of the grain (`docs/decisions/0021-curved-surfaces.md`).
 //!
 //! The strength of the drag is S = nu dt D, and s = S / (1 + S) is the weight of the rigid
 //! velocity.
