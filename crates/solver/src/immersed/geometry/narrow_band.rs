@@ -43,7 +43,8 @@ pub struct NarrowBandShape {
     /// `None` if the shape itself is evaluated: a closed form, or a shape that needs too many
     /// samples.
     samples: Option<Arc<BandSamples>>,
-    /// Variance sigma^2 of the kernel of the band along an axis [m^2], half of it in two dimensions.
+    /// Variance sigma^2 of the kernel of the band along an axis [m^2]; half of it in two
+    /// dimensions.
     variance: f64,
 }
 
