@@ -762,7 +762,7 @@ fn a_grain_that_meets_its_own_images_is_one_grain() {
 /// Plane flow past a rod along an axis of one cell, which is as long as the box is wide.
 #[test]
 fn a_sampled_grain_in_a_flat_box_is_held_and_takes_little_memory() {
-    let rod = grainwake_shape::analytic::capsule(0.1, 1.6, &Default::default()).unwrap();
+    let rod = grainwake_shape::analytic::capsule(0.1, 0.4, &Default::default()).unwrap();
     let mut grain = sphere(1.0, DVec3::new(0.5, 0.5, 0.5), 1.0);
     grain.shape = Arc::new(rod);
     (grain.translation, grain.rotation) = (HELD, HELD);
