@@ -1,13 +1,14 @@
 //! `grainwake study`.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use comfy_table::{CellAlignment, Table, presets};
 use grainwake_run::FailureKind;
 use grainwake_study::{
-    Analysis, Options, Outcome, Plan, Run, RunRecord, RunState, Selection, StudyError, execute,
-    records, run_state, write_tables,
+    Analysis, Archive, Options, Outcome, Plan, Run, RunRecord, RunState, Selection, StudyError,
+    execute, expected_cost, records, run_state, write_tables,
 };
 
 use crate::args::StudyArgs;
@@ -59,15 +60,16 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let each = if args.threads > 0 { args.threads } else { (all / jobs).max(1) };
     if args.list || args.dry_run {
         plan.check_folder(&folder)?;
+        let archive = Archive::read(&folder);
         let states: Vec<(usize, RunState)> =
-            chosen.iter().map(|i| (*i, run_state(&runs[*i], &folder))).collect();
+            chosen.iter().map(|i| (*i, run_state(&runs[*i], &folder, &archive))).collect();
         if args.json {
             return print(&serde_json::to_string_pretty(&listed(runs, &states))?);
         }
         if args.list {
             return print(&list(runs, &states));
         }
-        return print(&dry_run(args, runs, &states, jobs, each));
+        return print(&dry_run(args, &plan, &folder, &states, jobs, each));
     }
     if let Some(note) = plan.damage_in(&folder) {
         tell!("note: {note}");
@@ -170,41 +172,58 @@ fn listed(runs: &[Run], states: &[(usize, RunState)]) -> serde_json::Value {
     states.iter().map(entry).collect()
 }
 
-/// Returns the action on each run, and an upper estimate of the cost.
+/// Returns the action on each run, and the expected cost of all.
 fn dry_run(
     args: &StudyArgs,
-    runs: &[Run],
+    plan: &Plan,
+    folder: &Path,
     states: &[(usize, RunState)],
     jobs: usize,
     threads: usize,
 ) -> String {
     let mut lines = Vec::new();
-    let (mut wall, mut to_do) = (0.0, 0);
+    let mut to_do: Vec<&Run> = Vec::new();
     for (i, state) in states {
+        let run = &plan.runs[*i];
         let doing = match state {
             RunState::Missing => "run".to_owned(),
             RunState::Unfinished => "resume".to_owned(),
             RunState::Finished => continue,
             RunState::Failed(why) if args.retry => format!("restart, failed before: {why}"),
             RunState::Failed(why) => {
-                lines.push(format!("{}: skip, failed: {why}", runs[*i].name));
+                lines.push(format!("{}: skip, failed: {why}", run.name));
                 continue;
             }
             RunState::Stale(why) => format!("restart: {why}"),
         };
-        wall += runs[*i].wall_s;
-        to_do += 1;
-        lines.push(format!("{}: {doing}", runs[*i].name));
+        lines.push(format!("{}: {doing}", run.name));
+        to_do.push(run);
     }
-    let largest = states.iter().map(|(i, _)| runs[*i].memory_bytes).max().unwrap_or(0);
+    let cost = expected_cost(&to_do, plan, &records(plan, folder), folder);
+    let time = clock(cost.wall_s / (jobs * threads) as f64);
+    let (most, reason) = match cost.basis {
+        0 => {
+            ("at most", "runs that stop early take less; finished runs improve the estimate".into())
+        }
+        n => ("about", format!("from {}", count(n, "finished run"))),
+    };
+    let disk = cost
+        .disk_bytes
+        .map_or(String::new(), |bytes| format!(", {} of disk space", megabytes(bytes)));
+    let largest = to_do.iter().map(|run| run.memory_bytes).max().unwrap_or(0);
     lines.push(format!(
-        "{to_do} of {} to do; at most {} with {jobs} at once, {} each (an estimate; runs that stop early take less), {:.1} GB of memory",
+        "{} of {} to do: {most} {time} with {jobs} at once, {} each ({reason}); {} of memory{disk}",
+        to_do.len(),
         states.len(),
-        clock(wall / (jobs * threads) as f64),
         count(threads, "thread"),
-        jobs as f64 * largest as f64 / 1e9
+        megabytes(jobs as f64 * largest as f64),
     ));
     lines.join("\n")
+}
+
+/// Returns a size in megabytes or gigabytes.
+fn megabytes(bytes: f64) -> String {
+    if bytes < 1e9 { format!("{:.0} MB", bytes / 1e6) } else { format!("{:.1} GB", bytes / 1e9) }
 }
 
 /// Returns the table of the terminal.

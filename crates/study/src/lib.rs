@@ -24,6 +24,7 @@ pub mod run;
 
 pub use analysis::{correlation, kissing, observation, statistics, survival, verdict};
 pub use error::StudyError;
+pub use measure::cost::{Cost, expected_cost};
 pub use measure::pair::{PairHistory, PairMeasures};
 pub use measure::record::{RunRecord, records};
 pub use measure::settling::{GrainSettling, SettlingMeasures};
@@ -37,5 +38,5 @@ pub use plan::expand::{Model, Setting};
 pub use plan::file::{Ensemble, Study};
 pub use plan::selection::Selection;
 pub use plan::{MANIFEST, Plan, RUNS, Run};
-pub use run::state::{RunState, StateKind, run_state};
+pub use run::state::{Archive, RunState, StateKind, run_state};
 pub use run::{Options, Outcome, StudyObserver, execute};

@@ -261,3 +261,58 @@ fn claims_about_unconverged_quantities_are_never_contradicted() {
     let other = verdict(&paper, &(claim + &resolution("contact_stage")));
     assert_eq!(other.0, "contradicted");
 }
+
+/// Verdicts on the claims of an analysis file.
+fn verdicts(rows: &[RunRecord], text: &str) -> Vec<(String, String)> {
+    let analysis = Analysis::parse("analysis.toml", text, &models(rows)).unwrap();
+    let found = evaluate(&analysis, rows).into_iter();
+    found.map(|finding| (finding.verdict.to_string(), finding.says)).collect()
+}
+
+#[test]
+fn a_false_discovery_rate_adjusts_for_the_number_of_claims() {
+    // One weak trend among claims about noise.
+    let effect = |s: f64, o: usize| if o == 1 { 3.2 * s } else { 0.0 };
+    let weak = rows(|s, r, o| kiss(20.0 + effect(s, o) + noise(s, r, o)));
+    let claim = |with: &str, o: usize| {
+        format!("[[claim]]\nsays = \"a\"\n{}\n", trend(with, "rises", &format!("o{o}")))
+    };
+    let many: String = (1..=4).map(|o| claim("sphericity", o) + &claim("roundness", o)).collect();
+    let alone = verdicts(&weak, &many);
+    let adjusted = verdicts(&weak, &(many.clone() + "[verdicts]\nfalse_discovery_rate = 0.05\n"));
+    let held = |all: &[(String, String)]| all.iter().filter(|(v, _)| v == "holds").count();
+    assert!(held(&alone) > held(&adjusted), "{alone:#?} {adjusted:#?}");
+    assert!(adjusted.iter().all(|(_, says)| says.contains("; adjusted p ")));
+    assert!(alone.iter().all(|(_, says)| !says.contains("adjusted")));
+}
+
+#[test]
+fn an_effect_that_does_not_matter_contradicts_a_direction() {
+    // 0.1 longer in orientation 1, where 1.6 matters.
+    let small = rows(|s, r, o| kiss(if o == 1 { 16.1 } else { 16.0 } + 0.01 * noise(s, r, o)));
+    let claim = format!("[[claim]]\nsays = \"a\"\n{ORDER}\n");
+    assert_eq!(verdicts(&small, &claim)[0].0, "holds");
+    let opposite = claim.replace("more = \"o1\", less = \"o3\"", "more = \"o2\", less = \"o4\"");
+    assert_eq!(verdicts(&small, &opposite)[0].0, "open");
+    let rule = "[verdicts]\nnegligible = { kiss_time = 1.6, rank_correlation = 0.9 }\n";
+    assert_eq!(verdicts(&small, &(opposite + rule))[0].0, "contradicted");
+    // No trend is shown only by an interval of negligible correlations.
+    let none = format!("[[claim]]\nsays = \"a\"\n{}\n", trend("roundness", "none", "o2"));
+    assert_eq!(verdicts(&small, &none)[0].0, "open");
+    assert_eq!(verdicts(&small, &(none + rule))[0].0, "holds");
+}
+
+#[test]
+fn wrong_rules_of_verdicts_are_refused() {
+    let paper = rows(as_in_the_paper);
+    let problem =
+        |text: &str| Analysis::parse("analysis.toml", text, &models(&paper)).unwrap_err().remove(0);
+    let p = problem("[verdicts]\nfalse_discovery_rate = 5\n");
+    assert!(p.to_string().contains("between 0 and 1"), "{p}");
+    let p = problem("[verdicts]\nnegligible = { kiss_time = -1 }\n");
+    assert!(p.to_string().contains("positive number"), "{p}");
+    let p = problem("[verdicts]\nnegligible = { kis_time = 1 }\n");
+    assert!(p.to_string().contains("no effect \"kis_time\""), "{p}");
+    let p = problem("where = { orientation = \"o9\" }\n");
+    assert!(p.to_string().contains("\"o9\""), "{p}");
+}

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use grainwake_study::{Kissing, Plan, RUNS, Run, Study, StudyReportFiles, render};
+use grainwake_study::{Condition, Kissing, Plan, RUNS, Run, Study, StudyReportFiles, render};
 
 /// Plan of the 65 models of the repository, with the hashes of the synthetic run folders.
 fn synthetic_plan() -> Plan {
@@ -152,6 +152,7 @@ fn a_complete_study_has_all_figures() {
         "fig17-velocity-by-row",
         "fig18-velocity-by-column",
         "correlations",
+        "claims",
     ];
     assert_eq!(names(&rendered), expected);
     assert_eq!(rendered.runs, (65, 65));
@@ -312,4 +313,29 @@ fn the_page_tells_who_kisses_and_does_not_name_every_missing_run() {
     let difference = &analysis["kissing"]["differences"][0];
     assert!(difference["time_shift"].as_f64().unwrap() > 0.0, "orientation 1 is later");
     assert!(difference["log_rank_p"].as_f64().unwrap() < 1e-3);
+}
+
+#[test]
+fn claims_and_figures_can_be_restricted_to_some_runs() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = study(root.path(), |_| true);
+    let all = render(&folder).unwrap();
+    assert!(names(&all).contains(&"claims".to_owned()));
+    let path = folder.join("study.json");
+    let mut plan: Plan = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    plan.title = "Only spherical grains".into();
+    let spherical = Condition::Range { at_least: Some(0.7), at_most: None };
+    plan.analysis.when.insert("sphericity".into(), spherical);
+    std::fs::write(&path, serde_json::to_string(&plan).unwrap()).unwrap();
+    let some = render(&folder).unwrap();
+    assert_eq!(some.runs, all.runs, "the table has all runs");
+    let text = std::fs::read_to_string(folder.join("analysis.json")).unwrap();
+    let analysis: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let counts = |key: &str| -> Vec<u64> {
+        analysis[key].as_array().unwrap().iter().filter_map(|c| c["n"].as_u64()).collect()
+    };
+    assert!(counts("correlations").iter().all(|n| *n == 8), "{:?}", counts("correlations"));
+    assert!(counts("claims").iter().all(|n| *n <= 9), "{:?}", counts("claims"));
+    let svg = std::fs::read_to_string(folder.join("figures/claims.svg")).unwrap();
+    assert!(svg.contains("rank correlation") && !svg.contains("NaN"));
 }

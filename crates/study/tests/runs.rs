@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use common::{STUDY, folder, plan};
 use grainwake_run::{FailureKind, Progress};
 use grainwake_study::{
-    Options, Outcome, Plan, RunState, StateKind, Study, StudyObserver, execute, records, run_state,
-    to_csv, write_tables,
+    Archive, Options, Outcome, Plan, RunState, StateKind, Study, StudyObserver, execute, records,
+    run_state, to_csv, write_tables,
 };
 
 struct Quiet;
@@ -44,7 +44,8 @@ fn run(plan: &Plan, study: &Path, watcher: &dyn StudyObserver, options: &Options
 }
 
 fn states(plan: &Plan, study: &Path) -> Vec<RunState> {
-    plan.runs.iter().map(|r| run_state(r, study)).collect()
+    let archive = Archive::read(study);
+    plan.runs.iter().map(|r| run_state(r, study, &archive)).collect()
 }
 
 fn results(plan: &Plan, study: &Path) -> Vec<Vec<u8>> {
@@ -231,6 +232,35 @@ fn the_table_has_every_run_and_survives_removal_of_the_run_folders() {
     assert_eq!(to_csv(&rows).lines().count(), 6);
     std::fs::remove_dir_all(study.join("runs")).unwrap();
     assert_eq!(records(&plan, &study), rows, "the table is kept");
+}
+
+#[test]
+fn a_study_continues_from_its_archive() {
+    let (folder, path) = folder(STUDY);
+    let first = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    first.create_folder(&study).unwrap();
+    execute(&first.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
+    write_tables(&records(&first, &study), &study).unwrap();
+    // Only the table goes to another machine.
+    let archive = folder.path().join("archive");
+    std::fs::create_dir(&archive).unwrap();
+    std::fs::copy(study.join("table.json"), archive.join("table.json")).unwrap();
+    let ended = run(&first, &archive, &Quiet, &options(1));
+    let had: Vec<bool> = ended.iter().map(|o| *o == Outcome::AlreadyFinished).collect();
+    assert_eq!(had, [true, false, false, false, true]);
+    assert!(!archive.join("runs/alone").exists(), "not repeated");
+    let both = records(&first, &archive);
+    assert!(both.iter().all(|record| record.finished() && record.pair.is_some()));
+    assert_eq!(both[4], records(&first, &study)[4]);
+    // A run whose case has changed since is repeated.
+    write_tables(&both, &archive).unwrap();
+    std::fs::remove_dir_all(archive.join("runs")).unwrap();
+    std::fs::write(&path, STUDY.replace("friction = 0.6", "friction = 0.3")).unwrap();
+    let second = plan(&path).unwrap();
+    let found: Vec<StateKind> = states(&second, &archive).iter().map(RunState::kind).collect();
+    let (finished, missing) = (StateKind::Finished, StateKind::Missing);
+    assert_eq!(found, [finished, missing, finished, missing, finished]);
 }
 
 #[test]

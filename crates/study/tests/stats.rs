@@ -1,7 +1,8 @@
 //! Rank statistics compared with textbook examples and tables.
 
 use grainwake_study::statistics::{
-    coefficient_of_variation, median, quantile, ranks, relative_spread_test, signed_rank, spearman,
+    coefficient_of_variation, false_discovery_adjusted, median, quantile, ranks,
+    relative_spread_test, signed_rank, spearman,
 };
 use grainwake_study::survival::{Duration, kaplan_meier, log_rank, median_time};
 
@@ -149,4 +150,23 @@ fn log_rank_of_a_known_sample() {
     assert!(log_rank(&[[treated, Vec::new()]]).is_none());
     // Equal samples do not differ.
     assert!((log_rank(&[[placebo.clone(), placebo]]).unwrap() - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn adjusted_p_values_of_a_published_example() {
+    // The fifteen p values of Benjamini and Hochberg (1995): four hypotheses are rejected at 5 %.
+    let p = [
+        0.0201, 0.0001, 0.0278, 0.0298, 0.0344, 0.0004, 0.0459, 0.0019, 0.3240, 0.4262, 0.5719,
+        0.6528, 0.0095, 0.7590, 1.0,
+    ];
+    let adjusted = false_discovery_adjusted(&p);
+    let expected = [
+        0.0603, 0.0015, 0.063_857, 0.063_857, 0.0645, 0.0030, 0.0765, 0.0095, 0.4860, 0.581_182,
+        0.714_875, 0.753_231, 0.035_625, 0.813_214, 1.0,
+    ];
+    for (found, expected) in adjusted.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    }
+    assert_eq!(adjusted.iter().filter(|p| **p < 0.05).count(), 4);
+    assert!(false_discovery_adjusted(&[]).is_empty());
 }

@@ -1,5 +1,6 @@
 //! Statistics over runs: right-censored observations, rank tests and verdicts on claims.
 
+pub mod claim_test;
 pub mod correlation;
 pub mod kissing;
 pub mod observation;

@@ -90,7 +90,8 @@ pub fn observations(
     models.into_iter().map(observation).collect()
 }
 
-fn meets(record: &RunRecord, when: &BTreeMap<String, Condition>) -> bool {
+/// Returns whether a run meets all conditions.
+pub(crate) fn meets(record: &RunRecord, when: &BTreeMap<String, Condition>) -> bool {
     when.iter().all(|(name, condition)| match condition {
         Condition::Is(level) => record.levels.get(name) == Some(level),
         Condition::In(levels) => record.levels.get(name).is_some_and(|l| levels.contains(l)),

@@ -164,6 +164,20 @@ pub fn relative_spread_test(first: &[f64], second: &[f64]) -> Option<Estimate> {
     spearman(&sums, &differences)
 }
 
+/// Adjusts p values for their number: rejecting those below a rate keeps the expected share of
+/// false rejections below that rate (Benjamini and Hochberg 1995).
+pub fn false_discovery_adjusted(p: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p.len()).collect();
+    order.sort_by(|a, b| p[*b].total_cmp(&p[*a]));
+    let mut out = vec![1.0; p.len()];
+    let mut smallest: f64 = 1.0;
+    for (larger, i) in order.into_iter().enumerate() {
+        smallest = smallest.min(p[i] * p.len() as f64 / (p.len() - larger) as f64);
+        out[i] = smallest;
+    }
+    out
+}
+
 /// Returns the standard deviation divided by the mean.
 pub fn coefficient_of_variation(values: &[f64]) -> Option<f64> {
     let n = values.len() as f64;

@@ -1,27 +1,25 @@
-//! Verdicts on claims, from rank tests on the observations.
+//! Verdicts on claims, from the effects that their tests give.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
 
-use super::observation::{Observation, matched, observations, ranges, with_factor};
-use super::statistics::{
-    Estimate, coefficient_of_variation, relative_spread_test, signed_rank, spearman,
-};
-use crate::format::{p_value, percent, significant, title};
+use super::claim_test::{Claimed, Effect, Outcome, test};
+use super::statistics::{Estimate, false_discovery_adjusted};
+use crate::format::p_value;
 use crate::measure::record::RunRecord;
-use crate::plan::claims::{Analysis, Claim, Sign, Test};
+use crate::plan::claims::{Analysis, Claim, Condition, RANK_CORRELATION, Test, VerdictRule};
 
 /// Verdict on a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// The confidence interval shows the claim.
+    /// The results show the claim.
     Holds,
-    /// The confidence interval shows the opposite.
+    /// The results show the opposite.
     Contradicted,
-    /// The confidence interval shows neither.
+    /// The results show neither.
     Open,
 }
 
@@ -44,6 +42,13 @@ pub struct Finding {
     pub part: String,
     /// Quantity.
     pub quantity: String,
+    /// Statistical test.
+    pub test: Test,
+    /// Conditions that a run must meet to be included.
+    #[serde(rename = "where")]
+    pub when: BTreeMap<String, Condition>,
+    /// Whether right-censored observations are excluded.
+    pub observed: bool,
     /// Verdict.
     pub verdict: Verdict,
     /// Result of the test in words.
@@ -53,255 +58,107 @@ pub struct Finding {
     /// Number of right-censored observations.
     #[serde(rename = "bounds")]
     pub censored: usize,
-    /// Estimated rank correlation or difference.
+    /// Kind of the effect.
+    pub effect: Effect,
+    /// Estimated effect.
     pub value: Option<f64>,
     /// 95 % confidence interval.
     pub interval: Option<[f64; 2]>,
     /// Two-sided p value.
     pub p: Option<f64>,
+    /// p value adjusted for the number of claims, if the analysis states a false-discovery rate.
+    pub adjusted_p: Option<f64>,
+    /// Size of an effect that does not matter, if known.
+    pub negligible: Option<f64>,
 }
 
 /// Tests the claims of an analysis. A claim about a quantity that is not converged with the grid is
 /// never called contradicted.
 pub fn evaluate(analysis: &Analysis, records: &[RunRecord]) -> Vec<Finding> {
+    let rule = analysis.verdicts.clone().unwrap_or_default();
+    let outcomes: Vec<Outcome> = analysis.claims.iter().map(|claim| test(claim, records)).collect();
+    let known: Vec<f64> = outcomes.iter().filter_map(|o| Some(o.estimate?.p)).collect();
+    let mut adjusted = false_discovery_adjusted(&known).into_iter();
     let unconverged = |claim: &Claim| {
         let resolution = analysis.resolution.as_ref();
         resolution.is_some_and(|r| r.unconverged.contains(&claim.quantity))
     };
-    let test = |claim: &Claim| {
-        let mut finding = test(claim, records);
+    let finding = |(claim, mut outcome): (&Claim, Outcome)| {
+        let adjusted_p = outcome.estimate.and_then(|_| adjusted.next());
+        let adjusted_p = adjusted_p.filter(|_| rule.false_discovery_rate.is_some());
+        if let Some(p) = adjusted_p {
+            outcome.says += &format!("; adjusted p {}", p_value(p));
+        }
+        let negligible = rule.negligible_effect(claim, &outcome);
+        let judge = |estimate| judge(&rule, &outcome, estimate, adjusted_p, negligible);
+        let mut verdict = outcome.estimate.map_or(Verdict::Open, judge);
         if unconverged(claim) {
-            finding.says += "; not converged with the grid";
-            if finding.verdict == Verdict::Contradicted {
-                finding.verdict = Verdict::Open;
+            outcome.says += "; not converged with the grid";
+            if verdict == Verdict::Contradicted {
+                verdict = Verdict::Open;
             }
         }
-        finding
+        Finding {
+            claim: claim.says.clone(),
+            part: claim.part.clone(),
+            quantity: claim.quantity.clone(),
+            test: claim.test.clone(),
+            when: claim.when.clone(),
+            observed: claim.observed,
+            verdict,
+            says: outcome.says,
+            n: outcome.n,
+            censored: outcome.censored,
+            effect: outcome.effect,
+            value: outcome.estimate.map(|e| e.value),
+            interval: outcome.estimate.map(|e| [e.low, e.high]),
+            p: outcome.estimate.map(|e| e.p),
+            adjusted_p,
+            negligible,
+        }
     };
-    analysis.claims.iter().map(test).collect()
+    analysis.claims.iter().zip(outcomes).map(finding).collect()
 }
 
-/// Result of a test before it is worded.
-struct Outcome {
-    n: usize,
-    censored: usize,
-    estimate: Option<Estimate>,
-    /// Result in words; without meaning if there is no estimate.
-    says: String,
-    verdict: Verdict,
-}
-
-impl Outcome {
-    fn new(
-        n: usize,
-        censored: usize,
-        estimate: Option<Estimate>,
-        says: impl FnOnce(&Estimate) -> String,
-        verdict: impl FnOnce(&Estimate) -> Verdict,
-    ) -> Outcome {
-        Outcome {
-            n,
-            censored,
-            says: estimate.as_ref().map_or(String::new(), says),
-            verdict: estimate.as_ref().map_or(Verdict::Open, verdict),
-            estimate,
+impl VerdictRule {
+    /// Returns the size of an effect that does not matter.
+    fn negligible_effect(&self, claim: &Claim, outcome: &Outcome) -> Option<f64> {
+        match (outcome.claimed, outcome.effect) {
+            (Claimed::AtMost(within), _) => Some(within),
+            (_, Effect::RankCorrelation) => self.negligible.get(RANK_CORRELATION).copied(),
+            _ => self.negligible.get(&claim.quantity).copied(),
         }
     }
 }
 
-fn test(claim: &Claim, records: &[RunRecord]) -> Finding {
-    let all = observations(records, &claim.quantity, &claim.when);
-    let included = |all: Vec<Observation>| -> Vec<Observation> {
-        let excluded = |o: &Observation| claim.observed && o.censored;
-        all.into_iter().filter(|o| !excluded(o)).collect()
+/// Returns the verdict on an effect.
+///
+/// - A direction is shown by an interval that excludes zero, and by an adjusted p value below the
+///   false-discovery rate where one is given. It is contradicted by the opposite direction, and by
+///   an interval of negligible effects.
+/// - Equality is shown by an interval of negligible effects, and contradicted by an interval
+///   outside of them. Without a negligible size "no effect" is only contradicted: by a direction.
+fn judge(
+    rule: &VerdictRule,
+    outcome: &Outcome,
+    e: Estimate,
+    adjusted_p: Option<f64>,
+    negligible: Option<f64>,
+) -> Verdict {
+    let significant =
+        rule.false_discovery_rate.is_none_or(|rate| adjusted_p.is_some_and(|p| p < rate));
+    let (rises, falls) = (significant && e.low > 0.0, significant && e.high < 0.0);
+    let inside = negligible.is_some_and(|size| e.low >= -size && e.high <= size);
+    let outside = negligible.is_some_and(|size| e.low > size || e.high < -size);
+    let (holds, contradicted) = match outcome.claimed {
+        Claimed::Positive => (rises, falls || inside),
+        Claimed::Negative => (falls, rises || inside),
+        Claimed::Nothing if negligible.is_none() => (false, rises || falls),
+        Claimed::Nothing | Claimed::AtMost(_) => (inside, outside),
     };
-    let name = title(&claim.quantity);
-    let outcome = match &claim.test {
-        Test::Trend { with, sign } => trend(&included(all), with, *sign, &name),
-        Test::Range { over, with, sign } => {
-            let all = included(ranges(&all, over));
-            trend(&all, with, *sign, &format!("range of {name}"))
-        }
-        Test::Order { axis, more, less } => order(&included(all), axis, [more, less], &name),
-        Test::Equal { axis, values: [a, b], within } => {
-            equal(&included(all), axis, [a, b], *within, &name)
-        }
-        Test::Spread { axis, more, less } => spread(&included(all), axis, [more, less], &name),
-        Test::Near { model, within } => {
-            let everywhere = observations(records, &claim.quantity, &BTreeMap::new());
-            let reference = included(everywhere).into_iter().find(|o| o.model == *model);
-            near(&included(all), model, reference, *within, &name)
-        }
-    };
-    word(claim, outcome)
-}
-
-/// Adds the claim and the treatment of censored observations to the outcome of a test.
-fn word(claim: &Claim, outcome: Outcome) -> Finding {
-    let Outcome { n, censored, .. } = outcome;
-    let mut says = outcome.says;
-    if outcome.estimate.is_none() {
-        says = format!("{n} models or pairs of models have finished: too few for a test");
-    }
-    if claim.observed {
-        says += "; pairs that landed before the event are left out";
-    }
-    if censored > 0 {
-        says += &match claim.test {
-            Test::Trend { .. } | Test::Range { .. } => {
-                format!("; {censored} right-censored at the landing, ranked last with equal ranks")
-            }
-            _ => format!("; {censored} right-censored: lower bounds, as the pair landed before"),
-        };
-    }
-    Finding {
-        claim: claim.says.clone(),
-        part: claim.part.clone(),
-        quantity: claim.quantity.clone(),
-        verdict: outcome.verdict,
-        says,
-        n,
-        censored,
-        value: outcome.estimate.map(|e| e.value),
-        interval: outcome.estimate.map(|e| [e.low, e.high]),
-        p: outcome.estimate.map(|e| e.p),
-    }
-}
-
-fn order(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -> Outcome {
-    let pairs = matched(all, axis, more, less);
-    let differences: Vec<f64> = pairs.iter().map(|(a, b)| a.value - b.value).collect();
-    let larger = differences.iter().filter(|d| **d > 0.0).count();
-    let says = |e: &Estimate| {
-        format!(
-            "{name} is larger in {more} than in {less} for {larger} of {} grains; difference {} \
-             ({}), {}",
-            e.n,
-            significant(e.value),
-            interval(e, significant),
-            probability(e)
-        )
-    };
-    let estimate = signed_rank(&differences);
-    Outcome::new(pairs.len(), censored(&pairs), estimate, says, |e| {
-        verdict(e.low > 0.0, e.high < 0.0)
-    })
-}
-
-fn equal(all: &[Observation], axis: &str, [a, b]: [&str; 2], within: f64, name: &str) -> Outcome {
-    let pairs = matched(all, axis, a, b);
-    let relative =
-        |(a, b): &(&Observation, &Observation)| 2.0 * (a.value - b.value) / (a.value + b.value);
-    let relative: Vec<f64> = pairs.iter().map(relative).collect();
-    let says = |e: &Estimate| {
-        format!(
-            "{name} in {a} against {b}: relative difference {} ({}, n = {})",
-            percent(e.value),
-            interval(e, percent),
-            e.n
-        )
-    };
-    let estimate = signed_rank(&relative);
-    Outcome::new(pairs.len(), censored(&pairs), estimate, says, |e| inside(e, within))
-}
-
-fn spread(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -> Outcome {
-    let pairs = matched(all, axis, more, less);
-    let (first, second): (Vec<f64>, Vec<f64>) =
-        pairs.iter().map(|(a, b)| (a.value, b.value)).unzip();
-    let variation = |v: &[f64]| coefficient_of_variation(v).map_or("?".into(), percent);
-    let says = |e: &Estimate| {
-        format!(
-            "coefficient of variation of {name} over the grains: {} in {more}, {} in {less} \
-             (n = {}; equal variation: {})",
-            variation(&first),
-            variation(&second),
-            e.n,
-            probability(e)
-        )
-    };
-    let estimate = relative_spread_test(&first, &second);
-    Outcome::new(pairs.len(), censored(&pairs), estimate, says, |e| {
-        verdict(e.low > 0.0, e.high < 0.0)
-    })
-}
-
-fn trend(all: &[Observation], with: &str, sign: Sign, name: &str) -> Outcome {
-    let (x, y, censored) = with_factor(all, with);
-    let says = |e: &Estimate| {
-        format!(
-            "rank correlation of {name} with {with}: {} ({}, n = {}, {})",
-            significant(e.value),
-            interval(e, significant),
-            e.n,
-            probability(e)
-        )
-    };
-    Outcome::new(x.len(), censored, spearman(&x, &y), says, |e| {
-        let (rises, falls) = (e.low > 0.0, e.high < 0.0);
-        match sign {
-            Sign::Rises => verdict(rises, falls),
-            Sign::Falls => verdict(falls, rises),
-            Sign::None => verdict(false, rises || falls),
-        }
-    })
-}
-
-fn near(
-    all: &[Observation],
-    model: &str,
-    reference: Option<Observation>,
-    within: f64,
-    name: &str,
-) -> Outcome {
-    let Some(reference) = reference else {
-        return Outcome::new(0, 0, None, |_| String::new(), |_| Verdict::Open);
-    };
-    let others: Vec<&Observation> = all.iter().filter(|o| o.model != model).collect();
-    let relative = |o: &&Observation| o.value / reference.value - 1.0;
-    let relative: Vec<f64> = others.iter().map(relative).collect();
-    let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
-    let largest = relative.iter().fold(0.0, larger);
-    let says = |e: &Estimate| {
-        format!(
-            "{name} against {model} ({}): {} ({}, n = {}); largest difference {}",
-            significant(reference.value),
-            percent(e.value),
-            interval(e, percent),
-            e.n,
-            percent(largest)
-        )
-    };
-    let censored = others.iter().filter(|o| o.censored).count();
-    let estimate = signed_rank(&relative);
-    Outcome::new(others.len(), censored, estimate, says, |e| inside(e, within))
-}
-
-fn censored(pairs: &[(&Observation, &Observation)]) -> usize {
-    pairs.iter().filter(|(a, b)| a.censored || b.censored).count()
-}
-
-fn probability(e: &Estimate) -> String {
-    match p_value(e.p) {
-        bound if bound.starts_with('<') => format!("p {bound}"),
-        value => format!("p = {value}"),
-    }
-}
-
-fn interval(e: &Estimate, form: fn(f64) -> String) -> String {
-    format!("95 % interval {} to {}", form(e.low), form(e.high))
-}
-
-fn verdict(holds: bool, contradicted: bool) -> Verdict {
     match (holds, contradicted) {
         (true, _) => Verdict::Holds,
         (_, true) => Verdict::Contradicted,
         _ => Verdict::Open,
     }
-}
-
-/// Verdict on equality: whether the interval lies inside or outside of ± `within`.
-fn inside(e: &Estimate, within: f64) -> Verdict {
-    let equal = e.low >= -within && e.high <= within;
-    verdict(equal, e.low > within || e.high < -within)
 }

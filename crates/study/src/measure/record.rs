@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::pair::PairMeasures;
 use super::settling::SettlingMeasures;
-use crate::plan::{Plan, Run};
+use crate::plan::{Plan, Run, TABLE};
 use crate::run::state::{RunState, StateKind, run_state_for};
 
 /// A run and its measured values. The JSON names are stable.
@@ -139,7 +139,7 @@ impl RunRecord {
 ///
 /// A run without a folder keeps its record in `table.json`, so that run folders may be removed.
 pub fn records(plan: &Plan, study: &Path) -> Vec<RunRecord> {
-    let text = std::fs::read_to_string(study.join("table.json")).unwrap_or_default();
+    let text = std::fs::read_to_string(study.join(TABLE)).unwrap_or_default();
     let kept: Vec<RunRecord> = serde_json::from_str(&text).unwrap_or_default();
     let read = |run: &Run| {
         let record = RunRecord::read(run, plan, study);

@@ -7,6 +7,7 @@ use super::record::RunRecord;
 use super::settling::GrainSettling;
 use crate::error::{At, StudyError, write_file, write_json};
 use crate::format::rounded;
+use crate::plan::TABLE;
 use crate::plan::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES};
 
 /// Table of the grains of all runs that are not pairs, in the study folder.
@@ -36,7 +37,7 @@ const SETTLING_HEADER: [&str; 15] = [
 /// # Errors
 /// If a file cannot be written.
 pub fn write_tables(records: &[RunRecord], study: &Path) -> Result<(), StudyError> {
-    write_json(&study.join("table.json"), &records)?;
+    write_json(&study.join(TABLE), &records)?;
     if records.iter().any(|record| record.settling.is_some()) {
         write_csv(&study.join(SETTLING_TABLE), settling_rows(records))?;
     }

@@ -29,7 +29,7 @@ impl Content<'_> {
                 (section("Who kisses", &kissing::tables(results)))
             }
             @if !self.findings.is_empty() {
-                (section("Claims and verdicts", &tables::claims(self.findings)))
+                (section("Claims and verdicts", &tables::claims(self)))
             }
             @if !self.figures.is_empty() { (section("Figures", &html::figures(self.figures))) }
             (section("All runs", &tables::runs(self)))

@@ -19,6 +19,7 @@ use self::content::Content;
 use self::figure::FigureData;
 use crate::analysis::correlation::correlations;
 use crate::analysis::kissing::kissing;
+use crate::analysis::observation::meets;
 use crate::analysis::verdict::evaluate;
 use crate::error::{At, StudyError, write_file, write_json};
 use crate::measure::record::{RunRecord, records};
@@ -58,6 +59,10 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     finished
         .par_iter()
         .try_for_each(|(run, record)| write_thinned_history(run, record, folder).map(|_| ()))?;
+    let count = finished.len();
+    let (shown_plan, shown_records) = subset(&plan, &records);
+    let all = shown_plan.runs.iter().zip(&shown_records);
+    let finished: Vec<(&Run, &RunRecord)> = all.filter(|(_, r)| r.finished()).collect();
     let request = &plan.analysis.figures;
     let compared = |run: &Run| {
         let orientation = request.orientations.as_ref().zip(request.compare.as_ref());
@@ -69,19 +74,21 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     };
     let shown = finished.par_iter().filter(|(run, _)| compared(run));
     let trajectories = shown.filter_map(trajectory).collect();
-    let findings = evaluate(&plan.analysis, &records);
-    let correlations = correlations(&plan.analysis, &records);
+    let findings = evaluate(&plan.analysis, &shown_records);
+    let correlations = correlations(&plan.analysis, &shown_records);
     let kissing = kissing(&plan.analysis, &records);
     let analysis = serde_json::json!({
+        "where": plan.analysis.when,
         "claims": findings,
         "correlations": correlations,
         "kissing": kissing,
     });
     write_json(&folder.join("analysis.json"), &analysis)?;
     let data = FigureData {
-        plan: &plan,
-        records: &records,
+        plan: &shown_plan,
+        records: &shown_records,
         folder,
+        findings: &findings,
         correlations: &correlations,
         kissing: kissing.as_ref(),
         trajectories,
@@ -107,9 +114,17 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     Ok(StudyReportFiles {
         page,
         png: figures.into_iter().map(|figure| figure.png_file).collect(),
-        runs: (finished.len(), records.len()),
+        runs: (count, records.len()),
         notes,
     })
+}
+
+/// Returns the runs that claims, correlations and figures are about.
+fn subset(plan: &Plan, records: &[RunRecord]) -> (Plan, Vec<RunRecord>) {
+    let both = plan.runs.iter().zip(records);
+    let shown = both.filter(|(_, record)| meets(record, &plan.analysis.when));
+    let (runs, records) = shown.map(|(run, record)| (run.clone(), record.clone())).unzip();
+    (Plan { runs, ..plan.clone() }, records)
 }
 
 /// Replaces the analysis of the plan by that of the study file, which may have changed.

@@ -30,7 +30,9 @@ fn cell(text: Option<String>) -> Markup {
 }
 
 /// Returns the claims with their verdicts.
-pub(super) fn claims(findings: &[Finding]) -> Markup {
+pub(super) fn claims(content: &Content) -> Markup {
+    let findings = content.findings;
+    let rule = content.plan.analysis.verdicts.as_ref();
     let row = |f: &Finding| {
         let verdict = html! { span class={ "verdict " (f.verdict) } { (f.verdict) } };
         vec![html! { (f.part) }, html! { (f.claim) }, verdict, html! { (f.says) }]
@@ -39,8 +41,17 @@ pub(super) fn claims(findings: &[Finding]) -> Markup {
     html! {
         p {
             "A claim holds, or is contradicted, if the 95 % confidence interval shows it; \
-             otherwise it is open. Claims are tested independently: of twenty false claims, one appears to \
-             hold by chance."
+             otherwise it is open. "
+            @match rule.and_then(|rule| rule.false_discovery_rate) {
+                Some(rate) => {
+                    "A direction must also have an adjusted p value (Benjamini and Hochberg) below "
+                    (rate) ": of the directions found, about this share is due to chance."
+                }
+                None => {
+                    "Claims are tested independently: of twenty false claims, one appears to hold \
+                     by chance."
+                }
+            }
         }
         (table(&columns, findings.iter().map(row)))
     }

@@ -1,21 +1,22 @@
-//! The analysis file: claims to be tested, correlations and figures.
+//! The requested analysis of a study: claims to be tested, correlations and figures.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
-use grainwake_run::case::{Located, Problem, Source};
 use serde::{Deserialize, Serialize};
-
-use super::expand::Model;
-use super::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES, SHAPE_FACTORS};
-use crate::error::{did_you_mean, refer_to_study_keys};
 
 /// Requested analysis of the results: claims, correlations, figures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Analysis {
+    /// Conditions that a run must meet to be in claims, correlations and figures; the results on
+    /// the first contact are of all runs.
+    #[serde(default)]
+    pub when: BTreeMap<String, Condition>,
     /// Claims to be tested.
     #[serde(default)]
     pub claims: Vec<Claim>,
+    /// Rule of the verdicts on claims.
+    #[serde(default)]
+    pub verdicts: Option<VerdictRule>,
     /// Rank correlations to be computed.
     #[serde(default)]
     pub correlations: Option<Correlations>,
@@ -38,6 +39,23 @@ pub struct Resolution {
     pub unconverged: Vec<String>,
     /// Evidence, printed at the head of the report: what a finer grid gives.
     pub note: String,
+}
+
+/// Name of the effect of trends, in [`VerdictRule::negligible`].
+pub const RANK_CORRELATION: &str = "rank_correlation";
+
+/// Rule of the verdicts on claims.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VerdictRule {
+    /// Largest share of wrong verdicts on directions that is accepted, as the p values are adjusted
+    /// for the number of claims; none: no adjustment.
+    #[serde(default)]
+    pub false_discovery_rate: Option<f64>,
+    /// Sizes of effects that do not matter: of a `rank_correlation`, or of the difference of a
+    /// quantity, in its unit.
+    #[serde(default)]
+    pub negligible: BTreeMap<String, f64>,
 }
 
 /// Claim about a quantity, with its statistical test.
@@ -191,189 +209,17 @@ pub struct FigureRequest {
     pub reference: Option<String>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawAnalysis {
-    #[serde(default)]
-    claim: Vec<RawClaim>,
-    correlations: Option<Located<Correlations>>,
-    kissing: Option<Located<Kissing>>,
-    figures: Option<Located<FigureRequest>>,
-    resolution: Option<Located<Resolution>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawClaim {
-    says: String,
-    #[serde(default)]
-    part: String,
-    quantity: Located<String>,
-    test: Located<Test>,
-    #[serde(rename = "where", default)]
-    when: BTreeMap<String, Located<Condition>>,
-    #[serde(default)]
-    observed: bool,
-}
-
-type Span<'a> = Option<&'a Range<usize>>;
-
-/// Check of the names in an analysis file against the models of the study.
-struct NameCheck<'a> {
-    source: &'a Source,
-    models: &'a [Model],
-    problems: Vec<Problem>,
-}
-
-impl NameCheck<'_> {
-    /// Reports a name that is not among the known ones; returns whether it is known.
-    fn require<'b>(
-        &mut self,
-        kind: &str,
-        name: &str,
-        known: impl Iterator<Item = &'b str>,
-        span: Span,
-    ) -> bool {
-        let mut known: Vec<&str> = known.collect();
-        known.sort_unstable();
-        known.dedup();
-        if known.contains(&name) {
-            return true;
-        }
-        let hint = did_you_mean(name, known.iter().copied());
-        let problem = Problem::new(format!("there is no {kind} \"{name}\""))
-            .help(format!("{hint}known names: {}", known.join(", ")));
-        self.problems.push(self.source.locate(problem, span, "here"));
-        false
-    }
-
-    fn quantity(&mut self, name: &str, span: Span) {
-        let known = PAIR_QUANTITIES.into_iter().chain(SETTLING_QUANTITIES);
-        self.require("quantity", name, known, span);
-    }
-
-    fn axis(&mut self, name: &str, span: Span) -> bool {
-        let known = self.models.iter().flat_map(|m| m.levels.keys());
-        self.require("axis", name, known.map(String::as_str), span)
-    }
-
-    fn levels<'b>(&mut self, axis: &str, names: impl IntoIterator<Item = &'b String>, span: Span) {
-        if self.axis(axis, span) {
-            let kind = format!("value of \"{axis}\" called");
-            for name in names {
-                let known = self.models.iter().filter_map(|m| m.levels.get(axis));
-                self.require(&kind, name, known.map(String::as_str), span);
-            }
-        }
-    }
-
-    fn factor(&mut self, name: &str, span: Span) {
-        let own = self.models.iter().flat_map(|m| m.factors.keys());
-        self.require("factor", name, own.map(String::as_str).chain(SHAPE_FACTORS), span);
-    }
-
-    fn model(&mut self, name: &str, span: Span) {
-        let known = self.models.iter().map(|m| m.name.as_str());
-        self.require("model", name, known, span);
-    }
-
-    fn test(&mut self, test: &Located<Test>) {
-        let span = test.span.as_ref();
-        match &test.value {
-            Test::Trend { with, .. } => self.factor(with, span),
-            Test::Order { axis, more, less } | Test::Spread { axis, more, less } => {
-                self.levels(axis, [more, less], span);
-            }
-            Test::Equal { axis, values, .. } => self.levels(axis, values, span),
-            Test::Range { over, with, .. } => {
-                self.axis(over, span);
-                self.factor(with, span);
-            }
-            Test::Near { model, .. } => self.model(model, span),
-        }
-    }
-
-    fn condition(&mut self, name: &str, condition: &Located<Condition>) {
-        let span = condition.span.as_ref();
-        match &condition.value {
-            Condition::Is(level) => self.levels(name, [level], span),
-            Condition::In(levels) => self.levels(name, levels, span),
-            Condition::Range { .. } => self.factor(name, span),
-        }
-    }
-
-    fn figures(&mut self, figures: &FigureRequest, span: Span) {
-        for axis in [&figures.grains, &figures.orientations].into_iter().flatten() {
-            self.axis(axis, span);
-        }
-        for factor in [&figures.rows, &figures.columns].into_iter().flatten() {
-            self.factor(factor, span);
-        }
-        let models = [&figures.setup, &figures.reference].into_iter().flatten();
-        for model in models.chain(&figures.stories) {
-            self.model(model, span);
-        }
-        for (axis, level) in
-            [(&figures.grains, &figures.oriented), (&figures.orientations, &figures.compare)]
-        {
-            if let Some(axis) = axis {
-                self.levels(axis, level, span);
-            }
-        }
-    }
-}
-
 impl Analysis {
-    /// Reads an analysis file and checks its names against the models.
-    ///
-    /// # Errors
-    /// All problems found, with their location in the file.
-    pub fn parse(name: &str, text: &str, models: &[Model]) -> Result<Analysis, Vec<Problem>> {
-        let (source, raw): (Source, RawAnalysis) =
-            Source::parse(name, text, &[]).map_err(|p| vec![refer_to_study_keys(p)])?;
-        let mut check = NameCheck { source: &source, models, problems: Vec::new() };
-        for claim in &raw.claim {
-            check.quantity(&claim.quantity, claim.quantity.span.as_ref());
-            check.test(&claim.test);
-            for (name, condition) in &claim.when {
-                check.condition(name, condition);
-            }
+    /// Adds another analysis: its claims and conditions come on top, its tables replace those here.
+    pub(super) fn extend(&mut self, other: Analysis) {
+        self.when.extend(other.when);
+        self.claims.extend(other.claims);
+        self.verdicts = other.verdicts.or(self.verdicts.take());
+        self.correlations = other.correlations.or(self.correlations.take());
+        self.kissing = other.kissing.or(self.kissing.take());
+        self.resolution = other.resolution.or(self.resolution.take());
+        if other.figures != FigureRequest::default() {
+            self.figures = other.figures;
         }
-        if let Some(Located { value, span }) = &raw.correlations {
-            let span = span.as_ref();
-            value.quantities.iter().for_each(|q| check.quantity(q, span));
-            value.factors.iter().for_each(|f| check.factor(f, span));
-            check.axis(&value.by, span);
-        }
-        if let Some(Located { value, span }) = &raw.kissing {
-            for axis in [&value.by].into_iter().chain(&value.grid) {
-                check.axis(axis, span.as_ref());
-            }
-        }
-        if let Some(Located { value, span }) = &raw.resolution {
-            let quantities = &value.unconverged;
-            quantities.iter().for_each(|q| check.quantity(q, span.as_ref()));
-        }
-        if let Some(figures) = &raw.figures {
-            check.figures(&figures.value, figures.span.as_ref());
-        }
-        if !check.problems.is_empty() {
-            return Err(check.problems);
-        }
-        let claim = |raw: RawClaim| Claim {
-            says: raw.says,
-            part: raw.part,
-            quantity: raw.quantity.value,
-            test: raw.test.value,
-            observed: raw.observed,
-            when: raw.when.into_iter().map(|(name, c)| (name, c.value)).collect(),
-        };
-        Ok(Analysis {
-            claims: raw.claim.into_iter().map(claim).collect(),
-            correlations: raw.correlations.map(|c| c.value),
-            kissing: raw.kissing.map(|k| k.value),
-            figures: raw.figures.map(|f| f.value).unwrap_or_default(),
-            resolution: raw.resolution.map(|r| r.value),
-        })
     }
 }

@@ -8,7 +8,7 @@ use grainwake_run::case::{Located, Problem, Source, parse_angle, parse_length};
 
 use super::claims::Analysis;
 use super::expand::{self, Model};
-use super::raw::{RawEnsemble, RawStudy, Size};
+use super::raw::{Files, RawEnsemble, RawStudy, Size};
 use crate::error::{At, StudyError, refer_to_study_keys};
 
 /// A study: its models, repetitions and requested analysis.
@@ -105,17 +105,26 @@ impl Study {
 
 fn read_analysis(
     source: &Source,
-    given: &Located<PathBuf>,
+    given: &Located<Files>,
     folder: &Path,
     models: &[Model],
 ) -> Result<Analysis, StudyError> {
-    let path = folder.join(&given.value);
-    let text = read_text(&path, SETTINGS).map_err(|error| {
-        let problem = Problem::new(format!("cannot read {}: {error}", path.display()))
-            .help("paths are relative to the study file");
-        source.locate(problem, given.span.as_ref(), "this file")
-    })?;
-    Analysis::parse(&path.display().to_string(), &text, models).map_err(StudyError::Invalid)
+    let files = match &given.value {
+        Files::One(file) => std::slice::from_ref(file),
+        Files::Several(files) => files,
+    };
+    let mut all = Analysis::default();
+    for file in files {
+        let path = folder.join(file);
+        let text = read_text(&path, SETTINGS).map_err(|error| {
+            let problem = Problem::new(format!("cannot read {}: {error}", path.display()))
+                .help("paths are relative to the study file");
+            source.locate(problem, given.span.as_ref(), "this file")
+        })?;
+        let name = path.display().to_string();
+        all.extend(Analysis::parse(&name, &text, models).map_err(StudyError::Invalid)?);
+    }
+    Ok(all)
 }
 
 fn read_ensemble(

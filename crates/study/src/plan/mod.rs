@@ -1,5 +1,6 @@
 //! The plan of a study: study file to models, models to runs with a stable name and hash.
 
+mod analysis_file;
 pub mod claims;
 pub mod expand;
 pub mod file;
@@ -26,12 +27,14 @@ pub(crate) use resolve::end_condition;
 pub const RUNS: &str = "runs";
 /// File of a study folder that holds its plan.
 pub const MANIFEST: &str = "study.json";
+/// File of a study folder with a record of every run.
+pub const TABLE: &str = "table.json";
 
 /// Other files and folders of a study folder.
 const WRITTEN: [&str; 8] = [
     "locks",
     "table.csv",
-    "table.json",
+    TABLE,
     "settling.csv",
     "histories",
     "figures",
@@ -136,9 +139,10 @@ impl Plan {
             }
             return Ok(());
         }
-        // A study that has lost its plan is recognised by its runs.
+        // A study without its plan is recognised by its runs or its table.
+        let known = has_runs || folder.join(TABLE).is_file();
         let of_study = |name: &str| WRITTEN.contains(&name) || is_temporary(Path::new(name));
-        let own = |name: &str| name == RUNS || has_runs && of_study(name);
+        let own = |name: &str| name == RUNS || known && of_study(name);
         let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
         match entries.find(|entry| !entry.file_name().to_str().is_some_and(own)) {
             Some(_) => occupied("is not empty and holds no study".into()),

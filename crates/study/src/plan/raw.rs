@@ -27,7 +27,14 @@ pub(crate) struct RawStudy {
     #[serde(default)]
     pub adjust: Vec<RawAdjust>,
     pub ensemble: Option<RawEnsemble>,
-    pub analysis: Option<Located<PathBuf>>,
+    pub analysis: Option<Located<Files>>,
+}
+
+#[derive(Clone, Deserialize)]
+#[serde(untagged)]
+pub(crate) enum Files {
+    One(PathBuf),
+    Several(Vec<PathBuf>),
 }
 
 #[derive(Deserialize)]

@@ -9,7 +9,7 @@ use grainwake_run::provenance::Provenance;
 
 use super::claims::Analysis;
 use super::resolve::run_of_case;
-use super::{Plan, RUNS, Run};
+use super::{Plan, RUNS, Run, TABLE};
 use crate::error::StudyError;
 
 /// Entry of `table.json`, as far as a plan needs it.
@@ -78,7 +78,7 @@ impl Plan {
 
 /// Returns the runs with a folder or an entry in the table, by name.
 fn runs_in(folder: &Path) -> Vec<Run> {
-    let text = std::fs::read_to_string(folder.join("table.json")).unwrap_or_default();
+    let text = std::fs::read_to_string(folder.join(TABLE)).unwrap_or_default();
     let table: Vec<Entry> = serde_json::from_str(&text).unwrap_or_default();
     let mut runs: BTreeMap<String, Run> = BTreeMap::new();
     let folders = std::fs::read_dir(folder.join(RUNS)).into_iter().flatten().flatten();

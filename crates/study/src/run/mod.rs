@@ -15,7 +15,7 @@ use grainwake_run::checkpoint;
 use grainwake_run::lock::{self, Attempt};
 use grainwake_run::{Ending, Existing, FailureKind, Observer, Progress, RunError};
 
-use self::state::{RunState, run_state};
+use self::state::{Archive, RunState, run_state};
 use crate::error::{At, StudyError};
 use crate::plan::Run;
 
@@ -70,7 +70,8 @@ pub trait StudyObserver: Sync {
 /// Executes the chosen runs in a study folder and returns their outcomes, sorted by index.
 ///
 /// A run that fails or panics does not stop the others; a full disk does. Finished runs are not
-/// repeated, and interrupted ones resume from their last checkpoints.
+/// repeated, even if only their rows in `table.json` are left, and interrupted ones resume from
+/// their last checkpoints.
 ///
 /// # Errors
 /// If threads cannot be started.
@@ -91,9 +92,10 @@ pub fn execute(
     let queue: Mutex<VecDeque<usize>> = Mutex::new(chosen.iter().copied().collect());
     let ended: Mutex<Vec<(usize, Outcome)>> = Mutex::new(Vec::new());
     let disk_full = AtomicBool::new(false);
+    let archive = Archive::read(study);
     let work = |pool: &rayon::ThreadPool| {
         while let Some(index) = queue.lock().ok().and_then(|mut queue| queue.pop_front()) {
-            let job = Job { run: &runs[index], index, study, options, observer };
+            let job = Job { run: &runs[index], index, study, archive: &archive, options, observer };
             let outcome = if observer.interrupted() || disk_full.load(Ordering::Relaxed) {
                 Outcome::Interrupted
             } else {
@@ -124,6 +126,7 @@ struct Job<'a> {
     run: &'a Run,
     index: usize,
     study: &'a Path,
+    archive: &'a Archive,
     options: &'a Options,
     observer: &'a dyn StudyObserver,
 }
@@ -150,7 +153,7 @@ impl Job<'_> {
             return Ok(Outcome::Locked);
         };
         let folder = self.run.folder(self.study);
-        let existing = match run_state(self.run, self.study) {
+        let existing = match run_state(self.run, self.study, self.archive) {
             RunState::Finished => {
                 self.remove_checkpoints(&folder);
                 return Ok(Outcome::AlreadyFinished);

@@ -1,5 +1,6 @@
 //! State of a run in a study folder.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::Path;
 
@@ -8,7 +9,7 @@ use grainwake_run::RESOLVED;
 use grainwake_run::provenance::Provenance;
 use serde::{Deserialize, Serialize};
 
-use crate::plan::{Run, end_condition};
+use crate::plan::{Run, TABLE, end_condition};
 
 /// State of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -67,10 +68,39 @@ impl fmt::Display for StateKind {
     }
 }
 
-/// Determines the state of a run for this program.
-pub fn run_state(run: &Run, study: &Path) -> RunState {
+/// Finished runs in `table.json` of a study folder. Their run folders may have been removed.
+#[derive(Clone, Debug, Default)]
+pub struct Archive(BTreeSet<(String, String)>);
+
+impl Archive {
+    /// Reads the names and hashes of the finished runs; none if the table is missing or damaged.
+    pub fn read(study: &Path) -> Archive {
+        #[derive(Deserialize)]
+        struct Row {
+            name: String,
+            id: String,
+            state: StateKind,
+        }
+        let text = std::fs::read_to_string(study.join(TABLE)).unwrap_or_default();
+        let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
+        let finished = rows.into_iter().filter(|row| row.state == StateKind::Finished);
+        Archive(finished.map(|row| (row.name, row.id)).collect())
+    }
+
+    /// Returns whether the run finished with the same case, end condition and program.
+    pub fn contains(&self, run: &Run) -> bool {
+        self.0.contains(&(run.name.clone(), run.id.clone()))
+    }
+}
+
+/// Determines the state of a run for this program. A run without a folder is finished if the
+/// archive contains it.
+pub fn run_state(run: &Run, study: &Path, archive: &Archive) -> RunState {
     let program = Provenance::new("");
-    run_state_for(run, study, &program.version, program.commit.as_deref())
+    match run_state_for(run, study, &program.version, program.commit.as_deref()) {
+        RunState::Missing if archive.contains(run) => RunState::Finished,
+        state => state,
+    }
 }
 
 /// Determines the state of a run for a given version and commit of the program.

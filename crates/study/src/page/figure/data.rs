@@ -11,6 +11,7 @@ use grainwake_run::case::Case;
 
 use crate::analysis::correlation::Correlation;
 use crate::analysis::kissing::KissingResults;
+use crate::analysis::verdict::Finding;
 use crate::measure::record::RunRecord;
 use crate::measure::trajectory::Trajectory;
 use crate::plan::{Plan, Run};
@@ -23,6 +24,8 @@ pub struct FigureData<'a> {
     pub records: &'a [RunRecord],
     /// Study folder.
     pub folder: &'a Path,
+    /// Tested claims.
+    pub findings: &'a [Finding],
     /// Correlations.
     pub correlations: &'a [Correlation],
     /// Results on the first contact.

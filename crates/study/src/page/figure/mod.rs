@@ -1,5 +1,6 @@
 //! Figures of a study, each a drawing with its caption.
 
+mod claims;
 mod data;
 mod grains;
 mod histories;
@@ -30,6 +31,7 @@ pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     out.extend(histories::figures(data, notes));
     out.extend(overview::figures(data));
     out.extend(trends::figure(data));
+    out.extend(claims::figure(data));
     if !numbered_as_in_paper(data) {
         renumber(&mut out);
     }

@@ -1,0 +1,230 @@
+//! Statistical tests of claims, each with its effect and its result in words.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::observation::{Observation, matched, observations, ranges, with_factor};
+use super::statistics::{
+    Estimate, coefficient_of_variation, relative_spread_test, signed_rank, spearman,
+};
+use crate::format::{p_value, percent, significant, title};
+use crate::measure::record::RunRecord;
+use crate::plan::claims::{Claim, Sign, Test};
+
+/// Kind of an effect. The JSON names are stable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Effect {
+    /// Rank correlation, from -1 to 1.
+    RankCorrelation,
+    /// Difference, in the unit of the quantity.
+    Difference,
+    /// Relative difference.
+    RelativeDifference,
+}
+
+/// Statement of a claim about the effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Claimed {
+    /// The effect is positive.
+    Positive,
+    /// The effect is negative.
+    Negative,
+    /// There is no effect.
+    Nothing,
+    /// The size of the effect is at most this.
+    AtMost(f64),
+}
+
+/// Result of a test before its verdict.
+pub(super) struct Outcome {
+    /// Number of models or pairs of models.
+    pub n: usize,
+    /// Number of right-censored observations.
+    pub censored: usize,
+    /// Kind of the effect.
+    pub effect: Effect,
+    /// Statement of the claim.
+    pub claimed: Claimed,
+    /// Estimated effect.
+    pub estimate: Option<Estimate>,
+    /// Result in words, with the treatment of censored observations.
+    pub says: String,
+}
+
+impl Outcome {
+    fn new(
+        (n, censored): (usize, usize),
+        effect: Effect,
+        claimed: Claimed,
+        estimate: Option<Estimate>,
+        says: impl FnOnce(&Estimate) -> String,
+    ) -> Outcome {
+        let says = estimate.as_ref().map_or_else(
+            || format!("{n} models or pairs of models have finished: too few for a test"),
+            says,
+        );
+        Outcome { n, censored, effect, claimed, estimate, says }
+    }
+}
+
+/// Tests a claim.
+pub(super) fn test(claim: &Claim, records: &[RunRecord]) -> Outcome {
+    let all = observations(records, &claim.quantity, &claim.when);
+    let included = |all: Vec<Observation>| -> Vec<Observation> {
+        let excluded = |o: &Observation| claim.observed && o.censored;
+        all.into_iter().filter(|o| !excluded(o)).collect()
+    };
+    let name = title(&claim.quantity);
+    let mut outcome = match &claim.test {
+        Test::Trend { with, sign } => trend(&included(all), with, *sign, &name),
+        Test::Range { over, with, sign } => {
+            let all = included(ranges(&all, over));
+            trend(&all, with, *sign, &format!("range of {name}"))
+        }
+        Test::Order { axis, more, less } => order(&included(all), axis, [more, less], &name),
+        Test::Equal { axis, values: [a, b], within } => {
+            equal(&included(all), axis, [a, b], *within, &name)
+        }
+        Test::Spread { axis, more, less } => spread(&included(all), axis, [more, less], &name),
+        Test::Near { model, within } => {
+            let everywhere = observations(records, &claim.quantity, &BTreeMap::new());
+            let reference = included(everywhere).into_iter().find(|o| o.model == *model);
+            near(&included(all), model, reference, *within, &name)
+        }
+    };
+    if claim.observed {
+        outcome.says += "; pairs that landed before the event are left out";
+    }
+    if outcome.censored > 0 {
+        let censored = outcome.censored;
+        outcome.says += &match claim.test {
+            Test::Trend { .. } | Test::Range { .. } => {
+                format!("; {censored} right-censored at the landing, ranked last with equal ranks")
+            }
+            _ => format!("; {censored} right-censored: lower bounds, as the pair landed before"),
+        };
+    }
+    outcome
+}
+
+fn order(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -> Outcome {
+    let pairs = matched(all, axis, more, less);
+    let differences: Vec<f64> = pairs.iter().map(|(a, b)| a.value - b.value).collect();
+    let larger = differences.iter().filter(|d| **d > 0.0).count();
+    let says = |e: &Estimate| {
+        format!(
+            "{name} is larger in {more} than in {less} for {larger} of {} grains; difference {} \
+             ({}), {}",
+            e.n,
+            significant(e.value),
+            interval(e, significant),
+            probability(e)
+        )
+    };
+    let estimate = signed_rank(&differences);
+    Outcome::new(counts(&pairs), Effect::Difference, Claimed::Positive, estimate, says)
+}
+
+fn equal(all: &[Observation], axis: &str, [a, b]: [&str; 2], within: f64, name: &str) -> Outcome {
+    let pairs = matched(all, axis, a, b);
+    let relative =
+        |(a, b): &(&Observation, &Observation)| 2.0 * (a.value - b.value) / (a.value + b.value);
+    let relative: Vec<f64> = pairs.iter().map(relative).collect();
+    let says = |e: &Estimate| {
+        format!(
+            "{name} in {a} against {b}: relative difference {} ({}, n = {})",
+            percent(e.value),
+            interval(e, percent),
+            e.n
+        )
+    };
+    let (effect, claimed) = (Effect::RelativeDifference, Claimed::AtMost(within));
+    Outcome::new(counts(&pairs), effect, claimed, signed_rank(&relative), says)
+}
+
+fn spread(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -> Outcome {
+    let pairs = matched(all, axis, more, less);
+    let (first, second): (Vec<f64>, Vec<f64>) =
+        pairs.iter().map(|(a, b)| (a.value, b.value)).unzip();
+    let variation = |v: &[f64]| coefficient_of_variation(v).map_or("?".into(), percent);
+    let says = |e: &Estimate| {
+        format!(
+            "coefficient of variation of {name} over the grains: {} in {more}, {} in {less} \
+             (n = {}; equal variation: {})",
+            variation(&first),
+            variation(&second),
+            e.n,
+            probability(e)
+        )
+    };
+    let estimate = relative_spread_test(&first, &second);
+    Outcome::new(counts(&pairs), Effect::RankCorrelation, Claimed::Positive, estimate, says)
+}
+
+fn trend(all: &[Observation], with: &str, sign: Sign, name: &str) -> Outcome {
+    let (x, y, censored) = with_factor(all, with);
+    let says = |e: &Estimate| {
+        format!(
+            "rank correlation of {name} with {with}: {} ({}, n = {}, {})",
+            significant(e.value),
+            interval(e, significant),
+            e.n,
+            probability(e)
+        )
+    };
+    let claimed = match sign {
+        Sign::Rises => Claimed::Positive,
+        Sign::Falls => Claimed::Negative,
+        Sign::None => Claimed::Nothing,
+    };
+    let counts = (x.len(), censored);
+    Outcome::new(counts, Effect::RankCorrelation, claimed, spearman(&x, &y), says)
+}
+
+fn near(
+    all: &[Observation],
+    model: &str,
+    reference: Option<Observation>,
+    within: f64,
+    name: &str,
+) -> Outcome {
+    let (effect, claimed) = (Effect::RelativeDifference, Claimed::AtMost(within));
+    let Some(reference) = reference else {
+        return Outcome::new((0, 0), effect, claimed, None, |_| String::new());
+    };
+    let others: Vec<&Observation> = all.iter().filter(|o| o.model != model).collect();
+    let relative = |o: &&Observation| o.value / reference.value - 1.0;
+    let relative: Vec<f64> = others.iter().map(relative).collect();
+    let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
+    let largest = relative.iter().fold(0.0, larger);
+    let says = |e: &Estimate| {
+        format!(
+            "{name} against {model} ({}): {} ({}, n = {}); largest difference {}",
+            significant(reference.value),
+            percent(e.value),
+            interval(e, percent),
+            e.n,
+            percent(largest)
+        )
+    };
+    let censored = others.iter().filter(|o| o.censored).count();
+    Outcome::new((others.len(), censored), effect, claimed, signed_rank(&relative), says)
+}
+
+/// Number of pairs, and of pairs with a right-censored observation.
+fn counts(pairs: &[(&Observation, &Observation)]) -> (usize, usize) {
+    (pairs.len(), pairs.iter().filter(|(a, b)| a.censored || b.censored).count())
+}
+
+fn probability(e: &Estimate) -> String {
+    match p_value(e.p) {
+        bound if bound.starts_with('<') => format!("p {bound}"),
+        value => format!("p = {value}"),
+    }
+}
+
+fn interval(e: &Estimate, form: fn(f64) -> String) -> String {
+    format!("95 % interval {} to {}", form(e.low), form(e.high))
+}
