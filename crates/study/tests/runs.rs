@@ -4,6 +4,7 @@ mod common;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use common::{STUDY, folder, plan};
 use grainwake_run::{FailureKind, Progress};
@@ -231,6 +232,27 @@ fn the_table_has_every_run_and_survives_removal_of_the_run_folders() {
     assert_eq!(to_csv(&rows).lines().count(), 6);
     std::fs::remove_dir_all(study.join("runs")).unwrap();
     assert_eq!(records(&plan, &study), rows, "the table is kept");
+}
+
+#[test]
+fn temporary_files_of_killed_programs_are_removed_after_a_day() {
+    let (folder, path) = folder(STUDY);
+    let study = folder.path().join("out");
+    let plan = plan(&path).unwrap();
+    plan.create_folder(&study).unwrap();
+    let hours = |name: &str, age: u64| {
+        let file = study.join(name);
+        std::fs::write(&file, "{").unwrap();
+        let written = std::time::SystemTime::now() - Duration::from_secs(age * 3600);
+        std::fs::File::options().append(true).open(&file).unwrap().set_modified(written).unwrap();
+        file
+    };
+    let old = hours("study.json.4711.tmp", 25);
+    let kept = [("table.csv.4711.tmp", 23), ("notes.4711", 25), ("data.tmp", 25)];
+    let kept = kept.map(|(name, age)| hours(name, age));
+    plan.create_folder(&study).unwrap();
+    assert!(!old.exists());
+    assert!(kept.iter().all(|file| file.exists()));
 }
 
 #[test]
