@@ -2,7 +2,7 @@
 
 use grainwake_run::case::Case;
 use grainwake_run::case::number_format::{number, quantity, vector};
-use grainwake_run::case::{Estimate, cells_for_drag_error};
+use grainwake_run::case::{Estimate, cells_for_drag_error, drag_error_text};
 use grainwake_run::{Probe, ProbePlace};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 
@@ -53,8 +53,8 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     rows.extend(with_unit("cells across shortest axis", shortest.map(|(_, thin)| thin), ""));
     if let Some((error, reynolds)) = e.drag_error.zip(e.reynolds) {
         let [five, two] = [0.05, 0.02].map(|error| cells_for_drag_error(error, reynolds));
-        let error = 100.0 * error;
-        let text = format!("{error:.1} % expected; at most 5 % from {five} cells, 2 % from {two}");
+        let error = drag_error_text(error, 1);
+        let text = format!("{error} expected; at most 5 % from {five} cells, 2 % from {two}");
         rows.push(("error of the drag", text));
     }
     // For unequal grains the number refers to one of them.

@@ -56,8 +56,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let chosen = selection.choose(runs).map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
     let folder = args.output.clone().unwrap_or_else(|| study.default_folder());
     let jobs = args.jobs.clamp(1, chosen.len().max(1));
-    let all = threads::resolve(0);
-    let each = if args.threads > 0 { args.threads } else { (all / jobs).max(1) };
+    let (jobs, each) = threads::share(jobs, args.threads);
     if args.list || args.dry_run {
         plan.check_folder(&folder)?;
         let archive = Archive::read(&folder);

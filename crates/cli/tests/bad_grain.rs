@@ -543,6 +543,7 @@ fn lengths_that_no_grain_has() {
         let done = command.args(["grain", "make"]).args(body).arg("-o").arg(&out).assert().code(2);
         let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
         assert!(message.contains("between 1e-9 m and 1e6 m"), "{body:?}: {message}");
+        assert!(message.lines().all(|line| line.len() < 150), "{message}");
         assert!(!out.exists());
     }
     let mut command = grainwake();

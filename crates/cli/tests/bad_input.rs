@@ -172,6 +172,18 @@ fn thousands_of_threads_are_reduced_with_a_warning() {
     done.stderr(contains("warning: 5000 threads are too many for"));
 }
 
+#[test]
+fn thousands_of_threads_of_a_study_are_reduced_with_a_warning() {
+    let (folder, _) = folder_with(WET);
+    let study = folder.path().join("study.toml");
+    let text = "title = \"two\"\nbase = \"case.toml\"\n[[model]]\nname = \"one\"\n";
+    std::fs::write(&study, text.to_owned() + "[[model]]\nname = \"two\"\n").unwrap();
+    let mut program = grainwake();
+    program.arg("study").arg(&study).args(["--threads", "5000", "--jobs", "2", "--dry-run"]);
+    let done = program.arg("-o").arg(folder.path().join("out")).assert().success();
+    done.stderr(contains("warning: 2 at once with 5000 threads each are too many for"));
+}
+
 #[cfg(unix)]
 #[test]
 fn devices_are_no_files() {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use grainwake_run::case::{Case, schema};
+use grainwake_run::threads::resolve;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
 
@@ -261,7 +262,7 @@ impl PyCase {
         report: bool,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let threads = threads::resolve(threads.unwrap_or(self.case.threads));
+        let threads = threads::resolve(py, threads.unwrap_or(self.case.threads))?;
         let existing = running::existing(resume, force);
         let parent = start_from.map(|text| running::parent(py, &self.case, &text)).transpose()?;
         running::run(py, &self.case, &folder, existing, parent, threads, progress)?;
@@ -288,14 +289,14 @@ impl PyCase {
         py: Python<'py>,
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let threads = threads::resolve(threads.unwrap_or(self.case.threads));
+        let threads = threads::resolve(py, threads.unwrap_or(self.case.threads))?;
         json(py, &self.case.estimate(threads))
     }
 
     /// Warnings about settings that impair the results.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.case.estimate(threads::resolve(self.case.threads)).warnings
+        self.case.estimate(resolve(self.case.threads, |_| {})).warnings
     }
     /// Title, one line.
     #[getter]

@@ -132,7 +132,7 @@ impl PyStudy {
             .and_then(|selection| selection.choose(&plan.runs))
             .map_err(|problem| refused(&[problem]))?;
         let jobs = jobs.clamp(1, chosen.len().max(1));
-        let each = if threads > 0 { threads } else { (threads::resolve(0) / jobs).max(1) };
+        let (jobs, each) = threads::share(py, jobs, threads)?;
         plan.create_folder(&folder).raise()?;
         let options = Options {
             jobs,

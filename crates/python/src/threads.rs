@@ -2,22 +2,33 @@
 
 use std::sync::Arc;
 
+use pyo3::prelude::*;
 use rayon::ThreadPool;
 
 use crate::error::input;
 
-/// Returns the number of threads; 0 stands for `RAYON_NUM_THREADS` or all cores.
-pub fn resolve(threads: usize) -> usize {
-    if threads > 0 {
-        return threads;
-    }
-    let from_environment =
-        std::env::var("RAYON_NUM_THREADS").ok().and_then(|n| n.parse().ok()).filter(|n| *n > 0);
-    from_environment.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+/// Returns the number of threads; gives a `UserWarning` if it is reduced.
+pub fn resolve(py: Python<'_>, threads: usize) -> PyResult<usize> {
+    let mut warning = None;
+    let threads = grainwake_run::threads::resolve(threads, |text| warning = Some(text));
+    warn(py, warning).map(|()| threads)
+}
+
+/// Returns the number of simultaneous runs of a study and the threads of each; gives a
+/// `UserWarning` if they are reduced.
+pub fn share(py: Python<'_>, jobs: usize, threads: usize) -> PyResult<(usize, usize)> {
+    let mut warning = None;
+    let shares = grainwake_run::threads::share(jobs, threads, |text| warning = Some(text));
+    warn(py, warning).map(|()| shares)
+}
+
+fn warn(py: Python<'_>, warning: Option<String>) -> PyResult<()> {
+    let Some(text) = warning else { return Ok(()) };
+    py.import("warnings")?.call_method1("warn", (text,)).map(drop)
 }
 
 /// Starts a pool of this many threads.
-pub fn pool(threads: usize) -> pyo3::PyResult<Arc<ThreadPool>> {
+pub fn pool(threads: usize) -> PyResult<Arc<ThreadPool>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let refused = |error| input(format!("cannot start {threads} threads: {error}; use fewer"));
     pool.map(Arc::new).map_err(refused)

@@ -1,6 +1,7 @@
 """Simulations in memory: steps, arrays, control, interruption, checkpoints."""
 
 import gc
+import os
 import signal
 import sys
 import threading
@@ -61,6 +62,12 @@ def test_the_bits_do_not_depend_on_threads_and_on_python(case):
     assert one.time == two.time
     assert (one.velocities == two.velocities).all()
     assert (one.fluid_velocity("z") == two.fluid_velocity("z")).all()
+
+
+def test_thousands_of_threads_are_reduced_with_a_warning(case):
+    with pytest.warns(UserWarning, match="5000 threads are too many for"):
+        sim = gw.Simulation(case, threads=5000)
+    assert sim.threads <= 4 * (os.cpu_count() or 1)
 
 
 def test_fields_are_shown_without_a_copy(sim, case):

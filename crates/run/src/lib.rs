@@ -5,7 +5,8 @@
 //! `docs/reference/run-folder.md` lists the files.
 //!
 //! Layers, downwards: `case` -> `run_loop` -> `recording` -> `recorder` -> `run_folder`,
-//! `contact_events`, `series` -> `overlaps`, `contact_work`, `memory`, `meter`, `plan`, `error`.
+//! `contact_events`, `series` -> `overlaps`, `contact_work`, `memory`, `meter`, `threads`,
+//! `plan`, `error`.
 
 pub mod case;
 mod contact_events;
@@ -21,6 +22,7 @@ mod recording;
 mod run_folder;
 mod run_loop;
 mod series;
+pub mod threads;
 
 pub use error::{FailureKind, RunError};
 pub use job::{Job, Options};

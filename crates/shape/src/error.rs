@@ -42,7 +42,7 @@ pub enum ShapeError {
         reason: String,
     },
     /// A parameter is out of range.
-    #[error("{name} = {value}: {reason}")]
+    #[error("{name} = {}: {reason}", short(*value))]
     BadParameter {
         /// Parameter name.
         name: &'static str,
@@ -177,6 +177,12 @@ pub(crate) fn first_few<T: ToString>(items: impl IntoIterator<Item = T>, count: 
 
 /// Result of this crate's functions.
 pub type Result<T> = std::result::Result<T, ShapeError>;
+
+/// Writes a number in full, or with an exponent if it is very large or small.
+fn short(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-6..1e10).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
 
 /// Refuses a length that is not finite and positive.
 pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64> {

@@ -4,6 +4,7 @@ mod common;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use common::{STUDY, folder, plan};
 use grainwake_run::{FailureKind, Progress};
@@ -261,6 +262,27 @@ fn a_study_continues_from_its_archive() {
     let found: Vec<StateKind> = states(&second, &archive).iter().map(RunState::kind).collect();
     let (finished, missing) = (StateKind::Finished, StateKind::Missing);
     assert_eq!(found, [finished, missing, finished, missing, finished]);
+}
+
+#[test]
+fn temporary_files_of_killed_programs_are_removed_after_a_day() {
+    let (folder, path) = folder(STUDY);
+    let study = folder.path().join("out");
+    let plan = plan(&path).unwrap();
+    plan.create_folder(&study).unwrap();
+    let hours = |name: &str, age: u64| {
+        let file = study.join(name);
+        std::fs::write(&file, "{").unwrap();
+        let written = std::time::SystemTime::now() - Duration::from_secs(age * 3600);
+        std::fs::File::options().append(true).open(&file).unwrap().set_modified(written).unwrap();
+        file
+    };
+    let old = hours("study.json.4711.tmp", 25);
+    let kept = [("table.csv.4711.tmp", 23), ("notes.4711", 25), ("data.tmp", 25)];
+    let kept = kept.map(|(name, age)| hours(name, age));
+    plan.create_folder(&study).unwrap();
+    assert!(!old.exists());
+    assert!(kept.iter().all(|file| file.exists()));
 }
 
 #[test]

@@ -6,6 +6,7 @@ pub mod faults;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use faults::Change;
 
@@ -109,6 +110,26 @@ pub fn write_atomically(
 /// Returns whether a file is a temporary one, left behind by a program that was stopped.
 pub fn is_temporary(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "tmp")
+}
+
+/// Removes the files `NAME.PROCESS.tmp` of a folder that were written more than a day ago: no
+/// program still writes them. Errors are ignored, for another program may remove the same file.
+pub fn remove_old_temporaries(folder: &Path) {
+    const DAY: Duration = Duration::from_secs(24 * 3600);
+    let old = |path: &Path| {
+        let written = path.metadata().and_then(|data| data.modified());
+        written.is_ok_and(|at| at.elapsed().is_ok_and(|age| age > DAY))
+    };
+    let ours = |path: &Path| {
+        let process = path.file_stem().and_then(|stem| Path::new(stem).extension()?.to_str());
+        is_temporary(path) && process.is_some_and(|process| process.parse::<u32>().is_ok())
+    };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    for path in entries.map(|entry| entry.path()) {
+        if ours(&path) && path.is_file() && old(&path) {
+            let _ = remove_file(&path);
+        }
+    }
 }
 
 /// Waits until the content of a file, however it was written, is on the disk.

@@ -174,7 +174,7 @@ impl PySimulation {
         force: bool,
     ) -> PyResult<PySimulation> {
         let given = &case.get().case;
-        let threads = threads::resolve(threads.unwrap_or(given.threads));
+        let threads = threads::resolve(py, threads.unwrap_or(given.threads))?;
         let pool = threads::pool(threads)?;
         let (sim, recording) = match &output {
             Some(folder) => {

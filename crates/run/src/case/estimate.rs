@@ -125,6 +125,12 @@ fn drag_error(n: f64, reynolds: f64) -> f64 {
     resolved.max(THIN_LAYER_DRAG_ERROR * reynolds / (n * n))
 }
 
+/// Returns a relative error of the drag as text, "5.9 %". Beyond 30 % the formula is no measure,
+/// and the text is "more than 30 %".
+pub fn drag_error_text(error: f64, decimals: usize) -> String {
+    if error > 0.3 { "more than 30 %".into() } else { format!("{:.decimals$} %", 100.0 * error) }
+}
+
 /// Smallest number of cells per diameter, 8 or more, with which the expected error of the drag is
 /// at most `error`.
 pub fn cells_for_drag_error(error: f64, reynolds: f64) -> u32 {
@@ -178,6 +184,8 @@ mod tests {
             let expected = drag_error(n, reynolds);
             assert!(expected >= error && expected < 0.09, "Re {reynolds}, {n} cells: {expected}");
         }
+        assert_eq!(drag_error_text(drag_error(8.0, 350.0), 1), "8.8 %");
+        assert_eq!(drag_error_text(drag_error(8.0, 10_900.0), 1), "more than 30 %");
         assert_eq!(cells_for_drag_error(0.05, 100.0), 8);
         assert_eq!(cells_for_drag_error(0.02, 100.0), 11);
         assert_eq!(cells_for_drag_error(0.05, 300.0), 10);

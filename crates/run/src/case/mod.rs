@@ -44,7 +44,7 @@ use grainwake_solver::sim::Setup;
 
 pub use branch::find_parent;
 pub use error::{CaseError, Problem};
-pub use estimate::{Estimate, cells_for_drag_error};
+pub use estimate::{Estimate, cells_for_drag_error, drag_error_text};
 pub use expect::{Expectation, Verdict};
 pub use located::Located;
 pub use schema::schema;

@@ -79,6 +79,17 @@ impl<R: Real> ImmersedGrains<R> {
     pub fn couple(&mut self, flow: &mut Flow<R>, input: StepInput) -> CoupledGrains {
         let mut updates = std::mem::take(&mut self.updates);
         self.find_isolated(&input, &mut updates);
+        self.couple_marked(flow, input, updates)
+    }
+
+    /// Couples grains whose isolated ones are marked in `updates`. Panics in debug builds if a face
+    /// that one grain writes is used by another while both are coupled.
+    pub(super) fn couple_marked(
+        &mut self,
+        flow: &mut Flow<R>,
+        input: StepInput,
+        mut updates: Vec<GrainUpdate>,
+    ) -> CoupledGrains {
         let corrects_advection = self.scheme == Scheme::Aperture;
         if corrects_advection && updates.iter().any(|update| !update.isolated) {
             self.correct_advection(flow, &input, &updates);
@@ -117,7 +128,7 @@ impl<R: Real> ImmersedGrains<R> {
     }
 
     /// Resets the updates and marks the isolated grains.
-    fn find_isolated(&mut self, input: &StepInput, updates: &mut Vec<GrainUpdate>) {
+    pub(super) fn find_isolated(&mut self, input: &StepInput, updates: &mut Vec<GrainUpdate>) {
         let (immersed, grains) = (&self.grains, input.grains);
         let reach = self.locator.reach();
         let displacement = |index: usize| {

@@ -173,3 +173,70 @@ fn padding_of_rows_affects_no_link() {
     };
     assert!(predicted(0.0) == predicted(f64::NAN));
 }
+
+/// Couples two spheres at a gap of `reaches` reaches between their surfaces, one after the other.
+/// Returns whether they were isolated, and whether their borrowed rows conflict if they are updated
+/// as isolated grains anyway.
+fn isolated_and_conflicting(scheme: Scheme, reaches: f64) -> (bool, bool) {
+    let mesh = Mesh { cells: [48, 24, 24], spacing: DVec3::splat(0.125), origin: DVec3::ZERO };
+    let params = FluidParams {
+        density: 1.0,
+        kinematic_viscosity: 0.01,
+        body_acceleration: DVec3::ZERO,
+        initial_velocity: DVec3::ZERO,
+    };
+    let mut flow = Flow::<f64>::new(&mesh, Boundaries([[Boundary::WALL; 2]; 3]), &params);
+    flow.start_from(|axis, x| (1.5 * x).to_array()[(axis + 1) % 3].sin());
+    let grain =
+        |x: f64| Grain::new(Shape::sphere(0.5, 100), 2.0).with_position(DVec3::new(x, 1.52, 1.47));
+    let mut grains = [grain(1.55), grain(5.0)];
+    let reach = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &grains).locator.reach();
+    grains[1].pose.position.x = 1.55 + 1.0 + reaches * reach;
+    let mut immersed = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &grains);
+    flow.predict(DT);
+    let kinematics = grains.each_ref().map(GrainKinematics::of);
+    let (previous, none) = ([PreviousStep::default(); 2], [Load::default(); 2]);
+    let input = || StepInput {
+        grains: &grains,
+        kinematics: &kinematics,
+        previous: &previous,
+        contact: &none,
+        applied: &none,
+        last_loads: &[],
+        crossings: &[],
+        surface_loads: &[],
+        dt: DT,
+    };
+    // One thread: the conflict is recorded, and no face is used by two threads.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    // Marked by `find_isolated`, the grains never conflict.
+    let isolated = pool.install(|| immersed.couple(&mut flow, input())).isolated();
+    assert_eq!(isolated[0], isolated[1], "{reaches}");
+    let mut updates = Vec::new();
+    immersed.find_isolated(&input(), &mut updates);
+    updates.iter_mut().for_each(|update| update.isolated = true);
+    let anyway = || pool.install(|| immersed.couple_marked(&mut flow, input(), updates));
+    let conflict = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| drop(anyway())));
+    let message = conflict.err().map(|panic| *panic.downcast::<String>().expect("a message"));
+    if let Some(message) = &message {
+        assert_eq!(message, "grains 0 and 1 use the same faces at once", "{reaches}");
+    }
+    (isolated[0], message.is_some())
+}
+
+#[test]
+fn grains_that_use_the_same_faces_are_never_isolated() {
+    for scheme in [Scheme::Aperture, Scheme::Paper] {
+        let check = |reaches| isolated_and_conflicting(scheme, reaches);
+        // Closer than one reach, the recorder of borrowed rows finds the conflict in debug builds.
+        let conflicts = cfg!(debug_assertions);
+        for reaches in [0.1, 0.9] {
+            assert_eq!(check(reaches), (false, conflicts), "{scheme:?} {reaches}");
+        }
+        assert_eq!(check(2.5), (true, false), "{scheme:?}");
+        for reaches in [1.2, 1.5, 1.8, 1.9, 2.0, 2.05] {
+            let (isolated, conflict) = check(reaches);
+            assert!(!(isolated && conflict), "{scheme:?} {reaches}");
+        }
+    }
+}

@@ -109,13 +109,15 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Creates the study folder and writes the plan into it.
+    /// Creates the study folder, removes temporary files of killed programs that are more than a
+    /// day old, and writes the plan.
     ///
     /// # Errors
     /// [`StudyError::Occupied`] if the folder holds another study or other files.
     pub fn create_folder(&self, folder: &Path) -> Result<(), StudyError> {
         self.check_folder(folder)?;
         disk::create_folder(&folder.join(RUNS)).at("create", folder)?;
+        disk::remove_old_temporaries(folder);
         self.write(folder)
     }
 

@@ -1,6 +1,6 @@
 //! Warnings about resolution and cost.
 
-use crate::case::estimate::{Estimate, THIN_LAYER_DRAG_ERROR};
+use crate::case::estimate::{Estimate, THIN_LAYER_DRAG_ERROR, drag_error_text};
 use crate::case::number_format::{AXES, quantity};
 use crate::case::settling::time_step;
 use grainwake_solver::dem::{ContactLawKind, Grain};
@@ -38,9 +38,9 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
         let error = THIN_LAYER_DRAG_ERROR * re / (n * n);
         if error > LARGEST_DRAG_ERROR {
             found.push(format!(
-                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells): expect the drag {:.0} % too low; {:.0} cells reduce the error to 3 %",
+                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells): expect the drag {} too low; {:.0} cells reduce the error to 3 %",
                 n / re.sqrt(),
-                100.0 * error,
+                drag_error_text(error, 0),
                 (THIN_LAYER_DRAG_ERROR * re / 0.03).sqrt().ceil()
             ));
         }
