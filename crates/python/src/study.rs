@@ -132,7 +132,8 @@ impl PyStudy {
             .and_then(|selection| selection.choose(&plan.runs))
             .map_err(|problem| refused(&[problem]))?;
         let jobs = jobs.clamp(1, chosen.len().max(1));
-        let each = if threads > 0 { threads } else { (threads::resolve(0) / jobs).max(1) };
+        let all = threads::resolve(py, threads)?;
+        let each = if threads > 0 { all } else { (all / jobs).max(1) };
         plan.create_folder(&folder).raise()?;
         let options = Options {
             jobs,

@@ -2,22 +2,22 @@
 
 use std::sync::Arc;
 
+use pyo3::prelude::*;
 use rayon::ThreadPool;
 
 use crate::error::input;
+use crate::running::warn;
 
-/// Returns the number of threads; 0 stands for `RAYON_NUM_THREADS` or all cores.
-pub fn resolve(threads: usize) -> usize {
-    if threads > 0 {
-        return threads;
-    }
-    let from_environment =
-        std::env::var("RAYON_NUM_THREADS").ok().and_then(|n| n.parse().ok()).filter(|n| *n > 0);
-    from_environment.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+/// Returns the number of threads of [`grainwake_run::threads::resolve`]; too many are reduced with
+/// a `CaseWarning`.
+pub fn resolve(py: Python<'_>, threads: usize) -> PyResult<usize> {
+    let (threads, warning) = grainwake_run::threads::resolve(threads);
+    warn(py, warning)?;
+    Ok(threads)
 }
 
 /// Starts a pool of this many threads.
-pub fn pool(threads: usize) -> pyo3::PyResult<Arc<ThreadPool>> {
+pub fn pool(threads: usize) -> PyResult<Arc<ThreadPool>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let refused = |error| input(format!("cannot start {threads} threads: {error}; use fewer"));
     pool.map(Arc::new).map_err(refused)

@@ -33,7 +33,7 @@ pub fn _validate<'py>(
     };
     let library = Library::open(suites.as_deref()).raise()?;
     let suites = chosen(library.suites.clone(), &names)?;
-    let threads = threads::resolve(threads);
+    let threads = threads::resolve(py, threads)?;
     let mut results = Vec::new();
     for suite in &suites {
         let mut values = BTreeMap::new();

@@ -1,6 +1,7 @@
 """Simulations in memory: steps, arrays, control, interruption, checkpoints."""
 
 import gc
+import os
 import signal
 import sys
 import threading
@@ -208,8 +209,13 @@ def test_a_set_velocity_acts_in_the_next_step():
 
 
 def test_wrong_control_is_refused(sim):
-    with pytest.raises(IndexError, match="there is no grain 3"):
+    with pytest.raises(IndexError, match="no grain 3: the simulation has 1 grain, counted from 0"):
         sim.set_load(3, force=[0, 0, 0])
+    for call in (sim.set_velocity, sim.prescribe_motion, sim.set_load):
+        with pytest.raises(IndexError, match="no grain -1: the simulation has 1 grain"):
+            call(-1, [0, 0, 0])
+    with pytest.raises(IndexError, match="no grain -1"):
+        sim.release(-1)
     with pytest.raises(gw.CaseError, match="force, z.*is a length"):
         sim.set_load(0, force=[0, 0, "2 mm"])
     with pytest.raises(gw.CaseError, match="found 2 components"):
@@ -217,6 +223,14 @@ def test_wrong_control_is_refused(sim):
     with pytest.raises(gw.CaseError, match="give velocity, angular_velocity or both"):
         sim.prescribe_motion(0)
     sim.set_load(0, force=[0, 0, "2 uN"], torque=["1 nN m", 0, 0])
+
+
+def test_too_many_threads_are_reduced(case):
+    with pytest.warns(gw.CaseWarning, match="1000000 threads are too many"):
+        sim = gw.Simulation(case, threads=1_000_000)
+    assert sim.threads <= 4 * os.cpu_count()
+    with pytest.raises(gw.CaseError, match="found -1; expected a whole number"):
+        gw.Simulation(case, threads=-1)
 
 
 def test_contacts_are_listed():
