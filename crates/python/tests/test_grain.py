@@ -163,7 +163,7 @@ def test_counts_are_whole_numbers_from_0_on():
         gw.Grain.sphere("1 mm", nodes=-5)
     with pytest.raises(gw.CaseError, match="found -1; expected a whole number from 0 on"):
         gw.Grain.ellipsoid("1 mm", "1 mm", "1 mm", cells=-1)
-    with pytest.raises(TypeError, match="cells"):
+    with pytest.raises(TypeError):
         gw.Grain.ellipsoid("1 mm", "1 mm", "1 mm", cells=20.5)
 
 

@@ -51,10 +51,10 @@ def test_control_shows_in_the_tables(case, run, tmp_path):
     free, table = run.grain(0), controlled.grain(0)
     assert controlled.finished and len(table) == len(free) == 11
     # Up to the change the rows are those of the free grain; afterwards it goes up.
-    assert (table[:6] == free[:6]).all(axis=None)
+    assert (table.iloc[:6] == free.iloc[:6]).all(axis=None)
     assert free["vz"].iloc[-1] < -0.02 < 0.01 < table["vz"].iloc[-1]
     in_memory = gw.frame(seen)
-    assert np.array_equal(in_memory["vz"], table["vz"][5:])
+    assert np.array_equal(in_memory["vz"], table["vz"].iloc[5:])
     # The simulation is closed, but can still be read.
     assert sim.time == pytest.approx(0.02) and sim.output == tmp_path / "run"
     for call in (sim.step, sim.checkpoint, sim.finish):

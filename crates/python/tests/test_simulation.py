@@ -311,8 +311,9 @@ def test_the_lock_of_the_interpreter_is_released(case_file):
     wall = time.monotonic() - started
     done.set()
     counter.join()
-    # With the lock held, the thread would count a few times only.
-    assert counted[0] > 100 * wall
+    # With the lock held, the thread would count at most once per handling of signals, 20 times a
+    # second. A busy machine allows about 100.
+    assert counted[0] > 40 * wall
 
 
 def test_another_thread_cannot_step_at_the_same_time(case_file):
