@@ -13,8 +13,8 @@ use grainwake_validation::SuiteError;
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use pyo3::PyErr;
 use pyo3::exceptions::{
-    PyFileExistsError, PyFileNotFoundError, PyIndexError, PyIsADirectoryError,
-    PyNotADirectoryError, PyOSError, PyPermissionError,
+    PyFileExistsError, PyFileNotFoundError, PyIsADirectoryError, PyNotADirectoryError, PyOSError,
+    PyPermissionError,
 };
 
 pyo3::import_exception!(grainwake._errors, CaseError);
@@ -175,10 +175,7 @@ impl IntoException for StepError {
 
 impl IntoException for ControlError {
     fn into_exception(self) -> PyErr {
-        match self {
-            ControlError::NoGrain { .. } => PyIndexError::new_err(self.to_string()),
-            _ => input(self.to_string()),
-        }
+        input(self.to_string())
     }
 }
 

@@ -125,10 +125,7 @@ pub fn parent(py: Python<'_>, case: &Case, text: &str) -> PyResult<Parent> {
     let mut notes = Vec::new();
     let found = find_parent(text, &mut |note| notes.push(note.to_owned())).raise()?;
     case.check_parent(&found).raise()?;
-    let warnings = py.import("warnings")?;
-    for note in notes {
-        warnings.call_method1("warn", (note,))?;
-    }
+    warn(py, notes)?;
     Ok(found)
 }
 
@@ -171,6 +168,13 @@ pub fn run(
             Err(PyKeyboardInterrupt::new_err(format!("interrupted at t = {time:.6e} s")))
         }
     }
+}
+
+/// Gives notes as `CaseWarning`s.
+pub fn warn(py: Python<'_>, notes: impl IntoIterator<Item = String>) -> PyResult<()> {
+    let warnings = py.import("warnings")?;
+    let kind = py.import("grainwake")?.getattr("CaseWarning")?;
+    notes.into_iter().try_for_each(|note| warnings.call_method1("warn", (note, &kind)).map(drop))
 }
 
 /// Returns the command line of Python, for the provenance.
