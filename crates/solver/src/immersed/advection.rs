@@ -30,7 +30,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::geometry::{FaceRow, LocatedBody};
-use super::links::{BoxVelocity, LinkPlanes, compute_link_weights, listed_faces};
+use super::links::{BoxVelocity, LinkPlanes, NO_LINK, compute_link_weights, listed_faces};
 use crate::dem::Grain;
 use crate::flow::{OldState, Prediction};
 use crate::grid::{FACE_OFFSET, Mesh};
@@ -340,8 +340,9 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         weight: V,
     ) -> V {
         let (zero, half) = (V::constant(0.0), V::constant(0.5));
-        let no_link = V::constant(-0.5);
-        if no_link.mask_below(weight) == 0 {
+        // The weight is NO_LINK = -1 where there is no link, and at least 0 elsewhere.
+        let between = V::constant(0.5 * NO_LINK);
+        if between.mask_below(weight) == 0 {
             return zero;
         }
         let axis = &self.axes[along];
@@ -366,6 +367,6 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             flux = ((q_mean - u_q) * (c_mean - u_c)).mul_add(weight, higher_order);
         }
         let flux = flux * V::constant(axis.per_spacing);
-        no_link.select_below(weight, flux, zero)
+        between.select_below(weight, flux, zero)
     }
 }

@@ -15,6 +15,9 @@ use crate::flow::OldState;
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
+/// Weight where there is no link.
+pub(super) const NO_LINK: f64 = -1.0;
+
 /// The current plane of a component and the next, in rows aligned to registers. One row precedes
 /// the first, and one follows the last.
 #[derive(Default)]
@@ -150,7 +153,7 @@ impl ComputeLinkWeights<'_> {
         let (this, above) = (&distance[this][..], &distance[next][..]);
         let [x, y, z] = weight;
         let weight = [&mut x[..], &mut y[..], &mut z[..]];
-        let (half, zero, no_link) = (V::constant(0.5), V::constant(0.0), V::constant(-1.0));
+        let (half, zero, no_link) = (V::constant(0.5), V::constant(0.0), V::constant(NO_LINK));
         let [inside, band, outside] = [-1.0, 1.0, 2.0].map(|n| V::constant(n * self.eps));
         let rows = *row_length..*row_length * (self.body.size.y as usize + 1);
         for entry in rows.step_by(V::WIDTH) {

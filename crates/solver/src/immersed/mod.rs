@@ -1,6 +1,5 @@
-//! Coupling of flow and grains: the grid takes the rigid velocities, the grains take their loads.
-//!
-//! The loads follow Eq. 5.
+//! Coupling of flow and grains: the grid takes the rigid velocities, the grains take their loads
+//! (Eq. 5).
 //!
 //! # Layers
 //!
@@ -33,9 +32,9 @@
 //! 6. `rigidity.rs` imposes the velocities on the forced faces.
 //!
 //! An isolated grain passes from 1 to 6 at once. Grains that touch or are close to others are
-//! processed in passes: 1 for all of them, then 2 to 4, then 5 and 6. If grains touch, the caller
-//! (`sim/stages.rs`) repeats the contact sub-steps between 4 and 5, with
-//! `CoupledGrains::responses`.
+//! processed in passes: 1 for all of them, then 2 to 4, then 5 and 6. If a contact or a lubrication
+//! film loads a grain, the caller (`sim/stages.rs`) repeats the contact sub-steps between 4 and 5,
+//! with `CoupledGrains::responses`.
 //!
 //! Every kernel has a plain scalar form in `reference/`, against which it is tested.
 

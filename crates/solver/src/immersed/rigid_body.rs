@@ -86,8 +86,8 @@ impl RigidBodySystem {
         RigidBodySystem::new(grain, previous, impulse, fluid_density, load, Some(terms), dt)
     }
 
-    /// Assembles the equations under the `applied` load (weight less buoyancy) over `dt` [s],
-    /// without contact.
+    /// Assembles the equations under the `applied` load (weight less buoyancy, and external
+    /// loads) over `dt` [s], without contact.
     pub fn submerged(
         grain: &Grain,
         previous: &PreviousStep,

@@ -23,9 +23,9 @@ use crate::math::{Load, Real, RigidVelocity};
 pub struct ImmersedGrain {
     /// Faces within reach and their distances.
     pub body: LocatedBody,
-    /// Forced faces; empty for an isolated grain, which uses [`ThreadScratch`].
+    /// Forced faces; unused while the grain is isolated, as it then uses [`ThreadScratch`].
     pub forced: ForcedFaces,
-    /// Correction of the advection; empty for an isolated grain.
+    /// Correction of the advection; unused while the grain is isolated.
     pub correction: AdvectionCorrection,
 }
 
@@ -100,7 +100,7 @@ pub struct StepInput<'a> {
     pub previous: &'a [PreviousStep],
     /// Mean contact loads in the sub-steps so far.
     pub contact: &'a [Load],
-    /// Weight less buoyancy.
+    /// Weight less buoyancy, and external loads.
     pub applied: &'a [Load],
     /// Hydrodynamic loads of the last step.
     pub last_loads: &'a [Load],

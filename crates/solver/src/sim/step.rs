@@ -1,4 +1,4 @@
-//! The time step, in the order of section 2 of the paper.
+//! The time step: the equations of section 2 of the paper, in the order of decision 0014.
 
 use super::stages::Start;
 use super::{Simulation, StepError};

@@ -3,8 +3,9 @@
 //!
 //! A further force law implements `ContactLaw` in `law.rs` or in a file beside it, and needs one
 //! variant of [`ContactLawKind`] and of `SelectedLaw`, and its keys in the case file. A cohesive
-//! law overrides `ContactLaw::normal_force`, which is never negative by default; a force across a
-//! gap belongs beside the lubrication in `model.rs`.
+//! law overrides `ContactLaw::normal_force`, which is never negative by default. A force across a
+//! gap belongs beside the lubrication in `model.rs`: `ContactModel::range` makes pairs of this gap
+//! contacts, and `substeps.rs` chooses the sub-steps and takes the mean over the nodes in contact.
 
 mod law;
 mod model;

@@ -148,7 +148,7 @@ impl ContactDynamics {
         }
         let longest_step = shortest / self.model.params.substeps_per_contact;
         let count = (dt / longest_step.min(self.film_time())).ceil();
-        if count.is_finite() { count.clamp(1.0, MAX_SUBSTEPS) as usize } else { 1 }
+        if count.is_nan() { 1 } else { count.clamp(1.0, MAX_SUBSTEPS) as usize }
     }
 
     /// Time in which no listed pair closes its lubrication film by more than half the height of the
