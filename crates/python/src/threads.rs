@@ -5,8 +5,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
-use crate::error::input;
-use crate::running::warn;
+use crate::error::{input, warn};
 
 /// Returns the number of threads of [`grainwake_run::threads::resolve`]; too many are reduced with
 /// a `CaseWarning`.
