@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use grainwake_formats::summary::EndReason;
 use grainwake_formats::table::Table;
 use grainwake_run::case::Case;
 use grainwake_run::provenance::Provenance;
@@ -359,7 +358,7 @@ fn controlled(case: &Path, out: &Path, existing: Existing, until: f64) {
     }
     recording.checkpoint(&sim).unwrap();
     if recording.at_end(&sim) {
-        recording.finish(&sim, EndReason::End).unwrap();
+        recording.finish(&sim).unwrap();
     }
 }
 

@@ -2,11 +2,34 @@
 
 use glam::DVec3;
 use grainwake_run::case::quantity::{Kind, parse_quantity};
-use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{PyBool, PyString};
 
 use crate::error::input;
+
+/// Whole number from 0 on.
+#[derive(Clone, Copy)]
+pub struct Whole(usize);
+
+impl From<Whole> for usize {
+    fn from(whole: Whole) -> usize {
+        whole.0
+    }
+}
+
+impl<'py> FromPyObject<'_, 'py> for Whole {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Whole> {
+        match value.extract::<i128>() {
+            Ok(number) => usize::try_from(number)
+                .map(Whole)
+                .map_err(|_| input(format!("found {number}; expected a whole number from 0 on"))),
+            Err(error) => Err(error),
+        }
+    }
+}
 
 /// Returns a quantity in SI units: a number is SI, a string carries its unit ("2 mm").
 pub fn quantity<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
@@ -14,10 +37,14 @@ pub fn quantity<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> 
         let text = text.to_cow()?;
         return parse_quantity::<K>(&text).map_err(|message| input(format!("{name}: {message}")));
     }
-    match value.extract::<f64>() {
+    let number = match value.is_instance_of::<PyBool>() {
+        true => Err(()),
+        false => value.extract::<f64>().map_err(drop),
+    };
+    match number {
         Ok(number) if number.is_finite() => Ok(number),
         Ok(number) => Err(input(format!("{name}: found {number}; expected {}", K::EXPECTED))),
-        Err(_) => {
+        Err(()) => {
             let found = value.get_type().name()?;
             Err(input(format!("{name}: found a value of type {found}; expected {}", K::EXPECTED)))
         }
@@ -58,7 +85,11 @@ pub fn array<'py, T: numpy::Element>(
     if !matches!(kind.as_str(), "b" | "i" | "u" | "f") {
         return Err(input(format!("{name}: an array of {from} holds no real numbers")));
     }
-    let converted = numpy.call_method1("ascontiguousarray", (plain, dtype))?;
+    let converted = numpy.call_method1("ascontiguousarray", (&plain, &dtype))?;
+    let whole = matches!(dtype.kind(), b'i' | b'u') && kind == "f";
+    if whole && !numpy.call_method1("array_equal", (&plain, &converted))?.is_truthy()? {
+        return Err(input(format!("{name}: found numbers that are not whole")));
+    }
     Ok(converted.cast_into::<PyArrayDyn<T>>()?)
 }
 

@@ -7,9 +7,10 @@ use grainwake_run::threads::resolve;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
 
-use crate::arrays::json;
+use crate::arguments::Whole;
+use crate::arrays::{counted, json};
 use crate::case_dict::{override_list, to_toml};
-use crate::error::{IntoException, Raise, system};
+use crate::error::{IntoException, Raise, input, system};
 use crate::grain::PyGrain;
 use crate::{running, threads};
 
@@ -196,7 +197,15 @@ impl PyCase {
         all.set_item("grain", grains)?;
         for (name, table) in tables.into_iter().flatten() {
             match name.cast::<PyString>()?.to_str()? {
-                "time" => time.update(table.cast::<PyDict>()?.as_mapping())?,
+                "time" => match table.cast::<PyDict>() {
+                    Ok(more) => time.update(more.as_mapping())?,
+                    Err(_) => {
+                        let found = table.get_type().name()?;
+                        return Err(input(format!(
+                            "time: found a value of type {found}; expected a dict"
+                        )));
+                    }
+                },
                 _ => all.set_item(name, table)?,
             }
         }
@@ -258,11 +267,11 @@ impl PyCase {
         resume: bool,
         force: bool,
         start_from: Option<String>,
-        threads: Option<usize>,
+        threads: Option<Whole>,
         report: bool,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let threads = threads::resolve(py, threads.unwrap_or(self.case.threads))?;
+        let threads = threads::resolve(py, threads.map_or(self.case.threads, usize::from))?;
         let existing = running::existing(resume, force);
         let parent = start_from.map(|text| running::parent(py, &self.case, &text)).transpose()?;
         running::run(py, &self.case, &folder, existing, parent, threads, progress)?;
@@ -287,9 +296,9 @@ impl PyCase {
     fn estimate<'py>(
         &self,
         py: Python<'py>,
-        threads: Option<usize>,
+        threads: Option<Whole>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let threads = threads::resolve(py, threads.unwrap_or(self.case.threads))?;
+        let threads = threads::resolve(py, threads.map_or(self.case.threads, usize::from))?;
         json(py, &self.case.estimate(threads))
     }
 
@@ -345,7 +354,7 @@ impl PyCase {
     }
     fn __repr__(&self) -> String {
         let [nx, ny, nz] = self.case.setup.mesh.cells;
-        let grains = self.case.setup.grains.len();
-        format!("Case({:?}, {grains} grains, {nx} x {ny} x {nz} cells)", self.case.title)
+        let grains = counted(self.case.setup.grains.len());
+        format!("Case({:?}, {grains}, {nx} x {ny} x {nz} cells)", self.case.title)
     }
 }

@@ -61,9 +61,8 @@ pub fn _read_collection(path: PathBuf) -> PyResult<Vec<(f64, String, String)>> {
 /// (z, y, x, components).
 #[pyfunction]
 pub fn _read_image(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
-    let image = py
-        .detach(|| vti::read(&path))
-        .map_err(|error| system(error.kind(), format!("{}: {error}", path.display())))?;
+    let image =
+        py.detach(|| vti::read(&path)).map_err(|error| system(error.kind(), error.to_string()))?;
     let [nx, ny, nz] = image.frame.cells;
     let arrays = PyDict::new(py);
     for array in image.arrays {

@@ -15,7 +15,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::error::{Raise, numerics};
+use crate::error::{Raise, numerics, warn};
 use crate::threads;
 
 /// Interval at which signals are handled and the progress is shown.
@@ -125,10 +125,7 @@ pub fn parent(py: Python<'_>, case: &Case, text: &str) -> PyResult<Parent> {
     let mut notes = Vec::new();
     let found = find_parent(text, &mut |note| notes.push(note.to_owned())).raise()?;
     case.check_parent(&found).raise()?;
-    let warnings = py.import("warnings")?;
-    for note in notes {
-        warnings.call_method1("warn", (note,))?;
-    }
+    warn(py, notes)?;
     Ok(found)
 }
 

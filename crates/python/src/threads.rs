@@ -5,9 +5,9 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
-use crate::error::input;
+use crate::error::{input, warn};
 
-/// Returns the number of threads; gives a `UserWarning` if it is reduced.
+/// Returns the number of threads; gives a `CaseWarning` if it is reduced.
 pub fn resolve(py: Python<'_>, threads: usize) -> PyResult<usize> {
     let mut warning = None;
     let threads = grainwake_run::threads::resolve(threads, |text| warning = Some(text));
@@ -15,16 +15,11 @@ pub fn resolve(py: Python<'_>, threads: usize) -> PyResult<usize> {
 }
 
 /// Returns the number of simultaneous runs of a study and the threads of each; gives a
-/// `UserWarning` if they are reduced.
+/// `CaseWarning` if they are reduced.
 pub fn share(py: Python<'_>, jobs: usize, threads: usize) -> PyResult<(usize, usize)> {
     let mut warning = None;
     let shares = grainwake_run::threads::share(jobs, threads, |text| warning = Some(text));
     warn(py, warning).map(|()| shares)
-}
-
-fn warn(py: Python<'_>, warning: Option<String>) -> PyResult<()> {
-    let Some(text) = warning else { return Ok(()) };
-    py.import("warnings")?.call_method1("warn", (text,)).map(drop)
 }
 
 /// Starts a pool of this many threads.

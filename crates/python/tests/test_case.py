@@ -99,6 +99,11 @@ def test_a_value_without_toml_is_refused(tables, words):
         gw.Case.from_dict(tables)
 
 
+def test_a_table_that_is_no_dict_is_refused():
+    with pytest.raises(gw.CaseError, match="time: found a value of type int; expected a dict"):
+        gw.Case.new(size=["4 mm"] * 3, cell_size="1 mm", end="1 s", time=3)
+
+
 def test_a_case_of_keywords():
     pebble = gw.Grain.ellipsoid("2 mm", "1.6 mm", "1.2 mm", cells=32)
     case = gw.Case.new(

@@ -40,6 +40,7 @@ def test_units_are_numbers_in_si_or_strings():
     ("2 mmm", ["unknown unit `mmm`", "did you mean `mm`?"]),
     (float("nan"), ["found NaN"]),
     ([1], ["found a value of type list"]),
+    (True, ["found a value of type bool"]),
     (-1.0, ["must be finite and positive"]),
 ])
 def test_a_wrong_length_is_refused(value, words):
@@ -112,6 +113,7 @@ def test_a_mesh_of_arrays_becomes_a_grain():
     ((CUBE_VERTICES, CUBE_FACES[1:]), ["edge"]),
     ((CUBE_VERTICES, CUBE_FACES + 1), ["has vertex 8"]),
     ((CUBE_VERTICES, CUBE_FACES - 1), ["-1 is not the index"]),
+    ((CUBE_VERTICES, CUBE_FACES + 0.5), ["faces", "not whole"]),
     ((CUBE_VERTICES * np.nan, CUBE_FACES), ["not a finite number"]),
     ((CUBE_VERTICES * 1j, CUBE_FACES), ["holds no real numbers"]),
     ((CUBE_VERTICES, CUBE_FACES[:, ::-1]), ["inside out", "flip=True"]),
@@ -141,6 +143,28 @@ def test_meshes_go_to_pyvista_and_back():
     assert again.a == pytest.approx(grain.a, rel=0.02)
     with pytest.raises(gw.CaseError, match='expected "pyvista" or "trimesh"'):
         grain.mesh("blender")
+
+
+def test_meshes_go_to_trimesh_and_back():
+    trimesh = pytest.importorskip("trimesh")
+    grain = gw.Grain.ellipsoid("3 mm", "2 mm", "1 mm", cells=32)
+    mesh = grain.mesh("trimesh")
+    assert isinstance(mesh, trimesh.Trimesh)
+    assert mesh.is_watertight and mesh.is_winding_consistent
+    assert mesh.volume == pytest.approx(grain.volume, rel=0.02)
+    assert mesh.center_mass == pytest.approx([0, 0, 0], abs=1e-6)
+    assert gw.Grain.from_mesh(mesh, cells=32).a == pytest.approx(grain.a, rel=0.02)
+    box = trimesh.creation.box(extents=(2e-3, 1e-3, 1e-3))
+    assert gw.Grain.from_mesh(box, cells=32).volume == pytest.approx(2e-9, rel=0.02)
+
+
+def test_counts_are_whole_numbers_from_0_on():
+    with pytest.raises(gw.CaseError, match="found -5; expected a whole number from 0 on"):
+        gw.Grain.sphere("1 mm", nodes=-5)
+    with pytest.raises(gw.CaseError, match="found -1; expected a whole number from 0 on"):
+        gw.Grain.ellipsoid("1 mm", "1 mm", "1 mm", cells=-1)
+    with pytest.raises(TypeError):
+        gw.Grain.ellipsoid("1 mm", "1 mm", "1 mm", cells=20.5)
 
 
 def test_a_scan_of_an_array_becomes_a_grain():

@@ -51,10 +51,10 @@ def test_control_shows_in_the_tables(case, run, tmp_path):
     free, table = run.grain(0), controlled.grain(0)
     assert controlled.finished and len(table) == len(free) == 11
     # Up to the change the rows are those of the free grain; afterwards it goes up.
-    assert (table[:6] == free[:6]).all(axis=None)
+    assert (table.iloc[:6] == free.iloc[:6]).all(axis=None)
     assert free["vz"].iloc[-1] < -0.02 < 0.01 < table["vz"].iloc[-1]
     in_memory = gw.frame(seen)
-    assert np.array_equal(in_memory["vz"], table["vz"][5:])
+    assert np.array_equal(in_memory["vz"], table["vz"].iloc[5:])
     # The simulation is closed, but can still be read.
     assert sim.time == pytest.approx(0.02) and sim.output == tmp_path / "run"
     for call in (sim.step, sim.checkpoint, sim.finish):
@@ -174,3 +174,56 @@ def test_a_failed_step_keeps_the_last_checkpoint_and_unlocks_the_folder(case_fil
     with pytest.raises(gw.SolverError, match="cannot be continued"):
         sim.finish()
     assert gw.Simulation(unstable, output=folder, resume=True).steps < sim.steps
+
+
+def test_a_stop_condition_ends_a_run_as_it_does_in_case_run(case_file, tmp_path):
+    keys = {"time.end": "1 s", "time.step": "0.5 ms", "grain.0.position": ["2 mm", "2 mm", "1 mm"],
+            "time.stop": {"when": "landing", "hold": "1 ms"}}
+    case = gw.Case.load(case_file, keys)
+    free = case.run(tmp_path / "free", progress=False, report=False)
+    landing = free.summary["grains"][0]["landing_time_s"]
+    assert free.summary["ended_by"] == "landing" and 0 < landing < 0.02
+
+    def own_loop(sim):
+        while not sim.ended:
+            sim.step()
+
+    loops = {"states": lambda sim: list(sim.run(progress=False)), "own": own_loop}
+    for name, advance in loops.items():
+        sim = gw.Simulation(case, output=tmp_path / name)
+        assert sim.ended is None
+        advance(sim)
+        assert sim.ended == "landing" and 0.001 <= sim.time - landing < 0.002
+        run = sim.finish(report=False)
+        assert sim.ended == "landing" and run.summary["ended_by"] == "landing"
+        for file in BITS:
+            assert (run.path / file).read_bytes() == (free.path / file).read_bytes(), (name, file)
+        with pytest.raises(gw.CaseError, match="holds a finished run"):
+            gw.Simulation(case, output=tmp_path / name, resume=True)
+
+    # In memory as well, also after a checkpoint between the landing and the end.
+    sim = gw.Simulation(case)
+    sim.advance_to(landing + 5e-4)
+    sim.save_checkpoint(tmp_path / "state.ckpt")
+    again = gw.Simulation(case)
+    again.restore_checkpoint(tmp_path / "state.ckpt")
+    for each in (sim, again):
+        assert each.ended is None
+        last = list(each.run(progress=False))[-1]
+        assert each.ended == "landing" and 0.001 <= last.time - landing < 0.002
+        # `run` has nothing left to do, a step of the program is still possible.
+        assert [state.time for state in each.run(progress=False)] == [last.time]
+        each.step()
+        assert each.time > last.time
+    assert sim.time == again.time and np.array_equal(sim.positions, again.positions)
+
+
+def test_a_run_ends_at_the_end_of_its_case(case, tmp_path):
+    sim = gw.Simulation(case)
+    sim.advance_to("10 ms")
+    assert sim.ended is None
+    sim.advance_to("20 ms")
+    assert sim.ended == "end"
+    # In memory the end of the case is no bound.
+    assert [state.time for state in sim.run(until="22 ms", every="2 ms", progress=False)][1:] == [
+        pytest.approx(0.022)]

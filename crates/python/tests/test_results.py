@@ -186,6 +186,26 @@ def test_an_incomplete_folder_opens_as_far_as_it_can(broken):
     assert run.surfaces(0).n_cells > 0
 
 
+@pytest.mark.parametrize("index", ["", None])
+def test_without_an_index_the_vtk_files_tell_their_times(run, broken, index):
+    pytest.importorskip("xarray")
+    (broken / "run.pvd").unlink() if index is None else (broken / "run.pvd").write_text(index)
+    (broken / "slices" / "y-grain0_000001.vti").write_bytes(b"damaged")
+    with pytest.warns(gw.CaseWarning, match="run.pvd") as warned:
+        again = gw.open(broken)
+    # The warning names the folder once.
+    assert str(warned[0].message).count(str(broken)) == 1
+    assert again.planes == run.planes == ["y-grain0"]
+    assert again.slice("20 ms").equals(run.slice("20 ms"))
+    assert again.slice("10 ms").attrs["time"] == 0.0
+    assert again.surfaces("10 ms").points.tolist() == run.surfaces("10 ms").points.tolist()
+    assert again.volume(0).equals(run.volume(0))
+    whole = {tuple(row) for row in run.files.itertuples(index=False)}
+    left = {tuple(row) for row in again.files.itertuples(index=False)}
+    assert whole - left == {(0.01, "slice y-grain0", "slices/y-grain0_000001.vti")}
+    assert left <= whole
+
+
 def test_a_damaged_table_is_located(broken):
     lines = (broken / "grains.csv").read_text().splitlines()
     lines[3] = lines[3].replace(",", ",x", 1)
@@ -258,6 +278,13 @@ def test_a_failed_run_raises_solver_error(case_file, tmp_path):
             unstable.run(tmp_path / "run", progress=False)
         failed = gw.open(tmp_path / "run")
     assert "remedy" in failed.failure
+
+
+def test_warnings_name_the_line_of_the_caller(case_file, tmp_path):
+    coarse = gw.Case.load(case_file, {"domain.cell_size": "0.5 mm", "time.end": "1 ms"})
+    with pytest.warns(gw.CaseWarning) as warned:
+        coarse.run(tmp_path / "run", progress=False, report=False)
+    assert warned[0].filename == __file__
 
 
 def test_warnings_of_a_case_are_warnings(case_file, tmp_path):

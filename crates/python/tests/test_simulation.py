@@ -64,12 +64,6 @@ def test_the_bits_do_not_depend_on_threads_and_on_python(case):
     assert (one.fluid_velocity("z") == two.fluid_velocity("z")).all()
 
 
-def test_thousands_of_threads_are_reduced_with_a_warning(case):
-    with pytest.warns(UserWarning, match="5000 threads are too many for"):
-        sim = gw.Simulation(case, threads=5000)
-    assert sim.threads <= 4 * (os.cpu_count() or 1)
-
-
 def test_fields_are_shown_without_a_copy(sim, case):
     nx, ny, nz = case.cells
     sim.advance_to("2 ms")
@@ -215,8 +209,13 @@ def test_a_set_velocity_acts_in_the_next_step():
 
 
 def test_wrong_control_is_refused(sim):
-    with pytest.raises(IndexError, match="there is no grain 3"):
+    with pytest.raises(IndexError, match="no grain 3: the simulation has 1 grain, counted from 0"):
         sim.set_load(3, force=[0, 0, 0])
+    for call in (sim.set_velocity, sim.prescribe_motion, sim.set_load):
+        with pytest.raises(IndexError, match="no grain -1: the simulation has 1 grain"):
+            call(-1, [0, 0, 0])
+    with pytest.raises(IndexError, match="no grain -1"):
+        sim.release(-1)
     with pytest.raises(gw.CaseError, match="force, z.*is a length"):
         sim.set_load(0, force=[0, 0, "2 mm"])
     with pytest.raises(gw.CaseError, match="found 2 components"):
@@ -224,6 +223,14 @@ def test_wrong_control_is_refused(sim):
     with pytest.raises(gw.CaseError, match="give velocity, angular_velocity or both"):
         sim.prescribe_motion(0)
     sim.set_load(0, force=[0, 0, "2 uN"], torque=["1 nN m", 0, 0])
+
+
+def test_too_many_threads_are_reduced(case):
+    with pytest.warns(gw.CaseWarning, match="1000000 threads are too many"):
+        sim = gw.Simulation(case, threads=1_000_000)
+    assert sim.threads <= 4 * os.cpu_count()
+    with pytest.raises(gw.CaseError, match="found -1; expected a whole number"):
+        gw.Simulation(case, threads=-1)
 
 
 def test_contacts_are_listed():
@@ -304,8 +311,9 @@ def test_the_lock_of_the_interpreter_is_released(case_file):
     wall = time.monotonic() - started
     done.set()
     counter.join()
-    # With the lock held, the thread would count a few times only.
-    assert counted[0] > 100 * wall
+    # With the lock held, the thread would count at most once per handling of signals, 20 times a
+    # second. A busy machine allows about 100.
+    assert counted[0] > 40 * wall
 
 
 def test_another_thread_cannot_step_at_the_same_time(case_file):

@@ -5,8 +5,8 @@
 //! `docs/reference/run-folder.md` lists the files.
 //!
 //! Layers, downwards: `case` -> `run_loop` -> `recording` -> `recorder` -> `run_folder`,
-//! `contact_events`, `series` -> `overlaps`, `contact_work`, `memory`, `meter`, `threads`,
-//! `plan`, `error`.
+//! `contact_events`, `series`, `watch` -> `overlaps`, `contact_work`, `memory`, `meter`,
+//! `threads`, `plan`, `error`.
 
 pub mod case;
 mod contact_events;
@@ -23,6 +23,7 @@ mod run_folder;
 mod run_loop;
 mod series;
 pub mod threads;
+mod watch;
 
 pub use error::{FailureKind, RunError};
 pub use job::{Job, Options};
@@ -30,3 +31,4 @@ pub use plan::{Plane, PlanePosition, Probe, ProbePlace, RunPlan, Stop};
 pub use recording::Recording;
 pub use run_folder::{Existing, Parent, RESOLVED, checkpoint, lock, provenance};
 pub use run_loop::{Ending, Observer, Progress, Silent, run};
+pub use watch::Watch;

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use grainwake_formats::summary::Scales;
 
+use grainwake_solver::sim::SAME_TIME;
 use grainwake_solver::sim::events::StopWhen;
 
 /// Validated plan of a run. An interval of zero turns an output off.
@@ -46,6 +47,10 @@ pub struct RunPlan {
 }
 
 impl RunPlan {
+    /// Returns whether the end is reached at this time [s].
+    pub fn at_end(&self, time: f64) -> bool {
+        time >= self.end * (1.0 - SAME_TIME)
+    }
     /// Returns the number of checkpoints kept during the run: at least two, in case the newest one
     /// is damaged.
     pub(crate) fn kept_during_run(&self) -> usize {

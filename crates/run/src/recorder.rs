@@ -6,9 +6,7 @@ use grainwake_formats::disk;
 use grainwake_formats::events::{Event, EventKind};
 use grainwake_formats::pvd::{self, Entry};
 use grainwake_formats::summary::{Cost, EndReason, GrainSummary, PairSummary, Scales, Summary};
-use grainwake_solver::dem::{Enclosure, surface_gap};
 use grainwake_solver::sim::Simulation;
-use grainwake_solver::sim::events::{EventParams, Tracker};
 
 use crate::contact_events::{ContactEvents, MAX_GRAINS, WallEvents};
 use crate::contact_work::ContactWork;
@@ -18,6 +16,7 @@ use crate::plan::RunPlan;
 use crate::run_folder::checkpoint::{self, Record};
 use crate::run_folder::{ExtraTable, Tables, VtkOutput, contact_files};
 use crate::series::{self, Content, Series};
+use crate::watch::Watch;
 
 /// Index of the VTK files.
 const INDEX: &str = "run.pvd";
@@ -28,15 +27,12 @@ pub(crate) struct Recorder {
     digest: String,
     end: f64,
     at_events: bool,
-    enclosure: Enclosure,
     tables: Tables,
     vtk: VtkOutput,
-    tracker: Tracker,
+    watch: Watch,
     contact_events: ContactEvents,
     /// Contacts with walls, if they are events.
     wall_events: Option<WallEvents>,
-    /// Time without contact after which grains are separated [s].
-    separation_hold: f64,
     series: Vec<Series>,
     extra: Vec<ExtraTable>,
     /// Times of the last rows of the extra tables [s].
@@ -61,13 +57,6 @@ impl Recorder {
         sim: &Simulation,
         tables: Tables,
     ) -> Recorder {
-        let setup = sim.setup();
-        let enclosure = setup.enclosure();
-        let period =
-            [0, 1, 2].map(|axis| enclosure.is_periodic(axis).then(|| enclosure.size()[axis]));
-        let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
-        let params = EventParams::for_grains(sim.grains(), setup.gravity, fluid_density, period);
-        let gap = pair_gap(sim, &enclosure);
         let extra = ExtraTable::all(plan);
         let intervals: Vec<f64> = extra.iter().map(ExtraTable::interval).collect();
         Recorder {
@@ -75,13 +64,11 @@ impl Recorder {
             digest: digest.into(),
             end: plan.end,
             at_events: plan.at_events && sim.grains().len() <= 2,
-            enclosure,
             tables,
             vtk: VtkOutput::new(&plan.planes, sim),
-            tracker: Tracker::new(params, sim.grains(), gap),
+            watch: Watch::new(sim, plan.stop),
             contact_events: ContactEvents::default(),
             wall_events: plan.wall_events.then(WallEvents::default),
-            separation_hold: params.separation_hold,
             series: Series::of(plan, &intervals),
             last_extra_rows: vec![None; extra.len()],
             extra,
@@ -124,7 +111,7 @@ impl Recorder {
     ) -> Result<Recorder, RunError> {
         let tables = Tables::create(run, &ExtraTable::all(plan), plan.scales.as_ref())?;
         let mut recorder = Recorder::build(run, digest, plan, sim, tables);
-        recorder.tracker.restore(record.tracker);
+        recorder.watch.tracker.restore(record.tracker);
         recorder.contact_events = record.contact_events;
         recorder.restore_wall_events(record.wall_events);
         recorder.overlaps.mean_now = record.overlaps.mean_now;
@@ -160,7 +147,7 @@ impl Recorder {
             Tables::reopen(run, &record.lengths, &extra, plan.scales.as_ref())?
         };
         let mut recorder = Recorder::build(run, &record.digest, plan, sim, tables);
-        recorder.tracker.restore(record.tracker);
+        recorder.watch.tracker.restore(record.tracker);
         recorder.contact_events = record.contact_events;
         recorder.restore_wall_events(record.wall_events);
         for (series, next) in recorder.series.iter_mut().zip(record.next) {
@@ -198,16 +185,15 @@ impl Recorder {
         self.max_cfl = self.max_cfl.max(sim.cfl());
         self.overlaps.add(sim);
         self.contact_work.add(sim);
-        let gap = pair_gap(sim, &self.enclosure);
-        let before = self.tracker.events().len();
-        let mut events = self.tracker.update(sim.time(), sim.grains(), sim.contacts(), gap);
+        let before = self.watch.tracker.events().len();
+        let mut events = self.watch.update(sim);
         if (3..=MAX_GRAINS).contains(&sim.grains().len()) {
-            let hold = self.separation_hold;
+            let hold = self.watch.separation_hold;
             events.extend((self.contact_events).update(sim.time(), sim.contacts(), hold));
         }
         let of_grains = events.len();
         if let Some(walls) = &mut self.wall_events {
-            events.extend(walls.update(sim.time(), sim.contacts(), self.separation_hold));
+            events.extend(walls.update(sim.time(), sim.contacts(), self.watch.separation_hold));
         }
         self.tables.append_events(&events)?;
         self.write_due(sim)?;
@@ -225,7 +211,8 @@ impl Recorder {
         kind: EventKind,
         index: usize,
     ) -> Result<(), RunError> {
-        let earlier = self.tracker.events()[..index].iter().filter(|e| e.kind == kind).count();
+        let earlier =
+            self.watch.tracker.events()[..index].iter().filter(|e| e.kind == kind).count();
         let tag = format!("{}-{}", kind.name(), earlier + 1);
         let slices = self.vtk.slices(&self.run, sim, &tag)?;
         let grains = self.vtk.grains(&self.run, sim, &tag)?;
@@ -265,7 +252,7 @@ impl Recorder {
     }
 
     fn append_rows(&mut self, sim: &Simulation) -> Result<(), RunError> {
-        self.tables.append_rows(sim, self.tracker.gap(), &self.overlaps)?;
+        self.tables.append_rows(sim, self.watch.tracker.gap(), &self.overlaps)?;
         self.overlaps.largest_since_row = 0.0;
         self.last_row = Some(sim.time());
         Ok(())
@@ -343,21 +330,21 @@ impl Recorder {
             overlaps: self.overlaps,
             contact_work: self.contact_work,
             last_row: self.last_row,
-            tracker: self.tracker.state().clone(),
+            tracker: self.watch.tracker.state().clone(),
             contact_events: self.contact_events.clone(),
             wall_events: self.wall_events.clone().unwrap_or_default(),
         };
         checkpoint::write(&self.run, &record, sim, self.kept_checkpoints)
     }
 
-    /// Returns the event tracker.
-    pub fn tracker(&self) -> &Tracker {
-        &self.tracker
+    /// Returns the watch of events and stop condition.
+    pub fn watch(&self) -> &Watch {
+        &self.watch
     }
 
     /// Returns all events in the order of their confirmation.
     fn events(&self) -> Vec<Event> {
-        let mut events = self.tracker.events().to_vec();
+        let mut events = self.watch.tracker.events().to_vec();
         events.extend_from_slice(&self.contact_events.events);
         events.extend(self.wall_events.iter().flat_map(|walls| walls.events.iter().cloned()));
         // The sort is stable: events of one step keep the order of the log.
@@ -367,7 +354,7 @@ impl Recorder {
 
     /// Returns the results so far, of a run that has taken this time.
     pub fn summary(&self, sim: &Simulation, cost: Cost, ended_by: EndReason) -> Summary {
-        let tracker = &self.tracker;
+        let tracker = &self.watch.tracker;
         let grains = sim.grains().iter().enumerate().map(|(i, grain)| GrainSummary {
             equivalent_diameter_m: grain.shape.equivalent_diameter(),
             density: grain.density,
@@ -397,13 +384,5 @@ impl Recorder {
             }),
             grains: grains.collect(),
         }
-    }
-}
-
-/// Returns the gap between the surfaces of a pair [m].
-fn pair_gap(sim: &Simulation, enclosure: &Enclosure) -> Option<f64> {
-    match sim.grains() {
-        [a, b] if !a.has_left() && !b.has_left() => Some(surface_gap(a, b, enclosure)),
-        _ => None,
     }
 }

@@ -277,11 +277,12 @@ impl Recording {
         self.write_cost(sim)
     }
 
-    /// Writes the last outputs, a checkpoint and the summary.
+    /// Writes the last outputs, a checkpoint, and the summary with the reason of the end.
     ///
     /// # Errors
     /// [`RunError::Io`].
-    pub fn finish(mut self, sim: &Simulation, why: EndReason) -> Result<Summary, RunError> {
+    pub fn finish(mut self, sim: &Simulation) -> Result<Summary, RunError> {
+        let why = self.ended(sim).unwrap_or(EndReason::End);
         self.meter.output(|| self.recorder.finish(sim))?;
         // The checkpoint holds the lengths of the tables with their last rows.
         self.saved.step = None;
@@ -317,7 +318,17 @@ impl Recording {
 
     /// Returns whether the end of the case is reached.
     pub fn at_end(&self, sim: &Simulation) -> bool {
-        sim.time() >= self.plan.end * (1.0 - SAME_TIME)
+        self.plan.at_end(sim.time())
+    }
+
+    /// Returns the stop condition of the case, if it has held for its time.
+    pub fn stopped(&self, sim: &Simulation) -> Option<EndReason> {
+        self.recorder.watch().stopped(sim)
+    }
+
+    /// Returns the reason why the run is over: its end is reached, or its stop condition holds.
+    pub fn ended(&self, sim: &Simulation) -> Option<EndReason> {
+        if self.at_end(sim) { Some(EndReason::End) } else { self.stopped(sim) }
     }
 
     /// Writes `failure.json`; the last valid checkpoint is kept.

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use grainwake_formats::events::Event;
-use grainwake_formats::summary::{EndReason, Summary};
+use grainwake_formats::summary::Summary;
 use grainwake_solver::sim::Simulation;
-use grainwake_solver::sim::events::{Phase, StopWhen};
+use grainwake_solver::sim::events::Phase;
 
 use crate::error::RunError;
 use crate::job::{Job, Options};
@@ -98,13 +98,13 @@ fn advance(
 ) -> Result<Ending, RunError> {
     let (from, first_step) = (sim.time(), sim.steps());
     loop {
-        if let Some(why) = ended(&sim, &recording) {
-            return recording.finish(&sim, why).map(Ending::Finished);
+        if recording.ended(&sim).is_some() {
+            return recording.finish(&sim).map(Ending::Finished);
         }
         for event in recording.step(&mut sim, f64::INFINITY)? {
             observer.event(&event);
         }
-        let tracker = recording.recorder().tracker();
+        let tracker = &recording.recorder().watch().tracker;
         observer.progress(&Progress {
             time: sim.time(),
             end: recording.plan().end,
@@ -122,18 +122,4 @@ fn advance(
             return Ok(Ending::Interrupted(sim.time()));
         }
     }
-}
-
-/// Returns the reason of the end, if the run is at its end.
-fn ended(sim: &Simulation, recording: &Recording) -> Option<EndReason> {
-    if recording.at_end(sim) {
-        return Some(EndReason::End);
-    }
-    let stop = recording.plan().stop?;
-    let since = recording.recorder().tracker().holds_since(stop.when, sim.grains())?;
-    (sim.time() - since >= stop.hold).then_some(match stop.when {
-        StopWhen::Landing => EndReason::Landing,
-        StopWhen::Rest => EndReason::Rest,
-        StopWhen::Separation => EndReason::Separation,
-    })
 }

@@ -4,6 +4,7 @@ use grainwake_formats::events::Event;
 use grainwake_formats::table::Table;
 use grainwake_plot::colormap::ColorMap;
 use grainwake_plot::style::{SERIES_COLOURS, series_colour};
+use grainwake_report::features::RunFeatures;
 use grainwake_report::run_folder::RunFolder;
 use serde::Serialize;
 
@@ -120,6 +121,8 @@ pub struct RunDocument {
 
 #[derive(Clone, Debug, Serialize)]
 struct GrainDocument {
+    /// Number in the cycle of colours.
+    colour: usize,
     mesh: usize,
     scale: f64,
     diameter: Option<f64>,
@@ -156,9 +159,11 @@ impl RunDocument {
                 .push("no slices: the run has written none yet, or [output] turns them off".into());
         }
         thinning_notes(&mut notes, poses.as_ref(), &slices);
+        let features = RunFeatures::of(run);
         let grains = bodies.grains.iter().enumerate().map(|(i, (mesh, scale))| {
             let facts = facts.grains.get(i);
             GrainDocument {
+                colour: features.grain_rank(i),
                 mesh: *mesh,
                 scale: *scale,
                 diameter: bodies.diameters[i],

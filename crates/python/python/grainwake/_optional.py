@@ -1,4 +1,4 @@
-"""Optional packages."""
+"""Optional packages, and words."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import importlib
 from typing import Any
 
 _EXTRAS = {"pandas": "tables", "xarray": "fields", "pyvista": "meshes", "trimesh": None}
+
+
+def counted(number: int, noun: str) -> str:
+    """Number and noun, such as "1 grain" and "2 grains"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def need(name: str) -> Any:

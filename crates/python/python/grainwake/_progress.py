@@ -76,7 +76,7 @@ class Display:
 
     def warn(self, texts: Sequence[str]) -> None:
         for text in texts:
-            warnings.warn(text, CaseWarning, stacklevel=3)
+            warnings.warn(text, CaseWarning, stacklevel=2)
 
     def update(self, progress: dict[str, Any] | None, messages: Sequence[str] = ()) -> None:
         for text in messages:

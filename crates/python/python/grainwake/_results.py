@@ -14,7 +14,7 @@ from . import _grainwake
 from ._errors import CaseError, CaseWarning
 from ._grainwake import Case
 from ._mesh import poly_data
-from ._optional import need
+from ._optional import counted, need
 from ._simulation import to_dataset
 
 if TYPE_CHECKING:
@@ -53,14 +53,18 @@ class RunFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = pathlib.Path(path)
-        self.notes = _grainwake._run_notes(self.path)
+        # The warning names the folder once.
+        notes = _grainwake._run_notes(self.path)
+        self.notes = [note.replace(f"{self.path}{os.sep}", "") for note in notes]
+        if not (self.path / "run.pvd").is_file() and self._found():
+            self.notes.append("run.pvd is missing: the times of the VTK files are read from them")
         if self.notes:
             listed = "; ".join(self.notes)
             warnings.warn(f"{self.path}: {listed}", CaseWarning, stacklevel=3)
 
     def __repr__(self) -> str:
         state = "finished" if self.finished else "not finished"
-        notes = f", {len(self.notes)} notes" if self.notes else ""
+        notes = f", {counted(len(self.notes), 'note')}" if self.notes else ""
         return f"RunFolder({str(self.path)!r}, {state}{notes})"
 
     def _need(self, name: str) -> pathlib.Path:
@@ -119,7 +123,7 @@ class RunFolder:
         table = self.grains
         known = sorted(table["grain"].unique().tolist())
         if index not in known:
-            raise IndexError(f"there is no grain {index}: the table has {len(known)} grains")
+            raise IndexError(f"there is no grain {index}: the table has {counted(len(known), 'grain')}")
         return table[table["grain"] == index].drop(columns="grain").set_index("time")
 
     def by_grain(self) -> pandas.DataFrame:
@@ -177,11 +181,34 @@ class RunFolder:
 
     @property
     def files(self) -> pandas.DataFrame:
-        """VTK files of ``run.pvd``: time, group, file."""
+        """VTK files: time, group, file; those of ``run.pvd``, or without it those in the folder."""
         return need("pandas").DataFrame(self._entries(), columns=["time", "group", "file"])
 
     def _entries(self) -> list[tuple[float, str, str]]:
-        return _grainwake._read_collection(self._need("run.pvd"))
+        try:
+            return _grainwake._read_collection(self._need("run.pvd"))
+        except (CaseError, FileNotFoundError):
+            found = self._found()
+            if not found:
+                raise
+        entries = []
+        for group, file in found:
+            try:
+                time = _time_inside(self.path / file)
+            except (CaseError, OSError):
+                continue
+            entries.append((time, group, file))
+        return sorted(entries)
+
+    def _found(self) -> list[tuple[str, str]]:
+        """Group and name of the VTK files in the folder."""
+        found = []
+        for folder, kind in (("slices", "vti"), ("fields", "vti"), ("grains", "vtp")):
+            for file in sorted((self.path / folder).glob(f"*.{kind}")):
+                name = file.stem.rpartition("_")[0]
+                group = f"slice {name}" if folder == "slices" else folder
+                found.append((group, f"{folder}/{file.name}"))
+        return found
 
     def _nearest(self, time: Time, wanted: Callable[[str], bool], what: str) -> pathlib.Path:
         """File of the wanted group whose time is nearest; missing files are left out."""
@@ -287,6 +314,15 @@ class RunFolder:
         for note in notes:
             warnings.warn(note, CaseWarning, stacklevel=2)
         return pathlib.Path(page)
+
+
+def _time_inside(file: pathlib.Path) -> float:
+    """Time of a VTK file [s]."""
+    read = _grainwake._read_image if file.suffix == ".vti" else _grainwake._read_surface
+    time = read(file)["time"]
+    if time is None:
+        raise CaseError(f"{file} holds no time")
+    return time
 
 
 def _dataset(file: pathlib.Path) -> xarray.Dataset:

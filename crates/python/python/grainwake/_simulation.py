@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _progress
-from ._optional import need
+from ._optional import counted, need
 
 if TYPE_CHECKING:
     import pandas
@@ -54,7 +54,7 @@ class State:
     torques: NDArray[np.float64]
 
     def __repr__(self) -> str:
-        return f"State({len(self.positions)} grains, t = {self.time:.6f} s, step {self.steps})"
+        return f"State({counted(len(self.positions), 'grain')}, t = {self.time:.6f} s, step {self.steps})"
 
 
 def state(sim: Simulation) -> State:
@@ -72,17 +72,17 @@ def state(sim: Simulation) -> State:
 
 
 def states(sim: Simulation, end: float, every: float, choice: _progress.Choice) -> Iterator[State]:
-    """States at the multiples of an interval and at the end."""
+    """States at the multiples of an interval, and at the end or stop condition of the case."""
     display = _progress.of_run(choice)
     start = sim.time
     try:
         yield sim.state()
         index = math.floor(sim.time / every * (1 + _SAME)) + 1
-        while sim.time < end * (1 - _SAME):
+        while sim.time < end * (1 - _SAME) and not sim._stopped:
             time = min(index * every, end)
             if end - time <= _SHORTEST * sim.time_step:
                 time = end
-            sim.advance_to(time)
+            sim._advance(time)
             index = max(index + 1, math.floor(sim.time / every * (1 + _SAME)) + 1)
             display.update({"time": sim.time, "end": end, "start": start, "steps": sim.steps})
             yield sim.state()

@@ -15,16 +15,16 @@ use pyo3::prelude::*;
 use pyo3::types::PyString;
 
 use super::PyGrain;
-use crate::arguments::{array, points, quantity, wrong_shape};
+use crate::arguments::{Whole, array, points, quantity, wrong_shape};
 use crate::error::{Raise, input};
 
 /// Accepted equivalent diameters [m]; others indicate a wrong unit.
 const GRAINS: std::ops::Range<f64> = 1e-6..1.0;
 
 /// Returns the options of the resolution.
-pub(super) fn options(cells: Option<usize>, nodes: Option<usize>) -> ShapeOptions {
-    let mut options = ShapeOptions { nodes, ..ShapeOptions::default() };
-    options.cells = cells.unwrap_or(options.cells);
+pub(super) fn options(cells: Option<Whole>, nodes: Option<Whole>) -> ShapeOptions {
+    let mut options = ShapeOptions { nodes: nodes.map(usize::from), ..ShapeOptions::default() };
+    options.cells = cells.map_or(options.cells, usize::from);
     options
 }
 
@@ -69,7 +69,7 @@ impl PyGrain {
     fn sphere(
         py: Python<'_>,
         diameter: &Bound<'_, PyAny>,
-        nodes: Option<usize>,
+        nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let radius = 0.5 * quantity::<Length>("diameter", diameter)?;
         py.detach(|| analytic::sphere(radius, &options(None, nodes))).raise().map(PyGrain::new)
@@ -96,8 +96,8 @@ impl PyGrain {
         a: &Bound<'_, PyAny>,
         b: &Bound<'_, PyAny>,
         c: &Bound<'_, PyAny>,
-        cells: Option<usize>,
-        nodes: Option<usize>,
+        cells: Option<Whole>,
+        nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let [a, b, c] = lengths([("a", a), ("b", b), ("c", c)])?.map(|axis| 0.5 * axis);
         let how = options(cells, nodes);
@@ -126,8 +126,8 @@ impl PyGrain {
         b: &Bound<'_, PyAny>,
         c: &Bound<'_, PyAny>,
         radius: &Bound<'_, PyAny>,
-        cells: Option<usize>,
-        nodes: Option<usize>,
+        cells: Option<Whole>,
+        nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let [a, b, c] = lengths([("a", a), ("b", b), ("c", c)])?;
         let radius = quantity::<Length>("radius", radius)?;
@@ -153,8 +153,8 @@ impl PyGrain {
         py: Python<'_>,
         diameter: &Bound<'_, PyAny>,
         height: &Bound<'_, PyAny>,
-        cells: Option<usize>,
-        nodes: Option<usize>,
+        cells: Option<Whole>,
+        nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let [diameter, height] = lengths([("diameter", diameter), ("height", height)])?;
         let how = options(cells, nodes);
@@ -181,8 +181,8 @@ impl PyGrain {
         py: Python<'_>,
         diameter: &Bound<'_, PyAny>,
         height: &Bound<'_, PyAny>,
-        cells: Option<usize>,
-        nodes: Option<usize>,
+        cells: Option<Whole>,
+        nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let [diameter, height] = lengths([("diameter", diameter), ("height", height)])?;
         let how = options(cells, nodes);
@@ -211,8 +211,8 @@ impl PyGrain {
         b: &Bound<'_, PyAny>,
         c: &Bound<'_, PyAny>,
         exponents: (f64, f64),
-        cells: Option<usize>,
-        nodes: Option<usize>,
+        cells: Option<Whole>,
+        nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let semi_axes = lengths([("a", a), ("b", b), ("c", c)])?.map(|axis| 0.5 * axis);
         let (e1, e2) = exponents;
@@ -252,8 +252,8 @@ impl PyGrain {
         unit: Option<&Bound<'_, PyAny>>,
         flip: bool,
         equivalent_diameter: Option<&Bound<'_, PyAny>>,
-        cells: Option<usize>,
-        nodes: Option<usize>,
+        cells: Option<Whole>,
+        nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let how = MeshOptions { shape: options(cells, nodes), flip };
         let unit = unit.map(unit_length).transpose()?;
@@ -306,14 +306,14 @@ impl PyGrain {
         equivalent_diameter: Option<&Bound<'_, PyAny>>,
         flatness: Option<f64>,
         seed: u64,
-        cells: Option<usize>,
-        nodes: Option<usize>,
+        cells: Option<Whole>,
+        nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let diameter = equivalent_diameter
             .map_or(Ok(2e-3), |value| quantity::<Length>("equivalent_diameter", value))?;
         let mut how = family_options();
-        how.nodes = nodes;
-        how.cells = cells.unwrap_or(how.cells);
+        how.nodes = nodes.map(usize::from);
+        how.cells = cells.map_or(how.cells, usize::from);
         let mut target = FamilyTarget::new(sphericity, roundness, diameter);
         target.flatness = flatness.unwrap_or(target.flatness);
         py.detach(|| family_grain(&target, seed, &how)).raise().map(PyGrain::new)

@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyString};
 use super::PyGrain;
 use super::build::{options, sized};
 use super::volume;
-use crate::arguments::quantity;
+use crate::arguments::{Whole, quantity};
 use crate::error::{IntoException, Raise, input};
 
 /// Grains of a 3-D image, by label.
@@ -84,8 +84,8 @@ struct Given {
     rescue: bool,
     labels: bool,
     roundness: bool,
-    cells: Option<usize>,
-    nodes: Option<usize>,
+    cells: Option<Whole>,
+    nodes: Option<Whole>,
 }
 
 impl Given {
@@ -180,8 +180,8 @@ impl PyGrain {
         labels: bool,
         roundness: bool,
         equivalent_diameter: Option<&Bound<'_, PyAny>>,
-        cells: Option<usize>,
-        nodes: Option<usize>,
+        cells: Option<Whole>,
+        nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let given = Given {
             label,
@@ -277,8 +277,8 @@ pub fn scan(
     labels: bool,
     roundness: bool,
     equivalent_diameter: Option<&Bound<'_, PyAny>>,
-    cells: Option<usize>,
-    nodes: Option<usize>,
+    cells: Option<Whole>,
+    nodes: Option<Whole>,
 ) -> PyResult<PyScan> {
     let given = Given {
         label,

@@ -1,13 +1,15 @@
 //! Checkpoints of a simulation in memory.
 //!
-//! Layout, little-endian: 8 bytes signature, u32 version, digest of the case, state of the
-//! simulation, SHA-256 of all preceding bytes.
+//! Layout, little-endian: 8 bytes signature, u32 version, digest of the case, state of the events
+//! as JSON (null without a stop condition), state of the simulation, SHA-256 of all preceding
+//! bytes.
 
 use std::io::{self, Cursor, Write};
 use std::path::PathBuf;
 
 use grainwake_formats::codec::{Decoder, Encoder};
 use grainwake_formats::disk::write_atomically;
+use grainwake_solver::sim::events::TrackerState;
 use pyo3::prelude::*;
 use sha2::{Digest, Sha256};
 
@@ -15,7 +17,7 @@ use super::PySimulation;
 use crate::error::{input, system};
 
 const SIGNATURE: &[u8; 8] = b"GWSTATE\n";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const CHECKSUM: usize = 32;
 
 impl PySimulation {
@@ -25,6 +27,8 @@ impl PySimulation {
         encoder.raw(SIGNATURE)?;
         encoder.u32(VERSION)?;
         encoder.bytes(self.case.get().case.digest.as_bytes())?;
+        let events = self.watch.as_ref().map(|watch| watch.tracker.state());
+        encoder.bytes(&serde_json::to_vec(&events)?)?;
         self.sim.save(&mut bytes)?;
         let checksum = Sha256::digest(&bytes);
         bytes.write_all(&checksum)?;
@@ -51,11 +55,18 @@ impl PySimulation {
         if decoder.bytes().map_err(text)? != self.case.get().case.digest.as_bytes() {
             return Err("it belongs to another case".into());
         }
+        let events =
+            serde_json::from_slice::<Option<TrackerState>>(&decoder.bytes().map_err(text)?)
+                .map_err(|error| error.to_string())?;
         let restored = self.pool.install(|| self.sim.restore(&mut rest));
         restored.map_err(|error| {
             self.failed = Some("the state could not be restored".into());
             text(error)
-        })
+        })?;
+        if let (Some(watch), Some(events)) = (&mut self.watch, events) {
+            watch.tracker.restore(events);
+        }
+        Ok(())
     }
 }
 

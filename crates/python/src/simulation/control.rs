@@ -4,10 +4,12 @@ use glam::DVec3;
 use grainwake_run::case::quantity::{AngularVelocity, Force, Kind, Torque, Velocity};
 use grainwake_solver::math::Load;
 use grainwake_solver::sim::MotionComponent;
+use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
 use super::PySimulation;
 use crate::arguments::vector;
+use crate::arrays::counted;
 use crate::error::{Raise, input};
 
 fn optional<K: Kind>(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<DVec3>> {
@@ -28,6 +30,19 @@ fn motions(
         return Err(input("give velocity, angular_velocity or both"));
     }
     Ok(both)
+}
+
+impl PySimulation {
+    /// Returns the index of a grain, or the exception of an index that no grain has.
+    fn index(&self, grain: i64) -> PyResult<usize> {
+        let count = self.sim.grains().len();
+        usize::try_from(grain).ok().filter(|grain| *grain < count).ok_or_else(|| {
+            let has = counted(count);
+            PyIndexError::new_err(format!(
+                "there is no grain {grain}: the simulation has {has}, counted from 0"
+            ))
+        })
+    }
 }
 
 #[pymethods]
@@ -53,10 +68,11 @@ impl PySimulation {
     #[pyo3(signature = (grain, velocity = None, angular_velocity = None))]
     fn set_velocity(
         &mut self,
-        grain: usize,
+        grain: i64,
         velocity: Option<&Bound<'_, PyAny>>,
         angular_velocity: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
+        let grain = self.index(grain)?;
         for (component, value) in motions(velocity, angular_velocity)? {
             self.sim.set_velocity(grain, component, value).raise()?;
         }
@@ -80,10 +96,11 @@ impl PySimulation {
     #[pyo3(signature = (grain, velocity = None, angular_velocity = None))]
     fn prescribe_motion(
         &mut self,
-        grain: usize,
+        grain: i64,
         velocity: Option<&Bound<'_, PyAny>>,
         angular_velocity: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
+        let grain = self.index(grain)?;
         for (component, value) in motions(velocity, angular_velocity)? {
             self.sim.prescribe_velocity(grain, component, value).raise()?;
         }
@@ -99,7 +116,8 @@ impl PySimulation {
     /// translation, rotation : bool, default True
     ///     Motions to release.
     #[pyo3(signature = (grain, *, translation = true, rotation = true))]
-    fn release(&mut self, grain: usize, translation: bool, rotation: bool) -> PyResult<()> {
+    fn release(&mut self, grain: i64, translation: bool, rotation: bool) -> PyResult<()> {
+        let grain = self.index(grain)?;
         let chosen =
             [(MotionComponent::Translation, translation), (MotionComponent::Rotation, rotation)];
         for (component, _) in chosen.into_iter().filter(|(_, chosen)| *chosen) {
@@ -122,10 +140,11 @@ impl PySimulation {
     #[pyo3(signature = (grain, force = None, torque = None))]
     fn set_load(
         &mut self,
-        grain: usize,
+        grain: i64,
         force: Option<&Bound<'_, PyAny>>,
         torque: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
+        let grain = self.index(grain)?;
         let load = Load {
             force: optional::<Force>("force", force)?.unwrap_or(DVec3::ZERO),
             torque: optional::<Torque>("torque", torque)?.unwrap_or(DVec3::ZERO),

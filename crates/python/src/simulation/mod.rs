@@ -11,14 +11,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use grainwake_run::Recording;
+use grainwake_formats::summary::EndReason;
 use grainwake_run::case::quantity::Time;
+use grainwake_run::{Recording, Watch};
 use grainwake_solver::sim::{SAME_TIME, Simulation};
 use pyo3::exceptions::PyBufferError;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
-use crate::arguments::quantity;
+use crate::arguments::{Whole, quantity};
+use crate::arrays::counted;
 use crate::case::PyCase;
 use crate::error::{Raise, input, numerics};
 use crate::threads;
@@ -61,10 +63,11 @@ const CLOSED: &str = "the run folder is closed: continue it with Simulation(case
 /// a step, and the simulation can be continued.
 ///
 /// With `output`, steps end at the output times of the case as well. If nothing is controlled and
-/// no other times are asked for, the folder has the bits of `Case.run`. The program decides when
-/// to stop: a stop condition of the case (``time.stop``) has no effect, and steps beyond its end
-/// are refused. Call `finish` at the end, or use a ``with`` block: it calls `finish`, or after an
-/// exception `checkpoint`. The folder is locked until then.
+/// no other times are asked for, the folder has the bits of `Case.run`. Steps beyond the end of the
+/// case are refused. Call `finish` at the end, or use a ``with`` block: it calls `finish`, or after
+/// an exception `checkpoint`. The folder is locked until then.
+///
+/// A stop condition of the case (``time.stop``) ends `run`; `ended` tells loops of your own.
 ///
 /// Examples
 /// --------
@@ -86,6 +89,10 @@ pub struct PySimulation {
     sim: Simulation,
     /// Open run folder.
     recording: Option<Recording>,
+    /// Watch of the stop condition of a simulation in memory, if the case has one.
+    watch: Option<Watch>,
+    /// Stop condition that held when the run folder was closed.
+    closed_by: Option<EndReason>,
     /// Path of the run folder, open or closed.
     output: Option<PathBuf>,
     case: Py<PyCase>,
@@ -123,26 +130,33 @@ impl PySimulation {
         Ok(())
     }
 
+    /// Returns the stop condition of the case, if it holds.
+    fn stopped(&self) -> Option<EndReason> {
+        stopped(&self.sim, self.recording.as_ref(), self.watch.as_ref()).or(self.closed_by)
+    }
+
     /// Takes steps until `horizon` returns no time for another one [s], and handles signals between
-    /// them.
+    /// them. `horizon` gets the simulation and whether its stop condition holds.
     fn advance(
         &mut self,
         py: Python<'_>,
-        mut horizon: impl FnMut(&Simulation) -> Option<f64> + Send,
+        mut horizon: impl FnMut(&Simulation, bool) -> Option<f64> + Send,
     ) -> PyResult<()> {
         self.may_change()?;
         loop {
-            let (pool, sim, recording) = (self.pool.clone(), &mut self.sim, &mut self.recording);
+            let (pool, sim) = (self.pool.clone(), &mut self.sim);
+            let (recording, watch) = (&mut self.recording, &mut self.watch);
             let taken = py.detach(|| {
                 let started = Instant::now();
                 pool.install(|| {
-                    while let Some(horizon) = horizon(sim) {
-                        recording::step(sim, recording.as_mut(), horizon)?;
+                    loop {
+                        let stopped = stopped(sim, recording.as_ref(), watch.as_ref()).is_some();
+                        let Some(horizon) = horizon(sim, stopped) else { return Ok(true) };
+                        recording::step(sim, recording.as_mut(), watch.as_mut(), horizon)?;
                         if started.elapsed() > INTERVAL {
                             return Ok(false);
                         }
                     }
-                    Ok(true)
                 })
             });
             match taken {
@@ -161,6 +175,20 @@ impl PySimulation {
     }
 }
 
+/// Returns the time from now until `end` [s]; none if it has passed.
+fn left(sim: &Simulation, end: f64) -> Option<f64> {
+    (sim.time() < end * (1.0 - SAME_TIME)).then(|| end - sim.time())
+}
+
+/// Returns the stop condition of the case, if it holds.
+fn stopped(
+    sim: &Simulation,
+    recording: Option<&Recording>,
+    watch: Option<&Watch>,
+) -> Option<EndReason> {
+    recording.map_or_else(|| watch?.stopped(sim), |recording| recording.stopped(sim))
+}
+
 #[pymethods]
 impl PySimulation {
     #[new]
@@ -168,13 +196,13 @@ impl PySimulation {
     fn new(
         py: Python<'_>,
         case: Py<PyCase>,
-        threads: Option<usize>,
+        threads: Option<Whole>,
         output: Option<PathBuf>,
         resume: bool,
         force: bool,
     ) -> PyResult<PySimulation> {
         let given = &case.get().case;
-        let threads = threads::resolve(py, threads.unwrap_or(given.threads))?;
+        let threads = threads::resolve(py, threads.map_or(given.threads, usize::from))?;
         let pool = threads::pool(threads)?;
         let (sim, recording) = match &output {
             Some(folder) => {
@@ -190,8 +218,11 @@ impl PySimulation {
                 (py.detach(|| pool.install(|| Simulation::new(setup))).raise()?, None)
             }
         };
-        let views = Arc::default();
-        Ok(PySimulation { sim, recording, output, case, pool, views, failed: None })
+        let in_memory = given.plan.stop.filter(|_| recording.is_none());
+        let watch = in_memory.map(|stop| Watch::new(&sim, Some(stop)));
+        let (views, closed_by) = (Arc::default(), None);
+        let failed = None;
+        Ok(PySimulation { sim, recording, watch, closed_by, output, case, pool, views, failed })
     }
 
     /// Take one time step.
@@ -220,7 +251,7 @@ impl PySimulation {
             return Err(input(format!("horizon: found {horizon} s; expected a positive time")));
         }
         let mut steps = std::iter::once(horizon);
-        self.advance(py, |_| steps.next())?;
+        self.advance(py, |_, _| steps.next())?;
         Ok(self.sim.time_step())
     }
 
@@ -237,10 +268,21 @@ impl PySimulation {
     ///     As in `step`.
     fn advance_to(&mut self, py: Python<'_>, time: &Bound<'_, PyAny>) -> PyResult<()> {
         let until = quantity::<Time>("time", time)?;
-        self.advance(py, |sim| (sim.time() < until * (1.0 - SAME_TIME)).then(|| until - sim.time()))
+        self.advance(py, |sim, _| left(sim, until))
     }
 
-    /// Iterate over states at regular times.
+    /// Advances to a time [s], or until the stop condition of the case holds.
+    fn _advance(&mut self, py: Python<'_>, time: f64) -> PyResult<()> {
+        self.advance(py, |sim, stopped| if stopped { None } else { left(sim, time) })
+    }
+
+    /// Whether the stop condition of the case holds.
+    #[getter]
+    fn _stopped(&self) -> bool {
+        self.stopped().is_some()
+    }
+
+    /// Iterate over states at regular times, until the end or the stop condition of the case.
     ///
     /// Parameters
     /// ----------
@@ -254,7 +296,8 @@ impl PySimulation {
     /// Yields
     /// ------
     /// State
-    ///     Copy of the motion of the grains; the first is the present state.
+    ///     Copy of the motion of the grains; the first is the present state. If the stop condition
+    ///     of the case (``time.stop``) holds, the state of that step is the last.
     #[pyo3(signature = (until = None, every = None, *, progress = None))]
     fn run<'py>(
         slf: &Bound<'py, Self>,
@@ -309,6 +352,13 @@ impl PySimulation {
     fn time_step(&self) -> f64 {
         self.sim.time_step()
     }
+    /// Reason why the run is over: "end" at the end time of the case, or its stop condition
+    /// "landing", "rest" or "separation"; None before. Steps are possible after a stop condition.
+    #[getter]
+    fn ended(&self) -> Option<String> {
+        let end = self.case.get().case.plan.at_end(self.sim.time()).then_some(EndReason::End);
+        end.or_else(|| self.stopped()).map(|why| why.to_string())
+    }
     /// Threads of the simulation.
     #[getter]
     fn threads(&self) -> usize {
@@ -316,6 +366,7 @@ impl PySimulation {
     }
     fn __repr__(&self) -> String {
         let (time, steps) = (self.sim.time(), self.sim.steps());
-        format!("Simulation({} grains, t = {time:.6} s, step {steps})", self.sim.grains().len())
+        let grains = counted(self.sim.grains().len());
+        format!("Simulation({grains}, t = {time:.6} s, step {steps})")
     }
 }

@@ -2,15 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_formats::summary::EndReason;
 use grainwake_run::case::Case;
-use grainwake_run::{Options, Recording, RunError};
+use grainwake_run::{Options, Recording, RunError, Watch};
 use grainwake_solver::sim::{Simulation, StepError};
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
 use super::PySimulation;
-use crate::error::{IntoException, Raise, input};
+use crate::error::{IntoException, Raise, input, warn};
 use crate::running::{command, existing};
 
 /// Name of this program in the provenance.
@@ -46,10 +45,15 @@ impl IntoException for Failure {
 pub(super) fn step(
     sim: &mut Simulation,
     recording: Option<&mut Recording>,
+    watch: Option<&mut Watch>,
     horizon: f64,
 ) -> Result<(), Failure> {
     let Some(recording) = recording else {
-        return Ok(sim.step(horizon)?);
+        sim.step(horizon)?;
+        if let Some(watch) = watch {
+            watch.update(sim);
+        }
+        return Ok(());
     };
     if recording.at_end(sim) {
         return Err(Failure::End(sim.time()));
@@ -79,11 +83,7 @@ pub(super) fn start(
         let mut note = |text: &str| notes.push(text.to_owned());
         pool.install(|| Recording::start(&case.job(), folder, &options, &mut note))
     });
-    let warnings = py.import("warnings")?;
-    let kind = py.import("grainwake")?.getattr("CaseWarning")?;
-    for note in notes.into_iter().filter(|note| !note.starts_with("resuming")) {
-        warnings.call_method1("warn", (note, &kind))?;
-    }
+    warn(py, notes.into_iter().filter(|note| !note.starts_with("resuming")))?;
     started.raise()
 }
 
@@ -150,7 +150,8 @@ impl PySimulation {
         self.may_write()?;
         let (pool, sim, folder) = (self.pool.clone(), &self.sim, self.output.clone());
         if let Some(recording) = self.recording.take() {
-            py.detach(|| pool.install(|| recording.finish(sim, EndReason::End))).raise()?;
+            self.closed_by = recording.stopped(sim);
+            py.detach(|| pool.install(|| recording.finish(sim))).raise()?;
         }
         if let (true, Some(folder)) = (report, &folder) {
             py.detach(|| grainwake_report::render(folder)).raise()?;
@@ -178,6 +179,7 @@ impl PySimulation {
             return Ok(false);
         }
         let written = self.checkpoint(py);
+        self.closed_by = self.stopped();
         self.recording = None;
         written.map(|()| false)
     }

@@ -66,7 +66,7 @@ export class FlatScreen {
   }
 
   colour(run, grain, place, state, colours) {
-    if (state.colour === "grain") return colours.css(grain);
+    if (state.colour === "grain") return colours.css(run.rank(grain));
     const value = run.number(state.colour, grain, place) / (run.grainScale(state.colour) || 1);
     return `rgb(${onMap(GRAIN_MAP, value || 0).map((v) => Math.round(255 * v)).join(" ")})`;
   }
@@ -75,7 +75,7 @@ export class FlatScreen {
     const at = [0, 0, 0];
     const step = Math.max(1, Math.ceil(run.rows / 400));
     for (let grain = 0; grain < run.count; grain++) {
-      context.strokeStyle = colours.css(grain);
+      context.strokeStyle = colours.css(run.rank(grain));
       context.beginPath();
       for (let row = 0; row < run.rows; row += step) {
         if (run.position(grain, { row, part: 0 }, at)) context.lineTo(...this.project(at, i));

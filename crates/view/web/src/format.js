@@ -23,8 +23,8 @@ export function roundUp(value) {
 }
 
 /** Rounded number without zeros at its end. */
-export function plain(value) {
-  return short(value).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
+export function plain(value, digits = 3) {
+  return short(value, digits).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
 }
 
 /** Power of ten in which an axis up to `size` is labelled, and its name. */

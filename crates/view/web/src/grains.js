@@ -68,7 +68,7 @@ export class Grains {
   }
 
   colour(grain, place, state, colours, high) {
-    if (state.colour === "grain") return colours.grain(grain);
+    if (state.colour === "grain") return colours.grain(this.run.rank(grain));
     const value = this.run.number(state.colour, grain, place);
     if (value === null || !Number.isFinite(value)) return [0.6, 0.6, 0.6];
     return onMap(GRAIN_MAP, high > 0 ? value / high : 0);

@@ -15,13 +15,17 @@ import { Store, initial } from "./store.js";
 import { studyOverlay, toggleRun } from "./study.js";
 import { Timeline } from "./timeline.js";
 
+/** Runs shown at first: those that were asked for, as far as the window has room for them. */
+const firstShown = (count) => [...Array(Math.max(1, Math.min(count, 4, Math.floor(innerWidth / 500)))).keys()];
+
 const STATES = { finished: "finished", failed: "failed", unfinished: "not finished" };
 
 class Page {
   constructor(index) {
     this.index = index;
     this.colours = new Colours(index);
-    this.store = new Store({ ...initial, table: Boolean(index.study) });
+    const shown = index.study ? [0] : firstShown(index.runs.length);
+    this.store = new Store({ ...initial, shown, table: Boolean(index.study) });
     this.known = new Map();
     this.runs = [];
     this.draw = this.draw.bind(this);

@@ -118,7 +118,7 @@ export class Panel {
       ["shape", facts.shape],
     ];
     const swatch = el("i");
-    swatch.style.background = this.colours.css(grain);
+    swatch.style.background = this.colours.css(run.rank(grain));
     const buttons = el("span", { class: "buttons" },
       el("button", { onclick: () => this.store.set({ follow: this.store.state.follow === grain ? null : grain }) }, this.store.state.follow === grain ? "Stop following" : "Follow"),
       el("button", { "aria-label": "Close", onclick: () => this.store.set({ picked: null }) }, "×"));

@@ -28,10 +28,18 @@ export function curves(run, colours) {
   return plots;
 }
 
+/** Units of the columns of the diagnostics; the other columns are numbers. */
+const UNITS = {
+  dt: "s", max_divergence: "1/s", max_velocity: "m/s", slip: "m/s",
+  fluid_kinetic_energy: "J", grain_kinetic_energy: "J",
+  momentum_x: "kg m/s", momentum_y: "kg m/s", momentum_z: "kg m/s",
+};
+
 /** Curve of a column of the diagnostics. */
 export function diagnosticsCurve(run, name) {
   const [time, values] = [run.columns.get("time"), run.columns.get(name)];
-  return { title: name.replaceAll("_", " "), lines: [{ time, values, colour: "--accent" }] };
+  const unit = UNITS[name] ? ` [${UNITS[name]}]` : "";
+  return { title: name.replaceAll("_", " "), unit, lines: [{ time, values, colour: "--accent" }] };
 }
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -45,7 +53,7 @@ function ofGrains(run, colours, title, value) {
     });
   if (run.count <= EACH) {
     const lines = Array.from({ length: run.count }, (_, grain) => ({
-      time, values: at(grain), colour: colours.css(grain), grain,
+      time, values: at(grain), colour: colours.css(run.rank(grain)), grain,
     }));
     return { title, lines, zero: true };
   }
@@ -153,7 +161,7 @@ export class Plot {
     context.fillStyle = theme("--ink");
     context.textAlign = "left";
     context.font = "500 12px system-ui, sans-serif";
-    context.fillText(plot.title + name, 8, 12);
+    context.fillText(plot.title + name + (plot.unit ?? ""), 8, 12);
     const now = Math.min(state.time, run.last);
     context.strokeStyle = theme("--cursor");
     context.lineWidth = 1.5;

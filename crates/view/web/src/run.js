@@ -90,6 +90,11 @@ export class Run {
     return { row: low, part: Math.min(1, Math.max(0, part)) };
   }
 
+  /** Number of a grain in the cycle of colours, as in the report. */
+  rank(grain) {
+    return this.grains[grain]?.colour ?? grain;
+  }
+
   /** Position of a grain [m]; false if it has none. A step over a periodic face is not smooth. */
   position(grain, { row, part }, out) {
     const { position } = this.poses;

@@ -15,6 +15,9 @@ function drawsInSoftware() {
   return /swiftshader|llvmpipe|softpipe|basic render/i.test(name);
 }
 
+/** Height of the labels above and below the box [CSS px]. */
+const LABELS = 72;
+
 export class Screen {
   /** Throws if the browser has no WebGL 2. */
   constructor(canvas, changed) {
@@ -77,10 +80,10 @@ export class Screen {
         const corner = new THREE.Vector3(
           ...run.box.size.map((s, axis) => ((((n >> axis) & 1) - 0.5) * s) / unit),
         );
-        const need = Math.max(Math.abs(corner.dot(y)) / tangent, Math.abs(corner.dot(x)) / (tangent * (width / height)));
-        // Legends take a larger part of a small canvas.
-        const margin = height < 600 ? 1.2 : 1.09;
-        distance = Math.max(distance, margin * need + corner.dot(direction));
+        const [high, wide] = [Math.abs(corner.dot(y)) / tangent, Math.abs(corner.dot(x)) / (tangent * (width / height))];
+        // In a narrow part the box stands between the time above and the colour bar below.
+        const margin = width < 600 ? height / Math.max(0.5 * height, height - 2 * LABELS) : 1.09;
+        distance = Math.max(distance, Math.max(margin * high, 1.09 * wide) + corner.dot(direction));
       }
     }
     return distance;

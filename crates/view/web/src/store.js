@@ -34,7 +34,6 @@ export const initial = {
   box: true,
   follow: null,
   picked: null,
-  shown: [0],
   atEnd: false,
   help: false,
 };

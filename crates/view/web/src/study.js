@@ -1,6 +1,19 @@
 // Table of the runs of a study.
 
 import { el } from "./dom.js";
+import { plain } from "./format.js";
+
+const UNITS = [["_m_per_s", "m/s"], ["_deg", "deg"], ["_m", "m"], ["_s", "s"]];
+
+/** Heading of a column: words, and the unit that ends its name in brackets. */
+function heading(name) {
+  const [end, unit] = UNITS.find(([end]) => name.endsWith(end)) ?? ["", ""];
+  const words = name.slice(0, name.length - end.length).replaceAll("_", " ");
+  return unit ? `${words} [${unit}]` : words;
+}
+
+/** Value of a cell: numbers have four significant digits, words and whole numbers stay. */
+const shown = (text) => (/^-?\d*\.?\d+(e[-+]?\d+)?$/i.test(text) && !/^-?\d+$/.test(text) ? plain(Number(text), 4) : text);
 
 /** Overlay with the table and small pictures of the runs; a click on a row opens its run, a box adds it beside the others. */
 export function studyOverlay(study, store, pictures) {
@@ -28,8 +41,8 @@ export function studyOverlay(study, store, pictures) {
   };
   const line = (row) => {
     const open = row.run !== null;
-    const shown = open && store.state.shown.includes(row.run);
-    const box = open && el("input", { type: "checkbox", checked: shown, "aria-label": `Show ${row.name}`, onclick: (event) => {
+    const chosen = open && store.state.shown.includes(row.run);
+    const box = open && el("input", { type: "checkbox", checked: chosen, "aria-label": `Show ${row.name}`, onclick: (event) => {
       event.stopPropagation();
       toggleRun(store, row.run);
       fill();
@@ -37,8 +50,8 @@ export function studyOverlay(study, store, pictures) {
     const picture = el("td", { class: "pictures" });
     if (open) unfilled.push([row.run, picture]);
     const values = columns.map((i) => row.values[i] ?? "");
-    const cells = values.map((text) => el("td", { class: Number.isFinite(Number(text)) ? "number" : null }, text));
-    return el("tr", { class: open ? (shown ? "open shown" : "open") : null, onclick: () => open && store.set({ shown: [row.run], picked: null, follow: null, table: false }) },
+    const cells = values.map((text) => el("td", { class: Number.isFinite(Number(text)) ? "number" : null, title: text }, shown(text)));
+    return el("tr", { class: open ? (chosen ? "open shown" : "open") : null, onclick: () => open && store.set({ shown: [row.run], picked: null, follow: null, table: false }) },
       el("td", {}, box || ""), picture, el("th", {}, row.name), el("td", {}, row.state), ...cells);
   };
   const heads = head.map((name, i) => el("th", { onclick: () => {
@@ -46,7 +59,7 @@ export function studyOverlay(study, store, pictures) {
     down = sorted === i && !down;
     sorted = i;
     fill();
-  } }, name.replaceAll("_", " ")));
+  } }, heading(name)));
   const close = () => store.set({ table: false });
   const card = el("div", { class: "card wide", role: "dialog", "aria-label": "Runs of the study", onclick: (event) => event.stopPropagation() },
     el("h2", {}, study.title, el("button", { "aria-label": "Close", onclick: close }, "×")),

@@ -115,7 +115,7 @@ export class Paths {
   update(place, state, colours) {
     this.group.visible = state.paths;
     for (const { grain, ends, ahead, done } of this.lines) {
-      const [r, g, b] = colours.line(grain);
+      const [r, g, b] = colours.line(this.run.rank(grain));
       ahead.material.color.setRGB(r, g, b, THREE.SRGBColorSpace);
       done.material.color.setRGB(r, g, b, THREE.SRGBColorSpace);
       done.geometry.instanceCount = ends.findLastIndex((row) => row <= place.row) + 1;

@@ -141,7 +141,7 @@ test("grains are where the table says they are", async () => {
       const scene = [row.x - centre.x, row.y - centre.y, row.z - centre.z].map((c) => c / centre.unit);
       const clip = multiply(projection, multiply(view, [...scene, 1]));
       const point = [box.x + box.width * (0.5 + (0.5 * clip[0]) / clip[3]), box.y + box.height * (0.5 - (0.5 * clip[1]) / clip[3])];
-      const colour = await page.evaluate((g) => window.grainwake.colours.grain(g), row.grain);
+      const colour = await page.evaluate((g) => window.grainwake.colours.grain(window.grainwake.runs[0].rank(g)), row.grain);
       const far = [point[0] + 120, point[1]];
       const [found, beside] = await pixels(page, [point, far]);
       const [wanted] = hue(colour);
@@ -151,6 +151,30 @@ test("grains are where the table says they are", async () => {
     }
   }
   await context.close();
+});
+
+test("the trailing grain of a pair has the colour of the report, and the first one of the palette", async () => {
+  const [first, second] = table();
+  const trailing = first.z > second.z ? 0 : 1;
+  const { page, context } = await open(chrome, url(saved));
+  const ranks = await page.evaluate(() => [0, 1].map((grain) => window.grainwake.runs[0].rank(grain)));
+  assert.deepEqual(ranks, trailing === 0 ? [0, 1] : [1, 0]);
+  await context.close();
+});
+
+test("the labels stand above and below the box in a narrow window", async () => {
+  for (const name of [saved, save("spheres.html", manySpheres(4, 3))]) {
+    const { page, context } = await open(chrome, url(name), { viewport: { width: 400, height: 800 } });
+    const rows = await page.evaluate(() => {
+      const { screen, runs } = window.grainwake;
+      const { lower, size } = runs[0].box;
+      const corners = [...Array(8).keys()].map((n) => lower.map((l, axis) => l + ((n >> axis) & 1) * size[axis]));
+      return { y: corners.map((corner) => screen.project(corner)[1]), height: screen.canvas.clientHeight };
+    });
+    // The labels end 58 px below the upper edge, the colour bar begins 56 px above the lower one.
+    assert.ok(Math.min(...rows.y) > 58 && Math.max(...rows.y) < rows.height - 54, JSON.stringify(rows));
+    await context.close();
+  }
 });
 
 test("a click picks a grain and shows its numbers", async () => {
@@ -235,13 +259,22 @@ test("a run that goes on is followed", async () => {
 
 test("several runs stand beside each other", async () => {
   const spheres = manySpheres(3, 5);
-  const { page, context, problems } = await open(chrome, url(save("two.html", RUN, spheres)));
-  await page.locator(".chips .run").nth(1).click();
-  await page.waitForFunction(() => window.grainwake.screen.stages.length === 2);
+  const both = url(save("two.html", RUN, spheres));
+  const stages = (page) => page.evaluate(() => window.grainwake.screen.stages.length);
+  const { page, context, problems } = await open(chrome, both);
+  assert.equal(await stages(page), 2, "both are shown at once");
   await settled(page);
   if (SCREENSHOTS) await page.screenshot({ path: join(SCREENSHOTS, "two-runs.png") });
+  await page.locator(".chips .run").nth(0).click();
+  await page.waitForFunction(() => window.grainwake.screen.stages.length === 1);
   assert.deepEqual(problems, []);
   await context.close();
+  const narrow = await open(chrome, both, { viewport: { width: 400, height: 800 } });
+  assert.equal(await stages(narrow.page), 1, "a narrow window has room for one");
+  await narrow.page.locator(".chips .run").nth(1).click();
+  await narrow.page.waitForFunction(() => window.grainwake.screen.stages.length === 2);
+  assert.deepEqual(narrow.problems, []);
+  await narrow.context.close();
 });
 
 test("a study opens with the table of its runs", async () => {
@@ -249,6 +282,8 @@ test("a study opens with the table of its runs", async () => {
   const rows = page.locator(".study tbody tr");
   assert.equal(await rows.count(), 3);
   if (SCREENSHOTS) await page.screenshot({ path: join(SCREENSHOTS, "study.png") });
+  const heads = await page.locator(".study thead th").allInnerTexts();
+  assert.ok(heads.includes("peak speed [m/s]") && !heads.some((head) => head.includes("m per s")), heads.join(", "));
   await page.locator(".study thead th", { hasText: "weight" }).click({ clickCount: 2, delay: 20 });
   assert.match(await rows.first().innerText(), /d3000/, "sorted downwards");
   await rows.filter({ hasText: "d2500" }).locator("th").click();
