@@ -11,11 +11,11 @@ use grainwake_solver::sim::{ControlError, SetupError, StepError};
 use grainwake_study::StudyError;
 use grainwake_validation::SuiteError;
 use miette::{GraphicalReportHandler, GraphicalTheme};
-use pyo3::PyErr;
 use pyo3::exceptions::{
     PyFileExistsError, PyFileNotFoundError, PyIsADirectoryError, PyNotADirectoryError, PyOSError,
     PyPermissionError,
 };
+use pyo3::prelude::*;
 
 pyo3::import_exception!(grainwake._errors, CaseError);
 pyo3::import_exception!(grainwake._errors, SolverError);
@@ -82,6 +82,13 @@ pub fn system(kind: io::ErrorKind, message: impl Into<String>) -> PyErr {
         io::ErrorKind::InvalidData => input(message),
         _ => PyOSError::new_err(message),
     }
+}
+
+/// Gives notes as `CaseWarning`s.
+pub fn warn(py: Python<'_>, notes: impl IntoIterator<Item = String>) -> PyResult<()> {
+    let warnings = py.import("warnings")?;
+    let kind = py.import("grainwake")?.getattr("CaseWarning")?;
+    notes.into_iter().try_for_each(|note| warnings.call_method1("warn", (note, &kind)).map(drop))
 }
 
 /// Conversion of an error of a library to a Python exception.

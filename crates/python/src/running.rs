@@ -15,7 +15,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::error::{Raise, numerics};
+use crate::error::{Raise, numerics, warn};
 use crate::threads;
 
 /// Interval at which signals are handled and the progress is shown.
@@ -168,13 +168,6 @@ pub fn run(
             Err(PyKeyboardInterrupt::new_err(format!("interrupted at t = {time:.6e} s")))
         }
     }
-}
-
-/// Gives notes as `CaseWarning`s.
-pub fn warn(py: Python<'_>, notes: impl IntoIterator<Item = String>) -> PyResult<()> {
-    let warnings = py.import("warnings")?;
-    let kind = py.import("grainwake")?.getattr("CaseWarning")?;
-    notes.into_iter().try_for_each(|note| warnings.call_method1("warn", (note, &kind)).map(drop))
 }
 
 /// Returns the command line of Python, for the provenance.

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
-use crate::error::input;
-use crate::running::warn;
+use crate::error::{input, warn};
 
 /// Returns the number of threads; gives a `CaseWarning` if it is reduced.
 pub fn resolve(py: Python<'_>, threads: usize) -> PyResult<usize> {

@@ -64,12 +64,6 @@ def test_the_bits_do_not_depend_on_threads_and_on_python(case):
     assert (one.fluid_velocity("z") == two.fluid_velocity("z")).all()
 
 
-def test_thousands_of_threads_are_reduced_with_a_warning(case):
-    with pytest.warns(UserWarning, match="5000 threads are too many for"):
-        sim = gw.Simulation(case, threads=5000)
-    assert sim.threads <= 4 * (os.cpu_count() or 1)
-
-
 def test_fields_are_shown_without_a_copy(sim, case):
     nx, ny, nz = case.cells
     sim.advance_to("2 ms")

@@ -9,8 +9,8 @@ use pyo3::prelude::*;
 use rayon::ThreadPool;
 
 use super::PySimulation;
-use crate::error::{IntoException, Raise, input};
-use crate::running::{command, existing, warn};
+use crate::error::{IntoException, Raise, input, warn};
+use crate::running::{command, existing};
 
 /// Name of this program in the provenance.
 const PROGRAM: &str = "Python";
