@@ -10,6 +10,10 @@ use grainwake_study::survival::{Duration, kaplan_meier, log_rank, median_time};
 fn ties_share_their_mean_rank() {
     assert_eq!(ranks(&[3.0, 1.0, 3.0, 2.0]), [3.5, 1.0, 3.5, 2.0]);
     assert!(ranks(&[]).is_empty());
+    // Times that differ by rounding are equal.
+    assert_eq!(ranks(&[0.3, 0.1 + 0.2, 0.5 - 0.2]), [2.0; 3]);
+    let infinity = f64::INFINITY;
+    assert_eq!(ranks(&[infinity, 1.0, infinity]), [2.5, 1.0, 2.5]);
 }
 
 #[test]

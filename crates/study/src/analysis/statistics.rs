@@ -17,6 +17,16 @@ pub struct Estimate {
     pub p: f64,
 }
 
+/// Relative difference below which two values are equal: differences of times that agree to this
+/// precision differ by rounding only.
+const EQUAL: f64 = 1e-9;
+
+fn equal(a: f64, b: f64) -> bool {
+    // Censored observations rank as infinite.
+    let size = a.abs().max(b.abs());
+    a == b || size.is_finite() && (a - b).abs() <= EQUAL * size
+}
+
 /// Returns ranks from 1; equal values share their mean rank.
 pub fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
@@ -25,7 +35,7 @@ pub fn ranks(values: &[f64]) -> Vec<f64> {
     let mut i = 0;
     while i < order.len() {
         let mut j = i;
-        while j + 1 < order.len() && values[order[j + 1]] == values[order[i]] {
+        while j + 1 < order.len() && equal(values[order[j + 1]], values[order[i]]) {
             j += 1;
         }
         let rank = 0.5 * (i + j) as f64 + 1.0;
