@@ -51,8 +51,10 @@ def tolerance(groups):
 
 
 def median_time(table):
-    found = KaplanMeierFitter().fit(table.time, table.kissed).median_survival_time_
-    return found if np.isfinite(found) else None
+    survival = KaplanMeierFitter().fit(table.time, table.kissed).survival_function_.iloc[:, 0]
+    # A survival of one half, computed as a product, may differ by rounding.
+    half = survival.index[survival <= 0.5 + 1e-9]
+    return float(half[0]) if len(half) else None
 
 
 def pairs(first, second, other):
