@@ -1,11 +1,11 @@
-//! Puts the suites of the source tree, small text files, into the program. A copy of the crate
+//! Puts the suites of the source tree, small files, into the program. A copy of the crate
 //! without the tree has none.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Files of a suite: its cases and reference data.
-const KINDS: [&str; 2] = ["toml", "csv"];
+/// Files of a suite: its cases, grains and reference data.
+const KINDS: [&str; 3] = ["toml", "csv", "grain"];
 
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a readable folder").flatten() {
@@ -31,7 +31,7 @@ fn main() {
     for path in found {
         let name = path.strip_prefix(&root).unwrap().components();
         let name: Vec<_> = name.map(|part| part.as_os_str().to_str().expect("UTF-8")).collect();
-        writeln!(text, "    ({:?}, include_str!({path:?})),", name.join("/")).unwrap();
+        writeln!(text, "    ({:?}, include_bytes!({path:?})),", name.join("/")).unwrap();
     }
     text += "]\n";
     let output = Path::new(&std::env::var("OUT_DIR").unwrap()).join("suites.rs");

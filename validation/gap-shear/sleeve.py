@@ -1,7 +1,7 @@
 """Writes sleeve.obj: a spherical sleeve of revolution about y, with openings at the poles.
 
     python sleeve.py
-    grainwake grain from-mesh sleeve.obj --unit "1 mm" --cells 32 --nodes 2000 -o sleeve.grain
+    grainwake grain from-mesh sleeve.obj --unit "1 mm" --cells 24 --nodes 1000 -o sleeve.grain
 """
 
 from math import cos, pi, radians, sin, sqrt

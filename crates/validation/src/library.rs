@@ -7,7 +7,7 @@ use tempfile::TempDir;
 use crate::suite::{Suite, SuiteError};
 
 /// Files of the suites in the program: path below the folder of the suites, and contents.
-const EMBEDDED: &[(&str, &str)] = &include!(concat!(env!("OUT_DIR"), "/suites.rs"));
+const EMBEDDED: &[(&str, &[u8])] = &include!(concat!(env!("OUT_DIR"), "/suites.rs"));
 /// Folder of the suites in a source tree.
 const FOLDER: &str = "validation";
 
@@ -74,6 +74,19 @@ mod tests {
             suites.iter().map(|s| (s.name.clone(), s.title.clone(), s.runs.len())).collect()
         };
         let embedded = Library::embedded().unwrap();
+        let unpacked = embedded.unpacked.as_ref().unwrap().path();
+        let explains =
+            |path: &Path| ["md", "py"].iter().any(|e| path.extension() == Some(e.as_ref()));
+        for suite in std::fs::read_dir(&tree).unwrap().flatten().filter(|e| e.path().is_dir()) {
+            for file in std::fs::read_dir(suite.path()).unwrap().flatten().map(|e| e.path()) {
+                let copy = unpacked.join(file.strip_prefix(&tree).unwrap());
+                assert!(
+                    copy.exists() || explains(&file),
+                    "{} is not in the program",
+                    file.display()
+                );
+            }
+        }
         assert_eq!(
             describe(&embedded.suites),
             describe(&Library::open(Some(&tree)).unwrap().suites)
