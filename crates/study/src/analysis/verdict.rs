@@ -47,7 +47,7 @@ pub struct Finding {
     /// Conditions that a run must meet to be included.
     #[serde(rename = "where")]
     pub when: BTreeMap<String, Condition>,
-    /// Whether right-censored observations are excluded.
+    /// Whether pairs without the event are left out; otherwise they count as right-censored.
     pub observed: bool,
     /// Verdict.
     pub verdict: Verdict,
