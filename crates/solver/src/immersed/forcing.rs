@@ -24,7 +24,7 @@ use std::ops::Add;
 use glam::DVec3;
 
 use super::Scheme;
-use super::geometry::aperture::{aperture, open_depth, open_depth_integral};
+use super::geometry::aperture::{aperture, forcing_reach, open_depth, open_depth_integral};
 use super::geometry::{
     BandFaces, FaceRun, NarrowBandShapes, NeighbourGrain, load_all, nearest_distance,
 };
@@ -113,9 +113,9 @@ impl ForcingParams {
         let [drag, depth] = drag(d, normal, spacing, eps);
         let open = pressure_weight(mean, normal, spacing, eps);
         let strength = V::constant(self.diffusion) * drag;
-        // Zero beyond the forcing band, 2 eps from the surface: a run may span such faces between
-        // two parts of a concave grain.
-        let outside = V::constant(2.0 * eps);
+        // Zero beyond the reach of the forcing: a run may span such faces between two parts of a
+        // concave grain.
+        let outside = V::constant(forcing_reach(eps));
         let strength = d.select_below(outside, strength, V::constant(0.0));
         let one = V::constant(1.0);
         ([strength, depth], [one - open, one - aperture(d, eps)])
@@ -218,7 +218,7 @@ impl ForcedFaces {
         neighbours: &[NeighbourGrain],
         shapes: &NarrowBandShapes,
     ) {
-        let limit = 2.0 * params.eps;
+        let limit = forcing_reach(params.eps);
         for &(entry, x) in &band.shared {
             let (distances, normal) = band.face(entry);
             if params.scheme == Scheme::Aperture && distances[0] <= -params.eps {
@@ -341,7 +341,7 @@ pub fn pressure_weight<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) 
     // M / m grows from 0.2 to 0.283 times d + eps; the bound holds where rounding is larger than M.
     let bound = V::constant(0.3) * (d + V::constant(eps)).max(V::constant(0.0));
     let mean_depth = integral.div(depth);
-    let outside = V::constant(2.0 * eps);
+    let outside = V::constant(forcing_reach(eps));
     let mean_depth = d.select_below(V::constant(eps), mean_depth.min(bound), mean_depth);
     let weight = driven - numerator * mean_depth;
     let weight = weight.max(V::constant(0.0)).min(V::constant(1.0));

@@ -9,7 +9,7 @@
 
 use std::ops::Range;
 
-use super::geometry::aperture::inverse_aperture_excess;
+use super::geometry::aperture::{forcing_reach, inverse_aperture_excess};
 use super::geometry::{LocatedBody, PAD};
 use crate::flow::OldState;
 use crate::math::{Aligned, Real};
@@ -154,7 +154,8 @@ impl ComputeLinkWeights<'_> {
         let [x, y, z] = weight;
         let weight = [&mut x[..], &mut y[..], &mut z[..]];
         let (half, zero, no_link) = (V::constant(0.5), V::constant(0.0), V::constant(NO_LINK));
-        let [inside, band, outside] = [-1.0, 1.0, 2.0].map(|n| V::constant(n * self.eps));
+        let limits = [-self.eps, self.eps, forcing_reach(self.eps)];
+        let [inside, band, outside] = limits.map(V::constant);
         let rows = *row_length..*row_length * (self.body.size.y as usize + 1);
         for entry in rows.step_by(V::WIDTH) {
             let d_0 = V::load(&this[entry..]);

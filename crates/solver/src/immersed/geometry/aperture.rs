@@ -71,6 +71,13 @@ fn vanishing<V: Vector>(s: V, series: &[f64]) -> V {
     (V::constant(1.0) - square) * sum
 }
 
+/// Outer limit of the forcing band: distance from a surface [m] up to which a grain forces faces,
+/// twice the half-width `eps` [m]. On a cubic grid the drag and the closed fraction vanish at
+/// eps + h already, where the differences over one spacing h no longer reach the band of eps.
+pub fn forcing_reach(eps: f64) -> f64 {
+    2.0 * eps
+}
+
 /// Aperture of faces or links at distances `d` [m], which may be infinite.
 #[inline(always)]
 pub fn aperture<V: Vector>(d: V, eps: f64) -> V {

@@ -12,6 +12,7 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3, IVec3};
 
+use super::aperture::forcing_reach;
 use super::lists::{BandFaces, FaceRow, FaceRun, LocatedBody, RowPart, RowSpan};
 use super::narrow_band::{NarrowBandShapes, NeighbourGrain, load_all, nearest_distance, store_all};
 use crate::dem::Grain;
@@ -167,7 +168,7 @@ impl FillLists<'_> {
         let mut candidates = self.body.spans[component][row];
         candidates.first += plane_entry;
         let distances = &mut self.body.distance[component];
-        let limits = [self.reach, 2.0 * self.eps];
+        let limits = [self.reach, forcing_reach(self.eps)];
         let [span, in_band] = shorten::<V>(distances, candidates, limits);
         self.body.spans[component][row] = span;
         let h = self.mesh.spacing;
@@ -243,7 +244,7 @@ impl SharedRow<'_> {
                 let entry = first_forced + (i - forced.start) as usize;
                 if nearest <= -self.eps && nearest < d {
                     band.distance[entry] = BandFaces::outside(self.eps) as f32;
-                } else if nearest < 2.0 * self.eps {
+                } else if nearest < forcing_reach(self.eps) {
                     band.shared.push((entry, x));
                 }
             }

@@ -18,6 +18,7 @@ use glam::{DMat3, DVec3};
 use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};
 use crate::flow::Boundaries;
 use crate::grid::Mesh;
+use aperture::forcing_reach;
 use distances::{DistanceScratch, FillLists};
 use grainwake_simd::dispatch;
 use lists::UnknownFaces;
@@ -53,8 +54,8 @@ impl Locator {
         let axes = mesh.resolved_axes();
         let spacings: Vec<f64> = axes.map(|axis| mesh.spacing[axis]).collect();
         let eps = BAND_HALF_WIDTH * spacings.iter().sum::<f64>() / spacings.len().max(1) as f64;
-        // Two band half-widths, and half a link along the axis of the largest spacing.
-        let reach = 2.0 * eps + 0.5 * spacings.iter().copied().fold(0.0, f64::max);
+        // Half a link along the axis of the largest spacing beyond the reach of the forcing.
+        let reach = forcing_reach(eps) + 0.5 * spacings.iter().copied().fold(0.0, f64::max);
         Locator {
             mesh: *mesh,
             unknown_faces: UnknownFaces::new(mesh, boundaries),

@@ -282,7 +282,7 @@ pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [&mut [V::Number]; 3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::immersed::geometry::aperture::reference;
+    use crate::immersed::geometry::aperture::{forcing_reach, reference};
     use grainwake_shape::{ShapeOptions, analytic};
     use grainwake_simd::{Kernel, Registers, dispatch};
 
@@ -416,7 +416,7 @@ mod tests {
                 let index = [n % count, n / count % count, n / (count * count)];
                 let x = step * DVec3::from_array(index.map(|i| i as f64 - 44.3));
                 let d = band.distance_and_gradient(x).0;
-                if d < 2.0 * eps {
+                if d < forcing_reach(eps) {
                     let mean = band.mean_distance(x, d);
                     with_mean += step.powi(3) * (1.0 - reference::aperture(mean, eps));
                     with_distance += step.powi(3) * (1.0 - reference::aperture(d, eps));

@@ -8,6 +8,7 @@ use glam::IVec3;
 use super::Reference;
 use crate::flow::OldState;
 use crate::immersed::advection::GrainKinematics;
+use crate::immersed::geometry::aperture::forcing_reach;
 use crate::immersed::geometry::aperture::reference::inverse_aperture_excess;
 
 impl Reference {
@@ -43,7 +44,7 @@ impl Reference {
         }
         let [d_0, d_1] = faces.map(|face| self.distance(index, component, face));
         let d = 0.5 * (d_0? + d_1?);
-        if d <= -self.eps || d >= 2.0 * self.eps {
+        if d <= -self.eps || d >= forcing_reach(self.eps) {
             return None;
         }
         Some(if d < self.eps { inverse_aperture_excess(d, self.eps) } else { 0.0 })

@@ -10,6 +10,7 @@ use glam::{DVec3, IVec3};
 use super::Reference;
 use crate::flow::OldState;
 use crate::immersed::Scheme;
+use crate::immersed::geometry::aperture::forcing_reach;
 use crate::immersed::geometry::aperture::reference::{aperture, open_depth, open_depth_integral};
 use crate::math::RigidVelocity;
 
@@ -66,7 +67,7 @@ impl Reference {
             if image.distance <= -eps && image.distance < d {
                 return Weights::default();
             }
-            if image.distance < 2.0 * eps {
+            if image.distance < forcing_reach(eps) {
                 let [drag, closed_fraction, solid_fraction] =
                     self.drag(image.distance, image.mean_distance, image.normal);
                 all_drag += drag;
@@ -146,7 +147,7 @@ impl Reference {
         for component in 0..3 {
             for face in self.faces(component) {
                 let image = self.nearest_image(index, self.position(component, face));
-                if image.distance < 2.0 * self.eps {
+                if image.distance < forcing_reach(self.eps) {
                     let u = predicted[component][self.at(face)];
                     let gain = self.gain(index, known, u, motion, component, face);
                     let impulse = fluid_mass * gain * DVec3::AXES[component];

@@ -12,6 +12,7 @@ use crate::grid::Mesh;
 use crate::immersed::Scheme;
 use crate::immersed::advection::{GrainKinematics, find_correction};
 use crate::immersed::forcing::{ForcedFaces, ForcingParams};
+use crate::immersed::geometry::aperture::forcing_reach;
 use crate::immersed::geometry::{LocateScratch, LocatedBody, Locator};
 use crate::immersed::links::{LinkPlanes, compute_link_weights};
 use crate::immersed::rigid_body::{PreviousStep, RigidBodySystem};
@@ -170,7 +171,7 @@ fn distances_to_faces_match_the_reference() {
         let eps = case.locator.eps();
         let tolerance_at = |d: f64| match SPHERES.contains(&index) {
             true => 1e-6,
-            false if d > -eps && d < 2.0 * eps => 1e-3,
+            false if d > -eps && d < forcing_reach(eps) => 1e-3,
             false => 1e-2,
         };
         let tolerance = tolerance_at(case.locator.reach());
