@@ -1,5 +1,5 @@
 //! Binary encoding of `.grain` files and checkpoints: little-endian numbers without padding,
-//! byte strings with their length in front. Numbers keep their bits.
+//! byte strings with their length in front. Numbers are stored exactly.
 
 use std::io::{self, Read, Write};
 

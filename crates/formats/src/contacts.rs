@@ -59,7 +59,7 @@ pub struct ContactRow {
 }
 
 impl ContactRow {
-    /// Appends the row to a text; numbers read back bit for bit.
+    /// Appends the row to a text; numbers are read back exactly.
     pub fn append_to(&self, text: &mut String) {
         let (x, n, f) = (self.point, self.normal, self.force);
         let numbers = [x.x, x.y, x.z, n.x, n.y, n.z, self.overlap, f.x, f.y, f.z];

@@ -45,7 +45,7 @@ pub struct DiagnosticsRow {
 }
 
 impl DiagnosticsRow {
-    /// Returns the line of the table, with its line break; numbers read back bit for bit.
+    /// Returns the line of the table, with its line break; numbers are read back exactly.
     pub fn to_line(&self) -> String {
         let gap = self.gap.map_or(String::new(), |gap| format!("{gap:?}"));
         format!(

@@ -40,7 +40,7 @@ pub struct GrainRow {
 }
 
 impl GrainRow {
-    /// Appends the row to a text; numbers read back bit for bit, missing ones are NaN.
+    /// Appends the row to a text; numbers are read back exactly, missing ones are NaN.
     pub fn append_to(&self, text: &mut String) {
         let q = self.orientation;
         let [force, torque] = [self.force, self.torque].map(|v| v.unwrap_or(DVec3::NAN));

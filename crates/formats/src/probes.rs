@@ -30,7 +30,7 @@ pub struct PointRow {
 }
 
 impl PointRow {
-    /// Appends the row to a text; numbers read back bit for bit.
+    /// Appends the row to a text; numbers are read back exactly.
     pub fn append_to(&self, text: &mut String) {
         let (x, v) = (self.position, self.velocity);
         let numbers = [x.x, x.y, x.z, v.x, v.y, v.z, self.pressure, self.solid_fraction];
@@ -56,7 +56,7 @@ pub struct PlaneRow {
 }
 
 impl PlaneRow {
-    /// Appends the row to a text; numbers read back bit for bit.
+    /// Appends the row to a text; numbers are read back exactly.
     pub fn append_to(&self, text: &mut String) {
         let numbers = [self.volume_flux, self.grain_flux, self.solid_fraction, self.pressure];
         let _ = write!(text, "{:?}", self.time);

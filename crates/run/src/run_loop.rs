@@ -68,7 +68,7 @@ pub enum Ending {
 
 /// Runs a job in the folder `out`.
 ///
-/// Tables, VTK files and the final state have the same bits for any number of threads, and after
+/// Tables, VTK files and the final state are bitwise identical for any number of threads, and after
 /// any number of interruptions and resumptions.
 ///
 /// # Errors

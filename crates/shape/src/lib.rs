@@ -31,7 +31,7 @@
 //! let sphericity = pebble.morphology().krumbein_sphericity;
 //! assert!((sphericity - (2.0f64 / 9.0).cbrt()).abs() < 0.01);
 //!
-//! // Files restore the shape bit for bit.
+//! // Files restore the shape exactly.
 //! let restored = Shape::from_bytes(&pebble.to_bytes(), "pebble.grain".as_ref())?;
 //! assert_eq!(restored.digest(), pebble.digest());
 //! # Ok(())

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rand::RngExt;
 
 /// Generator of the grain family: the reference sequence of SplitMix64 (Steele, Lea and Flood
-/// 2014), on which committed grains depend bit for bit.
+/// 2014), on which committed grains depend exactly.
 pub(crate) type Random = rand_xoshiro::SplitMix64;
 
 /// Returns a uniformly distributed direction: a point of the unit ball by rejection, normalised.

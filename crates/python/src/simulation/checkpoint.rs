@@ -72,7 +72,7 @@ impl PySimulation {
 
 #[pymethods]
 impl PySimulation {
-    /// Write the state to a file, exact to the bit.
+    /// Write the exact state to a file.
     ///
     /// Parameters
     /// ----------
@@ -92,7 +92,7 @@ impl PySimulation {
     }
 
     /// Restore a state written by `save_checkpoint` of a simulation of the same case. The
-    /// simulation then continues with the same bits.
+    /// simulation then continues bitwise identically.
     ///
     /// Parameters
     /// ----------

@@ -63,7 +63,7 @@ const CLOSED: &str = "the run folder is closed: continue it with Simulation(case
 /// a step, and the simulation can be continued.
 ///
 /// With `output`, steps end at the output times of the case as well. If nothing is controlled and
-/// no other times are asked for, the folder has the bits of `Case.run`. Steps beyond the end of the
+/// no other times are asked for, the results are those of `Case.run`. Steps beyond the end of the
 /// case are refused. Call `finish` at the end, or use a ``with`` block: it calls `finish`, or after
 /// an exception `checkpoint`. The folder is locked until then.
 ///

@@ -4,7 +4,7 @@
 //!
 //! 1. raw: the file as written, each key with its position (`raw`),
 //! 2. validated: the parameter structs of the modules that own them (`validate`),
-//! 3. resolved: the raw case with every default written out. It gives the same bits when it is run.
+//! 3. resolved: the raw case with every default written out. Running it gives the same results.
 //!
 //! A problem is reported with file, line, key and remedy; then nothing is written.
 //!

@@ -8,7 +8,7 @@ use grainwake_solver::dem::{Enclosure, Grain, wall_gap};
 /// Returns the orientation of a grain after its turns. The principal frame of a shape has the
 /// longest axis along x and the shortest along z.
 ///
-/// A quaternion of unit length keeps its bits, so that a resolved case gives the same grain.
+/// A quaternion of unit length is kept exactly, so that a resolved case gives the same grain.
 pub(super) fn orientation(orientation: &Orientation, turns: &Turns) -> Result<DQuat, String> {
     let start = match orientation {
         Orientation::Quaternion(q) => *q,

@@ -30,8 +30,8 @@ const CHECKSUM: u64 = 32;
 /// Folder of the checkpoints in a run folder.
 pub const FOLDER: &str = "checkpoint";
 
-/// State of a run besides the simulation. It holds no wall-clock time: two runs of a case write the
-/// same bits.
+/// State of a run besides the simulation. It holds no wall-clock time: two runs of a case write
+/// identical bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Hash of the case.

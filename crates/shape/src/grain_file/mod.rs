@@ -33,7 +33,7 @@ impl Shape {
             .map_err(|e| ShapeError::io(path, e))
     }
 
-    /// Reads a shape, bit for bit as saved.
+    /// Reads a shape exactly as saved.
     pub fn load(path: &Path) -> Result<Shape> {
         let limits = crate::ReadLimits { file_bytes: LARGEST, ..Default::default() };
         let (bytes, _) = crate::limits::read_bytes(path, &limits)?;

@@ -1,7 +1,7 @@
 //! Parallel loops over planes and columns, and rows that several threads share.
 //!
-//! Every plane's result depends on nothing but its inputs, so the bits do not depend on the number
-//! of threads. Reductions run in the order of the planes.
+//! Every plane's result depends on nothing but its inputs, so it does not depend on the number of
+//! threads. Reductions run in the order of the planes.
 
 use std::cell::RefCell;
 use std::marker::PhantomData;

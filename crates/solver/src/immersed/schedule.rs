@@ -8,7 +8,8 @@
 //! - the advection next to a grain must be corrected before the impulse of its neighbour is summed;
 //! - contact must be resolved before rigidity is imposed.
 //!
-//! Both orders give the same bits (`docs/decisions/0016-isolated-grains-in-one-traversal.md`).
+//! Both orders give bitwise identical results
+//! (`docs/decisions/0016-isolated-grains-in-one-traversal.md`).
 
 use glam::DVec3;
 use rayon::prelude::*;

@@ -4,7 +4,7 @@
 //! register); the first half of a block are the real parts. Lines along y are adjacent in the
 //! plane. Lines along x are transposed in registers before the transform, and their modes stay
 //! adjacent: a plane of modes is a row of blocks, each [mode along x][line]. The pairs, hence the
-//! bits, do not depend on the width of the registers.
+//! rounding, do not depend on the width of the registers.
 //!
 //! Legend: L count of numbers in a cache line.
 

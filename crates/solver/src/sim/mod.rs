@@ -44,7 +44,7 @@ pub use step::SAME_TIME;
 ///
 /// Units are SI. Positions, velocities and loads are in the space frame, angular velocities and
 /// torques too; torques are about the centroid of their grain. State refers to the end of the last
-/// step. Built by [`Simulation::new`], advanced by [`Simulation::step`], and stored bit for bit by
+/// step. Built by [`Simulation::new`], advanced by [`Simulation::step`], and stored exactly by
 /// [`Simulation::save`] and [`Simulation::restore`]. Results do not depend on the number of
 /// threads.
 pub struct Simulation {

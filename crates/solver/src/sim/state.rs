@@ -1,4 +1,4 @@
-//! State of a simulation as bytes, exact to the bit.
+//! Exact state of a simulation as bytes.
 
 use std::io::{self, Read, Write};
 
@@ -15,7 +15,7 @@ use crate::math::{Load, Pose};
 const OPEN_SIDES: u64 = u64::from_le_bytes(*b"OPENSIDE");
 
 impl Simulation {
-    /// Writes the full state; a simulation restored from it continues with identical bits.
+    /// Writes the full state; a simulation restored from it continues bitwise identically.
     ///
     /// # Errors
     /// Errors of the writer.

@@ -121,7 +121,7 @@ impl Notation for Orientation {
         if !(norm.is_finite() && norm > 1e-12) {
             return Err("a quaternion cannot be zero".into());
         }
-        // A quaternion that is already of unit length keeps its bits.
+        // A quaternion that is already of unit length is kept exactly.
         Ok(Orientation::Quaternion(if (norm - 1.0).abs() < 1e-14 { q } else { q.normalize() }))
     }
     fn from_table(table: OrientationTable) -> Result<Self, String> {

@@ -151,8 +151,8 @@ pub struct RawPlane {
     pub grain: Option<Located<usize>>,
 }
 
-/// Threads and precision. Threads change no bit of a result; single precision has larger rounding
-/// errors.
+/// Threads and precision. Results are bitwise identical for any number of threads; single precision
+/// has larger rounding errors.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawRun {

@@ -1,4 +1,4 @@
-//! Contact history in a checkpoint, bit for bit.
+//! Exact contact history in a checkpoint.
 //!
 //! Layout, little-endian: signature and version; number of grains and their positions at the end of
 //! the last step; number of pairs in contact and each pair; number of contacts and each contact.
@@ -50,7 +50,7 @@ fn decode_grain(input: &mut Decoder, grains: usize) -> io::Result<usize> {
 }
 
 impl ContactDynamics {
-    /// Writes the contact history and the contacts, bit for bit.
+    /// Writes the exact contact history and contacts.
     pub fn save(&self, writer: &mut dyn Write) -> io::Result<()> {
         let mut out = Encoder::new(writer);
         out.raw(&SIGNATURE)?;

@@ -198,7 +198,7 @@ impl ContactDynamics {
             record.in_contact_during_step |= record.loads.overlap > 0.0;
             record.deepest_overlap = record.deepest_overlap.max(record.loads.overlap);
         };
-        // Each pair writes its own record and the records are summed in order, so the bits do not
+        // Each pair writes its own record and the records are summed in order, so results do not
         // depend on the number of threads.
         if self.records.len() < PARALLEL_PAIRS {
             self.records.iter_mut().for_each(evaluate);
