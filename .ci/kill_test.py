@@ -2,7 +2,7 @@
 """Kills runs and studies (SIGKILL) at random moments and resumes them.
 
 After every kill a copy of the folder is resumed to its end and compared with an undisturbed run:
-every file has the same bits, except for the wall times and the provenance. The killed folder itself
+every file is bitwise identical, except for the wall times and the provenance. The killed folder itself
 is resumed and killed up to five times in a row.
 
     .ci/kill_test.py [--kills 1000] [--seed N] [--work DIR] [--program FILE]
@@ -246,7 +246,7 @@ def main():
             job.check(copy, what)
         job.check(folder, f"seed {state['seed']}, chain before kill {state['kills']}")
         state_file.write_text(json.dumps(state))
-    print(f"{state['kills']} kills, seed {state['seed']}: every folder resumed to the same bits")
+    print(f"{state['kills']} kills, seed {state['seed']}: every folder resumed to bitwise identical results")
     if not args.work:
         shutil.rmtree(work)
 

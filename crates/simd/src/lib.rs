@@ -3,7 +3,8 @@
 //! A [`Kernel`] is written once over [`Vector`] and compiled for each instruction set; [`dispatch`]
 //! calls the widest set of the machine. All sets round alike: a product is fused with a sum only
 //! where a kernel says `mul_add`, and no result depends on the number of lanes, so results are
-//! bitwise identical on all machines. Machines without AVX2 have no fused instruction and call a function.
+//! bitwise identical on all machines. Machines without AVX2 have no fused instruction and call a
+//! function.
 //!
 //! All functions that a kernel calls must be inlined into it, hence the many `inline(always)`:
 //! functions that are not inlined are compiled for the baseline. Closures over vectors that are
