@@ -3,7 +3,7 @@
 //!
 //! In a step of dt, a forced face gains with the rigid velocity U, and U_old before it,
 //!
-//! - e = dt / h (p~(above) - p~(below)) - dt g, if the step's pressure gradient and body
+//! - e = dt / h (p~(above) - p~(below)) - dt a, if the step's pressure gradient and body
 //!   acceleration are removed from the face;
 //! - r = c e - s (u* + C e), next to a grain at rest: the drag acts on u* + C e;
 //! - r + s U + f (U - U_old) + (1 - s) (c - phi) W, next to a moving grain, with f = (1 - s) phi.
@@ -19,9 +19,10 @@
 //! fluid mass times gain over the faces, J = constant + matrix (V, Omega). The grain loses what the
 //! fluid gains ([`super::rigid_body`]). `immersed::reference` has the scalar form.
 //!
-//! Legend: s weight, c closed fraction, C total closed fraction, phi solid fraction (these three
-//! zero in the paper's scheme), f weight of the change of velocity, u* predicted velocity, h
-//! spacing along the component, l and m lever arms of the face about the two other axes.
+//! Legend: s weight of the rigid velocity, c closed fraction, C total closed fraction, phi solid
+//! fraction (these three zero in the paper's scheme), f weight of the change of velocity, r rest
+//! gain, u* predicted velocity, a body acceleration, h spacing along the component, l and m lever
+//! arms of the face about the two other axes.
 
 use glam::DVec3;
 
@@ -194,7 +195,7 @@ struct RunImpulse<'a, R> {
     dt_per_2h: [f64; 3],
     /// dt / h along the component [s/m].
     dt_per_h: f64,
-    /// dt g along the component [m/s].
+    /// dt a along the component, with the body acceleration a [m/s].
     dt_g: f64,
     /// h along x [m].
     spacing: f64,

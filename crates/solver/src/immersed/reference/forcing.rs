@@ -2,8 +2,7 @@
 //!
 //! Legend: d signed distance, n normal, m open depth, M its integral, s weight of the rigid
 //! velocity, c closed fraction, C total closed fraction, phi solid fraction, A aperture, U and
-//! U_old new and old rigid velocity, J impulse, h spacing, nu kinematic viscosity, p pressure, g
-//! body acceleration.
+//! U_old new and old rigid velocity, J impulse, h spacing, nu kinematic viscosity, p pressure.
 
 use glam::{DVec3, IVec3};
 
