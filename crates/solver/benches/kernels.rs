@@ -85,7 +85,7 @@ fn contact(c: &mut Criterion) {
     let pairs = dynamics.contacts().len();
     let tested = 2 * nodes * pairs * substeps;
     println!(
-        "{} grains of {nodes} nodes, {pairs} contacts, {substeps} sub-steps a step",
+        "{} grains of {nodes} nodes, {pairs} contacts, {substeps} sub-steps per step",
         grains.len()
     );
     let mut group = c.benchmark_group("contact in a packed heap");

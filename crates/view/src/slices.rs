@@ -1,4 +1,4 @@
-//! Slices of the fields: 8 bits a value, thinned in space and time.
+//! Slices of the fields: 8 bits per value, thinned in space and time.
 
 use std::collections::HashMap;
 use std::path::PathBuf;

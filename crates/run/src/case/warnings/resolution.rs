@@ -105,7 +105,7 @@ fn contact_cost(setup: &Setup, e: &Estimate) -> Option<String> {
     };
     (dominates || many).then(|| {
         format!(
-            "contact takes {:.0} % of the wall time ({substeps:.0} sub-steps a step): {stiffness}, fewer nodes per grain or fewer substeps_per_contact are cheaper",
+            "contact takes {:.0} % of the wall time ({substeps:.0} sub-steps per step): {stiffness}, fewer nodes per grain or fewer substeps_per_contact are cheaper",
             100.0 * e.contact_share
         )
     })
