@@ -451,7 +451,7 @@ fn ways_out_are_warned_of() {
             format!("{cell}\nboundaries = {{ x = \"periodic\", y = \"periodic\", z = {z} }}");
         warnings(cell, &walls)
     };
-    let none = ["leave through", "faster and faster", "given motion", "one cell thick"];
+    let none = ["leave through", "faster and faster", "prescribed motion", "one cell thick"];
     let quiet = walls("\"wall\"");
     assert!(none.iter().all(|text| !quiet.contains(text)), "{quiet}");
     let open = walls("[\"outflow\", \"wall\"]");

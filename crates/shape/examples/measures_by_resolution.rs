@@ -16,7 +16,7 @@ use grainwake_shape::ShapeOptions;
 const SEEDS: u64 = 3;
 
 fn main() {
-    println!("| body | voxels | Krumbein | by calipers | Wadell | convexity | roundness |");
+    println!("| body | voxels | Krumbein | Krumbein by Feret | Wadell | convexity | roundness |");
     println!("|---|---|---|---|---|---|---|");
     for name in ["spheroid", "box.1", "box", "peanut"] {
         let body = Body::named(name);

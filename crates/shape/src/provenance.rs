@@ -7,9 +7,9 @@ use glam::{DQuat, DVec3};
 pub struct Provenance {
     /// `analytic`, `mesh` or `scan`.
     pub method: String,
-    /// Name of the source file, empty for analytic shapes.
+    /// Name of the source file, empty for closed forms.
     pub source: String,
-    /// SHA-256 of the source file in hexadecimal, empty for analytic shapes.
+    /// SHA-256 of the source file in hexadecimal, empty for closed forms.
     pub source_sha256: String,
     /// Parameters by name, in order of application.
     pub parameters: Vec<(String, String)>,

@@ -18,7 +18,7 @@ pub enum GrainCommand {
     FromScan(FromScanArgs),
     /// Create a grain from a closed surface mesh or from spherical harmonics
     FromMesh(FromMeshArgs),
-    /// Create a grain of analytic shape
+    /// Create a grain of closed form: sphere, ellipsoid, box, cylinder, capsule, superquadric
     Make(MakeArgs),
     /// Generate grains of given sphericity and roundness, one for each pair
     Family(FamilyArgs),
@@ -33,7 +33,7 @@ pub enum GrainCommand {
 /// Output and resolution of new grains.
 #[derive(Debug, Args)]
 pub struct NewGrain {
-    /// Grain file; from-scan writes all grains if it is a folder
+    /// Grain file; for from-scan also a folder, which receives all grains
     #[arg(short, long, value_name = "FILE.grain")]
     pub output: PathBuf,
     /// Rescale to this diameter of the sphere of equal volume, for example "2 mm"
@@ -98,13 +98,14 @@ pub struct FromScanArgs {
     /// Apply a median filter of 27 voxels before the threshold
     #[arg(long)]
     pub median: bool,
-    /// Separate touching grains where the neck is narrower than this fraction of the smaller grain
+    /// Separate touching grains where the neck is narrower than this fraction of the smaller grain,
+    /// 0.87 if no value is given
     #[arg(long, value_name = "NECK", num_args = 0..=1, default_missing_value = "0.87")]
     pub separate: Option<f64>,
     /// Locate surfaces by the mask even if there are grey values
     #[arg(long)]
     pub from_mask: bool,
-    /// Skip the roundness measurement, which takes long
+    /// Do not measure roundness, which is slow
     #[arg(long)]
     pub no_roundness: bool,
     /// Treat each connected piece of solid as a grain
@@ -120,7 +121,8 @@ pub struct FromScanArgs {
     /// mask]
     #[arg(long, value_name = "VOXELS")]
     pub smoothing: Option<f64>,
-    /// Try rejected labels again with more smoothing or a median, each with the gentlest that works
+    /// Try rejected labels again with more smoothing or a median, each with the
+    /// least that works
     #[arg(long)]
     pub rescue: bool,
     /// Draw slices with the labels that would be kept and rejected into this PNG; write no grain

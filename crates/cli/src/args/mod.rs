@@ -32,7 +32,7 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
     format!("{} (commit {commit})", env!("CARGO_PKG_VERSION"))
 });
 
-/// Resolved simulation of grains in fluid: from images or meshes to figures.
+/// Command line of Grainwake; its description is that of the package.
 #[derive(Debug, Parser)]
 #[command(name = "grainwake", version, long_version = VERSION.as_str(), about)]
 #[command(propagate_version = true)]
@@ -55,7 +55,7 @@ pub enum Command {
     Validate(ValidateArgs),
     /// Run a parameter study; finished runs are kept, interrupted runs are resumed
     Study(StudyArgs),
-    /// Draw the figures and the page of a run folder or a study folder
+    /// Draw the figures and report.html of a run folder or a study folder
     Report(ReportArgs),
     /// Show runs as an interactive 3-D page, served on this machine or saved as one file
     View(ViewArgs),

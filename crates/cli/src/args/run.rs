@@ -33,7 +33,7 @@ pub struct RunArgs {
     /// Remove a key of the case, so that its default applies, for example time.step; before --set
     #[arg(long = "unset", value_name = "KEY")]
     pub unset: Vec<String>,
-    /// Do not draw the figures and the page at the end of the run
+    /// Do not draw the figures and report.html at the end of the run
     #[arg(long)]
     pub no_report: bool,
     /// Print warnings and errors only

@@ -1,4 +1,4 @@
-//! `grain make`: analytic shapes.
+//! `grain make`: shapes of closed form.
 
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
@@ -6,7 +6,7 @@ use super::{grain_file, length, may_write, options, save};
 use crate::args::Body;
 use crate::exit::Exit;
 
-/// Creates a grain of analytic shape.
+/// Creates a grain of closed form.
 pub fn make(body: &Body) -> Result<(), Exit> {
     let new = match body {
         Body::Sphere { new, .. }

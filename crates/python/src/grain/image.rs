@@ -143,7 +143,7 @@ impl PyGrain {
     /// labels : bool, default False
     ///     Read integers as labels even if the image looks grey.
     /// roundness : bool, default True
-    ///     Measure the roundness, which takes long.
+    ///     Measure the roundness, which is slow.
     /// equivalent_diameter : float or str, optional
     ///     Rescale to this diameter of the sphere of equal volume [m].
     /// cells, nodes : int, optional
@@ -248,7 +248,7 @@ impl PyGrain {
 /// labels : bool, default False
 ///     Read integers as labels even if the image looks grey.
 /// roundness : bool, default True
-///     Measure the roundness, which takes long.
+///     Measure the roundness, which is slow.
 /// equivalent_diameter : float or str, optional
 ///     Rescale to this diameter of the sphere of equal volume [m].
 /// cells, nodes : int, optional

@@ -180,8 +180,8 @@ impl Simulation {
         }
     }
 
-    /// Describes an overlap beyond the limit, with its remedy. No contact resists a given motion,
-    /// so a pair without a free grain does not count.
+    /// Describes an overlap beyond the limit, with its remedy. No contact resists a prescribed
+    /// motion, so a pair without a free grain does not count.
     fn excessive_overlap(&self) -> Option<(String, Remedy)> {
         let (params, grains) = (&self.setup.contact, &self.setup.grains);
         let overlap = self.largest_overlap().filter(|it| it.relative > params.overlap_limit)?;

@@ -109,7 +109,7 @@ fn unsupported_weight(setup: &Setup) -> Option<String> {
             false => format!("{a:.4e}"),
         });
         format!(
-            "no wall and no held grain carries the weight: grains and fluid fall together, faster and faster; [fluid] body_acceleration = [{}] (m/s2) balances it within a percent",
+            "no wall and no fixed grain carries the weight: grains and fluid fall together, faster and faster; [fluid] body_acceleration = [{}] (m/s2) balances it within a percent",
             balance.join(", ")
         )
     })
@@ -145,7 +145,7 @@ fn prescribed_motions(setup: &Setup, end: f64) -> Vec<String> {
             if let Some(out) = out.iter().find(|out| through(out.axis, out.side)) {
                 gone[index] = true;
                 found.push(format!(
-                    "the given motion of grain {index} takes it through the {} wall of {} at t = {}: nothing stops a given motion",
+                    "the prescribed motion of grain {index} takes it through the {} wall of {} at t = {}: nothing stops a prescribed motion",
                     SIDES[out.side],
                     AXES[out.axis],
                     quantity(middle + 0.5 * dt, "s")
