@@ -6,6 +6,8 @@
 2. Every decimal number has a digit before its point.
 3. A doc comment is a sentence about its subject: it does not open with a phrase that lacks one.
 4. Every source file that ARCHITECTURE.md names exists.
+5. Results are "bitwise identical", and rates are "per" something: 5 ns per cell, not 5 ns a cell.
+6. A page of docs/decisions has a status, context, decision and consequences, on one screen.
 
 Prints each finding as `file:line: rule: text` and exits with 1 if there is any.
 """
@@ -23,6 +25,12 @@ OPENINGS = re.compile(
     r"^(The same\b|Those\b|These\b|That\b|This is\b|What\b|Where\b|How\b|Why\b|When\b|Which\b|It\b|"
     r"Its\b|They\b|Their\b|Of\b|As\b|Some\b|One more\b|And\b|Also\b|Likewise\b|Ditto\b)"
 )
+# Private words for identical results.
+BITS = re.compile(r"\b(same|identical) bits\b|\bbit[ -]for[ -]bit\b|\bto the (last )?bit\b")
+RATE = re.compile(r"\d (ns|us|ms|s|min|[kMG]B|bytes?|frames|lines) an? [a-z]")
+# Parts of a decision page, and its most lines.
+DECISION_PARTS = ["Status:", "## Context", "## Decision", "## Consequences"]
+SCREEN = 64
 INLINE_CODE = re.compile(r"`[^`]*`")
 LINK = re.compile(r"\]\([^)]*\)|https?://\S+")
 
@@ -35,6 +43,16 @@ def tracked(*patterns):
     return [name for name in names if name and not EXEMPT.match(name)]
 
 
+def words(prose):
+    """Rules broken by the words of a line."""
+    if BARE_DECIMAL.search(prose):
+        yield "number without leading zero"
+    if BITS.search(prose):
+        yield 'write "bitwise identical"'
+    if RATE.search(prose):
+        yield 'write "per" for a rate'
+
+
 def markdown(name, text):
     fenced = False
     for number, line in enumerate(text.split("\n"), 1):
@@ -44,9 +62,21 @@ def markdown(name, text):
         breakable = not (fenced or line.lstrip().startswith("|") or LINK.search(line))
         if len(line) > WIDTH and breakable:
             yield number, "longer than 100 columns", line
-        prose = INLINE_CODE.sub("", LINK.sub("", line))
-        if not fenced and BARE_DECIMAL.search(prose):
-            yield number, "number without leading zero", line
+        if not fenced:
+            for rule in words(INLINE_CODE.sub("", LINK.sub("", line))):
+                yield number, rule, line
+    if re.match(r"docs/decisions/\d", name):
+        yield from decision(text)
+
+
+def decision(text):
+    lines = text.rstrip().split("\n")
+    parts = [line for line in lines if line.startswith(("## ", "Status:"))]
+    found = [part.split(" ")[0] if part.startswith("Status:") else part for part in parts]
+    if found != DECISION_PARTS:
+        yield 1, f"decision page without the parts {', '.join(DECISION_PARTS)}", lines[0]
+    if len(lines) > SCREEN:
+        yield len(lines), f"decision page longer than {SCREEN} lines", lines[0]
 
 
 def rust(name, text):
@@ -59,10 +89,10 @@ def rust(name, text):
             continue
         if len(line) > WIDTH and "http" not in line:
             yield number, "longer than 100 columns", line
-        if BARE_DECIMAL.search(INLINE_CODE.sub("", comment)):
-            yield number, "number without leading zero", line
-        words = re.sub(r"^[/!]\s?", "", comment).strip()
-        if doc and opening and OPENINGS.match(words):
+        for rule in words(INLINE_CODE.sub("", comment)):
+            yield number, rule, line
+        start = re.sub(r"^[/!]\s?", "", comment).strip()
+        if doc and opening and OPENINGS.match(start):
             yield number, "doc comment without a subject", line
         opening = not doc
 
@@ -73,8 +103,8 @@ def toml(name, text):
             continue
         if len(line) > WIDTH and "http" not in line:
             yield number, "longer than 100 columns", line
-        if BARE_DECIMAL.search(INLINE_CODE.sub("", line)):
-            yield number, "number without leading zero", line
+        for rule in words(INLINE_CODE.sub("", line)):
+            yield number, rule, line
 
 
 def architecture():

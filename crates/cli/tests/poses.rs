@@ -126,7 +126,7 @@ fn a_settled_heap_stays_at_rest_in_the_next_run() {
     let summary: Value =
         serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
     assert!(summary["max_overlap"].as_f64().unwrap() < 0.02, "{summary}");
-    // The resolved case lists the grains and gives the same bits.
+    // The resolved case lists the grains and gives bitwise identical results.
     let again = folder.path().join("again");
     run(&out.join("case.resolved.toml"), &again, &[]).success();
     assert_eq!(rows(&again), after);

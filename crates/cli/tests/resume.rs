@@ -74,7 +74,7 @@ fn dimensionless_columns_are_added_and_survive_kills() {
             }));
             assert!(values.iter().any(|value| *value != 0.0), "{name}");
         }
-        // The columns in SI units have the same bits as without scales.
+        // The columns in SI units are those without scales.
         let (all, si) = (read(&scaled), read(&plain));
         assert_eq!(all.lines().count(), si.lines().count());
         for (all, si) in all.lines().zip(si.lines()) {
