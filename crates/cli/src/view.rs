@@ -65,7 +65,7 @@ fn viewer(folders: &[PathBuf]) -> Result<Viewer, Exit> {
             }
             let source = |folder: &PathBuf| Source { name: name(folder), folder: folder.clone() };
             let mut sources: Vec<Source> = folders.iter().map(source).collect();
-            // Folders of equal names are told apart by their paths.
+            // Folders of equal names are distinguished by their paths.
             for i in 0..sources.len() {
                 if folders.iter().filter(|folder| name(folder) == name(&folders[i])).count() > 1 {
                     sources[i].name = folders[i].display().to_string();

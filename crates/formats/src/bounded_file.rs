@@ -24,7 +24,7 @@ pub fn read_bytes(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
         return Err(too_large(claimed - 1));
     }
     let mut bytes = Vec::new();
-    // A pipe does not tell its size.
+    // The size of a pipe is unknown.
     file.take(limit + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > limit { Err(too_large(limit)) } else { Ok(bytes) }
 }

@@ -115,7 +115,7 @@ impl Estimate {
 const RESOLVED_DRAG_ERROR: f64 = 0.023;
 /// Error of the drag times n^2 / Re where the boundary layer is not resolved, n cells per diameter:
 /// the smallest factor that bounds the errors at 8 cells in `docs/accuracy.md` (6.1 % at Re 300,
-/// 9.1 % at Re 350).
+/// 9.0 % at Re 350).
 pub(super) const THIN_LAYER_DRAG_ERROR: f64 = 0.017;
 
 /// Relative error of the drag expected with `n` cells per diameter at a Reynolds number: a bound of

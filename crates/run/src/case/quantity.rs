@@ -49,7 +49,7 @@ macro_rules! kinds {
             const EXPECTED_VECTOR: &'static str =
                 expected!("three components [x, y, z], each ", $name, $si, $example);
         }
-        // Generic tables of different kinds are told apart by the name of the kind.
+        // Generic tables of different kinds are distinguished by the name of the kind.
         impl JsonSchema for $kind {
             fn schema_name() -> Cow<'static, str> {
                 stringify!($kind).into()

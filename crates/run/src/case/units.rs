@@ -11,7 +11,7 @@ pub struct Dimension {
     pub length: i8,
     /// Exponent of s.
     pub time: i8,
-    /// Exponent of rad, which tells an angle from a plain number.
+    /// Exponent of rad, which distinguishes an angle from a plain number.
     pub angle: i8,
 }
 

@@ -1,4 +1,4 @@
-//! Tables that a case asks for: probes and contacts.
+//! Tables that a case requests: probes and contacts.
 
 use grainwake_formats::contacts;
 use grainwake_solver::sim::Simulation;
@@ -6,7 +6,7 @@ use grainwake_solver::sim::Simulation;
 use super::contacts::table_rows;
 use crate::plan::{Probe, RunPlan};
 
-/// Table that a case asks for.
+/// Table that a case requests.
 #[derive(Clone, Debug)]
 pub(crate) enum ExtraTable {
     /// Table of a probe.

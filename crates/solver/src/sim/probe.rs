@@ -120,7 +120,7 @@ impl SampledGrid<'_> {
     }
 }
 
-/// Velocity field with its ghosts and the grid it lives on.
+/// Velocity field with its ghosts and its grid.
 pub(super) struct Probe<'a, R> {
     pub velocity: &'a FaceVector<R>,
     pub grid: SampledGrid<'a>,
