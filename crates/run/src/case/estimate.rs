@@ -111,7 +111,7 @@ impl Estimate {
 }
 
 /// Error of the drag where the boundary layer is resolved, at 8 cells per diameter. It falls slowly
-/// with the number of cells (`docs/accuracy.md`: 2.3 % at 8 and 1.6 % at 16 cells, Re 100).
+/// with the number of cells (`docs/accuracy.md`: 2.2 % at 8 and 1.6 % at 16 cells, Re 100).
 const RESOLVED_DRAG_ERROR: f64 = 0.023;
 /// Error of the drag times n^2 / Re where the boundary layer is not resolved, n cells per diameter:
 /// the smallest factor that bounds the errors at 8 cells in `docs/accuracy.md` (6.1 % at Re 300,
