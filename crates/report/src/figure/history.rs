@@ -107,7 +107,7 @@ pub fn force(scene: &Scene) -> Option<Figure> {
     Some(scene.with_events("force", "Force of the fluid", caption, &panels))
 }
 
-/// Draws the conservation checks: divergence, Courant number, momentum residual, kinetic energy.
+/// Draws the conservation checks: divergence, CFL number, momentum residual, kinetic energy.
 pub fn diagnostics(scene: &Scene) -> Option<Figure> {
     let points = |names: &[&str]| {
         let points = scene.diagnostic(names)?;
@@ -135,7 +135,7 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
     }
     if let Some(cfl) = points(&["cfl"]) {
         let largest = highest("max_cfl", &cfl);
-        parts.push(format!("Courant number, at most {largest} in any step"));
+        parts.push(format!("CFL number, at most {largest} in any step"));
         let curve = Series::new(cfl, style::INK);
         panels.push(Panel::linear("CFL  [–]", vec![curve], &[0.0], 60.0));
     }

@@ -73,7 +73,7 @@ fn path_and_speed(name: &str, number: usize, report: &RunReport) -> Option<Figur
     let model = text::literal(name);
     let (beside, title) = match report.features.kind == RunKind::Pair {
         true => (
-            "gap of the centres and tilt of their line",
+            "distance of the centres and tilt of their line",
             format!("Drafting, kissing and tumbling of {model}"),
         ),
         false => ("velocity against time", format!("Path of {model}")),
