@@ -193,7 +193,7 @@ fn overlaps_are_refused_without_consent_and_the_list_is_short() {
     let outside = ["--set", "poses.0.offset=[1e-3, 1e-3, 1]"];
     let refused = message(&run(&next, &folder.path().join("outside"), &outside).code(2));
     assert_eq!(refused.matches("lies outside the box").count(), 10, "{refused}");
-    assert!(refused.contains("190 more grains cross a face"), "{refused}");
+    assert!(refused.contains("190 more grains cross a side"), "{refused}");
     // More than the run allows is no contact.
     let deep = ["--set", "contact.accept_overlap=0.3"];
     let refused = message(&run(&next, &folder.path().join("deep"), &deep).code(2));

@@ -38,9 +38,9 @@ pub struct DiagnosticsRow {
     pub contacts: usize,
     /// Gap between the surfaces of a pair [m].
     pub gap: Option<f64>,
-    /// Largest overlap since the last row, over the smaller equal-volume diameter.
+    /// Largest overlap since the last row, over the smaller equivalent diameter.
     pub max_overlap: f64,
-    /// Mean overlap of the contacts at this time, over the smaller equal-volume diameter.
+    /// Mean overlap of the contacts at this time, over the smaller equivalent diameter.
     pub mean_overlap: f64,
 }
 

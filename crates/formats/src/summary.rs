@@ -29,10 +29,10 @@ pub struct Summary {
     pub max_divergence: f64,
     /// Largest CFL number of any step.
     pub max_cfl: f64,
-    /// Largest overlap of any contact, over the smaller equal-volume diameter.
+    /// Largest overlap of any contact, over the smaller equivalent diameter.
     #[serde(default)]
     pub max_overlap: f64,
-    /// Mean overlap over all contacts and steps, over the smaller equal-volume diameter.
+    /// Mean overlap over all contacts and steps, over the smaller equivalent diameter.
     #[serde(default)]
     pub mean_overlap: f64,
     /// Contact sub-steps.

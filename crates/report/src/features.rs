@@ -23,7 +23,7 @@ pub enum RunKind {
 /// Scales of dimensionless quantities, as in the paper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scales {
-    /// Mean equal-volume diameter d [m].
+    /// Mean equivalent diameter d [m].
     pub diameter: f64,
     /// Magnitude of gravity g [m/s^2].
     pub gravity: f64,

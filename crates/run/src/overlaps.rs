@@ -1,4 +1,4 @@
-//! Overlaps of the contacts of a run, relative to the smaller equal-volume diameter of each pair.
+//! Overlaps of the contacts of a run, relative to the smaller equivalent diameter of each pair.
 
 use serde::{Deserialize, Serialize};
 

@@ -285,7 +285,7 @@ fn grains_must_stand_clear_and_inside() {
         "grain.1",
         &["overlap at the start by 1.0000 mm", "move them apart"],
     );
-    refused("\"80 mm\"]", "\"97 mm\"]", "grain.0.position", &["crosses a face", "0.5000 mm"]);
+    refused("\"80 mm\"]", "\"97 mm\"]", "grain.0.position", &["crosses a side", "0.5000 mm"]);
     refused(
         "[\"12.5 mm\", \"12.5 mm\", \"80 mm\"]",
         "[\"12.5 mm\", \"40 mm\", \"80 mm\"]",
@@ -319,7 +319,7 @@ fn grains_beyond_the_box_say_what_helps() {
         position,
         "[\"12.5 mm\", \"12.5 mm\", 80]",
         "grain.0.position",
-        &["beyond the upper z face (at 97.5 mm)", "unit forgotten? bare numbers are metres"],
+        &["beyond the upper z side (at 97.5 mm)", "unit forgotten? bare numbers are metres"],
     );
     let far = problems(&PAIR.replace("\"80 mm\"]", "\"80 m\"]"));
     assert!(!far[0].help.as_ref().unwrap().contains("metres"), "{far:?}");
@@ -455,7 +455,7 @@ fn ways_out_are_warned_of() {
     let quiet = walls("\"wall\"");
     assert!(none.iter().all(|text| !quiet.contains(text)), "{quiet}");
     let open = walls("[\"outflow\", \"wall\"]");
-    assert!(open.contains("lower face of z"), "{open}");
+    assert!(open.contains("lower side of z"), "{open}");
     let up = walls("[\"wall\", \"outflow\"]");
     assert!(!up.contains("leave through"), "{up}");
     // 2 x 500 kg/m^3 x 4.19 mm^3 g over 1000 kg/m^3 x 60.9 cm^3.

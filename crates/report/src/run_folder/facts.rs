@@ -58,7 +58,7 @@ impl Facts {
         (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
     }
 
-    /// Returns the mean equal-volume diameter of the grains [m].
+    /// Returns the mean equivalent diameter of the grains [m].
     pub fn diameter(&self) -> Option<f64> {
         self.mean(|grain| grain.diameter)
     }

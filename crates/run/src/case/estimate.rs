@@ -34,7 +34,7 @@ pub struct Estimate {
     pub reynolds: Option<f64>,
     /// Settling speed of that sphere [m/s].
     pub settling_speed_m_per_s: Option<f64>,
-    /// Cells across the smallest equal-volume diameter.
+    /// Cells across the smallest equivalent diameter.
     pub cells_per_diameter: Option<f64>,
     /// Cells across the shortest axis of the thinnest grain.
     pub cells_across_shortest_axis: Option<f64>,

@@ -122,7 +122,7 @@ pub(super) fn is_free(grain: &Grain) -> bool {
     grain.translation == MotionConstraint::Free
 }
 
-/// Returns the smallest equal-volume diameter [m]; infinite without grains.
+/// Returns the smallest equivalent diameter [m]; infinite without grains.
 pub(super) fn smallest_diameter(grains: &[Grain]) -> f64 {
     let diameters = grains.iter().map(|grain| grain.shape.equivalent_diameter());
     diameters.fold(f64::INFINITY, f64::min)

@@ -102,7 +102,7 @@ impl<'a> Library<'a> {
         Ok(shape)
     }
 
-    /// Returns `shape` rescaled to an equal-volume diameter [m].
+    /// Returns `shape` rescaled to an equivalent diameter [m].
     pub fn rescaled(&mut self, shape: &Arc<Shape>, diameter: f64) -> Result<Arc<Shape>, Refusal> {
         let key = format!("{:p} {diameter:?}", Arc::as_ptr(shape));
         if let Some(shape) = self.built.get(&key) {

@@ -164,13 +164,13 @@ impl Setup {
             }
             if self.fluid.is_some() && self.mesh.cells[axis] == 1 && *lower != Boundary::Periodic {
                 return fail(format!(
-                    "axis {name} has one cell, so both its faces must be periodic"
+                    "axis {name} has one cell, so both its sides must be periodic"
                 ));
             }
         }
         if sides().any(flux) && !sides().any(open) {
             return fail(
-                "fluid enters the box but no face lets it out: make one face an outflow".into(),
+                "fluid enters the box but no side lets it out: make one side an outflow".into(),
             );
         }
         let bounded = |x: f64| x.is_finite() && x > 0.0;

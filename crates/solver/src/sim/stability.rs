@@ -5,7 +5,7 @@ use std::fmt;
 use super::Simulation;
 use crate::dem::{ContactLawKind, MotionConstraint, Outside, Partner, RelativeOverlap, outside};
 
-/// Overlap for which a stiffness is suggested [smaller equal-volume diameters].
+/// Overlap for which a stiffness is suggested [smaller equivalent diameters].
 const SUGGESTED_OVERLAP: f64 = 0.01;
 
 /// Remedy of a failed run.
@@ -173,7 +173,7 @@ impl Simulation {
             Some(Outside { grain, axis, side, .. }) => {
                 let (side, axis) = (["lower", "upper"][side], ["x", "y", "z"][axis]);
                 let what =
-                    format!("{symptom} while grain {grain} crosses the open {side} {axis} face");
+                    format!("{symptom} while grain {grain} crosses the open {side} {axis} side");
                 (what, Remedy::FartherFace)
             }
             None => (symptom, otherwise),

@@ -127,7 +127,7 @@ fn an_instability_beside_an_open_face_names_the_grain_in_it() {
         sim.with_cause("the velocity is not finite".into(), Remedy::StepOrGrid)
     };
     let (what, remedy) = with_floor(Boundary::Outflow, 0.3);
-    assert!(what.ends_with("while grain 0 crosses the open lower z face"), "{what}");
+    assert!(what.ends_with("while grain 0 crosses the open lower z side"), "{what}");
     assert_eq!(remedy, Remedy::FartherFace);
     assert_eq!(with_floor(Boundary::WALL, 0.3).1, Remedy::StepOrGrid);
     assert_eq!(with_floor(Boundary::Outflow, 2.0).1, Remedy::StepOrGrid);

@@ -1,6 +1,6 @@
 //! Measured values of a settling pair.
 //!
-//! Lengths are in equal-volume diameters d, times in sqrt(d/g), speeds in sqrt(d g), down positive.
+//! Lengths are in equivalent diameters d, times in sqrt(d/g), speeds in sqrt(d g), down positive.
 //! *Leading* is the lower grain at the start, *trailing* the upper one. All values end with the
 //! first landing of a grain.
 

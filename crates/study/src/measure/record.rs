@@ -34,7 +34,7 @@ pub struct RunRecord {
     pub remark: Option<String>,
     /// Hash of the case, the end condition and the program.
     pub id: String,
-    /// Mean equal-volume diameter d of the grains [m].
+    /// Mean equivalent diameter d of the grains [m].
     pub diameter_m: Option<f64>,
     /// Gravity [m/s2].
     #[serde(default)]

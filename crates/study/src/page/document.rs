@@ -70,7 +70,7 @@ impl Content<'_> {
                 ". Of " (self.findings.len()) " claims, " (verdicts(Verdict::Holds)) " hold, "
                 (verdicts(Verdict::Contradicted)) " are contradicted and " (verdicts(Verdict::Open)) " are open"
             }
-            ". Times are in √(d/g), lengths in the equal-volume diameter d, speeds in √(d g)."
+            ". Times are in √(d/g), lengths in the equivalent diameter d, speeds in √(d g)."
         }
     }
 

@@ -92,7 +92,7 @@ pub struct AxisTable {
 }
 
 impl Notation for AxisFaces {
-    const EXPECTED: &'static str = "a condition for both faces (\"periodic\", \"wall\", ...), \
+    const EXPECTED: &'static str = "a condition for both sides (\"periodic\", \"wall\", ...), \
         a pair [lower, upper], or { lower = ..., upper = ... }";
     type List = [Located<Face>; 2];
     type Table = AxisTable;
@@ -110,7 +110,7 @@ impl Notation for AxisFaces {
                 upper: table.upper.unwrap_or_default(),
             }),
             (None, None, Some(kind), velocity) => Ok(AxisFaces::both(Face { kind, velocity })),
-            _ => Err("give either `kind` (for both faces) or `lower` and `upper`".into()),
+            _ => Err("give either `kind` (for both sides) or `lower` and `upper`".into()),
         }
     }
     fn scalar_schemas(generator: &mut SchemaGenerator) -> Vec<Schema> {

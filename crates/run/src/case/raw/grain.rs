@@ -19,7 +19,7 @@ pub struct RawGrain {
     pub file: Option<Located<String>>,
     /// A closed form. Give either `file` or `shape`.
     pub shape: Option<Located<RawShape>>,
-    /// Rescales the shape to this equal-volume diameter [m]; without it the shape keeps its size.
+    /// Rescales the shape to this equivalent diameter [m]; without it the shape keeps its size.
     pub equivalent_diameter: Option<Located<Quantity<Length>>>,
     /// Surface nodes of a closed form; 2000 if not given. A file brings its own.
     pub nodes: Option<Located<usize>>,

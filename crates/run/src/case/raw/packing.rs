@@ -20,7 +20,7 @@ pub struct RawPacking {
     /// Closed forms, taken in turn after the files.
     #[serde(default)]
     pub shapes: Vec<Located<RawShape>>,
-    /// Rescales each grain to this equal-volume diameter [m], or to one drawn uniformly
+    /// Rescales each grain to this equivalent diameter [m], or to one drawn uniformly
     /// from `{ from, to }`.
     pub equivalent_diameter: Option<Located<DiameterRange>>,
     /// Number of surface nodes of each grain.

@@ -112,11 +112,11 @@ pub struct RawContact {
     pub roughness: Option<Located<Quantity<Length>>>,
     /// Sub-steps per contact time.
     pub substeps_per_contact: Located<Quantity<Number>>,
-    /// Overlap over the smaller equal-volume diameter at which the run stops; 0.1, or twice
+    /// Overlap over the smaller equivalent diameter at which the run stops; 0.1, or twice
     /// `maximum_overlap` if that is larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub overlap_limit: Option<Located<Quantity<Number>>>,
-    /// Overlap over the smaller equal-volume diameter up to which grains may overlap at the start:
+    /// Overlap over the smaller equivalent diameter up to which grains may overlap at the start:
     /// they begin in contact, with compressed springs. Without it they may not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accept_overlap: Option<Located<Quantity<Number>>>,

@@ -34,7 +34,7 @@ pub struct RawPoses {
     pub shapes: Vec<Located<RawShape>>,
     /// With `file`: number of surface nodes of closed forms.
     pub nodes: Option<Located<usize>>,
-    /// With `file`: rescales each grain to this equal-volume diameter [m], unless the table gives
+    /// With `file`: rescales each grain to this equivalent diameter [m], unless the table gives
     /// it.
     pub equivalent_diameter: Option<Located<Quantity<Length>>>,
     /// Density [kg/m3]: with `file`, unless the table gives it; with `run`, instead of that of the

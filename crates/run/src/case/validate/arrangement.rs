@@ -110,9 +110,9 @@ pub(super) fn check_faces(
         }
         let face = [enclosure.lower, enclosure.upper][o.side][o.axis];
         let (by, axis, side) = (distance(o.by), AXES[o.axis], SIDES[o.side]);
-        let what = if o.centroid { "lies outside the box" } else { "crosses a face of the box" };
+        let what = if o.centroid { "lies outside the box" } else { "crosses a side of the box" };
         let message = format!(
-            "grain {} {what}: it reaches {by} beyond the {side} {axis} face (at {})",
+            "grain {} {what}: it reaches {by} beyond the {side} {axis} side (at {})",
             o.grain,
             length(face)
         );
@@ -124,7 +124,7 @@ pub(super) fn check_faces(
         check.fail(&placement.span, message, help);
     }
     if found.len() > LISTED {
-        let message = format!("{} more grains cross a face of the box", found.len() - LISTED);
+        let message = format!("{} more grains cross a side of the box", found.len() - LISTED);
         let help = "move the grains, or make the box larger";
         check.fail(&placements[found[LISTED].grain].span, message, help);
     }

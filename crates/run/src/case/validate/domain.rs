@@ -170,7 +170,7 @@ fn boundary(face: &Face, axis: usize, side: usize) -> Result<Boundary, (String, 
     let takes_velocity = matches!(face.kind, FaceKind::Wall | FaceKind::Inflow);
     if face.velocity.is_some() && !takes_velocity {
         return Err((
-            format!("a {} face has no velocity of its own", face.kind),
+            format!("a {} side has no velocity of its own", face.kind),
             "only wall and inflow take a velocity".into(),
         ));
     }
@@ -249,7 +249,7 @@ fn mass_balance(check: &mut Checker, spans: [[&Span; 2]; 3], boundaries: &Bounda
     }
     if let Some(span) = inflow.filter(|_| largest > 0.0) {
         let flux = quantity(1e3 * entering, "L/s");
-        let message = format!("{flux} enter the box and nothing leaves it: no face is an outflow");
-        check.fail(span, message, "make the opposite face an outflow");
+        let message = format!("{flux} enter the box and nothing leaves it: no side is an outflow");
+        check.fail(span, message, "make the opposite side an outflow");
     }
 }

@@ -183,7 +183,7 @@ pub(super) fn contact(
 
 /// Stiffness [N/m] for which no grain that meets a wall at 1.5 times its settling speed (dry: after
 /// falling through the box), or lies on it, overlaps by more than `fraction` of the smallest
-/// equal-volume diameter.
+/// equivalent diameter.
 fn stiffness_for(
     fraction: f64,
     grains: &[Grain],

@@ -70,11 +70,11 @@ fn open_faces(setup: &Setup) -> Vec<String> {
         let (side, axis) = (SIDES[side], AXES[axis]);
         if open && falls && boundary == Boundary::FreeSurface {
             found.push(format!(
-                "grains may float in the free surface at the {side} face of {axis}, which stays flat: they have their buoyancy there, but make no waves and feel no splash and no surface tension"
+                "grains may float in the free surface at the {side} side of {axis}, which stays flat: they have their buoyancy there, but make no waves and feel no splash and no surface tension"
             ));
         } else if open && falls {
             found.push(format!(
-                "grains may leave through the {side} face of {axis}: they are gone from then on, with an event \"left\"; make it a \"wall\" to keep them"
+                "grains may leave through the {side} side of {axis}: they are gone from then on, with an event \"left\"; make it a \"wall\" to keep them"
             ));
         }
     }

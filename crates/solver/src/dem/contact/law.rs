@@ -50,7 +50,7 @@ pub struct ContactParams {
     pub added_density: f64,
     /// Sub-steps per contact time of the fastest pair.
     pub substeps_per_contact: f64,
-    /// Overlap over the smaller equal-volume diameter above which a step of
+    /// Overlap over the smaller equivalent diameter above which a step of
     /// [`Simulation`](crate::sim::Simulation) fails; by default infinite, which is no limit.
     pub overlap_limit: f64,
 }

@@ -29,7 +29,7 @@ pub struct ContactDynamics {
     wall: ContactMaterial,
     enclosure: Enclosure,
     contacts: Vec<Contact>,
-    /// Deepest overlap of the last step relative to the smaller equal-volume diameter.
+    /// Deepest overlap of the last step relative to the smaller equivalent diameter.
     largest_overlap: Option<RelativeOverlap>,
     /// Sub-steps of the last step.
     substeps: usize,
@@ -185,7 +185,7 @@ impl ContactDynamics {
     }
 }
 
-/// Overlap of a pair, also relative to the smaller equal-volume diameter of its grains.
+/// Overlap of a pair, also relative to the smaller equivalent diameter of its grains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelativeOverlap {
     /// First grain.
@@ -194,7 +194,7 @@ pub struct RelativeOverlap {
     pub partner: Partner,
     /// Depth of the overlap [m].
     pub depth: f64,
-    /// Depth over the smaller equal-volume diameter.
+    /// Depth over the smaller equivalent diameter.
     pub relative: f64,
 }
 

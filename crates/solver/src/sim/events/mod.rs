@@ -81,7 +81,7 @@ pub struct EventParams {
 
 impl EventParams {
     /// Default thresholds: separation beyond 0.05 d for sqrt(d/g), tumbling from 45 degrees, role
-    /// change beyond 0.02 d, rest below 0.001 sqrt(g d); d is the mean equal-volume diameter.
+    /// change beyond 0.02 d, rest below 0.001 sqrt(g d); d is the mean equivalent diameter.
     pub fn for_grains(
         grains: &[Grain],
         gravity: DVec3,

@@ -78,7 +78,7 @@ pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure> {
     scale_bar(&mut drawing, corner, cell / window, diameter);
     let caption = format!(
         "{} grains at the same scale, from the same side. Rows: equal {rows}; columns: equal \
-         {columns}. The bar is the equal-volume diameter, {:.3} mm.",
+         {columns}. The bar is the equivalent diameter, {:.3} mm.",
         found.len(),
         1e3 * diameter
     );
