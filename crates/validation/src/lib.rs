@@ -4,7 +4,7 @@
 //! values measured in its tables ([`Measure`]) against references and bounds. [`Suite::evaluate`]
 //! measures a run folder and returns [`CheckResult`]s; each [`FigureSpec`] shows results beside the
 //! reference data. [`Library`] opens all suites: those of a folder, or those in the program.
-//! `validation/README.md` describes the keys of the file.
+//! `docs/reference/validation-file.md` describes the keys of the file.
 
 mod check;
 mod check_result;

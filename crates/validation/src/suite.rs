@@ -244,7 +244,7 @@ impl Builder<'_> {
         };
         let quantity = raw.quantity.value;
         sampling.validate(raw.take.value).map_err(|message| {
-            let help = "validation/README.md lists the keys that each `take` needs";
+            let help = "docs/reference/validation-file.md lists the keys that each `take` needs";
             let message = format!("\"{quantity}\": {message}");
             problem::at(self.source, &raw.take, message, help, "this measure")
         })?;
