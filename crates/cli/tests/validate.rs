@@ -186,7 +186,7 @@ fn what_falls_short_is_exit_code_1_and_another_run_can_be_the_reference() {
     let (folder, _) = suites(SUITE);
     validate(folder.path(), &["--level", "full"])
         .code(1)
-        .stdout(contains("SHORT"))
+        .stdout(contains("missed"))
         .stderr(contains("fall/slow acceleration"));
 }
 

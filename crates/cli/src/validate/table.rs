@@ -23,7 +23,7 @@ fn error(v: &CheckResult) -> String {
 
 fn verdict(v: &CheckResult) -> &'static str {
     match (v.pass, v.bound.is_empty()) {
-        (false, _) => "SHORT",
+        (false, _) => "missed",
         (true, true) => "context",
         (true, false) => "holds",
     }
@@ -49,7 +49,16 @@ pub fn line(v: &CheckResult) -> String {
 pub fn table(results: &[CheckResult]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header(["validation", "run", "quantity", "value", "reference", "error", "bound", ""]);
+    table.set_header([
+        "validation",
+        "run",
+        "quantity",
+        "value",
+        "reference",
+        "error",
+        "bound",
+        "verdict",
+    ]);
     for v in results {
         table.add_row([
             v.name.clone(),
