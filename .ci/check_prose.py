@@ -8,10 +8,13 @@
 4. Every source file that ARCHITECTURE.md names exists.
 5. Results are "bitwise identical", and rates are "per" something: 5 ns per cell, not 5 ns a cell.
 6. A page of docs/decisions has a status, context, decision and consequences, on one screen.
+7. Values with their errors in docs/accuracy.md, "1.142 (+2.2 %)", are those of
+   results/validation/full.json.
 
 Prints each finding as `file:line: rule: text` and exits with 1 if there is any.
 """
 
+import json
 import re
 import subprocess
 import sys
@@ -31,6 +34,8 @@ RATE = re.compile(r"\d (ns|us|ms|s|min|[kMG]B|bytes?|frames|lines) an? [a-z]")
 # Parts of a decision page, and its most lines.
 DECISION_PARTS = ["Status:", "## Context", "## Decision", "## Consequences"]
 SCREEN = 64
+# Value with the sign and size of its error.
+RESULT = re.compile(r"(\d+\.\d+) \(([+-][\d.]+) %\)")
 INLINE_CODE = re.compile(r"`[^`]*`")
 LINK = re.compile(r"\]\([^)]*\)|https?://\S+")
 
@@ -117,11 +122,30 @@ def architecture():
                 yield number, "no such file", name
 
 
+def results():
+    """Values and errors of docs/accuracy.md that no saved result has."""
+    with open("results/validation/full.json", encoding="utf-8") as file:
+        saved = json.load(file)["results"]
+    known = [(r["value"], 100 * r["error"]) for r in saved if r["error"] is not None]
+
+    def rounds_to(number, text):
+        _, _, decimals = text.partition(".")
+        return abs(number - float(text)) <= 0.501 * 10 ** -len(decimals)
+
+    with open("docs/accuracy.md", encoding="utf-8") as file:
+        lines = file.read().replace("*", "").split("\n")
+    for number, line in enumerate(lines, 1):
+        for value, error in RESULT.findall(line):
+            if not any(rounds_to(v, value) and rounds_to(e, error) for v, e in known):
+                yield number, "no such result in full.json", f"{value} ({error} %)"
+
+
 def main():
     findings = 0
-    for number, rule, line in architecture():
-        findings += 1
-        print(f"ARCHITECTURE.md:{number}: {rule}: {line}")
+    for name, found in [("ARCHITECTURE.md", architecture()), ("docs/accuracy.md", results())]:
+        for number, rule, line in found:
+            findings += 1
+            print(f"{name}:{number}: {rule}: {line}")
     for checker, patterns in [(markdown, ["*.md"]), (rust, ["*.rs"]), (toml, ["*.toml"])]:
         for name in tracked(*patterns):
             with open(name, encoding="utf-8") as file:
