@@ -2,8 +2,9 @@
 
 Recomputes it from table.csv with pandas, SciPy, lifelines and statsmodels. Table `kissing`: shares,
 their bootstrap intervals, medians of Kaplan and Meier, stratified log-rank tests, Hodges-Lehmann
-shifts, and the differences between grids. Claims about trends and orders: rank correlations,
-Hodges-Lehmann shifts, their p values, and the adjustment for the number of claims.
+shifts, and the differences between grids. Table `factor_means`: means and their intervals. Claims
+about trends and orders: rank correlations, Hodges-Lehmann shifts, their p values, and the
+adjustment for the number of claims.
 
     pip install lifelines scipy statsmodels
     python studies/second_route.py results/dkt-morphology-ensemble orientation cells
@@ -157,12 +158,41 @@ def check_claims(analysis, folder, axes):
     return checks
 
 
+def check_factor_means(analysis, folder, by):
+    """Checks the means at the values of factors that have few values, and their intervals."""
+    table = pd.read_csv(folder / "table.csv")
+    table = meets(table[table.state == "finished"], analysis.get("where", {}))
+    checks = 0
+    for entry in analysis["factor_means"]:
+        quantity, factor = entry["quantity"], entry["factor"]
+        here = table[(table[by] == entry["level"]) & ((table[factor] - entry["at"]).abs() < 1e-9)]
+        if quantity == "kissing_share":
+            values = here.kiss_time.notna().astype(float)
+        else:
+            values = here[quantity].astype(float)
+            if quantity == "contact_stage":
+                values = values.where(here.parted.astype(float) != 0)
+        here = here.assign(value=values)[values.notna()]
+        groups = [g.value.to_numpy() for _, g in here.groupby("model")]
+        what = f"{quantity} at {factor} {entry['at']} {entry['level']}"
+        close(f"{what}: models", float(len(groups)), entry["models"])
+        close(f"{what}: mean", float(np.mean([g.mean() for g in groups])), entry["mean"], 1e-4)
+        checks += 2
+        if entry["interval"] is not None:
+            # An end of the interval of few models is one of few values.
+            spread = here.value.max() - here.value.min()
+            for end, expected in zip(interval(groups), entry["interval"]):
+                close(f"{what}: interval", end, expected, 0.1 * spread + 1e-4)
+            checks += 2
+    return checks
+
+
 def main(folder, by, grid):
     folder = Path(folder)
     table = read(folder, by)
     analysis = json.loads((folder / "analysis.json").read_text())
     axes = [name for name in ("grain", "orientation", "cells") if name in table.columns]
-    checks = check_claims(analysis, folder, axes)
+    checks = check_claims(analysis, folder, axes) + check_factor_means(analysis, folder, by)
     analysis = analysis["kissing"]
 
     def on(level, cells):

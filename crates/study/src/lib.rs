@@ -22,7 +22,7 @@ pub mod page;
 pub mod plan;
 pub mod run;
 
-pub use analysis::{correlation, kissing, observation, statistics, survival, verdict};
+pub use analysis::{correlation, factor_mean, kissing, observation, statistics, survival, verdict};
 pub use error::StudyError;
 pub use measure::cost::{Cost, expected_cost};
 pub use measure::pair::{PairHistory, PairMeasures};

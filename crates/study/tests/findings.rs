@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use grainwake_study::correlation::correlations;
+use grainwake_study::factor_mean::{KISSING_SHARE, factor_means};
 use grainwake_study::observation::observations;
 use grainwake_study::verdict::evaluate;
 use grainwake_study::{Analysis, Model, PairMeasures, RunRecord, StateKind};
@@ -220,6 +221,56 @@ fn correlations_are_listed_by_level() {
     assert!(
         first.rho.unwrap() < -0.8 && first.interval.unwrap()[1] < -0.5 && first.p.unwrap() < 1e-3
     );
+}
+
+#[test]
+fn means_are_of_the_models_with_a_value_of_the_factor() {
+    let paper = rows(as_in_the_paper);
+    let text = "[correlations]\nquantities = [\"kiss_time\"]\nfactors = [\"sphericity\"]\n\
+                by = \"orientation\"\n[kissing]\nby = \"orientation\"\n";
+    let analysis = Analysis::parse("analysis.toml", text, &models(&paper)).unwrap();
+    let found = factor_means(&analysis, &paper);
+    // Two quantities, four orientations and four sphericities.
+    assert_eq!(found.len(), 32);
+    let of = |quantity: &str| {
+        found.iter().find(|m| m.quantity == quantity && m.level == "o1").unwrap().clone()
+    };
+    let (share, time) = (of(KISSING_SHARE), of("kiss_time"));
+    assert_eq!((share.at, share.models, share.mean), (0.45, 4, 1.0));
+    assert_eq!(share.interval, Some([1.0, 1.0]));
+    let here = |row: &&RunRecord| {
+        row.levels.get("orientation").is_some_and(|l| l == "o1")
+            && row.factors["sphericity"] == 0.45
+    };
+    let times: Vec<f64> =
+        paper.iter().filter(here).map(|row| row.get("kiss_time").unwrap()).collect();
+    assert_eq!(time.mean, times.iter().sum::<f64>() / 4.0);
+    let [low, high] = time.interval.unwrap();
+    assert!(low < time.mean && time.mean < high, "{low} {high}");
+}
+
+#[test]
+fn a_factor_with_many_values_has_four_groups_and_censored_times_count_in_the_share_only() {
+    let mut paper = rows(as_in_the_paper);
+    for (i, row) in paper.iter_mut().enumerate() {
+        row.factors.insert("sphericity".into(), i as f64);
+    }
+    // One of the 16 grains in orientation 1 lands before it kisses.
+    let missed = paper.iter_mut().find(|row| row.levels["orientation"] == "o1").unwrap();
+    let pair = missed.pair.as_mut().unwrap();
+    (pair.kiss_time, pair.landing_time) = (None, Some(90.0));
+    let text = "[correlations]\nquantities = [\"kiss_time\"]\nfactors = [\"sphericity\"]\n\
+                by = \"orientation\"\n[kissing]\nby = \"orientation\"\n";
+    let analysis = Analysis::parse("analysis.toml", text, &models(&paper)).unwrap();
+    let found = factor_means(&analysis, &paper);
+    let of = |quantity: &str| -> Vec<(usize, f64)> {
+        let here = found.iter().filter(|m| m.quantity == quantity && m.level == "o1");
+        here.map(|m| (m.models, m.mean)).collect()
+    };
+    let share: Vec<(usize, f64)> = of(KISSING_SHARE);
+    assert_eq!(share, [(4, 0.75), (4, 1.0), (4, 1.0), (4, 1.0)]);
+    let models: Vec<usize> = of("kiss_time").iter().map(|m| m.0).collect();
+    assert_eq!(models, [3, 4, 4, 4]);
 }
 
 #[test]

@@ -152,6 +152,7 @@ fn a_complete_study_has_all_figures() {
         "fig17-velocity-by-row",
         "fig18-velocity-by-column",
         "correlations",
+        "factor-means",
         "claims",
     ];
     assert_eq!(names(&rendered), expected);

@@ -202,11 +202,7 @@ impl Boundaries {
     /// Fills the ghosts along x and y of one plane of the pressure.
     pub(crate) fn fill_pressure_of_plane<R: Real>(&self, layout: Layout, plane: &mut [R]) {
         let (row, [nx, ny, _]) = (layout.row(), layout.cells);
-        let periodic = self.is_periodic(0);
-        for row in plane.chunks_exact_mut(row) {
-            let ends = [row[1], row[nx]];
-            [row[0], row[nx + 1]] = if periodic { [ends[1], ends[0]] } else { ends };
-        }
+        plane.chunks_exact_mut(row).for_each(|row| self.fill_pressure_ends(row, 1, 0, nx));
         self.fill_pressure_ends(plane, row, 1, ny);
     }
 
@@ -216,10 +212,13 @@ impl Boundaries {
         self.fill_pressure_ends(pressure, layout.plane(), 2, layout.cells[2]);
     }
 
+    /// Fills the ghost layers of the pressure at both ends of an axis with `n` cells.
     fn fill_pressure_ends<R: Real>(&self, values: &mut [R], layer: usize, axis: usize, n: usize) {
+        let rule = match pressure_condition(&self.0[axis][0]) {
+            Ends::Periodic => GhostRule::Periodic,
+            Ends::Neumann => GhostRule::ZeroGradient,
+        };
         for (ghost, inner) in [(0, 1), (n + 1, n)] {
-            let rule =
-                if self.is_periodic(axis) { GhostRule::Periodic } else { GhostRule::ZeroGradient };
             fill_ghost_layer(values, layer, rule, ghost, inner, n);
         }
     }

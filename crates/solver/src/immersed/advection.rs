@@ -27,7 +27,7 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
+use glam::{DVec3, IVec3};
 
 use super::geometry::{FaceRow, LocatedBody};
 use super::links::{BoxVelocity, LinkPlanes, NO_LINK, compute_link_weights, listed_faces};
@@ -155,10 +155,46 @@ pub struct ComponentLinks<'a, R> {
     /// Indices of the unknown faces along each axis.
     unknowns: [Range<i32>; 3],
     axes: [LinkAxis; 3],
-    /// Rigid velocity [m/s] at the middle of link (0, 0, 0), then its change from a link to the
-    /// next along x, y and z. Entries 2 a and 2 a + 1 are U_q and U_c of the links along axis a;
-    /// the last two are unused.
-    rigid: [[f64; 8]; 4],
+    rigid: RigidLinks,
+}
+
+/// Rigid velocity at the middles of the links of one component. It is linear in the indices
+/// (i, j, k) of the lower face of a link.
+struct RigidLinks {
+    /// U_q and U_c [m/s] of link (0, 0, 0) along each axis.
+    first: [[f64; 2]; 3],
+    /// Changes of U_q and U_c from a link to the next along x, y and z.
+    change: [[[f64; 2]; 3]; 3],
+}
+
+impl RigidLinks {
+    fn new(
+        mesh: &Mesh,
+        kinematics: &GrainKinematics,
+        lowest: IVec3,
+        component: usize,
+    ) -> RigidLinks {
+        let omega = kinematics.velocity.angular;
+        let change = DVec3::AXES.map(|axis| omega.cross(axis * mesh.spacing));
+        let face = lowest.as_dvec3() + (DVec3::from_array(FACE_OFFSET[component]) - 1.0);
+        let first = [0, 1, 2].map(|along| {
+            let middle = face + 0.5 * DVec3::AXES[along];
+            let velocity = kinematics.velocity_at(mesh.origin + mesh.spacing * middle);
+            [component, along].map(|of| velocity[of])
+        });
+        let change = change.map(|u| [0, 1, 2].map(|along| [component, along].map(|of| u[of])));
+        RigidLinks { first, change }
+    }
+
+    /// U_q and U_c [m/s] of the first link of row (j, k) along each axis.
+    #[inline(always)]
+    fn first_of_row(&self, [j, k]: [i32; 2]) -> [[f64; 2]; 3] {
+        let ([y, z], [_, by_y, by_z]) = ([j, k].map(f64::from), &self.change);
+        let sum = |along: usize, of: usize| {
+            self.first[along][of] + y * by_y[along][of] + z * by_z[along][of]
+        };
+        [0, 1, 2].map(|along| [sum(along, 0), sum(along, 1)])
+    }
 }
 
 /// Links along one axis.
@@ -194,18 +230,6 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         velocity: &'a BoxVelocity<'a, R>,
         component: usize,
     ) -> ComponentLinks<'a, R> {
-        let mut rigid = [[0.0; 8]; 4];
-        for along in 0..3 {
-            let middle = DVec3::from_array(FACE_OFFSET[component]) - 1.0;
-            let middle = body.lowest.as_dvec3() + middle + 0.5 * DVec3::AXES[along];
-            let first = kinematics.velocity_at(mesh.origin + mesh.spacing * middle);
-            let omega = kinematics.velocity.angular;
-            let change = DVec3::AXES.map(|axis| omega.cross(axis * mesh.spacing));
-            for (of, entry) in [component, along].into_iter().zip(2 * along..) {
-                rigid[0][entry] = first[of];
-                (0..3).for_each(|axis| rigid[1 + axis][entry] = change[axis][of]);
-            }
-        }
         let axes = [0, 1, 2].map(|along| {
             let [next, across] = [along, component].map(|axis| velocity.strides[axis] as isize);
             LinkAxis {
@@ -226,7 +250,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             eps,
             unknowns: [0, 1, 2].map(|axis| body.index_map.unknown_range(component, axis)),
             axes,
-            rigid,
+            rigid: RigidLinks::new(mesh, kinematics, body.lowest, component),
         }
     }
 
@@ -266,12 +290,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let [a, b, c] = &self.axes;
         let index = [0, j, k];
         let sixth_order = [0, 1, 2].map(|along| self.sixth_order_links(along, index));
-        let [y, z] = [j, k].map(f64::from);
-        let [rigid_0, _, by_y, by_z] = &self.rigid;
-        let mut rigid = [0.0; 8];
-        for n in 0..8 {
-            rigid[n] = rigid_0[n] + y * by_y[n] + z * by_z[n];
-        }
+        let rigid = self.rigid.first_of_row([j, k]);
         let LinkPlanes { row_length, weight, flux_y, flux_z, .. } = planes;
         let row_length = *row_length;
         let [wx, wy, wz] = weight;
@@ -285,19 +304,19 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             let mut sum = zero;
             if a.exists {
                 let weight = V::load_from(&wx[n..]);
-                let flux = self.flux::<V>(0, sixth_order[0], &rigid, at, index, weight);
+                let flux = self.flux::<V>(0, sixth_order[0], rigid[0], at, index, weight);
                 sum = flux.shift(last_flux) - flux;
                 last_flux = flux;
             }
             if b.exists {
                 let weight = V::load_from(&wy[n..]);
-                let flux = self.flux::<V>(1, sixth_order[1], &rigid, at, index, weight);
+                let flux = self.flux::<V>(1, sixth_order[1], rigid[1], at, index, weight);
                 sum = sum + (V::load(&fy[n..]) - flux);
                 flux.store(&mut fy[n..]);
             }
             if c.exists {
                 let weight = V::load_from(&wz[n..]);
-                let flux = self.flux::<V>(2, sixth_order[2], &rigid, at, index, weight);
+                let flux = self.flux::<V>(2, sixth_order[2], rigid[2], at, index, weight);
                 sum = sum + (V::load(&fz[n..]) - flux);
                 flux.store(&mut fz[n..]);
             }
@@ -328,13 +347,13 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
 
     /// Correction of the flux through links along an axis, over h [m/s^2]; zero where `weight` is
     /// -1. The links have the indices `index` in their row, their lower faces lie from position
-    /// `at` on; `rigid` holds U of the first link of the row.
+    /// `at` on; `u_q` and `u_c` are U_q and U_c of the first link of the row.
     #[inline(always)]
     fn flux<V: Vector<Number = f64>>(
         &self,
         along: usize,
         sixth_order: SixthOrderLinks,
-        rigid: &[f64; 8],
+        [u_q, u_c]: [f64; 2],
         at: usize,
         index: V,
         weight: V,
@@ -361,9 +380,9 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let mut flux = higher_order;
         // Links outside the band are open: 1/A - 1 is zero.
         if zero.mask_below(weight) != 0 {
-            let (by_x, [n, m]) = (&self.rigid[1], [2 * along, 2 * along + 1]);
-            let u_q = index.mul_add(V::constant(by_x[n]), V::constant(rigid[n]));
-            let u_c = index.mul_add(V::constant(by_x[m]), V::constant(rigid[m]));
+            let [change_q, change_c] = self.rigid.change[0][along].map(V::constant);
+            let u_q = index.mul_add(change_q, V::constant(u_q));
+            let u_c = index.mul_add(change_c, V::constant(u_c));
             flux = ((q_mean - u_q) * (c_mean - u_c)).mul_add(weight, higher_order);
         }
         let flux = flux * V::constant(axis.per_spacing);

@@ -57,8 +57,8 @@ mod update;
 pub(crate) use advection::GrainKinematics;
 pub(crate) use open_sides::{Crossing, OpenSides};
 pub(crate) use rigid_body::PreviousStep;
-pub(crate) use schedule::{CoupledGrains, RigidStep};
-pub(crate) use update::StepInput;
+pub(crate) use schedule::{CoupledGrains, RigidityInput};
+pub(crate) use update::CouplingInput;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

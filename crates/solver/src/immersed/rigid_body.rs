@@ -108,8 +108,9 @@ impl RigidBodySystem {
         surface: Option<SurfaceTerms>,
         dt: f64,
     ) -> RigidBodySystem {
-        let ratio = 1.0 - fluid_density / grain.density;
-        let (mass, inertia) = (grain.mass() * ratio, grain.inertia() * ratio);
+        // Mass and inertia less those of the displaced fluid.
+        let excess = 1.0 - fluid_density / grain.density;
+        let (mass, inertia) = (grain.mass() * excess, grain.inertia() * excess);
         let RigidVelocity { linear: v, angular: omega } = previous.velocity;
         let gyroscopic = omega.cross(inertia * omega);
         let momentum = mass * v + dt * applied.force;
@@ -184,10 +185,9 @@ impl RigidBodySystem {
             let momentum = multiply6(not_displaced, &change.to_vector());
             j.iter_mut().zip(momentum).for_each(|(j, momentum)| *j += momentum);
         }
-        let added = &self.virtual_mass;
-        let force = DVec3::from_slice(&j[..3]) + added.mass * new.linear - added.momentum;
-        let torque =
-            DVec3::from_slice(&j[3..]) + added.inertia * new.angular - added.angular_momentum;
+        let VirtualMass { mass, inertia, momentum, angular_momentum } = self.virtual_mass;
+        let force = DVec3::from_slice(&j[..3]) + mass * new.linear - momentum;
+        let torque = DVec3::from_slice(&j[3..]) + inertia * new.angular - angular_momentum;
         let omega = previous.velocity.angular;
         let displaced = fluid_density / grain.density;
         let fluid_inertia = grain.inertia() * displaced;
@@ -226,13 +226,13 @@ impl RigidBodySystem {
             (self.right[row] - momentum) / dt
         });
         let mut a = self.matrix;
-        let least = grain.mass() + added_density * grain.shape.volume();
-        let mean = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
+        let least_mass = grain.mass() + added_density * grain.shape.volume();
+        let mean_mass = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
         let free = [grain.translation, grain.rotation]
             .map(|constraint| constraint == MotionConstraint::Free);
         if free[0] {
             for (axis, row) in a.iter_mut().take(3).enumerate() {
-                row[axis] += (least - mean).max(0.0);
+                row[axis] += (least_mass - mean_mass).max(0.0);
             }
         }
         let column = |n: usize| {
@@ -286,9 +286,10 @@ impl VirtualMass {
         in_free_surface: bool,
         dt: f64,
     ) -> VirtualMass {
-        let ratio = grain.density / fluid_density;
-        let part = ((1.0 - ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0);
-        let part = if in_free_surface { 1.0 } else { part } / ratio;
+        let density_ratio = grain.density / fluid_density;
+        let part = ((1.0 - density_ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0);
+        // Virtual mass over the mass of the grain.
+        let part = if in_free_surface { 1.0 } else { part } / density_ratio;
         let free = |constraint: MotionConstraint| {
             if constraint == MotionConstraint::Free { part } else { 0.0 }
         };

@@ -252,7 +252,7 @@ impl<R: Real> RunImpulse<'_, R> {
 /// Adds the gain of the forced faces to component `axis` of a part of the prediction, for a grain
 /// with the new `velocity` that changed by `change` in the step. [`sum_impulse`] has filled
 /// the lists of `forced`.
-pub fn impose_rigidity<R: Real>(
+pub fn add_rigid_gain<R: Real>(
     axis: usize,
     spacing: DVec3,
     forced: &ForcedFaces,
@@ -260,10 +260,10 @@ pub fn impose_rigidity<R: Real>(
     change: RigidVelocity,
     prediction: &mut Prediction<R>,
 ) {
-    dispatch(ImposeRigidity { axis, spacing, forced, velocity, change, prediction });
+    dispatch(AddRigidGain { axis, spacing, forced, velocity, change, prediction });
 }
 
-struct ImposeRigidity<'a, 'b, R> {
+struct AddRigidGain<'a, 'b, R> {
     axis: usize,
     spacing: DVec3,
     forced: &'a ForcedFaces,
@@ -272,7 +272,7 @@ struct ImposeRigidity<'a, 'b, R> {
     prediction: &'a mut Prediction<'b, R>,
 }
 
-impl<R: Real> Kernel for ImposeRigidity<'_, '_, R> {
+impl<R: Real> Kernel for AddRigidGain<'_, '_, R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {

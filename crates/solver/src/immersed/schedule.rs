@@ -16,9 +16,9 @@ use rayon::prelude::*;
 
 use super::advection::{add_correction, find_correction};
 use super::rigid_body::PreviousStep;
-use super::rigidity::impose_rigidity;
+use super::rigidity::add_rigid_gain;
 use super::update::{
-    CouplingStep, GrainUpdate, ImmersedGrain, PendingRigidity, StepInput,
+    CouplingContext, CouplingInput, GrainUpdate, ImmersedGrain, PendingRigidity,
     locate_and_compute_weights,
 };
 use super::{ImmersedGrains, Scheme};
@@ -59,7 +59,7 @@ impl CoupledGrains {
 }
 
 /// Input and output of [`ImmersedGrains::impose_rigidity`], one entry per grain.
-pub struct RigidStep<'a> {
+pub struct RigidityInput<'a> {
     /// Grains, which get their new velocities.
     pub grains: &'a mut [Grain],
     /// State carried over from the previous step.
@@ -77,7 +77,7 @@ pub struct RigidStep<'a> {
 impl<R: Real> ImmersedGrains<R> {
     /// Corrects the advection next to the last poses of the grains, locates the grains at their
     /// present poses, and assembles their equations of motion. Imposes rigidity on isolated grains.
-    pub fn couple(&mut self, flow: &mut Flow<R>, input: StepInput) -> CoupledGrains {
+    pub fn couple(&mut self, flow: &mut Flow<R>, input: CouplingInput) -> CoupledGrains {
         let mut updates = std::mem::take(&mut self.updates);
         self.find_isolated(&input, &mut updates);
         self.couple_marked(flow, input, updates)
@@ -88,7 +88,7 @@ impl<R: Real> ImmersedGrains<R> {
     pub(super) fn couple_marked(
         &mut self,
         flow: &mut Flow<R>,
-        input: StepInput,
+        input: CouplingInput,
         mut updates: Vec<GrainUpdate>,
     ) -> CoupledGrains {
         let corrects_advection = self.scheme == Scheme::Aperture;
@@ -96,7 +96,7 @@ impl<R: Real> ImmersedGrains<R> {
             self.correct_advection(flow, &input, &updates);
         }
         let (known, predictions) = flow.prediction();
-        let step = CouplingStep {
+        let step = CouplingContext {
             locator: &self.locator,
             params: self.forcing_params(input.dt),
             input,
@@ -129,7 +129,7 @@ impl<R: Real> ImmersedGrains<R> {
     }
 
     /// Resets the updates and marks the isolated grains.
-    pub(super) fn find_isolated(&mut self, input: &StepInput, updates: &mut Vec<GrainUpdate>) {
+    pub(super) fn find_isolated(&mut self, input: &CouplingInput, updates: &mut Vec<GrainUpdate>) {
         let (immersed, grains) = (&self.grains, input.grains);
         let reach = self.locator.reach();
         let displacement = |index: usize| {
@@ -157,7 +157,7 @@ impl<R: Real> ImmersedGrains<R> {
     fn correct_advection(
         &mut self,
         flow: &mut Flow<R>,
-        input: &StepInput,
+        input: &CouplingInput,
         updates: &[GrainUpdate],
     ) {
         let (known, _) = flow.prediction();
@@ -185,9 +185,14 @@ impl<R: Real> ImmersedGrains<R> {
 
     /// Gives the grains their new velocities under the mean contact loads, and imposes the
     /// velocities on the faces that have not been forced yet.
-    pub fn impose_rigidity(&mut self, flow: &mut Flow<R>, coupled: CoupledGrains, step: RigidStep) {
+    pub fn impose_rigidity(
+        &mut self,
+        flow: &mut Flow<R>,
+        coupled: CoupledGrains,
+        step: RigidityInput,
+    ) {
         let mut updates = coupled.updates;
-        let RigidStep { dt, .. } = step;
+        let RigidityInput { dt, .. } = step;
         let density = self.fluid_density;
         let each = (updates.par_iter_mut().zip(&mut *step.grains)).zip(step.loads);
         each.enumerate().for_each(|(index, ((update, grain), load))| {
@@ -234,7 +239,7 @@ impl<R: Real> ImmersedGrains<R> {
                 };
                 if grain.body.overlaps(prediction.range(), mesh.layout()) {
                     let (h, forced) = (mesh.spacing, &grain.forced);
-                    impose_rigidity(axis, h, forced, velocity, change, &mut prediction);
+                    add_rigid_gain(axis, h, forced, velocity, change, &mut prediction);
                 }
             }
         });

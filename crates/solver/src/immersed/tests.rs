@@ -50,7 +50,7 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
         grain.pose.position += DT * grain.velocity;
     }
     let applied = [Load { force: DVec3::new(0.0, 0.0, -0.4), torque: DVec3::ZERO }; 2];
-    let input = StepInput {
+    let input = CouplingInput {
         grains: &grains,
         kinematics: &kinematics,
         previous: &previous,
@@ -64,7 +64,7 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
     let coupled = immersed.couple(&mut flow, input);
     let isolated = coupled.isolated();
     let mut loads = [Load::default(); 2];
-    let rigid = RigidStep {
+    let rigid = RigidityInput {
         grains: &mut grains,
         previous: &previous,
         contact: &resolved,
@@ -155,7 +155,7 @@ fn padding_of_rows_affects_no_link() {
         let before: Vec<f64> = flow.predicted.component(0).to_vec();
         immersed.couple(
             &mut flow,
-            StepInput {
+            CouplingInput {
                 grains: &grains,
                 kinematics: &grains.each_ref().map(GrainKinematics::of),
                 previous: &[PreviousStep::default(); 2],
@@ -196,7 +196,7 @@ fn isolated_and_conflicting(scheme: Scheme, reaches: f64) -> (bool, bool) {
     flow.predict(DT);
     let kinematics = grains.each_ref().map(GrainKinematics::of);
     let (previous, none) = ([PreviousStep::default(); 2], [Load::default(); 2]);
-    let input = || StepInput {
+    let input = || CouplingInput {
         grains: &grains,
         kinematics: &kinematics,
         previous: &previous,

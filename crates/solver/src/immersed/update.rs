@@ -12,7 +12,7 @@ use super::forcing::{ForcedFaces, ForcingParams};
 use super::geometry::{LocateScratch, LocatedBody, Locator};
 use super::open_sides::Crossing;
 use super::rigid_body::{PreviousStep, RigidBodySystem};
-use super::rigidity::{impose_rigidity, sum_impulse};
+use super::rigidity::{add_rigid_gain, sum_impulse};
 use crate::dem::Grain;
 use crate::flow::{OldState, Prediction};
 use crate::grid::BorrowedRow;
@@ -91,7 +91,7 @@ impl GrainUpdate {
 
 /// Inputs of a step, one entry per grain.
 #[derive(Clone, Copy)]
-pub struct StepInput<'a> {
+pub struct CouplingInput<'a> {
     /// Grains at their new poses.
     pub grains: &'a [Grain],
     /// Kinematics when the flow was predicted.
@@ -126,13 +126,13 @@ pub struct ThreadScratch<R> {
 }
 
 /// Fields and parameters of a step, shared by all grains.
-pub struct CouplingStep<'a, R> {
+pub struct CouplingContext<'a, R> {
     /// Geometry of the grains on the grid.
     pub locator: &'a Locator,
     /// Parameters of the forcing.
     pub params: ForcingParams,
     /// Grains and loads.
-    pub input: StepInput<'a>,
+    pub input: CouplingInput<'a>,
     /// Fields of the last step.
     pub known: OldState<'a, R>,
     /// Whether the advection next to the grains is corrected: in the aperture scheme.
@@ -141,7 +141,7 @@ pub struct CouplingStep<'a, R> {
     pub fluid_density: f64,
 }
 
-impl<R: Real> CouplingStep<'_, R> {
+impl<R: Real> CouplingContext<'_, R> {
     /// Updates an isolated grain: corrects the advection at its last pose, locates it, solves for
     /// its velocities and imposes them on `predictions`.
     pub fn update_isolated(
@@ -169,7 +169,7 @@ impl<R: Real> CouplingStep<'_, R> {
         let change = velocity - previous.velocity;
         let h = self.known.mesh.spacing;
         for (axis, prediction) in predictions.iter_mut().enumerate() {
-            impose_rigidity(axis, h, forced, velocity, change, prediction);
+            add_rigid_gain(axis, h, forced, velocity, change, prediction);
         }
         update.imposed = Some(velocity);
     }

@@ -11,7 +11,7 @@ use super::setup::Setup;
 use crate::dem::Grain;
 use crate::flow::{CoveredFace, Flow, FlowMeasures, FluidParams};
 use crate::grid::{Axis, FieldView};
-use crate::immersed::{CoupledGrains, ImmersedGrains, RigidStep, StepInput};
+use crate::immersed::{CoupledGrains, CouplingInput, ImmersedGrains, RigidityInput};
 use crate::math::{Precision, Real};
 use crate::poisson::PoissonTimes;
 
@@ -24,9 +24,9 @@ pub(super) trait Fluid: Send + Sync {
     /// First projection of the paper's scheme.
     fn project_prediction(&mut self, dt: f64);
     /// Locates the grains and assembles their equations of motion.
-    fn couple(&mut self, input: StepInput) -> CoupledGrains;
+    fn couple(&mut self, input: CouplingInput) -> CoupledGrains;
     /// Solves for the velocities of the grains and imposes them on the forced faces.
-    fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidStep);
+    fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidityInput);
     /// Sets the outward speeds [m/s] of the fastest grains close to each side.
     fn set_crossing_speeds(&mut self, speeds: [[f64; 2]; 3]);
     /// Kinematic pressure [m^2/s^2] below covered faces of one side, relative to the open ones.
@@ -105,10 +105,10 @@ where
     fn project_prediction(&mut self, dt: f64) {
         self.flow.project_prediction(dt);
     }
-    fn couple(&mut self, input: StepInput) -> CoupledGrains {
+    fn couple(&mut self, input: CouplingInput) -> CoupledGrains {
         self.grains.couple(&mut self.flow, input)
     }
-    fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidStep) {
+    fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidityInput) {
         self.grains.impose_rigidity(&mut self.flow, coupled, step);
     }
     fn set_crossing_speeds(&mut self, speeds: [[f64; 2]; 3]) {

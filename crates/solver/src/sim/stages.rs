@@ -9,12 +9,13 @@ use super::timing::PassTimes;
 use super::{GrainData, Simulation};
 use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
 use crate::immersed::{
-    CoupledGrains, Crossing, GrainKinematics, OpenSides, PreviousStep, RigidStep, Scheme, StepInput,
+    CoupledGrains, CouplingInput, Crossing, GrainKinematics, OpenSides, PreviousStep,
+    RigidityInput, Scheme,
 };
 use crate::math::{Load, RigidVelocity, timed};
 
 /// Grains of a step, with or without fluid.
-struct GrainStep<'a> {
+struct GrainContext<'a> {
     grains: &'a mut [Grain],
     dynamics: &'a mut ContactDynamics,
     /// Hydrodynamic loads; zero without fluid.
@@ -30,7 +31,7 @@ struct GrainStep<'a> {
 }
 
 /// Fluid of a step.
-struct FluidStep<'a> {
+struct FluidContext<'a> {
     fluid: &'a mut dyn Fluid,
     scheme: Scheme,
     /// Density [kg/m^3].
@@ -40,8 +41,8 @@ struct FluidStep<'a> {
 
 /// State that all stages of a coupled step work on.
 struct Context<'a> {
-    solid: GrainStep<'a>,
-    flow: FluidStep<'a>,
+    solid: GrainContext<'a>,
+    flow: FluidContext<'a>,
 }
 
 /// Step about to begin.
@@ -53,7 +54,7 @@ pub(super) enum Start<'a> {
 /// Coupled step about to begin.
 pub(super) struct CoupledStart<'a>(Context<'a>);
 /// Step without fluid about to begin.
-pub(super) struct DryStart<'a>(GrainStep<'a>);
+pub(super) struct DryStart<'a>(GrainContext<'a>);
 /// Flow predicted without the grains.
 pub(super) struct Predicted<'a>(Context<'a>);
 /// Grains at their new poses, by a trial step of contact.
@@ -84,9 +85,9 @@ enum FinalPoses {
 impl<'a> Start<'a> {
     /// Records the state before the step of `dt` [s] and sets weight, buoyancy, external
     /// loads and prescribed motion.
-    pub fn new(sim: &'a mut Simulation, dt: f64) -> Start<'a> {
+    pub fn prepare(sim: &'a mut Simulation, dt: f64) -> Start<'a> {
         let (setup, time) = (&mut sim.setup, sim.clock.time);
-        let mut solid = GrainStep {
+        let mut solid = GrainContext {
             grains: &mut setup.grains,
             dynamics: &mut sim.dynamics,
             loads: &mut sim.loads,
@@ -129,7 +130,7 @@ impl<'a> Start<'a> {
         if let Some(open_sides) = &solid.open_sides {
             fluid.set_crossing_speeds(open_sides.speeds(solid.grains));
         }
-        let flow = FluidStep {
+        let flow = FluidContext {
             fluid,
             scheme: setup.scheme,
             density: fluid_density,
@@ -139,7 +140,7 @@ impl<'a> Start<'a> {
     }
 }
 
-impl GrainStep<'_> {
+impl GrainContext<'_> {
     /// Moves the grains by `take_substeps` under weight, buoyancy and the hydrodynamic load of the
     /// last step (Eqs 6 to 36).
     fn move_grains<T>(
@@ -202,7 +203,7 @@ impl<'a> Moved<'a> {
             surface_loads = open_sides.surface_loads(|faces| flow.fluid.pressure_below(faces));
             crossings = open_sides.crossings();
         }
-        let input = StepInput {
+        let input = CouplingInput {
             grains: solid.grains,
             kinematics: &solid.data.kinematics,
             previous: &solid.data.previous,
@@ -246,7 +247,7 @@ impl<'a> Resolved<'a> {
         let Resolved(mut step, coupled, final_poses) = self;
         let Context { solid, flow } = &mut step;
         let open_sides = &mut solid.open_sides;
-        let rigid = RigidStep {
+        let rigid = RigidityInput {
             grains: solid.grains,
             previous: &solid.data.previous,
             contact: &solid.data.contact,

@@ -28,7 +28,7 @@ impl Simulation {
     pub fn step(&mut self, horizon: f64) -> Result<(), StepError> {
         let rate = (self.fluid.as_ref()).map_or(0.0, |fluid| fluid.measures().max_rate);
         let dt = self.clock.next_step(rate, horizon);
-        match Start::new(self, dt) {
+        match Start::prepare(self, dt) {
             Start::Coupled(start) => {
                 // u* of the momentum equation (Eqs 1b to 3), without the grains.
                 let predicted = start.predict();

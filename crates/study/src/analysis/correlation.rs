@@ -1,13 +1,13 @@
 //! Rank correlations of quantities with factors.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
 use super::observation::{observations, with_factor};
 use super::statistics::spearman;
 use crate::measure::record::RunRecord;
-use crate::plan::claims::{Analysis, Condition};
+use crate::plan::claims::{Analysis, Condition, Correlations};
 
 /// Rank correlation of a quantity with a factor. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -31,20 +31,25 @@ pub struct Correlation {
     pub p: Option<f64>,
 }
 
+impl Correlations {
+    /// Returns the levels of the axis, sorted.
+    pub fn levels(&self, records: &[RunRecord]) -> Vec<String> {
+        let levels = records.iter().filter_map(|r| r.levels.get(&self.by));
+        levels.cloned().collect::<BTreeSet<String>>().into_iter().collect()
+    }
+}
+
 /// Computes the rank correlations that an analysis requests.
 pub fn correlations(analysis: &Analysis, records: &[RunRecord]) -> Vec<Correlation> {
     let Some(request) = &analysis.correlations else {
         return Vec::new();
     };
-    let levels = records.iter().filter_map(|r| r.levels.get(&request.by));
-    let mut levels: Vec<&String> = levels.collect();
-    levels.sort();
-    levels.dedup();
+    let levels = request.levels(records);
     let mut out = Vec::new();
     for quantity in &request.quantities {
         for factor in &request.factors {
             for level in &levels {
-                let condition = Condition::Is((*level).clone());
+                let condition = Condition::Is(level.clone());
                 let when = BTreeMap::from([(request.by.clone(), condition)]);
                 let all = observations(records, quantity, &when);
                 let (x, y, censored) = with_factor(&all, factor);
@@ -52,7 +57,7 @@ pub fn correlations(analysis: &Analysis, records: &[RunRecord]) -> Vec<Correlati
                 out.push(Correlation {
                     quantity: quantity.clone(),
                     factor: factor.clone(),
-                    level: (*level).clone(),
+                    level: level.clone(),
                     n: x.len(),
                     censored,
                     rho: found.map(|e| e.value),

@@ -2,24 +2,18 @@
 //! first contact, and how both depend on the level of an axis and on the grid.
 //!
 //! The share of a set of models is the mean over the models of the share of their members.
-//! Intervals are 95 % intervals of a bootstrap that draws models, then members of each model, with
-//! replacement. Two sets are compared over the models that are equal on all other axes, and their
-//! members are drawn together.
+//! Intervals are 95 % intervals of a bootstrap over models and members. Two sets are compared over
+//! the models that are equal on all other axes, and their members are drawn together.
 
 use std::collections::BTreeMap;
 
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use super::observation::observe;
-use super::statistics::{median, quantile, signed_rank};
+use super::statistics::{bootstrap_interval, mean, median, signed_rank};
 use super::survival::{Duration, log_rank, median_time};
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Kissing};
-
-/// Number of samples of the bootstrap.
-const SAMPLES: usize = 2000;
 
 /// Results on the first contact.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -231,7 +225,7 @@ fn summary(level: &str, grid: Option<&str>, models: &[&Outcomes]) -> Option<Leve
         runs: durations.len(),
         all_some_none: [count(|s| s == 1.0), count(|s| s > 0.0 && s < 1.0), count(|s| s == 0.0)],
         share: mean(&shares)?,
-        interval: bootstrap(&members)?,
+        interval: bootstrap_interval(&members)?,
         median_time: median_time(&durations),
         durations,
     })
@@ -286,7 +280,7 @@ fn share_difference(pairs: &[Pair]) -> Option<(f64, [f64; 2])> {
     };
     let members: Vec<Vec<f64>> = pairs.iter().map(common).filter(|m| !m.is_empty()).collect();
     let means: Vec<f64> = members.iter().filter_map(|m| mean(m)).collect();
-    Some((mean(&means)?, bootstrap(&members)?))
+    Some((mean(&means)?, bootstrap_interval(&members)?))
 }
 
 fn kissed(members: &BTreeMap<usize, Duration>) -> Vec<f64> {
@@ -295,25 +289,4 @@ fn kissed(members: &BTreeMap<usize, Duration>) -> Vec<f64> {
 
 fn one_if_kissed(duration: &Duration) -> f64 {
     if duration.censored { 0.0 } else { 1.0 }
-}
-
-fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
-/// Returns the 95 % interval of the mean over models of the mean over members. Equal arguments give
-/// equal results.
-fn bootstrap(models: &[Vec<f64>]) -> Option<[f64; 2]> {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(0);
-    let mut draw = |count: usize| random.random_range(0..count);
-    let mut sample = || {
-        let models = (0..models.len()).filter_map(|_| {
-            let members = models.get(draw(models.len()))?;
-            let drawn: Vec<f64> = members.iter().map(|_| members[draw(members.len())]).collect();
-            mean(&drawn)
-        });
-        mean(&models.collect::<Vec<f64>>())
-    };
-    let samples: Vec<f64> = (0..SAMPLES).filter_map(|_| sample()).collect();
-    Some([quantile(&samples, 0.025)?, quantile(&samples, 0.975)?])
 }

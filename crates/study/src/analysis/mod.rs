@@ -2,6 +2,7 @@
 
 pub mod claim_test;
 pub mod correlation;
+pub mod factor_mean;
 pub mod kissing;
 pub mod observation;
 pub mod statistics;

@@ -56,13 +56,16 @@ pub fn observe(record: &RunRecord, quantity: &str) -> Option<(f64, bool)> {
     }
 }
 
-/// Returns the observations of a quantity for all models that meet the conditions.
-pub fn observations(
-    records: &[RunRecord],
+/// A run, its value of a quantity, and whether the value is right-censored.
+pub type Member<'a> = (&'a RunRecord, f64, bool);
+
+/// Returns the members that have a quantity, by model, of all models that meet the conditions.
+pub fn members<'a>(
+    records: &'a [RunRecord],
     quantity: &str,
     when: &BTreeMap<String, Condition>,
-) -> Vec<Observation> {
-    let mut models: Vec<Vec<(&RunRecord, f64, bool)>> = Vec::new();
+) -> Vec<Vec<Member<'a>>> {
+    let mut models: Vec<Vec<Member>> = Vec::new();
     for record in records.iter().filter(|record| meets(record, when)) {
         if let Some((value, censored)) = observe(record, quantity) {
             let member = (record, value, censored);
@@ -72,7 +75,16 @@ pub fn observations(
             }
         }
     }
-    let observation = |members: Vec<(&RunRecord, f64, bool)>| {
+    models
+}
+
+/// Returns the observations of a quantity for all models that meet the conditions.
+pub fn observations(
+    records: &[RunRecord],
+    quantity: &str,
+    when: &BTreeMap<String, Condition>,
+) -> Vec<Observation> {
+    let observation = |members: Vec<Member>| {
         let values: Vec<f64> = members.iter().map(|(_, v, _)| *v).collect();
         let first = members[0].0;
         Observation {
@@ -87,7 +99,7 @@ pub fn observations(
             censored: 2 * members.iter().filter(|(.., c)| *c).count() >= members.len(),
         }
     };
-    models.into_iter().map(observation).collect()
+    members(records, quantity, when).into_iter().map(observation).collect()
 }
 
 /// Returns whether a run meets all conditions.

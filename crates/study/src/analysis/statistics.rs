@@ -1,6 +1,11 @@
 //! Rank statistics of small samples; no assumption about the distribution of the values.
 
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+/// Number of samples of the bootstrap.
+const SAMPLES: usize = 2000;
 
 /// Estimate with its 95 % confidence interval and two-sided p value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,6 +148,30 @@ fn critical_value(counts: &[f64]) -> usize {
         cut = i / 2;
     }
     cut
+}
+
+/// Returns the arithmetic mean; none of an empty sample.
+pub fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// Returns the 95 % interval of the mean over models of the mean over members, by a bootstrap that
+/// draws models, then members of each model, with replacement.
+///
+/// Equal arguments give equal results.
+pub fn bootstrap_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(0);
+    let mut draw = |count: usize| random.random_range(0..count);
+    let mut sample = || {
+        let models = (0..models.len()).filter_map(|_| {
+            let members = models.get(draw(models.len()))?;
+            let drawn: Vec<f64> = members.iter().map(|_| members[draw(members.len())]).collect();
+            mean(&drawn)
+        });
+        mean(&models.collect::<Vec<f64>>())
+    };
+    let samples: Vec<f64> = (0..SAMPLES).filter_map(|_| sample()).collect();
+    Some([quantile(&samples, 0.025)?, quantile(&samples, 0.975)?])
 }
 
 /// Returns the median; none of an empty sample.

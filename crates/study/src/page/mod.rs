@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use self::content::Content;
 use self::figure::FigureData;
 use crate::analysis::correlation::correlations;
+use crate::analysis::factor_mean::factor_means;
 use crate::analysis::kissing::kissing;
 use crate::analysis::observation::meets;
 use crate::analysis::verdict::evaluate;
@@ -67,7 +68,7 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     let compared = |run: &Run| {
         let orientation = request.orientations.as_ref().zip(request.compare.as_ref());
         let matches = orientation.is_some_and(|(axis, l)| run.levels.get(axis) == Some(l));
-        run.member == 0 && (matches || request.reference.as_ref() == Some(&run.model))
+        matches || run.member == 0 && request.reference.as_ref() == Some(&run.model)
     };
     let trajectory = |(run, record): &(&Run, &RunRecord)| {
         Some((run.name.clone(), Trajectory::read(run, record, folder)?))
@@ -76,11 +77,13 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     let trajectories = shown.filter_map(trajectory).collect();
     let findings = evaluate(&plan.analysis, &shown_records);
     let correlations = correlations(&plan.analysis, &shown_records);
+    let factor_means = factor_means(&plan.analysis, &shown_records);
     let kissing = kissing(&plan.analysis, &records);
     let analysis = serde_json::json!({
         "where": plan.analysis.when,
         "claims": findings,
         "correlations": correlations,
+        "factor_means": factor_means,
         "kissing": kissing,
     });
     write_json(&folder.join("analysis.json"), &analysis)?;
@@ -90,6 +93,7 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
         folder,
         findings: &findings,
         correlations: &correlations,
+        factor_means: &factor_means,
         kissing: kissing.as_ref(),
         trajectories,
     };

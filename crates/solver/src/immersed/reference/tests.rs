@@ -16,7 +16,7 @@ use crate::immersed::geometry::aperture::forcing_reach;
 use crate::immersed::geometry::{LocateScratch, LocatedBody, Locator};
 use crate::immersed::links::{LinkPlanes, compute_link_weights};
 use crate::immersed::rigid_body::{PreviousStep, RigidBodySystem};
-use crate::immersed::rigidity::{impose_rigidity, sum_impulse};
+use crate::immersed::rigidity::{add_rigid_gain, sum_impulse};
 use crate::immersed::update::locate_and_compute_weights;
 use crate::math::{Load, RigidVelocity};
 
@@ -323,7 +323,7 @@ fn impulse_and_imposed_rigidity_match_the_reference() {
             }
             let (forced, h) = (&case.located[index].1, case.reference.mesh.spacing);
             case.flow.for_predictions(|axis, mut prediction| {
-                impose_rigidity(axis, h, forced, new, new - old, &mut prediction);
+                add_rigid_gain(axis, h, forced, new, new - old, &mut prediction);
             });
             let imposed = case.predicted();
             let (known, _) = case.flow.prediction();

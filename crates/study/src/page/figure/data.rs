@@ -10,6 +10,7 @@ use grainwake_run::RESOLVED;
 use grainwake_run::case::Case;
 
 use crate::analysis::correlation::Correlation;
+use crate::analysis::factor_mean::FactorMean;
 use crate::analysis::kissing::KissingResults;
 use crate::analysis::verdict::Finding;
 use crate::measure::record::RunRecord;
@@ -28,6 +29,8 @@ pub struct FigureData<'a> {
     pub findings: &'a [Finding],
     /// Correlations.
     pub correlations: &'a [Correlation],
+    /// Means of quantities at the values of factors.
+    pub factor_means: &'a [FactorMean],
     /// Results on the first contact.
     pub kissing: Option<&'a KissingResults>,
     /// Trajectories of the finished runs that are compared, by name of the run.

@@ -21,6 +21,8 @@ const HEIGHT: f64 = 128.0;
 const TITLE: f64 = 20.0;
 /// Height of the legend above the panels [pt].
 const LEGEND: f64 = 16.0;
+/// Width of the lines of further members of an ensemble [pt].
+const THIN: f64 = 0.45;
 /// Dashes of the trailing grain.
 const DASHED: Option<&str> = Some("3.5 1.8");
 
@@ -47,8 +49,8 @@ pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     else {
         return Vec::new();
     };
-    let wanted = |run: &&Run| run.member == 0 && run.levels.get(axis) == Some(level);
-    let wanted: Vec<&Run> = data.plan.runs.iter().filter(wanted).collect();
+    let compared = data.plan.runs.iter().filter(|run| run.levels.get(axis) == Some(level));
+    let (wanted, members): (Vec<&Run>, Vec<&Run>) = compared.partition(|run| run.member == 0);
     let missing = wanted.iter().filter(|r| !data.trajectories.contains_key(&r.name));
     let missing: Vec<&str> = missing.map(|r| r.name.as_str()).collect();
     if !missing.is_empty() {
@@ -63,22 +65,26 @@ pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     ];
     let draw = |(number, curve, by, within): (&str, Curve, &String, &String)| {
         let layout = Layout { number, curve, by, within };
-        figure(data, &wanted, &layout, level)
+        figure(data, [&wanted, &members], &layout, level)
     };
     layouts.into_iter().filter_map(draw).collect()
 }
 
-fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> Option<Figure> {
+fn figure(data: &FigureData, runs: [&[&Run]; 2], layout: &Layout, level: &str) -> Option<Figure> {
     let Layout { number, curve, by, within } = *layout;
     let reference = data.plan.analysis.figures.reference.as_ref();
     let reference =
         reference.and_then(|name| Some((name, data.trajectories.get(&data.run(name)?.name)?)));
-    let shown: Vec<(&Run, &Trajectory)> =
-        wanted.iter().filter_map(|r| Some((*r, data.trajectories.get(&r.name)?))).collect();
+    let [shown, members] = runs.map(|runs| -> Vec<(&Run, &Trajectory)> {
+        runs.iter().filter_map(|r| Some((*r, data.trajectories.get(&r.name)?))).collect()
+    });
     if shown.is_empty() {
         return None;
     }
-    let all = || shown.iter().map(|(_, t)| *t).chain(reference.map(|(_, t)| t));
+    let all = || {
+        let runs = shown.iter().chain(&members).map(|(_, t)| *t);
+        runs.chain(reference.map(|(_, t)| t))
+    };
     let end = all().filter_map(|t| t.time.last().copied()).fold(0.0, f64::max);
     let (label, low, high) = match curve {
         Curve::Gap => {
@@ -125,10 +131,27 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
         if let Some((_, trajectory)) = reference.filter(|_| curve == Curve::Gap) {
             draw(trajectory, INK, "sphere");
         }
-        for (run, trajectory) in shown.iter().filter(|(r, _)| r.factors.get(by) == Some(value)) {
+        let here = |(run, _): &&(&Run, &Trajectory)| run.factors.get(by) == Some(value);
+        let colour = |run: &Run| {
             let own = run.factors.get(within);
             let n = lines.iter().position(|v| own == Some(v)).unwrap_or(0);
-            draw(trajectory, COLOURS[n % 4], &run.name);
+            COLOURS[n % 4]
+        };
+        for (run, trajectory) in shown.iter().filter(here) {
+            draw(trajectory, colour(run), &run.name);
+        }
+        for (run, t) in members.iter().filter(here) {
+            let mut thin = |values: &[f64], dash| {
+                let points = t.points(values).into_iter().filter_map(|point| frame.position(point));
+                drawing.line(&points.collect::<Vec<_>>(), colour(run), THIN, dash);
+            };
+            match curve {
+                Curve::Gap => thin(&t.distance, None),
+                Curve::Velocity => {
+                    thin(&t.velocity[1], None);
+                    thin(&t.velocity[0], DASHED);
+                }
+            }
         }
         frame.outline(&mut drawing, Labelled { across: row + 1 == rows, up: column == 0 });
     }
@@ -164,8 +187,11 @@ fn figure(data: &FigureData, wanted: &[&Run], layout: &Layout, level: &str) -> O
     if curve == Curve::Velocity {
         caption += " Negative is downwards. The leading grain is the lower one at the start.";
     }
-    if shown.len() < wanted.len() {
-        caption += &format!(" {} of {} runs are finished.", shown.len(), wanted.len());
+    if !members.is_empty() {
+        caption += " Thin lines: further members of the ensemble.";
+    }
+    if shown.len() < runs[0].len() {
+        caption += &format!(" {} of {} runs are finished.", shown.len(), runs[0].len());
     }
     let way = if matches!(number, "15" | "17") { "row" } else { "column" };
     let name = format!("fig{number}-{file}-by-{way}");

@@ -2,6 +2,7 @@
 
 mod claims;
 mod data;
+mod factor_means;
 mod grains;
 mod histories;
 mod kissing_share;
@@ -31,6 +32,7 @@ pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     out.extend(histories::figures(data, notes));
     out.extend(overview::figures(data));
     out.extend(trends::figure(data));
+    out.extend(factor_means::figure(data));
     out.extend(claims::figure(data));
     if !numbered_as_in_paper(data) {
         renumber(&mut out);

@@ -11,7 +11,8 @@ use super::data::{FigureData, symbol_entry};
 use crate::analysis::correlation::Correlation;
 use crate::format::title;
 
-const COLOURS: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
+/// Colours of the levels of an axis.
+pub(super) const COLOURS: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
 /// Height of the row of one level [pt].
 const ROW: f64 = 9.0;
 const LEFT: f64 = 96.0;
