@@ -168,7 +168,7 @@ fn a_complete_study_has_all_figures() {
     }
     let page = std::fs::read_to_string(&rendered.page).unwrap();
     assert!(page.contains("65 of 65 runs are finished") && !page.contains("Missing or left out"));
-    assert_eq!(page.matches("<figure").count(), 17);
+    assert_eq!(page.matches("<figure").count(), 18);
     assert!(
         page.contains("<b>Shortest first contact</b>: g16-o3"),
         "the roundest, most spherical, broad side down"
