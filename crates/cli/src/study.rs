@@ -51,7 +51,8 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let study = kind::study(&args.study)?;
     let selection = args.only.as_deref().map_or(Ok(Selection::All), Selection::parse);
     let selection = selection.map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
-    let plan = Plan::resolve(&study, &args.set)?;
+    let plan = Plan::resolve(&study, &args.set)?.accepting(&args.accept);
+    let plan = plan.map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
     let runs = &plan.runs;
     let chosen = selection.choose(runs).map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
     let folder = args.output.clone().unwrap_or_else(|| study.default_folder());
@@ -59,7 +60,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let (jobs, each) = threads::share(jobs, args.threads);
     if args.list || args.dry_run {
         plan.check_folder(&folder)?;
-        let archive = Archive::read(&folder);
+        let archive = Archive::read(&folder, &plan.accepted);
         let states: Vec<(usize, RunState)> =
             chosen.iter().map(|i| (*i, run_state(&runs[*i], &folder, &archive))).collect();
         if args.json {
@@ -91,6 +92,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         threads: each,
         retry: args.retry,
         keep_checkpoints: args.keep_checkpoints,
+        accepted: plan.accepted.clone(),
         command: std::env::args().collect(),
     };
     let board = Board::new(runs, &chosen, jobs, args.quiet, stop.clone());

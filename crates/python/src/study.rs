@@ -99,6 +99,8 @@ impl PyStudy {
     ///     Restart failed runs.
     /// keep_checkpoints : bool, default False
     ///     Keep the checkpoints of finished runs.
+    /// accept : list of str, optional
+    ///     Commits of other programs whose finished runs count, 12 hexadecimal digits each.
     /// progress : bool or callable, optional
     ///     True shows a bar over the runs, False none; a callable receives a dict with done, runs
     ///     and messages.
@@ -114,7 +116,7 @@ impl PyStudy {
     ///     A run failed; the message lists the failed runs, the others are finished.
     /// KeyboardInterrupt
     ///     The study was interrupted; the same call continues it.
-    #[pyo3(signature = (folder, *, only = None, jobs = 1, threads = 0, retry = false, keep_checkpoints = false, progress = None))]
+    #[pyo3(signature = (folder, *, only = None, jobs = 1, threads = 0, retry = false, keep_checkpoints = false, accept = None, progress = None))]
     fn run<'py>(
         &self,
         py: Python<'py>,
@@ -124,9 +126,11 @@ impl PyStudy {
         threads: usize,
         retry: bool,
         keep_checkpoints: bool,
+        accept: Option<Vec<String>>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let plan = &self.plan;
+        let plan = self.plan.clone().accepting(&accept.unwrap_or_default());
+        let plan = &plan.map_err(|problem| refused(&[problem]))?;
         let selection = only.map_or(Ok(Selection::All), Selection::parse);
         let chosen = selection
             .and_then(|selection| selection.choose(&plan.runs))
@@ -139,6 +143,7 @@ impl PyStudy {
             threads: each,
             retry,
             keep_checkpoints,
+            accepted: plan.accepted.clone(),
             command: running::command(py)?,
         };
         let (messages, stop) = (Mutex::new(Vec::new()), AtomicBool::new(false));

@@ -33,6 +33,7 @@ fn options(jobs: usize) -> Options {
         threads: 1,
         retry: false,
         keep_checkpoints: false,
+        accepted: Vec::new(),
         command: vec!["test".into()],
     }
 }
@@ -45,7 +46,7 @@ fn run(plan: &Plan, study: &Path, watcher: &dyn StudyObserver, options: &Options
 }
 
 fn states(plan: &Plan, study: &Path) -> Vec<RunState> {
-    let archive = Archive::read(study);
+    let archive = Archive::read(study, &plan.accepted);
     plan.runs.iter().map(|r| run_state(r, study, &archive)).collect()
 }
 
@@ -262,6 +263,46 @@ fn a_study_continues_from_its_archive() {
     let found: Vec<StateKind> = states(&second, &archive).iter().map(RunState::kind).collect();
     let (finished, missing) = (StateKind::Finished, StateKind::Missing);
     assert_eq!(found, [finished, missing, finished, missing, finished]);
+}
+
+#[test]
+fn finished_runs_of_accepted_programs_count() {
+    let (folder, path) = folder(STUDY);
+    let mut plan = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    plan.create_folder(&study).unwrap();
+    execute(&plan.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
+    // Another program made both runs; of the second only the row of the table is left.
+    let other = "0123456789ab".to_owned();
+    let provenance = plan.runs[0].folder(&study).join("provenance.json");
+    let mut made: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&provenance).unwrap()).unwrap();
+    made["commit"] = other.clone().into();
+    std::fs::write(&provenance, made.to_string()).unwrap();
+    let mut rows = records(&plan, &study);
+    rows[4].id = plan.runs[4].id_at(&other);
+    write_tables(&rows, &study).unwrap();
+    std::fs::remove_dir_all(plan.runs[4].folder(&study)).unwrap();
+
+    let kinds =
+        |plan: &Plan| states(plan, &study).iter().map(RunState::kind).collect::<Vec<StateKind>>();
+    let (finished, missing, stale) = (StateKind::Finished, StateKind::Missing, StateKind::Stale);
+    assert_eq!(kinds(&plan), [stale, missing, missing, missing, missing]);
+    let wrong = plan.clone().accepting(&["900fc4e".into()]).unwrap_err();
+    assert!(wrong.to_string().contains("900fc4e") && wrong.help.unwrap().contains("12"));
+    plan = plan.accepting(std::slice::from_ref(&other)).unwrap();
+    assert_eq!(kinds(&plan), [finished, missing, missing, missing, finished]);
+    let rows = records(&plan, &study);
+    for i in [0, 4] {
+        assert!(rows[i].finished() && rows[i].pair.is_some());
+        assert_eq!(rows[i].id, plan.runs[i].id_at(&other), "the row names the program");
+    }
+    let accepting = Options { accepted: plan.accepted.clone(), ..options(1) };
+    let ended = execute(&plan.runs, &[0, 4], &study, &accepting, &Quiet).unwrap();
+    assert!(ended.iter().all(|(_, outcome)| *outcome == Outcome::AlreadyFinished));
+    // An unfinished run of another program is not continued.
+    std::fs::remove_file(plan.runs[0].folder(&study).join("summary.json")).unwrap();
+    assert_eq!(kinds(&plan)[0], stale);
 }
 
 #[test]

@@ -32,6 +32,10 @@ pub struct StudyArgs {
     /// Restart failed runs
     #[arg(long)]
     pub retry: bool,
+    /// Commit of another program whose finished runs count, if its results are the same; 12 digits,
+    /// repeatable
+    #[arg(long, value_name = "COMMIT")]
+    pub accept: Vec<String>,
     /// Keep the checkpoints of finished runs
     #[arg(long)]
     pub keep_checkpoints: bool,

@@ -380,6 +380,7 @@ class Study:
         threads: int = 0,
         retry: bool = False,
         keep_checkpoints: bool = False,
+        accept: list[str] | None = None,
         progress: _Progress = None,
     ) -> StudyFolder: ...
     def plan(self) -> list[dict[str, Any]]: ...

@@ -115,6 +115,7 @@ mod tests {
             title: String::new(),
             version: String::new(),
             commit: None,
+            accepted: Vec::new(),
             analysis: Default::default(),
             runs,
         };

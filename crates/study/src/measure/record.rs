@@ -61,7 +61,8 @@ pub struct RunRecord {
 impl RunRecord {
     /// Reads the record of a run from its folder.
     pub fn read(run: &Run, plan: &Plan, study: &Path) -> RunRecord {
-        let state = run_state_for(run, study, &plan.version, plan.commit.as_deref());
+        let state =
+            run_state_for(run, study, (&plan.version, plan.commit.as_deref()), &plan.accepted);
         let mut record = RunRecord {
             name: run.name.clone(),
             model: run.model.clone(),
@@ -69,7 +70,10 @@ impl RunRecord {
             levels: run.levels.clone(),
             factors: run.factors.clone(),
             state: state.kind(),
-            id: run.id.clone(),
+            id: match state {
+                RunState::Finished => id_of_folder(run, plan, study),
+                _ => run.id.clone(),
+            },
             ..RunRecord::default()
         };
         match state {
@@ -135,6 +139,15 @@ impl RunRecord {
     }
 }
 
+/// Returns the hash of the program that made a run folder: this program or an accepted one.
+fn id_of_folder(run: &Run, plan: &Plan, study: &Path) -> String {
+    let commit = Provenance::read(&run.folder(study)).and_then(|found| found.commit);
+    match commit.filter(|commit| plan.accepted.contains(commit)) {
+        Some(commit) => run.id_at(&commit),
+        None => run.id.clone(),
+    }
+}
+
 /// Reads the records of all runs of a study.
 ///
 /// A run without a folder keeps its record in `table.json`, so that run folders may be removed.
@@ -143,7 +156,9 @@ pub fn records(plan: &Plan, study: &Path) -> Vec<RunRecord> {
     let kept: Vec<RunRecord> = serde_json::from_str(&text).unwrap_or_default();
     let read = |run: &Run| {
         let record = RunRecord::read(run, plan, study);
-        let same = |old: &RunRecord| old.name == record.name && old.id == record.id;
+        let mut ids: Vec<String> = plan.accepted.iter().map(|commit| run.id_at(commit)).collect();
+        ids.push(run.id.clone());
+        let same = |old: &RunRecord| old.name == record.name && ids.contains(&old.id);
         let old = kept.iter().find(|old| same(old) && old.finished());
         let missing = record.state == StateKind::Missing;
         old.filter(|_| missing).cloned().unwrap_or(record)

@@ -116,6 +116,10 @@ pub(super) fn provenance(content: &Content) -> Markup {
     let sum = |pick: fn(&RunRecord) -> Option<f64>| -> f64 {
         content.records.iter().filter_map(pick).sum()
     };
+    let made_at = |commit: &String| {
+        let both = plan.runs.iter().zip(content.records);
+        both.filter(|(run, record)| record.finished() && record.id == run.id_at(commit)).count()
+    };
     let divergences = content.records.iter().filter_map(|r| r.max_divergence);
     let divergence = divergences.fold(0.0, f64::max);
     let rows = [
@@ -125,6 +129,9 @@ pub(super) fn provenance(content: &Content) -> Markup {
             html! {
                 "Grainwake " (plan.version)
                 @if let Some(commit) = &plan.commit { ", commit " (commit) }
+                @for commit in &plan.accepted {
+                    "; " (made_at(commit)) " finished runs at commit " (commit)
+                }
             },
         ),
         ("time steps, all runs", html! { (sum(|r| r.steps.map(|n| n as f64))) }),

@@ -15,7 +15,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use grainwake_formats::disk::{self, is_temporary};
-use grainwake_run::case::{Case, CaseError};
+use grainwake_run::case::{Case, CaseError, Problem};
+use grainwake_run::provenance::Provenance;
 use serde::{Deserialize, Serialize};
 
 use self::claims::Analysis;
@@ -82,6 +83,12 @@ impl Run {
         Case::load(&self.base, &self.set)
     }
 
+    /// Returns the hash of the run if the program of this version at `commit` made it.
+    pub fn id_at(&self, commit: &str) -> String {
+        let version = Provenance::new("").version;
+        resolve::run_id(&self.case_sha256, &self.ending, &version, commit)
+    }
+
     /// Returns the run folder in a study folder.
     pub fn folder(&self, study: &Path) -> PathBuf {
         study.join(RUNS).join(&self.name)
@@ -101,6 +108,9 @@ pub struct Plan {
     pub version: String,
     /// Commit of the program, if known.
     pub commit: Option<String>,
+    /// Commits of other programs of this version whose finished runs count.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub accepted: Vec<String>,
     /// Requested analysis.
     #[serde(default)]
     pub analysis: Analysis,
@@ -108,7 +118,29 @@ pub struct Plan {
     pub runs: Vec<Run>,
 }
 
+/// Number of digits of a commit in `provenance.json`.
+const COMMIT_DIGITS: usize = 12;
+
 impl Plan {
+    /// Returns the plan with commits of other programs whose finished runs count.
+    ///
+    /// # Errors
+    /// If a text is not a commit as in `provenance.json`.
+    pub fn accepting(self, commits: &[String]) -> Result<Plan, Problem> {
+        let is_commit = |text: &str| {
+            text.len() == COMMIT_DIGITS && text.chars().all(|c| matches!(c, '0'..='9' | 'a'..='f'))
+        };
+        match commits.iter().find(|commit| !is_commit(commit)) {
+            None => Ok(Plan { accepted: commits.to_vec(), ..self }),
+            Some(wrong) => {
+                let message = format!("--accept: \"{wrong}\" is not a commit of the program");
+                Err(Problem::new(message).help(format!(
+                    "give the {COMMIT_DIGITS} hexadecimal digits that `provenance.json` of a run has"
+                )))
+            }
+        }
+    }
+
     /// Creates the study folder, removes temporary files of killed programs that are more than a
     /// day old, and writes the plan.
     ///

@@ -50,6 +50,7 @@ impl Plan {
             title: format!("Study {name}"),
             version: program.version,
             commit: program.commit,
+            accepted: Vec::new(),
             analysis: Analysis::default(),
             runs,
         };

@@ -35,6 +35,7 @@ impl Plan {
             title: study.title.clone(),
             version: program.version,
             commit: program.commit,
+            accepted: Vec::new(),
             analysis: study.analysis.clone(),
             runs,
         })
@@ -82,12 +83,7 @@ pub(super) fn run_of_case(name: &str, base: &Path, set: Vec<String>, case: &Case
     let ending = end_condition(&case.resolved);
     let program = Provenance::new(&case.digest);
     let commit = program.commit.unwrap_or_default();
-    let mut hash = Sha256::new();
-    for part in [&program.case_sha256, &ending, &program.version, &commit] {
-        hash.update(part);
-        hash.update([0]);
-    }
-    let id = hash.finalize().iter().take(6).map(|b| format!("{b:02x}")).collect();
+    let id = run_id(&program.case_sha256, &ending, &program.version, &commit);
     Run {
         name: name.into(),
         model: name.into(),
@@ -104,6 +100,16 @@ pub(super) fn run_of_case(name: &str, base: &Path, set: Vec<String>, case: &Case
         // JSON has no infinity.
         wall_s: estimate.wall_s.min(f64::MAX),
     }
+}
+
+/// Returns the hash of a case, its end condition and a program.
+pub(super) fn run_id(case_sha256: &str, ending: &str, version: &str, commit: &str) -> String {
+    let mut hash = Sha256::new();
+    for part in [case_sha256, ending, version, commit] {
+        hash.update(part);
+        hash.update([0]);
+    }
+    hash.finalize().iter().take(6).map(|b| format!("{b:02x}")).collect()
 }
 
 /// Returns the shape factors of the first grain.

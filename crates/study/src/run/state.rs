@@ -70,11 +70,17 @@ impl fmt::Display for StateKind {
 
 /// Finished runs in `table.json` of a study folder. Their run folders may have been removed.
 #[derive(Clone, Debug, Default)]
-pub struct Archive(BTreeSet<(String, String)>);
+pub struct Archive {
+    /// Names and hashes of the runs.
+    finished: BTreeSet<(String, String)>,
+    /// Commits of other programs whose finished runs count.
+    accepted: Vec<String>,
+}
 
 impl Archive {
     /// Reads the names and hashes of the finished runs; none if the table is missing or damaged.
-    pub fn read(study: &Path) -> Archive {
+    /// Finished runs by other programs count if their commits are `accepted`.
+    pub fn read(study: &Path, accepted: &[String]) -> Archive {
         #[derive(Deserialize)]
         struct Row {
             name: String,
@@ -84,12 +90,18 @@ impl Archive {
         let text = std::fs::read_to_string(study.join(TABLE)).unwrap_or_default();
         let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
         let finished = rows.into_iter().filter(|row| row.state == StateKind::Finished);
-        Archive(finished.map(|row| (row.name, row.id)).collect())
+        Archive {
+            finished: finished.map(|row| (row.name, row.id)).collect(),
+            accepted: accepted.to_vec(),
+        }
     }
 
-    /// Returns whether the run finished with the same case, end condition and program.
+    /// Returns whether the run finished with the same case, end condition and program, or with an
+    /// accepted program.
     pub fn contains(&self, run: &Run) -> bool {
-        self.0.contains(&(run.name.clone(), run.id.clone()))
+        let ids = self.accepted.iter().map(|commit| run.id_at(commit));
+        let mut ids = ids.chain([run.id.clone()]);
+        ids.any(|id| self.finished.contains(&(run.name.clone(), id)))
     }
 }
 
@@ -97,18 +109,20 @@ impl Archive {
 /// archive contains it.
 pub fn run_state(run: &Run, study: &Path, archive: &Archive) -> RunState {
     let program = Provenance::new("");
-    match run_state_for(run, study, &program.version, program.commit.as_deref()) {
+    let program = (program.version.as_str(), program.commit.as_deref());
+    match run_state_for(run, study, program, &archive.accepted) {
         RunState::Missing if archive.contains(run) => RunState::Finished,
         state => state,
     }
 }
 
-/// Determines the state of a run for a given version and commit of the program.
+/// Determines the state of a run for a program, given by version and commit. Finished runs of the
+/// version at `accepted` commits count.
 pub(crate) fn run_state_for(
     run: &Run,
     study: &Path,
-    version: &str,
-    commit: Option<&str>,
+    (version, commit): (&str, Option<&str>),
+    accepted: &[String],
 ) -> RunState {
     let folder = run.folder(study);
     let Some(found) = Provenance::read(&folder) else {
@@ -117,10 +131,13 @@ pub(crate) fn run_state_for(
     if found.case_sha256 != run.case_sha256 {
         return RunState::Stale("its case has changed");
     }
-    if (found.version.as_str(), found.commit.as_deref()) != (version, commit) {
+    let finished = folder.join(summary::FILE).is_file();
+    let by = found.commit.as_deref();
+    let counts = by == commit || finished && by.is_some_and(|c| accepted.iter().any(|a| a == c));
+    if found.version != version || !counts {
         return RunState::Stale("another version of the program produced it");
     }
-    if folder.join(summary::FILE).is_file() {
+    if finished {
         let resolved = std::fs::read_to_string(folder.join(RESOLVED)).unwrap_or_default();
         return if end_condition(&resolved) == run.ending {
             RunState::Finished
