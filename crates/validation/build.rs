@@ -1,8 +1,12 @@
-//! Puts the suites of the source tree, small files, into the program. A copy of the crate
-//! without the tree has none.
+//! Puts the suites of the source tree, small files, into the program, compressed. A copy of the
+//! crate without the tree has none.
 
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
+
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
 
 /// Files of a suite: its cases, grains and reference data.
 const KINDS: [&str; 3] = ["toml", "csv", "grain"];
@@ -28,12 +32,16 @@ fn main() {
     }
     found.sort();
     let mut text = String::from("[\n");
+    let mut packed = DeflateEncoder::new(Vec::new(), Compression::best());
     for path in found {
+        let contents = std::fs::read(&path).expect("a readable file");
         let name = path.strip_prefix(&root).unwrap().components();
         let name: Vec<_> = name.map(|part| part.as_os_str().to_str().expect("UTF-8")).collect();
-        writeln!(text, "    ({:?}, include_bytes!({path:?})),", name.join("/")).unwrap();
+        writeln!(text, "    ({:?}, {}),", name.join("/"), contents.len()).unwrap();
+        packed.write_all(&contents).unwrap();
     }
     text += "]\n";
-    let output = Path::new(&std::env::var("OUT_DIR").unwrap()).join("suites.rs");
-    std::fs::write(output, text).expect("a writable output folder");
+    let output = PathBuf::from(std::env::var("OUT_DIR").unwrap());
+    std::fs::write(output.join("suites.rs"), text).expect("a writable output folder");
+    std::fs::write(output.join("suites.deflate"), packed.finish().unwrap()).unwrap();
 }
