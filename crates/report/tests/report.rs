@@ -319,6 +319,19 @@ fn other_runs_get_their_own_figures() {
     let seen = text_of(&svg(&rendered, "positions"));
     assert!(seen.contains("height of the centre  [mm]"), "{seen}");
     assert!(page(&rendered).contains("30 grains</th><td>rock.grain, "));
+    let outlines =
+        |rendered: &ReportFiles| svg(rendered, "positions").matches("stroke=\"#ffffff\"").count();
+    assert_eq!(outlines(&rendered), 2 * 30);
+    // In a narrow periodic box some grains lie across a side: their images are at the other one.
+    let case = folder.join("case.resolved.toml");
+    let text = std::fs::read_to_string(&case).unwrap();
+    let narrow = "size = [0.02, 0.04, 0.1]\ncells = [10, 20, 50]\n[domain.boundaries]\n\
+                  x = [\"periodic\", \"periodic\"]\ny = [\"wall\", \"wall\"]\n\
+                  z = [\"wall\", \"wall\"]";
+    let text = text.replace("size = [0.04, 0.04, 0.1]\ncells = [20, 20, 50]", narrow);
+    std::fs::write(&case, text).unwrap();
+    let images = outlines(&render(&folder).unwrap()) - 2 * 30;
+    assert!(images >= 2 && images.is_multiple_of(2), "{images}");
     remove(&folder);
 }
 

@@ -7,6 +7,7 @@ use grainwake_plot::drawing::Drawing;
 use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_unit};
 use grainwake_plot::style::PAGE;
 
+use super::grain_surface::Outline;
 use super::scene::{AXES, Scene};
 use crate::features::short;
 
@@ -16,6 +17,15 @@ const LEFT: f64 = 38.0;
 const MIDDLE: f64 = 44.0;
 /// Top margin [pt].
 const TOP: f64 = 8.0;
+
+/// Returns whether an outline reaches into the window.
+fn is_seen(outline: &Outline, window: Window) -> bool {
+    let range = |of: fn(&(f64, f64)) -> f64| extent(outline.iter().map(of));
+    range(|p| p.0).zip(range(|p| p.1)).is_some_and(|(x, y)| {
+        let part = window.intersection(Window { low: (x.0, y.0), high: (x.1, y.1) });
+        part.width() > 0.0 && part.height() > 0.0
+    })
+}
 
 /// Draws the grains at the end of the run, coloured by height.
 pub fn figure(scene: &Scene) -> Option<Figure> {
@@ -39,6 +49,10 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
             return Some((a, b));
         };
         let (l, h) = (run.facts.lower[axis], run.facts.lower[axis] + size[axis]);
+        if run.period(axis).is_some() && (a < l || b > h) {
+            // An image may lie at the opposite side.
+            return Some((l, h));
+        }
         let least = if axis == up { a + margin } else { f64::NEG_INFINITY };
         Some((a.max(l), b.min(h).max(least)))
     };
@@ -85,7 +99,12 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
                  stroke-linejoin=\"round\""
             );
             let outline = scene.outline(grain, last(grain), h, v);
-            drawing.path(&frame.path(&outline, true), &style);
+            for (dx, dy) in scene.image_shifts(h, v) {
+                let image: Outline = outline.iter().map(|p| (p.0 + dx, p.1 + dy)).collect();
+                if is_seen(&image, window) {
+                    drawing.path(&frame.path(&image, true), &style);
+                }
+            }
         }
         drawing.end_clip();
         let names = [h, v].map(|axis| format!("*{}*  [{unit}]", AXES[axis]));

@@ -137,6 +137,18 @@ impl Scene<'_> {
         })
     }
 
+    /// Returns the shifts of an outline to itself and to its images through periodic faces, along
+    /// two axes [m].
+    pub fn image_shifts(&self, across: usize, up: usize) -> Vec<(f64, f64)> {
+        let shifts = |axis: usize| match self.run.period(axis) {
+            Some(period) => vec![0.0, -period, period],
+            None => vec![0.0],
+        };
+        let upward = shifts(up);
+        let pairs = |dx: f64| upward.iter().map(move |dy| (dx, *dy));
+        shifts(across).into_iter().flat_map(pairs).collect()
+    }
+
     /// Returns the diameter of a grain that is a sphere [m].
     pub fn sphere_diameter(&self, grain: usize) -> Option<f64> {
         let facts = &self.run.facts;

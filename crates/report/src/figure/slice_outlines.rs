@@ -64,16 +64,10 @@ fn with_images(
     view: SliceView,
     loops: &[(Option<usize>, Outline)],
 ) -> Vec<(Option<usize>, Outline)> {
-    let shifts = |axis: usize| match scene.run.period(axis) {
-        Some(period) => vec![0.0, -period, period],
-        None => vec![0.0],
-    };
     let mut out = Vec::new();
-    for dx in shifts(view.across) {
-        for dz in shifts(view.up) {
-            let moved = |ring: &Outline| ring.iter().map(|p| (p.0 + dx, p.1 + dz)).collect();
-            out.extend(loops.iter().map(|(grain, ring)| (*grain, moved(ring))));
-        }
+    for (dx, dz) in scene.image_shifts(view.across, view.up) {
+        let moved = |ring: &Outline| ring.iter().map(|p| (p.0 + dx, p.1 + dz)).collect();
+        out.extend(loops.iter().map(|(grain, ring)| (*grain, moved(ring))));
     }
     out
 }
