@@ -1,17 +1,21 @@
 #!/usr/bin/env bash
 # Checks the unsafe code. Each check is run alone by its name; without names all of them are.
 #
-#   .ci/sanitize.sh [memcheck] [address] [miri]
+#   .ci/sanitize.sh [memcheck] [address] [thread] [miri]
 #
 # memcheck  valgrind on the release program with two small cases in both precisions, 2 threads
 # address   address sanitizer on the tests of crates/simd, with all instruction sets of the machine
-# miri      tests of crates/simd with the instructions of every machine
+# thread    thread sanitizer on grains that share rows of faces: unit tests of the coupling, and the
+#           test `sharing` of crates/solver with up to 4 threads
+# miri      tests of crates/simd with the instructions of every machine, and a step of two touching
+#           grains on 2 threads
 #
-# A check whose tool is missing is skipped with a note. The last two need a nightly toolchain.
+# A check whose tool is missing is skipped with a note. The last three need a nightly toolchain,
+# `thread` its component rust-src too.
 # The fuzz target `checkpoint` steps whole simulations under the address sanitizer.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-[ $# -gt 0 ] || set -- memcheck address miri
+[ $# -gt 0 ] || set -- memcheck address thread miri
 host="$(rustc -vV | sed -n 's/^host: //p')"
 export CARGO_INCREMENTAL=0
 
@@ -40,15 +44,25 @@ address() {
     -p grainwake-simd --lib
 }
 
+thread() {
+  local library
+  library="$(rustc +nightly --print sysroot 2>/dev/null)/lib/rustlib/src/rust/library"
+  [ -d "$library" ] || { missing thread "no nightly with rust-src"; return; }
+  RUSTFLAGS="-Zsanitizer=thread" cargo +nightly test -Zbuild-std --release --target "$host" \
+    --target-dir target/thread -p grainwake-solver --lib --test sharing -- immersed sharing
+}
+
 miri() {
   cargo +nightly miri --version >/dev/null 2>&1 || { missing miri "Miri is not installed"; return; }
   cargo +nightly miri test --target-dir target/miri -p grainwake-simd --lib
+  cargo +nightly miri test --target-dir target/miri -p grainwake-solver --test sharing
 }
 
 for check in "$@"; do
   case "$check" in
     memcheck) memcheck ;;
     address) address ;;
+    thread) thread ;;
     miri) miri ;;
     *) echo "unknown check: $check" >&2; exit 2 ;;
   esac
