@@ -56,9 +56,10 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         check::warnings(&case.estimate(threads)).for_each(|w| tell!("{w}"));
     }
     let diameter = case.setup.grains.first().map(|g| g.shape.equivalent_diameter());
+    let job = case.job_in(&out, existing)?;
     let mut shown = ProgressDisplay::new(args.quiet, stop, diameter);
     let ending = threads::on(threads, || {
-        let ending = grainwake_run::run(case.job(), &out, &options, &mut shown);
+        let ending = grainwake_run::run(job, &out, &options, &mut shown);
         shown.clear();
         ending
     })??;

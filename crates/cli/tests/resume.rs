@@ -347,6 +347,41 @@ fn a_finished_run_can_be_continued_to_a_later_end() {
     assert_same_run(&whole, &out);
 }
 
+#[test]
+fn an_extended_run_keeps_the_intervals_of_its_start() {
+    // Without gravity the longest step depends on the end, as the default intervals do.
+    let given = ["tables = \"2 ms\"\n", "slices = \"10 ms\"\n"];
+    let text = given.iter().fold(WET.to_owned(), |text, key| text.replace(key, ""));
+    let text = format!("gravity = [0, 0, 0]\n{text}velocity = [0, 0, -0.05]\n")
+        + "[[probe]]\nname = \"middle\"\npoint = [2e-3, 2e-3, 6e-3]\n";
+    let (folder, case) = folder_with(&text);
+    let (out, whole) = (folder.path().join("run"), folder.path().join("whole"));
+    let keys =
+        ["output.tables", "output.slices", "output.surfaces", "probe.0.every", "time.max_step"];
+    let intervals = || {
+        let Case { plan, setup, .. } = Case::load(&out.join("case.resolved.toml"), &[]).unwrap();
+        let outputs = [plan.tables, plan.slices, plan.surfaces, plan.probes[0].every];
+        (outputs, format!("{:?}", setup.step))
+    };
+    run(&case, &out, &["--set", "time.end=20 ms"]).success();
+    let started = intervals();
+    let anew = Case::load(&case, &["time.end=40 ms".into()]).unwrap();
+    assert_ne!(anew.digest, Provenance::read(&out).unwrap().case_sha256);
+    run(&case, &out, &["--set", "time.end=40 ms", "--resume"]).success();
+    assert_eq!(intervals(), started);
+    run(&out.join("case.resolved.toml"), &whole, &[]).success();
+    assert_same_run(&whole, &out);
+    run(&case, &out, &["--set", "time.end=50 ms", "--resume-or-start"]).success();
+    assert_eq!(intervals(), started);
+    // An interval that is given counts.
+    for key in keys {
+        let other = format!("{key}=0.3 ms");
+        let refused = run(&case, &out, &["--set", "time.end=60 ms", "--resume", "--set", &other]);
+        let message = String::from_utf8_lossy(&refused.code(2).get_output().stderr).into_owned();
+        assert!(message.contains("another case") && message.contains(key), "{message}");
+    }
+}
+
 /// Runs the case up to `until` [s] in steps that the test takes, as a program that controls grains.
 fn controlled(case: &Path, out: &Path, existing: Existing, until: f64) {
     let job = Case::load(case, &[]).unwrap().job();

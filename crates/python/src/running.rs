@@ -139,6 +139,7 @@ pub fn run(
     threads: usize,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Summary> {
+    let job = case.job_in(folder, existing).raise()?;
     let pool = threads::pool(threads)?;
     let (shared, stop) = (Mutex::new(Shared::default()), Arc::new(AtomicBool::new(false)));
     let options =
@@ -148,7 +149,7 @@ pub fn run(
     display.call_method1("warn", (warnings,))?;
     let work = || {
         let mut relay = Relay { shared: &shared, stop: stop.clone() };
-        pool.install(|| grainwake_run::run(case.job(), folder, &options, &mut relay))
+        pool.install(|| grainwake_run::run(job, folder, &options, &mut relay))
     };
     let show = |py: Python<'_>| -> PyResult<()> {
         let (progress, messages) = {

@@ -78,10 +78,11 @@ pub(super) fn start(
         controlled_from: Some(PROGRAM.into()),
         ..Options::default()
     };
+    let job = case.job_in(folder, options.existing).raise()?;
     let mut notes: Vec<String> = Vec::new();
     let started = py.detach(|| {
         let mut note = |text: &str| notes.push(text.to_owned());
-        pool.install(|| Recording::start(&case.job(), folder, &options, &mut note))
+        pool.install(|| Recording::start(&job, folder, &options, &mut note))
     });
     warn(py, notes.into_iter().filter(|note| !note.starts_with("resuming")))?;
     started.raise()

@@ -8,11 +8,12 @@
 //!
 //! A problem is reported with file, line, key and remedy; then nothing is written.
 //!
-//! Layers, downwards: `branch`, `validate` -> `warnings` -> `estimate`, `packing`, `placement`,
-//! `shapes` -> `settling`, `expect` -> `raw` -> `source` -> `quantity` -> `notation`, `units`,
-//! `located`, `error`, `number_format`, `suggest`.
+//! Layers, downwards: `branch`, `continuation`, `validate` -> `warnings` -> `estimate`, `packing`,
+//! `placement`, `shapes` -> `settling`, `expect` -> `raw` -> `source` -> `quantity` -> `notation`,
+//! `units`, `located`, `error`, `number_format`, `suggest`.
 
 mod branch;
+mod continuation;
 mod error;
 mod estimate;
 mod expect;
@@ -76,6 +77,8 @@ pub struct Case {
     pub digest: String,
     /// Text of the case, for the positions of later problems.
     source: Source,
+    /// Resolved case.
+    raw: RawCase,
 }
 
 impl Case {
@@ -106,7 +109,7 @@ impl Case {
         let resolved = write(&validated.resolved)?;
         let digest = digest(&validated.resolved, &validated.shapes)?;
         Ok(Case {
-            title: validated.resolved.title,
+            title: validated.resolved.title.clone(),
             setup: validated.setup,
             plan: validated.plan,
             threads: validated.threads,
@@ -115,6 +118,7 @@ impl Case {
             shapes: validated.shapes,
             digest,
             source,
+            raw: validated.resolved,
         })
     }
 
