@@ -1,7 +1,7 @@
 //! `grainwake check`.
 
 use grainwake_run::case::Case;
-use grainwake_run::case::number_format::{number, quantity, vector};
+use grainwake_run::case::number_format::{number, quantity, size, vector};
 use grainwake_run::case::{Estimate, cells_for_drag_error, drag_error_text};
 use grainwake_run::{Probe, ProbePlace};
 use grainwake_solver::dem::{ContactLawKind, Grain};
@@ -79,10 +79,9 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     rows.push(("time step", quantity(e.time_step_s, "s")));
     rows.push(("steps", format!("{} to t = {} s", e.steps, case.plan.end)));
     rows.extend(case.plan.probes.iter().map(|p| ("probe", probe(p))));
-    let free = e
-        .memory_free_bytes
-        .map_or(String::new(), |free| format!(" ({:.0} MB are free)", free as f64 / 1e6));
-    rows.push(("memory", format!("{:.0} MB{free}", e.memory_bytes as f64 / 1e6)));
+    let free =
+        e.memory_free_bytes.map_or(String::new(), |free| format!(" ({} are free)", size(free)));
+    rows.push(("memory", format!("{}{free}", size(e.memory_bytes))));
     let (wall, threads) = (clock(e.wall_s), count(threads, "thread"));
     rows.push(("wall time", format!("about {wall} on {threads}")));
     let mut lines = vec![columns(&rows)];

@@ -1,6 +1,7 @@
 //! `grainwake report`.
 
 use grainwake_report::{ReportError, render, write_film};
+use grainwake_run::case::number_format::size;
 use grainwake_study::{Analysis, Plan};
 
 use crate::args::ReportArgs;
@@ -72,8 +73,8 @@ fn film(args: &ReportArgs) -> Result<(), Exit> {
         film.folder.join("frame-%04d.png").display()
     );
     print(&format!(
-        "{} ({width} x {height} pixels, {:.1} MB)",
+        "{} ({width} x {height} pixels, {})",
         film.file.display(),
-        film.bytes as f64 / 1e6
+        size(film.bytes as u64)
     ))
 }

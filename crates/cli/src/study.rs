@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use comfy_table::{CellAlignment, Table, presets};
 use grainwake_run::FailureKind;
+use grainwake_run::case::number_format::size;
 use grainwake_study::{
     Analysis, Archive, Options, Outcome, Plan, Run, RunRecord, RunState, Selection, StudyError,
     execute, expected_cost, records, run_state, write_tables,
@@ -210,21 +211,16 @@ fn dry_run(
     };
     let disk = cost
         .disk_bytes
-        .map_or(String::new(), |bytes| format!(", {} of disk space", megabytes(bytes)));
+        .map_or(String::new(), |bytes| format!(", {} of disk space", size(bytes as u64)));
     let largest = to_do.iter().map(|run| run.memory_bytes).max().unwrap_or(0);
     lines.push(format!(
         "{} of {} to do: {most} {time} with {jobs} at once, {} each ({reason}); {} of memory{disk}",
         to_do.len(),
         states.len(),
         count(threads, "thread"),
-        megabytes(jobs as f64 * largest as f64),
+        size(jobs as u64 * largest),
     ));
     lines.join("\n")
-}
-
-/// Returns a size in megabytes or gigabytes.
-fn megabytes(bytes: f64) -> String {
-    if bytes < 1e9 { format!("{:.0} MB", bytes / 1e6) } else { format!("{:.1} GB", bytes / 1e9) }
 }
 
 /// Returns the table of the terminal.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use grainwake_report::run_folder::RunFolder;
+use grainwake_run::case::number_format::size;
 use grainwake_study::format::rounded;
 use grainwake_study::{Plan, columns, records};
 use grainwake_view::server::Server;
@@ -41,7 +42,7 @@ pub fn view(args: &ViewArgs) -> Result<(), Exit> {
             tell!("note: {note}");
         }
         let bytes = std::fs::metadata(file)?.len();
-        return print(&format!("{} ({:.1} MB)", file.display(), bytes as f64 / 1e6));
+        return print(&format!("{} ({})", file.display(), size(bytes)));
     }
     let server = Server::bind(viewer, args.port)?;
     let address = format!("http://{}/", server.address());

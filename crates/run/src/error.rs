@@ -3,6 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::case::number_format::size;
 use grainwake_solver::sim::{RemedyTerms, SetupError, StepError};
 
 /// Kind of a failure, from the mildest to the worst.
@@ -51,7 +52,7 @@ pub enum RunError {
         folder: PathBuf,
     },
     /// The run needs more memory than is free.
-    #[error("the run needs {} of memory and {} are free; take larger cells, a smaller box, fewer surface nodes or [run] precision = \"f32\"", gigabytes(*needed), gigabytes(*free))]
+    #[error("the run needs {} of memory and {} are free; take larger cells, a smaller box, fewer surface nodes or [run] precision = \"f32\"", size(*needed), size(*free))]
     Memory {
         /// Memory of the run [bytes].
         needed: u64,
@@ -119,13 +120,6 @@ impl RunError {
             RunError::Io { .. } | RunError::NoCheckpoint { .. } => FailureKind::InputOutput,
         }
     }
-}
-
-/// Formats bytes as gigabytes with three digits.
-fn gigabytes(bytes: u64) -> String {
-    let value = bytes as f64 / 1e9;
-    let digits = (2.0 - value.max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
-    format!("{value:.digits$} GB")
 }
 
 /// Conversion of input/output errors, with the file and the action.

@@ -3,6 +3,7 @@
 use grainwake_shape::scan::{Refusal, ScannedGrain};
 
 use crate::exit::shape_help;
+use crate::progress::count;
 
 /// Maximum number of labels named on a line.
 const NAMED: usize = 12;
@@ -14,7 +15,6 @@ pub fn named(labels: &[u32]) -> String {
 }
 
 /// Returns one line per reason, followed by the result of the trials if there were any.
-/// Returns the reason with the labels and their sizes.
 pub fn lines(refusals: &[Refusal], rescue: bool) -> Vec<String> {
     refusals
         .iter()
@@ -26,13 +26,13 @@ pub fn lines(refusals: &[Refusal], rescue: bool) -> Vec<String> {
 /// Returns the reason with the labels and their sizes.
 pub fn line(refusal: &Refusal) -> String {
     let [fewest, most] = refusal.voxels;
-    let sizes = if fewest == most { most.to_string() } else { format!("{fewest} to {most}") };
-    let count = refusal.labels.len();
+    let range = if fewest == most { String::new() } else { format!("{fewest} to ") };
     format!(
-        "{count} {} rejected, {}: {} ({sizes} voxels)",
-        if count == 1 { "label" } else { "labels" },
+        "{} rejected, {}: {} ({range}{})",
+        count(refusal.labels.len(), "label"),
         refusal.reason,
-        named(&refusal.labels)
+        named(&refusal.labels),
+        count(most as usize, "voxel")
     )
 }
 

@@ -49,6 +49,14 @@ pub fn vector(value: DVec3, unit: &str) -> String {
     format!("[{}]", parts.join(", "))
 }
 
+/// Formats a size [bytes] with three digits, in gigabytes from 1 GB on and in megabytes below.
+pub fn size(bytes: u64) -> String {
+    let bytes = bytes as f64;
+    let (value, unit) = if bytes < 1e9 { (1e-6 * bytes, "MB") } else { (1e-9 * bytes, "GB") };
+    let digits = (2.0 - value.max(0.1).log10().floor()).clamp(0.0, 2.0) as usize;
+    format!("{value:.digits$} {unit}")
+}
+
 fn six_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
@@ -68,5 +76,13 @@ mod tests {
         assert_eq!(quantity(0.5, "1"), "0.5");
         assert_eq!(number(3.1e-12), "3.1e-12");
         assert_eq!(number(1.0 / 3.0), "0.333333");
+    }
+
+    #[test]
+    fn sizes_have_three_digits() {
+        let sizes =
+            [0, 20_000, 1_234_567, 45_678_900, 999_000_000, 1_279_999_999, 7_040_400_000_000];
+        let wanted = ["0.00 MB", "0.02 MB", "1.23 MB", "45.7 MB", "999 MB", "1.28 GB", "7040 GB"];
+        assert_eq!(sizes.map(size), wanted);
     }
 }

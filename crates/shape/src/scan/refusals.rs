@@ -82,7 +82,7 @@ fn reason(why: &ShapeError) -> String {
         ShapeError::CutByBorder { .. } => "cut by the image border".into(),
         ShapeError::CutByView { .. } => "cut by the edge of the field of view".into(),
         ShapeError::SeveralPieces { .. } => "each of several separate pieces".into(),
-        ShapeError::TooFewVoxels { needed, .. } => format!("each of fewer than {needed} voxels"),
+        ShapeError::TooFewVoxels { needed, .. } => format!("fewer than {needed} voxels"),
         ShapeError::Quality { defect: Defect::Broken, .. } => {
             "the smoothed surface falls into pieces".into()
         }
