@@ -62,14 +62,17 @@ fn state(threads: usize, precision: Precision, scheme: Scheme) -> Vec<u8> {
 
 #[test]
 fn sharing_rows_gives_the_same_bits_on_several_threads() {
+    if cfg!(miri) {
+        // Miri finds races and undefined behaviour in one run.
+        state(2, Precision::Double, Scheme::Aperture);
+        return;
+    }
     for scheme in [Scheme::Aperture, Scheme::Paper] {
         for precision in [Precision::Double, Precision::Single] {
             let one = state(1, precision, scheme);
-            for threads in if cfg!(miri) { 2..3 } else { 2..5 } {
-                assert!(
-                    state(threads, precision, scheme) == one,
-                    "{scheme:?} {precision:?} {threads}"
-                );
+            for threads in 2..5 {
+                let several = state(threads, precision, scheme);
+                assert!(several == one, "{scheme:?} {precision:?} {threads}");
             }
         }
     }

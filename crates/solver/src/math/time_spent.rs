@@ -75,8 +75,9 @@ pub fn timed<T>(total: &mut TimeSpent, work: impl FnOnce() -> T) -> T {
 }
 
 /// CPU clocks of the threads of a pool. The clock of the process would also count other
-/// simulations, such as the runs of a study that are computed at the same time.
-#[cfg(target_os = "linux")]
+/// simulations, such as the runs of a study that are computed at the same time. Miri has no such
+/// clocks.
+#[cfg(all(target_os = "linux", not(miri)))]
 mod clocks {
     use std::time::Duration;
 
@@ -117,7 +118,7 @@ mod clocks {
     }
 }
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(any(miri, not(target_os = "linux")))]
 mod clocks {
     use std::time::Duration;
 
