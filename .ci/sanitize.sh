@@ -1,16 +1,17 @@
 #!/usr/bin/env bash
-# Checks the unsafe code. Each check is run alone by its name; without names all of them are.
+# Checks the unsafe code. Each check is run alone by its name; without names all but `step` are.
 #
-#   .ci/sanitize.sh [memcheck] [address] [thread] [miri]
+#   .ci/sanitize.sh [memcheck] [address] [thread] [miri] [step]
 #
 # memcheck  valgrind on the release program with two small cases in both precisions, 2 threads
 # address   address sanitizer on the tests of crates/simd, with all instruction sets of the machine
 # thread    thread sanitizer on grains that share rows of faces: unit tests of the coupling, and the
 #           test `sharing` of crates/solver with up to 4 threads
-# miri      tests of crates/simd with the instructions of every machine, and a step of two touching
-#           grains on 2 threads
+# miri      tests of crates/simd with the instructions of every machine, and tests of the shared rows
+#           of fields
+# step      a step of two touching grains on 2 threads under Miri; more than 6 min of CPU time
 #
-# A check whose tool is missing is skipped with a note. The last three need a nightly toolchain,
+# A check whose tool is missing is skipped with a note. All but the first need a nightly toolchain,
 # `thread` its component rust-src too.
 # The fuzz target `checkpoint` steps whole simulations under the address sanitizer.
 set -euo pipefail
@@ -52,14 +53,21 @@ thread() {
     --target-dir target/thread -p grainwake-solver --lib --test sharing -- immersed sharing
 }
 
-miri() {
+miri_solver() { # ARGUMENTS
   cargo +nightly miri --version >/dev/null 2>&1 || { missing miri "Miri is not installed"; return; }
-  cargo +nightly miri test --target-dir target/miri -p grainwake-simd --lib
   # The thread pool violates stacked borrows, but not tree borrows, and its threads outlive the test.
   local flags="-Zmiri-tree-borrows -Zmiri-ignore-leaks -Zmiri-permissive-provenance"
   MIRIFLAGS="$flags -Zmiri-disable-isolation" \
-    cargo +nightly miri test --target-dir target/miri -p grainwake-solver --test sharing
+    cargo +nightly miri test --target-dir target/miri -p grainwake-solver "$@"
 }
+
+miri() {
+  cargo +nightly miri --version >/dev/null 2>&1 || { missing miri "Miri is not installed"; return; }
+  cargo +nightly miri test --target-dir target/miri -p grainwake-simd --lib
+  miri_solver --lib -- grid::loops grid::field update::tests
+}
+
+step() { miri_solver --test sharing; }
 
 for check in "$@"; do
   case "$check" in
@@ -67,6 +75,7 @@ for check in "$@"; do
     address) address ;;
     thread) thread ;;
     miri) miri ;;
+    step) step ;;
     *) echo "unknown check: $check" >&2; exit 2 ;;
   esac
 done

@@ -1,5 +1,5 @@
 //! Grains that share rows of faces, coupled on several threads. The thread sanitizer and Miri run
-//! this test too (`.ci/sanitize.sh`); Miri takes a small grid.
+//! this test too (`.ci/sanitize.sh`); Miri steps two grains on a small grid.
 
 use glam::DVec3;
 use grainwake_shape::Shape;
@@ -14,10 +14,10 @@ use grainwake_solver::sim::{Setup, Simulation, StepRule};
 /// with another velocity, below a single sphere that touches none.
 fn case(precision: Precision, scheme: Scheme) -> Setup {
     let (lattice, cells, across) =
-        if cfg!(miri) { ([2, 1, 1], [9, 6, 9], 3) } else { ([3, 3, 2], [24, 20, 30], 5) };
+        if cfg!(miri) { ([2, 1, 1], [8, 5, 5], 3) } else { ([3, 3, 2], [24, 20, 30], 5) };
     let (spacing, pitch) = (1.0 / f64::from(across), 0.999);
     let mesh = Mesh::cubic(cells, spacing);
-    let shape = Shape::sphere(0.5, if cfg!(miri) { 20 } else { 200 });
+    let shape = Shape::sphere(0.5, if cfg!(miri) { 12 } else { 200 });
     let corner = DVec3::new(0.53, 0.52, 0.51);
     let mut grains = Vec::new();
     for i in 0..lattice[0] {
@@ -25,11 +25,14 @@ fn case(precision: Precision, scheme: Scheme) -> Setup {
             for k in 0..lattice[2] {
                 let place = DVec3::new(f64::from(i), f64::from(j), f64::from(k));
                 let velocity = DVec3::new(0.01, -0.02, -0.03) * (1.0 + place.element_sum());
+                let velocity = if cfg!(miri) { DVec3::ZERO } else { velocity };
                 grains.push((corner + pitch * place, velocity));
             }
         }
     }
-    grains.push((mesh.extent() - DVec3::splat(0.6), DVec3::ZERO));
+    if !cfg!(miri) {
+        grains.push((mesh.extent() - DVec3::splat(0.6), DVec3::ZERO));
+    }
     let grains = grains.into_iter().map(|(position, velocity)| {
         Grain::new(shape.clone(), 2.5).with_position(position).with_velocity(velocity)
     });
