@@ -1,8 +1,8 @@
 //! `grainwake check`.
 
 use grainwake_run::case::Case;
-use grainwake_run::case::number_format::{number, quantity, size, vector};
 use grainwake_run::case::{Estimate, cells_for_drag_error, drag_error_text};
+use grainwake_run::number_format::{number, quantity, size, vector};
 use grainwake_run::{Probe, ProbePlace};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 

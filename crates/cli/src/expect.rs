@@ -1,7 +1,7 @@
 //! Text form of the results of `[expect]`.
 
-use grainwake_run::case::number_format::quantity;
 use grainwake_run::case::{Problem, Verdict};
+use grainwake_run::number_format::quantity;
 
 /// Returns the value, the expected range and the verdict on one line.
 pub fn line(v: &Verdict) -> String {

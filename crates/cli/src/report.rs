@@ -1,7 +1,7 @@
 //! `grainwake report`.
 
 use grainwake_report::{ReportError, render, write_film};
-use grainwake_run::case::number_format::size;
+use grainwake_run::number_format::size;
 use grainwake_study::{Analysis, Plan};
 
 use crate::args::ReportArgs;

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use comfy_table::{CellAlignment, Table, presets};
 use grainwake_run::FailureKind;
-use grainwake_run::case::number_format::size;
+use grainwake_run::number_format::size;
 use grainwake_study::{
     Analysis, Archive, Options, Outcome, Plan, Run, RunRecord, RunState, Selection, StudyError,
     execute, expected_cost, records, run_state, write_tables,

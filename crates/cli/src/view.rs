@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use grainwake_report::run_folder::RunFolder;
-use grainwake_run::case::number_format::size;
+use grainwake_run::number_format::size;
 use grainwake_study::format::rounded;
 use grainwake_study::{Plan, columns, records};
 use grainwake_view::server::Server;

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::case::number_format::size;
+use crate::number_format::size;
 use grainwake_solver::sim::{RemedyTerms, SetupError, StepError};
 
 /// Kind of a failure, from the mildest to the worst.

@@ -6,7 +6,7 @@
 //!
 //! Layers, downwards: `case` -> `run_loop` -> `recording` -> `recorder` -> `run_folder`,
 //! `contact_events`, `series`, `watch` -> `overlaps`, `contact_work`, `memory`, `meter`,
-//! `threads`, `plan`, `error`.
+//! `threads`, `plan`, `error`, `number_format`.
 
 pub mod case;
 mod contact_events;
@@ -15,6 +15,7 @@ mod error;
 mod job;
 mod memory;
 mod meter;
+pub mod number_format;
 mod overlaps;
 mod plan;
 mod recorder;

@@ -12,8 +12,8 @@ mod table;
 
 use std::path::Path;
 
-use grainwake_run::case::number_format;
 use grainwake_run::case::parse_length;
+use grainwake_run::number_format;
 use grainwake_shape::render::Picture;
 use grainwake_shape::{Shape, ShapeOptions};
 

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use glam::DVec3;
-use grainwake_run::case::number_format;
 use grainwake_run::case::quantity::Length;
+use grainwake_run::number_format;
 use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
 use grainwake_shape::mesh::{
     MeshOptions, TriangleMesh, mesh_from_memory, read_mesh, shape_from_mesh,

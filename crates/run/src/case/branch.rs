@@ -5,9 +5,9 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::error::{CaseError, Problem};
-use super::number_format::{quantity, vector};
 use super::quantity::{Time, parse_quantity};
 use super::{Case, Source};
+use crate::number_format::{quantity, vector};
 use crate::{Parent, RESOLVED, RunError};
 use grainwake_solver::dem::{Grain, MotionConstraint};
 

@@ -10,7 +10,7 @@
 //!
 //! Layers, downwards: `branch`, `continuation`, `validate` -> `warnings` -> `estimate`, `packing`,
 //! `placement`, `shapes` -> `settling`, `expect` -> `raw` -> `source` -> `quantity` -> `notation`,
-//! `units`, `located`, `error`, `number_format`, `suggest`.
+//! `units`, `located`, `error`, `suggest`.
 
 mod branch;
 mod continuation;
@@ -19,7 +19,6 @@ mod estimate;
 mod expect;
 mod located;
 mod notation;
-pub mod number_format;
 mod overrides;
 mod packing;
 mod placement;

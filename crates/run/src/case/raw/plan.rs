@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::scales::RawScales;
 use crate::case::located::Located;
 use crate::case::notation::{Notation, Unsupported, notations, variant};
-use crate::case::number_format::AXES;
 use crate::case::quantity::{Length, Number, Quantity, Time};
+use crate::number_format::AXES;
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::events::StopWhen;
 

@@ -2,9 +2,9 @@
 
 use crate::case::error::Problem;
 use crate::case::located::{Located, Span};
-use crate::case::number_format::{number, quantity};
 use crate::case::quantity::{Kind, Quantity};
 use crate::case::source::Source;
+use crate::number_format::{number, quantity};
 
 /// Collector of problems; a case without problems is valid.
 pub(super) struct Checker<'a> {

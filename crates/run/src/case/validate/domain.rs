@@ -4,9 +4,9 @@ use glam::DVec3;
 
 use super::check::Checker;
 use crate::case::located::{Located, Span};
-use crate::case::number_format::{AXES, length, number, quantity, vector};
 use crate::case::quantity::{Length, Triple};
 use crate::case::raw::{AxisFaces, CellSize, Face, FaceKind, RawBoundaries, RawDomain};
+use crate::number_format::{AXES, length, number, quantity, vector};
 use grainwake_solver::flow::{Boundaries, Boundary};
 use grainwake_solver::grid::Mesh;
 

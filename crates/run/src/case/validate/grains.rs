@@ -8,12 +8,12 @@ use grainwake_shape::Shape;
 use super::arrangement::Placement;
 use super::check::Checker;
 use crate::case::located::{Located, Span};
-use crate::case::number_format::{AXES, number, quantity, vector};
 use crate::case::placement::{extent_along, orientation};
 use crate::case::quantity::{Density, Kind, Quantity, Triple};
 use crate::case::raw::{MotionLaw, Orientation, Position, RawGrain, Turns};
 use crate::case::settling::LIGHTEST_FREE;
 use crate::case::shapes::{DEFAULT_NODES, Library};
+use crate::number_format::{AXES, number, quantity, vector};
 use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::sim::PrescribedMotion;
 

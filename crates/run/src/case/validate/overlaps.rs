@@ -4,9 +4,9 @@ use glam::{DQuat, DVec3};
 
 use super::arrangement::{LISTED, Placement, distance};
 use super::check::Checker;
-use crate::case::number_format::number;
 use crate::case::packing::ROUNDING;
 use crate::case::placement::extent_along;
+use crate::number_format::number;
 use grainwake_solver::dem::{
     Enclosure, Grain, Overlap, Partner, RelativeOverlap, initial_overlaps,
 };

@@ -3,12 +3,12 @@
 use super::check::Checker;
 use super::grains::{Grains, not_too_light, shape};
 use crate::case::located::Located;
-use crate::case::number_format::vector;
 use crate::case::packing::{Random, Region, Sphere, orientation};
 use crate::case::quantity::Quantity;
 use crate::case::raw::{
     Arrangement, Bounds, Orientation, PackingOrientation, Position, RawGrain, RawPacking,
 };
+use crate::number_format::vector;
 use grainwake_solver::dem::Enclosure;
 use rand::{RngExt, SeedableRng};
 

@@ -4,9 +4,9 @@ use glam::DVec3;
 
 use super::check::Checker;
 use crate::case::located::{Located, Span};
-use crate::case::number_format::{AXES, length, vector};
 use crate::case::quantity::{Length, Triple};
 use crate::case::raw::{RawLine, RawProbe, RawProbePlane};
+use crate::number_format::{AXES, length, vector};
 use crate::{Probe, ProbePlace};
 use grainwake_solver::grid::Mesh;
 

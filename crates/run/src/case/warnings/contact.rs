@@ -1,7 +1,7 @@
 //! Warnings about contact.
 
-use crate::case::number_format::number;
 use crate::case::settling::{impact_speed, is_free, terminal_speed};
+use crate::number_format::number;
 use grainwake_solver::dem::{ContactDynamics, ContactLawKind, Grain};
 use grainwake_solver::math::Load;
 use grainwake_solver::sim::Setup;

@@ -7,8 +7,8 @@ use glam::DVec3;
 
 use crate::case::estimate::Estimate;
 use crate::case::expect::{Expectation, Measure};
-use crate::case::number_format::{AXES, SIDES, quantity};
 use crate::case::settling::{is_free, time_step};
+use crate::number_format::{AXES, SIDES, quantity};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{MotionConstraint, outside};
 use grainwake_solver::flow::Boundary;

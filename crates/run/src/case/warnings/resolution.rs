@@ -1,8 +1,8 @@
 //! Warnings about resolution and cost.
 
 use crate::case::estimate::{Estimate, THIN_LAYER_DRAG_ERROR, drag_error_text};
-use crate::case::number_format::{AXES, quantity};
 use crate::case::settling::time_step;
+use crate::number_format::{AXES, quantity};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::{Setup, StepRule};

@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 /// Names of the axes.
-pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 /// Names of the two faces of an axis.
-pub(super) const SIDES: [&str; 2] = ["lower", "upper"];
+pub(crate) const SIDES: [&str; 2] = ["lower", "upper"];
 
 /// Units that take a prefix: those whose first part is not a power.
 const PREFIXED: [&str; 7] = ["m", "s", "m/s", "m/s2", "Pa s", "N/m", "L/s"];
