@@ -61,7 +61,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let (jobs, each) = threads::share(jobs, args.threads);
     if args.list || args.dry_run {
         plan.check_folder(&folder)?;
-        let archive = Archive::read(&folder, &plan.accepted);
+        let archive = Archive::read(&folder);
         let states: Vec<(usize, RunState)> =
             chosen.iter().map(|i| (*i, run_state(&runs[*i], &folder, &archive))).collect();
         if args.json {
@@ -93,7 +93,6 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         threads: each,
         retry: args.retry,
         keep_checkpoints: args.keep_checkpoints,
-        accepted: plan.accepted.clone(),
         command: std::env::args().collect(),
     };
     let board = Board::new(runs, &chosen, jobs, args.quiet, stop.clone());

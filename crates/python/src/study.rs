@@ -143,7 +143,6 @@ impl PyStudy {
             threads: each,
             retry,
             keep_checkpoints,
-            accepted: plan.accepted.clone(),
             command: running::command(py)?,
         };
         let (messages, stop) = (Mutex::new(Vec::new()), AtomicBool::new(false));

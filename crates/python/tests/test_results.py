@@ -309,6 +309,8 @@ values = [{{ name = "light", value = 1500 }}, {{ name = "heavy", value = 2500 }}
     seen = []
     results = study.run(tmp_path / "study", progress=seen.append)
     assert seen[-1]["done"] == 2
+    with pytest.raises(gw.CaseError, match="900fc4e"):
+        study.run(tmp_path / "study", accept=["900fc4e"], progress=False)
     assert results.runs == study.runs
     table = results.table
     assert len(table) == 2 and set(table["state"]) == {"finished"}

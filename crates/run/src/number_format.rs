@@ -4,7 +4,7 @@ use glam::DVec3;
 
 /// Names of the axes.
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
-/// Names of the two faces of an axis.
+/// Names of the two sides of the box along an axis.
 pub(crate) const SIDES: [&str; 2] = ["lower", "upper"];
 
 /// Units that take a prefix: those whose first part is not a power.

@@ -31,7 +31,6 @@ fn session(plan: &Plan, study: &Path) -> Result<Vec<Outcome>, StudyError> {
         threads: 1,
         retry: false,
         keep_checkpoints: false,
-        accepted: Vec::new(),
         command: vec!["test".into()],
     };
     plan.create_folder(study)?;

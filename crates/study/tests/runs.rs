@@ -33,7 +33,6 @@ fn options(jobs: usize) -> Options {
         threads: 1,
         retry: false,
         keep_checkpoints: false,
-        accepted: Vec::new(),
         command: vec!["test".into()],
     }
 }
@@ -46,7 +45,7 @@ fn run(plan: &Plan, study: &Path, watcher: &dyn StudyObserver, options: &Options
 }
 
 fn states(plan: &Plan, study: &Path) -> Vec<RunState> {
-    let archive = Archive::read(study, &plan.accepted);
+    let archive = Archive::read(study);
     plan.runs.iter().map(|r| run_state(r, study, &archive)).collect()
 }
 
@@ -268,7 +267,7 @@ fn a_study_continues_from_its_archive() {
 #[test]
 fn finished_runs_of_accepted_programs_count() {
     let (folder, path) = folder(STUDY);
-    let mut plan = plan(&path).unwrap();
+    let plan = plan(&path).unwrap();
     let study = folder.path().join("out");
     plan.create_folder(&study).unwrap();
     execute(&plan.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
@@ -280,7 +279,9 @@ fn finished_runs_of_accepted_programs_count() {
     made["commit"] = other.clone().into();
     std::fs::write(&provenance, made.to_string()).unwrap();
     let mut rows = records(&plan, &study);
-    rows[4].id = plan.runs[4].id_at(&other);
+    let accepting = plan.clone().accepting(std::slice::from_ref(&other)).unwrap();
+    let id_by_other = |i: usize| accepting.runs[i].accepted_ids[0].clone();
+    rows[4].id = id_by_other(4);
     write_tables(&rows, &study).unwrap();
     std::fs::remove_dir_all(plan.runs[4].folder(&study)).unwrap();
 
@@ -290,15 +291,14 @@ fn finished_runs_of_accepted_programs_count() {
     assert_eq!(kinds(&plan), [stale, missing, missing, missing, missing]);
     let wrong = plan.clone().accepting(&["900fc4e".into()]).unwrap_err();
     assert!(wrong.to_string().contains("900fc4e") && wrong.help.unwrap().contains("12"));
-    plan = plan.accepting(std::slice::from_ref(&other)).unwrap();
+    let plan = accepting.clone();
     assert_eq!(kinds(&plan), [finished, missing, missing, missing, finished]);
     let rows = records(&plan, &study);
     for i in [0, 4] {
         assert!(rows[i].finished() && rows[i].pair.is_some());
-        assert_eq!(rows[i].id, plan.runs[i].id_at(&other), "the row names the program");
+        assert_eq!(rows[i].id, id_by_other(i), "the row names the program");
     }
-    let accepting = Options { accepted: plan.accepted.clone(), ..options(1) };
-    let ended = execute(&plan.runs, &[0, 4], &study, &accepting, &Quiet).unwrap();
+    let ended = execute(&plan.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
     assert!(ended.iter().all(|(_, outcome)| *outcome == Outcome::AlreadyFinished));
     // An unfinished run of another program is not continued.
     std::fs::remove_file(plan.runs[0].folder(&study).join("summary.json")).unwrap();

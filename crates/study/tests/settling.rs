@@ -51,7 +51,6 @@ fn carried_out(grains: usize) -> (tempfile::TempDir, PathBuf, Plan) {
         threads: 1,
         retry: false,
         keep_checkpoints: false,
-        accepted: Vec::new(),
         command: vec!["test".into()],
     };
     let ended = execute(&plan.runs, &[0, 1], &out, &options, &Quiet).unwrap();

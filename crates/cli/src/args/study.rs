@@ -32,7 +32,7 @@ pub struct StudyArgs {
     /// Restart failed runs
     #[arg(long)]
     pub retry: bool,
-    /// Commit of another program whose finished runs count, if its results are the same; 12 digits,
+    /// Count finished runs by this commit of the program (12 digits), if its results are identical;
     /// repeatable
     #[arg(long, value_name = "COMMIT")]
     pub accept: Vec<String>,

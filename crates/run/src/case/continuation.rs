@@ -22,7 +22,7 @@ impl Case {
     pub fn job_in(&self, folder: &Path, existing: Existing) -> Result<Job, CaseError> {
         let mut job = self.job();
         let resumes = matches!(existing, Existing::Resume | Existing::ResumeOrStart);
-        let Some(started) = started(folder).filter(|_| resumes) else { return Ok(job) };
+        let Some(started) = resumes.then(|| started(folder)).flatten() else { return Ok(job) };
         let mut raw = self.raw.clone();
         let (output, before) = (&mut raw.output, &started.output);
         self.keep("output.tables", &mut output.tables, &before.tables, &mut job.plan.tables);

@@ -202,19 +202,25 @@ impl Boundaries {
     /// Fills the ghosts along x and y of one plane of the pressure.
     pub(crate) fn fill_pressure_of_plane<R: Real>(&self, layout: Layout, plane: &mut [R]) {
         let (row, [nx, ny, _]) = (layout.row(), layout.cells);
-        plane.chunks_exact_mut(row).for_each(|row| self.fill_pressure_ends(row, 1, 0, nx));
-        self.fill_pressure_ends(plane, row, 1, ny);
+        let ends = self.pressure_ends()[0];
+        for row in plane.chunks_exact_mut(row) {
+            (row[0], row[nx + 1]) = match ends {
+                Ends::Periodic => (row[nx], row[1]),
+                Ends::Neumann => (row[1], row[nx]),
+            };
+        }
+        self.fill_pressure_layers(plane, row, 1, ny);
     }
 
     /// Fills the ghost planes of the pressure.
     pub(crate) fn fill_pressure_planes<R: Real>(&self, pressure: &mut Field<Centre, R>) {
         let layout = pressure.layout();
-        self.fill_pressure_ends(pressure, layout.plane(), 2, layout.cells[2]);
+        self.fill_pressure_layers(pressure, layout.plane(), 2, layout.cells[2]);
     }
 
     /// Fills the ghost layers of the pressure at both ends of an axis with `n` cells.
-    fn fill_pressure_ends<R: Real>(&self, values: &mut [R], layer: usize, axis: usize, n: usize) {
-        let rule = match pressure_condition(&self.0[axis][0]) {
+    fn fill_pressure_layers<R: Real>(&self, values: &mut [R], layer: usize, axis: usize, n: usize) {
+        let rule = match self.pressure_ends()[axis] {
             Ends::Periodic => GhostRule::Periodic,
             Ends::Neumann => GhostRule::ZeroGradient,
         };

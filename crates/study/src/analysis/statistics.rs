@@ -1,4 +1,5 @@
-//! Rank statistics of small samples; no assumption about the distribution of the values.
+//! Rank statistics and bootstrap intervals of small samples, without an assumption about the
+//! distribution of the values.
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -91,6 +91,7 @@ mod tests {
             base: Default::default(),
             set: Vec::new(),
             id: String::new(),
+            accepted_ids: Vec::new(),
             case_sha256: String::new(),
             ending: String::new(),
             end_s: 1.0,

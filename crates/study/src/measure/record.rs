@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::pair::PairMeasures;
 use super::settling::SettlingMeasures;
 use crate::plan::{Plan, Run, TABLE};
-use crate::run::state::{RunState, StateKind, run_state_for};
+use crate::run::state::{RunState, StateKind, folder_state};
 
 /// A run and its measured values. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -60,9 +60,10 @@ pub struct RunRecord {
 
 impl RunRecord {
     /// Reads the record of a run from its folder.
-    pub fn read(run: &Run, plan: &Plan, study: &Path) -> RunRecord {
-        let state =
-            run_state_for(run, study, (&plan.version, plan.commit.as_deref()), &plan.accepted);
+    pub fn read(run: &Run, study: &Path) -> RunRecord {
+        let (state, folder) = (folder_state(run, study), run.folder(study));
+        let by_program = || Some(run.id_by(&Provenance::read(&folder)?));
+        let id = if state == RunState::Finished { by_program() } else { None };
         let mut record = RunRecord {
             name: run.name.clone(),
             model: run.model.clone(),
@@ -70,16 +71,13 @@ impl RunRecord {
             levels: run.levels.clone(),
             factors: run.factors.clone(),
             state: state.kind(),
-            id: match state {
-                RunState::Finished => id_of_folder(run, plan, study),
-                _ => run.id.clone(),
-            },
+            id: id.unwrap_or_else(|| run.id.clone()),
             ..RunRecord::default()
         };
         match state {
             RunState::Failed(why) => record.remark = Some(why),
             RunState::Stale(why) => record.remark = Some(why.into()),
-            RunState::Finished => record.measure(&run.folder(study)),
+            RunState::Finished => record.measure(&folder),
             RunState::Missing | RunState::Unfinished => {}
         }
         record
@@ -139,15 +137,6 @@ impl RunRecord {
     }
 }
 
-/// Returns the hash of the program that made a run folder: this program or an accepted one.
-fn id_of_folder(run: &Run, plan: &Plan, study: &Path) -> String {
-    let commit = Provenance::read(&run.folder(study)).and_then(|found| found.commit);
-    match commit.filter(|commit| plan.accepted.contains(commit)) {
-        Some(commit) => run.id_at(&commit),
-        None => run.id.clone(),
-    }
-}
-
 /// Reads the records of all runs of a study.
 ///
 /// A run without a folder keeps its record in `table.json`, so that run folders may be removed.
@@ -155,10 +144,8 @@ pub fn records(plan: &Plan, study: &Path) -> Vec<RunRecord> {
     let text = std::fs::read_to_string(study.join(TABLE)).unwrap_or_default();
     let kept: Vec<RunRecord> = serde_json::from_str(&text).unwrap_or_default();
     let read = |run: &Run| {
-        let record = RunRecord::read(run, plan, study);
-        let mut ids: Vec<String> = plan.accepted.iter().map(|commit| run.id_at(commit)).collect();
-        ids.push(run.id.clone());
-        let same = |old: &RunRecord| old.name == record.name && ids.contains(&old.id);
+        let record = RunRecord::read(run, study);
+        let same = |old: &RunRecord| old.name == run.name && run.ids().any(|id| *id == old.id);
         let old = kept.iter().find(|old| same(old) && old.finished());
         let missing = record.state == StateKind::Missing;
         old.filter(|_| missing).cloned().unwrap_or(record)

@@ -116,9 +116,10 @@ pub(super) fn provenance(content: &Content) -> Markup {
     let sum = |pick: fn(&RunRecord) -> Option<f64>| -> f64 {
         content.records.iter().filter_map(pick).sum()
     };
-    let made_at = |commit: &String| {
-        let both = plan.runs.iter().zip(content.records);
-        both.filter(|(run, record)| record.finished() && record.id == run.id_at(commit)).count()
+    // Finished runs of the n-th accepted program.
+    let accepted = |n: usize| {
+        let both = plan.runs.iter().zip(content.records).filter(|(_, record)| record.finished());
+        both.filter(|(run, record)| run.accepted_ids.get(n) == Some(&record.id)).count()
     };
     let divergences = content.records.iter().filter_map(|r| r.max_divergence);
     let divergence = divergences.fold(0.0, f64::max);
@@ -129,8 +130,8 @@ pub(super) fn provenance(content: &Content) -> Markup {
             html! {
                 "Grainwake " (plan.version)
                 @if let Some(commit) = &plan.commit { ", commit " (commit) }
-                @for commit in &plan.accepted {
-                    "; " (made_at(commit)) " finished runs at commit " (commit)
+                @for (n, commit) in plan.accepted.iter().enumerate() {
+                    "; " (accepted(n)) " finished runs by commit " (commit)
                 }
             },
         ),

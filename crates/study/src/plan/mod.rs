@@ -62,6 +62,9 @@ pub struct Run {
     pub set: Vec<String>,
     /// Hash of the case, the end condition and the program.
     pub id: String,
+    /// Hashes with the programs whose finished runs count, in the order of [`Plan::accepted`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub accepted_ids: Vec<String>,
     /// Hash of the case without its end, as in `provenance.json`.
     pub case_sha256: String,
     /// End time and stop condition as text.
@@ -83,10 +86,15 @@ impl Run {
         Case::load(&self.base, &self.set)
     }
 
-    /// Returns the hash of the run if the program of this version at `commit` made it.
-    pub fn id_at(&self, commit: &str) -> String {
-        let version = Provenance::new("").version;
-        resolve::run_id(&self.case_sha256, &self.ending, &version, commit)
+    /// Returns the hash of the case, the end condition and another program.
+    pub fn id_by(&self, program: &Provenance) -> String {
+        let commit = program.commit.as_deref().unwrap_or_default();
+        resolve::run_id(&self.case_sha256, &self.ending, &program.version, commit)
+    }
+
+    /// Returns the hashes of the run by the program of the plan and by the accepted ones.
+    pub fn ids(&self) -> impl Iterator<Item = &String> {
+        std::iter::once(&self.id).chain(&self.accepted_ids)
     }
 
     /// Returns the run folder in a study folder.
@@ -126,19 +134,22 @@ impl Plan {
     ///
     /// # Errors
     /// If a text is not a commit as in `provenance.json`.
-    pub fn accepting(self, commits: &[String]) -> Result<Plan, Problem> {
+    pub fn accepting(mut self, commits: &[String]) -> Result<Plan, Problem> {
         let is_commit = |text: &str| {
             text.len() == COMMIT_DIGITS && text.chars().all(|c| matches!(c, '0'..='9' | 'a'..='f'))
         };
-        match commits.iter().find(|commit| !is_commit(commit)) {
-            None => Ok(Plan { accepted: commits.to_vec(), ..self }),
-            Some(wrong) => {
-                let message = format!("--accept: \"{wrong}\" is not a commit of the program");
-                Err(Problem::new(message).help(format!(
-                    "give the {COMMIT_DIGITS} hexadecimal digits that `provenance.json` of a run has"
-                )))
-            }
+        if let Some(wrong) = commits.iter().find(|commit| !is_commit(commit)) {
+            let message = format!("accept: \"{wrong}\" is not a commit of the program");
+            return Err(Problem::new(message).help(format!(
+                "give the {COMMIT_DIGITS} hexadecimal digits of `commit` in the run's provenance.json"
+            )));
         }
+        for run in &mut self.runs {
+            let id = |commit| resolve::run_id(&run.case_sha256, &run.ending, &self.version, commit);
+            run.accepted_ids = commits.iter().map(|commit| id(commit)).collect();
+        }
+        self.accepted = commits.to_vec();
+        Ok(self)
     }
 
     /// Creates the study folder, removes temporary files of killed programs that are more than a

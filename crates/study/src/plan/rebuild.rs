@@ -111,6 +111,7 @@ fn runs_in(folder: &Path) -> Vec<Run> {
             base: PathBuf::new(),
             set: Vec::new(),
             id,
+            accepted_ids: Vec::new(),
             case_sha256: String::new(),
             ending: String::new(),
             end_s: 0.0,

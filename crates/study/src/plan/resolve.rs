@@ -93,6 +93,7 @@ pub(super) fn run_of_case(name: &str, base: &Path, set: Vec<String>, case: &Case
         base: base.into(),
         set,
         id,
+        accepted_ids: Vec::new(),
         case_sha256: case.digest.clone(),
         ending,
         end_s: case.plan.end,

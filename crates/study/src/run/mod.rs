@@ -30,8 +30,6 @@ pub struct Options {
     pub retry: bool,
     /// Whether checkpoints of finished runs are kept.
     pub keep_checkpoints: bool,
-    /// Commits of other programs whose finished runs are not repeated.
-    pub accepted: Vec<String>,
     /// Command line, for the provenance.
     pub command: Vec<String>,
 }
@@ -94,7 +92,7 @@ pub fn execute(
     let queue: Mutex<VecDeque<usize>> = Mutex::new(chosen.iter().copied().collect());
     let ended: Mutex<Vec<(usize, Outcome)>> = Mutex::new(Vec::new());
     let disk_full = AtomicBool::new(false);
-    let archive = Archive::read(study, &options.accepted);
+    let archive = Archive::read(study);
     let work = |pool: &rayon::ThreadPool| {
         while let Some(index) = queue.lock().ok().and_then(|mut queue| queue.pop_front()) {
             let job = Job { run: &runs[index], index, study, archive: &archive, options, observer };

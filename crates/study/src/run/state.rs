@@ -70,17 +70,11 @@ impl fmt::Display for StateKind {
 
 /// Finished runs in `table.json` of a study folder. Their run folders may have been removed.
 #[derive(Clone, Debug, Default)]
-pub struct Archive {
-    /// Names and hashes of the runs.
-    finished: BTreeSet<(String, String)>,
-    /// Commits of other programs whose finished runs count.
-    accepted: Vec<String>,
-}
+pub struct Archive(BTreeSet<(String, String)>);
 
 impl Archive {
     /// Reads the names and hashes of the finished runs; none if the table is missing or damaged.
-    /// Finished runs by other programs count if their commits are `accepted`.
-    pub fn read(study: &Path, accepted: &[String]) -> Archive {
+    pub fn read(study: &Path) -> Archive {
         #[derive(Deserialize)]
         struct Row {
             name: String,
@@ -90,40 +84,26 @@ impl Archive {
         let text = std::fs::read_to_string(study.join(TABLE)).unwrap_or_default();
         let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
         let finished = rows.into_iter().filter(|row| row.state == StateKind::Finished);
-        Archive {
-            finished: finished.map(|row| (row.name, row.id)).collect(),
-            accepted: accepted.to_vec(),
-        }
+        Archive(finished.map(|row| (row.name, row.id)).collect())
     }
 
-    /// Returns whether the run finished with the same case, end condition and program, or with an
-    /// accepted program.
+    /// Returns whether the run finished with the same case and end condition, by the program of the
+    /// plan or an accepted one.
     pub fn contains(&self, run: &Run) -> bool {
-        let ids = self.accepted.iter().map(|commit| run.id_at(commit));
-        let mut ids = ids.chain([run.id.clone()]);
-        ids.any(|id| self.finished.contains(&(run.name.clone(), id)))
+        run.ids().any(|id| self.0.contains(&(run.name.clone(), id.clone())))
     }
 }
 
-/// Determines the state of a run for this program. A run without a folder is finished if the
-/// archive contains it.
+/// Determines the state of a run. A run without a folder is finished if the archive contains it.
 pub fn run_state(run: &Run, study: &Path, archive: &Archive) -> RunState {
-    let program = Provenance::new("");
-    let program = (program.version.as_str(), program.commit.as_deref());
-    match run_state_for(run, study, program, &archive.accepted) {
+    match folder_state(run, study) {
         RunState::Missing if archive.contains(run) => RunState::Finished,
         state => state,
     }
 }
 
-/// Determines the state of a run for a program, given by version and commit. Finished runs of the
-/// version at `accepted` commits count.
-pub(crate) fn run_state_for(
-    run: &Run,
-    study: &Path,
-    (version, commit): (&str, Option<&str>),
-    accepted: &[String],
-) -> RunState {
+/// Determines the state of a run by its run folder. The finished run of an accepted program counts.
+pub(crate) fn folder_state(run: &Run, study: &Path) -> RunState {
     let folder = run.folder(study);
     let Some(found) = Provenance::read(&folder) else {
         return RunState::Missing;
@@ -131,10 +111,8 @@ pub(crate) fn run_state_for(
     if found.case_sha256 != run.case_sha256 {
         return RunState::Stale("its case has changed");
     }
-    let finished = folder.join(summary::FILE).is_file();
-    let by = found.commit.as_deref();
-    let counts = by == commit || finished && by.is_some_and(|c| accepted.iter().any(|a| a == c));
-    if found.version != version || !counts {
+    let (finished, id) = (folder.join(summary::FILE).is_file(), run.id_by(&found));
+    if id != run.id && !(finished && run.accepted_ids.contains(&id)) {
         return RunState::Stale("another version of the program produced it");
     }
     if finished {

@@ -79,8 +79,8 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
         }
     }
     let caption = "Mean over the models with equal or similar values of a factor; bars: \
-                   95 % intervals of a bootstrap over models and members. Events that did not occur \
-                   before the landing count in the kissing share only.";
+                   95 % intervals of a bootstrap over models and members. A pair that lands \
+                   before the event counts in the kissing share only.";
     Some(Figure::new("factor-means", "Results against shape factors", caption, drawing))
 }
 
