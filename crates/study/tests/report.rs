@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use grainwake_run::provenance::Provenance;
 use grainwake_study::{Condition, Kissing, Plan, RUNS, Run, Study, StudyReportFiles, render};
 
 /// Plan of the 65 models of the repository, with the hashes of the synthetic run folders.
@@ -15,8 +16,11 @@ fn synthetic_plan() -> Plan {
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/dkt-morphology/study.toml");
     let mut plan = Plan::resolve(&Study::read(&path).unwrap(), &[]).unwrap();
     (plan.version, plan.commit) = ("0.1.0".into(), Some("0123abc".into()));
+    let program =
+        Provenance { version: "0.1.0".into(), commit: plan.commit.clone(), ..Provenance::new("") };
     for run in &mut plan.runs {
         (run.case_sha256, run.ending) = ("00ff".into(), "end -, stop -".into());
+        run.id = run.id_by(&program);
     }
     plan
 }
