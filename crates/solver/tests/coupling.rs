@@ -246,6 +246,36 @@ fn grains_on_the_floor_come_to_rest_at_steps_longer_than_a_contact() {
     assert!(fastest < 0.1, "{fastest} mm/s");
 }
 
+/// Impacts of a weakly damped sphere on a floor die out, although each is shorter than a step.
+#[test]
+fn weakly_damped_impacts_die_out() {
+    for cells in [6, 7, 8] {
+        let spacing = 2.0 / f64::from(cells);
+        let ball = sphere(2.0, DVec3::new(4.1, 4.03, 1.2), 2.5);
+        let boundaries = [PERIODIC, PERIODIC, WALLS];
+        let size = [4 * cells as usize, 4 * cells as usize, 4 * cells as usize];
+        let mut case = setup(size, spacing, boundaries, 5.0, vec![ball]);
+        // Units: millimetres, milligrams, seconds.
+        case.gravity.z = -9810.0;
+        case.contact = ContactParams {
+            normal_stiffness: 1.8e6,
+            restitution: 0.9,
+            added_density: 0.8,
+            ..ContactParams::default()
+        };
+        case.step = StepRule::Fixed(0.5e-3);
+        let mut sim = Simulation::new(case).unwrap();
+        run(&mut sim, 0.15);
+        let mut fastest = 0.0_f64;
+        for _ in 0..20 {
+            sim.step(f64::INFINITY).unwrap();
+            fastest = fastest.max(sim.grains()[0].velocity.z.abs());
+        }
+        // Without decision 0022 the sphere keeps bouncing at 3 to 6 mm/s.
+        assert!(fastest < 0.1, "{cells} cells: {fastest} mm/s");
+    }
+}
+
 /// Heavy sphere on a lighter one on a floor: the total energy, fluid included, does not exceed its
 /// initial value.
 #[test]

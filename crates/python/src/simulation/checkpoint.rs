@@ -17,7 +17,7 @@ use super::PySimulation;
 use crate::error::{input, system};
 
 const SIGNATURE: &[u8; 8] = b"GWSTATE\n";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const CHECKSUM: usize = 32;
 
 impl PySimulation {

@@ -25,7 +25,7 @@ use crate::error::{Context, RunError};
 use crate::overlaps::Overlaps;
 
 const SIGNATURE: &[u8; 8] = b"GWCKPT\r\n";
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const CHECKSUM: u64 = 32;
 /// Folder of the checkpoints in a run folder.
 pub const FOLDER: &str = "checkpoint";

@@ -34,18 +34,21 @@ pub struct CoupledGrains {
 }
 
 impl CoupledGrains {
-    /// Fills `responses` with the responses of the grains to contact in this step.
+    /// Fills `responses` with the responses of the grains to contact in this step. `contact` are
+    /// the loads of the trial step.
     pub fn responses(
         &self,
         grains: &[Grain],
         previous: &[PreviousStep],
+        contact: &[Load],
         added_density: f64,
         dt: f64,
         responses: &mut Vec<GrainResponse>,
     ) {
         responses.clear();
-        let each = self.updates.iter().zip(grains).zip(previous);
-        let each = each.map(|((update, grain), previous)| {
+        let each = self.updates.iter().zip(grains).zip(previous).zip(contact);
+        let each = each.map(|(((update, grain), previous), contact)| {
+            let added_density = (!contact.is_zero()).then_some(added_density);
             (update.system).response(grain, previous, added_density, dt)
         });
         responses.extend(each);

@@ -150,6 +150,9 @@ impl GrainContext<'_> {
         let data = &mut *self.data;
         for (i, driving) in data.driving.iter_mut().enumerate() {
             *driving = data.applied[i] + self.loads[i];
+            if let Some(load) = data.previous[i].added_mass_load(&self.grains[i]) {
+                *driving += load;
+            }
         }
         let taken = timed(&mut self.times.contact, || {
             take_substeps(self.dynamics, self.grains, &data.driving, self.dt, &mut data.contact)
@@ -221,18 +224,19 @@ impl<'a> Moved<'a> {
 
 impl<'a> Coupled<'a> {
     /// Repeats the contact sub-steps with the 6 x 6 mass of grain and fluid if a contact or
-    /// lubrication load acts, walls included.
+    /// lubrication load acts, walls included, or acted in the step before.
     pub fn resolve_contact(self) -> Resolved<'a> {
         let Coupled(mut step, coupled, trial) = self;
         let solid = &mut step.solid;
         let (grains, data, dt) = (&mut *solid.grains, &mut *solid.data, solid.dt);
-        if data.contact.iter().all(Load::is_zero) {
+        let after_contact = data.previous.iter().any(PreviousStep::after_contact);
+        if data.contact.iter().all(Load::is_zero) && !after_contact {
             solid.dynamics.accept(trial);
             return Resolved(step, coupled, FinalPoses::TrialStep);
         }
         let added_density = solid.dynamics.params().added_density;
         let (previous, responses) = (&data.previous, &mut data.responses);
-        coupled.responses(grains, previous, added_density, dt, responses);
+        coupled.responses(grains, previous, &data.contact, added_density, dt, responses);
         timed(&mut solid.times.contact, || {
             let (contact, ends) = (&mut data.contact, &mut data.ends);
             (solid.dynamics).resolve_with_response(trial, grains, &data.responses, contact, ends)
@@ -296,10 +300,12 @@ impl Projected<'_> {
             let touched = !data.contact[i].is_zero();
             // The acceleration of an impact does not continue in the next step; its added mass
             // does.
+            let taken_up = previous.pending_added_mass_velocity;
+            previous.added_mass_loss = taken_up / dt;
             (previous.acceleration, previous.pending_added_mass_velocity) = if touched {
                 (RigidVelocity::default(), beyond_substeps(grain, &data.ends[i]))
             } else {
-                (change / dt, RigidVelocity::default())
+                ((change + taken_up) / dt, RigidVelocity::default())
             };
         }
         *flow.momentum_residual = residual;

@@ -37,6 +37,8 @@ impl Simulation {
                 previous.acceleration.angular,
                 previous.pending_added_mass_velocity.linear,
                 previous.pending_added_mass_velocity.angular,
+                previous.added_mass_loss.linear,
+                previous.added_mass_loss.angular,
             ] {
                 out.vector(v)?;
             }
@@ -78,7 +80,7 @@ impl Simulation {
             grain.angular_velocity = input.vector()?;
             *load = Load { force: input.vector()?, torque: input.vector()? };
             let pending = &mut previous.pending_added_mass_velocity;
-            for rates in [&mut previous.acceleration, pending] {
+            for rates in [&mut previous.acceleration, pending, &mut previous.added_mass_loss] {
                 rates.linear = input.vector()?;
                 rates.angular = input.vector()?;
             }

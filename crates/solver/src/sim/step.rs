@@ -37,7 +37,7 @@ impl Simulation {
                 // Faces forced at the new poses; Eqs 4 and 5 as a 6 x 6 system of each grain.
                 let coupled = moved.couple();
                 // The sub-steps again, with the 6 x 6 mass of grain and fluid, if a contact load
-                // acts (decision 0014).
+                // acts or acted in the last step (decisions 0014, 0022).
                 let resolved = coupled.resolve_contact();
                 // New velocities of the grains on the forced faces (Eq. 4), loads (Eq. 5).
                 let rigid = resolved.impose_rigidity();

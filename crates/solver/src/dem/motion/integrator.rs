@@ -128,6 +128,8 @@ pub(super) fn second_half_step(
 pub struct GrainResponse {
     /// Velocities at the start, space frame.
     pub(super) start: RigidVelocity,
+    /// Whether contact acted in the step before; the trial step then began with other velocities.
+    pub(super) after_contact: bool,
     /// Acceleration [m/s^2] and angular acceleration [rad/s^2] without contact, space frame.
     free: [DVec3; 2],
     /// Columns of the inverse 6 x 6 mass of grain and entrained fluid: accelerations under a unit
@@ -138,8 +140,14 @@ pub struct GrainResponse {
 impl GrainResponse {
     /// Response from the velocities at the start, the loads without contact [N] and [N m], and the
     /// columns of the inverse 6 x 6 mass.
-    pub fn new(start: RigidVelocity, load: Vector6, inverse: Matrix6) -> GrainResponse {
-        let mut response = GrainResponse { start, free: Default::default(), inverse };
+    pub fn new(
+        start: RigidVelocity,
+        after_contact: bool,
+        load: Vector6,
+        inverse: Matrix6,
+    ) -> GrainResponse {
+        let free = Default::default();
+        let mut response = GrainResponse { start, after_contact, free, inverse };
         response.free = response.acceleration(&Load {
             force: DVec3::from_slice(&load[..3]),
             torque: DVec3::from_slice(&load[3..]),

@@ -247,8 +247,8 @@ impl ContactDynamics {
     /// Repeats a trial step from its start, with the response of the fluid of this step to contact.
     ///
     /// The grains keep the state of the trial step; `ends` receives the state after the repetition.
-    /// A grain on which no contact or lubrication load acts in either pass keeps the pose of the
-    /// trial step. On entry `mean_contact` holds the
+    /// A grain on which no contact or lubrication load acts in either pass or in the step before
+    /// keeps the pose of the trial step. On entry `mean_contact` holds the
     /// contact loads of the trial step, on return the loads of the repetition.
     pub fn resolve_with_response(
         &mut self,
@@ -260,10 +260,10 @@ impl ContactDynamics {
     ) {
         let TrialStep { dt, mut before } = trial;
         before.trial_ends.clear();
-        let trial_ends = grains.iter().zip(&*mean_contact);
-        (before.trial_ends).extend(trial_ends.map(|(grain, load)| TrialEnd {
+        let trial_ends = grains.iter().zip(&*mean_contact).zip(responses);
+        (before.trial_ends).extend(trial_ends.map(|((grain, load), response)| TrialEnd {
             state: RigidState::of(grain),
-            touched: !load.is_zero(),
+            touched: !load.is_zero() || response.after_contact,
         }));
         mean_contact.fill(Load::default());
         self.records.clone_from(&before.records);
@@ -331,6 +331,6 @@ struct StateBefore {
 #[derive(Clone, Copy, Debug)]
 struct TrialEnd {
     state: RigidState,
-    /// Whether a contact or lubrication load acted on the grain.
+    /// Whether a contact or lubrication load acted on the grain in this step or the one before.
     touched: bool,
 }
