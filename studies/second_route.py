@@ -1,7 +1,7 @@
 """Checks a study's analysis.json by a second route.
 
 Recomputes it from table.csv with pandas, SciPy, lifelines and statsmodels. Table `kissing`: shares,
-their bootstrap intervals, medians of Kaplan and Meier, stratified log-rank tests, Hodges-Lehmann
+their intervals, medians of Kaplan and Meier, stratified log-rank tests, Hodges-Lehmann
 shifts, and the differences between grids. Table `factor_means`: means and their intervals. Claims
 about trends and orders: rank correlations, Hodges-Lehmann shifts, their p values, and the
 adjustment for the number of claims.
@@ -44,6 +44,15 @@ def interval(groups, seed=1):
         models = random.integers(len(groups), size=len(groups))
         samples[i] = np.mean([np.mean(random.choice(groups[m], len(groups[m]))) for m in models])
     return np.quantile(samples, [0.025, 0.975])
+
+
+def share_interval(groups):
+    """As `interval`; of Clopper and Pearson for the number of models if all outcomes are equal."""
+    outcomes = np.concatenate(groups)
+    if outcomes.min() < outcomes.max():
+        return interval(groups)
+    kissed = len(groups) if outcomes[0] else 0
+    return stats.binomtest(kissed, len(groups)).proportion_ci(0.95, "exact")
 
 
 def tolerance(groups):
@@ -181,7 +190,8 @@ def check_factor_means(analysis, folder, by):
         if entry["interval"] is not None:
             # An end of the interval of few models is one of few values.
             spread = here.value.max() - here.value.min()
-            for end, expected in zip(interval(groups), entry["interval"]):
+            ends = (share_interval if quantity == "kissing_share" else interval)(groups)
+            for end, expected in zip(ends, entry["interval"]):
                 close(f"{what}: interval", end, expected, 0.1 * spread + 1e-4)
             checks += 2
     return checks
@@ -206,7 +216,7 @@ def main(folder, by, grid):
         close(f"{what}: runs", float(len(here)), entry["runs"])
         close(f"{what}: share", float(np.mean([g.mean() for g in groups])), entry["share"])
         close(f"{what}: median time", median_time(here), entry["median_time"], TIME_TOLERANCE)
-        for end, expected in zip(interval(groups), entry["interval"]):
+        for end, expected in zip(share_interval(groups), entry["interval"]):
             close(f"{what}: interval", end, expected, tolerance(groups))
         checks += 5
     for entry in analysis["differences"]:

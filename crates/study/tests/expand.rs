@@ -170,6 +170,12 @@ fn an_ensemble_shifts_all_grains_by_a_part_of_a_cell() {
         assert!(own.length() <= 0.05e-3 * (1.0 + 1e-6) && own.z.abs() < 1e-5, "{own}");
     }
     assert!(largest > 0.3e-3, "{largest}");
+    // The shift alone, without an offset of one grain.
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replace("offset = \"0.05 mm\"\n", "")).unwrap();
+    let runs = plan(&path).unwrap().runs;
+    let [first, second] = [0, 1].map(|i| runs[1].case().unwrap().setup.grains[i].pose.position);
+    assert!((second - first - (start[1] - start[0])).length() < 1e-12 && first != start[0]);
 }
 
 #[test]
@@ -203,6 +209,8 @@ fn problems_are_located() {
     assert_eq!(place, Some((true, 5)));
     let (message, ..) = one(&format!("{STUDY}[ensemble]\nmembers = 0\noffset = 1\n"));
     assert!(message.contains("1 to 1000"), "{message}");
+    let (message, help, _) = one(&format!("{STUDY}[ensemble]\nmembers = 2\n"));
+    assert!(message.contains("start alike") && help.contains("cell_shift"), "{message}");
     let (message, ..) = one(&format!("{STUDY}[ensemble]\nmembers = 2\noffset = \"1 s\"\n"));
     assert!(message.contains("length") || message.contains("time"), "{message}");
     let (message, ..) = one("title = \"empty\"\n");

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::observation::{Member, members};
-use super::statistics::{bootstrap_interval, mean};
+use super::statistics::{bootstrap_interval, mean, share_interval};
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Condition};
 
@@ -51,6 +51,10 @@ pub fn factor_means(analysis: &Analysis, records: &[RunRecord]) -> Vec<FactorMea
     let share = analysis.kissing.as_ref().map(|_| KISSING_SHARE.to_owned());
     let mut out = Vec::new();
     for quantity in share.iter().chain(&request.quantities) {
+        let interval = match quantity == KISSING_SHARE {
+            true => share_interval,
+            false => bootstrap_interval,
+        };
         for level in request.levels(records) {
             let when = BTreeMap::from([(request.by.clone(), Condition::Is(level.clone()))]);
             let models = models(records, quantity, &when);
@@ -66,7 +70,7 @@ pub fn factor_means(analysis: &Analysis, records: &[RunRecord]) -> Vec<FactorMea
                         at: mean(&at)?,
                         models: means.len(),
                         mean: mean(&means)?,
-                        interval: several.then(|| bootstrap_interval(&values)).flatten(),
+                        interval: several.then(|| interval(&values)).flatten(),
                     })
                 }));
             }

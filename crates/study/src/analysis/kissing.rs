@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::observation::observe;
-use super::statistics::{bootstrap_interval, mean, median, signed_rank};
+use super::statistics::{bootstrap_interval, mean, median, share_interval, signed_rank};
 use super::survival::{Duration, log_rank, median_time};
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Kissing};
@@ -225,7 +225,7 @@ fn summary(level: &str, grid: Option<&str>, models: &[&Outcomes]) -> Option<Leve
         runs: durations.len(),
         all_some_none: [count(|s| s == 1.0), count(|s| s > 0.0 && s < 1.0), count(|s| s == 0.0)],
         share: mean(&shares)?,
-        interval: bootstrap_interval(&members)?,
+        interval: share_interval(&members)?,
         median_time: median_time(&durations),
         durations,
     })

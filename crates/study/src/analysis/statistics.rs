@@ -175,6 +175,20 @@ pub fn bootstrap_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
     Some([quantile(&samples, 0.025)?, quantile(&samples, 0.975)?])
 }
 
+/// Returns the 95 % interval of a share, the mean over models of outcomes 0 and 1 of their members:
+/// that of [`bootstrap_interval`], or, if all outcomes are equal and a bootstrap has no width, that
+/// of Clopper and Pearson for the number of models.
+pub fn share_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
+    let all = |outcome: f64| models.iter().flatten().all(|value| *value == outcome);
+    let limit = 0.025_f64.powf(1.0 / models.len().max(1) as f64);
+    match (all(0.0), all(1.0)) {
+        (false, false) => bootstrap_interval(models),
+        (true, true) => None,
+        (true, false) => Some([0.0, 1.0 - limit]),
+        (false, true) => Some([limit, 1.0]),
+    }
+}
+
 /// Returns the median; none of an empty sample.
 pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)

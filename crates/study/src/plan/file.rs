@@ -132,8 +132,10 @@ fn read_ensemble(
     raw: &RawEnsemble,
     models: &[Model],
 ) -> Result<Ensemble, StudyError> {
-    let offset = positive(source, &raw.offset, parse_length, "an offset must be a positive length")
-        .map_err(|problem| problem.help("for example offset = \"0.02 mm\""))?;
+    let offset = raw.offset.as_ref().map(|offset| {
+        positive(source, offset, parse_length, "an offset must be a positive length")
+            .map_err(|problem| problem.help("for example offset = \"0.02 mm\""))
+    });
     let turn = raw.turn.as_ref().map(|turn| {
         positive(source, turn, parse_angle, "a turn must be a positive angle")
             .map_err(|problem| problem.help("for example turn = \"2 deg\""))
@@ -141,6 +143,11 @@ fn read_ensemble(
     if !(1..=1000).contains(&raw.members.value) {
         let problem = Problem::new("an ensemble has 1 to 1000 members")
             .help("members includes the run without offset");
+        return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
+    }
+    if offset.is_none() && turn.is_none() && !raw.cell_shift {
+        let problem = Problem::new("all members of the ensemble would start alike")
+            .help("give offset, turn or cell_shift, for example offset = \"0.02 mm\"");
         return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
     }
     let models = match &raw.models {
@@ -156,7 +163,7 @@ fn read_ensemble(
     }
     Ok(Ensemble {
         members: raw.members.value,
-        offset,
+        offset: offset.transpose()?.unwrap_or(0.0),
         turn: turn.transpose()?.unwrap_or(0.0),
         cell_shift: raw.cell_shift,
         grain: raw.grain,

@@ -86,7 +86,7 @@ pub(crate) struct RawAdjust {
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawEnsemble {
     pub members: Located<usize>,
-    pub offset: Located<Size>,
+    pub offset: Option<Located<Size>>,
     pub turn: Option<Located<Size>>,
     #[serde(default)]
     pub cell_shift: bool,
