@@ -307,9 +307,12 @@ fn record() -> Vec<u8> {
 }
 
 #[test]
-fn a_sound_record_is_read() {
+fn a_sound_record_and_a_sound_state_are_read() {
     let folder = tempfile::tempdir().unwrap();
     assert!(found(folder.path(), &record()));
+    let state = &include_bytes!("../../../fuzz/seeds/checkpoint/state")[1..];
+    let case = parse(include_str!("../../../fuzz/seeds/case/wet.toml")).unwrap();
+    Simulation::new(case.setup).unwrap().restore(&mut &state[..]).unwrap();
 }
 
 proptest! {
