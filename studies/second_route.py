@@ -46,13 +46,13 @@ def interval(groups, seed=1):
     return np.quantile(samples, [0.025, 0.975])
 
 
-def share_interval(groups):
-    """As `interval`; of Clopper and Pearson for the number of models if all outcomes are equal."""
+def outcome_interval(groups, least, most):
+    """As `interval`; if all outcomes are equal, with the limit of Clopper and Pearson."""
     outcomes = np.concatenate(groups)
     if outcomes.min() < outcomes.max():
         return interval(groups)
-    kissed = len(groups) if outcomes[0] else 0
-    return stats.binomtest(kissed, len(groups)).proportion_ci(0.95, "exact")
+    other = stats.binomtest(0, len(groups)).proportion_ci(0.95, "exact").high
+    return [outcomes[0] + other * (end - outcomes[0]) for end in (least, most)]
 
 
 def tolerance(groups):
@@ -190,7 +190,8 @@ def check_factor_means(analysis, folder, by):
         if entry["interval"] is not None:
             # An end of the interval of few models is one of few values.
             spread = here.value.max() - here.value.min()
-            ends = (share_interval if quantity == "kissing_share" else interval)(groups)
+            share = quantity == "kissing_share"
+            ends = outcome_interval(groups, 0, 1) if share else interval(groups)
             for end, expected in zip(ends, entry["interval"]):
                 close(f"{what}: interval", end, expected, 0.1 * spread + 1e-4)
             checks += 2
@@ -216,7 +217,7 @@ def main(folder, by, grid):
         close(f"{what}: runs", float(len(here)), entry["runs"])
         close(f"{what}: share", float(np.mean([g.mean() for g in groups])), entry["share"])
         close(f"{what}: median time", median_time(here), entry["median_time"], TIME_TOLERANCE)
-        for end, expected in zip(share_interval(groups), entry["interval"]):
+        for end, expected in zip(outcome_interval(groups, 0, 1), entry["interval"]):
             close(f"{what}: interval", end, expected, tolerance(groups))
         checks += 5
     for entry in analysis["differences"]:
@@ -225,7 +226,7 @@ def main(folder, by, grid):
         two = pairs(on(entry["first"], entry["grid"]), on(entry["second"], entry["grid"]), other)
         groups = common_differences(two)
         close(f"{what}: share", float(np.mean([g.mean() for g in groups])), entry["share"])
-        for end, expected in zip(interval(groups), entry["interval"]):
+        for end, expected in zip(outcome_interval(groups, -1, 1), entry["interval"]):
             close(f"{what}: interval", end, expected, tolerance(groups))
         strata = pd.concat([g.assign(stratum=i) for i, ab in enumerate(two) for g in ab])
         if strata.kissed.any():

@@ -349,14 +349,15 @@ fn rebound(density: f64, length: f64, phase: f64) -> f64 {
 /// than a step or several.
 #[test]
 fn undamped_impacts_give_the_speed_back() {
-    for density in [8.0, 2.5] {
+    for (density, least) in [(8.0, 0.94), (2.5, 0.9), (1.1, 0.86)] {
         for length in [0.2, 1.0, 2.0, 5.0] {
-            let phases = [0.0, 0.35, 0.7];
-            let sum: f64 = phases.map(|phase| rebound(density, length, phase)).iter().sum();
-            let mean = sum / phases.len() as f64;
+            let each = [0.0, 0.35, 0.7].map(|phase| rebound(density, length, phase));
+            let [low, high] = [f64::min, f64::max].map(|of| each.into_iter().fold(each[0], of));
             // With added mass in the first step of a contact only, a contact of one step gives 0.90
-            // at density ratio 8 and 0.67 at 2.5.
-            assert!((0.9..1.03).contains(&mean), "{density}, {length} steps: {mean}");
+            // at density ratio 8 and 0.67 at 2.5. Without decision 0022 the rebound depends on the
+            // phase of the step by up to 0.2.
+            let all = format!("{density}, {length} steps: {each:?}");
+            assert!(least < low && high < 1.0 && high - low < 0.05, "{all}");
         }
     }
 }
@@ -701,6 +702,8 @@ fn restores(precision: Precision) {
         straight.step(f64::INFINITY).unwrap();
         assert!(straight.steps() < 500, "no contact");
     }
+    // After one more step it includes the uptake of the added mass too.
+    straight.step(f64::INFINITY).unwrap();
     let middle = state(&straight);
     for _ in 0..50 {
         straight.step(f64::INFINITY).unwrap();

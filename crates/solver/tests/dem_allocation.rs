@@ -96,5 +96,5 @@ fn response(grain: &Grain, gravity: DVec3) -> GrainResponse {
         row[n] = 1.0 / if n < 3 { mass } else { inertia };
     }
     let [x, y, z] = (mass * gravity).to_array();
-    GrainResponse::new(grain.rigid_velocity(), false, [x, y, z, 0.0, 0.0, 0.0], inverse)
+    GrainResponse::new(grain.rigid_velocity(), [x, y, z, 0.0, 0.0, 0.0], inverse)
 }

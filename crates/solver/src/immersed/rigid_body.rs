@@ -23,29 +23,29 @@ use crate::math::{Load, Matrix6, RigidVelocity, Vector6, multiply6, solve6};
 pub struct PreviousStep {
     /// Velocities at the start of the step.
     pub velocity: RigidVelocity,
-    /// Mean acceleration over the previous step [m/s^2, rad/s^2], without `added_mass_loss`; zero
+    /// Mean acceleration over the previous step [m/s^2, rad/s^2], without `added_mass_uptake`; zero
     /// after contact.
     pub acceleration: RigidVelocity,
     /// Part of `velocity` that contact caused in the previous step and that the added mass takes up
     /// in this step (`docs/decisions/0014-contact-with-the-fluid-response.md`).
     pub pending_added_mass_velocity: RigidVelocity,
-    /// Rate of the velocity that the added mass took up in the previous step [m/s^2, rad/s^2]. The
-    /// hydrodynamic load contains it once; the next trial step leaves it out
+    /// Pending velocity that the added mass took up in the previous step, over its length [m/s^2,
+    /// rad/s^2]. The hydrodynamic load of that step contains it; the next trial step leaves it out
     /// (`docs/decisions/0022-rest-after-impacts.md`).
-    pub added_mass_loss: RigidVelocity,
+    pub added_mass_uptake: RigidVelocity,
 }
 
 impl PreviousStep {
-    /// Whether contact acted on the grain in the previous step.
-    pub fn after_contact(&self) -> bool {
+    /// Whether the added mass takes up a velocity from contact in this step.
+    pub fn has_pending_velocity(&self) -> bool {
         self.pending_added_mass_velocity != RigidVelocity::default()
     }
 
-    /// Load that gives the grain `added_mass_loss`; none after a step without it.
-    pub fn added_mass_load(&self, grain: &Grain) -> Option<Load> {
-        let RigidVelocity { linear, angular } = self.added_mass_loss;
+    /// Load that balances `added_mass_uptake` in the hydrodynamic load; none in other steps.
+    pub fn uptake_load(&self, grain: &Grain) -> Option<Load> {
+        let RigidVelocity { linear, angular } = self.added_mass_uptake;
         let load = || Load { force: grain.mass() * linear, torque: grain.inertia() * angular };
-        (self.added_mass_loss != RigidVelocity::default()).then(load)
+        (self.added_mass_uptake != RigidVelocity::default()).then(load)
     }
 }
 
@@ -81,6 +81,7 @@ impl RigidBodySystem {
         [applied, last_load]: [Load; 2],
         dt: f64,
     ) -> RigidBodySystem {
+        let last_load = previous.uptake_load(grain).map_or(last_load, |load| last_load + load);
         let (none, load) = (Impulse::default(), applied + last_load);
         let system = RigidBodySystem::new(grain, previous, none, 0.0, load, None, dt);
         RigidBodySystem { impulse, last_load: Some(last_load), ..system }
@@ -227,15 +228,14 @@ impl RigidBodySystem {
     /// grain has the velocities of [`Self::velocities`] at their end
     /// (`docs/decisions/0014-contact-with-the-fluid-response.md`).
     ///
-    /// In contact the mass is at least that of the grain with `added_density` [kg/m^3] of fluid in
-    /// its volume, since most of the added mass responds by the projection, one step late; without
-    /// contact there is no `added_density`. The initial velocities exclude the pending added-mass
-    /// velocity of the last impact.
+    /// The mass is at least that of the grain with `added_density` [kg/m^3] of fluid in its volume,
+    /// since most of the added mass responds by the projection, one step late. The initial
+    /// velocities exclude the pending added-mass velocity of the last impact.
     pub fn response(
         &self,
         grain: &Grain,
         previous: &PreviousStep,
-        added_density: Option<f64>,
+        added_density: f64,
         dt: f64,
     ) -> GrainResponse {
         let start = previous.velocity - previous.pending_added_mass_velocity;
@@ -246,7 +246,7 @@ impl RigidBodySystem {
             (self.right[row] - momentum) / dt
         });
         let mut a = self.matrix;
-        let least_mass = added_density.map_or(0.0, |d| grain.mass() + d * grain.shape.volume());
+        let least_mass = grain.mass() + added_density * grain.shape.volume();
         let mean_mass = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
         let free = [grain.translation, grain.rotation]
             .map(|constraint| constraint == MotionConstraint::Free);
@@ -266,7 +266,12 @@ impl RigidBodySystem {
                 drive[3 * n..3 * n + 3].fill(0.0);
             }
         }
-        GrainResponse::new(start, previous.after_contact(), drive, columns)
+        let response = GrainResponse::new(start, drive, columns);
+        if previous.has_pending_velocity() {
+            response.after_contact(self.velocities(grain, previous, Load::default(), dt))
+        } else {
+            response
+        }
     }
 }
 

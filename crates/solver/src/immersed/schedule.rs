@@ -34,21 +34,18 @@ pub struct CoupledGrains {
 }
 
 impl CoupledGrains {
-    /// Fills `responses` with the responses of the grains to contact in this step. `contact` are
-    /// the loads of the trial step.
+    /// Fills `responses` with the responses of the grains to contact in this step.
     pub fn responses(
         &self,
         grains: &[Grain],
         previous: &[PreviousStep],
-        contact: &[Load],
         added_density: f64,
         dt: f64,
         responses: &mut Vec<GrainResponse>,
     ) {
         responses.clear();
-        let each = self.updates.iter().zip(grains).zip(previous).zip(contact);
-        let each = each.map(|(((update, grain), previous), contact)| {
-            let added_density = (!contact.is_zero()).then_some(added_density);
+        let each = self.updates.iter().zip(grains).zip(previous);
+        let each = each.map(|((update, grain), previous)| {
             (update.system).response(grain, previous, added_density, dt)
         });
         responses.extend(each);

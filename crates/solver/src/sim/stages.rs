@@ -7,7 +7,7 @@ use super::fluid::Fluid;
 use super::prescription::Prescription;
 use super::timing::PassTimes;
 use super::{GrainData, Simulation};
-use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
+use crate::dem::{ContactDynamics, Grain, MotionConstraint, TrialStep};
 use crate::immersed::{
     CoupledGrains, CouplingInput, Crossing, GrainKinematics, OpenSides, PreviousStep,
     RigidityInput, Scheme,
@@ -76,7 +76,8 @@ pub(super) struct Projected<'a> {
 /// Contact sub-steps that give the poses at the end of a step.
 #[derive(Clone, Copy)]
 enum FinalPoses {
-    /// Poses of the trial step, under the hydrodynamic load of the last step: no contact acts.
+    /// Poses of the trial step, under the hydrodynamic load of the last step: no contact acts or
+    /// acted in the step before.
     TrialStep,
     /// Poses of the repeated step, with the response of the fluid in this step.
     Resolved,
@@ -150,7 +151,7 @@ impl GrainContext<'_> {
         let data = &mut *self.data;
         for (i, driving) in data.driving.iter_mut().enumerate() {
             *driving = data.applied[i] + self.loads[i];
-            if let Some(load) = data.previous[i].added_mass_load(&self.grains[i]) {
+            if let Some(load) = data.previous[i].uptake_load(&self.grains[i]) {
                 *driving += load;
             }
         }
@@ -229,14 +230,14 @@ impl<'a> Coupled<'a> {
         let Coupled(mut step, coupled, trial) = self;
         let solid = &mut step.solid;
         let (grains, data, dt) = (&mut *solid.grains, &mut *solid.data, solid.dt);
-        let after_contact = data.previous.iter().any(PreviousStep::after_contact);
-        if data.contact.iter().all(Load::is_zero) && !after_contact {
+        let pending = data.previous.iter().any(PreviousStep::has_pending_velocity);
+        if data.contact.iter().all(Load::is_zero) && !pending {
             solid.dynamics.accept(trial);
             return Resolved(step, coupled, FinalPoses::TrialStep);
         }
         let added_density = solid.dynamics.params().added_density;
         let (previous, responses) = (&data.previous, &mut data.responses);
-        coupled.responses(grains, previous, &data.contact, added_density, dt, responses);
+        coupled.responses(grains, previous, added_density, dt, responses);
         timed(&mut solid.times.contact, || {
             let (contact, ends) = (&mut data.contact, &mut data.ends);
             (solid.dynamics).resolve_with_response(trial, grains, &data.responses, contact, ends)
@@ -300,27 +301,33 @@ impl Projected<'_> {
             let touched = !data.contact[i].is_zero();
             // The acceleration of an impact does not continue in the next step; its added mass
             // does.
-            let taken_up = previous.pending_added_mass_velocity;
-            previous.added_mass_loss = taken_up / dt;
+            let taken_up = of_free_motion(grain, previous.pending_added_mass_velocity);
+            previous.added_mass_uptake = taken_up / dt;
             (previous.acceleration, previous.pending_added_mass_velocity) = if touched {
-                (RigidVelocity::default(), beyond_substeps(grain, &data.ends[i]))
+                // Velocity on the faces beyond that at the end of the sub-steps.
+                let beyond = grain.rigid_velocity() - data.ends[i].velocity;
+                (RigidVelocity::default(), of_free_motion(grain, beyond))
             } else {
                 ((change + taken_up) / dt, RigidVelocity::default())
             };
+            if solid.open_sides.as_deref().is_some_and(|open_sides| open_sides.departs(i)) {
+                // No fluid responds to the grain.
+                previous.added_mass_uptake = RigidVelocity::default();
+                previous.pending_added_mass_velocity = RigidVelocity::default();
+            }
         }
         *flow.momentum_residual = residual;
     }
 }
 
-/// Velocities of a grain beyond those at the end of its sub-steps; zero where they are prescribed.
-fn beyond_substeps(grain: &Grain, end: &RigidState) -> RigidVelocity {
-    let beyond = grain.rigid_velocity() - end.velocity;
+/// Returns the velocities of a grain, with zero for those that are prescribed.
+fn of_free_motion(grain: &Grain, velocity: RigidVelocity) -> RigidVelocity {
     let free = |constraint: MotionConstraint, velocity: DVec3| match constraint {
         MotionConstraint::Free => velocity,
         MotionConstraint::Prescribed(_) => DVec3::ZERO,
     };
     RigidVelocity {
-        linear: free(grain.translation, beyond.linear),
-        angular: free(grain.rotation, beyond.angular),
+        linear: free(grain.translation, velocity.linear),
+        angular: free(grain.rotation, velocity.angular),
     }
 }

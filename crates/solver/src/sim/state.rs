@@ -37,8 +37,8 @@ impl Simulation {
                 previous.acceleration.angular,
                 previous.pending_added_mass_velocity.linear,
                 previous.pending_added_mass_velocity.angular,
-                previous.added_mass_loss.linear,
-                previous.added_mass_loss.angular,
+                previous.added_mass_uptake.linear,
+                previous.added_mass_uptake.angular,
             ] {
                 out.vector(v)?;
             }
@@ -80,7 +80,7 @@ impl Simulation {
             grain.angular_velocity = input.vector()?;
             *load = Load { force: input.vector()?, torque: input.vector()? };
             let pending = &mut previous.pending_added_mass_velocity;
-            for rates in [&mut previous.acceleration, pending, &mut previous.added_mass_loss] {
+            for rates in [&mut previous.acceleration, pending, &mut previous.added_mass_uptake] {
                 rates.linear = input.vector()?;
                 rates.angular = input.vector()?;
             }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::observation::{Member, members};
-use super::statistics::{bootstrap_interval, mean, share_interval};
+use super::statistics::{bootstrap_interval, mean, outcome_interval};
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Condition};
 
@@ -32,7 +32,8 @@ pub struct FactorMean {
     pub models: usize,
     /// Mean over the models of the mean over their members, without right-censored values.
     pub mean: f64,
-    /// 95 % interval of a bootstrap over models and members; none for a single run.
+    /// 95 % interval of a bootstrap over models and members, of a share of equal outcomes the exact
+    /// one; none for a single run.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -51,9 +52,9 @@ pub fn factor_means(analysis: &Analysis, records: &[RunRecord]) -> Vec<FactorMea
     let share = analysis.kissing.as_ref().map(|_| KISSING_SHARE.to_owned());
     let mut out = Vec::new();
     for quantity in share.iter().chain(&request.quantities) {
-        let interval = match quantity == KISSING_SHARE {
-            true => share_interval,
-            false => bootstrap_interval,
+        let interval = |values: &[Vec<f64>]| match quantity == KISSING_SHARE {
+            true => outcome_interval(values, [0.0, 1.0]),
+            false => bootstrap_interval(values),
         };
         for level in request.levels(records) {
             let when = BTreeMap::from([(request.by.clone(), Condition::Is(level.clone()))]);

@@ -2,7 +2,8 @@
 //! first contact, and how both depend on the level of an axis and on the grid.
 //!
 //! The share of a set of models is the mean over the models of the share of their members.
-//! Intervals are 95 % intervals of a bootstrap over models and members. Two sets are compared over
+//! Intervals are 95 % intervals of a bootstrap over models and members, or exact ones if all
+//! outcomes are equal. Two sets are compared over
 //! the models that are equal on all other axes, and their members are drawn together.
 
 use std::collections::BTreeMap;
@@ -10,7 +11,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::observation::observe;
-use super::statistics::{bootstrap_interval, mean, median, share_interval, signed_rank};
+use super::statistics::{mean, median, outcome_interval, signed_rank};
 use super::survival::{Duration, log_rank, median_time};
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Kissing};
@@ -225,7 +226,7 @@ fn summary(level: &str, grid: Option<&str>, models: &[&Outcomes]) -> Option<Leve
         runs: durations.len(),
         all_some_none: [count(|s| s == 1.0), count(|s| s > 0.0 && s < 1.0), count(|s| s == 0.0)],
         share: mean(&shares)?,
-        interval: share_interval(&members)?,
+        interval: outcome_interval(&members, [0.0, 1.0])?,
         median_time: median_time(&durations),
         durations,
     })
@@ -280,7 +281,7 @@ fn share_difference(pairs: &[Pair]) -> Option<(f64, [f64; 2])> {
     };
     let members: Vec<Vec<f64>> = pairs.iter().map(common).filter(|m| !m.is_empty()).collect();
     let means: Vec<f64> = members.iter().filter_map(|m| mean(m)).collect();
-    Some((mean(&means)?, bootstrap_interval(&members)?))
+    Some((mean(&means)?, outcome_interval(&members, [-1.0, 1.0])?))
 }
 
 fn kissed(members: &BTreeMap<usize, Duration>) -> Vec<f64> {

@@ -175,18 +175,19 @@ pub fn bootstrap_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
     Some([quantile(&samples, 0.025)?, quantile(&samples, 0.975)?])
 }
 
-/// Returns the 95 % interval of a share, the mean over models of outcomes 0 and 1 of their members:
-/// that of [`bootstrap_interval`], or, if all outcomes are equal and a bootstrap has no width, that
-/// of Clopper and Pearson for the number of models.
-pub fn share_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
-    let all = |outcome: f64| models.iter().flatten().all(|value| *value == outcome);
-    let limit = 0.025_f64.powf(1.0 / models.len().max(1) as f64);
-    match (all(0.0), all(1.0)) {
-        (false, false) => bootstrap_interval(models),
-        (true, true) => None,
-        (true, false) => Some([0.0, 1.0 - limit]),
-        (false, true) => Some([limit, 1.0]),
+/// Returns the 95 % interval of the mean over models of outcomes of their members between `least`
+/// and `most`: shares (0 to 1) or differences of shares (-1 to 1).
+///
+/// It is that of [`bootstrap_interval`]. If all outcomes are equal a bootstrap has no width. The
+/// part of the models with another outcome is then between 0 and the limit of Clopper and Pearson
+/// for the number of models; the interval has the mean for this limit at its ends.
+pub fn outcome_interval(models: &[Vec<f64>], [least, most]: [f64; 2]) -> Option<[f64; 2]> {
+    let first = *models.iter().flatten().next()?;
+    if models.iter().flatten().any(|value| *value != first) {
+        return bootstrap_interval(models);
     }
+    let other = 1.0 - 0.025_f64.powf(1.0 / models.len() as f64);
+    Some([least, most].map(|outcome| first + other * (outcome - first)))
 }
 
 /// Returns the median; none of an empty sample.

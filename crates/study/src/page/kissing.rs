@@ -13,7 +13,8 @@ pub(super) fn tables(results: &KissingResults) -> Markup {
         p {
             "Share of runs in which the pair comes into contact before it lands: mean over the \
              models of the share of their members, with 95 % intervals of a bootstrap over models \
-             and members (exact binomial if all runs have the same outcome). The median time is Kaplan and Meier's; a pair that lands first is \
+             and members (exact binomial for the number of models if all runs have the same \
+             outcome). The median time is Kaplan and Meier's; a pair that lands first is \
              right-censored."
         }
         (levels(&results.levels, gridded))

@@ -142,7 +142,7 @@ fn read_ensemble(
     });
     if !(1..=1000).contains(&raw.members.value) {
         let problem = Problem::new("an ensemble has 1 to 1000 members")
-            .help("members includes the run without offset");
+            .help("members includes the undisturbed run");
         return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
     }
     if offset.is_none() && turn.is_none() && !raw.cell_shift {

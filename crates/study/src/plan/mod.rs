@@ -50,7 +50,7 @@ pub struct Run {
     pub name: String,
     /// Name of the model.
     pub model: String,
-    /// Index in the ensemble; 0 has no offset.
+    /// Index in the ensemble; 0 starts as the case says.
     pub member: usize,
     /// Level on each axis.
     pub levels: BTreeMap<String, String>,

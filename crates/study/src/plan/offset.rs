@@ -26,7 +26,7 @@ pub(crate) fn member_overrides(
     let index = ensemble.grain.unwrap_or(grains.len().saturating_sub(1));
     let Some(grain) = grains.get(index) else {
         let problem = Problem::new(format!(
-            "the ensemble offsets grain {index}, but \"{}\" has {} grains",
+            "the ensemble moves grain {index}, but \"{}\" has {} grains",
             model.name,
             grains.len()
         ));

@@ -123,13 +123,31 @@ pub(super) fn second_half_step(
     }
 }
 
+/// Moves a grain over `dt` [s] with velocities that change at a constant rate, from the first to
+/// the second.
+pub(super) fn move_at_constant_acceleration(
+    grain: &mut Grain,
+    [from, to]: [RigidVelocity; 2],
+    dt: f64,
+) {
+    let free = (from + to) / 2.0;
+    let of = |constraint: MotionConstraint, free: DVec3| match constraint {
+        MotionConstraint::Free => free,
+        MotionConstraint::Prescribed(velocity) => velocity,
+    };
+    grain.pose.position += dt * of(grain.translation, free.linear);
+    let omega = of(grain.rotation, free.angular);
+    grain.pose.orientation = rotate_exactly(grain.pose.orientation, omega, dt);
+}
+
 /// Acceleration of a grain in a fluid as an affine function of the contact load, over one step.
 #[derive(Clone, Copy, Debug)]
 pub struct GrainResponse {
     /// Velocities at the start, space frame.
     pub(super) start: RigidVelocity,
-    /// Whether contact acted in the step before; the trial step then began with other velocities.
-    pub(super) after_contact: bool,
+    /// Velocities at the end if no contact acts; only in the step after a contact, whose trial step
+    /// begins with other velocities.
+    pub(super) end_without_contact: Option<RigidVelocity>,
     /// Acceleration [m/s^2] and angular acceleration [rad/s^2] without contact, space frame.
     free: [DVec3; 2],
     /// Columns of the inverse 6 x 6 mass of grain and entrained fluid: accelerations under a unit
@@ -140,19 +158,19 @@ pub struct GrainResponse {
 impl GrainResponse {
     /// Response from the velocities at the start, the loads without contact [N] and [N m], and the
     /// columns of the inverse 6 x 6 mass.
-    pub fn new(
-        start: RigidVelocity,
-        after_contact: bool,
-        load: Vector6,
-        inverse: Matrix6,
-    ) -> GrainResponse {
+    pub fn new(start: RigidVelocity, load: Vector6, inverse: Matrix6) -> GrainResponse {
         let free = Default::default();
-        let mut response = GrainResponse { start, after_contact, free, inverse };
+        let mut response = GrainResponse { start, end_without_contact: None, free, inverse };
         response.free = response.acceleration(&Load {
             force: DVec3::from_slice(&load[..3]),
             torque: DVec3::from_slice(&load[3..]),
         });
         response
+    }
+
+    /// Response in the step after a contact, with the velocities at the end if no contact acts.
+    pub fn after_contact(self, end: RigidVelocity) -> GrainResponse {
+        GrainResponse { end_without_contact: Some(end), ..self }
     }
 
     /// Acceleration [m/s^2] and angular acceleration [rad/s^2] under a contact load.

@@ -12,6 +12,7 @@ pub mod rotation;
 mod substeps;
 
 pub use integrator::GrainResponse;
+use integrator::move_at_constant_acceleration;
 
 use glam::{DVec3, IVec3};
 
@@ -247,9 +248,10 @@ impl ContactDynamics {
     /// Repeats a trial step from its start, with the response of the fluid of this step to contact.
     ///
     /// The grains keep the state of the trial step; `ends` receives the state after the repetition.
-    /// A grain on which no contact or lubrication load acts in either pass or in the step before
-    /// keeps the pose of the trial step. On entry `mean_contact` holds the
-    /// contact loads of the trial step, on return the loads of the repetition.
+    /// A grain on which no contact or lubrication load acts in either pass keeps the pose of the
+    /// trial step, or, in the step after a contact, moves at a constant acceleration. On entry
+    /// `mean_contact` holds the contact loads of the trial step, on return the loads of the
+    /// repetition.
     pub fn resolve_with_response(
         &mut self,
         trial: TrialStep,
@@ -260,10 +262,10 @@ impl ContactDynamics {
     ) {
         let TrialStep { dt, mut before } = trial;
         before.trial_ends.clear();
-        let trial_ends = grains.iter().zip(&*mean_contact).zip(responses);
-        (before.trial_ends).extend(trial_ends.map(|((grain, load), response)| TrialEnd {
+        let trial_ends = grains.iter().zip(&*mean_contact);
+        (before.trial_ends).extend(trial_ends.map(|(grain, load)| TrialEnd {
             state: RigidState::of(grain),
-            touched: !load.is_zero() || response.after_contact,
+            touched: !load.is_zero(),
         }));
         mean_contact.fill(Load::default());
         self.records.clone_from(&before.records);
@@ -280,8 +282,13 @@ impl ContactDynamics {
         self.substeps = self.integrate(grains, &[], dt, mean_contact);
         for (n, grain) in grains.iter_mut().enumerate() {
             let trial_end = &before.trial_ends[n];
-            if !trial_end.touched && mean_contact[n].is_zero() {
-                grain.pose = trial_end.state.pose;
+            if mean_contact[n].is_zero() {
+                if let Some(end) = responses[n].end_without_contact {
+                    grain.pose = before.poses[n];
+                    move_at_constant_acceleration(grain, [responses[n].start, end], dt);
+                } else if !trial_end.touched {
+                    grain.pose = trial_end.state.pose;
+                }
             }
             ends[n] = RigidState::of(grain);
         }
@@ -331,6 +338,6 @@ struct StateBefore {
 #[derive(Clone, Copy, Debug)]
 struct TrialEnd {
     state: RigidState,
-    /// Whether a contact or lubrication load acted on the grain in this step or the one before.
+    /// Whether a contact or lubrication load acted on the grain.
     touched: bool,
 }
