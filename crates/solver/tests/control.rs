@@ -99,6 +99,29 @@ fn a_set_velocity_is_slowed_by_the_fluid() {
     assert!(0.0 < later && later < first && first < velocity.x, "{first} {later}");
 }
 
+/// The added mass of an impact takes up no part of a velocity that is set after it.
+#[test]
+fn a_velocity_set_after_an_impact_is_that_at_the_start_of_the_next_step() {
+    let mut setup = setup();
+    setup.grains[0].pose.position.z = 0.51e-3;
+    setup.grains[0].velocity.z = -0.05;
+    // The contact lasts a fifth of a step.
+    setup.contact.normal_stiffness = 5e4;
+    setup.contact.added_density = 800.0;
+    let mut sim = Simulation::new(setup).unwrap();
+    while sim.grains()[0].velocity.z <= 0.0 {
+        sim.step(f64::INFINITY).unwrap();
+        assert!(sim.steps() < 20, "no impact");
+    }
+    let height = sim.grains()[0].pose.position.z;
+    sim.set_velocity(0, TRANSLATION, DVec3::ZERO).unwrap();
+    sim.step(f64::INFINITY).unwrap();
+    let moved = sim.grains()[0].pose.position.z - height;
+    let expected = 0.5 * 1e-4 * sim.grains()[0].velocity.z;
+    // With the pending velocity of the impact the grain moves 2.7 times as far.
+    assert!((moved / expected - 1.0).abs() < 0.05, "{moved:e} m, {expected:e} m");
+}
+
 #[test]
 fn unknown_grains_and_infinite_values_are_refused() {
     let mut sim = Simulation::new(setup()).unwrap();

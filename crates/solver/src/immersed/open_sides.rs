@@ -90,11 +90,6 @@ impl OpenSides {
         &self.crossings
     }
 
-    /// Whether a grain is about to leave and moves under its last hydrodynamic load.
-    pub fn departs(&self, grain: usize) -> bool {
-        matches!(self.crossings[grain], Crossing::Departing)
-    }
-
     /// Impulse on the fluid in the last step [N s] of a grain that crosses a side; none of another.
     pub fn impulse_across(&self, grain: usize) -> Option<DVec3> {
         let crosses = !matches!(self.crossings[grain], Crossing::Inside);

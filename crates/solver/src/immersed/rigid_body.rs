@@ -36,7 +36,8 @@ pub struct PreviousStep {
 }
 
 impl PreviousStep {
-    /// Whether the added mass takes up a velocity from contact in this step.
+    /// Returns whether contact in the previous step left a velocity that the added mass takes up in
+    /// this step.
     pub fn has_pending_velocity(&self) -> bool {
         self.pending_added_mass_velocity != RigidVelocity::default()
     }

@@ -39,13 +39,16 @@ impl CoupledGrains {
         &self,
         grains: &[Grain],
         previous: &[PreviousStep],
+        contact: &[Load],
         added_density: f64,
         dt: f64,
         responses: &mut Vec<GrainResponse>,
     ) {
         responses.clear();
-        let each = self.updates.iter().zip(grains).zip(previous);
-        let each = each.map(|((update, grain), previous)| {
+        let each = self.updates.iter().zip(grains).zip(previous).zip(contact);
+        let each = each.map(|(((update, grain), previous), contact)| {
+            let leaves_contact = previous.has_pending_velocity() && contact.is_zero();
+            let added_density = if leaves_contact { 0.0 } else { added_density };
             (update.system).response(grain, previous, added_density, dt)
         });
         responses.extend(each);

@@ -91,12 +91,21 @@ impl Simulation {
     ) -> Result<(), ControlError> {
         self.check_control(grain, velocity.is_finite(), component.quantity())?;
         let quantity = component.quantity();
-        let body = &mut self.setup.grains[grain];
-        if *component.constraint(body) != MotionConstraint::Free {
+        if *component.constraint(&mut self.setup.grains[grain]) != MotionConstraint::Free {
             return Err(ControlError::Prescribed { grain, quantity });
         }
-        *component.velocity(body) = velocity;
+        self.replace_velocity(grain, component, velocity);
         Ok(())
+    }
+
+    /// Replaces a velocity. The added mass takes up no part of the new one.
+    fn replace_velocity(&mut self, grain: usize, component: MotionComponent, velocity: DVec3) {
+        *component.velocity(&mut self.setup.grains[grain]) = velocity;
+        let pending = &mut self.data.previous[grain].pending_added_mass_velocity;
+        match component {
+            MotionComponent::Translation => pending.linear = DVec3::ZERO,
+            MotionComponent::Rotation => pending.angular = DVec3::ZERO,
+        }
     }
 
     /// Prescribes a velocity from now on: [m/s] or [rad/s], space frame. A formula of the set-up
@@ -112,9 +121,9 @@ impl Simulation {
     ) -> Result<(), ControlError> {
         self.check_control(grain, velocity.is_finite(), component.quantity())?;
         self.remove_formula(grain, component);
-        let body = &mut self.setup.grains[grain];
-        *component.constraint(body) = MotionConstraint::Prescribed(velocity);
-        *component.velocity(body) = velocity;
+        let constraint = component.constraint(&mut self.setup.grains[grain]);
+        *constraint = MotionConstraint::Prescribed(velocity);
+        self.replace_velocity(grain, component, velocity);
         Ok(())
     }
 

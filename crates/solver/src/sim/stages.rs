@@ -7,7 +7,7 @@ use super::fluid::Fluid;
 use super::prescription::Prescription;
 use super::timing::PassTimes;
 use super::{GrainData, Simulation};
-use crate::dem::{ContactDynamics, Grain, MotionConstraint, TrialStep};
+use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
 use crate::immersed::{
     CoupledGrains, CouplingInput, Crossing, GrainKinematics, OpenSides, PreviousStep,
     RigidityInput, Scheme,
@@ -110,6 +110,10 @@ impl<'a> Start<'a> {
                 solid.open_sides.as_ref().map_or(&Crossing::Inside, |o| &o.crossings()[i]);
             data.previous[i].velocity = grain.rigid_velocity();
             data.applied[i] = crossing.weight_less_buoyancy(grain, setup.gravity, fluid_density);
+            if let Crossing::Departing = crossing {
+                // Departing grains move under their last load: no added mass takes up a velocity.
+                data.previous[i].pending_added_mass_velocity = RigidVelocity::default();
+            }
             if let Crossing::Left = crossing {
                 (data.previous[i], solid.loads[i]) = (PreviousStep::default(), Load::default());
             } else if !data.external[i].is_zero() {
@@ -237,7 +241,7 @@ impl<'a> Coupled<'a> {
         }
         let added_density = solid.dynamics.params().added_density;
         let (previous, responses) = (&data.previous, &mut data.responses);
-        coupled.responses(grains, previous, added_density, dt, responses);
+        coupled.responses(grains, previous, &data.contact, added_density, dt, responses);
         timed(&mut solid.times.contact, || {
             let (contact, ends) = (&mut data.contact, &mut data.ends);
             (solid.dynamics).resolve_with_response(trial, grains, &data.responses, contact, ends)
@@ -301,33 +305,27 @@ impl Projected<'_> {
             let touched = !data.contact[i].is_zero();
             // The acceleration of an impact does not continue in the next step; its added mass
             // does.
-            let taken_up = of_free_motion(grain, previous.pending_added_mass_velocity);
+            let taken_up = previous.pending_added_mass_velocity;
             previous.added_mass_uptake = taken_up / dt;
             (previous.acceleration, previous.pending_added_mass_velocity) = if touched {
-                // Velocity on the faces beyond that at the end of the sub-steps.
-                let beyond = grain.rigid_velocity() - data.ends[i].velocity;
-                (RigidVelocity::default(), of_free_motion(grain, beyond))
+                (RigidVelocity::default(), beyond_substeps(grain, &data.ends[i]))
             } else {
                 ((change + taken_up) / dt, RigidVelocity::default())
             };
-            if solid.open_sides.as_deref().is_some_and(|open_sides| open_sides.departs(i)) {
-                // No fluid responds to the grain.
-                previous.added_mass_uptake = RigidVelocity::default();
-                previous.pending_added_mass_velocity = RigidVelocity::default();
-            }
         }
         *flow.momentum_residual = residual;
     }
 }
 
-/// Returns the velocities of a grain, with zero for those that are prescribed.
-fn of_free_motion(grain: &Grain, velocity: RigidVelocity) -> RigidVelocity {
+/// Velocities of a grain beyond those at the end of its sub-steps; zero where they are prescribed.
+fn beyond_substeps(grain: &Grain, end: &RigidState) -> RigidVelocity {
+    let beyond = grain.rigid_velocity() - end.velocity;
     let free = |constraint: MotionConstraint, velocity: DVec3| match constraint {
         MotionConstraint::Free => velocity,
         MotionConstraint::Prescribed(_) => DVec3::ZERO,
     };
     RigidVelocity {
-        linear: free(grain.translation, velocity.linear),
-        angular: free(grain.rotation, velocity.angular),
+        linear: free(grain.translation, beyond.linear),
+        angular: free(grain.rotation, beyond.angular),
     }
 }
