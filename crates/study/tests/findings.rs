@@ -132,6 +132,8 @@ fn trends_and_ranges_follow_the_factors() {
     assert_eq!(verdict(&paper, spread).0, "holds");
     let near = "quantity = \"kiss_time\"\ntest.near = { model = \"sphere\", within = 0.05 }\nwhere = { orientation = \"o3\" }";
     assert_eq!(verdict(&paper, near).0, "holds");
+    // A pattern finds the same reference.
+    assert_eq!(verdict(&paper, &near.replace("\"sphere\"", "\"sph*\"")), verdict(&paper, near));
     assert_eq!(verdict(&paper, &near.replace("\"o3\"", "\"o1\"")).0, "contradicted");
 }
 

@@ -90,8 +90,11 @@ pub(super) fn test(claim: &Claim, records: &[RunRecord]) -> Outcome {
         Test::Spread { axis, more, less } => spread(&included(all), axis, [more, less], &name),
         Test::Near { model, within } => {
             let everywhere = observations(records, &claim.quantity, &BTreeMap::new());
-            let reference = included(everywhere).into_iter().find(|o| o.model == *model);
-            near(&included(all), model, reference, *within, &name)
+            let pattern = glob::Pattern::new(model).ok();
+            let is_reference =
+                |o: &Observation| pattern.as_ref().is_some_and(|p| p.matches(&o.model));
+            let reference = included(everywhere).into_iter().find(is_reference);
+            near(&included(all), reference, *within, &name)
         }
     };
     if claim.observed {
@@ -183,18 +186,13 @@ fn trend(all: &[Observation], with: &str, sign: Sign, name: &str) -> Outcome {
     Outcome::new(counts, Effect::RankCorrelation, claimed, spearman(&x, &y), says)
 }
 
-fn near(
-    all: &[Observation],
-    model: &str,
-    reference: Option<Observation>,
-    within: f64,
-    name: &str,
-) -> Outcome {
+fn near(all: &[Observation], reference: Option<Observation>, within: f64, name: &str) -> Outcome {
     let (effect, claimed) = (Effect::RelativeDifference, Claimed::AtMost(within));
     let Some(reference) = reference else {
         return Outcome::new((0, 0), effect, claimed, None, |_| String::new());
     };
-    let others: Vec<&Observation> = all.iter().filter(|o| o.model != model).collect();
+    let model = &reference.model;
+    let others: Vec<&Observation> = all.iter().filter(|o| o.model != *model).collect();
     let relative = |o: &&Observation| o.value / reference.value - 1.0;
     let relative: Vec<f64> = others.iter().map(relative).collect();
     let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };

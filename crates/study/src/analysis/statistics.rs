@@ -178,9 +178,9 @@ pub fn bootstrap_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
 /// Returns the 95 % interval of the mean over models of outcomes of their members between `least`
 /// and `most`: shares (0 to 1) or differences of shares (-1 to 1).
 ///
-/// It is that of [`bootstrap_interval`]. If all outcomes are equal a bootstrap has no width. The
-/// part of the models with another outcome is then between 0 and the limit of Clopper and Pearson
-/// for the number of models; the interval has the mean for this limit at its ends.
+/// It is that of [`bootstrap_interval`], which has no width if all outcomes are equal. Then the
+/// limit of Clopper and Pearson for the number of models bounds the part of the models with another
+/// outcome. The ends of the interval are the means if that part has the outcome `least` or `most`.
 pub fn outcome_interval(models: &[Vec<f64>], [least, most]: [f64; 2]) -> Option<[f64; 2]> {
     let first = *models.iter().flatten().next()?;
     if models.iter().flatten().any(|value| *value != first) {

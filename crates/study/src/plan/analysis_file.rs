@@ -115,7 +115,13 @@ impl NameCheck<'_> {
                 self.axis(over, span);
                 self.factor(with, span);
             }
-            Test::Near { model, .. } => self.model(model, span),
+            Test::Near { model, .. } => {
+                let known = glob::Pattern::new(model)
+                    .is_ok_and(|pattern| self.models.iter().any(|m| pattern.matches(&m.name)));
+                if !known {
+                    self.model(model, span);
+                }
+            }
         }
     }
 

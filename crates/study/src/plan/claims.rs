@@ -126,7 +126,7 @@ pub enum Test {
     },
     /// Equal to the value of a reference model.
     Near {
-        /// Reference model.
+        /// Name of the reference model, or a pattern: the first model in the records is taken.
         model: String,
         /// Relative difference that counts as equal.
         within: f64,
