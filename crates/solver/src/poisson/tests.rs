@@ -200,23 +200,6 @@ fn bits<R: Real>(mesh: &Mesh, ends: [Ends; 3]) -> Vec<u64> {
 }
 
 #[test]
-fn bits_do_not_depend_on_the_instruction_set() {
-    use grainwake_simd::{InstructionSet, limit_instructions};
-    let mesh =
-        Mesh { cells: [37, 39, 18], spacing: DVec3::new(0.5, 0.7, 0.6), origin: DVec3::ZERO };
-    for ends in [[Ends::Neumann; 3], [Ends::Periodic; 3]] {
-        let [eight, four, common] =
-            [InstructionSet::Avx512, InstructionSet::Avx2, InstructionSet::Baseline].map(|level| {
-                limit_instructions(level);
-                [bits::<f64>(&mesh, ends), bits::<f32>(&mesh, ends)]
-            });
-        limit_instructions(InstructionSet::Avx512);
-        assert_eq!(eight, four);
-        assert_eq!(eight, common);
-    }
-}
-
-#[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
     let mesh = Mesh { cells: [30, 21, 17], spacing: DVec3::ONE, origin: DVec3::ZERO };
     let solve = |threads| {

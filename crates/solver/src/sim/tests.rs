@@ -5,9 +5,7 @@ use super::{CELL_FIELDS, PrescribedMotion, Prescription, Remedy, Setup, Simulati
 use crate::dem::Grain;
 use crate::flow::{Boundary, FluidParams};
 use crate::grid::{Axis, Mesh};
-use crate::immersed::Scheme;
 use crate::math::Precision;
-use grainwake_simd::{InstructionSet, limit_instructions};
 
 /// Rotated ellipsoid beside a wall and sphere across the edges of a periodic box, both moving.
 fn two_grains(precision: Precision) -> Setup {
@@ -33,39 +31,6 @@ fn two_grains(precision: Precision) -> Setup {
             grain(Shape::sphere(0.4, 600), along(0.1, 0.2, 1.5), along(-0.3, 0.4, 0.2)),
         ])
         .with_step(StepRule::Fixed(0.02))
-}
-
-#[test]
-fn bits_of_coupled_steps_do_not_depend_on_the_instruction_set() {
-    fn bits(precision: Precision, scheme: Scheme) -> Vec<u64> {
-        let mut sim = Simulation::new(two_grains(precision).with_scheme(scheme)).unwrap();
-        for _ in 0..4 {
-            sim.step(f64::INFINITY).unwrap();
-        }
-        let velocity = [Axis::X, Axis::Y, Axis::Z].into_iter().flat_map(|axis| {
-            let view = sim.velocity(axis).unwrap();
-            let [nz, ny, nx] = view.shape();
-            let rows = (0..nz).flat_map(move |k| (0..ny).map(move |j| (k, j)));
-            rows.flat_map(move |(k, j)| (0..nx).map(move |i| view.get([k, j, i])))
-        });
-        let of = |grain: &Grain| [grain.pose.position, grain.velocity, grain.angular_velocity];
-        let grains = sim.setup.grains.iter().flat_map(of);
-        let all = velocity.chain(grains.flat_map(|v| v.to_array()));
-        all.map(f64::to_bits).collect()
-    }
-    for (precision, scheme) in [
-        (Precision::Double, Scheme::Aperture),
-        (Precision::Single, Scheme::Aperture),
-        (Precision::Double, Scheme::Paper),
-    ] {
-        let [widest, middle, common] =
-            [InstructionSet::Avx512, InstructionSet::Avx2, InstructionSet::Baseline].map(|level| {
-                limit_instructions(level);
-                bits(precision, scheme)
-            });
-        limit_instructions(InstructionSet::Avx512);
-        assert!(widest == middle && widest == common, "{precision}, {scheme:?}");
-    }
 }
 
 #[test]
