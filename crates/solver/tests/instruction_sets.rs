@@ -1,6 +1,6 @@
-//! Bits of coupled steps with every instruction set. The set in use belongs to the whole program, and
-//! one that changes within a step changes its bits: this file has a single test, so that no other
-//! runs beside it.
+//! Bits of coupled steps with every instruction set. The set in use belongs to the whole program,
+//! and a change of it within a step changes the bits. This file has a single test, so that no other
+//! test runs beside it.
 
 use grainwake_shape::{ShapeOptions, analytic};
 use grainwake_solver::dem::Grain;
