@@ -243,7 +243,7 @@ impl SharedRow<'_> {
             if forced.contains(&i) {
                 let entry = first_forced + (i - forced.start) as usize;
                 if nearest <= -self.eps && nearest < d {
-                    band.distance[entry] = BandFaces::outside(self.eps) as f32;
+                    band.set_outside(entry, self.eps);
                 } else if nearest < forcing_reach(self.eps) {
                     band.shared.push((entry, x));
                 }

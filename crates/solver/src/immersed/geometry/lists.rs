@@ -155,9 +155,14 @@ impl BandFaces {
         let distances = [&self.distance, &self.mean_distance].map(|list| f64::from(list[entry]));
         (distances, DVec3::from_array(normal))
     }
+    /// Moves a face out of the forcing band of half-width `eps` [m]: the grain does not force it.
+    pub(super) fn set_outside(&mut self, entry: usize, eps: f64) {
+        self.distance[entry] = Self::outside(eps);
+        self.mean_distance[entry] = Self::outside(eps);
+    }
     /// Distance outside the forcing band [m].
-    pub(super) fn outside(eps: f64) -> f64 {
-        4.0 * eps
+    fn outside(eps: f64) -> f32 {
+        4.0 * eps as f32
     }
     /// Fills the lists up to a whole number of registers with faces outside the band of half-width
     /// `eps` [m]; returns that length.
@@ -167,7 +172,7 @@ impl BandFaces {
             list.resize(padded.max(list.len()), 0.0);
         }
         for list in [&mut self.distance, &mut self.mean_distance] {
-            list[self.count..padded].fill(Self::outside(eps) as f32);
+            list[self.count..padded].fill(Self::outside(eps));
         }
         padded
     }
