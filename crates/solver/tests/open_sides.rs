@@ -84,6 +84,35 @@ fn a_grain_leaves_through_an_outflow_as_if_the_domain_went_on() {
     assert!(after.max_divergence < 1e-10 * after.max_velocity / H, "{after:?}");
 }
 
+/// A sphere pushes another one out of the box. Both leave as if the domain went on, and the contact
+/// between them keeps their momentum.
+#[test]
+fn touching_grains_leave_through_an_outflow_one_after_the_other() {
+    let pair = |height: usize, above: f64| {
+        let nu = 1.65f64.sqrt() / 100.0;
+        let grains = [0.0, 1.0].map(|z| sphere(2.65, [2.0, 2.02, above + z]));
+        let case = setup([32, 32, height], [Boundary::Outflow, Boundary::WALL], nu, grains.into());
+        Simulation::new(case).unwrap()
+    };
+    let (mut short, mut long) = (pair(56, 4.5), pair(88, 8.5));
+    // In the long box the first sphere is still in front of the second when that one leaves.
+    let (mut contacts, mut enough) = (0, 50);
+    for (grain, bound) in [(0, 0.015), (1, 0.06)] {
+        while short.grains()[grain].pose.position.z > 0.0 {
+            step(&mut short);
+            contacts += usize::from(!short.contacts().is_empty());
+            let balance = short.diagnostics().momentum_residual;
+            assert!(balance < 1e-13, "momentum residual {balance:e}");
+        }
+        long.advance_to(short.time()).unwrap();
+        let [short_speed, long_speed] = [&short, &long].map(|sim| sim.grains()[grain].velocity.z);
+        let difference = short_speed / long_speed - 1.0;
+        assert!(difference.abs() < bound, "speed of {grain}: {short_speed} and {long_speed}");
+        assert!(contacts > enough, "{contacts} steps with contact");
+        (contacts, enough) = (0, 0);
+    }
+}
+
 #[test]
 fn a_grain_that_leaves_is_restored_with_the_same_bits() {
     let bits = |sim: &Simulation| {
