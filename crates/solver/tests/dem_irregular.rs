@@ -338,7 +338,7 @@ fn irregular_contact_across_a_periodic_face_is_the_same() {
 
 #[test]
 fn pairs_that_are_not_looked_at_do_not_miss_a_contact() {
-    // One long step skips pairs with a known separation and starts from the last nearest node; a
+    // One long step skips pairs with a known separation and tests candidate nodes alone; a
     // hundred short steps search without this information.
     let turn = DQuat::from_scaled_axis(DVec3::new(0.4, -0.2, 0.9));
     let start = {

@@ -177,7 +177,7 @@ pub(super) fn evaluate_pair(record: &mut ContactRecord, context: &PairContext) {
         Partner::Grain(j) => bodies[j].displacement,
         Partner::Wall { .. } => 0.0,
     };
-    record.patch.separation -= MOTION_MARGIN * (bodies[i].displacement + partner_displacement);
+    record.patch.approach(MOTION_MARGIN * (bodies[i].displacement + partner_displacement));
     if record.patch.separation > 0.0 {
         return;
     }

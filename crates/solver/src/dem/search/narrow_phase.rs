@@ -5,7 +5,8 @@ use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 
 use super::surface::{
-    DescentLimits, NodeTree, PartnerField, SurfacePoint, minimise_distance, project_to_surface,
+    DescentLimits, GRADIENT_MARGIN, NodeTree, PartnerField, SurfacePoint, minimise_distance,
+    project_to_surface,
 };
 
 /// Penetrating point of a pair, space frame.
@@ -54,8 +55,8 @@ pub(in crate::dem) struct ContactPatch {
     pub points: Vec<ContactPoint>,
     /// Lower bound of the distance between the surfaces [m]; not positive if unknown.
     pub separation: f64,
-    /// Nearest node of either grain in the last search.
-    seeds: [Option<u32>; 2],
+    /// Last searches of the surfaces of both grains.
+    memory: [SurfaceMemory; 2],
     found: Vec<PenetratingPoint>,
 }
 
@@ -67,19 +68,27 @@ impl Clone for ContactPatch {
     }
     /// Copies a patch into the buffers of this one.
     fn clone_from(&mut self, source: &ContactPatch) {
-        let (mut points, mut found) =
-            (std::mem::take(&mut self.points), std::mem::take(&mut self.found));
+        let ContactPatch { points, separation, memory, found } = self;
         points.clone_from(&source.points);
+        *separation = source.separation;
+        memory.clone_from(&source.memory);
         found.clone_from(&source.found);
-        *self = ContactPatch { points, found, ..*source };
     }
 }
 
 impl ContactPatch {
-    /// Discards the separation and the nearest nodes of earlier searches.
+    /// Discards what earlier searches found.
     pub fn reset(&mut self) {
         self.separation = 0.0;
-        self.seeds = [None; 2];
+        self.memory.iter_mut().for_each(SurfaceMemory::reset);
+    }
+
+    /// Takes note that the surfaces may have approached each other by `displacement` [m].
+    pub fn approach(&mut self, displacement: f64) {
+        self.separation -= displacement;
+        for memory in &mut self.memory {
+            memory.slack -= GRADIENT_MARGIN * displacement;
+        }
     }
 
     /// Finds the penetrating points of two grains (Eqs 7-8); returns the closest point if the
@@ -100,22 +109,18 @@ impl ContactPatch {
         let to_b = b.rotation.transpose();
         let rotation = to_b * a.rotation;
         let field_of_b = PartnerField::grain(b.shape, rotation, to_b * branch);
-        let scan_a = scan_surface(a, &field_of_b, reach, &mut self.seeds[0], &mut self.found);
+        let scan_a = scan_surface(a, &field_of_b, reach, &mut self.memory[0], &mut self.found);
         let to_space = |p: &SurfacePoint| (a.rotation * p.position, -(a.rotation * p.normal));
         let closest_a = scan_a.closest.map(|p| ClosestPoint::new(&p, to_space(&p)));
         self.append_points(0, to_space);
         let translation = -(a.rotation.transpose() * branch);
         let field_of_a = PartnerField::grain(a.shape, rotation.transpose(), translation);
-        let scan_b = scan_surface(b, &field_of_a, reach, &mut self.seeds[1], &mut self.found);
+        let scan_b = scan_surface(b, &field_of_a, reach, &mut self.memory[1], &mut self.found);
         let to_space = |p: &SurfacePoint| (b.rotation * p.position - branch, b.rotation * p.normal);
         let closest_b = scan_b.closest.map(|p| ClosestPoint::new(&p, to_space(&p)));
         self.append_points(SECOND_GRAIN, to_space);
-        self.separation = if self.points.is_empty() {
-            scan_a.separation.max(scan_b.separation) - reach
-        } else {
-            0.0
-        };
-        ClosestPoint::nearer(closest_a, closest_b)
+        let node_bound = scan_a.separation.max(scan_b.separation);
+        self.finish(ClosestPoint::nearer(closest_a, closest_b), node_bound, reach)
     }
 
     /// Finds the penetrating points of a grain in a wall with the unit normal `inward`, at the
@@ -134,11 +139,25 @@ impl ContactPatch {
             return None;
         }
         let wall = PartnerField::HalfSpace { normal: a.rotation.transpose() * inward, offset };
-        let scan = scan_surface(a, &wall, reach, &mut self.seeds[0], &mut self.found);
+        let scan = scan_surface(a, &wall, reach, &mut self.memory[0], &mut self.found);
         let to_space = |p: &SurfacePoint| (a.rotation * p.position, -inward);
         self.append_points(0, to_space);
-        self.separation = if self.points.is_empty() { scan.separation - reach } else { 0.0 };
-        scan.closest.map(|p| ClosestPoint::new(&p, to_space(&p)))
+        let closest = scan.closest.map(|p| ClosestPoint::new(&p, to_space(&p)));
+        self.finish(closest, scan.separation, reach)
+    }
+
+    /// Sets the separation after a search that found the closest point, if near; returns that point
+    /// if it is nearer than `reach` [m]. `node_bound` is the lower bound that the nodes give [m].
+    fn finish(
+        &mut self,
+        closest: Option<ClosestPoint>,
+        node_bound: f64,
+        reach: f64,
+    ) -> Option<ClosestPoint> {
+        // Half of the gap may close before the pair is searched again.
+        let bound = closest.map_or(node_bound, |point| node_bound.max(0.5 * point.gap));
+        self.separation = if self.points.is_empty() { bound - reach } else { 0.0 };
+        closest.filter(|point| point.gap < reach)
     }
 
     /// Appends the points of the last scan, with lever arm and normal from `to_space`.
@@ -178,6 +197,8 @@ const MIRROR_TOLERANCE: f64 = 0.3;
 const RESOLVED: usize = 128;
 /// Range of the search for the nearest node [node spacings]; bounds the separation of the pair.
 const SEARCH_RANGE: f64 = 3.0;
+/// Distance from the partner up to which nodes are candidates of the next searches [node spacings].
+const CANDIDATE_RANGE: f64 = 0.5;
 /// Largest distance of a surface point from the nearest node [node spacings].
 const NODE_COVERAGE: f64 = 1.2;
 
@@ -205,11 +226,46 @@ pub(super) struct PenetratingPoint {
     pub point: SurfacePoint,
 }
 
+/// What the last search of the surface of one grain found: within a step, a search starts from it.
+#[derive(Debug, Default)]
+struct SurfaceMemory {
+    /// Nodes within the candidate range at the last traversal, in ascending order.
+    candidates: Vec<u32>,
+    /// Distance by which the surfaces may approach until other nodes than the candidates may
+    /// penetrate [m].
+    slack: f64,
+    /// Nearest node.
+    nearest: Option<u32>,
+}
+
+impl Clone for SurfaceMemory {
+    fn clone(&self) -> SurfaceMemory {
+        let mut copy = SurfaceMemory::default();
+        copy.clone_from(self);
+        copy
+    }
+    /// Copies a memory into the buffer of this one.
+    fn clone_from(&mut self, source: &SurfaceMemory) {
+        let mut candidates = std::mem::take(&mut self.candidates);
+        candidates.clone_from(&source.candidates);
+        *self = SurfaceMemory { candidates, ..*source };
+    }
+}
+
+impl SurfaceMemory {
+    /// Forgets all but the buffer.
+    fn reset(&mut self) {
+        self.candidates.clear();
+        let candidates = std::mem::take(&mut self.candidates);
+        *self = SurfaceMemory { candidates, ..SurfaceMemory::default() };
+    }
+}
+
 /// Result of testing the nodes of one grain in the field of its partner.
 pub(super) struct SurfaceScan {
     /// Lower bound of the distance between surface and partner [m].
     pub separation: f64,
-    /// Closest point of the surface, if nearer than the search range asked for.
+    /// Closest point of the surface, if it may be nearer than the reach of the search.
     pub closest: Option<SurfacePoint>,
 }
 
@@ -231,20 +287,20 @@ impl NearestNode {
 /// Tests the nodes of `owner` in the field of its partner (Eq. 7).
 ///
 /// Penetrating points go to `found` in ascending identifier. The closest point of the surface is
-/// determined if it may be nearer than `reach` [m]. `seed`, the nearest node of the last scan, only
-/// saves work.
-pub(super) fn scan_surface(
+/// determined if it may be nearer than `reach` [m]. `memory`, which the last search in the same step
+/// has filled, only saves work.
+fn scan_surface(
     owner: &PosedShape,
     partner: &PartnerField,
     reach: f64,
-    seed: &mut Option<u32>,
+    memory: &mut SurfaceMemory,
     found: &mut Vec<PenetratingPoint>,
 ) -> SurfaceScan {
-    found.clear();
     let tree = owner.tree;
-    let range = tree.spacing.max(reach);
-    let nearest = scan_nodes(tree, partner, SEARCH_RANGE * range, *seed, found);
-    *seed = nearest.index;
+    let range = NODE_COVERAGE * tree.spacing + reach;
+    let nearest = scan_candidates(tree, partner, memory, found)
+        .unwrap_or_else(|| scan_nodes(tree, partner, SEARCH_RANGE * range, memory, found));
+    memory.nearest = nearest.index;
     let separation = nearest.distance - NODE_COVERAGE * tree.spacing;
     let start = nearest
         .index
@@ -269,40 +325,78 @@ pub(super) fn scan_surface(
             point: closest,
         });
     }
-    SurfaceScan { separation, closest: (closest.distance < reach).then_some(closest) }
+    SurfaceScan { separation, closest: Some(closest) }
 }
 
-/// Collects the penetrating nodes and returns the nearest node within `range` [m].
+/// Collects the penetrating nodes among the candidates of the last traversal and returns the
+/// nearest node; `None` if other nodes may be nearer or penetrate.
+fn scan_candidates(
+    tree: &NodeTree,
+    partner: &PartnerField,
+    memory: &SurfaceMemory,
+    found: &mut Vec<PenetratingPoint>,
+) -> Option<NearestNode> {
+    if memory.slack <= 0.0 {
+        return None;
+    }
+    found.clear();
+    let mut nearest = NearestNode { distance: memory.slack, index: None };
+    for &index in &memory.candidates {
+        test_node(tree, partner, index, f64::INFINITY, &mut nearest, found);
+    }
+    nearest.index.is_some().then_some(nearest)
+}
+
+/// Tests a node unless it is farther than `reach` [m] from the partner; returns its distance.
+fn test_node(
+    tree: &NodeTree,
+    partner: &PartnerField,
+    index: u32,
+    reach: f64,
+    nearest: &mut NearestNode,
+    found: &mut Vec<PenetratingPoint>,
+) -> Option<f64> {
+    let node = &tree.nodes[index as usize];
+    let distance = partner.distance_within(node.position, reach)?;
+    nearest.update(distance, index);
+    if distance < 0.0
+        && let Some(point) = SurfacePoint::at(partner, node.position)
+    {
+        found.push(PenetratingPoint { id: 2 * index, area: node.area, point });
+    }
+    Some(distance)
+}
+
+/// Collects the penetrating nodes and returns the nearest node within `range` [m]; lists the
+/// candidates of the next searches.
 fn scan_nodes(
     tree: &NodeTree,
     partner: &PartnerField,
     range: f64,
-    seed: Option<u32>,
+    memory: &mut SurfaceMemory,
     found: &mut Vec<PenetratingPoint>,
 ) -> NearestNode {
+    found.clear();
+    let SurfaceMemory { candidates, slack, nearest: seed, .. } = memory;
+    candidates.clear();
+    *slack = CANDIDATE_RANGE * tree.spacing;
     let mut nearest = NearestNode { distance: range, index: None };
     if let Some((index, node)) = seed.and_then(|n| Some((n, tree.nodes.get(n as usize)?))) {
         nearest.update(partner.distance(node.position), index);
     }
     let mut cluster_index = 0;
     while let Some(cluster) = tree.clusters.get(cluster_index) {
-        // Only penetrating nodes and nodes nearer than the nearest one so far are of interest.
-        if partner.is_beyond(cluster.centre, cluster.radius, nearest.distance.max(0.0)) {
+        // Only candidates and nodes nearer than the nearest one so far are of interest.
+        if partner.is_beyond(cluster.centre, cluster.radius, nearest.distance.max(*slack)) {
             cluster_index = cluster.skip as usize;
             continue;
         }
         if cluster.is_leaf(cluster_index) {
             for index in cluster.nodes.0..cluster.nodes.1 {
-                let node = &tree.nodes[index as usize];
-                let limit = nearest.distance.max(0.0);
-                let Some(distance) = partner.distance_within(node.position, limit) else {
-                    continue;
-                };
-                nearest.update(distance, index);
-                if distance < 0.0
-                    && let Some(point) = SurfacePoint::at(partner, node.position)
-                {
-                    found.push(PenetratingPoint { id: 2 * index, area: node.area, point });
+                let reach = nearest.distance.max(*slack);
+                let distance = test_node(tree, partner, index, reach, &mut nearest, found);
+                if distance.is_some_and(|distance| distance <= *slack) {
+                    candidates.push(index);
                 }
             }
         }

@@ -80,7 +80,7 @@ impl NodeTree {
 }
 
 /// Safety factor on a distance from a sampled field, whose gradient may slightly exceed one.
-const GRADIENT_MARGIN: f64 = 1.1;
+pub(super) const GRADIENT_MARGIN: f64 = 1.1;
 
 /// Signed distance field of a grain or a wall in the principal frame of another grain.
 #[derive(Clone, Copy, Debug)]
