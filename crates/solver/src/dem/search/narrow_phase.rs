@@ -226,7 +226,8 @@ pub(super) struct PenetratingPoint {
     pub point: SurfacePoint,
 }
 
-/// What the last search of the surface of one grain found: within a step, a search starts from it.
+/// Result of the last search of the surface of one grain, from which the next one in the same step
+/// starts.
 #[derive(Debug, Default)]
 struct SurfaceMemory {
     /// Nodes within the candidate range at the last traversal, in ascending order.
@@ -287,8 +288,8 @@ impl NearestNode {
 /// Tests the nodes of `owner` in the field of its partner (Eq. 7).
 ///
 /// Penetrating points go to `found` in ascending identifier. The closest point of the surface is
-/// determined if it may be nearer than `reach` [m]. `memory`, which the last search in the same step
-/// has filled, only saves work.
+/// determined if it may be nearer than `reach` [m]. `memory`, filled by the last search in the same
+/// step, only saves work.
 fn scan_surface(
     owner: &PosedShape,
     partner: &PartnerField,
