@@ -460,6 +460,29 @@ fn a_bed_at_rest_stays_at_rest() {
     assert!(speed < 2e-5, "{speed:e}");
 }
 
+/// A face almost closed by the sphere, next to the floor, must not accelerate itself
+/// (`docs/decisions/0023-jets-out-of-closed-faces.md`).
+#[test]
+fn a_sphere_lands_on_a_coarse_grid_without_jets() {
+    for (cells, density) in [(4, 2.5), (4, 7.8), (5, 2.5), (5, 5.0)] {
+        let (n, h) = (4 * cells, 1.0 / cells as f64);
+        let ball = sphere(1.0, DVec3::new(2.015, 2.025, 2.5), density);
+        let sides = [PERIODIC, PERIODIC, WALLS];
+        // Water and a diameter of 2 mm: the unit of the viscosity is sqrt(g d^3).
+        let mut case = setup([n, n, n], h, sides, 1e-6 / (9.81f64 * 8e-9).sqrt(), vec![ball]);
+        case.gravity = DVec3::NEG_Z;
+        case.contact.restitution = 0.9;
+        case.contact.normal_stiffness = 2e4;
+        case.step = limits(0.4);
+        let mut sim = Simulation::new(case).unwrap();
+        while sim.time() < 15.0 {
+            sim.step(f64::INFINITY).expect("a stable step");
+            let speed = sim.diagnostics().max_velocity;
+            assert!(speed < 2.2, "{cells} cells, density {density}: {speed} at {}", sim.time());
+        }
+    }
+}
+
 #[test]
 fn a_squeezed_pair_is_stable_on_coarse_grids() {
     // Two spheres side by side fill the width of a periodic box. Fluid between them is squeezed

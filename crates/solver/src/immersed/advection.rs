@@ -18,6 +18,9 @@
 //! ```
 //!
 //! The second term is left out at the ends of the grid, where fewer than six faces are in line.
+//! |(1/A - 1) (c - U_c)| is limited to 100 nu / h: through a face that is almost closed, a jet out
+//! of the grain would otherwise accelerate itself without bound
+//! (`docs/decisions/0023-jets-out-of-closed-faces.md`).
 //! Both are fluxes between two faces, so momentum is conserved
 //! (`docs/decisions/0003-advection-next-to-grains.md`). `links.rs` finds the links,
 //! `immersed::reference` has the scalar form.
@@ -58,6 +61,9 @@ impl GrainKinematics {
     }
 }
 
+/// Largest Reynolds number |(1/A - 1) (c - U_c)| h / nu of the first term.
+pub const LARGEST_EXCESS: f64 = 100.0;
+
 /// Change of the tendency of each face near a grain [m/s^2], by component, in the order of
 /// [`LocatedBody::distance`].
 pub type AdvectionCorrection = [Vec<f64>; 3];
@@ -73,6 +79,7 @@ pub struct AdvectionScratch<R> {
 /// [m] is the half-width of the band.
 pub fn find_correction<R: Real>(
     eps: f64,
+    kinematic_viscosity: f64,
     known: &OldState<R>,
     kinematics: &GrainKinematics,
     body: &LocatedBody,
@@ -81,6 +88,7 @@ pub fn find_correction<R: Real>(
 ) {
     dispatch(FindCorrection {
         eps,
+        kinematic_viscosity,
         mesh: known.mesh,
         kinematics,
         body,
@@ -124,6 +132,7 @@ impl<R: Real> Kernel for AddCorrection<'_, '_, R> {
 
 struct FindCorrection<'a, R> {
     eps: f64,
+    kinematic_viscosity: f64,
     mesh: &'a Mesh,
     kinematics: &'a GrainKinematics,
     body: &'a LocatedBody,
@@ -136,10 +145,11 @@ impl<R: Real> Kernel for FindCorrection<'_, R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let FindCorrection { eps, mesh, kinematics, body, velocity, planes, correction } = self;
+        let FindCorrection { eps, mesh, kinematics, body, velocity, planes, correction, .. } = self;
+        let nu = self.kinematic_viscosity;
         for (component, correction) in correction.iter_mut().enumerate() {
             correction.resize(body.distance[component].len(), 0.0);
-            ComponentLinks::new(eps, mesh, kinematics, body, &velocity, component)
+            ComponentLinks::new([eps, nu], mesh, kinematics, body, &velocity, component)
                 .correct::<V>(planes, correction);
         }
     }
@@ -209,6 +219,8 @@ struct LinkAxis {
     advecting: Stencil<2>,
     /// 1 / h [1/m].
     per_spacing: f64,
+    /// Largest |(1/A - 1) (c - U_c)| [m/s].
+    largest_excess: f64,
 }
 
 /// Links of a row along one axis that get the sixth-order mean.
@@ -223,7 +235,7 @@ struct SixthOrderLinks<'a> {
 
 impl<'a, R: Real> ComponentLinks<'a, R> {
     pub fn new(
-        eps: f64,
+        [eps, nu]: [f64; 2],
         mesh: &Mesh,
         kinematics: &GrainKinematics,
         body: &'a LocatedBody,
@@ -241,6 +253,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
                     false => Stencil::new([next, next - across]),
                 },
                 per_spacing: 1.0 / mesh.spacing[along],
+                largest_excess: LARGEST_EXCESS * nu / mesh.spacing[along],
             }
         });
         ComponentLinks {
@@ -383,7 +396,15 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             let [change_q, change_c] = self.rigid.change[0][along].map(V::constant);
             let u_q = index.mul_add(change_q, V::constant(u_q));
             let u_c = index.mul_add(change_c, V::constant(u_c));
-            flux = ((q_mean - u_q) * (c_mean - u_c)).mul_add(weight, higher_order);
+            let (q_relative, c_relative) = (q_mean - u_q, c_mean - u_c);
+            flux = (q_relative * c_relative).mul_add(weight, higher_order);
+            let (limit, excess) = (V::constant(axis.largest_excess), weight * c_relative);
+            let size = excess.abs();
+            if limit.mask_below(size) != 0 {
+                let limited = excess.max(zero - limit).min(limit);
+                let limited = q_relative.mul_add(limited, higher_order);
+                flux = limit.select_below(size, limited, flux);
+            }
         }
         let flux = flux * V::constant(axis.per_spacing);
         between.select_below(weight, flux, zero)

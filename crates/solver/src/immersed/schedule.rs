@@ -106,6 +106,7 @@ impl<R: Real> ImmersedGrains<R> {
             known,
             corrects_advection,
             fluid_density: self.fluid_density,
+            kinematic_viscosity: self.kinematic_viscosity,
         };
         let (scratch, access) = (&self.scratch, &self.access);
         let each = self.grains.par_iter_mut().zip(&mut updates).enumerate();
@@ -164,7 +165,8 @@ impl<R: Real> ImmersedGrains<R> {
         updates: &[GrainUpdate],
     ) {
         let (known, _) = flow.prediction();
-        let (eps, scratch) = (self.locator.eps(), &self.scratch);
+        let (eps, nu) = (self.locator.eps(), self.kinematic_viscosity);
+        let scratch = &self.scratch;
         let each = self.grains.par_iter_mut().zip(updates).enumerate();
         let each = each.filter(|(_, (_, update))| !update.isolated);
         each.for_each(|(index, (grain, _))| {
@@ -174,7 +176,7 @@ impl<R: Real> ImmersedGrains<R> {
                 return;
             }
             let (body, correction) = (&grain.body, &mut grain.correction);
-            find_correction(eps, &known, kinematics, body, &mut scratch.advection, correction);
+            find_correction(eps, nu, &known, kinematics, body, &mut scratch.advection, correction);
         });
         let (layout, grains) = (flow.mesh().layout(), &self.grains);
         flow.for_predictions(|component, mut prediction| {

@@ -139,6 +139,8 @@ pub struct CouplingContext<'a, R> {
     pub corrects_advection: bool,
     /// Density of the fluid [kg/m^3].
     pub fluid_density: f64,
+    /// Kinematic viscosity of the fluid [m^2/s].
+    pub kinematic_viscosity: f64,
 }
 
 impl<R: Real> CouplingContext<'_, R> {
@@ -156,7 +158,8 @@ impl<R: Real> CouplingContext<'_, R> {
         let body = &mut grain.body;
         if self.corrects_advection {
             let (kinematics, eps) = (&self.input.kinematics[index], self.locator.eps());
-            find_correction(eps, &self.known, kinematics, body, advection, correction);
+            let (nu, known) = (self.kinematic_viscosity, &self.known);
+            find_correction(eps, nu, known, kinematics, body, advection, correction);
             for (component, prediction) in predictions.iter_mut().enumerate() {
                 add_correction(body, correction, component, prediction);
             }

@@ -7,7 +7,7 @@ use glam::IVec3;
 
 use super::Reference;
 use crate::flow::OldState;
-use crate::immersed::advection::GrainKinematics;
+use crate::immersed::advection::{GrainKinematics, LARGEST_EXCESS};
 use crate::immersed::geometry::aperture::forcing_reach;
 use crate::immersed::geometry::aperture::reference::inverse_aperture_excess;
 
@@ -79,7 +79,8 @@ impl Reference {
         let x_0 = self.position(component, lower);
         let middle = self.nearest_image(index, x_0).lever_arm + 0.5 * h * e.as_dvec3();
         let rigid = kinematics.velocity.at(middle);
-        let relative = (0.5 * (q(0) + q(1)) - rigid[component]) * (c - rigid[axis]);
-        (weight * relative + c / 60.0 * sixth_order) / h
+        let largest = LARGEST_EXCESS * self.kinematic_viscosity / h;
+        let excess = (weight * (c - rigid[axis])).clamp(-largest, largest);
+        (excess * (0.5 * (q(0) + q(1)) - rigid[component]) + c / 60.0 * sixth_order) / h
     }
 }
