@@ -18,9 +18,6 @@ const CONTACT_DOMINATES: f64 = 0.5;
 const UNSTABLE_CFL: f64 = 1.0;
 /// Cells per diameter below which forces are rough.
 const COARSE: f64 = 8.0;
-/// Cells per diameter below which the flow can become unstable. A sphere of density ratio 2.5 and
-/// Galileo number 343 that lands on a floor does at 4 and 5 cells and a CFL number of 0.4.
-const FRAGILE: f64 = 6.0;
 /// Estimated error of the drag from which the resolution is a reason for a warning.
 const LARGEST_DRAG_ERROR: f64 = 0.05;
 /// Steps over which single-precision rounding errors of one sign add up to 0.3 %.
@@ -32,13 +29,7 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     // The number counts as printed: a measured diameter of 7.98 cells is no reason for a warning.
     let printed = |n: f64| (10.0 * n).round() / 10.0;
     if let Some(n) = e.cells_per_diameter.map(printed).filter(|n| *n < COARSE) {
-        let fragile = match n < FRAGILE {
-            true => {
-                format!(", and below {FRAGILE:.0} a run can become unstable at a cfl above 0.2")
-            }
-            false => String::new(),
-        };
-        found.push(format!("only {n:.1} cells across the smallest grain: below {COARSE:.0} forces are rough{fragile}; make cell_size smaller"));
+        found.push(format!("only {n:.1} cells across the smallest grain: below {COARSE:.0} forces are rough; make cell_size smaller"));
     }
     if let Some(n) = e.cells_across_shortest_axis.map(printed).filter(|n| *n < THIN) {
         found.push(format!("only {n:.1} cells across the shortest axis of the thinnest grain: below {THIN:.0} forces are rough; make cell_size smaller"));
