@@ -12,6 +12,8 @@ pub fn folder() -> PathBuf {
         COUNT.fetch_add(1, Ordering::Relaxed)
     );
     let path = std::env::temp_dir().join(name);
+    // Left by an earlier process with the same number.
+    let _ = std::fs::remove_dir_all(&path);
     std::fs::create_dir_all(&path).unwrap();
     path
 }
