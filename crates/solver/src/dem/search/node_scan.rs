@@ -1,0 +1,147 @@
+//! Nodes of one grain that penetrate its partner, and the nearest node: by the hierarchy of the
+//! nodes, or within a step by the candidates of the last search.
+
+use super::surface::{NodeTree, PartnerField, SurfacePoint};
+
+/// Distance from the partner up to which nodes are candidates of the next searches [node spacings].
+const CANDIDATE_RANGE: f64 = 0.5;
+/// Penetrating point in the principal frame of the grain on whose surface it lies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PenetratingPoint {
+    /// Identifier of the node or point.
+    pub id: u32,
+    /// Area that the point represents [m^2].
+    pub area: f64,
+    /// Position and distance.
+    pub point: SurfacePoint,
+}
+
+/// Result of the last search of the surface of one grain, from which the next one in the same step
+/// starts.
+#[derive(Debug, Default)]
+pub(super) struct SurfaceMemory {
+    /// Nodes within the candidate range at the last traversal, in ascending order.
+    candidates: Vec<u32>,
+    /// Distance by which the surfaces may approach until other nodes than the candidates may
+    /// penetrate [m].
+    pub slack: f64,
+    /// Nearest node.
+    pub nearest: Option<u32>,
+}
+
+impl Clone for SurfaceMemory {
+    fn clone(&self) -> SurfaceMemory {
+        let mut copy = SurfaceMemory::default();
+        copy.clone_from(self);
+        copy
+    }
+    /// Copies a memory into the buffer of this one.
+    fn clone_from(&mut self, source: &SurfaceMemory) {
+        let mut candidates = std::mem::take(&mut self.candidates);
+        candidates.clone_from(&source.candidates);
+        *self = SurfaceMemory { candidates, ..*source };
+    }
+}
+
+impl SurfaceMemory {
+    /// Forgets all but the buffer.
+    pub fn reset(&mut self) {
+        self.candidates.clear();
+        let candidates = std::mem::take(&mut self.candidates);
+        *self = SurfaceMemory { candidates, ..SurfaceMemory::default() };
+    }
+}
+
+/// Nearest node found so far; the lowest index among equally near nodes.
+pub(super) struct NearestNode {
+    /// Distance from the partner [m].
+    pub distance: f64,
+    /// Index of the node; `None` if no node is nearer than that.
+    pub index: Option<u32>,
+}
+
+impl NearestNode {
+    fn update(&mut self, distance: f64, index: u32) {
+        let tied = distance == self.distance && self.index.is_some_and(|known| index < known);
+        if distance < self.distance || tied {
+            *self = NearestNode { distance, index: Some(index) };
+        }
+    }
+}
+
+/// Collects the penetrating nodes among the candidates of the last traversal and returns the
+/// nearest node; `None` if other nodes may be nearer or penetrate.
+pub(super) fn scan_candidates(
+    tree: &NodeTree,
+    partner: &PartnerField,
+    memory: &SurfaceMemory,
+    found: &mut Vec<PenetratingPoint>,
+) -> Option<NearestNode> {
+    if memory.slack <= 0.0 {
+        return None;
+    }
+    found.clear();
+    let mut nearest = NearestNode { distance: memory.slack, index: None };
+    for &index in &memory.candidates {
+        test_node(tree, partner, index, f64::INFINITY, &mut nearest, found);
+    }
+    nearest.index.is_some().then_some(nearest)
+}
+
+/// Tests a node unless it is farther than `reach` [m] from the partner; returns its distance.
+fn test_node(
+    tree: &NodeTree,
+    partner: &PartnerField,
+    index: u32,
+    reach: f64,
+    nearest: &mut NearestNode,
+    found: &mut Vec<PenetratingPoint>,
+) -> Option<f64> {
+    let node = &tree.nodes[index as usize];
+    let distance = partner.distance_within(node.position, reach)?;
+    nearest.update(distance, index);
+    if distance < 0.0
+        && let Some(point) = SurfacePoint::at(partner, node.position)
+    {
+        found.push(PenetratingPoint { id: 2 * index, area: node.area, point });
+    }
+    Some(distance)
+}
+
+/// Collects the penetrating nodes and returns the nearest node within `range` [m]; lists the
+/// candidates of the next searches.
+pub(super) fn scan_nodes(
+    tree: &NodeTree,
+    partner: &PartnerField,
+    range: f64,
+    memory: &mut SurfaceMemory,
+    found: &mut Vec<PenetratingPoint>,
+) -> NearestNode {
+    found.clear();
+    let SurfaceMemory { candidates, slack, nearest: seed, .. } = memory;
+    candidates.clear();
+    *slack = CANDIDATE_RANGE * tree.spacing;
+    let mut nearest = NearestNode { distance: range, index: None };
+    if let Some((index, node)) = seed.and_then(|n| Some((n, tree.nodes.get(n as usize)?))) {
+        nearest.update(partner.distance(node.position), index);
+    }
+    let mut cluster_index = 0;
+    while let Some(cluster) = tree.clusters.get(cluster_index) {
+        // Only candidates and nodes nearer than the nearest one so far are of interest.
+        if partner.is_beyond(cluster.centre, cluster.radius, nearest.distance.max(*slack)) {
+            cluster_index = cluster.skip as usize;
+            continue;
+        }
+        if cluster.is_leaf(cluster_index) {
+            for index in cluster.nodes.0..cluster.nodes.1 {
+                let reach = nearest.distance.max(*slack);
+                let distance = test_node(tree, partner, index, reach, &mut nearest, found);
+                if distance.is_some_and(|distance| distance <= *slack) {
+                    candidates.push(index);
+                }
+            }
+        }
+        cluster_index += 1;
+    }
+    nearest
+}
