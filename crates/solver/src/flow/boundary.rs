@@ -166,21 +166,6 @@ impl Boundaries {
     }
 }
 
-#[cfg(test)]
-impl Boundaries {
-    /// Fills the ghost layers of a velocity whose interior and boundary faces are set.
-    pub(crate) fn fill_ghosts<R: Real>(&self, velocity: &mut FaceVector<R>) {
-        let layout = velocity.x.layout();
-        for component in 0..3 {
-            let planes = velocity.component_mut(component);
-            for plane in planes.chunks_exact_mut(layout.plane()) {
-                self.fill_ghosts_of_plane(layout, component, plane);
-            }
-        }
-        self.fill_ghost_planes(velocity);
-    }
-}
-
 /// Condition on the pressure at a face of the box; an outflow has a zero normal gradient.
 fn pressure_condition(boundary: &Boundary) -> Ends {
     match boundary {
@@ -227,18 +212,6 @@ impl Boundaries {
         for (ghost, inner) in [(0, 1), (n + 1, n)] {
             fill_ghost_layer(values, layer, rule, ghost, inner, n);
         }
-    }
-}
-
-#[cfg(test)]
-impl Boundaries {
-    /// Fills all ghosts of the pressure.
-    pub(crate) fn fill_pressure<R: Real>(&self, pressure: &mut Field<Centre, R>) {
-        let layout = pressure.layout();
-        for plane in pressure.chunks_exact_mut(layout.plane()) {
-            self.fill_pressure_of_plane(layout, plane);
-        }
-        self.fill_pressure_planes(pressure);
     }
 }
 

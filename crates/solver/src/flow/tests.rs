@@ -8,6 +8,28 @@ use super::*;
 
 const PERIODIC: Boundaries = Boundaries([[Boundary::Periodic; 2]; 3]);
 
+impl Boundaries {
+    /// Fills the ghost layers of a velocity whose interior and boundary faces are set.
+    fn fill_ghosts<R: Real>(&self, velocity: &mut FaceVector<R>) {
+        let layout = velocity.x.layout();
+        for component in 0..3 {
+            let planes = velocity.component_mut(component);
+            for plane in planes.chunks_exact_mut(layout.plane()) {
+                self.fill_ghosts_of_plane(layout, component, plane);
+            }
+        }
+        self.fill_ghost_planes(velocity);
+    }
+    /// Fills all ghosts of the pressure.
+    fn fill_pressure<R: Real>(&self, pressure: &mut Field<Centre, R>) {
+        let layout = pressure.layout();
+        for plane in pressure.chunks_exact_mut(layout.plane()) {
+            self.fill_pressure_of_plane(layout, plane);
+        }
+        self.fill_pressure_planes(pressure);
+    }
+}
+
 fn params(nu: f64) -> FluidParams {
     FluidParams {
         density: 1.0,

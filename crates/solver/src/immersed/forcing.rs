@@ -25,9 +25,7 @@ use glam::DVec3;
 
 use super::Scheme;
 use super::geometry::aperture::{aperture, forcing_reach, open_depth, open_depth_integral};
-use super::geometry::{
-    BandFaces, FaceRun, NarrowBandShapes, NeighbourGrain, load_all, nearest_distance,
-};
+use super::geometry::{BandFaces, FaceRun, NarrowBandShapes, NeighbourGrain, load_all};
 use grainwake_simd::{Kernel, MAX_LANES, Scalar, Vector, dispatch};
 
 /// Forcing of a face by one grain, or by several together.
@@ -165,7 +163,7 @@ pub struct ForcedFaces {
     /// Fraction of a face that the grain closes to the pressure gradient, 0 to 1.
     pub closed_fraction: Vec<f32>,
     /// Fraction of a face that all grains together close; empty if the grain shares no face.
-    total_closed_fraction: Vec<f32>,
+    pub total_closed_fraction: Vec<f32>,
     /// Solid fraction of a face, with which it takes a change of the rigid velocity, 0 to 1.
     pub solid_fraction: Vec<f32>,
     /// Velocity that a face gains next to a grain at rest [m/s]; filled by
@@ -242,29 +240,6 @@ impl ForcedFaces {
                 (forcing.solid_fraction / all.solid_fraction.max(1.0)) as f32;
             self.total_closed_fraction[entry] = all.closed_fraction.min(1.0) as f32;
         }
-    }
-
-    /// Forces the faces inside the grain alone, with full weight: those nearer to this grain than
-    /// to its `neighbours`, at a negative distance in `band`.
-    pub fn force_inside(
-        &mut self,
-        band: &BandFaces,
-        neighbours: &[NeighbourGrain],
-        shapes: &NarrowBandShapes,
-    ) {
-        let inside = |distance: &f32| if *distance < 0.0 { 1.0 } else { 0.0 };
-        let count = band.count();
-        for (weight, distance) in self.weight[..count].iter_mut().zip(&band.distance) {
-            *weight = inside(distance);
-        }
-        for &(entry, x) in &band.shared {
-            if nearest_distance(neighbours, shapes, x, 0.0) < f64::from(band.distance[entry]) {
-                self.weight[entry] = 0.0;
-            }
-        }
-        let unused =
-            [&mut self.closed_fraction, &mut self.total_closed_fraction, &mut self.solid_fraction];
-        unused.into_iter().for_each(|list| list.fill(0.0));
     }
 
     /// Fraction of each face that all grains together close, 0 to 1.

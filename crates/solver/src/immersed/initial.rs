@@ -9,6 +9,8 @@
 //! the faces hardly change. Faces in the band around the surface stay free: forced as well, they
 //! would drag along a layer of fluid.
 
+use super::forcing::ForcedFaces;
+use super::geometry::{BandFaces, NarrowBandShapes, NeighbourGrain, nearest_distance};
 use super::rigidity::sum_impulse;
 use super::update::{GrainUpdate, PendingRigidity, locate_and_compute_weights};
 use super::{ImmersedGrain, ImmersedGrains};
@@ -50,7 +52,7 @@ impl<R: Real> ImmersedGrains<R> {
         each.for_each(|(index, ImmersedGrain { body, forced, .. })| {
             let (grain, scratch) = (&grains[index], &mut scratch.borrow().locate);
             locate_and_compute_weights(locator, &params, index, grain, body, forced, scratch);
-            forced.force_inside(&scratch.band, locator.neighbours(index), locator.shapes());
+            force_inside(forced, &scratch.band, locator.neighbours(index), locator.shapes());
         });
     }
 
@@ -76,4 +78,26 @@ impl<R: Real> ImmersedGrains<R> {
         self.updates = updates;
         square.sqrt()
     }
+}
+
+/// Forces the faces inside the grain alone, with full weight: those nearer to this grain than to
+/// its `neighbours`, at a negative distance in `band`.
+fn force_inside(
+    forced: &mut ForcedFaces,
+    band: &BandFaces,
+    neighbours: &[NeighbourGrain],
+    shapes: &NarrowBandShapes,
+) {
+    let inside = |distance: &f32| if *distance < 0.0 { 1.0 } else { 0.0 };
+    let ForcedFaces { weight, closed_fraction, total_closed_fraction, solid_fraction, .. } = forced;
+    for (weight, distance) in weight[..band.count()].iter_mut().zip(&band.distance) {
+        *weight = inside(distance);
+    }
+    for &(entry, x) in &band.shared {
+        if nearest_distance(neighbours, shapes, x, 0.0) < f64::from(band.distance[entry]) {
+            weight[entry] = 0.0;
+        }
+    }
+    let unused = [closed_fraction, total_closed_fraction, solid_fraction];
+    unused.into_iter().for_each(|list| list.fill(0.0));
 }

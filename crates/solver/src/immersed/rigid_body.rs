@@ -88,47 +88,23 @@ impl RigidBodySystem {
         RigidBodySystem { impulse, last_load: Some(last_load), ..system }
     }
 
-    /// Assembles the equations of a grain with an emerged `part` under the `applied` load and that
-    /// of the pressure at the free surface, `surface_load`, over `dt` [s], without contact.
-    pub fn emerged(
+    /// Assembles the equations under the `applied` load (weight less buoyancy, and external loads)
+    /// over `dt` [s], without contact. `surface` is the part of the grain beyond a free surface, and
+    /// the load of the pressure at this surface.
+    pub fn new(
         grain: &Grain,
         previous: &PreviousStep,
         impulse: Impulse,
         fluid_density: f64,
-        [applied, surface_load]: [Load; 2],
-        part: &EmergedPart,
+        applied: Load,
+        surface: Option<(&EmergedPart, Load)>,
         dt: f64,
     ) -> RigidBodySystem {
-        let terms = SurfaceTerms {
+        let surface = surface.map(|(part, load)| SurfaceTerms {
             not_displaced: part.inertia.map(|row| row.map(|entry| fluid_density * entry)),
-            load: surface_load,
-        };
-        let load = applied + surface_load;
-        RigidBodySystem::new(grain, previous, impulse, fluid_density, load, Some(terms), dt)
-    }
-
-    /// Assembles the equations under the `applied` load (weight less buoyancy, and external
-    /// loads) over `dt` [s], without contact.
-    pub fn submerged(
-        grain: &Grain,
-        previous: &PreviousStep,
-        impulse: Impulse,
-        fluid_density: f64,
-        applied: Load,
-        dt: f64,
-    ) -> RigidBodySystem {
-        RigidBodySystem::new(grain, previous, impulse, fluid_density, applied, None, dt)
-    }
-
-    fn new(
-        grain: &Grain,
-        previous: &PreviousStep,
-        impulse: Impulse,
-        fluid_density: f64,
-        applied: Load,
-        surface: Option<SurfaceTerms>,
-        dt: f64,
-    ) -> RigidBodySystem {
+            load,
+        });
+        let applied = surface.map_or(applied, |terms| applied + terms.load);
         // Mass and inertia less those of the displaced fluid.
         let excess = 1.0 - fluid_density / grain.density;
         let (mass, inertia) = (grain.mass() * excess, grain.inertia() * excess);

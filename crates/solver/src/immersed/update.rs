@@ -213,17 +213,17 @@ impl<R: Real> CouplingContext<'_, R> {
         let motion = [previous.velocity, previous.acceleration];
         let impulse = sum_impulse(known, predictions, density, forced, motion, dt);
         let applied = self.input.applied[index];
-        match self.input.crossings.get(index) {
+        let surface = match self.input.crossings.get(index) {
             Some(Crossing::Departing) => {
                 let loads = [applied, self.input.last_loads[index]];
-                RigidBodySystem::departing(grain, previous, impulse, loads, dt)
+                return RigidBodySystem::departing(grain, previous, impulse, loads, dt);
             }
             Some(Crossing::Emerged(part)) => {
-                let loads = [applied, self.input.surface_loads[index] * density];
-                RigidBodySystem::emerged(grain, previous, impulse, density, loads, part, dt)
+                Some((&**part, self.input.surface_loads[index] * density))
             }
-            _ => RigidBodySystem::submerged(grain, previous, impulse, density, applied, dt),
-        }
+            _ => None,
+        };
+        RigidBodySystem::new(grain, previous, impulse, density, applied, surface, dt)
     }
 }
 

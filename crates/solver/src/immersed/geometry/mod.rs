@@ -9,6 +9,7 @@ mod distances;
 mod lists;
 mod narrow_band;
 mod samples;
+mod sampling;
 
 pub use lists::{BandFaces, FaceRow, FaceRun, LocatedBody, PAD};
 pub use narrow_band::{NarrowBandShapes, NeighbourGrain, load_all, nearest_distance};

@@ -7,105 +7,45 @@
 //!
 //! The sampled field of a shape ends closer to the surface than the band of the flow, and is often
 //! finer than the flow resolves. A wider and, where possible, coarser sampled field replaces it,
-//! which fits the cache and is interpolated for several points at a time, without searching.
+//! which fits the cache and is interpolated for several points at a time, without searching
+//! (`sampling.rs`).
 
-use std::collections::HashMap;
 use std::ops::Deref;
 use std::sync::Arc;
 
 use glam::DVec3;
 use grainwake_shape::{Field, Shape};
-use rayon::prelude::*;
 
-use super::aperture::band_variance;
 use super::samples::{BandSamples, INFINITE_DISTANCE, SampleGrid, SurfaceDistance};
-use crate::dem::Grain;
 use crate::math::Pose;
-use grainwake_simd::{MAX_LANES, MAX_SINGLE_INDEX, Scalar, Vector};
-
-/// Least number of samples per half-width of the band.
-const SAMPLES_PER_BAND: f64 = 5.0;
-/// Least number of samples across the thinnest side of a grain.
-const SAMPLES_ACROSS: f64 = 12.0;
-/// Largest number of samples per half-width of the band; the flow does not resolve a thinner grain.
-const MAX_SAMPLES_PER_BAND: f64 = 20.0;
+use grainwake_simd::{MAX_LANES, Scalar, Vector};
 
 /// Narrow-band shapes of all grains; equal shapes share their samples.
 pub struct NarrowBandShapes {
     /// Entry i is the shape of grain i.
-    shapes: Vec<NarrowBandShape>,
+    pub(super) shapes: Vec<NarrowBandShape>,
 }
 
 /// A shape with distances sampled in a band around its surface.
 #[derive(Clone)]
 pub struct NarrowBandShape {
-    shape: Arc<Shape>,
+    pub(super) shape: Arc<Shape>,
     /// `None` if the shape itself is evaluated: a closed form, or a shape that needs too many
     /// samples.
-    samples: Option<Arc<BandSamples>>,
+    pub(super) samples: Option<Arc<BandSamples>>,
     /// Variance sigma^2 of the kernel of the band along an axis [m^2]; half of it in two
     /// dimensions.
-    variance: f64,
+    pub(super) variance: f64,
 }
 
 impl NarrowBandShapes {
-    /// Samples the distances up to `reach` [m] from the surfaces; `eps` [m] is the half-width of
-    /// the band, `dimensions` those of the flow.
-    pub fn new(grains: &[Grain], [eps, reach]: [f64; 2], dimensions: usize) -> NarrowBandShapes {
-        // A sphere in two dimensions is a disc, which has half the curvature.
-        let variance = band_variance(eps) * 0.5 * (dimensions as f64 - 1.0).max(0.0);
-        let mut indices: HashMap<*const Shape, usize> = HashMap::new();
-        let mut distinct = Vec::new();
-        for grain in grains {
-            indices.entry(Arc::as_ptr(&grain.shape)).or_insert_with(|| {
-                distinct.push(&grain.shape);
-                distinct.len() - 1
-            });
-        }
-        let sampled: Vec<NarrowBandShape> = (distinct.into_par_iter())
-            .map(|shape| NarrowBandShape::new(shape, eps, reach, variance))
-            .collect();
-        let of = |grain: &Grain| sampled[indices[&Arc::as_ptr(&grain.shape)]].clone();
-        NarrowBandShapes { shapes: grains.iter().map(of).collect() }
-    }
-
     /// Shape of grain `index`.
     pub fn of(&self, index: usize) -> &NarrowBandShape {
         &self.shapes[index]
     }
-
-    /// Memory held in addition to the shapes [bytes].
-    pub fn bytes(&self) -> usize {
-        let samples = self.shapes.iter().filter_map(|shape| shape.samples.as_ref());
-        let mut samples: Vec<_> = samples.collect();
-        samples.sort_by_key(|samples| Arc::as_ptr(samples));
-        samples.dedup_by_key(|samples| Arc::as_ptr(samples));
-        let levels = samples.iter().map(|samples| 2 * samples.mean_excess.len());
-        size_of::<f32>() * levels.sum::<usize>()
-    }
 }
 
 impl NarrowBandShape {
-    fn new(shape: &Arc<Shape>, eps: f64, reach: f64, variance: f64) -> NarrowBandShape {
-        let samples = match shape.field() {
-            Field::Sampled(_) => {
-                let thickness = (shape.upper() - shape.lower()).min_element();
-                let spacing = (eps / SAMPLES_PER_BAND)
-                    .min(thickness / SAMPLES_ACROSS)
-                    .max(eps / MAX_SAMPLES_PER_BAND);
-                // Doubled until single precision represents the indices of all samples.
-                let mut spacings = (0..20).map(|n| spacing * f64::from(1 << n));
-                let field = spacings.find_map(|spacing| {
-                    let field = shape.distances(spacing, reach + spacing).ok()?;
-                    (field.levels().len() <= MAX_SINGLE_INDEX).then_some(field)
-                });
-                field.map(|field| Arc::new(BandSamples::new(field, variance)))
-            }
-            _ => None,
-        };
-        NarrowBandShape { shape: shape.clone(), samples, variance }
-    }
-
     /// Signed distance [m] and its gradient at `x`, both in the frame of the grain. The distance
     /// may be infinite where it exceeds the reach.
     #[inline(always)]
@@ -282,7 +222,7 @@ pub fn store_all<V: Vector>(values: [V; 3], [x, y, z]: &mut [&mut [V::Number]; 3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::immersed::geometry::aperture::{forcing_reach, reference};
+    use crate::immersed::geometry::aperture::{band_variance, forcing_reach, reference};
     use grainwake_shape::{ShapeOptions, analytic};
     use grainwake_simd::{Kernel, Registers, dispatch};
 

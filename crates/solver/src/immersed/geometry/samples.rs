@@ -26,30 +26,6 @@ pub struct SurfaceDistance<T> {
     pub gradient: [T; 3],
 }
 
-impl BandSamples {
-    /// Samples with the mean distances over a kernel of the given `variance` [m^2]: the mean of six
-    /// samples around a sample has the variance of their distance squared over 3.
-    pub fn new(distances: SampledField, variance: f64) -> BandSamples {
-        let deviation = (3.0 * variance).sqrt() / distances.spacing();
-        let reach = deviation.round().max(1.0);
-        let factor = (deviation / reach).powi(2);
-        let (dims, levels) = (distances.dims(), distances.levels());
-        let strides = [1, dims[0], dims[0] * dims[1]];
-        let mean_excess = |at: usize| {
-            let around = (0..3).map(|axis| {
-                let index = at / strides[axis] % dims[axis];
-                let below = index.min(reach as usize);
-                let above = (dims[axis] - 1 - index).min(reach as usize);
-                f64::from(levels[at - below * strides[axis]])
-                    + f64::from(levels[at + above * strides[axis]])
-            });
-            (factor * (around.sum::<f64>() / 6.0 - f64::from(levels[at]))) as f32
-        };
-        let mean_excess = (0..levels.len()).map(mean_excess).collect();
-        BandSamples { distances, mean_excess }
-    }
-}
-
 /// A sampled distance field with its constants in vector registers.
 pub struct SampleGrid<'a, V> {
     lower: [V; 3],

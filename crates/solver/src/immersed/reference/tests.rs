@@ -373,7 +373,7 @@ fn new_velocities_satisfy_the_equations_of_motion() {
             let before = [previous.velocity, previous.acceleration];
             let impulse = sum_impulse(&known, &predictions, DENSITY, forced, before, DT);
             let system =
-                RigidBodySystem::submerged(&grain, &previous, impulse, DENSITY, applied, DT);
+                RigidBodySystem::new(&grain, &previous, impulse, DENSITY, applied, None, DT);
             let new = system.velocities(&grain, &previous, contact, DT);
             let (reference, load) = (&case.reference, applied + contact);
             let j = reference.impulse(index, &known, u, [before[0], before[1], new], DENSITY);
