@@ -2,6 +2,7 @@
 
 mod cache;
 mod formula;
+mod pool_clock;
 mod time_spent;
 
 pub(crate) use cache::last_cache;
