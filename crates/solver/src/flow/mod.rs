@@ -19,8 +19,9 @@ pub(crate) use prediction::{OldState, Prediction};
 pub(crate) use project::FlowMeasures;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
-use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, Slab, for_planes_of};
+use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, planes_of};
 use crate::math::{Real, last_cache};
 use crate::poisson::{Plane, Poisson, PoissonTimes};
 use grainwake_simd::dispatch;
@@ -57,7 +58,6 @@ pub struct Flow<R = f64> {
     /// Grid of the box.
     mesh: Mesh,
     /// Planes whose fields this flow holds, the whole box.
-    slab: Slab,
     /// Conditions on the faces of the box.
     boundaries: Boundaries,
     /// Constants of the tendency.
@@ -92,20 +92,18 @@ pub struct Flow<R = f64> {
 impl<R: Real> Flow<R> {
     /// Fluid at the initial velocity, projected onto the divergence-free fields.
     pub fn new(mesh: &Mesh, boundaries: Boundaries, params: &FluidParams) -> Flow<R> {
-        let slab = mesh.whole();
         let mut flow = Flow {
             mesh: *mesh,
-            slab,
             boundaries,
             coefficients: Coefficients::new(
                 mesh,
                 params.kinematic_viscosity,
                 params.body_acceleration,
             ),
-            velocity: FaceVector::zeros(&slab),
-            predicted: FaceVector::zeros(&slab),
-            pressure: Field::zeros(&slab),
-            tendency: FaceVector::zeros(&slab),
+            velocity: FaceVector::zeros(mesh),
+            predicted: FaceVector::zeros(mesh),
+            pressure: Field::zeros(mesh),
+            tendency: FaceVector::zeros(mesh),
             poisson: Poisson::new(mesh, boundaries.pressure_ends()),
             non_temporal: false,
             partial: vec![PlaneMeasures::default(); mesh.cells[2]],
@@ -117,7 +115,6 @@ impl<R: Real> Flow<R> {
             crossing_speeds: [[0.0; 2]; 3],
         };
         flow.non_temporal = flow.bytes() > last_cache() / 4 * 3;
-        flow.poisson.non_temporal = flow.non_temporal;
         flow.velocity.fill(params.initial_velocity);
         flow.make_solenoidal();
         flow
@@ -125,8 +122,7 @@ impl<R: Real> Flow<R> {
 
     /// Sets the velocity to `component(axis, position)` [m/s, m] and projects.
     pub fn start_from(&mut self, component: impl Fn(usize, DVec3) -> f64) {
-        let slab = self.slab;
-        self.velocity.fill_with(&slab, component);
+        self.velocity.fill_with(&self.mesh, component);
         self.make_solenoidal();
     }
 
@@ -159,27 +155,23 @@ impl<R: Real> Flow<R> {
         let (coefficients, non_temporal) = (&self.coefficients, self.non_temporal);
         let FaceVector { x, y, z } = &mut self.tendency;
         let FaceVector { x: px, y: py, z: pz } = &mut self.predicted;
-        for_planes_of(
-            layout,
-            [&mut *x, y, z, px, py, pz],
-            &mut self.partial,
-            |k, [x, y, z, px, py, pz], partial| {
-                dispatch(PredictPlane {
-                    layout,
-                    coefficients,
-                    weights,
-                    velocity,
-                    pressure,
-                    periodic,
-                    k,
-                    non_temporal,
-                    tendency: [x, y, z],
-                    predicted: [&mut *px, &mut *py, pz],
-                    sum: &mut partial.tendency,
-                });
-                boundaries.set_normal_of_plane(layout, [px, py]);
-            },
-        );
+        let planes = planes_of(layout, [&mut *x, y, z, px, py, pz], &mut self.partial);
+        planes.for_each(|(k, [x, y, z, px, py, pz], partial)| {
+            dispatch(PredictPlane {
+                layout,
+                coefficients,
+                weights,
+                velocity,
+                pressure,
+                periodic,
+                k,
+                non_temporal,
+                tendency: [x, y, z],
+                predicted: [&mut *px, &mut *py, pz],
+                sum: &mut partial.tendency,
+            });
+            boundaries.set_normal_of_plane(layout, [px, py]);
+        });
         for (face, value) in boundaries.prescribed_faces(2, layout.cells[2]) {
             let plane = layout.plane();
             pz[face * plane..(face + 1) * plane].fill(R::of(value));
@@ -208,8 +200,7 @@ impl<R: Real> Flow<R> {
         let FaceVector { x, y, z } = &mut self.velocity;
         let fields = [&mut **x, &mut **y, &mut **z, &mut *self.pressure];
         let partial = &mut self.partial;
-        self.poisson.solve(divergence, fields, partial, |k, solution, range| {
-            let ([x, y, z, p], measures) = range.plane(k);
+        self.poisson.solve(divergence, fields, partial, |k, solution, [x, y, z, p], measures| {
             dispatch(Correct {
                 layout,
                 predicted,
@@ -316,11 +307,11 @@ impl<R: Real> Flow<R> {
 
     /// View of the velocity component along `axis` on its faces [m/s].
     pub fn velocity_view(&self, axis: Axis) -> FieldView<'_, R> {
-        self.velocity.view(axis, &self.slab)
+        FieldView::new(self.velocity.component(axis as usize), &self.mesh, Some(axis))
     }
     /// View of the dynamic pressure over density at the cell centres [m^2/s^2].
     pub fn pressure_view(&self) -> FieldView<'_, R> {
-        self.pressure.view(&self.slab)
+        FieldView::new(&self.pressure, &self.mesh, None)
     }
     /// Grid of the box.
     pub fn mesh(&self) -> &Mesh {

@@ -3,29 +3,36 @@
 //! Every plane's result depends on nothing but its inputs, so it does not depend on the number of
 //! threads. Reductions run in the order of the planes.
 
-use std::cell::RefCell;
 use std::marker::PhantomData;
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::Layout;
+use super::borrowed::record;
 
-/// Calls `f(k, plane, partial)` for the interior planes k = 1..=nz of several fields in parallel,
-/// with one partial result per plane.
-pub fn for_planes_of<const N: usize, R: Send, T: Send>(
+/// Interior planes k = 1..=nz of several fields, each with its index k and its partial result.
+pub fn planes_of<'a, const N: usize, R: Send, T: Send>(
     layout: Layout,
-    fields: [&mut [R]; N],
-    partial: &mut [T],
-    f: impl Fn(usize, [&mut [R]; N], &mut T) + Sync,
-) {
-    let fields = fields.map(|field| Pieces::interior(layout, field));
-    assert_eq!(partial.len(), layout.cells[2]);
-    partial.par_iter_mut().enumerate().for_each(|(k, partial)| {
-        // SAFETY: each k occurs once, so no two threads hold the same plane.
-        let slabs = fields.each_ref().map(|field| unsafe { field.get(k) });
-        f(k + 1, slabs, partial);
-    });
+    fields: [&'a mut [R]; N],
+    partial: &'a mut [T],
+) -> impl IndexedParallelIterator<Item = (usize, [&'a mut [R]; N], &'a mut T)> {
+    let (plane, nz) = (layout.plane(), layout.cells[2]);
+    assert_eq!(partial.len(), nz);
+    let mut interior = fields.map(|field| &mut field[plane..(nz + 1) * plane]);
+    let planes: Vec<_> = partial
+        .iter_mut()
+        .zip(1..)
+        .map(|(partial, k)| (k, split_off(&mut interior, plane), partial))
+        .collect();
+    planes.into_par_iter()
+}
+
+/// Splits the first `len` entries off each list.
+fn split_off<'a, const N: usize, R>(lists: &mut [&'a mut [R]; N], len: usize) -> [&'a mut [R]; N] {
+    lists
+        .each_mut()
+        .map(|list| list.split_off_mut(..len).expect("lists have at least `len` entries"))
 }
 
 /// Calls `f(component, start, parts)` in parallel for slabs of whole planes, ghosts included, of
@@ -42,181 +49,61 @@ pub fn for_slabs<const N: usize, R: Send>(
     for (component, mut fields) in components.into_iter().enumerate() {
         for start in (0..layout.len()).step_by(length) {
             let size = length.min(layout.len() - start);
-            let parts = fields.each_mut().map(|field| {
-                let part = field.split_off_mut(..size);
-                part.expect("fields have the entries of their layout")
-            });
-            tasks.push((component, start, parts));
+            tasks.push((component, start, split_off(&mut fields, size)));
         }
     }
     tasks.into_par_iter().for_each(|(component, start, parts)| f(component, start, parts));
 }
 
-/// Consecutive planes of several fields that one thread holds during [`for_plane_ranges`].
-pub struct PlaneRange<'a, const N: usize, R, T> {
-    range: Range<usize>,
-    fields: &'a [Pieces<'a, R>; N],
-    partial: &'a Pieces<'a, T>,
-}
-
-impl<const N: usize, R, T> PlaneRange<'_, N, R, T> {
-    /// Indices k of the planes.
-    pub fn range(&self) -> Range<usize> {
-        self.range.clone()
-    }
-    /// Plane k of each field and its partial result.
-    #[inline]
-    pub fn plane(&mut self, k: usize) -> ([&mut [R]; N], &mut T) {
-        assert!(self.range.contains(&k));
-        // SAFETY: `for_plane_ranges` makes disjoint ranges, and the result borrows this range as a
-        // whole, so each plane is borrowed once.
-        unsafe {
-            let fields = self.fields.each_ref().map(|field| field.get(k - 1));
-            (fields, &mut self.partial.get(k - 1)[0])
-        }
-    }
-}
-
-/// Calls `f(range, scratch)` for one range of consecutive interior planes per scratch slot, in
-/// parallel.
-pub fn for_plane_ranges<const N: usize, R: Send, T: Send, S: Send>(
-    layout: Layout,
-    fields: [&mut [R]; N],
-    partial: &mut [T],
-    scratch: &mut [S],
-    f: impl Fn(&mut PlaneRange<N, R, T>, &mut S) + Sync,
-) {
-    let fields = fields.map(|field| Pieces::interior(layout, field));
-    let (planes, slots) = (layout.cells[2], scratch.len());
-    assert_eq!(partial.len(), planes);
-    let partial = Pieces::new(partial, 1);
-    let slots_with_ends = scratch.par_iter_mut().enumerate();
-    slots_with_ends.for_each(|(slot, scratch)| {
-        let mut range = PlaneRange {
-            range: 1 + planes * slot / slots..1 + planes * (slot + 1) / slots,
-            fields: &fields,
-            partial: &partial,
-        };
-        f(&mut range, scratch);
-    });
-}
-
-/// Calls `f(k, chunk, scratch)` for the chunks k = 0.. of `values` in parallel; each scratch slot
-/// serves a range of k.
-pub fn for_chunks<R: Send, S: Send>(
-    values: &mut [R],
-    chunk: usize,
-    scratch: &mut [S],
-    f: impl Fn(usize, &mut [R], &mut S) + Sync,
-) {
-    let slots = scratch.len();
-    let chunks = Pieces::new(values, chunk);
-    scratch.par_iter_mut().enumerate().for_each(|(slot, scratch)| {
-        let chunks = &chunks;
-        for k in chunks.count * slot / slots..chunks.count * (slot + 1) / slots {
-            // SAFETY: every k belongs to one slot.
-            f(k, unsafe { chunks.get(k) }, scratch);
-        }
-    });
-}
-
-/// Neighbouring columns through all planes that one thread holds during [`for_columns`].
+/// Neighbouring columns through all planes of a list.
 pub struct Columns<'a, R> {
+    range: Range<usize>,
     start: *mut R,
     stride: usize,
     planes: usize,
-    width: usize,
     borrow: PhantomData<&'a mut [R]>,
 }
 
+// SAFETY: `columns_of` makes disjoint blocks, so each acts as an exclusive borrow of its entries,
+// which may move to another thread if they may.
+unsafe impl<R: Send> Send for Columns<'_, R> {}
+
 impl<R> Columns<'_, R> {
-    /// Number of columns.
-    pub fn width(&self) -> usize {
-        self.width
+    /// Positions of the columns in a plane.
+    pub fn range(&self) -> Range<usize> {
+        self.range.clone()
     }
     /// Entries of the columns in plane `k`, counted from 0.
     #[inline(always)]
     pub fn row(&mut self, k: usize) -> &mut [R] {
         assert!(k < self.planes);
-        // SAFETY: `for_columns` makes disjoint blocks of columns inside the planes, and the result
-        // borrows `self` as a whole.
-        unsafe { std::slice::from_raw_parts_mut(self.start.add(k * self.stride), self.width) }
+        // SAFETY: `columns_of` makes disjoint blocks inside the planes, and the result borrows
+        // `self` as a whole.
+        unsafe {
+            let row = self.start.add(k * self.stride + self.range.start);
+            std::slice::from_raw_parts_mut(row, self.range.len())
+        }
     }
 }
 
 /// Cuts the first `len` entries of the planes of `values`, `stride` apart, into blocks of `width`
-/// columns and calls `f(first column, block, scratch)` in parallel; each scratch slot serves a
-/// range of blocks.
-pub fn for_columns<R: Send, S: Send>(
+/// columns; the last block may have fewer.
+pub fn columns_of<R>(
     values: &mut [R],
     stride: usize,
     len: usize,
     width: usize,
-    scratch: &mut [S],
-    f: impl Fn(usize, &mut Columns<R>, &mut S) + Sync,
-) {
-    assert!(
-        len <= stride && stride <= values.len(),
-        "columns lie within a plane, and one plane within the values"
-    );
-    let (slots, blocks, planes) = (scratch.len(), len.div_ceil(width), values.len() / stride);
-    let whole = Pieces::new(values, stride);
-    scratch.par_iter_mut().enumerate().for_each(|(slot, scratch)| {
-        let whole = &whole;
-        for block in blocks * slot / slots..blocks * (slot + 1) / slots {
-            let at = block * width;
-            let mut columns = Columns {
-                // SAFETY: `at < len <= stride <= values.len()`, so the block starts inside the
-                // first plane. Every block belongs to one slot.
-                start: unsafe { whole.start.add(at) },
-                stride,
-                planes,
-                width: width.min(len - at),
-                borrow: PhantomData,
-            };
-            f(at, &mut columns, scratch);
-        }
-    });
-}
-
-/// A slice cut into equal pieces, each of which one thread may hold.
-struct Pieces<'a, T> {
-    start: *mut T,
-    size: usize,
-    count: usize,
-    slice: PhantomData<&'a mut [T]>,
-}
-
-// SAFETY: a piece is an exclusive borrow of entries that may move to another thread. The callers of
-// `get` guarantee that no piece is borrowed twice, so a shared `Pieces` gives no shared entry.
-unsafe impl<T: Send> Send for Pieces<'_, T> {}
-// SAFETY: see `Send`.
-unsafe impl<T: Send> Sync for Pieces<'_, T> {}
-
-impl<'a, T> Pieces<'a, T> {
-    fn new(values: &'a mut [T], size: usize) -> Pieces<'a, T> {
-        Pieces { start: values.as_mut_ptr(), size, count: values.len() / size, slice: PhantomData }
-    }
-    /// Returns piece `k`.
-    ///
-    /// # Safety
-    /// No two live borrows may have the same `k`.
-    #[allow(clippy::mut_from_ref)]
-    unsafe fn get(&self, k: usize) -> &mut [T] {
-        assert!(k < self.count);
-        // SAFETY: the first `count * size` entries belong to the slice, which is borrowed for `'a`.
-        // The caller guarantees that no other borrow of the piece is live.
-        unsafe { std::slice::from_raw_parts_mut(self.start.add(k * self.size), self.size) }
-    }
-}
-
-impl<'a, R> Pieces<'a, R> {
-    /// Cuts a field into its interior planes.
-    fn interior(layout: Layout, field: &'a mut [R]) -> Pieces<'a, R> {
-        assert_eq!(field.len(), layout.len());
-        let plane = layout.plane();
-        Pieces::new(&mut field[plane..plane * (layout.cells[2] + 1)], plane)
-    }
+) -> Vec<Columns<'_, R>> {
+    assert!(len <= stride, "columns lie within a plane");
+    let (start, planes) = (values.as_mut_ptr(), values.len() / stride);
+    let block = |first: usize| Columns {
+        range: first..len.min(first + width),
+        start,
+        stride,
+        planes,
+        borrow: PhantomData,
+    };
+    (0..len).step_by(width).map(block).collect()
 }
 
 /// Contiguous part of a field, read and written by rows; aliases share its entries.
@@ -286,65 +173,9 @@ impl<'a, R> SharedRows<'a, R> {
     }
 }
 
-/// Row that was borrowed from [`SharedRows`].
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BorrowedRow {
-    /// Addresses in memory.
-    pub addresses: Range<usize>,
-    /// Whether the row may be written.
-    pub mutable: bool,
-}
-
-thread_local! {
-    /// Rows that this thread has borrowed; none unless they are recorded.
-    static BORROWED: RefCell<Option<Vec<BorrowedRow>>> = const { RefCell::new(None) };
-}
-
-/// Calls `work` and returns the rows that it borrows on this thread; none in release builds.
-pub fn borrowed_rows(work: impl FnOnce()) -> Vec<BorrowedRow> {
-    if !cfg!(debug_assertions) {
-        work();
-        return Vec::new();
-    }
-    let outer = BORROWED.replace(Some(Vec::new()));
-    work();
-    BORROWED.replace(outer).unwrap_or_default()
-}
-
-#[inline(always)]
-fn record<R>(first: *mut R, count: usize, mutable: bool) {
-    if cfg!(debug_assertions) && count > 0 {
-        let addresses = first.addr()..first.addr() + count * size_of::<R>();
-        BORROWED.with_borrow_mut(|rows| {
-            rows.iter_mut().for_each(|rows| {
-                rows.push(BorrowedRow { addresses: addresses.clone(), mutable });
-            });
-        });
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn borrowed_rows_are_recorded_in_debug_builds() {
-        let mut field = [0.0_f64; 8];
-        let start = field.as_ptr().addr();
-        let mut shared = SharedRows::new(0, &mut field);
-        assert_eq!(shared.row(0, 8).len(), 8);
-        let rows = borrowed_rows(|| {
-            shared.row_mut(2, 3)[0] = shared.row(5, 1)[0];
-            assert!(shared.row(7, 0).is_empty());
-        });
-        let row = |from: usize, to: usize, mutable| BorrowedRow {
-            addresses: start + 8 * from..start + 8 * to,
-            mutable,
-        };
-        let mut expected = vec![row(5, 6, false), row(2, 5, true)];
-        expected.retain(|_| cfg!(debug_assertions));
-        assert_eq!(rows, expected);
-    }
 
     #[test]
     fn rows_are_those_of_the_field() {

@@ -10,17 +10,18 @@
 
 mod axis;
 mod fft;
+mod plan;
 mod plane;
 mod tridiagonal;
 
-#[cfg(test)]
-use crate::grid::{Centre, Field};
-use crate::grid::{Mesh, PlaneRange, for_chunks, for_columns, for_plane_ranges};
+use rayon::prelude::*;
+
+use crate::grid::{Mesh, columns_of, planes_of};
 use crate::math::{Aligned, Real, Stopwatch, TimeSpent};
-use axis::{AxisTransform, Buffers};
+use axis::AxisTransform;
 use grainwake_simd::dispatch;
-use plane::{Forward, Inverse, PlaneLayout};
-use tridiagonal::{ColumnScratch, Solve, Tridiagonal, block_width};
+use plane::PlaneLayout;
+use tridiagonal::{ColumnScratch, Solve, Tridiagonal};
 
 pub use plane::Plane;
 
@@ -55,7 +56,7 @@ pub struct Solution<'a, R> {
     pub above: &'a Plane<R>,
 }
 
-/// Solver for lap(phi) = f, planned once for a mesh; solving allocates no memory.
+/// Solver for lap(phi) = f, planned once for a mesh (`plan.rs`).
 pub struct Poisson<R = f64> {
     mesh: Mesh,
     ends: [Ends; 3],
@@ -68,61 +69,16 @@ pub struct Poisson<R = f64> {
     slots: Vec<Slot<R>>,
     columns: Vec<ColumnScratch>,
     times: PoissonTimes,
-    /// Whether the forward transform writes the modes with non-temporal stores.
-    pub non_temporal: bool,
 }
 
 /// Scratch of one range of planes.
 struct Slot<R> {
     planes: [Plane<R>; 3],
-    buffers: Buffers<R>,
+    /// Both buffers of the transforms, one after the other.
+    buffers: Aligned<R>,
 }
 
-/// Largest number of ranges of planes and of ranges of columns, enough for many threads.
-const SLOTS: usize = 32;
-/// Smallest number of planes of a range: the planes below and above each range are transformed
-/// twice.
-const MIN_PLANES_PER_SLOT: usize = 16;
-
 impl<R: Real> Poisson<R> {
-    /// Plans the solver for `mesh` with the given ends along x, y, z.
-    pub fn new(mesh: &Mesh, ends: [Ends; 3]) -> Poisson<R> {
-        let [nx, ny, nz] = mesh.cells;
-        let axes = [0, 1].map(|a| AxisTransform::new(mesh.cells[a], ends[a], mesh.spacing[a]));
-        // A forward and an inverse transform multiply by the number of cells.
-        let scale = 1.0 / (nx as f64 * ny as f64);
-        let layout = PlaneLayout::new::<R>(nx, ny);
-        let mut eigenvalues = vec![0.0; layout.modes()];
-        // Padding lines of a block hold round-off of their partners; a singular system would turn
-        // it into infinities that return to the partners.
-        let filler = mesh.spacing.y.powi(-2);
-        layout.each_mode(|at, i, j| {
-            let along_y = axes[1].eigenvalues.get(j).unwrap_or(&filler);
-            eigenvalues[at] = axes[0].eigenvalues[i] + along_y;
-        });
-        let slot = || Slot {
-            planes: [(); 3].map(|()| Plane::new(layout)),
-            buffers: Buffers::new([&axes[0], &axes[1]]),
-        };
-        let width = block_width::<R>(nz).min(layout.modes());
-        let blocks = layout.modes().div_ceil(width);
-        Poisson {
-            mesh: *mesh,
-            ends,
-            along_z: Tridiagonal::new(nz, ends[2], mesh.spacing.z, scale),
-            layout,
-            modes: Aligned::zeros(layout.stride() * nz),
-            eigenvalues,
-            slots: (0..(nz / MIN_PLANES_PER_SLOT).clamp(1, SLOTS)).map(|_| slot()).collect(),
-            columns: (0..SLOTS.min(blocks))
-                .map(|_| ColumnScratch::new(width, nz, ends[2]))
-                .collect(),
-            axes,
-            times: PoissonTimes::default(),
-            non_temporal: false,
-        }
-    }
-
     /// Solves for the right-hand side whose plane k = 1..=nz `source` writes (rows 1..=ny, entries
     /// 1..=nx), and hands each plane of the solution to `sink` with the same plane of `fields` and
     /// its `partial` result. Where the solution is defined up to a constant, the mean of the
@@ -132,69 +88,66 @@ impl<R: Real> Poisson<R> {
         source: impl Fn(usize, &mut Plane<R>) + Sync,
         fields: [&mut [R]; N],
         partial: &mut [T],
-        sink: impl Fn(usize, Solution<R>, &mut PlaneRange<N, R, T>) + Sync,
+        sink: impl Fn(usize, Solution<R>, [&mut [R]; N], &mut T) + Sync,
     ) {
+        let (axes, stride, nz) = (&self.axes, self.layout.stride(), self.mesh.cells[2]);
+        let range = nz.div_ceil(self.slots.len());
+
         let start = Stopwatch::start();
-        let non_temporal = self.non_temporal;
-        let (axes, stride) = ([&self.axes[0], &self.axes[1]], self.layout.stride());
-        for_chunks(&mut self.modes, stride, &mut self.slots, |k, modes, slot| {
+        let ranges = self.modes.par_chunks_mut(range * stride).enumerate();
+        self.slots.par_iter_mut().zip(ranges).for_each(|(slot, (n, modes))| {
             let Slot { planes: [plane, ..], buffers } = slot;
-            source(k + 1, plane);
-            dispatch(Forward { axes, plane, modes, buffers, non_temporal });
+            for (k, modes) in (1 + n * range..).zip(modes.chunks_exact_mut(stride)) {
+                source(k, plane);
+                plane.forward(axes, modes, buffers);
+            }
         });
+
         let forward = Stopwatch::start();
         let (system, eigenvalues) = (self.along_z, &self.eigenvalues);
-        let nz = self.mesh.cells[2];
-        for_columns(
-            &mut self.modes,
-            stride,
-            eigenvalues.len(),
-            block_width::<R>(nz),
-            &mut self.columns,
-            |at, columns, scratch| {
-                let lambda = &eigenvalues[at..at + columns.width()];
-                let singular = at == 0 && lambda[0] == 0.0;
+        let width = self.columns[0].width();
+        let blocks = columns_of(&mut self.modes, stride, eigenvalues.len(), width);
+        let blocks_of_slot = blocks.len().div_ceil(self.columns.len());
+        let blocks = blocks.into_par_iter().chunks(blocks_of_slot);
+        self.columns.par_iter_mut().zip(blocks).for_each(|(scratch, blocks)| {
+            for mut columns in blocks {
+                let range = columns.range();
+                let singular = range.start == 0 && eigenvalues[0] == 0.0;
+                let (columns, lambda) = (&mut columns, &eigenvalues[range]);
                 dispatch(Solve { system, columns, lambda, singular, scratch });
-            },
-        );
-        let columns = Stopwatch::start();
-        let periodic = self.ends.map(|ends| ends == Ends::Periodic);
-        let modes = &self.modes;
-        let invert = |k: usize, plane: &mut Plane<R>, buffers: &mut Buffers<R>| {
-            dispatch(Inverse {
-                axes,
-                periodic: [periodic[0], periodic[1]],
-                plane,
-                modes: &modes[(k - 1) * stride..][..self.layout.modes()],
-                buffers,
-            });
-        };
-        for_plane_ranges(self.mesh.layout(), fields, partial, &mut self.slots, |range, slot| {
-            let Slot { planes, buffers } = slot;
-            // Plane k, wrapped on a periodic axis; none beyond another end.
-            let across = |k: usize| match k {
-                0 => periodic[2].then_some(nz),
-                k if k > nz => periodic[2].then_some(1),
-                k => Some(k),
-            };
-            let start = range.range().start;
-            let [below, here, _] = planes;
-            if let Some(k) = across(start - 1) {
-                invert(k, below, buffers);
             }
-            invert(start, here, buffers);
-            for k in range.range() {
-                let [below, here, above] = planes;
-                if let Some(k) = across(k + 1) {
-                    invert(k, above, buffers);
-                }
-                let (here, end) = (&*here, |k: usize| across(k).is_none());
+        });
+
+        let columns = Stopwatch::start();
+        let [periodic_x, periodic_y, periodic_z] = self.ends.map(|ends| ends == Ends::Periodic);
+        let modes = &self.modes;
+        // Plane k, wrapped on a periodic axis; none beyond another end.
+        let inside = |k: usize| match k {
+            0 => periodic_z.then_some(nz),
+            k if k > nz => periodic_z.then_some(1),
+            k => Some(k),
+        };
+        let invert = |k: usize, plane: &mut Plane<R>, buffers: &mut Aligned<R>| {
+            if let Some(k) = inside(k) {
+                let modes = &modes[(k - 1) * stride..];
+                plane.inverse(axes, [periodic_x, periodic_y], modes, buffers);
+            }
+        };
+        let ranges = planes_of(self.mesh.layout(), fields, partial).chunks(range);
+        self.slots.par_iter_mut().zip(ranges).for_each(|(slot, range)| {
+            let Slot { planes, buffers } = slot;
+            let first = range[0].0;
+            invert(first - 1, &mut planes[0], buffers);
+            invert(first, &mut planes[1], buffers);
+            for (k, fields, partial) in range {
+                invert(k + 1, &mut planes[2], buffers);
+                let [below, here, above] = &*planes;
                 let solution = Solution {
                     here,
-                    below: if end(k - 1) { here } else { below },
-                    above: if end(k + 1) { here } else { above },
+                    below: if inside(k - 1).is_some() { below } else { here },
+                    above: if inside(k + 1).is_some() { above } else { here },
                 };
-                sink(k, solution, range);
+                sink(k, solution, fields, partial);
                 planes.rotate_left(1);
             }
         });
@@ -203,41 +156,9 @@ impl<R: Real> Poisson<R> {
         self.times.inverse += columns.elapsed();
     }
 
-    /// Replaces the right-hand side in the interior of `field` by the solution; ghosts keep
-    /// their values.
-    #[cfg(test)]
-    pub fn solve_field(&mut self, field: &mut Field<Centre, R>) {
-        let layout = self.mesh.layout();
-        let [nx, ny, nz] = layout.cells;
-        let given = field.clone();
-        let source = |k: usize, plane: &mut Plane<R>| {
-            for j in 1..=ny {
-                plane.row_mut(j)[1..=nx].copy_from_slice(&given.row(j, k)[1..=nx]);
-            }
-        };
-        self.solve(source, [field], &mut vec![(); nz], |k, solution, range| {
-            let ([plane], ()) = range.plane(k);
-            for j in 1..=ny {
-                let at = layout.row() * j;
-                plane[at + 1..=at + nx].copy_from_slice(&solution.here.row(j)[1..=nx]);
-            }
-        });
-    }
-
     /// Time spent in each stage.
     pub fn times(&self) -> PoissonTimes {
         self.times
-    }
-
-    /// Memory held [bytes].
-    pub fn bytes(&self) -> usize {
-        let slots: usize = self
-            .slots
-            .iter()
-            .map(|slot| slot.buffers.bytes() + slot.planes.iter().map(Plane::bytes).sum::<usize>())
-            .sum();
-        let columns: usize = self.columns.iter().map(ColumnScratch::bytes).sum();
-        R::BYTES * self.modes.len() + 8 * self.eigenvalues.len() + slots + columns
     }
 }
 

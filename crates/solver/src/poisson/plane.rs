@@ -8,29 +8,27 @@
 //!
 //! Legend: L count of numbers in a cache line.
 
-use super::axis::{AxisTransform, Buffers};
+use super::axis::AxisTransform;
 use crate::math::{Aligned, Real};
-use grainwake_simd::{Complex, Kernel, MAX_LANES, Vector};
+use grainwake_simd::{Complex, Kernel, MAX_LANES, Vector, as_complex, dispatch};
 
 /// Memory layout of a plane of cells and of a plane of modes.
 #[derive(Clone, Copy, Debug)]
 pub struct PlaneLayout {
-    nx: usize,
-    ny: usize,
-    /// Count of numbers in a cache line, and position of i = 1 in a row of a [`Plane`]: rows start
-    /// on cache lines, and a ghost precedes i = 1.
-    line: usize,
-    pitch: usize,
+    /// Cells along x.
+    pub nx: usize,
+    /// Cells along y.
+    pub ny: usize,
+    /// Count L of numbers in a cache line, and position of i = 1 in a row of a [`Plane`]: rows
+    /// start on cache lines, and a ghost precedes i = 1.
+    pub line: usize,
+    /// Distance of two rows of a [`Plane`].
+    pub pitch: usize,
 }
 
 impl PlaneLayout {
-    /// Layout of `nx` x `ny` cells.
-    pub fn new<R: Real>(nx: usize, ny: usize) -> PlaneLayout {
-        let line = R::LANES;
-        PlaneLayout { nx, ny, line, pitch: line + nx.next_multiple_of(line) + line }
-    }
     /// Number of lines along x, padded to a multiple of L.
-    fn lines(&self) -> usize {
+    pub fn lines(&self) -> usize {
         self.ny.next_multiple_of(self.line)
     }
     /// Number of modes of a plane, padding lines included.
@@ -42,58 +40,22 @@ impl PlaneLayout {
     pub fn stride(&self) -> usize {
         self.line * ((self.modes() / self.line) | 1)
     }
-    /// Calls `f` with the position of each mode in its plane, the index of the mode along x and the
-    /// line along x, both from 0; lines from `ny` on are padding.
-    pub fn each_mode(&self, mut f: impl FnMut(usize, usize, usize)) {
-        for (first, width) in self.blocks(self.lines()) {
-            for m in 0..self.nx {
-                for line in 0..width {
-                    let at = first * self.nx + m * width + line;
-                    f(at, m, first + line);
-                }
-            }
-        }
-    }
-    /// Lines along y in a plane of cells, from line `first` on and `second` lines further.
-    #[inline(always)]
-    fn along_y(&self, first: usize, second: usize) -> Lines {
-        Lines { at: self.pitch + self.line + first, step: self.pitch, second }
-    }
-    /// Rows of a plane of cells, `lane` rows and `lane + second` rows from the start of the block
-    /// of 2 `second` lines that begins with line `first`, and their modes.
-    #[inline(always)]
-    fn along_x(&self, first: usize, lane: usize, second: usize) -> (Rows, Lines) {
-        let at = (first + 1 + lane) * self.pitch + self.line;
-        let modes = Lines { at: first * self.nx + lane, step: 2 * second, second };
-        (Rows { at, pitch: self.pitch, second }, modes)
-    }
-    /// First line and number of lines, 2 L or L, of each block.
-    #[inline(always)]
-    fn blocks(&self, lines: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let (line, whole) = (self.line, 2 * self.line);
-        let lines = lines.next_multiple_of(line);
-        (0..lines).step_by(whole).map(move |first| {
-            let rest = lines - first;
-            (first, if rest >= whole { whole } else { line })
-        })
+    /// First line and half the number of lines, L or L/2, of each block of `lines` lines.
+    pub fn blocks(&self, lines: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (line, lines) = (self.line, lines.next_multiple_of(self.line));
+        (0..lines)
+            .step_by(2 * line)
+            .map(move |first| (first, if first + line < lines { line } else { line / 2 }))
     }
 }
 
 /// Plane of cells with one layer of ghosts, rows aligned to cache lines.
 pub struct Plane<R> {
-    layout: PlaneLayout,
-    values: Aligned<R>,
+    pub(super) layout: PlaneLayout,
+    pub(super) values: Aligned<R>,
 }
 
 impl<R: Real> Plane<R> {
-    /// Plane of zeros.
-    pub(super) fn new(layout: PlaneLayout) -> Plane<R> {
-        Plane { layout, values: Aligned::zeros(layout.pitch * (layout.lines() + 2)) }
-    }
-    /// Memory held [bytes].
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.values)
-    }
     /// Row j, ghosts included: entries 0 to nx + 1.
     #[inline(always)]
     pub fn row(&self, j: usize) -> &[R] {
@@ -104,10 +66,42 @@ impl<R: Real> Plane<R> {
     pub fn row_mut(&mut self, j: usize) -> &mut [R] {
         &mut self.values[j * self.layout.pitch + R::LANES - 1..][..self.layout.nx + 2]
     }
-    /// Sets the ghosts: periodic, or equal to the adjacent cells.
-    #[inline(always)]
-    fn fill_ghosts(&mut self, [periodic_x, periodic_y]: [bool; 2]) {
+
+    /// Transforms the cells to `modes`; the cells are overwritten.
+    pub(super) fn forward(
+        &mut self,
+        [along_x, along_y]: &[AxisTransform<R>; 2],
+        modes: &mut [R],
+        buffers: &mut Aligned<R>,
+    ) {
         let PlaneLayout { nx, ny, pitch, .. } = self.layout;
+        self.clear_padding_columns();
+        self.values[(ny + 1) * pitch..(self.layout.lines() + 1) * pitch].fill(R::default());
+        for block in self.layout.blocks(nx) {
+            self.transform(along_y, block, Direction::ForwardY, buffers);
+        }
+        for block in self.layout.blocks(ny) {
+            self.transform(along_x, block, Direction::ForwardX(modes), buffers);
+        }
+    }
+
+    /// Transforms `modes` to cells, unnormalised, and sets the ghosts: periodic, or equal to the
+    /// adjacent cells.
+    pub(super) fn inverse(
+        &mut self,
+        [along_x, along_y]: &[AxisTransform<R>; 2],
+        [periodic_x, periodic_y]: [bool; 2],
+        modes: &[R],
+        buffers: &mut Aligned<R>,
+    ) {
+        let PlaneLayout { nx, ny, pitch, .. } = self.layout;
+        for block in self.layout.blocks(ny) {
+            self.transform(along_x, block, Direction::InverseX(modes), buffers);
+        }
+        self.clear_padding_columns();
+        for block in self.layout.blocks(nx) {
+            self.transform(along_y, block, Direction::InverseY, buffers);
+        }
         for j in 1..=ny {
             let row = self.row_mut(j);
             let ends = [row[1], row[nx]];
@@ -117,138 +111,109 @@ impl<R: Real> Plane<R> {
         self.values.copy_within(below * pitch..(below + 1) * pitch, 0);
         self.values.copy_within(above * pitch..(above + 1) * pitch, (ny + 1) * pitch);
     }
+
     /// Clears the padding lines along y, whose old values would change the rounding of their
     /// partners.
-    #[inline(always)]
-    fn clear_columns(&mut self) {
+    fn clear_padding_columns(&mut self) {
         let PlaneLayout { nx, pitch, .. } = self.layout;
         for row in self.values.chunks_exact_mut(pitch) {
             row[R::LANES + nx..R::LANES + nx.next_multiple_of(R::LANES)].fill(R::default());
         }
     }
-    /// Clears the padding lines along x.
-    #[inline(always)]
-    fn clear_rows(&mut self) {
-        let PlaneLayout { ny, pitch, .. } = self.layout;
-        self.values[(ny + 1) * pitch..(self.layout.lines() + 1) * pitch].fill(R::default());
+
+    fn transform(
+        &mut self,
+        axis: &AxisTransform<R>,
+        (first, second): (usize, usize),
+        direction: Direction<R>,
+        buffers: &mut [R],
+    ) {
+        let (layout, values) = (self.layout, &mut *self.values);
+        dispatch(TransformBlock { axis, layout, first, second, direction, values, buffers });
     }
 }
 
-/// Forward transform: cells of `plane` to `modes`; the plane is overwritten.
-pub struct Forward<'a, R> {
-    /// Transforms along x and y.
-    pub axes: [&'a AxisTransform<R>; 2],
-    /// Cells, overwritten by modes along y.
-    pub plane: &'a mut Plane<R>,
-    /// Plane of modes, overwritten.
-    pub modes: &'a mut [R],
-    /// Buffers of the thread.
-    pub buffers: &'a mut Buffers<R>,
-    /// Whether the modes are written with non-temporal stores.
-    pub non_temporal: bool,
+/// Direction of a transform, and the modes along x that it writes or reads.
+enum Direction<'a, R> {
+    /// Cells to modes along y, in place.
+    ForwardY,
+    /// Rows of modes along y to modes along both axes.
+    ForwardX(&'a mut [R]),
+    /// Modes along both axes to rows of modes along y.
+    InverseX(&'a [R]),
+    /// Modes along y to cells, in place.
+    InverseY,
 }
 
-impl<R: Real> Kernel for Forward<'_, R> {
+/// Transform of one block of lines.
+struct TransformBlock<'a, R> {
+    axis: &'a AxisTransform<R>,
+    layout: PlaneLayout,
+    /// First line of the block.
+    first: usize,
+    /// Number of lines from each first line to its second line, half of the block.
+    second: usize,
+    direction: Direction<'a, R>,
+    /// Values of the plane of cells.
+    values: &'a mut [R],
+    /// Both buffers of the transform, one after the other.
+    buffers: &'a mut [R],
+}
+
+impl<R: Real> Kernel for TransformBlock<'_, R> {
     type Number = R;
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
-        let Forward { axes: [along_x, along_y], plane, modes, buffers, non_temporal } = self;
-        let layout = plane.layout;
-        plane.clear_columns();
-        plane.clear_rows();
-        let values = &mut plane.values[..];
-        for (first, width) in layout.blocks(layout.nx) {
-            if width == 2 * R::LANES {
-                for lane in (0..R::LANES).step_by(V::WIDTH) {
-                    let lines = layout.along_y(first + lane, R::LANES);
-                    lines.forward::<V>(along_y, values, buffers);
-                }
-            } else {
-                layout.along_y(first, R::LANES / 2).forward::<V::Half>(along_y, values, buffers);
-            }
+        if self.second == R::LANES {
+            self.transform::<V>();
+        } else {
+            self.transform::<V::Half>();
         }
-        for (first, width) in layout.blocks(layout.ny) {
-            if width == 2 * R::LANES {
-                for lane in (0..R::LANES).step_by(V::WIDTH) {
-                    let (rows, lines) = layout.along_x(first, lane, R::LANES);
-                    rows.load(&along_x.order, values, buffers.lines::<V>(along_x));
-                    let found = buffers.transform::<V>(along_x, false);
-                    // A narrower register writes part of a cache line.
-                    if non_temporal && V::WIDTH == R::LANES {
-                        lines.store_non_temporal(found, modes);
-                    } else {
-                        lines.store(found, modes);
+    }
+}
+
+impl<R: Real> TransformBlock<'_, R> {
+    #[inline(always)]
+    fn transform<V: Vector<Number = R>>(mut self) {
+        let TransformBlock { axis, layout, first, second, .. } = self;
+        let PlaneLayout { nx, line, pitch, .. } = layout;
+        let len = axis.fourier.buffer_len();
+        let (a, b) = as_complex::<V>(&mut self.buffers[..4 * V::WIDTH * len]).split_at_mut(len);
+        for lane in (0..second).step_by(V::WIDTH) {
+            let cells = Lines { at: pitch + line + first + lane, step: pitch, second };
+            let rows = Rows { at: (first + 1 + lane) * pitch + line, pitch, second };
+            let modes = Lines { at: first * nx + lane, step: 2 * second, second };
+            match &self.direction {
+                Direction::ForwardY => {
+                    for (i, &to) in axis.order.iter().enumerate() {
+                        a[to] = cells.entry(self.values, i);
                     }
                 }
-            } else {
-                let (rows, lines) = layout.along_x(first, 0, R::LANES / 2);
-                rows.load(&along_x.order, values, buffers.lines::<V::Half>(along_x));
-                lines.store(buffers.transform::<V::Half>(along_x, false), modes);
+                Direction::ForwardX(_) => rows.load(&axis.order, self.values, a),
+                Direction::InverseX(from) => modes.load(from, &mut a[..axis.n]),
+                Direction::InverseY => cells.load(self.values, &mut a[..axis.n]),
             }
-        }
-        V::fence();
-    }
-}
-
-/// Inverse transform: `modes` to cells of `plane` and its ghosts.
-pub struct Inverse<'a, R> {
-    /// Transforms along x and y.
-    pub axes: [&'a AxisTransform<R>; 2],
-    /// Whether x and y are periodic.
-    pub periodic: [bool; 2],
-    /// Cells and ghosts, overwritten.
-    pub plane: &'a mut Plane<R>,
-    /// Plane of modes.
-    pub modes: &'a [R],
-    /// Buffers of the thread.
-    pub buffers: &'a mut Buffers<R>,
-}
-
-impl<R: Real> Kernel for Inverse<'_, R> {
-    type Number = R;
-    #[inline(always)]
-    fn run<V: Vector<Number = R>>(self) {
-        let Inverse { axes: [along_x, along_y], periodic, plane, modes, buffers } = self;
-        let layout = plane.layout;
-        let values = &mut plane.values[..];
-        for (first, width) in layout.blocks(layout.ny) {
-            if width == 2 * R::LANES {
-                for lane in (0..R::LANES).step_by(V::WIDTH) {
-                    let (rows, lines) = layout.along_x(first, lane, R::LANES);
-                    lines.load(modes, buffers.lines::<V>(along_x));
-                    rows.store(&along_x.order, buffers.transform::<V>(along_x, true), values);
+            let inverse = matches!(self.direction, Direction::InverseX(_) | Direction::InverseY);
+            let found = axis.run(a, b, inverse);
+            match &mut self.direction {
+                Direction::ForwardY => cells.store(found, self.values),
+                Direction::ForwardX(to) => modes.store(found, to),
+                Direction::InverseX(_) => rows.store(&axis.order, found, self.values),
+                Direction::InverseY => {
+                    for (i, &from) in axis.order.iter().enumerate() {
+                        cells.set_entry(self.values, i, found[from].swap_parts());
+                    }
                 }
-            } else {
-                let (rows, lines) = layout.along_x(first, 0, R::LANES / 2);
-                lines.load(modes, buffers.lines::<V::Half>(along_x));
-                rows.store(&along_x.order, buffers.transform::<V::Half>(along_x, true), values);
             }
         }
-        plane.clear_columns();
-        let values = &mut plane.values[..];
-        for (first, width) in layout.blocks(layout.nx) {
-            if width == 2 * R::LANES {
-                for lane in (0..R::LANES).step_by(V::WIDTH) {
-                    let lines = layout.along_y(first + lane, R::LANES);
-                    lines.inverse::<V>(along_y, values, buffers);
-                }
-            } else {
-                layout.along_y(first, R::LANES / 2).inverse::<V::Half>(along_y, values, buffers);
-            }
-        }
-        plane.fill_ghosts(periodic);
     }
 }
 
 /// Pairs of adjacent lines: entry i of the first lines at `at + i step`, of the second lines
 /// `second` further.
-#[derive(Clone, Copy)]
 struct Lines {
-    /// Position of entry 0 of the first lines.
     at: usize,
-    /// Distance of successive entries of a line.
     step: usize,
-    /// Distance of the second lines from the first.
     second: usize,
 }
 
@@ -259,14 +224,12 @@ impl Lines {
         let both = &values[self.at + i * self.step..][..self.second + V::WIDTH];
         Complex { re: V::load(both), im: V::load(&both[self.second..]) }
     }
-    /// Mutable entry i of the first lines, and of the second lines.
+    /// Stores entry i of the lines.
     #[inline(always)]
-    fn entry_mut<'a, V: Vector>(
-        &self,
-        values: &'a mut [V::Number],
-        i: usize,
-    ) -> (&'a mut [V::Number], &'a mut [V::Number]) {
-        values[self.at + i * self.step..][..self.second + V::WIDTH].split_at_mut(self.second)
+    fn set_entry<V: Vector>(&self, values: &mut [V::Number], i: usize, x: Complex<V>) {
+        let both = &mut values[self.at + i * self.step..][..self.second + V::WIDTH];
+        x.re.store(both);
+        x.im.store(&mut both[self.second..]);
     }
     /// Loads all entries of the lines.
     #[inline(always)]
@@ -279,61 +242,16 @@ impl Lines {
     #[inline(always)]
     fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
         for (i, x) in a.iter().enumerate() {
-            let (first, second) = self.entry_mut::<V>(values, i);
-            x.re.store(first);
-            x.im.store(second);
-        }
-    }
-    /// Stores all entries of the lines with non-temporal stores.
-    #[inline(always)]
-    fn store_non_temporal<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
-        for (i, x) in a.iter().enumerate() {
-            let (first, second) = self.entry_mut::<V>(values, i);
-            x.re.store_non_temporal(first);
-            x.im.store_non_temporal(second);
-        }
-    }
-    /// Replaces the lines by their modes along `axis`.
-    #[inline(always)]
-    fn forward<V: Vector>(
-        &self,
-        axis: &AxisTransform<V::Number>,
-        values: &mut [V::Number],
-        buffers: &mut Buffers<V::Number>,
-    ) {
-        let lines = buffers.lines::<V>(axis);
-        for (i, &to) in axis.order.iter().enumerate() {
-            lines[to] = self.entry(values, i);
-        }
-        self.store(buffers.transform::<V>(axis, false), values);
-    }
-    /// Replaces modes along `axis` by the lines, unnormalised.
-    #[inline(always)]
-    fn inverse<V: Vector>(
-        &self,
-        axis: &AxisTransform<V::Number>,
-        values: &mut [V::Number],
-        buffers: &mut Buffers<V::Number>,
-    ) {
-        self.load(values, buffers.lines::<V>(axis));
-        let lines = buffers.transform::<V>(axis, true);
-        for (i, &from) in axis.order.iter().enumerate() {
-            let (first, second) = self.entry_mut::<V>(values, i);
-            let line = &lines[from];
-            line.im.store(first);
-            line.re.store(second);
+            self.set_entry(values, i, *x);
         }
     }
 }
 
-/// Pairs of rows of a plane: the first rows start at `at`, the second rows `second` rows further.
-#[derive(Clone, Copy)]
+/// Pairs of rows of a plane: the first rows start at `at`, `pitch` apart; the second rows lie
+/// `second` rows further.
 struct Rows {
-    /// Position of entry 0 of the first row.
     at: usize,
-    /// Distance of successive rows.
     pitch: usize,
-    /// Number of rows from the first rows to the second rows.
     second: usize,
 }
 
@@ -359,39 +277,20 @@ impl Rows {
     /// swapped.
     #[inline(always)]
     fn store<V: Vector>(&self, order: &[usize], a: &[Complex<V>], values: &mut [V::Number]) {
-        let groups = order.chunks_exact(V::WIDTH);
-        let rest = groups.remainder();
-        let mut at = self.at;
-        for order in groups {
-            let mut block = [[V::constant(0.0); MAX_LANES]; 2];
+        for (group, order) in order.chunks(V::WIDTH).enumerate() {
+            let at = self.at + group * V::WIDTH;
+            let (mut re, mut im) = ([V::constant(0.0); MAX_LANES], [V::constant(0.0); MAX_LANES]);
             for n in 0..V::WIDTH {
-                let line = &a[order[n]];
-                (block[0][n], block[1][n]) = (line.im, line.re);
+                // Columns beyond the last entry are padding.
+                let line = &a[*order.get(n).unwrap_or(&0)];
+                (re[n], im[n]) = (line.im, line.re);
             }
-            self.store_block(block, at, values);
-            at += V::WIDTH;
-        }
-        if !rest.is_empty() {
-            let mut block = [[V::constant(0.0); MAX_LANES]; 2];
-            for (n, &from) in rest.iter().enumerate() {
-                (block[0][n], block[1][n]) = (a[from].im, a[from].re);
+            V::transpose(&mut re);
+            V::transpose(&mut im);
+            for row in 0..V::WIDTH {
+                re[row].store(&mut values[at + row * self.pitch..]);
+                im[row].store(&mut values[at + (row + self.second) * self.pitch..]);
             }
-            self.store_block(block, at, values);
-        }
-    }
-    /// Transposes two blocks into the entries from `at` on of `V::WIDTH` first and second rows.
-    #[inline(always)]
-    fn store_block<V: Vector>(
-        &self,
-        [mut first, mut second]: [[V; MAX_LANES]; 2],
-        at: usize,
-        values: &mut [V::Number],
-    ) {
-        V::transpose(&mut first);
-        V::transpose(&mut second);
-        for row in 0..V::WIDTH {
-            first[row].store(&mut values[at + row * self.pitch..]);
-            second[row].store(&mut values[at + (row + self.second) * self.pitch..]);
         }
     }
 }

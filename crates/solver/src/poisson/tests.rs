@@ -1,8 +1,31 @@
 //! The solver against its definition: the residual of the seven-point Laplacian.
 
+use super::plan::root;
 use super::*;
+use crate::grid::{Centre, Field};
 use glam::DVec3;
 use grainwake_simd::Vector;
+
+impl<R: Real> Poisson<R> {
+    /// Replaces the right-hand side in the interior of `field` by the solution; ghosts keep
+    /// their values.
+    pub fn solve_field(&mut self, field: &mut Field<Centre, R>) {
+        let layout = self.mesh.layout();
+        let [nx, ny, nz] = layout.cells;
+        let given = field.clone();
+        let source = |k: usize, plane: &mut Plane<R>| {
+            for j in 1..=ny {
+                plane.row_mut(j)[1..=nx].copy_from_slice(&given.row(j, k)[1..=nx]);
+            }
+        };
+        self.solve(source, [field], &mut vec![(); nz], |_, solution, [plane], ()| {
+            for j in 1..=ny {
+                let at = layout.row() * j;
+                plane[at + 1..=at + nx].copy_from_slice(&solution.here.row(j)[1..=nx]);
+            }
+        });
+    }
+}
 
 /// Small deterministic generator of values in (-1, 1).
 fn noise(state: &mut u64) -> f64 {
@@ -14,7 +37,7 @@ fn noise(state: &mut u64) -> f64 {
 fn residual(cells: [usize; 3], ends: [Ends; 3]) -> f64 {
     let mesh = Mesh { cells, spacing: DVec3::new(0.5, 0.7, 0.6), origin: DVec3::ZERO };
     let [nx, ny, nz] = cells;
-    let mut f = Field::<Centre>::zeros(&mesh.whole());
+    let mut f = Field::<Centre>::zeros(&mesh);
     let mut state = 7;
     let mut sum = 0.0;
     for k in 1..=nz {
@@ -98,8 +121,8 @@ fn residual_is_round_off_for_every_pairing_and_awkward_sizes() {
 fn single_against_double(cells: [usize; 3], spacing: DVec3, ends: [Ends; 3]) -> f64 {
     let mesh = Mesh { cells, spacing, origin: DVec3::ZERO };
     let mut state = 7;
-    let mut double = Field::<Centre>::zeros(&mesh.whole());
-    double.fill_with(&mesh.whole(), |x| (std::f64::consts::PI * x.x / mesh.extent().x).cos());
+    let mut double = Field::<Centre>::zeros(&mesh);
+    double.fill_with(&mesh, |x| (std::f64::consts::PI * x.x / mesh.extent().x).cos());
     double.iter_mut().for_each(|value| *value += 0.1 * noise(&mut state));
     let inside: Vec<usize> = (1..=cells[2])
         .flat_map(|k| (1..=cells[1]).map(move |j| (j, k)))
@@ -110,7 +133,7 @@ fn single_against_double(cells: [usize; 3], spacing: DVec3, ends: [Ends; 3]) -> 
         inside.iter().fold(from, |sum, &at| f(sum, field[at]))
     };
     let mean = of_inside(&double, |a, b| a + b, 0.0) / inside.len() as f64;
-    let mut single = Field::<Centre, f32>::zeros(&mesh.whole());
+    let mut single = Field::<Centre, f32>::zeros(&mesh);
     for (double, single) in double.iter_mut().zip(single.iter_mut()) {
         *double -= mean;
         *single = f32::of(*double);
@@ -159,7 +182,7 @@ fn transforms_of_every_length_match_their_definition() {
         let given: Vec<[f64; 2]> =
             (0..n).map(|t| [(1.3 * t as f64).sin(), (0.7 * (t * t) as f64).cos()]).collect();
         let plan = axis::Fourier::new(n);
-        let len = plan.buffer_len(n);
+        let len = plan.buffer_len();
         let lanes = |values: &[f64]| {
             let mut a = vec![Complex::<Scalar<f64>>::zero(); len];
             for (a, value) in a.iter_mut().zip(values.chunks(2)) {
@@ -172,7 +195,7 @@ fn transforms_of_every_length_match_their_definition() {
         for (k, found) in found[..n].iter().enumerate() {
             let mut sum = [0.0; 2];
             for (t, [re, im]) in given.iter().enumerate() {
-                let [c, s] = fft::root(k * t, n);
+                let [c, s] = root(k * t, n);
                 sum[0] += re * c - im * s;
                 sum[1] += re * s + im * c;
             }
@@ -188,7 +211,7 @@ fn transforms_of_every_length_match_their_definition() {
 /// Bits of a solution that meets whole and half blocks of lines, odd lengths and all stages.
 fn bits<R: Real>(mesh: &Mesh, ends: [Ends; 3]) -> Vec<u64> {
     let mut state = 3;
-    let mut f = Field::<Centre, R>::zeros(&mesh.whole());
+    let mut f = Field::<Centre, R>::zeros(&mesh);
     f.iter_mut().for_each(|value| *value = R::of(noise(&mut state)));
     let mut poisson = Poisson::new(mesh, ends);
     // The second solve meets what the first has left in the buffers.

@@ -15,59 +15,38 @@ use crate::grid::Columns;
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Kernel, Vector};
 
-/// Cache for a block of columns [bytes].
-const CACHE: usize = 1 << 19;
-
-/// Width of a block of columns: a multiple of two cache lines.
-pub fn block_width<R: Real>(nz: usize) -> usize {
-    let unit = 2 * R::LANES;
-    (CACHE / size_of::<f64>() / 2 / nz / unit * unit).max(unit)
-}
-
 /// Scratch for one block of columns.
 pub struct ColumnScratch {
-    values: Aligned<f64>,
-    pivots: Aligned<f64>,
-    corner: Aligned<f64>,
-    carry: Aligned<f64>,
+    /// Solutions y of the systems without corners, one row of columns for each k.
+    pub values: Aligned<f64>,
+    /// Inverse pivots, one row for each k.
+    pub pivots: Aligned<f64>,
+    /// Solutions q for the corner vector; empty unless z is periodic.
+    pub corner: Aligned<f64>,
+    /// One row: the solution of the plane above, or the factor of q.
+    pub carry: Aligned<f64>,
     /// Right-hand side of the mean mode and pivots of its system.
-    mean: [Vec<f64>; 2],
+    pub mean: [Vec<f64>; 2],
 }
 
 impl ColumnScratch {
-    /// Scratch for `width` columns through `nz` planes with the conditions `ends`.
-    pub fn new(width: usize, nz: usize, ends: Ends) -> ColumnScratch {
-        let periodic = ends == Ends::Periodic && nz > 1;
-        ColumnScratch {
-            values: Aligned::zeros(width * nz),
-            pivots: Aligned::zeros(width * nz),
-            corner: Aligned::zeros(if periodic { width * nz } else { 0 }),
-            carry: Aligned::zeros(2 * width),
-            mean: [(); 2].map(|()| vec![0.0; nz]),
-        }
-    }
-    /// Memory held [bytes].
-    pub fn bytes(&self) -> usize {
-        let Self { values, pivots, corner, carry, mean } = self;
-        8 * (values.len() + pivots.len() + corner.len() + carry.len() + 2 * mean[0].len())
+    /// Number of columns that fit.
+    pub fn width(&self) -> usize {
+        self.carry.len()
     }
 }
 
 /// Tridiagonal systems along z, one for each pair of modes along x and y.
 #[derive(Clone, Copy)]
 pub struct Tridiagonal {
-    n: usize,
-    ends: Ends,
-    square: f64,
-    scale: f64,
-}
-
-impl Tridiagonal {
-    /// Systems of `n` cells, `spacing` [m] apart, with the conditions `ends`; `scale` multiplies
-    /// the right-hand side (the normalisation of the transforms).
-    pub fn new(n: usize, ends: Ends, spacing: f64, scale: f64) -> Tridiagonal {
-        Tridiagonal { n, ends, square: spacing * spacing, scale }
-    }
+    /// Number of cells along z.
+    pub n: usize,
+    /// Conditions at both ends.
+    pub ends: Ends,
+    /// Square of the spacing dz [m^2].
+    pub square: f64,
+    /// Factor of the right-hand side: the normalisation of the transforms.
+    pub scale: f64,
 }
 
 /// Solves all columns of a block.
@@ -142,13 +121,13 @@ impl Tridiagonal {
         let factor = V::constant(-self.square * self.scale);
         let (values, pivots) = (&mut scratch.values[..n * width], &mut scratch.pivots[..n * width]);
         for k in 0..n {
-            let open =
-                V::constant(2.0 - f64::from(u8::from(k == 0)) - f64::from(u8::from(k + 1 == n)));
+            let neighbours = u8::from(k > 0) + u8::from(k + 1 < n);
+            let neighbours = V::constant(f64::from(neighbours));
             let row = &columns.row(k)[..width];
             let (pivots_before, pivots) = row_of(pivots, k, width);
             let (values_before, values) = row_of(values, k, width);
             for i in starts::<V>(width) {
-                let mut b = open + V::load(&lambda[i..]) * square;
+                let mut b = neighbours + V::load(&lambda[i..]) * square;
                 let mut f = factor * V::load_from(&row[i..]);
                 if k > 0 {
                     b = b - V::load(&pivots_before[i..]);

@@ -210,7 +210,7 @@ mod tests {
                 for j in 1..=upper[1] {
                     for i in 1..=upper[0] {
                         let offset = FACE_OFFSET[component];
-                        let x = mesh.position(offset, crate::grid::GlobalCell([i, j, k]));
+                        let x = mesh.position(offset, [i, j, k]);
                         values[layout.index(i, j, k)] = field(x)[component];
                     }
                 }
@@ -268,9 +268,7 @@ mod tests {
         let boundaries = Boundaries([SLIP, [Boundary::Periodic; 2], SLIP]);
         let grid = SampledGrid { mesh: &mesh, boundaries: &boundaries };
         let field = |x: DVec3| 4.0 - x.x + 2.0 * x.z;
-        let value = |cell: [usize; 3]| {
-            field(mesh.position(CENTRE_OFFSET, crate::grid::GlobalCell(cell.map(|i| i + 1))))
-        };
+        let value = |cell: [usize; 3]| field(mesh.position(CENTRE_OFFSET, cell.map(|i| i + 1)));
         for part in [DVec3::ZERO, DVec3::splat(0.37), DVec3::ONE] {
             let x = mesh.origin + part * mesh.extent();
             let found = grid.interpolate_cells(x, value).unwrap();

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::Simulation;
 use super::probe::SampledGrid;
 use crate::dem::Grain;
-use crate::grid::{Axis, GlobalCell};
+use crate::grid::Axis;
 
 /// Sub-cells along each edge of a cell face, for the grains on a plane.
 const SUBCELLS: usize = 4;
@@ -63,7 +63,7 @@ impl Simulation {
         let count = (mesh.cells[a] * mesh.cells[b]) as f64;
         let grid = self.sampled_grid();
         let (mut solid_sum, mut pressure_sum) = (0.0, 0.0);
-        let mut x = mesh.position([0.5; 3], GlobalCell([1; 3]));
+        let mut x = mesh.position([0.5; 3], [1; 3]);
         x[normal] = at;
         for (n, fraction) in solid.fraction.iter().enumerate() {
             solid_sum += fraction;

@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use super::Simulation;
 use crate::dem::Grain;
-use crate::grid::GlobalCell;
 
 /// Sub-cells along each axis of a cell cut by a surface.
 const SUBCELLS: usize = 4;
@@ -52,7 +51,7 @@ impl Simulation {
     /// Grains whose surface may cut a cell with these edges [m].
     fn grains_near(&self, cell: [usize; 3], edge: DVec3) -> Near<'_> {
         let mesh = &self.setup.mesh;
-        let centre = mesh.position([0.5; 3], GlobalCell(cell.map(|i| i + 1)));
+        let centre = mesh.position([0.5; 3], cell.map(|i| i + 1));
         let extent = mesh.extent();
         let mut near = Vec::new();
         for grain in &self.setup.grains {

@@ -61,8 +61,7 @@ impl Case {
         boundaries.0[1] = [Boundary::Periodic; 2];
         let mut flow = Flow::new(&mesh, boundaries, &params);
         flow.start_from(|axis, x| (1.5 * x).to_array()[(axis + 1) % 3].sin());
-        flow.pressure
-            .fill_with(&mesh.whole(), |x| (2.0 * x.x).sin() * (1.5 * x.y).cos() + 0.4 * x.z * x.z);
+        flow.pressure.fill_with(&mesh, |x| (2.0 * x.x).sin() * (1.5 * x.y).cos() + 0.4 * x.z * x.z);
         flow.predict(DT);
         let sphere = Arc::new(Shape::sphere(0.5, 100));
         let options = ShapeOptions::default();
