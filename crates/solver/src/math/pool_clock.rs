@@ -11,7 +11,8 @@ mod clocks {
     thread_local! {
         /// Clocks of the threads of the pool of this thread, and its own.
         static CLOCKS: Vec<libc::clockid_t> = {
-            let mut clocks: Vec<_> = rayon::broadcast(|_| own_clock()).into_iter().flatten().collect();
+            let of_pool = rayon::broadcast(|_| own_clock());
+            let mut clocks: Vec<_> = of_pool.into_iter().flatten().collect();
             if rayon::current_thread_index().is_none() {
                 clocks.extend(own_clock());
             }

@@ -200,7 +200,7 @@ mod tests {
             origin: DVec3::new(-0.2, 1.0, 0.5),
         };
         let layout = mesh.layout();
-        let mut velocity = FaceVector::<f64>::zeros(&mesh.whole());
+        let mut velocity = FaceVector::<f64>::zeros(&mesh);
         velocity.fill(DVec3::NAN);
         for component in 0..3 {
             let mut upper = mesh.cells;
