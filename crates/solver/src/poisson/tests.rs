@@ -211,7 +211,7 @@ fn transforms_of_every_length_match_their_definition() {
 /// Bits of a solution that meets whole and half blocks of lines, odd lengths and all stages.
 fn bits<R: Real>(mesh: &Mesh, ends: [Ends; 3]) -> Vec<u64> {
     let mut state = 3;
-    let mut f = Field::<Centre, R>::zeros(&mesh);
+    let mut f = Field::<Centre, R>::zeros(mesh);
     f.iter_mut().for_each(|value| *value = R::of(noise(&mut state)));
     let mut poisson = Poisson::new(mesh, ends);
     // The second solve meets what the first has left in the buffers.
